@@ -1,6 +1,7 @@
 #include "pictura/simulator/map_rules.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -232,13 +233,43 @@ Grid cells_of(const std::vector<Item>& items, ToBox&& to_box) {
   return Grid(boxes, kLookupCell_m);
 }
 
-struct Neighbor {
-  float distance_m;
-  int32_t item;
+/// What lies within range of a cell's centre, nearest first.
+struct Neighbors {
+  std::vector<int32_t> items;
+  std::vector<float> distance_m;
+  std::vector<float> x_m, y_m;  // from the centre
+
+  size_t size() const { return items.size(); }
 };
 
+/// Of the points, those that `cells` has within range of a place; of two that are equally far, the lower number first.
+/// `keys` is memory for that.
+void find_neighbors(const std::vector<Vec2>& points, const GridView& cells, Vec2 center, float range_m,
+                    std::vector<uint64_t>* keys, Neighbors* out) {
+  keys->clear();
+  const Vec2 reach{range_m, range_m};
+  visit_items(cells, {center - reach, center + reach}, [&](size_t item) {
+    const float distance = length(points[item] - center);
+    // Floats that are not negative are ordered as their bits are: one number to compare, which is much faster.
+    if (distance <= range_m) keys->push_back(uint64_t{std::bit_cast<uint32_t>(distance)} << 32 | item);
+  });
+  std::sort(keys->begin(), keys->end());
+  const size_t count = keys->size();
+  out->items.resize(count);
+  out->distance_m.resize(count);
+  out->x_m.resize(count);
+  out->y_m.resize(count);
+  for (size_t i = 0; i < count; ++i) {
+    const auto item = static_cast<uint32_t>((*keys)[i]);
+    out->items[i] = static_cast<int32_t>(item);
+    out->distance_m[i] = std::bit_cast<float>(static_cast<uint32_t>((*keys)[i] >> 32));
+    out->x_m[i] = points[item].x - center.x;
+    out->y_m[i] = points[item].y - center.y;
+  }
+}
+
 /// For every cell that an observer may stand in, the items whose points lie within range of its centre, nearest first,
-/// go through `append(center, neighbors, &lists)`, which appends lists_per_cell lists. Throws Error naming the map when
+/// go through `append(neighbors, &lists)`, which appends lists_per_cell lists. Throws Error naming the map when
 /// they would take more than a gigabyte: so they also fit their 32-bit ends.
 template <typename Append>
 CellLists lists_by_distance(const MapRules& map, const std::string& map_name, const std::vector<Vec2>& points,
@@ -263,28 +294,21 @@ CellLists lists_by_distance(const MapRules& map, const std::string& map_name, co
   for (const Vec2& point : points) boxes.push_back({point, point});
   const Grid grid(boxes, 20.0f);
   const GridView point_cells = grid.view();
-  std::vector<Neighbor> found;
+  std::vector<uint64_t> keys;
+  Neighbors found;
   lists.begin.assign(1, 0);
   for (size_t cell = 0; cell < num_cells; ++cell) {
     if (is_occupied[cell] && !points.empty()) {
       const Vec2 center = lists.origin_m + Vec2{static_cast<float>(cell % static_cast<size_t>(lists.num_x)) + 0.5f,
                                                 static_cast<float>(cell / static_cast<size_t>(lists.num_x)) + 0.5f} *
                                                kNearCell_m;
-      found.clear();
-      const Vec2 reach{range_m, range_m};
-      visit_items(point_cells, {center - reach, center + reach}, [&](size_t item) {
-        const float distance = length(points[item] - center);
-        if (distance <= range_m) found.push_back({distance, static_cast<int32_t>(item)});
-      });
-      std::sort(found.begin(), found.end(), [](const Neighbor& a, const Neighbor& b) {
-        return a.distance_m < b.distance_m || (a.distance_m == b.distance_m && a.item < b.item);
-      });
+      find_neighbors(points, point_cells, center, range_m, &keys, &found);
       // Before they are made, since one cell may need all of them.
       PICTURA_CHECK(lists.items.size() + found.size() * static_cast<size_t>(lists_per_cell) <= kMaxItems,
                     "map {}: expected lists of what is near of at most {} entries in all, got more: too much lies "
                     "within {} m of ({}, {})",
                     map_name, kMaxItems, range_m, center.x, center.y);
-      append(center, found, &lists);
+      append(found, &lists);
     } else {
       lists.begin.insert(lists.begin.end(), static_cast<size_t>(lists_per_cell), lists.begin.back());
     }
@@ -294,19 +318,38 @@ CellLists lists_by_distance(const MapRules& map, const std::string& map_name, co
 
 void end_list(CellLists* lists_inout) { lists_inout->begin.push_back(static_cast<int32_t>(lists_inout->items.size())); }
 
-/// Whether a piece in this direction from a cell's centre may be in the sight of somebody in the cell who heads within
-/// a sector; never wrong about a piece that is.
-bool may_be_seen(float direction_rad, float distance_m, float sector_middle_rad) {
+/// Which neighbours may be in the sight of somebody in the cell who heads between two directions, `right` and, less
+/// than half a turn counter-clockwise of it, `left`: 1, or 0; never wrong about one that is. Most of what compiling a
+/// map takes, so without angles and branches: conditions are integers since compilers do several at once only then.
+void find_seen(const Neighbors& neighbors, Vec2 right, Vec2 left, std::vector<int32_t>* seen_out) {
   const float margin_m = 0.5f * std::sqrt(2.0f) * kNearCell_m + 0.1f;
-  if (distance_m <= kRoadBehind_m + margin_m) return true;  // whatever its direction
-  const float half_sector = kPi / kSectors;
-  // As seen by the heading of the sector that turns most towards it.
-  const float off_axis = std::max(0.0f, std::fabs(wrap_angle(direction_rad - sector_middle_rad)) - half_sector);
-  const float ahead = distance_m * std::cos(off_axis), aside = distance_m * std::sin(off_axis);
-  if (ahead > kRoadAhead_m + margin_m || ahead < -kRoadBehind_m - margin_m) return false;
+  const float most_ahead_m = kRoadAhead_m + margin_m, most_behind_m = kRoadBehind_m + margin_m;
+  const float most_aside_m = kRoadAside_m + margin_m;
   // A piece behind comes into the window sideways too, as the heading turns away from it: keep what is that close.
-  const float close_m = std::sqrt(square(kRoadBehind_m + margin_m) + square(kRoadAside_m + margin_m));
-  return aside <= kRoadAside_m + margin_m || distance_m <= close_m;
+  const float close_m = std::sqrt(square(most_behind_m) + square(most_aside_m));
+  const size_t count = neighbors.size();
+  seen_out->resize(count);
+  int32_t* seen = seen_out->data();
+  const float *xs = neighbors.x_m.data(), *ys = neighbors.y_m.data(), *distances = neighbors.distance_m.data();
+  for (size_t i = 0; i < count; ++i) {
+    const float x_m = xs[i], y_m = ys[i], distance_m = distances[i];
+    const float along_right_m = x_m * right.x + y_m * right.y, along_left_m = x_m * left.x + y_m * left.y;
+    const float left_of_right_m = right.x * y_m - right.y * x_m, right_of_left_m = left.y * x_m - left.x * y_m;
+    // From the heading that turns most towards it.
+    const float ahead_m = along_right_m > along_left_m ? along_right_m : along_left_m;
+    const float aside_m = std::fabs(along_right_m > along_left_m ? left_of_right_m : right_of_left_m);
+    const int32_t is_between = int32_t{left_of_right_m >= 0} & int32_t{right_of_left_m >= 0};
+    const int32_t is_ahead = (is_between & int32_t{distance_m <= most_ahead_m}) |
+                             ((1 ^ is_between) & int32_t{ahead_m >= -most_behind_m} & int32_t{ahead_m <= most_ahead_m});
+    const int32_t is_beside = is_between | int32_t{aside_m <= most_aside_m} | int32_t{distance_m <= close_m};
+    seen[i] = int32_t{distance_m <= most_behind_m} | (is_ahead & is_beside);
+  }
+}
+
+/// Where a sector of headings begins, as cell_and_sector_at() counts them; see Place.
+Vec2 sector_begin(int sector) {
+  const float heading_rad = -kPi + static_cast<float>(sector) * (kTwoPi / kSectors);
+  return {std::cos(heading_rad), std::sin(heading_rad)};
 }
 
 std::vector<Vec2> middles_of(const std::vector<ObservedPiece>& pieces) {
@@ -317,21 +360,19 @@ std::vector<Vec2> middles_of(const std::vector<ObservedPiece>& pieces) {
 
 CellLists lists_of_pieces(const MapRules& map, const std::string& map_name, const std::vector<Vec2>& middles) {
   const float sight_m = std::sqrt(square(kRoadAhead_m) + square(kRoadAside_m)) + kNearCell_m;
-  std::vector<float> directions_rad;  // of a cell's neighbours
+  std::vector<int32_t> seen;
   return lists_by_distance(map, map_name, middles, sight_m, kSectors,
-                           [&](Vec2 center, const std::vector<Neighbor>& neighbors, CellLists* lists) {
-                             directions_rad.clear();
-                             for (const Neighbor& near : neighbors) {
-                               const Vec2 offset = middles[static_cast<size_t>(near.item)] - center;
-                               directions_rad.push_back(std::atan2(offset.y, offset.x));
-                             }
+                           [&seen](const Neighbors& neighbors, CellLists* lists) {
                              for (int sector = 0; sector < kSectors; ++sector) {
-                               const float heading = -kPi + (static_cast<float>(sector) + 0.5f) * (kTwoPi / kSectors);
+                               find_seen(neighbors, sector_begin(sector), sector_begin(sector + 1), &seen);
+                               // Each is written, and the next one over it where it is not seen.
+                               size_t end = lists->items.size();
+                               lists->items.resize(end + neighbors.size());
                                for (size_t i = 0; i < neighbors.size(); ++i) {
-                                 if (may_be_seen(directions_rad[i], neighbors[i].distance_m, heading)) {
-                                   lists->items.push_back(neighbors[i].item);
-                                 }
+                                 lists->items[end] = neighbors.items[i];
+                                 end += static_cast<size_t>(seen[i]);
                                }
+                               lists->items.resize(end);
                                end_list(lists);
                              }
                            });
@@ -342,17 +383,16 @@ CellLists lists_of_pieces(const MapRules& map, const std::string& map_name, cons
 CellLists lists_of_stop_lines(const MapRules& map, const std::string& map_name) {
   std::vector<Vec2> middles;
   for (const StopLine& line : map.stop_lines) middles.push_back(line.middle_m.xy());
-  return lists_by_distance(map, map_name, middles, kControlRange_m + kNearCell_m, 1,
-                           [](Vec2, const std::vector<Neighbor>& neighbors, CellLists* lists) {
-                             const float last_m =
-                                 neighbors.size() < kMaxControls
-                                     ? INFINITY
-                                     : neighbors[kMaxControls - 1].distance_m + std::sqrt(2.0f) * kNearCell_m;
-                             for (const Neighbor& near : neighbors) {
-                               if (near.distance_m <= last_m) lists->items.push_back(near.item);
-                             }
-                             end_list(lists);
-                           });
+  return lists_by_distance(
+      map, map_name, middles, kControlRange_m + kNearCell_m, 1, [](const Neighbors& neighbors, CellLists* lists) {
+        const float last_m = neighbors.size() < kMaxControls
+                                 ? INFINITY
+                                 : neighbors.distance_m[kMaxControls - 1] + std::sqrt(2.0f) * kNearCell_m;
+        for (size_t i = 0; i < neighbors.size() && neighbors.distance_m[i] <= last_m; ++i) {
+          lists->items.push_back(neighbors.items[i]);
+        }
+        end_list(lists);
+      });
 }
 
 }  // namespace
