@@ -18,6 +18,7 @@ namespace {
 /// Observed pieces follow curves within this distance, so that junctions do not fill the observation with short pieces.
 constexpr float kObservedChordError_m = 0.25f;
 constexpr float kNearCell_m = 10.0f;
+constexpr float kCellRadius_m = 0.5f * 1.41421356f * kNearCell_m + 0.1f;  // half a diagonal, and room for rounding
 constexpr float kLookupCell_m = 5.0f;
 /// Agents stay this close to drivable lanes; cells farther out list nothing to observe.
 constexpr float kObserverReach_m = 15.0f;
@@ -318,13 +319,12 @@ CellLists lists_by_distance(const MapRules& map, const std::string& map_name, co
 
 void end_list(CellLists* lists_inout) { lists_inout->begin.push_back(static_cast<int32_t>(lists_inout->items.size())); }
 
-/// Which neighbours may be in the sight of somebody in the cell who heads between two directions, `right` and, less
-/// than half a turn counter-clockwise of it, `left`: 1, or 0; never wrong about one that is. Most of what compiling a
-/// map takes, so without angles and branches: conditions are integers since compilers do several at once only then.
+/// Which neighbours, none farther than the far corner of what is in sight, may be in the sight of somebody in the cell
+/// who heads between two directions, `right` and, less than half a turn counter-clockwise of it, `left`: 1, or 0; never
+/// wrong about one that is. Most of what compiling a map takes, so without angles and branches: conditions are integers
+/// since compilers do several at once only then.
 void find_seen(const Neighbors& neighbors, Vec2 right, Vec2 left, std::vector<int32_t>* seen_out) {
-  const float margin_m = 0.5f * std::sqrt(2.0f) * kNearCell_m + 0.1f;
-  const float most_ahead_m = kRoadAhead_m + margin_m, most_behind_m = kRoadBehind_m + margin_m;
-  const float most_aside_m = kRoadAside_m + margin_m;
+  constexpr float most_behind_m = kRoadBehind_m + kCellRadius_m, most_aside_m = kRoadAside_m + kCellRadius_m;
   // A piece behind comes into the window sideways too, as the heading turns away from it: keep what is that close.
   const float close_m = std::sqrt(square(most_behind_m) + square(most_aside_m));
   const size_t count = neighbors.size();
@@ -335,14 +335,14 @@ void find_seen(const Neighbors& neighbors, Vec2 right, Vec2 left, std::vector<in
     const float x_m = xs[i], y_m = ys[i], distance_m = distances[i];
     const float along_right_m = x_m * right.x + y_m * right.y, along_left_m = x_m * left.x + y_m * left.y;
     const float left_of_right_m = right.x * y_m - right.y * x_m, right_of_left_m = left.y * x_m - left.x * y_m;
-    // From the heading that turns most towards it.
+    // From the heading that turns most towards it. How far ahead it is there says nothing: as the heading turns away,
+    // a piece beyond the window's end comes into the far corner.
     const float ahead_m = along_right_m > along_left_m ? along_right_m : along_left_m;
     const float aside_m = std::fabs(along_right_m > along_left_m ? left_of_right_m : right_of_left_m);
     const int32_t is_between = int32_t{left_of_right_m >= 0} & int32_t{right_of_left_m >= 0};
-    const int32_t is_ahead = (is_between & int32_t{distance_m <= most_ahead_m}) |
-                             ((1 ^ is_between) & int32_t{ahead_m >= -most_behind_m} & int32_t{ahead_m <= most_ahead_m});
-    const int32_t is_beside = is_between | int32_t{aside_m <= most_aside_m} | int32_t{distance_m <= close_m};
-    seen[i] = int32_t{distance_m <= most_behind_m} | (is_ahead & is_beside);
+    const int32_t is_ahead = int32_t{ahead_m >= -most_behind_m};
+    const int32_t is_beside = int32_t{aside_m <= most_aside_m} | int32_t{distance_m <= close_m};
+    seen[i] = int32_t{distance_m <= most_behind_m} | is_between | (is_ahead & is_beside);
   }
 }
 
@@ -359,7 +359,7 @@ std::vector<Vec2> middles_of(const std::vector<ObservedPiece>& pieces) {
 }
 
 CellLists lists_of_pieces(const MapRules& map, const std::string& map_name, const std::vector<Vec2>& middles) {
-  const float sight_m = std::sqrt(square(kRoadAhead_m) + square(kRoadAside_m)) + kNearCell_m;
+  const float sight_m = std::sqrt(square(kRoadAhead_m) + square(kRoadAside_m)) + kCellRadius_m;
   std::vector<int32_t> seen;
   return lists_by_distance(map, map_name, middles, sight_m, kSectors,
                            [&seen](const Neighbors& neighbors, CellLists* lists) {

@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include "pictura/map/load_map.h"
 #include "pictura/map/map_geometry.h"
+#include "pictura/simulator/compiled_map.h"
 #include "pictura/simulator/rules/observe.h"
 #include "pictura/tests/simulator/stage.h"
 #include "pictura/tests/simulator/test_maps.h"
@@ -241,6 +243,33 @@ TEST_F(Observation, LanesBoundariesAndWallsAreAllThatIsInSight) {
       for (size_t k = static_cast<size_t>(in_sight) * kLaneFeatures; k < 80 * kLaneFeatures; ++k) ASSERT_EQ(rows[k], 0);
     }
   }
+}
+
+/// Far corners of what is in sight are reached from the cell's edges and the sector's ends only.
+TEST(ObservedLists, HoldWhateverIsInSight) {
+  const auto map = compile_map(load_map("procedural:3"));
+  const MapRules& rules = map->rules;
+  const MapView view = rules.view();
+  RandomStream random({.seed = 6, .purpose = Purpose::town});
+  int in_far_corners = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const LaneSegment& segment = rules.segments[random.below(static_cast<uint32_t>(rules.segments.size()))];
+    const Vec2 aside{random.uniform(-8, 8), random.uniform(-8, 8)};
+    const Vec2 at = segment.a_m.xy() + aside;
+    const float heading_rad = random.uniform(-kPi, kPi);
+    const EgoFrame frame{{at.x, at.y, 0}, {cos_of(heading_rad), sin_of(heading_rad)}};
+    std::vector<uint8_t> is_listed(rules.boundary_pieces.size());
+    for (const int32_t item : list_of(view.near_boundary_pieces, near_place(view, at, heading_rad).cell_and_sector())) {
+      is_listed[static_cast<size_t>(item)] = 1;
+    }
+    for (size_t k = 0; k < is_listed.size(); ++k) {
+      if (!is_in_sight(rules.boundary_pieces[k], frame)) continue;
+      const Vec2 local = frame.turn(rules.boundary_middles[k] - at);
+      if (local.x > 115 && std::abs(local.y) > 20) ++in_far_corners;
+      ASSERT_TRUE(is_listed[k]) << "piece " << k << " at " << local.x << ", " << local.y << " of place " << i;
+    }
+  }
+  EXPECT_GT(in_far_corners, 1000);
 }
 
 TEST_F(Observation, PiecesAreAtMostTenMetresLong) {
