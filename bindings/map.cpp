@@ -35,27 +35,6 @@ py::array_t<int32_t> ranges(const auto& elements, IndexRange std::decay_t<declty
   });
 }
 
-py::dict facts_of(const MapFacts& facts) {
-  py::dict d;
-  d["roads"] = facts.roads;
-  d["junction_roads"] = facts.junction_roads;
-  d["junctions"] = facts.junctions;
-  d["signal_junctions"] = facts.signal_junctions;
-  d["lanes"] = facts.lanes;
-  d["driving_lanes"] = facts.driving_lanes;
-  d["driving_lane_km"] = facts.driving_lane_km;
-  d["driving_lane_km_in_junctions"] = facts.driving_lane_km_in_junctions;
-  d["traffic_lights"] = facts.traffic_lights;
-  d["stop_lines"] = facts.stop_lines;
-  d["crosswalks"] = facts.crosswalks;
-  d["parking_spaces"] = facts.parking_spaces;
-  d["painted_stop_lines"] = facts.painted_stop_lines;
-  d["signs"] = facts.signs;
-  d["z_min_m"] = facts.z_min_m;
-  d["z_max_m"] = facts.z_max_m;
-  return d;
-}
-
 py::dict arrays_of(const RoadMap& map) {
   py::dict d;
   d["lane_points"] = table<float>(map.lane_points.size(), 6, [&](size_t i, float* out) {
@@ -149,8 +128,33 @@ std::shared_ptr<const CompiledMap> Map::compiled(const MapOptions& options) {
   for (const auto& made : compiled_) {
     if (made->options == options) return made;
   }
-  compiled_.push_back(run_interruptibly("map", 1, {}, [road = road_, options] { return compile_map(road, options); }));
+  compiled_.push_back(run_interruptibly("map", 1, {}, compilation(options)));
   return compiled_.back();
+}
+
+std::function<std::shared_ptr<const CompiledMap>()> Map::compilation(const MapOptions& options) const {
+  return [road = road_, options] { return compile_map(road, options); };
+}
+
+py::dict facts_of(const MapFacts& facts) {
+  py::dict d;
+  d["roads"] = facts.roads;
+  d["junction_roads"] = facts.junction_roads;
+  d["junctions"] = facts.junctions;
+  d["signal_junctions"] = facts.signal_junctions;
+  d["lanes"] = facts.lanes;
+  d["driving_lanes"] = facts.driving_lanes;
+  d["driving_lane_km"] = facts.driving_lane_km;
+  d["driving_lane_km_in_junctions"] = facts.driving_lane_km_in_junctions;
+  d["traffic_lights"] = facts.traffic_lights;
+  d["stop_lines"] = facts.stop_lines;
+  d["crosswalks"] = facts.crosswalks;
+  d["parking_spaces"] = facts.parking_spaces;
+  d["painted_stop_lines"] = facts.painted_stop_lines;
+  d["signs"] = facts.signs;
+  d["z_min_m"] = facts.z_min_m;
+  d["z_max_m"] = facts.z_max_m;
+  return d;
 }
 
 void bind_maps(py::module_& module) {

@@ -39,6 +39,7 @@ PYBIND11_MODULE(_pictura, module) {
       "FNV-1a, with which files of the library end.");
   pictura::python::bind_arrays(module);
   pictura::python::bind_maps(module);
+  pictura::python::bind_scenarios(module);
   pictura::python::bind_rendering(module);
   pictura::python::bind_simulator(module);
   pictura::python::bind_replays(module);

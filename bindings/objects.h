@@ -11,6 +11,7 @@
 
 #include "pictura/bindings/arrays.h"
 #include "pictura/common/renderer.h"
+#include "pictura/map/scenario/scenario.h"
 #include "pictura/simulator/compiled_map.h"
 #include "pictura/simulator/controllers/controller.h"
 #include "pictura/simulator/simulator.h"
@@ -22,15 +23,35 @@ class Map {
  public:
   /// `source` names its file in messages.
   Map(std::shared_ptr<const RoadMap> road, std::string source) : road_(std::move(road)), source_(std::move(source)) {}
+  virtual ~Map() = default;
   const std::shared_ptr<const RoadMap>& road() const { return road_; }
   const std::string& source() const { return source_; }
   /// Compiles at the first call with these options. The caller holds the GIL.
   std::shared_ptr<const CompiledMap> compiled(const MapOptions& options);
 
+ protected:
+  /// Compiles it; owns all that it reads.
+  virtual std::function<std::shared_ptr<const CompiledMap>()> compilation(const MapOptions& options) const;
+
  private:
   std::shared_ptr<const RoadMap> road_;
   std::string source_;
   std::vector<std::shared_ptr<const CompiledMap>> compiled_;
+};
+
+/// A recorded scene from one of its steps on: the map of worlds whose agents are its tracks.
+class RecordedScene final : public Map {
+ public:
+  /// Throws UsageError for a step that it does not have.
+  RecordedScene(std::shared_ptr<const Scenario> scenario, std::string source, int32_t start_step);
+  const std::shared_ptr<const Scenario>& scenario() const { return scenario_; }
+  int32_t start_step() const { return start_step_; }
+
+ private:
+  std::function<std::shared_ptr<const CompiledMap>()> compilation(const MapOptions& options) const override;
+
+  std::shared_ptr<const Scenario> scenario_;
+  int32_t start_step_;
 };
 
 /// What a renderer draws of a map.
@@ -84,7 +105,11 @@ Device device_of(const std::string& name);
 /// Of a stream's handle as Python has it, an int; None: CUDA's legacy default stream.
 Stream stream_of(const py::object& handle);
 
+/// Of a map, by name.
+py::dict facts_of(const MapFacts& facts);
+
 void bind_maps(py::module_& module);
+void bind_scenarios(py::module_& module);
 void bind_rendering(py::module_& module);
 void bind_simulator(py::module_& module);
 void bind_replays(py::module_& module);

@@ -14,6 +14,7 @@
 #include "pictura/drawing/world.h"
 #include "pictura/simulator/agent_state_arrays.h"
 #include "pictura/simulator/conditioning_lookup.h"
+#include "pictura/simulator/controllers/shared_control.h"
 #include "pictura/simulator/observation_arrays.h"
 #ifdef PICTURA_HAS_CUDA
 #include "pictura/common/cuda/device_buffer.h"
@@ -545,6 +546,7 @@ class PyController {
   }
 
   std::string name() const { return std::string(inside_.controller->name()); }
+  const ControllerInside& inside() const { return inside_; }
   /// Without the GIL.
   void act(const PySimulator& simulator) {
     PICTURA_CHECK(simulator.shared() == inside_.of && of().num_slots() == static_cast<int>(commands_->span.size()),
@@ -590,6 +592,42 @@ void PySimulator::run(PyController& controller, int64_t steps) {
     controller.act(*this);
     simulator_->step(controller.commands(), stream_);
   });
+}
+
+/// A controller that others hold as well.
+class HeldController final : public Controller {
+ public:
+  explicit HeldController(std::shared_ptr<Controller> held) : held_(std::move(held)) {}
+  std::string_view name() const override { return held_->name(); }
+  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
+    held_->act(input, mask, commands_out, stream);
+  }
+
+ private:
+  std::shared_ptr<Controller> held_;
+};
+
+/// What several controllers of one simulator become; a mask that is None is everybody.
+ControllerInside shared_controller(const std::vector<std::pair<PyController*, py::object>>& drivers,
+                                   const PySimulator& simulator) {
+  using Owners = std::vector<std::shared_ptr<const void>>;
+  auto owners = std::make_shared<Owners>();
+  std::vector<Driver> driving;
+  for (const auto& [controller, mask] : drivers) {
+    PICTURA_CHECK(controller, "Controller.shared: expected a controller, got None");
+    const ControllerInside& inside = controller->inside();
+    PICTURA_CHECK(inside.of == simulator.shared(), "Controller.shared: expected controllers of this simulator");
+    owners->push_back(inside.owner);
+    Driver driver{.controller = std::make_unique<HeldController>(inside.controller)};
+    if (!mask.is_none()) {
+      const std::string what = "Controller.shared: mask of '" + controller->name() + "'";
+      const auto borrowed = std::make_shared<BorrowedArray>(borrow(mask, what, simulator.stream()));
+      driver.mask = borrowed->array().checked<const uint8_t>(what, {inside.of->num_slots()}, inside.of->device());
+      driver.mask_memory = borrowed;
+    }
+    driving.push_back(std::move(driver));
+  }
+  return {simulator.shared(), owners, std::make_shared<SharedControl>(std::move(driving))};
 }
 
 ControllerInside controller_by_name(const std::string& name, const PySimulator& simulator, uint64_t seed) {
@@ -691,8 +729,8 @@ What a step returns, one element a slot, in the simulator's memory: every step w
   py::class_<SimulatorInside>(module, "_SimulatorInside");
   py::class_<ControllerInside>(module, "_ControllerInside");
   py::class_<PyController> controller_class(module, "Controller", R"(
-Who drives in one simulator: 'lane' (the lane keeper), 'idle' or 'random' on the CPU, or a policy of a
-pictura.PolicySession.)");
+Who drives in one simulator on the CPU: 'lane' (the lane keeper), 'idle' or 'random', in worlds of recorded scenes 'log', 'inverse'
+or 'idm', or a policy of a pictura.PolicySession, or several of them.)");
   py::class_<PySimulator>(module, "Simulator", R"(
 Many worlds, each on one map, stepped together. Arrays have one element a slot: the controlled agents of world 0, then those
 of world 1, and so on. Executors 'cpu' and 'cuda' give the same bits.
@@ -785,7 +823,8 @@ Returns the StepResult. Raises pictura.Error, which leaves the state as it was, 
 range.)")
       .def(
           "step_commands", &PySimulator::step_commands, py::arg("commands"),
-          R"(The same by commands, COMMAND_DTYPE [slots]: kind 0 an action, 1 a kinematic state, 2 absence from the episode.)")
+          R"(The same by commands, COMMAND_DTYPE [slots]: kind 0 an action, 1 a kinematic state, 2 absence from the episode,
+3 as recorded, in worlds of a pictura.Scenario.)")
       .def(
           "set_state", &PySimulator::set_state, py::arg("slots"), py::arg("fields"),
           R"(Gives fields of chosen agents other values. slots: int32 [n], each once. fields: arrays [n] or [n, per agent] by the
@@ -928,6 +967,16 @@ waypoints; -1 shows the whole map. width_m: what is shown around it.)")
       .def_static(
           "_of", [](const ControllerInside& inside) { return std::make_unique<PyController>(inside); },
           py::arg("inside"))
+      .def_static(
+          "shared",
+          [](const std::vector<std::pair<PyController*, py::object>>& drivers, const PySimulator& simulator) {
+            return std::make_unique<PyController>(shared_controller(drivers, simulator));
+          },
+          py::arg("drivers"), py::arg("simulator"), py::keep_alive<0, 2>(),
+          R"(Controllers that share a simulator's slots, of (controller, mask): of two that command a slot, the later one drives.
+
+mask: uint8 or bool [slots] in the simulator's memory, which is read at every step; None: all. Raises pictura.Error for another
+array and for a controller of another simulator.)")
       .def_property_readonly("name", &PyController::name)
       .def(
           "act",

@@ -128,19 +128,11 @@ namespace {
 
 /// [tracks] those that the policy drives: the controlled ones that are there at the start.
 std::vector<uint8_t> controlled_tracks(const WorldOptions& options, const CompiledMap& map) {
-  std::vector<uint8_t> mask;
   try {
-    mask = tracks_of(*map.scenario, options.controlled);
+    return tracks_of(*map.scenario, options.controlled, map.start_step);
   } catch (const UsageError& error) {
     fail_usage("--control: {}", error.what());
   }
-  for (size_t track = 0; track < mask.size(); ++track) {
-    mask[track] &= map.scenario->valid_of(static_cast<int32_t>(track))[static_cast<size_t>(map.start_step)];
-  }
-  if (std::find(mask.begin(), mask.end(), 1) == mask.end()) {
-    fail_usage("--control {}: expected a track that is there at step {}, got none", options.controlled, map.start_step);
-  }
-  return mask;
 }
 
 }  // namespace

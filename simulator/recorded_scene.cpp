@@ -132,4 +132,15 @@ std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& word
   return mask;
 }
 
+std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words, int32_t step) {
+  std::vector<uint8_t> mask = tracks_of(scenario, words);
+  for (size_t i = 0; i < mask.size(); ++i) {
+    mask[i] &= scenario.valid_of(static_cast<int32_t>(i))[static_cast<size_t>(step)];
+  }
+  if (std::find(mask.begin(), mask.end(), 1) == mask.end()) {
+    fail_usage("'{}': expected a track that is there at step {}, got none", words, step);
+  }
+  return mask;
+}
+
 }  // namespace pictura

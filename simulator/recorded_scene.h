@@ -30,5 +30,7 @@ WorldSpec scene_world(const CompiledMap& map, int index = 0, uint32_t global_wor
 /// others (who is no vehicle), all, tracks_to_predict, objects_of_interest, and ids of tracks. Throws UsageError for
 /// another word, and for one that names nobody.
 std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words);
+/// The same but for those that are not there at a step. Throws UsageError as well when nobody is left.
+std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words, int32_t step);
 
 }  // namespace pictura

@@ -7,7 +7,7 @@ import numpy
 import numpy.dtypes
 import numpy.typing
 import typing
-__all__: list[str] = ['AGENT_FIELDS', 'Array', 'BOX_DTYPE', 'COMMAND_DTYPE', 'CONDITIONING_NAMES', 'Camera', 'Controller', 'EVENTS', 'Error', 'Geometry', 'HAS_CUDA', 'IDLE_ACTION', 'INSERTED_DTYPE', 'Images', 'LANE_TYPES', 'LiveView', 'Map', 'NUM_ACTIONS', 'OBSERVATION_ARRAYS', 'QUERY_DTYPE', 'REWARD_TERMS', 'Recorder', 'Renderer', 'Rig', 'Scene', 'SceneFile', 'Simulator', 'Snapshot', 'StepResult', 'UsageError', 'VIEW_DTYPE', 'draw_worlds', 'known_towns', 'make_views', 'map_folder', 'renderer_names', 'simulator_names', 'write_gallery']
+__all__: list[str] = ['AGENT_FIELDS', 'Array', 'BOX_DTYPE', 'COMMAND_DTYPE', 'CONDITIONING_NAMES', 'Camera', 'Controller', 'EVENTS', 'Error', 'Geometry', 'HAS_CUDA', 'IDLE_ACTION', 'INSERTED_DTYPE', 'Images', 'LANE_TYPES', 'LiveView', 'Map', 'NUM_ACTIONS', 'OBSERVATION_ARRAYS', 'QUERY_DTYPE', 'REWARD_TERMS', 'Recorder', 'Renderer', 'Rig', 'Scenario', 'Scene', 'SceneFile', 'Simulator', 'Snapshot', 'StepResult', 'TRACK_TYPES', 'UsageError', 'VIEW_DTYPE', 'draw_worlds', 'known_towns', 'make_views', 'map_folder', 'renderer_names', 'simulator_names', 'write_gallery']
 class Error(RuntimeError):
     """
     The work failed; the message names what was expected and what came.
@@ -164,6 +164,109 @@ class Map:
     def origin_m(self) -> typing.Annotated[list[float], "FixedSize(3)"]:
         """
         File coordinates of the map's origin, three floats in metres.
+        """
+class Scenario(Map):
+    """
+    A recorded scene: a map, the tracks of all road users, and the lights as they were recorded. Immutable.
+    
+    It is the map of worlds whose agents are its tracks, in their order, from `start_step` on:
+    pictura.Simulator([scene], [(0, scene.num_tracks)], **scene.world()). Commands of kind 3 and the controller 'log' replay it.
+    """
+    @staticmethod
+    def load(name: str, *, start_step: typing.SupportsInt | typing.SupportsIndex = 0) -> Scenario:
+        """
+        Loads a scene by name: FILE.json, FILE.bin, a file with '.tfrecord' in its name, or a folder of them; with '#7' or
+        '#SCENARIO_ID' one of several.
+        
+        start_step: of the recording, at which episodes begin.
+        Raises pictura.Error naming file, record and field; pictura.UsageError where there is no such scene or step.
+        """
+    def __repr__(self) -> str:
+        ...
+    def inverse_actions(self, num_threads: typing.SupportsInt | typing.SupportsIndex = 0) -> dict:
+        """
+        The actions by which the simulator's dynamics follow the recording most closely, as NumPy arrays by name.
+        
+        actions int32, is_followed bool and error_m float32 [tracks, steps from start_step on]: for the step after each state, whether
+        there is a state to start from and one to reach, and how far from the recorded place it leads. num_threads: 0 for all.
+        """
+    def mask(self, words: str, *, absent: bool = False) -> numpy.typing.NDArray[numpy.uint8]:
+        """
+        uint8 [tracks]: 1 for the tracks that words with commas between them name: self (the self-driving car), vehicles (the
+        others), others (who is no vehicle), all, tracks_to_predict, objects_of_interest, and ids of tracks.
+        
+        absent: also those that are not there at start_step. Raises pictura.UsageError for another word, and where nobody is left.
+        """
+    def starting_at(self, start_step: typing.SupportsInt | typing.SupportsIndex) -> Scenario:
+        """
+        The same scene, whose episodes begin at another step; nothing is copied.
+        
+        Raises pictura.UsageError for a step that it does not have.
+        """
+    def tracks(self) -> dict:
+        """
+        Copies of the tracks as NumPy arrays by name.
+        
+        id int64 [tracks], as in the file; type uint8 [tracks] counts pictura.TRACK_TYPES; size_m float32 [tracks, 3]: length, width,
+        height. valid bool [tracks, steps]; position_m float32 [tracks, steps, 3], centre of the box's foot in the map's frame;
+        heading_rad [tracks, steps]; velocity_mps [tracks, steps, 2]: 0 where not valid.
+        """
+    def world(self, **kwargs) -> dict:
+        """
+        Options by which pictura.Simulator([scene], worlds, **options) makes its worlds: the recording's time step, an episode
+        as long as what is left of it, no walls, no parked cars, no early end, plain dynamics.
+        
+        Options given are kept but for these, as those of a pictura.PolicySession: scene.world(**session.training_world()).
+        """
+    @property
+    def current_step(self) -> int:
+        """
+        The last step of the history that a predictor is given.
+        """
+    @property
+    def dt_s(self) -> float:
+        """
+        Seconds between states.
+        """
+    @property
+    def facts(self) -> dict:
+        """
+        Counts and lengths of the map, and counts of tracks and lights, by name, as `pictura map` prints them.
+        """
+    @property
+    def format(self) -> str:
+        """
+        'womd', 'gpudrive', 'pufferdrive v1', ...
+        """
+    @property
+    def id(self) -> str:
+        """
+        The recording's, such as '637f20cafde22ff8'; may be empty.
+        """
+    @property
+    def notes(self) -> list:
+        """
+        What was left out or changed on the way from the file: (what, how often, the first place) each.
+        """
+    @property
+    def num_steps(self) -> int:
+        """
+        States of each track, from the first one of the recording on.
+        """
+    @property
+    def num_tracks(self) -> int:
+        """
+        How many agents its worlds have.
+        """
+    @property
+    def sdc_track(self) -> int | None:
+        """
+        The self-driving car's track; None where the file does not say.
+        """
+    @property
+    def start_step(self) -> int:
+        """
+        Of the recording, at which episodes begin.
         """
 class Camera:
     """
@@ -467,12 +570,20 @@ class _ControllerInside:
     pass
 class Controller:
     """
-    Who drives in one simulator: 'lane' (the lane keeper), 'idle' or 'random' on the CPU, or a policy of a
-    pictura.PolicySession.
+    Who drives in one simulator on the CPU: 'lane' (the lane keeper), 'idle' or 'random', in worlds of recorded scenes 'log', 'inverse'
+    or 'idm', or a policy of a pictura.PolicySession, or several of them.
     """
     @staticmethod
     def _of(inside: _ControllerInside) -> Controller:
         ...
+    @staticmethod
+    def shared(drivers: collections.abc.Sequence[tuple[Controller, typing.Any]], simulator: Simulator) -> Controller:
+        """
+        Controllers that share a simulator's slots, of (controller, mask): of two that command a slot, the later one drives.
+        
+        mask: uint8 or bool [slots] in the simulator's memory, which is read at every step; None: all. Raises pictura.Error for another
+        array and for a controller of another simulator.
+        """
     def __init__(self, name: str, simulator: Simulator, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         """
         Raises pictura.UsageError listing the names.
@@ -580,7 +691,8 @@ class Simulator:
         """
     def step_commands(self, commands: typing.Any) -> typing.Any:
         """
-        The same by commands, COMMAND_DTYPE [slots]: kind 0 an action, 1 a kinematic state, 2 absence from the episode.
+        The same by commands, COMMAND_DTYPE [slots]: kind 0 an action, 1 a kinematic state, 2 absence from the episode,
+        3 as recorded, in worlds of a pictura.Scenario.
         """
     def time_steps(self, actions: typing.Any, steps: typing.SupportsInt | typing.SupportsIndex) -> float:
         """
@@ -789,5 +901,6 @@ NUM_ACTIONS: int = 12
 OBSERVATION_ARRAYS: tuple = (('ego', 'f32', 1, 9), ('partners', 'f32', 16, 8), ('lanes', 'f32', 80, 7), ('boundaries', 'f32', 80, 7), ('controls', 'f32', 10, 7), ('walls', 'f32', 80, 7), ('set_counts', 'i32', 1, 5), ('conditioning', 'f32', 1, 17), ('waypoints', 'f32', 3, 3))
 QUERY_DTYPE: numpy.dtypes.VoidDType
 REWARD_TERMS: tuple = ('goal', 'collision', 'off_road', 'stop_line', 'comfort', 'lane_align', 'lane_center', 'velocity', 'overspeed', 'reverse', 'timestep')
+TRACK_TYPES: tuple = ('unset', 'vehicle', 'pedestrian', 'cyclist', 'other')
 VIEW_DTYPE: numpy.dtypes.VoidDType
 __version__: str = '0.1.0'

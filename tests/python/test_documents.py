@@ -27,7 +27,7 @@ def test_the_tables_name_every_observation_and_info():
 def test_the_five_minutes_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
-    blocks = re.findall(r"```python\n(.*?)```", TEXT.split("## Five minutes")[1].split("## Arrays")[0], re.S)
+    blocks = re.findall(r"```python\n(.*?)```", TEXT.split("## Five minutes")[1].split("## Recorded scenes")[0], re.S)
     assert len(blocks) == 4
     if importlib.util.find_spec("gymnasium") is None:
         blocks = [block for block in blocks if "make_vec" not in block and "gymnasium" not in block]

@@ -1,0 +1,229 @@
+// Recorded scenes in Python.
+#include <algorithm>
+#include <cstddef>
+#include <optional>
+
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+
+#include "pictura/bindings/call.h"
+#include "pictura/bindings/objects.h"
+#include "pictura/map/scenario/load_scenario.h"
+#include "pictura/simulator/controllers/inverse_actions.h"
+#include "pictura/simulator/recorded_scene.h"
+
+namespace pictura::python {
+
+RecordedScene::RecordedScene(std::shared_ptr<const Scenario> scenario, std::string source, int32_t start_step)
+    : Map({scenario, &scenario->map}, std::move(source)), scenario_(std::move(scenario)), start_step_(start_step) {
+  if (start_step < 0 || start_step >= scenario_->num_steps) {
+    fail_usage("scene {}: start_step: expected a step of its recording, in [0, {}), got {}", scenario_->id,
+               scenario_->num_steps, start_step);
+  }
+}
+
+std::function<std::shared_ptr<const CompiledMap>()> RecordedScene::compilation(const MapOptions& options) const {
+  return [scenario = scenario_, options, start_step = start_step_] {
+    return compile_scenario(scenario, options, start_step);
+  };
+}
+
+namespace {
+
+std::shared_ptr<RecordedScene> load(const std::string& name, int32_t start_step) {
+  auto scenario = run_interruptibly("Scenario.load", 1, {},
+                                    [name] { return std::make_shared<const Scenario>(load_scenario(name)); });
+  return std::make_shared<RecordedScene>(std::move(scenario), name, start_step);
+}
+
+py::dict facts_of_scene(const Scenario& scenario) {
+  const ScenarioFacts facts = pictura::facts_of(scenario);
+  py::dict d = facts_of(scenario.map.facts);
+  d["vehicles"] = facts.vehicles;
+  d["moving_vehicles"] = facts.moving_vehicles;
+  d["pedestrians"] = facts.pedestrians;
+  d["cyclists"] = facts.cyclists;
+  d["others"] = facts.others;
+  d["tracks_with_gaps"] = facts.tracks_with_gaps;
+  d["tracks_to_predict"] = scenario.tracks_to_predict.size();
+  d["objects_of_interest"] = scenario.objects_of_interest.size();
+  d["recorded_lights"] = scenario.lights.size();
+  d["recorded_light_states"] = facts.recorded_light_states;
+  return d;
+}
+
+/// Copies numbers that lie one after another in every item.
+template <typename T, typename Item>
+py::array_t<T> copied(const std::vector<py::ssize_t>& shape, const std::vector<Item>& items, const T Item::* first,
+                      size_t count) {
+  py::array_t<T> array(shape);
+  T* out = array.mutable_data();
+  for (const Item& item : items) out = std::copy_n(&(item.*first), count, out);
+  return array;
+}
+
+py::dict tracks_of_scene(const Scenario& scenario) {
+  const auto tracks = static_cast<py::ssize_t>(scenario.tracks.size()), steps = py::ssize_t{scenario.num_steps};
+  py::dict d;
+  d["id"] = copied<int64_t>({tracks}, scenario.tracks, &RecordedTrack::id, 1);
+  py::array_t<uint8_t> type(tracks), valid({tracks, steps});
+  for (py::ssize_t i = 0; i < tracks; ++i) {
+    type.mutable_at(i) = static_cast<uint8_t>(scenario.tracks[static_cast<size_t>(i)].type);
+  }
+  std::copy(scenario.valid.begin(), scenario.valid.end(), valid.mutable_data());
+  d["type"] = type;
+  d["valid"] = valid.attr("view")("bool");
+  static_assert(offsetof(RecordedTrack, height_m) == offsetof(RecordedTrack, length_m) + 2 * sizeof(float));
+  d["size_m"] = copied<float>({tracks, 3}, scenario.tracks, &RecordedTrack::length_m, 3);
+  py::array_t<float> position({tracks, steps, py::ssize_t{3}}), velocity({tracks, steps, py::ssize_t{2}});
+  float *xyz = position.mutable_data(), *xy = velocity.mutable_data();
+  for (const TrackState& state : scenario.states) {
+    for (const float value : {state.position_m.x, state.position_m.y, state.position_m.z}) *xyz++ = value;
+    for (const float value : {state.velocity_mps.x, state.velocity_mps.y}) *xy++ = value;
+  }
+  d["position_m"] = position;
+  d["velocity_mps"] = velocity;
+  d["heading_rad"] = copied<float>({tracks, steps}, scenario.states, &TrackState::heading_rad, 1);
+  return d;
+}
+
+py::list notes_of(const Scenario& scenario) {
+  py::list notes;
+  for (const ConversionNote& note : scenario.notes) notes.append(py::make_tuple(note.what, note.count, note.first));
+  return notes;
+}
+
+py::array_t<uint8_t> mask_of(const std::vector<uint8_t>& mask) {
+  return py::array_t<uint8_t>(static_cast<py::ssize_t>(mask.size()), mask.data());
+}
+
+/// Options of a pictura.Simulator as scene_config() has them, the others as they come.
+py::dict world_of(const RecordedScene& scene, const py::kwargs& options) {
+  const SimulatorConfig config = scene_config(*scene.scenario(), scene.start_step());
+  py::dict d(options);
+  d["dt_s"] = config.dt_s;
+  d["episode_steps"] = config.episode_steps;
+  d["reset_inactive_fraction"] = config.reset_inactive_fraction;
+  d["parked_cars"] = config.parked_cars;
+  d["walls"] = config.walls;
+  py::dict conditioning(d.contains("conditioning") ? d["conditioning"] : py::dict());
+  for (const Conditioning which : {Conditioning::throttle, Conditioning::steer, Conditioning::acceleration}) {
+    conditioning[kConditioningNames[static_cast<size_t>(which)]] = config.conditioning[static_cast<size_t>(which)].low;
+  }
+  d["conditioning"] = conditioning;
+  return d;
+}
+
+py::dict inverse_actions_of(RecordedScene& scene, int num_threads) {
+  MapOptions options;
+  options.walls = false;
+  const float dt_s = scene_config(*scene.scenario(), scene.start_step()).dt_s;
+  const InverseActions found = run_interruptibly(
+      "Scenario.inverse_actions", num_threads, {},
+      [map = scene.compiled(options), dt_s, num_threads] { return find_inverse_actions(*map, dt_s, num_threads); });
+  const std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(scene.scenario()->tracks.size()), found.num_steps};
+  py::dict d;
+  d["actions"] = py::array_t<int32_t>(shape, found.actions.data());
+  d["is_followed"] = py::array_t<uint8_t>(shape, found.is_followed.data()).attr("view")("bool");
+  d["error_m"] = py::array_t<float>(shape, found.error_m.data());
+  return d;
+}
+
+}  // namespace
+
+void bind_scenarios(py::module_& module) {
+  py::class_<RecordedScene, Map, std::shared_ptr<RecordedScene>>(module, "Scenario", R"(
+A recorded scene: a map, the tracks of all road users, and the lights as they were recorded. Immutable.
+
+It is the map of worlds whose agents are its tracks, in their order, from `start_step` on:
+pictura.Simulator([scene], [(0, scene.num_tracks)], **scene.world()). Commands of kind 3 and the controller 'log' replay it.)")
+      .def_static(
+          "load", load, py::arg("name"), py::kw_only(), py::arg("start_step") = 0,
+          R"(Loads a scene by name: FILE.json, FILE.bin, a file with '.tfrecord' in its name, or a folder of them; with '#7' or
+'#SCENARIO_ID' one of several.
+
+start_step: of the recording, at which episodes begin.
+Raises pictura.Error naming file, record and field; pictura.UsageError where there is no such scene or step.)")
+      .def(
+          "starting_at",
+          [](const RecordedScene& self, int32_t start_step) {
+            return std::make_shared<RecordedScene>(self.scenario(), self.source(), start_step);
+          },
+          py::arg("start_step"),
+          R"(The same scene, whose episodes begin at another step; nothing is copied.
+
+Raises pictura.UsageError for a step that it does not have.)")
+      .def_property_readonly(
+          "start_step", [](const RecordedScene& self) { return self.start_step(); },
+          py::doc("Of the recording, at which episodes begin."))
+      .def_property_readonly(
+          "id", [](const RecordedScene& self) { return self.scenario()->id; },
+          py::doc("The recording's, such as '637f20cafde22ff8'; may be empty."))
+      .def_property_readonly(
+          "format", [](const RecordedScene& self) { return self.scenario()->format; },
+          py::doc("'womd', 'gpudrive', 'pufferdrive v1', ..."))
+      .def_property_readonly(
+          "num_tracks", [](const RecordedScene& self) { return self.scenario()->tracks.size(); },
+          py::doc("How many agents its worlds have."))
+      .def_property_readonly(
+          "num_steps", [](const RecordedScene& self) { return self.scenario()->num_steps; },
+          py::doc("States of each track, from the first one of the recording on."))
+      .def_property_readonly(
+          "dt_s", [](const RecordedScene& self) { return self.scenario()->dt_s; }, py::doc("Seconds between states."))
+      .def_property_readonly(
+          "current_step", [](const RecordedScene& self) { return self.scenario()->current_step; },
+          py::doc("The last step of the history that a predictor is given."))
+      .def_property_readonly(
+          "sdc_track",
+          [](const RecordedScene& self) -> std::optional<int32_t> {
+            const int32_t track = self.scenario()->sdc_track;
+            return track < 0 ? std::nullopt : std::optional(track);
+          },
+          py::doc("The self-driving car's track; None where the file does not say."))
+      .def_property_readonly(
+          "facts", [](const RecordedScene& self) { return facts_of_scene(*self.scenario()); },
+          py::doc(
+              "Counts and lengths of the map, and counts of tracks and lights, by name, as `pictura map` prints them."))
+      .def_property_readonly(
+          "notes", [](const RecordedScene& self) { return notes_of(*self.scenario()); },
+          py::doc("What was left out or changed on the way from the file: (what, how often, the first place) each."))
+      .def(
+          "tracks", [](const RecordedScene& self) { return tracks_of_scene(*self.scenario()); },
+          R"(Copies of the tracks as NumPy arrays by name.
+
+id int64 [tracks], as in the file; type uint8 [tracks] counts pictura.TRACK_TYPES; size_m float32 [tracks, 3]: length, width,
+height. valid bool [tracks, steps]; position_m float32 [tracks, steps, 3], centre of the box's foot in the map's frame;
+heading_rad [tracks, steps]; velocity_mps [tracks, steps, 2]: 0 where not valid.)")
+      .def(
+          "mask",
+          [](const RecordedScene& self, const std::string& words, bool absent) {
+            const Scenario& scenario = *self.scenario();
+            return mask_of(absent ? tracks_of(scenario, words) : tracks_of(scenario, words, self.start_step()));
+          },
+          py::arg("words"), py::kw_only(), py::arg("absent") = false,
+          R"(uint8 [tracks]: 1 for the tracks that words with commas between them name: self (the self-driving car), vehicles (the
+others), others (who is no vehicle), all, tracks_to_predict, objects_of_interest, and ids of tracks.
+
+absent: also those that are not there at start_step. Raises pictura.UsageError for another word, and where nobody is left.)")
+      .def(
+          "world", world_of,
+          R"(Options by which pictura.Simulator([scene], worlds, **options) makes its worlds: the recording's time step, an episode
+as long as what is left of it, no walls, no parked cars, no early end, plain dynamics.
+
+Options given are kept but for these, as those of a pictura.PolicySession: scene.world(**session.training_world()).)")
+      .def("inverse_actions", inverse_actions_of, py::arg("num_threads") = 0,
+           R"(The actions by which the simulator's dynamics follow the recording most closely, as NumPy arrays by name.
+
+actions int32, is_followed bool and error_m float32 [tracks, steps from start_step on]: for the step after each state, whether
+there is a state to start from and one to reach, and how far from the recorded place it leads. num_threads: 0 for all.)")
+      .def("__repr__", [](const RecordedScene& self) {
+        const Scenario& scenario = *self.scenario();
+        return fmt::format("<pictura.Scenario {} ({}): {} tracks, {} steps, from step {}>", scenario.id,
+                           scenario.format, scenario.tracks.size(), scenario.num_steps, self.start_step());
+      });
+  py::list types;
+  for (int i = 0; i <= static_cast<int>(TrackType::other); ++i) types.append(to_string(static_cast<TrackType>(i)));
+  module.attr("TRACK_TYPES") = py::tuple(types);
+}
+
+}  // namespace pictura::python

@@ -1,0 +1,165 @@
+"""Recorded scenes: what was read of them, and worlds whose agents are their tracks."""
+
+import os
+import pathlib
+import re
+import subprocess
+
+import numpy as np
+import pytest
+
+import pictura
+
+FIXTURE = os.environ.get("PICTURA_SCENE_FIXTURE", "")  # writes a synthetic scene in every format
+RECORDED_COMMAND, ACTIVE, ABSENT = 3, 0, 3
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    if not os.path.isfile(FIXTURE):
+        pytest.skip("PICTURA_SCENE_FIXTURE: expected the program scene_fixture")
+    path = tmp_path_factory.mktemp("scenes")
+    subprocess.run([FIXTURE, "write", str(path)], check=True)
+    return path
+
+
+@pytest.fixture(scope="module")
+def scene(folder) -> pictura.Scenario:
+    return pictura.Scenario.load(str(folder / "womd.tfrecord"))
+
+
+def world_of(scene: pictura.Scenario, **options) -> pictura.Simulator:
+    return pictura.Simulator([scene], [(0, scene.num_tracks)], num_threads=1, **scene.world(**options))
+
+
+def feet_of(simulator: pictura.Simulator) -> np.ndarray:
+    return np.asarray(simulator.scene.boxes).view(pictura.BOX_DTYPE)[:, 0]["center_m"]
+
+
+def test_a_scene_has_facts_tracks_and_a_map(scene):
+    assert scene.format == "womd" and scene.num_steps == 91 and scene.current_step == 10
+    assert isinstance(scene, pictura.Map) and len(scene.arrays()["lane_type"]) == scene.facts["lanes"] > 0
+    assert scene.facts["vehicles"] == 8 and scene.facts["pedestrians"] == 3 and scene.facts["cyclists"] == 1
+    tracks = scene.tracks()
+    assert tracks["valid"].shape == (12, 91) == tracks["position_m"].shape[:2] and tracks["valid"].dtype == bool
+    assert [pictura.TRACK_TYPES[i] for i in tracks["type"]].count("pedestrian") == 3
+    assert not tracks["position_m"][~tracks["valid"]].any() and np.isfinite(tracks["position_m"]).all()
+    moved = np.diff(tracks["position_m"][..., :2], axis=1) / scene.dt_s
+    both = tracks["valid"][:, 1:] & tracks["valid"][:, :-1]
+    np.testing.assert_allclose(moved[both], tracks["velocity_mps"][:, :-1][both], atol=2)
+    assert (tracks["size_m"] > 0).all() and len(set(tracks["id"])) == 12
+    assert all(len(note) == 3 for note in scene.notes)
+    assert "12 tracks" in repr(scene) and scene.draw(64, 64).shape == (64, 64, 3)
+
+
+def test_every_format_loads_and_what_is_wrong_is_named(folder, scene):
+    for name in ("gpudrive.json", "pufferdrive_v1.bin", "pufferdrive_v3c.bin"):
+        other = pictura.Scenario.load(str(folder / name))
+        np.testing.assert_allclose(other.tracks()["position_m"].shape, scene.tracks()["position_m"].shape)
+    assert pictura.Scenario.load(f"{folder / 'womd.tfrecord'}#0").id == scene.id
+    with pytest.raises(pictura.UsageError, match="#7"):
+        pictura.Scenario.load(f"{folder / 'womd.tfrecord'}#7")
+    with pytest.raises(pictura.Error, match="nowhere.json"):
+        pictura.Scenario.load("nowhere.json")
+    with pytest.raises(pictura.UsageError, match=r"\[0, 91\), got 91"):
+        scene.starting_at(91)
+
+
+def test_masks_name_tracks(scene):
+    assert scene.mask("all", absent=True).sum() == 12
+    assert scene.mask("self").nonzero()[0].tolist() == [scene.sdc_track]
+    assert (scene.mask("self,vehicles") <= scene.mask("all")).all()
+    one = int(scene.tracks()["id"][scene.sdc_track])
+    assert (scene.mask(str(one)) == scene.mask("self")).all()
+    valid = scene.tracks()["valid"]
+    for step in (0, 20, 60):
+        mask = scene.starting_at(step).mask("all")
+        assert (mask.astype(bool) == valid[:, step]).all()
+    with pytest.raises(pictura.UsageError, match="cars"):
+        scene.mask("cars")
+
+
+@pytest.mark.parametrize("start_step", [0, 30])
+def test_the_log_replays_the_recording(scene, start_step):
+    scene = scene.starting_at(start_step)
+    simulator = world_of(scene)
+    assert simulator.maps[0].start_step == start_step
+    tracks = scene.tracks()
+    log = pictura.Controller("log", simulator)
+    for step in range(start_step, scene.num_steps - 1):
+        if step == start_step:
+            commands = log.act(simulator)
+            assert (commands["kind"] == RECORDED_COMMAND).all()
+            simulator.step_commands(commands)
+        else:
+            simulator.run(log, 1)
+        there = tracks["valid"][:, step + 1]
+        status = simulator.state["status"].numpy()
+        assert ((status != ABSENT) == there).all()
+        np.testing.assert_allclose(feet_of(simulator)[there, :2], tracks["position_m"][there, step + 1, :2], atol=1e-3)
+    assert simulator.totals()["agent_steps"] == 0
+
+
+def test_some_drive_among_the_recorded(scene):
+    scene = scene.starting_at(10)
+    simulator = world_of(scene)
+    mask = scene.mask("self")
+    drivers = [(pictura.Controller("log", simulator), None), (pictura.Controller("idle", simulator), mask)]
+    shared = pictura.Controller.shared(drivers, simulator)
+    assert shared.name == "log, idle"
+    simulator.run(shared, 1)
+    status = simulator.state["status"].numpy()
+    assert status[scene.sdc_track] == ACTIVE and (status == ACTIVE).sum() == 1
+    mask[:] = 0  # is read at every step
+    simulator.run(shared, 1)
+    assert (simulator.state["status"].numpy() == ACTIVE).sum() == 0
+    with pytest.raises(pictura.Error, match=r"mask of 'idle'.*\[12\]"):
+        pictura.Controller.shared([(pictura.Controller("idle", simulator), np.ones(3, np.uint8))], simulator)
+    with pytest.raises(pictura.UsageError):
+        pictura.Controller.shared([], simulator)
+    other = world_of(scene)
+    with pytest.raises(pictura.Error, match="of this simulator"):
+        pictura.Controller.shared([(pictura.Controller("idle", other), None)], simulator)
+
+
+def test_inverse_actions_follow_and_idm_drives(scene):
+    found = scene.inverse_actions(num_threads=1)
+    assert found["actions"].shape == found["is_followed"].shape == found["error_m"].shape == (12, 91)
+    moving = found["error_m"][scene.sdc_track][found["is_followed"][scene.sdc_track]]
+    assert len(moving) > 50 and moving.mean() < 0.2
+    for name in ("inverse", "idm"):
+        simulator = world_of(scene)
+        drivers = [(pictura.Controller("log", simulator), None), (pictura.Controller(name, simulator), scene.mask("self"))]
+        shared, driven = pictura.Controller.shared(drivers, simulator), 0
+        for step in range(1, 41):
+            simulator.run(shared, 1)
+            if simulator.state["status"].numpy()[scene.sdc_track] != ACTIVE:
+                break  # the fixture's road users stand in its way
+            driven += 1
+            place = feet_of(simulator)[scene.sdc_track, :2]
+            recorded = scene.tracks()["position_m"][scene.sdc_track, step, :2]
+            assert np.linalg.norm(place - recorded) < (0.5 if name == "inverse" else 20)
+        assert driven > 5
+
+
+def test_worlds_mix_scenes_and_options_are_kept(scene):
+    options = scene.world(conditioning={"delta_goal_m": 3.0, "throttle": 0.5}, seed=4)
+    assert options["conditioning"]["delta_goal_m"] == 3.0 and options["conditioning"]["throttle"] == 1
+    assert options["seed"] == 4 and options["episode_steps"] == 90 and not options["walls"]
+    late = scene.starting_at(30)
+    simulator = pictura.Simulator([scene, late], [(0, 12), (1, 12)], num_threads=1, **options)
+    simulator.run(pictura.Controller("log", simulator), 5)
+    valid = scene.tracks()["valid"]
+    status = simulator.state["status"].numpy()
+    assert ((status != ABSENT) == np.concatenate([valid[:, 5], valid[:, 35]])).all()
+    with pytest.raises(pictura.UsageError, match="12"):
+        pictura.Simulator([scene], [(0, 3)], **options)
+
+
+def test_the_documents_code_runs(folder):
+    text = (pathlib.Path(__file__).parents[2] / "docs" / "python.md").read_text()
+    (block,) = re.findall(r"```python\n(.*?)```", text.split("## Recorded scenes")[1].split("## Arrays")[0], re.S)
+    block = block.replace("validation.tfrecord-00000-of-00150#7", str(folder / "womd.tfrecord"))
+    names: dict[str, object] = {"pictura": pictura}
+    exec(compile(block, "docs/python.md", "exec"), names)  # noqa: S102
+    assert names["errors"].shape == (12, 81) and names["simulator"].totals()["agent_steps"] > 0
