@@ -214,7 +214,7 @@ void add_map_command(CLI::App& app) {
   command
       ->add_option("MAP", arguments->map,
                    "A .xodr file, a town's name, procedural[:SEED], or a recorded scene: FILE.json, FILE.bin, "
-                   "FILE.tfrecord[#K] or FOLDER[#K], with a number or a scenario's id as K")
+                   "FILE.scenario, FILE.tfrecord[#K] or FOLDER[#K], with a number or a scenario's id as K")
       ->required();
   command
       ->add_option("--png", arguments->png,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <optional>
 
 #include "pictura/apps/commands.h"
 #include "pictura/cli/drive.h"
@@ -16,6 +17,8 @@
 #include "pictura/drawing/drawing.h"
 #include "pictura/drawing/film.h"
 #include "pictura/map/scenario/scenario.h"
+#include "pictura/map/scenario/scene_file.h"
+#include "pictura/simulator/scene_recorder.h"
 
 namespace pictura {
 
@@ -25,7 +28,7 @@ struct Arguments {
   WorldOptions world;
   int steps = 300;
   BackendOptions backends;
-  std::string policy = "random", video, replay, mcap;
+  std::string policy = "random", video, replay, mcap, scene;
   RecordingOptions recording;
   ServeOptions serve;
   bool endless = false;  // until it is interrupted
@@ -108,6 +111,8 @@ void run(Arguments arguments) {
   const RecordedDriver driver{arguments.policy, world.session.get(), world.renderer.get()};
   if (!arguments.replay.empty() || !arguments.mcap.empty())
     recording = std::make_unique<Recording>(*simulator, driver, arguments.recording);
+  std::optional<SceneRecorder> saved;
+  if (!arguments.scene.empty()) saved.emplace(*simulator);
   std::unique_ptr<LiveView> live;
   if (arguments.serve.is_asked) live = serve(arguments.serve, *simulator, driver, arguments.recording);
 
@@ -130,6 +135,7 @@ void run(Arguments arguments) {
     const auto end = std::chrono::steady_clock::now();
     if (scene) displacement.add(*simulator, *scene);
     if (recording) recording->after_step(result);
+    if (saved) saved->after_step();
     if (live) live->after_step(result);
     simulate_s += std::chrono::duration<double>(end - begin).count();
     film_s += std::chrono::duration<double>(begin - begin_of_recording).count() + seconds_since(end);
@@ -145,6 +151,10 @@ void run(Arguments arguments) {
     const Replay replay = recording->finish();
     if (!arguments.replay.empty()) write_replay_and_say_so(arguments.replay, replay);
     if (!arguments.mcap.empty()) write_mcap_and_say_so(arguments.mcap, replay);
+  }
+  if (saved) {
+    write_scene_file(arguments.scene, saved->scenario());
+    fmt::print(stderr, "{}: {} steps of the first episode\n", arguments.scene, saved->num_steps() - 1);
   }
 
   const SimulatorTotals& totals = simulator->totals();
@@ -215,6 +225,11 @@ void add_simulate_command(CLI::App& app) {
   command->add_option("--replay", arguments->replay, "Record it as a page that a browser plays")
       ->check(file_ending(".html"));
   command->add_option("--mcap", arguments->mcap, "The same as an MCAP file, for Foxglove")->check(file_ending(".mcap"));
+  command
+      ->add_option(
+          "--scene", arguments->scene,
+          "Save the first episode as a recorded scene, which SCENE may name: to the bit, lights as recorded ones")
+      ->check(file_ending(std::string(kSceneFileEnding)));
   add_serve_options(command, &arguments->serve);
   add_recording_options(command, &arguments->recording);
   command->add_flag("--json", arguments->json, "Print one JSON object");
@@ -224,7 +239,8 @@ void add_simulate_command(CLI::App& app) {
       "Examples:\n  pictura simulate Town01 --agents 80 --steps 600 --policy random --json\n"
       "  pictura simulate procedural:1 --policy runs/demo/checkpoint.ckpt --video drive.mp4\n"
       "  pictura simulate Town05 --agents 60 --policy lane --serve --cameras\n"
-      "  pictura simulate validation.tfrecord-00000-of-00150#7 --policy runs/demo/checkpoint.ckpt --control vehicles");
+      "  pictura simulate validation.tfrecord-00000-of-00150#7 --policy runs/demo/checkpoint.ckpt --control vehicles\n"
+      "  pictura simulate procedural:1 --policy lane --scene drive.scenario && pictura simulate drive.scenario");
   command->callback([arguments, command] {
     settle_driving_options(*command, &arguments->world, &arguments->steps, &arguments->policy);
     refuse_idle_options(*command, *arguments);

@@ -9,8 +9,10 @@
 #include "pictura/bindings/call.h"
 #include "pictura/bindings/objects.h"
 #include "pictura/map/scenario/load_scenario.h"
+#include "pictura/map/scenario/scene_file.h"
 #include "pictura/simulator/controllers/inverse_actions.h"
 #include "pictura/simulator/recorded_scene.h"
+#include "pictura/simulator/scene_recorder.h"
 
 namespace pictura::python {
 
@@ -129,6 +131,29 @@ py::dict inverse_actions_of(RecordedScene& scene, int num_threads) {
   return d;
 }
 
+class PySceneRecorder final : public Watcher {
+ public:
+  PySceneRecorder(SimulatorInside inside, int world) : inside_(std::move(inside)) {
+    inside_.run("SceneRecorder", [&] { recorder_.emplace(*inside_.simulator, world); });
+  }
+
+  void before_step(Span<Command> /*commands_inout*/) override {}
+  void after_step(const StepResult& /*result*/) override { recorder_->after_step(); }
+  void after_reset() override { recorder_->after_step(); }
+
+  int num_steps() const { return recorder_->num_steps() - 1; }
+  std::shared_ptr<RecordedScene> scenario(const std::string& id, int self_agent) {
+    std::shared_ptr<const Scenario> scenario;
+    inside_.run("scenario", [&] { scenario = std::make_shared<const Scenario>(recorder_->scenario(id, self_agent)); });
+    std::string source = scenario->id;
+    return std::make_shared<RecordedScene>(std::move(scenario), std::move(source), 0);
+  }
+
+ private:
+  SimulatorInside inside_;
+  std::optional<SceneRecorder> recorder_;
+};
+
 }  // namespace
 
 void bind_scenarios(py::module_& module) {
@@ -139,7 +164,7 @@ It is the map of worlds whose agents are its tracks, in their order, from `start
 pictura.Simulator([scene], [(0, scene.num_tracks)], **scene.world()). Commands of kind 3 and the controller 'log' replay it.)")
       .def_static(
           "load", load, py::arg("name"), py::kw_only(), py::arg("start_step") = 0,
-          R"(Loads a scene by name: FILE.json, FILE.bin, a file with '.tfrecord' in its name, or a folder of them; with '#7' or
+          R"(Loads a scene by name: FILE.json, FILE.bin, FILE.scenario, a file with '.tfrecord' in its name, or a folder of them; with '#7' or
 '#SCENARIO_ID' one of several.
 
 start_step: of the recording, at which episodes begin.
@@ -211,6 +236,16 @@ absent: also those that are not there at start_step. Raises pictura.UsageError f
 as long as what is left of it, no walls, no parked cars, no early end, plain dynamics.
 
 Options given are kept but for these, as those of a pictura.PolicySession: scene.world(**session.training_world()).)")
+      .def(
+          "save",
+          [](const RecordedScene& self, const std::string& path) {
+            const py::gil_scoped_release no_gil;
+            write_scene_file(path, *self.scenario());
+          },
+          py::arg("path"),
+          R"(Writes it, whole or not at all, as *.scenario, which load() reads again to the bit.
+
+Raises pictura.UsageError for another ending, pictura.Error naming the file.)")
       .def("inverse_actions", inverse_actions_of, py::arg("num_threads") = 0,
            R"(The actions by which the simulator's dynamics follow the recording most closely, as NumPy arrays by name.
 
@@ -221,6 +256,27 @@ there is a state to start from and one to reach, and how far from the recorded p
         return fmt::format("<pictura.Scenario {} ({}): {} tracks, {} steps, from step {}>", scenario.id,
                            scenario.format, scenario.tracks.size(), scenario.num_steps, self.start_step());
       });
+
+  py::class_<PySceneRecorder, std::shared_ptr<PySceneRecorder>>(module, "SceneRecorder", R"(
+Records the present episode of a world of a simulator on the CPU as a scene: every step from now on, however it is asked for, for as
+long as the recorder lives.)")
+      .def(py::init([](const py::object& simulator, int world) {
+             auto inside = py::cast<SimulatorInside>(simulator.attr("_inside")());
+             const auto watch = inside.watch;
+             auto recorder = std::make_shared<PySceneRecorder>(std::move(inside), world);
+             watch(recorder);
+             return recorder;
+           }),
+           py::arg("simulator"), py::kw_only(), py::arg("world") = 0, py::keep_alive<1, 2>(),
+           "Raises pictura.UsageError where there is no such world and where the simulator is on a device.")
+      .def_property_readonly("num_steps", &PySceneRecorder::num_steps, "Steps until now.")
+      .def(
+          "scenario", &PySceneRecorder::scenario, py::kw_only(), py::arg("id") = "", py::arg("self_agent") = -1,
+          R"(The pictura.Scenario of what was driven until now: controlled agents and parked cars that were there as tracks, with the
+number of their box in the world as id, and lights as recorded ones.
+
+self_agent: of the world, whose track becomes the self-driving car's; -1: nobody's. Raises pictura.UsageError for one that was
+never there.)");
   py::list types;
   for (int i = 0; i <= static_cast<int>(TrackType::other); ++i) types.append(to_string(static_cast<TrackType>(i)));
   module.attr("TRACK_TYPES") = py::tuple(types);

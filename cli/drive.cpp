@@ -52,7 +52,7 @@ void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_
   command
       ->add_option("MAP", world_out->map,
                    "A .xodr file, a town's name, procedural[:SEED], or a recorded scene: FILE.json, FILE.bin, "
-                   "FILE.tfrecord[#K] or FOLDER[#K], with a number or a scenario's id as K")
+                   "FILE.scenario, FILE.tfrecord[#K] or FOLDER[#K], with a number or a scenario's id as K")
       ->required();
   add_world_options(command, world_out);
   command

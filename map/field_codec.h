@@ -52,6 +52,31 @@ constexpr uint64_t min_bytes() {
   }
 }
 
+/// Appends what a T's bytes mean: the names of its fields and the sizes of its numbers. Files that say it cannot be
+/// read as something else.
+template <typename T>
+void append_layout(std::string* text_out) {
+  if constexpr (HasFields<T>) {
+    *text_out += '{';
+    *text_out += field_names_of(T{});
+    [&]<typename... F>(std::type_identity<std::tuple<F&...>>) {
+      (append_layout<F>(text_out), ...);
+    }(std::type_identity<FieldsOf<T>>());
+    *text_out += '}';
+  } else if constexpr (kIsVector<T>) {
+    *text_out += '*';
+    append_layout<typename T::value_type>(text_out);
+  } else if constexpr (std::is_same_v<T, std::string>) {
+    *text_out += 's';
+  } else if constexpr (std::is_scalar_v<T>) {
+    *text_out += std::is_floating_point_v<T> ? 'f' : 'i';
+    *text_out += std::to_string(sizeof(T));
+  } else {
+    *text_out += std::to_string(sizeof(T) / sizeof(typename T::value_type));
+    append_layout<typename T::value_type>(text_out);
+  }
+}
+
 class FieldWriter {
  public:
   explicit FieldWriter(std::string* bytes) : bytes_(bytes) {}

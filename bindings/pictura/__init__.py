@@ -36,6 +36,7 @@ from pictura._pictura import (  # noqa: F401
     Scenario,
     Scene,
     SceneFile,
+    SceneRecorder,
     Simulator,
     Snapshot,
     StepResult,

@@ -14,6 +14,7 @@
 #include "pictura/map/pufferdrive/pufferdrive.h"
 #include "pictura/map/scenario/logged_scene.h"
 #include "pictura/map/scenario/scene_cache.h"
+#include "pictura/map/scenario/scene_file.h"
 #include "pictura/map/womd/womd.h"
 
 namespace pictura {
@@ -35,7 +36,7 @@ PICTURA_FIELDS(ShardIndex, records, fault)
 
 namespace {
 
-enum class SceneFormat { none, womd, gpudrive, pufferdrive };
+enum class SceneFormat { none, womd, gpudrive, pufferdrive, own };
 
 /// What says whether a file is still the same.
 struct FileVersion {
@@ -50,6 +51,7 @@ SceneFormat format_of(std::string_view path) {
   const std::string name = fs::path(path).filename().string();
   if (name.ends_with(".json")) return SceneFormat::gpudrive;
   if (name.ends_with(".bin")) return SceneFormat::pufferdrive;
+  if (name.ends_with(kSceneFileEnding)) return SceneFormat::own;
   // Shards of the dataset are called NAME.tfrecord-00000-of-00150; GPUDrive's names of JSON files begin with tfrecord.
   if (name.find(kShard) != std::string::npos) return SceneFormat::womd;
   return SceneFormat::none;
@@ -143,7 +145,8 @@ LoggedScene parse(std::string_view bytes, const std::string& name) {
     case SceneFormat::pufferdrive: return pufferdrive::parse_scene(bytes, name);
     default: break;
   }
-  fail_usage("{}: expected a scene: FILE.json, FILE.bin or a file with {} in its name", name, kShard);
+  fail_usage("{}: expected a scene: FILE.json, FILE.bin, FILE{} or a file with {} in its name", name, kSceneFileEnding,
+             kShard);
 }
 
 Scenario import_scene(const SceneRef& scene) {
@@ -153,6 +156,7 @@ Scenario import_scene(const SceneRef& scene) {
     const std::string payload = womd::read_record(file, scene.file, record, {scene.offset, scene.bytes});
     return make_scenario(womd::parse_scenario(payload, fmt::format("{}: record {}", scene.file, record)));
   }
+  if (format_of(scene.file) == SceneFormat::own) return parse_scene_file(read_file(scene.file), scene.file);
   const bool is_json = format_of(scene.file) == SceneFormat::gpudrive;
   return make_scenario(parse(read_file(scene.file, is_json ? kMaxJson_bytes : kMaxBinary_bytes), scene.file));
 }
@@ -180,7 +184,8 @@ SceneIndex index_scenes(const std::string& path) {
     if (format_of(entry.path().string()) != SceneFormat::none) files.push_back(entry.path().string());
   }
   PICTURA_CHECK(!error, "{}: the folder cannot be read: {}", path, error.message());
-  PICTURA_CHECK(!files.empty(), "{}: expected scenes (.json, .bin or {} files) in the folder, got none", path, kShard);
+  PICTURA_CHECK(!files.empty(), "{}: expected scenes (.json, .bin, {} or {} files) in the folder, got none", path,
+                kSceneFileEnding, kShard);
   std::sort(files.begin(), files.end());
   for (const std::string& file : files) {
     try {
@@ -213,7 +218,8 @@ Scenario load_scenario(const SceneRef& scene, SceneReport* report_out) {
   SceneReport& report = report_out ? *report_out : unused;
   report = {};
   const std::string folder = cache_folder("scenes");
-  if (folder.empty()) return import_scene(scene);
+  // What we wrote ourselves is as quickly read as the cache.
+  if (folder.empty() || format_of(scene.file) == SceneFormat::own) return import_scene(scene);
   const std::string cached =
       fmt::format("{}/{:016x}/{}.scene", folder, hash_of_path(scene.file), std::max(scene.record, 0));
   const SceneCacheKey key{.file = hash_of_version(version_of(scene.file)), .record = scene.record};
@@ -237,6 +243,7 @@ Scenario load_scenario(const std::string& name, SceneReport* report_out) {
 }
 
 Scenario parse_scenario_file(std::string_view bytes, const std::string& name, int32_t record) {
+  if (format_of(name) == SceneFormat::own) return parse_scene_file(bytes, name);
   if (format_of(name) != SceneFormat::womd) return make_scenario(parse(bytes, name));
   const womd::MemoryBytes file(bytes);
   const womd::RecordList list = womd::list_records(file, name);

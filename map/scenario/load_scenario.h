@@ -31,8 +31,8 @@ struct SceneReport {
   std::string cache_rejection;  // why an existing cached file was not used, or empty
 };
 
-/// Whether a name is a scene's rather than a map's: FILE.json, FILE.bin, a file with `.tfrecord` in its name, or a
-/// folder; each with or without #K or #SCENARIO_ID.
+/// Whether a name is a scene's rather than a map's: FILE.json, FILE.bin, FILE.scenario, a file with `.tfrecord` in its
+/// name, or a folder; each with or without #K or #SCENARIO_ID.
 bool is_scene_name(std::string_view name);
 
 /// The scenes of a file or a folder. Records are found from their lengths and ids; the index of a TFRecord file is kept

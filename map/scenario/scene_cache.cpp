@@ -12,14 +12,15 @@ namespace pictura {
 
 namespace {
 
-constexpr std::array<char, 8> kMagic{'P', 'I', 'C', 'T', 'R', 'S', 'C', 'N'};
-constexpr uint32_t kVersion = 1;  // of the header; what follows is covered by the importers' hash
+constexpr FieldFileKind kCached{.magic = {'P', 'I', 'C', 'T', 'R', 'S', 'C', 'N'},
+                                .layout = PICTURA_MAP_FINGERPRINT,
+                                .other = "stale: made by another version of the importer"};
 constexpr uint32_t kByteOrder = 0x01020304;
 
 struct Header {
-  std::array<char, 8> magic = kMagic;
-  uint32_t version = kVersion, byte_order = kByteOrder;
-  uint64_t importer = PICTURA_MAP_FINGERPRINT;
+  std::array<char, 8> magic{};
+  uint32_t version = 0, byte_order = kByteOrder;
+  uint64_t layout = 0;
   uint64_t file = 0;
   int64_t record = 0;
   uint64_t payload_bytes = 0, payload_crc = 0;
@@ -29,29 +30,35 @@ static_assert(is_plain<TrackState>() && is_plain<LanePoint>(), "copied as a whol
 
 }  // namespace
 
-std::string encode_cached(const SceneCacheKey& key, const std::function<void(FieldWriter*)>& put) {
+std::string encode_fields(const FieldFileKind& kind, const SceneCacheKey& key,
+                          const std::function<void(FieldWriter*)>& put) {
   std::string bytes(sizeof(Header), '\0');
   FieldWriter writer(&bytes);
   put(&writer);
   const std::string_view payload = std::string_view(bytes).substr(sizeof(Header));
-  const Header header{
-      .file = key.file, .record = key.record, .payload_bytes = payload.size(), .payload_crc = crc32c(payload)};
+  const Header header{.magic = kind.magic,
+                      .version = kind.version,
+                      .layout = kind.layout,
+                      .file = key.file,
+                      .record = key.record,
+                      .payload_bytes = payload.size(),
+                      .payload_crc = crc32c(payload)};
   std::memcpy(bytes.data(), &header, sizeof header);
   return bytes;
 }
 
-void decode_cached(std::string_view bytes, const SceneCacheKey& key, const std::string& name,
+void decode_fields(std::string_view bytes, const FieldFileKind& kind, const SceneCacheKey& key, const std::string& name,
                    const std::function<void(FieldReader*)>& get) {
   try {
     Header header;
     PICTURA_CHECK(bytes.size() >= sizeof header, "truncated: {} bytes, expected at least {} for the header",
                   bytes.size(), sizeof header);
     std::memcpy(&header, bytes.data(), sizeof header);
-    PICTURA_CHECK(header.magic == kMagic, "foreign: expected it to begin with {}",
-                  std::string_view(kMagic.data(), kMagic.size()));
+    PICTURA_CHECK(header.magic == kind.magic, "foreign: expected it to begin with {}",
+                  std::string_view(kind.magic.data(), kind.magic.size()));
     PICTURA_CHECK(header.byte_order == kByteOrder, "written on a machine of another byte order");
-    PICTURA_CHECK(header.version == kVersion, "expected version {}, got {}", kVersion, header.version);
-    PICTURA_CHECK(header.importer == PICTURA_MAP_FINGERPRINT, "stale: made by another version of the importer");
+    PICTURA_CHECK(header.version == kind.version, "expected version {}, got {}", kind.version, header.version);
+    PICTURA_CHECK(header.layout == kind.layout, "{}", kind.other);
     PICTURA_CHECK(header.file == key.file && header.record == key.record,
                   "stale: the scene's file has changed, or this is another one's");
     const std::string_view payload = bytes.substr(sizeof header);
@@ -65,6 +72,15 @@ void decode_cached(std::string_view bytes, const SceneCacheKey& key, const std::
   } catch (const Error& error) {
     fail("{}: {}", name, error.what());
   }
+}
+
+std::string encode_cached(const SceneCacheKey& key, const std::function<void(FieldWriter*)>& put) {
+  return encode_fields(kCached, key, put);
+}
+
+void decode_cached(std::string_view bytes, const SceneCacheKey& key, const std::string& name,
+                   const std::function<void(FieldReader*)>& get) {
+  decode_fields(bytes, kCached, key, name, get);
 }
 
 std::string encode_scenario(const Scenario& scenario, const SceneCacheKey& key) {

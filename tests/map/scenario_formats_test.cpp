@@ -170,8 +170,10 @@ TEST(PufferDrive, BytesBeyondTheEndAndMissingOnesAreRefused) {
 }
 
 TEST(SceneFiles, TypesOfFilesAreToldByName) {
-  EXPECT_THAT(message_of([] { parse_scenario_file("", "scene.txt"); }),
-              HasSubstr("scene.txt: expected a scene: FILE.json, FILE.bin or a file with .tfrecord in its name"));
+  EXPECT_THAT(
+      message_of([] { parse_scenario_file("", "scene.txt"); }),
+      HasSubstr(
+          "scene.txt: expected a scene: FILE.json, FILE.bin, FILE.scenario or a file with .tfrecord in its name"));
   // A file of another format is refused by the format that its name says.
   const LoggedScene fixture = test::make_fixture({.num_steps = 2});
   EXPECT_THAT(message_of([&] { read_binary(test::write_gpudrive(fixture)); }),

@@ -269,7 +269,7 @@ TEST(SceneNames, FoldersWithoutScenesAndBadScenesAreNamed) {
   const ScratchFolder folder;
   write_file(folder / "notes.txt", "nothing");
   EXPECT_EQ(message_of([&] { index_scenes(folder.path()); }),
-            folder.path() + ": expected scenes (.json, .bin or .tfrecord files) in the folder, got none");
+            folder.path() + ": expected scenes (.json, .bin, .scenario or .tfrecord files) in the folder, got none");
   const std::string file = shard_of(2);
   write_file(folder / "cut.tfrecord", file.substr(0, file.size() - 100));
   std::string damaged = file;

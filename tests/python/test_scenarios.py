@@ -156,10 +156,45 @@ def test_worlds_mix_scenes_and_options_are_kept(scene):
         pictura.Simulator([scene], [(0, 3)], **options)
 
 
-def test_the_documents_code_runs(folder):
+def test_a_run_is_saved_loaded_and_replayed(town, tmp_path):
+    simulator = pictura.Simulator([town], [(0, 12)], num_threads=1, parked_cars=2, seed=5)
+    recorder = pictura.SceneRecorder(simulator)
+    boxes = [np.asarray(simulator.scene.boxes).view(pictura.BOX_DTYPE)[:, 0].copy()]
+    lane = pictura.Controller("lane", simulator)
+    for _ in range(30):
+        simulator.run(lane, 1)
+        boxes.append(np.asarray(simulator.scene.boxes).view(pictura.BOX_DTYPE)[:, 0].copy())
+    assert recorder.num_steps == 30
+    driven = recorder.scenario(id="lanes", self_agent=3)
+    path = str(tmp_path / "drive.scenario")
+    driven.save(path)
+    scene = pictura.Scenario.load(path)
+    assert scene.id == "lanes" and scene.format == "pictura" and scene.num_steps == 31
+    ids = scene.tracks()["id"]
+    assert ids[scene.sdc_track] == 3
+    for name, values in driven.tracks().items():
+        assert (values == scene.tracks()[name]).all(), name
+    replay = world_of(scene)
+    log = pictura.Controller("log", replay)
+    for step, was in enumerate(boxes):
+        np.testing.assert_allclose(feet_of(replay)[:, :2], was["center_m"][ids, :2], atol=1e-4, err_msg=str(step))
+        if step < 30:
+            replay.run(log, 1)
+    with pytest.raises(pictura.UsageError, match=".scenario"):
+        driven.save(str(tmp_path / "drive.json"))
+    with pytest.raises(pictura.UsageError, match="got 99"):
+        recorder.scenario(self_agent=99)
+    simulator.reset()
+    assert recorder.num_steps == 30, "another episode"
+
+
+def test_the_documents_code_runs(folder, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     text = (pathlib.Path(__file__).parents[2] / "docs" / "python.md").read_text()
-    (block,) = re.findall(r"```python\n(.*?)```", text.split("## Recorded scenes")[1].split("## Arrays")[0], re.S)
-    block = block.replace("validation.tfrecord-00000-of-00150#7", str(folder / "womd.tfrecord"))
+    blocks = re.findall(r"```python\n(.*?)```", text.split("## Recorded scenes")[1].split("## Arrays")[0], re.S)
     names: dict[str, object] = {"pictura": pictura}
-    exec(compile(block, "docs/python.md", "exec"), names)  # noqa: S102
+    for block in blocks:
+        block = block.replace("validation.tfrecord-00000-of-00150#7", str(folder / "womd.tfrecord"))
+        exec(compile(block, "docs/python.md", "exec"), names)  # noqa: S102
     assert names["errors"].shape == (12, 81) and names["simulator"].totals()["agent_steps"] > 0
+    assert pictura.Scenario.load("drive.scenario").id == "my drive"

@@ -1,0 +1,163 @@
+#include "pictura/simulator/scene_recorder.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace pictura {
+namespace {
+
+TrackType type_of(AgentClass agent_class) {
+  switch (agent_class) {
+    case AgentClass::pedestrian: return TrackType::pedestrian;
+    case AgentClass::cyclist: return TrackType::cyclist;
+    default: return TrackType::vehicle;
+  }
+}
+
+RecordedLightState recorded_light(LightState state) {
+  switch (state) {
+    case LightState::red: return RecordedLightState::stop;
+    case LightState::yellow: return RecordedLightState::caution;
+    case LightState::green: return RecordedLightState::go;
+    default: return RecordedLightState::none;
+  }
+}
+
+/// The lights of a map become recorded ones: in worlds of recorded scenes none runs by itself.
+void move_lights(Scenario* scenario) {
+  RoadMap& map = scenario->map;
+  for (const TrafficLight& light : map.lights) {
+    scenario->lights.push_back({light.stop_a_m, light.stop_b_m, light.stop_heading_rad, light.lanes});
+  }
+  scenario->light_lanes = std::move(map.light_lanes);
+  map.lights.clear();
+  map.light_lanes.clear();
+  map.provenance.lights.clear();
+  map.facts.traffic_lights = map.facts.stop_lines = map.facts.signal_junctions = 0;
+}
+
+/// Those of a recording from a step on; after its end they show nothing.
+void copy_lights(const Scenario& from, int32_t start_step, Scenario* to) {
+  to->lights = from.lights;
+  to->light_lanes = from.light_lanes;
+  for (int32_t light = 0; light < static_cast<int32_t>(from.lights.size()); ++light) {
+    for (int32_t step = start_step; step < start_step + to->num_steps; ++step) {
+      to->light_states.push_back(step < from.num_steps ? from.states_of_light(light)[static_cast<size_t>(step)]
+                                                       : RecordedLightState::none);
+    }
+  }
+}
+
+}  // namespace
+
+SceneRecorder::SceneRecorder(Simulator& simulator, int world)
+    : simulator_(simulator), world_(static_cast<size_t>(world)) {
+  if (!simulator.device().is_host()) {
+    fail_usage("scenes are recorded of simulators on cpu, got one on {}", name_of(simulator.device()));
+  }
+  if (world < 0 || world_ >= simulator.worlds().size()) {
+    fail_usage("expected a world to record in [0, {}), got {}", simulator.worlds().size(), world);
+  }
+  for (size_t i = 0; i < world_; ++i) first_slot_ += simulator.worlds()[i].num_agents;
+  episode_ = simulator.episode_index()[world_];
+  first_step_ = simulator.episode_step()[world_];
+  const Span<const AgentBox> now = boxes();
+  bodies_.assign(now.begin(), now.end());
+  add_step();
+}
+
+Span<const AgentBox> SceneRecorder::boxes() const {
+  const SceneBatch& scene = simulator_.scene();
+  const auto begin = static_cast<size_t>(scene.world_begin[world_]);
+  return scene.agents.subspan(begin, static_cast<size_t>(scene.world_begin[world_ + 1]) - begin);
+}
+
+void SceneRecorder::add_step() {
+  const SceneBatch& scene = simulator_.scene();
+  const AgentStateView state = simulator_.state();
+  const int num_agents = simulator_.worlds()[world_].num_agents;
+  const Span<const AgentBox> now = boxes();
+  for (size_t i = 0; i < now.size(); ++i) {
+    const AgentBox& box = now[i];
+    valid_.push_back(box.drawn ? 1 : 0);
+    states_.emplace_back();
+    if (!box.drawn) continue;
+    bodies_[i] = box;
+    const bool moves = static_cast<int>(i) < num_agents;
+    const auto slot = static_cast<size_t>(first_slot_) + i;
+    const float speed_mps = moves ? state.speed_mps[slot] : 0.0f;
+    states_.back() = {box.center_m,
+                      moves ? state.heading_rad[slot] : std::atan2(box.sin_heading, box.cos_heading),
+                      {speed_mps * box.cos_heading, speed_mps * box.sin_heading}};
+  }
+  for (int32_t i = scene.light_begin[world_]; i < scene.light_begin[world_ + 1]; ++i) {
+    lights_.push_back(recorded_light(scene.light_states[static_cast<size_t>(i)]));
+  }
+  ++num_steps_;
+}
+
+void SceneRecorder::after_step() {
+  is_over_ = is_over_ || simulator_.episode_index()[world_] != episode_ ||
+             simulator_.episode_step()[world_] != first_step_ + num_steps_;
+  if (is_over_) return;
+  PICTURA_CHECK(num_steps_ < kMaxScenarioSteps, "expected a scene of at most {} steps, got more", kMaxScenarioSteps);
+  add_step();
+}
+
+Scenario SceneRecorder::scenario(std::string id, int self_agent) const {
+  const WorldSpec& world = simulator_.worlds()[world_];
+  const CompiledMap& map = *simulator_.maps()[static_cast<size_t>(world.map)];
+  Scenario scenario;
+  scenario.format = "pictura";
+  scenario.id = id.empty() ? fmt::format("{} seed {} world {} episode {}", map.road->name, simulator_.config().seed,
+                                         world.global_world, episode_)
+                           : std::move(id);
+  scenario.dt_s = simulator_.config().dt_s;
+  scenario.num_steps = num_steps_;
+  scenario.current_step = std::min(10, num_steps_ - 1);
+  scenario.map = *map.road;
+
+  const Scenario* const recorded = map.scenario.get();  // what it was the replay of
+  if (recorded && self_agent < 0) self_agent = recorded->sdc_track;
+  const auto steps = static_cast<size_t>(num_steps_);
+  for (size_t i = 0; i < bodies_.size(); ++i) {
+    const AgentBox& body = bodies_[i];
+    RecordedTrack track{
+        .id = recorded ? recorded->tracks[i].id : static_cast<int64_t>(i),
+        .type = recorded ? recorded->tracks[i].type : type_of(body.agent_class),
+        .control = static_cast<int>(i) < world.num_agents ? RecordedControl::unstated : RecordedControl::still,
+        .length_m = body.length_m,
+        .width_m = body.width_m,
+        .height_m = body.height_m};
+    for (size_t step = 0; step < steps; ++step) {
+      if (!valid_[step * bodies_.size() + i]) continue;
+      if (track.num_valid++ == 0) track.first_valid = static_cast<int32_t>(step);
+      track.last_valid = static_cast<int32_t>(step);
+    }
+    if (track.num_valid == 0) continue;
+    if (static_cast<int>(i) == self_agent) scenario.sdc_track = static_cast<int32_t>(scenario.tracks.size());
+    scenario.tracks.push_back(track);
+    for (size_t step = 0; step < steps; ++step) {
+      scenario.states.push_back(states_[step * bodies_.size() + i]);
+      scenario.valid.push_back(valid_[step * bodies_.size() + i]);
+    }
+  }
+  if (self_agent >= 0 && scenario.sdc_track < 0) {
+    fail_usage("expected an agent that was there as the self-driving car, got {}", self_agent);
+  }
+
+  const auto num_lights = static_cast<size_t>(map.road->lights.size());
+  move_lights(&scenario);
+  for (size_t light = 0; light < num_lights; ++light) {
+    for (size_t step = 0; step < steps; ++step) {
+      scenario.light_states.push_back(lights_[step * num_lights + light]);
+    }
+  }
+  if (recorded) copy_lights(*recorded, map.start_step + first_step_, &scenario);
+  validate(scenario);
+  return scenario;
+}
+
+}  // namespace pictura
