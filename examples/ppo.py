@@ -63,14 +63,14 @@ def main() -> None:
     agent = Policy(SETTINGS | {"modality": "perspective" if sees_images else "vector"}, num_cameras=len(rig) if rig else 0)
     agent = agent.to(device)
     nn.init.normal_(agent.actor.weight, std=0.01)
-    optimizer = torch.optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
+    optimizer = torch.optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5, fused=device.type == "cuda")
 
     seen, info = envs.reset(seed=args.seed)
     shape = (args.num_steps, n)
     obs = {key: torch.zeros(*shape, *value.shape[1:], dtype=value.dtype, device=device) for key, value in seen.items()}
     actions = torch.zeros(shape, dtype=torch.int32, device=device)
     logprobs, rewards, values = (torch.zeros(shape, device=device) for _ in range(3))
-    dones, valids = (torch.zeros(shape, dtype=torch.bool, device=device) for _ in range(2))
+    terminations, dones, valids = (torch.zeros(shape, dtype=torch.bool, device=device) for _ in range(3))
     num_updates = max(1, args.total_timesteps // (args.num_steps * n))
     start, before, agent_steps, summary = time.time(), 0, 0, {}
 
@@ -80,23 +80,21 @@ def main() -> None:
                 obs[key][step] = value
             with torch.no_grad():
                 logits, values[step] = agent(seen)
-            chosen = torch.distributions.Categorical(logits=logits)
-            action = chosen.sample()
-            actions[step], logprobs[step] = action, chosen.log_prob(action)
-            seen, rewards[step], terminated, truncated, info = envs.step(action)
+            logprob = logits.log_softmax(1)
+            # A draw of the softmax (Gumbel's), without the host waiting for the device as torch.distributions lets it.
+            action = (logprob - torch.empty_like(logprob).exponential_().log()).argmax(1)
+            actions[step], logprobs[step] = action, logprob.gather(1, action[:, None]).squeeze(1)
+            seen, rewards[step], terminations[step], truncated, info = envs.step(action)
             # The step in which a world begins its next episode is not valid, and is not learnt from.
-            dones[step], valids[step] = terminated | truncated, info["valid"]
-            if bool(truncated.any()):
-                with torch.no_grad():
-                    rewards[step] += args.gamma * truncated * agent(seen)[1]
+            dones[step], valids[step] = terminations[step] | truncated, info["valid"]
         with torch.no_grad():
             next_value = agent(seen)[1]
             advantages, last = torch.zeros_like(rewards), torch.zeros(n, device=device)
             for t in reversed(range(args.num_steps)):
+                # After a truncation, too, the next observation is the episode's last: its value is what would have followed.
                 following = next_value if t == args.num_steps - 1 else values[t + 1]
-                live = (~dones[t]).float()
-                delta = rewards[t] + args.gamma * following * live - values[t]
-                advantages[t] = last = delta + args.gamma * args.gae_lambda * live * last
+                delta = rewards[t] + args.gamma * following * ~terminations[t] - values[t]
+                advantages[t] = last = delta + args.gamma * args.gae_lambda * last * ~dones[t]
             returns = advantages + values
 
         rows = valids.flatten().nonzero().squeeze(1)
@@ -105,14 +103,14 @@ def main() -> None:
         for _ in range(args.update_epochs):
             for batch in rows[torch.randperm(len(rows), device=device)].chunk(args.num_minibatches):
                 logits, value = agent({key: rows_[batch] for key, rows_ in flat.items()})
-                distribution = torch.distributions.Categorical(logits=logits)
-                ratio = (distribution.log_prob(actions.flatten()[batch]) - logprobs.flatten()[batch]).exp()
+                logprob = logits.log_softmax(1)
+                ratio = (logprob.gather(1, actions.flatten()[batch, None].long()).squeeze(1) - logprobs.flatten()[batch]).exp()
                 advantage = advantages.flatten()[batch]
                 advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
                 clipped = ratio.clamp(1 - args.clip_coef, 1 + args.clip_coef)
                 policy_loss = -torch.min(ratio * advantage, clipped * advantage).mean()
                 value_loss = 0.5 * (value - returns.flatten()[batch]).square().mean()
-                entropy = distribution.entropy().mean()
+                entropy = -(logprob.exp() * logprob).sum(1).mean()
                 loss = policy_loss - args.ent_coef * entropy + args.vf_coef * value_loss
                 optimizer.zero_grad()
                 loss.backward()

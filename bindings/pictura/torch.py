@@ -60,25 +60,29 @@ class _Attention(nn.Module):
         if mlp > 0:
             self.mlp_norm, self.mlp_hidden, self.mlp_out = nn.LayerNorm(width), nn.Linear(width, mlp), nn.Linear(mlp, width)
 
-    def forward(self, maps: Tensor, camera: int) -> Tensor:
-        """maps [batch, width, rows, columns] of one camera; returns [batch, width]."""
-        rows, columns = maps.shape[-2:]
+    def forward(self, maps: Tensor, first: int) -> Tensor:
+        """maps [batch, cameras, width, rows, columns] of cameras from number `first` on; returns [batch, cameras, width]."""
+        cameras, rows, columns = maps.shape[1], *maps.shape[-2:]
         y = (torch.arange(rows, device=maps.device) + 0.5) * (math.pi / rows)
         x = (torch.arange(columns, device=maps.device) + 0.5) * (math.pi / columns)
         y, x = (a.flatten().to(maps.dtype) for a in torch.meshgrid(y, x, indexing="ij"))
         where = torch.stack([x.cos(), y.cos(), x.sin(), y.sin(), (2 * x).cos(), (2 * y).cos(), (2 * x).sin(), (2 * y).sin()], 1)
-        tokens = self.token_norm(maps.flatten(2).transpose(1, 2) + self.position(where))
-        asked = self.query(self.query_norm(self.queries[camera]))
+        tokens = self.token_norm(maps.flatten(3).transpose(2, 3) + self.position(where))
+        queries = self.queries[first : first + cameras]
 
         def split(values: Tensor) -> Tensor:
             return values.unflatten(-1, (self.heads, -1)).transpose(-3, -2)
 
-        query = split(asked).expand(len(maps), -1, -1, -1)
-        seen = functional.scaled_dot_product_attention(query, split(self.key(tokens)), split(self.value(tokens)))
-        z = self.queries[camera] + self.out(seen.transpose(1, 2).flatten(2))
+        query, key, value = split(self.query(self.query_norm(queries))), split(self.key(tokens)), split(self.value(tokens))
+        # Camera by camera: the queries of one are the same for the whole batch, and are not copied for it.
+        seen = [
+            functional.scaled_dot_product_attention(query[i].expand(len(maps), -1, -1, -1), key[:, i], value[:, i])
+            for i in range(cameras)
+        ]
+        z = queries + self.out(torch.stack(seen, 1).transpose(2, 3).flatten(3))
         if hasattr(self, "mlp_norm"):
             z = z + self.mlp_out(functional.gelu(self.mlp_hidden(self.mlp_norm(z))))
-        return z.mean(1)
+        return z.mean(2)
 
 
 class Policy(nn.Module):
@@ -161,23 +165,30 @@ class Policy(nn.Module):
 
     def _images(self, images: Tensor | list[Tensor]) -> Tensor:
         blocks = [images] if isinstance(images, Tensor) else images
-        of_cameras = [block[:, i] for block in blocks for i in range(block.shape[1])]
-        if len(of_cameras) != self.num_cameras:
-            raise pictura.Error(f"rgb: expected images of {self.num_cameras} cameras, got {len(of_cameras)}")
-        return self.project(torch.cat([self._camera(pixels, i) for i, pixels in enumerate(of_cameras)], 1))
+        num_cameras = sum(block.shape[1] for block in blocks)
+        if num_cameras != self.num_cameras:
+            raise pictura.Error(f"rgb: expected images of {self.num_cameras} cameras, got {num_cameras}")
+        embedded, first = [], 0
+        for block in blocks:
+            embedded.append(self.attention(self._maps(block), first).flatten(1))
+            first += block.shape[1]
+        return self.project(torch.cat(embedded, 1))
 
-    def _camera(self, pixels: Tensor, camera: int) -> Tensor:
-        patch = self.patch_px
-        if patch > 1:
-            pixels = functional.pad(pixels, (0, -pixels.shape[3] % patch, 0, -pixels.shape[2] % patch))
-        x = pixels.to(self.actor.weight.dtype)
-        if patch > 1:
-            x = functional.pixel_unshuffle(x, patch)
+    def _maps(self, pixels: Tensor) -> Tensor:
+        """Feature maps [batch, cameras, width, rows, columns] of pixels uint8 [batch, cameras, 3, height, width]: the cameras share
+        the convolutions, so they are one batch of them."""
+        patch, x = self.patch_px, pixels.flatten(0, 1)
+        right, below = -x.shape[3] % patch, -x.shape[2] % patch
+        if right or below:
+            x = functional.pad(x, (0, right, 0, below))
+        # Patches are taken of bytes. Channels come last on CUDA, where tensor cores read them so; a CPU is slower then.
+        layout = torch.channels_last if x.is_cuda else torch.contiguous_format
+        x = functional.pixel_unshuffle(x, patch).to(self.actor.weight.dtype, memory_format=layout)
         for i, layer in enumerate(self.conv):
             # Pixels are 0 to 255: the first weight is divided instead of them.
             weight = layer.weight / 255.0 if i == 0 else layer.weight
             x = functional.gelu(functional.conv2d(x, weight, layer.bias, layer.stride, layer.padding))
-        return self.attention(x, camera)
+        return x.unflatten(0, pixels.shape[:2])
 
 
 _TYPES = {"F32": torch.float32, "BF16": torch.bfloat16, "I64": torch.int64}  # of safetensors

@@ -191,16 +191,16 @@ class Batch:
         """bool [slots]: who drives now; the others have halted or are absent, and what they are told is ignored."""
         return self._state["status"] == STATUS_ACTIVE
 
-    def info(self) -> dict[str, Any]:
-        """Of every slot after a step, by name; docs/python.md lists them."""
+    def info(self, copy: bool = True) -> dict[str, Any]:
+        """Of every slot after a step, by name; docs/python.md lists them. Views of the simulator's memory unless copied, but for
+        "active"."""
         results = self._result_views
-        info = {"active": self.active}
-        for name in ("events", "halt_reason", "goals_reached", "waypoints_reached", "episode_return", "agent_class"):
-            info[name] = self.copied(self._state[name])
-        for name in ("valid", "reward_terms", "distance_m"):
-            if name in results:
-                info[name] = self.copied(results[name])
-        return info
+        names = ("events", "halt_reason", "goals_reached", "waypoints_reached", "episode_return", "agent_class")
+        info = {name: self._state[name] for name in names}
+        info |= {name: results[name] for name in ("valid", "reward_terms", "distance_m") if name in results}
+        if copy:
+            info = {name: self.copied(value) for name, value in info.items()}
+        return {"active": self.active} | info
 
     def draw(self, world: int = 0, agent: int = 0, width_px: int = 640, height_px: int = 480) -> np.ndarray:
         """From above around an agent of a world, uint8 [height, width, 3]; on the CPU."""

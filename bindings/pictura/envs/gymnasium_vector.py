@@ -22,8 +22,8 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
     rewards are 0. "same_step": the step that ends it begins it, and info["final_obs"] and info["final_info"] have, for the
     slots that ended in that step, what was last seen.
 
-    num_envs: how many slots there must be; num_agents times num_worlds otherwise. copy: whether observations are copies;
-    without, they are views that the next step overwrites. Other options are pictura.envs.Batch's. On CUDA everything is
+    num_envs: how many slots there must be; num_agents times num_worlds otherwise. copy: whether what calls return
+    are copies; without, they are views that the next step overwrites. Other options are pictura.envs.Batch's. On CUDA everything is
     torch tensors in device memory.
     """
 
@@ -58,17 +58,22 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._over = self.batch.view(self.batch.simulator.episode_over)
+        self._everybody = self.batch.active
+        self._everybody[:] = True
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         super().reset(seed=seed)
         self.batch.reset(self._next_seed())
-        return self.batch.observe(self._copy), self._info()
+        return self.batch.observe(self._copy), self._info(self._copy)
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         batch = self.batch
         results = batch.step(actions)
-        reward, terminated, truncated = (batch.copied(results[key]) for key in ("reward", "terminated", "truncated"))
-        info = self._info()
+        # The reset of the same step writes them again.
+        copy = self._copy or self._same_step
+        returned = (results[key] for key in ("reward", "terminated", "truncated"))
+        reward, terminated, truncated = map(batch.copied, returned) if copy else returned
+        info = self._info(copy)
         if self._same_step and bool(self._over.any()):
             ended = terminated | truncated
             info["final_obs"], info["_final_obs"] = batch.observe(copy=True), ended
@@ -87,10 +92,9 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
     def _next_seed(self) -> int:
         return int(self.np_random.integers(2**63))
 
-    def _info(self) -> dict[str, Any]:
-        info = self.batch.info()
-        everybody = self.batch.copied(info["active"])
-        everybody[:] = True
+    def _info(self, copy: bool) -> dict[str, Any]:
+        info = self.batch.info(copy)
+        everybody = self.batch.copied(self._everybody) if copy else self._everybody
         return info | {f"_{key}": everybody for key in info}
 
 
