@@ -7,7 +7,7 @@ import numpy
 import numpy.dtypes
 import numpy.typing
 import typing
-__all__: list[str] = ['AGENT_FIELDS', 'Array', 'BOX_DTYPE', 'COMMAND_DTYPE', 'CONDITIONING_NAMES', 'Camera', 'Controller', 'EVENTS', 'Error', 'Geometry', 'HAS_CUDA', 'IDLE_ACTION', 'INSERTED_DTYPE', 'Images', 'LANE_TYPES', 'LiveView', 'Map', 'NUM_ACTIONS', 'OBSERVATION_ARRAYS', 'QUERY_DTYPE', 'REWARD_TERMS', 'Recorder', 'Renderer', 'Rig', 'Scenario', 'Scene', 'SceneFile', 'Simulator', 'Snapshot', 'StepResult', 'TRACK_TYPES', 'UsageError', 'VIEW_DTYPE', 'draw_worlds', 'known_towns', 'make_views', 'map_folder', 'renderer_names', 'simulator_names', 'write_gallery']
+__all__: list[str] = ['AGENT_FIELDS', 'Array', 'BOX_DTYPE', 'COMMAND_DTYPE', 'CONDITIONING_NAMES', 'Camera', 'Controller', 'EVENTS', 'Error', 'Geometry', 'HAS_CUDA', 'IDLE_ACTION', 'INSERTED_DTYPE', 'Images', 'LANE_TYPES', 'LiveView', 'Map', 'NUM_ACTIONS', 'OBSERVATION_ARRAYS', 'QUERY_DTYPE', 'REWARD_TERMS', 'Recorder', 'Renderer', 'Rig', 'Scenario', 'Scene', 'SceneFile', 'SceneRecorder', 'Simulator', 'Snapshot', 'StepResult', 'TRACK_TYPES', 'UsageError', 'VIEW_DTYPE', 'draw_worlds', 'known_towns', 'make_views', 'map_folder', 'renderer_names', 'simulator_names', 'write_gallery']
 class Error(RuntimeError):
     """
     The work failed; the message names what was expected and what came.
@@ -175,7 +175,7 @@ class Scenario(Map):
     @staticmethod
     def load(name: str, *, start_step: typing.SupportsInt | typing.SupportsIndex = 0) -> Scenario:
         """
-        Loads a scene by name: FILE.json, FILE.bin, a file with '.tfrecord' in its name, or a folder of them; with '#7' or
+        Loads a scene by name: FILE.json, FILE.bin, FILE.scenario, a file with '.tfrecord' in its name, or a folder of them; with '#7' or
         '#SCENARIO_ID' one of several.
         
         start_step: of the recording, at which episodes begin.
@@ -196,6 +196,12 @@ class Scenario(Map):
         others), others (who is no vehicle), all, tracks_to_predict, objects_of_interest, and ids of tracks.
         
         absent: also those that are not there at start_step. Raises pictura.UsageError for another word, and where nobody is left.
+        """
+    def save(self, path: str) -> None:
+        """
+        Writes it, whole or not at all, as *.scenario, which load() reads again to the bit.
+        
+        Raises pictura.UsageError for another ending, pictura.Error naming the file.
         """
     def starting_at(self, start_step: typing.SupportsInt | typing.SupportsIndex) -> Scenario:
         """
@@ -267,6 +273,28 @@ class Scenario(Map):
     def start_step(self) -> int:
         """
         Of the recording, at which episodes begin.
+        """
+class SceneRecorder:
+    """
+    Records the present episode of a world of a simulator on the CPU as a scene: every step from now on, however it is asked for, for as
+    long as the recorder lives.
+    """
+    def __init__(self, simulator: typing.Any, *, world: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        """
+        Raises pictura.UsageError where there is no such world and where the simulator is on a device.
+        """
+    def scenario(self, *, id: str = '', self_agent: typing.SupportsInt | typing.SupportsIndex = -1) -> Scenario:
+        """
+        The pictura.Scenario of what was driven until now: controlled agents and parked cars that were there as tracks, with the
+        number of their box in the world as id, and lights as recorded ones.
+        
+        self_agent: of the world, whose track becomes the self-driving car's; -1: nobody's. Raises pictura.UsageError for one that was
+        never there.
+        """
+    @property
+    def num_steps(self) -> int:
+        """
+        Steps until now.
         """
 class Camera:
     """
