@@ -188,6 +188,28 @@ def test_a_run_is_saved_loaded_and_replayed(town, tmp_path):
     assert recorder.num_steps == 30, "another episode"
 
 
+@pytest.mark.parametrize("others", ["log", "idm"])
+def test_one_road_user_among_the_recorded_is_an_environment(folder, scene, others):
+    gymnasium = pytest.importorskip("gymnasium")
+    from gymnasium.utils.env_checker import check_env
+
+    env = gymnasium.make("pictura/Log-v0", scene=str(folder / "womd.tfrecord"), start_step=20, others=others)
+    check_env(env.unwrapped, skip_render_check=True)
+    seen, info = env.reset(seed=1)
+    assert seen["ego"].shape == (9,) and not info["active"], "as recorded until the first action"
+    tracks, simulator = scene.tracks(), env.unwrapped.batch.simulator
+    walkers = tracks["type"] == pictura.TRACK_TYPES.index("pedestrian")
+    for step in range(21, 31):
+        seen, reward, terminated, truncated, info = env.step(pictura.IDLE_ACTION)
+        there = tracks["valid"][:, step] & (walkers if others == "idm" else np.arange(12) != scene.sdc_track)
+        np.testing.assert_allclose(feet_of(simulator)[there, :2], tracks["position_m"][there, step, :2], atol=1e-3)
+        assert info["active"] != terminated
+        if terminated:
+            break
+    with pytest.raises(pictura.UsageError, match="lane"):
+        gymnasium.make("pictura/Log-v0", scene=scene, others="lane", disable_env_checker=True)
+
+
 def test_the_documents_code_runs(folder, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = (pathlib.Path(__file__).parents[2] / "docs" / "python.md").read_text()

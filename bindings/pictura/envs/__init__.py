@@ -7,7 +7,7 @@ from pictura.envs.batch import Batch  # noqa: F401
 
 
 def register() -> None:
-    """Registers pictura/Drive-v0 with Gymnasium, as `import pictura` does where that is installed."""
+    """Registers pictura/Drive-v0 and pictura/Log-v0 with Gymnasium, as `import pictura` does where that is installed."""
     from gymnasium.envs.registration import register as register_with_gymnasium
     from gymnasium.envs.registration import registry
 
@@ -18,3 +18,4 @@ def register() -> None:
         entry_point="pictura.envs.gymnasium_env:DriveEnv",
         vector_entry_point="pictura.envs.gymnasium_vector:DriveVectorEnv",
     )
+    register_with_gymnasium(id="pictura/Log-v0", entry_point="pictura.envs.gymnasium_env:LogEnv")

@@ -230,15 +230,15 @@ def checked_render_mode(mode: str | None) -> str | None:
 
 
 class OtherDrivers:
-    """Who drives the agents of a world that a user does not: "lane", "idle" or "random", or a function of observations.
+    """Who drives the agents of a world that a user does not: a controller or its name, or a function of observations.
 
     A function takes the dict of all slots' observations and returns int32 [slots].
     """
 
-    def __init__(self, who: str | Callable[[Mapping[str, Any]], Any], batch: Batch, seed: int) -> None:
+    def __init__(self, who: str | pictura.Controller | Callable[[Mapping[str, Any]], Any], batch: Batch, seed: int) -> None:
         self._batch = batch
         self._policy = who if callable(who) else None
-        self._controller = None if callable(who) else pictura.Controller(who, batch.simulator, seed)
+        self._controller = pictura.Controller(who, batch.simulator, seed) if isinstance(who, str) else who
 
     def step(self, slot: int, action: int) -> dict[str, Any]:
         """One step in which the agent of `slot` does `action` and the others do what they do."""

@@ -45,8 +45,7 @@ class DriveEnv(gymnasium.Env):
         super().reset(seed=seed)
         for _ in range(100):
             self.batch.reset(int(self.np_random.integers(2**63)))
-            state = self.batch._state
-            drivers = np.flatnonzero(self.batch.active & (state["agent_class"] == 0))
+            drivers = self._drivers()
             if len(drivers):
                 self._slot = int(drivers[0])
                 if self.render_mode == "human":
@@ -69,6 +68,10 @@ class DriveEnv(gymnasium.Env):
     def close(self) -> None:
         self.batch.close()
 
+    def _drivers(self) -> np.ndarray:
+        """Slots that may be the one agent of the episode which begins."""
+        return np.flatnonzero(self.batch.active & (self.batch._state["agent_class"] == 0))
+
     def _observation(self) -> Any:
         seen = self.batch.observe(copy=False)
         if isinstance(seen, dict):
@@ -77,3 +80,35 @@ class DriveEnv(gymnasium.Env):
 
     def _info(self) -> dict[str, Any]:
         return {key: value[self._slot] for key, value in self.batch.info().items()}
+
+
+class LogEnv(DriveEnv):
+    """One road user of a recorded scene from start_step on: the self-driving car, or the first of `control`, words that
+    pictura.Scenario.mask takes. others: as recorded ("log"), or vehicles by the intelligent driver model along their recorded
+    paths ("idm"). scene: a name or a pictura.Scenario, whose world it is; its goal is where its record ends.
+
+    Before the first action it is as recorded. Other options are DriveEnv's.
+    """
+
+    def __init__(
+        self,
+        scene: str | pictura.Scenario,
+        *,
+        start_step: int = 10,
+        control: str = "self",
+        others: str = "log",
+        **options: Any,
+    ) -> None:
+        if others not in ("log", "idm"):
+            raise pictura.UsageError(f"others: expected 'log' or 'idm', got '{others}'")
+        scene = pictura.Scenario.load(scene, start_step=start_step) if isinstance(scene, str) else scene.starting_at(start_step)
+        self._tracks = np.flatnonzero(scene.mask(control))
+        super().__init__(scene, scene.num_tracks, others="log", **scene.world(**options))
+        if others == "idm":
+            simulator = self.batch.simulator
+            log, idm = pictura.Controller("log", simulator), pictura.Controller("idm", simulator)
+            vehicles = (scene.tracks()["type"] == pictura.TRACK_TYPES.index("vehicle")) & scene.mask("all").astype(bool)
+            self._others = OtherDrivers(pictura.Controller.shared([(log, None), (idm, vehicles)], simulator), self.batch, 0)
+
+    def _drivers(self) -> np.ndarray:
+        return self._tracks
