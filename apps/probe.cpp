@@ -294,7 +294,7 @@ void add_corner_command(CLI::App& probe) {
   command
       ->add_option("--max-distance", options.search.max_distance_m,
                    "How far before the corner a policy may take over, m; at least 8 m")
-      ->transform(number(8.1, 1000))
+      ->transform(number(8.1, kCornerLead_m))
       ->capture_default_str();
   command
       ->add_option("--min-speed", options.search.min_speed_mps,
@@ -303,7 +303,7 @@ void add_corner_command(CLI::App& probe) {
       ->capture_default_str();
   command
       ->add_option("--range", options.search.user_range_m, "How far before the junction the hidden vehicle may be, m")
-      ->transform(number(1, 1000))
+      ->transform(number(1, kCornerLead_m))
       ->capture_default_str();
   command
       ->add_option("--driver", arguments->evaluation.evaluate.controller,

@@ -206,7 +206,8 @@ TEST_F(Corner, RefusesWhatCannotBe) {
               HasSubstr("more than 85 steps, of which a takeover takes 80, got 85"));
   o = options(2);
   o.search.max_distance_m = 5;
-  EXPECT_THAT(message_of([&] { probe_corner(o); }), HasSubstr("distances from 0 m in ascending order, got 8 and 5"));
+  EXPECT_THAT(message_of([&] { probe_corner(o); }),
+              HasSubstr("distances of 0 to 60 m in ascending order, got 8 and 5"));
 }
 
 // ---- results

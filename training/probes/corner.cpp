@@ -181,9 +181,13 @@ void check(const CornerOptions& options) {
     fail_usage("probe: expected more than {} steps, of which a takeover takes {}, got {}",
                kTakeoverSteps + options.sample_steps, kTakeoverSteps, options.worlds.steps);
   }
-  if (!(search.min_distance_m >= 0 && search.max_distance_m > search.min_distance_m)) {
-    fail_usage("probe: expected distances from 0 m in ascending order, got {} and {}", search.min_distance_m,
-               search.max_distance_m);
+  if (!(search.min_distance_m >= 0 && search.max_distance_m > search.min_distance_m &&
+        search.max_distance_m <= kCornerLead_m)) {
+    fail_usage("probe: expected distances of 0 to {} m in ascending order, got {} and {}", kCornerLead_m,
+               search.min_distance_m, search.max_distance_m);
+  }
+  if (!(search.user_range_m > 0 && search.user_range_m <= kCornerLead_m)) {
+    fail_usage("probe: expected a range of up to {} m, got {}", kCornerLead_m, search.user_range_m);
   }
 }
 
