@@ -30,7 +30,7 @@ class CornerProbe {
     results_.maps = run_.maps();
     for (const auto& map : run_.maps()) {
       corners_.push_back(find_blind_corners(*map->road, map->geometry.walls));
-      sights_.push_back(std::make_unique<LineOfSight>(map->geometry.walls));
+      sights_.emplace_back(map->geometry.walls);
     }
   }
 
@@ -63,7 +63,7 @@ class CornerProbe {
       const auto map = static_cast<size_t>(frame.worlds[world].map);
       bool is_kept = false;
       for (const CornerState& state : find_corner_states(frame, world, *run_.maps()[map]->road, corners_[map],
-                                                         *sights_[map], run_.cameras().rig, options_.search)) {
+                                                         sights_[map], run_.front_camera(), options_.search)) {
         if (state.user < 0) {
           empty_.push_back(state);
           continue;
@@ -124,7 +124,7 @@ class CornerProbe {
   }
 
   void take_over() {
-    TakeoverWorlds worlds(run_, options_);
+    TakeoverWorlds worlds(run_, options_, sights_);
     const auto pass = static_cast<size_t>(takeover_pass(run_.device()));
     const size_t batch = (static_cast<size_t>(options_.batch) + pass - 1) / pass * pass, count = results_.pairs.size(),
                  num_policies = results_.policies.size(), of_pair = 2 * kCornerCases * num_policies;
@@ -168,8 +168,8 @@ class CornerProbe {
   const Stopwatch since_start_;
   ProbeRun run_;
   DrivenScenes scenes_;
-  std::vector<BlindCorners> corners_;                 // [maps]
-  std::vector<std::unique_ptr<LineOfSight>> sights_;  // [maps]
+  std::vector<BlindCorners> corners_;  // [maps]
+  std::vector<LineOfSight> sights_;    // [maps]
   std::vector<Found> hidden_;
   std::vector<CornerState> empty_;
 };

@@ -51,16 +51,9 @@ BlindCorners find_blind_corners(const RoadMap& map, Span<const WallFace> walls) 
   return corners;
 }
 
-Vec3 eye_of(const View& view, const Rig& rig) {
-  const Vec3 at_m = rig.cameras[0].position_m;
-  const Vec2 forward{view.cos_heading, view.sin_heading};
-  const Vec2 aside = forward * at_m.x + left_normal(forward) * at_m.y;
-  return view.origin_m + Vec3{aside.x, aside.y, at_m.z};
-}
-
 std::vector<CornerState> find_corner_states(const ProbeFrame& frame, size_t world, const RoadMap& map,
                                             const BlindCorners& corners, const LineOfSight& line_of_sight,
-                                            const Rig& rig, const CornerSearch& search) {
+                                            const PinholeCamera& front, const CornerSearch& search) {
   const WorldSpec& spec = frame.worlds[world];
   const int32_t first = frame.slot_begin[world];
   const auto box_of = [&](int32_t agent) -> const AgentBox& {
@@ -86,6 +79,7 @@ std::vector<CornerState> find_corner_states(const ProbeFrame& frame, size_t worl
                       .distance_m = distance_m,
                       .speed_mps = frame.speed_mps[slot],
                       .view = view};
+    const Vec3 eye_m = place_camera(front, view).position_m;
     bool is_empty = true;
     float nearest_m = search.user_range_m;
     for (int32_t other = 0; other < spec.num_agents; ++other) {
@@ -101,7 +95,7 @@ std::vector<CornerState> find_corner_states(const ProbeFrame& frame, size_t worl
       is_empty = false;
       const bool comes = frame.is_ego(its_slot) && frame.speed_mps[its_slot] >= search.min_speed_mps;
       if (!comes || its_distance_m > nearest_m) continue;
-      if (!line_of_sight.is_hidden(eye_of(view, rig), box_of(other))) continue;
+      if (!line_of_sight.is_hidden(eye_m, box_of(other))) continue;
       nearest_m = its_distance_m;
       state.user = other;
     }

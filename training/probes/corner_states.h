@@ -5,7 +5,7 @@
 #include <map>
 #include <vector>
 
-#include "pictura/common/camera.h"
+#include "pictura/common/raster/camera.h"
 #include "pictura/map/line_of_sight.h"
 #include "pictura/map/road_map.h"
 
@@ -43,15 +43,12 @@ struct CornerState {
   View view;                               // of the ego; its indices are those of its frame
 };
 
-/// The eye of a view: its front camera, the first of the rig.
-Vec3 eye_of(const View& view, const Rig& rig);
-
 /// Of a world of a frame. Somebody comes hidden: of the vehicles that drive on the corner's hidden lanes, in range, the
-/// nearest one whom walls hide from the eye. Nobody comes: no vehicle or cyclist is on these lanes in range, or in the
-/// junction.
+/// nearest one whom walls hide from the ego's front camera, `front`. Nobody comes: no vehicle or cyclist is on these
+/// lanes in range, or in the junction.
 std::vector<CornerState> find_corner_states(const ProbeFrame& frame, size_t world, const RoadMap& map,
                                             const BlindCorners& corners, const LineOfSight& line_of_sight,
-                                            const Rig& rig, const CornerSearch& search);
+                                            const PinholeCamera& front, const CornerSearch& search);
 
 struct CornerPair {
   CornerState hidden, empty;

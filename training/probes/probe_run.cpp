@@ -9,6 +9,7 @@
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
+#include "pictura/common/raster/check.h"
 #include "pictura/simulator/rules/dynamics.h"
 #include "pictura/training/observation.h"
 #include "pictura/training/probes/observation_rows.h"
@@ -210,6 +211,7 @@ ProbeRun::ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptio
     if (session->reads_images() && !has_cameras) cameras_ = session->renderer_config();
     has_cameras |= session->reads_images();
   }
+  front_camera_ = pinhole_cameras(cameras_.rig)[0];
   measuring_ = make_renderer("auto", {.rig = cameras_.rig, .device = device_, .num_threads = worlds.num_threads});
   upload_maps(maps_, {}, measuring_.get());
 

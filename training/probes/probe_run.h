@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "pictura/common/raster/camera.h"
 #include "pictura/common/renderer.h"
 #include "pictura/simulator/simulator.h"
 #include "pictura/training/phase_timer.h"
@@ -120,6 +121,8 @@ class ProbeRun final : public EvaluationObserver {
                                 const std::vector<VisibilityQuery>& queries);
   /// What that policy's images are drawn with.
   const RendererConfig& cameras() const { return cameras_; }
+  /// The first of them, in the ego's frame.
+  const PinholeCamera& front_camera() const { return front_camera_; }
   const CompiledMaps& maps() const { return maps_; }
   Renderer& measuring() { return *measuring_; }
   Device device() const { return device_; }
@@ -154,6 +157,7 @@ class ProbeRun final : public EvaluationObserver {
   std::map<bool, std::unique_ptr<ObservedWorlds>> observed_;  // by whether auxiliary slots are filled
   std::vector<Participant> participants_;
   RendererConfig cameras_;
+  PinholeCamera front_camera_;
   std::unique_ptr<Renderer> measuring_;
   std::function<void(const ProbeFrame&)> sample_;
   Watch watch_;

@@ -6,6 +6,7 @@
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
+#include "pictura/common/raster/camera.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/simulator/rules/observe.h"
 #include "pictura/training/probes/corner_states.h"
@@ -16,14 +17,6 @@
 namespace pictura {
 
 namespace {
-
-// Of logits [kNumActions] in place.
-void make_log_probabilities(float* logits) {
-  const float largest = *std::max_element(logits, logits + kNumActions);
-  double sum = 0;
-  for (int action = 0; action < kNumActions; ++action) sum += std::exp(static_cast<double>(logits[action] - largest));
-  for (int action = 0; action < kNumActions; ++action) logits[action] -= largest + static_cast<float>(std::log(sum));
-}
 
 Command to_be_at(const DrivenState& state) {
   return {.kind = CommandKind::kinematic_state,
@@ -55,13 +48,11 @@ struct TakeoverWorlds::Worlds {
   std::vector<View> views;           // [starts] of the egos in the present state
 };
 
-TakeoverWorlds::TakeoverWorlds(ProbeRun& run, const ProbeOptions& options) : run_(run), options_(options) {
+TakeoverWorlds::TakeoverWorlds(ProbeRun& run, const ProbeOptions& options, const std::vector<LineOfSight>& sights)
+    : run_(run), options_(options), sights_(sights) {
   const CompiledMaps& maps = run_.maps();
   std::vector<std::shared_ptr<const RoadMap>> roads;
-  for (const auto& map : maps) {
-    roads.push_back(map->road);
-    sights_.push_back(std::make_unique<LineOfSight>(map->geometry.walls));
-  }
+  for (const auto& map : maps) roads.push_back(map->road);
   MapOptions open = maps[0]->options;
   open.walls = false;
   open_maps_ = compile_maps(roads, open, options.worlds.num_threads);
@@ -213,11 +204,11 @@ bool TakeoverWorlds::look(Worlds* worlds, size_t policy, const std::vector<Takeo
     if (start.user < 0) continue;
 
     const AgentBox user = start.scene->box_at(start.step + step, start.user);
-    const LineOfSight& sight = *sights_[static_cast<size_t>(start.scene->world.map)];
+    const LineOfSight& sight = sights_[static_cast<size_t>(start.scene->world.map)];
     const Span<const AgentBox> its_boxes = Span<const AgentBox>(boxes).subspan(
         static_cast<size_t>(box_begin[i]), static_cast<size_t>(box_begin[i + 1] - box_begin[i]));
     const auto ego = static_cast<size_t>(start.ego);
-    if (one.sight_step < 0 && !sight.is_hidden(eye_of(view, run_.cameras().rig), user)) {
+    if (one.sight_step < 0 && !sight.is_hidden(place_camera(run_.front_camera(), view).position_m, user)) {
       one.sight_step = step;
       one.sight_distance_m = length((user.center_m - its_boxes[ego].center_m).xy());
     }
@@ -249,15 +240,15 @@ std::vector<int32_t> TakeoverWorlds::decide(Worlds* worlds, size_t policy, const
   const PolicyInput input{
       .observations = rows, .scene = &simulator.scene(), .views = views.span(), .full_chunk = takeover_pass(device)};
   run_.session(policy).evaluate(input, run_.renderer(policy), span_of<float>(logits), span_of<float>(values));
-  std::vector<float> its_logits = host_copy(span_of<const float>(logits), device);
+  const at::Tensor all = at::log_softmax(logits, 1);
+  const std::vector<float> log_probs = host_copy(span_of<const float>(all), device);
   std::vector<int32_t> actions;
   for (size_t i = 0; i < starts.size(); ++i) {
-    float* const one = &its_logits[i * kNumActions];
+    const float* const one = &log_probs[i * kNumActions];
     if (options_.worlds.argmax) {
       actions.push_back(most_likely_action(one, kNumActions));
       continue;
     }
-    make_log_probabilities(one);
     const ActionKey key{options_.worlds.seed, starts[i].scene->world.global_world, static_cast<uint32_t>(starts[i].ego),
                         0, static_cast<uint32_t>(starts[i].step + step)};
     actions.push_back(draw_action(one, kNumActions, key));

@@ -15,8 +15,8 @@ namespace pictura {
 class ProbeRun;
 struct ProbeOptions;
 
-/// Of 0.1 s.
 constexpr int kTakeoverSteps = 80;
+constexpr double kTakeoverStep_s = 0.1;
 
 /// Runs that go through a network at once, always, each at its place: equal inputs give equal bits.
 constexpr int takeover_pass(Device device) { return device.is_host() ? 8 : 256; }
@@ -46,8 +46,8 @@ struct Takeover {
 /// Runs takeovers in worlds of the probe's maps, with their walls and without them.
 class TakeoverWorlds {
  public:
-  /// After run.run(), which drives the scenes. The run and the options must outlive it.
-  TakeoverWorlds(ProbeRun& run, const ProbeOptions& options);
+  /// After run.run(), which drives the scenes. sights: [maps]. All must outlive it.
+  TakeoverWorlds(ProbeRun& run, const ProbeOptions& options, const std::vector<LineOfSight>& sights);
   ~TakeoverWorlds();
 
   /// [starts, policies] Each start is a world of its own that goes through its scene from the beginning: all agents are
@@ -67,8 +67,8 @@ class TakeoverWorlds {
 
   ProbeRun& run_;
   const ProbeOptions& options_;
+  const std::vector<LineOfSight>& sights_;
   CompiledMaps open_maps_;                                           // the same without walls
-  std::vector<std::unique_ptr<LineOfSight>> sights_;                 // [maps]
   std::map<std::pair<bool, bool>, std::unique_ptr<Worlds>> worlds_;  // by walls, and whether auxiliary slots are filled
 };
 
