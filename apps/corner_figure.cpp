@@ -14,7 +14,7 @@ namespace pictura {
 
 namespace {
 
-constexpr double kStep_s = 0.1, kNothing = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 constexpr int kDotSteps = 5;  // between dots of a way
 constexpr int kTopSize_px = 560, kGap_px = 8;
 constexpr float kMargin_m = 8;
@@ -46,7 +46,7 @@ std::vector<PlotCell> reveal_strip(const CornerResults& results, bool walls) {
   const int32_t first = reveals[reveals.size() / 10], last = reveals[reveals.size() - 1 - reveals.size() / 10];
   std::vector<PlotCell> strip;
   for (int32_t k = 0; k <= kTakeoverSteps; ++k)
-    strip.push_back({kStep_s * k, k >= first && k <= last ? kRevealColor : kOtherColor});
+    strip.push_back({kTakeoverStep_s * k, k >= first && k <= last ? kRevealColor : kOtherColor});
   return strip;
 }
 
@@ -64,7 +64,7 @@ void draw_means(const CornerResults& results, const std::vector<CornerRow>& rows
         for (size_t k = 0; k < row.speed_mps.size(); ++k) {
           const Estimate& speed = row.speed_mps[k];
           const bool has_band = std::isfinite(speed.half_width_95);
-          series.x.push_back(kStep_s * static_cast<double>(k));
+          series.x.push_back(kTakeoverStep_s * static_cast<double>(k));
           series.y.push_back(row.driving[k] > 0 ? speed.value : kNothing);
           series.low.push_back(has_band ? speed.value - speed.half_width_95 : kNothing);
           series.high.push_back(has_band ? speed.value + speed.half_width_95 : kNothing);
@@ -140,12 +140,12 @@ RgbImage speeds_of(const CornerResults& results, size_t pair, bool walls) {
     const Takeover& run = results.takeover(pair, walls, CornerCase::hidden, policy);
     PlotSeries series{.name = results.policies[policy].name};
     for (size_t k = 0; k < run.speed_mps.size(); ++k) {
-      series.x.push_back(kStep_s * static_cast<double>(k));
+      series.x.push_back(kTakeoverStep_s * static_cast<double>(k));
       series.y.push_back(static_cast<double>(run.speed_mps[k]));
     }
     panel.series.push_back(std::move(series));
-    if (run.input_step >= 0) panel.marks.push_back({kStep_s * run.input_step, "x"});
-    if (walls && run.sight_step >= 0) panel.marks.push_back({kStep_s * run.sight_step, "o"});
+    if (run.input_step >= 0) panel.marks.push_back({kTakeoverStep_s * run.input_step, "x"});
+    if (walls && run.sight_step >= 0) panel.marks.push_back({kTakeoverStep_s * run.sight_step, "o"});
   }
   return draw_plots({panel}, {.panel_width_px = kTopSize_px, .panel_height_px = 280, .columns = 1});
 }

@@ -211,11 +211,7 @@ void add_map_command(CLI::App& app) {
   constexpr double kFarthest_m = 1e8;  // from the origin of a map projection
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("map", "Print a map's properties, list its elements, draw it from above");
-  command
-      ->add_option("MAP", arguments->map,
-                   "A .xodr file, a town's name, procedural[:SEED], or a recorded scene: FILE.json, FILE.bin, "
-                   "FILE.scenario, FILE.tfrecord[#K] or FOLDER[#K], with a number or a scenario's id as K")
-      ->required();
+  add_map_or_scene(command, &arguments->map);
   command
       ->add_option("--png", arguments->png,
                    "Draw lanes, markings, edges, lights, signs, crosswalks, parking and building lines into this file")

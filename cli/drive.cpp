@@ -6,6 +6,7 @@
 #include "pictura/backends/make_controller.h"
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
+#include "pictura/cli/file_options.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/reported_map.h"
 #include "pictura/common/error.h"
@@ -49,11 +50,7 @@ void add_world_options(CLI::App* command, WorldOptions* options_out) {
 
 void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_out, std::string* policy_out,
                          BackendOptions* backends_out) {
-  command
-      ->add_option("MAP", world_out->map,
-                   "A .xodr file, a town's name, procedural[:SEED], or a recorded scene: FILE.json, FILE.bin, "
-                   "FILE.scenario, FILE.tfrecord[#K] or FOLDER[#K], with a number or a scenario's id as K")
-      ->required();
+  add_map_or_scene(command, &world_out->map);
   add_world_options(command, world_out);
   command
       ->add_option("--control", world_out->controlled,

@@ -6,6 +6,14 @@
 
 namespace pictura {
 
+void add_map_or_scene(CLI::App* command, std::string* map_out) {
+  command
+      ->add_option("MAP", *map_out,
+                   "A .xodr file, a town's name, procedural[:SEED], or a recorded scene: FILE.json, FILE.bin, "
+                   "FILE.scenario, FILE.tfrecord[#K] or FOLDER[#K], with a number or a scenario's id as K")
+      ->required();
+}
+
 CLI::Validator file_ending(const std::string& ending) {
   auto complaint = [ending](const std::string& text) -> std::string {
     const std::string own = std::filesystem::path(text).extension().string();

@@ -1,4 +1,4 @@
-// Options that name files to write.
+// Options that name files.
 #pragma once
 
 #include <string>
@@ -10,6 +10,9 @@ namespace pictura {
 /// Takes names that end in `ending`, as .png, or in none at all, as devices do: no other format is written under a name
 /// that promises it.
 CLI::Validator file_ending(const std::string& ending);
+
+/// Adds MAP, which may be a recorded scene.
+void add_map_or_scene(CLI::App* command, std::string* map_out);
 
 /// Lets no option of a command and its subcommands take an empty text, which would count as not given.
 void refuse_empty_values(CLI::App* command);

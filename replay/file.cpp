@@ -70,14 +70,14 @@ void put_body(const ReplayBody& body, std::string* bytes_inout) {
   put_number(static_cast<int32_t>(body.agent_class), bytes_inout);
   for (const int32_t size_cm : {body.length_cm, body.width_cm, body.height_cm}) put_number(size_cm, bytes_inout);
 }
-AgentClass class_from(int32_t number) {
-  PICTURA_CHECK(number >= 0 && number < kNumAgentClasses, "expected a class of 0 to {}, got {}", kNumAgentClasses - 1,
-                number);
+AgentClass class_from(std::string_view where, int32_t number) {
+  PICTURA_CHECK(number >= 0 && number < kNumAgentClasses, "{}: expected a class of 0 to {}, got {}", where,
+                kNumAgentClasses - 1, number);
   return static_cast<AgentClass>(number);
 }
 ReplayBody next_body(NumberReader* reader) {
   ReplayBody body;
-  body.agent_class = class_from(reader->next());
+  body.agent_class = class_from("episodes", reader->next());
   for (int32_t* size_cm : {&body.length_cm, &body.width_cm, &body.height_cm}) *size_cm = reader->next();
   return body;
 }
@@ -229,7 +229,7 @@ ReplayCase case_from(const Json& json, const Replay& replay) {
   }
   if (const Json& box = json.at("inserted"); !box.is_null()) {
     ReplayBox& inserted = probed.inserted.emplace();
-    inserted.body.agent_class = class_from(box.at("class").get<int32_t>());
+    inserted.body.agent_class = class_from("header: case", box.at("class").get<int32_t>());
     for (const auto& [name, value] : {std::pair{"length_cm", &inserted.body.length_cm},
                                       {"width_cm", &inserted.body.width_cm},
                                       {"height_cm", &inserted.body.height_cm},

@@ -60,7 +60,7 @@ SceneRecorder::SceneRecorder(Simulator& simulator, int world)
   if (world < 0 || world_ >= simulator.worlds().size()) {
     fail_usage("expected a world to record in [0, {}), got {}", simulator.worlds().size(), world);
   }
-  for (size_t i = 0; i < world_; ++i) first_slot_ += simulator.worlds()[i].num_agents;
+  first_slot_ = simulator.slots().slot_begin[world_];
   episode_ = simulator.episode_index()[world_];
   first_step_ = simulator.episode_step()[world_];
   const Span<const AgentBox> now = boxes();

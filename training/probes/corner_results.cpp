@@ -14,7 +14,6 @@ namespace pictura {
 
 namespace {
 
-constexpr double kStep_s = 0.1;
 constexpr int kDecelerationSteps = 20;
 constexpr std::array<double, 3> kQuantiles{0.1, 0.5, 0.9};
 constexpr std::array<const char*, 3> kQuantileNames{"reveal_s_p10", "reveal_s_p50", "reveal_s_p90"};
@@ -64,7 +63,7 @@ CornerRow runs_row(const CornerResults& results, bool walls, CornerCase its_case
     const std::optional<Reveal> reveal = reveal_of(results, pair, walls, its_case, policy);
     if (!reveal) continue;
     sums.add(scene, *reveal);
-    reveals_s.push_back(kStep_s * reveal->step);
+    reveals_s.push_back(kTakeoverStep_s * reveal->step);
   }
   row.revealed = sums.speed_mps.count();
   row.scenes = sums.speed_mps.scenes();
@@ -128,7 +127,7 @@ Json to_json(const CornerRow& row, const CornerResults& results) {
 
 std::string text_of(const std::optional<float>& number) { return number ? fmt::format("{:.3f}", *number) : ""; }
 
-std::string seconds_of(int32_t step) { return step < 0 ? "" : fmt::format("{:.1f}", kStep_s * step); }
+std::string seconds_of(int32_t step) { return step < 0 ? "" : fmt::format("{:.1f}", kTakeoverStep_s * step); }
 
 }  // namespace
 
@@ -151,7 +150,7 @@ std::optional<Reveal> reveal_of(const CornerResults& results, size_t pair, bool 
   const size_t later = at + kDecelerationSteps;
   if (later < run.speed_mps.size() && std::isfinite(run.speed_mps[later])) {
     reveal.deceleration_mps2 =
-        (run.speed_mps[at] - run.speed_mps[later]) / static_cast<float>(kStep_s * kDecelerationSteps);
+        (run.speed_mps[at] - run.speed_mps[later]) / static_cast<float>(kTakeoverStep_s * kDecelerationSteps);
   }
   return reveal;
 }
@@ -184,7 +183,7 @@ void write_corner_cases(const std::string& path, const CornerResults& results) {
       "run,pair,walls,case,policy,scene,map,driver,step,ego,user,corner_distance_m,start_speed_mps,lasted_s,ended_by,"
       "input_s,sight_s,reveal_s,reveal_distance_m,reveal_corner_m,reveal_speed_mps,approach_mps,deceleration_mps2";
   for (int k = 0; k <= kTakeoverSteps; ++k)
-    fmt::format_to(std::back_inserter(header), ",speed_mps_{:.1f}", kStep_s * k);
+    fmt::format_to(std::back_inserter(header), ",speed_mps_{:.1f}", kTakeoverStep_s * k);
   file.write(header + '\n');
   size_t run = 0;
   for (size_t pair = 0; pair < results.pairs.size(); ++pair) {
@@ -201,7 +200,7 @@ void write_corner_cases(const std::string& path, const CornerResults& results) {
                           kWallNames[walls ? 0 : 1], name_of(its_case), csv_quoted(results.policies[policy].name),
                           state.scene, csv_quoted(results.setting.maps[static_cast<size_t>(state.map)]),
                           csv_quoted(results.driver_name(state.driver)), state.step, state.ego, state.user,
-                          state.distance_m, state.speed_mps, kStep_s * one.steps, one.ended_by,
+                          state.distance_m, state.speed_mps, kTakeoverStep_s * one.steps, one.ended_by,
                           seconds_of(one.input_step), seconds_of(one.sight_step));
           if (reveal) {
             fmt::format_to(std::back_inserter(row), ",{},{},{:.3f},{:.3f},{:.3f},{}", seconds_of(reveal->step),
@@ -238,11 +237,8 @@ std::string corner_summary_json(const CornerResults& results, const std::vector<
                {"max_distance_m", search.max_distance_m},
                {"min_speed_mps", search.min_speed_mps},
                {"user_range_m", search.user_range_m}};
-  add_setting(results, &json);
-  Json rows_json = Json::array();
-  for (const CornerRow& row : rows) rows_json.push_back(to_json(row, results));
-  json["rows"] = std::move(rows_json);
-  return json.dump(1);
+  return summary_text(results, std::move(json), rows,
+                      [&results](const CornerRow& row) { return to_json(row, results); });
 }
 
 }  // namespace pictura

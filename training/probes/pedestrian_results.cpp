@@ -109,11 +109,8 @@ std::string pedestrian_summary_json(const PedestrianResults& results, const std:
                {"hider_range_m", results.hider_range_m},
                {"min_speed_mps", results.min_speed_mps},
                {"height_m", results.height_m}};
-  add_setting(results, &json);
-  Json rows_json = Json::array();
-  for (const PedestrianRow& row : rows) rows_json.push_back(to_json(row, results));
-  json["rows"] = std::move(rows_json);
-  return json.dump(1);
+  return summary_text(results, std::move(json), rows,
+                      [&results](const PedestrianRow& row) { return to_json(row, results); });
 }
 
 }  // namespace pictura

@@ -15,4 +15,14 @@ Json policies_json(const ProbeResults& results, const std::vector<int32_t>& driv
 /// Adds the worlds, who drove them and how, and how long it took.
 void add_setting(const ProbeResults& results, Json* json_out);
 
+/// A summary: what it begins with, the setting, and to_json(row) of each row.
+template <typename Row, typename ToJson>
+std::string summary_text(const ProbeResults& results, Json json, const std::vector<Row>& rows, const ToJson& to_json) {
+  add_setting(results, &json);
+  Json rows_json = Json::array();
+  for (const Row& row : rows) rows_json.push_back(to_json(row));
+  json["rows"] = std::move(rows_json);
+  return json.dump(1);
+}
+
 }  // namespace pictura

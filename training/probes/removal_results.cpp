@@ -138,11 +138,8 @@ std::string removal_summary_json(const RemovalResults& results, const std::vecto
                {"cases_asked", results.removals_asked},
                {"cases_file", cases_file.empty() ? Json(nullptr) : Json(cases_file)},
                {"range_m", results.range_m}};
-  add_setting(results, &json);
-  Json rows_json = Json::array();
-  for (const RemovalRow& row : rows) rows_json.push_back(to_json(row, results));
-  json["rows"] = std::move(rows_json);
-  return json.dump(1);
+  return summary_text(results, std::move(json), rows,
+                      [&results](const RemovalRow& row) { return to_json(row, results); });
 }
 
 }  // namespace pictura
