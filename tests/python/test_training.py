@@ -225,6 +225,7 @@ def test_removal_is_the_commands(trained, tmp_path):
     assert (tmp_path / "out" / "removal.png").exists() and json.loads((tmp_path / "out" / "summary.json").read_text()) == theirs
 
 
+@pytest.mark.parametrize("trained", ["vector"], indirect=True)  # minutes with images; what both do is compared above
 def test_pedestrian_is_the_commands(trained, tmp_path):
     _, folder, _, _ = trained
     done, cases = [], tmp_path / "cases.csv"
@@ -247,6 +248,7 @@ def test_pedestrian_is_the_commands(trained, tmp_path):
     assert sorted(each.name for each in (tmp_path / "out").iterdir()) == ["cases.csv", *drawn, "pedestrian.png", "summary.json"]
 
 
+@pytest.mark.parametrize("trained", ["vector"], indirect=True)  # minutes with images; what both do is compared above
 def test_corner_is_the_commands(trained, tmp_path):
     _, folder, _, _ = trained
     done, cases = [], tmp_path / "cases.csv"
