@@ -122,11 +122,12 @@ function(pictura_test_properties out timeout_s labels)
   set(${out} "${properties}" PARENT_SCOPE)
 endfunction()
 
-# pictura_add_test(NAME SOURCES... LINK libs... [LABELS labels...] [PRECOMPILED header] [OPTIMIZED]): GoogleTest binary
-# NAME_test, every test its own ctest entry, with PICTURA_DATA set to ../shared/data if that exists and the caller has not
-# set it. OPTIMIZED: for tests that compute much themselves.
+# pictura_add_test(NAME SOURCES... LINK libs... [LABELS labels...] [PRECOMPILED header] [WHOLE suites...] [OPTIMIZED]):
+# GoogleTest binary NAME_test, every test its own ctest entry, with PICTURA_DATA set to ../shared/data if that exists and
+# the caller has not set it. WHOLE: suites whose tests share results that are costly to make, an entry each. OPTIMIZED: for
+# tests that compute much themselves.
 function(pictura_add_test name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "OPTIMIZED" "PRECOMPILED" "SOURCES;LINK;LABELS")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "OPTIMIZED" "PRECOMPILED" "SOURCES;LINK;LABELS;WHOLE")
   find_package(GTest REQUIRED)
   include(GoogleTest)
   add_executable(${name}_test ${arg_SOURCES})
@@ -146,7 +147,17 @@ function(pictura_add_test name)
     pictura_leave_unoptimized(${name}_test)
   endif()
   pictura_test_properties(properties 900 "${arg_LABELS}")
-  gtest_discover_tests(${name}_test DISCOVERY_TIMEOUT 120 PROPERTIES ${properties})
+  set(filter)
+  foreach(suite ${arg_WHOLE})
+    add_test(NAME ${suite} COMMAND ${name}_test --gtest_filter=${suite}.*)
+    set_tests_properties(${suite} PROPERTIES ${properties} COST 400)
+    list(APPEND filter ${suite}.*)
+  endforeach()
+  if(filter)
+    list(JOIN filter ":" filter)
+    set(filter TEST_FILTER "-${filter}")
+  endif()
+  gtest_discover_tests(${name}_test ${filter} DISCOVERY_TIMEOUT 120 PROPERTIES ${properties})
 endfunction()
 
 # The environment of tests. Maps are not cached, so that the importer just built is tested. Idle threads sleep: spinning

@@ -4,6 +4,7 @@ Run by ctest, one entry per class: python3 command_test.py PICTURA [unittest arg
 """
 
 import base64
+import concurrent.futures
 import csv
 import fcntl
 import itertools
@@ -836,9 +837,7 @@ class Ranks(CommandCase):
         return processes
 
     def test_a_rank_that_is_killed_or_stopped_ends_the_others_by_name(self):
-        for victim, how in (
-            (1, signal.SIGKILL), (0, signal.SIGKILL), (1, signal.SIGSTOP), (0, signal.SIGSTOP),
-        ):  # fmt: skip
+        def end(victim, how):
             out = self.folder / f"{victim}-{how}"
             processes = self.long_run(out)
             processes[victim].send_signal(how)
@@ -853,6 +852,12 @@ class Ranks(CommandCase):
             updates = int((out / "progress.csv").read_text().splitlines()[-1].split(",")[0])
             report = self.json_of(*self.SETTINGS, "--set", f"train.updates={updates + 2}", "--out", out, "--resume")
             self.assertEqual(report["updates"], updates + 2)
+
+        # At once, since half a minute passes until a stopped rank is missed.
+        cases = [(victim, how) for victim in (0, 1) for how in (signal.SIGKILL, signal.SIGSTOP)]
+        with concurrent.futures.ThreadPoolExecutor() as pool:
+            for case in [pool.submit(end, *each) for each in cases]:
+                case.result()
 
     def test_a_request_to_end_that_one_gets_ends_both_after_the_same_update(self):
         for asked in (0, 1):
