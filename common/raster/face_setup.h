@@ -65,9 +65,15 @@ PICTURA_HD inline bool is_quad_visible(const ImageSetting& setting, const Screen
          !setting.occluders.occludes(setting.camera, bounds);
 }
 
-/// Completes a face with the fields that make_screen_face and make_quad_face leave unset.
+/// Completes a face that make_screen_face or make_quad_face made with what depends on its primitive.
 PICTURA_HD inline ScreenFace complete_face(const ScreenFace& face, PrimitiveRef primitive, int32_t edge_begin) {
   ScreenFace whole = face;
+  if (kind_of(primitive.object_id) == kStripKind) {
+    whole.inverse_depth_low *= 1.0f / kWidenedDepth;
+    whole.inverse_depth_high *= kWidenedDepth;
+  } else {
+    whole.plane_distance_m = 0.0f;
+  }
   whole.edge_begin = edge_begin;
   whole.object_id = primitive.object_id;
   whole.class_id = primitive.class_id;

@@ -30,9 +30,9 @@ struct alignas(16) ScreenFace {
   // Inverse depth at screen point (x, y): inverse_depth_x * x + inverse_depth_y * y + inverse_depth_0.
   float inverse_depth_x = 0, inverse_depth_y = 0, inverse_depth_0 = 0;
   uint32_t object_id = 0;  // of its primitive, see common/raster/visibility.h
-  // Range of the inverse depth over the face's corners.
+  // Range of the inverse depth over the face's corners, of strips widened by kWidenedDepth.
   float inverse_depth_low = 0, inverse_depth_high = 0;
-  float plane_distance_m = 0;  // from the camera to the face's plane, along its normal: upwards for strips
+  float plane_distance_m = 0;  // of strips: how far their plane is above the camera, along its normal; of solids 0
   uint32_t color_bytes = 0;    // to_bytes(color), used by devices
   Rgb color;
 
@@ -118,7 +118,7 @@ PICTURA_HD inline void set_bounds(const PinholeCamera& camera, const Frustum& f,
 }
 
 /// Projects a clipped face (camera coordinates) of at most kMaxCorners corners, which lies in `plane`. Calls store_edge
-/// as make_edges does, and sets all of face_out except edge_begin and the members of its primitive. False if it covers
+/// as make_edges does, and sets all of face_out but what complete_face() sets. False if it covers
 /// nothing.
 template <int kMaxCorners, typename Corners, typename StoreEdge>
 PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Frustum& f, const Corners& polygon,
@@ -203,11 +203,6 @@ PICTURA_HD inline void make_quad_face(const PinholeCamera& camera, const Frustum
 /// 1 / depth of a face's plane at a screen point; negative where the plane is behind the camera.
 PICTURA_HD inline float inverse_depth(const ScreenFace& face, Vec2 at_px) {
   return face.inverse_depth_0 + face.inverse_depth_x * at_px.x + face.inverse_depth_y * at_px.y;
-}
-
-/// Depth (camera z) of a face at a screen point, clamped to the depths of its corners.
-PICTURA_HD inline float face_depth_m(const ScreenFace& face, Vec2 at_px) {
-  return 1.0f / clamp(inverse_depth(face, at_px), face.inverse_depth_low, face.inverse_depth_high);
 }
 
 }  // namespace pictura

@@ -136,9 +136,7 @@ PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip) {
 
 /// Whether a face is a strip that is seen from below. It is in front of solids that stand on it, also of those that are
 /// nearer, because they reach through it.
-PICTURA_HD inline bool is_strip_from_below(const ScreenFace& face) {
-  return is_strip(face) && face.plane_distance_m > 0.0f;
-}
+PICTURA_HD inline bool is_strip_from_below(const ScreenFace& face) { return face.plane_distance_m > 0.0f; }
 
 /// How many times the inverse depth of a strip's point that of a solid which stands on it can be, on one ray from an
 /// eye so far below the strip's plane: solids reach kThroughStrip_m through it. Infinite where the eye is within that.
@@ -150,9 +148,13 @@ PICTURA_HD inline float nearest_standing(float plane_distance_m) {
 /// 1 / depth of a face at a screen point, clamped to the depths of its corners; for strips that range is widened by
 /// kWidenedDepth. Used to compare faces.
 PICTURA_HD inline float clamped_inverse_depth(const ScreenFace& face, Vec2 at_px) {
-  const float factor = is_strip(face) ? kWidenedDepth : 1.0f,
-              inverse_factor = is_strip(face) ? 1.0f / kWidenedDepth : 1.0f;
-  return clamp(inverse_depth(face, at_px), face.inverse_depth_low * inverse_factor, face.inverse_depth_high * factor);
+  return clamp(inverse_depth(face, at_px), face.inverse_depth_low, face.inverse_depth_high);
+}
+
+/// Depth (camera z) of a face at a screen point, clamped to the depths of its corners.
+PICTURA_HD inline float face_depth_m(const ScreenFace& face, Vec2 at_px) {
+  const float widened = is_strip(face) ? kWidenedDepth : 1.0f;
+  return 1.0f / clamp(inverse_depth(face, at_px), face.inverse_depth_low * widened, face.inverse_depth_high / widened);
 }
 
 /// Whether two strips are on one level at a screen point: at the nearer one's depth, their planes are at nearly the

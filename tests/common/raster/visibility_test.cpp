@@ -216,12 +216,11 @@ TEST(Order, WhatStandsOnAStripIsInFrontOfItEvenWhereItDipsIn) {
   EXPECT_FALSE(stands_on(extent_of(below), extent_of(mark)));
 }
 
-// A face without edges, seen from above, whose plane has the given inverse depth at a pixel's corner and the given
-// gradient.
+// A face without edges, of a solid unless said otherwise, whose plane has the given inverse depth at a pixel's corner
+// and the given gradient.
 ScreenFace plane_face(uint32_t object_id, float inverse_depth_0, Vec2 gradient = {}) {
   ScreenFace face;
   face.object_id = object_id;
-  face.plane_distance_m = -1.5f;
   face.inverse_depth_0 = inverse_depth_0;
   face.inverse_depth_x = gradient.x;
   face.inverse_depth_y = gradient.y;
