@@ -413,23 +413,23 @@ class ObservationWriter {
   template <typename ThreadGroup, typename Observation>
   PICTURA_HD static void write_sets(const ThreadGroup& group, const WorldView& world, int agent,
                                     const Observation& observation, const ObservationView& out, int row) {
-    const NearPlace place = near_place(world, world.first_slot + agent);
     for (int k = 0; k < num_observed_sets(out); ++k) {
       const auto set = static_cast<EntitySet>(k);
-      write_set(group, world, agent, place, set, set_rows(out, row, set), observation);
+      write_set(group, world, agent, set, set_rows(out, row, set), observation);
     }
   }
 
  private:
   /// The rows are put together in the group's own memory, so that they are written whole and in order.
   template <typename ThreadGroup, typename Observation>
-  PICTURA_HD static void write_set(const ThreadGroup& group, const WorldView& world, int agent, const NearPlace& place,
-                                   EntitySet set, const SetRows& out, const Observation& observation) {
+  PICTURA_HD static void write_set(const ThreadGroup& group, const WorldView& world, int agent, EntitySet set,
+                                   const SetRows& out, const Observation& observation) {
     const int slot = world.first_slot + agent;
     float* rows = group.staging();
     int count = 0;
     if (observes(world, agent)) {
       const EgoFrame frame = ego_frame(world.agents, slot);
+      const NearPlace place = near_place(world, slot);  // kept from set to set, it would be spilled
       if (set == EntitySet::partners) {
         count = observation.observe_partners(world, agent, frame, rows, group);
       } else if (set == EntitySet::controls) {
