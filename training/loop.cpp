@@ -1,18 +1,13 @@
-// The training loop: collect a rollout, improve the policy on it, log and save.
+// The training loop: collect a rollout, improve the policy on it, count, log and keep.
 #include "pictura/training/loop.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <optional>
 
 #include <ATen/Parallel.h>
-#include <fmt/ranges.h>
+#include <fmt/format.h>
 
-#include "pictura/backends/make_learner.h"
 #include "pictura/common/error.h"
-#include "pictura/common/support/file.h"
-#include "pictura/common/support/folder_lock.h"
-#include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/parallel_for.h"
 #include "pictura/training/algorithm.h"
 #include "pictura/training/config_keys.h"
@@ -25,7 +20,9 @@
 #include "pictura/training/run.h"
 #include "pictura/training/run_evaluation.h"
 #include "pictura/training/run_folder.h"
+#include "pictura/training/run_keeper.h"
 #include "pictura/training/run_log.h"
+#include "pictura/training/run_time.h"
 #include "pictura/training/schedule.h"
 #include "pictura/training/torch_device.h"
 
@@ -33,196 +30,180 @@ namespace pictura {
 
 namespace {
 
-// Improves the policy on the rollout. What stops it for a number that is not finite is kept in the folder for study.
-UpdateStats improve(const std::string& folder, Run* run) {
-  try {
-    return improve(run);
-  } catch (const NotFinite& error) {
-    run->communicator->step();  // throws where a rank is lost, which leaves numbers that mean nothing
-    if (!run->communicator->is_first()) throw;
-    const std::string path = folder + "/failed_minibatch.safetensors";
-    write_safetensors(path, error.minibatch, to_toml(run->config));
-    fail("{}; see {}", error.what(), path);
+// Updates, one after another, until there is nothing more to do, no time left, or a request to end.
+class TrainingLoop {
+ public:
+  /// What is given must outlive it.
+  TrainingLoop(const TrainOptions& options, Ranks* ranks, RunKeeper* keeper, RunTime* time, RunLog* log, Run* run)
+      : options_(options),
+        ranks_(*ranks),
+        keeper_(*keeper),
+        time_(*time),
+        log_(*log),
+        run_(*run),
+        collector_(run),
+        evaluation_(*run) {}
+
+  void go() {
+    evaluate_if_due();
+    while (goes_on()) {
+      UpdateRecord record;
+      if (!collect(&record)) return;
+      improve(&record);
+      count(record);
+      TrainProgress progress = log_.add(run_.update, run_.agent_steps, record);
+      time_.bound(&progress);
+      update_image_size();
+      evaluate_if_due();
+      is_interrupted_ = any_rank_interrupted(run_.communicator);
+      keep(record.totals.agent_steps);
+      agent_steps_per_s_ = progress.agent_steps_per_s;
+      if (options_.on_progress) options_.on_progress(progress);
+    }
   }
+
+  bool is_interrupted() const { return is_interrupted_; }
+  bool is_out_of_time() const { return is_out_of_time_; }
+  /// As of the last update.
+  double agent_steps_per_s() const { return agent_steps_per_s_; }
+
+ private:
+  bool goes_on() {
+    const Config::Train& train = run_.config.train;
+    if (is_interrupted_ || is_out_of_time_) return false;
+    if (run_.update >= train.updates || schedule_has_ended(train, run_.agent_steps)) return false;
+    is_out_of_time_ = time_.is_too_short_for(RunWork::update);
+    return !is_out_of_time_;
+  }
+
+  // Drives through a rollout. False after ^C within it: then the run is as at its start, from which resuming is exact.
+  bool collect(UpdateRecord* record) {
+    const std::unique_ptr<StateSnapshot> before = run_.simulator->snapshot();
+    const SimulatorTotals totals_before = run_.simulator->totals();
+    const Stopwatch watch;
+    if (!collector_.collect()) {
+      run_.simulator->restore(*before);
+      is_interrupted_ = true;
+      return false;
+    }
+    record->totals = run_.simulator->totals();
+    record->totals.subtract(totals_before);
+    record->totals = totals_of_all(record->totals, run_.communicator);
+    record->image_size = run_.image_size();
+    record->rollout_s = watch.seconds();
+    return true;
+  }
+
+  // Improves the policy on the rollout. What stops it for a number that is not finite is kept for study.
+  void improve(UpdateRecord* record) {
+    const Stopwatch watch;
+    try {
+      record->stats = pictura::improve(&run_);
+    } catch (const NotFinite& error) {
+      run_.communicator->step();  // throws where a rank is lost, which leaves numbers that mean nothing
+      if (!run_.communicator->is_first()) throw;
+      const std::string path = keeper_.path("failed_minibatch.safetensors");
+      write_safetensors(path, error.minibatch, to_toml(run_.config));
+      fail("{}; see {}", error.what(), path);
+    }
+    run_.on_stream([&] { scale_logits(*run_.policy, logit_growth(run_.config.train, record->totals.agent_steps)); });
+    record->update_s = watch.seconds();
+    record->phases_s = run_.timer.take();
+    record->diagnosis = diagnose(run_.rollout, record->stats.adv_threshold, run_.communicator);
+  }
+
+  void count(const UpdateRecord& record) {
+    time_.add(RunWork::update, record.rollout_s + record.update_s);
+    ++run_.update;
+    run_.check_ranks_agree();
+    run_.agent_steps += record.totals.agent_steps;
+    run_.distance_m += record.totals.distance_m;
+  }
+
+  void update_image_size() {
+    const auto pixels = static_cast<double>(run_.image_size().pixels());
+    const std::string change = run_.update_image_size();
+    if (change.empty()) return;
+    options_.notify(change);
+    time_.expect_growth(std::max(1.0, static_cast<double>(run_.image_size().pixels()) / pixels));
+  }
+
+  // One that there is no time for, or that was interrupted, is made when the run goes on. All ranks make the same one.
+  void evaluate_if_due() {
+    if (!any_rank(evaluation_.is_due() && log_.lacks_evaluation(run_.update), run_.communicator)) return;
+    is_out_of_time_ = time_.is_too_short_for(RunWork::evaluation);
+    if (is_out_of_time_) return;
+    const Ranks::LongWork evaluates(&ranks_);
+    const std::optional<EvaluationRecord> record = evaluation_.evaluate();
+    if (!record) return;
+    log_.add_evaluation(run_.update, run_.agent_steps, *record);
+    time_.add(RunWork::evaluation, record->seconds);
+  }
+
+  void keep(int64_t agent_steps_of_update) {
+    if (keeper_.is_due(run_)) keeper_.save(run_, log_.recent());
+    const std::string milestone = milestone_name(run_.agent_steps - agent_steps_of_update, run_.agent_steps,
+                                                 run_.config.train.milestone_agent_steps);
+    if (!milestone.empty()) keeper_.save_as(milestone, run_, log_.recent());
+  }
+
+  const TrainOptions& options_;
+  Ranks& ranks_;
+  RunKeeper& keeper_;
+  RunTime& time_;
+  RunLog& log_;
+  Run& run_;
+  Collector collector_;
+  RunEvaluation evaluation_;
+  bool is_interrupted_ = false, is_out_of_time_ = false;
+  double agent_steps_per_s_ = 0;
+};
+
+// What torch has for all of a process.
+void set_up_torch(const Config& config, Device device) {
+  if (device.is_host()) keep_freed_memory();
+  at::set_num_threads(resolve_num_threads(config.run.num_threads));
+  set_float32_products(config.train.precision);
+  set_reproducible(config.train.reproducible);
+  release_unused_memory(device);  // of an earlier run
 }
 
 TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
-  const Stopwatch since_start;
+  const Stopwatch start;
   const Config config = load_config(options.config_path, options.overrides);
   check_equal_settings(
       config, fmt::format("old_run {}, init_from '{}'", static_cast<int>(options.old_run), options.init_from), ranks);
   const Device device = open_learning_device(config, options.launch.local_rank);
   check_memory(config, device, available_bytes(device), ranks->size());
   const std::unique_ptr<Communicator> communicator = make_communicator(ranks, device);
-  const bool is_first = communicator->is_first();
-  std::optional<FolderLock> lock;
-  std::vector<std::string> old_files;
-  if (is_first) {
-    make_output_folder(options.out_folder);
-    lock.emplace(options.out_folder);
-    old_files = run_files(options.out_folder);
-    PICTURA_CHECK(old_files.empty() || options.old_run != OldRun::refuse,
-                  "{}: holds a run already ({}): resume it, overwrite it, or name another folder", options.out_folder,
-                  fmt::join(old_files, ", "));
-  }
-  if (device.is_host()) keep_freed_memory();
-  at::set_num_threads(resolve_num_threads(config.run.num_threads));
-  set_float32_products(config.train.precision);
-  set_reproducible(config.train.reproducible);
-  release_unused_memory(device);  // of an earlier run
+  RunKeeper keeper(options, ranks, communicator.get());
+  set_up_torch(config, device);
+  for (const std::string& notice : idle_settings(config)) options.notify(notice);
 
-  const auto notify = [&options](const std::string& notice) {
-    if (options.on_notice) options.on_notice(notice);
-  };
-  for (const std::string& notice : idle_settings(config)) notify(notice);
-  TrainReport report;
-  report.checkpoint = options.out_folder + "/checkpoint.ckpt";
-  report.ranks = communicator->size();
   Run run(config, device, communicator.get());
-  report.device = name_of(device);
-  report.simulator = run.simulator->name();
-  if (run.renderer) report.renderer = run.renderer->name();
-  Collector collector(&run);
-  std::vector<RecentUpdate> recent;
-  const auto bytes_everywhere = [&](const std::string& path) {
-    return communicator->from_first(is_first ? read_checkpoint_file(path) : "");
-  };
-  // All ranks take part in a checkpoint; the first one writes it.
-  const auto write_with = [&](const auto& write, const std::vector<RecentUpdate>& its_recent) {
-    const Checkpoint checkpoint = run.checkpoint(its_recent);
-    const Ranks::LongWork writes(ranks);  // disks may be slow
-    if (is_first) write(checkpoint);
-  };
-  const auto save_as = [&](const std::string& name, const std::vector<RecentUpdate>& its_recent) {
-    write_with([&](const Checkpoint& checkpoint) { write_checkpoint(options.out_folder + "/" + name, checkpoint); },
-               its_recent);
-  };
-  if (options.old_run == OldRun::resume) {
-    const Checkpoint saved = parse_checkpoint(bytes_everywhere(report.checkpoint), report.checkpoint);
-    const std::string why_new_episodes = run.restore(saved);
-    if (!why_new_episodes.empty()) notify("the saved episodes cannot go on, new ones begin: " + why_new_episodes);
-    for (const std::string& change : differences_to_report(saved.config, config)) notify(change);
-    recent = saved.recent;
-  } else {
-    if (!options.init_from.empty()) {
-      run.begin_with(parse_policy(bytes_everywhere(options.init_from), options.init_from));
-    }
-    for (const std::string& name : old_files) std::filesystem::remove(options.out_folder + "/" + name);
-    run.simulator->reset();
-    save_as("untrained.ckpt", recent);
-  }
-  if (is_first) write_file(options.out_folder + "/config.toml", to_toml(with_absolute_paths(config)));
-  RunLog log(is_first ? options.out_folder : "", config, run.update, run.agent_steps, recent, options.on_notice);
+  const std::vector<RecentUpdate> recent = keeper.begin(&run);
+  RunLog log(communicator->is_first() ? options.out_folder : "", config, run.update, run.agent_steps, recent,
+             options.on_notice);
+  RunTime time(options.minutes, start, &run);
+  TrainingLoop loop(options, ranks, &keeper, &time, &log, &run);
+  loop.go();
 
-  Stopwatch since_saved;
-  int64_t saved_update = options.old_run == OldRun::resume ? run.update : -1;
-  const auto save = [&] {
-    // A second time it would be the same, in the place of an older one.
-    if (run.update == saved_update) return;
-    write_with(
-        [&](const Checkpoint& checkpoint) {
-          save_checkpoint(options.out_folder, config.train.keep_checkpoints,
-                          [&](const std::string& path) { write_checkpoint(path, checkpoint); });
-        },
-        log.recent());
-    saved_update = run.update;
-    since_saved.restart();
-  };
-  // Before the first update of this process it is that of an earlier one, where the run was on such a device before.
-  const std::string machine = fmt::format("{}, {} agents", product_name(device), run.simulator->num_slots());
-  double own_longest_s = 0;
-  const auto ends_too_late = [&](const std::string& work) {
-    // A fifth more, for what takes longer than the longest before, and for saving.
-    const auto longest = run.longest_update_s.find(work);
-    const double expected_s = longest == run.longest_update_s.end() ? 0 : 1.2 * longest->second;
-    return any_rank(options.minutes > 0 && since_start.seconds() + expected_s > 60 * options.minutes,
-                    communicator.get());
-  };
-  // One that there is no time for, or that was interrupted, is made when the run goes on. All ranks make the same one.
-  RunEvaluation evaluation(run);
-  const std::string evaluation_on_machine = machine + ", evaluation";
-  const auto evaluate_if_due = [&] {
-    if (!any_rank(evaluation.is_due() && log.lacks_evaluation(run.update), communicator.get())) return;
-    report.out_of_time = ends_too_late(evaluation_on_machine);
-    if (report.out_of_time) return;
-    const Ranks::LongWork evaluates(ranks);
-    const std::optional<EvaluationRecord> record = evaluation.evaluate();
-    if (!record) return;
-    log.add_evaluation(run.update, run.agent_steps, *record);
-    double& longest_s = run.longest_update_s[evaluation_on_machine];
-    longest_s = std::max(longest_s, record->seconds);
-  };
-  evaluate_if_due();
-  while (run.update < config.train.updates && !schedule_has_ended(config.train, run.agent_steps) &&
-         !report.interrupted && !report.out_of_time) {
-    report.out_of_time = ends_too_late(machine);
-    if (report.out_of_time) break;
-    const std::unique_ptr<StateSnapshot> before = run.simulator->snapshot();
-    const SimulatorTotals totals_before = run.simulator->totals();
-    UpdateRecord record;
-    Stopwatch watch;
-    if (!collector.collect()) {
-      // ^C within a rollout: what is saved is the state at its start, from which resuming is exact.
-      run.simulator->restore(*before);
-      report.interrupted = true;
-      break;
-    }
-    record.totals = run.simulator->totals();
-    record.totals.subtract(totals_before);
-    record.totals = totals_of_all(record.totals, communicator.get());
-    record.rollout_s = watch.restart();
-    record.image_size = run.image_size();
-
-    record.stats = improve(options.out_folder, &run);
-    run.on_stream([&] { scale_logits(*run.policy, logit_growth(config.train, record.totals.agent_steps)); });
-    record.update_s = watch.restart();
-    record.phases_s = run.timer.take();
-    record.diagnosis = diagnose(run.rollout, record.stats.adv_threshold, communicator.get());
-    own_longest_s = std::max(own_longest_s, record.rollout_s + record.update_s);
-    run.longest_update_s[machine] = own_longest_s;
-
-    ++run.update;
-    run.check_ranks_agree();
-    const std::string milestone = milestone_name(run.agent_steps, run.agent_steps + record.totals.agent_steps,
-                                                 config.train.milestone_agent_steps);
-    run.agent_steps += record.totals.agent_steps;
-    run.distance_m += record.totals.distance_m;
-    TrainProgress progress = log.add(run.update, run.agent_steps, record);
-    const double left_s = 60 * options.minutes - since_start.seconds();
-    if (options.minutes > 0 && left_s < progress.eta_s) {
-      progress.eta_s = std::max(0.0, left_s);
-      progress.ends_by_minutes = true;
-    }
-    report.agent_steps_per_s = progress.agent_steps_per_s;
-    const auto pixels = static_cast<double>(run.image_size().pixels());
-    if (const std::string change = run.update_image_size(); !change.empty()) {
-      notify(change);
-      // Until an update of that size is measured: as much longer as there are more pixels.
-      own_longest_s = 0;
-      const double growth = std::max(1.0, static_cast<double>(run.image_size().pixels()) / pixels);
-      for (const std::string& work : {machine, evaluation_on_machine}) {
-        if (run.longest_update_s.contains(work)) run.longest_update_s[work] *= growth;
-      }
-    }
-    evaluate_if_due();
-    report.interrupted = any_rank_interrupted(communicator.get());
-    if (run.update % config.train.checkpoint_every == 0 ||
-        any_rank(since_saved.seconds() > 60 * config.train.checkpoint_minutes, communicator.get())) {
-      save();
-    }
-    if (!milestone.empty()) save_as(milestone, log.recent());
-    if (options.on_progress) options.on_progress(progress);
-  }
-
+  TrainReport report;
   const DeviceMemory memory = memory_of(device);
   report.device_bytes = memory.used_bytes;
   report.peak_tensor_bytes = memory.peak_tensor_bytes;
-  save();
-  if (is_first) {
-    write_policy(options.out_folder + "/policy.safetensors", run.saved_policy(), WeightType::f32, options.commit);
-  }
+  keeper.save(run, log.recent());
+  keeper.write_weights(run);
+  report.checkpoint = keeper.checkpoint_path();
+  report.ranks = communicator->size();
+  report.device = name_of(device);
+  report.simulator = run.simulator->name();
+  if (run.renderer) report.renderer = run.renderer->name();
+  report.interrupted = loop.is_interrupted();
+  report.out_of_time = loop.is_out_of_time();
   report.agent_steps = run.agent_steps;
   report.updates = run.update;
+  report.agent_steps_per_s = loop.agent_steps_per_s();
   report.episode_return = log.episode_return();
   report.km_driven = run.distance_m / 1000;
   report.evaluation_s = log.evaluation_s();

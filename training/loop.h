@@ -54,6 +54,10 @@ struct TrainOptions {
   Launch launch;       // which of the processes that train together this one is
   std::function<void(const TrainProgress&)> on_progress;  // as all that reports, of rank 0 alone
   std::function<void(const std::string&)> on_notice;      // what a person should know, and no error is
+
+  void notify(const std::string& notice) const {
+    if (on_notice) on_notice(notice);
+  }
 };
 
 struct TrainReport {

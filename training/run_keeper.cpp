@@ -1,0 +1,89 @@
+#include "pictura/training/run_keeper.h"
+
+#include <filesystem>
+
+#include <fmt/ranges.h>
+
+#include "pictura/common/error.h"
+#include "pictura/common/support/file.h"
+#include "pictura/training/config_keys.h"
+#include "pictura/training/ranks/agree.h"
+#include "pictura/training/run_folder.h"
+
+namespace pictura {
+
+RunKeeper::RunKeeper(const TrainOptions& options, Ranks* ranks, Communicator* communicator)
+    : options_(options), ranks_(ranks), communicator_(communicator) {
+  if (!communicator->is_first()) return;
+  make_output_folder(options.out_folder);
+  lock_.emplace(options.out_folder);
+  old_files_ = run_files(options.out_folder);
+  PICTURA_CHECK(old_files_.empty() || options.old_run != OldRun::refuse,
+                "{}: holds a run already ({}): resume it, overwrite it, or name another folder", options.out_folder,
+                fmt::join(old_files_, ", "));
+}
+
+std::string RunKeeper::bytes_everywhere(const std::string& path) const {
+  return communicator_->from_first(communicator_->is_first() ? read_checkpoint_file(path) : "");
+}
+
+std::vector<RecentUpdate> RunKeeper::begin(Run* run) {
+  std::vector<RecentUpdate> recent;
+  if (options_.old_run == OldRun::resume) {
+    const Checkpoint saved = parse_checkpoint(bytes_everywhere(checkpoint_path()), checkpoint_path());
+    const std::string why_new_episodes = run->restore(saved);
+    if (!why_new_episodes.empty()) {
+      options_.notify("the saved episodes cannot go on, new ones begin: " + why_new_episodes);
+    }
+    for (const std::string& change : differences_to_report(saved.config, run->config)) options_.notify(change);
+    recent = saved.recent;
+    saved_update_ = run->update;
+  } else {
+    if (!options_.init_from.empty()) {
+      run->begin_with(parse_policy(bytes_everywhere(options_.init_from), options_.init_from));
+    }
+    for (const std::string& name : old_files_) std::filesystem::remove(path(name));
+    run->simulator->reset();
+    save_as("untrained.ckpt", *run, recent);
+  }
+  if (communicator_->is_first()) write_file(path("config.toml"), to_toml(with_absolute_paths(run->config)));
+  since_saved_.restart();
+  return recent;
+}
+
+bool RunKeeper::is_due(const Run& run) const {
+  const Config::Train& train = run.config.train;
+  return run.update % train.checkpoint_every == 0 ||
+         any_rank(since_saved_.seconds() > 60 * train.checkpoint_minutes, communicator_);
+}
+
+void RunKeeper::save(const Run& run, const std::vector<RecentUpdate>& recent) {
+  // A second time it would be the same, in the place of an older one.
+  if (run.update == saved_update_) return;
+  const auto write = [&](const Checkpoint& checkpoint) {
+    save_checkpoint(options_.out_folder, run.config.train.keep_checkpoints,
+                    [&](const std::string& path) { write_checkpoint(path, checkpoint); });
+  };
+  write_with(write, run, recent);
+  saved_update_ = run.update;
+  since_saved_.restart();
+}
+
+void RunKeeper::save_as(const std::string& name, const Run& run, const std::vector<RecentUpdate>& recent) const {
+  write_with([&](const Checkpoint& checkpoint) { write_checkpoint(path(name), checkpoint); }, run, recent);
+}
+
+void RunKeeper::write_with(const std::function<void(const Checkpoint&)>& write, const Run& run,
+                           const std::vector<RecentUpdate>& recent) const {
+  const Checkpoint checkpoint = run.checkpoint(recent);
+  const Ranks::LongWork writes(ranks_);  // disks may be slow
+  if (communicator_->is_first()) write(checkpoint);
+}
+
+void RunKeeper::write_weights(const Run& run) const {
+  if (communicator_->is_first()) {
+    write_policy(path("policy.safetensors"), run.saved_policy(), WeightType::f32, options_.commit);
+  }
+}
+
+}  // namespace pictura

@@ -1,0 +1,53 @@
+// What a training run keeps on disk: its folder is its own while it runs, and holds its checkpoints and weights.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pictura/common/support/folder_lock.h"
+#include "pictura/training/loop.h"
+#include "pictura/training/ranks/ranks.h"
+#include "pictura/training/run.h"
+
+namespace pictura {
+
+/// Rank 0 alone reads and writes; all ranks must call what names no rank, since a checkpoint has something of each.
+class RunKeeper {
+ public:
+  /// Takes the folder for this process. Throws Error naming it where another run is at work in it, and where one lies
+  /// that options.old_run does not speak of. What is given must outlive this.
+  RunKeeper(const TrainOptions& options, Ranks* ranks, Communicator* communicator);
+
+  /// Begins the run as the options say: from its last checkpoint, from the weights of another run, or anew, when the
+  /// untrained policy is kept too. Returns what the mean return of its last updates is made of.
+  std::vector<RecentUpdate> begin(Run* run);
+
+  /// Whether the configuration asks for a checkpoint after the update that the run has just made.
+  bool is_due(const Run& run) const;
+  /// Saves the run as checkpoint.ckpt and keeps older ones, unless it is saved already.
+  void save(const Run& run, const std::vector<RecentUpdate>& recent);
+  /// Saves it under another name of the folder, once and for all.
+  void save_as(const std::string& name, const Run& run, const std::vector<RecentUpdate>& recent) const;
+  /// Writes the weights as policy.safetensors.
+  void write_weights(const Run& run) const;
+
+  std::string path(const std::string& name) const { return options_.out_folder + "/" + name; }
+  std::string checkpoint_path() const { return path("checkpoint.ckpt"); }
+
+ private:
+  void write_with(const std::function<void(const Checkpoint&)>& write, const Run& run,
+                  const std::vector<RecentUpdate>& recent) const;
+  std::string bytes_everywhere(const std::string& path) const;
+
+  const TrainOptions& options_;
+  Ranks* const ranks_;
+  Communicator* const communicator_;
+  std::optional<FolderLock> lock_;
+  std::vector<std::string> old_files_;  // of an earlier run
+  int64_t saved_update_ = -1;
+  Stopwatch since_saved_;
+};
+
+}  // namespace pictura
