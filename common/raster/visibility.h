@@ -300,8 +300,11 @@ PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFac
 }
 
 /// Whether two fragments, one of them a sliver, together fill a pixel exactly: neighbouring surfaces that meet there.
+/// The tolerance is that of their areas; with a larger one slivers of what is hidden would pass for neighbours. A
+/// fragment that covers the pixel alone leaves nothing to meet.
 PICTURA_HD inline bool are_complementary(const PixelCoverage& a, const PixelCoverage& b) {
-  return (a.samples == 0 || b.samples == 0) && fabsf(a.area + b.area - 1.0f) < kFullCoverage;
+  constexpr float kExact = 1e-5f;
+  return (a.samples == 0 || b.samples == 0) && max_of(a.area, b.area) < 1.0f && fabsf(a.area + b.area - 1.0f) < kExact;
 }
 
 /// Whether two fragments of a pixel may still occlude more of each other, given their visible samples. Those only

@@ -60,6 +60,40 @@ TEST(Invariance, AWallInFrontHidesAnAgentToTheLastBit) {
   EXPECT_NE(draw(open, scene_of({near, hidden}), views, config).rgb, draw(open, scene_of({near}), views, config).rgb);
 }
 
+/// Far cars behind a wall of many pieces: slivers of them lie in pixels that pieces fill, alone or two of them
+/// together.
+TEST(Invariance, WhatIsHiddenBehindPiecesOfAWallLeavesNoSliver) {
+  std::vector<AgentBox> hidden;
+  for (int i = 0; i < 40; ++i) {
+    const auto at = static_cast<float>(i);
+    hidden.push_back(make_box(AgentClass::vehicle, {25 + 2 * at, 1.1f * at - 22, 0}, 0.3f * at, {4.5f, 2, 1.5f}));
+  }
+  const std::vector<View> views{make_view({}, 0.05f)};
+  const RendererConfig config{.rig = paper_rig(32, 18), .num_threads = 1};
+  constexpr float kRounding = 1e-6f;  // a pixel of one fragment is not summed
+  for (int i = 0; i < 120; ++i) {
+    StaticGeometry geometry;
+    const float shift_m = 0.017f * static_cast<float>(i);
+    for (int piece = 0; piece < 14; ++piece) {
+      const auto end = [&](int k) {
+        return Vec3{k % 2 ? 10.0f : 11.0f, 2.1f * static_cast<float>(k) - 15 + shift_m, 0};
+      };
+      WallFace wall;
+      wall.a_m = end(piece);
+      wall.b_m = end(piece + 1);
+      wall.height_m = 9;
+      geometry.walls.push_back(wall);
+    }
+    geometry.build_grids();
+    const std::vector<float> with = draw(geometry, scene_of(hidden), views, config).rgb,
+                             without = draw(geometry, scene_of({}), views, config).rgb;
+    // The front camera sees nothing but the wall.
+    for (std::size_t k = 0; k < std::size_t{3} * 32 * 18; ++k) {
+      ASSERT_NEAR(with[k], without[k], kRounding) << i << ", " << k;
+    }
+  }
+}
+
 TEST(Invariance, ImagesDoNotDependOnTheNumberOfThreads) {
   const Snapshot town = make_synthetic_town(3, 60);
   std::vector<float> first;
