@@ -107,22 +107,23 @@ std::shared_ptr<Map> from_text(const std::string& text, const std::string& sourc
   });
 }
 
-py::array_t<uint8_t> draw(const Map& map, int width_px, int height_px) {
+}  // namespace
+
+py::array_t<uint8_t> draw(const RoadMap& map, int width_px, int height_px, const Scenario* scenario, int step) {
   RgbImage image;
   {
     const py::gil_scoped_release no_gil;
-    WorldPainter painter(*map.road(), width_px, height_px);
-    const std::vector<LightState> lights(map.road()->lights.size(), LightState::off);
+    WorldPainter painter(map, width_px, height_px, {}, scenario);
+    const std::vector<LightState> lights(map.lights.size(), LightState::off);
     WorldFrame frame;
     frame.lights = lights;
+    frame.recorded_step = step;
     image = painter.draw(frame, painter.whole_map());
   }
   py::array_t<uint8_t> pixels({image.height_px, image.width_px, 3});
   std::copy(image.rgb.begin(), image.rgb.end(), pixels.mutable_data());
   return pixels;
 }
-
-}  // namespace
 
 std::shared_ptr<const CompiledMap> Map::compiled(const MapOptions& options) {
   for (const auto& made : compiled_) {
@@ -242,8 +243,10 @@ predecessors; road_edges, stop_lines and building_lines float32 [n, 6] are two e
           },
           py::arg("walls") = true, py::arg("wall_seed") = 0,
           "What renderers draw of it. walls: along the building lines, of heights drawn from wall_seed.")
-      .def("draw", draw, py::arg("width_px") = 1024, py::arg("height_px") = 1024,
-           "A picture from above, uint8 [height, width, 3], north up. Sizes of 16 to 8192 px.")
+      .def(
+          "draw", [](const Map& self, int width_px, int height_px) { return draw(*self.road(), width_px, height_px); },
+          py::arg("width_px") = 1024, py::arg("height_px") = 1024,
+          "A picture from above, uint8 [height, width, 3], north up. Sizes of 16 to 8192 px.")
       .def("__repr__", [](const Map& self) {
         return fmt::format("<pictura.Map {}: {} lanes, {:.1f} km>", self.road()->name, self.road()->lanes.size(),
                            self.road()->facts.driving_lane_km);

@@ -108,6 +108,11 @@ Stream stream_of(const py::object& handle);
 /// Of a map, by name.
 py::dict facts_of(const MapFacts& facts);
 
+/// From above, uint8 [height, width, 3]; of a scenario on that map its tracks as well, and their boxes at a step. The
+/// caller holds the GIL.
+py::array_t<uint8_t> draw(const RoadMap& map, int width_px, int height_px, const Scenario* scenario = nullptr,
+                          int step = -1);
+
 void bind_maps(py::module_& module);
 void bind_scenarios(py::module_& module);
 void bind_rendering(py::module_& module);

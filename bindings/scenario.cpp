@@ -246,6 +246,15 @@ Options given are kept but for these, as those of a pictura.PolicySession: scene
           R"(Writes it, whole or not at all, as *.scenario, which load() reads again to the bit.
 
 Raises pictura.UsageError for another ending, pictura.Error naming the file.)")
+      .def(
+          "draw",
+          [](const RecordedScene& self, int width_px, int height_px) {
+            return draw(*self.road(), width_px, height_px, self.scenario().get(), self.start_step());
+          },
+          py::arg("width_px") = 1024, py::arg("height_px") = 1024,
+          R"(A picture from above, uint8 [height, width, 3], north up: the ways of all tracks, and who is there at start_step.
+
+Sizes of 16 to 8192 px.)")
       .def("inverse_actions", inverse_actions_of, py::arg("num_threads") = 0,
            R"(The actions by which the simulator's dynamics follow the recording most closely, as NumPy arrays by name.
 

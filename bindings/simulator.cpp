@@ -278,7 +278,8 @@ class PySimulator {
     const RgbImage image = calls_->run("draw", [&] {
       if (!painter_ || painted_map_ != map.road || painter_->width_px() != width_px ||
           painter_->height_px() != height_px) {
-        painter_ = std::make_unique<WorldPainter>(*map.road, width_px, height_px, map.geometry.walls);
+        painter_ =
+            std::make_unique<WorldPainter>(*map.road, width_px, height_px, map.geometry.walls, map.scenario.get());
         painted_map_ = map.road;
       }
       return draw_world(*painter_, *simulator_, world, agent, width_m);

@@ -77,7 +77,8 @@ struct Film::Parts {
   Parts(const std::string& path, const Simulator& simulator, const FilmOptions& options)
       : agent(options.agent),
         width_m(options.width_m),
-        painter(*simulator.maps()[0]->road, kTopWidth_px, kTopHeight_px, simulator.maps()[0]->geometry.walls),
+        painter(*simulator.maps()[0]->road, kTopWidth_px, kTopHeight_px, simulator.maps()[0]->geometry.walls,
+                simulator.maps()[0]->scenario.get()),
         renderer(make_renderer("cpu", view_of(options))),
         order(film_order(renderer->config().rig)),
         images(renderer->config().rig, 1),

@@ -279,7 +279,10 @@ void draw_on(Canvas& canvas, const Layout& layout, const RoadMap& map, const Sce
   canvas.stop_when_interrupted(fmt::format("map {}: interrupted while it was drawn", map.name));
   MapLayers(map).paint(canvas, layout.left_top_m, layout.px_per_m);
   paint_details(map, canvas, layout.left_top_m, layout.px_per_m);
-  if (scenario) paint_tracks(*scenario, canvas, layout.left_top_m, layout.px_per_m);
+  if (scenario) {
+    paint_ways(*scenario, canvas, layout.left_top_m, layout.px_per_m);
+    paint_boxes(*scenario, scenario->current_step, canvas, layout.left_top_m, layout.px_per_m);
+  }
   draw_band(canvas, layout, map);
   draw_coordinates(canvas, layout, map);
   draw_scale_bar(canvas, layout);

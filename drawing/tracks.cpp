@@ -28,6 +28,10 @@ void paint_box(GroundPen& pen, const RecordedTrack& track, const TrackState& sta
   pen.line(at(0.5 * front, 0), at(front, 0), pen.at_least(0.1, kMinOutline_px), hex(0xFFFFFF));
 }
 
+Rgb color_of(const Scenario& scenario, std::size_t track) {
+  return static_cast<int32_t>(track) == scenario.sdc_track ? kSdcInk : track_color(scenario.tracks[track].type);
+}
+
 }  // namespace
 
 Rgb track_color(TrackType type) {
@@ -41,11 +45,8 @@ Rgb track_color(TrackType type) {
   return kUnknownTrackInk;
 }
 
-void paint_tracks(const Scenario& scenario, Canvas& canvas, const Eigen::Vector2d& left_top_m, double px_per_m) {
+void paint_ways(const Scenario& scenario, Canvas& canvas, const Eigen::Vector2d& left_top_m, double px_per_m) {
   GroundPen pen(canvas, left_top_m, px_per_m);
-  const auto color_of = [&](std::size_t i) {
-    return static_cast<int32_t>(i) == scenario.sdc_track ? kSdcInk : track_color(scenario.tracks[i].type);
-  };
   for (std::size_t i = 0; i < scenario.tracks.size(); ++i) {
     const Span<const TrackState> states = scenario.states_of(static_cast<int32_t>(i));
     const Span<const uint8_t> valid = scenario.valid_of(static_cast<int32_t>(i));
@@ -55,18 +56,23 @@ void paint_tracks(const Scenario& scenario, Canvas& canvas, const Eigen::Vector2
       const Eigen::Vector2d position = in_plan(states[step].position_m);
       goes_on ? pen.line_to(position) : pen.move_to(position);
     }
-    canvas.set_color(color_of(i), 0.8);
+    canvas.set_color(color_of(scenario, i), 0.8);
     cairo_set_line_width(pen.context(), pen.at_least(kWay_m, kMinWay_px));
     cairo_stroke(pen.context());
   }
-  const auto step = static_cast<std::size_t>(scenario.current_step);
-  for (std::size_t i = 0; i < scenario.tracks.size(); ++i) {
-    const auto index = static_cast<int32_t>(i);
-    if (!scenario.valid_of(index)[step]) continue;
-    paint_box(pen, scenario.tracks[i], scenario.states_of(index)[step], color_of(i));
-  }
   for (const RecordedLight& light : scenario.lights) {
     pen.line(in_plan(light.stop_a_m), in_plan(light.stop_b_m), pen.at_least(0.4, 1.5), kStopLineInk);
+  }
+}
+
+void paint_boxes(const Scenario& scenario, int32_t step, Canvas& canvas, const Eigen::Vector2d& left_top_m,
+                 double px_per_m) {
+  GroundPen pen(canvas, left_top_m, px_per_m);
+  for (std::size_t i = 0; i < scenario.tracks.size(); ++i) {
+    const auto index = static_cast<int32_t>(i);
+    const auto at = static_cast<std::size_t>(step);
+    if (!scenario.valid_of(index)[at]) continue;
+    paint_box(pen, scenario.tracks[i], scenario.states_of(index)[at], color_of(scenario, i));
   }
 }
 

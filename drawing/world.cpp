@@ -10,6 +10,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/drawing/map_layers.h"
+#include "pictura/drawing/tracks.h"
 
 namespace pictura {
 
@@ -147,9 +148,15 @@ void paint_legend(Canvas& canvas, const WorldFrame& frame) {
     for (size_t i = 0; i < frame.agents.size(); ++i) sum += counts(frame.status[i], frame.halt_reason[i]);
     return sum;
   };
-  const auto active = static_cast<uint8_t>(AgentStatus::active), halted = static_cast<uint8_t>(AgentStatus::halted);
-  std::vector<Row> rows{{fmt::format("{} active", count([&](int status, int) { return status == active; })),
-                         agent_color(AgentClass::vehicle, BoxFace::back)}};
+  const auto with = [&count](AgentStatus which) {
+    return count([which](int status, int) { return status == static_cast<int>(which); });
+  };
+  const int halted = static_cast<int>(AgentStatus::halted);
+  std::vector<Row> rows{
+      {fmt::format("{} active", with(AgentStatus::active)), agent_color(AgentClass::vehicle, BoxFace::back)}};
+  if (const int recorded = with(AgentStatus::recorded)) {
+    rows.push_back({fmt::format("{} as recorded", recorded), agent_color(AgentClass::vehicle, BoxFace::front)});
+  }
   for (const HaltReason& reason : kHaltReasons) {
     const int sum = count([&](int status, int events) { return status == halted && reason_of(events) == &reason; });
     rows.push_back({fmt::format("{} {}", sum, reason.name), reason.color});
@@ -172,10 +179,11 @@ Rgb lamp_color(LightState state) { return state == LightState::off ? hex(0x4A4F5
 }  // namespace
 
 struct WorldPainter::Impl {
-  Impl(const RoadMap& road_map, int width, int height, std::vector<WallFace> wall_faces)
+  Impl(const RoadMap& road_map, int width, int height, std::vector<WallFace> wall_faces, const Scenario* recorded)
       : map(road_map),
         layers(road_map),
         walls(std::move(wall_faces)),
+        scenario(recorded),
         bounds(bounds_of(road_map)),
         width_px(width),
         height_px(height) {}
@@ -190,6 +198,7 @@ struct WorldPainter::Impl {
       GroundPen pen(canvas, left_top, px_per_m);
       for (const WallFace& wall : walls) paint_wall(pen, wall);
     }
+    if (scenario) paint_ways(*scenario, canvas, left_top, px_per_m);
     cairo_surface_flush(canvas.surface());
     return tiles.emplace(std::pair{column, row}, std::move(canvas)).first->second;
   }
@@ -215,16 +224,18 @@ struct WorldPainter::Impl {
   const RoadMap& map;
   MapLayers layers;
   std::vector<WallFace> walls;
+  const Scenario* scenario;
   Aabb2 bounds;
   int width_px, height_px;
   float tiles_px_per_m = 0;
   std::map<std::pair<int, int>, Canvas> tiles;
 };
 
-WorldPainter::WorldPainter(const RoadMap& map, int width_px, int height_px, std::vector<WallFace> walls) {
+WorldPainter::WorldPainter(const RoadMap& map, int width_px, int height_px, std::vector<WallFace> walls,
+                           const Scenario* scenario) {
   PICTURA_CHECK(width_px >= 16 && width_px <= 8192 && height_px >= 16 && height_px <= 8192,
                 "picture of a world: expected sides of 16 to 8192 px, got {}x{}", width_px, height_px);
-  impl_ = std::make_unique<Impl>(map, width_px, height_px, std::move(walls));
+  impl_ = std::make_unique<Impl>(map, width_px, height_px, std::move(walls), scenario);
 }
 
 WorldPainter::~WorldPainter() = default;
@@ -261,6 +272,9 @@ RgbImage WorldPainter::draw(const WorldFrame& frame, const TopCamera& camera) {
   PICTURA_CHECK(frame.halt_reason.empty() || (frame.halt_reason.size() == frame.agents.size() && !frame.status.empty()),
                 "picture of a world: expected status and halt reason of {} agents, got {} and {}", frame.agents.size(),
                 frame.status.size(), frame.halt_reason.size());
+  PICTURA_CHECK(frame.recorded_step < (impl_->scenario ? impl_->scenario->num_steps : 0),
+                "picture of a world: expected a recorded step below {}, got {}",
+                impl_->scenario ? impl_->scenario->num_steps : 0, frame.recorded_step);
   Canvas canvas(impl_->width_px, impl_->height_px, kGroundColor);
   cairo_t* context = canvas.context();
   const Corner corner = corner_of(camera, impl_->width_px, impl_->height_px);
@@ -272,6 +286,9 @@ RgbImage WorldPainter::draw(const WorldFrame& frame, const TopCamera& camera) {
     paint_light(canvas, impl_->map.lights[i], left_top, camera.px_per_m, lamp_color(frame.lights[i]));
   }
 
+  if (frame.recorded_step >= 0) {
+    paint_boxes(*impl_->scenario, frame.recorded_step, canvas, left_top, camera.px_per_m);
+  }
   for (const AgentGoal& goal : frame.goals) {
     const AgentBox& agent = frame.agents[static_cast<size_t>(goal.agent)];
     paint_goal(canvas, pixel_at(agent.center_m), pixel_at(goal.position_m), agent.agent_class);

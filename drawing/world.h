@@ -9,6 +9,7 @@
 #include "pictura/common/image.h"
 #include "pictura/common/scene.h"
 #include "pictura/map/road_map.h"
+#include "pictura/map/scenario/scenario.h"
 #include "pictura/simulator/simulator.h"
 
 namespace pictura {
@@ -43,13 +44,16 @@ struct WorldFrame {
   Span<const Vec2> waypoints_m;     // those not yet passed, nearest first
   Span<const WorldMark> marks;      // the last covers those before
   std::string caption;              // one line at the top left, or empty
+  int recorded_step = -1;           // of the painter's scenario: its road users as recorded then; -1: none
 };
 
-/// Draws frames of one size of worlds on one map, with its walls. The map must outlive it.
+/// Draws frames of one size of worlds on one map, with its walls. What it is given must outlive it.
 class WorldPainter {
  public:
-  /// Throws Error unless both sizes are in [16, 8192] px.
-  WorldPainter(const RoadMap& map, int width_px, int height_px, std::vector<WallFace> walls = {});
+  /// The ways of all road users of a scenario on that map lie on the ground. Throws Error unless both sizes are in
+  /// [16, 8192] px.
+  WorldPainter(const RoadMap& map, int width_px, int height_px, std::vector<WallFace> walls = {},
+               const Scenario* scenario = nullptr);
   ~WorldPainter();
 
   int width_px() const;

@@ -30,6 +30,7 @@
 #include "pictura/map/procedural/procedural_town.h"
 #include "pictura/tests/map/small_roads.h"
 #include "pictura/tests/support/error_message.h"
+#include "pictura/tests/support/recorded_crossing.h"
 #include "pictura/tests/support/scratch_folder.h"
 
 namespace pictura {
@@ -272,6 +273,32 @@ TEST(WorldPainter, LightsShowTheirState) {
   WorldFrame frame;
   frame.lights = two;
   EXPECT_THAT(test::message_of([&] { painter.draw(frame, painter.whole_map()); }), HasSubstr("1 lights, got 2"));
+}
+
+TEST(WorldPainter, WaysOfARecordingLieOnTheGroundAndBoxesOverThem) {
+  const std::shared_ptr<const Scenario> scene = test::crossing();
+  WorldPainter bare(scene->map, 500, 500), painter(scene->map, 500, 500, {}, scene.get());
+  const TopCamera camera = painter.whole_map();
+  const auto self_at = [&](int step) {
+    const TrackState& state = scene->states_of(scene->sdc_track)[static_cast<size_t>(step)];
+    return painter.pixel_of(camera, state.position_m.xy());
+  };
+  WorldFrame frame;
+  const RgbImage ground = bare.draw(frame, camera), ways = painter.draw(frame, camera);
+  frame.recorded_step = scene->current_step;
+  const RgbImage boxes = painter.draw(frame, camera);
+  for (const int step : {scene->current_step, 40, 80}) {
+    const Vec2 p = self_at(step);
+    EXPECT_GT(distance(at(ways, p), at(ground, p)), 30) << step;
+    if (step > scene->current_step) {
+      EXPECT_EQ(at(boxes, p), at(ways, p)) << step;
+    }
+  }
+  EXPECT_NE(boxes.rgb, ways.rgb);
+  frame.recorded_step = scene->num_steps;
+  EXPECT_THROW(painter.draw(frame, camera), Error);
+  frame.recorded_step = 0;
+  EXPECT_THROW(bare.draw(frame, camera), Error);
 }
 
 TEST(WorldPainter, RejectsSizesOutOfRange) {

@@ -49,7 +49,15 @@ def test_a_scene_has_facts_tracks_and_a_map(scene):
     np.testing.assert_allclose(moved[both], tracks["velocity_mps"][:, :-1][both], atol=2)
     assert (tracks["size_m"] > 0).all() and len(set(tracks["id"])) == 12
     assert all(len(note) == 3 for note in scene.notes)
-    assert "12 tracks" in repr(scene) and scene.draw(64, 64).shape == (64, 64, 3)
+    assert "12 tracks" in repr(scene)
+
+
+def test_pictures_show_tracks(scene):
+    bare, drawn, later = pictura.Map.draw(scene, 400, 300), scene.draw(400, 300), scene.starting_at(60).draw(400, 300)
+    assert drawn.shape == (300, 400, 3) and drawn.dtype == np.uint8
+    assert (bare != drawn).any() and (drawn != later).any()
+    with pytest.raises(pictura.Error, match="16 to 8192"):
+        scene.draw(8, 300)
 
 
 def test_every_format_loads_and_what_is_wrong_is_named(folder, scene):
