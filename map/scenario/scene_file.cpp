@@ -3,13 +3,10 @@
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/hash.h"
 #include "pictura/map/scenario/scenario_fields.h"
-#include "pictura/map/scenario/scene_cache.h"
 
 namespace pictura {
 
-namespace {
-
-FieldFileKind saved_scene() {
+FieldFileKind scene_file_kind() {
   std::string layout;
   append_layout<Scenario>(&layout);
   return {.magic = {'P', 'I', 'C', 'T', 'S', 'C', 'E', 'N'},
@@ -17,16 +14,14 @@ FieldFileKind saved_scene() {
           .other = "expected the fields that this version's scenes have: it was written by another version of pictura"};
 }
 
-}  // namespace
-
 void write_scene_file(const std::string& path, const Scenario& scenario) {
   if (!path.ends_with(kSceneFileEnding)) fail_usage("expected a file *{}, got '{}'", kSceneFileEnding, path);
-  write_file(path, encode_fields(saved_scene(), {}, [&](FieldWriter* writer) { writer->put(scenario); }));
+  write_file(path, encode_fields(scene_file_kind(), {}, [&](FieldWriter* writer) { writer->put(scenario); }));
 }
 
 Scenario parse_scene_file(std::string_view bytes, const std::string& name) {
   Scenario scenario;
-  decode_fields(bytes, saved_scene(), {}, name, [&](FieldReader* reader) {
+  decode_fields(bytes, scene_file_kind(), {}, name, [&](FieldReader* reader) {
     reader->get(&scenario);
     validate(scenario);
   });

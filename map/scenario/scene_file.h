@@ -7,10 +7,14 @@
 
 #include "pictura/common/error.h"
 #include "pictura/map/scenario/scenario.h"
+#include "pictura/map/scenario/scene_cache.h"
 
 namespace pictura {
 
 constexpr std::string_view kSceneFileEnding = ".scenario";
+
+/// Of encode_fields() and decode_fields(), with an empty key.
+FieldFileKind scene_file_kind();
 
 /// Writes it whole or not at all. Throws UsageError for a name without that ending, Error naming the file.
 void write_scene_file(const std::string& path, const Scenario& scenario);
