@@ -10,9 +10,10 @@
 
 namespace pictura {
 
-/// "random" (uniform actions, keyed by seed, world, agent and step), "idle" (no jerk), or "lane": the lane keeper,
-/// which drives on the host whatever the simulator's memory, and says so in its name(). The controller drives this
-/// simulator alone, which must outlive it. Throws UsageError listing the known names.
+/// "random" (uniform actions, keyed by seed, world, agent and step), "idle" (no jerk), "lane" (the lane keeper), and in
+/// recorded scenes "log", "inverse" and "idm"; see host_controllers.h. "lane" and "idm" drive on the host whatever the
+/// simulator's memory, and say so in their name(). The controller drives this simulator alone, which must outlive it.
+/// Throws UsageError listing the known names.
 std::unique_ptr<Controller> make_controller(const std::string& name, Simulator& simulator, uint64_t seed);
 
 }  // namespace pictura

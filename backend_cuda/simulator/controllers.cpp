@@ -1,5 +1,5 @@
-// Controllers in device memory: the rules of simulator/rules/control.h, a thread a slot; and the lane keeper, which
-// drives on the host.
+// Controllers in device memory: the rules of simulator/rules/control.h, a thread a slot; and those that drive on the
+// host.
 #include <memory>
 #include <string>
 #include <type_traits>
@@ -7,11 +7,12 @@
 
 #include "pictura/backend_cuda/simulator/kernels.h"
 #include "pictura/common/cuda/check.h"
+#include "pictura/common/cuda/device_buffer.h"
 #include "pictura/common/cuda/device_guard.h"
 #include "pictura/common/error.h"
 #include "pictura/simulator/agent_state.h"
 #include "pictura/simulator/controllers/host_controllers.h"
-#include "pictura/simulator/controllers/lane_keeping.h"
+#include "pictura/simulator/controllers/inverse_actions.h"
 #include "pictura/simulator/simulator_setup.h"
 
 namespace pictura {
@@ -56,6 +57,27 @@ class CudaRuleController final : public Controller {
   Device device_;
 };
 
+/// Drives by the actions that follow recordings, which are searched on the host and copied once.
+class CudaInverseController final : public Controller {
+ public:
+  explicit CudaInverseController(const Simulator& simulator) : device_(simulator.device()) {
+    const InverseTable table(simulator);
+    const DeviceGuard guard(device_);
+    worlds_ = DeviceBuffer<ActionTable>(Span<const ActionTable>(table.worlds));
+    actions_ = DeviceBuffer<int32_t>(Span<const int32_t>(table.actions));
+  }
+  std::string_view name() const override { return "inverse"; }
+  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
+    check_controller_arrays(name(), input, device_, mask, commands_out);
+    write(TabledCommands{input.slots, input.episode_step, worlds_.span(), actions_.span()}, mask, commands_out, stream);
+  }
+
+ private:
+  Device device_;
+  DeviceBuffer<ActionTable> worlds_;
+  DeviceBuffer<int32_t> actions_;
+};
+
 template <typename T>
 void read(Span<T> device, std::vector<std::remove_const_t<T>>* host_out, cudaStream_t stream) {
   host_out->resize(device.size());
@@ -64,15 +86,16 @@ void read(Span<T> device, std::vector<std::remove_const_t<T>>* host_out, cudaStr
       cudaMemcpyAsync(host_out->data(), device.data(), device.size() * sizeof(T), cudaMemcpyDeviceToHost, stream));
 }
 
-/// Copies what the lane keeper looks at to the host and its commands back, in every step.
-class CudaLaneController final : public Controller {
+/// Lets one that drives on the host do so: copies what it looks at there and its commands back, in every step.
+class CudaHostController final : public Controller {
  public:
-  explicit CudaLaneController(const Simulator& simulator)
+  CudaHostController(const Simulator& simulator, std::unique_ptr<Controller> on_host)
       : device_(simulator.device()),
         setup_(simulator.config(), simulator.maps(), simulator.handles(), simulator.worlds()),
         agents_(static_cast<size_t>(setup_.num_slots())),
-        keeper_(simulator) {}
-  std::string_view name() const override { return "lane, on the host"; }
+        on_host_(std::move(on_host)),
+        name_(std::string(on_host_->name()) + ", on the host") {}
+  std::string_view name() const override { return name_; }
   void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
     check_controller_arrays(name(), input, device_, mask, commands_out);
     const DeviceGuard guard(device_);
@@ -92,6 +115,7 @@ class CudaLaneController final : public Controller {
 
     ControllerInput on_host;
     on_host.slots = setup_.slot_table();
+    on_host.scene.world_begin = setup_.box_begin;
     on_host.scene.agents = boxes_;
     on_host.scene.light_begin = setup_.light_begin;
     on_host.scene.light_states = lights_;
@@ -99,7 +123,7 @@ class CudaLaneController final : public Controller {
     on_host.episode_step = episode_step_;
     on_host.episode_index = episode_index_;
     on_host.seed = seed_;
-    keeper_.act(on_host, mask_, commands_);
+    on_host_->act(on_host, mask_, commands_);
     PICTURA_CUDA(cudaMemcpyAsync(commands_out.data(), commands_.data(), commands_.size() * sizeof(Command),
                                  cudaMemcpyHostToDevice, cuda_stream));
     PICTURA_CUDA(cudaStreamSynchronize(cuda_stream));
@@ -108,7 +132,7 @@ class CudaLaneController final : public Controller {
  private:
   Device device_;
   SimulatorSetup setup_;
-  // Copies, at addresses that last as long as this does: the keeper's agents look at them.
+  // Copies, at addresses that last as long as this does: the lane keeper's agents look at them.
   AgentState agents_;
   std::vector<AgentBox> boxes_;
   std::vector<LightState> lights_;
@@ -116,7 +140,8 @@ class CudaLaneController final : public Controller {
   std::vector<uint64_t> seed_;
   std::vector<uint8_t> mask_;
   std::vector<Command> commands_;
-  LaneKeepingController keeper_;
+  std::unique_ptr<Controller> on_host_;
+  std::string name_;
 };
 
 }  // namespace
@@ -125,11 +150,10 @@ std::unique_ptr<Controller> make_cuda_controller(const std::string& name, const 
   check_worlds(name, simulator);
   if (name == "random") return std::make_unique<CudaRandomController>(simulator.device(), seed);
   if (name == "idle") return std::make_unique<CudaRuleController<IdleCommands>>("idle", simulator.device());
-  if (name == "lane") return std::make_unique<CudaLaneController>(simulator);
+  if (name == "lane" || name == "idm")
+    return std::make_unique<CudaHostController>(simulator, make_host_controller(name, simulator, seed));
   if (name == "log") return std::make_unique<CudaRuleController<RecordedCommands>>("log", simulator.device());
-  if (name == "inverse" || name == "idm") {
-    fail_usage("controller {}: expected a simulator in host memory, got one on {}", name, name_of(simulator.device()));
-  }
+  if (name == "inverse") return std::make_unique<CudaInverseController>(simulator);
   fail_usage("controller: expected one of {}; got '{}'", fmt::join(host_controller_names(), ", "), name);
 }
 

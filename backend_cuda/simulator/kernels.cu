@@ -247,6 +247,7 @@ void launch_commands(const Rule& rule, int32_t num_slots, const uint8_t* mask, C
 }
 template void launch_commands(const RandomCommands&, int32_t, const uint8_t*, Command*, cudaStream_t);
 template void launch_commands(const IdleCommands&, int32_t, const uint8_t*, Command*, cudaStream_t);
+template void launch_commands(const TabledCommands&, int32_t, const uint8_t*, Command*, cudaStream_t);
 template void launch_commands(const RecordedCommands&, int32_t, const uint8_t*, Command*, cudaStream_t);
 
 }  // namespace pictura::cuda

@@ -112,7 +112,7 @@ InverseActions find_inverse_actions(const CompiledMap& scene, float dt_s, int nu
   return out;
 }
 
-InverseController::InverseController(const Simulator& simulator) {
+InverseTable::InverseTable(const Simulator& simulator) {
   for (const Conditioning which : {Conditioning::throttle, Conditioning::steer, Conditioning::acceleration}) {
     const ConditioningRange& range = simulator.config().conditioning[static_cast<size_t>(which)];
     if (range.low != 1 || range.high != 1) {
@@ -120,25 +120,21 @@ InverseController::InverseController(const Simulator& simulator) {
                  kConditioningNames[static_cast<size_t>(which)], range.low, range.high);
     }
   }
+  std::vector<ActionTable> of_map;
   for (const auto& map : simulator.maps()) {
-    of_map_.push_back(find_inverse_actions(*map, simulator.config().dt_s, simulator.config().num_threads));
+    const InverseActions found = find_inverse_actions(*map, simulator.config().dt_s, simulator.config().num_threads);
+    of_map.push_back({static_cast<int64_t>(actions.size()), found.num_steps});
+    actions.insert(actions.end(), found.actions.begin(), found.actions.end());
   }
-  for (const WorldSpec& world : simulator.worlds()) map_of_world_.push_back(world.map);
+  for (const WorldSpec& world : simulator.worlds()) worlds.push_back(of_map[static_cast<size_t>(world.map)]);
 }
 
 void InverseController::act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out,
                             Stream) {
   check_controller_arrays(name(), input, Device{}, mask, commands_out);
+  const TabledCommands rule{input.slots, input.episode_step, table_.worlds, table_.actions};
   for (size_t slot = 0; slot < commands_out.size(); ++slot) {
-    if (!mask.empty() && !mask[slot]) continue;
-    commands_out[slot] = {};
-    const auto world = static_cast<size_t>(input.slots.world_of_slot[slot]);
-    const InverseActions& inverse = of_map_[static_cast<size_t>(map_of_world_[world])];
-    const int32_t step = input.episode_step[world];
-    if (step >= inverse.num_steps) continue;
-    commands_out[slot].action =
-        inverse.actions[static_cast<size_t>(input.slots.agent_of_slot[slot]) * static_cast<size_t>(inverse.num_steps) +
-                        static_cast<size_t>(step)];
+    if (mask.empty() || mask[slot]) commands_out[slot] = rule(slot);
   }
 }
 

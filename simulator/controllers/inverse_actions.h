@@ -8,6 +8,7 @@
 #include "pictura/common/error.h"
 #include "pictura/simulator/compiled_map.h"
 #include "pictura/simulator/controllers/controller.h"
+#include "pictura/simulator/rules/control.h"
 #include "pictura/simulator/simulator.h"
 
 namespace pictura {
@@ -27,18 +28,25 @@ struct InverseActions {
 InverseActions find_inverse_actions(const CompiledMap& scene, float dt_s, int num_threads = 0);
 constexpr int kBeamWidth = 48;
 
-/// Drives by them. On the host only.
+/// Those of all worlds of one simulator, as TabledCommands reads them.
+struct InverseTable {
+  /// Throws UsageError where multipliers of the dynamics are not 1, and for worlds without a record.
+  explicit InverseTable(const Simulator& simulator);
+  std::vector<ActionTable> worlds;
+  std::vector<int32_t> actions;  // of one map after the other
+};
+
+/// Drives by them.
 class InverseController final : public Controller {
  public:
   /// Of one simulator, whose worlds are all recorded scenes.
-  explicit InverseController(const Simulator& simulator);
+  explicit InverseController(const Simulator& simulator) : table_(simulator) {}
   std::string_view name() const override { return "inverse"; }
   void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out,
            Stream stream = {}) override;
 
  private:
-  std::vector<InverseActions> of_map_;  // [maps]
-  std::vector<int32_t> map_of_world_;
+  const InverseTable table_;
 };
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// The controllers that need no more than a slot's number: the same rule on every executor.
+// The controllers that need no more than a slot's number, or a table: the same rule on every executor.
 #pragma once
 
 #include "pictura/common/rng.h"
@@ -50,6 +50,31 @@ struct RecordedCommands {
   PICTURA_HD Command operator()(size_t) const {
     Command command;
     command.kind = CommandKind::recorded;
+    return command;
+  }
+};
+
+/// Where the actions of a world are in TabledCommands::actions: [agents, num_steps] from `first` on.
+struct ActionTable {
+  int64_t first = 0;
+  int32_t num_steps = 0;
+};
+
+/// By tables, for so many steps of each episode; no jerk after them.
+struct TabledCommands {
+  SlotTable slots;
+  Span<const int32_t> episode_step;  // [worlds]
+  Span<const ActionTable> tables;    // [worlds]
+  Span<const int32_t> actions;
+
+  PICTURA_HD Command operator()(size_t slot) const {
+    const auto world = static_cast<size_t>(slots.world_of_slot[slot]);
+    const ActionTable table = tables[world];
+    const int32_t step = episode_step[world];
+    Command command;
+    if (step >= table.num_steps) return command;
+    command.action =
+        actions[static_cast<size_t>(table.first + int64_t{slots.agent_of_slot[slot]} * table.num_steps + step)];
     return command;
   }
 };

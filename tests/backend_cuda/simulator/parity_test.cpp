@@ -573,6 +573,35 @@ TEST_F(CudaSimulatorTest, IsDrivenByTheLaneKeeperOnTheHost) {
   EXPECT_GT(cpu->totals().waypoints_reached, 0);
 }
 
+TEST_F(CudaSimulatorTest, IsDrivenByInverseActionsAndTheDriverModel) {
+  const auto scene = test::crossing({.num_steps = 60});
+  SimulatorConfig config = scene_config(*scene);
+  config.episode_steps = 70;  // longer than the record
+  const CompiledMaps maps{compile_scenario(scene, map_options(config)),
+                          compile_scenario(scene, map_options(config), 20)};
+  const std::vector<WorldSpec> worlds{scene_world(*maps[0], 0, 0), scene_world(*maps[1], 1, 1)};
+  for (const auto& [name, on_device] : {std::pair{"inverse", "inverse"}, std::pair{"idm", "idm, on the host"}}) {
+    const auto cpu = make_simulator("cpu", config, maps, worlds), cuda = make_simulator("cuda", config, maps, worlds);
+    const auto cpu_controller = make_controller(name, *cpu, 0), cuda_controller = make_controller(name, *cuda, 0);
+    EXPECT_EQ(cuda_controller->name(), on_device);
+    const auto num_slots = static_cast<size_t>(cpu->num_slots());
+    std::vector<uint8_t> mask(num_slots, 1);
+    mask[2] = 0;
+    const DeviceBuffer<uint8_t> device_mask{Span<const uint8_t>(mask)};
+    std::vector<Command> commands(num_slots, Command{.kind = CommandKind::recorded});
+    const DeviceBuffer<Command> device_commands{Span<const Command>(commands)};
+    for (int step = 0; step < 150; ++step) {
+      cpu_controller->act(cpu->controller_input(), mask, commands);
+      cuda_controller->act(cuda->controller_input(), device_mask.span(), {device_commands.data(), num_slots});
+      cpu->step(commands);
+      cuda->step(device_commands.span());
+    }
+    cuda->check();
+    expect_same_view(cpu.get(), cuda.get(), 150);
+    EXPECT_GT(cpu->totals().agent_steps, 0);
+  }
+}
+
 TEST_F(CudaSimulatorTest, AnActionOutOfRangeChangesNothingAndIsThrownLater) {
   const auto cuda = make_simulator("cuda", {}, {load_map("procedural:1")}, {{0, 30, 0}, {0, 10, 1}});
   std::vector<int32_t> actions(40, 7);
