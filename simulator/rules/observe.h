@@ -163,6 +163,23 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
   }
 }
 
+/// As nearest_partners(), of any boxes one after the other: box_at(i) is one of num_boxes, and counts where
+/// is_there(i).
+template <typename ThreadGroup, typename BoxAt, typename IsThere>
+PICTURA_HD auto nearest_boxes(int num_boxes, const BoxAt& box_at, const IsThere& is_there, Vec2 origin,
+                              const ThreadGroup& group) {
+  typename ThreadGroup::template Nearest<kMaxPartners> nearest;
+  for (int first = 0; first < num_boxes; first += group.size()) {
+    const int i = min_of(first + group.rank(), num_boxes - 1);
+    const AgentBox& box = box_at(i);
+    const Vec2 apart = box.center_m.xy() - origin;
+    const float d2 = length2(apart.x, apart.y);
+    nearest.offer(first + group.rank() < num_boxes && box.drawn && is_there(i) && d2 < square(kPartnerRange_m), d2, i);
+  }
+  nearest.settle();
+  return nearest;
+}
+
 /// The speed of a world's box as others observe it: parked cars have none.
 PICTURA_HD inline float observed_speed_mps(const WorldView& world, int box) {
   const bool moves = world.options.auxiliary_observations && box < world.num_agents;

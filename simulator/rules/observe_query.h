@@ -53,21 +53,13 @@ class QueriedObservation {
   /// world's.
   template <typename ThreadGroup>
   PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin, const ThreadGroup& group) const {
-    typename ThreadGroup::template Nearest<kMaxPartners> nearest;
-    const int num_items = world.num_boxes + static_cast<int>(inserted_.size());
-    for (int first = 0; first < num_items; first += group.size()) {
-      const int item = min_of(first + group.rank(), num_items - 1);
-      const bool is_inserted = item >= world.num_boxes;
-      const AgentBox& box =
-          is_inserted ? inserted_[static_cast<size_t>(item - world.num_boxes)].box : world.boxes[item];
-      const Vec2 apart = box.center_m.xy() - origin;
-      const float d2 = length2(apart.x, apart.y);
-      const bool is_there = is_inserted || (item != agent && (leaves_gaps_ || !hides(world, item)));
-      nearest.offer(first + group.rank() < num_items && box.drawn && is_there && d2 < square(kPartnerRange_m), d2,
-                    item);
-    }
-    nearest.settle();
-    return nearest;
+    const auto box_at = [&](int item) -> const AgentBox& {
+      return item < world.num_boxes ? world.boxes[item] : inserted_[static_cast<size_t>(item - world.num_boxes)].box;
+    };
+    const auto is_there = [&](int item) {
+      return item >= world.num_boxes || (item != agent && (leaves_gaps_ || !hides(world, item)));
+    };
+    return nearest_boxes(world.num_boxes + static_cast<int>(inserted_.size()), box_at, is_there, origin, group);
   }
 
   Span<const int32_t> hidden_;

@@ -27,13 +27,15 @@ Command to_be_at(const DrivenState& state) {
           .speed_mps = state.speed_mps};
 }
 
-// Whether a box is among those that vectors hold of an ego's world: the nearest ones in range.
-bool is_partner(Span<const AgentBox> boxes, size_t box, size_t ego, Vec2 origin_m) {
-  const auto distance_m = [&](const AgentBox& one) { return length(one.center_m.xy() - origin_m); };
-  const float its_m = distance_m(boxes[box]);
-  int nearer = 0;
-  for (size_t i = 0; i < boxes.size(); ++i) nearer += i != ego && boxes[i].drawn && distance_m(boxes[i]) < its_m;
-  return its_m < kPartnerRange_m && nearer < kMaxPartners;
+// Whether a box is among those that vectors hold of an ego's world.
+bool is_partner(Span<const AgentBox> boxes, int32_t box, int32_t ego, Vec2 origin_m) {
+  const auto nearest = nearest_boxes(
+      static_cast<int>(boxes.size()), [&](int i) -> const AgentBox& { return boxes[static_cast<size_t>(i)]; },
+      [ego](int i) { return i != ego; }, origin_m, SingleThread{});
+  for (int i = 0; i < nearest.count(); ++i) {
+    if (nearest.item(i) == box) return true;
+  }
+  return false;
 }
 
 }  // namespace
@@ -207,15 +209,14 @@ bool TakeoverWorlds::look(Worlds* worlds, size_t policy, const std::vector<Takeo
     const LineOfSight& sight = sights_[static_cast<size_t>(start.scene->world.map)];
     const Span<const AgentBox> its_boxes = Span<const AgentBox>(boxes).subspan(
         static_cast<size_t>(box_begin[i]), static_cast<size_t>(box_begin[i + 1] - box_begin[i]));
-    const auto ego = static_cast<size_t>(start.ego);
     if (one.sight_step < 0 && !sight.is_hidden(place_camera(run_.front_camera(), view).position_m, user)) {
       one.sight_step = step;
-      one.sight_distance_m = length((user.center_m - its_boxes[ego].center_m).xy());
+      one.sight_distance_m = length((user.center_m - its_boxes[static_cast<size_t>(start.ego)].center_m).xy());
     }
     if (one.input_step >= 0 || !start.is_user_there) continue;
     if (reads_images)
       queries.push_back({static_cast<int32_t>(i), box_begin[i] + start.user});
-    else if (is_partner(its_boxes, static_cast<size_t>(start.user), ego, view.origin_m.xy()))
+    else if (is_partner(its_boxes, start.user, start.ego, view.origin_m.xy()))
       one.input_step = step;
   }
   const std::vector<float> shares = run_.visibility(simulator.scene(), worlds->views, queries);
