@@ -43,15 +43,18 @@ class Map {
 class RecordedScene final : public Map {
  public:
   /// Throws UsageError for a step that it does not have.
-  RecordedScene(std::shared_ptr<const Scenario> scenario, std::string source, int32_t start_step);
+  RecordedScene(std::shared_ptr<const Scenario> scenario, std::string source, int32_t start_step,
+                bool recorded_lights = false);
   const std::shared_ptr<const Scenario>& scenario() const { return scenario_; }
   int32_t start_step() const { return start_step_; }
+  bool recorded_lights() const { return recorded_lights_; }
 
  private:
   std::function<std::shared_ptr<const CompiledMap>()> compilation(const MapOptions& options) const override;
 
   std::shared_ptr<const Scenario> scenario_;
   int32_t start_step_;
+  bool recorded_lights_;
 };
 
 /// What a renderer draws of a map.

@@ -16,8 +16,12 @@
 
 namespace pictura::python {
 
-RecordedScene::RecordedScene(std::shared_ptr<const Scenario> scenario, std::string source, int32_t start_step)
-    : Map({scenario, &scenario->map}, std::move(source)), scenario_(std::move(scenario)), start_step_(start_step) {
+RecordedScene::RecordedScene(std::shared_ptr<const Scenario> scenario, std::string source, int32_t start_step,
+                             bool recorded_lights)
+    : Map({scenario, &scenario->map}, std::move(source)),
+      scenario_(std::move(scenario)),
+      start_step_(start_step),
+      recorded_lights_(recorded_lights) {
   if (start_step < 0 || start_step >= scenario_->num_steps) {
     fail_usage("scene {}: start_step: expected a step of its recording, in [0, {}), got {}", scenario_->id,
                scenario_->num_steps, start_step);
@@ -25,8 +29,10 @@ RecordedScene::RecordedScene(std::shared_ptr<const Scenario> scenario, std::stri
 }
 
 std::function<std::shared_ptr<const CompiledMap>()> RecordedScene::compilation(const MapOptions& options) const {
-  return [scenario = scenario_, options, start_step = start_step_] {
-    return compile_scenario(scenario, options, start_step);
+  MapOptions compiled = options;
+  compiled.recorded_lights = recorded_lights_;
+  return [scenario = scenario_, compiled, start_step = start_step_] {
+    return compile_scenario(scenario, compiled, start_step);
   };
 }
 
@@ -172,12 +178,18 @@ Raises pictura.Error naming file, record and field; pictura.UsageError where the
       .def(
           "starting_at",
           [](const RecordedScene& self, int32_t start_step) {
-            return std::make_shared<RecordedScene>(self.scenario(), self.source(), start_step);
+            return std::make_shared<RecordedScene>(self.scenario(), self.source(), start_step, self.recorded_lights());
           },
           py::arg("start_step"),
           R"(The same scene, whose episodes begin at another step; nothing is copied.
 
 Raises pictura.UsageError for a step that it does not have.)")
+      .def(
+          "with_recorded_lights",
+          [](const RecordedScene& self) {
+            return std::make_shared<RecordedScene>(self.scenario(), self.source(), self.start_step(), true);
+          },
+          "The same scene, whose worlds have its lights as recorded: drawn, observed, and red ones hold.")
       .def_property_readonly(
           "start_step", [](const RecordedScene& self) { return self.start_step(); },
           py::doc("Of the recording, at which episodes begin."))

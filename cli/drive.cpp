@@ -48,6 +48,26 @@ void add_world_options(CLI::App* command, WorldOptions* options_out) {
   command->add_flag("!--no-walls", options_out->walls, "Leave out the walls along the building lines");
 }
 
+void add_scene_options(CLI::App* command, WorldOptions* options_out) {
+  command->add_option("--start", options_out->start_step, "The step of a recorded scene to start at")
+      ->transform(whole_number(0, kMaxScenarioSteps - 1))
+      ->capture_default_str();
+  command->add_flag("--recorded-lights", options_out->recorded_lights,
+                    "Put the lights of a recorded scene there, as recorded: drawn, observed, and red ones hold");
+}
+
+void refuse_scene_options(const CLI::App& command, const std::string& map, std::initializer_list<const char*> more) {
+  const std::string why = fmt::format("on {}, which is no recorded scene", map);
+  refuse_options(command, {"--start", "--recorded-lights"}, why);
+  refuse_options(command, more, why);
+}
+
+void refuse_options(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why) {
+  for (const char* option : options) {
+    if (command.count(option) > 0) fail_usage("{}: has no effect {}", option, why);
+  }
+}
+
 void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_out, std::string* policy_out,
                          BackendOptions* backends_out) {
   add_map_or_scene(command, &world_out->map);
@@ -58,9 +78,7 @@ void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_
                    "vehicle), all, tracks_to_predict, objects_of_interest, and ids, with commas between them; whoever "
                    "is not there at the start follows the recording")
       ->capture_default_str();
-  command->add_option("--start", world_out->start_step, "The step of a recorded scene to start at")
-      ->transform(whole_number(0, kMaxScenarioSteps - 1))
-      ->capture_default_str();
+  add_scene_options(command, world_out);
   command->add_option("--steps", *steps_out, "Steps of 0.1 s; of a recorded scene by default as many as are recorded")
       ->transform(whole_number(1))
       ->capture_default_str();
@@ -75,19 +93,15 @@ void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_
 
 void settle_driving_options(const CLI::App& command, WorldOptions* world_inout, int* steps_inout,
                             std::string* policy_inout) {
-  const auto refuse = [&command](std::initializer_list<const char*> options, const std::string& why) {
-    for (const char* option : options) {
-      if (command.count(option) > 0) fail_usage("{}: has no effect {}", option, why);
-    }
-  };
   if (!is_scene_name(world_inout->map)) {
-    refuse({"--control", "--start"}, fmt::format("on {}, which is no recorded scene", world_inout->map));
-    return;
+    return refuse_scene_options(command, world_inout->map, {"--control"});
   }
-  refuse({"--agents", "--pedestrians", "--cyclists", "--parked", "--no-walls"},
-         "on a recorded scene, which says that itself");
+  refuse_options(command, {"--agents", "--pedestrians", "--cyclists", "--parked", "--no-walls"},
+                 "on a recorded scene, which says that itself");
   if (command.count("--policy") == 0) *policy_inout = "log";
-  if (*policy_inout == "log") refuse({"--control"}, "with the policy log, which drives everybody as recorded");
+  if (*policy_inout == "log") {
+    refuse_options(command, {"--control"}, "with the policy log, which drives everybody as recorded");
+  }
   if (command.count("--steps") == 0) {
     *steps_inout = 0;
   } else {
@@ -102,11 +116,8 @@ bool is_host_controller(const std::string& policy) {
 
 void refuse_idle_backend_options(const CLI::App& command, const std::string& policy) {
   if (!is_host_controller(policy)) return;
-  for (const char* option : {"--device", "--renderer", "--samples"}) {
-    if (command.count(option) > 0) {
-      fail_usage("{}: has no effect with the policy '{}', which computes and draws nothing", option, policy);
-    }
-  }
+  refuse_options(command, {"--device", "--renderer", "--samples"},
+                 fmt::format("with the policy '{}', which computes and draws nothing", policy));
 }
 
 void set_population(const WorldOptions& options, SimulatorConfig* config_inout) {
@@ -179,7 +190,9 @@ DrivenWorld make_world(const WorldOptions& options, const std::string& policy, c
     const auto scene = std::make_shared<const Scenario>(load_scenario(options.map));
     config = scene_config(*scene, options.start_step, config);
     config.episode_steps = std::max(config.episode_steps, options.min_episode_steps);
-    const auto map = compile_scenario(scene, map_options(config), options.start_step);
+    MapOptions compiled = map_options(config);
+    compiled.recorded_lights = options.recorded_lights;
+    const auto map = compile_scenario(scene, compiled, options.start_step);
     if (policy != "log") controlled = controlled_tracks(options, *map);
     world.simulator = make_simulator(simulator, config, CompiledMaps{map}, {scene_world(*map)});
     world.first_agent = std::max(scene->sdc_track, 0);

@@ -1,6 +1,7 @@
 // One world of one map for `render` and `simulate`, and the controller that drives in it, by name or from a checkpoint.
 #pragma once
 
+#include <initializer_list>
 #include <memory>
 #include <optional>
 #include <string>
@@ -26,15 +27,24 @@ struct WorldOptions {
   // Where nothing is said, as the policy was trained, or as in the paper.
   std::optional<float> pedestrian_fraction, cyclist_fraction;
   std::optional<int> parked_cars;
-  // Of recorded scenes: which tracks the policy drives, and where the recording starts. An episode is as long as what
-  // is left of the recording, or as so many steps.
+  // Of recorded scenes: which tracks the policy drives, where the recording starts, and whether its lights are there.
+  // An episode is as long as what is left of the recording, or as so many steps.
   std::string controlled = "self";
   int start_step = 0;
+  bool recorded_lights = false;
   int min_episode_steps = 1;
 };
 
 /// Adds --agents, --pedestrians, --cyclists, --parked, --seed, --threads and --no-walls, which fill *options_out.
 void add_world_options(CLI::App* command, WorldOptions* options_out);
+
+/// Adds what chooses of a recorded scene: --start and --recorded-lights.
+void add_scene_options(CLI::App* command, WorldOptions* options_out);
+/// Throws UsageError where one of these, or of `more` options of recorded scenes, was given for another map.
+void refuse_scene_options(const CLI::App& command, const std::string& map, std::initializer_list<const char*> more);
+
+/// Throws UsageError where one of these options was given; `why` says where it would have no effect.
+void refuse_options(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why);
 
 /// Adds MAP, which may be a recorded scene, those options, --control, --start, --steps, --policy and where the policy
 /// runs.

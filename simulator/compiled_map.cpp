@@ -46,6 +46,7 @@ uint64_t fingerprint_of(const RoadMap& map, const MapRecord& record) {
   add_values(&hash, fingerprint_of(map), record.num_steps);
   hash.add(Span<const RecordedAgent>(record.agents));
   hash.add(Span<const RecordedState>(record.states));
+  hash.add(Span<const LightState>(record.light_states));
   return hash.value();
 }
 

@@ -17,7 +17,8 @@ struct SimulatorConfig;
 struct MapOptions {
   bool walls = true;  // along the building lines
   uint64_t wall_seed = 0;
-  bool observe_walls = false;  // rules.near_wall_pieces is made
+  bool observe_walls = false;    // rules.near_wall_pieces is made
+  bool recorded_lights = false;  // those of a recorded scene are there, see compile_scenario()
   bool operator==(const MapOptions&) const = default;
 };
 

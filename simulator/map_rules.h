@@ -28,7 +28,8 @@ struct CellLists {
 /// What a map was recorded with; empty for most maps.
 struct MapRecord {
   std::vector<RecordedAgent> agents;
-  std::vector<RecordedState> states;  // [agents, steps]
+  std::vector<RecordedState> states;     // [agents, steps]
+  std::vector<LightState> light_states;  // [lights of the map, steps], or empty
   int32_t num_steps = 0;
   float dt_s = 0.1f;
 };

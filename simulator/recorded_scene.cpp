@@ -48,6 +48,53 @@ MapRecord record_of(const Scenario& scenario, int32_t start_step) {
   return record;
 }
 
+/// Who stops at a flashing red light may drive on: it is no red one.
+LightState light_state(RecordedLightState state) {
+  switch (state) {
+    case RecordedLightState::stop:
+    case RecordedLightState::arrow_stop: return LightState::red;
+    case RecordedLightState::caution:
+    case RecordedLightState::arrow_caution:
+    case RecordedLightState::flashing_stop:
+    case RecordedLightState::flashing_caution: return LightState::yellow;
+    case RecordedLightState::go:
+    case RecordedLightState::arrow_go: return LightState::green;
+    case RecordedLightState::none: break;
+  }
+  return LightState::off;
+}
+
+std::vector<LightState> light_states_of(const Scenario& scenario, int32_t start_step) {
+  std::vector<LightState> states;
+  for (int32_t light = 0; light < static_cast<int32_t>(scenario.lights.size()); ++light) {
+    for (const RecordedLightState state : scenario.states_of_light(light).subspan(
+             static_cast<size_t>(start_step), static_cast<size_t>(scenario.num_steps - start_step))) {
+      states.push_back(light_state(state));
+    }
+  }
+  return states;
+}
+
+/// The scene's road with its lights.
+std::shared_ptr<const RoadMap> lit_road(const Scenario& scenario) {
+  PICTURA_CHECK(scenario.map.lights.empty(), "scene {}: expected a map without lights of its own beside recorded ones",
+                scenario.id);
+  auto road = std::make_shared<RoadMap>(scenario.map);
+  for (const RecordedLight& recorded : scenario.lights) {
+    const SinCos heading = sincos_of(recorded.stop_heading_rad);
+    TrafficLight light{.stop_a_m = recorded.stop_a_m,
+                       .stop_b_m = recorded.stop_b_m,
+                       .stop_heading_rad = recorded.stop_heading_rad,
+                       .head_facing = {-heading.cos, -heading.sin},
+                       .lanes = recorded.lanes};
+    light.head_m = (light.stop_a_m + light.stop_b_m) * 0.5f +
+                   Vec3{kRecordedHeadAhead_m * heading.cos, kRecordedHeadAhead_m * heading.sin, kRecordedHeadHeight_m};
+    road->lights.push_back(light);
+  }
+  road->light_lanes = scenario.light_lanes;
+  return road;
+}
+
 /// What one word names; see tracks_of().
 std::vector<uint8_t> tracks_of_word(const Scenario& scenario, const std::string& word) {
   std::vector<uint8_t> mask(scenario.tracks.size());
@@ -98,8 +145,13 @@ std::shared_ptr<const CompiledMap> compile_scenario(std::shared_ptr<const Scenar
   }
   PICTURA_CHECK(scenario->tracks.size() <= kMaxAgentsPerWorld, "scene {}: expected at most {} tracks, got {}",
                 scenario->id, kMaxAgentsPerWorld, scenario->tracks.size());
-  const std::shared_ptr<CompiledMap> map =
-      compile_map({scenario, &scenario->map}, options, record_of(*scenario, start_step));
+  std::shared_ptr<const RoadMap> road(scenario, &scenario->map);
+  MapRecord record = record_of(*scenario, start_step);
+  if (options.recorded_lights) {
+    road = lit_road(*scenario);
+    record.light_states = light_states_of(*scenario, start_step);
+  }
+  const std::shared_ptr<CompiledMap> map = compile_map(std::move(road), options, std::move(record));
   map->scenario = std::move(scenario);
   map->start_step = start_step;
   return map;

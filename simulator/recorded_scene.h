@@ -12,10 +12,14 @@
 
 namespace pictura {
 
+constexpr float kRecordedHeadAhead_m = 15.0f, kRecordedHeadHeight_m = 5.0f;
+
 /// The map of a scene, whose worlds' agents are its tracks, in their order: each starts an episode where the recording
 /// has it at start_step, or absent. Throws Error naming scene and track when it has no drivable lane, more than
 /// kMaxAgentsPerWorld tracks, or a track too large to be simulated; UsageError for a null pointer, and for a step that
-/// the recording does not have.
+/// the recording does not have. With options.recorded_lights its road has the scene's lights, whose states are those
+/// recorded: they are drawn, observed, and hold traffic. Recordings do not have their heads, which are put
+/// kRecordedHeadAhead_m past the middle of the stop line, and kRecordedHeadHeight_m above it.
 std::shared_ptr<const CompiledMap> compile_scenario(std::shared_ptr<const Scenario> scenario,
                                                     const MapOptions& options = {}, int32_t start_step = 0);
 

@@ -117,9 +117,8 @@ Scenario SceneRecorder::scenario(std::string id, int self_agent) const {
   scenario.dt_s = simulator_.config().dt_s;
   scenario.num_steps = num_steps_;
   scenario.current_step = std::min(10, num_steps_ - 1);
-  scenario.map = *map.road;
-
   const Scenario* const recorded = map.scenario.get();  // what it was the replay of
+  scenario.map = recorded ? recorded->map : *map.road;  // recorded lights are no part of it
   if (recorded && self_agent < 0) self_agent = recorded->sdc_track;
   const auto steps = static_cast<size_t>(num_steps_);
   for (size_t i = 0; i < bodies_.size(); ++i) {
@@ -148,7 +147,7 @@ Scenario SceneRecorder::scenario(std::string id, int self_agent) const {
     fail_usage("expected an agent that was there as the self-driving car, got {}", self_agent);
   }
 
-  const auto num_lights = static_cast<size_t>(map.road->lights.size());
+  const auto num_lights = scenario.map.lights.size();
   move_lights(&scenario);
   for (size_t light = 0; light < num_lights; ++light) {
     for (size_t step = 0; step < steps; ++step) {

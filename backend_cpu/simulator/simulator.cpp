@@ -310,7 +310,7 @@ class SimulatorCpu final : public Simulator {
       active += keeps_episode(world, agent);
     }
     for (int light = 0; light < static_cast<int>(world.map.stop_lines.size()); ++light) {
-      world.lights[light] = light_state(world.light_plans[light], steps);
+      world.lights[light] = light_state(world.map, light, world.light_plans[light], steps);
     }
     const bool ends = episode_ends(world.options, steps, worlds_.state.spawned[index], active);
     worlds_.state.episode_over[index] = ends;

@@ -381,7 +381,7 @@ struct FinishStep {
     for_each_agent([&](int agent, SimulatorTotals* part) { finish_agent(world, agent, ends, arrays.results, part); });
     add_up(group, parts, totals_out);
     for (int i = group.rank(); i < static_cast<int>(world.map.stop_lines.size()); i += group.size()) {
-      world.lights[i] = light_state(world.light_plans[i], steps);
+      world.lights[i] = light_state(world.map, i, world.light_plans[i], steps);
     }
     return ends;
   }

@@ -60,7 +60,7 @@ PICTURA_HD inline void begin_light(const WorldView& world, int light) {
   world.light_plans[light] =
       draw_light_plan(world.map.stop_lines[static_cast<size_t>(light)], light, world.options.fixed_lights,
                       world.options.dt_s, world.seed, world.global_world, world.episode);
-  world.lights[light] = light_state(world.light_plans[light], 0);
+  world.lights[light] = light_state(world.map, light, world.light_plans[light], 0);
 }
 
 PICTURA_HD inline void count_events(int events, SimulatorTotals* totals_inout) {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "pictura/common/cells_around.h"
+#include "pictura/common/color.h"
 #include "pictura/common/math.h"
 #include "pictura/common/span.h"
 #include "pictura/map/scenario/road_side.h"
@@ -125,6 +126,7 @@ struct MapView {
   Span<const RecordedState> recorded_states;  // [recorded_agents, recorded_steps]
   Span<const SideEdge> side_edges;            // of maps with a record: on which side of them the road is
   GridView side_cells;
+  Span<const LightState> recorded_lights;         // [stop_lines, recorded_steps]; or none, and lights run by plans
   int32_t recorded_steps = 0;                     // the first one is where episodes start
   float max_box_radius_m = 0, max_speed_mps = 0;  // no box has a longer half-diagonal, and nothing is faster
 };
@@ -156,6 +158,7 @@ PICTURA_HD void visit_arrays(MapView* view, Visit&& visit) {
   visit(&view->wall_middles);
   visit(&view->recorded_agents);
   visit(&view->recorded_states);
+  visit(&view->recorded_lights);
   visit(&view->side_edges);
   GridView* const lists[] = {
       &view->segment_cells,   &view->edge_cells,       &view->wall_cells,           &view->stop_line_cells,

@@ -67,6 +67,14 @@ PICTURA_HD inline LightState light_state(const LightPlan& plan, int step) {
   return in_slot < plan.green_steps + plan.yellow_steps ? LightState::yellow : LightState::red;
 }
 
+/// Of stop line `light` so many steps after its episode's start: as recorded, on maps whose lights are, else by its
+/// plan. After the record's end it stays as it was.
+PICTURA_HD inline LightState light_state(const MapView& map, int light, const LightPlan& plan, int step) {
+  if (map.recorded_lights.empty()) return light_state(plan, step);
+  return map.recorded_lights[static_cast<size_t>(light) * static_cast<size_t>(map.recorded_steps) +
+                             static_cast<size_t>(min_of(step, map.recorded_steps - 1))];
+}
+
 /// A stop line holds those who head within 45 degrees of its traffic, and reaches a little beyond its ends.
 constexpr float kStopLineCosine = 0.70710678f, kStopLineSideTolerance_m = 0.5f;
 

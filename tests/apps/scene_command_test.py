@@ -76,6 +76,7 @@ with tempfile.TemporaryDirectory() as name:
     driven = simulate(scene, "--policy", "idle", "--control", "self", "--steps", 10)
     assert driven["agent_steps"] == 10 and driven["displacement_max_m"] < 0.1, driven
     assert simulate(scene, "--policy", "inverse", "--control", "1000,1014", "--steps", 10)["agent_steps"] == 20
+    assert simulate(scene, "--recorded-lights")["state_hash"] != simulate(scene)["state_hash"]
     # Longer than the recording: nobody comes again.
     assert simulate(scene, "--policy", "random", "--control", "all", "--steps", 120)["episodes"] == 0
 

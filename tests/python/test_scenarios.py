@@ -108,6 +108,13 @@ def test_the_log_replays_the_recording(scene, start_step):
     assert simulator.totals()["agent_steps"] == 0
 
 
+def test_recorded_lights_are_there_where_they_are_asked_for(scene):
+    lit = scene.with_recorded_lights()
+    assert scene.geometry(walls=False).num_lights == 0 and lit.geometry(walls=False).num_lights == 3
+    assert lit.starting_at(5).geometry(walls=False).num_lights == scene.facts["recorded_lights"] == 3
+    assert (world_of(lit).draw(width_px=300, height_px=300) != world_of(scene).draw(width_px=300, height_px=300)).any()
+
+
 def test_some_drive_among_the_recorded(scene):
     scene = scene.starting_at(10)
     simulator = world_of(scene)

@@ -101,6 +101,75 @@ TEST(RecordedWorlds, StartAtAChosenStep) {
               HasSubstr("expected a step of its recording to start at, in [0, 91), got 91"));
 }
 
+std::unique_ptr<Simulator> lit_world_of(const std::shared_ptr<const Scenario>& scene, int32_t start_step = 0) {
+  const SimulatorConfig config = scene_config(*scene, start_step);
+  MapOptions options = map_options(config);
+  options.recorded_lights = true;
+  const auto map = compile_scenario(scene, options, start_step);
+  return make_simulator("cpu", config, CompiledMaps{map}, {scene_world(*map)});
+}
+
+/// The crossing, all of whose lights always show one state.
+std::shared_ptr<const Scenario> crossing_with(RecordedLightState state) {
+  Scenario scene = *crossing(kNobodyInTheWay);
+  std::fill(scene.light_states.begin(), scene.light_states.end(), state);
+  return std::make_shared<const Scenario>(std::move(scene));
+}
+
+TEST(RecordedWorlds, RecordedLightsShowWhatWasRecordedWhereTheyAreAskedFor) {
+  constexpr int32_t kStart = 7;
+  const auto scene = crossing();
+  ASSERT_EQ(world_of(scene)->scene().light_states.size(), 0u);
+  const auto simulator = lit_world_of(scene, kStart);
+  const CompiledMap& map = *simulator->maps()[0];
+  ASSERT_EQ(map.road->lights.size(), scene->lights.size());
+  EXPECT_EQ(map.geometry.heads.size(), scene->lights.size());
+  EXPECT_NE(map.fingerprint, world_of(scene, kStart)->maps()[0]->fingerprint);
+  int changes = 0;
+  for (int32_t step = kStart; step < scene->num_steps; ++step) {
+    const Span<const LightState> shown = simulator->scene().light_states;
+    for (int32_t light = 0; light < static_cast<int32_t>(scene->lights.size()); ++light) {
+      const Span<const RecordedLightState> states = scene->states_of_light(light);
+      const auto at = static_cast<size_t>(step);
+      const LightState is = shown[static_cast<size_t>(light)];
+      EXPECT_EQ(is == LightState::red,
+                states[at] == RecordedLightState::stop || states[at] == RecordedLightState::arrow_stop)
+          << light << ", " << step;
+      EXPECT_EQ(is == LightState::green,
+                states[at] == RecordedLightState::go || states[at] == RecordedLightState::arrow_go);
+      EXPECT_EQ(is == LightState::off, states[at] == RecordedLightState::none);
+      changes += step > kStart && states[at] != states[at - 1];
+    }
+    simulator->step(recorded(*simulator));
+  }
+  EXPECT_GT(changes, 0);
+}
+
+TEST(RecordedWorlds, RedRecordedLightsHoldWhoDrives) {
+  const auto crosses = [](Simulator& simulator) {
+    std::vector<Command> commands = recorded(simulator);
+    commands[0] = {.action = kIdleAction};
+    for (int step = 0; step < 60; ++step) simulator.step(commands);
+    return simulator.totals().red_light;
+  };
+  EXPECT_EQ(crosses(*lit_world_of(crossing_with(RecordedLightState::stop))), 1);
+  EXPECT_EQ(crosses(*lit_world_of(crossing_with(RecordedLightState::flashing_stop))), 0);
+  EXPECT_EQ(crosses(*lit_world_of(crossing_with(RecordedLightState::go))), 0);
+  EXPECT_EQ(crosses(*lit_world_of(crossing_with(RecordedLightState::none))), 0);
+  EXPECT_EQ(crosses(*world_of(crossing_with(RecordedLightState::stop))), 0);
+  // Who is recorded is held by nothing.
+  const auto replay = lit_world_of(crossing_with(RecordedLightState::stop));
+  for (int step = 0; step < 60; ++step) replay->step(recorded(*replay));
+  EXPECT_EQ(replay->totals().red_light, 0);
+}
+
+TEST(RecordedWorlds, RecordedLightsAreObserved) {
+  const auto controls = [](Simulator& simulator) {
+    return simulator.observations().set_counts[static_cast<size_t>(EntitySet::controls)];
+  };
+  EXPECT_GT(controls(*lit_world_of(crossing())), controls(*world_of(crossing())));
+}
+
 TEST(RecordedWorlds, StandStillAfterTheEndOfTheRecord) {
   const auto scene = crossing();
   SimulatorConfig config = scene_config(*scene);

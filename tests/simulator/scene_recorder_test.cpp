@@ -119,7 +119,9 @@ TEST(SceneRecorder, LightsBecomeRecordedOnes) {
 TEST(SceneRecorder, AReplayedRecordingIsTheRecording) {
   const auto scene = test::crossing();
   const SimulatorConfig config = scene_config(*scene, 5, {.num_threads = 1});
-  const auto map = compile_scenario(scene, map_options(config), 5);
+  MapOptions options = map_options(config);
+  options.recorded_lights = true;  // change nothing in what is saved
+  const auto map = compile_scenario(scene, options, 5);
   const auto simulator = make_simulator("cpu", config, CompiledMaps{map}, {scene_world(*map)});
   const auto log = make_controller("log", *simulator, 0);
   std::vector<Command> commands(scene->tracks.size());

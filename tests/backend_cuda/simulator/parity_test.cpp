@@ -230,8 +230,9 @@ TEST_F(CudaSimulatorTest, FollowsRecordsAndTakesOver) {
   const auto scene = test::crossing({.num_vehicles = 40, .num_pedestrians = 10});
   SimulatorConfig config = scene_config(*scene);
   config.episode_steps = 100;  // longer than the record
-  const CompiledMaps maps{compile_scenario(scene, map_options(config)),
-                          compile_scenario(scene, map_options(config), 30)};
+  MapOptions lit = map_options(config);
+  lit.recorded_lights = true;
+  const CompiledMaps maps{compile_scenario(scene, map_options(config)), compile_scenario(scene, lit, 30)};
   const std::vector<WorldSpec> worlds{scene_world(*maps[0], 0, 0), scene_world(*maps[1], 1, 1)};
   const auto cpu = make_simulator("cpu", config, maps, worlds), cuda = make_simulator("cuda", config, maps, worlds);
   const auto log = make_controller("log", *cuda, 0), random = make_controller("random", *cuda, 5);

@@ -99,8 +99,9 @@ TEST(Phases, FollowRecords) {
   const auto scene = test::crossing({.num_steps = 40, .num_pedestrians = 6});
   SimulatorConfig config = scene_config(*scene);
   config.episode_steps = 50;  // longer than the record, and several times
-  const CompiledMaps maps{compile_scenario(scene, map_options(config)),
-                          compile_scenario(scene, map_options(config), 20),
+  MapOptions lit = map_options(config);
+  lit.recorded_lights = true;
+  const CompiledMaps maps{compile_scenario(scene, map_options(config)), compile_scenario(scene, lit, 20),
                           compile_map(testing::stadium(200, 2), map_options(config))};
   const std::vector<WorldSpec> worlds{
       scene_world(*maps[0], 0, 0), scene_world(*maps[1], 1, 1), {2, 20, 2}, scene_world(*maps[0], 0, 3)};
