@@ -1,4 +1,5 @@
-// `pictura render`: writes what cameras see, of a scene file or of a world that was driven with random actions.
+// `pictura render`: writes what cameras see, of a scene file, of a world that was driven with random actions, or of a
+// recorded scene.
 #include <cctype>
 #include <chrono>
 #include <filesystem>
@@ -8,6 +9,7 @@
 #include "pictura/apps/commands.h"
 #include "pictura/backends/make_renderer.h"
 #include "pictura/cli/drive.h"
+#include "pictura/cli/file_options.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
@@ -18,6 +20,8 @@
 #include "pictura/common/support/interrupt.h"
 #include "pictura/drawing/drawing.h"
 #include "pictura/drawing/planes.h"
+#include "pictura/map/scenario/load_scenario.h"
+#include "pictura/simulator/recorded_scene.h"
 
 namespace pictura {
 
@@ -26,6 +30,7 @@ namespace {
 struct Arguments {
   WorldOptions world;
   int steps = 50, views = 4;
+  std::string tracks;  // of a recorded scene, whose cameras are drawn
   BackendOptions backends;
   std::string size = "96x54", rig, out;
   std::vector<std::string> planes;
@@ -35,7 +40,7 @@ struct Arguments {
 
 /// What is drawn, and under which names, whether a world was driven there or a file says so.
 struct Subject {
-  std::vector<StaticGeometry> geometries;
+  std::vector<StaticGeometry> geometries;  // handles are indices
   SceneBatch scene;
   Span<const View> views;
   std::vector<std::string> names, captions;  // [views]
@@ -142,19 +147,23 @@ void render_scene_file(const Arguments& arguments) {
                   renderer.get());
 }
 
-void render_world(const Arguments& arguments) {
+/// What a map's worlds are drawn with.
+RendererConfig config_of(const Arguments& arguments) {
   const Pair size = parse_pair("--size", arguments.size, 8192);
   if (!arguments.rig.empty() && arguments.size_given) fail_usage("--size: the rig of --rig has sizes of its own");
   if (!arguments.rig.empty() && arguments.square_pixels) fail_usage("--square-pixels: has no effect beside --rig");
-  if (arguments.views > arguments.world.agents) {
-    fail_usage("--views: expected 1 to {} (one per agent), got {}", arguments.world.agents, arguments.views);
-  }
   RendererConfig config;
   config.rig =
       arguments.rig.empty() ? paper_rig(size.first, size.second, arguments.square_pixels) : load_rig(arguments.rig);
   config.line_floor_px = arguments.line_floor_px;
-  const auto renderer = open_renderer(arguments, config);
+  return config;
+}
 
+void render_world(const Arguments& arguments) {
+  if (arguments.views > arguments.world.agents) {
+    fail_usage("--views: expected 1 to {} (one per agent), got {}", arguments.world.agents, arguments.views);
+  }
+  const auto renderer = open_renderer(arguments, config_of(arguments));
   DrivenWorld world = make_world(arguments.world, "random", arguments.backends);
   Simulator* const simulator = world.simulator.get();
   for (int step = 0; step < arguments.steps; ++step) {
@@ -173,12 +182,48 @@ void render_world(const Arguments& arguments) {
   draw_and_report(arguments, subject, renderer.get());
 }
 
+/// The tracks of a recorded scene that look, in their order.
+std::vector<uint8_t> looking_tracks(const Arguments& arguments, const CompiledMap& map) {
+  const Scenario& scenario = *map.scenario;
+  if (arguments.tracks.empty() && scenario.sdc_track < 0) {
+    // The file does not say who is the self-driving car.
+    std::vector<uint8_t> first = tracks_of(scenario, "all", map.start_step);
+    std::fill(std::find(first.begin(), first.end(), 1) + 1, first.end(), 0);
+    return first;
+  }
+  try {
+    return tracks_of(scenario, arguments.tracks.empty() ? "self" : arguments.tracks, map.start_step);
+  } catch (const UsageError& error) {
+    fail_usage("--tracks: {}", error.what());
+  }
+}
+
+void render_recorded_scene(const Arguments& arguments) {
+  const RendererConfig config = config_of(arguments);
+  DrivenWorld world = make_world(arguments.world, "log", arguments.backends);
+  const CompiledMap& map = *world.simulator->maps()[0];
+  const std::vector<uint8_t> looks = looking_tracks(arguments, map);
+  const auto renderer = open_renderer(arguments, config);
+  Subject subject{{map.geometry}, world.simulator->scene(), {}, {}, {}};
+  std::vector<View> views;
+  for (size_t i = 0; i < looks.size(); ++i) {
+    if (!looks[i]) continue;
+    const RecordedTrack& track = map.scenario->tracks[i];
+    views.push_back(world.simulator->views()[i]);
+    subject.names.push_back(fmt::format("track{}", track.id));
+    subject.captions.push_back(fmt::format("{} {}, step {}", to_string(track.type), track.id, map.start_step));
+  }
+  subject.views = views;
+  draw_and_report(arguments, subject, renderer.get());
+}
+
 // A scene file says these itself.
 void refuse_world_options(const CLI::App& command) {
-  for (const char* option : {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--steps",
-                             "--views", "--size", "--square-pixels", "--rig", "--line-floor", "--simulator"}) {
-    if (command.count(option) > 0) fail_usage("{}: has no effect on a scene file, which says that itself", option);
-  }
+  refuse_options(
+      command,
+      {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--steps", "--views", "--size",
+       "--square-pixels", "--rig", "--line-floor", "--simulator", "--start", "--recorded-lights", "--tracks"},
+      "on a scene file, which says that itself");
 }
 
 }  // namespace
@@ -186,10 +231,7 @@ void refuse_world_options(const CLI::App& command) {
 void add_render_command(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("render", "Write what the cameras of some agents see");
-  command
-      ->add_option("MAP", arguments->world.map,
-                   "A .xodr file, a town's name, procedural[:SEED], or a scene file (.toml)")
-      ->required();
+  add_map_or_scene(command, &arguments->world.map, "a scene file (.toml), ");
   add_world_options(command, &arguments->world);
   command->add_option("--steps", arguments->steps, "Steps of random actions before the pictures")
       ->transform(whole_number(0))
@@ -197,6 +239,11 @@ void add_render_command(CLI::App& app) {
   command->add_option("--views", arguments->views, "Draw the cameras of the first so many agents")
       ->transform(whole_number(1))
       ->capture_default_str();
+  add_scene_options(command, &arguments->world);
+  command->add_option("--tracks", arguments->tracks,
+                      "Of a recorded scene, whose cameras are drawn, of those who are there at --start: self, vehicles "
+                      "(the others), others (who is no vehicle), all, tracks_to_predict, objects_of_interest, and ids, "
+                      "with commas between them; default: self, or the first where the file does not say who that is");
   CLI::Option* size =
       command->add_option("--size", arguments->size, "Image size in pixels, WxH")->capture_default_str();
   command->add_flag("--square-pixels", arguments->square_pixels,
@@ -219,7 +266,8 @@ void add_render_command(CLI::App& app) {
   command->footer(
       "Examples:\n  pictura render Town01 --agents 80 --steps 100 --views 6 --size 192x108 --out images\n"
       "  pictura render procedural:1 --agents 40 --steps 20 --views 2 --out images\n"
-      "  pictura render tests/golden/crossing.toml --backend cpu --planes depth,class --out images");
+      "  pictura render tests/golden/crossing.toml --backend cpu --planes depth,class --out images\n"
+      "  pictura render validation.tfrecord-00000-of-00150#7 --start 10 --tracks self,1014 --out images");
   command->callback([arguments, size, command] {
     if (is_scene_file(arguments->world.map)) {
       refuse_world_options(*command);
@@ -227,6 +275,14 @@ void add_render_command(CLI::App& app) {
     }
     arguments->size_given = size->count() > 0;
     arguments->world.vector_observations = false;
+    if (is_scene_name(arguments->world.map)) {
+      refuse_options(
+          *command,
+          {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--steps", "--views"},
+          "on a recorded scene, which says that itself: --start and --tracks choose of it");
+      return render_recorded_scene(*arguments);
+    }
+    refuse_scene_options(*command, arguments->world.map, {"--tracks"});
     render_world(*arguments);
   });
 }

@@ -11,8 +11,8 @@ namespace pictura {
 /// that promises it.
 CLI::Validator file_ending(const std::string& ending);
 
-/// Adds MAP, which may be a recorded scene.
-void add_map_or_scene(CLI::App* command, std::string* map_out);
+/// Adds MAP, which may be a recorded scene; `more` names what else it may be.
+void add_map_or_scene(CLI::App* command, std::string* map_out, const std::string& more = "");
 
 /// Lets no option of a command and its subcommands take an empty text, which would count as not given.
 void refuse_empty_values(CLI::App* command);

@@ -183,6 +183,12 @@ class Scenario(Map):
         """
     def __repr__(self) -> str:
         ...
+    def draw(self, width_px: typing.SupportsInt | typing.SupportsIndex = 1024, height_px: typing.SupportsInt | typing.SupportsIndex = 1024) -> numpy.typing.NDArray[numpy.uint8]:
+        """
+        A picture from above, uint8 [height, width, 3], north up: the ways of all tracks, and who is there at start_step.
+        
+        Sizes of 16 to 8192 px.
+        """
     def inverse_actions(self, num_threads: typing.SupportsInt | typing.SupportsIndex = 0) -> dict:
         """
         The actions by which the simulator's dynamics follow the recording most closely, as NumPy arrays by name.
@@ -216,6 +222,10 @@ class Scenario(Map):
         id int64 [tracks], as in the file; type uint8 [tracks] counts pictura.TRACK_TYPES; size_m float32 [tracks, 3]: length, width,
         height. valid bool [tracks, steps]; position_m float32 [tracks, steps, 3], centre of the box's foot in the map's frame;
         heading_rad [tracks, steps]; velocity_mps [tracks, steps, 2]: 0 where not valid.
+        """
+    def with_recorded_lights(self) -> Scenario:
+        """
+        The same scene, whose worlds have its lights as recorded: drawn, observed, and red ones hold.
         """
     def world(self, **kwargs) -> dict:
         """

@@ -1,4 +1,4 @@
-"""`pictura map` and `pictura simulate` of recorded scenes, from outside. Usage: scene_command_test.py PICTURA SCENE_FIXTURE."""
+"""`pictura map`, `simulate` and `render` of recorded scenes, from outside. Usage: scene_command_test.py PICTURA SCENE_FIXTURE."""
 
 import json
 import pathlib
@@ -79,6 +79,28 @@ with tempfile.TemporaryDirectory() as name:
     assert simulate(scene, "--recorded-lights")["state_hash"] != simulate(scene)["state_hash"]
     # Longer than the recording: nobody comes again.
     assert simulate(scene, "--policy", "random", "--control", "all", "--steps", 120)["episodes"] == 0
+
+    def render(*words):
+        out = folder / "images"
+        shutil.rmtree(out, ignore_errors=True)
+        drawn = json.loads(run(scene, *words, "--backend", "cpu", "--out", out, "--json", command="render").stdout)
+        return drawn, {path.name for path in out.iterdir()}
+
+    drawn, files = render("--figure", "--size", "32x18")
+    assert drawn["images"] == 4 and drawn["cameras"] == 4
+    assert files == {f"track1000_{camera}.png" for camera in ("front", "front_left", "front_right", "back")} | {
+        "track1000.png", "figure.png", "contact_sheet.png"}, files
+    lit, _ = render("--recorded-lights", "--size", "32x18")
+    assert lit["image_hash"] != drawn["image_hash"]
+    later, _ = render("--start", 60, "--size", "32x18")
+    assert later["image_hash"] != drawn["image_hash"]
+    several, files = render("--start", 10, "--tracks", "self,1007", "--size", "32x18")
+    assert several["images"] == 8 and {name.split("_")[0] for name in files} == {"track1000", "track1007", "contact"}
+    out = ("--out", folder / "images")
+    assert "--tracks: expected self, vehicles" in refusal(scene, "--tracks", "cars", *out, command="render")
+    assert "--views: has no effect on a recorded scene" in refusal(scene, "--views", 2, *out, command="render")
+    assert "--start: has no effect on procedural:1" in refusal("procedural:1", "--start", 2, *out, command="render")
+    assert "in [0, 91), got 91" in refusal(scene, "--start", 91, *out, command="render")
 
     run(scene, "--out", folder / "scene.html", "--mcap", folder / "scene.mcap", command="replay")
     assert (folder / "scene.html").stat().st_size > 10_000 and (folder / "scene.mcap").stat().st_size > 10_000
