@@ -77,25 +77,6 @@ void draw_means(const CornerResults& results, const std::vector<CornerRow>& rows
   draw_plots_png(panels, path, {.panel_width_px = 400, .panel_height_px = 300, .columns = 3, .one_legend = true});
 }
 
-// The pair at whose reveal speeds differ most; else the first.
-size_t example_of(const CornerResults& results) {
-  size_t example = 0;
-  float most = -1;
-  for (size_t pair = 0; pair < results.pairs.size(); ++pair) {
-    std::vector<float> speeds;
-    for (size_t policy = 0; policy < results.policies.size(); ++policy) {
-      const auto reveal = reveal_of(results, pair, true, CornerCase::hidden, policy);
-      if (reveal) speeds.push_back(reveal->speed_mps);
-    }
-    if (speeds.size() < results.policies.size()) continue;
-    const auto [low, high] = std::minmax_element(speeds.begin(), speeds.end());
-    if (*high - *low <= most) continue;
-    most = *high - *low;
-    example = pair;
-  }
-  return example;
-}
-
 RgbImage from_above(const CornerResults& results, size_t pair, bool walls) {
   const CornerState& state = results.pairs[pair].hidden;
   const CornerScene& scene = results.scenes_of_pairs[pair];

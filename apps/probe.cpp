@@ -37,6 +37,9 @@ constexpr std::array<const char*, 3> kCornerExamples{
     "pictura probe corner runs/a/checkpoint.ckpt --map Town05 --scenes 2 --pairs 20 --driver lane",
     "pictura probe corner agent.safetensors --map procedural:1,procedural:2 --density light --pairs 10 --min-speed 1"};
 
+constexpr const char* kCaseOfReplay =
+    "The case of --replay, as numbered in cases.csv; default: where the first policy's value changes most";
+
 std::string footer(const std::array<const char*, 3>& examples) {
   return fmt::format(
       "docs/probes.md says what is asked, how, and what the files hold.\n"
@@ -201,7 +204,7 @@ void add_removal_command(CLI::App& probe) {
                    "case")
       ->check(one_of({kRemovalControlNames.begin(), kRemovalControlNames.end()}))
       ->capture_default_str();
-  add_case_replay_options(command, &arguments->replay);
+  add_case_replay_options(command, &arguments->replay, kCaseOfReplay);
   add_output_options(command, arguments.get(), &options, "probe_removal", "cases.csv, summary.json and removal.png");
   command->footer(footer(kRemovalExamples));
   command->callback([arguments] {
@@ -250,7 +253,7 @@ void add_pedestrian_command(CLI::App& probe) {
   command->add_option("--control", arguments->control, "A control: nobody puts no pedestrian there")
       ->check(one_of({kPedestrianControlNames.begin(), kPedestrianControlNames.end()}))
       ->capture_default_str();
-  add_case_replay_options(command, &arguments->replay);
+  add_case_replay_options(command, &arguments->replay, kCaseOfReplay);
   add_output_options(command, arguments.get(), &options, "probe_pedestrian",
                      "cases.csv, summary.json, pedestrian.png and path_000.png, path_001.png, ...");
   command->footer(footer(kPedestrianExamples));
@@ -282,6 +285,8 @@ void add_pedestrian_command(CLI::App& probe) {
 void add_corner_command(CLI::App& probe) {
   struct Arguments : ProbeArguments {
     CornerOptions corner;
+    CaseReplayOptions replay;
+    std::string control = kCornerControlNames[0];
   };
   auto arguments = std::make_shared<Arguments>();
   CornerOptions& options = arguments->corner;
@@ -309,11 +314,19 @@ void add_corner_command(CLI::App& probe) {
       ->add_option("--driver", arguments->evaluation.evaluate.controller,
                    "Who drives the scenes in which policies take over, instead of the policies: lane, the lane keeper")
       ->check(one_of({"lane"}));
+  command
+      ->add_option("--control", arguments->control,
+                   "A control: permuted removes another vehicle near the ego instead of who is hidden")
+      ->check(one_of({kCornerControlNames.begin(), kCornerControlNames.end()}))
+      ->capture_default_str();
+  add_case_replay_options(command, &arguments->replay,
+                          "The pair of --replay, as numbered in cases.csv; default: that of example.png");
   add_output_options(command, arguments.get(), &options, "probe_corner",
                      "cases.csv, summary.json, corner.png and example.png");
   command->footer(footer(kCornerExamples));
   command->callback([arguments] {
     CornerOptions& corner = arguments->corner;
+    corner.control = corner_control_named(arguments->control);
     const CornerResults results = run_probe(&probe_corner, arguments.get(), &corner);
     const std::vector<CornerRow> rows = summarize(results);
     const std::string cases_file = arguments->out + "/cases.csv";
@@ -324,6 +337,7 @@ void add_corner_command(CLI::App& probe) {
       throw Interrupted(fmt::format("interrupted; {} of {} pairs are done, and written to {}", results.pairs.size(),
                                     results.pairs_asked, arguments->out));
     }
+    if (!arguments->replay.path.empty()) write_case_replay(arguments->replay, corner, results);
   });
 }
 

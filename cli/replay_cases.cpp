@@ -21,15 +21,21 @@ struct CasePlace {
 CasePlace place_of(const RemovalCase& one) { return {one.scene, one.driver, one.step, one.ego, one.ego_speed_mps}; }
 CasePlace place_of(const PedestrianPath& one) { return {one.scene, one.driver, one.step, one.ego, one.ego_speed_mps}; }
 
-// The case that was asked for, or the one in which the first policy's value changes most.
+CasePlace place_of(const CornerState& one) { return {one.scene, one.driver, one.step, one.ego, one.speed_mps}; }
+
+// The case that was asked for, of so many; nothing if none was.
+std::optional<size_t> asked_case(const CaseReplayOptions& options, size_t count) {
+  if (count == 0) fail("--replay: the probe found no case");
+  if (!options.number) return std::nullopt;
+  if (*options.number >= static_cast<int64_t>(count))
+    fail_usage("--case: expected 0 to {}, got {}", count - 1, *options.number);
+  return static_cast<size_t>(*options.number);
+}
+
+// That, or the one in which the first policy's value changes most.
 size_t chosen_case(const CaseReplayOptions& options, const ProbeResults& results) {
   const size_t count = results.responses.size() / results.policies.size();
-  if (count == 0) fail("--replay: the probe found no case");
-  if (options.number) {
-    if (*options.number >= static_cast<int64_t>(count))
-      fail_usage("--case: expected 0 to {}, got {}", count - 1, *options.number);
-    return static_cast<size_t>(*options.number);
-  }
+  if (const auto asked = asked_case(options, count)) return *asked;
   size_t largest = 0;
   const auto change = [&results](size_t i) { return std::abs(results.response(i, 0).value_change()); };
   for (size_t i = 1; i < count; ++i) {
@@ -56,11 +62,21 @@ std::string about(const PedestrianPoint& point, const PedestrianPath& path, Pede
                      point.distance_m, 100 * point.visible_share);
 }
 
+std::string about(const CornerState& one, int32_t removed, CornerControl control) {
+  const std::string hidden =
+      fmt::format("agent {} comes hidden towards agent {}, which is {:.1f} m before a blind corner", one.user, one.ego,
+                  one.distance_m);
+  if (control == CornerControl::none) return hidden;
+  return fmt::format("{}; a control: {} is removed instead", hidden,
+                     removed < 0 ? "nobody" : fmt::format("agent {}", removed));
+}
+
 // Drives the scene again; `probed` says what the case is about.
 void write(const CaseReplayOptions& options, const ProbeOptions& probe, const ProbeResults& results, size_t number,
            const CasePlace& place, ReplayCase probed) {
   EvaluateOptions driven = probe.worlds;
-  driven.checkpoint = probe.policies[static_cast<size_t>(place.driver)];
+  // A controller comes after all policies.
+  if (driven.controller.empty()) driven.checkpoint = probe.policies[static_cast<size_t>(place.driver)];
   RecordingOptions recording = options.recording;
   recording.followed = place.ego;
   ScenarioCounts counts;
@@ -76,7 +92,7 @@ void write(const CaseReplayOptions& options, const ProbeOptions& probe, const Pr
   probed.what = fmt::format("case {}: {}", number, probed.what);
   probed.frame = place.step;
   probed.ego = place.ego;
-  for (size_t policy = 0; policy < results.policies.size(); ++policy) {
+  for (size_t policy = 0; policy < results.policies.size() && !results.responses.empty(); ++policy) {
     const PairedResponse& response = results.response(number, policy);
     probed.answers.push_back({.policy = results.policies[policy].name,
                               .value = double{response.value},
@@ -98,18 +114,13 @@ void write(const CaseReplayOptions& options, const ProbeOptions& probe, const Pr
 
 }  // namespace
 
-void add_case_replay_options(CLI::App* command, CaseReplayOptions* options_out) {
+void add_case_replay_options(CLI::App* command, CaseReplayOptions* options_out, const std::string& case_help) {
   CLI::Option* const replay =
       command
           ->add_option("--replay", options_out->path,
                        "A page that plays the scene of one case, follows its ego, and marks the road user")
           ->check(file_ending(".html"));
-  command
-      ->add_option("--case", options_out->number,
-                   "The case of --replay, as numbered in cases.csv; default: where the first policy's value changes "
-                   "most")
-      ->transform(whole_number(0))
-      ->needs(replay);
+  command->add_option("--case", options_out->number, case_help)->transform(whole_number(0))->needs(replay);
   add_cameras_option(command, &options_out->recording)->needs(replay);
 }
 
@@ -134,6 +145,14 @@ void write_case_replay(const CaseReplayOptions& options, const PedestrianOptions
     }
   }
   write(options, probe, results, number, place_of(path), std::move(probed));
+}
+
+void write_case_replay(const CaseReplayOptions& options, const CornerOptions& probe, const CornerResults& results) {
+  const size_t pair = asked_case(options, results.pairs.size()).value_or(example_of(results));
+  const CornerState& state = results.pairs[pair].hidden;
+  const int32_t removed = results.scenes_of_pairs[pair].removed;
+  write(options, probe, results, pair, place_of(state),
+        {.what = about(state, removed, results.control), .removed = state.user});
 }
 
 }  // namespace pictura

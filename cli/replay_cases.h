@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "pictura/cli/record.h"
+#include "pictura/training/probes/corner.h"
 #include "pictura/training/probes/pedestrian.h"
 #include "pictura/training/probes/removal.h"
 
@@ -14,18 +15,20 @@ namespace pictura {
 
 struct CaseReplayOptions {
   std::string path;               // empty: no replay
-  std::optional<int64_t> number;  // of the case, as in cases.csv; nothing: where the first policy's value changes most
+  std::optional<int64_t> number;  // of the case, as in cases.csv; nothing: see write_case_replay()
   RecordingOptions recording;     // whom it follows is the case's ego
 };
 
-/// Adds --replay, --case and --cameras.
-void add_case_replay_options(CLI::App* command, CaseReplayOptions* options_out);
+/// Adds --replay, --case with its help, and --cameras.
+void add_case_replay_options(CLI::App* command, CaseReplayOptions* options_out, const std::string& case_help);
 
 /// Drives the case's scene again, on the host, by whom it was driven and in the world of the first policy, and writes
-/// the replay. Says on stderr what it writes, and whether the ego is driven otherwise than it was probed. Throws
-/// UsageError where there is no such case.
+/// the replay. Says on stderr what it writes, and whether the ego is driven otherwise than it was probed. Without a
+/// number it is the case in which the first policy's value changes most; of corners, whose cases are pairs, it is
+/// example_of(). Throws UsageError where there is no such case.
 void write_case_replay(const CaseReplayOptions& options, const RemovalOptions& probe, const RemovalResults& results);
 void write_case_replay(const CaseReplayOptions& options, const PedestrianOptions& probe,
                        const PedestrianResults& results);
+void write_case_replay(const CaseReplayOptions& options, const CornerOptions& probe, const CornerResults& results);
 
 }  // namespace pictura

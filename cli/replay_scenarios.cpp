@@ -104,13 +104,15 @@ Replay record_scenario(const EvaluateOptions& options, const RecordedScenario& s
   one.on_progress = nullptr;
   std::unique_ptr<PolicySession> session;
   if (one.controller.empty()) session = std::make_unique<PolicySession>(one.checkpoint, session_options(one));
+  if (!session && !scenario.world_of.empty()) one.checkpoint = scenario.world_of;
   // The followed agent's policy is asked with a renderer of its own, which holds the scenario's map.
   std::unique_ptr<Renderer> renderer = session ? session->make_renderer() : nullptr;
   ScenarioRecorder recorder({session ? one.checkpoint : one.controller, session.get(), renderer.get()}, recording);
   one.observer = &recorder;
-  const EvaluateReport report = !scenario.world_of.empty() ? evaluate_in_world_of(scenario.world_of, session.get(), one)
-                                : session                  ? evaluate(session.get(), one)
-                                                           : evaluate(one);
+  const EvaluateReport report = !session ? evaluate(one)
+                                : scenario.world_of.empty()
+                                    ? evaluate(session.get(), one)
+                                    : evaluate_in_world_of(scenario.world_of, session.get(), one);
   if (report.interrupted) throw Interrupted("interrupted while a scenario was recorded");
   *counts_out = report.results.densities[0].scenarios[0];
   return recorder.finish();

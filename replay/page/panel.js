@@ -98,6 +98,7 @@ class Panel {
     byId("case-step").textContent = `Step ${probed.frame}`;
     byId("case-step").addEventListener("click", () => this.actions.showCase());
     const row = (tag, texts) => { const line = make("tr"); line.append(...texts.map(text => make(tag, text))); return line; };
+    if (probed.answers.length === 0) return;
     byId("case-answers").append(row("th", ["policy", "V", "\u0394V", "P(brake)", "\u0394P(brake)"]), ...probed.answers.map(answer => {
       const change = value => (value >= 5e-8 ? "+" : "") + short(value);
       return row("td", [answer.policy, short(answer.value), change(answer.value - answer.value_without), short(answer.brake), change(answer.brake - answer.brake_without)]);

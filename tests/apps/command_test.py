@@ -1012,6 +1012,18 @@ class Replays(CommandCase):
         result = run(*probe, "--replay", path, "--case", len(cases))  # how many there are is known in the end
         self.assertEqual((result.returncode, f"--case: expected 0 to {len(cases) - 1}, got {len(cases)}" in result.stderr), (2, True), result.stderr)
         self.assert_refused(2, "--replay", *probe, "--case", 1)
+        corner = ["probe", "corner", policies[0], "--map", "procedural:1", "--agents", 90, "--scenes", 2, "--steps", 300, "--pairs", 1, "--driver", "lane"]
+        out = ["--seed", 3, "--device", "cpu", "--out", self.folder / "corner", "--replay", path]
+        result = run(*corner, *out)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with open(self.folder / "corner" / "cases.csv") as file:
+            case = next(csv.DictReader(file))
+        header = header_of(path)
+        shown = header["case"]
+        self.assertEqual((shown["frame"], shown["ego"], shown["removed"]), (int(case["step"]), int(case["ego"]), int(case["user"])))
+        self.assertIn(f"case 0: agent {case['user']} comes hidden", shown["what"])
+        self.assertNotIn("notice", result.stderr)
+        self.assert_refused(2, "--case: expected 0 to 0, got 1", *corner, *out, "--case", 1)
         self.assert_refused(2, "--case: expected 0 to 79, got 80", "probe", "removal", *world, "--removals", 80, "--replay", path, "--case", 80)
 
     def test_a_policys_decisions_are_those_that_it_drives_by(self):

@@ -266,6 +266,9 @@ def test_corner_is_the_commands(trained, tmp_path):
     assert len(lines) == 1 + report["cases"] and lines[0].startswith("run,pair,walls,case,policy,scene,map,driver,step,ego,user")
     with pytest.raises(pictura.UsageError, match="expected one pair or more, got 0"):
         pictura.probe_corner([str(folder / "checkpoint.ckpt")], ["procedural:1"], pairs=0)
+    assert report["control"] == "none"
+    with pytest.raises(pictura.UsageError, match="none, permuted"):
+        pictura.probe_corner([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="nobody")
     theirs = probed_by_command("corner", folder, tmp_path / "out", options)
     assert theirs["rows"] == report["rows"]
     assert (tmp_path / "out" / "cases.csv").read_text() == cases.read_text()

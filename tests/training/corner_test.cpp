@@ -186,6 +186,33 @@ TEST_F(Corner, BatchesDecideNothing) {
   EXPECT_TRUE(same_runs(probe_corner(o), results()));
 }
 
+TEST_F(Corner, AnotherOneIsRemovedInstead) {
+  CornerOptions o = options(12);
+  o.control = CornerControl::permuted;
+  const CornerResults permuted = probe_corner(o);
+  const CornerResults& all = results();
+  ASSERT_EQ(permuted.pairs.size(), all.pairs.size());
+  size_t removed = 0, differ = 0;
+  for (size_t pair = 0; pair < all.pairs.size(); ++pair) {
+    const CornerState& state = permuted.pairs[pair].hidden;
+    const int32_t other = permuted.scenes_of_pairs[pair].removed;
+    EXPECT_EQ(all.scenes_of_pairs[pair].removed, state.user);
+    EXPECT_NE(other, state.user);
+    EXPECT_NE(other, state.ego);
+    removed += other >= 0;
+    for (const size_t policy : {kAgent, kVectorized, kLikeForLike}) {
+      const auto input_of = [&](const CornerResults& some, CornerCase its_case) {
+        return some.takeover(pair, true, its_case, policy).input_step;
+      };
+      EXPECT_EQ(input_of(permuted, CornerCase::hidden), input_of(all, CornerCase::hidden));
+      EXPECT_EQ(input_of(all, CornerCase::removed), -1);
+      differ += input_of(permuted, CornerCase::removed) >= 0;  // who is hidden is there
+    }
+  }
+  EXPECT_GT(removed, all.pairs.size() / 2);
+  EXPECT_GT(differ, 0u);
+}
+
 TEST_F(Corner, SeedsDecideWhatIsFound) {
   CornerOptions one = options(4);
   one.policies = {policies_[kAgent]};
@@ -238,6 +265,7 @@ CornerResults made_up() {
   all.pairs_asked = 3;
   all.pairs = {{state(3, 0, 20, 5, 7), state(4, 1, 20.5f, 5)}, {state(4, 0, 15, 5, 7), state(3, 1, 15, 5)}};
   for (size_t pair = 0; pair < 2; ++pair) {
+    all.scenes_of_pairs.push_back({.removed = all.pairs[pair].hidden.user});
     for (size_t walls = 0; walls < 2; ++walls) {
       for (size_t i = 0; i < kCornerCases; ++i) {
         for (size_t policy = 0; policy < 2; ++policy) {
@@ -305,16 +333,20 @@ TEST(CornerResults, AreWrittenRunByRun) {
   write_corner_cases(folder / "cases.csv", all);
   const auto table = read_table(folder / "cases.csv");
   ASSERT_EQ(table.size(), 1u + 2 * 2 * 3 * 2);
-  ASSERT_EQ(table[0].size(), 23u + kTakeoverSteps + 1);
-  EXPECT_EQ(table[0][19], "reveal_corner_m");
-  EXPECT_EQ(table[1][19], "10.000");
-  EXPECT_EQ(table[1][15], "2.1");
-  EXPECT_EQ(table[13][22], "") << "no deceleration of a run that ended";
-  EXPECT_EQ(table[13][22 + 30], "2.100");
-  EXPECT_EQ(table[13][22 + 31], "") << "it has ended";
+  ASSERT_EQ(table[0].size(), 24u + kTakeoverSteps + 1);
+  EXPECT_EQ(table[0][11], "removed");
+  EXPECT_EQ(table[1][11], "-1");
+  EXPECT_EQ(table[3][11], "7");
+  EXPECT_EQ(table[0][20], "reveal_corner_m");
+  EXPECT_EQ(table[1][20], "10.000");
+  EXPECT_EQ(table[1][16], "2.1");
+  EXPECT_EQ(table[13][23], "") << "no deceleration of a run that ended";
+  EXPECT_EQ(table[13][23 + 30], "2.100");
+  EXPECT_EQ(table[13][23 + 31], "") << "it has ended";
 
   const auto json = nlohmann::json::parse(corner_summary_json(all, summarize(all), "cases.csv"));
   EXPECT_EQ(json.at("kind"), "corner");
+  EXPECT_EQ(json.at("control"), "none");
   EXPECT_EQ(json.at("pairs"), 2);
   EXPECT_EQ(json.at("cases"), 24);
   EXPECT_EQ(json.at("rows")[0].at("driving")[30], 1);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "pictura/common/error.h"
+#include "pictura/common/rng.h"
 #include "pictura/training/probes/probe_run.h"
 #include "pictura/training/probes/takeover.h"
 
@@ -119,8 +120,28 @@ class CornerProbe {
       CornerScene scene = found->scene;
       for (int step = 0; step <= kTakeoverSteps; ++step)
         scene.user_m.push_back(scenes_.of(state.scene).box_at(state.step + step, state.user).center_m.xy());
+      scene.removed = options_.control == CornerControl::none ? state.user : another_of(scene, state);
       results_.scenes_of_pairs.push_back(std::move(scene));
     }
+  }
+
+  // A vehicle near the ego other than who is hidden, drawn by the seed; -1: there is none.
+  int32_t another_of(const CornerScene& scene, const CornerState& state) const {
+    std::vector<int32_t> others;
+    const auto num_agents = static_cast<int32_t>(scenes_.of(state.scene).bodies.size());
+    const Vec2 ego_m = scene.boxes[static_cast<size_t>(state.ego)].center_m.xy();
+    for (int32_t agent = 0; agent < num_agents; ++agent) {
+      const AgentBox& box = scene.boxes[static_cast<size_t>(agent)];
+      if (agent == state.ego || agent == state.user || !box.drawn || box.agent_class != AgentClass::vehicle) continue;
+      if (length(box.center_m.xy() - ego_m) < options_.search.user_range_m) others.push_back(agent);
+    }
+    if (others.empty()) return -1;
+    RandomStream random({.seed = options_.worlds.seed,
+                         .world = static_cast<uint32_t>(state.scene),
+                         .agent = static_cast<uint32_t>(state.ego),
+                         .step = static_cast<uint32_t>(state.step),
+                         .purpose = Purpose::minibatch});
+    return others[static_cast<size_t>(random.below(static_cast<int>(others.size())))];
   }
 
   void take_over() {
@@ -135,7 +156,7 @@ class CornerProbe {
       for (size_t part = 0; part < 2 * kCornerCases; ++part) {
         std::vector<TakeoverStart> starts;
         for (size_t pair = begin; pair < end; ++pair)
-          starts.push_back(start_of(results_.pairs[pair], static_cast<CornerCase>(part % kCornerCases)));
+          starts.push_back(start_of(pair, static_cast<CornerCase>(part % kCornerCases)));
         std::vector<Takeover> runs;
         if (!worlds.run(starts, part < kCornerCases, &runs)) {
           results_.interrupted = true;
@@ -157,9 +178,11 @@ class CornerProbe {
     }
   }
 
-  TakeoverStart start_of(const CornerPair& pair, CornerCase its_case) const {
-    const CornerState& state = its_case == CornerCase::empty ? pair.empty : pair.hidden;
-    return {&scenes_.of(state.scene), state.step, state.ego, state.user, its_case == CornerCase::hidden};
+  TakeoverStart start_of(size_t pair, CornerCase its_case) const {
+    const CornerPair& both = results_.pairs[pair];
+    const CornerState& state = its_case == CornerCase::empty ? both.empty : both.hidden;
+    const int32_t removed = its_case == CornerCase::removed ? results_.scenes_of_pairs[pair].removed : -1;
+    return {&scenes_.of(state.scene), state.step, state.ego, state.user, removed};
   }
 
   const std::function<void(double, double)> report_;
@@ -201,6 +224,7 @@ CornerResults probe_corner(const std::vector<PolicySession*>& sessions, const Co
   CornerResults results;
   results.pairs_asked = options.pairs;
   results.search = options.search;
+  results.control = options.control;
   CornerProbe(sessions, options, &results).run();
   return results;
 }

@@ -16,6 +16,7 @@ struct CornerOptions : ProbeOptions {
   }
   int64_t pairs = 200;  // in all, from all scenes in turn; fewer where so many are not found
   CornerSearch search;
+  CornerControl control = CornerControl::none;
 };
 
 /// Drives evaluation worlds as probe_removal() does, or has options.worlds.controller drive all of them, and looks in

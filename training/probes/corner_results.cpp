@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "pictura/common/support/output_file.h"
+#include "pictura/common/support/suggestion.h"
 #include "pictura/training/evaluation/csv.h"
 #include "pictura/training/probes/probe_json.h"
 
@@ -177,10 +178,33 @@ std::vector<CornerRow> summarize(const CornerResults& results) {
   return rows;
 }
 
+CornerControl corner_control_named(const std::string& name) {
+  return static_cast<CornerControl>(index_of_word("control", name, kCornerControlNames));
+}
+
+size_t example_of(const CornerResults& results) {
+  size_t example = 0;
+  float most = -1;
+  for (size_t pair = 0; pair < results.pairs.size(); ++pair) {
+    std::vector<float> speeds;
+    for (size_t policy = 0; policy < results.policies.size(); ++policy) {
+      const auto reveal = reveal_of(results, pair, true, CornerCase::hidden, policy);
+      if (reveal) speeds.push_back(reveal->speed_mps);
+    }
+    if (speeds.size() < results.policies.size()) continue;
+    const auto [low, high] = std::minmax_element(speeds.begin(), speeds.end());
+    if (*high - *low <= most) continue;
+    most = *high - *low;
+    example = pair;
+  }
+  return example;
+}
+
 void write_corner_cases(const std::string& path, const CornerResults& results) {
   OutputFile file(path);
   std::string header =
-      "run,pair,walls,case,policy,scene,map,driver,step,ego,user,corner_distance_m,start_speed_mps,lasted_s,ended_by,"
+      "run,pair,walls,case,policy,scene,map,driver,step,ego,user,removed,corner_distance_m,start_speed_mps,lasted_s,"
+      "ended_by,"
       "input_s,sight_s,reveal_s,reveal_distance_m,reveal_corner_m,reveal_speed_mps,approach_mps,deceleration_mps2";
   for (int k = 0; k <= kTakeoverSteps; ++k)
     fmt::format_to(std::back_inserter(header), ",speed_mps_{:.1f}", kTakeoverStep_s * k);
@@ -196,10 +220,11 @@ void write_corner_cases(const std::string& path, const CornerResults& results) {
           const Takeover& one = results.takeover(pair, walls, its_case, policy);
           const std::optional<Reveal> reveal = reveal_of(results, pair, walls, its_case, policy);
           std::string row =
-              fmt::format("{},{},{},{},{},{},{},{},{},{},{},{:.3f},{:.3f},{:.1f},{},{},{}", run++, pair,
+              fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{:.3f},{:.3f},{:.1f},{},{},{}", run++, pair,
                           kWallNames[walls ? 0 : 1], name_of(its_case), csv_quoted(results.policies[policy].name),
                           state.scene, csv_quoted(results.setting.maps[static_cast<size_t>(state.map)]),
                           csv_quoted(results.driver_name(state.driver)), state.step, state.ego, state.user,
+                          its_case == CornerCase::removed ? results.scenes_of_pairs[pair].removed : -1,
                           state.distance_m, state.speed_mps, kTakeoverStep_s * one.steps, one.ended_by,
                           seconds_of(one.input_step), seconds_of(one.sight_step));
           if (reveal) {
@@ -226,6 +251,7 @@ std::string corner_summary_json(const CornerResults& results, const std::vector<
   const CornerSearch& search = results.search;
   Json json = {{"kind", "corner"},
                {"policy", policies_json(results, drivers)},
+               {"control", kCornerControlNames[static_cast<size_t>(results.control)]},
                {"pairs", results.pairs.size()},
                {"pairs_asked", results.pairs_asked},
                {"hidden_found", results.hidden_found},

@@ -24,15 +24,26 @@ constexpr std::array<const char*, 3> kCornerCaseNames{"hidden", "removed", "empt
 constexpr size_t kCornerCases = kCornerCaseNames.size();
 constexpr std::array<const char*, 2> kWallNames{"on", "off"};  // in the order of runs
 
+/// Who is not there in CornerCase::removed.
+enum class CornerControl : uint8_t {
+  none,      // who comes hidden
+  permuted,  // a control: another vehicle near the ego, drawn for each pair; nobody where there is none
+};
+constexpr std::array<const char*, 2> kCornerControlNames{"none", "permuted"};
+/// Throws UsageError listing the known names.
+CornerControl corner_control_named(const std::string& name);
+
 /// A world at a takeover, for pictures: agents, then parked cars.
 struct CornerScene {
   std::vector<AgentBox> boxes;
   std::vector<uint8_t> status;  // [boxes] AgentStatus
   std::vector<Vec2> user_m;     // [kTakeoverSteps + 1] where the hidden vehicle's box is
+  int32_t removed = -1;         // who is not there in CornerCase::removed; -1: nobody
 };
 
 struct CornerResults : ProbeResults {
   CornerSearch search;
+  CornerControl control = CornerControl::none;
   int64_t pairs_asked = 0, hidden_found = 0, empty_found = 0;  // states, before they are matched
   std::vector<CornerPair> pairs;                               // by scene, step, ego and user of the hidden state
   std::vector<CornerScene> scenes_of_pairs;                    // [pairs] of the hidden state
@@ -58,6 +69,9 @@ struct Reveal {
 /// Nothing where the run ends before.
 std::optional<Reveal> reveal_of(const CornerResults& results, size_t pair, bool walls, CornerCase its_case,
                                 size_t policy);
+
+/// The pair at whose reveal policies' speeds differ most, with walls and with who is hidden; else the first.
+size_t example_of(const CornerResults& results);
 
 /// What is measured of a run at the reveal, by name in files.
 struct CornerMeasures {

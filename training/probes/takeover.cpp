@@ -156,8 +156,7 @@ void TakeoverWorlds::command(const TakeoverStart& start, int step, int32_t actio
     commands_out[agent] = to_be_at(start.scene->at(step + 1, agent));
   }
   commands_out[start.ego] = {.action = action};
-  if (start.user >= 0 && !start.is_user_there && step + 1 >= start.step)
-    commands_out[start.user] = {.kind = CommandKind::absent};
+  if (start.removed >= 0 && step + 1 >= start.step) commands_out[start.removed] = {.kind = CommandKind::absent};
 }
 
 // Notes the present state in runs that have not ended; false where all have.
@@ -213,7 +212,7 @@ bool TakeoverWorlds::look(Worlds* worlds, size_t policy, const std::vector<Takeo
       one.sight_step = step;
       one.sight_distance_m = length((user.center_m - its_boxes[static_cast<size_t>(start.ego)].center_m).xy());
     }
-    if (one.input_step >= 0 || !start.is_user_there) continue;
+    if (one.input_step >= 0 || start.removed == start.user) continue;
     if (reads_images)
       queries.push_back({static_cast<int32_t>(i), box_begin[i] + start.user});
     else if (is_partner(its_boxes, start.user, start.ego, view.origin_m.xy()))

@@ -25,7 +25,7 @@ struct TakeoverStart {
   const DrivenScene* scene = nullptr;
   int32_t step = 0, ego = 0;  // steps done in the scenario when the policy takes over
   int32_t user = -1;          // whom the ego cannot see; -1: nobody
-  bool is_user_there = true;  // else it left just before
+  int32_t removed = -1;       // who left just before; -1: nobody
 };
 
 /// One run of one policy. What has an index k is after k steps; NaN once the run has ended.
