@@ -220,6 +220,7 @@ void add_evaluate_command(CLI::App& app) {
     if (!has_scenes || command->count("--scenarios") > 0) parse_scenarios(arguments->scenarios, &evaluation);
     if (has_scenes) {
       check_driver(evaluation, /*has_parts=*/false);
+      refuse_recording_options(*command, "--replay or --gallery");
       SceneEvaluateOptions in_scenes;
       static_cast<DriverOptions&>(in_scenes) = evaluation;
       in_scenes.first_scene = evaluation.first_scenario;

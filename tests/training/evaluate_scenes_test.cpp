@@ -138,7 +138,7 @@ TEST_F(SceneEvaluations, EqualASimulatorThatIsDrivenByHand) {
 }
 
 TEST_F(SceneEvaluations, RecordedActionsArriveAndAreRemoved) {
-  write(1, {.num_vehicles = 2, .num_pedestrians = 0, .num_cyclists = 0});
+  write(1, {.num_vehicles = 1, .num_pedestrians = 3, .num_cyclists = 0});
   options_.controller = "inverse";
   options_.protocol.steps = 600;
   options_.protocol.densities = {1.0};
@@ -191,7 +191,7 @@ TEST_F(SceneEvaluations, LeaveOutWhatCannotBeUsed) {
 }
 
 TEST_F(SceneEvaluations, TakeOverLaterAndLetTheRecordVanish) {
-  Scenario late = *test::crossing({.num_vehicles = 2, .num_pedestrians = 0, .num_cyclists = 0});
+  Scenario late = *test::crossing({.num_vehicles = 1, .num_pedestrians = 3, .num_cyclists = 0});
   int32_t mover = 0;
   while (!is_moving(late, mover)) ++mover;
   const auto at = static_cast<size_t>(mover);

@@ -102,7 +102,9 @@ TEST_F(ScenePlans, DriveWhoIsNotAtItsGoal) {
     const bool drives = scene_->tracks[track].type == TrackType::vehicle && is_moving(*scene_, int32_t(track)) &&
                         scene_->valid_of(int32_t(track))[0];
     EXPECT_EQ(all.roles[track] == SceneRole::driven, drives) << track;
-    if (drives) EXPECT_EQ(all.takeover_steps[track], 0);
+    if (drives) {
+      EXPECT_EQ(all.takeover_steps[track], 0);
+    }
   }
   EXPECT_GE(count_of(all, SceneRole::driven), 3);
   const ScenePlan half = plan(scene_protocol("womd"), 0.5);

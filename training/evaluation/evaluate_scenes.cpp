@@ -255,9 +255,9 @@ class BatchDrive {
     std::vector<AgentBox> boxes;
     for (size_t slot = 0; slot < roles_.size(); ++slot) {
       if (!is_driven(slot, step - 1)) continue;
-      const auto was = static_cast<AgentStatus>(before[slot]);
-      driven_steps_[slot] += takes_actions(was);
-      if (was == AgentStatus::absent || step > last_steps_[slot]) continue;
+      if (!takes_actions(static_cast<AgentStatus>(before[slot]))) continue;
+      ++driven_steps_[slot];
+      if (step > last_steps_[slot]) continue;
       // Only as long as anybody is measured is anything copied.
       if (boxes.empty()) boxes = host_copy_of_structs(simulator_.scene().agents, device());
       const CompiledMap& map = map_of(slot);

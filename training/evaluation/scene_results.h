@@ -34,7 +34,7 @@ struct SceneAgent {
   int events = 0;  // of its episode: bits of Event
   bool arrived = false;
   float distance_m = 0;
-  // From the recording, over the steps that it has while the agent stands anywhere; NaN where there is none.
+  // From the recording, over the steps that it has while the agent drives, and at the last of them; NaN without one.
   float mean_displacement_m = std::numeric_limits<float>::quiet_NaN(), final_displacement_m = mean_displacement_m;
 };
 
