@@ -122,6 +122,7 @@ void print_faults(const std::vector<std::string>& faults) {
 }  // namespace
 
 void add_scene_options(CLI::App* command, SceneArguments* arguments) {
+  const std::vector<std::string> names = scene_protocol_names();
   std::vector<std::string> rules;
   for (const SceneRule& rule : scene_rules()) {
     rules.push_back(fmt::format("{} ({}): {}", rule.name, rule.values, rule.what));
@@ -130,8 +131,8 @@ void add_scene_options(CLI::App* command, SceneArguments* arguments) {
       ->add_option("--protocol", arguments->protocol,
                    fmt::format("Evaluate in recorded scenes instead of on maps: womd, the paper's zero-shot protocol, "
                                "or, with their settings, {}",
-                               fmt::join(scene_protocol_names().begin() + 1, scene_protocol_names().end(), ", ")))
-      ->check(one_of(scene_protocol_names()));
+                               fmt::join(names.begin() + 1, names.end(), ", ")))
+      ->check(one_of(names));
   command
       ->add_option("--scenes", arguments->scenes,
                    "Its scenes: files, folders of them, FILE#K or FILE#SCENARIO_ID, with commas between them")
