@@ -226,10 +226,11 @@ void add_parking_spots(const RoadMap& map, MapRules* out) {
 
 /// Takes the record, and with it how large and how fast anything on the map can be.
 void add_record(MapRecord record, MapRules* out) {
+  constexpr float kRoom = 1.0f + 1e-6f;  // so that rounding leaves the largest box within the radius
   out->max_box_radius_m = kMaxBoxRadius_m;
   out->max_speed_mps = kMaxSpeed_mps;
   for (const RecordedAgent& agent : record.agents) {
-    out->max_box_radius_m = std::max(out->max_box_radius_m, 0.5f * std::hypot(agent.length_m, agent.width_m));
+    out->max_box_radius_m = std::max(out->max_box_radius_m, 0.5f * kRoom * std::hypot(agent.length_m, agent.width_m));
   }
   for (size_t i = 1; i < record.states.size(); ++i) {
     const RecordedState &before = record.states[i - 1], &now = record.states[i];

@@ -337,6 +337,17 @@ TEST(RecordedWorlds, AreSavedAndRestored) {
   EXPECT_THAT(test::message_of<Error>([&] { later->restore(a->save()); }), HasSubstr("saved with another"));
 }
 
+TEST(RecordedWorlds, WithTheLargestBoxAreRestored) {
+  for (int i = 0; i < 50; ++i) {
+    Scenario large = *crossing();
+    large.tracks[0].length_m = 15.0f + 0.137f * static_cast<float>(i);
+    large.tracks[0].width_m = 2.5f + 0.011f * static_cast<float>(i);
+    const auto simulator = world_of(std::make_shared<const Scenario>(large));
+    const std::vector<uint8_t> saved = simulator->save();
+    EXPECT_NO_THROW(simulator->restore(saved)) << large.tracks[0].length_m << " by " << large.tracks[0].width_m;
+  }
+}
+
 TEST(RecordedWorlds, ControllersShareThemByMasks) {
   const auto scene = crossing();
   const auto simulator = world_of(scene);
