@@ -229,6 +229,13 @@ TEST(SceneSamples, AreEvaluated) {
   EXPECT_TRUE(evaluation.faults.empty());
   EXPECT_GT(evaluation.rows[0].vehicle_episodes, 10);
   EXPECT_GT(evaluation.rows[0].goal_rate.value, 0.3);
+  for (const char* rule : {"overlapping=drive", "others=absent", "late=drive", "late=absent", "record_end=vanish",
+                           "after_infraction=leave", "leave_at_goal=no", "waypoints=path", "box_scale=0.7"}) {
+    SCOPED_TRACE(rule);
+    options.protocol = scene_protocol("womd");
+    set_scene_rule(rule, &options.protocol);
+    EXPECT_EQ(evaluate_scenes(options).scored, 3);
+  }
 }
 
 }  // namespace
