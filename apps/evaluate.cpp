@@ -1,10 +1,10 @@
-// `pictura evaluate`: the paper's five driving metrics of a checkpoint or a controller, by traffic density.
+// `pictura evaluate`: the paper's driving metrics of a checkpoint or a controller, by traffic density.
 #include "pictura/training/evaluation/evaluate.h"
 
-#include <chrono>
 #include <map>
 
 #include "pictura/apps/commands.h"
+#include "pictura/apps/scene_evaluation.h"
 #include "pictura/cli/evaluation_options.h"
 #include "pictura/cli/file_options.h"
 #include "pictura/cli/number_options.h"
@@ -21,8 +21,6 @@ namespace pictura {
 
 namespace {
 
-// A notice says how long it takes when that is long, as soon as a few seconds tell.
-constexpr double kEstimateAfter_s = 5, kLong_s = 600;
 constexpr int kShownGroups = 6;  // of each kind of infraction
 
 void print_table(const EvaluateReport& report) {
@@ -108,6 +106,15 @@ void parse_scenarios(const std::string& text, EvaluateOptions* options) {
   options->scenarios = static_cast<int>(*end - *first);
 }
 
+void check_driver(const DriverOptions& options, bool has_parts) {
+  if (options.checkpoint.empty() && options.controller.empty() && !has_parts) {
+    fail_usage("evaluate: expected a CHECKPOINT, --policy, or --merge and the parts of an evaluation");
+  }
+  if (!options.controller.empty() && !(options.renderer.empty() && options.samples.empty())) {
+    fail_usage("--renderer, --samples: {} sees no images", options.controller);
+  }
+}
+
 EvaluateReport merged(const std::vector<std::string>& paths) {
   std::vector<EvaluationResults> parts;
   for (const std::string& path : paths) parts.push_back(read_results(path));
@@ -128,36 +135,41 @@ void add_evaluate_command(CLI::App& app) {
     std::vector<std::string> parts;
     std::string size, scenarios = "200", out, infractions;
     bool json = false;
+    SceneArguments scenes;
     std::string replay, gallery;
     int replays = 0;
     RecordingOptions recording;
   };
   auto arguments = std::make_shared<Arguments>();
   EvaluateOptions& options = arguments->evaluation.evaluate;
-  CLI::App* command = app.add_subcommand("evaluate", "Measure a policy's driving (the paper's in-domain protocol)");
+  CLI::App* command = app.add_subcommand("evaluate", "Measure a policy's driving (the paper's protocols)");
   CLI::Option* const checkpoint =
       command->add_option("CHECKPOINT", options.checkpoint, "A checkpoint that train wrote, or safetensors");
   CLI::Option* const policy =
       command
-          ->add_option("--policy", options.controller,
-                       fmt::format("Who drives instead of the checkpoint's policy, in its world, or, without a "
-                                   "checkpoint, in the paper's: {}",
-                                   fmt::join(town_controller_names(), ", ")))
-          ->check(one_of(town_controller_names()));
+          ->add_option(
+              "--policy", options.controller,
+              fmt::format("Who drives instead of the checkpoint's policy, in its world, or, without a "
+                          "checkpoint, in the paper's: {}; in recorded scenes {}, random or idle",
+                          fmt::join(town_controller_names(), ", "), fmt::join(record_controller_names(), ", ")))
+          ->check(one_of(host_controller_names()));
   command
       ->add_option("--merge", arguments->parts,
                    "Instead of evaluating: join parts of one evaluation, which --out wrote, exactly")
       ->excludes(checkpoint)
       ->excludes(policy);
   add_evaluation_options(command, &arguments->evaluation)->excludes(policy);
-  command->add_option("--density", arguments->densities, "light, medium, dense: 60, 120, 150 agents a world")
+  command
+      ->add_option("--density", arguments->densities,
+                   "light, medium, dense: 60, 120, 150 agents a world; with --protocol the shares of road users that "
+                   "stay, in %, as 100,75,50, by default the protocol's")
       ->delimiter(',')
       ->allow_extra_args(false)
-      ->check(one_of({kDensityNames.begin(), kDensityNames.end()}))
       ->capture_default_str();
   command
       ->add_option("--scenarios", arguments->scenarios,
-                   "Scenarios per density: N, or A:B for the part of them from A up to but not including B")
+                   "Scenarios per density: N, or A:B for the part of them from A up to but not including B; with "
+                   "--protocol scenes, by default all")
       ->capture_default_str();
   CLI::Option* const rig = command->add_option(
       "--rig", options.rig, "A rig file with as many cameras as in training, instead of those of training");
@@ -182,6 +194,7 @@ void add_evaluate_command(CLI::App& app) {
   replays->needs(gallery);
   gallery->needs(replays);
   add_recording_options(command, &arguments->recording);
+  add_scene_options(command, &arguments->scenes);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "Examples:\n  pictura evaluate runs/town01/checkpoint.ckpt --map Town01 --density light --scenarios 4 --steps "
@@ -189,6 +202,7 @@ void add_evaluate_command(CLI::App& app) {
       "  pictura evaluate --policy lane --density medium --scenarios 8\n"
       "  pictura evaluate run.ckpt --map Town05 --scenarios 50 --replays 10 --gallery replays\n"
       "  pictura evaluate run.ckpt --density medium --scenarios 40 --infractions infractions.csv\n"
+      "  pictura evaluate run.ckpt --protocol womd --scenes validation/ --density 100,50 --csv agents.csv\n"
       "In parts, on several machines or after one another:\n"
       "  pictura evaluate run.ckpt --scenarios 0:100 --out a.json\n"
       "  pictura evaluate run.ckpt --scenarios 100:200 --out b.json\n"
@@ -201,43 +215,36 @@ void add_evaluate_command(CLI::App& app) {
       evaluation.width_px = pixels.first;
       evaluation.height_px = pixels.second;
     }
+    refuse_idle_scene_options(*command, arguments->scenes);
+    const bool has_scenes = !arguments->scenes.protocol.empty();
+    if (!has_scenes || command->count("--scenarios") > 0) parse_scenarios(arguments->scenarios, &evaluation);
+    if (has_scenes) {
+      check_driver(evaluation, /*has_parts=*/false);
+      refuse_recording_options(*command, "--replay or --gallery");
+      SceneEvaluateOptions in_scenes;
+      static_cast<DriverOptions&>(in_scenes) = evaluation;
+      in_scenes.first_scene = evaluation.first_scenario;
+      in_scenes.num_scenes = command->count("--scenarios") > 0 ? evaluation.scenarios : 0;
+      run_scene_evaluation(*command, arguments->scenes, evaluation.steps, arguments->densities, std::move(in_scenes),
+                           arguments->json);
+      return;
+    }
     evaluation.densities.clear();
     for (const std::string& name : arguments->densities) evaluation.densities.push_back(density_named(name));
     if (evaluation.agents_per_world > 0) evaluation.densities.resize(1);
-    parse_scenarios(arguments->scenarios, &evaluation);
-    if (evaluation.checkpoint.empty() && evaluation.controller.empty() && arguments->parts.empty()) {
-      fail_usage("evaluate: expected a CHECKPOINT, --policy, or --merge and the parts of an evaluation");
-    }
-    if (!evaluation.controller.empty() && !(evaluation.renderer.empty() && evaluation.samples.empty())) {
-      fail_usage("--renderer, --samples: {} sees no images", evaluation.controller);
-    }
+    check_driver(evaluation, !arguments->parts.empty());
     const bool records = !arguments->replay.empty() || !arguments->gallery.empty();
     if (!records) refuse_recording_options(*command, "--replay or --gallery");
     if (records && !arguments->parts.empty()) fail_usage("--replay, --gallery: have no effect with --merge");
-    ProgressLine line;
-    const auto begin = std::chrono::steady_clock::now();
-    bool has_estimate = false;
-    evaluation.on_progress = [&](double done, double eta_s) {
-      const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-      if (!has_estimate && elapsed_s >= kEstimateAfter_s) {
-        has_estimate = true;
-        if (elapsed_s + eta_s > kLong_s) {
-          line.finish();
-          fmt::print(stderr,
-                     "notice: this takes {} at most; ^C reports the scenarios that are finished, and --scenarios A:B "
-                     "evaluates a part\n",
-                     format_duration(elapsed_s + eta_s));
-        }
-      }
-      line.update(fmt::format("evaluating: {:.0f} %  ETA {}", 100 * done, format_duration(eta_s)));
-    };
+    EvaluationProgress progress("the scenarios that are finished");
+    evaluation.on_progress = [&progress](double done, double eta_s) { progress.update(done, eta_s); };
     const bool lists_infractions = !arguments->infractions.empty();
     if (lists_infractions && !arguments->parts.empty()) fail_usage("--infractions: has no effect with --merge");
     InfractionObserver infractions;
     if (lists_infractions) evaluation.observer = &infractions;
     const EvaluateReport report = arguments->parts.empty() ? evaluate(evaluation) : merged(arguments->parts);
     evaluation.observer = nullptr;
-    line.finish();
+    progress.finish();
     const std::vector<InfractionGroup> groups = group_infractions(infractions.found());
     if (lists_infractions) write_infractions_csv(arguments->infractions, infractions.found());
     if (!arguments->out.empty()) write_results(arguments->out, report.results);

@@ -18,6 +18,7 @@
 #include "pictura/drawing/film.h"
 #include "pictura/map/scenario/scenario.h"
 #include "pictura/map/scenario/scene_file.h"
+#include "pictura/simulator/recorded_scene.h"
 #include "pictura/simulator/scene_recorder.h"
 
 namespace pictura {
@@ -58,14 +59,13 @@ struct Displacement {
   void add(Simulator& simulator, const Scenario& scene) {
     const int32_t step = simulator.maps()[0]->start_step + simulator.episode_step()[0];
     for (int32_t track = 0; track < simulator.num_slots() && step < scene.num_steps; ++track) {
-      const auto at = static_cast<size_t>(step);
-      const bool drives = simulator.state().status[track] == static_cast<uint8_t>(AgentStatus::active);
-      if (!drives || !scene.valid_of(track)[at]) continue;
-      const Vec3 center_m = simulator.scene().agents[static_cast<size_t>(track)].center_m;
-      const double apart_m = length((center_m - scene.states_of(track)[at].position_m).xy());
+      if (simulator.state().status[track] != static_cast<uint8_t>(AgentStatus::active)) continue;
+      const std::optional<float> apart_m =
+          displacement_m(scene, track, step, simulator.scene().agents[static_cast<size_t>(track)].center_m);
+      if (!apart_m) continue;
       ++steps;
-      sum_m += apart_m;
-      max_m = std::max(max_m, apart_m);
+      sum_m += double{*apart_m};
+      max_m = std::max(max_m, double{*apart_m});
     }
   }
 };

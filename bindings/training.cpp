@@ -13,6 +13,7 @@
 #include "pictura/common/error.h"
 #include "pictura/simulator/observation_arrays.h"
 #include "pictura/training/evaluation/evaluate.h"
+#include "pictura/training/evaluation/evaluate_scenes.h"
 #include "pictura/training/loop.h"
 #include "pictura/training/probes/corner.h"
 #include "pictura/training/probes/pedestrian.h"
@@ -78,6 +79,52 @@ py::dict dict_of(const EvaluateReport& report) {
   d["seconds"] = report.seconds;
   d["agent_steps"] = report.agent_steps;
   d["policy_hash"] = report.results.setting.policy_hash;
+  return d;
+}
+
+py::dict dict_of(const SceneAgent& agent) {
+  const auto has = [&agent](Event event) { return (agent.events & event) != 0; };
+  py::dict d;
+  d["scenario_id"] = agent.scenario_id;
+  d["density"] = agent.density;
+  d["track_id"] = agent.track_id;
+  d["type"] = to_string(agent.type);
+  d["takeover_step"] = agent.takeover_step;
+  d["driven_steps"] = agent.driven_steps;
+  d["arrived"] = agent.arrived;
+  d["collision"] = has(kEventCollision);
+  d["at_fault"] = has(kEventAtFault);
+  d["off_road"] = has(kEventOffRoad);
+  d["distance_m"] = agent.distance_m;
+  d["mean_displacement_m"] = agent.mean_displacement_m;
+  d["final_displacement_m"] = agent.final_displacement_m;
+  return d;
+}
+
+py::dict dict_of(const SceneEvaluation& evaluation, const std::vector<SceneAgent>& agents) {
+  py::list rows, agent_dicts;
+  for (const SceneRow& row : evaluation.rows) {
+    py::dict d;
+    d["density"] = row.density;
+    d["scenes"] = row.scenes;
+    d["vehicle_episodes"] = row.vehicle_episodes;
+    d["km_driven"] = row.km_driven;
+    for (const auto& [name, estimate] : metrics_of(row)) {
+      d[py::str(name)] = py::make_tuple(estimate.value, estimate.half_width_95);
+    }
+    rows.append(d);
+  }
+  for (const SceneAgent& agent : agents) agent_dicts.append(dict_of(agent));
+  py::dict d;
+  d["rows"] = rows;
+  d["agents"] = agent_dicts;
+  d["scenes"] = evaluation.found;
+  d["scored"] = evaluation.scored;
+  d["without_drivers"] = evaluation.without_drivers;
+  d["faults"] = evaluation.faults;
+  d["seconds"] = evaluation.seconds;
+  d["agent_steps"] = evaluation.agent_steps;
+  d["policy_hash"] = evaluation.setting.policy_hash;
   return d;
 }
 
@@ -384,6 +431,59 @@ device, simulator, renderer: 'auto' or names; renderer '': as it was trained. ri
 conditioning: numbers by name. on_progress: called with the fraction that is done and the seconds to come, from a thread of its
 own. Returns a dict: rows, one a density: its counts, and each metric as (value, half of its 95 % interval); seconds,
 agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
+  module.def(
+      "evaluate_scenes",
+      [](const std::string& checkpoint, const std::vector<std::string>& scenes, const std::string& protocol,
+         const std::string& controller, const std::optional<std::string>& control, const std::optional<int>& start_step,
+         const std::optional<int>& steps, const std::optional<std::vector<double>>& densities, const py::dict& rules,
+         int first_scene, int num_scenes, bool argmax, uint64_t seed, int num_threads, const std::string& device,
+         const std::string& simulator, const std::string& renderer, const std::string& samples,
+         const py::dict& conditioning, const py::object& on_progress) {
+        SceneEvaluateOptions options;
+        options.checkpoint = checkpoint;
+        options.controller = controller;
+        options.scenes = scenes;
+        options.protocol = scene_protocol(protocol);
+        options.protocol.control = control.value_or(options.protocol.control);
+        options.protocol.start_step = start_step.value_or(options.protocol.start_step);
+        options.protocol.steps = steps.value_or(options.protocol.steps);
+        options.protocol.densities = densities.value_or(options.protocol.densities);
+        for (const auto& [name, value] : rules) {
+          set_scene_rule(fmt::format("{}={}", py::cast<std::string>(name), py::cast<std::string>(py::str(value))),
+                         &options.protocol);
+        }
+        options.first_scene = first_scene;
+        options.num_scenes = num_scenes;
+        options.argmax = argmax;
+        options.seed = seed;
+        options.num_threads = num_threads;
+        options.device = device;
+        options.simulator = simulator;
+        options.renderer = renderer;
+        options.samples = samples;
+        options.conditioning = texts_of(conditioning);
+        options.on_progress = progress_to(on_progress);
+        std::vector<SceneAgent> agents;
+        options.on_agent = [&agents](const SceneAgent& agent) { agents.push_back(agent); };
+        const SceneEvaluation evaluation = run_to_an_orderly_end(
+            "evaluate_scenes", num_threads, {}, [&options] { return pictura::evaluate_scenes(options); });
+        return dict_of(evaluation, agents);
+      },
+      py::arg("checkpoint"), py::arg("scenes"), py::kw_only(), py::arg("protocol") = "womd", py::arg("controller") = "",
+      py::arg("control") = py::none(), py::arg("start_step") = py::none(), py::arg("steps") = py::none(),
+      py::arg("densities") = py::none(), py::arg("rules") = py::dict(), py::arg("first_scene") = 0,
+      py::arg("num_scenes") = 0, py::arg("argmax") = true, py::arg("seed") = 1, py::arg("num_threads") = 0,
+      py::arg("device") = "auto", py::arg("simulator") = "auto", py::arg("renderer") = "", py::arg("samples") = "",
+      py::arg("conditioning") = py::dict(), py::arg("on_progress") = py::none(),
+      R"(The paper's zero-shot evaluation in recorded scenes, as `pictura evaluate --protocol` does it.
+
+checkpoint: of a policy; '' with a controller: 'log', 'inverse', 'idm', 'random' or 'idle', which drives instead. scenes: files,
+folders, 'FILE#K'. protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3' or 'waymax'; control, start_step, steps,
+densities (shares of road users that stay) and rules (values by name, docs/evaluation.md) replace what it says.
+first_scene, num_scenes: a part of the scenes; 0: all from the first on. The others as in evaluate(). Returns a dict: rows, one a
+density, with each metric as (value, half of its 95 % interval); agents, one for every driven road user of a scene and density;
+scenes, scored, without_drivers, faults (scenes that are left out, and why); seconds, agent_steps, policy_hash. ^C raises
+KeyboardInterrupt. Raises pictura.Error where no scene can be used.)");
   module.def(
       "probe_removal",
       [](const std::vector<std::string>& policies, const std::vector<std::string>& maps, const std::string& density,

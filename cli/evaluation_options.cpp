@@ -40,4 +40,19 @@ void settle_evaluation_options(EvaluationArguments* arguments) {
   options.samples = backends.samples;
 }
 
+void EvaluationProgress::update(double done, double eta_s) {
+  // The notice comes when the time is long, as soon as a few seconds tell.
+  constexpr double kEstimateAfter_s = 5, kLong_s = 600;
+  const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  if (!has_estimate_ && elapsed_s >= kEstimateAfter_s) {
+    has_estimate_ = true;
+    if (elapsed_s + eta_s > kLong_s) {
+      line_.finish();
+      fmt::print(stderr, "notice: this takes {} at most; ^C reports {}, and --scenarios A:B evaluates a part\n",
+                 format_duration(elapsed_s + eta_s), finished_);
+    }
+  }
+  line_.update(fmt::format("evaluating: {:.0f} %  ETA {}", 100 * done, format_duration(eta_s)));
+}
+
 }  // namespace pictura

@@ -1,7 +1,10 @@
 // Options of commands that drive evaluation worlds: which worlds, and what computes.
 #pragma once
 
+#include <chrono>
+
 #include "pictura/cli/backend_options.h"
+#include "pictura/cli/report.h"
 #include "pictura/training/evaluation/evaluate.h"
 
 namespace pictura {
@@ -20,5 +23,20 @@ CLI::Option* add_evaluation_options(CLI::App* command, EvaluationArguments* argu
 
 /// Puts into arguments->evaluate what has been parsed beside it.
 void settle_evaluation_options(EvaluationArguments* arguments);
+
+/// Says how far an evaluation is, and once, where it takes long, for how long and what can be done about it.
+class EvaluationProgress {
+ public:
+  /// `finished` is what ^C reports: "the scenarios that are finished".
+  explicit EvaluationProgress(std::string finished) : finished_(std::move(finished)) {}
+  void update(double done, double eta_s);
+  void finish() { line_.finish(); }
+
+ private:
+  std::string finished_;
+  ProgressLine line_;
+  const std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  bool has_estimate_ = false;
+};
 
 }  // namespace pictura

@@ -67,7 +67,7 @@ std::shared_ptr<CompiledMap> compile_map(std::shared_ptr<const RoadMap> road, co
   const MapGeometryOptions geometry_options{.walls = options.walls, .wall_seed = options.wall_seed};
   const std::vector<WallFace> walls = options.walls ? make_walls(*road, geometry_options) : std::vector<WallFace>{};
   map->fingerprint = record.agents.empty() ? fingerprint_of(*road) : fingerprint_of(*road, record);
-  map->rules = make_map_rules(*road, walls, options.observe_walls, std::move(record));
+  map->rules = make_map_rules(*road, walls, options.observe_walls, std::move(record), options.observed_span_m);
   map->geometry = make_static_geometry(*road, geometry_options);
   map->options = options;
   map->road = std::move(road);

@@ -19,6 +19,10 @@ struct MapOptions {
   uint64_t wall_seed = 0;
   bool observe_walls = false;    // rules.near_wall_pieces is made
   bool recorded_lights = false;  // those of a recorded scene are there, see compile_scenario()
+  // How long observed pieces of lanes and boundaries are. 0: at most 10 m, and they follow curves within 0.25 m, as in
+  // training. Above 0: what is straight within 2 cm, however long, is cut evenly into pieces of at most so many metres
+  // (paper, evaluation protocol: on logged maps long segments are subdivided at observation time).
+  float observed_span_m = 0;
   bool operator==(const MapOptions&) const = default;
 };
 

@@ -17,6 +17,9 @@ PICTURA_HD constexpr bool takes_actions(AgentStatus status) {
   return status == AgentStatus::active || status == AgentStatus::recorded;
 }
 
+/// What an infraction does to whom it happens to: it halts, it leaves the episode, or it drives on and only counts.
+enum class AfterInfraction : uint8_t { halt, leave, drive_on };
+
 /// Why an agent found no place at the start of its episode.
 enum class SpawnFailure : uint8_t {
   none,

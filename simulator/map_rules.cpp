@@ -35,14 +35,28 @@ float distance_to_segment(Vec2 p, Vec2 a, Vec2 b) {
   return length(p - a - way * t);
 }
 
-/// Cuts a polyline into observed pieces of that extent: as long as kMaxPiece_m and kObservedChordError_m allow.
-void append_pieces(const std::vector<Vec3>& points, float extent, std::vector<ObservedPiece>* pieces_out) {
+/// How observed pieces are cut out of polylines.
+struct PieceRule {
+  float chord_error_m;  // points that lie so near to a straight line are left out of it
+  float longest_m;      // what is longer is cut evenly
+  bool joins_all;       // lines of any length are made, and then cut; else lines end where a piece must
+};
+
+PieceRule piece_rule(float observed_span_m) {
+  constexpr float kStraight_m = 0.02f;
+  if (observed_span_m > 0) return {kStraight_m, observed_span_m, true};
+  return {kObservedChordError_m, kMaxPiece_m, false};
+}
+
+/// Cuts a polyline into observed pieces of that extent.
+void append_pieces(const std::vector<Vec3>& points, float extent, const PieceRule& rule,
+                   std::vector<ObservedPiece>* pieces_out) {
   for (size_t begin = 0; begin + 1 < points.size();) {
     size_t end = begin + 1;
     const auto fits = [&](size_t last) {
-      if (length(points[last].xy() - points[begin].xy()) > kMaxPiece_m) return false;
+      if (!rule.joins_all && length(points[last].xy() - points[begin].xy()) > rule.longest_m) return false;
       for (size_t i = begin + 1; i < last; ++i) {
-        if (distance_to_segment(points[i].xy(), points[begin].xy(), points[last].xy()) > kObservedChordError_m)
+        if (distance_to_segment(points[i].xy(), points[begin].xy(), points[last].xy()) > rule.chord_error_m)
           return false;
       }
       return true;
@@ -50,8 +64,7 @@ void append_pieces(const std::vector<Vec3>& points, float extent, std::vector<Ob
     while (end + 1 < points.size() && fits(end + 1)) ++end;
     const Vec2 way = points[end].xy() - points[begin].xy();
     const float way_m = length(way);
-    // What is longer than a piece may be is cut evenly.
-    const int cuts = std::max(1, static_cast<int>(std::ceil(way_m / kMaxPiece_m - 1e-4f)));
+    const int cuts = std::max(1, static_cast<int>(std::ceil(way_m / rule.longest_m - 1e-4f)));
     for (int i = 0; i < cuts && way_m > 0; ++i) {
       const float fraction = (static_cast<float>(i) + 0.5f) / static_cast<float>(cuts);
       pieces_out->push_back({points[begin] + (points[end] - points[begin]) * fraction,
@@ -61,7 +74,7 @@ void append_pieces(const std::vector<Vec3>& points, float extent, std::vector<Ob
   }
 }
 
-void add_lanes(const RoadMap& map, MapRules* out) {
+void add_lanes(const RoadMap& map, const PieceRule& rule, MapRules* out) {
   out->lanes.resize(map.lanes.size());
   for (size_t index = 0; index < map.lanes.size(); ++index) {
     const Lane& lane = map.lanes[index];
@@ -99,7 +112,7 @@ void add_lanes(const RoadMap& map, MapRules* out) {
     }
     flat.length_m = s;
     flat.num_segments = static_cast<int32_t>(out->segments.size()) - flat.first_segment;
-    if (is_driven) append_pieces(line, widest * (1.0f / kScaleLaneWidth_m), &out->lane_pieces);
+    if (is_driven) append_pieces(line, widest * (1.0f / kScaleLaneWidth_m), rule, &out->lane_pieces);
 
     const auto goes_on = [&](int32_t other) { return other >= 0 && map.lanes[static_cast<size_t>(other)].is_endless; };
     for (const int32_t successor : map.links(lane.successors)) {
@@ -119,10 +132,10 @@ void add_lanes(const RoadMap& map, MapRules* out) {
   }
 }
 
-void add_barriers(const RoadMap& map, Span<const WallFace> walls, MapRules* out) {
+void add_barriers(const RoadMap& map, Span<const WallFace> walls, const PieceRule& rule, MapRules* out) {
   std::vector<Vec3> line;
   const auto finish_line = [&] {
-    if (line.size() > 1) append_pieces(line, 0.0f, &out->boundary_pieces);
+    if (line.size() > 1) append_pieces(line, 0.0f, rule, &out->boundary_pieces);
     line.clear();
   };
   for (const RoadEdge& edge : map.road_edges) {
@@ -137,7 +150,7 @@ void add_barriers(const RoadMap& map, Span<const WallFace> walls, MapRules* out)
   finish_line();
   for (const WallFace& wall : walls) {
     out->walls.push_back({wall.a_m.xy(), wall.b_m.xy(), 0.5f * (wall.a_m.z + wall.b_m.z)});
-    append_pieces({wall.a_m, wall.b_m}, wall.height_m * (1.0f / kScaleWallHeight_m), &out->wall_pieces);
+    append_pieces({wall.a_m, wall.b_m}, wall.height_m * (1.0f / kScaleWallHeight_m), rule, &out->wall_pieces);
   }
 }
 
@@ -213,10 +226,11 @@ void add_parking_spots(const RoadMap& map, MapRules* out) {
 
 /// Takes the record, and with it how large and how fast anything on the map can be.
 void add_record(MapRecord record, MapRules* out) {
+  constexpr float kRoom = 1.0f + 1e-6f;  // so that rounding leaves the largest box within the radius
   out->max_box_radius_m = kMaxBoxRadius_m;
   out->max_speed_mps = kMaxSpeed_mps;
   for (const RecordedAgent& agent : record.agents) {
-    out->max_box_radius_m = std::max(out->max_box_radius_m, 0.5f * std::hypot(agent.length_m, agent.width_m));
+    out->max_box_radius_m = std::max(out->max_box_radius_m, 0.5f * kRoom * std::hypot(agent.length_m, agent.width_m));
   }
   for (size_t i = 1; i < record.states.size(); ++i) {
     const RecordedState &before = record.states[i - 1], &now = record.states[i];
@@ -397,13 +411,15 @@ CellLists lists_of_stop_lines(const MapRules& map, const std::string& map_name) 
 
 }  // namespace
 
-MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool observe_walls, MapRecord record) {
+MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool observe_walls, MapRecord record,
+                        float observed_span_m) {
+  const PieceRule rule = piece_rule(observed_span_m);
   MapRules out;
   if (!record.agents.empty()) out.sides = side_edges_of(map);
   add_record(std::move(record), &out);
-  add_lanes(map, &out);
+  add_lanes(map, rule, &out);
   PICTURA_CHECK(!out.segments.empty(), "map {}: expected at least one drivable lane, got none", map.name);
-  add_barriers(map, walls, &out);
+  add_barriers(map, walls, rule, &out);
   add_stop_lines(map, &out);
   add_parking_spots(map, &out);
 

@@ -59,8 +59,9 @@ struct MapRules {
 };
 constexpr size_t kMapAlignment_bytes = 256;
 
-/// Walls can be observed on it if `observe_walls`. Throws Error naming the map when it has no drivable lane.
+/// Walls can be observed on it if `observe_walls`; observed_span_m is that of MapOptions. Throws Error naming the map
+/// when it has no drivable lane.
 MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool observe_walls = false,
-                        MapRecord record = {});
+                        MapRecord record = {}, float observed_span_m = 0);
 
 }  // namespace pictura

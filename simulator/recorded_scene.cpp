@@ -95,13 +95,13 @@ std::shared_ptr<const RoadMap> lit_road(const Scenario& scenario) {
   return road;
 }
 
-/// What one word names; see tracks_of().
+/// What one word names; see tracks_named().
 std::vector<uint8_t> tracks_of_word(const Scenario& scenario, const std::string& word) {
   std::vector<uint8_t> mask(scenario.tracks.size());
   const auto choose = [&](auto&& is_chosen) {
     for (size_t i = 0; i < mask.size(); ++i) mask[i] = is_chosen(static_cast<int32_t>(i), scenario.tracks[i]);
   };
-  if (word == "self") {
+  if (word == "self" || word == "sdc") {
     choose([&](int32_t i, const RecordedTrack&) { return i == scenario.sdc_track; });
   } else if (word == "vehicles") {
     choose([&](int32_t i, const RecordedTrack& track) {
@@ -122,17 +122,28 @@ std::vector<uint8_t> tracks_of_word(const Scenario& scenario, const std::string&
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), id);
     if (error != std::errc() || end != word.data() + word.size()) {
       fail_usage(
-          "expected self, vehicles, others, all, tracks_to_predict, objects_of_interest or the id of a track, got "
+          "expected self (or sdc), vehicles, others, all, tracks_to_predict, objects_of_interest or the id of a track, "
+          "got "
           "'{}'",
           word);
     }
     choose([id](int32_t, const RecordedTrack& track) { return track.id == id; });
   }
-  if (std::find(mask.begin(), mask.end(), 1) == mask.end()) {
-    fail_usage("scene {}: expected tracks, got '{}', which names none of its {}", scenario.id, word, mask.size());
-  }
   return mask;
 }
+
+/// Calls visit(word, mask of those that it names) for each.
+template <typename Visit>
+void visit_words(const Scenario& scenario, const std::string& words, Visit&& visit) {
+  for (size_t begin = 0; begin <= words.size();) {
+    const size_t end = std::min(words.find(',', begin), words.size());
+    const std::string word = words.substr(begin, end - begin);
+    visit(word, tracks_of_word(scenario, word));
+    begin = end + 1;
+  }
+}
+
+bool names_nobody(const std::vector<uint8_t>& mask) { return std::find(mask.begin(), mask.end(), 1) == mask.end(); }
 
 }  // namespace
 
@@ -173,15 +184,20 @@ WorldSpec scene_world(const CompiledMap& map, int index, uint32_t global_world) 
   return {index, static_cast<int>(map.rules.record.agents.size()), global_world};
 }
 
-std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words) {
+std::vector<uint8_t> tracks_named(const Scenario& scenario, const std::string& words) {
   std::vector<uint8_t> mask(scenario.tracks.size());
-  for (size_t begin = 0; begin <= words.size();) {
-    const size_t end = std::min(words.find(',', begin), words.size());
-    const std::vector<uint8_t> named = tracks_of_word(scenario, words.substr(begin, end - begin));
+  visit_words(scenario, words, [&mask](const std::string&, const std::vector<uint8_t>& named) {
     for (size_t i = 0; i < mask.size(); ++i) mask[i] |= named[i];
-    begin = end + 1;
-  }
+  });
   return mask;
+}
+
+std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words) {
+  visit_words(scenario, words, [&scenario](const std::string& word, const std::vector<uint8_t>& named) {
+    if (!names_nobody(named)) return;
+    fail_usage("scene {}: expected tracks, got '{}', which names none of its {}", scenario.id, word, named.size());
+  });
+  return tracks_named(scenario, words);
 }
 
 std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words, int32_t step) {
@@ -189,10 +205,15 @@ std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& word
   for (size_t i = 0; i < mask.size(); ++i) {
     mask[i] &= scenario.valid_of(static_cast<int32_t>(i))[static_cast<size_t>(step)];
   }
-  if (std::find(mask.begin(), mask.end(), 1) == mask.end()) {
+  if (names_nobody(mask)) {
     fail_usage("'{}': expected a track that is there at step {}, got none", words, step);
   }
   return mask;
+}
+
+std::optional<float> displacement_m(const Scenario& scenario, int32_t track, int32_t step, Vec3 center_m) {
+  if (step >= scenario.num_steps || !scenario.valid_of(track)[static_cast<size_t>(step)]) return std::nullopt;
+  return length((center_m - scenario.states_of(track)[static_cast<size_t>(step)].position_m).xy());
 }
 
 }  // namespace pictura

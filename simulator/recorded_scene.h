@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,11 +31,17 @@ SimulatorConfig scene_config(const Scenario& scenario, int32_t start_step = 0, S
 /// The world of a scene's map: all of its tracks.
 WorldSpec scene_world(const CompiledMap& map, int index = 0, uint32_t global_world = 0);
 
-/// [tracks] 1 for those that words with commas between them name: self (the self-driving car), vehicles (the others),
-/// others (who is no vehicle), all, tracks_to_predict, objects_of_interest, and ids of tracks. Throws UsageError for
-/// another word, and for one that names nobody.
+/// [tracks] 1 for those that words with commas between them name: self or sdc (the self-driving car), vehicles (the
+/// others), others (who is no vehicle), all, tracks_to_predict, objects_of_interest, and ids of tracks. A word may name
+/// nobody. Throws UsageError for another word.
+std::vector<uint8_t> tracks_named(const Scenario& scenario, const std::string& words);
+/// The same. Throws UsageError as well for a word that names nobody.
 std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words);
 /// The same but for those that are not there at a step. Throws UsageError as well when nobody is left.
 std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words, int32_t step);
+
+/// How far a box's centre is, on the ground, from where the recording has the track at a step; nullopt where it has it
+/// nowhere.
+std::optional<float> displacement_m(const Scenario& scenario, int32_t track, int32_t step, Vec3 center_m);
 
 }  // namespace pictura

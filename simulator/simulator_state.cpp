@@ -55,6 +55,10 @@ std::vector<Fingerprint> fingerprints(const SimulatorSetup& setup) {
   prints.push_back({"worlds", worlds.value()});
   add("number of maps", setup.maps.size());
   for (const auto& map : setup.maps) prints.push_back({fmt::format("map {}", map->road->name), map->fingerprint});
+  // States of the usual rules carry no mark of them, so that those of earlier versions are restored.
+  if (config.after_infraction != AfterInfraction::halt || config.leave_at_goal) {
+    add("way to end (after_infraction, leave_at_goal)", config.after_infraction, config.leave_at_goal);
+  }
   return prints;
 }
 

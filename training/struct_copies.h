@@ -33,6 +33,7 @@ class DeviceCopy {
     if (num_bytes > 0) bytes_.copy_(tensor_over(from, Device{}, {num_bytes}));
   }
   Span<const T> span() const { return {reinterpret_cast<const T*>(bytes_.data_ptr<uint8_t>()), size_}; }
+  Span<T> span() { return {reinterpret_cast<T*>(bytes_.data_ptr<uint8_t>()), size_}; }
 
  private:
   size_t size_;

@@ -53,11 +53,19 @@ from pictura._pictura import (  # noqa: F401
 from pictura.queries import make_queries  # noqa: F401
 
 if TYPE_CHECKING:
-    from pictura._training import PolicySession, evaluate, probe_corner, probe_pedestrian, probe_removal, train  # noqa: F401
+    from pictura._training import (  # noqa: F401
+        PolicySession,
+        evaluate,
+        evaluate_scenes,
+        probe_corner,
+        probe_pedestrian,
+        probe_removal,
+        train,
+    )
 
 
 def __getattr__(name: str):
-    if name not in ("PolicySession", "evaluate", "probe_corner", "probe_pedestrian", "probe_removal", "train"):
+    if name not in ("PolicySession", "evaluate", "evaluate_scenes", "probe_corner", "probe_pedestrian", "probe_removal", "train"):
         raise AttributeError(f"module 'pictura' has no attribute '{name}'")
     from pictura._load_training import load
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import collections.abc
 import pictura._pictura
 import typing
-__all__: list[str] = ['PolicySession', 'evaluate', 'probe_corner', 'probe_pedestrian', 'probe_removal', 'train']
+__all__: list[str] = ['PolicySession', 'evaluate', 'evaluate_scenes', 'probe_corner', 'probe_pedestrian', 'probe_removal', 'train']
 class PolicySession:
     """
     A saved policy: what it makes of scenes and observations, and the world and cameras that it was trained with. One thread at a
@@ -62,6 +62,18 @@ def evaluate(checkpoint: str, maps: collections.abc.Sequence[str], *, controller
     conditioning: numbers by name. on_progress: called with the fraction that is done and the seconds to come, from a thread of its
     own. Returns a dict: rows, one a density: its counts, and each metric as (value, half of its 95 % interval); seconds,
     agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.
+    """
+def evaluate_scenes(checkpoint: str, scenes: collections.abc.Sequence[str], *, protocol: str = 'womd', controller: str = '', control: str | None = None, start_step: typing.SupportsInt | typing.SupportsIndex | None = None, steps: typing.SupportsInt | typing.SupportsIndex | None = None, densities: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, rules: dict = {}, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, num_scenes: typing.SupportsInt | typing.SupportsIndex = 0, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', conditioning: dict = {}, on_progress: typing.Any = None) -> dict:
+    """
+    The paper's zero-shot evaluation in recorded scenes, as `pictura evaluate --protocol` does it.
+
+    checkpoint: of a policy; '' with a controller: 'log', 'inverse', 'idm', 'random' or 'idle', which drives instead. scenes: files,
+    folders, 'FILE#K'. protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3' or 'waymax'; control, start_step, steps,
+    densities (shares of road users that stay) and rules (values by name, docs/evaluation.md) replace what it says.
+    first_scene, num_scenes: a part of the scenes; 0: all from the first on. The others as in evaluate(). Returns a dict: rows, one a
+    density, with each metric as (value, half of its 95 % interval); agents, one for every driven road user of a scene and density;
+    scenes, scored, without_drivers, faults (scenes that are left out, and why); seconds, agent_steps, policy_hash. ^C raises
+    KeyboardInterrupt. Raises pictura.Error where no scene can be used.
     """
 def probe_corner(policies: collections.abc.Sequence[str], maps: collections.abc.Sequence[str], *, density: str = 'medium', agents_per_world: typing.SupportsInt | typing.SupportsIndex = 0, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, scenes: typing.SupportsInt | typing.SupportsIndex = 0, steps: typing.SupportsInt | typing.SupportsIndex = 600, pairs: typing.SupportsInt | typing.SupportsIndex = 200, sample_steps: typing.SupportsInt | typing.SupportsIndex = 5, max_distance_m: typing.SupportsFloat | typing.SupportsIndex = 25.0, min_speed_mps: typing.SupportsFloat | typing.SupportsIndex = 2.0, user_range_m: typing.SupportsFloat | typing.SupportsIndex = 50.0, driver: str = '', control: str = 'none', batch: typing.SupportsInt | typing.SupportsIndex = 256, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', conditioning: dict = {}, cases_file: str = '', on_progress: typing.Any = None) -> typing.Any:
     """

@@ -197,6 +197,11 @@ SceneIndex index_scenes(const std::string& path) {
   return index;
 }
 
+SceneIndex find_scenes(const std::string& name) {
+  const SceneName wanted = split(name);
+  return wanted.selector.empty() ? index_scenes(wanted.path) : SceneIndex{{find_scene(name)}, {}};
+}
+
 SceneRef find_scene(const std::string& name) {
   const SceneName wanted = split(name);
   SceneIndex index = index_scenes(wanted.path);

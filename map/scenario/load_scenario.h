@@ -40,6 +40,9 @@ bool is_scene_name(std::string_view name);
 /// there is no such file or folder, and when a folder holds no scene.
 SceneIndex index_scenes(const std::string& path);
 
+/// All scenes that a name says: with a selector the one of find_scene(), else those of the file or folder.
+SceneIndex find_scenes(const std::string& name);
+
 /// The scene that a name says: FILE, FILE#K (from 0), FILE#SCENARIO_ID, FOLDER#K, FOLDER#SCENARIO_ID; without a
 /// selector the first one. Throws UsageError for a name or selector that is none, Error naming file, record and field.
 SceneRef find_scene(const std::string& name);

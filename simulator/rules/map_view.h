@@ -77,8 +77,8 @@ struct ParkingSpot {
   Vec2 outward;  // unit vector away from the road; null on parking lanes and spaces
 };
 
-/// A piece of a lane, boundary or wall as the policy sees it: at most kMaxPiece_m long. Eight floats, which a host
-/// reads in one load and a device in two.
+/// A piece of a lane, boundary or wall as the policy sees it: as long as MapOptions says. Eight floats, which
+/// a host reads in one load and a device in two.
 struct alignas(16) ObservedPiece {
   Vec3 middle_m;  // on the ground
   float half_length_m = 0;

@@ -142,6 +142,9 @@ PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& co
   }
   if (!takes_actions(world, agent)) {
     if (group.rank() > 0) return;
+    // Who left at the end of the last step was still there for all to see.
+    const bool has_left = agents.status[slot] == static_cast<uint8_t>(AgentStatus::absent) && before.drawn;
+    if (has_left) return leave(world, agent);
     world.boxes_before[agent] = before;
     agents.events[slot] = kEventNone;
     return;
@@ -226,8 +229,9 @@ PICTURA_HD inline StepFacts step_facts(const Motion& motion, const LaneFit& fit,
   return facts;
 }
 
-/// Phase 3: the reward of an active agent, and its halt after an infraction. Returns the reward's terms. Nothing that
-/// it writes is read by another agent's phase 2.
+/// Phase 3: the reward of an active agent, and its end: the halt after an infraction, or its leaving after one or at
+/// its goal. Whoever leaves is absent, but its box stands there until the next step, in which nobody meets it. Returns
+/// the reward's terms. Nothing that it writes is read by another agent's phase 2.
 PICTURA_HD inline RewardTerms apply_reward_and_halt(const WorldView& world, int agent) {
   if (!is_active(world, agent)) return {};
   const AgentStateView& agents = world.agents;
@@ -239,8 +243,16 @@ PICTURA_HD inline RewardTerms apply_reward_and_halt(const WorldView& world, int 
   agents.episode_events[slot] = static_cast<uint8_t>(agents.episode_events[slot] | events);
 
   const int infractions = events & kInfractions;
-  if (infractions == 0) return terms;
-  agents.halt_reason[slot] = static_cast<uint8_t>(infractions);
+  const AfterInfraction after = world.options.after_infraction;
+  if (infractions != 0 && after != AfterInfraction::drive_on) {
+    agents.halt_reason[slot] = static_cast<uint8_t>(infractions);
+  }
+  const bool arrives = world.options.leave_at_goal && (events & kEventMetricGoal) != 0;
+  if (arrives || (infractions != 0 && after == AfterInfraction::leave)) {
+    agents.status[slot] = static_cast<uint8_t>(AgentStatus::absent);
+    return terms;
+  }
+  if (infractions == 0 || after != AfterInfraction::halt) return terms;
   agents.status[slot] = static_cast<uint8_t>(AgentStatus::halted);
   agents.speed_mps[slot] = agents.accel_long_mps2[slot] = agents.accel_lat_mps2[slot] = 0.0f;
   agents.steer_rad[slot] = agents.jerk_long_mps3[slot] = agents.jerk_lat_mps3[slot] = 0.0f;

@@ -1,4 +1,4 @@
-"""`pictura map`, `simulate` and `render` of recorded scenes, from outside. Usage: scene_command_test.py PICTURA SCENE_FIXTURE."""
+"""`pictura map`, `simulate`, `render` and `evaluate` of recorded scenes, from outside. Usage: scene_command_test.py PICTURA SCENE_FIXTURE."""
 
 import json
 import pathlib
@@ -111,7 +111,7 @@ with tempfile.TemporaryDirectory() as name:
     assert "--agents: has no effect on a recorded scene" in refusal(scene, "--agents", 4)
     assert "--control: has no effect with the policy log" in refusal(scene, "--control", "self")
     assert "--start: has no effect on procedural:1, which is no recorded scene" in refusal("procedural:1", "--start", 4)
-    assert "--control: expected self, vehicles" in refusal(scene, "--policy", "idle", "--control", "cars")
+    assert "--control: expected self (or sdc), vehicles" in refusal(scene, "--policy", "idle", "--control", "cars")
     assert "names none of its 12" in refusal(scene, "--policy", "idle", "--control", "3")
     assert "in [0, 91), got 91" in refusal(scene, "--start", 91)
     assert "--follow: expected 0 to 11, got 12" in refusal(scene, "--replay", folder / "x.html", "--follow", 12)
@@ -127,4 +127,35 @@ with tempfile.TemporaryDirectory() as name:
     (folder / "damaged.tfrecord").write_bytes(damaged)
     refused = run(folder / "damaged.tfrecord", status=1).stderr
     assert "damaged.tfrecord: record 0: expected the checksum" in refused, refused
+
+    # Evaluations: one damaged scene of six is left out.
+    words = ("--policy", "idm", "--protocol", "womd", "--scenes", folder, "--threads", 1)
+    if "evaluate" in subprocess.run([PICTURA, "--help"], capture_output=True, text=True).stdout:
+        done = run(*words, "--csv", folder / "agents.csv", "--json", command="evaluate")
+        report = json.loads(done.stdout)
+        assert "warning: left out: " in done.stderr and "damaged.tfrecord: record 0" in done.stderr, done.stderr
+        assert (report["scenes"], report["scored"], report["without_drivers"]) == (6, 5, 0), report
+        assert len(report["faults"]) == 1 and report["rules"]["overlapping"] == "replay"
+        assert [row["density"] for row in report["rows"]] == [1, 0.75, 0.5]
+        assert report["rows"][0]["vehicle_episodes"] > report["rows"][2]["vehicle_episodes"] > 0
+        rows = (folder / "agents.csv").read_text().splitlines()
+        assert rows[0].startswith("scenario_id,density,track_id,type,") and rows[1].startswith('"fixture00000001",1,'), rows[:2]
+        assert len(rows) == 1 + sum(row["vehicle_episodes"] for row in report["rows"])
+        table = run(*words, "--density", "100,50", "--rule", "late=drive", "--steps", 20, command="evaluate").stdout
+        assert "late=drive" in table and "paper: perspective" in table and "75 %" not in table, table
+        self_alone = json.loads(
+            run("--policy", "idm", "--protocol", "waymax", "--scenes", scene, "--json", command="evaluate").stdout
+        )
+        assert self_alone["steps"] == 80 and self_alone["start_step"] == 10
+        assert self_alone["rows"][0]["vehicle_episodes"] == 1, self_alone
+        for expected, bad in [
+            ("--protocol: expected --scenes as well", ("--policy", "idm", "--protocol", "womd")),
+            ("--csv: has no effect without --protocol", ("--policy", "idle", "--csv", folder / "x.csv")),
+            ("--map: has no effect with --protocol", (*words, "--map", "procedural:1")),
+            ("expected shares in %, above 0 and at most 100, got 'dense'", (*words, "--density", "dense")),
+            ("rules: expected overlapping, others", (*words, "--rule", "nobody=drive")),
+            ("--control", (*words, "--control", "cars")),
+        ]:
+            refused = run(*bad, command="evaluate", status=2).stderr
+            assert expected in refused or (expected == "--control" and "got 'cars'" in refused), refused
 print("all good")

@@ -293,6 +293,20 @@ def test_a_controller_is_evaluated_without_a_policy():
         pictura.evaluate("", ["procedural:1"], controller="lane", densities=["thick"])
 
 
+def test_a_controller_is_evaluated_in_recorded_scenes(tmp_path):
+    fixture = os.environ.get("PICTURA_SCENE_FIXTURE")
+    if not fixture:
+        pytest.skip("PICTURA_SCENE_FIXTURE names no writer of scenes")
+    subprocess.run([fixture, "write", str(tmp_path)], check=True)
+    options = {"controller": "idm", "device": "cpu", "densities": [1.0], "rules": {"leave_at_goal": "no"}, "steps": 60}
+    report = pictura.evaluate_scenes("", [str(tmp_path / "womd.tfrecord")], **options)
+    (row,) = report["rows"]
+    assert report["scored"] == 1 and report["faults"] == [] and row["vehicle_episodes"] == len(report["agents"]) > 0
+    assert report["agents"][0]["scenario_id"] == "fixture00000001" and report["agents"][0]["driven_steps"] > 0
+    with pytest.raises(pictura.UsageError, match="rule late: expected replay, drive, absent, got 'never'"):
+        pictura.evaluate_scenes("", [str(tmp_path)], controller="idm", rules={"late": "never"})
+
+
 def test_what_a_callback_raises_ends_training(tmp_path):
     def fail(progress):
         raise ZeroDivisionError(progress["update"])

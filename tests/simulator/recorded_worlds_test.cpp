@@ -275,6 +275,104 @@ TEST(RecordedWorlds, TheGoalIsTheEndOfTheRecordAndPassedOnce) {
   EXPECT_EQ(simulator->totals().waypoints_reached, 1);
 }
 
+/// The scene's world under other rules of how agents end, with everybody else as recorded.
+std::unique_ptr<Simulator> world_with(const std::shared_ptr<const Scenario>& scene, AfterInfraction after,
+                                      bool leave_at_goal) {
+  SimulatorConfig config;
+  config.after_infraction = after;
+  config.leave_at_goal = leave_at_goal;
+  return world_of(scene, 0, config);
+}
+
+Command place(const Scenario& scene, int32_t track, const TrackState& at) {
+  const RecordedTrack& about = scene.tracks[static_cast<size_t>(track)];
+  const float ahead_m = reference_to_center(AgentClass::vehicle, about.length_m);
+  return {.kind = CommandKind::kinematic_state,
+          .x_m = at.position_m.x - ahead_m * std::cos(at.heading_rad),
+          .y_m = at.position_m.y - ahead_m * std::sin(at.heading_rad),
+          .z_m = at.position_m.z,
+          .heading_rad = at.heading_rad,
+          .speed_mps = length(at.velocity_mps)};
+}
+
+TEST(RecordedWorlds, WhoArrivesLeavesAndNobodyMeetsIt) {
+  const auto scene = crossing(kNobodyInTheWay);
+  const int32_t self = mover(*scene, 40), other = self + 1;
+  const auto simulator = world_with(scene, AfterInfraction::halt, /*leave_at_goal=*/true);
+  const RecordedTrack& track = scene->tracks[static_cast<size_t>(self)];
+  const TrackState& goal = scene->states_of(self)[static_cast<size_t>(track.last_valid)];
+  std::vector<Command> commands = recorded(*simulator);
+  commands[static_cast<size_t>(self)] = place(*scene, self, goal);
+  StepResult result = simulator->step(commands);
+  const auto slot = static_cast<size_t>(self);
+  EXPECT_EQ(result.terminated[slot], 1);
+  EXPECT_EQ(result.truncated[slot], 0);
+  EXPECT_EQ(status_of(*simulator, self), AgentStatus::absent);
+  EXPECT_EQ(simulator->state().goals_reached[self], 1);
+  EXPECT_EQ(simulator->scene().agents[slot].drawn, 1) << "all see where it arrived";
+  const std::vector<uint8_t> saved = simulator->save();
+  // Another comes to the same place, and meets nobody; what the one that left is told means nothing.
+  commands[static_cast<size_t>(other)] = place(*scene, other, goal);
+  commands[slot] = {};
+  result = simulator->step(commands);
+  EXPECT_EQ(result.valid[slot], 0);
+  EXPECT_EQ(simulator->scene().agents[slot].drawn, 0);
+  EXPECT_EQ(simulator->totals().collisions, 0);
+  EXPECT_EQ(simulator->totals().goals_reached, 1);
+  // The same from a saved state; but not under other rules.
+  const uint64_t hash = simulator->state_hash();
+  simulator->restore(saved);
+  simulator->step(commands);
+  EXPECT_EQ(simulator->state_hash(), hash);
+  const auto usual = world_of(scene);
+  EXPECT_THAT(test::message_of<Error>([&] { usual->restore(saved); }), HasSubstr("fingerprints"));
+  EXPECT_THAT(test::message_of<Error>([&] { simulator->restore(usual->save()); }), HasSubstr("way to end"));
+}
+
+TEST(RecordedWorlds, InfractionsHaltOrRemoveOrOnlyCount) {
+  const auto scene = crossing();
+  const int32_t self = mover(*scene, 40);
+  TrackState aside = scene->states_of(self)[0];
+  const SinCos heading = sincos_of(aside.heading_rad);
+  aside.position_m = aside.position_m + Vec3{8 * heading.sin, -8 * heading.cos, 0};
+  for (const AfterInfraction after : {AfterInfraction::halt, AfterInfraction::leave, AfterInfraction::drive_on}) {
+    SCOPED_TRACE(static_cast<int>(after));
+    const auto simulator = world_with(scene, after, false);
+    std::vector<Command> commands = recorded(*simulator);
+    commands[static_cast<size_t>(self)] = place(*scene, self, aside);
+    EXPECT_EQ(simulator->step(commands).terminated[static_cast<size_t>(self)], after != AfterInfraction::drive_on);
+    const AgentStatus expected = after == AfterInfraction::halt    ? AgentStatus::halted
+                                 : after == AfterInfraction::leave ? AgentStatus::absent
+                                                                   : AgentStatus::active;
+    EXPECT_EQ(status_of(*simulator, self), expected);
+    EXPECT_EQ(simulator->state().episode_events[self] & kEventOffRoad, kEventOffRoad);
+    simulator->step(commands);
+    EXPECT_EQ(simulator->totals().off_road, after == AfterInfraction::drive_on ? 2 : 1);
+    EXPECT_EQ(simulator->scene().agents[static_cast<size_t>(self)].drawn, after != AfterInfraction::leave);
+  }
+}
+
+TEST(RecordedWorlds, ObservedPiecesAreCutFromWholeLines) {
+  const auto scene = crossing();
+  const auto longest_m = [&](float span_m) {
+    const auto map = compile_scenario(scene, {.walls = false, .observed_span_m = span_m});
+    float longest = 0, sum = 0;
+    for (const ObservedPiece& piece : map->rules.lane_pieces) {
+      longest = std::max(longest, 2 * piece.half_length_m);
+      sum += 2 * piece.half_length_m;
+    }
+    return std::pair(longest, sum);
+  };
+  const auto [usual_m, whole_m] = longest_m(0);
+  EXPECT_LE(usual_m, kMaxPiece_m + 1e-3f);
+  for (const float span_m : {2.0f, 5.0f, 20.0f}) {
+    const auto [longest, sum] = longest_m(span_m);
+    EXPECT_LE(longest, span_m + 1e-3f);
+    EXPECT_GT(longest, 0.9f * span_m) << "straight lanes of 40 m are whole before they are cut";
+    EXPECT_NEAR(sum, whole_m, 0.01f * whole_m);
+  }
+}
+
 TEST(RecordedWorlds, DriversLeaveTheRoadWhereTheEdgesSaySo) {
   const auto scene = crossing();
   const int32_t self = mover(*scene, 40);
@@ -306,6 +404,17 @@ TEST(RecordedWorlds, AreSavedAndRestored) {
   // Another start is another record.
   const auto later = world_of(scene, 1, {});
   EXPECT_THAT(test::message_of<Error>([&] { later->restore(a->save()); }), HasSubstr("saved with another"));
+}
+
+TEST(RecordedWorlds, WithTheLargestBoxAreRestored) {
+  for (int i = 0; i < 50; ++i) {
+    Scenario large = *crossing();
+    large.tracks[0].length_m = 15.0f + 0.137f * static_cast<float>(i);
+    large.tracks[0].width_m = 2.5f + 0.011f * static_cast<float>(i);
+    const auto simulator = world_of(std::make_shared<const Scenario>(large));
+    const std::vector<uint8_t> saved = simulator->save();
+    EXPECT_NO_THROW(simulator->restore(saved)) << large.tracks[0].length_m << " by " << large.tracks[0].width_m;
+  }
 }
 
 TEST(RecordedWorlds, ControllersShareThemByMasks) {

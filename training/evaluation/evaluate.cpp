@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "pictura/backends/make_controller.h"
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
@@ -10,10 +9,9 @@
 #include "pictura/common/support/suggestion.h"
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/agent_state.h"
-#include "pictura/training/config.h"
-#include "pictura/training/phase_timer.h"
-#include "pictura/training/saved_policy.h"
+#include "pictura/training/evaluation/progress.h"
 #include "pictura/training/session.h"
+#include "pictura/training/struct_copies.h"
 #include "pictura/training/torch_device.h"
 
 namespace pictura {
@@ -80,61 +78,7 @@ void check(const EvaluateOptions& options) {
   }
 }
 
-// What drives the agents of a batch of worlds, and how many it drove when it last acted.
-struct Driving {
-  std::unique_ptr<Controller> controller;
-  std::function<int64_t()> num_driven;
-};
-
-// Who is evaluated, and where.
-struct Driver {
-  SimulatorConfig world;
-  EvaluationSetting setting;  // what of it is the driver's
-  Device device;
-  std::function<Driving(Simulator&)> drive;
-};
-
-Driver driver_of(PolicySession* session, Renderer* renderer, const EvaluateOptions& options) {
-  return {session->evaluation_world(options.steps), session->evaluation_setting(), session->device(),
-          [session, renderer, &options](Simulator&) {
-            std::unique_ptr<PolicyController> controller =
-                session->make_controller(renderer, options.argmax, options.seed);
-            const PolicyController* const policy = controller.get();
-            return Driving{std::move(controller), [policy] { return policy->num_driven(); }};
-          }};
-}
-
-int64_t count_active(Simulator& simulator) {
-  const Span<const uint8_t> status(simulator.state().status, static_cast<size_t>(simulator.num_slots()));
-  const std::vector<uint8_t> all = host_copy(status, simulator.device());
-  return std::count(all.begin(), all.end(), static_cast<uint8_t>(AgentStatus::active));
-}
-
-// One that needs no policy.
-Driver driver_of(const std::string& controller, const EvaluateOptions& options) {
-  Config config = options.checkpoint.empty() ? Config() : read_policy(options.checkpoint).config;
-  config = with_evaluate_conditioning(config, options.conditioning);
-  config.policy.modality = Modality::perspective;  // nobody reads vectors,
-  config.render.backend = "auto";                  // and nothing is drawn
-  config.run.num_threads = options.num_threads;
-  config.run.device = options.device;
-  config.simulator.backend = options.simulator;
-  const bool drives_on_host = controller == "lane";
-  if (drives_on_host && options.device == "auto" && options.simulator == "auto") config.run.device = "cpu";
-  Driver driver;
-  driver.device = open_learning_device(config);
-  driver.world = evaluation_simulator_config(config, options.steps, driver.device);
-  driver.setting.policy_hash = controller;
-  driver.setting.conditioning = config.evaluate.conditioning;
-  driver.setting.device = driver.device.is_host() ? "cpu" : drives_on_host ? "cuda, driven from the host" : "cuda";
-  driver.drive = [controller, &options](Simulator& simulator) {
-    return Driving{make_controller(controller, simulator, options.seed),
-                   [&simulator] { return count_active(simulator); }};
-  };
-  return driver;
-}
-
-EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options, EvaluationWorlds* shared) {
+EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& options, EvaluationWorlds* shared) {
   const CompiledMaps& maps = shared->maps;
   SimulatorConfig simulator_config = driver.world;
   simulator_config.seed = options.seed;
@@ -146,8 +90,7 @@ EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options, Ev
   double work = 0, done = 0;  // in agents times steps
   for (const DensityOf& density : densities) work += double(density.agents) * options.scenarios * options.steps;
 
-  const Stopwatch since_start;
-  double first_s = -1, first_fraction = 0;  // when the first step was done, and what part it was
+  EvaluationClock clock(options.on_progress);
   EvaluateReport report;
   report.results.setting = driver.setting;
   EvaluationSetting& setting = report.results.setting;
@@ -174,13 +117,12 @@ EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options, Ev
       const Driving driving = driver.drive(*simulator);
       if (options.observer) options.observer->begin(*simulator);
       const auto num_slots = static_cast<size_t>(simulator->num_slots());
-      const at::Tensor command_bytes = at::zeros({static_cast<int64_t>(num_slots * sizeof(Command))},
-                                                 at::TensorOptions(at::kByte).device(torch_device(driver.device)));
-      const Span<Command> commands(reinterpret_cast<Command*>(command_bytes.data_ptr<uint8_t>()), num_slots);
+      DeviceCopy<Command> command_memory(std::vector<Command>(num_slots), driver.device);
+      const Span<Command> commands = command_memory.span();
       for (int step = 0; step < options.steps; ++step) {
         if (interrupted()) {
           report.interrupted = true;
-          report.seconds = since_start.seconds();
+          report.seconds = clock.seconds();
           // The scenarios of this batch are not finished, those before are.
           if (first > 0) {
             result.scenarios.resize(static_cast<size_t>(first));
@@ -197,17 +139,7 @@ EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options, Ev
         if (options.observer) options.observer->before_step(commands);
         const StepResult taken = simulator->step(Span<const Command>(commands));
         if (options.observer) options.observer->after_step(taken);
-        if (options.on_progress && (step % 10 == 0 || step == 1)) {
-          const double fraction = (done + double(simulator->num_slots()) * (step + 1)) / work;
-          // The first step compiles and tunes: how long it takes tells nothing of the others.
-          if (first_s < 0) {
-            first_s = since_start.seconds();
-            first_fraction = fraction;
-          } else {
-            options.on_progress(fraction,
-                                (since_start.seconds() - first_s) * (1 - fraction) / (fraction - first_fraction));
-          }
-        }
+        if (step % 10 == 0 || step == 1) clock.update((done + double(simulator->num_slots()) * (step + 1)) / work);
       }
       done += double(simulator->num_slots()) * options.steps;
       AgentState state = counted_state(*simulator);
@@ -218,8 +150,8 @@ EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options, Ev
     report.rows.push_back(row_of(result, options.steps));
     report.results.densities.push_back(std::move(result));
   }
-  report.seconds = since_start.seconds();
-  if (options.on_progress) options.on_progress(1, 0);
+  report.seconds = clock.seconds();
+  clock.finish();
   return report;
 }
 
@@ -235,19 +167,6 @@ CompiledMaps compile_maps_of(const EvaluateOptions& options, const SimulatorConf
   return compile_maps(roads, map_options(world), options.num_threads);
 }
 
-SessionOptions session_options(const EvaluateOptions& options) {
-  return {.num_threads = options.num_threads,
-          .device = options.device,
-          .simulator = options.simulator,
-          .renderer = options.renderer,
-          .samples = options.samples,
-          .rig = options.rig,
-          .width_px = options.width_px,
-          .height_px = options.height_px,
-          .backbone = options.backbone,
-          .conditioning = options.conditioning};
-}
-
 EvaluateReport evaluate(const EvaluateOptions& options) {
   if (options.controller.empty()) {
     PolicySession session(options.checkpoint, session_options(options));
@@ -259,7 +178,7 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
 
 EvaluateReport evaluate(const EvaluateOptions& options, EvaluationWorlds* shared) {
   check(options);
-  const Driver driver = driver_of(options.controller, options);
+  const EvaluatedDriver driver = controller_driver(options, options.steps);
   if (shared->maps.empty()) shared->maps = compile_maps_of(options, driver.world);
   return evaluate(driver, options, shared);
 }
@@ -276,7 +195,7 @@ EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options) 
 
 EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options, EvaluationWorlds* shared) {
   check(options);
-  return evaluate(driver_of(session, shared->renderer, options), options, shared);
+  return evaluate(policy_driver(session, shared->renderer, options, options.steps), options, shared);
 }
 
 }  // namespace pictura

@@ -8,13 +8,10 @@
 
 #include "pictura/common/portable/hd.h"
 #include "pictura/simulator/simulator.h"
+#include "pictura/training/evaluation/evaluated_driver.h"
 #include "pictura/training/evaluation/results.h"
 
 namespace pictura {
-
-class PolicySession;
-class Renderer;
-struct SessionOptions;
 
 enum class Density { light, medium, dense };
 
@@ -36,26 +33,11 @@ class EvaluationObserver {
   virtual void after_step(const StepResult& result) = 0;
 };
 
-struct EvaluateOptions {
-  std::string checkpoint;
-  // A controller of make_controller, "lane" for one, that drives instead of the checkpoint's policy, in its world, or
-  // in the paper's if there is no checkpoint.
-  std::string controller;
+struct EvaluateOptions : DriverOptions {
   std::vector<std::string> maps;  // as load_map takes them; the paper's eight towns
   std::vector<Density> densities{Density::light, Density::medium, Density::dense};
   int agents_per_world = 0;  // > 0: instead of the densities' own numbers
   int first_scenario = 0, scenarios = 200, steps = 3000;
-  bool argmax = true;
-  uint64_t seed = 1;
-  int num_threads = 0;
-  std::string device = "auto", simulator = "auto";  // as run.device and simulator.backend of a configuration
-  // As render.backend and render.samples; empty: as the policy was trained.
-  std::string renderer, samples;
-  // Cameras other than those of training, see SessionOptions.
-  std::string rig;
-  int width_px = 0, height_px = 0;
-  std::string backbone;                   // as in SessionOptions
-  std::vector<std::string> conditioning;  // as in SessionOptions
   std::function<void(double done_fraction, double eta_s)> on_progress;
   EvaluationObserver* observer = nullptr;
 };
@@ -79,9 +61,6 @@ struct EvaluationWorlds {
 
 /// The options' maps as a world of that configuration needs them.
 CompiledMaps compile_maps_of(const EvaluateOptions& options, const SimulatorConfig& world);
-
-/// With which the checkpoint's policy is opened.
-SessionOptions session_options(const EvaluateOptions& options);
 
 /// Scenario k is on map k modulo the number of maps and draws its random numbers as world kFirstEvaluationWorld + k, so
 /// that it repeats no world of training whatever the seeds. Throws Error naming file and key for bad input.

@@ -226,10 +226,13 @@ TEST_F(CudaSimulatorTest, CrowdsUpToTheLargestWorld) {
   expect_parity(config, {load_map("procedural:1")}, {{0, kMaxAgentsPerWorld, 0}, {0, 1000, 1}, {0, 1, 2}}, 45, 5);
 }
 
-TEST_F(CudaSimulatorTest, FollowsRecordsAndTakesOver) {
+/// Drives recorded scenes, of which a fifth at a time is taken over by random actions.
+void expect_same_records(AfterInfraction after_infraction, bool leave_at_goal) {
   const auto scene = test::crossing({.num_vehicles = 40, .num_pedestrians = 10});
   SimulatorConfig config = scene_config(*scene);
   config.episode_steps = 100;  // longer than the record
+  config.after_infraction = after_infraction;
+  config.leave_at_goal = leave_at_goal;
   MapOptions lit = map_options(config);
   lit.recorded_lights = true;
   const CompiledMaps maps{compile_scenario(scene, map_options(config)), compile_scenario(scene, lit, 30)};
@@ -254,6 +257,13 @@ TEST_F(CudaSimulatorTest, FollowsRecordsAndTakesOver) {
     cpu->step(host_commands);
   }
   ASSERT_EQ(cpu->save(), cuda->save());
+}
+
+TEST_F(CudaSimulatorTest, FollowsRecordsAndTakesOver) { expect_same_records(AfterInfraction::halt, false); }
+
+TEST_F(CudaSimulatorTest, EndsAgentsAsTheRulesSay) {
+  expect_same_records(AfterInfraction::leave, true);
+  expect_same_records(AfterInfraction::drive_on, true);
 }
 
 TEST_F(CudaSimulatorTest, WhatOneSavesTheOtherRestores) {

@@ -109,6 +109,18 @@ TEST(Phases, FollowRecords) {
   expect_same(config, maps, worlds, 60, 10);  // actions alone take everybody over
 }
 
+TEST(Phases, EndAgentsAsTheRulesSay) {
+  const auto scene = test::crossing({.num_steps = 40, .num_pedestrians = 6});
+  SimulatorConfig config = scene_config(*scene);
+  config.leave_at_goal = true;
+  for (const AfterInfraction after : {AfterInfraction::halt, AfterInfraction::leave, AfterInfraction::drive_on}) {
+    config.after_infraction = after;
+    const CompiledMaps maps{compile_scenario(scene, map_options(config)),
+                            compile_map(testing::stadium(200, 2), map_options(config))};
+    expect_same(config, maps, {scene_world(*maps[0], 0, 0), {1, 20, 1}}, 90, 11, /*by_commands=*/true);
+  }
+}
+
 TEST(Phases, RefuseAnActionOutOfRangeAndChangeNothing) {
   const auto map = testing::stadium(200, 2);
   testing::ShuffledExecutor executor(testing::cars(), {map}, {{0, 30, 0}, {0, 10, 1}}, 4);

@@ -1,0 +1,205 @@
+#include "pictura/apps/scene_evaluation.h"
+
+#include <memory>
+
+#include "pictura/cli/backend_options.h"
+#include "pictura/cli/evaluation_options.h"
+#include "pictura/cli/file_options.h"
+#include "pictura/cli/number_options.h"
+#include "pictura/cli/report.h"
+#include "pictura/common/error.h"
+#include "pictura/common/support/numbers.h"
+#include "pictura/common/support/output_file.h"
+#include "pictura/map/scenario/scenario.h"
+#include "pictura/training/evaluation/estimate_json.h"
+
+namespace pictura {
+
+namespace {
+
+constexpr size_t kShownFaults = 10;
+
+double parse_density(const std::string& text) {
+  const std::optional<double> percent = parse_number(text);
+  if (!percent || !(*percent > 0) || *percent > 100) {
+    fail_usage("--density: with --protocol expected shares in %, above 0 and at most 100, got '{}'", text);
+  }
+  return *percent / 100;
+}
+
+std::string text_of(const Estimate& e) { return fmt::format("{:.3f} +- {:.3f}", e.value, e.half_width_95); }
+
+void print_settings(const SceneProtocol& protocol) {
+  fmt::print("protocol {}: control {}, start {}, {} steps\n", protocol.name, protocol.control, protocol.start_step,
+             protocol.steps);
+  std::string rules;
+  for (const auto& [name, value] : rules_of(protocol)) rules += fmt::format(" {}={}", name, value);
+  fmt::print("rules:{}\n", rules);
+}
+
+void print_table(const SceneProtocol& protocol, const SceneEvaluation& evaluation) {
+  print_settings(protocol);
+  fmt::print("{} scenes: {} scored, {} with nobody to drive, {} faults\n\n", evaluation.found, evaluation.scored,
+             evaluation.without_drivers, evaluation.faults.size());
+  constexpr const char* kLine = "{:8} {:34} {:>8} {:>9} {:>17} {:>17} {:>17} {:>17} {:>17} {:>9}\n";
+  fmt::print(fmt::runtime(kLine), "density", "agent", "scenes", "vehicles", "at-fault", "off-road", "goals",
+             "collisions", "displacement m", "km");
+  for (const SceneRow& row : evaluation.rows) {
+    const std::string density = fmt::format("{:g} %", 100 * row.density);
+    fmt::print(fmt::runtime(kLine), density, "this", row.scenes, row.vehicle_episodes,
+               text_of(row.at_fault_collision_rate), text_of(row.off_road_rate), text_of(row.goal_rate),
+               text_of(row.collision_rate), text_of(row.mean_displacement_m), fmt::format("{:.2f}", row.km_driven));
+    if (protocol.name != scene_protocols().front().name) continue;
+    for (const PaperSceneRow& paper : paper_scene_rows()) {
+      if (paper.density != row.density) continue;
+      const auto rate = [](double value) { return fmt::format("{:.3f}", value); };
+      fmt::print(fmt::runtime(kLine), density, fmt::format("paper: {}", paper.agent), "44073", "", rate(paper.at_fault),
+                 rate(paper.off_road), rate(paper.goals), "", "", "");
+    }
+  }
+  fmt::print("+- is the half width of a 95 % confidence interval over scenes\n");
+  const auto steps = static_cast<double>(evaluation.agent_steps);
+  fmt::print("{} agent-steps in {}: {}/s, {:.1f} scenes a minute\n", format_count(steps),
+             format_duration(evaluation.seconds), format_count(steps / evaluation.seconds),
+             60 * evaluation.scored / evaluation.seconds);
+}
+
+void print_report(const SceneEvaluateOptions& options, const SceneEvaluation& evaluation) {
+  const auto text_or_null = [](const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); };
+  const SceneProtocol& protocol = options.protocol;
+  Json rows = Json::array();
+  for (const SceneRow& row : evaluation.rows) {
+    Json json = {{"density", row.density},
+                 {"scenes", row.scenes},
+                 {"vehicle_episodes", row.vehicle_episodes},
+                 {"km_driven", row.km_driven}};
+    for (const auto& [name, estimate] : metrics_of(row)) add_estimate(name, estimate, &json);
+    rows.push_back(std::move(json));
+  }
+  Json paper = Json::array();
+  for (const PaperSceneRow& row : paper_scene_rows()) {
+    paper.push_back({{"agent", row.agent},
+                     {"density", row.density},
+                     {"at_fault_collision_rate", row.at_fault},
+                     {"off_road_rate", row.off_road},
+                     {"goal_rate", row.goals}});
+  }
+  Json rules = Json::object();
+  for (const auto& [name, value] : rules_of(protocol)) rules[name] = value;
+  const EvaluationSetting& setting = evaluation.setting;
+  print_json({{"checkpoint", text_or_null(options.checkpoint)},
+              {"controller", text_or_null(options.controller)},
+              {"policy_hash", setting.policy_hash},
+              {"argmax", setting.argmax},
+              {"seed", setting.seed},
+              {"device", setting.device},
+              {"precision", setting.precision},
+              {"protocol", protocol.name},
+              {"control", protocol.control},
+              {"start_step", protocol.start_step},
+              {"steps", protocol.steps},
+              {"rules", rules},
+              {"scenes", evaluation.found},
+              {"scored", evaluation.scored},
+              {"without_drivers", evaluation.without_drivers},
+              {"faults", evaluation.faults},
+              {"interrupted", evaluation.interrupted},
+              {"agent_steps", evaluation.agent_steps},
+              {"seconds", evaluation.seconds},
+              {"rows", rows},
+              {"paper_rows", paper}});
+}
+
+void print_faults(const std::vector<std::string>& faults) {
+  for (size_t i = 0; i < std::min(faults.size(), kShownFaults); ++i) {
+    fmt::print(stderr, "warning: left out: {}\n", printable(faults[i]));
+  }
+  if (faults.size() > kShownFaults) {
+    fmt::print(stderr, "warning: {} more are left out; --json lists all\n", faults.size() - kShownFaults);
+  }
+}
+
+}  // namespace
+
+void add_scene_options(CLI::App* command, SceneArguments* arguments) {
+  const std::vector<std::string> names = scene_protocol_names();
+  std::vector<std::string> rules;
+  for (const SceneRule& rule : scene_rules()) {
+    rules.push_back(fmt::format("{} ({}): {}", rule.name, rule.values, rule.what));
+  }
+  command
+      ->add_option("--protocol", arguments->protocol,
+                   fmt::format("Evaluate in recorded scenes instead of on maps: womd, the paper's zero-shot protocol, "
+                               "or, with their settings, {}",
+                               fmt::join(names.begin() + 1, names.end(), ", ")))
+      ->check(one_of(names));
+  command
+      ->add_option("--scenes", arguments->scenes,
+                   "Its scenes: files, folders of them, FILE#K or FILE#SCENARIO_ID, with commas between them")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command->add_option("--control", arguments->control,
+                      "Who is driven: self (or sdc), vehicles (the others), others (who is no vehicle), all, "
+                      "tracks_to_predict, objects_of_interest, and ids, with commas between them; default: the "
+                      "protocol's");
+  command->add_option("--start", arguments->start_step, "The step of recordings to start at; default: the protocol's")
+      ->transform(whole_number(0, kMaxScenarioSteps - 1));
+  command
+      ->add_option("--rule", arguments->rules,
+                   fmt::format("NAME=VALUE in place of one of the protocol's; may be given many times. {}",
+                               fmt::join(rules, "; ")))
+      ->allow_extra_args(false);
+  command->add_option("--csv", arguments->csv, "A file with a row for every driven road user of every scene")
+      ->check(file_ending(".csv"));
+}
+
+void refuse_idle_scene_options(const CLI::App& command, const SceneArguments& arguments) {
+  const auto refuse = [&command](std::initializer_list<const char*> options, const char* why) {
+    for (const char* option : options) {
+      if (command.count(option) > 0) fail_usage("{}: has no effect {}", option, why);
+    }
+  };
+  if (arguments.protocol.empty()) {
+    refuse({"--scenes", "--control", "--start", "--rule", "--csv"}, "without --protocol");
+    return;
+  }
+  refuse({"--map", "--agents", "--merge", "--out", "--infractions", "--replay", "--replays"}, "with --protocol");
+  if (arguments.scenes.empty()) fail_usage("--protocol: expected --scenes as well");
+}
+
+void run_scene_evaluation(const CLI::App& command, const SceneArguments& arguments, int steps,
+                          const std::vector<std::string>& densities, SceneEvaluateOptions options, bool json) {
+  options.scenes = arguments.scenes;
+  SceneProtocol& protocol = options.protocol;
+  protocol = scene_protocol(arguments.protocol);
+  if (command.count("--control") > 0) protocol.control = arguments.control;
+  if (command.count("--start") > 0) protocol.start_step = arguments.start_step;
+  if (command.count("--steps") > 0) protocol.steps = steps;
+  if (command.count("--density") > 0) {
+    protocol.densities.clear();
+    for (const std::string& density : densities) protocol.densities.push_back(parse_density(density));
+  }
+  for (const std::string& rule : arguments.rules) set_scene_rule(rule, &protocol);
+  std::unique_ptr<OutputFile> csv;
+  if (!arguments.csv.empty()) {
+    csv = std::make_unique<OutputFile>(arguments.csv);
+    csv->write(scene_agents_csv_head());
+    options.on_agent = [&csv](const SceneAgent& agent) { csv->write(csv_line(agent)); };
+  }
+  EvaluationProgress progress("the scenes that are finished");
+  options.on_progress = [&progress](double done, double eta_s) { progress.update(done, eta_s); };
+  const SceneEvaluation evaluation = evaluate_scenes(options);
+  progress.finish();
+  if (csv) csv->commit();
+  print_faults(evaluation.faults);
+  if (json)
+    print_report(options, evaluation);
+  else
+    print_table(protocol, evaluation);
+  if (evaluation.interrupted) {
+    throw Interrupted(fmt::format("interrupted; {} of {} scenes are finished, and counted above", evaluation.scored,
+                                  evaluation.found));
+  }
+}
+
+}  // namespace pictura

@@ -1,0 +1,33 @@
+// `pictura evaluate --protocol`: evaluations in recorded scenes, and their reports.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "pictura/training/evaluation/evaluate_scenes.h"
+
+namespace pictura {
+
+/// What the command is told besides the options of every evaluation.
+struct SceneArguments {
+  std::string protocol;  // empty: no recorded scenes
+  std::vector<std::string> scenes, rules;
+  std::string control, csv;
+  int start_step = 0;
+};
+
+/// Adds --protocol, --scenes, --control, --start, --rule and --csv.
+void add_scene_options(CLI::App* command, SceneArguments* arguments);
+
+/// Throws UsageError for options that have no effect with, or without, --protocol.
+void refuse_idle_scene_options(const CLI::App& command, const SceneArguments& arguments);
+
+/// Evaluates and prints a table, or one JSON object. densities: shares in %, or as the protocol has them where
+/// --density was not given; options holds who drives, and which scenes of all. Throws Interrupted, after what is
+/// finished was printed, where ^C came.
+void run_scene_evaluation(const CLI::App& command, const SceneArguments& arguments, int steps,
+                          const std::vector<std::string>& densities, SceneEvaluateOptions options, bool json);
+
+}  // namespace pictura

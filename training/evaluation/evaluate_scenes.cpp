@@ -1,0 +1,405 @@
+#include "pictura/training/evaluation/evaluate_scenes.h"
+
+#include <algorithm>
+#include <optional>
+
+#include <fmt/ranges.h>
+
+#include "pictura/backends/make_controller.h"
+#include "pictura/backends/make_simulator.h"
+#include "pictura/backends/upload_maps.h"
+#include "pictura/common/error.h"
+#include "pictura/common/support/interrupt.h"
+#include "pictura/common/support/parallel_for.h"
+#include "pictura/map/scenario/load_scenario.h"
+#include "pictura/simulator/recorded_scene.h"
+#include "pictura/simulator/rules/limits.h"
+#include "pictura/training/evaluation/evaluate.h"
+#include "pictura/training/evaluation/progress.h"
+#include "pictura/training/evaluation/scene_plan.h"
+#include "pictura/training/session.h"
+#include "pictura/training/struct_copies.h"
+#include "pictura/training/torch_device.h"
+
+namespace pictura {
+
+namespace {
+
+// Worlds that are simulated together: on a device as many as keep it busy.
+int scenes_at_once(const SceneEvaluateOptions& options, Device device) {
+  if (options.scenes_at_once > 0) return options.scenes_at_once;
+  return device.is_host() ? 16 : 256;
+}
+
+std::string name_of(const SceneRef& scene) {
+  return scene.record < 0 ? scene.file : fmt::format("{}#{}", scene.file, scene.record);
+}
+
+/// Scenes that are simulated together.
+struct Batch {
+  CompiledMaps maps;
+  std::vector<int> numbers;  // [maps] of each among all scenes
+};
+
+/// Loads and compiles the scenes [first, end), and says which are left out.
+Batch load_batch(const std::vector<SceneRef>& scenes, int first, int end, const SceneProtocol& protocol,
+                 const MapOptions& map_options, int num_threads, SceneEvaluation* evaluation_inout) {
+  const auto count = static_cast<size_t>(end - first);
+  std::vector<std::shared_ptr<const CompiledMap>> maps(count);
+  std::vector<std::string> faults(count);
+  parallel_for(num_threads, end - first, [&](int64_t item) {
+    const auto i = static_cast<size_t>(item);
+    const SceneRef& scene = scenes[static_cast<size_t>(first) + i];
+    try {
+      maps[i] = compile_scenario(protocol_scene(load_scenario(scene), protocol), map_options, protocol.start_step);
+    } catch (const Error& error) {
+      const std::string what = error.what();
+      faults[i] = what.starts_with(scene.file) ? what : fmt::format("{}: {}", name_of(scene), what);
+    }
+  });
+  Batch batch;
+  for (size_t i = 0; i < count; ++i) {
+    if (!maps[i]) {
+      evaluation_inout->faults.push_back(faults[i]);
+    } else if (!has_drivers(*maps[i], protocol)) {
+      ++evaluation_inout->without_drivers;
+    } else {
+      batch.maps.push_back(maps[i]);
+      batch.numbers.push_back(first + static_cast<int>(i));
+    }
+  }
+  return batch;
+}
+
+template <typename T>
+Array array_of(const DeviceCopy<T>& copy, const Dims& shape, Device device) {
+  return Array(copy.span().data(), shape, device);
+}
+
+/// One batch of scenes at one density, from the start to the end.
+class BatchDrive {
+ public:
+  BatchDrive(const Batch& batch, const SceneProtocol& protocol, double density, uint64_t seed, Simulator* simulator)
+      : batch_(batch), protocol_(protocol), density_(density), simulator_(*simulator) {
+    const std::vector<AgentBox> boxes = host_copy_of_structs(simulator_.scene().agents, device());
+    const auto num_slots = static_cast<size_t>(simulator_.num_slots());
+    roles_.reserve(num_slots);
+    for (size_t world = 0; world < batch.maps.size(); ++world) {
+      const CompiledMap& map = *batch.maps[world];
+      const size_t first = roles_.size(), count = map.scenario->tracks.size();
+      const ScenePlan plan =
+          plan_scene(map, Span<const AgentBox>(boxes).subspan(first, count), protocol, density, seed);
+      roles_.insert(roles_.end(), plan.roles.begin(), plan.roles.end());
+      takeover_steps_.insert(takeover_steps_.end(), plan.takeover_steps.begin(), plan.takeover_steps.end());
+      for (size_t track = 0; track < count; ++track) {
+        world_of_slot_.push_back(static_cast<int32_t>(world));
+        track_of_slot_.push_back(static_cast<int32_t>(track));
+      }
+    }
+    last_steps_.resize(num_slots);
+    displacements_.resize(num_slots);
+    driven_steps_.resize(num_slots);
+    for (size_t slot = 0; slot < num_slots; ++slot) last_steps_[slot] = map_of(slot).rules.record.num_steps - 1;
+    take_out(slots_where([&](size_t slot) { return roles_[slot] == SceneRole::removed; }));
+    if (protocol.waypoints == Waypoints::path) set_path_waypoints();
+    status_ = status();
+  }
+
+  /// Drives all steps, or until nobody drives any more; false: ^C came before. on_step(steps done).
+  template <typename OnStep>
+  bool run(Controller* driver, const OnStep& on_step) {
+    const std::unique_ptr<Controller> log = pictura::make_controller("log", simulator_, 0);
+    DeviceCopy<Command> command_memory(std::vector<Command>(static_cast<size_t>(simulator_.num_slots())), device());
+    const Span<Command> commands = command_memory.span();
+    std::vector<uint8_t> driven, replayed;
+    std::optional<DeviceCopy<uint8_t>> driven_mask, replayed_mask;
+    for (int step = 0; step < protocol_.steps && has_open(step); ++step) {
+      if (interrupted()) return false;
+      if (protocol_.record_end == RecordEnd::vanish) {
+        take_out(slots_where([&](size_t slot) {
+          return last_steps_[slot] == step && !is_driven(slot, step) &&
+                 status_[slot] == static_cast<uint8_t>(AgentStatus::recorded);
+        }));
+      }
+      // Who drives changes where somebody appears, or vanishes.
+      std::vector<uint8_t> drives = mask_where([&](size_t slot) { return is_driven(slot, step); });
+      std::vector<uint8_t> follows = mask_where([&](size_t slot) { return is_replayed(slot, step); });
+      if (!driven_mask || drives != driven || follows != replayed) {
+        driven = std::move(drives);
+        replayed = std::move(follows);
+        driven_mask.emplace(driven, device());
+        replayed_mask.emplace(replayed, device());
+      }
+      driver->act(simulator_.controller_input(), driven_mask->span(), commands);
+      log->act(simulator_.controller_input(), replayed_mask->span(), commands);
+      simulator_.step(Span<const Command>(commands));
+      measure(step + 1);
+      on_step(step + 1);
+    }
+    return true;
+  }
+
+  /// [scenes] of the batch, its driven road users in the order of tracks.
+  std::vector<std::vector<SceneAgent>> results() const {
+    const AgentStateView state = simulator_.state();
+    const auto num_slots = static_cast<size_t>(simulator_.num_slots());
+    const std::vector<uint8_t> events = host_copy(Span<const uint8_t>(state.episode_events, num_slots), device());
+    const std::vector<int32_t> goals = host_copy(Span<const int32_t>(state.goals_reached, num_slots), device());
+    const std::vector<float> distance_m = host_copy(Span<const float>(state.distance_m, num_slots), device());
+    std::vector<std::vector<SceneAgent>> scenes(batch_.maps.size());
+    for (size_t slot = 0; slot < num_slots; ++slot) {
+      // Who was to be taken over later, and for whom the episode ended before, has not driven.
+      if (roles_[slot] != SceneRole::driven || driven_steps_[slot] == 0) continue;
+      const Scenario& scene = *map_of(slot).scenario;
+      const RecordedTrack& track = scene.tracks[static_cast<size_t>(track_of_slot_[slot])];
+      const Displacement& displacement = displacements_[slot];
+      SceneAgent agent{.scenario_id = scene.id,
+                       .density = density_,
+                       .track_id = track.id,
+                       .type = track.type,
+                       .takeover_step = takeover_steps_[slot],
+                       .driven_steps = driven_steps_[slot],
+                       .events = events[slot],
+                       .arrived = goals[slot] > 0,
+                       .distance_m = distance_m[slot]};
+      if (displacement.steps > 0) {
+        agent.mean_displacement_m = static_cast<float>(displacement.sum_m / displacement.steps);
+        agent.final_displacement_m = displacement.last_m;
+      }
+      scenes[static_cast<size_t>(world_of_slot_[slot])].push_back(std::move(agent));
+    }
+    return scenes;
+  }
+
+ private:
+  struct Displacement {
+    int steps = 0;
+    double sum_m = 0;
+    float last_m = 0;
+  };
+
+  Device device() const { return simulator_.device(); }
+  const CompiledMap& map_of(size_t slot) const { return *batch_.maps[static_cast<size_t>(world_of_slot_[slot])]; }
+  bool is_driven(size_t slot, int step) const {
+    return roles_[slot] == SceneRole::driven && takeover_steps_[slot] <= step;
+  }
+  bool is_replayed(size_t slot, int step) const {
+    if (roles_[slot] == SceneRole::removed || is_driven(slot, step)) return false;
+    return protocol_.record_end == RecordEnd::stand || step < last_steps_[slot];
+  }
+  /// Whether anybody drives in this step, or will later.
+  bool has_open(int step) const {
+    for (size_t slot = 0; slot < roles_.size(); ++slot) {
+      if (roles_[slot] != SceneRole::driven) continue;
+      if (takeover_steps_[slot] > step || takes_actions(static_cast<AgentStatus>(status_[slot]))) return true;
+    }
+    return false;
+  }
+
+  template <typename Predicate>
+  std::vector<uint8_t> mask_where(const Predicate& is_chosen) const {
+    std::vector<uint8_t> mask(roles_.size());
+    for (size_t slot = 0; slot < mask.size(); ++slot) mask[slot] = is_chosen(slot);
+    return mask;
+  }
+  template <typename Predicate>
+  std::vector<int32_t> slots_where(const Predicate& is_chosen) const {
+    std::vector<int32_t> slots;
+    for (size_t slot = 0; slot < roles_.size(); ++slot) {
+      if (is_chosen(slot)) slots.push_back(static_cast<int32_t>(slot));
+    }
+    return slots;
+  }
+
+  std::vector<uint8_t> status() const {
+    return host_copy(Span<const uint8_t>(simulator_.state().status, roles_.size()), device());
+  }
+
+  /// These are absent from now on, unless they are told to follow the recording.
+  void take_out(const std::vector<int32_t>& slots) {
+    if (slots.empty()) return;
+    const DeviceCopy<int32_t> chosen(slots, device());
+    const DeviceCopy<uint8_t> absent(std::vector<uint8_t>(slots.size(), static_cast<uint8_t>(AgentStatus::absent)),
+                                     device());
+    const Dims shape{static_cast<int64_t>(slots.size())};
+    const NamedArray field{"status", array_of(absent, shape, device())};
+    simulator_.set_state(array_of(chosen, shape, device()), Span(&field, 1));
+  }
+
+  void set_path_waypoints() {
+    const std::vector<int32_t> slots = slots_where([&](size_t slot) { return roles_[slot] == SceneRole::driven; });
+    if (slots.empty()) return;
+    std::vector<float> x_m, y_m, z_m;
+    for (const int32_t slot : slots) {
+      const auto at = static_cast<size_t>(slot);
+      for (const Vec3& waypoint : path_waypoints(map_of(at), track_of_slot_[at], takeover_steps_[at])) {
+        x_m.push_back(waypoint.x);
+        y_m.push_back(waypoint.y);
+        z_m.push_back(waypoint.z);
+      }
+    }
+    const DeviceCopy<int32_t> chosen(slots, device()), next(std::vector<int32_t>(slots.size(), 0), device());
+    const DeviceCopy<float> x(x_m, device()), y(y_m, device()), z(z_m, device());
+    const auto count = static_cast<int64_t>(slots.size());
+    const Dims shape{count}, waypoints{count, kNumWaypoints};
+    const std::vector<NamedArray> fields{{"waypoint_x_m", array_of(x, waypoints, device())},
+                                         {"waypoint_y_m", array_of(y, waypoints, device())},
+                                         {"waypoint_z_m", array_of(z, waypoints, device())},
+                                         {"next_waypoint", array_of(next, shape, device())}};
+    simulator_.set_state(array_of(chosen, shape, device()), fields);
+  }
+
+  /// Of the step that led to this one of the episode.
+  void measure(int step) {
+    const std::vector<uint8_t> before = std::exchange(status_, status());
+    std::vector<AgentBox> boxes;
+    for (size_t slot = 0; slot < roles_.size(); ++slot) {
+      if (!is_driven(slot, step - 1)) continue;
+      if (!takes_actions(static_cast<AgentStatus>(before[slot]))) continue;
+      ++driven_steps_[slot];
+      if (step > last_steps_[slot]) continue;
+      // Only as long as anybody is measured is anything copied.
+      if (boxes.empty()) boxes = host_copy_of_structs(simulator_.scene().agents, device());
+      const CompiledMap& map = map_of(slot);
+      const std::optional<float> apart_m =
+          displacement_m(*map.scenario, track_of_slot_[slot], map.start_step + step, boxes[slot].center_m);
+      if (!apart_m) continue;
+      Displacement& sum = displacements_[slot];
+      ++sum.steps;
+      sum.sum_m += static_cast<double>(*apart_m);
+      sum.last_m = *apart_m;
+    }
+  }
+
+  const Batch& batch_;
+  const SceneProtocol& protocol_;
+  double density_;
+  Simulator& simulator_;
+  std::vector<SceneRole> roles_;         // [slots], as the following
+  std::vector<int32_t> takeover_steps_;  // of the episode
+  std::vector<int32_t> world_of_slot_, track_of_slot_;
+  std::vector<int32_t> last_steps_;  // of the episode, that the recording has
+  std::vector<uint8_t> status_;      // after the last step
+  std::vector<Displacement> displacements_;
+  std::vector<int32_t> driven_steps_;
+};
+
+/// The scenes that the options name, and what of them is no scene.
+SceneIndex find_all(const SceneEvaluateOptions& options) {
+  if (options.scenes.empty()) fail_usage("evaluate: expected scenes, got none");
+  SceneIndex all;
+  for (const std::string& name : options.scenes) {
+    SceneIndex some = find_scenes(name);
+    std::move(some.scenes.begin(), some.scenes.end(), std::back_inserter(all.scenes));
+    std::move(some.faults.begin(), some.faults.end(), std::back_inserter(all.faults));
+  }
+  const auto found = static_cast<int>(all.scenes.size());
+  if (found > 0 && (options.first_scene < 0 || options.first_scene >= found)) {
+    fail_usage("evaluate: expected a first scene in [0, {}), got {}", found, options.first_scene);
+  }
+  const int end = options.num_scenes > 0 ? std::min(found, options.first_scene + options.num_scenes) : found;
+  all.scenes = {all.scenes.begin() + std::min(found, options.first_scene), all.scenes.begin() + end};
+  return all;
+}
+
+SceneEvaluation evaluate_scenes(const EvaluatedDriver& driver, Renderer* renderer,
+                                const SceneEvaluateOptions& options) {
+  const SceneProtocol& protocol = options.protocol;
+  SceneIndex index = find_all(options);
+  SceneEvaluation evaluation;
+  evaluation.setting = driver.setting;
+  evaluation.setting.maps = options.scenes;
+  evaluation.setting.steps = protocol.steps;
+  evaluation.setting.argmax = options.argmax;
+  evaluation.setting.seed = options.seed;
+  evaluation.faults = std::move(index.faults);
+  evaluation.found = static_cast<int>(index.scenes.size());
+
+  SimulatorConfig config = protocol_config(protocol, driver.world);
+  config.seed = options.seed;
+  MapOptions map_options = pictura::map_options(config);
+  map_options.observed_span_m = protocol.observed_span_m;
+  const size_t num_densities = protocol.densities.size();
+  std::vector<std::vector<SceneCounts>> counts(num_densities);  // [densities][scored scenes]
+  std::unique_ptr<Simulator> simulator;
+  EvaluationClock clock(options.on_progress);
+  const int at_once = scenes_at_once(options, driver.device);
+  const double work = double(evaluation.found) * static_cast<double>(num_densities) * protocol.steps;
+  for (int first = 0; first < evaluation.found && !evaluation.interrupted; first += at_once) {
+    const int end = std::min(first + at_once, evaluation.found);
+    const Batch batch = load_batch(index.scenes, first, end, protocol, map_options, options.num_threads, &evaluation);
+    if (batch.maps.empty()) continue;
+    std::vector<WorldSpec> worlds;
+    for (size_t i = 0; i < batch.maps.size(); ++i) {
+      const int number = options.first_scene + batch.numbers[i];
+      worlds.push_back(
+          scene_world(*batch.maps[i], static_cast<int>(i), kFirstEvaluationWorld + static_cast<uint32_t>(number)));
+    }
+    if (renderer) upload_maps(batch.maps, {}, renderer);
+    std::vector<std::vector<std::vector<SceneAgent>>> agents;  // [densities][scenes][driven]
+    for (size_t d = 0; d < num_densities && !evaluation.interrupted; ++d) {
+      if (simulator)
+        simulator->set_worlds(batch.maps, {}, worlds, options.seed);
+      else
+        simulator = make_simulator(options.simulator, config, batch.maps, worlds);
+      BatchDrive drive(batch, protocol, protocol.densities[d], options.seed, simulator.get());
+      const Driving driving = driver.drive(*simulator);
+      const double done = double(first) * static_cast<double>(num_densities) * protocol.steps +
+                          double(end - first) * static_cast<double>(d) * protocol.steps;
+      const bool is_finished = drive.run(driving.controller.get(), [&](int steps) {
+        if (steps == 1 || steps % 10 == 0) clock.update((done + double(end - first) * steps) / work);
+      });
+      if (is_finished)
+        agents.push_back(drive.results());
+      else
+        evaluation.interrupted = true;
+    }
+    if (evaluation.interrupted) break;
+    for (size_t i = 0; i < batch.maps.size(); ++i) {
+      for (size_t d = 0; d < num_densities; ++d) {
+        SceneCounts& scene = counts[d].emplace_back();
+        for (const SceneAgent& agent : agents[d][i]) {
+          const bool is_vehicle = agent.type != TrackType::pedestrian && agent.type != TrackType::cyclist;
+          add(agent, is_vehicle, &scene);
+          evaluation.agent_steps += agent.driven_steps;
+          if (options.on_agent) options.on_agent(agent);
+        }
+      }
+    }
+    evaluation.scored += static_cast<int>(batch.maps.size());
+  }
+  evaluation.seconds = clock.seconds();
+  const auto num_faults = static_cast<int>(evaluation.faults.size());
+  PICTURA_CHECK(evaluation.scored > 0 || evaluation.interrupted || evaluation.without_drivers > 0,
+                "{}: expected a scene, got {} that cannot be used: {}", fmt::join(options.scenes, ", "), num_faults,
+                num_faults > 0 ? evaluation.faults.front() : "no scene is there");
+  for (size_t d = 0; d < num_densities && evaluation.scored > 0; ++d) {
+    evaluation.rows.push_back(row_of(protocol.densities[d], counts[d]));
+  }
+  if (!evaluation.interrupted) clock.finish();
+  return evaluation;
+}
+
+}  // namespace
+
+SimulatorConfig protocol_config(const SceneProtocol& protocol, SimulatorConfig config) {
+  config = scene_config(Scenario{}, 0, config);
+  config.dt_s = kMaxStep_s;
+  config.episode_steps = protocol.steps;
+  config.after_infraction = protocol.after_infraction;
+  config.leave_at_goal = protocol.leave_at_goal;
+  return config;
+}
+
+SceneEvaluation evaluate_scenes(const SceneEvaluateOptions& options) {
+  check(options.protocol);
+  if (!options.controller.empty()) {
+    return evaluate_scenes(controller_driver(options, options.protocol.steps), nullptr, options);
+  }
+  PolicySession session(options.checkpoint, session_options(options));
+  const std::unique_ptr<Renderer> renderer = session.make_renderer();
+  return evaluate_scenes(policy_driver(&session, renderer.get(), options, options.protocol.steps), renderer.get(),
+                         options);
+}
+
+}  // namespace pictura
