@@ -127,8 +127,7 @@ struct Recording::Parts {
       : simulator(its_simulator),
         driver(std::move(its_driver)),
         followed(options.followed.value_or(0)),
-        recorder(simulator, {.followed = followed,
-                             .cameras = options.cameras ? std::optional(cameras_of(driver)) : std::nullopt}) {}
+        recorder(simulator, {.followed = followed, .cameras = cameras_of(driver), .keeps_images = options.cameras}) {}
 
   Simulator& simulator;
   const RecordedDriver driver;
