@@ -408,10 +408,18 @@ Json header_of(const Replay& replay, const std::vector<Section>& sections) {
         {"frames_per_group", replay.images.frames_per_group}, {"hues", replay_hues()}, {"group_bytes", Json::array()}};
     for (const std::string& group : written_groups(replay.images)) images["group_bytes"].push_back(group.size());
   }
-  Json cameras = Json::array(), reference = Json::array();
+  Json cameras = Json::array(), classes = Json::array(), light_hues = Json::array();
   for (const ReplayCamera& camera : replay.cameras) cameras.push_back(camera_json(camera));
-  for (int agent_class = 0; agent_class < kNumAgentClasses; ++agent_class) {
-    reference.push_back(reference_to_center(static_cast<AgentClass>(agent_class), 1.0f));
+  for (int number = 0; number < kNumAgentClasses; ++number) {
+    const auto agent_class = static_cast<AgentClass>(number);
+    Json hues = Json::array();
+    for (int face = 0; face < kNumBoxFaces; ++face) {
+      hues.push_back(replay_hue(agent_color(agent_class, static_cast<BoxFace>(face))));
+    }
+    classes.push_back({{"reference_to_center", reference_to_center(agent_class, 1.0f)}, {"hues", hues}});
+  }
+  for (const LightState state : {LightState::off, LightState::red, LightState::yellow, LightState::green}) {
+    light_hues.push_back(replay_hue(light_color(state)));
   }
   return {{"format", kFormat},
           {"version", kReplayVersion},
@@ -438,7 +446,8 @@ Json header_of(const Replay& replay, const std::vector<Section>& sections) {
           {"sections", list},
           {"cameras", cameras},
           {"line_floor_px", replay.line_floor_px},
-          {"reference_to_center", reference},
+          {"classes", classes},
+          {"light_hues", light_hues},
           {"images", images}};
 }
 

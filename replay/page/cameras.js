@@ -3,14 +3,8 @@
 
 const NEAR_M = 0.1, RANGE_M = 120, MAX_PIECE_M = 10, MAX_MITRE = 4, LIGHT_RADIUS_M = 0.5, LIGHT_SIDES = 24, RIG_BODY_M = 4.5;
 const STRIP_RANKS = [2, 3, 1, 0];  // lane mark, road edge, crosswalk, stop line: the lowest lies on the others
-const LIGHT_HUES = [null, [255, 0, 0], [255, 200, 0], [0, 255, 0]];
-// front, back, left, right, top, underside
-const BOX_HUES = [
-  [[247, 37, 133], [76, 201, 240], [114, 9, 183], [67, 97, 238], [58, 12, 163], [58, 12, 163]],
-  [[255, 190, 11], [251, 133, 0], [214, 96, 10], [255, 214, 92], [150, 75, 0], [150, 75, 0]],
-  [[128, 237, 153], [34, 139, 84], [87, 204, 120], [56, 163, 165], [22, 96, 66], [22, 96, 66]],
-];
-// Corners of a box: front left, rear left, rear right, front right on the ground, then the same on the roof.
+// Faces of a box: front, back, left, right, top, and the underside in the top's colour. Its corners are front left, rear left, rear
+// right, front right on the ground, then the same on the roof.
 const BOX_FACES = [[3, 0, 4, 7], [1, 2, 6, 5], [0, 1, 5, 4], [2, 3, 7, 6], [4, 5, 6, 7], [3, 2, 1, 0]];
 const FACE_FLOATS = 16, SOLID = -1;
 
@@ -278,14 +272,14 @@ class CameraView {
       const c = Math.cos(box.heading_deg * Math.PI / 180), s = Math.sin(box.heading_deg * Math.PI / 180);
       const dx = eye[0] - box.x_m, dy = eye[1] - box.y_m, ahead = dx * c + dy * s, left = dy * c - dx * s;
       if (Math.hypot(dx, dy) > 2 * RANGE_M) continue;
-      const l = 0.5 * box.length_m, w = 0.5 * box.width_m, top = box.z_m + box.height_m;
+      const { hues } = this.header.classes[box.agentClass], l = 0.5 * box.length_m, w = 0.5 * box.width_m, top = box.z_m + box.height_m;
       const turned = [ahead > l, ahead < -l, left > w, left < -w, eye[2] > top, eye[2] < box.z_m];
       const corners = [box.z_m, top].flatMap(z => [[l, w], [-l, w], [-l, -w], [l, -w]].map(([x, y]) => [box.x_m + x * c - y * s, box.y_m + x * s + y * c, z]));
-      BOX_FACES.forEach((face, i) => { if (turned[i]) faces.add(face.map(corner => corners[corner]), SOLID, BOX_HUES[box.agentClass][i]); });
+      BOX_FACES.forEach((face, i) => { if (turned[i]) faces.add(face.map(corner => corners[corner]), SOLID, hues[Math.min(i, 4)]); });
     }
     for (const { signal, facing_rad, half_angle_rad, position: [x, y, z] } of this.heads) {
-      const hue = LIGHT_HUES[signal < this.replay.numLights ? this.replay.light(signal, frame) : 0];
-      if (!hue) continue;
+      const state = signal < this.replay.numLights ? this.replay.light(signal, frame) : 0, hue = this.header.light_hues[state];
+      if (!state) continue;
       const fx = Math.cos(facing_rad), fy = Math.sin(facing_rad), dx = eye[0] - x, dy = eye[1] - y, ahead = dx * fx + dy * fy;
       const cosine = Math.max(Math.cos(half_angle_rad), 0);
       if (ahead <= 0 || ahead * ahead < cosine * cosine * (dx * dx + dy * dy)) continue;
@@ -303,7 +297,7 @@ class CameraView {
     if (gl.isContextLost()) throw new Error("its WebGL2 was taken away");
     const c = Math.cos(pose.heading_deg * Math.PI / 180), s = Math.sin(pose.heading_deg * Math.PI / 180);
     const turned = ([x, y, z]) => [x * c - y * s, x * s + y * c, z];
-    const back = header.reference_to_center[body.agentClass] * body.length_m, shrink = Math.min(1, body.length_m / RIG_BODY_M);
+    const back = header.classes[body.agentClass].reference_to_center * body.length_m, shrink = Math.min(1, body.length_m / RIG_BODY_M);
     const boxes = this.boxesOf(frame, [agent, ...hidden], added);
     this.upload(0, this.facesAround(pose.x_m, pose.y_m));
     this.cameras.forEach((camera, i) => {
