@@ -124,7 +124,7 @@ class Replay {
   constructor(header, bytes, imageBytes) {
     this.header = header;
     const { agents, frames, lights } = header;
-    Object.assign(this, { agents, frames, dt_s: header.dt_s, followed: header.followed, numLights: lights, firstStep: 0, version: 0 });
+    Object.assign(this, { agents, frames, dt_s: header.dt_s, followed: header.followed, numLights: lights, firstStep: 0, version: 0, imageSource: "as recorded" });
     const orders = new Map(header.tracks.map(track => [track.name, track]));
     this.tracks = {};
     this.units = {};

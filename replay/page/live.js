@@ -9,7 +9,7 @@ class LiveReplay extends Replay {
   }
   constructor(header, bytes, step, sendsImages) {
     super(header, bytes, null);
-    Object.assign(this, { firstStep: step, looks: new Map(), version: 0, watched: -1 });
+    Object.assign(this, { firstStep: step, looks: new Map(), version: 0, watched: -1, imageSource: "drawn by the simulation" });
     if (sendsImages) this.images = { frame: async frame => this.looks.get(frame)?.images ?? null };
     this.grow(512);
   }

@@ -244,7 +244,7 @@ class Panel {
       }
     }
     if (wanted !== this.wanted || (isKept && !bytes)) return;
-    byId("pictures-note").textContent = fault ? `not recorded, and not drawn: ${fault}` : isKept ? "as recorded" : "drawn by this page, not recorded";
+    byId("pictures-note").textContent = fault ? `not recorded, and not drawn: ${fault}` : isKept ? replay.imageSource : "drawn by this page, not recorded";
     document.querySelector(".pictures").hidden = Boolean(fault);
     if (fault) return;
     let at = 0;
