@@ -24,10 +24,9 @@ SimulatorInside inside_of(const py::object& simulator) {
   return py::cast<SimulatorInside>(simulator.attr("_inside")());
 }
 
-std::optional<RendererConfig> cameras_of(const std::optional<Rig>& rig) {
-  if (!rig) return {};
+RendererConfig cameras_of(const std::optional<Rig>& rig) {
   RendererConfig config;
-  config.rig = *rig;
+  if (rig) config.rig = *rig;
   return config;
 }
 
@@ -163,14 +162,16 @@ the recorder lives.)")
             SimulatorInside inside = inside_of(simulator);
             const auto watch = inside.watch;
             auto recorder = std::make_shared<PyRecorder>(
-                std::move(inside), RecorderOptions{.world = world, .followed = follow, .cameras = cameras_of(rig)});
+                std::move(inside),
+                RecorderOptions{
+                    .world = world, .followed = follow, .cameras = cameras_of(rig), .keeps_images = rig.has_value()});
             watch(recorder);
             return recorder;
           }),
           py::arg("simulator"), py::kw_only(), py::arg("world") = 0, py::arg("follow") = -1,
           py::arg("rig") = py::none(), py::keep_alive<1, 2>(),
           R"(follow: the agent of that world that the page opens with, whose decisions are kept; -1: none. rig: keeps that agent's
-images of every step, drawn by the CPU renderer, without loss. Raises pictura.UsageError where there is no such world or agent and
+images of every step, drawn by the CPU renderer, without loss; without it the page draws the paper's cameras itself. Raises pictura.UsageError where there is no such world or agent and
 where the simulator is on a device.)")
       .def(
           "decide",
@@ -200,6 +201,7 @@ the keyboard. The simulator's steps then wait until they are due: in real time, 
                                                                                 .host_name = host_name,
                                                                                 .watched = follow,
                                                                                 .cameras = cameras_of(rig),
+                                                                                .sends_images = rig.has_value(),
                                                                                 .waits_for_page = wait_for_page});
             watch(view);
             return view;
@@ -207,7 +209,7 @@ the keyboard. The simulator's steps then wait until they are due: in real time, 
           py::arg("simulator"), py::kw_only(), py::arg("port") = 0, py::arg("host_name") = "", py::arg("follow") = 0,
           py::arg("rig") = py::none(), py::arg("wait_for_page") = true, py::keep_alive<1, 2>(),
           R"(port: of the loopback, 0 for a free one. host_name: if given, listens on all addresses, for pages that name this machine so.
-follow: the agent that pages open with. rig: what its images are drawn with; none without it. wait_for_page: no step is taken before
+follow: the agent that pages open with. rig: what its images are drawn with; without it pages draw the paper's cameras themselves. wait_for_page: no step is taken before
 a page has come. Raises pictura.UsageError where this package cannot serve, pictura.Error where the port is taken.)")
       .def(
           "decide",

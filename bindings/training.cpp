@@ -10,6 +10,7 @@
 #include "pictura/bindings/arrays.h"
 #include "pictura/bindings/call.h"
 #include "pictura/bindings/objects.h"
+#include "pictura/cli/replay_cases.h"
 #include "pictura/common/error.h"
 #include "pictura/simulator/observation_arrays.h"
 #include "pictura/training/evaluation/evaluate.h"
@@ -240,6 +241,14 @@ void fill_probe(ProbeOptions* options, const std::vector<std::string>& policies,
   worlds.samples = samples;
   worlds.conditioning = texts_of(conditioning);
   worlds.on_progress = progress_to(on_progress);
+}
+
+/// What is written of one case; nothing without a path.
+CaseReplayOptions case_replay(const std::string& path, std::optional<int64_t> number, bool cameras) {
+  if (path.empty() && (number || cameras)) fail_usage("replay: expected a file *.html for a case or cameras, got none");
+  if (!path.empty() && !path.ends_with(".html")) fail_usage("replay: expected a file *.html, got '{}'", path);
+  if (number && *number < 0) fail_usage("case: expected 0 or more, got {}", *number);
+  return {.path = path, .number = number, .recording = {.cameras = cameras}};
 }
 
 /// Logits and values of a batch, in the memory of a session's device.
@@ -491,16 +500,20 @@ KeyboardInterrupt. Raises pictura.Error where no scene can be used.)");
          float range_m, const std::string& control, int batch, bool argmax, uint64_t seed, int num_threads,
          const std::string& device, const std::string& simulator, const std::string& renderer,
          const std::string& samples, const py::dict& conditioning, const std::string& cases_file,
-         const py::object& on_progress) {
+         const std::string& replay, std::optional<int64_t> case_number, bool cameras, const py::object& on_progress) {
+        const CaseReplayOptions shown = case_replay(replay, case_number, cameras);
         RemovalOptions options;
         fill_probe(&options, policies, maps, density, agents_per_world, first_scene, scenes, steps, sample_steps, batch,
                    argmax, seed, num_threads, device, simulator, renderer, samples, conditioning, on_progress);
         options.removals = removals;
         options.range_m = range_m;
         options.control = removal_control_named(control);
-        const RemovalResults results =
-            run_to_an_orderly_end("probe_removal", num_threads, {}, [&options] { return probe_removal(options); });
-        if (!cases_file.empty()) write_removal_cases(cases_file, results);
+        const RemovalResults results = run_to_an_orderly_end("probe_removal", num_threads, {}, [&] {
+          RemovalResults found = probe_removal(options);
+          if (!cases_file.empty()) write_removal_cases(cases_file, found);
+          if (!shown.path.empty()) write_case_replay(shown, options, found);
+          return found;
+        });
         return py::module_::import("json").attr("loads")(removal_summary_json(results, summarize(results), cases_file));
       },
       py::arg("policies"), py::arg("maps"), py::kw_only(), py::arg("density") = "medium",
@@ -510,13 +523,16 @@ KeyboardInterrupt. Raises pictura.Error where no scene can be used.)");
       py::arg("control") = "none", py::arg("batch") = RemovalOptions{}.batch, py::arg("argmax") = true,
       py::arg("seed") = 1, py::arg("num_threads") = 0, py::arg("device") = "auto", py::arg("simulator") = "auto",
       py::arg("renderer") = "", py::arg("samples") = "", py::arg("conditioning") = py::dict(),
-      py::arg("cases_file") = "", py::arg("on_progress") = py::none(),
+      py::arg("cases_file") = "", py::arg("replay") = "", py::arg("case") = py::none(), py::arg("cameras") = false,
+      py::arg("on_progress") = py::none(),
       R"(How policies' value and braking change when one road user is taken away, as `pictura probe removal` asks it.
 
 policies: checkpoints or safetensors; the world is the first one's. maps, density, agents_per_world, steps and what follows
 argmax: as in evaluate(). scenes: how many scenarios are driven, an equal share by each policy; 0: as many on each map for each
 policy, two a map or more. removals: in all. sample_steps: between states. range_m: how far away a user may be. control: 'none',
-'nobody' or 'permuted'. batch: cases in a call. cases_file: a CSV file for every case. Returns a dict, that of the command's
+'nobody' or 'permuted'. batch: cases in a call. cases_file: a CSV file for every case. replay: a page *.html that plays the scene of one case and shows
+its images with and without the road user (docs/replay.md); case: its number in cases_file, by default the one where the first
+policy's value changes most; cameras: keeps the ego's images of every step. Returns a dict, that of the command's
 summary.json (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
   module.def(
       "probe_pedestrian",
@@ -525,7 +541,9 @@ summary.json (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error
          float hider_range_m, float min_speed_mps, float height_m, const std::string& control, int batch, bool argmax,
          uint64_t seed, int num_threads, const std::string& device, const std::string& simulator,
          const std::string& renderer, const std::string& samples, const py::dict& conditioning,
-         const std::string& cases_file, const py::object& on_progress) {
+         const std::string& cases_file, const std::string& replay, std::optional<int64_t> case_number, bool cameras,
+         const py::object& on_progress) {
+        const CaseReplayOptions shown = case_replay(replay, case_number, cameras);
         PedestrianOptions options;
         fill_probe(&options, policies, maps, density, agents_per_world, first_scene, scenes, steps, sample_steps, batch,
                    argmax, seed, num_threads, device, simulator, renderer, samples, conditioning, on_progress);
@@ -534,9 +552,12 @@ summary.json (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error
         options.min_speed_mps = min_speed_mps;
         options.height_m = height_m;
         options.control = pedestrian_control_named(control);
-        const PedestrianResults results = run_to_an_orderly_end("probe_pedestrian", num_threads, {},
-                                                                [&options] { return probe_pedestrian(options); });
-        if (!cases_file.empty()) write_pedestrian_cases(cases_file, results);
+        const PedestrianResults results = run_to_an_orderly_end("probe_pedestrian", num_threads, {}, [&] {
+          PedestrianResults found = probe_pedestrian(options);
+          if (!cases_file.empty()) write_pedestrian_cases(cases_file, found);
+          if (!shown.path.empty()) write_case_replay(shown, options, found);
+          return found;
+        });
         return py::module_::import("json").attr("loads")(
             pedestrian_summary_json(results, summarize(results), cases_file));
       },
@@ -549,13 +570,14 @@ summary.json (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error
       py::arg("control") = "none", py::arg("batch") = PedestrianOptions{}.batch, py::arg("argmax") = true,
       py::arg("seed") = 1, py::arg("num_threads") = 0, py::arg("device") = "auto", py::arg("simulator") = "auto",
       py::arg("renderer") = "", py::arg("samples") = "", py::arg("conditioning") = py::dict(),
-      py::arg("cases_file") = "", py::arg("on_progress") = py::none(),
+      py::arg("cases_file") = "", py::arg("replay") = "", py::arg("case") = py::none(), py::arg("cameras") = false,
+      py::arg("on_progress") = py::none(),
       R"(How policies' value and braking change as a pedestrian comes out from behind a vehicle and is hidden again, as
 `pictura probe pedestrian` asks it.
 
 policies, maps, density, agents_per_world, scenes, steps, sample_steps, batch and what follows argmax: as in probe_removal().
 paths: in all, each through one state. hider_range_m: how far away the vehicle may be that a path begins behind. min_speed_mps:
-of the ego, forwards. height_m: of the pedestrian. control: 'none' or 'nobody'. cases_file: a CSV file for every place of every path. Returns a dict, that of
+of the ego, forwards. height_m: of the pedestrian. control: 'none' or 'nobody'. cases_file: a CSV file for every place of every path. replay, case, cameras: as in probe_removal(). Returns a dict, that of
 the command's summary.json (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad
 input.)");
   module.def(

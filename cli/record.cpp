@@ -60,9 +60,10 @@ void add_recording_options(CLI::App* command, RecordingOptions* options_out) {
 }
 
 CLI::Option* add_cameras_option(CLI::App* command, RecordingOptions* options_out) {
-  return command->add_flag("--cameras", options_out->cameras,
-                           "Keep the followed agent's images of every step as well, without loss: as its policy was "
-                           "trained, else the paper's");
+  return command->add_flag(
+      "--cameras", options_out->cameras,
+      "Keep the followed agent's images as well, without loss: as its policy was trained, else the "
+      "paper's. A page holds 10 MB of them, and draws what it does not hold");
 }
 
 void settle_followed(const DrivenWorld& world, RecordingOptions* options_inout) {
@@ -127,8 +128,7 @@ struct Recording::Parts {
       : simulator(its_simulator),
         driver(std::move(its_driver)),
         followed(options.followed.value_or(0)),
-        recorder(simulator, {.followed = followed,
-                             .cameras = options.cameras ? std::optional(cameras_of(driver)) : std::nullopt}) {}
+        recorder(simulator, {.followed = followed, .cameras = cameras_of(driver), .keeps_images = options.cameras}) {}
 
   Simulator& simulator;
   const RecordedDriver driver;

@@ -42,7 +42,8 @@ std::unique_ptr<LiveView> serve(const ServeOptions& options, Simulator& simulato
   const LiveViewOptions view{.port = options.port,
                              .host_name = options.host_name,
                              .watched = recording.followed.value_or(0),
-                             .cameras = recording.cameras ? std::optional(cameras_of(driver)) : std::nullopt};
+                             .cameras = cameras_of(driver),
+                             .sends_images = recording.cameras};
   auto serving = std::make_unique<LiveView>(simulator, view, origin_of(driver), [&simulator, driver](int agent) {
     return decision_of_agent(simulator, driver, agent);
   });

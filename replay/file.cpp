@@ -11,6 +11,7 @@
 #include "pictura/replay/page_sources.h"
 #include "pictura/replay/template.h"
 #include "pictura/simulator/conditioning.h"
+#include "pictura/simulator/rules/limits.h"
 
 namespace pictura {
 
@@ -64,6 +65,97 @@ std::vector<ReplayShape> map_from(NumberReader reader) {
     }
   }
   return map;
+}
+
+// Points as differences from the point before, of anything.
+class PointWriter {
+ public:
+  explicit PointWriter(std::string* bytes) : bytes_(bytes) {}
+  void put(const ReplayPoint& point) {
+    for (size_t i = 0; i < point.size(); ++i) put_number(point[i] - before_[i], bytes_);
+    before_ = point;
+  }
+
+ private:
+  std::string* bytes_;
+  ReplayPoint before_{};
+};
+class PointReader {
+ public:
+  explicit PointReader(NumberReader* reader) : reader_(reader) {}
+  ReplayPoint next() {
+    for (int32_t& value : at_)
+      value = static_cast<int32_t>(static_cast<uint32_t>(value) + static_cast<uint32_t>(reader_->next()));
+    return at_;
+  }
+
+ private:
+  NumberReader* reader_;
+  ReplayPoint at_{};
+};
+
+void put_hue(const ReplayHue& hue, std::string* bytes_inout) {
+  for (const uint8_t channel : hue) put_number(channel, bytes_inout);
+}
+ReplayHue next_hue(NumberReader* reader) {
+  ReplayHue hue;
+  for (uint8_t& channel : hue) channel = static_cast<uint8_t>(reader->next());
+  return hue;
+}
+
+std::string scenery_bytes(const ReplayScenery& scenery) {
+  std::string bytes;
+  PointWriter points(&bytes);
+  put_number(static_cast<int32_t>(scenery.lines.size()), &bytes);
+  for (const ReplayLine& line : scenery.lines) {
+    put_number(static_cast<int32_t>(line.kind), &bytes);
+    put_hue(line.color, &bytes);
+    put_number(line.width_mm, &bytes);
+    put_number(static_cast<int32_t>(line.points_cm.size()), &bytes);
+    for (const ReplayPoint& point : line.points_cm) points.put(point);
+  }
+  put_number(static_cast<int32_t>(scenery.walls.size()), &bytes);
+  for (const ReplayWall& wall : scenery.walls) {
+    put_hue(wall.color, &bytes);
+    put_number(wall.height_cm, &bytes);
+    points.put(wall.a_cm);
+    points.put(wall.b_cm);
+  }
+  put_number(static_cast<int32_t>(scenery.heads.size()), &bytes);
+  for (const ReplayHead& head : scenery.heads) {
+    for (const int32_t value : {head.signal, head.facing_ddeg, head.half_angle_ddeg}) put_number(value, &bytes);
+    points.put(head.position_cm);
+  }
+  return bytes;
+}
+
+ReplayScenery scenery_from(NumberReader reader) {
+  ReplayScenery scenery;
+  PointReader points(&reader);
+  scenery.lines.resize(size(reader.next_count()));
+  for (ReplayLine& line : scenery.lines) {
+    const int32_t kind = reader.next();
+    PICTURA_CHECK(kind >= 0 && kind < kNumStripKinds, "scenery: expected a kind of 0 to {}, got {}", kNumStripKinds - 1,
+                  kind);
+    line.kind = static_cast<StripKind>(kind);
+    line.color = next_hue(&reader);
+    line.width_mm = reader.next();
+    line.points_cm.resize(size(reader.next_count()));
+    for (ReplayPoint& point : line.points_cm) point = points.next();
+  }
+  scenery.walls.resize(size(reader.next_count()));
+  for (ReplayWall& wall : scenery.walls) {
+    wall.color = next_hue(&reader);
+    wall.height_cm = reader.next();
+    wall.a_cm = points.next();
+    wall.b_cm = points.next();
+  }
+  scenery.heads.resize(size(reader.next_count()));
+  for (ReplayHead& head : scenery.heads) {
+    for (int32_t* value : {&head.signal, &head.facing_ddeg, &head.half_angle_ddeg}) *value = reader.next();
+    head.position_cm = points.next();
+  }
+  return scenery;
 }
 
 void put_body(const ReplayBody& body, std::string* bytes_inout) {
@@ -174,6 +266,7 @@ struct Section {
 
 std::vector<Section> sections_of(const Replay& replay) {
   std::vector<Section> sections{{"map", map_bytes(replay.map)},
+                                {"scenery", scenery_bytes(replay.scenery)},
                                 {"episodes", episode_bytes(replay.episodes)},
                                 {"conditioning", conditioning_bytes(replay.episodes)}};
   const size_t frames = size(replay.num_frames);
@@ -187,6 +280,15 @@ std::vector<Section> sections_of(const Replay& replay) {
     sections.push_back({"decisions", column_bytes(replay.decisions.data(), frames, kDecisionValues, kDecisionOrder)});
   }
   return sections;
+}
+
+/// The groups, from the first on, that fit into a file.
+Span<const std::string> written_groups(const ReplayImages& images) {
+  size_t count = 0, bytes = 0;
+  while (count < images.groups.size() && bytes + images.groups[count].size() <= kMaxWrittenImageBytes) {
+    bytes += images.groups[count++].size();
+  }
+  return {images.groups.data(), count};
 }
 
 Json case_json(const ReplayCase& probed) {
@@ -249,6 +351,41 @@ ReplayCase case_from(const Json& json, const Replay& replay) {
   return probed;
 }
 
+// X(name): the numbers of a camera.
+#define PICTURA_REPLAY_CAMERA(X) \
+  X(width_px)                    \
+  X(height_px)                   \
+  X(focal_x_px)                  \
+  X(focal_y_px)                  \
+  X(center_x_px)                 \
+  X(center_y_px)                 \
+  X(x_m)                         \
+  X(y_m)                         \
+  X(z_m)                         \
+  X(yaw_rad)                     \
+  X(pitch_rad)                   \
+  X(roll_rad)
+
+Json camera_json(const ReplayCamera& camera) {
+  Json json{{"name", camera.name}};
+#define X(value) json[#value] = camera.value;
+  PICTURA_REPLAY_CAMERA(X)
+#undef X
+  return json;
+}
+
+ReplayCamera camera_from(const Json& json) {
+  ReplayCamera camera{.name = json.at("name").get<std::string>()};
+#define X(value) json.at(#value).get_to(camera.value);
+  PICTURA_REPLAY_CAMERA(X)
+#undef X
+  for (const int32_t size_px : {camera.width_px, camera.height_px}) {
+    PICTURA_CHECK(size_px >= 1 && size_px <= kMaxImage_px, "header: cameras: expected sizes of 1 to {}, got {}",
+                  kMaxImage_px, size_px);
+  }
+  return camera;
+}
+
 Json header_of(const Replay& replay, const std::vector<Section>& sections) {
   const ReplayOrigin& origin = replay.origin;
   Json metrics;
@@ -266,16 +403,23 @@ Json header_of(const Replay& replay, const std::vector<Section>& sections) {
   Json list = Json::array();
   for (const Section& section : sections) list.push_back({{"name", section.name}, {"bytes", section.bytes.size()}});
   Json images = nullptr;
-  if (!replay.images.cameras.empty()) {
-    images = {{"frames_per_group", replay.images.frames_per_group},
-              {"cameras", Json::array()},
-              {"hues", replay_hues()},
-              {"group_bytes", Json::array()}};
-    for (const ReplayCamera& camera : replay.images.cameras) {
-      images["cameras"].push_back(
-          {{"name", camera.name}, {"width_px", camera.width_px}, {"height_px", camera.height_px}});
+  if (!replay.images.groups.empty()) {
+    images = {
+        {"frames_per_group", replay.images.frames_per_group}, {"hues", replay_hues()}, {"group_bytes", Json::array()}};
+    for (const std::string& group : written_groups(replay.images)) images["group_bytes"].push_back(group.size());
+  }
+  Json cameras = Json::array(), classes = Json::array(), light_hues = Json::array();
+  for (const ReplayCamera& camera : replay.cameras) cameras.push_back(camera_json(camera));
+  for (int number = 0; number < kNumAgentClasses; ++number) {
+    const auto agent_class = static_cast<AgentClass>(number);
+    Json hues = Json::array();
+    for (int face = 0; face < kNumBoxFaces; ++face) {
+      hues.push_back(replay_hue(agent_color(agent_class, static_cast<BoxFace>(face))));
     }
-    for (const std::string& group : replay.images.groups) images["group_bytes"].push_back(group.size());
+    classes.push_back({{"reference_to_center", reference_to_center(agent_class, 1.0f)}, {"hues", hues}});
+  }
+  for (const LightState state : {LightState::off, LightState::red, LightState::yellow, LightState::green}) {
+    light_hues.push_back(replay_hue(light_color(state)));
   }
   return {{"format", kFormat},
           {"version", kReplayVersion},
@@ -300,6 +444,10 @@ Json header_of(const Replay& replay, const std::vector<Section>& sections) {
           {"decision_unit", kDecisionUnit},
           {"tracks", tracks},
           {"sections", list},
+          {"cameras", cameras},
+          {"line_floor_px", replay.line_floor_px},
+          {"classes", classes},
+          {"light_hues", light_hues},
           {"images", images}};
 }
 
@@ -363,24 +511,15 @@ void read_header_values(const Json& header, Replay* replay_out) {
     first.at("agent").get_to(replay_out->first_infraction.agent);
   }
   check_header(*replay_out);
-  // Replays without a case may also be of a time when there were none.
-  if (const auto probed = header.find("case"); probed != header.end() && !probed->is_null()) {
-    replay_out->probed = case_from(*probed, *replay_out);
-  }
+  if (const Json& probed = header.at("case"); !probed.is_null()) replay_out->probed = case_from(probed, *replay_out);
+  for (const Json& camera : header.at("cameras")) replay_out->cameras.push_back(camera_from(camera));
+  header.at("line_floor_px").get_to(replay_out->line_floor_px);
 }
 
 void read_images(const Json& header, std::string_view page, ReplayImages* images_out) {
   const Json& images = header.at("images");
   if (images.is_null()) return;
   images.at("frames_per_group").get_to(images_out->frames_per_group);
-  for (const Json& camera : images.at("cameras")) {
-    images_out->cameras.push_back({camera.at("name").get<std::string>(), camera.at("width_px").get<int32_t>(),
-                                   camera.at("height_px").get<int32_t>()});
-    for (const int32_t size_px : {images_out->cameras.back().width_px, images_out->cameras.back().height_px}) {
-      PICTURA_CHECK(size_px >= 1 && size_px <= kMaxImage_px, "header: images: expected sizes of 1 to {}, got {}",
-                    kMaxImage_px, size_px);
-    }
-  }
   const std::string bytes = from_base64(element(page, kImagesBegin, "a replay's images"));
   size_t at = 0;
   for (const Json& group : images.at("group_bytes")) {
@@ -407,6 +546,8 @@ Replay replay_from(std::string_view page) {
     const NumberReader reader(section);
     if (name == "map") {
       replay.map = map_from(reader);
+    } else if (name == "scenery") {
+      replay.scenery = scenery_from(reader);
     } else if (name == "episodes") {
       replay.episodes = episodes_from(reader, replay.num_agents);
     } else if (name == "conditioning") {
@@ -457,7 +598,7 @@ ReplayText replay_text(const Replay& replay) {
 void write_replay(const std::string& path, const Replay& replay) {
   const ReplayText text = replay_text(replay);
   std::string images;
-  for (const std::string& group : replay.images.groups) images += group;
+  for (const std::string& group : written_groups(replay.images)) images += group;
   std::string elements;
   elements += fmt::format("{}{}{}\n", kHeaderBegin, script_text(text.header), kEnd);
   elements += fmt::format("{}{}{}\n", kDataBegin, text.data, kEnd);

@@ -10,6 +10,9 @@
 
 namespace pictura {
 
+/// Of a page's images: those of later frames are left out, and the page draws them itself. In base64 they are 10 MB.
+constexpr size_t kMaxWrittenImageBytes = 7'500'000;
+
 /// Writes the page, whole or not at all. Throws Error naming the path.
 void write_replay(const std::string& path, const Replay& replay);
 

@@ -239,12 +239,14 @@ uint32_t checksum(std::string_view frames) {
 
 }  // namespace
 
+ReplayHue replay_hue(Rgb color) {
+  const auto byte = [](float channel) { return static_cast<uint8_t>(channel * 255 + 0.5f); };
+  return {byte(color.r), byte(color.g), byte(color.b)};
+}
+
 std::vector<ReplayHue> replay_hues() {
   std::vector<ReplayHue> hues;
-  const auto add = [&hues](Rgb color) {
-    const auto byte = [](float channel) { return static_cast<uint8_t>(channel * 255 + 0.5f); };
-    hues.push_back({byte(color.r), byte(color.g), byte(color.b)});
-  };
+  const auto add = [&hues](Rgb color) { hues.push_back(replay_hue(color)); };
   for (const Rgb color :
        {kWhiteMarkColor, kYellowMarkColor, kRoadEdgeColor, kCrosswalkColor, kStopLineColor, kWallColor}) {
     add(color);

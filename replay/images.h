@@ -3,7 +3,6 @@
 // arithmetic coder, as docs/replay.md defines it. A group of frames needs no other to be read.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -15,9 +14,11 @@ namespace pictura {
 
 constexpr int kReplayFramesPerGroup = 25;
 
-/// The colours that primitives have before they fade, [red, green, blue].
-using ReplayHue = std::array<uint8_t, 3>;
+/// The colours that primitives have before they fade.
 std::vector<ReplayHue> replay_hues();
+
+/// A colour in bytes.
+ReplayHue replay_hue(Rgb color);
 
 /// Bytes of a frame: [height, width, 3] of each camera, one after the other.
 size_t bytes_of_frame(const std::vector<ReplayCamera>& cameras);

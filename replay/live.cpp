@@ -57,10 +57,10 @@ DrivingKeys keys_from(const LiveJson& names) {
 
 }  // namespace
 
-LiveWorld::LiveWorld(Simulator& simulator, ReplayOrigin origin, std::optional<RendererConfig> cameras)
-    : recorder_(simulator, {}) {
+LiveWorld::LiveWorld(Simulator& simulator, ReplayOrigin origin, const RendererConfig& cameras, bool sends_images)
+    : recorder_(simulator, {.cameras = cameras}) {
   recorder_.set_origin(std::move(origin));
-  if (cameras) cameras_ = std::make_unique<AgentCameras>(simulator, std::move(*cameras));
+  if (sends_images) cameras_ = std::make_unique<AgentCameras>(simulator, cameras);
 }
 
 void LiveWorld::after_step(const StepResult& result) {
@@ -84,14 +84,10 @@ void LiveWorld::keep_newest(size_t num_episodes) {
 
 LiveJson LiveWorld::begin() const {
   ReplayText text = replay_text(recorder_.recorded());
-  LiveJson cameras = nullptr;
-  if (cameras_) {
-    cameras = LiveJson::array();
-    for (const ReplayCamera& camera : cameras_->cameras()) {
-      cameras.push_back({{"name", camera.name}, {"width_px", camera.width_px}, {"height_px", camera.height_px}});
-    }
-  }
-  return {{"step", step_}, {"header", std::move(text.header)}, {"data", std::move(text.data)}, {"cameras", cameras}};
+  return {{"step", step_},
+          {"header", std::move(text.header)},
+          {"data", std::move(text.data)},
+          {"images", cameras_ != nullptr}};
 }
 
 LiveJson LiveWorld::frame() const {

@@ -20,7 +20,7 @@ using LiveJson = nlohmann::ordered_json;
 class LiveWorld {
  public:
   /// The simulator must outlive it.
-  LiveWorld(Simulator& simulator, ReplayOrigin origin, std::optional<RendererConfig> cameras);
+  LiveWorld(Simulator& simulator, ReplayOrigin origin, const RendererConfig& cameras, bool sends_images);
 
   /// Around each step.
   void before_step(Span<const Command> commands) { recorder_.before_step(commands); }

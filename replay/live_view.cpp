@@ -21,7 +21,7 @@ struct LiveView::Parts {
   Parts(Simulator& its_simulator, const LiveViewOptions& options, const ReplayOrigin& origin, Decide its_decide)
       : simulator(its_simulator),
         decide(std::move(its_decide)),
-        world(simulator, origin, options.cameras),
+        world(simulator, origin, options.cameras, options.sends_images),
         server({.port = options.port, .host_name = options.host_name, .num_agents = world.num_agents()}),
         has_begun(!options.waits_for_page),
         watched(options.watched),

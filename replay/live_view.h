@@ -16,11 +16,12 @@
 namespace pictura {
 
 struct LiveViewOptions {
-  int port = 0;                           // 0: a free one
-  std::string host_name;                  // if set: listens on all addresses, for pages that name this machine so
-  int watched = 0;                        // the agent whose decisions and images pages get first
-  std::optional<RendererConfig> cameras;  // what its images are drawn with; nothing: no images
-  bool waits_for_page = true;             // no step is due before a page has come
+  int port = 0;                // 0: a free one
+  std::string host_name;       // if set: listens on all addresses, for pages that name this machine so
+  int watched = 0;             // the agent whose decisions and images pages get first
+  RendererConfig cameras;      // of every agent
+  bool sends_images = false;   // of the watched agent, drawn here; else pages draw them themselves
+  bool waits_for_page = true;  // no step is due before a page has come
 };
 
 class LiveView {

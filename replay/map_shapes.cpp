@@ -3,12 +3,17 @@
 #include <cmath>
 
 #include "pictura/drawing/lane_shapes.h"
+#include "pictura/replay/images.h"
 
 namespace pictura {
 
 namespace {
 
 int32_t centimetres(float value_m) { return static_cast<int32_t>(std::lround(static_cast<double>(value_m) * 100)); }
+int32_t tenths_of_degree(float angle_rad) {
+  return static_cast<int32_t>(std::lround(static_cast<double>(angle_rad) * 1800 / 3.14159265358979323846));
+}
+ReplayPoint point_of(const Vec3& p) { return {centimetres(p.x), centimetres(p.y), centimetres(p.z)}; }
 std::array<int32_t, 2> point_of(Vec2 p) { return {centimetres(p.x), centimetres(p.y)}; }
 
 ReplayShape line(ShapeKind kind, const Vec3& a, const Vec3& b, float width_m = 0) {
@@ -79,6 +84,34 @@ std::vector<ReplayShape> map_shapes(const CompiledMap& map) {
     shapes.push_back(std::move(shape));
   }
   return shapes;
+}
+
+ReplayScenery map_scenery(const StaticGeometry& geometry) {
+  ReplayScenery scenery;
+  Vec3 end;  // of the line
+  for (const Strip& strip : geometry.strips) {
+    ReplayLine next{strip.kind,
+                    replay_hue(strip.color),
+                    static_cast<int32_t>(std::lround(static_cast<double>(strip.width_m) * 1000)),
+                    {point_of(strip.a_m), point_of(strip.b_m)}};
+    const bool goes_on = !scenery.lines.empty() && end.x == strip.a_m.x && end.y == strip.a_m.y &&
+                         end.z == strip.a_m.z && scenery.lines.back().kind == next.kind &&
+                         scenery.lines.back().color == next.color && scenery.lines.back().width_mm == next.width_mm;
+    if (goes_on)
+      scenery.lines.back().points_cm.push_back(next.points_cm[1]);
+    else
+      scenery.lines.push_back(std::move(next));
+    end = strip.b_m;
+  }
+  for (const WallFace& wall : geometry.walls) {
+    scenery.walls.push_back(
+        {replay_hue(wall.color), centimetres(wall.height_m), point_of(wall.a_m), point_of(wall.b_m)});
+  }
+  for (const LightHead& head : geometry.heads) {
+    scenery.heads.push_back({head.signal, tenths_of_degree(std::atan2(head.facing.y, head.facing.x)),
+                             tenths_of_degree(std::acos(head.cos_half_angle)), point_of(head.position_m)});
+  }
+  return scenery;
 }
 
 }  // namespace pictura

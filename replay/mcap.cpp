@@ -235,7 +235,9 @@ void write_mcap(const std::string& path, const Replay& replay) {
   const int followed = std::max(0, replay.followed);
   const uint16_t agent_channel = writer.add_channel("/agent", "pictura.Agent", agent_schema().dump());
   std::vector<uint16_t> cameras;
-  for (const ReplayCamera& camera : replay.images.cameras) {
+  const int num_pictured = replay.num_pictured_frames();
+  for (const ReplayCamera& camera : replay.cameras) {
+    if (num_pictured == 0) break;
     cameras.push_back(writer.add_channel("/camera/" + camera.name, "foxglove.CompressedImage", image_schema().dump()));
   }
   writer.add_message(map, 0, map_json(replay).dump());
@@ -270,15 +272,15 @@ void write_mcap(const std::string& path, const Replay& replay) {
                               {"name", origin.map}}
                              .dump());
     }
-    if (cameras.empty()) continue;
+    if (frame >= num_pictured) continue;
     const int per_group = replay.images.frames_per_group, in_group = frame % per_group;
     if (in_group == 0) {
-      frames = unpack_images(replay.images.cameras, replay.images.groups[index / static_cast<size_t>(per_group)],
-                             std::min(per_group, replay.num_frames - frame));
+      frames = unpack_images(replay.cameras, replay.images.groups[index / static_cast<size_t>(per_group)],
+                             std::min(per_group, num_pictured - frame));
     }
-    const char* rgb = frames.data() + static_cast<size_t>(in_group) * bytes_of_frame(replay.images.cameras);
+    const char* rgb = frames.data() + static_cast<size_t>(in_group) * bytes_of_frame(replay.cameras);
     for (size_t i = 0; i < cameras.size(); ++i) {
-      const ReplayCamera& camera = replay.images.cameras[i];
+      const ReplayCamera& camera = replay.cameras[i];
       writer.add_message(cameras[i], ns,
                          Json{{"timestamp", time_json(ns)},
                               {"frame_id", camera.name},

@@ -55,15 +55,23 @@ ReplayDecision decision_of(Span<const float> logits, float value) {
   return decision;
 }
 
+std::vector<ReplayCamera> replay_cameras(const Rig& rig) {
+  std::vector<ReplayCamera> cameras;
+  for (const Camera& camera : rig.cameras) {
+    const Vec3 at = camera.position_m;
+    cameras.push_back({camera.name, camera.width_px, camera.height_px, camera.focal_x_px, camera.focal_y_px,
+                       camera.center_x_px, camera.center_y_px, at.x, at.y, at.z, camera.yaw_rad, camera.pitch_rad,
+                       camera.roll_rad});
+  }
+  return cameras;
+}
+
 AgentCameras::AgentCameras(Simulator& simulator, RendererConfig config) : simulator_(simulator) {
   config.device = {};   // by the oracle, which draws on the host
   config.samples = {};  // with exact coverage
   renderer_ = make_renderer("cpu", config);
   upload_maps(simulator, renderer_.get());
   images_ = std::make_unique<HostImages>(renderer_->config().rig, 1);
-  for (const Camera& camera : renderer_->config().rig.cameras) {
-    cameras_.push_back({camera.name, camera.width_px, camera.height_px});
-  }
 }
 
 AgentCameras::~AgentCameras() = default;
@@ -71,7 +79,7 @@ AgentCameras::~AgentCameras() = default;
 std::string AgentCameras::draw(int slot) {
   renderer_->render(simulator_.scene(), simulator_.views().subspan(static_cast<size_t>(slot), 1), images_->batch());
   std::string bytes;
-  for (size_t camera = 0; camera < cameras_.size(); ++camera) {
+  for (size_t camera = 0; camera < renderer_->config().rig.cameras.size(); ++camera) {
     const std::vector<uint8_t> rgb = images_->interleaved(0, static_cast<int>(camera));
     bytes.append(reinterpret_cast<const char*>(rgb.data()), rgb.size());
   }
@@ -92,9 +100,11 @@ struct Recorder::Parts {
     replay.num_lights = setup.light_begin[static_cast<size_t>(world) + 1] - first_light;
     replay.followed = options.followed;
     replay.map = map_shapes(setup.map_of(world));
-    if (!options.cameras || options.followed < 0) return;
-    cameras = std::make_unique<AgentCameras>(simulator, *options.cameras);
-    replay.images.cameras = cameras->cameras();
+    replay.scenery = map_scenery(setup.map_of(world).geometry);
+    replay.cameras = replay_cameras(options.cameras.rig);
+    replay.line_floor_px = options.cameras.line_floor_px;
+    if (!options.keeps_images || options.followed < 0) return;
+    cameras = std::make_unique<AgentCameras>(simulator, options.cameras);
     replay.images.frames_per_group = kReplayFramesPerGroup;
   }
 
@@ -191,7 +201,7 @@ struct Recorder::Parts {
     if (replay.num_frames % kReplayFramesPerGroup == 0) end_group();
   }
   void end_group() {
-    if (!group.empty()) replay.images.groups.push_back(pack_images(replay.images.cameras, group));
+    if (!group.empty()) replay.images.groups.push_back(pack_images(replay.cameras, group));
     group.clear();
   }
 

@@ -15,8 +15,9 @@ namespace pictura {
 
 struct RecorderOptions {
   int world = 0;
-  int followed = -1;                      // agent of the world whose decisions and images are kept, or -1
-  std::optional<RendererConfig> cameras;  // what its images are drawn with, by the CPU renderer; nothing: no images
+  int followed = -1;          // agent of the world whose decisions and images are kept, or -1
+  RendererConfig cameras;     // of every agent, for whom looks at the replay
+  bool keeps_images = false;  // of the followed agent, drawn by the CPU renderer
 };
 
 /// Draws what one agent sees, by the CPU renderer.
@@ -26,16 +27,17 @@ class AgentCameras {
   AgentCameras(Simulator& simulator, RendererConfig config);
   ~AgentCameras();
 
-  const std::vector<ReplayCamera>& cameras() const { return cameras_; }
   /// [height, width, 3] of each camera, one after the other, of a slot's view now.
   std::string draw(int slot);
 
  private:
   Simulator& simulator_;
-  std::vector<ReplayCamera> cameras_;
   std::unique_ptr<Renderer> renderer_;
   std::unique_ptr<HostImages> images_;
 };
+
+/// Cameras as replays hold them.
+std::vector<ReplayCamera> replay_cameras(const Rig& rig);
 
 /// What a policy makes of the followed agent's state.
 struct ReplayDecision {

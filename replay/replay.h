@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "pictura/common/color.h"
+#include "pictura/common/scene_types.h"
 #include "pictura/simulator/actions.h"
 #include "pictura/simulator/fields.h"
 #include "pictura/simulator/reward_terms.h"
@@ -20,7 +21,7 @@ namespace pictura {
 constexpr int64_t kMaxReplayNumbers = int64_t{1} << 26;
 
 /// Of the format; a reader takes no other.
-constexpr int kReplayVersion = 1;
+constexpr int kReplayVersion = 2;
 
 // X(name, unit, order): a quantity of every agent at every frame, as a whole number of units; what is written are its
 // differences of this order from frame to frame. Those of a step belong to the frame that it leads to, and are 0 at the
@@ -118,20 +119,54 @@ struct ReplayShape {
   bool operator==(const ReplayShape&) const = default;
 };
 
+/// A colour before it fades, [red, green, blue].
+using ReplayHue = std::array<uint8_t, 3>;
+using ReplayPoint = std::array<int32_t, 3>;  // x, y, z in cm
+
+/// What cameras see of the map, see docs/image.md. Lines are painted on the road from point to point, as
+/// append_strips() makes strips of them, and stand in the order of the map's strips.
+struct ReplayLine {
+  StripKind kind = StripKind::lane_mark;
+  ReplayHue color{};
+  int32_t width_mm = 0;
+  std::vector<ReplayPoint> points_cm;
+  bool operator==(const ReplayLine&) const = default;
+};
+struct ReplayWall {
+  ReplayHue color{};
+  int32_t height_cm = 0;
+  ReplayPoint a_cm{}, b_cm{};  // the ends of its foot
+  bool operator==(const ReplayWall&) const = default;
+};
+struct ReplayHead {
+  int32_t signal = 0;  // of the lights of a frame
+  int32_t facing_ddeg = 0, half_angle_ddeg = 0;
+  ReplayPoint position_cm{};
+  bool operator==(const ReplayHead&) const = default;
+};
+struct ReplayScenery {
+  std::vector<ReplayLine> lines;
+  std::vector<ReplayWall> walls;
+  std::vector<ReplayHead> heads;
+  bool operator==(const ReplayScenery&) const = default;
+};
+
 /// What the followed agent's policy made of a frame, in units of kDecisionUnit: the probability of each action, and the
 /// value. All 0 where it was not asked.
 constexpr size_t kDecisionValues = kNumActions + 1;
 constexpr double kDecisionUnit = 1e-4;
 
+/// A camera on a body, as Camera has it.
 struct ReplayCamera {
   std::string name;
   int32_t width_px = 0, height_px = 0;
+  float focal_x_px = 0, focal_y_px = 0, center_x_px = 0, center_y_px = 0;
+  float x_m = 0, y_m = 0, z_m = 0, yaw_rad = 0, pitch_rad = 0, roll_rad = 0;
   bool operator==(const ReplayCamera&) const = default;
 };
 
-/// The followed agent's images, compressed as a whole number of groups of frames.
+/// The followed agent's images of the first frames, compressed as a whole number of groups of frames.
 struct ReplayImages {
-  std::vector<ReplayCamera> cameras;
   int32_t frames_per_group = 0;
   std::vector<std::string> groups;  // see images.h
   bool operator==(const ReplayImages&) const = default;
@@ -204,16 +239,24 @@ struct Replay {
   int32_t num_agents = 0, num_frames = 0, num_lights = 0;
   int32_t followed = -1;  // the agent whose decisions and images there are, or -1
   std::vector<ReplayShape> map;
+  ReplayScenery scenery;
+  std::vector<ReplayCamera> cameras;  // of every agent
+  float line_floor_px = 0;            // of their images
   std::vector<ReplayEpisode> episodes;
   std::array<std::vector<int32_t>, kNumTracks> tracks;  // [frames, agents]
   std::vector<uint8_t> lights;                          // [frames, lights] LightState
   std::vector<int32_t> decisions;                       // [frames, kDecisionValues], or empty
-  ReplayImages images;                                  // without cameras where there are none
+  ReplayImages images;                                  // without groups where there are none
   bool operator==(const Replay&) const = default;
 
   int32_t at(Track track, int frame, int agent) const {
     return tracks[static_cast<size_t>(track)]
                  [static_cast<size_t>(frame) * static_cast<size_t>(num_agents) + static_cast<size_t>(agent)];
+  }
+  /// The frames, from the first on, of which there are images of the followed agent.
+  int num_pictured_frames() const {
+    const auto kept = static_cast<int64_t>(images.groups.size()) * images.frames_per_group;
+    return static_cast<int>(kept < num_frames ? kept : num_frames);
   }
 };
 

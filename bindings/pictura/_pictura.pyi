@@ -840,7 +840,7 @@ class Recorder:
     def __init__(self, simulator: typing.Any, *, world: typing.SupportsInt | typing.SupportsIndex = 0, follow: typing.SupportsInt | typing.SupportsIndex = -1, rig: Rig | None = None) -> None:
         """
         follow: the agent of that world that the page opens with, whose decisions are kept; -1: none. rig: keeps that agent's
-        images of every step, drawn by the CPU renderer, without loss. Raises pictura.UsageError where there is no such world or agent and
+        images of every step, drawn by the CPU renderer, without loss; without it the page draws the paper's cameras itself. Raises pictura.UsageError where there is no such world or agent and
         where the simulator is on a device.
         """
     def decide(self, logits: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], value: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
@@ -870,7 +870,7 @@ class LiveView:
     def __init__(self, simulator: typing.Any, *, port: typing.SupportsInt | typing.SupportsIndex = 0, host_name: str = '', follow: typing.SupportsInt | typing.SupportsIndex = 0, rig: Rig | None = None, wait_for_page: bool = True) -> None:
         """
         port: of the loopback, 0 for a free one. host_name: if given, listens on all addresses, for pages that name this machine so.
-        follow: the agent that pages open with. rig: what its images are drawn with; none without it. wait_for_page: no step is taken before
+        follow: the agent that pages open with. rig: what its images are drawn with; without it pages draw the paper's cameras themselves. wait_for_page: no step is taken before
         a page has come. Raises pictura.UsageError where this package cannot serve, pictura.Error where the port is taken.
         """
     def close(self) -> None:

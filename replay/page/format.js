@@ -86,6 +86,18 @@ function mapOf(reader) {
   return shapes;
 }
 
+// What cameras see of the map: lines that are painted on the road, walls, and light heads, in metres and radians.
+function sceneryOf(reader) {
+  const at = [0, 0, 0], point = () => at.map((_, i) => (at[i] += reader.next()) / 100), list = make => Array.from({ length: reader.next() }, make);
+  const lines = list(() => ({ kind: reader.next(), color: reader.many(3), width_m: reader.next() / 1000, points: list(point) }));
+  const walls = list(() => ({ color: reader.many(3), height_m: reader.next() / 100, a: point(), b: point() }));
+  const heads = list(() => {
+    const [signal, facing, half] = reader.many(3);
+    return { signal, facing_rad: facing / 1800 * Math.PI, half_angle_rad: half / 1800 * Math.PI, position: point() };
+  });
+  return { lines, walls, heads };
+}
+
 function episodesOf(reader, agents) {
   const body = () => {
     const [agentClass, length, width, height] = reader.many(4);
@@ -112,7 +124,7 @@ class Replay {
   constructor(header, bytes, imageBytes) {
     this.header = header;
     const { agents, frames, lights } = header;
-    Object.assign(this, { agents, frames, dt_s: header.dt_s, followed: header.followed, numLights: lights, firstStep: 0, version: 0 });
+    Object.assign(this, { agents, frames, dt_s: header.dt_s, followed: header.followed, numLights: lights, firstStep: 0, version: 0, imageSource: "as recorded" });
     const orders = new Map(header.tracks.map(track => [track.name, track]));
     this.tracks = {};
     this.units = {};
@@ -121,6 +133,7 @@ class Replay {
       const part = bytes.subarray(at, at + size), reader = new NumberReader(part);
       at += size;
       if (name === "map") this.map = mapOf(reader);
+      else if (name === "scenery") this.scenery = sceneryOf(reader);
       else if (name === "episodes") this.episodes = episodesOf(reader, agents);
       else if (name === "conditioning") conditioning = new Float32Array(part.slice().buffer);
       else if (name === "lights") this.lights = reader.columns(lights, frames, 1);
@@ -138,8 +151,8 @@ class Replay {
     this.episodes.forEach((episode, i) => this.episodeOf.fill(i, episode.first, episode.end));
     this.rewardTerms = header.tracks.filter(track => track.name.startsWith("reward_")).map(track => track.name.slice(7));
     this.events = this.findEvents();
-    this.probed = header.case ?? null;
-    if (header.images) this.images = new Images(header.images, frames, imageBytes);
+    this.probed = header.case;
+    if (header.images) this.images = new Images(header, imageBytes);
   }
   // Columns have room for `stride` frames.
   raw(track, agent, frame) { return this.tracks[track][agent * this.stride + frame]; }
@@ -149,6 +162,19 @@ class Replay {
   body(agent, frame) { return this.episode(frame).bodies[agent]; }
   light(light, frame) { return this.lights[light * this.stride + frame]; }
   isFollowed(agent) { return agent === this.followed; }
+  // Whether the file has what an agent's cameras saw.
+  hasImages(agent, frame) { return agent === this.followed && Boolean(this.images) && frame < this.images.frames; }
+  // The road user of a probe's case, where an agent is asked about it: whether it is inserted, and the change of the images
+  // that takes it away or puts it there.
+  caseUser(agent, frame) {
+    const { probed } = this;
+    if (!probed || probed.frame !== frame || probed.ego !== agent || (probed.removed === null && !probed.inserted)) return null;
+    const box = probed.inserted;
+    if (!box) return { isInserted: false, change: { hidden: [probed.removed] } };
+    const body = { agentClass: box.class, length_m: box.length_cm / 100, width_m: box.width_cm / 100, height_m: box.height_cm / 100 };
+    const pose = { x_m: box.x_cm / 100, y_m: box.y_cm / 100, z_m: box.z_cm / 100, heading_deg: box.heading_ddeg / 10 };
+    return { isInserted: true, change: { added: [{ ...body, ...pose }] } };
+  }
   // What can be asked of a policy: 12 probabilities and the value; null where it was not.
   decision(agent, frame) {
     if (!this.isFollowed(agent, frame) || !this.decisions) return null;
@@ -176,10 +202,10 @@ class Replay {
   // The pose between two frames.
   pose(agent, time) {
     const frame = Math.min(Math.floor(time), this.frames - 1), share = time - frame, next = frame + 1;
-    const a = agent * this.stride + frame, { x_m, y_m, heading_deg } = this.tracks;
+    const a = agent * this.stride + frame, { x_m, y_m, z_m, heading_deg } = this.tracks;
     const goes = share > 0 && next < this.frames && this.episodeOf[next] === this.episodeOf[frame] && !this.isAbsent(agent, next);
     const mix = track => goes ? track[a] + (track[a + 1] - track[a]) * share : track[a];
-    return { x_m: mix(x_m) * this.units.x_m, y_m: mix(y_m) * this.units.y_m, heading_deg: mix(heading_deg) * this.units.heading_deg };
+    return { x_m: mix(x_m) * this.units.x_m, y_m: mix(y_m) * this.units.y_m, z_m: mix(z_m) * this.units.z_m, heading_deg: mix(heading_deg) * this.units.heading_deg };
   }
   // Infractions and goals by frame: [{frame, agent, kind}]
   findEvents() {
@@ -191,12 +217,12 @@ class Replay {
   }
 }
 
-// The followed agent's images, group by group.
+// The followed agent's images of the first `frames` frames, group by group.
 class Images {
-  constructor(header, frames, bytes) {
-    Object.assign(this, { cameras: header.cameras, hues: header.hues, perGroup: header.frames_per_group, frames, bytes });
+  constructor({ cameras, frames, images: { hues, frames_per_group: perGroup, group_bytes } }, bytes) {
+    Object.assign(this, { cameras, hues, perGroup, frames: Math.min(frames, perGroup * group_bytes.length), bytes });
     this.begins = [0];
-    for (const size of header.group_bytes) this.begins.push(this.begins.at(-1) + size);
+    for (const size of group_bytes) this.begins.push(this.begins.at(-1) + size);
     if (bytes.length !== this.begins.at(-1)) throw new Damaged(`expected ${this.begins.at(-1)} bytes of images, got ${bytes.length}`);
     this.frameBytes = this.cameras.reduce((sum, c) => sum + c.width_px * c.height_px * 3, 0);
     this.groups = new Map();  // group -> promise of its frames; a few are kept
@@ -237,7 +263,7 @@ async function readReplay() {
     throw new Damaged("its header cannot be read");
   }
   if (header.format !== "pictura replay") throw new Damaged("its header is of something else");
-  if (header.version !== 1) throw new Damaged(`it is of version ${header.version}, this page reads version 1`);
+  if (header.version !== 2) throw new Damaged(`it is of version ${header.version}, this page reads version 2`);
   const whole = header.sections.reduce((sum, section) => sum + section.bytes, 0);
   try {
     const bytes = await inflated(bytesOfBase64(text("replay-data")), whole);

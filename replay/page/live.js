@@ -3,14 +3,14 @@
 const MAX_LIVE_FRAMES = 8192, LIVE_PICTURES = 600;
 
 class LiveReplay extends Replay {
-  static async of({ step, header, data, cameras }) {
+  static async of({ step, header, data, images }) {
     const size = header.sections.reduce((sum, section) => sum + section.bytes, 0);
-    return new LiveReplay(header, await inflated(bytesOfBase64(data), size), step, cameras);
+    return new LiveReplay(header, await inflated(bytesOfBase64(data), size), step, images);
   }
-  constructor(header, bytes, step, cameras) {
+  constructor(header, bytes, step, sendsImages) {
     super(header, bytes, null);
-    Object.assign(this, { firstStep: step, looks: new Map(), version: 0, watched: -1 });
-    if (cameras) this.images = { cameras, frame: async frame => this.looks.get(frame)?.images ?? null };
+    Object.assign(this, { firstStep: step, looks: new Map(), version: 0, watched: -1, imageSource: "drawn by the simulation" });
+    if (sendsImages) this.images = { frame: async frame => this.looks.get(frame)?.images ?? null };
     this.grow(512);
   }
   // Begins anew, for views that hold this object: the page has missed some steps.
@@ -93,6 +93,8 @@ class LiveReplay extends Replay {
   }
   // A frame whose look has not come yet is taken for the watched agent's.
   isFollowed(agent, frame) { return (this.looks.get(frame)?.agent ?? this.watched) === agent; }
+  // One that has not come yet will.
+  hasImages(agent, frame) { return Boolean(this.images && this.isFollowed(agent, frame) && (this.looks.get(frame)?.images ?? !this.looks.has(frame))); }
   decision(agent, frame) {
     const look = this.looks.get(frame);
     return look?.agent === agent ? look.decision : null;

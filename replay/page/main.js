@@ -27,7 +27,7 @@ async function main() {
   byId("app").hidden = false;
 
   const state = { time: replay.probed?.frame ?? 0, agent: Math.max(0, replay.followed), speed: 1, playing: false, follow: false, goals: false, numbers: false,
-    onlyAgent: false, camera: "", x: 0, y: 0, zoom: 1, isAtEdge: Boolean(live) };
+    onlyAgent: false, camera: "", isWithout: false, x: 0, y: 0, zoom: 1, isAtEdge: Boolean(live) };
   let theme = readTheme(), isDirty = true;
   const dirty = () => { isDirty = true; };
   const clampFrame = frame => Math.min(last(), Math.max(0, frame));
@@ -101,6 +101,7 @@ async function main() {
   world.resize();
   world.fit();
   if (replay.probed) actions.showCase();
+  for (const element of document.querySelectorAll(".case-only")) element.hidden = !replay.probed;
 
   // Address.
   function readAddress() {
@@ -113,7 +114,8 @@ async function main() {
     else if (number("zoom") > 0) ({ x_m: state.x, y_m: state.y } = replay.pose(state.agent, state.time));
     state.follow = values.get("follow") === "1";
     if (values.get("goals") === "1") state.goals = true;
-    state.camera = replay.images?.cameras.some(c => c.name === values.get("camera")) ? values.get("camera") : "";
+    state.camera = header.cameras.some(c => c.name === values.get("camera")) ? values.get("camera") : "";
+    state.isWithout = values.get("without") === "1";
     dirty();
   }
   let written = location.hash, writtenAt = 0;
@@ -123,6 +125,7 @@ async function main() {
     else { values.set("x", state.x.toFixed(1)); values.set("y", state.y.toFixed(1)); }
     if (state.goals) values.set("goals", "1");
     if (state.camera) values.set("camera", state.camera);
+    if (state.isWithout) values.set("without", "1");
     const hash = `#${values}`;
     if (hash === written) return;
     written = hash;
@@ -246,6 +249,7 @@ async function main() {
   on("zoom-in", () => zoom(1.5));
   on("zoom-out", () => zoom(1 / 1.5));
   on("fit", () => fit());
+  on("user-shown", () => switchUser());
   on("about-button", () => toggle("about"));
   on("help-button", () => toggle("help"));
   byId("speed").addEventListener("change", event => actions.speed(Number(event.target.value)));
@@ -274,6 +278,7 @@ async function main() {
     state.playing = false;
     actions.seek((live && state.isAtEdge ? last() : Math.floor(state.time)) + count);
   }
+  function switchUser() { if (replay.probed) state.isWithout = !state.isWithout; }
   function step_agent(count) {
     actions.select((state.agent + count + replay.agents) % replay.agents);
     actions.show(state.agent);
@@ -294,16 +299,10 @@ async function main() {
     n: () => jump(1), p: () => jump(-1), ",": () => step_agent(-1), ".": () => step_agent(1), f: () => actions.follow(!state.follow),
     g: () => { state.goals = !state.goals; }, l: () => { state.numbers = !state.numbers; },
     c: () => {
-      const names = ["", ...(replay.images?.cameras ?? []).map(camera => camera.name)];
-      // Only one agent's images are recorded: its.
-      if (names.length > 1 && replay.followed >= 0 && !replay.isFollowed(state.agent, Math.floor(state.time))) {
-        actions.select(replay.followed);
-        actions.show(replay.followed);
-        actions.camera(state.camera || names[1]);
-        return;
-      }
+      const names = ["", ...header.cameras.map(camera => camera.name)];
       actions.camera(names[(names.indexOf(state.camera) + 1) % names.length]);
     },
+    o: () => switchUser(),
     "+": () => zoom(1.4), "=": () => zoom(1.4), "-": () => zoom(1 / 1.4), 0: fit,
     "/": () => byId("search-number").focus(), "?": () => toggle("help"), Escape: () => { toggle(""); if (live && live.mine >= 0) actions.drive(false); },
   };
@@ -414,7 +413,13 @@ async function main() {
   window.pictura = {
     replay, state, actions, live,
     drawn: () => { render(); return world.drawn.map(({ agent, x_m, y_m, heading_deg, px, py }) => ({ agent, x_m, y_m, heading_deg, px, py })); },
-    pictured: () => panel.pictured,
+    pictured: () => panel.pictured ?? {},
+    // Bytes [height, width, 3] of each camera, drawn here.
+    drawnImages: (agent, frame, change = {}) => {
+      const contexts = header.cameras.map(({ width_px, height_px }) => new OffscreenCanvas(width_px, height_px).getContext("2d", { willReadFrequently: true }));
+      panel.drawImages(agent, frame, change, contexts);
+      return contexts.flatMap(context => [...context.getImageData(0, 0, context.canvas.width, context.canvas.height).data].filter((_, i) => i % 4 < 3));
+    },
   };
   readAddress();
   if (live) live.ask({ watch: state.agent });

@@ -12,7 +12,7 @@ function short(value) {
 
 class Panel {
   constructor(replay, state, actions) {
-    Object.assign(this, { replay, state, actions, shown: null });
+    Object.assign(this, { replay, state, actions, shown: null, drawer: null, noDrawer: "" });
     this.facts = this.makeFacts();
     this.cells = this.makeActions();
     this.rows = this.makeRewards();
@@ -76,8 +76,7 @@ class Panel {
     return list;
   }
   makePictures() {
-    if (!this.replay.images) return [];
-    return this.replay.images.cameras.map((camera, i) => {
+    return this.replay.header.cameras.map(camera => {
       const figure = make("figure"), canvas = make("canvas");
       canvas.width = camera.width_px;
       canvas.height = camera.height_px;
@@ -85,7 +84,8 @@ class Panel {
       figure.append(canvas, make("figcaption", camera.name.replace(/_/g, " ")));
       figure.addEventListener("click", () => this.actions.camera(this.state.camera === camera.name ? "" : camera.name));
       document.querySelector(".pictures").append(figure);
-      return { figure, canvas, camera, pixels: canvas.getContext("2d").createImageData(camera.width_px, camera.height_px), index: i };
+      const context = canvas.getContext("2d");
+      return { figure, canvas, camera, context, pixels: context.createImageData(camera.width_px, camera.height_px) };
     });
   }
 
@@ -128,14 +128,14 @@ class Panel {
       this.drawCurves(theme, ratio);
     }
     this.drawPlayheads(frame, theme, ratio);
-    if (isNew || this.shown.frame !== frame || this.shown.camera !== state.camera) {
+    if (isNew || this.shown.frame !== frame || this.shown.camera !== state.camera || this.shown.isWithout !== state.isWithout) {
       this.drawHead(frame, agent, theme);
       this.drawActions(frame, agent, theme);
       this.drawRewards(frame, agent, theme);
       this.drawPictures(frame);
       if (isNew || this.shown.episode !== replay.episodeOf[frame]) this.drawConditioning(frame, agent);
     }
-    this.shown = { agent, frame, theme, version: replay.version, camera: state.camera, width: this.curves[0].canvas.clientWidth, episode: replay.episodeOf[frame] };
+    this.shown = { agent, frame, theme, version: replay.version, camera: state.camera, isWithout: state.isWithout, width: this.curves[0].canvas.clientWidth, episode: replay.episodeOf[frame] };
   }
 
   drawHead(frame, agent, theme) {
@@ -205,31 +205,59 @@ class Panel {
     byId("conditioning").replaceChildren(...names.flatMap((name, i) => [make("dt", name), make("dd", Number(values[agent * names.length + i].toPrecision(4)))]));
   }
 
+  // Draws what cameras see into contexts. Throws where the browser cannot.
+  drawImages(agent, frame, change, contexts) {
+    if (this.noDrawer) throw new Error(this.noDrawer);
+    try {
+      this.drawer ??= new CameraView(this.replay);
+      this.drawer.draw(agent, frame, change, contexts);
+    } catch (error) {
+      this.noDrawer = error.message;
+      throw error;
+    }
+  }
+
   async drawPictures(frame) {
-    const shows = this.pictures.length > 0 && this.replay.isFollowed(this.state.agent, frame);
+    const { replay, state } = this, { agent } = state, shows = this.pictures.length > 0 && !replay.isAbsent(agent, frame);
     byId("cameras").hidden = !shows;
     if (!shows) return;
-    for (const { figure, camera } of this.pictures) figure.classList.toggle("large", camera.name === this.state.camera);
-    const wanted = this.wanted = frame;
-    let bytes;
-    try {
-      bytes = await this.replay.images.frame(frame);
-    } catch (error) {
-      this.actions.fail(`its images cannot be read (${error.message})`);
-      return;
+    for (const { figure, camera } of this.pictures) figure.classList.toggle("large", camera.name === state.camera);
+    // In the step of a case its road user can be taken away, or is there where the scene has nobody.
+    const user = replay.caseUser(agent, frame), change = user && state.isWithout !== user.isInserted ? user.change : null;
+    byId("user-shown").hidden = !user;
+    byId("user-shown").textContent = `${state.isWithout ? "without" : "with"} the road user`;
+    byId("user-shown").setAttribute("aria-pressed", !state.isWithout);
+    const isKept = !change && replay.hasImages(agent, frame), wanted = this.wanted = {};
+    let bytes = null, fault = "";
+    if (isKept) {
+      try {
+        bytes = await replay.images.frame(frame);
+      } catch (error) {
+        this.actions.fail(`its images cannot be read (${error.message})`);
+        return;
+      }
+    } else {
+      try {
+        this.drawImages(agent, frame, change ?? {}, this.pictures.map(({ context }) => context));
+      } catch (error) {
+        fault = error.message;
+      }
     }
-    if (wanted !== this.wanted || !bytes) return;
+    if (wanted !== this.wanted || (isKept && !bytes)) return;
+    byId("pictures-note").textContent = fault ? `not recorded, and not drawn: ${fault}` : isKept ? replay.imageSource : "drawn by this page, not recorded";
+    document.querySelector(".pictures").hidden = Boolean(fault);
+    if (fault) return;
     let at = 0;
-    for (const { canvas, pixels } of this.pictures) {
+    for (const { context, pixels } of isKept ? this.pictures : []) {
       for (let to = 0; to < pixels.data.length; to += 4, at += 3) {
         pixels.data[to] = bytes[at];
         pixels.data[to + 1] = bytes[at + 1];
         pixels.data[to + 2] = bytes[at + 2];
         pixels.data[to + 3] = 255;
       }
-      canvas.getContext("2d").putImageData(pixels, 0, 0);
+      context.putImageData(pixels, 0, 0);
     }
-    this.pictured = frame;
+    this.pictured = { frame, agent, isKept };
   }
 
   drawCurves(theme, ratio) {

@@ -1008,7 +1008,7 @@ class Replays(CommandCase):
                 if kind == "pedestrian":
                     self.assertAlmostEqual(shown["inserted"]["x_cm"] / 100, float(case["x_m"]), delta=0.006)
                     self.assertIn([shown["inserted"]["x_cm"], shown["inserted"]["y_cm"]], shown["inserted"]["path_cm"])
-            self.assertEqual([c["width_px"] for c in header["images"]["cameras"]], [96] * 4)  # the vectors' driver has the paper's
+            self.assertEqual([c["width_px"] for c in header["cameras"]], [96] * 4)  # the vectors' driver has the paper's
         result = run(*probe, "--replay", path, "--case", len(cases))  # how many there are is known in the end
         self.assertEqual((result.returncode, f"--case: expected 0 to {len(cases) - 1}, got {len(cases)}" in result.stderr), (2, True), result.stderr)
         self.assert_refused(2, "--replay", *probe, "--case", 1)
@@ -1034,7 +1034,7 @@ class Replays(CommandCase):
         checkpoint = self.folder / "run" / "checkpoint.ckpt"
         self.json_of("replay", *self.WORLD, "--policy", checkpoint, "--steps", 20, "--follow", 2, "--cameras", "--out", path)
         header = header_of(path)
-        self.assertEqual([(c["width_px"], c["height_px"]) for c in header["images"]["cameras"]], [(16, 9)] * 4)
+        self.assertEqual([(c["width_px"], c["height_px"]) for c in header["cameras"]], [(16, 9)] * 4)
         self.assertRegex(header["policy_hash"], "^[0-9a-f]{16}$")
         actions = self.numbers_of(path, "action")[2 * 21 : 3 * 21]  # of agent 2, order 0
         decisions = self.decisions_of(path)

@@ -28,7 +28,7 @@ MAY_INCLUDE = {
     "drawing": SIMULATION | {"backends"},
     "replay": SIMULATION | {"backends", "drawing"},
     "cli": SIMULATION | {"backends", "replay", "training"},
-    "bindings": SIMULATION | {"backends", "drawing", "replay", "training"},
+    "bindings": SIMULATION | {"backends", "cli", "drawing", "replay", "training"},
     "bench": SIMULATION | {"backends", "backend_cpu/renderer"},
     "bench/commands": SIMULATION | {"backends", "bench", "cli", "drawing", "training"},
     "apps": SIMULATION | {"backends", "bench/commands", "cli", "drawing", "replay", "training"},

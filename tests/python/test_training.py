@@ -1,6 +1,7 @@
 """Training, evaluation and saved policies through Python: the numbers of pictura.torch and of the command. Skipped where the
 package was built without torch."""
 
+import csv
 import json
 import os
 import pathlib
@@ -200,6 +201,17 @@ def test_evaluation_gives_the_commands_numbers(trained):
     assert json.loads(out.stdout)["policy_hash"] == report["policy_hash"]
 
 
+def replay_of(page):
+    """The header of a replay, and its case."""
+    header = json.loads(re.search(r'id="replay-header">(.*?)</script>', page.read_text()).group(1))
+    return header, header["case"]
+
+
+def row_of_case(cases, number):
+    with open(cases, newline="") as file:
+        return list(csv.DictReader(file))[number]
+
+
 def test_removal_is_the_commands(trained, tmp_path):
     modality, folder, _, _ = trained
     done, cases = [], tmp_path / "cases.csv"
@@ -215,6 +227,15 @@ def test_removal_is_the_commands(trained, tmp_path):
     assert sum(row["cases"] for row in report["rows"] if row["distance_from_m"] is None) == number
     lines = cases.read_text().splitlines()
     assert len(lines) == 1 + number and lines[0].startswith("case,scene,map,driver,step,ego,user,hidden,class")
+    page, few_cases, few = tmp_path / "case.html", tmp_path / "few.csv", {**options, "removals": 8}
+    pictura.probe_removal([str(folder / "checkpoint.ckpt")], ["procedural:1"], cases_file=str(few_cases), replay=str(page), case=3, cameras=True, **few)
+    header, case = replay_of(page)
+    row = row_of_case(few_cases, 3)
+    assert (case["frame"], case["ego"], case["removed"]) == (int(row["step"]), int(row["ego"]), int(row["hidden"]))
+    assert header["followed"] == case["ego"] and header["images"] and header["frames"] == 41
+    for wrong in ({"replay": "case.png"}, {"case": 3}, {"replay": str(page), "case": 10**6}):
+        with pytest.raises(pictura.UsageError, match="replay|case"):
+            pictura.probe_removal([str(folder / "checkpoint.ckpt")], ["procedural:1"], **wrong, **few)
     nobody = pictura.probe_removal([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="nobody", **options)
     assert all(row["abs_d_value"] in (0, None) for row in nobody["rows"])
     with pytest.raises(pictura.UsageError, match="none, nobody, permuted"):
@@ -231,8 +252,12 @@ def test_pedestrian_is_the_commands(trained, tmp_path):
     done, cases = [], tmp_path / "cases.csv"
     options = {"scenes": 2, "steps": 60, "paths": 2, "sample_steps": 4, "min_speed_mps": -10, "agents_per_world": 30, "seed": 3, "num_threads": 2, "device": "cpu"}
     report = pictura.probe_pedestrian(
-        [str(folder / "checkpoint.ckpt")], ["procedural:1"], cases_file=str(cases), on_progress=lambda fraction, eta_s: done.append(fraction),
+        [str(folder / "checkpoint.ckpt")], ["procedural:1"], cases_file=str(cases), replay=str(tmp_path / "case.html"), on_progress=lambda fraction, eta_s: done.append(fraction),
         **options)  # fmt: skip
+    header, case = replay_of(tmp_path / "case.html")
+    shown = row_of_case(cases, int(re.match(r"case (\d+):", case["what"]).group(1)))
+    assert (case["frame"], case["ego"]) == (int(shown["step"]), int(shown["ego"])) and case["inserted"]["x_cm"] / 100 == pytest.approx(float(shown["x_m"]), abs=0.006)
+    assert header["images"] is None
     assert report["kind"] == "pedestrian" and report["paths"] in (1, 2) and report["paths_asked"] == 2 and done[-1] == 1
     assert sum(row["cases"] for row in report["rows"] if row["phase"]) == report["cases"]
     lines = cases.read_text().splitlines()

@@ -79,10 +79,15 @@ Replay any_replay() {
     replay.lights.push_back(static_cast<uint8_t>(random() % 4));
   }
   for (size_t i = 0; i < 50 * kDecisionValues; ++i) replay.decisions.push_back(any_number(&random));
-  replay.images.cameras = {{"front", 16, 9}, {"back", 5, 3}};
+  replay.scenery.lines = {{StripKind::crosswalk, {206, 131, 63}, 300, {{-100, 200, 3}, {-1100, 200, 7}, {5, 6, 8}}},
+                          {StripKind::road_edge, {200, 36, 35}, 150, {}}};
+  replay.scenery.walls = {{{141, 153, 174}, 950, {1, 2, 3}, {4, 5, -6}}};
+  replay.scenery.heads = {{1, -900, 600, {700, 800, 500}}};
+  replay.cameras = {{"front", 16, 9, 1.5f, 2.5f, 8.0f, 4.5f, 1.66f, -0.01f, 1.49f, 0.1f, 0.2f, 0.3f}, {"back", 5, 3}};
+  replay.line_floor_px = 0.35f;
   replay.images.frames_per_group = 40;
-  replay.images.groups = {pack_images(replay.images.cameras, any_frames(replay.images.cameras, 40, &random)),
-                          pack_images(replay.images.cameras, any_frames(replay.images.cameras, 10, &random))};
+  replay.images.groups = {pack_images(replay.cameras, any_frames(replay.cameras, 40, &random)),
+                          pack_images(replay.cameras, any_frames(replay.cameras, 10, &random))};
   return replay;
 }
 
@@ -205,6 +210,18 @@ TEST(ReplayFormat, AReplayIsReadBackAsItWas) {
   EXPECT_TRUE(read_replay(folder / "c.html") == removal);
 }
 
+TEST(ReplayFormat, ImagesThatAreTooManyForAFileAreLeftOutFromTheEnd) {
+  const ScratchFolder folder;
+  Replay replay = any_replay();
+  replay.images.frames_per_group = 10;
+  replay.images.groups.assign(5, std::string(kMaxWrittenImageBytes / 3, 'x'));
+  EXPECT_EQ(replay.num_pictured_frames(), 50);
+  write_replay(folder / "a.html", replay);
+  const Replay back = read_replay(folder / "a.html");
+  EXPECT_EQ(back.images.groups.size(), 3u);
+  EXPECT_EQ(back.num_pictured_frames(), 30);
+}
+
 TEST(ReplayFormat, WhatIsDamagedIsNamed) {
   const ScratchFolder folder;
   const std::string path = folder / "a.html";
@@ -225,8 +242,8 @@ TEST(ReplayFormat, WhatIsDamagedIsNamed) {
   std::string flipped = page;
   flipped[data + 101] = flipped[data + 101] == 'A' ? 'B' : 'A';
   EXPECT_THAT(message(flipped), HasSubstr("a damaged one"));
-  EXPECT_THAT(message(without("\"version\":1,", "\"version\":2,")),
-              HasSubstr("expected a replay of version 1, got version 2"));
+  EXPECT_THAT(message(without("\"version\":2,", "\"version\":3,")),
+              HasSubstr("expected a replay of version 2, got version 3"));
   EXPECT_THAT(message(without("\"agents\":3", "\"agents\":4")), HasSubstr("a.html"));
   EXPECT_THAT(message(without("\"agents\":3", "\"agents\":-1")), HasSubstr("agents: expected"));
   EXPECT_THAT(message(without("\"frame\":49", "\"frame\":50")), HasSubstr("case: expected a frame below 50, got 50"));
@@ -257,7 +274,7 @@ TEST(ReplayFormat, NoHeaderMakesTheReaderFailOtherwiseThanByAnError) {
     write_file(path, damaged);
     try {
       const Replay replay = read_replay(path);
-      for (const std::string& group : replay.images.groups) unpack_images(replay.images.cameras, group, 1);
+      for (const std::string& group : replay.images.groups) unpack_images(replay.cameras, group, 1);
     } catch (const Error&) {
       ++refused;
     }

@@ -29,7 +29,7 @@ TEST(LiveWorld, TellsWhatARecordingHolds) {
   const auto recorded = make_town(8), told = make_town(8);
   const auto controller = make_host_controller("random", *recorded, 1);
   Recorder recorder(*recorded, {});
-  LiveWorld live(*told, {}, {});
+  LiveWorld live(*told, {}, {}, false);
   EXPECT_EQ(live.begin()["header"]["frames"], 1);
   std::vector<Command> commands(8);
   for (int frame = 1; frame <= 60; ++frame) {

@@ -255,7 +255,7 @@ class Chromium(Served):
 
     def test_another_agent_is_watched_with_its_images(self):
         self.browser.run("pictura.actions.select(8)")
-        self.browser.wait_for("pictura.replay.isFollowed(8, pictura.replay.frames - 1) && pictura.pictured() > 0")
+        self.browser.wait_for("pictura.replay.isFollowed(8, pictura.replay.frames - 1) && pictura.pictured().frame > 0 && pictura.pictured().isKept")
         self.browser.wait_for("!document.getElementById('cameras').hidden")
         shown = self.browser.run("[...document.querySelectorAll('.pictures canvas')].map(c => c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some((v, i) => i % 4 < 3 && v > 0))")
         self.assertEqual(len(shown), 4)

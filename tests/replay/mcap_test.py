@@ -40,7 +40,7 @@ class Mcap(unittest.TestCase):
 
     def test_topics_and_schemas(self):
         schemas = {topic: messages[0][0].name for topic, messages in self.messages.items()}
-        cameras = {f"/camera/{name}": "foxglove.CompressedImage" for name in (c["name"] for c in self.page.header["images"]["cameras"])}
+        cameras = {f"/camera/{name}": "foxglove.CompressedImage" for name in (c["name"] for c in self.page.header["cameras"])}
         self.assertEqual(schemas, {"/map": "foxglove.SceneUpdate", "/agents": "foxglove.SceneUpdate", "/lights": "foxglove.SceneUpdate",
                                    "/events": "foxglove.Log", "/agent": "pictura.Agent", **cameras})  # fmt: skip
         for messages in self.messages.values():

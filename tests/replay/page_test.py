@@ -6,6 +6,7 @@ installed are skipped.
 
 import base64
 import json
+import math
 import pathlib
 import re
 import shutil
@@ -199,13 +200,11 @@ class Chromium(PageCase):
         self.browser.wait_for("pictura.state.agent === 17")
         self.assertEqual(self.browser.errors, [])
 
-    def test_the_camera_key_goes_to_the_agent_whose_images_are_recorded(self):
+    def test_the_camera_key_goes_through_the_cameras_of_any_agent(self):
         self.open(fragment="#step=5&agent=7")
-        self.browser.key("c")
-        cameras = [camera["name"] for camera in self.browser.run("pictura.replay.images.cameras.map(({name}) => ({name}))")]
-        self.assertEqual((self.state()["agent"], self.state()["camera"]), (4, cameras[0]))
-        self.browser.key("c")
-        self.assertEqual((self.state()["agent"], self.state()["camera"]), (4, cameras[1]))
+        for camera in [*(camera["name"] for camera in self.recorded.header["cameras"]), ""]:
+            self.browser.key("c")
+            self.assertEqual((self.state()["agent"], self.state()["camera"]), (7, camera))
 
     def test_who_halts_is_not_said_to_brake(self):
         tracks = self.recorded.tracks
@@ -270,11 +269,20 @@ class Chromium(PageCase):
 
     def test_a_probed_case_is_shown_and_marked(self):
         alive = [a for a in range(24) if round(self.recorded.tracks["status"][a][20]) == 0]
-        ego, removed = alive[:2]
+        place = {a: [self.recorded.tracks[name][a][20] for name in ("x_m", "y_m", "heading_deg")] for a in alive}
+
+        def ahead(ego, other):  # in the ego's frame
+            (x, y, heading), (u, v, _) = place[ego], place[other]
+            c, s = math.cos(math.radians(heading)), math.sin(math.radians(heading))
+            return (u - x) * c + (v - y) * s, (v - y) * c - (u - x) * s
+
+        pairs = [(ahead(a, b)[0], a, b) for a in alive for b in alive if ahead(a, b)[0] > 10 and abs(ahead(a, b)[1]) < 0.3 * ahead(a, b)[0]]
+        _, ego, removed = min(pairs)
         answer = {"policy": "agent", "value": 1.5, "value_without": 1.25, "brake": 0.02, "brake_without": 0.0213}
-        x, y = (round(100 * self.recorded.tracks[name][ego][20]) for name in ("x_m", "y_m"))
-        box = {"class": 2, "length_cm": 50, "width_cm": 50, "height_cm": 120, "x_cm": x + 900, "y_cm": y, "z_cm": 0, "heading_ddeg": 900,
-               "path_cm": [[x + 900, y - 500], [x + 900, y + 500]]}  # fmt: skip
+        heading = math.radians(place[ego][2])
+        x, y = round(100 * place[ego][0] + 600 * math.cos(heading)), round(100 * place[ego][1] + 600 * math.sin(heading))
+        box = {"class": 2, "length_cm": 50, "width_cm": 50, "height_cm": 120, "x_cm": x, "y_cm": y, "z_cm": round(100 * self.recorded.tracks["z_m"][ego][20]), "heading_ddeg": 900,
+               "path_cm": [[x, y - 500], [x, y + 500]]}  # fmt: skip
         case = {"what": "case 7: somebody is gone", "frame": 20, "ego": ego, "removed": removed, "inserted": None, "answers": [answer]}
         page = self.path.read_text()
         for name, change in {"removed": {}, "inserted": {"removed": None, "inserted": box}}.items():
@@ -289,7 +297,17 @@ class Chromium(PageCase):
                 color = bytes.fromhex(self.browser.run("getComputedStyle(document.documentElement).getPropertyValue('--case')").strip()[1:])
                 count = lambda: sum(row[3 * i : 3 * i + 3] == color for row in png_pixels(self.browser.screenshot())[2][50:590] for i in range(0, 930))
                 self.assertGreater(count(), 60)  # the mark's ring
+                # Its images with the road user and without it.
+                change = '{hidden: [%d]}' % removed if name == "removed" else "pictura.replay.caseUser(%d, 20).change" % ego
+                changed, as_driven = self.drawn_pictures(ego, 20, change), self.drawn_pictures(ego, 20)
+                self.assertTrue(changed != as_driven)
+                for is_without in (False, True):
+                    self.browser.wait_for(f"pictura.state.isWithout === {json.dumps(is_without)} && document.getElementById('user-shown').textContent.startsWith('{'without' if is_without else 'with '}')")
+                    self.browser.run("new Promise(requestAnimationFrame).then(() => new Promise(requestAnimationFrame)).then(() => null)")
+                    self.assertTrue(self.shown_pictures() == (changed if is_without == (name == "removed") else as_driven))
+                    self.browser.key("o")
                 self.browser.run("pictura.actions.seek(70); pictura.drawn() && null")
+                self.assertTrue(self.browser.run("document.getElementById('user-shown').hidden"))
                 self.browser.run("document.getElementById('case-step').click(); pictura.drawn() && null")
                 self.assertEqual(self.state()["time"], 20)
                 self.assertEqual(self.browser.errors, [])
@@ -309,15 +327,61 @@ class Chromium(PageCase):
 
     def test_the_followed_agents_images_are_those_of_the_file(self):
         self.open(fragment="#step=50&agent=4")
-        self.browser.wait_for("pictura.pictured() === 50")
-        shown = self.browser.run("""[...document.querySelectorAll('.pictures canvas')].map(c => {
-            const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
-            return [...d].filter((_, i) => i % 4 < 3);
-        })""")
+        self.browser.wait_for("pictura.pictured().frame === 50 && pictura.pictured().isKept")
         kept = self.browser.run("pictura.replay.images.frame(50).then(bytes => [...bytes])")
-        self.assertEqual([value for image in shown for value in image], kept)
+        self.assertEqual(self.shown_pictures(), kept)
         self.assertEqual(len(kept), 4 * 96 * 54 * 3)
         self.assertGreater(sum(value > 0 for value in kept), 1000)
+
+    def shown_pictures(self):
+        images = self.browser.run("""[...document.querySelectorAll('.pictures canvas')].map(c => {
+            const copy = new OffscreenCanvas(c.width, c.height).getContext('2d', { willReadFrequently: true });
+            copy.drawImage(c, 0, 0);
+            const d = copy.getImageData(0, 0, c.width, c.height).data;
+            return [...d].filter((_, i) => i % 4 < 3);
+        })""")
+        return [value for image in images for value in image]
+
+    def drawn_pictures(self, agent, frame, change="{}"):
+        return self.browser.run(f"[...pictura.drawnImages({agent}, {frame}, {change})]")
+
+    def test_images_drawn_in_the_page_are_those_of_the_renderer_but_for_sampling(self):
+        self.open()
+        squares = count = 0
+        for frame in range(0, 91, 10):
+            drawn, kept = self.drawn_pictures(4, frame), self.browser.run(f"pictura.replay.images.frame({frame}).then(bytes => [...bytes])")
+            self.assertEqual(len(drawn), len(kept))
+            self.assertGreater(sum(value > 0 for value in drawn), 1000)
+            squares += sum((a - b) ** 2 for a, b in zip(drawn, kept))
+            count += len(kept)
+        psnr_db = 10 * math.log10(255**2 * count / squares)
+        print(f"images drawn in the page: {psnr_db:.1f} dB")
+        self.assertGreater(psnr_db, 40)
+        self.assertEqual(self.browser.errors, [])
+
+    def test_the_page_draws_what_the_file_holds_no_images_of(self):
+        # Of an agent that was not followed, and of the followed one after the last image that was kept.
+        self.open(fragment="#step=50&agent=7")
+        self.browser.wait_for("pictura.pictured().agent === 7")
+        self.assertEqual(self.browser.run("pictura.pictured()"), {"frame": 50, "agent": 7, "isKept": False})
+        self.assertTrue(self.shown_pictures() == self.drawn_pictures(7, 50))
+        note = "document.getElementById('pictures-note').textContent"
+        self.assertIn("drawn by this page", self.browser.run(note))
+        self.browser.run("pictura.replay.images.frames = 75; pictura.actions.select(4); pictura.actions.seek(74)")
+        self.browser.wait_for("pictura.pictured().frame === 74 && pictura.pictured().isKept")
+        self.assertEqual(self.browser.run(note), "as recorded")
+        self.browser.run("pictura.actions.seek(75)")
+        self.browser.wait_for("pictura.pictured().frame === 75 && !pictura.pictured().isKept")
+        self.assertTrue(self.shown_pictures() == self.drawn_pictures(4, 75))
+
+    def test_without_webgl_the_page_says_that_it_cannot_draw(self):
+        self.open(fragment="#step=50&agent=4")
+        self.browser.run("HTMLCanvasElement.prototype.getContext = (of => function (kind, ...more) { return kind === 'webgl2' ? null : of.call(this, kind, ...more); })(HTMLCanvasElement.prototype.getContext)")
+        self.browser.run("pictura.actions.select(7)")
+        self.browser.wait_for("document.getElementById('pictures-note').textContent.includes('no WebGL2')")
+        self.browser.run("pictura.actions.select(4)")
+        self.browser.wait_for("document.getElementById('pictures-note').textContent === 'as recorded'")
+        self.assertEqual(self.browser.errors, [])
 
     def test_what_is_damaged_says_so(self):
         page = self.path.read_text()
@@ -330,7 +394,7 @@ class Chromium(PageCase):
             "a letter of the images": page[: images + 900] + ("B" if page[images + 900] == "A" else "A") + page[images + 901 :],
             "a letter of the numbers": page[: data + 5000] + flipped + page[data + 5001 :],
             "the header": page.replace('{"format"', '{"format', 1),
-            "a newer version": page.replace('"version":1,', '"version":9,', 1),
+            "a newer version": page.replace('"version":2,', '"version":9,', 1),
         }
         for name, text in damaged.items():
             with self.subTest(name):
@@ -375,6 +439,14 @@ class Firefox(PageCase):
         drawn = browser.run("pictura.actions.seek(37); JSON.stringify(pictura.drawn())")
         for agent in json.loads(drawn):
             self.assertAlmostEqual(agent["x_m"], self.recorded.tracks["x_m"][agent["agent"]][37], 6)
+        # Not every Firefox has WebGL2: a headless one without a display has none.
+        note = "document.getElementById('pictures-note').textContent"
+        browser.run("pictura.actions.select(4)")
+        browser.wait_for(f"{note} === 'as recorded'")
+        browser.run("pictura.actions.select(7)")
+        browser.wait_for(f"{note}.includes('drawn')")
+        if browser.run(f"{note}.includes('no WebGL2')"):
+            self.assertTrue(browser.run("document.querySelector('.pictures').hidden"))
         _, _, rows = png_pixels(browser.screenshot())
         self.assertGreater(len({row[3 * x : 3 * x + 3] for row in rows for x in range(0, len(row) // 3)}), 30)
 

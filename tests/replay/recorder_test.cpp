@@ -53,6 +53,34 @@ Replay record(Simulator& simulator, const std::string& policy, int steps, const 
   return recorder.finish({.policy = policy});
 }
 
+TEST(Recorder, SceneryIsTheMapsGeometryToACentimetre) {
+  const std::unique_ptr<Simulator> simulator = town(kAgents);
+  const StaticGeometry& geometry = simulator->maps()[0]->geometry;
+  const ReplayScenery scenery = record(*simulator, "idle", 1, {.world = kWorld}, [](auto&&...) {}).scenery;
+  const auto near = [](const ReplayPoint& point, const Vec3& place) {
+    return std::abs(0.01f * static_cast<float>(point[0]) - place.x) < 0.0051f &&
+           std::abs(0.01f * static_cast<float>(point[1]) - place.y) < 0.0051f &&
+           std::abs(0.01f * static_cast<float>(point[2]) - place.z) < 0.0051f;
+  };
+  size_t strip = 0;
+  for (const ReplayLine& line : scenery.lines) {
+    for (size_t i = 0; i + 1 < line.points_cm.size(); ++i, ++strip) {
+      const Strip& drawn = geometry.strips.at(strip);
+      ASSERT_TRUE(near(line.points_cm[i], drawn.a_m) && near(line.points_cm[i + 1], drawn.b_m)) << strip;
+      EXPECT_EQ(line.kind, drawn.kind);
+      EXPECT_NEAR(0.001f * static_cast<float>(line.width_mm), drawn.width_m, 0.0006f);
+    }
+  }
+  EXPECT_EQ(strip, geometry.strips.size());
+  EXPECT_LT(scenery.lines.size(), geometry.strips.size() / 2);
+  ASSERT_EQ(scenery.walls.size(), geometry.walls.size());
+  ASSERT_GT(scenery.walls.size(), 0u);
+  EXPECT_TRUE(near(scenery.walls[0].a_cm, geometry.walls[0].a_m));
+  ASSERT_EQ(scenery.heads.size(), geometry.heads.size());
+  ASSERT_GT(scenery.heads.size(), 0u);
+  EXPECT_TRUE(near(scenery.heads[0].position_cm, geometry.heads[0].position_m));
+}
+
 TEST(Recorder, PlacesAreWithinHalfAUnitOfTheSimulators) {
   for (const char* policy : {"random", "lane"}) {
     const std::unique_ptr<Simulator> simulator = town(kAgents);
@@ -191,7 +219,7 @@ TEST(Recorder, ImagesAreTheOraclesBytes) {
   constexpr int kFollowed = 3, kSteps = kReplayFramesPerGroup + 10;
   std::vector<std::string> frames;
   const Replay replay = record(
-      *simulator, "lane", kSteps, {.world = kWorld, .followed = kFollowed, .cameras = config},
+      *simulator, "lane", kSteps, {.world = kWorld, .followed = kFollowed, .cameras = config, .keeps_images = true},
       [&](int, const StepResult*, const std::vector<Command>&) {
         renderer->render(simulator->scene(), simulator->views().subspan(kFirstSlot + kFollowed, 1), images.batch());
         std::string frame;
@@ -204,8 +232,8 @@ TEST(Recorder, ImagesAreTheOraclesBytes) {
   ASSERT_EQ(replay.images.groups.size(), 2u);
   std::string all;
   for (const std::string& frame : frames) all += frame;
-  EXPECT_EQ(unpack_images(replay.images.cameras, replay.images.groups[0], kReplayFramesPerGroup) +
-                unpack_images(replay.images.cameras, replay.images.groups[1], 11),
+  EXPECT_EQ(unpack_images(replay.cameras, replay.images.groups[0], kReplayFramesPerGroup) +
+                unpack_images(replay.cameras, replay.images.groups[1], 11),
             all);
   EXPECT_GT(std::count_if(all.begin(), all.end(), [](char c) { return c != 0; }), 10000);
 }
