@@ -4,9 +4,13 @@ import os
 import pathlib
 import sys
 
+from pictura._load_training import wrong_torch
+
 
 def main() -> None:
     """Becomes the command, with the same arguments."""
+    if wrong := wrong_torch():
+        sys.exit(f"error: the pictura command was {wrong}")
     program = pathlib.Path(__file__).parent / "bin" / "pictura"
     if not program.exists():
         sys.exit(f"error: this package was built without the command: expected {program}")

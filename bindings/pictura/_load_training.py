@@ -1,26 +1,44 @@
 """Loads pictura._training beside the torch that it was built with, or says what is missing."""
 
+import importlib.util
+import pathlib
+import re
+
 _HOW = (
     "with torch 2.9 or later installed, pip install --no-build-isolation -Ccmake.define.PICTURA_WITH_TORCH=ON . from a checkout"
     " (docs/python.md)"
 )
 
 
-def load(name: str):
-    """`name` of pictura._training. Raises ImportError naming what is missing, or which torch was expected."""
+def built_torch() -> str | None:
+    """The torch that the package was built with, or None."""
     try:
         from pictura._built_torch import VERSION
     except ImportError:
-        raise ImportError(f"pictura.{name}: this package was built without pictura._training, which needs torch: {_HOW}") from None
-    try:
-        import torch
-    except ImportError as error:
-        raise ImportError(f"pictura.{name}: pictura._training was built with torch {VERSION}, and {error}") from error
-    if torch.__version__ != VERSION:
-        raise ImportError(
-            f"pictura.{name}: pictura._training was built with torch {VERSION}, and torch {torch.__version__} is installed: build it"
-            f" again: {_HOW}"
-        )
+        return None
+    return VERSION
+
+
+def wrong_torch() -> str | None:
+    """What keeps a package that was built with torch from that torch, or None. It imports no torch, which takes a second."""
+    built = built_torch()
+    if built is None:
+        return None
+    spec = importlib.util.find_spec("torch")
+    if spec is None:
+        return f"built with torch {built}, and no torch is installed: pip install torch=={built.split('+')[0]}"
+    (found,) = re.findall(r"^__version__ = '(.*)'$", (pathlib.Path(spec.origin).parent / "version.py").read_text(), re.M)
+    return None if found == built else f"built with torch {built}, and torch {found} is installed: build it again: {_HOW}"
+
+
+def load(name: str):
+    """`name` of pictura._training. Raises ImportError naming what is missing, or which torch was expected."""
+    if built_torch() is None:
+        raise ImportError(f"pictura.{name}: this package was built without pictura._training, which needs torch: {_HOW}")
+    if wrong := wrong_torch():
+        raise ImportError(f"pictura.{name}: pictura._training was {wrong}")
+    import torch  # noqa: F401  (with what its own __init__ loads)
+
     from pictura import _training
 
     return getattr(_training, name)

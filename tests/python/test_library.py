@@ -10,6 +10,7 @@ import pytest
 from conftest import actions_of
 
 import pictura
+from pictura._load_training import wrong_torch
 
 
 def test_a_map_has_facts_geometry_and_a_picture(town):
@@ -307,8 +308,11 @@ def test_the_command_comes_along():
     folder = __import__("pathlib").Path(pictura.__file__).parent
     if not (folder / "bin" / "pictura").exists():
         pytest.skip("this package was built without the command")
-    out = subprocess.run([sys.executable, "-m", "pictura", "--version"], capture_output=True, text=True, check=True)
-    assert out.stdout.strip() == pictura.__version__
+    out = subprocess.run([sys.executable, "-m", "pictura", "--version"], capture_output=True, text=True)
+    if wrong := wrong_torch():
+        assert out.returncode == 1 and out.stderr == f"error: the pictura command was {wrong}\n"
+    else:
+        assert out.stdout.strip() == pictura.__version__, out.stderr
 
 
 def test_a_package_without_training_says_so():

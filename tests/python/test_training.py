@@ -375,11 +375,14 @@ def test_interrupted_training_saves_and_goes_on(tmp_path):
 
 
 def test_another_torch_or_none_is_named(monkeypatch):
+    from pictura.__main__ import main
     from pictura._load_training import load
 
     monkeypatch.setitem(sys.modules, "pictura._built_torch", types.SimpleNamespace(VERSION="2.9.9"))
     with pytest.raises(ImportError, match=r"pictura.train: .* built with torch 2.9.9, and torch " + torch.__version__.split("+")[0]):
         load("train")
+    with pytest.raises(SystemExit, match=r"error: the pictura command was built with torch 2.9.9"):
+        main()
     monkeypatch.setitem(sys.modules, "torch", None)
     with pytest.raises(ImportError, match="built with torch 2.9.9, and .*torch"):
         load("train")
