@@ -66,7 +66,7 @@ def evaluate(checkpoint: str, maps: collections.abc.Sequence[str], *, controller
 def evaluate_scenes(checkpoint: str, scenes: collections.abc.Sequence[str], *, protocol: str = 'womd', controller: str = '', control: str | None = None, start_step: typing.SupportsInt | typing.SupportsIndex | None = None, steps: typing.SupportsInt | typing.SupportsIndex | None = None, densities: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, rules: dict = {}, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, num_scenes: typing.SupportsInt | typing.SupportsIndex = 0, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', conditioning: dict = {}, on_progress: typing.Any = None) -> dict:
     """
     The paper's zero-shot evaluation in recorded scenes, as `pictura evaluate --protocol` does it.
-
+    
     checkpoint: of a policy; '' with a controller: 'log', 'inverse', 'idm', 'random' or 'idle', which drives instead. scenes: files,
     folders, 'FILE#K'. protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3' or 'waymax'; control, start_step, steps,
     densities (shares of road users that stay) and rules (values by name, docs/evaluation.md) replace what it says.
