@@ -1,6 +1,7 @@
 // `pictura evaluate`: the paper's driving metrics of a checkpoint or a controller, by traffic density.
 #include "pictura/training/evaluation/evaluate.h"
 
+#include <algorithm>
 #include <map>
 
 #include "pictura/apps/commands.h"
@@ -106,9 +107,21 @@ void parse_scenarios(const std::string& text, EvaluateOptions* options) {
   options->scenarios = static_cast<int>(*end - *first);
 }
 
-void check_driver(const DriverOptions& options, bool has_parts) {
+// Who drives in towns, or in recorded scenes.
+std::vector<std::string> driver_names(bool has_scenes) {
+  if (!has_scenes) return town_controller_names();
+  std::vector<std::string> names = record_controller_names();
+  names.insert(names.end(), {"random", "idle"});
+  return names;
+}
+
+void check_driver(const DriverOptions& options, bool has_parts, bool has_scenes) {
   if (options.checkpoint.empty() && options.controller.empty() && !has_parts) {
     fail_usage("evaluate: expected a CHECKPOINT, --policy, or --merge and the parts of an evaluation");
+  }
+  const std::vector<std::string> names = driver_names(has_scenes);
+  if (!options.controller.empty() && std::find(names.begin(), names.end(), options.controller) == names.end()) {
+    fail_usage("--policy: expected one of {}; got '{}'", fmt::join(names, ", "), options.controller);
   }
   if (!options.controller.empty() && !(options.renderer.empty() && options.samples.empty())) {
     fail_usage("--renderer, --samples: {} sees no images", options.controller);
@@ -219,7 +232,7 @@ void add_evaluate_command(CLI::App& app) {
     const bool has_scenes = !arguments->scenes.protocol.empty();
     if (!has_scenes || command->count("--scenarios") > 0) parse_scenarios(arguments->scenarios, &evaluation);
     if (has_scenes) {
-      check_driver(evaluation, /*has_parts=*/false);
+      check_driver(evaluation, /*has_parts=*/false, has_scenes);
       refuse_recording_options(*command, "--replay or --gallery");
       SceneEvaluateOptions in_scenes;
       static_cast<DriverOptions&>(in_scenes) = evaluation;
@@ -232,7 +245,7 @@ void add_evaluate_command(CLI::App& app) {
     evaluation.densities.clear();
     for (const std::string& name : arguments->densities) evaluation.densities.push_back(density_named(name));
     if (evaluation.agents_per_world > 0) evaluation.densities.resize(1);
-    check_driver(evaluation, !arguments->parts.empty());
+    check_driver(evaluation, !arguments->parts.empty(), has_scenes);
     const bool records = !arguments->replay.empty() || !arguments->gallery.empty();
     if (!records) refuse_recording_options(*command, "--replay or --gallery");
     if (records && !arguments->parts.empty()) fail_usage("--replay, --gallery: have no effect with --merge");

@@ -210,9 +210,7 @@ void add_removal_command(CLI::App& probe) {
   command->callback([arguments] {
     RemovalOptions& removal = arguments->removal;
     removal.control = removal_control_named(arguments->control);
-    const std::optional<int64_t> number = arguments->replay.number;
-    if (number && *number >= removal.removals)
-      fail_usage("--case: expected 0 to {}, got {}", removal.removals - 1, *number);
+    check_case_number(arguments->replay, removal.removals);
     const RemovalResults results = run_probe(&probe_removal, arguments.get(), &removal);
     const std::vector<RemovalRow> rows = summarize(results);
     const std::string cases_file = arguments->out + "/cases.csv";
@@ -327,6 +325,7 @@ void add_corner_command(CLI::App& probe) {
   command->callback([arguments] {
     CornerOptions& corner = arguments->corner;
     corner.control = corner_control_named(arguments->control);
+    check_case_number(arguments->replay, corner.pairs);
     const CornerResults results = run_probe(&probe_corner, arguments.get(), &corner);
     const std::vector<CornerRow> rows = summarize(results);
     const std::string cases_file = arguments->out + "/cases.csv";

@@ -587,7 +587,9 @@ input.)");
          float max_distance_m, float min_speed_mps, float user_range_m, const std::string& driver,
          const std::string& control, int batch, bool argmax, uint64_t seed, int num_threads, const std::string& device,
          const std::string& simulator, const std::string& renderer, const std::string& samples,
-         const py::dict& conditioning, const std::string& cases_file, const py::object& on_progress) {
+         const py::dict& conditioning, const std::string& cases_file, const std::string& replay,
+         std::optional<int64_t> case_number, bool cameras, const py::object& on_progress) {
+        const CaseReplayOptions shown = case_replay(replay, case_number, cameras);
         CornerOptions options;
         fill_probe(&options, policies, maps, density, agents_per_world, first_scene, scenes, steps, sample_steps, batch,
                    argmax, seed, num_threads, device, simulator, renderer, samples, conditioning, on_progress);
@@ -597,9 +599,12 @@ input.)");
         options.search.user_range_m = user_range_m;
         options.worlds.controller = driver;
         options.control = corner_control_named(control);
-        const CornerResults results =
-            run_to_an_orderly_end("probe_corner", num_threads, {}, [&options] { return probe_corner(options); });
-        if (!cases_file.empty()) write_corner_cases(cases_file, results);
+        const CornerResults results = run_to_an_orderly_end("probe_corner", num_threads, {}, [&] {
+          CornerResults found = probe_corner(options);
+          if (!cases_file.empty()) write_corner_cases(cases_file, found);
+          if (!shown.path.empty()) write_case_replay(shown, options, found);
+          return found;
+        });
         return py::module_::import("json").attr("loads")(corner_summary_json(results, summarize(results), cases_file));
       },
       py::arg("policies"), py::arg("maps"), py::kw_only(), py::arg("density") = "medium",
@@ -612,15 +617,17 @@ input.)");
       py::arg("control") = "none", py::arg("batch") = CornerOptions{}.batch, py::arg("argmax") = true,
       py::arg("seed") = 1, py::arg("num_threads") = 0, py::arg("device") = "auto", py::arg("simulator") = "auto",
       py::arg("renderer") = "", py::arg("samples") = "", py::arg("conditioning") = py::dict(),
-      py::arg("cases_file") = "", py::arg("on_progress") = py::none(),
+      py::arg("cases_file") = "", py::arg("replay") = "", py::arg("case") = py::none(), py::arg("cameras") = false,
+      py::arg("on_progress") = py::none(),
       R"(How policies drive on towards blind corners with a hidden vehicle, and towards empty ones like them, as `pictura probe
 corner` asks it.
 
 policies, maps, density, agents_per_world, scenes, steps, sample_steps and what follows argmax: as in probe_removal(). pairs: in
 all. max_distance_m: how far before the corner a policy may take over. min_speed_mps: of the ego then, and of who is hidden.
 user_range_m: how far before the junction that one may be. driver: 'lane' drives the scenes instead of the policies. control: 'none' or
-'permuted'. batch: pairs that are run at once. cases_file: a CSV file for every run. Returns a dict, that of the command's summary.json (docs/probes.md).
-^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
+'permuted'. batch: pairs that are run at once. cases_file: a CSV file for every run. replay, case, cameras: as
+in probe_removal(); a case is a pair, by default that of the example's figure. Returns a dict, that of the command's summary.json
+(docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
   py::class_<PySession>(module, "PolicySession", R"(
 A saved policy: what it makes of scenes and observations, and the world and cameras that it was trained with. One thread at a
 time, also for a renderer that it is given.)")

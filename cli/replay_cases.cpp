@@ -27,8 +27,7 @@ CasePlace place_of(const CornerState& one) { return {one.scene, one.driver, one.
 std::optional<size_t> asked_case(const CaseReplayOptions& options, size_t count) {
   if (count == 0) fail("--replay: the probe found no case");
   if (!options.number) return std::nullopt;
-  if (*options.number >= static_cast<int64_t>(count))
-    fail_usage("--case: expected 0 to {}, got {}", count - 1, *options.number);
+  check_case_number(options, static_cast<int64_t>(count));
   return static_cast<size_t>(*options.number);
 }
 
@@ -122,6 +121,11 @@ void add_case_replay_options(CLI::App* command, CaseReplayOptions* options_out, 
           ->check(file_ending(".html"));
   command->add_option("--case", options_out->number, case_help)->transform(whole_number(0))->needs(replay);
   add_cameras_option(command, &options_out->recording)->needs(replay);
+}
+
+void check_case_number(const CaseReplayOptions& options, int64_t count) {
+  if (options.number && *options.number >= count)
+    fail_usage("--case: expected 0 to {}, got {}", count - 1, *options.number);
 }
 
 void write_case_replay(const CaseReplayOptions& options, const RemovalOptions& probe, const RemovalResults& results) {

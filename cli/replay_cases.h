@@ -22,6 +22,10 @@ struct CaseReplayOptions {
 /// Adds --replay, --case with its help, and --cameras.
 void add_case_replay_options(CLI::App* command, CaseReplayOptions* options_out, const std::string& case_help);
 
+/// Throws UsageError where there is no case of the number that was asked for among `count`. A probe's number of cases
+/// may be known only in the end: before, `count` is the most that there can be.
+void check_case_number(const CaseReplayOptions& options, int64_t count);
+
 /// Drives the case's scene again, on the host, by whom it was driven and in the world of the first policy, and writes
 /// the replay. Says on stderr what it writes, and whether the ego is driven otherwise than it was probed. Without a
 /// number it is the case in which the first policy's value changes most; of corners, whose cases are pairs, it is

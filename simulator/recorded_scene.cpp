@@ -123,8 +123,7 @@ std::vector<uint8_t> tracks_of_word(const Scenario& scenario, const std::string&
     if (error != std::errc() || end != word.data() + word.size()) {
       fail_usage(
           "expected self (or sdc), vehicles, others, all, tracks_to_predict, objects_of_interest or the id of a track, "
-          "got "
-          "'{}'",
+          "got '{}'",
           word);
     }
     choose([id](int32_t, const RecordedTrack& track) { return track.id == id; });

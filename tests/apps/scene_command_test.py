@@ -97,7 +97,7 @@ with tempfile.TemporaryDirectory() as name:
     several, files = render("--start", 10, "--tracks", "self,1007", "--size", "32x18")
     assert several["images"] == 8 and {name.split("_")[0] for name in files} == {"track1000", "track1007", "contact"}
     out = ("--out", folder / "images")
-    assert "--tracks: expected self, vehicles" in refusal(scene, "--tracks", "cars", *out, command="render")
+    assert "--tracks: expected self (or sdc), vehicles" in refusal(scene, "--tracks", "cars", *out, command="render")
     assert "--views: has no effect on a recorded scene" in refusal(scene, "--views", 2, *out, command="render")
     assert "--start: has no effect on procedural:1" in refusal("procedural:1", "--start", 2, *out, command="render")
     assert "in [0, 91), got 91" in refusal(scene, "--start", 91, *out, command="render")

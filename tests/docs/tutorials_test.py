@@ -54,6 +54,11 @@ class Tutorials(unittest.TestCase):
         for name in ("configs", "models"):
             (folder / name).symlink_to(ROOT / name)
         subprocess.run([PICTURA, "town", "--seed", "7", "--blocks", "2x2", "--out", folder / "mytown.xodr"], check=True, capture_output=True)
+        # Where pages have recorded scenes.
+        for name in ("validation", "womd", "gpudrive", "pufferdrive"):
+            (folder / name).mkdir()
+            drive = [PICTURA, "simulate", folder / "mytown.xodr", "--agents", "6", "--parked", "2", "--steps", "30", "--policy", "lane"]
+            subprocess.run([*drive, "--scene", folder / name / "drive.scenario"], check=True, capture_output=True)
         count, written = 0, set()
         for page in PAGES:
             text = page.read_text()
@@ -66,7 +71,7 @@ class Tutorials(unittest.TestCase):
                 with self.subTest(f"{page.relative_to(ROOT)}: pictura {line}"):
                     result = subprocess.run([PICTURA, *words], cwd=folder, capture_output=True, text=True, timeout=300)
                     self.assertEqual(result.returncode, 0, f"pictura {shlex.join(words)}\n{result.stderr}")
-                    outputs = [words[i + 1] for i, word in enumerate(words[:-1]) if word in ("--out", "--png", "--svg", "--gallery", "--replay")]
+                    outputs = [words[i + 1] for i, word in enumerate(words[:-1]) if word in ("--out", "--png", "--svg", "--gallery", "--replay", "--csv")]
                     for output in outputs:
                         self.assertTrue((folder / output).exists(), f"pictura {shlex.join(words)} wrote no {output}")
                         written.add(output)

@@ -279,7 +279,7 @@ def test_corner_is_the_commands(trained, tmp_path):
     done, cases = [], tmp_path / "cases.csv"
     options = {"scenes": 2, "steps": 300, "pairs": 1, "driver": "lane", "agents_per_world": 90, "seed": 3, "num_threads": 2, "device": "cpu"}
     report = pictura.probe_corner(
-        [str(folder / "checkpoint.ckpt")], ["procedural:1"], cases_file=str(cases), on_progress=lambda fraction, eta_s: done.append(fraction),
+        [str(folder / "checkpoint.ckpt")], ["procedural:1"], cases_file=str(cases), replay=str(tmp_path / "pair.html"), on_progress=lambda fraction, eta_s: done.append(fraction),
         **options)  # fmt: skip
     assert report["kind"] == "corner" and report["pairs"] == report["pairs_asked"] == 1 and report["driver"] == "lane" and done[-1] == 1
     assert report["cases"] == 2 * 3 and report["policy"][0]["scenes_driven"] == 0
@@ -294,6 +294,9 @@ def test_corner_is_the_commands(trained, tmp_path):
     assert report["control"] == "none"
     with pytest.raises(pictura.UsageError, match="none, permuted"):
         pictura.probe_corner([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="nobody")
+    _, case = replay_of(tmp_path / "pair.html")
+    shown = row_of_case(cases, 0)
+    assert (case["frame"], case["ego"]) == (int(shown["step"]), int(shown["ego"]))
     theirs = probed_by_command("corner", folder, tmp_path / "out", options)
     assert theirs["rows"] == report["rows"]
     assert (tmp_path / "out" / "cases.csv").read_text() == cases.read_text()
