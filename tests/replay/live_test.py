@@ -32,6 +32,7 @@ class Served(unittest.TestCase):
         self.process = subprocess.Popen([PICTURA, "simulate", *WORLD, "--serve", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.addCleanup(self.stop)
         line = self.process.stderr.readline()
+        self.opens_with = line.split()[1].partition("#")[2]
         self.address = re.search(r"http://127\.0\.0\.1:\d+/[0-9a-f]{32}/", line).group()
         parts = urllib.parse.urlsplit(self.address)
         self.port, self.path = parts.port, parts.path
@@ -194,7 +195,8 @@ class Http(Served):
             page.close()
 
     def test_it_ends_after_its_steps_and_reports(self):
-        self.serve("--steps", "20", "--json")
+        self.serve("--steps", "20", "--json", "--follow", "3")
+        self.assertEqual(self.opens_with, "agent=3")
         events = Events(self.address)
         self.control({"pace": 64})
         self.assertEqual(events.next("end")["step"], 20)
