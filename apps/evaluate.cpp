@@ -45,7 +45,6 @@ void print_table(const EvaluateReport& report) {
 }
 
 void print_report(const EvaluateOptions& options, const EvaluateReport& report, const Json& infractions) {
-  const auto text_or_null = [](const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); };
   Json table = Json::array();
   for (const EvaluateRow& row : report.rows) {
     Json json = {{"density", row.density},
@@ -56,19 +55,13 @@ void print_report(const EvaluateOptions& options, const EvaluateReport& report, 
     for (const auto& [name, estimate] : metrics_of(row)) add_estimate(name, estimate, &json);
     table.push_back(std::move(json));
   }
-  const EvaluationSetting& setting = report.results.setting;
-  print_json({{"checkpoint", text_or_null(options.checkpoint)},
-              {"controller", text_or_null(options.controller)},
-              {"policy_hash", setting.policy_hash},
-              {"argmax", setting.argmax},
-              {"seed", setting.seed},
-              {"device", setting.device},
-              {"precision", setting.precision},
-              {"interrupted", report.interrupted},
-              {"agent_steps", report.agent_steps > 0 ? Json(report.agent_steps) : Json(nullptr)},
-              {"seconds", report.agent_steps > 0 ? Json(report.seconds) : Json(nullptr)},
-              {"rows", table},
-              {"infractions", infractions}});
+  Json json = driver_json(options, report.results.setting);
+  json.update({{"interrupted", report.interrupted},
+               {"agent_steps", report.agent_steps > 0 ? Json(report.agent_steps) : Json(nullptr)},
+               {"seconds", report.agent_steps > 0 ? Json(report.seconds) : Json(nullptr)},
+               {"rows", table},
+               {"infractions", infractions}});
+  print_json(json);
 }
 
 void print_groups(const std::vector<InfractionGroup>& groups) {

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "pictura/cli/backend_options.h"
+#include "pictura/cli/drive.h"
 #include "pictura/cli/evaluation_options.h"
 #include "pictura/cli/file_options.h"
 #include "pictura/cli/number_options.h"
@@ -65,7 +66,6 @@ void print_table(const SceneProtocol& protocol, const SceneEvaluation& evaluatio
 }
 
 void print_report(const SceneEvaluateOptions& options, const SceneEvaluation& evaluation) {
-  const auto text_or_null = [](const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); };
   const SceneProtocol& protocol = options.protocol;
   Json rows = Json::array();
   for (const SceneRow& row : evaluation.rows) {
@@ -86,28 +86,22 @@ void print_report(const SceneEvaluateOptions& options, const SceneEvaluation& ev
   }
   Json rules = Json::object();
   for (const auto& [name, value] : rules_of(protocol)) rules[name] = value;
-  const EvaluationSetting& setting = evaluation.setting;
-  print_json({{"checkpoint", text_or_null(options.checkpoint)},
-              {"controller", text_or_null(options.controller)},
-              {"policy_hash", setting.policy_hash},
-              {"argmax", setting.argmax},
-              {"seed", setting.seed},
-              {"device", setting.device},
-              {"precision", setting.precision},
-              {"protocol", protocol.name},
-              {"control", protocol.control},
-              {"start_step", protocol.start_step},
-              {"steps", protocol.steps},
-              {"rules", rules},
-              {"scenes", evaluation.found},
-              {"scored", evaluation.scored},
-              {"without_drivers", evaluation.without_drivers},
-              {"faults", evaluation.faults},
-              {"interrupted", evaluation.interrupted},
-              {"agent_steps", evaluation.agent_steps},
-              {"seconds", evaluation.seconds},
-              {"rows", rows},
-              {"paper_rows", paper}});
+  Json json = driver_json(options, evaluation.setting);
+  json.update({{"protocol", protocol.name},
+               {"control", protocol.control},
+               {"start_step", protocol.start_step},
+               {"steps", protocol.steps},
+               {"rules", rules},
+               {"scenes", evaluation.found},
+               {"scored", evaluation.scored},
+               {"without_drivers", evaluation.without_drivers},
+               {"faults", evaluation.faults},
+               {"interrupted", evaluation.interrupted},
+               {"agent_steps", evaluation.agent_steps},
+               {"seconds", evaluation.seconds},
+               {"rows", rows},
+               {"paper_rows", paper}});
+  print_json(json);
 }
 
 void print_faults(const std::vector<std::string>& faults) {
@@ -154,16 +148,12 @@ void add_scene_options(CLI::App* command, SceneArguments* arguments) {
 }
 
 void refuse_idle_scene_options(const CLI::App& command, const SceneArguments& arguments) {
-  const auto refuse = [&command](std::initializer_list<const char*> options, const char* why) {
-    for (const char* option : options) {
-      if (command.count(option) > 0) fail_usage("{}: has no effect {}", option, why);
-    }
-  };
   if (arguments.protocol.empty()) {
-    refuse({"--scenes", "--control", "--start", "--rule", "--csv"}, "without --protocol");
+    refuse_options(command, {"--scenes", "--control", "--start", "--rule", "--csv"}, "without --protocol");
     return;
   }
-  refuse({"--map", "--agents", "--merge", "--out", "--infractions", "--replay", "--replays"}, "with --protocol");
+  refuse_options(command, {"--map", "--agents", "--merge", "--out", "--infractions", "--replay", "--replays"},
+                 "with --protocol");
   if (arguments.scenes.empty()) fail_usage("--protocol: expected --scenes as well");
 }
 

@@ -61,6 +61,14 @@ py::dict dict_of(const TrainReport& report) {
   return d;
 }
 
+/// Each metric of an evaluation's row as (value, half of its 95 % interval).
+template <typename Row>
+void add_metrics(const Row& row, py::dict* row_out) {
+  for (const auto& [name, estimate] : metrics_of(row)) {
+    (*row_out)[py::str(name)] = py::make_tuple(estimate.value, estimate.half_width_95);
+  }
+}
+
 py::dict dict_of(const EvaluateReport& report) {
   py::list rows;
   for (const EvaluateRow& row : report.rows) {
@@ -70,9 +78,7 @@ py::dict dict_of(const EvaluateReport& report) {
     d["steps"] = row.steps;
     d["vehicle_episodes"] = row.vehicle_episodes;
     d["km_driven"] = row.km_driven;
-    for (const auto& [name, estimate] : metrics_of(row)) {
-      d[py::str(name)] = py::make_tuple(estimate.value, estimate.half_width_95);
-    }
+    add_metrics(row, &d);
     rows.append(d);
   }
   py::dict d;
@@ -110,9 +116,7 @@ py::dict dict_of(const SceneEvaluation& evaluation, const std::vector<SceneAgent
     d["scenes"] = row.scenes;
     d["vehicle_episodes"] = row.vehicle_episodes;
     d["km_driven"] = row.km_driven;
-    for (const auto& [name, estimate] : metrics_of(row)) {
-      d[py::str(name)] = py::make_tuple(estimate.value, estimate.half_width_95);
-    }
+    add_metrics(row, &d);
     rows.append(d);
   }
   for (const SceneAgent& agent : agents) agent_dicts.append(dict_of(agent));

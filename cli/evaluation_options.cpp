@@ -55,4 +55,15 @@ void EvaluationProgress::update(double done, double eta_s) {
   line_.update(fmt::format("evaluating: {:.0f} %  ETA {}", 100 * done, format_duration(eta_s)));
 }
 
+Json driver_json(const DriverOptions& options, const EvaluationSetting& setting) {
+  const auto text_or_null = [](const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); };
+  return {{"checkpoint", text_or_null(options.checkpoint)},
+          {"controller", text_or_null(options.controller)},
+          {"policy_hash", setting.policy_hash},
+          {"argmax", setting.argmax},
+          {"seed", setting.seed},
+          {"device", setting.device},
+          {"precision", setting.precision}};
+}
+
 }  // namespace pictura

@@ -5,6 +5,7 @@
 
 #include "pictura/cli/backend_options.h"
 #include "pictura/cli/report.h"
+#include "pictura/common/support/json.h"
 #include "pictura/training/evaluation/evaluate.h"
 
 namespace pictura {
@@ -38,5 +39,8 @@ class EvaluationProgress {
   const std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
   bool has_estimate_ = false;
 };
+
+/// What reports of evaluations begin with: who drove, and where it computed.
+Json driver_json(const DriverOptions& options, const EvaluationSetting& setting);
 
 }  // namespace pictura
