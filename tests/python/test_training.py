@@ -232,7 +232,8 @@ def test_removal_is_the_commands(trained, tmp_path):
     header, case = replay_of(page)
     row = row_of_case(few_cases, 3)
     assert (case["frame"], case["ego"], case["removed"]) == (int(row["step"]), int(row["ego"]), int(row["hidden"]))
-    assert header["followed"] == case["ego"] and header["images"] and header["frames"] == 41
+    assert header["followed"] == case["ego"] and header["images"]
+    assert case["frame"] < header["frames"] <= 41, "fewer where all of this policy's agents have halted by then"
     for wrong in ({"replay": "case.png"}, {"case": 3}, {"replay": str(page), "case": 10**6}):
         with pytest.raises(pictura.UsageError, match="replay|case"):
             pictura.probe_removal([str(folder / "checkpoint.ckpt")], ["procedural:1"], **wrong, **few)
