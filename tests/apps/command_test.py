@@ -642,6 +642,22 @@ class Benchmarks(CommandCase):
         self.assertNotEqual(figure.read_bytes(), again.read_bytes())
         self.assert_refused(2, "--plot and --figure", "bench", "render", "--figure", figure)
 
+    def test_rates_on_several_gpus_are_drawn_from_what_gpu_ranks_measured(self):
+        def row(case, gpus, rate):
+            rates = {"median": rate, "min": 0.9 * rate, "max": 1.1 * rate}
+            return {"case": case, "gpus": gpus, "agent_steps_per_s": rates, "efficiency": rate / gpus / 1e5}
+
+        results, figure, again = (self.folder / name for name in ("gpu_ranks.json", "ranks.png", "again.png"))
+        rows = [row("one", 1, 1e5), row("each", 2, 2e5), row("in_all", 2, 1.5e5)]
+        results.write_text(json.dumps({"arguments": [], "rate": {"96x54": rows}}))
+        run("bench", "train", "--plot", results, "--figure", figure)
+        self.assertGreater(figure.stat().st_size, 5000)
+        results.write_text(json.dumps({"arguments": ["--set", "train.precision=tf32"], "rate": {"96x54": rows}}))
+        run("bench", "train", "--plot", results, "--figure", again)
+        self.assertNotEqual(figure.read_bytes(), again.read_bytes(), "another precision, another name")
+        results.write_text("{}")
+        self.assert_refused(1, "expected rates of scripts/gpu_ranks", "bench", "train", "--plot", results, "--figure", figure)
+
     def test_the_cost_of_steps_is_drawn_from_results(self):
         names = ["cpu, 64 worlds of 1 agents", "cpu, 64 worlds of 4 agents", "cpu, 1 worlds of 60 agents"]
         results = self.folder / "results.json"
