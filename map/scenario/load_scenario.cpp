@@ -205,7 +205,9 @@ SceneIndex find_scenes(const std::string& name) {
 SceneRef find_scene(const std::string& name) {
   const SceneName wanted = split(name);
   SceneIndex index = index_scenes(wanted.path);
-  if (index.scenes.empty()) fail("{}: {}", wanted.path, index.faults.empty() ? "holds no scene" : index.faults.front());
+  if (index.scenes.empty()) {
+    fail("{}", index.faults.empty() ? fmt::format("{}: holds no scene", wanted.path) : index.faults.front());
+  }
   if (wanted.selector.empty()) return index.scenes.front();
   for (const SceneRef& scene : index.scenes) {
     if (scene.id == wanted.selector) return scene;

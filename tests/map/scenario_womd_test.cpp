@@ -285,6 +285,9 @@ TEST(SceneNames, FoldersWithoutScenesAndBadScenesAreNamed) {
   EXPECT_THAT(message_of([&] { load_scenario(index.scenes[1]); }),
               AllOf(HasSubstr("damaged.tfrecord: record 0: expected the checksum"), HasSubstr(" of its ")));
   EXPECT_EQ(message_of([&] { load_scenario(index.scenes[2]); }), test::kNoError);
+  // A shard of nothing else says it once.
+  const std::string junk = folder / "junk.tfrecord";
+  EXPECT_THAT(message_of([&] { find_scene(junk); }), ::testing::StartsWith(junk + ": record 0: expected"));
 }
 
 TEST(Womd, RandomlyChangedRecordsAreScenesOrErrors) {
