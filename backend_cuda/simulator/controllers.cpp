@@ -150,7 +150,7 @@ std::unique_ptr<Controller> make_cuda_controller(const std::string& name, const 
   check_worlds(name, simulator);
   if (name == "random") return std::make_unique<CudaRandomController>(simulator.device(), seed);
   if (name == "idle") return std::make_unique<CudaRuleController<IdleCommands>>("idle", simulator.device());
-  if (name == "lane" || name == "idm")
+  if (drives_on_host(name))
     return std::make_unique<CudaHostController>(simulator, make_host_controller(name, simulator, seed));
   if (name == "log") return std::make_unique<CudaRuleController<RecordedCommands>>("log", simulator.device());
   if (name == "inverse") return std::make_unique<CudaInverseController>(simulator);

@@ -64,6 +64,7 @@ class RuleController final : public Controller {
 
 std::vector<std::string> town_controller_names() { return {"random", "idle", "lane"}; }
 std::vector<std::string> record_controller_names() { return {"log", "inverse", "idm"}; }
+bool drives_on_host(std::string_view name) { return name == "lane" || name == "idm"; }
 std::vector<std::string> host_controller_names() {
   std::vector<std::string> names = town_controller_names();
   for (const std::string& name : record_controller_names()) names.push_back(name);

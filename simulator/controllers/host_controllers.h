@@ -18,6 +18,8 @@ std::vector<std::string> town_controller_names();
 std::vector<std::string> record_controller_names();
 /// Both.
 std::vector<std::string> host_controller_names();
+/// Whether it drives on the host whatever the simulator's memory: "lane" and "idm" do.
+bool drives_on_host(std::string_view name);
 
 /// Throws UsageError naming the first world on a map without a record, which "log", "inverse" and "idm" cannot drive
 /// in; or with one, whose lanes end, which "lane" cannot.

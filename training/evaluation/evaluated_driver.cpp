@@ -4,6 +4,7 @@
 
 #include "pictura/backends/make_controller.h"
 #include "pictura/common/error.h"
+#include "pictura/simulator/controllers/host_controllers.h"
 #include "pictura/training/config.h"
 #include "pictura/training/saved_policy.h"
 #include "pictura/training/session.h"
@@ -53,14 +54,14 @@ EvaluatedDriver controller_driver(const DriverOptions& options, int steps) {
   config.run.device = options.device;
   config.simulator.backend = options.simulator;
   const std::string& name = options.controller;
-  const bool drives_on_host = name == "lane" || name == "idm" || name == "inverse";
-  if (drives_on_host && options.device == "auto" && options.simulator == "auto") config.run.device = "cpu";
+  const bool is_on_host = drives_on_host(name);
+  if (is_on_host && options.device == "auto" && options.simulator == "auto") config.run.device = "cpu";
   EvaluatedDriver driver;
   driver.device = open_learning_device(config);
   driver.world = evaluation_simulator_config(config, steps, driver.device);
   driver.setting.policy_hash = name;
   driver.setting.conditioning = config.evaluate.conditioning;
-  driver.setting.device = driver.device.is_host() ? "cpu" : drives_on_host ? "cuda, driven from the host" : "cuda";
+  driver.setting.device = driver.device.is_host() ? "cpu" : is_on_host ? "cuda, driven from the host" : "cuda";
   driver.drive = [&options](Simulator& simulator) {
     return Driving{make_controller(options.controller, simulator, options.seed),
                    [&simulator] { return count_active(simulator); }};
