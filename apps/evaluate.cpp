@@ -185,7 +185,7 @@ void add_evaluate_command(CLI::App& app) {
       ->excludes(policy);
   command->add_option("--backbone", options.backbone,
                       "The program of policy.backbone, where it does not lie where it did in training");
-  command->add_option("--out", arguments->out, "A file for the counts of each scenario, which --merge reads");
+  command->add_option("--out", arguments->out, "A file for the counts of each scenario, or scene, which --merge reads");
   command
       ->add_option("--infractions", arguments->infractions,
                    "A file for every infraction: where, with whom, at what speed; and a table of the commonest kinds")
@@ -212,7 +212,9 @@ void add_evaluate_command(CLI::App& app) {
       "In parts, on several machines or after one another:\n"
       "  pictura evaluate run.ckpt --scenarios 0:100 --out a.json\n"
       "  pictura evaluate run.ckpt --scenarios 100:200 --out b.json\n"
-      "  pictura evaluate --merge a.json b.json");
+      "  pictura evaluate --merge a.json b.json\n"
+      "Rollouts for the Waymo sim-agents challenge:\n"
+      "  pictura evaluate run.ckpt --protocol simagents --scenes shard.tfrecord --sampled --rollouts shard.binproto");
   command->callback([arguments, command] {
     settle_evaluation_options(&arguments->evaluation);
     EvaluateOptions& evaluation = arguments->evaluation.evaluate;
@@ -232,7 +234,13 @@ void add_evaluate_command(CLI::App& app) {
       in_scenes.first_scene = evaluation.first_scenario;
       in_scenes.num_scenes = command->count("--scenarios") > 0 ? evaluation.scenarios : 0;
       run_scene_evaluation(*command, arguments->scenes, evaluation.steps, arguments->densities, std::move(in_scenes),
-                           arguments->json);
+                           arguments->out, arguments->json);
+      return;
+    }
+    if (!arguments->parts.empty() && has_scene_results(arguments->parts.front())) {
+      refuse_recording_options(*command, "--replay or --gallery");
+      refuse_options(*command, {"--infractions", "--replay", "--replays"}, "on parts of an evaluation in scenes");
+      merge_scene_evaluations(arguments->parts, arguments->out, arguments->json);
       return;
     }
     evaluation.densities.clear();

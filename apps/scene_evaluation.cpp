@@ -38,10 +38,12 @@ void print_settings(const SceneProtocol& protocol) {
   fmt::print("rules:{}\n", rules);
 }
 
-void print_table(const SceneProtocol& protocol, const SceneEvaluation& evaluation) {
+void print_table(const SceneEvaluation& evaluation) {
+  const SceneProtocol& protocol = evaluation.results.protocol;
   print_settings(protocol);
-  fmt::print("{} scenes: {} scored, {} with nobody to drive, {} faults\n\n", evaluation.found, evaluation.scored,
-             evaluation.without_drivers, evaluation.faults.size());
+  const SceneResults& results = evaluation.results;
+  fmt::print("{} scenes: {} scored, {} with nobody to drive, {} faults\n\n", evaluation.found, results.scored(),
+             results.without_drivers, evaluation.faults().size());
   constexpr const char* kLine = "{:8} {:34} {:>8} {:>9} {:>17} {:>17} {:>17} {:>17} {:>17} {:>9}\n";
   fmt::print(fmt::runtime(kLine), "density", "agent", "scenes", "vehicles", "at-fault", "off-road", "goals",
              "collisions", "displacement m", "km");
@@ -59,14 +61,17 @@ void print_table(const SceneProtocol& protocol, const SceneEvaluation& evaluatio
     }
   }
   fmt::print("+- is the half width of a 95 % confidence interval over scenes\n");
-  const auto steps = static_cast<double>(evaluation.agent_steps);
+  if (evaluation.seconds <= 0) return;
+  const auto steps = static_cast<double>(results.agent_steps());
   fmt::print("{} agent-steps in {}: {}/s, {:.1f} scenes a minute\n", format_count(steps),
              format_duration(evaluation.seconds), format_count(steps / evaluation.seconds),
-             60 * evaluation.scored / evaluation.seconds);
+             60 * results.scored() / evaluation.seconds);
 }
 
-void print_report(const SceneEvaluateOptions& options, const SceneEvaluation& evaluation) {
-  const SceneProtocol& protocol = options.protocol;
+// Of parts, the time is not known.
+void print_report(const DriverOptions& options, const SceneEvaluation& evaluation) {
+  const SceneResults& results = evaluation.results;
+  const SceneProtocol& protocol = results.protocol;
   Json rows = Json::array();
   for (const SceneRow& row : evaluation.rows) {
     Json json = {{"density", row.density},
@@ -86,19 +91,19 @@ void print_report(const SceneEvaluateOptions& options, const SceneEvaluation& ev
   }
   Json rules = Json::object();
   for (const auto& [name, value] : rules_of(protocol)) rules[name] = value;
-  Json json = driver_json(options, evaluation.setting);
+  Json json = driver_json(options, results.setting);
   json.update({{"protocol", protocol.name},
                {"control", protocol.control},
                {"start_step", protocol.start_step},
                {"steps", protocol.steps},
                {"rules", rules},
                {"scenes", evaluation.found},
-               {"scored", evaluation.scored},
-               {"without_drivers", evaluation.without_drivers},
-               {"faults", evaluation.faults},
+               {"scored", results.scored()},
+               {"without_drivers", results.without_drivers},
+               {"faults", evaluation.faults()},
                {"interrupted", evaluation.interrupted},
-               {"agent_steps", evaluation.agent_steps},
-               {"seconds", evaluation.seconds},
+               {"agent_steps", results.agent_steps()},
+               {"seconds", evaluation.seconds > 0 ? Json(evaluation.seconds) : Json(nullptr)},
                {"rows", rows},
                {"paper_rows", paper}});
   print_json(json);
@@ -111,6 +116,14 @@ void print_faults(const std::vector<std::string>& faults) {
   if (faults.size() > kShownFaults) {
     fmt::print(stderr, "warning: {} more are left out; --json lists all\n", faults.size() - kShownFaults);
   }
+}
+
+void print(const DriverOptions& options, const SceneEvaluation& evaluation, bool json) {
+  print_faults(evaluation.faults());
+  if (json)
+    print_report(options, evaluation);
+  else
+    print_table(evaluation);
 }
 
 }  // namespace
@@ -145,20 +158,25 @@ void add_scene_options(CLI::App* command, SceneArguments* arguments) {
       ->allow_extra_args(false);
   command->add_option("--csv", arguments->csv, "A file with a row for every driven road user of every scene")
       ->check(file_ending(".csv"));
+  command->add_option(
+      "--rollouts", arguments->rollouts,
+      "A file for the rollouts, as the Waymo sim-agents challenge takes them: with --protocol simagents");
 }
 
 void refuse_idle_scene_options(const CLI::App& command, const SceneArguments& arguments) {
   if (arguments.protocol.empty()) {
-    refuse_options(command, {"--scenes", "--control", "--start", "--rule", "--csv"}, "without --protocol");
+    refuse_options(command, {"--scenes", "--control", "--start", "--rule", "--csv", "--rollouts"},
+                   "without --protocol");
     return;
   }
-  refuse_options(command, {"--map", "--agents", "--merge", "--out", "--infractions", "--replay", "--replays"},
+  refuse_options(command, {"--map", "--agents", "--merge", "--infractions", "--replay", "--replays"},
                  "with --protocol");
   if (arguments.scenes.empty()) fail_usage("--protocol: expected --scenes as well");
 }
 
 void run_scene_evaluation(const CLI::App& command, const SceneArguments& arguments, int steps,
-                          const std::vector<std::string>& densities, SceneEvaluateOptions options, bool json) {
+                          const std::vector<std::string>& densities, SceneEvaluateOptions options,
+                          const std::string& out, bool json) {
   options.scenes = arguments.scenes;
   SceneProtocol& protocol = options.protocol;
   protocol = scene_protocol(arguments.protocol);
@@ -176,20 +194,40 @@ void run_scene_evaluation(const CLI::App& command, const SceneArguments& argumen
     csv->write(scene_agents_csv_head());
     options.on_agent = [&csv](const SceneAgent& agent) { csv->write(csv_line(agent)); };
   }
+  std::unique_ptr<RolloutsFile> rollouts;
+  if (!arguments.rollouts.empty()) {
+    check_rollouts(protocol);
+    if (options.controller.empty() && options.argmax) {
+      fmt::print(stderr,
+                 "notice: the rollouts of a scene are equal, since the most likely actions are taken; --sampled "
+                 "draws them\n");
+    }
+    rollouts = std::make_unique<RolloutsFile>(arguments.rollouts);
+    options.on_rollouts = [&rollouts](const SceneRollouts& scene) { rollouts->write(scene); };
+  }
   EvaluationProgress progress("the scenes that are finished");
   options.on_progress = [&progress](double done, double eta_s) { progress.update(done, eta_s); };
   const SceneEvaluation evaluation = evaluate_scenes(options);
   progress.finish();
   if (csv) csv->commit();
-  print_faults(evaluation.faults);
-  if (json)
-    print_report(options, evaluation);
-  else
-    print_table(protocol, evaluation);
+  if (rollouts) rollouts->commit();
+  if (!out.empty()) write_results(out, evaluation.results);
+  print(options, evaluation, json);
   if (evaluation.interrupted) {
-    throw Interrupted(fmt::format("interrupted; {} of {} scenes are finished, and counted above", evaluation.scored,
-                                  evaluation.found));
+    throw Interrupted(fmt::format("interrupted; {} of {} scenes are finished, and counted above",
+                                  evaluation.results.num_scenes, evaluation.found));
   }
+}
+
+void merge_scene_evaluations(const std::vector<std::string>& paths, const std::string& out, bool json) {
+  std::vector<SceneResults> parts;
+  for (const std::string& path : paths) parts.push_back(read_scene_results(path));
+  SceneEvaluation evaluation;
+  evaluation.results = merge(parts, paths);
+  evaluation.rows = rows_of(evaluation.results);
+  evaluation.found = evaluation.results.num_scenes;
+  if (!out.empty()) write_results(out, evaluation.results);
+  print(DriverOptions{}, evaluation, json);
 }
 
 }  // namespace pictura

@@ -14,20 +14,24 @@ namespace pictura {
 struct SceneArguments {
   std::string protocol;  // empty: no recorded scenes
   std::vector<std::string> scenes, rules;
-  std::string control, csv;
+  std::string control, csv, rollouts;
   int start_step = 0;
 };
 
-/// Adds --protocol, --scenes, --control, --start, --rule and --csv.
+/// Adds --protocol, --scenes, --control, --start, --rule, --csv and --rollouts.
 void add_scene_options(CLI::App* command, SceneArguments* arguments);
 
 /// Throws UsageError for options that have no effect with, or without, --protocol.
 void refuse_idle_scene_options(const CLI::App& command, const SceneArguments& arguments);
 
 /// Evaluates and prints a table, or one JSON object. densities: shares in %, or as the protocol has them where
-/// --density was not given; options holds who drives, and which scenes of all. Throws Interrupted, after what is
-/// finished was printed, where ^C came.
+/// --density was not given; options holds who drives, and which scenes of all; out: a file for what merging reads, or
+/// empty. Throws Interrupted, after what is finished was printed, where ^C came.
 void run_scene_evaluation(const CLI::App& command, const SceneArguments& arguments, int steps,
-                          const std::vector<std::string>& densities, SceneEvaluateOptions options, bool json);
+                          const std::vector<std::string>& densities, SceneEvaluateOptions options,
+                          const std::string& out, bool json);
+
+/// Joins the parts of an evaluation in scenes, and prints and writes what one evaluation would have.
+void merge_scene_evaluations(const std::vector<std::string>& paths, const std::string& out, bool json);
 
 }  // namespace pictura

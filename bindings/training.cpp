@@ -94,6 +94,7 @@ py::dict dict_of(const SceneAgent& agent) {
   py::dict d;
   d["scenario_id"] = agent.scenario_id;
   d["density"] = agent.density;
+  d["rollout"] = agent.rollout;
   d["track_id"] = agent.track_id;
   d["type"] = to_string(agent.type);
   d["takeover_step"] = agent.takeover_step;
@@ -124,12 +125,12 @@ py::dict dict_of(const SceneEvaluation& evaluation, const std::vector<SceneAgent
   d["rows"] = rows;
   d["agents"] = agent_dicts;
   d["scenes"] = evaluation.found;
-  d["scored"] = evaluation.scored;
-  d["without_drivers"] = evaluation.without_drivers;
-  d["faults"] = evaluation.faults;
+  d["scored"] = evaluation.results.scored();
+  d["without_drivers"] = evaluation.results.without_drivers;
+  d["faults"] = evaluation.faults();
   d["seconds"] = evaluation.seconds;
-  d["agent_steps"] = evaluation.agent_steps;
-  d["policy_hash"] = evaluation.setting.policy_hash;
+  d["agent_steps"] = evaluation.results.agent_steps();
+  d["policy_hash"] = evaluation.results.setting.policy_hash;
   return d;
 }
 
@@ -451,7 +452,7 @@ agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error nami
          const std::optional<int>& steps, const std::optional<std::vector<double>>& densities, const py::dict& rules,
          int first_scene, int num_scenes, bool argmax, uint64_t seed, int num_threads, const std::string& device,
          const std::string& simulator, const std::string& renderer, const std::string& samples,
-         const py::dict& conditioning, const py::object& on_progress) {
+         const py::dict& conditioning, const std::string& rollouts, const py::object& on_progress) {
         SceneEvaluateOptions options;
         options.checkpoint = checkpoint;
         options.controller = controller;
@@ -478,8 +479,15 @@ agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error nami
         options.on_progress = progress_to(on_progress);
         std::vector<SceneAgent> agents;
         options.on_agent = [&agents](const SceneAgent& agent) { agents.push_back(agent); };
+        std::optional<RolloutsFile> file;
+        if (!rollouts.empty()) {
+          check_rollouts(options.protocol);
+          file.emplace(rollouts);
+          options.on_rollouts = [&file](const SceneRollouts& scene) { file->write(scene); };
+        }
         const SceneEvaluation evaluation = run_to_an_orderly_end(
             "evaluate_scenes", num_threads, {}, [&options] { return pictura::evaluate_scenes(options); });
+        if (file) file->commit();
         return dict_of(evaluation, agents);
       },
       py::arg("checkpoint"), py::arg("scenes"), py::kw_only(), py::arg("protocol") = "womd", py::arg("controller") = "",
@@ -487,13 +495,14 @@ agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error nami
       py::arg("densities") = py::none(), py::arg("rules") = py::dict(), py::arg("first_scene") = 0,
       py::arg("num_scenes") = 0, py::arg("argmax") = true, py::arg("seed") = 1, py::arg("num_threads") = 0,
       py::arg("device") = "auto", py::arg("simulator") = "auto", py::arg("renderer") = "", py::arg("samples") = "",
-      py::arg("conditioning") = py::dict(), py::arg("on_progress") = py::none(),
+      py::arg("conditioning") = py::dict(), py::arg("rollouts") = "", py::arg("on_progress") = py::none(),
       R"(The paper's zero-shot evaluation in recorded scenes, as `pictura evaluate --protocol` does it.
 
 checkpoint: of a policy; '' with a controller: 'log', 'inverse', 'idm', 'random' or 'idle', which drives instead. scenes: files,
-folders, 'FILE#K'. protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3' or 'waymax'; control, start_step, steps,
+folders, 'FILE#K'. protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3', 'waymax' or 'simagents'; control, start_step, steps,
 densities (shares of road users that stay) and rules (values by name, docs/evaluation.md) replace what it says.
-first_scene, num_scenes: a part of the scenes; 0: all from the first on. The others as in evaluate(). Returns a dict: rows, one a
+first_scene, num_scenes: a part of the scenes; 0: all from the first on. rollouts: a file for them, with the protocol
+'simagents', as the Waymo sim-agents challenge takes them. The others as in evaluate(). Returns a dict: rows, one a
 density, with each metric as (value, half of its 95 % interval); agents, one for every driven road user of a scene and density;
 scenes, scored, without_drivers, faults (scenes that are left out, and why); seconds, agent_steps, policy_hash. ^C raises
 KeyboardInterrupt. Raises pictura.Error where no scene can be used.)");

@@ -139,7 +139,8 @@ with tempfile.TemporaryDirectory() as name:
         assert [row["density"] for row in report["rows"]] == [1, 0.75, 0.5]
         assert report["rows"][0]["vehicle_episodes"] > report["rows"][2]["vehicle_episodes"] > 0
         rows = (folder / "agents.csv").read_text().splitlines()
-        assert rows[0].startswith("scenario_id,density,track_id,type,") and rows[1].startswith('"fixture00000001",1,'), rows[:2]
+        assert rows[0].startswith("scenario_id,density,rollout,track_id,type,"), rows[0]
+        assert rows[1].startswith('"fixture00000001",1,0,'), rows[1]
         assert len(rows) == 1 + sum(row["vehicle_episodes"] for row in report["rows"])
         table = run(*words, "--density", "100,50", "--rule", "late=drive", "--steps", 20, command="evaluate").stdout
         assert "late=drive" in table and "paper: perspective" in table and "75 %" not in table, table
@@ -148,7 +149,42 @@ with tempfile.TemporaryDirectory() as name:
         )
         assert self_alone["steps"] == 80 and self_alone["start_step"] == 10
         assert self_alone["rows"][0]["vehicle_episodes"] == 1, self_alone
+
+        # Parts give what the whole gives. They do not lie among the scenes, which may be JSON too.
+        parts = folder / "parts"
+        parts.mkdir()
+
+        def part(name, *more):
+            run(*words, "--steps", 40, "--out", parts / name, *more, command="evaluate")
+            return parts / name
+
+        whole, first, second = part("whole.json"), part("first.json", "--scenarios", "0:2"), part("second.json", "--scenarios", "2:6")
+        merged = run("--merge", second, first, "--out", parts / "merged.json", "--json", command="evaluate")
+        assert (parts / "merged.json").read_bytes() == whole.read_bytes()
+        report = json.loads(merged.stdout)
+        assert (report["scenes"], report["scored"], len(report["faults"]), report["seconds"]) == (6, 5, 1, None), report
+        assert "0 s:" not in run("--merge", first, second, command="evaluate").stdout
+        refused = run("--merge", second, second, command="evaluate", status=1).stderr
+        assert "second.json: begins with scene 2: expected 6" in refused, refused
+
+        # Rollouts: a road user has five fields, of which four hold 80 floats.
+        sim_agents = ("--policy", "random", "--protocol", "simagents", "--scenes", scene, "--device", "cpu")
+        rollouts = folder / "rollouts.binproto"
+        report = json.loads(run(*sim_agents, "--rollouts", rollouts, "--json", command="evaluate").stdout)
+        assert report["rules"]["rollouts"] == "32" and report["rows"][0]["vehicle_episodes"] == 32 * 8, report
+        assert 32 * 12 * 4 * 320 < rollouts.stat().st_size < 32 * 12 * (4 * 320 + 30), rollouts.stat().st_size
+
+        rate = json.loads(
+            run("scenes", "--policy", "idm", "--protocol", "waymax", "--scenes", scene, "--copies", 3, "--repeats", 2, "--device",
+                "cpu", "--json", command="bench").stdout
+        )
+        assert rate["results"][0]["unit"] == "scenes_per_min" and rate["results"][0]["repeats"] == 2, rate
+        assert "3 copies of" in rate["workload"] and ", 3 scored; protocol waymax, 80 steps" in rate["workload"], rate
+        assert "expected --scenes" in refusal("scenes", "--policy", "idm", command="bench")
         for expected, bad in [
+            ("--rollouts: has no effect without --protocol", ("--policy", "idle", "--rollouts", folder / "x")),
+            ("expected 32 rollouts of 80 steps from step 10", (*words, "--rollouts", folder / "x")),
+            ("got rollouts=4, 80 steps", (*sim_agents, "--rule", "rollouts=4", "--rollouts", folder / "x")),
             ("--protocol: expected --scenes as well", ("--policy", "idm", "--protocol", "womd")),
             ("--csv: has no effect without --protocol", ("--policy", "idle", "--csv", folder / "x.csv")),
             ("--map: has no effect with --protocol", (*words, "--map", "procedural:1")),

@@ -332,6 +332,12 @@ def test_a_controller_is_evaluated_in_recorded_scenes(tmp_path):
     (row,) = report["rows"]
     assert report["scored"] == 1 and report["faults"] == [] and row["vehicle_episodes"] == len(report["agents"]) > 0
     assert report["agents"][0]["scenario_id"] == "fixture00000001" and report["agents"][0]["driven_steps"] > 0
+    rollouts = tmp_path / "rollouts.binproto"
+    options = {"controller": "random", "device": "cpu", "protocol": "simagents", "rollouts": str(rollouts)}
+    report = pictura.evaluate_scenes("", [str(tmp_path / "womd.tfrecord")], **options)
+    assert {agent["rollout"] for agent in report["agents"]} == set(range(32)) and rollouts.stat().st_size > 32 * 12 * 4 * 320
+    with pytest.raises(pictura.UsageError, match="expected 32 rollouts of 80 steps"):
+        pictura.evaluate_scenes("", [str(tmp_path)], controller="idm", rollouts=str(rollouts))
     with pytest.raises(pictura.UsageError, match="rule late: expected replay, drive, absent, got 'never'"):
         pictura.evaluate_scenes("", [str(tmp_path)], controller="idm", rules={"late": "never"})
 

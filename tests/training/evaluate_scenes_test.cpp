@@ -2,13 +2,16 @@
 // what becomes of scenes that cannot be used.
 #include "pictura/training/evaluation/evaluate_scenes.h"
 
+#include <cstring>
 #include <filesystem>
+#include <set>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "pictura/backends/make_controller.h"
 #include "pictura/backends/make_simulator.h"
+#include "pictura/common/math.h"
 #include "pictura/common/support/file.h"
 #include "pictura/map/scenario/load_scenario.h"
 #include "pictura/map/scenario/scene_file.h"
@@ -124,7 +127,7 @@ TEST_F(SceneEvaluations, EqualASimulatorThatIsDrivenByHand) {
       const StepResult result = simulator->step(Span<const Command>(commands));
       for (const uint8_t valid : result.valid) steps += valid;
     }
-    EXPECT_EQ(evaluation.agent_steps, steps);
+    EXPECT_EQ(evaluation.results.agent_steps(), steps);
     ASSERT_EQ(agents.size(), driven.size());
     const AgentStateView state = simulator->state();
     for (size_t i = 0; i < driven.size(); ++i) {
@@ -148,9 +151,9 @@ TEST_F(SceneEvaluations, RecordedActionsArriveAndAreRemoved) {
   EXPECT_EQ(row.goal_rate.value, 1) << agents_;
   EXPECT_EQ(row.collision_rate.value, 0);
   EXPECT_LT(row.mean_displacement_m.value, 0.2);
-  EXPECT_LE(evaluation.agent_steps, 91) << "nobody drives on after the goal";
+  EXPECT_LE(evaluation.results.agent_steps(), 91) << "nobody drives on after the goal";
   options_.protocol.leave_at_goal = false;
-  EXPECT_EQ(evaluate_scenes(options_).agent_steps, 600);
+  EXPECT_EQ(evaluate_scenes(options_).results.agent_steps(), 600);
 }
 
 TEST_F(SceneEvaluations, LeaveOutWhatCannotBeUsed) {
@@ -172,14 +175,14 @@ TEST_F(SceneEvaluations, LeaveOutWhatCannotBeUsed) {
   write_scene_file(folder_ / "5.scenario", slow);
   const SceneEvaluation evaluation = evaluate_scenes(options_);
   EXPECT_EQ(evaluation.found, 5);
-  EXPECT_EQ(evaluation.scored, 2);
-  EXPECT_EQ(evaluation.without_drivers, 1);
-  ASSERT_EQ(evaluation.faults.size(), 2u);
-  EXPECT_THAT(evaluation.faults[0], HasSubstr("4.json"));
-  EXPECT_THAT(evaluation.faults[1], ::testing::AllOf(HasSubstr("5.scenario"), HasSubstr("expected time steps")));
+  EXPECT_EQ(evaluation.results.scored(), 2);
+  EXPECT_EQ(evaluation.results.without_drivers, 1);
+  ASSERT_EQ(evaluation.faults().size(), 2u);
+  EXPECT_THAT(evaluation.faults()[0], HasSubstr("4.json"));
+  EXPECT_THAT(evaluation.faults()[1], ::testing::AllOf(HasSubstr("5.scenario"), HasSubstr("expected time steps")));
 
   options_.protocol.control = "4711";
-  EXPECT_EQ(evaluate_scenes(options_).without_drivers, 3);
+  EXPECT_EQ(evaluate_scenes(options_).results.without_drivers, 3);
   options_.scenes = {folder_ / "4.json"};
   EXPECT_THAT(test::message_of<Error>([&] { evaluate_scenes(options_); }), HasSubstr("4.json"));
   options_.scenes = {folder_ / "1.scenario"};
@@ -205,7 +208,7 @@ TEST_F(SceneEvaluations, TakeOverLaterAndLetTheRecordVanish) {
   options_.controller = "idle";
   options_.protocol.densities = {1.0};
   options_.protocol.steps = 100;
-  EXPECT_EQ(evaluate_scenes(options_).without_drivers, 1);
+  EXPECT_EQ(evaluate_scenes(options_).results.without_drivers, 1);
   options_.protocol.late = Late::drive;
   options_.protocol.record_end = RecordEnd::vanish;
   std::vector<SceneAgent> agents;
@@ -214,6 +217,119 @@ TEST_F(SceneEvaluations, TakeOverLaterAndLetTheRecordVanish) {
   ASSERT_EQ(agents.size(), 1u);
   EXPECT_EQ(agents[0].takeover_step, 7);
   EXPECT_GT(agents[0].driven_steps, 5);
+}
+
+TEST_F(SceneEvaluations, PartsMergeIntoTheWhole) {
+  for (int i = 1; i <= 5; ++i) write(i, {.num_vehicles = 4 + 2 * i});
+  write_file(folder_ / "6.json", "{\"objects\": 3}");
+  Scenario slow = *test::crossing();
+  slow.dt_s = 0.2f;
+  write_scene_file(folder_ / "3.scenario", slow);
+  options_.protocol = scene_protocol("pufferdrive2");
+  options_.protocol.densities = {1.0, 0.5};
+  set_scene_rule("rollouts=2", &options_.protocol);
+  const test::ScratchFolder files;
+  write_results(files / "whole", evaluate_scenes(options_).results);
+  std::vector<SceneResults> parts;
+  std::vector<std::string> names;
+  const auto add_part = [&](int first, int count) {
+    options_.first_scene = first;
+    options_.num_scenes = count;
+    names.push_back(files / fmt::format("{}.json", first));
+    write_results(names.back(), evaluate_scenes(options_).results);
+    EXPECT_TRUE(has_scene_results(names.back()));
+    parts.push_back(read_scene_results(names.back()));
+  };
+  add_part(4, 100);  // of which there are two
+  add_part(0, 2);
+  add_part(2, 2);
+  write_results(files / "merged", merge(parts, names));
+  EXPECT_EQ(read_file(files / "merged"), read_file(files / "whole"));
+  const SceneResults merged = merge(parts, names);
+  EXPECT_EQ(merged.scored(), 4);
+  EXPECT_EQ(merged.num_scenes, 6);
+  EXPECT_EQ(merged.faults.size(), 2u);
+
+  const auto refusal = [&] { return test::message_of<Error>([&] { merge(parts, names); }); };
+  parts[2].first_scene = 3;
+  EXPECT_THAT(refusal(), HasSubstr("2.json: begins with scene 3: expected 2, the next after those of"));
+  parts[2].first_scene = 1;
+  EXPECT_THAT(refusal(), HasSubstr("begins with scene 1: expected 2"));
+  parts[2].first_scene = 2;
+  parts[2].protocol.box_scale = 1;
+  EXPECT_THAT(refusal(), ::testing::AllOf(HasSubstr("rules is"), HasSubstr("2.json")));
+  parts[2].protocol.box_scale = 0.7f;
+  parts[2].setting.seed = 2;
+  EXPECT_THAT(refusal(), HasSubstr("seed is 2, in "));
+  write_file(files / "bad.json", R"({"format": "pictura evaluation 1"})");
+  EXPECT_FALSE(has_scene_results(files / "bad.json"));
+  EXPECT_FALSE(has_scene_results(folder_ / "1.scenario"));
+  EXPECT_THAT(test::message_of<Error>([&] { read_scene_results(files / "bad.json"); }),
+              HasSubstr("expected \"format\": \"pictura evaluation in scenes 1\""));
+}
+
+TEST_F(SceneEvaluations, KeepRolloutsOfEverybodyWhoIsThere) {
+  write(1);
+  write(2, {.num_vehicles = 6});
+  options_.protocol = scene_protocol("simagents");
+  std::vector<SceneRollouts> scenes;
+  options_.on_rollouts = [&scenes](const SceneRollouts& scene) { scenes.push_back(scene); };
+  const SceneEvaluation evaluation = evaluate_scenes(options_);
+  ASSERT_EQ(scenes.size(), 2u);
+  EXPECT_EQ(scenes[1].scenario_id, "scene2");
+  const Scenario scene = load_scenario(folder_ / "1.scenario");
+  std::vector<int64_t> ids;
+  std::vector<int32_t> tracks;
+  for (int32_t track = 0; track < static_cast<int32_t>(scene.tracks.size()); ++track) {
+    if (!scene.valid_of(track)[10]) continue;
+    ids.push_back(scene.tracks[size_t(track)].id);
+    tracks.push_back(track);
+  }
+  EXPECT_EQ(scenes[0].track_ids, ids);
+  ASSERT_EQ(scenes[0].rollouts.size(), 32u);
+  EXPECT_EQ(evaluation.rows[0].vehicle_episodes % 32, 0);
+  std::set<float> ends;
+  for (const std::vector<SimulatedState>& rollout : scenes[0].rollouts) {
+    ASSERT_EQ(rollout.size(), ids.size() * 80);
+    ends.insert(rollout[79].x_m);
+    // A step of 0.1 s leads nowhere else.
+    for (size_t i = 0; i < ids.size(); ++i) {
+      const TrackState& start = scene.states_of(tracks[i])[10];
+      const SimulatedState& first = rollout[i * 80];
+      EXPECT_NEAR(first.x_m, scene.map.origin_m[0] + double(start.position_m.x), 3.5);
+      EXPECT_NEAR(first.y_m, scene.map.origin_m[1] + double(start.position_m.y), 3.5);
+      const float height_m = scene.tracks[size_t(tracks[i])].height_m;
+      EXPECT_NEAR(first.z_m, scene.map.origin_m[2] + double(start.position_m.z + height_m / 2), 0.5);
+      EXPECT_LE(std::abs(first.heading_rad), kPi);
+    }
+  }
+  EXPECT_GT(ends.size(), 1u) << "draws differ between rollouts";
+
+  // Whoever follows the recording is where that has it, in the file's coordinates; who is lost stays.
+  scenes.clear();
+  options_.protocol.control = "self";
+  evaluate_scenes(options_);
+  for (size_t i = 0; i < ids.size(); ++i) {
+    if (tracks[i] == scene.sdc_track) continue;
+    const RecordedTrack& track = scene.tracks[size_t(tracks[i])];
+    const SimulatedState* last = nullptr;
+    for (int32_t step = 11; step < 91; ++step) {
+      const SimulatedState& state = scenes[0].rollouts[5][i * 80 + size_t(step) - 11];
+      if (!scene.valid_of(tracks[i])[size_t(step)]) {
+        EXPECT_TRUE(!last || std::memcmp(&state, last, sizeof state) == 0) << track.id << " at " << step;
+        continue;
+      }
+      const TrackState& recorded = scene.states_of(tracks[i])[size_t(step)];
+      EXPECT_NEAR(state.x_m, scene.map.origin_m[0] + double(recorded.position_m.x), 2e-3);
+      EXPECT_NEAR(state.y_m, scene.map.origin_m[1] + double(recorded.position_m.y), 2e-3);
+      EXPECT_NEAR(wrap_angle(state.heading_rad - recorded.heading_rad), 0, 1e-5);
+      last = &state;
+    }
+  }
+
+  options_.protocol = scene_protocol("womd");
+  EXPECT_THAT(test::message_of<UsageError>([&] { evaluate_scenes(options_); }),
+              HasSubstr("expected 32 rollouts of 80 steps from step 10"));
 }
 
 TEST(SceneSamples, AreEvaluated) {
@@ -225,8 +341,8 @@ TEST(SceneSamples, AreEvaluated) {
   options.scenes = {std::string(data) + "/womd", std::string(data) + "/gpudrive"};
   options.protocol.densities = {1.0};
   const SceneEvaluation evaluation = evaluate_scenes(options);
-  EXPECT_EQ(evaluation.scored, 3);
-  EXPECT_TRUE(evaluation.faults.empty());
+  EXPECT_EQ(evaluation.results.scored(), 3);
+  EXPECT_TRUE(evaluation.faults().empty());
   EXPECT_GT(evaluation.rows[0].vehicle_episodes, 10);
   EXPECT_GT(evaluation.rows[0].goal_rate.value, 0.3);
   for (const char* rule : {"overlapping=drive", "others=absent", "late=drive", "late=absent", "record_end=vanish",
@@ -234,7 +350,7 @@ TEST(SceneSamples, AreEvaluated) {
     SCOPED_TRACE(rule);
     options.protocol = scene_protocol("womd");
     set_scene_rule(rule, &options.protocol);
-    EXPECT_EQ(evaluate_scenes(options).scored, 3);
+    EXPECT_EQ(evaluate_scenes(options).results.scored(), 3);
   }
 }
 

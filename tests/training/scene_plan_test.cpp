@@ -40,7 +40,7 @@ std::vector<AgentBox> boxes_at(const Scenario& scene, int32_t step) {
 
 TEST(SceneProtocols, AreDataAndTheirRulesCanBeChosenOtherwise) {
   EXPECT_THAT(scene_protocol_names(),
-              ::testing::ElementsAre("womd", "gpudrive", "pufferdrive2", "pufferdrive3", "waymax"));
+              ::testing::ElementsAre("womd", "gpudrive", "pufferdrive2", "pufferdrive3", "waymax", "simagents"));
   EXPECT_EQ(scene_protocol("womd").steps, 600);
   EXPECT_EQ(scene_protocol("waymax").start_step, 10);
   EXPECT_FLOAT_EQ(scene_protocol("pufferdrive2").box_scale, 0.7f);
@@ -63,6 +63,7 @@ TEST(SceneProtocols, AreDataAndTheirRulesCanBeChosenOtherwise) {
   EXPECT_THAT(refusal("late"), HasSubstr("expected NAME=VALUE, got 'late'"));
   EXPECT_THAT(refusal("later=drive"), HasSubstr("late"));
   EXPECT_THAT(refusal("late=never"), HasSubstr("rule late: expected replay, drive, absent, got 'never'"));
+  EXPECT_THAT(refusal("rollouts=1.5"), HasSubstr("rule rollouts: expected a whole number of 1 to 1000, got '1.5'"));
   EXPECT_THAT(refusal("box_scale=big"), HasSubstr("rule box_scale: expected a number of 0 to 2, got 'big'"));
   protocol.control = "cars";
   EXPECT_THAT(test::message_of<UsageError>([&] { check(protocol); }), HasSubstr("got 'cars'"));

@@ -1,6 +1,7 @@
 #include "pictura/training/evaluation/evaluate_scenes.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include <fmt/ranges.h>
@@ -39,11 +40,14 @@ std::string name_of(const SceneRef& scene) {
 struct Batch {
   CompiledMaps maps;
   std::vector<int> numbers;  // [maps] of each among all scenes
+  // What is left out.
+  std::vector<std::string> faults;
+  int without_drivers = 0;
 };
 
-/// Loads and compiles the scenes [first, end), and says which are left out.
+/// Loads and compiles the scenes [first, end).
 Batch load_batch(const std::vector<SceneRef>& scenes, int first, int end, const SceneProtocol& protocol,
-                 const MapOptions& map_options, int num_threads, SceneEvaluation* evaluation_inout) {
+                 const MapOptions& map_options, int num_threads) {
   const auto count = static_cast<size_t>(end - first);
   std::vector<std::shared_ptr<const CompiledMap>> maps(count);
   std::vector<std::string> faults(count);
@@ -60,9 +64,9 @@ Batch load_batch(const std::vector<SceneRef>& scenes, int first, int end, const 
   Batch batch;
   for (size_t i = 0; i < count; ++i) {
     if (!maps[i]) {
-      evaluation_inout->faults.push_back(faults[i]);
+      batch.faults.push_back(faults[i]);
     } else if (!has_drivers(*maps[i], protocol)) {
-      ++evaluation_inout->without_drivers;
+      ++batch.without_drivers;
     } else {
       batch.maps.push_back(maps[i]);
       batch.numbers.push_back(first + static_cast<int>(i));
@@ -76,11 +80,21 @@ Array array_of(const DeviceCopy<T>& copy, const Dims& shape, Device device) {
   return Array(copy.span().data(), shape, device);
 }
 
-/// One batch of scenes at one density, from the start to the end.
+/// Where a box of the map's is, in the coordinates of the scene's file.
+SimulatedState simulated_state(const RoadMap& map, const AgentBox& box) {
+  const auto in_file = [&map](int axis, float metres) {
+    return static_cast<float>(map.origin_m[static_cast<size_t>(axis)] + static_cast<double>(metres));
+  };
+  return {in_file(0, box.center_m.x), in_file(1, box.center_m.y), in_file(2, box.center_m.z + box.height_m / 2),
+          std::atan2(box.sin_heading, box.cos_heading)};
+}
+
+/// One rollout of a batch of scenes at one density, from the start to the end.
 class BatchDrive {
  public:
-  BatchDrive(const Batch& batch, const SceneProtocol& protocol, double density, uint64_t seed, Simulator* simulator)
-      : batch_(batch), protocol_(protocol), density_(density), simulator_(*simulator) {
+  BatchDrive(const Batch& batch, const SceneProtocol& protocol, double density, int rollout, uint64_t seed,
+             Simulator* simulator)
+      : batch_(batch), protocol_(protocol), density_(density), rollout_(rollout), simulator_(*simulator) {
     const std::vector<AgentBox> boxes = host_copy_of_structs(simulator_.scene().agents, device());
     const auto num_slots = static_cast<size_t>(simulator_.num_slots());
     roles_.reserve(num_slots);
@@ -105,7 +119,40 @@ class BatchDrive {
     status_ = status();
   }
 
-  /// Drives all steps, or until nobody drives any more; false: ^C came before. on_step(steps done).
+  /// From now on, keeps where everybody is who is there at the start.
+  void keep_places() {
+    kept_slots_ = slots_where([&](size_t slot) {
+      const CompiledMap& map = map_of(slot);
+      return map.scenario->valid_of(track_of_slot_[slot])[static_cast<size_t>(map.start_step)] != 0;
+    });
+    places_.resize(kept_slots_.size() * static_cast<size_t>(protocol_.steps));
+    note_places(0);
+  }
+
+  /// Adds to each scene of the batch where everybody was.
+  void add_rollout(std::vector<SceneRollouts>* scenes_inout) const {
+    scenes_inout->resize(batch_.maps.size());
+    for (size_t world = 0; world < batch_.maps.size(); ++world) {
+      SceneRollouts& scene = (*scenes_inout)[world];
+      scene.scenario_id = batch_.maps[world]->scenario->id;
+      scene.steps = protocol_.steps;
+      scene.rollouts.emplace_back();
+    }
+    const auto steps = static_cast<size_t>(protocol_.steps);
+    for (size_t i = 0; i < kept_slots_.size(); ++i) {
+      const auto slot = static_cast<size_t>(kept_slots_[i]);
+      SceneRollouts& scene = (*scenes_inout)[static_cast<size_t>(world_of_slot_[slot])];
+      if (scene.rollouts.size() == 1) {
+        scene.track_ids.push_back(map_of(slot).scenario->tracks[static_cast<size_t>(track_of_slot_[slot])].id);
+      }
+      const auto first = places_.begin() + static_cast<ptrdiff_t>(i * steps);
+      std::vector<SimulatedState>& places = scene.rollouts.back();
+      places.insert(places.end(), first, first + static_cast<ptrdiff_t>(steps));
+    }
+  }
+
+  /// Drives all steps, or, unless places are kept, until nobody drives any more; false: ^C came before. on_step(steps
+  /// done).
   template <typename OnStep>
   bool run(Controller* driver, const OnStep& on_step) {
     const std::unique_ptr<Controller> log = pictura::make_controller("log", simulator_, 0);
@@ -113,7 +160,7 @@ class BatchDrive {
     const Span<Command> commands = command_memory.span();
     std::vector<uint8_t> driven, replayed;
     std::optional<DeviceCopy<uint8_t>> driven_mask, replayed_mask;
-    for (int step = 0; step < protocol_.steps && has_open(step); ++step) {
+    for (int step = 0; step < protocol_.steps && (!kept_slots_.empty() || has_open(step)); ++step) {
       if (interrupted()) return false;
       if (protocol_.record_end == RecordEnd::vanish) {
         take_out(slots_where([&](size_t slot) {
@@ -134,6 +181,7 @@ class BatchDrive {
       log->act(simulator_.controller_input(), replayed_mask->span(), commands);
       simulator_.step(Span<const Command>(commands));
       measure(step + 1);
+      if (!kept_slots_.empty()) note_places(step);
       on_step(step + 1);
     }
     return true;
@@ -155,6 +203,7 @@ class BatchDrive {
       const Displacement& displacement = displacements_[slot];
       SceneAgent agent{.scenario_id = scene.id,
                        .density = density_,
+                       .rollout = rollout_,
                        .track_id = track.id,
                        .type = track.type,
                        .takeover_step = takeover_steps_[slot],
@@ -271,9 +320,24 @@ class BatchDrive {
     }
   }
 
+  /// After a step of the episode, and of the first one also before it: who is not there is where it was.
+  void note_places(int step) {
+    const std::vector<AgentBox> boxes = host_copy_of_structs(simulator_.scene().agents, device());
+    const auto steps = static_cast<size_t>(protocol_.steps), at = static_cast<size_t>(step);
+    for (size_t i = 0; i < kept_slots_.size(); ++i) {
+      const auto slot = static_cast<size_t>(kept_slots_[i]);
+      SimulatedState* const places = &places_[i * steps];
+      if (boxes[slot].drawn)
+        places[at] = simulated_state(map_of(slot).scenario->map, boxes[slot]);
+      else if (at > 0)
+        places[at] = places[at - 1];
+    }
+  }
+
   const Batch& batch_;
   const SceneProtocol& protocol_;
   double density_;
+  int rollout_;
   Simulator& simulator_;
   std::vector<SceneRole> roles_;         // [slots], as the following
   std::vector<int32_t> takeover_steps_;  // of the episode
@@ -282,7 +346,21 @@ class BatchDrive {
   std::vector<uint8_t> status_;      // after the last step
   std::vector<Displacement> displacements_;
   std::vector<int32_t> driven_steps_;
+  std::vector<int32_t> kept_slots_;     // whose places are kept
+  std::vector<SimulatedState> places_;  // [kept_slots * steps]
 };
+
+/// Of one rollout of a batch whose numbers are among the scenes from first_scene on. No two rollouts of any scene have
+/// the same number, by which draws differ.
+std::vector<WorldSpec> worlds_of(const Batch& batch, int first_scene, int rollout, int num_rollouts) {
+  std::vector<WorldSpec> worlds;
+  for (size_t i = 0; i < batch.maps.size(); ++i) {
+    const auto scene = static_cast<uint32_t>(first_scene + batch.numbers[i]);
+    const uint32_t number = scene * static_cast<uint32_t>(num_rollouts) + static_cast<uint32_t>(rollout);
+    worlds.push_back(scene_world(*batch.maps[i], static_cast<int>(i), kFirstEvaluationWorld + number));
+  }
+  return worlds;
+}
 
 /// The scenes that the options name, and what of them is no scene.
 SceneIndex find_all(const SceneEvaluateOptions& options) {
@@ -307,80 +385,91 @@ SceneEvaluation evaluate_scenes(const EvaluatedDriver& driver, Renderer* rendere
   const SceneProtocol& protocol = options.protocol;
   SceneIndex index = find_all(options);
   SceneEvaluation evaluation;
-  evaluation.setting = driver.setting;
-  evaluation.setting.maps = options.scenes;
-  evaluation.setting.steps = protocol.steps;
-  evaluation.setting.argmax = options.argmax;
-  evaluation.setting.seed = options.seed;
-  evaluation.faults = std::move(index.faults);
+  SceneResults& results = evaluation.results;
+  results.setting = driver.setting;
+  results.setting.maps = options.scenes;
+  results.setting.steps = protocol.steps;
+  results.setting.argmax = options.argmax;
+  results.setting.seed = options.seed;
+  results.protocol = protocol;
+  results.unread = std::move(index.faults);
+  results.first_scene = options.first_scene;
+  results.counts.resize(protocol.densities.size());
   evaluation.found = static_cast<int>(index.scenes.size());
 
   SimulatorConfig config = protocol_config(protocol, driver.world);
   config.seed = options.seed;
   MapOptions map_options = pictura::map_options(config);
   map_options.observed_span_m = protocol.observed_span_m;
-  const size_t num_densities = protocol.densities.size();
-  std::vector<std::vector<SceneCounts>> counts(num_densities);  // [densities][scored scenes]
   std::unique_ptr<Simulator> simulator;
   EvaluationClock clock(options.on_progress);
   const int at_once = scenes_at_once(options, driver.device);
-  const double work = double(evaluation.found) * static_cast<double>(num_densities) * protocol.steps;
+  const auto num_drives = static_cast<int>(protocol.densities.size()) * protocol.rollouts;
+  const double work = double(evaluation.found) * num_drives * protocol.steps;
   for (int first = 0; first < evaluation.found && !evaluation.interrupted; first += at_once) {
     const int end = std::min(first + at_once, evaluation.found);
-    const Batch batch = load_batch(index.scenes, first, end, protocol, map_options, options.num_threads, &evaluation);
-    if (batch.maps.empty()) continue;
-    std::vector<WorldSpec> worlds;
-    for (size_t i = 0; i < batch.maps.size(); ++i) {
-      const int number = options.first_scene + batch.numbers[i];
-      worlds.push_back(
-          scene_world(*batch.maps[i], static_cast<int>(i), kFirstEvaluationWorld + static_cast<uint32_t>(number)));
-    }
-    if (renderer) upload_maps(batch.maps, {}, renderer);
-    std::vector<std::vector<std::vector<SceneAgent>>> agents;  // [densities][scenes][driven]
-    for (size_t d = 0; d < num_densities && !evaluation.interrupted; ++d) {
+    const Batch batch = load_batch(index.scenes, first, end, protocol, map_options, options.num_threads);
+    if (renderer && !batch.maps.empty()) upload_maps(batch.maps, {}, renderer);
+    std::vector<std::vector<std::vector<SceneAgent>>> agents;  // [drives][scenes][driven]
+    std::vector<SceneRollouts> rollouts;                       // [scenes], where they are asked for
+    for (int i = 0; i < num_drives && !batch.maps.empty() && !evaluation.interrupted; ++i) {
+      const int rollout = i % protocol.rollouts;
+      const std::vector<WorldSpec> worlds = worlds_of(batch, options.first_scene, rollout, protocol.rollouts);
       if (simulator)
         simulator->set_worlds(batch.maps, {}, worlds, options.seed);
       else
         simulator = make_simulator(options.simulator, config, batch.maps, worlds);
-      BatchDrive drive(batch, protocol, protocol.densities[d], options.seed, simulator.get());
+      const double density = protocol.densities[static_cast<size_t>(i / protocol.rollouts)];
+      BatchDrive drive(batch, protocol, density, rollout, options.seed, simulator.get());
+      if (options.on_rollouts) drive.keep_places();
       const Driving driving = driver.drive(*simulator);
-      const double done = double(first) * static_cast<double>(num_densities) * protocol.steps +
-                          double(end - first) * static_cast<double>(d) * protocol.steps;
+      const double done = double(first) * num_drives * protocol.steps + double(end - first) * i * protocol.steps;
       const bool is_finished = drive.run(driving.controller.get(), [&](int steps) {
         if (steps == 1 || steps % 10 == 0) clock.update((done + double(end - first) * steps) / work);
       });
-      if (is_finished)
-        agents.push_back(drive.results());
-      else
+      if (!is_finished) {
         evaluation.interrupted = true;
+        break;
+      }
+      agents.push_back(drive.results());
+      if (options.on_rollouts) drive.add_rollout(&rollouts);
     }
     if (evaluation.interrupted) break;
-    for (size_t i = 0; i < batch.maps.size(); ++i) {
-      for (size_t d = 0; d < num_densities; ++d) {
-        SceneCounts& scene = counts[d].emplace_back();
-        for (const SceneAgent& agent : agents[d][i]) {
-          const bool is_vehicle = agent.type != TrackType::pedestrian && agent.type != TrackType::cyclist;
-          add(agent, is_vehicle, &scene);
-          evaluation.agent_steps += agent.driven_steps;
-          if (options.on_agent) options.on_agent(agent);
+    for (size_t scene = 0; scene < batch.maps.size(); ++scene) {
+      for (size_t density = 0; density < protocol.densities.size(); ++density) {
+        SceneCounts& counts = results.counts[density].emplace_back();
+        for (int rollout = 0; rollout < protocol.rollouts; ++rollout) {
+          const size_t drive = density * static_cast<size_t>(protocol.rollouts) + static_cast<size_t>(rollout);
+          for (const SceneAgent& agent : agents[drive][scene]) {
+            const bool is_vehicle = agent.type != TrackType::pedestrian && agent.type != TrackType::cyclist;
+            add(agent, is_vehicle, &counts);
+            if (options.on_agent) options.on_agent(agent);
+          }
         }
       }
+      if (options.on_rollouts) options.on_rollouts(rollouts[scene]);
     }
-    evaluation.scored += static_cast<int>(batch.maps.size());
+    results.faults.insert(results.faults.end(), batch.faults.begin(), batch.faults.end());
+    results.without_drivers += batch.without_drivers;
+    results.num_scenes = end;
   }
   evaluation.seconds = clock.seconds();
-  const auto num_faults = static_cast<int>(evaluation.faults.size());
-  PICTURA_CHECK(evaluation.scored > 0 || evaluation.interrupted || evaluation.without_drivers > 0,
-                "{}: expected a scene, got {} that cannot be used: {}", fmt::join(options.scenes, ", "), num_faults,
-                num_faults > 0 ? evaluation.faults.front() : "no scene is there");
-  for (size_t d = 0; d < num_densities && evaluation.scored > 0; ++d) {
-    evaluation.rows.push_back(row_of(protocol.densities[d], counts[d]));
-  }
+  const std::vector<std::string> faults = evaluation.faults();
+  PICTURA_CHECK(results.scored() > 0 || evaluation.interrupted || results.without_drivers > 0,
+                "{}: expected a scene, got {} that cannot be used: {}", fmt::join(options.scenes, ", "), faults.size(),
+                faults.empty() ? "no scene is there" : faults.front());
+  evaluation.rows = rows_of(results);
   if (!evaluation.interrupted) clock.finish();
   return evaluation;
 }
 
 }  // namespace
+
+std::vector<std::string> SceneEvaluation::faults() const {
+  std::vector<std::string> all = results.unread;
+  all.insert(all.end(), results.faults.begin(), results.faults.end());
+  return all;
+}
 
 SimulatorConfig protocol_config(const SceneProtocol& protocol, SimulatorConfig config) {
   config = scene_config(Scenario{}, 0, config);
@@ -393,6 +482,7 @@ SimulatorConfig protocol_config(const SceneProtocol& protocol, SimulatorConfig c
 
 SceneEvaluation evaluate_scenes(const SceneEvaluateOptions& options) {
   check(options.protocol);
+  if (options.on_rollouts) check_rollouts(options.protocol);
   if (!options.controller.empty()) {
     return evaluate_scenes(controller_driver(options, options.protocol.steps), nullptr, options);
   }

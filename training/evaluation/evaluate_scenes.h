@@ -8,6 +8,7 @@
 #include "pictura/training/evaluation/evaluated_driver.h"
 #include "pictura/training/evaluation/scene_protocol.h"
 #include "pictura/training/evaluation/scene_results.h"
+#include "pictura/training/evaluation/scene_rollouts.h"
 
 namespace pictura {
 
@@ -16,20 +17,22 @@ struct SceneEvaluateOptions : DriverOptions {
   SceneProtocol protocol;
   int first_scene = 0, num_scenes = 0;  // of all that are found; 0: all from the first on
   int scenes_at_once = 0;               // that are simulated together, which changes no figure; 0: as the device needs
-  // For every driven road user: scene by scene, density by density, in the order of the tracks.
+  // For every driven road user: scene by scene, density by density, rollout by rollout, in the order of the tracks.
   std::function<void(const SceneAgent&)> on_agent;
+  // For every scored scene; the protocol must be what check_rollouts() demands.
+  std::function<void(const SceneRollouts&)> on_rollouts;
   std::function<void(double done_fraction, double eta_s)> on_progress;
 };
 
 struct SceneEvaluation {
-  EvaluationSetting setting;
-  std::vector<SceneRow> rows;       // by the densities of the protocol
-  int found = 0, scored = 0;        // scenes
-  int without_drivers = 0;          // left out: nobody whom the protocol would drive, since all are parked or not there
-  std::vector<std::string> faults;  // scenes, files and ends of files that are left out, and why
-  bool interrupted = false;         // ^C came; what is finished is reported
-  double seconds = 0;               // with the loading of scenes
-  int64_t agent_steps = 0;          // of driven agents
+  SceneResults results;
+  std::vector<SceneRow> rows;  // by the densities of the protocol
+  int found = 0;               // scenes that there were to evaluate
+  bool interrupted = false;    // ^C came; what is finished is reported
+  double seconds = 0;          // with the loading of scenes
+
+  /// Scenes, files and ends of files that are left out, and why.
+  std::vector<std::string> faults() const;
 };
 
 /// A world's configuration as a protocol has it: `config`, that of an evaluation, without what scenes have none of.

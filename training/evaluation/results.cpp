@@ -5,16 +5,13 @@
 #include <limits>
 #include <map>
 
-#include <nlohmann/json.hpp>
-
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/training/evaluation/results_json.h"
 
 namespace pictura {
 
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 // The names of all fields of a ScenarioCounts, in files.
 #define PICTURA_SCENARIO_COUNTS(X) \
@@ -38,40 +35,6 @@ Estimate ratio(const std::vector<ScenarioCounts>& scenarios, const Part& part_of
     terms.push_back({static_cast<double>(part_of(scenario)), static_cast<double>(whole_of(scenario))});
   }
   return estimate_ratio(terms);
-}
-
-Json to_json(const EvaluationSetting& s) {
-  Json conditioning;
-  for (size_t i = 0; i < kNumConditioning; ++i) conditioning[kConditioningNames[i]] = s.conditioning[i];
-  return {{"policy_hash", s.policy_hash},
-          {"maps", s.maps},
-          {"steps", s.steps},
-          {"argmax", s.argmax},
-          {"seed", s.seed},
-          {"precision", s.precision},
-          {"device", s.device},
-          {"renderer", s.renderer},
-          {"samples", s.samples},
-          {"image_sizes", s.image_sizes},
-          {"conditioning", conditioning}};
-}
-
-EvaluationSetting setting_from(const Json& json) {
-  EvaluationSetting s;
-  json.at("policy_hash").get_to(s.policy_hash);
-  json.at("maps").get_to(s.maps);
-  json.at("steps").get_to(s.steps);
-  json.at("argmax").get_to(s.argmax);
-  json.at("seed").get_to(s.seed);
-  json.at("precision").get_to(s.precision);
-  json.at("device").get_to(s.device);
-  json.at("renderer").get_to(s.renderer);
-  json.at("samples").get_to(s.samples);
-  json.at("image_sizes").get_to(s.image_sizes);
-  for (size_t i = 0; i < kNumConditioning; ++i) {
-    json.at("conditioning").at(kConditioningNames[i]).get_to(s.conditioning[i]);
-  }
-  return s;
 }
 
 Json to_json(const ScenarioCounts& counts) {
@@ -179,13 +142,7 @@ EvaluationResults merge(const std::vector<EvaluationResults>& parts, const std::
   std::vector<std::string> order;
   std::map<std::string, std::vector<Part>> by_density;
   for (size_t i = 0; i < parts.size(); ++i) {
-    if (parts[i].setting != parts[0].setting) {
-      const Json first = to_json(parts[0].setting), other = to_json(parts[i].setting);
-      for (const auto& [key, value] : first.items()) {
-        PICTURA_CHECK(other[key] == value, "{}: {} is {}, in {} {}", names[i], key, other[key].dump(), names[0],
-                      value.dump());
-      }
-    }
+    check_same(to_json(parts[0].setting), names[0], to_json(parts[i].setting), names[i]);
     for (const DensityResult& density : parts[i].densities) {
       if (!by_density.contains(density.density)) order.push_back(density.density);
       by_density[density.density].push_back({&density, &names[i]});
@@ -211,12 +168,9 @@ void write_results(const std::string& path, const EvaluationResults& results) {
 }
 
 EvaluationResults read_results(const std::string& path) {
-  constexpr const char* kExpected = "expected the results that pictura evaluate --out writes";
-  const std::string text = read_file(path);
+  const Json json = read_results_json(path, kFormat);
   EvaluationResults results;
-  try {
-    const Json json = Json::parse(text);
-    PICTURA_CHECK(json.value("format", "") == kFormat, "expected \"format\": \"{}\"", kFormat);
+  parse_results(path, [&] {
     results.setting = setting_from(json.at("setting"));
     for (const Json& density : json.at("densities")) {
       DensityResult result;
@@ -226,13 +180,7 @@ EvaluationResults read_results(const std::string& path) {
       for (const Json& counts : density.at("scenarios")) result.scenarios.push_back(counts_from(counts));
       results.densities.push_back(std::move(result));
     }
-  } catch (const Json::parse_error& error) {
-    fail("{}: {}, got no JSON from byte {}", path, kExpected, error.byte);
-  } catch (const Json::exception&) {
-    fail("{}: {}, got JSON in which a value is missing or of another type", path, kExpected);
-  } catch (const Error& error) {
-    fail("{}: {}: {}", path, kExpected, error.what());
-  }
+  });
   return results;
 }
 

@@ -1,6 +1,7 @@
 #include "pictura/training/evaluation/scene_protocol.h"
 
 #include <array>
+#include <cmath>
 
 #include "pictura/common/support/numbers.h"
 #include "pictura/common/support/suggestion.h"
@@ -38,11 +39,14 @@ template <auto kMember, int kLow, int kHigh>
 constexpr Rule number_rule(const char* name, const char* values, const char* what) {
   return {{name, values, what},
           [](const std::string& its_name, const std::string& value, SceneProtocol* out) {
+            using Value = std::remove_reference_t<decltype(out->*kMember)>;
+            constexpr bool kIsWhole = std::is_integral_v<Value>;
             const std::optional<double> number = parse_number(value);
-            if (!number || *number < kLow || *number > kHigh) {
-              fail_usage("rule {}: expected a number of {} to {}, got '{}'", its_name, kLow, kHigh, value);
+            if (!number || *number < kLow || *number > kHigh || (kIsWhole && *number != std::floor(*number))) {
+              fail_usage("rule {}: expected a {}number of {} to {}, got '{}'", its_name, kIsWhole ? "whole " : "", kLow,
+                         kHigh, value);
             }
-            out->*kMember = static_cast<std::remove_reference_t<decltype(out->*kMember)>>(*number);
+            out->*kMember = static_cast<Value>(*number);
           },
           [](const SceneProtocol& protocol) { return fmt::format("{}", protocol.*kMember); }};
 }
@@ -65,6 +69,8 @@ constexpr std::array kRules{
     number_rule<&P::least_way_m, 0, 1000>("least_way_m", "0 to 1000",
                                           "who starts nearer to its goal follows the recording"),
     word_rule<&P::replay_experts, kYesNo>("replay_experts", "no, yes", "whether who the file marks as expert is"),
+    number_rule<&P::rollouts, 1, 1000>("rollouts", "1 to 1000",
+                                       "times that each scene is driven, with draws of their own"),
     number_rule<&P::max_driven, 0, 4096>("max_driven", "0 to 4096", "vehicles of a scene, at most; 0: all"),
     number_rule<&P::box_scale, 0, 2>("box_scale", "0 to 2", "of lengths and widths of all road users"),
     number_rule<&P::observed_span_m, 0, 100>("observed_span_m", "0 to 100",
@@ -109,7 +115,14 @@ std::vector<SceneProtocol> make_protocols() {
   waymax.overlapping = Overlapping::drive;
   waymax.after_infraction = AfterInfraction::drive_on;
   waymax.leave_at_goal = false;
-  return {paper, gpudrive, puffer2, puffer3, waymax};
+
+  // The Waymo sim-agents challenge: everybody who is there at the start, whatever happens, 32 times.
+  SceneProtocol simagents = waymax;
+  simagents.name = "simagents";
+  simagents.control = "all";
+  simagents.rollouts = 32;
+  simagents.late = Late::absent;
+  return {paper, gpudrive, puffer2, puffer3, waymax, simagents};
 }
 
 }  // namespace

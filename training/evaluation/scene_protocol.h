@@ -26,6 +26,7 @@ struct SceneProtocol {
   int start_step = 0;                     // of the recording
   int steps = 600;
   std::vector<double> densities{1.0, 0.75, 0.5};  // shares of a scene's road users that stay
+  int rollouts = 1;                               // times that each scene is driven, with draws of their own
   float box_scale = 1;                            // of all lengths and widths
   // Who starts nearer to its goal than this follows the recording. 0: nobody does.
   float least_way_m = 2;
@@ -41,7 +42,8 @@ struct SceneProtocol {
   float observed_span_m = 5;              // see MapOptions
 };
 
-/// The paper's, and gpudrive, pufferdrive2, pufferdrive3 and waymax, whose settings are data in this one place.
+/// The paper's, and gpudrive, pufferdrive2, pufferdrive3, waymax and simagents, whose settings are data in this one
+/// place.
 const std::vector<SceneProtocol>& scene_protocols();
 std::vector<std::string> scene_protocol_names();
 /// Throws UsageError listing the names.

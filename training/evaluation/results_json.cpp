@@ -1,0 +1,78 @@
+#include "pictura/training/evaluation/results_json.h"
+
+#include "pictura/common/error.h"
+#include "pictura/common/support/file.h"
+
+namespace pictura {
+
+namespace {
+
+constexpr const char* kExpected = "expected the results that pictura evaluate --out writes";
+
+}  // namespace
+
+Json to_json(const EvaluationSetting& s) {
+  Json conditioning;
+  for (size_t i = 0; i < kNumConditioning; ++i) conditioning[kConditioningNames[i]] = s.conditioning[i];
+  return {{"policy_hash", s.policy_hash},
+          {"maps", s.maps},
+          {"steps", s.steps},
+          {"argmax", s.argmax},
+          {"seed", s.seed},
+          {"precision", s.precision},
+          {"device", s.device},
+          {"renderer", s.renderer},
+          {"samples", s.samples},
+          {"image_sizes", s.image_sizes},
+          {"conditioning", conditioning}};
+}
+
+EvaluationSetting setting_from(const Json& json) {
+  EvaluationSetting s;
+  json.at("policy_hash").get_to(s.policy_hash);
+  json.at("maps").get_to(s.maps);
+  json.at("steps").get_to(s.steps);
+  json.at("argmax").get_to(s.argmax);
+  json.at("seed").get_to(s.seed);
+  json.at("precision").get_to(s.precision);
+  json.at("device").get_to(s.device);
+  json.at("renderer").get_to(s.renderer);
+  json.at("samples").get_to(s.samples);
+  json.at("image_sizes").get_to(s.image_sizes);
+  for (size_t i = 0; i < kNumConditioning; ++i) {
+    json.at("conditioning").at(kConditioningNames[i]).get_to(s.conditioning[i]);
+  }
+  return s;
+}
+
+void check_same(const Json& first, const std::string& first_name, const Json& other, const std::string& other_name) {
+  for (const auto& [key, value] : first.items()) {
+    PICTURA_CHECK(other.at(key) == value, "{}: {} is {}, in {} {}", other_name, key, other.at(key).dump(), first_name,
+                  value.dump());
+  }
+}
+
+Json read_results_json(const std::string& path, const std::string& format) {
+  const std::string text = read_file(path);
+  Json json;
+  try {
+    json = Json::parse(text);
+  } catch (const Json::parse_error& error) {
+    fail("{}: {}, got no JSON from byte {}", path, kExpected, error.byte);
+  }
+  parse_results(path,
+                [&] { PICTURA_CHECK(json.value("format", "") == format, "expected \"format\": \"{}\"", format); });
+  return json;
+}
+
+void parse_results(const std::string& path, const std::function<void()>& parse) {
+  try {
+    parse();
+  } catch (const Json::exception&) {
+    fail("{}: {}, got JSON in which a value is missing or of another type", path, kExpected);
+  } catch (const Error& error) {
+    fail("{}: {}: {}", path, kExpected, error.what());
+  }
+}
+
+}  // namespace pictura
