@@ -30,14 +30,16 @@ CLI::Option* add_evaluation_options(CLI::App* command, EvaluationArguments* argu
   return sampled;
 }
 
+void set_backends(const BackendOptions& backends, DriverOptions* options_out) {
+  if (!backends.device.empty()) options_out->device = backends.device;
+  if (!backends.simulator.empty()) options_out->simulator = backends.simulator;
+  options_out->renderer = backends.renderer;
+  options_out->samples = backends.samples;
+}
+
 void settle_evaluation_options(EvaluationArguments* arguments) {
-  EvaluateOptions& options = arguments->evaluate;
-  const BackendOptions& backends = arguments->backends;
-  options.argmax = !arguments->sampled;
-  if (!backends.device.empty()) options.device = backends.device;
-  if (!backends.simulator.empty()) options.simulator = backends.simulator;
-  options.renderer = backends.renderer;
-  options.samples = backends.samples;
+  arguments->evaluate.argmax = !arguments->sampled;
+  set_backends(arguments->backends, &arguments->evaluate);
 }
 
 void EvaluationProgress::update(double done, double eta_s) {

@@ -22,6 +22,9 @@ struct EvaluationArguments {
 /// --threads. Returns --sampled.
 CLI::Option* add_evaluation_options(CLI::App* command, EvaluationArguments* arguments);
 
+/// Lets those that were named compute.
+void set_backends(const BackendOptions& backends, DriverOptions* options_out);
+
 /// Puts into arguments->evaluate what has been parsed beside it.
 void settle_evaluation_options(EvaluationArguments* arguments);
 

@@ -116,14 +116,15 @@ void add_compare_option(CLI::App* command, std::optional<EarlierReport>* earlier
 void add_bench_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "bench",
-      "Measure rates, quality and worlds: bench render, bench history, bench simulate, bench train, bench breakdown, "
-      "bench quality, bench worlds, bench map, bench soak");
+      "Measure rates, quality and worlds: bench render, bench history, bench simulate, bench train, bench scenes, "
+      "bench breakdown, bench quality, bench worlds, bench map, bench soak");
   command->require_subcommand(1);
   command->footer(
       "Examples:\n  pictura bench simulate --map Town01 --agents 120 --json\n  pictura bench render --size 192x108\n"
       "  pictura bench worlds --map procedural:1 --episodes 5");
 #ifdef PICTURA_HAS_TORCH
   add_train_benchmark(*command);
+  add_scenes_benchmark(*command);
 #endif
 #ifdef PICTURA_HAS_BENCH
   add_simulate_benchmark(*command);

@@ -61,9 +61,10 @@ void add_compare_option(CLI::App* command, std::optional<EarlierReport>* earlier
 /// Adds the subcommand `bench`.
 void add_bench_command(CLI::App& app);
 
-/// Add `bench train`, `bench breakdown`, `bench simulate`, `bench quality`, `bench render`, `bench history`, `bench
-/// worlds`, `bench map` and `bench soak`.
+/// Add `bench train`, `bench scenes`, `bench breakdown`, `bench simulate`, `bench quality`, `bench render`, `bench
+/// history`, `bench worlds`, `bench map` and `bench soak`.
 void add_train_benchmark(CLI::App& bench);
+void add_scenes_benchmark(CLI::App& bench);
 void add_breakdown_benchmark(CLI::App& bench);
 void add_simulate_benchmark(CLI::App& bench);
 void add_quality_benchmark(CLI::App& bench);

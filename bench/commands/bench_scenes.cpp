@@ -1,0 +1,126 @@
+// `pictura bench scenes`: how many recorded scenes a minute a protocol evaluates, with the loading of scenes.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "pictura/bench/commands/bench.h"
+#ifdef PICTURA_HAS_BENCH
+#include "pictura/bench/render.h"
+#endif
+#include "pictura/cli/evaluation_options.h"
+#include "pictura/cli/number_options.h"
+#include "pictura/common/error.h"
+#include "pictura/common/support/interrupt.h"
+#include "pictura/training/evaluation/evaluate_scenes.h"
+
+namespace pictura {
+
+namespace {
+
+struct Arguments {
+  SceneEvaluateOptions evaluate;
+  BackendOptions backends;
+  std::string protocol = "womd";
+  std::vector<std::string> rules;
+  int copies = 1, repeats = 5;
+  bool sampled = false, json = false;
+  std::optional<EarlierReport> earlier;
+};
+
+SceneEvaluation measured(const SceneEvaluateOptions& options) {
+  SceneEvaluation evaluation = evaluate_scenes(options);
+  if (evaluation.interrupted) throw Interrupted("interrupted");
+  PICTURA_CHECK(evaluation.results.scored() > 0, "bench scenes: expected a scene with somebody to drive, got none");
+  return evaluation;
+}
+
+void run(const Arguments& arguments) {
+  SceneEvaluateOptions options = arguments.evaluate;
+  const bool has_policy = options.controller.empty();
+  if (options.checkpoint.empty() && has_policy) fail_usage("bench scenes: expected a CHECKPOINT or --policy");
+  if (options.scenes.empty()) fail_usage("bench scenes: expected --scenes");
+  set_backends(arguments.backends, &options);
+  options.argmax = !arguments.sampled;
+  options.protocol = scene_protocol(arguments.protocol);
+  for (const std::string& rule : arguments.rules) set_scene_rule(rule, &options.protocol);
+  ProgressLine progress;
+  progress.update("warming up");
+  measured(options);  // scenes are in the cache afterwards, and kernels compiled
+  const std::vector<std::string> names = options.scenes;
+  for (int copy = 1; copy < arguments.copies; ++copy) {
+    options.scenes.insert(options.scenes.end(), names.begin(), names.end());
+  }
+  const std::string name =
+      fmt::format("{}, {}", arguments.protocol, has_policy ? options.checkpoint : options.controller);
+  BenchResult scenes{name, "scenes_per_min", {}}, steps{name + ", driven agents", "agent_steps_per_s", {}};
+  SceneEvaluation last;
+  for (int repeat = 0; repeat < arguments.repeats; ++repeat) {
+    options.on_progress = [&](double done, double eta_s) {
+      progress.update(fmt::format("repeat {} of {}: {:.0f} %  ETA {}", repeat + 1, arguments.repeats, 100 * done,
+                                  format_duration(eta_s)));
+    };
+    last = measured(options);
+    scenes.values.push_back(60 * last.results.scored() / last.seconds);
+    steps.values.push_back(static_cast<double>(last.results.agent_steps()) / last.seconds);
+  }
+  progress.finish();
+  const EvaluationSetting& setting = last.results.setting;
+  const SceneProtocol& protocol = options.protocol;
+  std::string images;
+  if (!setting.image_sizes.empty()) {
+    images = fmt::format(", images {} by {}, {} samples", fmt::join(setting.image_sizes, " "), setting.renderer,
+                         setting.samples);
+  }
+  BenchContext context{
+      .workload = fmt::format("scenes: {} copies of {}, {} scored; protocol {}, {} steps, {} densities, {} rollouts{}",
+                              arguments.copies, fmt::join(names, " "), last.results.scored(), protocol.name,
+                              protocol.steps, protocol.densities.size(), protocol.rollouts, images),
+      .backend = setting.device};
+#ifdef PICTURA_HAS_BENCH
+  if (setting.device.starts_with("cuda")) context.add_gpu(cuda_device_name(), cuda_driver_name());
+#endif
+  report_benchmark(arguments.json, context, {scenes, steps}, arguments.earlier);
+}
+
+}  // namespace
+
+void add_scenes_benchmark(CLI::App& bench) {
+  auto arguments = std::make_shared<Arguments>();
+  SceneEvaluateOptions& options = arguments->evaluate;
+  CLI::App* command = bench.add_subcommand("scenes", "Evaluations in recorded scenes, as evaluate --protocol");
+  command->add_option("CHECKPOINT", options.checkpoint, "A checkpoint that train wrote, or safetensors");
+  command->add_option("--policy", options.controller, "A controller that drives instead, such as idm or random");
+  command->add_option("--protocol", arguments->protocol, "As evaluate has it")
+      ->check(one_of(scene_protocol_names()))
+      ->capture_default_str();
+  command
+      ->add_option("--scenes", options.scenes,
+                   "Files, folders of them, FILE#K or FILE#SCENARIO_ID, with commas between")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command->add_option("--copies", arguments->copies, "How often each scene is evaluated in one measurement")
+      ->transform(whole_number(1, 100'000))
+      ->capture_default_str();
+  command
+      ->add_option("--rule", arguments->rules, "NAME=VALUE in place of one of the protocol's; may be given many times")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--at-once", options.scenes_at_once,
+                   "Scenes that are simulated together; default: 256 on a device, 16 on the host")
+      ->transform(whole_number(1, 100'000));
+  command->add_flag("--sampled", arguments->sampled, "Draw actions from the policy instead of taking the most likely");
+  add_policy_backend_options(command, "auto, and drawn as in training", &arguments->backends);
+  add_threads_option(command, &options.num_threads);
+  command->add_option("--repeats", arguments->repeats, "Measurements; the median is printed")
+      ->transform(whole_number(1, 1000))
+      ->capture_default_str();
+  command->add_flag("--json", arguments->json, "Print one JSON object");
+  add_compare_option(command, &arguments->earlier);
+  command->footer(
+      "Examples:\n"
+      "  pictura bench scenes run.ckpt --scenes validation/ --repeats 3\n"
+      "  pictura bench scenes run.ckpt --scenes scene.tfrecord --copies 1000 --device cuda --json\n"
+      "  pictura bench scenes --policy idm --protocol waymax --scenes scene.tfrecord --copies 20");
+  command->callback([arguments] { run(*arguments); });
+}
+
+}  // namespace pictura
