@@ -6,6 +6,7 @@
 
 #include "pictura/apps/commands.h"
 #include "pictura/apps/scene_evaluation.h"
+#include "pictura/cli/drive.h"
 #include "pictura/cli/evaluation_options.h"
 #include "pictura/cli/file_options.h"
 #include "pictura/cli/number_options.h"

@@ -503,7 +503,7 @@ folders, 'FILE#K'. protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3',
 densities (shares of road users that stay) and rules (values by name, docs/evaluation.md) replace what it says.
 first_scene, num_scenes: a part of the scenes; 0: all from the first on. rollouts: a file for them, with the protocol
 'simagents', as the Waymo sim-agents challenge takes them. The others as in evaluate(). Returns a dict: rows, one a
-density, with each metric as (value, half of its 95 % interval); agents, one for every driven road user of a scene and density;
+density, with each metric as (value, half of its 95 % interval); agents, one for every driven road user of a scene, density and rollout;
 scenes, scored, without_drivers, faults (scenes that are left out, and why); seconds, agent_steps, policy_hash. ^C raises
 KeyboardInterrupt. Raises pictura.Error where no scene can be used.)");
   module.def(

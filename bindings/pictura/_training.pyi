@@ -63,15 +63,16 @@ def evaluate(checkpoint: str, maps: collections.abc.Sequence[str], *, controller
     own. Returns a dict: rows, one a density: its counts, and each metric as (value, half of its 95 % interval); seconds,
     agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.
     """
-def evaluate_scenes(checkpoint: str, scenes: collections.abc.Sequence[str], *, protocol: str = 'womd', controller: str = '', control: str | None = None, start_step: typing.SupportsInt | typing.SupportsIndex | None = None, steps: typing.SupportsInt | typing.SupportsIndex | None = None, densities: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, rules: dict = {}, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, num_scenes: typing.SupportsInt | typing.SupportsIndex = 0, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', conditioning: dict = {}, on_progress: typing.Any = None) -> dict:
+def evaluate_scenes(checkpoint: str, scenes: collections.abc.Sequence[str], *, protocol: str = 'womd', controller: str = '', control: str | None = None, start_step: typing.SupportsInt | typing.SupportsIndex | None = None, steps: typing.SupportsInt | typing.SupportsIndex | None = None, densities: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, rules: dict = {}, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, num_scenes: typing.SupportsInt | typing.SupportsIndex = 0, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', conditioning: dict = {}, rollouts: str = '', on_progress: typing.Any = None) -> dict:
     """
     The paper's zero-shot evaluation in recorded scenes, as `pictura evaluate --protocol` does it.
     
     checkpoint: of a policy; '' with a controller: 'log', 'inverse', 'idm', 'random' or 'idle', which drives instead. scenes: files,
-    folders, 'FILE#K'. protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3' or 'waymax'; control, start_step, steps,
+    folders, 'FILE#K'. protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3', 'waymax' or 'simagents'; control, start_step, steps,
     densities (shares of road users that stay) and rules (values by name, docs/evaluation.md) replace what it says.
-    first_scene, num_scenes: a part of the scenes; 0: all from the first on. The others as in evaluate(). Returns a dict: rows, one a
-    density, with each metric as (value, half of its 95 % interval); agents, one for every driven road user of a scene and density;
+    first_scene, num_scenes: a part of the scenes; 0: all from the first on. rollouts: a file for them, with the protocol
+    'simagents', as the Waymo sim-agents challenge takes them. The others as in evaluate(). Returns a dict: rows, one a
+    density, with each metric as (value, half of its 95 % interval); agents, one for every driven road user of a scene, density and rollout;
     scenes, scored, without_drivers, faults (scenes that are left out, and why); seconds, agent_steps, policy_hash. ^C raises
     KeyboardInterrupt. Raises pictura.Error where no scene can be used.
     """
