@@ -299,7 +299,7 @@ TEST_F(SceneEvaluations, KeepRolloutsOfEverybodyWhoIsThere) {
       EXPECT_NEAR(first.x_m, scene.map.origin_m[0] + double(start.position_m.x), 3.5);
       EXPECT_NEAR(first.y_m, scene.map.origin_m[1] + double(start.position_m.y), 3.5);
       const float height_m = scene.tracks[size_t(tracks[i])].height_m;
-      EXPECT_NEAR(first.z_m, scene.map.origin_m[2] + double(start.position_m.z + height_m / 2), 0.5);
+      EXPECT_NEAR(first.z_m, scene.map.origin_m[2] + double(start.position_m.z + height_m / 2), 0.01);
       EXPECT_LE(std::abs(first.heading_rad), kPi);
     }
   }

@@ -80,12 +80,12 @@ Array array_of(const DeviceCopy<T>& copy, const Dims& shape, Device device) {
   return Array(copy.span().data(), shape, device);
 }
 
-/// Where a box of the map's is, in the coordinates of the scene's file.
-SimulatedState simulated_state(const RoadMap& map, const AgentBox& box) {
+/// Where a box of the map's is, in the coordinates of the scene's file; its centre is rise_m above its foot.
+SimulatedState simulated_state(const RoadMap& map, const AgentBox& box, float rise_m) {
   const auto in_file = [&map](int axis, float metres) {
     return static_cast<float>(map.origin_m[static_cast<size_t>(axis)] + static_cast<double>(metres));
   };
-  return {in_file(0, box.center_m.x), in_file(1, box.center_m.y), in_file(2, box.center_m.z + box.height_m / 2),
+  return {in_file(0, box.center_m.x), in_file(1, box.center_m.y), in_file(2, box.center_m.z + rise_m),
           std::atan2(box.sin_heading, box.cos_heading)};
 }
 
@@ -126,6 +126,15 @@ class BatchDrive {
       return map.scenario->valid_of(track_of_slot_[slot])[static_cast<size_t>(map.start_step)] != 0;
     });
     places_.resize(kept_slots_.size() * static_cast<size_t>(protocol_.steps));
+    // Boxes stand on the road of the map, recorded ones near it: none rises or falls at the start.
+    const std::vector<AgentBox> boxes = host_copy_of_structs(simulator_.scene().agents, device());
+    for (const int32_t kept : kept_slots_) {
+      const auto slot = static_cast<size_t>(kept);
+      const CompiledMap& map = map_of(slot);
+      const float foot_m =
+          map.scenario->states_of(track_of_slot_[slot])[static_cast<size_t>(map.start_step)].position_m.z;
+      rises_m_.push_back(foot_m + boxes[slot].height_m / 2 - boxes[slot].center_m.z);
+    }
     note_places(0);
   }
 
@@ -328,7 +337,7 @@ class BatchDrive {
       const auto slot = static_cast<size_t>(kept_slots_[i]);
       SimulatedState* const places = &places_[i * steps];
       if (boxes[slot].drawn)
-        places[at] = simulated_state(map_of(slot).scenario->map, boxes[slot]);
+        places[at] = simulated_state(map_of(slot).scenario->map, boxes[slot], rises_m_[i]);
       else if (at > 0)
         places[at] = places[at - 1];
     }
@@ -347,6 +356,7 @@ class BatchDrive {
   std::vector<Displacement> displacements_;
   std::vector<int32_t> driven_steps_;
   std::vector<int32_t> kept_slots_;     // whose places are kept
+  std::vector<float> rises_m_;          // [kept_slots] from the foot of the box to the centre of the recorded one
   std::vector<SimulatedState> places_;  // [kept_slots * steps]
 };
 
