@@ -126,6 +126,9 @@ void add_tracks(const FixtureOptions& options, LoggedScene* scene) {
     return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
   };
   const int count = options.num_vehicles + options.num_pedestrians + options.num_cyclists;
+  // On long lanes nobody starts in another's place.
+  constexpr double kApart_m = 8;
+  const int places = std::max(4, static_cast<int>(kSpacing_m * (options.lane_points - 1) / kApart_m) - 1);
   for (int i = 0; i < count; ++i) {
     LoggedTrack track{.id = 1000 + 7 * i, .type = TrackType::vehicle, .control = RecordedControl::controllable};
     double length_m = uniform(4, 5.5), width_m = uniform(1.8, 2.1), height_m = uniform(1.4, 1.8), speed_mps = 0;
@@ -141,7 +144,8 @@ void add_tracks(const FixtureOptions& options, LoggedScene* scene) {
       track.control = RecordedControl::expert;
     }
     const int arm = i % 4;
-    const double start_m = kArm_m + 4 + 8 * (i / 4 % 4), side_m = track.type == TrackType::pedestrian ? 6 : kHalfLane_m;
+    const double start_m = kArm_m + 4 + kApart_m * (i / 4 % places),
+                 side_m = track.type == TrackType::pedestrian ? 6 : kHalfLane_m;
     for (int step = 0; step < options.num_steps; ++step) {
       LoggedState state;
       // The last track has gaps; invalid states still carry a centre.
