@@ -125,7 +125,9 @@ endfunction()
 # pictura_add_test(NAME SOURCES... LINK libs... [LABELS labels...] [PRECOMPILED header] [WHOLE suites...] [OPTIMIZED]):
 # GoogleTest binary NAME_test, every test its own ctest entry, with PICTURA_DATA set to ../shared/data if that exists and
 # the caller has not set it. WHOLE: suites whose tests share results that are costly to make, an entry each. OPTIMIZED: for
-# tests that compute much themselves.
+# tests that compute much themselves. The label threads is for tests of what runs on several threads: the target
+# threaded_tests builds them, and the preset tsan these alone.
+add_custom_target(threaded_tests)
 function(pictura_add_test name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "OPTIMIZED" "PRECOMPILED" "SOURCES;LINK;LABELS;WHOLE")
   find_package(GTest REQUIRED)
@@ -145,6 +147,9 @@ function(pictura_add_test name)
   endif()
   if(NOT arg_OPTIMIZED)
     pictura_leave_unoptimized(${name}_test)
+  endif()
+  if(threads IN_LIST arg_LABELS)
+    add_dependencies(threaded_tests ${name}_test)
   endif()
   pictura_test_properties(properties 900 "${arg_LABELS}")
   set(filter)
