@@ -74,11 +74,9 @@ function(pictura_forbid_fma target)
 endfunction()
 
 # pictura_leave_unoptimized(TARGET): for code that calls what is optimized. Optimizing takes a compiler three quarters of
-# its time with a test. Sanitized code is little optimized anyway.
+# its time with a test.
 function(pictura_leave_unoptimized target)
-  if(NOT PICTURA_SANITIZE)
-    target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-O0>)
-  endif()
+  target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-O0>)
 endfunction()
 
 # pictura_precompile(NAME HEADERS [LINK libs...]): a precompiled header of libraries' headers, which take a compiler longer
