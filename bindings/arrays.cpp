@@ -86,6 +86,17 @@ std::string numpy_name(const LentArray& lent) {
   return "";
 }
 
+/// NumPy's type; the common ones without a look-up by name.
+py::dtype numpy_type(const LentArray& lent) {
+  if (lent.is_bool) return py::dtype::of<bool>();
+  switch (lent.array.type) {
+    case ElementType::u8: return py::dtype::of<uint8_t>();
+    case ElementType::i32: return py::dtype::of<int32_t>();
+    case ElementType::f32: return py::dtype::of<float>();
+    default: return py::dtype(numpy_name(lent));
+  }
+}
+
 std::vector<int64_t> values_of(const Dims& dims) {
   std::vector<int64_t> values;
   for (int i = 0; i < dims.rank(); ++i) values.push_back(dims[i]);
@@ -231,8 +242,11 @@ py::array numpy_of(const py::object& self) {
     shape.push_back(lent.array.shape[i]);
     strides.push_back(lent.array.strides[i] * static_cast<py::ssize_t>(bytes_of(lent.array.type)));
   }
-  py::array view(py::dtype(numpy_name(lent)), shape, strides, lent.array.data, self);
-  if (lent.array.is_read_only) view.attr("setflags")(py::arg("write") = false);
+  py::array view(numpy_type(lent), shape, strides, lent.array.data, self);
+  // As setflags(write=False), which takes as long as all the rest.
+  if (lent.array.is_read_only) {
+    py::detail::array_proxy(view.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
+  }
   return view;
 }
 
