@@ -79,6 +79,11 @@ function(pictura_leave_unoptimized target)
   target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-O0>)
 endfunction()
 
+# pictura_optimize_little(TARGET): for what reads options and prints results, whose templates take a compiler long.
+function(pictura_optimize_little target)
+  target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-O1>)
+endfunction()
+
 # pictura_precompile(NAME HEADERS [LINK libs...]): a precompiled header of libraries' headers, which take a compiler longer
 # than most sources that include them; pictura_use_precompiled(TARGET NAME) reads it. Headers of the project and of the
 # standard are left out, so that a source which lacks one does not compile, as long as HEADERS do not bring it along:
