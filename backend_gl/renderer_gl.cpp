@@ -64,6 +64,7 @@ class GlRenderer final : public Renderer {
   std::string_view name() const override { return name_; }
   Device device() const override { return memory_; }
   const RendererConfig& config() const override { return config_; }
+  bool draws_all_formats() const override { return false; }
   /// The driver's name of the device.
   const std::string& drawn_by() const { return drawn_by_; }
 
@@ -78,7 +79,7 @@ class GlRenderer final : public Renderer {
   }
 
   void render(const SceneBatch& scene, const ViewBatch& views, const ImageBatch& images_out, Stream stream) override {
-    check_images(name_, config_.rig, device(), views.size(), images_out);
+    check_images(*this, views.size(), images_out);
     for (std::size_t i = 0; i < images_out.cameras.size(); ++i) {
       const CameraImages& camera = images_out.cameras[i];
       PICTURA_CHECK(!camera.depth_m && !camera.class_id && !camera.instance_id,

@@ -36,7 +36,7 @@ class NullRenderer final : public Renderer {
   void release(GeometryHandle handle, Stream) override { check_handle(name(), handle); }
 
   void render(const SceneBatch&, const ViewBatch& batch, const ImageBatch& images_out, Stream) override {
-    check_images(name(), config_.rig, device(), batch.size(), images_out, /*draws_f16=*/true);
+    check_images(*this, batch.size(), images_out);
     const Span<const View> views = counted_views(name(), batch);
     const std::size_t value_bytes = bytes_per_value(images_out.format);
     for (const CameraImages& camera : images_out.cameras) {
@@ -44,7 +44,8 @@ class NullRenderer final : public Renderer {
       for (std::size_t view = 0; view < views.size(); ++view) {
         auto* first =
             static_cast<uint8_t*>(camera.data) + view * static_cast<std::size_t>(camera.view_stride) * value_bytes;
-        std::memset(first, 0, 3 * pixels * value_bytes);
+        const int64_t values = image_values({camera.width_px, camera.height_px}, images_out.order);
+        std::memset(first, 0, static_cast<std::size_t>(values) * value_bytes);
         for (std::size_t i = view * pixels; i < (view + 1) * pixels; ++i) {
           if (camera.depth_m) camera.depth_m[i] = std::numeric_limits<float>::infinity();
           if (camera.class_id) camera.class_id[i] = 0;

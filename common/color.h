@@ -11,8 +11,13 @@ struct Rgb {
   float r = 0, g = 0, b = 0;
 };
 
-/// Storage of a channel: a byte, or a half or float in [0, 1].
-enum class PixelFormat : uint8_t { u8, f16, f32 };
+/// Storage of a channel: a byte; a half or float in [0, 1]; or the byte, 0 to 255, as a bfloat16, which holds it
+/// exactly.
+enum class PixelFormat : uint8_t { u8, f16, f32, bf16 };
+
+/// How the channels of an image are stored: [3, height, width]; [height, width, 3]; or [rows, columns, kPatchValues] of
+/// patches (patches.h), black beyond the image.
+enum class ChannelOrder : uint8_t { planar, interleaved, patches };
 
 PICTURA_HD constexpr Rgb rgb8(int r, int g, int b) {
   return {static_cast<float>(r) / 255.0f, static_cast<float>(g) / 255.0f, static_cast<float>(b) / 255.0f};

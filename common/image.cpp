@@ -16,12 +16,26 @@ namespace pictura {
 std::size_t bytes_per_value(PixelFormat format) {
   switch (format) {
     case PixelFormat::u8: return 1;
-    case PixelFormat::f16: return 2;
+    case PixelFormat::f16:
+    case PixelFormat::bf16: return 2;
     default: return 4;
   }
 }
 
-std::string_view name_of(ChannelOrder order) { return order == ChannelOrder::planar ? "planar" : "interleaved"; }
+std::string_view name_of(ChannelOrder order) {
+  switch (order) {
+    case ChannelOrder::planar: return "planar";
+    case ChannelOrder::interleaved: return "interleaved";
+    default: return "patches";
+  }
+}
+
+constexpr int64_t kChannels = 3;
+
+int64_t image_values(ImageSize size, ChannelOrder order) {
+  if (order != ChannelOrder::patches) return kChannels * size.pixels();
+  return int64_t{kPatchValues} * patches_along(size.width_px) * patches_along(size.height_px);
+}
 
 ImageLayout image_layout(Span<const ImageSize> sizes, int64_t num_views, PixelFormat format, ChannelOrder order) {
   PICTURA_CHECK(num_views >= 0, "images: expected 0 views or more, got {}", num_views);
@@ -37,21 +51,21 @@ ImageLayout image_layout(Span<const ImageSize> sizes, int64_t num_views, PixelFo
     if (block == layout.blocks.end()) layout.blocks.push_back({.size = sizes[i]});
     layout.blocks[static_cast<std::size_t>(camera.block)].cameras.push_back(static_cast<int>(i));
   }
-  constexpr int64_t kChannels = 3;
   const bool is_planar = order == ChannelOrder::planar;
   for (BlockLayout& block : layout.blocks) {
     block.offset = layout.num_values;
-    const int64_t image_values = kChannels * block.size.pixels();
+    const int64_t values = image_values(block.size, order);
     for (std::size_t i = 0; i < block.cameras.size(); ++i) {
       CameraLayout& camera = layout.cameras[static_cast<std::size_t>(block.cameras[i])];
-      camera.offset = block.offset + static_cast<int64_t>(i) * image_values;
-      camera.view_stride = static_cast<int64_t>(block.cameras.size()) * image_values;
-      camera.camera_stride = image_values;
+      camera.offset = block.offset + static_cast<int64_t>(i) * values;
+      camera.view_stride = static_cast<int64_t>(block.cameras.size()) * values;
+      camera.camera_stride = values;
+      if (order == ChannelOrder::patches) continue;
       camera.channel_stride = is_planar ? block.size.pixels() : 1;
       camera.pixel_stride = is_planar ? 1 : kChannels;
       camera.row_stride = block.size.width_px * camera.pixel_stride;
     }
-    layout.num_values += num_views * static_cast<int64_t>(block.cameras.size()) * image_values;
+    layout.num_values += num_views * static_cast<int64_t>(block.cameras.size()) * values;
   }
   return layout;
 }
@@ -73,8 +87,8 @@ CameraImages camera_images(const ImageLayout& layout, int camera, void* first) {
   return images;
 }
 
-HostImages::HostImages(const Rig& rig, int num_views, PixelFormat format, Planes planes)
-    : layout_(image_layout(rig, num_views, format)), bytes_(layout_.bytes()) {
+HostImages::HostImages(const Rig& rig, int num_views, PixelFormat format, Planes planes, ChannelOrder order)
+    : layout_(image_layout(rig, num_views, format, order)), bytes_(layout_.bytes()) {
   for (int i = 0; i < static_cast<int>(layout_.cameras.size()); ++i) {
     cameras_.push_back(camera_images(layout_, i, bytes_.data()));
   }
@@ -102,7 +116,8 @@ ImageBatch HostImages::batch() {
 }
 
 std::vector<uint8_t> HostImages::interleaved(int view, int camera_index) const {
-  PICTURA_CHECK(layout_.format == PixelFormat::u8, "images: expected the format u8");
+  PICTURA_CHECK(layout_.format == PixelFormat::u8 && layout_.order == ChannelOrder::planar,
+                "images: expected planar ones of the format u8");
   const CameraLayout& from = layout_.cameras[static_cast<std::size_t>(camera_index)];
   const ImageLayout one =
       image_layout(Span<const ImageSize>(&from.size, 1), 1, PixelFormat::u8, ChannelOrder::interleaved);

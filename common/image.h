@@ -11,6 +11,7 @@
 #include "pictura/common/color.h"
 #include "pictura/common/device.h"
 #include "pictura/common/error.h"
+#include "pictura/common/patches.h"
 #include "pictura/common/span.h"
 
 namespace pictura {
@@ -18,8 +19,6 @@ namespace pictura {
 /// Size of one channel of one pixel.
 std::size_t bytes_per_value(PixelFormat format);
 
-/// How the channels of an image are stored: [3, height, width], or [height, width, 3].
-enum class ChannelOrder : uint8_t { planar, interleaved };
 std::string_view name_of(ChannelOrder order);
 
 struct ImageSize {
@@ -27,9 +26,12 @@ struct ImageSize {
   bool operator==(const ImageSize&) const = default;
   int64_t pixels() const { return int64_t{width_px} * height_px; }
 };
+/// How many values one image of this size has: channels of pixels, and what patches add to them.
+int64_t image_values(ImageSize size, ChannelOrder order);
 
 /// Where one camera's images lie in the memory of a layout. Channel c of pixel (x, y) of a view is the value
-/// offset + view * view_stride + c * channel_stride + y * row_stride + x * pixel_stride; all of these count values.
+/// offset + view * view_stride + c * channel_stride + y * row_stride + x * pixel_stride; all of these count values. In
+/// patches it is offset + view * view_stride + place_in_patches(width, c, x, y), and the last three are 0.
 struct CameraLayout {
   ImageSize size;
   int block = 0;  // index into ImageLayout::blocks
@@ -58,8 +60,9 @@ ImageLayout image_layout(Span<const ImageSize> sizes, int64_t num_views, PixelFo
 ImageLayout image_layout(const Rig& rig, int64_t num_views, PixelFormat format,
                          ChannelOrder order = ChannelOrder::planar);
 
-/// Memory of one camera's images. Value (view, channel, y, x) is element
-/// view * view_stride + (channel * height + y) * width + x of `data`: images are planar and have no gaps within.
+/// Memory of one camera's images. In planar images value (view, channel, y, x) is element
+/// view * view_stride + (channel * height + y) * width + x of `data`, in patches view * view_stride +
+/// place_in_patches(width, channel, x, y): there are no gaps within.
 struct CameraImages {
   int width_px = 0, height_px = 0;
   void* data = nullptr;             // colour, of ImageBatch::format
@@ -72,7 +75,8 @@ struct CameraImages {
 /// A camera's images in the memory of a whole layout, without planes.
 CameraImages camera_images(const ImageLayout& layout, int camera, void* first);
 
-/// What render() fills. Renderers draw planar images, and refuse an order that they do not draw.
+/// What render() fills. All renderers draw planar images, those that say so (Renderer::draws_all_formats) patches too;
+/// others are refused.
 struct ImageBatch {
   Device device;  // of all that follows
   PixelFormat format = PixelFormat::u8;
@@ -83,10 +87,11 @@ struct ImageBatch {
 
 enum class Planes : uint8_t { none, all };  // depth, class and instance
 
-/// Host memory for the images of a rig: colour as image_layout says, planar.
+/// Host memory for the images of a rig: colour as image_layout says.
 class HostImages {
  public:
-  HostImages(const Rig& rig, int num_views, PixelFormat format = PixelFormat::u8, Planes planes = Planes::none);
+  HostImages(const Rig& rig, int num_views, PixelFormat format = PixelFormat::u8, Planes planes = Planes::none,
+             ChannelOrder order = ChannelOrder::planar);
   // A copy's cameras would point into the original's memory.
   HostImages(const HostImages&) = delete;
   HostImages& operator=(const HostImages&) = delete;
@@ -98,7 +103,7 @@ class HostImages {
   Span<const uint8_t> bytes() const { return bytes_; }
   Span<uint8_t> bytes() { return bytes_; }
   const CameraImages& camera(int index) const { return cameras_[static_cast<size_t>(index)]; }
-  /// u8 colour of one image as [height, width, 3]. Throws unless the format is u8.
+  /// u8 colour of one image as [height, width, 3]. Throws unless the format is u8 and the order planar.
   std::vector<uint8_t> interleaved(int view, int camera) const;
 
  private:

@@ -48,6 +48,8 @@ class Renderer {
   /// Where scenes, views and queries are read from and images written to.
   virtual Device device() const = 0;
   virtual const RendererConfig& config() const = 0;
+  /// Whether it draws every format, and patches as well as planar images; otherwise it draws u8 and f32, planar.
+  virtual bool draws_all_formats() const { return true; }
 
   /// Copies a map's geometry. The caller chooses the handle, in [0, kNumGeometryHandles), that names it in
   /// SceneBatch::geometry, so that one scene serves several renderers; what the handle held before is replaced for the

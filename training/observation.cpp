@@ -75,19 +75,44 @@ std::vector<ImageBlock> allocate_images(const Rig& rig, std::vector<int64_t> bat
   return blocks;
 }
 
-std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> views, Renderer* renderer) {
+namespace {
+
+// Images of one camera after the other.
+std::vector<ImageBlock> allocate_patches(const ImageLayout& layout, Device device) {
+  std::vector<ImageBlock> blocks;
+  for (const BlockLayout& block : layout.blocks) {
+    const at::Tensor pixels =
+        at::empty({static_cast<int64_t>(block.cameras.size()), layout.num_views, patches_along(block.size.height_px),
+                   patches_along(block.size.width_px), kPatchValues},
+                  at::TensorOptions(at::kBFloat16).device(torch_device(device)));
+    blocks.push_back({pixels.transpose(0, 1), {block.cameras.begin(), block.cameras.end()}});
+  }
+  return blocks;
+}
+
+}  // namespace
+
+std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> views, Renderer* renderer,
+                                    bool wants_patches) {
+  const bool as_patches = wants_patches && renderer->draws_all_formats();
   const Rig& rig = renderer->config().rig;
   const auto num_views = static_cast<int64_t>(views.size());
-  const ImageLayout layout = image_layout(rig, num_views, PixelFormat::u8);
-  std::vector<ImageBlock> blocks = allocate_images(rig, {num_views}, renderer->device());
+  const PixelFormat format = as_patches ? PixelFormat::bf16 : PixelFormat::u8;
+  const ChannelOrder order = as_patches ? ChannelOrder::patches : ChannelOrder::planar;
+  const ImageLayout layout = image_layout(rig, num_views, format, order);
+  std::vector<ImageBlock> blocks =
+      as_patches ? allocate_patches(layout, renderer->device()) : allocate_images(rig, {num_views}, renderer->device());
+  // Each block is a tensor of its own, whose strides say where an image of a view and a camera begins.
   std::vector<CameraImages> cameras;
+  std::vector<int64_t> num_placed(blocks.size());
   for (const CameraLayout& camera : layout.cameras) {
-    // Each block is a tensor of its own.
     const auto block = static_cast<size_t>(camera.block);
-    uint8_t* const first = blocks[block].pixels.data_ptr<uint8_t>() + (camera.offset - layout.blocks[block].offset);
-    cameras.push_back({camera.size.width_px, camera.size.height_px, first, camera.view_stride});
+    const at::Tensor& pixels = blocks[block].pixels;
+    auto* const first = static_cast<std::byte*>(pixels.data_ptr()) +
+                        num_placed[block]++ * pixels.stride(1) * static_cast<int64_t>(pixels.element_size());
+    cameras.push_back({camera.size.width_px, camera.size.height_px, first, pixels.stride(0)});
   }
-  renderer->render(scene, views, {renderer->device(), PixelFormat::u8, static_cast<int>(num_views), cameras},
+  renderer->render(scene, views, {renderer->device(), format, static_cast<int>(num_views), cameras, order},
                    current_stream(renderer->device()));
   return blocks;
 }

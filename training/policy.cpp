@@ -186,6 +186,9 @@ class PerspectiveEncoder final : public SceneEncoder {
 
   int64_t width() const override { return 4 * int64_t{config_.embedding_width}; }
   const ImageBackbone* image_backbone() const override { return backbone_.get(); }
+  bool reads_patches() const override {
+    return !backbone_ && config_.patch_px == kPatch_px && image_type_ == at::kBFloat16;
+  }
 
   at::Tensor forward(const Observation& o) const override {
     std::vector<at::Tensor> per_camera(static_cast<size_t>(num_cameras_));
@@ -231,9 +234,11 @@ class PerspectiveEncoder final : public SceneEncoder {
     return backbone;
   }
 
-  // [cameras * batch, width, rows, columns], channels last in memory.
+  // [cameras * batch, width, rows, columns], channels last in memory. images: as an ImageBlock has them.
   at::Tensor convolve(const at::Tensor& images) const {
-    at::Tensor x = image_patches(images, config_.patch_px, image_type_);
+    const bool are_patches = images.scalar_type() != at::kByte;
+    at::Tensor x = are_patches ? images.transpose(0, 1).flatten(0, 1).permute({0, 3, 1, 2})
+                               : image_patches(images, config_.patch_px, image_type_);
     for (size_t i = 0; i < convolutions_.size(); ++i) {
       // Pixels are 0 to 255. Scaling a few weights is cheaper than scaling them.
       const at::Tensor weight = i == 0 ? convolutions_[i].weight / 255.0 : convolutions_[i].weight;
@@ -369,6 +374,8 @@ std::string PolicyNetwork::backbone_hash() const {
 void PolicyNetwork::check_images(const Rig& rig) const {
   if (scene_->image_backbone()) scene_->image_backbone()->check_images(rig);
 }
+
+bool PolicyNetwork::reads_patches() const { return scene_->reads_patches(); }
 
 std::unique_ptr<const Policy> make_policy(const Config& config, const Rig& rig, Device device) {
   auto policy = std::make_unique<PolicyNetwork>(config.policy, static_cast<int>(rig.cameras.size()), config.run.seed,

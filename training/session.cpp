@@ -115,7 +115,8 @@ struct PolicySession::Parts {
 
   std::vector<ImageBlock> draw(const PolicyInput& input, const at::Tensor& indices, Renderer* renderer) const {
     if (input.is_drawn.empty()) {
-      return draw_images(*input.scene, SelectedViews(input.views, device, indices).views(), renderer);
+      return draw_images(*input.scene, SelectedViews(input.views, device, indices).views(), renderer,
+                         policy.reads_patches());
     }
     const auto batch = static_cast<int64_t>(input.is_drawn.size());
     const at::Tensor drawn =

@@ -200,7 +200,9 @@ void ImageDrawer::draw(const ImageTarget& target) {
   const int width = setting_.camera.width_px, height = setting_.camera.height_px;
   const int band_rows = max_of(1, min_of(height, kBandPixels / width));
   const int64_t plane = int64_t{width} * height;
+  const bool in_patches = target.order == ChannelOrder::patches;
   auto draw_as = [&](auto* out, auto&& value_of) {
+    if (in_patches) std::fill_n(out, image_values({width, height}, target.order), 0);  // what reaches beyond the image
     for (int y_begin = 0; y_begin < height; y_begin += band_rows) {
       const RowRange rows{y_begin, min_of(height, y_begin + band_rows)};
       make_fragments({0, static_cast<int32_t>(faces_.size())}, rows);
@@ -208,9 +210,13 @@ void ImageDrawer::draw(const ImageTarget& target) {
       composite_rows(
           rows, [](int, const Fragment&, float) {},
           [&](int pixel, Rgb color) {
-            first[pixel] = value_of(color.r);
-            first[plane + pixel] = value_of(color.g);
-            first[2 * plane + pixel] = value_of(color.b);
+            const float channels[] = {color.r, color.g, color.b};
+            for (int channel = 0; channel < 3; ++channel) {
+              auto* const to = in_patches
+                                   ? out + place_in_patches(width, channel, pixel % width, y_begin + pixel / width)
+                                   : first + channel * plane + pixel;
+              *to = value_of(channels[channel]);
+            }
           });
     }
   };
@@ -218,6 +224,8 @@ void ImageDrawer::draw(const ImageTarget& target) {
     draw_as(static_cast<uint8_t*>(target.color), [](float channel) { return to_byte(channel); });
   } else if (target.format == PixelFormat::f16) {
     draw_as(static_cast<uint16_t*>(target.color), [](float channel) { return to_half(channel); });
+  } else if (target.format == PixelFormat::bf16) {
+    draw_as(static_cast<uint16_t*>(target.color), [](float channel) { return bf16_of_byte(to_byte(channel)); });
   } else {
     draw_as(static_cast<float*>(target.color), [](float channel) { return clamp(channel, 0.0f, 1.0f); });
   }

@@ -25,7 +25,8 @@ struct ImageRequest {
 /// Outputs of one image.
 struct ImageTarget {
   PixelFormat format = PixelFormat::u8;
-  void* color = nullptr;  // [3, height, width]
+  ChannelOrder order = ChannelOrder::planar;  // or patches
+  void* color = nullptr;                      // of one image
   float* depth_m = nullptr;
   uint8_t* class_id = nullptr;
   uint16_t* instance_id = nullptr;

@@ -38,7 +38,7 @@ class CpuRenderer final : public Renderer {
   }
 
   void render(const SceneBatch& scene, const ViewBatch& batch, const ImageBatch& images_out, Stream) override {
-    check_images(name(), config_.rig, device(), batch.size(), images_out, /*draws_f16=*/true);
+    check_images(*this, batch.size(), images_out);
     const Span<const View> views = counted_views(name(), batch);
     check_scene(name(), scene, geometries_);
     check_views(name(), scene, views);
@@ -86,7 +86,7 @@ class CpuRenderer final : public Renderer {
     const CameraImages& out = images.cameras[camera];
     const int64_t offset = static_cast<int64_t>(view) * out.view_stride;
     const std::size_t pixels = static_cast<std::size_t>(out.width_px) * static_cast<std::size_t>(out.height_px);
-    ImageTarget target{images.format};
+    ImageTarget target{images.format, images.order};
     target.color = static_cast<std::byte*>(out.data) + offset * static_cast<int64_t>(bytes_per_value(images.format));
     if (out.depth_m) target.depth_m = out.depth_m + view * pixels;
     if (out.class_id) target.class_id = out.class_id + view * pixels;

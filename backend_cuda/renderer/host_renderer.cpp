@@ -35,7 +35,7 @@ class HostRendererCuda final : public Renderer {
 
   void render(const SceneBatch& scene, const ViewBatch& batch, const ImageBatch& images_out, Stream stream) override {
     const DeviceGuard guard(renderer_->device());
-    check_images(name(), config_.rig, device(), batch.size(), images_out, /*draws_f16=*/true);
+    check_images(*this, batch.size(), images_out);
     const Span<const View> views = counted_views(name(), batch);
     check_input(scene, views);
     ImageBatch drawn = images_out;

@@ -1,22 +1,25 @@
-// Writes pixels as bytes, halves or floats, one plane per channel, several neighbours per store; or not at all.
+// Writes pixels as bytes, halves, floats or bfloat16s, one plane per channel or as patches, several neighbours per
+// store; or not at all.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/fragments.cuh"
+#include "pictura/common/patches.h"
 #include "pictura/common/portable/intrinsics.h"
 
 namespace pictura::cuda {
 
-/// Writes the pixels of one image, one plane per channel.
+/// Writes the pixels of one image.
 struct ImageWriter {
   PixelFormat format;
+  ChannelOrder order;
   void* images;
   int64_t first, plane;  // in elements: the image's offset, and the stride of planes
-  int width_px;
+  int width_px, height_px;
 
   /// Stores the colour of a pixel with a fragment list at the first of its fragments.
   template <typename Memory>
   __device__ void store_color(const Memory& memory, int fragment, Rgb color) const {
-    if (format == PixelFormat::u8) {
+    if (has_bytes()) {
       memory.set_color_bytes(fragment, to_bytes(color));
     } else {
       memory.set_color(fragment, color);
@@ -26,13 +29,15 @@ struct ImageWriter {
   /// Writes at most kPixelsPerWrite neighbouring pixels, given their words.
   template <typename Memory>
   __device__ void pixels(const Memory& memory, int x, int y, int count, const typename Memory::Word* words) const {
-    const int64_t at = first + static_cast<int64_t>(y) * width_px + x;
+    const Place place{x, y, count};
     if (format == PixelFormat::u8) {
-      write_bytes(memory, static_cast<uint8_t*>(images) + at, count, words);
+      write_bytes(memory, static_cast<uint8_t*>(images), place, words, [](uint8_t v) { return v; });
+    } else if (format == PixelFormat::bf16) {
+      write_bytes(memory, static_cast<uint16_t*>(images), place, words, [](uint8_t v) { return bf16_of_byte(v); });
     } else if (format == PixelFormat::f16) {
-      write_floats(memory, static_cast<uint16_t*>(images) + at, count, words, [](float v) { return to_half(v); });
+      write_floats(memory, static_cast<uint16_t*>(images), place, words, [](float v) { return to_half(v); });
     } else {
-      write_floats(memory, static_cast<float*>(images) + at, count, words, [](float v) { return saturate(v); });
+      write_floats(memory, static_cast<float*>(images), place, words, [](float v) { return saturate(v); });
     }
   }
 
@@ -41,9 +46,16 @@ struct ImageWriter {
   struct alignas(kPixelsPerWrite * sizeof(Value)) PixelVector {
     Value value[kPixelsPerWrite];
   };
+  // So many neighbouring pixels from (x, y) on.
+  struct Place {
+    int x, y, count;
+  };
 
-  template <typename Memory>
-  __device__ void write_bytes(const Memory& memory, uint8_t* to, int count, const typename Memory::Word* words) const {
+  __device__ bool has_bytes() const { return format == PixelFormat::u8 || format == PixelFormat::bf16; }
+
+  template <typename Memory, typename Value, typename ValueOf>
+  __device__ void write_bytes(const Memory& memory, Value* all, const Place& place, const typename Memory::Word* words,
+                              ValueOf&& value_of) const {
     // Many warps write only black.
     uint32_t bytes[kPixelsPerWrite] = {};
     typename Memory::Word some = 0;
@@ -54,11 +66,12 @@ struct ImageWriter {
                  : full != Memory::kNone ? memory.faces[full].color_bytes
                                          : 0u;
     }
-    store_channels(to, count, [&](int i, int channel) { return static_cast<uint8_t>(bytes[i] >> (8 * channel)); });
+    store_channels(all + first, place,
+                   [&](int i, int channel) { return value_of(static_cast<uint8_t>(bytes[i] >> (8 * channel))); });
   }
 
   template <typename Memory, typename Value, typename ValueOf>
-  __device__ void write_floats(const Memory& memory, Value* to, int count, const typename Memory::Word* words,
+  __device__ void write_floats(const Memory& memory, Value* all, const Place& place, const typename Memory::Word* words,
                                ValueOf&& value_of) const {
     Rgb colors[kPixelsPerWrite];
     for (int i = 0; i < kPixelsPerWrite; ++i) {
@@ -69,19 +82,53 @@ struct ImageWriter {
         colors[i] = memory.faces[full].color;
       }
     }
-    store_channels(to, count, [&](int i, int channel) {
+    store_channels(all + first, place, [&](int i, int channel) {
       return value_of(channel == 0 ? colors[i].r : channel == 1 ? colors[i].g : colors[i].b);
     });
   }
 
   // value_of(i, channel) is a channel of the i-th pixel.
   template <typename Value, typename ValueOf>
-  __device__ void store_channels(Value* to, int count, ValueOf&& value_of) const {
-    PICTURA_NO_UNROLL
-    for (int channel = 0; channel < 3; ++channel, to += plane) {
+  __device__ void store_channels(Value* image, const Place& place, ValueOf&& value_of) const {
+    auto values_of = [&](int channel) {
       PixelVector<Value> values;
       for (int i = 0; i < kPixelsPerWrite; ++i) values.value[i] = value_of(i, channel);
-      store(to, count, values);
+      return values;
+    };
+    if (order == ChannelOrder::patches) {
+      PICTURA_NO_UNROLL
+      for (int channel = 0; channel < 3; ++channel) store_in_patches(image, channel, place, values_of(channel));
+      return;
+    }
+    Value* to = image + static_cast<int64_t>(place.y) * width_px + place.x;
+    PICTURA_NO_UNROLL
+    for (int channel = 0; channel < 3; ++channel, to += plane) store(to, place.count, values_of(channel));
+  }
+
+  // What the last column and row of patches have beyond the image becomes black.
+  template <typename Value>
+  __device__ void store_in_patches(Value* image, int channel, const Place& place,
+                                   const PixelVector<Value>& values) const {
+    static_assert(kPixelsPerWrite == kPatch_px);
+    const bool is_last_column = place.x + place.count == width_px, is_last_row = place.y + 1 == height_px;
+    const int x_end = is_last_column ? patches_along(width_px) * kPatch_px : place.x + place.count;
+    const int y_end = is_last_row ? patches_along(height_px) * kPatch_px : place.y + 1;
+    const bool are_aligned = place.x % kPatch_px == 0 && place.count == kPatch_px;
+    PICTURA_NO_UNROLL
+    for (int y = place.y; y < y_end; ++y) {
+      const bool is_drawn = y == place.y;
+      if (are_aligned) {
+        store(image + place_in_patches(width_px, channel, place.x, y), kPatch_px,
+              is_drawn ? values : PixelVector<Value>{});
+        continue;
+      }
+      // As many as there can be: of the last pixels but one, and of the columns beyond the image.
+      for (int i = 0; i < 2 * kPixelsPerWrite; ++i) {
+        if (place.x + i >= x_end) break;
+        const bool is_pixel = is_drawn && i < place.count;
+        image[place_in_patches(width_px, channel, place.x + i, y)] =
+            is_pixel ? values.value[i % kPixelsPerWrite] : Value{};
+      }
     }
   }
 

@@ -212,6 +212,7 @@ struct DrawTask {
   float line_floor_px = 0;
   bool debug_palette = false;
   PixelFormat format = PixelFormat::u8;
+  ChannelOrder order = ChannelOrder::planar;  // or patches
   bool wants_planes = false;
   FaultWord* fault = nullptr;
   FacePool pool;

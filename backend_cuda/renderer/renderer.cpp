@@ -79,7 +79,7 @@ class CudaRenderer final : public Renderer {
   void render(const SceneBatch& scene, const ViewBatch& views, const ImageBatch& images_out, Stream stream) override {
     const DeviceGuard guard(device());
     check_call(scene);
-    check_images(name(), config_.rig, device(), views.size(), images_out, /*draws_f16=*/true);
+    check_images(*this, views.size(), images_out);
     cuda::DrawTask task = draw_task(scene, views, &images_out);
     const auto on_stream = static_cast<cudaStream_t>(stream.handle);
     clear_counters(on_stream);

@@ -41,29 +41,33 @@ void check_device(std::string_view renderer, std::string_view what, Device expec
                 name_of(device));
 }
 
-void check_images(std::string_view renderer, const Rig& rig, Device device, std::size_t num_views,
-                  const ImageBatch& images, bool draws_f16) {
-  check_device(renderer, "images", device, images.device);
-  PICTURA_CHECK(draws_f16 || images.format != PixelFormat::f16,
-                "renderer {}: images: expected the format u8 or f32, got f16", renderer);
-  PICTURA_CHECK(images.order == ChannelOrder::planar, "renderer {}: images: expected planar channels, got {} ones",
-                renderer, name_of(images.order));
+void check_images(const Renderer& renderer, std::size_t num_views, const ImageBatch& images) {
+  const std::string_view name = renderer.name();
+  const Rig& rig = renderer.config().rig;
+  const bool draws_all = renderer.draws_all_formats();
+  check_device(name, "images", renderer.device(), images.device);
+  PICTURA_CHECK(draws_all || images.format == PixelFormat::u8 || images.format == PixelFormat::f32,
+                "renderer {}: images: expected the format u8 or f32, got {}", name,
+                images.format == PixelFormat::f16 ? "f16" : "bf16");
+  PICTURA_CHECK(images.order == ChannelOrder::planar || (draws_all && images.order == ChannelOrder::patches),
+                "renderer {}: images: expected planar channels{}, got {} ones", name, draws_all ? " or patches" : "",
+                name_of(images.order));
   PICTURA_CHECK(images.num_views >= 0 && static_cast<std::size_t>(images.num_views) == num_views,
-                "renderer {}: images: expected images of {} views, got {}", renderer, num_views, images.num_views);
-  PICTURA_CHECK(images.cameras.size() == rig.cameras.size(), "renderer {}: images: expected {} cameras, got {}",
-                renderer, rig.cameras.size(), images.cameras.size());
+                "renderer {}: images: expected images of {} views, got {}", name, num_views, images.num_views);
+  PICTURA_CHECK(images.cameras.size() == rig.cameras.size(), "renderer {}: images: expected {} cameras, got {}", name,
+                rig.cameras.size(), images.cameras.size());
   for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
     const CameraImages& camera = images.cameras[i];
     const Camera& wanted = rig.cameras[i];
     PICTURA_CHECK(camera.width_px == wanted.width_px && camera.height_px == wanted.height_px,
-                  "renderer {}: images: camera {}: expected {}x{} pixels, got {}x{}", renderer, i, wanted.width_px,
+                  "renderer {}: images: camera {}: expected {}x{} pixels, got {}x{}", name, i, wanted.width_px,
                   wanted.height_px, camera.width_px, camera.height_px);
     PICTURA_CHECK(num_views == 0 || camera.data != nullptr, "renderer {}: images: camera {}: no memory for colour",
-                  renderer, i);
-    const int64_t image_values = 3 * ImageSize{camera.width_px, camera.height_px}.pixels();
-    PICTURA_CHECK(num_views < 2 || camera.view_stride >= image_values,
-                  "renderer {}: images: camera {}: expected a view stride of at least {} values, got {}", renderer, i,
-                  image_values, camera.view_stride);
+                  name, i);
+    const int64_t values = image_values({camera.width_px, camera.height_px}, images.order);
+    PICTURA_CHECK(num_views < 2 || camera.view_stride >= values,
+                  "renderer {}: images: camera {}: expected a view stride of at least {} values, got {}", name, i,
+                  values, camera.view_stride);
   }
 }
 

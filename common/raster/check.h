@@ -13,10 +13,9 @@ namespace pictura {
 /// Throws Error unless `what`, "scene" or "images", lies on the device that the renderer draws from and to.
 void check_device(std::string_view renderer, std::string_view what, Device expected, Device device);
 
-/// Throws Error unless the images lie on `device`, fit the rig and the number of views, and have an order and a
-/// format that the renderer draws: planar; u8, f32 and, where it says so, f16.
-void check_images(std::string_view renderer, const Rig& rig, Device device, std::size_t num_views,
-                  const ImageBatch& images, bool draws_f16 = false);
+/// Throws Error unless the images lie where the renderer draws to, fit its rig and the number of views, and have an
+/// order and a format that it draws.
+void check_images(const Renderer& renderer, std::size_t num_views, const ImageBatch& images);
 
 /// Throws Error unless the rig is valid and the line floor within the guard band; returns the configuration.
 const RendererConfig& check_config(std::string_view renderer, const RendererConfig& config);

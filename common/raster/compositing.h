@@ -121,6 +121,10 @@ PICTURA_HD inline uint16_t to_half(float channel) {
 
 /// A channel as an unsigned byte.
 PICTURA_HD inline uint8_t to_byte(float channel) { return static_cast<uint8_t>(saturate(channel) * 255.0f + 0.5f); }
+/// A byte's value as a bfloat16, which holds it exactly.
+PICTURA_HD inline uint16_t bf16_of_byte(uint8_t byte) {
+  return static_cast<uint16_t>(bits_from_float(static_cast<float>(byte)) >> 16);
+}
 /// A colour as three bytes, red lowest.
 PICTURA_HD inline uint32_t to_bytes(Rgb color) {
   return uint32_t{to_byte(color.r)} | uint32_t{to_byte(color.g)} << 8 | uint32_t{to_byte(color.b)} << 16;

@@ -427,6 +427,8 @@ TEST(CpuRenderer, KeepsMapsByHandle) {
   test::expect_refused_order(make_cpu);
 }
 
+TEST(CpuRenderer, DrawsPatches) { test::expect_patches(make_cpu); }
+
 TEST(CpuRenderer, DrawsAsManyViewsAsItsCountSays) {
   test::expect_counted_views(make_cpu);
   test::expect_counted_queries(make_cpu);

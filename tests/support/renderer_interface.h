@@ -2,7 +2,9 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstring>
 #include <functional>
 #include <memory>
 #include <string>
@@ -85,15 +87,72 @@ inline void expect_refused_handles(const MakeForRig& make) {
   }
 }
 
-/// Renderers draw planar images and refuse others by name.
+/// Images as patches, and bytes as bfloat16s, hold what planar ones hold, and black beyond the image.
+inline void expect_patches(const MakeForRig& make) {
+  Rig rig = paper_rig(33, 19);  // neither side is a multiple of a patch's
+  rig.cameras[1] = paper_rig(32, 18).cameras[1];
+  rig.cameras[2] = paper_rig(6, 24).cameras[2];
+  Snapshot town = make_synthetic_town(2, 40);
+  town.views.resize(2);
+  const auto renderer = make(rig);
+  ASSERT_TRUE(renderer->draws_all_formats());
+  renderer->upload(0, town.geometry);
+  const auto drawn = [&](PixelFormat format, ChannelOrder order) {
+    HostImages images(rig, 2, format, Planes::none, order);
+    std::ranges::fill(images.bytes(), uint8_t{0xA5});
+    renderer->render(town.scene.batch(), town.views, images.batch());
+    renderer->check();
+    return images;
+  };
+  for (const PixelFormat format : {PixelFormat::u8, PixelFormat::f16, PixelFormat::f32, PixelFormat::bf16}) {
+    const HostImages planar = drawn(format, ChannelOrder::planar), patches = drawn(format, ChannelOrder::patches);
+    const std::size_t size = bytes_per_value(format);
+    std::vector<uint8_t> expected(patches.bytes().size());
+    for (std::size_t k = 0; k < rig.cameras.size(); ++k) {
+      const CameraLayout &from = planar.layout().cameras[k], &to = patches.layout().cameras[k];
+      for (int view = 0; view < 2; ++view) {
+        for (int channel = 0; channel < 3; ++channel) {
+          for (int y = 0; y < from.size.height_px; ++y) {
+            for (int x = 0; x < from.size.width_px; ++x) {
+              const int64_t source = from.offset + view * from.view_stride + channel * from.channel_stride +
+                                     y * from.row_stride + x * from.pixel_stride;
+              const int64_t target =
+                  to.offset + view * to.view_stride + place_in_patches(from.size.width_px, channel, x, y);
+              std::memcpy(&expected[static_cast<std::size_t>(target) * size],
+                          &planar.bytes()[static_cast<std::size_t>(source) * size], size);
+            }
+          }
+        }
+      }
+    }
+    EXPECT_TRUE(std::ranges::equal(patches.bytes(), expected)) << static_cast<int>(format);
+  }
+  const HostImages bytes = drawn(PixelFormat::u8, ChannelOrder::planar),
+                   floats = drawn(PixelFormat::bf16, ChannelOrder::planar);
+  for (std::size_t i = 0; i < bytes.bytes().size(); ++i) {
+    uint16_t bits = 0;
+    std::memcpy(&bits, &floats.bytes()[2 * i], 2);
+    ASSERT_EQ(std::bit_cast<float>(uint32_t{bits} << 16), static_cast<float>(bytes.bytes()[i])) << i;
+  }
+}
+
+/// Renderers draw planar images, some patches, and refuse others by name.
 inline void expect_refused_order(const MakeForRig& make) {
   const Rig rig = front_rig(8, 8);
   HostImages images(rig, 1);
   ImageBatch batch = images.batch();
   batch.order = ChannelOrder::interleaved;
   const std::vector<View> views(1);
-  EXPECT_THAT(message_of([&] { make(rig)->render({}, views, batch); }),
-              testing::HasSubstr("images: expected planar channels, got interleaved ones"));
+  const auto renderer = make(rig);
+  EXPECT_THAT(message_of([&] { renderer->render({}, views, batch); }),
+              testing::ContainsRegex("images: expected planar channels.*, got interleaved ones"));
+  if (renderer->draws_all_formats()) return;
+  HostImages patches(rig, 1, PixelFormat::u8, Planes::none, ChannelOrder::patches);
+  EXPECT_THAT(message_of([&] { renderer->render({}, views, patches.batch()); }),
+              testing::HasSubstr("images: expected planar channels, got patches ones"));
+  HostImages halves(rig, 1, PixelFormat::bf16);
+  EXPECT_THAT(message_of([&] { renderer->render({}, views, halves.batch()); }),
+              testing::HasSubstr("images: expected the format u8 or f32, got bf16"));
 }
 
 /// Drawing a compacted list with its count equals drawing exactly those views; the images of others are not written,

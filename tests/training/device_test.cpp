@@ -264,7 +264,7 @@ TEST_F(DeviceTraining, WhatARolloutKeepsIsWhatItKeepsOnTheHost) {
   constexpr int64_t kSteps = 4;
   struct Kept {
     at::Tensor rows;
-    std::vector<Observation> saw;  // kept and redrawn
+    std::vector<Observation> saw;  // kept, redrawn, and redrawn as patches
   };
   const auto config_of = [](const std::string& device, const std::string& images) {
     return load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml",
@@ -296,6 +296,8 @@ TEST_F(DeviceTraining, WhatARolloutKeepsIsWhatItKeepsOnTheHost) {
     for (const RolloutObservations& observations : all) {
       result.saw.push_back(observations.gather(result.rows).map([](const at::Tensor& t) { return t.cpu(); }));
     }
+    result.saw.push_back(
+        all[1].gather(result.rows, /*wants_patches=*/true).map([](const at::Tensor& t) { return t.cpu(); }));
     renderer->check();
     result.rows = result.rows.cpu();
     return result;
@@ -305,8 +307,10 @@ TEST_F(DeviceTraining, WhatARolloutKeepsIsWhatItKeepsOnTheHost) {
   ASSERT_LT(host.rows.size(0), kSlots * kSteps) << "some have halted";
   ASSERT_GT(host.rows.size(0), 0);
   EXPECT_GT(host.saw[0].images.at(0).pixels.count_nonzero().item<int64_t>(), 1000);
-  for (const Observation& saw : device.saw) {
-    EXPECT_TRUE(saw.images.at(0).pixels.equal(host.saw[0].images.at(0).pixels));
+  EXPECT_TRUE(host.saw[1].images.at(0).pixels.equal(host.saw[0].images[0].pixels));
+  for (size_t i = 0; i < device.saw.size(); ++i) {
+    const Observation& saw = device.saw[i];
+    EXPECT_TRUE(saw.images.at(0).pixels.equal(host.saw[i].images.at(0).pixels)) << i;
     EXPECT_TRUE(saw.ego.equal(host.saw[0].ego));
     EXPECT_TRUE(saw.waypoints.equal(host.saw[0].waypoints));
   }

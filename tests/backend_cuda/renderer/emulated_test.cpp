@@ -229,7 +229,7 @@ TEST(EmulatedKernels, DrawOddSizesAndPlanes) {
   expect_oracles(&renderer, town, Planes::all);
 }
 
-TEST(EmulatedKernels, WriteTheOraclesBytesAndHalves) {
+TEST(EmulatedKernels, WriteTheOraclesFormatsAndOrders) {
   Snapshot town = make_synthetic_town(3, 60);
   town.views.resize(1);
   const RendererConfig config = config_of(mixed_rig());
@@ -237,11 +237,16 @@ TEST(EmulatedKernels, WriteTheOraclesBytesAndHalves) {
   const auto oracle = make_renderer("cpu", config);
   emulated.upload(0, town.geometry);
   oracle->upload(0, town.geometry);
-  for (const PixelFormat format : {PixelFormat::u8, PixelFormat::f16}) {
-    HostImages result(config.rig, 1, format), expected(config.rig, 1, format);
-    emulated.render(town.scene.batch(), town.views, result.batch(), {});
-    oracle->render(town.scene.batch(), town.views, expected.batch(), {});
-    EXPECT_TRUE(std::ranges::equal(result.bytes(), expected.bytes())) << static_cast<int>(format);
+  for (const PixelFormat format : {PixelFormat::u8, PixelFormat::f16, PixelFormat::bf16}) {
+    for (const ChannelOrder order : {ChannelOrder::planar, ChannelOrder::patches}) {
+      HostImages result(config.rig, 1, format, Planes::none, order),
+          expected(config.rig, 1, format, Planes::none, order);
+      std::ranges::fill(result.bytes(), uint8_t{0xA5});
+      emulated.render(town.scene.batch(), town.views, result.batch(), {});
+      oracle->render(town.scene.batch(), town.views, expected.batch(), {});
+      EXPECT_TRUE(std::ranges::equal(result.bytes(), expected.bytes()))
+          << static_cast<int>(format) << ", " << name_of(order);
+    }
   }
 }
 

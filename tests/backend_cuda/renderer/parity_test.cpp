@@ -177,6 +177,8 @@ TEST_F(CudaRendererTest, KeepsMapsByHandle) {
   test::expect_refused_order(make_for_host);
 }
 
+TEST_F(CudaRendererTest, DrawsPatches) { test::expect_patches(make_for_host); }
+
 TEST_F(CudaRendererTest, DrawsAsManyViewsAsItsCountSays) {
   test::expect_counted_views(make_for_host);
   test::expect_counted_queries(make_for_host);
