@@ -252,9 +252,20 @@ __device__ void make_fragments(const Memory& memory, const Part& part) {
   }
 }
 
+// Whether, of the fragments of a list from `at` on, one is as wanted(coverage) says.
+template <typename Memory, typename Wanted>
+__device__ bool any_fragment(const Memory& memory, typename Memory::Word at, Wanted&& wanted) {
+  PICTURA_NO_UNROLL
+  for (; at != Memory::kNone; at = memory.next[at]) {
+    if (wanted(memory.coverage(static_cast<int>(at)))) return true;
+  }
+  return false;
+}
+
 // Initially all effective samples of a fragment are visible. A fragment that covers its pixel fully may intersect the
 // pixel's full face, which then becomes a fragment too. Lists the pixels that must be composited: those with fragments
-// that are not alone.
+// that are not alone. Notes whether any pixel may have to be divided: several fragments cover it fully, and another,
+// not a sliver, partly. Hardly any has such fragments.
 template <typename Memory>
 __device__ void finish_fragments(const Memory& memory, int count) {
   using Index = typename Memory::Index;
@@ -275,9 +286,17 @@ __device__ void finish_fragments(const Memory& memory, int count) {
     if (i >= count) continue;
     set_all_visible(i);
     if (!memory.coverage(i).is_full()) continue;
-    atomicAdd(&memory.state->num_full, 1);
     const int pixel = memory.pixel[i];
-    const Word full = full_of_word<Memory>(atomicAnd(&memory.pixels[pixel], ~PixelWord<Word>::kFace));
+    const Word before = atomicAnd(&memory.pixels[pixel], ~PixelWord<Word>::kFace), full = full_of_word<Memory>(before);
+    auto is_full = [](const PixelCoverage& coverage) { return coverage.is_full(); };
+    auto hides = [](const PixelCoverage& coverage) { return !coverage.is_full() && coverage.samples != 0; };
+    const Word first_of_list = first_of_word<Memory>(before);
+    // Of several full fragments the first of the list finds the others behind it. Where the list begins with a face
+    // that another thread has added, that thread decides: the list may not be linked yet.
+    if ((full != Memory::kNone || any_fragment(memory, Word{memory.next[i]}, is_full)) &&
+        first_of_list < static_cast<Word>(count) && any_fragment(memory, first_of_list, hides)) {
+      atomicOr(&memory.state->divides, 1);
+    }
     if (full == Memory::kNone) continue;
     const int32_t added = count + atomicAdd(&memory.state->num_added, 1);
     if (added >= memory.max_fragments) continue;

@@ -192,7 +192,7 @@ template <typename Memory>
 __device__ void reset_counts(const Memory& memory) {
   BlockState* state = memory.state;
   if (threadIdx.x != 0) return;
-  state->num_rows = state->num_candidates = state->num_fragments = state->num_added = state->num_full = 0;
+  state->num_rows = state->num_candidates = state->num_fragments = state->num_added = state->divides = 0;
   state->num_composited = state->next_fragments = 0;
 }
 // Clears the pixels and counters. Before a block's first part, and after a part that did not fit. All threads of the
@@ -225,7 +225,7 @@ __device__ bool draw_rows(const Memory& memory, const Part& part, const Visit& v
   if (count > memory.max_fragments) return false;
   resolve_occlusion(memory, part, count);
   sync_block();
-  if (state->num_full != 0) {
+  if (state->divides != 0) {
     divide_remainders<Memory>(count);
     sync_block();
   }

@@ -71,7 +71,9 @@ PICTURA_HD inline ScreenFace complete_face(const ScreenFace& face, PrimitiveRef 
   if (kind_of(primitive.object_id) == kStripKind) {
     whole.inverse_depth_low *= 1.0f / kWidenedDepth;
     whole.inverse_depth_high *= kWidenedDepth;
+    whole.nearest_standing = nearest_standing(whole.plane_distance_m);
   } else {
+    whole.nearest_standing = 1.0f;
     whole.plane_distance_m = 0.0f;
   }
   whole.edge_begin = edge_begin;

@@ -32,9 +32,10 @@ struct alignas(16) ScreenFace {
   uint32_t object_id = 0;  // of its primitive, see common/raster/visibility.h
   // Range of the inverse depth over the face's corners, of strips widened by kWidenedDepth.
   float inverse_depth_low = 0, inverse_depth_high = 0;
+  float nearest_standing = 1;  // see nearest_standing(); 1 unless it is a strip that is seen from below
   float plane_distance_m = 0;  // of strips: how far their plane is above the camera, along its normal; of solids 0
-  uint32_t color_bytes = 0;    // to_bytes(color), used by devices
   Rgb color;
+  uint32_t color_bytes = 0;  // to_bytes(color), used by devices
 
   /// Coverage of a pixel below this area is ignored, see min_area_of.
   PICTURA_HD float min_area() const { return static_cast<float>(min_area_units) * (1.0f / kAreaUnits); }

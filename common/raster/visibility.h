@@ -139,8 +139,10 @@ PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip) {
 PICTURA_HD inline bool is_strip_from_below(const ScreenFace& face) { return face.plane_distance_m > 0.0f; }
 
 /// How many times the inverse depth of a strip's point that of a solid which stands on it can be, on one ray from an
-/// eye so far below the strip's plane: solids reach kThroughStrip_m through it. Infinite where the eye is within that.
+/// eye so far below the strip's plane: solids reach kThroughStrip_m through it. Infinite where the eye is within that,
+/// 1 where it is above the plane.
 PICTURA_HD inline float nearest_standing(float plane_distance_m) {
+  if (!(plane_distance_m > 0.0f)) return 1.0f;
   return plane_distance_m > kThroughStrip_m ? plane_distance_m * reciprocal_in_range(plane_distance_m - kThroughStrip_m)
                                             : float_from_bits(0x7F800000u);
 }
@@ -250,8 +252,7 @@ PICTURA_HD inline float occluder_bound(const ScreenFace& face, int x, int y) {
 /// largest rejects too.
 PICTURA_HD inline bool passes_occluder_bound(const ScreenFace& face, float bound, int x, int y) {
   const float nearest = center_inverse_depth(face, x, y) + inverse_depth_half_range(face);
-  return !(nearest < bound) ||
-         (is_strip_from_below(face) && !(nearest * nearest_standing(face.plane_distance_m) < bound));
+  return !(nearest * face.nearest_standing < bound);
 }
 
 /// Order of fragments, independent of their list: nearer first, then by object id.

@@ -255,12 +255,12 @@ TEST(Order, AStripFromBelowIsHiddenByWhatIsTooNearToStandOnIt) {
   ScreenFace strip = plane_face(make_object_id(kStripKind, 0), 0.02f);
   for (const auto& [above_eye_m, hiding] :
        {std::pair{-1.5f, 1.0f}, {2 * kThroughStrip_m, 2.0f}, {3 * kThroughStrip_m, 1.5f}}) {
-    strip.plane_distance_m = above_eye_m;
+    strip.nearest_standing = nearest_standing(above_eye_m);
     EXPECT_TRUE(passes_occluder_bound(strip, 0.99f * hiding * 0.02f, 0, 0)) << above_eye_m;
     EXPECT_FALSE(passes_occluder_bound(strip, 1.01f * hiding * 0.02f, 0, 0)) << above_eye_m;
   }
   for (const float above_eye_m : {0.01f, kThroughStrip_m}) {
-    strip.plane_distance_m = above_eye_m;
+    strip.nearest_standing = nearest_standing(above_eye_m);
     EXPECT_TRUE(passes_occluder_bound(strip, 1e6f, 0, 0)) << above_eye_m;
   }
 }
