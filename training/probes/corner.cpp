@@ -1,6 +1,8 @@
 #include "pictura/training/probes/corner.h"
 
 #include <algorithm>
+#include <map>
+#include <set>
 
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
@@ -39,6 +41,7 @@ class CornerProbe {
     run_.run([this](const ProbeFrame& frame) { look_for_corners(frame); },
              [this](Simulator& simulator, int driver, Span<const Command> commands) {
                scenes_.add(simulator, driver, commands);
+               driven_ = &simulator;
              });
     if (!results_.interrupted) choose_pairs();
     if (!results_.interrupted) take_over();
@@ -61,11 +64,13 @@ class CornerProbe {
     std::vector<VisibilityQuery> queries;
     std::vector<Found> hidden;
     for (size_t world = 0; world < frame.worlds.size(); ++world) {
+    std::vector<size_t> found_in;  // worlds
       const auto map = static_cast<size_t>(frame.worlds[world].map);
-      bool is_kept = false;
+      bool is_kept = false, is_found = false;
       for (const CornerState& state : find_corner_states(frame, world, *run_.maps()[map]->road, corners_[map],
                                                          sights_[map], run_.front_camera(), options_.search)) {
         if (state.user < 0) {
+        is_found = true;
           empty_.push_back(state);
           continue;
         }
@@ -77,13 +82,23 @@ class CornerProbe {
         hidden.push_back({state, scene_of(frame, world)});
       }
     }
+      if (is_found) found_in.push_back(world);
     const std::vector<float> shares = run_.visibility(kept, views, queries);
+    keep(frame, found_in);
     for (size_t i = 0; i < shares.size(); ++i) {
       if (!(shares[i] > 0)) hidden_.push_back(std::move(hidden[i]));
     }
   }
 
   static CornerScene scene_of(const ProbeFrame& frame, size_t world) {
+  // Worlds of the frame, in which policies may take over.
+  void keep(const ProbeFrame& frame, const std::vector<size_t>& worlds) {
+    if (worlds.empty()) return;
+    const std::vector<uint8_t> saved = driven_->save(current_stream(run_.device()));
+    const auto kept = keep_worlds(*driven_, saved, worlds);
+    for (size_t i = 0; i < worlds.size(); ++i) kept_[{frame.scene_of(worlds[i]), frame.step}] = kept[i];
+  }
+
     CornerScene scene;
     scene.boxes.assign(frame.boxes.begin() + frame.box_begin[world], frame.boxes.begin() + frame.box_begin[world + 1]);
     scene.status.assign(scene.boxes.size(), static_cast<uint8_t>(AgentStatus::parked));
@@ -113,6 +128,11 @@ class CornerProbe {
     results_.empty_found = static_cast<int64_t>(empty_.size());
     results_.pairs = match_corners(coming, empty_, options_.pairs);
     for (const CornerPair& pair : results_.pairs) {
+    std::set<std::pair<int32_t, int32_t>> used;
+    for (const CornerPair& pair : results_.pairs) {
+      for (const CornerState* state : {&pair.hidden, &pair.empty}) used.insert({state->scene, state->step});
+    }
+    std::erase_if(kept_, [&used](const auto& one) { return !used.contains(one.first); });
       const CornerState& state = pair.hidden;
       const auto found = std::find_if(hidden_.begin(), hidden_.end(), [&state](const Found& one) {
         return one.state.scene == state.scene && one.state.step == state.step && one.state.ego == state.ego;
@@ -182,7 +202,12 @@ class CornerProbe {
     const CornerPair& both = results_.pairs[pair];
     const CornerState& state = its_case == CornerCase::empty ? both.empty : both.hidden;
     const int32_t removed = its_case == CornerCase::removed ? results_.scenes_of_pairs[pair].removed : -1;
-    return {&scenes_.of(state.scene), state.step, state.ego, state.user, removed};
+    return {&scenes_.of(state.scene),
+            kept_.at({state.scene, state.step}).get(),
+            state.step,
+            state.ego,
+            state.user,
+            removed};
   }
 
   const std::function<void(double, double)> report_;
@@ -194,6 +219,8 @@ class CornerProbe {
   std::vector<BlindCorners> corners_;  // [maps]
   std::vector<LineOfSight> sights_;    // [maps]
   std::vector<Found> hidden_;
+  Simulator* driven_ = nullptr;
+  std::map<std::pair<int32_t, int32_t>, std::shared_ptr<const KeptWorld>> kept_;  // by scene and step
   std::vector<CornerState> empty_;
 };
 

@@ -237,7 +237,14 @@ ProbeRun::~ProbeRun() = default;
 
 PolicySession& ProbeRun::session(size_t policy) const { return *participants_[policy].session; }
 Renderer* ProbeRun::renderer(size_t policy) const { return participants_[policy].renderer.get(); }
-const SimulatorConfig& ProbeRun::world_of(size_t policy) const { return participants_[policy].worlds->config; }
+
+SimulatorConfig ProbeRun::world_of(size_t policy) const {
+  SimulatorConfig config = participants_[policy].worlds->config;
+  const SimulatorConfig its = participants_[policy].session->evaluation_world(options_.worlds.steps);
+  config.vector_observations = its.vector_observations;
+  config.wall_observations = its.wall_observations;
+  return config;
+}
 
 std::vector<float> ProbeRun::run(const std::function<void(const ProbeFrame&)>& sample, const Watch& watch) {
   sample_ = sample;
@@ -313,9 +320,15 @@ void ProbeRun::drive() {
 void ProbeRun::drive_by_controller() {
   EvaluateOptions worlds = share_of_driver(1);
   worlds.device = device_.is_host() ? "cpu" : "cuda";
-  EvaluationWorlds shared{maps_, nullptr, std::move(participants_[0].worlds->simulator)};
+  std::unique_ptr<Simulator>& simulator = participants_[0].worlds->simulator;
+  if (watch_) {
+    SimulatorConfig config = simulator->config();
+    config.vector_observations = false;
+    simulator = make_simulator(worlds.simulator, config, maps_, simulator->worlds());
+  }
+  EvaluationWorlds shared{maps_, nullptr, std::move(simulator)};
   const EvaluateReport report = evaluate(worlds, &shared);
-  participants_[0].worlds->simulator = std::move(shared.simulator);
+  simulator = std::move(shared.simulator);
   driven_ = nullptr;
   results_.interrupted = report.interrupted;
   const EvaluationSetting& driven = report.results.setting;

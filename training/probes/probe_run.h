@@ -126,10 +126,11 @@ class ProbeRun final : public EvaluationObserver {
   const CompiledMaps& maps() const { return maps_; }
   Renderer& measuring() { return *measuring_; }
   Device device() const { return device_; }
-  /// Of a policy: its session, the renderer of its images, if it reads any, and worlds as it observes them.
+  /// Of a policy: the session that answers, the renderer of its images, if it reads any, and worlds as it observes
+  /// them.
   PolicySession& session(size_t policy) const;
   Renderer* renderer(size_t policy) const;
-  const SimulatorConfig& world_of(size_t policy) const;
+  SimulatorConfig world_of(size_t policy) const;
 
   void begin(Simulator& simulator) override;
   void before_step(Span<const Command> commands) override;
