@@ -213,6 +213,34 @@ TEST_F(Corner, AnotherOneIsRemovedInstead) {
   EXPECT_GT(differ, 0u);
 }
 
+TEST_F(Corner, UntrainedPoliciesTakeOverInTheSameStates) {
+  CornerOptions o = options(12);
+  o.control = CornerControl::untrained;
+  const CornerResults control = probe_corner(o);
+  const CornerResults& all = results();
+  ASSERT_EQ(control.pairs.size(), all.pairs.size());
+  std::array<size_t, 3> differ{};
+  for (size_t pair = 0; pair < all.pairs.size(); ++pair) {
+    EXPECT_EQ(control.scenes_of_pairs[pair].removed, all.scenes_of_pairs[pair].removed);
+    for (const size_t policy : {kAgent, kVectorized, kLikeForLike}) {
+      const Takeover &run = control.takeover(pair, true, CornerCase::hidden, policy),
+                     &without = control.takeover(pair, true, CornerCase::removed, policy),
+                     &trained = all.takeover(pair, true, CornerCase::hidden, policy);
+      EXPECT_EQ(run.speed_mps[0], trained.speed_mps[0]);
+      differ[policy] += run.x_m[10] != trained.x_m[10];
+      if (policy != kAgent) continue;
+      const int32_t end = run.input_step < 0 ? run.steps : std::min(run.input_step, run.steps);
+      for (size_t k = 0; k < static_cast<size_t>(end); ++k)
+        EXPECT_EQ(run.x_m[k], without.x_m[k]) << "nobody is seen, pair " << pair << ", step " << k;
+    }
+  }
+  for (const size_t policy : {kAgent, kVectorized, kLikeForLike}) {
+    EXPECT_GT(differ[policy], 0u) << policy;
+    EXPECT_EQ(control.policies[policy].hash, all.policies[policy].hash);
+    EXPECT_NE(control.policies[policy].untrained_hash, control.policies[policy].hash);
+  }
+}
+
 TEST_F(Corner, SeedsDecideWhatIsFound) {
   CornerOptions one = options(4);
   one.policies = {policies_[kAgent]};

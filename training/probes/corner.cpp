@@ -29,7 +29,8 @@ class CornerProbe {
       : report_(options.worlds.on_progress),
         options_(with_half_progress(options)),
         results_(*results_out),
-        run_(sessions, options_, results_out, true) {
+        run_(sessions, options_, results_out,
+             {.walls = true, .untrained = options.control == CornerControl::untrained}) {
     results_.maps = run_.maps();
     for (const auto& map : run_.maps()) {
       corners_.push_back(find_blind_corners(*map->road, map->geometry.walls));
@@ -40,8 +41,8 @@ class CornerProbe {
   void run() {
     run_.run([this](const ProbeFrame& frame) { look_for_corners(frame); },
              [this](Simulator& simulator, int driver, Span<const Command> commands) {
-               scenes_.add(simulator, driver, commands);
                driven_ = &simulator;
+               scenes_.add(simulator, driver, commands);
              });
     if (!results_.interrupted) choose_pairs();
     if (!results_.interrupted) take_over();
@@ -63,14 +64,14 @@ class CornerProbe {
     std::vector<View> views;
     std::vector<VisibilityQuery> queries;
     std::vector<Found> hidden;
-    for (size_t world = 0; world < frame.worlds.size(); ++world) {
     std::vector<size_t> found_in;  // worlds
+    for (size_t world = 0; world < frame.worlds.size(); ++world) {
       const auto map = static_cast<size_t>(frame.worlds[world].map);
       bool is_kept = false, is_found = false;
       for (const CornerState& state : find_corner_states(frame, world, *run_.maps()[map]->road, corners_[map],
                                                          sights_[map], run_.front_camera(), options_.search)) {
-        if (state.user < 0) {
         is_found = true;
+        if (state.user < 0) {
           empty_.push_back(state);
           continue;
         }
@@ -81,16 +82,15 @@ class CornerProbe {
         views.push_back(kept.view_of(frame, world, frame.slot_begin[world] + state.ego, {}));
         hidden.push_back({state, scene_of(frame, world)});
       }
-    }
       if (is_found) found_in.push_back(world);
-    const std::vector<float> shares = run_.visibility(kept, views, queries);
+    }
     keep(frame, found_in);
+    const std::vector<float> shares = run_.visibility(kept, views, queries);
     for (size_t i = 0; i < shares.size(); ++i) {
       if (!(shares[i] > 0)) hidden_.push_back(std::move(hidden[i]));
     }
   }
 
-  static CornerScene scene_of(const ProbeFrame& frame, size_t world) {
   // Worlds of the frame, in which policies may take over.
   void keep(const ProbeFrame& frame, const std::vector<size_t>& worlds) {
     if (worlds.empty()) return;
@@ -99,6 +99,7 @@ class CornerProbe {
     for (size_t i = 0; i < worlds.size(); ++i) kept_[{frame.scene_of(worlds[i]), frame.step}] = kept[i];
   }
 
+  static CornerScene scene_of(const ProbeFrame& frame, size_t world) {
     CornerScene scene;
     scene.boxes.assign(frame.boxes.begin() + frame.box_begin[world], frame.boxes.begin() + frame.box_begin[world + 1]);
     scene.status.assign(scene.boxes.size(), static_cast<uint8_t>(AgentStatus::parked));
@@ -127,12 +128,12 @@ class CornerProbe {
     results_.hidden_found = static_cast<int64_t>(coming.size());
     results_.empty_found = static_cast<int64_t>(empty_.size());
     results_.pairs = match_corners(coming, empty_, options_.pairs);
-    for (const CornerPair& pair : results_.pairs) {
     std::set<std::pair<int32_t, int32_t>> used;
     for (const CornerPair& pair : results_.pairs) {
       for (const CornerState* state : {&pair.hidden, &pair.empty}) used.insert({state->scene, state->step});
     }
     std::erase_if(kept_, [&used](const auto& one) { return !used.contains(one.first); });
+    for (const CornerPair& pair : results_.pairs) {
       const CornerState& state = pair.hidden;
       const auto found = std::find_if(hidden_.begin(), hidden_.end(), [&state](const Found& one) {
         return one.state.scene == state.scene && one.state.step == state.step && one.state.ego == state.ego;
@@ -140,7 +141,7 @@ class CornerProbe {
       CornerScene scene = found->scene;
       for (int step = 0; step <= kTakeoverSteps; ++step)
         scene.user_m.push_back(scenes_.of(state.scene).box_at(state.step + step, state.user).center_m.xy());
-      scene.removed = options_.control == CornerControl::none ? state.user : another_of(scene, state);
+      scene.removed = options_.control == CornerControl::permuted ? another_of(scene, state) : state.user;
       results_.scenes_of_pairs.push_back(std::move(scene));
     }
   }
@@ -218,9 +219,9 @@ class CornerProbe {
   DrivenScenes scenes_;
   std::vector<BlindCorners> corners_;  // [maps]
   std::vector<LineOfSight> sights_;    // [maps]
-  std::vector<Found> hidden_;
   Simulator* driven_ = nullptr;
   std::map<std::pair<int32_t, int32_t>, std::shared_ptr<const KeptWorld>> kept_;  // by scene and step
+  std::vector<Found> hidden_;
   std::vector<CornerState> empty_;
 };
 
