@@ -91,7 +91,7 @@ class CornerProbe {
     }
   }
 
-  // Worlds of the frame, in which policies may take over.
+  // Worlds of the frame, in which policies may take over: some 50 KB each, until pairs are chosen.
   void keep(const ProbeFrame& frame, const std::vector<size_t>& worlds) {
     if (worlds.empty()) return;
     const std::vector<uint8_t> saved = driven_->save(current_stream(run_.device()));
