@@ -16,8 +16,8 @@ namespace {
 // The progress of driving is its first half.
 CornerOptions with_half_progress(CornerOptions options) {
   if (const auto report = options.worlds.on_progress) {
-    options.worlds.on_progress = [report](double done, double eta_s) {
-      report(done / 2, eta_s + eta_s / std::max(1 - done, 0.01));  // as if the rest took as long
+    options.worlds.on_progress = [report, since_start = Stopwatch()](double done, double eta_s) {
+      report(done / 2, 2 * eta_s + since_start.seconds());  // as if the rest took as long
     };
   }
   return options;
@@ -179,7 +179,13 @@ class CornerProbe {
         for (size_t pair = begin; pair < end; ++pair)
           starts.push_back(start_of(pair, static_cast<CornerCase>(part % kCornerCases)));
         std::vector<Takeover> runs;
-        if (!worlds.run(starts, part < kCornerCases, &runs)) {
+        const auto report = [&](double part_done) {
+          const double of_batch = (static_cast<double>(part) + part_done) / static_cast<double>(2 * kCornerCases);
+          const double done =
+              (static_cast<double>(begin) + static_cast<double>(end - begin) * of_batch) / static_cast<double>(count);
+          if (report_) report_((1 + done) / 2, since_driven.seconds() * (1 - done) / done);
+        };
+        if (!worlds.run(starts, part < kCornerCases, report, &runs)) {
           results_.interrupted = true;
           results_.takeovers.resize(begin * of_pair);
           results_.pairs.resize(begin);
@@ -191,10 +197,6 @@ class CornerProbe {
               runs.begin() + static_cast<std::ptrdiff_t>(i * num_policies), num_policies,
               results_.takeovers.begin() + static_cast<std::ptrdiff_t>((begin + i) * of_pair + part * num_policies));
         }
-        const double done = (static_cast<double>(begin) +
-                             static_cast<double>((end - begin) * (part + 1)) / static_cast<double>(2 * kCornerCases)) /
-                            static_cast<double>(count);
-        if (report_) report_((1 + done) / 2, since_driven.seconds() * (1 - done) / done);
       }
     }
   }

@@ -75,7 +75,8 @@ std::vector<GeometryHandle> TakeoverWorlds::handles_of(bool walls) const {
   return handles;
 }
 
-bool TakeoverWorlds::run(const std::vector<TakeoverStart>& starts, bool walls, std::vector<Takeover>* takeovers_out) {
+bool TakeoverWorlds::run(const std::vector<TakeoverStart>& starts, bool walls,
+                         const std::function<void(double)>& on_progress, std::vector<Takeover>* takeovers_out) {
   const size_t num_policies = options_.policies.size();
   takeovers_out->assign(starts.size() * num_policies, {});
   for (const auto& [kind, worlds] : worlds_) worlds->at_takeover.reset();
@@ -91,6 +92,7 @@ bool TakeoverWorlds::run(const std::vector<TakeoverStart>& starts, bool walls, s
         command(starts[i], starts[i].step + step, actions[i], &commands[static_cast<size_t>(worlds->first_slots[i])]);
       }
       worlds->simulator->step(DeviceCopy(commands, run_.device()).span(), current_stream(run_.device()));
+      on_progress((static_cast<double>(policy) + (step + 1.0) / kTakeoverSteps) / static_cast<double>(num_policies));
     }
   }
   return true;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <limits>
 #include <map>
 #include <memory>
@@ -54,9 +55,10 @@ class TakeoverWorlds {
 
   /// [starts, policies] Each start is a world of its own that goes on from the state that was kept, without whoever is
   /// removed: all others are put where they were, and the policy drives the ego by what it reads, the most likely
-  /// action or a draw. Sight is measured by the walls of the maps also where worlds have none. Returns false on ^C,
-  /// with nothing to be used.
-  bool run(const std::vector<TakeoverStart>& starts, bool walls, std::vector<Takeover>* takeovers_out);
+  /// action or a draw. Sight is measured by the walls of the maps also where worlds have none. on_progress is told
+  /// which part of it is done, above 0. Returns false on ^C, with nothing to be used.
+  bool run(const std::vector<TakeoverStart>& starts, bool walls, const std::function<void(double)>& on_progress,
+           std::vector<Takeover>* takeovers_out);
 
  private:
   struct Worlds;
