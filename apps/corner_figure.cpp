@@ -60,7 +60,7 @@ void draw_means(const CornerResults& results, const std::vector<CornerRow>& rows
                       .strip = reveal_strip(results, walls)};
       for (const CornerRow& row : rows) {
         if (row.walls != walls || row.its_case != its_case || row.less_policy || row.less_case) continue;
-        PlotSeries series{.name = results.policies[row.policy].name};
+        PlotSeries series{.name = results.policies[row.policy].answers_as()};
         for (size_t k = 0; k < row.speed_mps.size(); ++k) {
           const Estimate& speed = row.speed_mps[k];
           const bool has_band = std::isfinite(speed.half_width_95);
@@ -119,7 +119,7 @@ RgbImage speeds_of(const CornerResults& results, size_t pair, bool walls) {
                   .y_label = "speed (m/s)"};
   for (size_t policy = 0; policy < results.policies.size(); ++policy) {
     const Takeover& run = results.takeover(pair, walls, CornerCase::hidden, policy);
-    PlotSeries series{.name = results.policies[policy].name};
+    PlotSeries series{.name = results.policies[policy].answers_as()};
     for (size_t k = 0; k < run.speed_mps.size(); ++k) {
       series.x.push_back(kTakeoverStep_s * static_cast<double>(k));
       series.y.push_back(static_cast<double>(run.speed_mps[k]));

@@ -128,7 +128,7 @@ class PathFigures {
     for (const Quantity& quantity : kQuantities) {
       PlotPanel panel{.title = quantity.title, .x_label = "along the path (m)", .y_label = quantity.label};
       for (size_t policy = 0; policy < results_.policies.size(); ++policy) {
-        PlotSeries series{.name = results_.policies[policy].name};
+        PlotSeries series{.name = results_.policies[policy].answers_as()};
         for (int32_t at = 0; at < path.num_points; ++at) {
           series.x.push_back(static_cast<double>(point(path, at).along_m));
           series.y.push_back(
@@ -185,7 +185,7 @@ void draw_means(const PedestrianResults& results, const std::vector<PedestrianRo
   std::vector<PlotPanel> panels;
   for (const Quantity& quantity : kQuantities) {
     PlotPanel panel{.title = quantity.title, .x_label = "from where it is first seen (m)", .y_label = quantity.label};
-    for (const ProbedPolicy& policy : results.policies) panel.series.push_back({.name = policy.name});
+    for (const ProbedPolicy& policy : results.policies) panel.series.push_back({.name = policy.answers_as()});
     for (const PedestrianRow& row : rows) {
       // Where most paths have a point: the ends are of few.
       if (!row.offset || 2 * row.cases < static_cast<int64_t>(results.paths.size())) continue;

@@ -117,7 +117,7 @@ std::string text_of(const Estimate& estimate) {
 
 size_t name_width(const ProbeResults& results) {
   size_t width = 6;
-  for (const ProbedPolicy& policy : results.policies) width = std::max(width, policy.name.size());
+  for (const ProbedPolicy& policy : results.policies) width = std::max(width, policy.answers_as().size());
   return width;
 }
 
@@ -131,8 +131,9 @@ void print_table(const RemovalResults& results, const std::vector<RemovalRow>& r
   for (const RemovalRow& row : rows) {
     if (row.group.distance_band || row.cases == 0) continue;
     fmt::print("{:{}} {:>10} {:>8} {:>7} {:>20} {:>20} {:>6.1f} %\n",
-               results.policies[static_cast<size_t>(row.policy)].name, width, row.group.occlusion_name(), row.cases,
-               row.scenes, text_of(row.abs_value_change), text_of(row.abs_brake_change), 100 * row.changed_share.value);
+               results.policies[static_cast<size_t>(row.policy)].answers_as(), width, row.group.occlusion_name(),
+               row.cases, row.scenes, text_of(row.abs_value_change), text_of(row.abs_brake_change),
+               100 * row.changed_share.value);
   }
   fmt::print("{}\n{} removals in {}\n", kEstimateNote, results.cases.size(), format_duration(results.seconds));
 }
@@ -144,7 +145,7 @@ void print_table(const PedestrianResults& results, const std::vector<PedestrianR
   for (const PedestrianRow& row : rows) {
     if (!row.phase || row.cases == 0) continue;
     fmt::print("{:{}} {:>12} {:>8} {:>7} {:>20} {:>20} {:>6.1f} %\n",
-               results.policies[static_cast<size_t>(row.policy)].name, width,
+               results.policies[static_cast<size_t>(row.policy)].answers_as(), width,
                kPathPhaseNames[static_cast<size_t>(*row.phase)], row.cases, row.scenes, text_of(row.value_change),
                text_of(row.brake_change), 100 * row.changed_share.value);
   }
@@ -158,10 +159,11 @@ void print_table(const CornerResults& results, const std::vector<CornerRow>& row
              "after (s)", "distance (m)", "speed (m/s)", "deceleration");
   for (const CornerRow& row : rows) {
     if (row.less_policy || row.less_case || row.revealed == 0) continue;
-    fmt::print("{:{}} {:>8} {:>6} {:>9} {:>5.1f}-{:>5.1f} {:>20} {:>20} {:>20}\n", results.policies[row.policy].name,
-               width, kCornerCaseNames[static_cast<size_t>(row.its_case)], kWallNames[row.walls ? 0 : 1], row.revealed,
-               row.reveal_s.front(), row.reveal_s.back(), text_of(row.at_reveal.distance_m),
-               text_of(row.at_reveal.speed_mps), text_of(row.at_reveal.deceleration_mps2));
+    fmt::print("{:{}} {:>8} {:>6} {:>9} {:>5.1f}-{:>5.1f} {:>20} {:>20} {:>20}\n",
+               results.policies[row.policy].answers_as(), width, kCornerCaseNames[static_cast<size_t>(row.its_case)],
+               kWallNames[row.walls ? 0 : 1], row.revealed, row.reveal_s.front(), row.reveal_s.back(),
+               text_of(row.at_reveal.distance_m), text_of(row.at_reveal.speed_mps),
+               text_of(row.at_reveal.deceleration_mps2));
   }
   fmt::print(
       "at the reveal, where line of sight past the walls opens; deceleration over the next 2 s, m/s2\n{}\n"
@@ -201,7 +203,7 @@ void add_removal_command(CLI::App& probe) {
   command
       ->add_option("--control", arguments->control,
                    "A control: nobody hides no one; permuted hides another of the ego's users, drawn anew for each "
-                   "case")
+                   "case; untrained has policies with fresh weights answer in the same states")
       ->check(one_of({kRemovalControlNames.begin(), kRemovalControlNames.end()}))
       ->capture_default_str();
   add_case_replay_options(command, &arguments->replay, kCaseOfReplay);
@@ -248,7 +250,11 @@ void add_pedestrian_command(CLI::App& probe) {
   command->add_option("--height", options.height_m, "Of the pedestrian, m; vehicles are 1.5 m high")
       ->transform(number(0.1, 3))
       ->capture_default_str();
-  command->add_option("--control", arguments->control, "A control: nobody puts no pedestrian there")
+  command
+      ->add_option(
+          "--control", arguments->control,
+          "A control: nobody puts no pedestrian there; untrained has policies with fresh weights answer in the "
+          "same states")
       ->check(one_of({kPedestrianControlNames.begin(), kPedestrianControlNames.end()}))
       ->capture_default_str();
   add_case_replay_options(command, &arguments->replay, kCaseOfReplay);
@@ -313,8 +319,10 @@ void add_corner_command(CLI::App& probe) {
                    "Who drives the scenes in which policies take over, instead of the policies: lane, the lane keeper")
       ->check(one_of({"lane"}));
   command
-      ->add_option("--control", arguments->control,
-                   "A control: permuted removes another vehicle near the ego instead of who is hidden")
+      ->add_option(
+          "--control", arguments->control,
+          "A control: permuted removes another vehicle near the ego instead of who is hidden; untrained has policies "
+          "with fresh weights take over in the same states")
       ->check(one_of({kCornerControlNames.begin(), kCornerControlNames.end()}))
       ->capture_default_str();
   add_case_replay_options(command, &arguments->replay,

@@ -36,7 +36,7 @@ void draw_removal_figure(const RemovalResults& results, const std::vector<Remova
       PlotPanel panel{.title = fmt::format("{}{}", quantity.title, by_distance ? ", wholly hidden users" : ""),
                       .x_label = by_distance ? "distance of the user (m)" : "occlusion of the user (%)",
                       .y_label = quantity.label};
-      for (const ProbedPolicy& policy : results.policies) panel.series.push_back({.name = policy.name});
+      for (const ProbedPolicy& policy : results.policies) panel.series.push_back({.name = policy.answers_as()});
       for (const RemovalRow& row : rows) {
         PlotSeries* const series = &panel.series[static_cast<size_t>(row.policy)];
         const RemovalGroup& group = row.group;

@@ -65,7 +65,7 @@ std::string about(const CornerState& one, int32_t removed, CornerControl control
   const std::string hidden =
       fmt::format("agent {} comes hidden towards agent {}, which is {:.1f} m before a blind corner", one.user, one.ego,
                   one.distance_m);
-  if (control == CornerControl::none) return hidden;
+  if (control != CornerControl::permuted) return hidden;
   return fmt::format("{}; a control: {} is removed instead", hidden,
                      removed < 0 ? "nobody" : fmt::format("agent {}", removed));
 }
@@ -93,7 +93,7 @@ void write(const CaseReplayOptions& options, const ProbeOptions& probe, const Pr
   probed.ego = place.ego;
   for (size_t policy = 0; policy < results.policies.size() && !results.responses.empty(); ++policy) {
     const PairedResponse& response = results.response(number, policy);
-    probed.answers.push_back({.policy = results.policies[policy].name,
+    probed.answers.push_back({.policy = results.policies[policy].answers_as(),
                               .value = double{response.value},
                               .value_without = double{response.value_without},
                               .brake = double{response.brake},
@@ -140,7 +140,7 @@ void write_case_replay(const CaseReplayOptions& options, const PedestrianOptions
   const PedestrianPoint& point = results.points[number];
   const PedestrianPath& path = results.paths[static_cast<size_t>(point.path)];
   ReplayCase probed{.what = about(point, path, results.control)};
-  if (results.control == PedestrianControl::none) {
+  if (results.control != PedestrianControl::nobody) {
     probed.inserted = replay_box(point.pedestrian);
     const auto first = results.points.begin() + path.first_point;
     for (auto at = first; at != first + path.num_points; ++at) {

@@ -7,6 +7,11 @@
 
 namespace pictura {
 
+struct KeptWorld {
+  WorldSpec spec;
+  SimulatorState state;
+};
+
 namespace {
 
 // The first world of each part, and the end of the last: where the agents before it come nearest to an equal share.
@@ -69,6 +74,41 @@ std::vector<uint8_t> part_of_saved_state(const Simulator& simulator, const std::
   its.copy_worlds(its_setup, 0, whole, setup, static_cast<int>(part_begins(all, num_parts)[static_cast<size_t>(part)]),
                   its_setup.num_worlds());
   return its.save(its_setup);
+}
+
+std::vector<std::shared_ptr<const KeptWorld>> keep_worlds(const Simulator& simulator, Span<const uint8_t> saved,
+                                                          const std::vector<size_t>& worlds) {
+  const SimulatorSetup setup = setup_of(simulator, simulator.worlds());
+  SimulatorState whole(setup);
+  whole.restore(setup, saved);
+  std::vector<std::shared_ptr<const KeptWorld>> kept;
+  for (const size_t world : worlds) {
+    const WorldSpec& spec = setup.worlds[world];
+    const SimulatorSetup its_setup = setup_of(simulator, {spec});
+    auto its = std::make_shared<KeptWorld>(KeptWorld{spec, SimulatorState(its_setup)});
+    its->state.copy_worlds(its_setup, 0, whole, setup, static_cast<int>(world), 1);
+    kept.push_back(std::move(its));
+  }
+  return kept;
+}
+
+std::vector<uint8_t> saved_state_of(const Simulator& simulator, const std::vector<const KeptWorld*>& worlds) {
+  const SimulatorSetup setup = setup_of(simulator, simulator.worlds());
+  PICTURA_CHECK(worlds.size() == setup.worlds.size(), "simulator state: expected {} kept worlds, got {}",
+                setup.worlds.size(), worlds.size());
+  SimulatorState joined(setup);
+  for (size_t i = 0; i < worlds.size(); ++i) {
+    const WorldSpec &expected = setup.worlds[i], &spec = worlds[i]->spec;
+    const SimulatorSetup its_setup = setup_of(simulator, {spec});
+    PICTURA_CHECK(
+        spec.map == expected.map && spec.num_agents == expected.num_agents &&
+            spec.global_world == expected.global_world && worlds[i]->state.boxes.size() == its_setup.num_boxes() &&
+            worlds[i]->state.lights.size() == its_setup.num_lights(),
+        "simulator state: world {}: expected world {} with {} agents on map {}, got world {} with {} on map {}", i,
+        expected.global_world, expected.num_agents, expected.map, spec.global_world, spec.num_agents, spec.map);
+    joined.copy_worlds(setup, static_cast<int>(i), worlds[i]->state, its_setup, 0, 1);
+  }
+  return joined.save(setup);
 }
 
 }  // namespace pictura

@@ -40,6 +40,11 @@ Config adapted(const Config& trained, const SessionOptions& options) {
   return config;
 }
 
+Config with_seed(Config config, uint64_t seed) {
+  config.run.seed = seed;
+  return config;
+}
+
 // The cameras that the options ask for, else those of training. No weight depends on sizes or poses.
 Rig chosen_rig(const SavedPolicy& saved, const SessionOptions& options) {
   const bool is_resized = options.width_px != 0 || options.height_px != 0;
@@ -74,6 +79,13 @@ struct PolicySession::Parts {
         policy(*own_policy) {
     restore_policy(saved, policy);
   }
+  Parts(const Parts& trained, uint64_t seed)
+      : config(with_seed(trained.config, seed)),
+        device(trained.device),
+        rig(trained.rig),
+        executor(make_learner_executor(device)),
+        own_policy(make_policy(config, rig, device)),
+        policy(*own_policy) {}
   Parts(const Config& its_config, const Rig& its_rig, Device its_device, const Policy& its_policy)
       : config(its_config),
         device(its_device),
@@ -169,7 +181,13 @@ PolicySession::PolicySession(const std::string& path, const SessionOptions& opti
 PolicySession::PolicySession(const Config& config, const Rig& rig, Device device, const Policy& policy)
     : parts_(std::make_unique<Parts>(config, rig, device, policy)) {}
 
+PolicySession::PolicySession(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+
 PolicySession::~PolicySession() = default;
+
+std::unique_ptr<PolicySession> PolicySession::untrained(uint64_t seed) const {
+  return std::unique_ptr<PolicySession>(new PolicySession(std::make_unique<Parts>(*parts_, seed)));
+}
 
 bool PolicySession::reads_images() const { return parts_->config.reads_images(); }
 

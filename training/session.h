@@ -56,6 +56,9 @@ class PolicySession {
   /// The policy of a configuration with cameras of `rig`, as it is when it is asked; it must outlive the session.
   PolicySession(const Config& config, const Rig& rig, Device device, const Policy& policy);
   ~PolicySession();
+  /// The same policy as it is before training, in the same worlds and with the same cameras: weights are drawn from
+  /// `seed` as train draws them, but for those of a backbone's program.
+  std::unique_ptr<PolicySession> untrained(uint64_t seed) const;
   PolicySession(const PolicySession&) = delete;
   PolicySession& operator=(const PolicySession&) = delete;
 
@@ -91,6 +94,7 @@ class PolicySession {
  private:
   friend class SessionController;
   struct Parts;
+  explicit PolicySession(std::unique_ptr<Parts> parts);
   std::unique_ptr<Parts> parts_;
 };
 

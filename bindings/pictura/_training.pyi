@@ -83,8 +83,8 @@ def probe_corner(policies: collections.abc.Sequence[str], maps: collections.abc.
     
     policies, maps, density, agents_per_world, scenes, steps, sample_steps and what follows argmax: as in probe_removal(). pairs: in
     all. max_distance_m: how far before the corner a policy may take over. min_speed_mps: of the ego then, and of who is hidden.
-    user_range_m: how far before the junction that one may be. driver: 'lane' drives the scenes instead of the policies. control: 'none' or
-    'permuted'. batch: pairs that are run at once. cases_file: a CSV file for every run. replay, case, cameras: as
+    user_range_m: how far before the junction that one may be. driver: 'lane' drives the scenes instead of the policies. control: 'none',
+    'permuted' or 'untrained'. batch: pairs that are run at once. cases_file: a CSV file for every run. replay, case, cameras: as
     in probe_removal(); a case is a pair, by default that of the example's figure. Returns a dict, that of the command's summary.json
     (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.
     """
@@ -95,7 +95,7 @@ def probe_pedestrian(policies: collections.abc.Sequence[str], maps: collections.
     
     policies, maps, density, agents_per_world, scenes, steps, sample_steps, batch and what follows argmax: as in probe_removal().
     paths: in all, each through one state. hider_range_m: how far away the vehicle may be that a path begins behind. min_speed_mps:
-    of the ego, forwards. height_m: of the pedestrian. control: 'none' or 'nobody'. cases_file: a CSV file for every place of every path. replay, case, cameras: as in probe_removal(). Returns a dict, that of
+    of the ego, forwards. height_m: of the pedestrian. control: 'none', 'nobody' or 'untrained'. cases_file: a CSV file for every place of every path. replay, case, cameras: as in probe_removal(). Returns a dict, that of
     the command's summary.json (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad
     input.
     """
@@ -106,7 +106,7 @@ def probe_removal(policies: collections.abc.Sequence[str], maps: collections.abc
     policies: checkpoints or safetensors; the world is the first one's. maps, density, agents_per_world, steps and what follows
     argmax: as in evaluate(). scenes: how many scenarios are driven, an equal share by each policy; 0: as many on each map for each
     policy, two a map or more. removals: in all. sample_steps: between states. range_m: how far away a user may be. control: 'none',
-    'nobody' or 'permuted'. batch: cases in a call. cases_file: a CSV file for every case. replay: a page *.html that plays the scene of one case and shows
+    'nobody', 'permuted' or 'untrained'. batch: cases in a call. cases_file: a CSV file for every case. replay: a page *.html that plays the scene of one case and shows
     its images with and without the road user (docs/replay.md); case: its number in cases_file, by default the one where the first
     policy's value changes most; cameras: keeps the ego's images of every step. Returns a dict, that of the command's
     summary.json (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.

@@ -239,7 +239,13 @@ def test_removal_is_the_commands(trained, tmp_path):
             pictura.probe_removal([str(folder / "checkpoint.ckpt")], ["procedural:1"], **wrong, **few)
     nobody = pictura.probe_removal([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="nobody", **options)
     assert all(row["abs_d_value"] in (0, None) for row in nobody["rows"])
-    with pytest.raises(pictura.UsageError, match="none, nobody, permuted"):
+    untrained_cases = tmp_path / "untrained.csv"
+    untrained = pictura.probe_removal([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="untrained", cases_file=str(untrained_cases), **options)
+    assert untrained["control"] == "untrained" and untrained["cases"] == number and untrained["policy"][0]["untrained_hash"] != policy["policy_hash"]
+    assert policy["untrained_hash"] is None and untrained["policy"][0]["policy_hash"] == policy["policy_hash"]
+    theirs_of_state, mine = ([line.split(",")[:14] for line in each.read_text().splitlines()] for each in (untrained_cases, cases))
+    assert theirs_of_state == mine and untrained_cases.read_text() != cases.read_text()
+    with pytest.raises(pictura.UsageError, match="none, nobody, permuted, untrained"):
         pictura.probe_removal([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="some")
     theirs = probed_by_command("removal", folder, tmp_path / "out", options)
     assert theirs["rows"] == report["rows"]
@@ -265,7 +271,9 @@ def test_pedestrian_is_the_commands(trained, tmp_path):
     assert len(lines) == 1 + report["cases"] and lines[0].startswith("case,path,scene,map,driver,step,ego")
     nobody = pictura.probe_pedestrian([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="nobody", **options)
     assert all(row["abs_d_value"] == 0 for row in nobody["rows"])
-    with pytest.raises(pictura.UsageError, match="none, nobody, got 'some'"):
+    untrained = pictura.probe_pedestrian([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="untrained", **options)
+    assert untrained["cases"] == report["cases"] and untrained["rows"] != report["rows"]
+    with pytest.raises(pictura.UsageError, match="none, nobody, untrained, got 'some'"):
         pictura.probe_pedestrian([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="some")
     theirs = probed_by_command("pedestrian", folder, tmp_path / "out", options)
     assert theirs["rows"] == report["rows"]
@@ -293,8 +301,11 @@ def test_corner_is_the_commands(trained, tmp_path):
     with pytest.raises(pictura.UsageError, match="expected one pair or more, got 0"):
         pictura.probe_corner([str(folder / "checkpoint.ckpt")], ["procedural:1"], pairs=0)
     assert report["control"] == "none"
-    with pytest.raises(pictura.UsageError, match="none, permuted"):
+    with pytest.raises(pictura.UsageError, match="none, permuted, untrained"):
         pictura.probe_corner([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="nobody")
+    untrained = pictura.probe_corner([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="untrained", **options)
+    assert untrained["pairs"] == 1 and untrained["rows"] != report["rows"]
+    assert untrained["rows"][0]["speed_curve_mps"][0] == hidden["speed_curve_mps"][0]
     _, case = replay_of(tmp_path / "pair.html")
     shown = row_of_case(cases, 0)
     assert (case["frame"], case["ego"]) == (int(shown["step"]), int(shown["ego"]))

@@ -1,4 +1,5 @@
-// Worlds divided among simulators: together they do, and save, what one simulator of all worlds does.
+// Worlds that leave their simulator: divided among several they together do, and save, what one simulator of all worlds
+// does, and single ones go on in others.
 #include "pictura/simulator/saved_worlds.h"
 
 #include <gmock/gmock.h>
@@ -7,6 +8,7 @@
 #include "pictura/backends/make_simulator.h"
 #include "pictura/common/error.h"
 #include "pictura/map/load_map.h"
+#include "pictura/tests/simulator/same_bits.h"
 #include "pictura/tests/simulator/test_maps.h"
 #include "pictura/tests/support/error_message.h"
 
@@ -92,6 +94,49 @@ TEST(PartsOfWorlds, StepAndSaveAsOneSimulatorDoes) {
   std::vector<WorldSpec> others = all;
   ++others[0].num_agents;
   EXPECT_THAT(test::message_of([&] { part_of_saved_state(*whole, others, joined, 0, 1); }), HasSubstr("worlds"));
+}
+
+// Two worlds of different moments and in another order, where walls are off and no entities are observed.
+TEST(KeptWorlds, GoOnInAnotherSimulator) {
+  SimulatorConfig config{.seed = 5, .num_threads = 1, .episode_steps = 100, .reset_inactive_fraction = 2};
+  const std::vector<std::shared_ptr<const RoadMap>> maps{load_map("procedural"), load_map("procedural:7")};
+  const std::vector<WorldSpec> all{{0, 9, 4}, {1, 12, 5}, {0, 7, 6}};
+  const auto whole = make_simulator("cpu", config, maps, all);
+  // All speed up straight ahead: who leaves the road halts before it comes to a wall.
+  const auto step = [](Simulator* simulator, int count) {
+    const std::vector<int32_t> actions(static_cast<size_t>(simulator->num_slots()), 3 * kNumLatActions + 1);
+    for (int i = 0; i < count; ++i) simulator->step(actions);
+  };
+  step(whole.get(), 20);
+  const auto early = keep_worlds(*whole, whole->save(), {1});
+  step(whole.get(), 10);
+  const auto late = keep_worlds(*whole, whole->save(), {0, 2});
+
+  config.walls = false;
+  config.vector_observations = false;
+  const auto other = make_simulator("cpu", config, maps, {all[2], all[1]});
+  other->restore(saved_state_of(*other, {late[1].get(), early[0].get()}));
+  EXPECT_EQ(other->episode_step()[0], 30);
+  EXPECT_EQ(other->episode_step()[1], 20);
+  step(whole.get(), 10);
+  step(other.get(), 10);
+  const auto expect_same = [&](int slot, int other_slot) {
+    const AgentStateView a = whole->state(), b = other->state();
+#define X(name, type, per_agent, first, comment)                                                                     \
+  EXPECT_EQ(std::memcmp(a.name + slot * (per_agent), b.name + other_slot * (per_agent), sizeof(type) * (per_agent)), \
+            0)                                                                                                       \
+      << #name << " of slot " << slot;
+    PICTURA_AGENT_FIELDS(X)
+#undef X
+  };
+  for (int agent = 0; agent < 7; ++agent) expect_same(9 + 12 + agent, agent);
+  step(other.get(), 10);  // to step 40, as the whole is
+  for (int agent = 0; agent < 12; ++agent) expect_same(9 + agent, 7 + agent);
+
+  EXPECT_THAT(test::message_of([&] { saved_state_of(*other, {late[0].get(), early[0].get()}); }),
+              HasSubstr("world 0: expected world 6 with 7 agents on map 0, got world 4 with 9 on map 0"));
+  EXPECT_THAT(test::message_of([&] { saved_state_of(*other, {early[0].get()}); }),
+              HasSubstr("expected 2 kept worlds, got 1"));
 }
 
 }  // namespace

@@ -167,6 +167,27 @@ TEST_F(Corner, WithoutWallsItIsSeenFromTheStart) {
   EXPECT_EQ(later, 0u);
 }
 
+// Vectors hold no walls: without them these policies drive the same, among the same parked cars, up to where walls end
+// a run. Of empty corners too.
+TEST_F(Corner, WallsAloneAreGone) {
+  const CornerResults& all = results();
+  size_t compared = 0;
+  for (size_t pair = 0; pair < all.pairs.size(); ++pair) {
+    for (const CornerCase its_case : {CornerCase::hidden, CornerCase::removed, CornerCase::empty}) {
+      for (const size_t policy : {kVectorized, kLikeForLike}) {
+        const Takeover &with = all.takeover(pair, true, its_case, policy),
+                       &open = all.takeover(pair, false, its_case, policy);
+        const bool hits_wall = (with.ended_by & kEventWall) != 0;
+        for (size_t k = 0; k <= kTakeoverSteps && std::isfinite(with.x_m[k]); ++k)
+          EXPECT_EQ(with.x_m[k], open.x_m[k]) << "pair " << pair << ", step " << k;
+        EXPECT_TRUE(hits_wall || (with.steps == open.steps && with.ended_by == open.ended_by)) << "pair " << pair;
+        compared += !hits_wall;
+      }
+    }
+  }
+  EXPECT_GT(compared, all.pairs.size());
+}
+
 bool same_runs(const CornerResults& a, const CornerResults& b) {
   if (a.takeovers.size() != b.takeovers.size()) return false;
   const auto same = [](float x, float y) { return x == y || (std::isnan(x) && std::isnan(y)); };
@@ -211,6 +232,34 @@ TEST_F(Corner, AnotherOneIsRemovedInstead) {
   }
   EXPECT_GT(removed, all.pairs.size() / 2);
   EXPECT_GT(differ, 0u);
+}
+
+TEST_F(Corner, UntrainedPoliciesTakeOverInTheSameStates) {
+  CornerOptions o = options(12);
+  o.control = CornerControl::untrained;
+  const CornerResults control = probe_corner(o);
+  const CornerResults& all = results();
+  ASSERT_EQ(control.pairs.size(), all.pairs.size());
+  std::array<size_t, 3> differ{};
+  for (size_t pair = 0; pair < all.pairs.size(); ++pair) {
+    EXPECT_EQ(control.scenes_of_pairs[pair].removed, all.scenes_of_pairs[pair].removed);
+    for (const size_t policy : {kAgent, kVectorized, kLikeForLike}) {
+      const Takeover &run = control.takeover(pair, true, CornerCase::hidden, policy),
+                     &without = control.takeover(pair, true, CornerCase::removed, policy),
+                     &trained = all.takeover(pair, true, CornerCase::hidden, policy);
+      EXPECT_EQ(run.speed_mps[0], trained.speed_mps[0]);
+      differ[policy] += run.x_m[10] != trained.x_m[10];
+      if (policy != kAgent) continue;
+      const int32_t end = run.input_step < 0 ? run.steps : std::min(run.input_step, run.steps);
+      for (size_t k = 0; k < static_cast<size_t>(end); ++k)
+        EXPECT_EQ(run.x_m[k], without.x_m[k]) << "nobody is seen, pair " << pair << ", step " << k;
+    }
+  }
+  for (const size_t policy : {kAgent, kVectorized, kLikeForLike}) {
+    EXPECT_GT(differ[policy], 0u) << policy;
+    EXPECT_EQ(control.policies[policy].hash, all.policies[policy].hash);
+    EXPECT_NE(control.policies[policy].untrained_hash, control.policies[policy].hash);
+  }
 }
 
 TEST_F(Corner, SeedsDecideWhatIsFound) {

@@ -16,6 +16,7 @@
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/tests/training/small_runs.h"
+#include "pictura/training/probes/corner.h"
 #include "pictura/training/probes/removal.h"
 #include "pictura/training/ranks/ranks.h"
 #include "pictura/training/run.h"
@@ -197,6 +198,42 @@ TEST_F(DeviceTraining, RemovalAgreesWithTheHosts) {
   }
   EXPECT_GT(same, 270);
   EXPECT_GT(hidden, 20);
+}
+
+// The lane keeper drives alike on both, so that policies take over in the same states, bit for bit. From there a
+// rounding error may decide an action.
+TEST_F(DeviceTraining, TakeoversAtCornersBeginAsTheHosts) {
+  CornerOptions o;
+  for (const char* modality : {"perspective", "vector"}) {
+    const std::vector<std::string> more{fmt::format("policy.modality={}", modality), "train.precision=fp32",
+                                        "train.updates=1", "simulator.walls=true"};
+    o.policies.push_back(train(options(modality, "cpu", more)).checkpoint);
+  }
+  o.worlds.maps = {"procedural:1", "procedural:2"};
+  o.worlds.agents_per_world = 90;
+  o.worlds.scenarios = 4;
+  o.worlds.steps = 300;
+  o.worlds.controller = "lane";
+  o.pairs = 8;
+  o.worlds.device = o.worlds.simulator = "cpu";
+  const CornerResults on_host = probe_corner(o);
+  o.worlds.device = o.worlds.simulator = "cuda";
+  const CornerResults on_device = probe_corner(o);
+  ASSERT_GT(on_host.pairs.size(), 2u);
+  ASSERT_EQ(on_device.pairs.size(), on_host.pairs.size());
+  EXPECT_EQ(on_device.hidden_found, on_host.hidden_found);
+  EXPECT_EQ(on_device.empty_found, on_host.empty_found);
+  for (size_t pair = 0; pair < on_host.pairs.size(); ++pair) {
+    const CornerState &a = on_host.pairs[pair].hidden, &b = on_device.pairs[pair].hidden;
+    EXPECT_EQ(std::tie(a.scene, a.step, a.ego, a.user), std::tie(b.scene, b.step, b.ego, b.user)) << pair;
+  }
+  size_t alike = 0;
+  for (size_t i = 0; i < on_host.takeovers.size(); ++i) {
+    const Takeover &a = on_host.takeovers[i], &b = on_device.takeovers[i];
+    EXPECT_EQ(std::tie(a.speed_mps[0], a.x_m[0], a.y_m[0]), std::tie(b.speed_mps[0], b.x_m[0], b.y_m[0])) << i;
+    alike += a.x_m[5] == b.x_m[5];
+  }
+  EXPECT_GT(alike, on_host.takeovers.size() * 9 / 10) << "after half a second";
 }
 
 bool equal(const std::vector<NamedTensor>& a, const std::vector<NamedTensor>& b) {

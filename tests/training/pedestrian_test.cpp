@@ -181,6 +181,27 @@ TEST_F(Pedestrian, NobodyChangesNothing) {
   }
 }
 
+TEST_F(Pedestrian, UntrainedPoliciesAnswerOnTheSamePaths) {
+  PedestrianOptions o = options(6);
+  o.control = PedestrianControl::untrained;
+  const PedestrianResults control = probe_pedestrian(o);
+  const PedestrianResults& all = results();
+  ASSERT_EQ(control.points.size(), all.points.size());
+  std::array<int, 3> differ{};
+  int hidden_changes = 0, seen_changes = 0;
+  for (size_t i = 0; i < control.points.size(); ++i) {
+    EXPECT_EQ(control.points[i].visible_share, all.points[i].visible_share);
+    EXPECT_EQ(control.points[i].pedestrian.center_m.x, all.points[i].pedestrian.center_m.x);
+    for (const size_t policy : {kAgent, kVectorized, kLikeForLike})
+      differ[policy] += control.response(i, policy).value != all.response(i, policy).value;
+    const bool is_changed = !control.response(i, kAgent).is_unchanged();
+    (control.points[i].visible_share == 0 ? hidden_changes : seen_changes) += is_changed;
+  }
+  for (const int count : differ) EXPECT_GT(count, static_cast<int>(all.points.size()) * 9 / 10);
+  EXPECT_EQ(hidden_changes, 0);
+  EXPECT_GT(seen_changes, 10);
+}
+
 TEST_F(Pedestrian, BatchesDecideNothing) {
   PedestrianOptions o = options(6);
   for (const int batch : {1, 300}) {
@@ -209,7 +230,7 @@ TEST_F(Pedestrian, RefusesWhatCannotBe) {
   o = options(2);
   o.hider_range_m = 3;
   EXPECT_THAT(message_of([&] { probe_pedestrian(o); }), HasSubstr("a range above 5 m, got 3"));
-  EXPECT_THAT(message_of([&] { pedestrian_control_named("some"); }), HasSubstr("none, nobody, got 'some'"));
+  EXPECT_THAT(message_of([&] { pedestrian_control_named("some"); }), HasSubstr("none, nobody, untrained, got 'some'"));
 }
 
 // ---- results

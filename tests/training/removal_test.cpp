@@ -144,6 +144,52 @@ TEST_F(Removal, HidingAnotherUserGivesOtherNumbers) {
   EXPECT_GT(differ, others * 9 / 10);
 }
 
+TEST_F(Removal, UntrainedPoliciesAnswerInTheSameStates) {
+  RemovalOptions o = options(600);
+  o.control = RemovalControl::untrained;
+  const RemovalResults control = probe_removal(o);
+  const RemovalResults& all = results();
+  ASSERT_EQ(control.cases.size(), all.cases.size());
+  int hidden = 0, seen_changes = 0;
+  std::array<int, 3> differ{}, hidden_changes{};
+  for (size_t i = 0; i < control.cases.size(); ++i) {
+    const RemovalCase &one = control.cases[i], &same = all.cases[i];
+    EXPECT_EQ(std::tuple(one.scene, one.step, one.ego, one.user, one.hidden, one.ego_speed_mps),
+              std::tuple(same.scene, same.step, same.ego, same.user, same.hidden, same.ego_speed_mps))
+        << "the trained policies drive";
+    const bool is_hidden = one.is_in_frame() && one.visible_share == 0;
+    hidden += is_hidden;
+    for (const size_t policy : {kAgent, kVectorized, kLikeForLike}) {
+      differ[policy] += control.response(i, policy).value != all.response(i, policy).value;
+      hidden_changes[policy] += is_hidden && !control.response(i, policy).is_unchanged();
+    }
+    seen_changes += one.visible_share > 0.5f && !control.response(i, kAgent).is_unchanged();
+  }
+  for (const size_t policy : {kAgent, kVectorized, kLikeForLike}) {
+    EXPECT_GT(differ[policy], 590) << policy;
+    EXPECT_NE(control.policies[policy].untrained_hash, control.policies[policy].hash);
+    EXPECT_EQ(control.policies[policy].hash, all.policies[policy].hash);
+    EXPECT_EQ(all.policies[policy].untrained_hash, "");
+  }
+  EXPECT_EQ(hidden_changes[kAgent], 0) << "no weights see through walls";
+  EXPECT_GT(hidden_changes[kVectorized], hidden / 2);
+  EXPECT_GT(seen_changes, 20);
+  EXPECT_EQ(control.policies[kVectorized].untrained_hash, control.policies[kLikeForLike].untrained_hash)
+      << "one architecture, one seed";
+  EXPECT_EQ(control.policies[kAgent].answers_as(), "untrained agent");
+  const auto json = nlohmann::json::parse(removal_summary_json(control, summarize(control), ""));
+  EXPECT_EQ(json.at("control"), "untrained");
+  EXPECT_EQ(json.at("policy")[0].at("untrained_hash"), control.policies[kAgent].untrained_hash);
+}
+
+TEST_F(Removal, WeightsOfUntrainedPoliciesAreOfTheSeed) {
+  const PolicySession trained(policies_[kAgent], {.num_threads = 1, .device = "cpu"});
+  const auto hash_of = [&](uint64_t seed) { return trained.untrained(seed)->evaluation_setting().policy_hash; };
+  EXPECT_EQ(hash_of(1), hash_of(1));
+  EXPECT_NE(hash_of(1), hash_of(2));
+  EXPECT_EQ(trained.untrained(1)->training_world().walls, trained.training_world().walls);
+}
+
 TEST_F(Removal, BatchesDecideNothing) {
   RemovalOptions o = options(600);
   for (const int batch : {1, 300}) {

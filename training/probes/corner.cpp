@@ -1,6 +1,8 @@
 #include "pictura/training/probes/corner.h"
 
 #include <algorithm>
+#include <map>
+#include <set>
 
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
@@ -14,8 +16,8 @@ namespace {
 // The progress of driving is its first half.
 CornerOptions with_half_progress(CornerOptions options) {
   if (const auto report = options.worlds.on_progress) {
-    options.worlds.on_progress = [report](double done, double eta_s) {
-      report(done / 2, eta_s + eta_s / std::max(1 - done, 0.01));  // as if the rest took as long
+    options.worlds.on_progress = [report, since_start = Stopwatch()](double done, double eta_s) {
+      report(done / 2, 2 * eta_s + since_start.seconds());  // as if the rest took as long
     };
   }
   return options;
@@ -27,7 +29,8 @@ class CornerProbe {
       : report_(options.worlds.on_progress),
         options_(with_half_progress(options)),
         results_(*results_out),
-        run_(sessions, options_, results_out, true) {
+        run_(sessions, options_, results_out,
+             {.walls = true, .untrained = options.control == CornerControl::untrained}) {
     results_.maps = run_.maps();
     for (const auto& map : run_.maps()) {
       corners_.push_back(find_blind_corners(*map->road, map->geometry.walls));
@@ -38,6 +41,7 @@ class CornerProbe {
   void run() {
     run_.run([this](const ProbeFrame& frame) { look_for_corners(frame); },
              [this](Simulator& simulator, int driver, Span<const Command> commands) {
+               driven_ = &simulator;
                scenes_.add(simulator, driver, commands);
              });
     if (!results_.interrupted) choose_pairs();
@@ -60,11 +64,13 @@ class CornerProbe {
     std::vector<View> views;
     std::vector<VisibilityQuery> queries;
     std::vector<Found> hidden;
+    std::vector<size_t> found_in;  // worlds
     for (size_t world = 0; world < frame.worlds.size(); ++world) {
       const auto map = static_cast<size_t>(frame.worlds[world].map);
-      bool is_kept = false;
+      bool is_kept = false, is_found = false;
       for (const CornerState& state : find_corner_states(frame, world, *run_.maps()[map]->road, corners_[map],
                                                          sights_[map], run_.front_camera(), options_.search)) {
+        is_found = true;
         if (state.user < 0) {
           empty_.push_back(state);
           continue;
@@ -76,11 +82,21 @@ class CornerProbe {
         views.push_back(kept.view_of(frame, world, frame.slot_begin[world] + state.ego, {}));
         hidden.push_back({state, scene_of(frame, world)});
       }
+      if (is_found) found_in.push_back(world);
     }
+    keep(frame, found_in);
     const std::vector<float> shares = run_.visibility(kept, views, queries);
     for (size_t i = 0; i < shares.size(); ++i) {
       if (!(shares[i] > 0)) hidden_.push_back(std::move(hidden[i]));
     }
+  }
+
+  // Worlds of the frame, in which policies may take over: some 50 KB each, until pairs are chosen.
+  void keep(const ProbeFrame& frame, const std::vector<size_t>& worlds) {
+    if (worlds.empty()) return;
+    const std::vector<uint8_t> saved = driven_->save(current_stream(run_.device()));
+    const auto kept = keep_worlds(*driven_, saved, worlds);
+    for (size_t i = 0; i < worlds.size(); ++i) kept_[{frame.scene_of(worlds[i]), frame.step}] = kept[i];
   }
 
   static CornerScene scene_of(const ProbeFrame& frame, size_t world) {
@@ -112,6 +128,11 @@ class CornerProbe {
     results_.hidden_found = static_cast<int64_t>(coming.size());
     results_.empty_found = static_cast<int64_t>(empty_.size());
     results_.pairs = match_corners(coming, empty_, options_.pairs);
+    std::set<std::pair<int32_t, int32_t>> used;
+    for (const CornerPair& pair : results_.pairs) {
+      for (const CornerState* state : {&pair.hidden, &pair.empty}) used.insert({state->scene, state->step});
+    }
+    std::erase_if(kept_, [&used](const auto& one) { return !used.contains(one.first); });
     for (const CornerPair& pair : results_.pairs) {
       const CornerState& state = pair.hidden;
       const auto found = std::find_if(hidden_.begin(), hidden_.end(), [&state](const Found& one) {
@@ -120,7 +141,7 @@ class CornerProbe {
       CornerScene scene = found->scene;
       for (int step = 0; step <= kTakeoverSteps; ++step)
         scene.user_m.push_back(scenes_.of(state.scene).box_at(state.step + step, state.user).center_m.xy());
-      scene.removed = options_.control == CornerControl::none ? state.user : another_of(scene, state);
+      scene.removed = options_.control == CornerControl::permuted ? another_of(scene, state) : state.user;
       results_.scenes_of_pairs.push_back(std::move(scene));
     }
   }
@@ -158,7 +179,13 @@ class CornerProbe {
         for (size_t pair = begin; pair < end; ++pair)
           starts.push_back(start_of(pair, static_cast<CornerCase>(part % kCornerCases)));
         std::vector<Takeover> runs;
-        if (!worlds.run(starts, part < kCornerCases, &runs)) {
+        const auto report = [&](double part_done) {
+          const double of_batch = (static_cast<double>(part) + part_done) / static_cast<double>(2 * kCornerCases);
+          const double done =
+              (static_cast<double>(begin) + static_cast<double>(end - begin) * of_batch) / static_cast<double>(count);
+          if (report_) report_((1 + done) / 2, since_driven.seconds() * (1 - done) / done);
+        };
+        if (!worlds.run(starts, part < kCornerCases, report, &runs)) {
           results_.interrupted = true;
           results_.takeovers.resize(begin * of_pair);
           results_.pairs.resize(begin);
@@ -170,10 +197,6 @@ class CornerProbe {
               runs.begin() + static_cast<std::ptrdiff_t>(i * num_policies), num_policies,
               results_.takeovers.begin() + static_cast<std::ptrdiff_t>((begin + i) * of_pair + part * num_policies));
         }
-        const double done = (static_cast<double>(begin) +
-                             static_cast<double>((end - begin) * (part + 1)) / static_cast<double>(2 * kCornerCases)) /
-                            static_cast<double>(count);
-        if (report_) report_((1 + done) / 2, since_driven.seconds() * (1 - done) / done);
       }
     }
   }
@@ -182,7 +205,12 @@ class CornerProbe {
     const CornerPair& both = results_.pairs[pair];
     const CornerState& state = its_case == CornerCase::empty ? both.empty : both.hidden;
     const int32_t removed = its_case == CornerCase::removed ? results_.scenes_of_pairs[pair].removed : -1;
-    return {&scenes_.of(state.scene), state.step, state.ego, state.user, removed};
+    return {&scenes_.of(state.scene),
+            kept_.at({state.scene, state.step}).get(),
+            state.step,
+            state.ego,
+            state.user,
+            removed};
   }
 
   const std::function<void(double, double)> report_;
@@ -193,6 +221,8 @@ class CornerProbe {
   DrivenScenes scenes_;
   std::vector<BlindCorners> corners_;  // [maps]
   std::vector<LineOfSight> sights_;    // [maps]
+  Simulator* driven_ = nullptr;
+  std::map<std::pair<int32_t, int32_t>, std::shared_ptr<const KeptWorld>> kept_;  // by scene and step
   std::vector<Found> hidden_;
   std::vector<CornerState> empty_;
 };

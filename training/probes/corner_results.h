@@ -26,10 +26,11 @@ constexpr std::array<const char*, 2> kWallNames{"on", "off"};  // in the order o
 
 /// Who is not there in CornerCase::removed.
 enum class CornerControl : uint8_t {
-  none,      // who comes hidden
-  permuted,  // a control: another vehicle near the ego, drawn for each pair; nobody where there is none
+  none,       // who comes hidden
+  permuted,   // a control: another vehicle near the ego, drawn for each pair; nobody where there is none
+  untrained,  // a control: who comes hidden, and policies with fresh weights take over in the same states
 };
-constexpr std::array<const char*, 2> kCornerControlNames{"none", "permuted"};
+constexpr std::array<const char*, 3> kCornerControlNames{"none", "permuted", "untrained"};
 /// Throws UsageError listing the known names.
 CornerControl corner_control_named(const std::string& name);
 

@@ -63,7 +63,7 @@ class PedestrianProbe {
                   PedestrianResults* results_out)
       : options_(options),
         results_(*results_out),
-        run_(sessions, options, results_out),
+        run_(sessions, options, results_out, {.untrained = options.control == PedestrianControl::untrained}),
         quota_(options.paths, options) {
     results_.maps = run_.maps();
     results_.cameras = run_.cameras();
@@ -236,7 +236,7 @@ class PedestrianProbe {
                                  .distance_m = length(one.path.point_m(i) - eye_m),
                                  .visible_share = trial.shares[static_cast<size_t>(i)]});
       pairs.push_back({.world = world, .slot = slot});
-      if (options_.control == PedestrianControl::none) pairs.back().inserted = pedestrian;
+      if (options_.control != PedestrianControl::nobody) pairs.back().inserted = pedestrian;
     }
     results_.paths.push_back(std::move(path));
     quota_.take(scene, 1);

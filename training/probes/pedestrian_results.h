@@ -16,9 +16,10 @@ namespace pictura {
 /// Whether the pedestrian is there.
 enum class PedestrianControl : uint8_t {
   none,
-  nobody,  // a control: nobody is inserted, so that nothing may change
+  nobody,     // a control: nobody is inserted, so that nothing may change
+  untrained,  // a control: it is, and policies with fresh weights answer in the same states
 };
-constexpr std::array<const char*, 2> kPedestrianControlNames{"none", "nobody"};
+constexpr std::array<const char*, 3> kPedestrianControlNames{"none", "nobody", "untrained"};
 /// Throws UsageError listing the names.
 PedestrianControl pedestrian_control_named(const std::string& name);
 

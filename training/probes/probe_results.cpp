@@ -79,6 +79,7 @@ Json policies_json(const ProbeResults& results, const std::vector<int32_t>& driv
     policies.push_back({{"name", policy.name},
                         {"file", policy.path},
                         {"policy_hash", policy.hash},
+                        {"untrained_hash", policy.untrained_hash.empty() ? Json(nullptr) : Json(policy.untrained_hash)},
                         {"reads_images", policy.reads_images},
                         {"scenes_driven", results.controller.empty() ? share : 0},
                         {"cases_driven", std::count(drivers.begin(), drivers.end(), static_cast<int32_t>(p))}});

@@ -25,6 +25,10 @@ struct ProbedPolicy {
   std::string name;  // of its file or run; unique
   std::string path, hash;
   bool reads_images = false;
+  std::string untrained_hash;  // of who answered in its place, with fresh weights; empty: it answered itself
+
+  /// What figures and tables call who answered.
+  std::string answers_as() const { return untrained_hash.empty() ? name : "untrained " + name; }
 };
 
 struct ProbeResults {

@@ -166,9 +166,12 @@ struct ProbeRun::ObservedWorlds {
 };
 
 struct ProbeRun::Participant {
-  PolicySession* session = nullptr;
-  std::unique_ptr<Renderer> renderer;  // of its images, with the maps
-  ObservedWorlds* worlds = nullptr;    // that it drives in and observes
+  PolicySession* session = nullptr;          // drives
+  std::unique_ptr<PolicySession> untrained;  // answers in its place
+  std::unique_ptr<Renderer> renderer;        // of its images, with the maps
+  ObservedWorlds* worlds = nullptr;          // that it drives in and observes
+
+  PolicySession& answering() const { return untrained ? *untrained : *session; }
 };
 
 // Pairs whose states and observations are kept until there are enough for a call.
@@ -180,7 +183,7 @@ struct ProbeRun::Pending {
 };
 
 ProbeRun::ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptions& options, ProbeResults* results_out,
-                   bool needs_walls)
+                   const ProbeKind& kind)
     : options_(options),
       device_(sessions[0]->device()),
       pass_(probe_pass(device_)),
@@ -192,7 +195,7 @@ ProbeRun::ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptio
   const EvaluateOptions& worlds = options.worlds;
   SimulatorConfig config = sessions[0]->evaluation_world(worlds.steps);
   config.seed = worlds.seed;
-  config.walls |= needs_walls;
+  config.walls |= kind.walls;
   for (const PolicySession* session : sessions) {
     PICTURA_CHECK(session->device() == device_, "probe: expected policies on one device, got {} and {}",
                   pictura::name_of(device_), pictura::name_of(session->device()));
@@ -206,7 +209,8 @@ ProbeRun::ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptio
     config.auxiliary_observations = session->evaluation_world(worlds.steps).auxiliary_observations;
     std::unique_ptr<ObservedWorlds>& observed = observed_[config.auxiliary_observations];
     if (!observed) observed = std::make_unique<ObservedWorlds>(worlds.simulator, config, maps_, batch_);
-    participants_.push_back({session, session->make_renderer(), observed.get()});
+    participants_.push_back({session, kind.untrained ? session->untrained(worlds.seed) : nullptr,
+                             session->make_renderer(), observed.get()});
     if (participants_.back().renderer) upload_maps(maps_, {}, participants_.back().renderer.get());
     if (session->reads_images() && !has_cameras) cameras_ = session->renderer_config();
     has_cameras |= session->reads_images();
@@ -228,16 +232,25 @@ ProbeRun::ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptio
   results_.controller = worlds.controller;
   const std::vector<std::string> names = names_of(options.policies);
   for (size_t i = 0; i < sessions.size(); ++i) {
-    results_.policies.push_back(
-        {names[i], options.policies[i], sessions[i]->evaluation_setting().policy_hash, sessions[i]->reads_images()});
+    const PolicySession* const untrained = participants_[i].untrained.get();
+    results_.policies.push_back({names[i], options.policies[i], sessions[i]->evaluation_setting().policy_hash,
+                                 sessions[i]->reads_images(),
+                                 untrained ? untrained->evaluation_setting().policy_hash : ""});
   }
 }
 
 ProbeRun::~ProbeRun() = default;
 
-PolicySession& ProbeRun::session(size_t policy) const { return *participants_[policy].session; }
+PolicySession& ProbeRun::session(size_t policy) const { return participants_[policy].answering(); }
 Renderer* ProbeRun::renderer(size_t policy) const { return participants_[policy].renderer.get(); }
-const SimulatorConfig& ProbeRun::world_of(size_t policy) const { return participants_[policy].worlds->config; }
+
+SimulatorConfig ProbeRun::world_of(size_t policy) const {
+  SimulatorConfig config = participants_[policy].worlds->config;
+  const SimulatorConfig its = participants_[policy].session->evaluation_world(options_.worlds.steps);
+  config.vector_observations = its.vector_observations;
+  config.wall_observations = its.wall_observations;
+  return config;
+}
 
 std::vector<float> ProbeRun::run(const std::function<void(const ProbeFrame&)>& sample, const Watch& watch) {
   sample_ = sample;
@@ -309,13 +322,19 @@ void ProbeRun::drive() {
   if (driver_ == 0) results_.setting = report.results.setting;
 }
 
-// All scenes by a controller. What is said of the setting is of the policies.
+// All scenes by a controller, which reads no observations. What is said of the setting is of the policies.
 void ProbeRun::drive_by_controller() {
   EvaluateOptions worlds = share_of_driver(1);
   worlds.device = device_.is_host() ? "cpu" : "cuda";
-  EvaluationWorlds shared{maps_, nullptr, std::move(participants_[0].worlds->simulator)};
+  std::unique_ptr<Simulator>& simulator = participants_[0].worlds->simulator;
+  if (watch_) {
+    SimulatorConfig config = simulator->config();
+    config.vector_observations = false;
+    simulator = make_simulator(worlds.simulator, config, maps_, simulator->worlds());
+  }
+  EvaluationWorlds shared{maps_, nullptr, std::move(simulator)};
   const EvaluateReport report = evaluate(worlds, &shared);
-  participants_[0].worlds->simulator = std::move(shared.simulator);
+  simulator = std::move(shared.simulator);
   driven_ = nullptr;
   results_.interrupted = report.interrupted;
   const EvaluationSetting& driven = report.results.setting;
@@ -429,7 +448,7 @@ void ProbeRun::respond() {
                               .scene = &on_device.scene(),
                               .views = is_without ? views_without.span() : views.span(),
                               .full_chunk = pass_};
-      one.session->evaluate(input, one.renderer.get(), span_of<float>(logits), span_of<float>(values));
+      one.answering().evaluate(input, one.renderer.get(), span_of<float>(logits), span_of<float>(values));
       const std::vector<float> its_logits = host_copy(span_of<const float>(logits), device_),
                                its_values = host_copy(span_of<const float>(values), device_);
       for (size_t i = 0; i < count; ++i) {

@@ -94,12 +94,18 @@ class CaseQuota {
   std::map<int32_t, int64_t> taken_;
 };
 
+/// What differs between probes.
+struct ProbeKind {
+  bool walls = false;  // worlds have walls also where that of the first policy has none
+  // A control: policies with fresh weights, drawn from the seed, answer. The others still drive.
+  bool untrained = false;
+};
+
 class ProbeRun final : public EvaluationObserver {
  public:
   /// Opens nothing: the sessions are of one device, `options` names them. Fills in what results say of the setting.
-  /// With `needs_walls` worlds have walls also where that of the first policy has none.
   ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptions& options, ProbeResults* results_out,
-           bool needs_walls = false);
+           const ProbeKind& kind);
   ~ProbeRun() override;
 
   /// Sees every step: worlds before it, who drives, and what agents are told.
@@ -126,10 +132,11 @@ class ProbeRun final : public EvaluationObserver {
   const CompiledMaps& maps() const { return maps_; }
   Renderer& measuring() { return *measuring_; }
   Device device() const { return device_; }
-  /// Of a policy: its session, the renderer of its images, if it reads any, and worlds as it observes them.
+  /// Of a policy: the session that answers, the renderer of its images, if it reads any, and worlds as it observes
+  /// them.
   PolicySession& session(size_t policy) const;
   Renderer* renderer(size_t policy) const;
-  const SimulatorConfig& world_of(size_t policy) const;
+  SimulatorConfig world_of(size_t policy) const;
 
   void begin(Simulator& simulator) override;
   void before_step(Span<const Command> commands) override;

@@ -24,7 +24,7 @@ class RemovalProbe {
   RemovalProbe(const std::vector<PolicySession*>& sessions, const RemovalOptions& options, RemovalResults* results_out)
       : options_(options),
         results_(*results_out),
-        run_(sessions, options, results_out),
+        run_(sessions, options, results_out, {.untrained = options.control == RemovalControl::untrained}),
         quota_(options.removals, options) {}
 
   void run() {
@@ -115,7 +115,7 @@ class RemovalProbe {
 
   int32_t hidden_of(const std::vector<DrawnCase>& pairs, const DrawnCase& one, RandomStream* random) const {
     if (options_.control == RemovalControl::nobody) return -1;
-    if (options_.control == RemovalControl::none) return one.facts.user;
+    if (options_.control != RemovalControl::permuted) return one.facts.user;
     std::vector<int32_t> others;
     for (const DrawnCase& pair : pairs) {
       if (pair.slot == one.slot && pair.facts.user != one.facts.user) others.push_back(pair.facts.user);

@@ -14,11 +14,12 @@ namespace pictura {
 
 /// Who is hidden in a case.
 enum class RemovalControl : uint8_t {
-  none,      // the user that the case is about
-  nobody,    // a control: nothing may change
-  permuted,  // a control: another one of the ego's road users, drawn anew for each case; nobody where it has none
+  none,       // the user that the case is about
+  nobody,     // a control: nothing may change
+  permuted,   // a control: another one of the ego's road users, drawn anew for each case; nobody where it has none
+  untrained,  // a control: the user, and policies with fresh weights answer in the same states
 };
-constexpr std::array<const char*, 3> kRemovalControlNames{"none", "nobody", "permuted"};
+constexpr std::array<const char*, 4> kRemovalControlNames{"none", "nobody", "permuted", "untrained"};
 /// Throws UsageError listing the names.
 RemovalControl removal_control_named(const std::string& name);
 

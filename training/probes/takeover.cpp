@@ -75,13 +75,13 @@ std::vector<GeometryHandle> TakeoverWorlds::handles_of(bool walls) const {
   return handles;
 }
 
-bool TakeoverWorlds::run(const std::vector<TakeoverStart>& starts, bool walls, std::vector<Takeover>* takeovers_out) {
+bool TakeoverWorlds::run(const std::vector<TakeoverStart>& starts, bool walls,
+                         const std::function<void(double)>& on_progress, std::vector<Takeover>* takeovers_out) {
   const size_t num_policies = options_.policies.size();
   takeovers_out->assign(starts.size() * num_policies, {});
   for (const auto& [kind, worlds] : worlds_) worlds->at_takeover.reset();
   for (size_t policy = 0; policy < num_policies; ++policy) {
     Worlds* const worlds = prepare(policy, starts, walls);
-    if (!worlds) return false;
     std::vector<Takeover*> runs;
     for (size_t i = 0; i < starts.size(); ++i) runs.push_back(&(*takeovers_out)[i * num_policies + policy]);
     for (int step = 0; look(worlds, policy, starts, step, runs) && step < kTakeoverSteps; ++step) {
@@ -92,15 +92,18 @@ bool TakeoverWorlds::run(const std::vector<TakeoverStart>& starts, bool walls, s
         command(starts[i], starts[i].step + step, actions[i], &commands[static_cast<size_t>(worlds->first_slots[i])]);
       }
       worlds->simulator->step(DeviceCopy(commands, run_.device()).span(), current_stream(run_.device()));
+      on_progress((static_cast<double>(policy) + (step + 1.0) / kTakeoverSteps) / static_cast<double>(num_policies));
     }
   }
   return true;
 }
 
-// Worlds that the policy observes, at the takeover; null on ^C.
+// Worlds that the policy observes, at the takeover.
 TakeoverWorlds::Worlds* TakeoverWorlds::prepare(size_t policy, const std::vector<TakeoverStart>& starts, bool walls) {
-  const SimulatorConfig& observed = run_.world_of(policy);
-  std::unique_ptr<Worlds>& worlds = worlds_[{walls, observed.auxiliary_observations}];
+  SimulatorConfig config = run_.world_of(policy);
+  config.walls = walls;
+  std::unique_ptr<Worlds>& worlds =
+      worlds_[{walls, config.auxiliary_observations, config.vector_observations, config.wall_observations}];
   const Stream stream = current_stream(run_.device());
   if (worlds && worlds->at_takeover) {
     worlds->simulator->restore(*worlds->at_takeover, stream);
@@ -108,15 +111,13 @@ TakeoverWorlds::Worlds* TakeoverWorlds::prepare(size_t policy, const std::vector
   }
   const CompiledMaps& maps = walls ? run_.maps() : open_maps_;
   std::vector<WorldSpec> specs;
-  int32_t last = 0;
+  std::vector<const KeptWorld*> kept;
   for (const TakeoverStart& start : starts) {
     specs.push_back(start.scene->world);
-    last = std::max(last, start.step);
+    kept.push_back(start.world);
   }
   if (!worlds) {
     worlds = std::make_unique<Worlds>();
-    SimulatorConfig config = observed;
-    config.walls = walls;
     worlds->simulator = make_simulator(options_.worlds.simulator, config, maps, specs);
   }
   Simulator& simulator = *worlds->simulator;
@@ -126,28 +127,27 @@ TakeoverWorlds::Worlds* TakeoverWorlds::prepare(size_t policy, const std::vector
     worlds->num_rows = static_cast<int64_t>(starts.size());
     worlds->rows = std::make_unique<ObservationRows>(worlds->num_rows, simulator.config());
   }
-
-  // A world is empty until the others are so far that, from its beginning, all takeovers are at the same step.
-  for (int step = 0; step < last; ++step) {
-    if (interrupted()) return nullptr;
-    std::vector<uint8_t> begins(starts.size());
-    std::vector<Command> commands(static_cast<size_t>(simulator.num_slots()), {.kind = CommandKind::absent});
-    for (size_t i = 0; i < starts.size(); ++i) {
-      const int its_step = step - (last - starts[i].step);
-      begins[i] = its_step == 0;
-      if (its_step < 0) continue;
-      command(starts[i], its_step, starts[i].scene->at(its_step, starts[i].ego).action,
-              &commands[static_cast<size_t>(worlds->first_slots[i])]);
-    }
-    if (step > 0 && std::find(begins.begin(), begins.end(), 1) != begins.end()) {
-      const DeviceCopy mask(begins, run_.device());
-      simulator.reset(Array(mask.span().data(), {static_cast<int64_t>(begins.size())}, run_.device()),
-                      options_.worlds.seed, stream);
-    }
-    simulator.step(DeviceCopy(commands, run_.device()).span(), stream);
-  }
+  simulator.restore(saved_state_of(simulator, kept), stream);
+  remove(worlds.get(), starts);
   worlds->at_takeover = simulator.snapshot(stream);
   return worlds.get();
+}
+
+// Takes whoever is removed out of their worlds.
+void TakeoverWorlds::remove(Worlds* worlds, const std::vector<TakeoverStart>& starts) {
+  std::vector<int32_t> slots;
+  for (size_t i = 0; i < starts.size(); ++i) {
+    if (starts[i].removed >= 0) slots.push_back(worlds->first_slots[i] + starts[i].removed);
+  }
+  if (slots.empty()) return;
+  const Device device = run_.device();
+  const auto count = static_cast<int64_t>(slots.size());
+  const DeviceCopy<int32_t> which(slots, device);
+  const DeviceCopy<uint8_t> absent(std::vector<uint8_t>(slots.size(), static_cast<uint8_t>(AgentStatus::absent)),
+                                   device);
+  worlds->simulator->set_state(Array(which.span().data(), {count}, device),
+                               std::vector<NamedArray>{{"status", Array(absent.span().data(), {count}, device)}},
+                               current_stream(device));
 }
 
 // What agents of a world are told after so many steps of its scene; commands_out: [agents].
@@ -156,7 +156,6 @@ void TakeoverWorlds::command(const TakeoverStart& start, int step, int32_t actio
     commands_out[agent] = to_be_at(start.scene->at(step + 1, agent));
   }
   commands_out[start.ego] = {.action = action};
-  if (start.removed >= 0 && step + 1 >= start.step) commands_out[start.removed] = {.kind = CommandKind::absent};
 }
 
 // Notes the present state in runs that have not ended; false where all have.

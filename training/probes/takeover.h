@@ -2,12 +2,14 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <limits>
 #include <map>
 #include <memory>
 #include <vector>
 
 #include "pictura/map/line_of_sight.h"
+#include "pictura/simulator/saved_worlds.h"
 #include "pictura/training/probes/driven_scenes.h"
 
 namespace pictura {
@@ -23,9 +25,10 @@ constexpr int takeover_pass(Device device) { return device.is_host() ? 8 : 256; 
 
 struct TakeoverStart {
   const DrivenScene* scene = nullptr;
-  int32_t step = 0, ego = 0;  // steps done in the scenario when the policy takes over
-  int32_t user = -1;          // whom the ego cannot see; -1: nobody
-  int32_t removed = -1;       // who left just before; -1: nobody
+  const KeptWorld* world = nullptr;  // the scene's, in the state in which the policy takes over
+  int32_t step = 0, ego = 0;         // steps done in the scenario when the policy takes over
+  int32_t user = -1;                 // whom the ego cannot see; -1: nobody
+  int32_t removed = -1;              // who is not there; -1: nobody
 };
 
 /// One run of one policy. What has an index k is after k steps; NaN once the run has ended.
@@ -50,16 +53,18 @@ class TakeoverWorlds {
   TakeoverWorlds(ProbeRun& run, const ProbeOptions& options, const std::vector<LineOfSight>& sights);
   ~TakeoverWorlds();
 
-  /// [starts, policies] Each start is a world of its own that goes through its scene from the beginning: all agents are
-  /// put where they were, the ego does what it did, so that at the takeover it is in the same state bit for bit. From
-  /// there the policy drives it by what it reads, the most likely action or a draw. Sight is measured by the walls of
-  /// the maps also where worlds have none. Returns false on ^C, with nothing to be used.
-  bool run(const std::vector<TakeoverStart>& starts, bool walls, std::vector<Takeover>* takeovers_out);
+  /// [starts, policies] Each start is a world of its own that goes on from the state that was kept, without whoever is
+  /// removed: all others are put where they were, and the policy drives the ego by what it reads, the most likely
+  /// action or a draw. Sight is measured by the walls of the maps also where worlds have none. on_progress is told
+  /// which part of it is done, above 0. Returns false on ^C, with nothing to be used.
+  bool run(const std::vector<TakeoverStart>& starts, bool walls, const std::function<void(double)>& on_progress,
+           std::vector<Takeover>* takeovers_out);
 
  private:
   struct Worlds;
   std::vector<GeometryHandle> handles_of(bool walls) const;
   Worlds* prepare(size_t policy, const std::vector<TakeoverStart>& starts, bool walls);
+  void remove(Worlds* worlds, const std::vector<TakeoverStart>& starts);
   static void command(const TakeoverStart& start, int step, int32_t action, Command* commands_out);
   bool look(Worlds* worlds, size_t policy, const std::vector<TakeoverStart>& starts, int step,
             const std::vector<Takeover*>& runs);
@@ -68,8 +73,9 @@ class TakeoverWorlds {
   ProbeRun& run_;
   const ProbeOptions& options_;
   const std::vector<LineOfSight>& sights_;
-  CompiledMaps open_maps_;                                           // the same without walls
-  std::map<std::pair<bool, bool>, std::unique_ptr<Worlds>> worlds_;  // by walls, and whether auxiliary slots are filled
+  CompiledMaps open_maps_;  // the same without walls
+  // By walls, and by what is observed: auxiliary slots, entities, walls.
+  std::map<std::array<bool, 4>, std::unique_ptr<Worlds>> worlds_;
 };
 
 }  // namespace pictura
