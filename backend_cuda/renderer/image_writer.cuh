@@ -90,45 +90,23 @@ struct ImageWriter {
   // value_of(i, channel) is a channel of the i-th pixel.
   template <typename Value, typename ValueOf>
   __device__ void store_channels(Value* image, const Place& place, ValueOf&& value_of) const {
-    auto values_of = [&](int channel) {
+    static_assert(kPixelsPerWrite == kPatch_px);
+    const bool in_patches = order == ChannelOrder::patches;
+    Value* to = image + (in_patches ? place_in_patches(width_px, 0, place.x, place.y)
+                                    : static_cast<int64_t>(place.y) * width_px + place.x);
+    const int64_t step = in_patches ? kPatch_px * kPatch_px : plane;
+    // Neighbours lie in one patch (plan_next_part). What it has beyond the image is black, as are words beyond a part.
+    const bool is_last = in_patches && place.x + place.count == width_px;
+    const int count = is_last ? kPatch_px - place.x % kPatch_px : place.count;
+    const int rows_beyond =
+        in_patches && place.y + 1 == height_px ? patches_along(height_px) * kPatch_px - height_px : 0;
+    PICTURA_NO_UNROLL
+    for (int channel = 0; channel < 3; ++channel, to += step) {
       PixelVector<Value> values;
       for (int i = 0; i < kPixelsPerWrite; ++i) values.value[i] = value_of(i, channel);
-      return values;
-    };
-    if (order == ChannelOrder::patches) {
+      store(to, count, values);
       PICTURA_NO_UNROLL
-      for (int channel = 0; channel < 3; ++channel) store_in_patches(image, channel, place, values_of(channel));
-      return;
-    }
-    Value* to = image + static_cast<int64_t>(place.y) * width_px + place.x;
-    PICTURA_NO_UNROLL
-    for (int channel = 0; channel < 3; ++channel, to += plane) store(to, place.count, values_of(channel));
-  }
-
-  // What the last column and row of patches have beyond the image becomes black.
-  template <typename Value>
-  __device__ void store_in_patches(Value* image, int channel, const Place& place,
-                                   const PixelVector<Value>& values) const {
-    static_assert(kPixelsPerWrite == kPatch_px);
-    const bool is_last_column = place.x + place.count == width_px, is_last_row = place.y + 1 == height_px;
-    const int x_end = is_last_column ? patches_along(width_px) * kPatch_px : place.x + place.count;
-    const int y_end = is_last_row ? patches_along(height_px) * kPatch_px : place.y + 1;
-    const bool are_aligned = place.x % kPatch_px == 0 && place.count == kPatch_px;
-    PICTURA_NO_UNROLL
-    for (int y = place.y; y < y_end; ++y) {
-      const bool is_drawn = y == place.y;
-      if (are_aligned) {
-        store(image + place_in_patches(width_px, channel, place.x, y), kPatch_px,
-              is_drawn ? values : PixelVector<Value>{});
-        continue;
-      }
-      // As many as there can be: of the last pixels but one, and of the columns beyond the image.
-      for (int i = 0; i < 2 * kPixelsPerWrite; ++i) {
-        if (place.x + i >= x_end) break;
-        const bool is_pixel = is_drawn && i < place.count;
-        image[place_in_patches(width_px, channel, place.x + i, y)] =
-            is_pixel ? values.value[i % kPixelsPerWrite] : Value{};
-      }
+      for (int row = 1; row <= rows_beyond; ++row) store(to + row * kPatch_px, count, PixelVector<Value>{});
     }
   }
 
