@@ -40,9 +40,9 @@ class CornerProbe {
 
   void run() {
     run_.run([this](const ProbeFrame& frame) { look_for_corners(frame); },
-             [this](Simulator& simulator, int driver, Span<const Command> commands) {
+             [this](Simulator& simulator, int driver) {
                driven_ = &simulator;
-               scenes_.add(simulator, driver, commands);
+               scenes_.add(simulator, driver);
              });
     if (!results_.interrupted) choose_pairs();
     if (!results_.interrupted) take_over();

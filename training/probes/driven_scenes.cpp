@@ -25,7 +25,7 @@ AgentBox DrivenScene::box_at(int step, int32_t agent) const {
   return box;
 }
 
-void DrivenScenes::add(Simulator& simulator, int driver, Span<const Command> commands) {
+void DrivenScenes::add(Simulator& simulator, int driver) {
   const Device device = simulator.device();
   const AgentStateView state = simulator.state();
   const auto slots = static_cast<size_t>(simulator.num_slots());
@@ -34,7 +34,6 @@ void DrivenScenes::add(Simulator& simulator, int driver, Span<const Command> com
                            heading_rad = copy(state.heading_rad), speed_mps = copy(state.speed_mps);
   const std::vector<int32_t> lane = copy(state.lane);
   const std::vector<uint8_t> status = copy(state.status);
-  const std::vector<Command> told = host_copy_of_structs(commands, device);
   const std::vector<int32_t> slot_begin = host_copy(simulator.slots().slot_begin, device);
   for (size_t world = 0; world < simulator.worlds().size(); ++world) {
     const WorldSpec& spec = simulator.worlds()[world];
@@ -51,14 +50,11 @@ void DrivenScenes::add(Simulator& simulator, int driver, Span<const Command> com
       }
     }
     for (size_t slot = first; slot < end; ++slot) {
-      PICTURA_CHECK(told[slot].kind == CommandKind::action, "probe: agent {} of scene {}: expected an action",
-                    slot - first, spec.global_world - kFirstEvaluationWorld);
       scene.states.push_back({{x_m[slot], y_m[slot], z_m[slot]},
                               heading_rad[slot],
                               speed_mps[slot],
                               lane[slot],
-                              static_cast<AgentStatus>(status[slot]),
-                              static_cast<uint8_t>(told[slot].action)});
+                              static_cast<AgentStatus>(status[slot])});
     }
   }
 }

@@ -1,4 +1,4 @@
-// What all agents of driven scenes did, state by state, so that some can do it again while another one does not.
+// Where all agents of driven scenes were, state by state, so that some can be put there again while another one drives.
 #pragma once
 
 #include <map>
@@ -8,13 +8,12 @@
 
 namespace pictura {
 
-/// An agent in one state, and the action that it was told there.
+/// An agent in one state.
 struct DrivenState {
   Vec3 position_m;  // of its reference point
   float heading_rad = 0, speed_mps = 0;
   int32_t lane = -1;
   AgentStatus status = AgentStatus::absent;
-  uint8_t action = kIdleAction;
 };
 
 /// A scene up to its last step, or to where all of its agents had halted.
@@ -32,8 +31,8 @@ struct DrivenScene {
 
 class DrivenScenes {
  public:
-  /// Adds the states of all worlds before a step. Throws Error where an agent is told something other than an action.
-  void add(Simulator& simulator, int driver, Span<const Command> commands);
+  /// Adds the present states of all worlds.
+  void add(Simulator& simulator, int driver);
   /// By the number of its scenario.
   const DrivenScene& of(int32_t scene) const { return scenes_.at(scene); }
 

@@ -275,7 +275,7 @@ void ProbeRun::begin(Simulator& simulator) {
 
 void ProbeRun::before_step(Span<const Command> commands) {
   const int driver = options_.worlds.controller.empty() ? driver_ : static_cast<int>(participants_.size());
-  if (watch_) watch_(*driven_, driver, commands);
+  if (watch_) watch_(*driven_, driver);
   if (step_ > 0 && step_ % options_.sample_steps == 0) sample_(ProbeFrame(*driven_, step_, driver));
   for_each_other([&](Simulator& other) { other.step(commands, current_stream(device_)); });
   ++step_;

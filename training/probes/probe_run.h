@@ -108,8 +108,8 @@ class ProbeRun final : public EvaluationObserver {
            const ProbeKind& kind);
   ~ProbeRun() override;
 
-  /// Sees every step: worlds before it, who drives, and what agents are told.
-  using Watch = std::function<void(Simulator& simulator, int driver, Span<const Command> commands)>;
+  /// Sees worlds before every step, and who drives.
+  using Watch = std::function<void(Simulator& simulator, int driver)>;
 
   /// Drives all scenes, each policy its share, or options.worlds.controller all, and hands out their states of every
   /// sample_steps steps, from the first such on. Then asks what is left, and returns the visibility of whom all pairs
