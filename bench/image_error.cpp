@@ -1,6 +1,7 @@
 #include "pictura/bench/image_error.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -25,6 +26,8 @@ double channel_at(const CameraImages& images, PixelFormat format, int64_t elemen
   switch (format) {
     case PixelFormat::u8: return static_cast<const uint8_t*>(images.data)[element] / 255.0;
     case PixelFormat::f16: return half_to_number(static_cast<const uint16_t*>(images.data)[element]);
+    case PixelFormat::bf16:
+      return std::bit_cast<float>(uint32_t{static_cast<const uint16_t*>(images.data)[element]} << 16) / 255.0;
     default: return static_cast<double>(static_cast<const float*>(images.data)[element]);
   }
 }

@@ -95,7 +95,12 @@ PixelFormat format_of(const std::string& name) {
   fail_usage("images: dtype: expected 'uint8', 'float16' or 'float32', got '{}'", name);
 }
 ElementType element_of(PixelFormat format) {
-  return format == PixelFormat::u8 ? ElementType::u8 : format == PixelFormat::f16 ? ElementType::f16 : ElementType::f32;
+  switch (format) {
+    case PixelFormat::u8: return ElementType::u8;
+    case PixelFormat::f16: return ElementType::f16;
+    case PixelFormat::bf16: return ElementType::bf16;
+    default: return ElementType::f32;
+  }
 }
 
 /// Images, and planes where asked for, in one piece of memory of a device.
@@ -222,9 +227,10 @@ class PyRenderer {
     // An array of the caller for a rig of one size.
     BorrowedArray images = borrow(out, "render: out", stream_);
     const Array& array = images.array();
-    const PixelFormat format = array.type == ElementType::f32   ? PixelFormat::f32
-                               : array.type == ElementType::f16 ? PixelFormat::f16
-                                                                : PixelFormat::u8;
+    const PixelFormat format = array.type == ElementType::f32    ? PixelFormat::f32
+                               : array.type == ElementType::f16  ? PixelFormat::f16
+                               : array.type == ElementType::bf16 ? PixelFormat::bf16
+                                                                 : PixelFormat::u8;
     const ImageLayout layout = image_layout(renderer_->config().rig, num_views, format);
     PICTURA_CHECK(layout.blocks.size() == 1, "render: out: expected pictura.Images, since the cameras have {} sizes",
                   layout.blocks.size());
@@ -234,10 +240,11 @@ class PyRenderer {
     switch (format) {
       case PixelFormat::u8: first = array.checked<uint8_t>("render: out", shape, renderer_->device()).data(); break;
       case PixelFormat::f32: first = array.checked<float>("render: out", shape, renderer_->device()).data(); break;
-      case PixelFormat::f16: {
+      case PixelFormat::f16:
+      case PixelFormat::bf16: {
         PICTURA_CHECK(
             array.shape == shape && array.device == renderer_->device() && array.is_contiguous() && !array.is_read_only,
-            "render: out: expected f16 {} on {} that can be written, got {}", shape.text(),
+            "render: out: expected {} {} on {} that can be written, got {}", name_of(array.type), shape.text(),
             name_of(renderer_->device()), array.text());
         first = array.data;
       }
@@ -598,9 +605,9 @@ Raises pictura.UsageError listing the names, pictura.Error where the backend can
            R"(Draws every camera for every view. Returns `out`.
 
 views: VIEW_DTYPE [n], or a simulator's. out: Images, or for a rig of one size an array [n, cameras, 3, height, width] of
-uint8, float32 or float16 in the renderer's memory (NumPy, torch, ...); new Images of `dtype` and `planes` without it. On
-CUDA the call returns when the work is on the stream; on the CPU ^C ends it between views. Raises pictura.Error naming what
-does not fit.)")
+uint8, float32, float16 or bfloat16 (0 to 255) in the renderer's memory (NumPy, torch, ...); new Images of `dtype` and
+`planes` without it. On CUDA the call returns when the work is on the stream; on the CPU ^C ends it between views. Raises
+pictura.Error naming what does not fit.)")
       .def(
           "visibility", &PyRenderer::visibility, py::arg("scene"), py::arg("views"), py::arg("queries"),
           R"(How much of agents can be seen: for each query of (view, box of the scene), int [n, 2], the coverage in the view's

@@ -25,11 +25,11 @@ struct ImageRequest {
 /// Outputs of one image.
 struct ImageTarget {
   PixelFormat format = PixelFormat::u8;
-  ChannelOrder order = ChannelOrder::planar;  // or patches
-  void* color = nullptr;                      // of one image
+  void* color = nullptr;  // of one image
   float* depth_m = nullptr;
   uint8_t* class_id = nullptr;
   uint16_t* instance_id = nullptr;
+  ChannelOrder order = ChannelOrder::planar;  // or patches
 };
 
 /// Draws images one after another. An object serves one thread.

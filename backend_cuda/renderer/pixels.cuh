@@ -287,7 +287,8 @@ __device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn
     } else if (rows > 1) {
       plan.rows = half_of(rows);
     } else {
-      // It begins at a multiple of its width, so that the pixels that a thread writes lie in one patch (common/patches.h).
+      // It begins at a multiple of its width, so that the pixels that a thread writes lie in one patch
+      // (common/patches.h).
       plan.wide_px = columns > kPatch_px ? kPatch_px : columns > 2 ? 2 : 1;
     }
     plan.part = {x, min_of(x + plan.wide_px, min_of(plan.band_begin + plan.band_px, whole.x_end)), y,

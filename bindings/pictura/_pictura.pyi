@@ -524,9 +524,9 @@ class Renderer:
         Draws every camera for every view. Returns `out`.
         
         views: VIEW_DTYPE [n], or a simulator's. out: Images, or for a rig of one size an array [n, cameras, 3, height, width] of
-        uint8, float32 or float16 in the renderer's memory (NumPy, torch, ...); new Images of `dtype` and `planes` without it. On
-        CUDA the call returns when the work is on the stream; on the CPU ^C ends it between views. Raises pictura.Error naming what
-        does not fit.
+        uint8, float32, float16 or bfloat16 (0 to 255) in the renderer's memory (NumPy, torch, ...); new Images of `dtype` and
+        `planes` without it. On CUDA the call returns when the work is on the stream; on the CPU ^C ends it between views. Raises
+        pictura.Error naming what does not fit.
         """
     def upload(self, handle: typing.SupportsInt | typing.SupportsIndex, geometry: Geometry) -> None:
         """

@@ -84,6 +84,8 @@ def test_torch_takes_and_gives_without_a_copy(make):
         renderer.upload(handle, geometry)
     out = torch.zeros(12, 4, 3, 9, 16, dtype=torch.float32)
     assert renderer.render(simulator.scene, simulator.views, out) is out and out.max() > 0
+    bytes_, bfloats = (renderer.render(simulator.scene, simulator.views, torch.zeros(12, 4, 3, 9, 16, dtype=dtype)) for dtype in (torch.uint8, torch.bfloat16))
+    assert torch.equal(bfloats, bytes_.to(torch.bfloat16)) and bytes_.max() > 100
     with pytest.raises(pictura.Error, match="expected i32"):
         simulator.step(torch.zeros(12, dtype=torch.int64))
 

@@ -8,6 +8,8 @@
 #include <numbers>
 #include <random>
 
+#include <fmt/ranges.h>
+
 #include "pictura/common/support/crc32c.h"
 
 namespace pictura::test {
