@@ -215,7 +215,7 @@ void add_evaluate_command(CLI::App& app) {
       "  pictura evaluate run.ckpt --scenarios 100:200 --out b.json\n"
       "  pictura evaluate --merge a.json b.json\n"
       "Rollouts for the Waymo sim-agents challenge:\n"
-      "  pictura evaluate run.ckpt --protocol simagents --scenes shard.tfrecord --sampled --rollouts shard.binproto");
+      "  pictura evaluate run.ckpt --protocol simagents --scenes validation --sampled --rollouts rollouts.binproto");
   command->callback([arguments, command] {
     settle_evaluation_options(&arguments->evaluation);
     EvaluateOptions& evaluation = arguments->evaluation.evaluate;

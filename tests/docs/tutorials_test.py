@@ -35,7 +35,8 @@ def shorter(line):
             words[i + 1] = "configs/smoke.toml"
         if word == "--backend":
             words[i + 1] = "cpu"
-    if words[0] in ("evaluate", "replay") and "--steps" not in words:
+    # The length of rollouts is their format's.
+    if words[0] in ("evaluate", "replay") and not {"--steps", "--rollouts"} & set(words):
         words += ["--steps", str(AT_MOST["--steps"])]
     if words[0] == "train":
         words += ["--set", "train.updates=1", "--set", "simulator.num_slots=8"]
