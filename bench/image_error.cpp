@@ -1,13 +1,13 @@
 #include "pictura/bench/image_error.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
 
 #include "pictura/bench/truth/image_truth.h"
 #include "pictura/bench/truth/tolerances.h"
+#include "pictura/common/portable/intrinsics.h"
 
 namespace pictura {
 
@@ -27,7 +27,7 @@ double channel_at(const CameraImages& images, PixelFormat format, int64_t elemen
     case PixelFormat::u8: return static_cast<const uint8_t*>(images.data)[element] / 255.0;
     case PixelFormat::f16: return half_to_number(static_cast<const uint16_t*>(images.data)[element]);
     case PixelFormat::bf16:
-      return std::bit_cast<float>(uint32_t{static_cast<const uint16_t*>(images.data)[element]} << 16) / 255.0;
+      return float_from_bits(uint32_t{static_cast<const uint16_t*>(images.data)[element]} << 16) / 255.0;
     default: return static_cast<double>(static_cast<const float*>(images.data)[element]);
   }
 }

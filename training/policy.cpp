@@ -13,6 +13,7 @@
 #include "pictura/training/layers.h"
 #include "pictura/training/point_features.h"
 #include "pictura/training/precision.h"
+#include "pictura/training/rules/network_passes.h"
 #include "pictura/training/torch_device.h"
 
 namespace pictura {
@@ -186,6 +187,7 @@ class PerspectiveEncoder final : public SceneEncoder {
 
   int64_t width() const override { return 4 * int64_t{config_.embedding_width}; }
   const ImageBackbone* image_backbone() const override { return backbone_.get(); }
+  static_assert(PatchSize::channels_of(kPatch_px) == kPatchValues, "renderers draw what image_patches() makes");
   bool reads_patches() const override {
     return !backbone_ && config_.patch_px == kPatch_px && image_type_ == at::kBFloat16;
   }

@@ -199,8 +199,9 @@ void ImageDrawer::composite_rows(RowRange rows, Visit&& visit, Finish&& finish) 
 void ImageDrawer::draw(const ImageTarget& target) {
   const int width = setting_.camera.width_px, height = setting_.camera.height_px;
   const int band_rows = max_of(1, min_of(height, kBandPixels / width));
-  const int64_t plane = int64_t{width} * height;
   const bool in_patches = target.order == ChannelOrder::patches;
+  // From one channel of a pixel to the next.
+  const int64_t step = in_patches ? place_in_patches(width, 1, 0, 0) : int64_t{width} * height;
   auto draw_as = [&](auto* out, auto&& value_of) {
     if (in_patches) std::fill_n(out, image_values({width, height}, target.order), 0);  // what reaches beyond the image
     for (int y_begin = 0; y_begin < height; y_begin += band_rows) {
@@ -210,13 +211,11 @@ void ImageDrawer::draw(const ImageTarget& target) {
       composite_rows(
           rows, [](int, const Fragment&, float) {},
           [&](int pixel, Rgb color) {
-            const float channels[] = {color.r, color.g, color.b};
-            for (int channel = 0; channel < 3; ++channel) {
-              auto* const to = in_patches
-                                   ? out + place_in_patches(width, channel, pixel % width, y_begin + pixel / width)
-                                   : first + channel * plane + pixel;
-              *to = value_of(channels[channel]);
-            }
+            auto* const to =
+                in_patches ? out + place_in_patches(width, 0, pixel % width, y_begin + pixel / width) : first + pixel;
+            to[0] = value_of(color.r);
+            to[step] = value_of(color.g);
+            to[2 * step] = value_of(color.b);
           });
     }
   };

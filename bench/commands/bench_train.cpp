@@ -38,7 +38,8 @@ void draw_rates_of_ranks(const PlotArguments& plot) {
       if (text.starts_with(key)) precision = text.substr(key.size());
     }
     for (const auto& [size, rows] : file["rate"].items()) {
-      for (const char* const its_case : {"each", "in_all"}) {
+      for (const bool of_each : {true, false}) {
+        const char* const its_case = of_each ? "each" : "in_all";
         PlotSeries rate{.name = size + " " + precision}, efficiency = rate;
         for (const Json& row : rows) {
           if (row.at("case") != "one" && row.at("case") != its_case) continue;
@@ -50,7 +51,6 @@ void draw_rates_of_ranks(const PlotArguments& plot) {
           efficiency.x.push_back(row.at("gpus"));
           efficiency.y.push_back(row.at("efficiency"));
         }
-        const bool of_each = its_case == std::string("each");
         (of_each ? rate_of_each : rate_in_all).series.push_back(std::move(rate));
         (of_each ? efficiency_of_each : efficiency_in_all).series.push_back(std::move(efficiency));
       }
