@@ -28,15 +28,6 @@ namespace {
 
 constexpr const char* kFormat = "pictura evaluation 1";
 
-template <typename Part, typename Whole>
-Estimate ratio(const std::vector<ScenarioCounts>& scenarios, const Part& part_of, const Whole& whole_of) {
-  std::vector<RatioTerm> terms;
-  for (const ScenarioCounts& scenario : scenarios) {
-    terms.push_back({static_cast<double>(part_of(scenario)), static_cast<double>(whole_of(scenario))});
-  }
-  return estimate_ratio(terms);
-}
-
 Json to_json(const ScenarioCounts& counts) {
   Json json;
 #define X(name) json[#name] = counts.name;
@@ -101,7 +92,7 @@ EvaluateRow row_of(const DensityResult& result, int steps) {
   using Counts = ScenarioCounts;
   const std::vector<Counts>& all = result.scenarios;
   const auto per_vehicle = [&all](const auto& part_of) {
-    return ratio(all, part_of, [](const Counts& c) { return c.vehicles; });
+    return estimate_ratio(all, part_of, [](const Counts& c) { return c.vehicles; });
   };
   const auto km_of = [](const Counts& c) { return c.distance_m / 1000; };
 
@@ -117,7 +108,7 @@ EvaluateRow row_of(const DensityResult& result, int steps) {
   row.off_road_rate = per_vehicle([](const Counts& c) { return c.off_road; });
   row.red_light_rate = per_vehicle([](const Counts& c) { return c.red_light; });
   row.goals_per_vehicle = per_vehicle([](const Counts& c) { return c.goals; });
-  row.km_per_infraction = ratio(all, km_of, [](const Counts& c) { return c.infractions; });
+  row.km_per_infraction = estimate_ratio(all, km_of, [](const Counts& c) { return c.infractions; });
   row.km_per_vehicle = per_vehicle(km_of);
   row.waypoints_per_vehicle = per_vehicle([](const Counts& c) { return c.waypoints; });
   row.return_per_vehicle = per_vehicle([](const Counts& c) { return c.returns; });

@@ -61,6 +61,15 @@ struct RatioTerm {
 };
 /// Infinite where there is nothing to divide by. A mean of one number a scenario is the ratio with wholes of 1.
 Estimate estimate_ratio(const std::vector<RatioTerm>& scenarios);
+/// Of the parts and wholes of what was counted in each scenario.
+template <typename Counts, typename Part, typename Whole>
+Estimate estimate_ratio(const std::vector<Counts>& scenarios, const Part& part_of, const Whole& whole_of) {
+  std::vector<RatioTerm> terms;
+  for (const Counts& counts : scenarios) {
+    terms.push_back({static_cast<double>(part_of(counts)), static_cast<double>(whole_of(counts))});
+  }
+  return estimate_ratio(terms);
+}
 
 /// The paper's five metrics (appendix, metric definitions) over the vehicles of one density, and more.
 struct EvaluateRow {

@@ -68,15 +68,6 @@ SceneProtocol protocol_from(const Json& json) {
   return protocol;
 }
 
-template <typename Part, typename Whole>
-Estimate ratio(const std::vector<SceneCounts>& scenes, const Part& part_of, const Whole& whole_of) {
-  std::vector<RatioTerm> terms;
-  for (const SceneCounts& scene : scenes) {
-    terms.push_back({static_cast<double>(part_of(scene)), static_cast<double>(whole_of(scene))});
-  }
-  return estimate_ratio(terms);
-}
-
 }  // namespace
 
 int64_t SceneResults::agent_steps() const {
@@ -105,7 +96,7 @@ void add(const SceneAgent& agent, bool is_vehicle, SceneCounts* counts_inout) {
 SceneRow row_of(double density, const std::vector<SceneCounts>& scenes) {
   using Counts = SceneCounts;
   const auto per_vehicle = [&scenes](const auto& part_of) {
-    return ratio(scenes, part_of, [](const Counts& c) { return c.vehicles; });
+    return estimate_ratio(scenes, part_of, [](const Counts& c) { return c.vehicles; });
   };
   SceneRow row;
   row.density = density;
@@ -118,8 +109,8 @@ SceneRow row_of(double density, const std::vector<SceneCounts>& scenes) {
   row.off_road_rate = per_vehicle([](const Counts& c) { return c.off_road; });
   row.goal_rate = per_vehicle([](const Counts& c) { return c.goals; });
   row.collision_rate = per_vehicle([](const Counts& c) { return c.collision; });
-  row.mean_displacement_m =
-      ratio(scenes, [](const Counts& c) { return c.displacement_m; }, [](const Counts& c) { return c.measured; });
+  row.mean_displacement_m = estimate_ratio(
+      scenes, [](const Counts& c) { return c.displacement_m; }, [](const Counts& c) { return c.measured; });
   return row;
 }
 
