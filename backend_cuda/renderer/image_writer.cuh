@@ -90,24 +90,26 @@ struct ImageWriter {
   // value_of(i, channel) is a channel of the i-th pixel.
   template <typename Value, typename ValueOf>
   __device__ void store_channels(Value* image, const Place& place, ValueOf&& value_of) const {
-    static_assert(kPixelsPerWrite == kPatch_px);
-    const bool in_patches = order == ChannelOrder::patches;
-    Value* to = image + (in_patches ? place_in_patches(width_px, 0, place.x, place.y)
-                                    : static_cast<int64_t>(place.y) * width_px + place.x);
-    const int64_t step = in_patches ? kPatch_px * kPatch_px : plane;
-    // Neighbours lie in one patch (plan_next_part). What it has beyond the image is black, as are words beyond a part.
-    const bool is_last = in_patches && place.x + place.count == width_px;
-    const int count = is_last ? kPatch_px - place.x % kPatch_px : place.count;
-    const int rows_beyond =
-        in_patches && place.y + 1 == height_px ? patches_along(height_px) * kPatch_px - height_px : 0;
-    PICTURA_NO_UNROLL
-    for (int channel = 0; channel < 3; ++channel, to += step) {
-      PixelVector<Value> values;
-      for (int i = 0; i < kPixelsPerWrite; ++i) values.value[i] = value_of(i, channel);
-      store(to, count, values);
+    auto store_each = [&](Value* to, int64_t step, int count, int rows_beyond) {
       PICTURA_NO_UNROLL
-      for (int row = 1; row <= rows_beyond; ++row) store(to + row * kPatch_px, count, PixelVector<Value>{});
+      for (int channel = 0; channel < 3; ++channel, to += step) {
+        PixelVector<Value> values;
+        for (int i = 0; i < kPixelsPerWrite; ++i) values.value[i] = value_of(i, channel);
+        store(to, count, values);
+        PICTURA_NO_UNROLL
+        for (int row = 1; row <= rows_beyond; ++row) store(to + row * kPatch_px, count, PixelVector<Value>{});
+      }
+    };
+    // Planes have a loop of their own: without it, each store asks whether a patch ends there.
+    if (order != ChannelOrder::patches) {
+      store_each(image + static_cast<int64_t>(place.y) * width_px + place.x, plane, place.count, 0);
+      return;
     }
+    static_assert(kPixelsPerWrite == kPatch_px);
+    // Neighbours lie in one patch (plan_next_part). What it has beyond the image is black, as are words beyond a part.
+    const int count = place.x + place.count == width_px ? kPatch_px - place.x % kPatch_px : place.count;
+    const int rows_beyond = place.y + 1 == height_px ? patches_along(height_px) * kPatch_px - height_px : 0;
+    store_each(image + place_in_patches(width_px, 0, place.x, place.y), kPatch_px * kPatch_px, count, rows_beyond);
   }
 
   // One vector store if all pixels are written and the address is aligned.
