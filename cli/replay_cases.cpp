@@ -70,26 +70,32 @@ std::string about(const CornerState& one, int32_t removed, CornerControl control
                      removed < 0 ? "nobody" : fmt::format("agent {}", removed));
 }
 
-// Drives the scene again; `probed` says what the case is about.
-void write(const CaseReplayOptions& options, const ProbeOptions& probe, const ProbeResults& results, size_t number,
-           const CasePlace& place, ReplayCase probed) {
+// The scene of a case, to be driven again by whom it was driven.
+EvaluateOptions driven_by(const ProbeOptions& probe, const CasePlace& place) {
   EvaluateOptions driven = probe.worlds;
   // A controller comes after all policies.
   if (driven.controller.empty()) driven.checkpoint = probe.policies[static_cast<size_t>(place.driver)];
-  RecordingOptions recording = options.recording;
-  recording.followed = place.ego;
-  ScenarioCounts counts;
-  Replay replay = record_scenario(
-      driven, {.number = place.scene, .agents_per_world = results.agents_per_world, .world_of = probe.policies[0]},
-      recording, &counts);
-  if (place.step >= replay.num_frames) {
-    fail(
-        "--replay: case {} is at step {} of scenario {}, which was over after {} steps when it was driven again: the "
-        "policy's numbers differ in their last bits where batches or devices differ",
-        number, place.step, place.scene, replay.num_frames - 1);
-  }
+  return driven;
+}
+RecordedScenario scenario_of(const ProbeOptions& probe, const ProbeResults& results, const CasePlace& place) {
+  return {.number = place.scene, .agents_per_world = results.agents_per_world, .world_of = probe.policies[0]};
+}
+
+// Says where the ego drives at another speed in the replay, whose speeds are rounded to 1 cm/s.
+void compare_speed(const std::string& path, const Replay& replay, int frame, int ego, float probed_mps) {
+  const double speed_mps = 0.01 * replay.at(Track::speed_mps, frame, ego);
+  if (std::abs(speed_mps - double{probed_mps}) < 0.0051) return;
+  fmt::print(stderr,
+             "notice: {}: the ego drives at {:.2f} m/s, in the probe at {:.2f} m/s: the policy's numbers differ in "
+             "their last bits where batches or devices differ\n",
+             path, speed_mps, probed_mps);
+}
+
+// Writes the replay of a case, which is at `frame` of it; `probed` says what the case is about.
+void write(const CaseReplayOptions& options, const ProbeResults& results, size_t number, const CasePlace& place,
+           int frame, ReplayCase probed, Replay replay) {
   probed.what = fmt::format("case {}: {}", number, probed.what);
-  probed.frame = place.step;
+  probed.frame = frame;
   probed.ego = place.ego;
   for (size_t policy = 0; policy < results.policies.size() && !results.responses.empty(); ++policy) {
     const PairedResponse& response = results.response(number, policy);
@@ -100,15 +106,25 @@ void write(const CaseReplayOptions& options, const ProbeOptions& probe, const Pr
                               .brake_without = double{response.brake_without}});
   }
   replay.probed = std::move(probed);
-  const double speed_mps = 0.01 * replay.at(Track::speed_mps, place.step, place.ego);
   write_replay_and_say_so(options.path, replay);
   fmt::print(stderr, "{}\n", replay.probed->what);
-  // Speeds of replays are rounded to 1 cm/s.
-  if (std::abs(speed_mps - double{place.ego_speed_mps}) < 0.0051) return;
-  fmt::print(stderr,
-             "notice: {}: the ego drives at {:.2f} m/s, in the probe at {:.2f} m/s: the policy's numbers differ in "
-             "their last bits where batches or devices differ\n",
-             options.path, speed_mps, place.ego_speed_mps);
+  compare_speed(options.path, replay, frame, place.ego, place.ego_speed_mps);
+}
+
+// Drives the scene again, and writes it.
+void write_scene(const CaseReplayOptions& options, const ProbeOptions& probe, const ProbeResults& results,
+                 size_t number, const CasePlace& place, ReplayCase probed) {
+  RecordingOptions recording = options.recording;
+  recording.followed = place.ego;
+  ScenarioCounts counts;
+  Replay replay = record_scenario(driven_by(probe, place), scenario_of(probe, results, place), recording, &counts);
+  if (place.step >= replay.num_frames) {
+    fail(
+        "--replay: case {} is at step {} of scenario {}, which was over after {} steps when it was driven again: the "
+        "policy's numbers differ in their last bits where batches or devices differ",
+        number, place.step, place.scene, replay.num_frames - 1);
+  }
+  write(options, results, number, place, place.step, std::move(probed), std::move(replay));
 }
 
 }  // namespace
@@ -131,7 +147,8 @@ void check_case_number(const CaseReplayOptions& options, int64_t count) {
 void write_case_replay(const CaseReplayOptions& options, const RemovalOptions& probe, const RemovalResults& results) {
   const size_t number = chosen_case(options, results);
   const RemovalCase& one = results.cases[number];
-  write(options, probe, results, number, place_of(one), {.what = about(one, results.control), .removed = one.hidden});
+  write_scene(options, probe, results, number, place_of(one),
+              {.what = about(one, results.control), .removed = one.hidden});
 }
 
 void write_case_replay(const CaseReplayOptions& options, const PedestrianOptions& probe,
@@ -148,15 +165,34 @@ void write_case_replay(const CaseReplayOptions& options, const PedestrianOptions
       probed.path_cm.push_back({place.x_cm, place.y_cm});
     }
   }
-  write(options, probe, results, number, place_of(path), std::move(probed));
+  write_scene(options, probe, results, number, place_of(path), std::move(probed));
 }
 
 void write_case_replay(const CaseReplayOptions& options, const CornerOptions& probe, const CornerResults& results) {
   const size_t pair = asked_case(options, results.pairs.size()).value_or(example_of(results));
   const CornerState& state = results.pairs[pair].hidden;
-  const int32_t removed = results.scenes_of_pairs[pair].removed;
-  write(options, probe, results, pair, place_of(state),
-        {.what = about(state, removed, results.control), .removed = state.user});
+  const CasePlace place = place_of(state);
+  const Replay replay = record_takeover(driven_by(probe, place), scenario_of(probe, results, place),
+                                        {.policy = probe.policies[0],
+                                         .untrained = results.control == CornerControl::untrained,
+                                         .step = state.step,
+                                         .agent = state.ego,
+                                         .steps = kTakeoverSteps},
+                                        options.recording);
+  const std::string what = fmt::format("{}; from here on {} drives agent {}, and all others go where they went",
+                                       about(state, results.scenes_of_pairs[pair].removed, results.control),
+                                       results.policies[0].answers_as(), state.ego);
+  write(options, results, pair, place, 0, {.what = what, .removed = state.user}, replay);
+  const Takeover& probed = results.takeover(pair, true, CornerCase::hidden, 0);
+  if (const int steps = replay.num_frames - 1; steps != probed.steps) {
+    fmt::print(
+        stderr,
+        "notice: {}: the ego drives for {} steps, in the probe for {}: the policy's numbers differ in their last "
+        "bits where batches or devices differ\n",
+        options.path, steps, probed.steps);
+  } else if (probed.ended_by == 0) {
+    compare_speed(options.path, replay, steps, state.ego, probed.speed_mps[static_cast<size_t>(steps)]);
+  }
 }
 
 }  // namespace pictura

@@ -27,9 +27,10 @@ void add_case_replay_options(CLI::App* command, CaseReplayOptions* options_out, 
 void check_case_number(const CaseReplayOptions& options, int64_t count);
 
 /// Drives the case's scene again, on the host, by whom it was driven and in the world of the first policy, and writes
-/// the replay. Says on stderr what it writes, and whether the ego is driven otherwise than it was probed. Without a
-/// number it is the case in which the first policy's value changes most; of corners, whose cases are pairs, it is
-/// example_of(). Throws UsageError where there is no such case.
+/// the replay. Of corners, whose cases are pairs, it is the takeover of the first policy in the hidden state. Says on
+/// stderr what it writes, and whether the ego is driven otherwise than it was probed. Without a number it is the case
+/// in which the first policy's value changes most; of corners example_of(). Throws UsageError where there is no such
+/// case.
 void write_case_replay(const CaseReplayOptions& options, const RemovalOptions& probe, const RemovalResults& results);
 void write_case_replay(const CaseReplayOptions& options, const PedestrianOptions& probe,
                        const PedestrianResults& results);

@@ -10,6 +10,8 @@
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/replay/gallery.h"
+#include "pictura/simulator/saved_worlds.h"
+#include "pictura/training/probes/driven_scenes.h"
 #include "pictura/training/session.h"
 
 namespace pictura {
@@ -36,6 +38,41 @@ class ScenarioRecorder final : public EvaluationObserver {
   std::optional<Recording> recording_;
 };
 
+// Keeps where all agents of the only world were, and the world after so many steps.
+class ScenarioKeeper final : public EvaluationObserver {
+ public:
+  explicit ScenarioKeeper(int step) : step_(step) {}
+
+  void begin(Simulator& simulator) override { simulator_ = &simulator; }
+  void before_step(Span<const Command>) override {
+    scenes_.add(*simulator_, 0);
+    if (steps_++ == step_) kept_ = keep_worlds(*simulator_, simulator_->save(), {0})[0];
+  }
+  void after_step(const StepResult&) override {}
+
+  const DrivenScene& scene(int number) const { return scenes_.of(number); }
+  const KeptWorld* kept() const { return kept_.get(); }
+
+ private:
+  const int step_;
+  int steps_ = 0;
+  Simulator* simulator_ = nullptr;
+  DrivenScenes scenes_;
+  std::shared_ptr<const KeptWorld> kept_;
+};
+
+// An evaluation of one scenario, on the host.
+EvaluateOptions options_of(const EvaluateOptions& options, const RecordedScenario& scenario) {
+  EvaluateOptions one = options;
+  one.agents_per_world = scenario.agents_per_world;
+  one.maps = {options.maps[static_cast<size_t>(scenario.number) % options.maps.size()]};
+  one.first_scenario = scenario.number;
+  one.scenarios = 1;
+  one.device = one.simulator = "cpu";
+  one.on_progress = nullptr;
+  return one;
+}
+
 // An evaluation in the world of another policy, of which the driver observes what it reads.
 EvaluateReport evaluate_in_world_of(const std::string& path, PolicySession* driver, const EvaluateOptions& options) {
   const SimulatorConfig its = driver->evaluation_world(options.steps);
@@ -50,6 +87,23 @@ EvaluateReport evaluate_in_world_of(const std::string& path, PolicySession* driv
   if (renderer) upload_maps(worlds.maps, {}, renderer.get());
   worlds.simulator = make_simulator(options.simulator, world, worlds.maps, {{0, 1, kFirstEvaluationWorld}});
   return evaluate(driver, options, &worlds);
+}
+
+// The policy that drives; null where a controller does.
+std::unique_ptr<PolicySession> session_of(const EvaluateOptions& options) {
+  if (!options.controller.empty()) return nullptr;
+  return std::make_unique<PolicySession>(options.checkpoint, session_options(options));
+}
+
+// Drives the scenario, and returns what it counts. session: as session_of() gives it.
+ScenarioCounts drive(const EvaluateOptions& options, const RecordedScenario& scenario, PolicySession* session) {
+  EvaluateOptions one = options;
+  if (!session && !scenario.world_of.empty()) one.checkpoint = scenario.world_of;
+  const EvaluateReport report = !session                    ? evaluate(one)
+                                : scenario.world_of.empty() ? evaluate(session, one)
+                                                            : evaluate_in_world_of(scenario.world_of, session, one);
+  if (report.interrupted) throw Interrupted("interrupted while a scenario was recorded");
+  return report.results.densities[0].scenarios[0];
 }
 
 double infractions_per_vehicle(const ScenarioCounts& counts) {
@@ -95,27 +149,51 @@ std::vector<ScenarioPlace> worst_scenarios(const EvaluationResults& results, int
 
 Replay record_scenario(const EvaluateOptions& options, const RecordedScenario& scenario,
                        const RecordingOptions& recording, ScenarioCounts* counts_out) {
-  EvaluateOptions one = options;
-  one.agents_per_world = scenario.agents_per_world;
-  one.maps = {options.maps[static_cast<size_t>(scenario.number) % options.maps.size()]};
-  one.first_scenario = scenario.number;
-  one.scenarios = 1;
-  one.device = one.simulator = "cpu";
-  one.on_progress = nullptr;
-  std::unique_ptr<PolicySession> session;
-  if (one.controller.empty()) session = std::make_unique<PolicySession>(one.checkpoint, session_options(one));
-  if (!session && !scenario.world_of.empty()) one.checkpoint = scenario.world_of;
+  EvaluateOptions one = options_of(options, scenario);
+  const std::unique_ptr<PolicySession> session = session_of(one);
   // The followed agent's policy is asked with a renderer of its own, which holds the scenario's map.
   std::unique_ptr<Renderer> renderer = session ? session->make_renderer() : nullptr;
   ScenarioRecorder recorder({session ? one.checkpoint : one.controller, session.get(), renderer.get()}, recording);
   one.observer = &recorder;
-  const EvaluateReport report = !session ? evaluate(one)
-                                : scenario.world_of.empty()
-                                    ? evaluate(session.get(), one)
-                                    : evaluate_in_world_of(scenario.world_of, session.get(), one);
-  if (report.interrupted) throw Interrupted("interrupted while a scenario was recorded");
-  *counts_out = report.results.densities[0].scenarios[0];
+  *counts_out = drive(one, scenario, session.get());
   return recorder.finish();
+}
+
+Replay record_takeover(const EvaluateOptions& options, const RecordedScenario& scenario,
+                       const RecordedTakeover& takeover, const RecordingOptions& recording) {
+  EvaluateOptions one = options_of(options, scenario);
+  ScenarioKeeper keeper(takeover.step);
+  one.observer = &keeper;
+  drive(one, scenario, session_of(one).get());
+  if (!keeper.kept()) fail("scenario {} was over before step {}", scenario.number, takeover.step);
+  const DrivenScene& scene = keeper.scene(scenario.number);
+
+  const PolicySession trained(takeover.policy, session_options(one));
+  const std::unique_ptr<PolicySession> session =
+      takeover.untrained ? trained.untrained(one.seed)
+                         : std::make_unique<PolicySession>(takeover.policy, session_options(one));
+  SimulatorConfig world = session->evaluation_world(one.steps);
+  world.seed = one.seed;
+  const std::unique_ptr<Simulator> simulator =
+      make_simulator(one.simulator, world, compile_maps_of(one, world), {scene.world});
+  simulator->restore(saved_state_of(*simulator, {keeper.kept()}));
+  const std::unique_ptr<Renderer> renderer = session->make_renderer();
+  if (renderer) upload_maps(*simulator, renderer.get());
+  RecordingOptions followed = recording;
+  followed.followed = takeover.agent;
+  Recording recorded(*simulator, {takeover.policy, session.get(), renderer.get()}, followed);
+  const std::unique_ptr<PolicyController> controller = session->make_controller(renderer.get(), one.argmax, one.seed);
+  std::vector<uint8_t> mask(static_cast<size_t>(simulator->num_slots()));
+  mask[static_cast<size_t>(takeover.agent)] = 1;
+  std::vector<Command> commands(mask.size());
+  for (int step = 0; step < takeover.steps; ++step) {
+    scene.command_places(takeover.step + step + 1, commands.data());
+    controller->act(simulator->controller_input(), mask, commands);
+    if (controller->num_driven() == 0) break;
+    recorded.before_step(commands);
+    recorded.after_step(simulator->step(Span<const Command>(commands)));
+  }
+  return recorded.finish();
 }
 
 void write_scenario_replays(const EvaluateOptions& options, const EvaluationResults& results,

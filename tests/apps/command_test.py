@@ -1036,9 +1036,12 @@ class Replays(CommandCase):
             case = next(csv.DictReader(file))
         header = header_of(path)
         shown = header["case"]
-        self.assertEqual((shown["frame"], shown["ego"], shown["removed"]), (int(case["step"]), int(case["ego"]), int(case["user"])))
+        self.assertEqual((shown["frame"], shown["ego"], shown["removed"]), (0, int(case["ego"]), int(case["user"])))
         self.assertIn(f"case 0: agent {case['user']} comes hidden", shown["what"])
-        self.assertNotIn("notice", result.stderr)
+        self.assertIn(f"from here on images drives agent {case['ego']}", shown["what"])
+        self.assertNotIn("notice", result.stderr)  # it takes over as it did
+        self.assertEqual((case["policy"], case["walls"], case["case"]), ("images", "on", "hidden"))
+        self.assertEqual(header["frames"], round(10 * float(case["lasted_s"])) + 1)
         self.assert_refused(2, "--case: expected 0 to 0, got 1", *corner, *out, "--case", 1)
         self.assert_refused(2, "--case: expected 0 to 79, got 80", "probe", "removal", *world, "--removals", 80, "--replay", path, "--case", 80)
 

@@ -25,6 +25,18 @@ AgentBox DrivenScene::box_at(int step, int32_t agent) const {
   return box;
 }
 
+void DrivenScene::command_places(int step, Command* commands_out) const {
+  for (int32_t agent = 0; agent < world.num_agents; ++agent) {
+    const DrivenState& state = at(step, agent);
+    commands_out[agent] = {.kind = CommandKind::kinematic_state,
+                           .x_m = state.position_m.x,
+                           .y_m = state.position_m.y,
+                           .z_m = state.position_m.z,
+                           .heading_rad = state.heading_rad,
+                           .speed_mps = state.speed_mps};
+  }
+}
+
 void DrivenScenes::add(Simulator& simulator, int driver) {
   const Device device = simulator.device();
   const AgentStateView state = simulator.state();

@@ -27,6 +27,8 @@ struct DrivenScene {
   /// After so many steps; beyond the last state it stays as it is.
   const DrivenState& at(int step, int32_t agent) const;
   AgentBox box_at(int step, int32_t agent) const;
+  /// What puts all agents where they were after so many steps; commands_out: [agents].
+  void command_places(int step, Command* commands_out) const;
 };
 
 class DrivenScenes {

@@ -18,15 +18,6 @@ namespace pictura {
 
 namespace {
 
-Command to_be_at(const DrivenState& state) {
-  return {.kind = CommandKind::kinematic_state,
-          .x_m = state.position_m.x,
-          .y_m = state.position_m.y,
-          .z_m = state.position_m.z,
-          .heading_rad = state.heading_rad,
-          .speed_mps = state.speed_mps};
-}
-
 // Whether a box is among those that vectors hold of an ego's world.
 bool is_partner(Span<const AgentBox> boxes, int32_t box, int32_t ego, Vec2 origin_m) {
   const auto nearest = nearest_boxes(
@@ -89,7 +80,10 @@ bool TakeoverWorlds::run(const std::vector<TakeoverStart>& starts, bool walls,
       const std::vector<int32_t> actions = decide(worlds, policy, starts, step);
       std::vector<Command> commands(static_cast<size_t>(worlds->simulator->num_slots()));
       for (size_t i = 0; i < starts.size(); ++i) {
-        command(starts[i], starts[i].step + step, actions[i], &commands[static_cast<size_t>(worlds->first_slots[i])]);
+        const TakeoverStart& start = starts[i];
+        Command* const its_commands = &commands[static_cast<size_t>(worlds->first_slots[i])];
+        start.scene->command_places(start.step + step + 1, its_commands);
+        its_commands[start.ego] = {.action = actions[i]};
       }
       worlds->simulator->step(DeviceCopy(commands, run_.device()).span(), current_stream(run_.device()));
       on_progress((static_cast<double>(policy) + (step + 1.0) / kTakeoverSteps) / static_cast<double>(num_policies));
@@ -148,14 +142,6 @@ void TakeoverWorlds::remove(Worlds* worlds, const std::vector<TakeoverStart>& st
   worlds->simulator->set_state(Array(which.span().data(), {count}, device),
                                std::vector<NamedArray>{{"status", Array(absent.span().data(), {count}, device)}},
                                current_stream(device));
-}
-
-// What agents of a world are told after so many steps of its scene; commands_out: [agents].
-void TakeoverWorlds::command(const TakeoverStart& start, int step, int32_t action, Command* commands_out) {
-  for (int32_t agent = 0; agent < start.scene->world.num_agents; ++agent) {
-    commands_out[agent] = to_be_at(start.scene->at(step + 1, agent));
-  }
-  commands_out[start.ego] = {.action = action};
 }
 
 // Notes the present state in runs that have not ended; false where all have.

@@ -65,7 +65,6 @@ class TakeoverWorlds {
   std::vector<GeometryHandle> handles_of(bool walls) const;
   Worlds* prepare(size_t policy, const std::vector<TakeoverStart>& starts, bool walls);
   void remove(Worlds* worlds, const std::vector<TakeoverStart>& starts);
-  static void command(const TakeoverStart& start, int step, int32_t action, Command* commands_out);
   bool look(Worlds* worlds, size_t policy, const std::vector<TakeoverStart>& starts, int step,
             const std::vector<Takeover*>& runs);
   std::vector<int32_t> decide(Worlds* worlds, size_t policy, const std::vector<TakeoverStart>& starts, int step);
