@@ -47,7 +47,11 @@ class _Encoder(nn.Module):
 
 
 class _Attention(nn.Module):
-    """Learned queries of each camera, which ask the tokens of its feature map."""
+    """Learned queries of each camera, which ask the tokens of its feature map.
+
+    Queries are the same for all images, so they ask tokens and not keys, q (W t) = (q W) t, and values are made of weighted
+    sums of tokens (docs/network.md): neither keys nor values are computed for each token.
+    """
 
     def __init__(self, cameras: int, queries: int, width: int, heads: int, mlp: int) -> None:
         super().__init__()
@@ -61,25 +65,22 @@ class _Attention(nn.Module):
             self.mlp_norm, self.mlp_hidden, self.mlp_out = nn.LayerNorm(width), nn.Linear(width, mlp), nn.Linear(mlp, width)
 
     def forward(self, maps: Tensor, first: int) -> Tensor:
-        """maps [batch, cameras, width, rows, columns] of cameras from number `first` on; returns [batch, cameras, width]."""
-        cameras, rows, columns = maps.shape[1], *maps.shape[-2:]
+        """maps [cameras, batch, width, rows, columns] of cameras from number `first` on; returns [cameras, batch, width]."""
+        cameras, rows, columns = maps.shape[0], *maps.shape[-2:]
         y = (torch.arange(rows, device=maps.device) + 0.5) * (math.pi / rows)
         x = (torch.arange(columns, device=maps.device) + 0.5) * (math.pi / columns)
         y, x = (a.flatten().to(maps.dtype) for a in torch.meshgrid(y, x, indexing="ij"))
         where = torch.stack([x.cos(), y.cos(), x.sin(), y.sin(), (2 * x).cos(), (2 * y).cos(), (2 * x).sin(), (2 * y).sin()], 1)
         tokens = self.token_norm(maps.flatten(3).transpose(2, 3) + self.position(where))
         queries = self.queries[first : first + cameras]
-
-        def split(values: Tensor) -> Tensor:
-            return values.unflatten(-1, (self.heads, -1)).transpose(-3, -2)
-
-        query, key, value = split(self.query(self.query_norm(queries))), split(self.key(tokens)), split(self.value(tokens))
-        # Camera by camera: the queries of one are the same for the whole batch, and are not copied for it.
-        seen = [
-            functional.scaled_dot_product_attention(query[i].expand(len(maps), -1, -1, -1), key[:, i], value[:, i])
-            for i in range(cameras)
-        ]
-        z = queries + self.out(torch.stack(seen, 1).transpose(2, 3).flatten(3))
+        key, value = (layer.weight.unflatten(0, (self.heads, -1)) for layer in (self.key, self.value))
+        out = self.out.weight.unflatten(1, (self.heads, -1)).transpose(0, 1)
+        query = self.query(self.query_norm(queries)).unflatten(-1, (self.heads, 1, -1))
+        asked = (query @ key / math.sqrt(key.shape[1])).flatten(1, 3)
+        # Scores [cameras, batch, tokens, queries x heads].
+        scores = (tokens.flatten(1, 2) @ asked.transpose(1, 2)).unflatten(1, tokens.shape[1:3])
+        sums = (scores.softmax(2).transpose(2, 3) @ tokens).unflatten(2, (-1, self.heads)).flatten(3)
+        z = queries.unsqueeze(1) + functional.linear(sums, (out @ value).transpose(0, 1).flatten(1), self.out(self.value.bias))
         if hasattr(self, "mlp_norm"):
             z = z + self.mlp_out(functional.gelu(self.mlp_hidden(self.mlp_norm(z))))
         return z.mean(2)
@@ -170,17 +171,18 @@ class Policy(nn.Module):
             raise pictura.Error(f"rgb: expected images of {self.num_cameras} cameras, got {num_cameras}")
         embedded, first = [], 0
         for block in blocks:
-            embedded.append(self.attention(self._maps(block), first).flatten(1))
+            embedded.extend(self.attention(self._maps(block), first))
             first += block.shape[1]
         return self.project(torch.cat(embedded, 1))
 
     def _maps(self, pixels: Tensor) -> Tensor:
-        """Feature maps [batch, cameras, width, rows, columns] of pixels uint8 [batch, cameras, 3, height, width]: the cameras share
+        """Feature maps [cameras, batch, width, rows, columns] of pixels uint8 [batch, cameras, 3, height, width]: the cameras share
         the convolutions, so they are one batch of them."""
-        patch, x = self.patch_px, pixels.flatten(0, 1)
-        right, below = -x.shape[3] % patch, -x.shape[2] % patch
+        patch, x = self.patch_px, pixels.transpose(0, 1)
+        right, below = -x.shape[4] % patch, -x.shape[3] % patch
         if right or below:
             x = functional.pad(x, (0, right, 0, below))
+        x = x.flatten(0, 1)
         # Patches are taken of bytes. Channels come last on CUDA, where tensor cores read them so; a CPU is slower then.
         layout = torch.channels_last if x.is_cuda else torch.contiguous_format
         x = functional.pixel_unshuffle(x, patch).to(self.actor.weight.dtype, memory_format=layout)
@@ -188,7 +190,7 @@ class Policy(nn.Module):
             # Pixels are 0 to 255: the first weight is divided instead of them.
             weight = layer.weight / 255.0 if i == 0 else layer.weight
             x = functional.gelu(functional.conv2d(x, weight, layer.bias, layer.stride, layer.padding))
-        return x.unflatten(0, pixels.shape[:2])
+        return x.unflatten(0, (pixels.shape[1], -1))
 
 
 _TYPES = {"F32": torch.float32, "BF16": torch.bfloat16, "I64": torch.int64}  # of safetensors
