@@ -98,10 +98,14 @@ def main() -> None:
             returns = advantages + values
 
         rows = valids.flatten().nonzero().squeeze(1)
+        # Minibatches of few sizes, so that the memory and the kernels chosen for one serve the next; the rest of an epoch's
+        # shuffled rows is left out.
+        coarse = max(1, args.num_steps * n // (16 * args.num_minibatches))
+        size = max(coarse, len(rows) // args.num_minibatches // coarse * coarse)
         agent_steps += len(rows)
         flat = {key: value.flatten(0, 1) for key, value in obs.items()}
         for _ in range(args.update_epochs):
-            for batch in rows[torch.randperm(len(rows), device=device)].chunk(args.num_minibatches):
+            for batch in rows[torch.randperm(len(rows), device=device)].split(size)[: args.num_minibatches]:
                 logits, value = agent({key: rows_[batch] for key, rows_ in flat.items()})
                 logprob = logits.log_softmax(1)
                 ratio = (logprob.gather(1, actions.flatten()[batch, None].long()).squeeze(1) - logprobs.flatten()[batch]).exp()
