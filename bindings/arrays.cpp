@@ -267,6 +267,11 @@ void check_tensor(const DLTensor& tensor, std::string_view what, Array* array_ou
                   tensor.device.device_type);
   }
   const std::vector<int64_t> lengths(tensor.shape, tensor.shape + tensor.ndim);
+  auto num_bytes = static_cast<int64_t>(bytes_of(*type));
+  for (const int64_t length : lengths) {
+    PICTURA_CHECK(length >= 0 && !__builtin_mul_overflow(num_bytes, std::max<int64_t>(length, 1), &num_bytes),
+                  "{}: expected lengths of 0 or more that memory can have, got [{}]", what, fmt::join(lengths, ", "));
+  }
   const Dims shape = dims_of(lengths);
   *array_out = Array(static_cast<uint8_t*>(tensor.data) + tensor.byte_offset, *type, shape, device);
   if (!tensor.strides) return;
@@ -314,6 +319,10 @@ Dims dims_of(const std::vector<int64_t>& v) {
   }
 }
 
+std::string type_name_of(const py::handle& object) {
+  return py::cast<std::string>(py::type::handle_of(object).attr("__name__"));
+}
+
 BorrowedArray& BorrowedArray::operator=(BorrowedArray&& other) noexcept {
   std::swap(array_, other.array_);
   std::swap(keep_, other.keep_);
@@ -344,8 +353,7 @@ BorrowedArray borrow(const py::handle& object, std::string_view what, Stream str
     return borrowed;
   }
   PICTURA_CHECK(py::hasattr(object, "__dlpack__") && py::hasattr(object, "__dlpack_device__"),
-                "{}: expected an array that speaks DLPack (NumPy, torch, ...), got {}", what,
-                py::cast<std::string>(py::str(py::type::handle_of(object).attr("__name__"))));
+                "{}: expected an array that speaks DLPack (NumPy, torch, ...), got {}", what, type_name_of(object));
   const py::object capsule = capsule_of(object, what, stream);
   if (PyCapsule_IsValid(capsule.ptr(), kVersionedName)) {
     auto* tensor = static_cast<DLManagedTensorVersioned*>(PyCapsule_GetPointer(capsule.ptr(), kVersionedName));

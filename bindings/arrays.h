@@ -57,6 +57,9 @@ BorrowedArray borrow(const py::handle& object, std::string_view what, Stream str
 /// A NumPy array of structs as the bytes that it is: [count, size] u8 on the host; anything else as borrow().
 BorrowedArray borrow_structs(const py::handle& object, std::string_view what, size_t size, Stream stream);
 
+/// The name of an object's class, for messages.
+std::string type_name_of(const py::handle& object);
+
 void bind_arrays(py::module_& module);
 
 }  // namespace pictura::python

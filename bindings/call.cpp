@@ -32,4 +32,15 @@ void check_process(std::string_view what, int num_threads, Device device) {
                 what);
 }
 
+void refuse_unmade_objects(const py::module_& module) {
+  for (const auto& [name, value] : py::cast<py::dict>(module.attr("__dict__"))) {
+    if (!PyType_Check(value.ptr())) continue;
+    auto* const info = py::detail::get_type_info(reinterpret_cast<PyTypeObject*>(value.ptr()));
+    if (!info) continue;
+    info->operator_new = [](size_t) -> void* {
+      fail("expected an object that was made by calling its class, got one of __new__ alone");
+    };
+  }
+}
+
 }  // namespace pictura::python

@@ -27,6 +27,30 @@ namespace py = pybind11;
 /// are gone in the child, and waiting for them would never end.
 void check_process(std::string_view what, int num_threads, Device device);
 
+/// Lets go of the GIL for as long as it lives. A thread that wants it back while the interpreter ends is ended by
+/// Python before 3.14 through an exception that no destructor may let out: it waits for the end of the process, as
+/// from 3.14 on.
+class WithoutGil {
+ public:
+  WithoutGil() : state_(PyEval_SaveThread()) {}
+  WithoutGil(const WithoutGil&) = delete;
+  WithoutGil& operator=(const WithoutGil&) = delete;
+  ~WithoutGil() {
+    try {
+      PyEval_RestoreThread(state_);
+    } catch (...) {
+      for (;;) std::this_thread::sleep_for(std::chrono::hours(1));
+    }
+  }
+
+ private:
+  PyThreadState* state_;
+};
+
+/// Makes methods of a module's classes refuse objects that were made by __new__ alone, which have nothing in C++:
+/// pybind11 would hand them memory that nobody has written. For the end of a module's definition.
+void refuse_unmade_objects(const py::module_& module);
+
 /// Of one object of the library. An object serves one thread at a time.
 class Calls {
  public:
@@ -40,7 +64,7 @@ class Calls {
     PICTURA_CHECK(!is_busy_.exchange(true),
                   "{}: another thread is in a call of this object, which serves one at a time", what);
     const Free free{&is_busy_};
-    const py::gil_scoped_release no_gil;
+    const WithoutGil no_gil;
     return std::forward<Work>(work)();
   }
 
@@ -66,7 +90,7 @@ auto run_interruptibly(std::string_view what, int num_threads, Device device, Wo
   std::thread([task = std::move(task)] { (*task)(); }).detach();
   for (;;) {
     {
-      const py::gil_scoped_release no_gil;
+      const WithoutGil no_gil;
       if (result.wait_for(std::chrono::milliseconds(20)) == std::future_status::ready) break;
     }
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
@@ -83,7 +107,7 @@ auto run_to_an_orderly_end(std::string_view what, int num_threads, Device device
   auto result = std::async(std::launch::async, std::move(work));
   for (;;) {
     {
-      const py::gil_scoped_release no_gil;
+      const WithoutGil no_gil;
       if (result.wait_for(std::chrono::milliseconds(20)) == std::future_status::ready) break;
     }
     if (!raised && PyErr_CheckSignals() != 0) {

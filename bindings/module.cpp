@@ -1,6 +1,7 @@
 // The extension module pictura._pictura: the library without torch.
 #include <pybind11/pybind11.h>
 
+#include "pictura/bindings/call.h"
 #include "pictura/bindings/objects.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/hash.h"
@@ -43,4 +44,5 @@ PYBIND11_MODULE(_pictura, module) {
   pictura::python::bind_rendering(module);
   pictura::python::bind_simulator(module);
   pictura::python::bind_replays(module);
+  pictura::python::refuse_unmade_objects(module);
 }

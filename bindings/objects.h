@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "pictura/bindings/arrays.h"
+#include "pictura/common/error.h"
 #include "pictura/common/renderer.h"
 #include "pictura/map/scenario/scenario.h"
 #include "pictura/simulator/compiled_map.h"
@@ -102,10 +103,34 @@ struct ControllerInside {
   std::shared_ptr<Controller> controller;
 };
 
+/// What is inside a pictura.Simulator or a pictura.Renderer, as `expected` names it. Throws UsageError for other
+/// objects; `what` begins its message.
+template <typename Inside>
+Inside inside_of(const py::handle& object, std::string_view what, std::string_view expected) {
+  const py::object inside = py::hasattr(object, "_inside") ? py::object(object.attr("_inside")()) : py::none();
+  if (!py::isinstance<Inside>(inside)) {
+    fail_usage("{}: expected a pictura.{}, got {}", what, expected, type_name_of(object));
+  }
+  return py::cast<Inside>(inside);
+}
+
+/// A value of Python's. Throws UsageError saying what was expected where it is of another kind.
+template <typename T>
+T cast_checked(const py::handle& value, std::string_view what, std::string_view expected) {
+  try {
+    return py::cast<T>(value);
+  } catch (const py::cast_error&) {
+    fail_usage("{}: expected {}, got {}", what, expected, py::cast<std::string>(py::repr(value)));
+  }
+}
+
 /// "cpu", "cuda" or "cuda:1". Throws UsageError for others.
 Device device_of(const std::string& name);
 
-/// Of a stream's handle as Python has it, an int; None: CUDA's legacy default stream.
+/// Throws Error where a device was asked for and the CPU chosen; `choice` says why.
+void check_device(std::string_view what, Device wanted, Device given, std::string_view choice);
+
+/// Of a stream's handle as Python has it, an int; None: CUDA's legacy default stream. Throws UsageError for others.
 Stream stream_of(const py::object& handle);
 
 /// Of a map, by name.

@@ -198,7 +198,9 @@ class PyRenderer {
   PyRenderer(const std::string& name, const RendererConfig& config, Stream stream)
       : renderer_(make_renderer(name, config, &choice_)),
         calls_(config.num_threads, renderer_->device()),
-        stream_(stream) {}
+        stream_(stream) {
+    check_device("Renderer", config.device, renderer_->device(), choice_);
+  }
   explicit PyRenderer(std::shared_ptr<Renderer> renderer)
       : renderer_(std::move(renderer)), calls_(renderer_->config().num_threads, renderer_->device()) {}
 
@@ -353,9 +355,15 @@ Device device_of(const std::string& name) {
   fail_usage("device: expected 'cpu', 'cuda' or 'cuda:INDEX', got '{}'", name);
 }
 
+void check_device(std::string_view what, Device wanted, Device given, std::string_view choice) {
+  PICTURA_CHECK(wanted.is_host() || !given.is_host(), "{}: expected device '{}', got {}", what, name_of(wanted),
+                choice);
+}
+
 Stream stream_of(const py::object& handle) {
   if (handle.is_none()) return {};
-  return {reinterpret_cast<void*>(static_cast<intptr_t>(py::cast<int64_t>(handle)))};
+  const auto address = cast_checked<int64_t>(handle, "stream", "a cudaStream_t as int, or None");
+  return {reinterpret_cast<void*>(static_cast<intptr_t>(address))};
 }
 
 void bind_rendering(py::module_& module) {
@@ -434,13 +442,13 @@ counter-clockwise, pitch positive looks up, roll positive turns it clockwise as 
         return fmt::format("<pictura.Camera {}: {}x{} px>", c.name, c.width_px, c.height_px);
       });
 
+  const auto made = [](std::vector<Camera> cameras) {
+    Rig rig{std::move(cameras)};
+    validate(rig);
+    return rig;
+  };
   py::class_<Rig>(module, "Rig", "One or more cameras of any sizes on a body; their order is that of images.")
-      .def(py::init([](std::vector<Camera> cameras) {
-             Rig rig{std::move(cameras)};
-             validate(rig);
-             return rig;
-           }),
-           py::arg("cameras"), "Raises pictura.Error unless there are 1 to 64 valid cameras.")
+      .def(py::init(made), py::arg("cameras"), "Raises pictura.Error unless there are 1 to 64 valid cameras.")
       .def_static("paper", paper_rig, py::arg("width_px") = 96, py::arg("height_px") = 54,
                   py::arg("square_pixels") = false,
                   "The paper's four cameras: front, front left, front right and back. Sizes of 1 to 8192 px.")
@@ -448,7 +456,7 @@ counter-clockwise, pitch positive looks up, roll positive turns it clockwise as 
                   "Reads a rig from a TOML file. Raises pictura.Error naming file, camera and key.")
       .def_readonly("cameras", &Rig::cameras)
       .def(py::pickle([](const Rig& rig) { return py::make_tuple(rig.cameras); },
-                      [](const py::tuple& t) { return Rig{py::cast<std::vector<Camera>>(t[0])}; }))
+                      [made](const py::tuple& t) { return made(py::cast<std::vector<Camera>>(t[0])); }))
       .def("__len__", [](const Rig& rig) { return rig.cameras.size(); });
 
   py::class_<Scene, std::shared_ptr<Scene>>(module, "Scene", R"(

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <pybind11/stl.h>
 
+#include "pictura/bindings/call.h"
 #include "pictura/bindings/objects.h"
 #include "pictura/commit.h"
 #include "pictura/common/error.h"
@@ -19,10 +20,6 @@ namespace pictura::python {
 namespace {
 
 constexpr std::chrono::milliseconds kGlance{50};  // between two looks at whether ^C was pressed
-
-SimulatorInside inside_of(const py::object& simulator) {
-  return py::cast<SimulatorInside>(simulator.attr("_inside")());
-}
 
 RendererConfig cameras_of(const std::optional<Rig>& rig) {
   RendererConfig config;
@@ -82,7 +79,7 @@ class PyRecorder final : public Watcher {
       inside_.run("write", [&] { finished_ = recorder_->finish(std::move(origin)); });
       recorder_.reset();
     }
-    const py::gil_scoped_release no_gil;
+    const WithoutGil no_gil;
     is_html ? write_replay(path, *finished_) : write_mcap(path, *finished_);
   }
 
@@ -159,7 +156,7 @@ Records a world of a simulator on the CPU from now on: every step that the simul
 the recorder lives.)")
       .def(
           py::init([](const py::object& simulator, int world, int follow, const std::optional<Rig>& rig) {
-            SimulatorInside inside = inside_of(simulator);
+            SimulatorInside inside = inside_of<SimulatorInside>(simulator, "Recorder", "Simulator");
             const auto watch = inside.watch;
             auto recorder = std::make_shared<PyRecorder>(
                 std::move(inside),
@@ -194,7 +191,7 @@ the keyboard. The simulator's steps then wait until they are due: in real time, 
       .def(
           py::init([](const py::object& simulator, int port, const std::string& host_name, int follow,
                       const std::optional<Rig>& rig, bool wait_for_page) {
-            SimulatorInside inside = inside_of(simulator);
+            SimulatorInside inside = inside_of<SimulatorInside>(simulator, "LiveView", "Simulator");
             const auto watch = inside.watch;
             auto view =
                 std::make_shared<PyLiveView>(std::move(inside), LiveViewOptions{.port = port,
@@ -224,7 +221,7 @@ a page has come. Raises pictura.UsageError where this package cannot serve, pict
   module.def(
       "write_gallery",
       [](const std::string& folder) {
-        const py::gil_scoped_release no_gil;
+        const WithoutGil no_gil;
         return write_gallery(folder);
       },
       py::arg("folder"),

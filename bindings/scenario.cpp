@@ -251,7 +251,7 @@ Options given are kept but for these, as those of a pictura.PolicySession: scene
       .def(
           "save",
           [](const RecordedScene& self, const std::string& path) {
-            const py::gil_scoped_release no_gil;
+            const WithoutGil no_gil;
             write_scene_file(path, *self.scenario());
           },
           py::arg("path"),
@@ -282,7 +282,7 @@ there is a state to start from and one to reach, and how far from the recorded p
 Records the present episode of a world of a simulator on the CPU as a scene: every step from now on, however it is asked for, for as
 long as the recorder lives.)")
       .def(py::init([](const py::object& simulator, int world) {
-             auto inside = py::cast<SimulatorInside>(simulator.attr("_inside")());
+             auto inside = inside_of<SimulatorInside>(simulator, "SceneRecorder", "Simulator");
              const auto watch = inside.watch;
              auto recorder = std::make_shared<PySceneRecorder>(std::move(inside), world);
              watch(recorder);

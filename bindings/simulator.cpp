@@ -30,25 +30,30 @@ using WorldTuple = std::tuple<int, int, uint32_t>;  // map, agents, global world
 std::vector<WorldSpec> worlds_of(const py::sequence& worlds) {
   std::vector<WorldSpec> specs;
   for (const py::handle world : worlds) {
-    const auto entry = py::cast<py::sequence>(world);
-    PICTURA_CHECK(entry.size() == 2 || entry.size() == 3,
-                  "worlds: world {}: expected (map, agents) or (map, agents, global world), got {} numbers",
-                  specs.size(), entry.size());
-    WorldSpec spec{py::cast<int>(entry[0]), py::cast<int>(entry[1]), static_cast<uint32_t>(specs.size())};
-    if (entry.size() == 3) spec.global_world = py::cast<uint32_t>(entry[2]);
-    specs.push_back(spec);
+    const std::string what = fmt::format("worlds: world {}", specs.size());
+    const auto next = static_cast<uint32_t>(specs.size());
+    constexpr const char* kExpected = "integers (map, agents) or (map, agents, global world)";
+    if (py::isinstance<py::sequence>(world) && py::len(world) == 2) {
+      const auto [map, agents] = cast_checked<std::pair<int, int>>(world, what, kExpected);
+      specs.push_back({map, agents, next});
+    } else {
+      const auto [map, agents, global_world] = cast_checked<WorldTuple>(world, what, kExpected);
+      specs.push_back({map, agents, global_world});
+    }
   }
   return specs;
 }
 
 void set_conditioning(const py::dict& given, SimulatorConfig* config) {
   for (const auto& [key, value] : given) {
-    ConditioningRange& range = config->conditioning[conditioning_index(py::cast<std::string>(key), "conditioning")];
+    const auto name = cast_checked<std::string>(key, "conditioning", "names");
+    ConditioningRange& range = config->conditioning[conditioning_index(name, "conditioning")];
     if (py::isinstance<py::float_>(value) || py::isinstance<py::int_>(value)) {
       const auto fixed = py::cast<float>(value);
       range = {fixed, fixed, false};
     } else {
-      const auto [low, high] = py::cast<std::pair<float, float>>(value);
+      const auto [low, high] =
+          cast_checked<std::pair<float, float>>(value, "conditioning: " + name, "a number or (low, high)");
       range.low = low;
       range.high = high;
     }
@@ -105,7 +110,8 @@ class PySimulator {
   PySimulator(const std::string& executor, const SimulatorConfig& config, const std::vector<std::shared_ptr<Map>>& maps,
               std::vector<WorldSpec> worlds, Stream stream)
       : executor_(executor), config_(config), stream_(stream) {
-    make(compiled(maps), std::move(worlds));
+    make(config, compiled(maps), std::move(worlds));
+    maps_ = maps;
     calls_ = std::make_unique<Calls>(config.num_threads, simulator_->device());
   }
 
@@ -129,8 +135,10 @@ class PySimulator {
     } else {
       const std::unique_ptr<Calls>& calls = calls_;
       calls->run("set_worlds", [] {});
-      config_.seed = seed;
-      make(std::move(next), std::move(worlds));
+      SimulatorConfig config = config_;
+      config.seed = seed;
+      make(config, std::move(next), std::move(worlds));
+      config_ = config;
     }
     maps_ = maps;
     watchers_.clear();  // they saw the worlds before
@@ -182,9 +190,8 @@ class PySimulator {
     std::vector<NamedArray> named;
     for (size_t i = 0; i < names.size(); ++i) named.push_back({names[i], borrowed[i].array()});
     calls_->run("set_state", [&] { simulator_->set_state(borrowed_slots.array(), named, stream_); });
-    kept_.clear();
-    for (BorrowedArray& array : borrowed) kept_.push_back(std::move(array));
-    kept_.push_back(std::move(borrowed_slots));
+    borrowed.push_back(std::move(borrowed_slots));
+    keep(std::move(borrowed));
   }
 
   py::dict observations() {
@@ -216,7 +223,7 @@ class PySimulator {
       view = view_of(py::cast<py::dict>(out), count, &borrowed);
     }
     calls_->run("observe", [&] { simulator_->observe(asked, left_out, boxes, view, stream_); });
-    kept_ = std::move(borrowed);
+    keep(std::move(borrowed));
     return answers;
   }
   py::dict state() {
@@ -435,7 +442,6 @@ class PySimulator {
       PICTURA_CHECK(map, "simulator: maps: expected maps, got None");
       made.push_back(map->compiled(map_options(config_)));
     }
-    maps_ = maps;
     return made;
   }
   static SimulatorCapacity capacity_checked(const CompiledMaps& maps, const std::vector<WorldSpec>& worlds) {
@@ -447,13 +453,14 @@ class PySimulator {
     }
     return capacity_of(maps, worlds);
   }
-  void make(CompiledMaps maps, std::vector<WorldSpec> worlds) {
+  void make(const SimulatorConfig& config, CompiledMaps maps, std::vector<WorldSpec> worlds) {
     const SimulatorCapacity needs = capacity_checked(maps, worlds);
-    check_process("Simulator", config_.num_threads, config_.device);
+    check_process("Simulator", config.num_threads, config.device);
     {
-      const py::gil_scoped_release no_gil;
-      simulator_ = make_simulator(executor_, config_, std::move(maps), std::move(worlds), &choice_);
+      const WithoutGil no_gil;
+      simulator_ = make_simulator(executor_, config, std::move(maps), std::move(worlds), &choice_);
     }
+    check_device("Simulator", config.device, simulator_->device(), choice_);
     capacity_ = needs;
   }
   void forget_arrays() {
@@ -462,10 +469,13 @@ class PySimulator {
     result_ = {};
     of_result_ = nullptr;
   }
-  /// On a device the work that reads it may still be to come.
+  /// On a device the work that reads them may still be to come. What was kept goes last: its end may call Python, which
+  /// may call this object.
+  void keep(std::vector<BorrowedArray> arrays) { kept_.swap(arrays); }
   void keep(BorrowedArray array) {
-    kept_.clear();
-    kept_.push_back(std::move(array));
+    std::vector<BorrowedArray> arrays;
+    arrays.push_back(std::move(array));
+    keep(std::move(arrays));
   }
   Array all_worlds() {
     const auto count = static_cast<int64_t>(simulator_->worlds().size());

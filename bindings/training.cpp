@@ -295,13 +295,15 @@ class PySession {
   }
 
   py::object make_controller(const py::object& simulator, const py::object& renderer, bool argmax, uint64_t seed) {
-    const auto of = py::cast<SimulatorInside>(simulator.attr("_inside")()).simulator;
+    const auto of = inside_of<SimulatorInside>(simulator, "make_controller", "Simulator").simulator;
     struct Owner {
       std::shared_ptr<PolicySession> session;
       std::shared_ptr<Renderer> renderer;
     };
     auto owner = std::make_shared<Owner>(Owner{session_, nullptr});
-    if (!renderer.is_none()) owner->renderer = py::cast<RendererInside>(renderer.attr("_inside")()).renderer;
+    if (!renderer.is_none()) {
+      owner->renderer = inside_of<RendererInside>(renderer, "make_controller", "Renderer").renderer;
+    }
     ControllerInside inside;
     inside.of = of;
     inside.controller = session_->make_controller(owner->renderer.get(), argmax, seed);
@@ -359,7 +361,7 @@ class PySession {
       input.is_drawn = borrowed.back().array().checked<const uint8_t>("evaluate: is_drawn", {batch}, device);
     }
     std::optional<RendererInside> inside;
-    if (!renderer.is_none()) inside = py::cast<RendererInside>(renderer.attr("_inside")());
+    if (!renderer.is_none()) inside = inside_of<RendererInside>(renderer, "evaluate", "Renderer");
 
     const auto answers = std::make_shared<Answers>(batch, device);
     const auto count = static_cast<size_t>(batch);
@@ -695,4 +697,5 @@ naming what is missing or does not fit.)")
           R"(A pictura.Controller that drives in this simulator, which works on the session's device: the most likely action, or draws
 keyed by seed, world, agent, episode and step as in training. renderer: for a policy that reads images, of make_renderer(), with
 the simulator's geometries. Raises pictura.Error where one is missing.)");
+  refuse_unmade_objects(module);
 }

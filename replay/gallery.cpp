@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/replay/file.h"
 #include "pictura/replay/page_sources.h"
@@ -28,6 +29,7 @@ int64_t infractions_of(const Json& header) {
 }  // namespace
 
 int write_gallery(const std::string& folder) {
+  PICTURA_CHECK(std::filesystem::is_directory(folder), "{}: expected a folder of replays", folder);
   std::vector<std::string> names;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();

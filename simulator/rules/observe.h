@@ -392,8 +392,8 @@ PICTURA_HD inline PieceList pieces_near(const MapView& map, const NearPlace& pla
 
 /// The observation that each step writes: of all who are there, over the one of the step before.
 struct StepObservation {
-  /// How many rows may hold more than zeros.
-  PICTURA_HD static int num_filled(const SetRows& set) { return *set.count; }
+  /// How many rows may hold more than zeros. The memory is lent to callers, who may have written anything to it.
+  PICTURA_HD static int num_filled(const SetRows& set) { return min_of(max_of(*set.count, 0), set.capacity); }
   template <typename ThreadGroup>
   PICTURA_HD static int observe_partners(const WorldView& world, int agent, const EgoFrame& frame, float* rows,
                                          const ThreadGroup& group) {

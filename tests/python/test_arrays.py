@@ -1,5 +1,7 @@
 """Arrays: no copies, lifetimes, DLPack's protocol, and what is refused."""
 
+import contextlib
+import ctypes
 import gc
 import random
 import subprocess
@@ -194,6 +196,124 @@ def test_fuzzed_arrays_are_taken_or_refused(make):
     simulator.step(np.zeros(12, np.int32))
 
 
+class Tensor(ctypes.Structure):
+    """DLPack's tensor, whose every number a test may choose."""
+
+    _fields_ = [
+        ("data", ctypes.c_void_p), ("device_type", ctypes.c_int32), ("device_id", ctypes.c_int32), ("ndim", ctypes.c_int32),
+        ("code", ctypes.c_uint8), ("bits", ctypes.c_uint8), ("lanes", ctypes.c_uint16),
+        ("shape", ctypes.POINTER(ctypes.c_int64)), ("strides", ctypes.POINTER(ctypes.c_int64)), ("byte_offset", ctypes.c_uint64),
+        ("manager_ctx", ctypes.c_void_p), ("deleter", ctypes.c_void_p),
+    ]  # fmt: skip
+
+
+class Lender:
+    """Lends memory by a tensor of any type, shape, strides and device."""
+
+    memory = np.full(4096, pictura.IDLE_ACTION, np.int32)
+    living: list["Lender"] = []  # nobody says when a tensor is let go of
+
+    def __init__(self, shape, strides=None, device=(1, 0), said=None, dtype=(0, 32, 1), data=True, ndim=None):
+        self.shape = (ctypes.c_int64 * max(len(shape), 1))(*shape)
+        self.strides = None if strides is None else (ctypes.c_int64 * max(len(strides), 1))(*strides)
+        self.tensor = Tensor(self.memory.ctypes.data if data else None, *device, len(shape) if ndim is None else ndim, *dtype)
+        self.tensor.shape = self.shape
+        if strides is not None:
+            self.tensor.strides = self.strides
+        self.said = said or device
+        self.living.append(self)
+
+    def __dlpack_device__(self):
+        return self.said
+
+    def __dlpack__(self, stream=None):
+        new = ctypes.pythonapi.PyCapsule_New
+        new.restype, new.argtypes = ctypes.py_object, [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p]
+        return new(ctypes.addressof(self.tensor), b"dltensor", None)
+
+
+def test_tensors_of_any_device_type_shape_and_stride_are_taken_or_refused(make):
+    simulator = make()
+    simulator.step(Lender([12]))
+    for device, said in (((2, 0), None), ((2, 7), (1, 0)), ((1, 0), (2, 0)), ((10, 0), None), ((13, 0), (1, 0)), ((-1, -1), None)):
+        lender = Lender([12], device=device, said=said)
+        if device == (1, 0) and pictura.HAS_CUDA:
+            simulator.step(lender)  # on the CPU, whatever it says
+        else:
+            assert "cpu" in refusal(simulator, lender)
+    assert "null address" in refusal(simulator, Lender([12], data=False))
+    for shape, ndim in (([-12], None), ([2**62, 4], None), ([2**40] * 3, None), ([12], -1), ([12], 9), ([12] * 6, None)):
+        refusal(simulator, Lender(shape, ndim=ndim))
+    draw = random.Random(5)
+    taken = 0
+    for _ in range(5000):
+        shape = [draw.choice([12, 12, 12, 1, 0, 28, 40, 5, -1, 2**31, 2**62]) for _ in range(draw.choice([1, 1, 1, 0, 2, 3, 5, 6]))]
+        strides = [draw.choice([1, 1, 1, 0, -1, 2, 28, 2**40, -(2**62)]) for _ in shape] if draw.random() < 0.5 else None
+        dtype = (draw.choice([0, 0, 0, 1, 2, 4, 5, 6, 255]), draw.choice([32, 32, 32, 8, 16, 64, 1, 0, 255]), draw.choice([1, 1, 1, 0, 4]))
+        device = (draw.choice([1, 1, 1, 3, 2, 4, 7, 13, 0, -5]), draw.choice([0, 0, 0, 1, -1, 99]))
+        lender = Lender(shape, strides, device, draw.choice([None, (1, 0)]), dtype, draw.random() < 0.95)
+        calls = [
+            lambda: simulator.step(lender),
+            lambda: simulator.step_commands(lender),
+            lambda: simulator.reset(lender, 3),
+            lambda: simulator.set_state(np.array([1], np.int32), {"speed_mps": lender}),
+            lambda: simulator.observe(np.zeros(1, pictura.QUERY_DTYPE), lender),
+        ]
+        try:
+            draw.choice(calls)()
+            taken += 1
+        except (pictura.Error, BufferError):
+            pass
+    assert 0 < taken < 2500
+    simulator.step(np.zeros(12, np.int32))
+
+
+def test_observations_may_be_overwritten(make, idle):
+    written, kept = make(worlds=2, wall_observations=True), make(worlds=2, wall_observations=True)
+    junk = np.random.default_rng(0)
+    for step in range(20):
+        for array in written.observations.values():
+            view = array.numpy()
+            if view.flags.writeable:
+                view[...] = junk.integers(0, 256, view.nbytes, dtype=np.uint8).view(view.dtype).reshape(view.shape)
+        for simulator in (written, kept):
+            simulator.step(idle(simulator))
+    assert written.state_hash() == kept.state_hash()
+    assert (written.observations["set_counts"].numpy() == kept.observations["set_counts"].numpy()).all()
+
+
+def test_letting_go_of_an_array_may_call_the_simulator(make):
+    simulator = make()
+    called = []
+
+    class Last(np.ndarray):
+        def __del__(self):
+            simulator.step(np.zeros(12, np.int32))
+            called.append(True)
+
+    for _ in range(20):
+        simulator.step(np.zeros(12, np.int32).view(Last))
+        simulator.set_state(np.array([1], np.int32), {"speed_mps": np.ones(1, np.float32)})
+    assert len(called) == 20
+
+
+def test_objects_that_were_never_made_are_refused():
+    classes = [value for value in vars(pictura._pictura).values() if isinstance(value, type) and not issubclass(value, Exception)]
+    refused = 0
+    for its_class in classes:
+        unmade = its_class.__new__(its_class)
+        for member in dir(unmade):
+            if not member.startswith("__") or member in ("__array__", "__dlpack__", "__dlpack_device__", "__len__", "__repr__"):
+                with contextlib.suppress(TypeError):
+                    try:
+                        value = getattr(unmade, member)
+                        if callable(value):
+                            value()
+                    except (pictura.Error, RuntimeError) as error:
+                        refused += "__new__ alone" in str(error)
+    assert len(classes) > 15 and refused > 50
+
+
 def test_a_second_call_while_one_runs_is_refused(town):
     simulator = pictura.Simulator([town], [(0, 60)] * 4, num_threads=1)
     lane = pictura.Controller("lane", simulator)
@@ -270,6 +390,31 @@ def test_interrupts_end_a_render_between_views():
     """
     out = run_python(code)
     assert out.stdout == "stopped True False\n", out.stderr
+
+
+@pytest.mark.parametrize("work", ["simulator.run(lane, 10**9)", "step()", "draw()", "load()"])
+def test_the_interpreter_ends_while_threads_work(work):
+    code = f"""
+        import threading, time
+        import numpy as np
+        import pictura
+        town = pictura.Map.load("procedural:3")
+        simulator = pictura.Simulator([town], [(0, 60)] * 4, num_threads=1)
+        lane = pictura.Controller("lane", simulator)
+        renderer = pictura.Renderer("cpu", pictura.Rig.paper(32, 18), num_threads=1)
+        for handle, geometry in simulator.geometries.items():
+            renderer.upload(handle, geometry)
+        def step(): simulator.step(np.full(240, 10, np.int32))
+        def draw(): renderer.render(simulator.scene, simulator.views)
+        def load(): pictura.Map.load("procedural:5")
+        def work():
+            while True: {work}
+        threading.Thread(target=work, daemon=True).start()
+        time.sleep(0.2)
+        print("left")
+    """
+    out = run_python(code)
+    assert (out.returncode, out.stdout) == (0, "left\n"), out.stderr
 
 
 def test_forks_are_refused_or_work():

@@ -292,6 +292,39 @@ def test_conditioning_is_set_by_name(town):
         pictura.Simulator([town], [(0, 8)], conditioning={"colision": 2.5})
 
 
+def test_what_cannot_be_simulated_is_named(town):
+    numbers = r"integers \(map, agents\) or \(map, agents, global world\)"
+    for worlds, message in (
+        ([(0, 4, -1)], f"world 0: expected {numbers}, got \\(0, 4, -1\\)"),
+        ([(0, 4), ("a", 4)], f"world 1: expected {numbers}, got \\('a', 4\\)"),
+        ([(0,)], numbers),
+        ([3], numbers),
+    ):
+        with pytest.raises(pictura.UsageError, match=message):
+            pictura.Simulator([town], worlds)
+    for options, message in (
+        ({"conditioning": {"collision": "a"}}, r"conditioning: collision: expected a number or \(low, high\), got 'a'"),
+        ({"conditioning": {3: 1}}, "conditioning: expected names, got 3"),
+        ({"stream": "x"}, "stream: expected a cudaStream_t as int, or None, got 'x'"),
+    ):
+        with pytest.raises(pictura.UsageError, match=message):
+            pictura.Simulator([town], [(0, 4)], **options)
+    for make in (pictura.Recorder, pictura.LiveView, pictura.SceneRecorder):
+        with pytest.raises(pictura.UsageError, match="expected a pictura.Simulator, got NoneType"):
+            make(None)
+    with pytest.raises(pictura.Error, match="nowhere: expected a folder of replays"):
+        pictura.write_gallery("nowhere")
+
+
+@pytest.mark.parametrize("executor", ["auto", "cpu"])
+def test_a_device_that_is_not_there_is_refused(town, executor):
+    device = "cuda:99"  # of no machine
+    with pytest.raises(pictura.Error, match=device):
+        pictura.Simulator([town], [(0, 4)], executor=executor, device=device)
+    with pytest.raises(pictura.Error, match=device):
+        pictura.Renderer(executor, device=device)
+
+
 def test_other_worlds_are_those_of_a_new_simulator(make, town):
     simulator, expected = make(6, worlds=2), make(9, worlds=4, seed=3)
     old = simulator.observations["ego"].numpy()
@@ -300,6 +333,11 @@ def test_other_worlds_are_those_of_a_new_simulator(make, town):
     assert simulator.state_hash() == expected.state_hash()
     assert simulator.observations["ego"].shape == (36, 9)
     assert (old == kept).all(), "memory of before lives"
+    other = pictura.Map.load("procedural:4")
+    for maps, worlds in (([other], [(3, 1)]), ([other], [(0, -1)]), ([other], []), ([], [(0, 1)])):
+        with pytest.raises(pictura.UsageError):
+            simulator.set_worlds(maps, worlds)
+        assert simulator.maps == [town] and simulator.num_slots == 36
     simulator.set_worlds([town], [(0, 6)], seed=3)
     assert simulator.num_slots == 6
 
