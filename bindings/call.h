@@ -51,6 +51,28 @@ class WithoutGil {
 /// pybind11 would hand them memory that nobody has written. For the end of a module's definition.
 void refuse_unmade_objects(const py::module_& module);
 
+/// Lets one thread at a time into calls of an object.
+class Turnstile {
+ public:
+  /// In a call for as long as it lives. Throws Error where another thread is in one.
+  class Pass {
+   public:
+    Pass(Turnstile* turnstile, std::string_view what) : turnstile_(turnstile) {
+      PICTURA_CHECK(!turnstile->is_taken_.exchange(true),
+                    "{}: another thread is in a call of this object, which serves one at a time", what);
+    }
+    Pass(const Pass&) = delete;
+    Pass& operator=(const Pass&) = delete;
+    ~Pass() { turnstile_->is_taken_ = false; }
+
+   private:
+    Turnstile* turnstile_;
+  };
+
+ private:
+  std::atomic<bool> is_taken_{false};
+};
+
 /// Of one object of the library. An object serves one thread at a time.
 class Calls {
  public:
@@ -61,21 +83,18 @@ class Calls {
   template <typename Work>
   auto run(std::string_view what, Work&& work) {
     check_process(what, num_threads_, device_);
-    PICTURA_CHECK(!is_busy_.exchange(true),
-                  "{}: another thread is in a call of this object, which serves one at a time", what);
-    const Free free{&is_busy_};
+    const Turnstile::Pass pass(turnstile_.get(), what);
     const WithoutGil no_gil;
     return std::forward<Work>(work)();
   }
 
+  /// For calls of the same object by others that hold it.
+  const std::shared_ptr<Turnstile>& turnstile() const { return turnstile_; }
+
  private:
-  struct Free {
-    std::atomic<bool>* flag;
-    ~Free() { *flag = false; }
-  };
   int num_threads_;
   Device device_;
-  std::atomic<bool> is_busy_{false};
+  std::shared_ptr<Turnstile> turnstile_ = std::make_shared<Turnstile>();
 };
 
 /// Runs long work in a thread of its own and returns its result; the caller's thread meanwhile answers ^C, and then

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "pictura/bindings/arrays.h"
+#include "pictura/bindings/call.h"
 #include "pictura/common/error.h"
 #include "pictura/common/renderer.h"
 #include "pictura/map/scenario/scenario.h"
@@ -94,12 +95,12 @@ struct SimulatorInside {
 /// What is inside a pictura.Renderer.
 struct RendererInside {
   std::shared_ptr<Renderer> renderer;
+  std::shared_ptr<Turnstile> turnstile;
 };
 
 /// What becomes a pictura.Controller.
 struct ControllerInside {
   std::shared_ptr<Simulator> of;
-  std::shared_ptr<const void> owner;  // of what the controller reads
   std::shared_ptr<Controller> controller;
 };
 

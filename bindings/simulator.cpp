@@ -621,14 +621,11 @@ class HeldController final : public Controller {
 /// What several controllers of one simulator become; a mask that is None is everybody.
 ControllerInside shared_controller(const std::vector<std::pair<PyController*, py::object>>& drivers,
                                    const PySimulator& simulator) {
-  using Owners = std::vector<std::shared_ptr<const void>>;
-  auto owners = std::make_shared<Owners>();
   std::vector<Driver> driving;
   for (const auto& [controller, mask] : drivers) {
     PICTURA_CHECK(controller, "Controller.shared: expected a controller, got None");
     const ControllerInside& inside = controller->inside();
     PICTURA_CHECK(inside.of == simulator.shared(), "Controller.shared: expected controllers of this simulator");
-    owners->push_back(inside.owner);
     Driver driver{.controller = std::make_unique<HeldController>(inside.controller)};
     if (!mask.is_none()) {
       const std::string what = "Controller.shared: mask of '" + controller->name() + "'";
@@ -638,14 +635,14 @@ ControllerInside shared_controller(const std::vector<std::pair<PyController*, py
     }
     driving.push_back(std::move(driver));
   }
-  return {simulator.shared(), owners, std::make_shared<SharedControl>(std::move(driving))};
+  return {simulator.shared(), std::make_shared<SharedControl>(std::move(driving))};
 }
 
 ControllerInside controller_by_name(const std::string& name, const PySimulator& simulator, uint64_t seed) {
   const std::shared_ptr<Simulator>& of = simulator.shared();
   PICTURA_CHECK(of->device().is_host(), "Controller: expected a simulator on cpu, got one on {}",
                 name_of(of->device()));
-  return {of, nullptr, make_controller(name, *of, seed)};
+  return {of, make_controller(name, *of, seed)};
 }
 
 py::dict report_of(const SpawnReport& report) {

@@ -280,6 +280,31 @@ struct Answers {
   }
 };
 
+/// A controller of a session, which it holds together with the renderer: both may be called from other threads.
+class SessionController final : public Controller {
+ public:
+  SessionController(std::shared_ptr<PolicySession> session, std::shared_ptr<Turnstile> of_session,
+                    RendererInside renderer, std::unique_ptr<Controller> controller)
+      : session_(std::move(session)),
+        of_session_(std::move(of_session)),
+        renderer_(std::move(renderer)),
+        controller_(std::move(controller)) {}
+
+  std::string_view name() const override { return controller_->name(); }
+  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
+    const Turnstile::Pass in_session(of_session_.get(), "the controller's session");
+    std::optional<Turnstile::Pass> in_renderer;
+    if (renderer_.turnstile) in_renderer.emplace(renderer_.turnstile.get(), "the controller's renderer");
+    controller_->act(input, mask, commands_out, stream);
+  }
+
+ private:
+  std::shared_ptr<PolicySession> session_;
+  std::shared_ptr<Turnstile> of_session_;
+  RendererInside renderer_;
+  std::unique_ptr<Controller> controller_;
+};
+
 class PySession {
  public:
   PySession(const std::string& checkpoint, const SessionOptions& options)
@@ -291,23 +316,17 @@ class PySession {
   py::object make_renderer() {
     std::shared_ptr<Renderer> renderer = calls_.run("make_renderer", [&] { return session_->make_renderer(); });
     if (!renderer) return py::none();
-    return of_main("Renderer")(RendererInside{std::move(renderer)});
+    return of_main("Renderer")(RendererInside{std::move(renderer), nullptr});
   }
 
   py::object make_controller(const py::object& simulator, const py::object& renderer, bool argmax, uint64_t seed) {
     const auto of = inside_of<SimulatorInside>(simulator, "make_controller", "Simulator").simulator;
-    struct Owner {
-      std::shared_ptr<PolicySession> session;
-      std::shared_ptr<Renderer> renderer;
-    };
-    auto owner = std::make_shared<Owner>(Owner{session_, nullptr});
-    if (!renderer.is_none()) {
-      owner->renderer = inside_of<RendererInside>(renderer, "make_controller", "Renderer").renderer;
-    }
+    RendererInside drawing;
+    if (!renderer.is_none()) drawing = inside_of<RendererInside>(renderer, "make_controller", "Renderer");
     ControllerInside inside;
     inside.of = of;
-    inside.controller = session_->make_controller(owner->renderer.get(), argmax, seed);
-    inside.owner = std::move(owner);
+    inside.controller = std::make_shared<SessionController>(
+        session_, calls_.turnstile(), drawing, session_->make_controller(drawing.renderer.get(), argmax, seed));
     return of_main("Controller")(inside);
   }
 
@@ -367,8 +386,11 @@ class PySession {
     const auto count = static_cast<size_t>(batch);
     const Span<float> logits(answers->all.data(), count * kNumActions);
     const Span<float> values(answers->all.data() + count * kNumActions, count);
-    calls_.run("evaluate",
-               [&] { session_->evaluate(input, inside ? inside->renderer.get() : nullptr, logits, values); });
+    calls_.run("evaluate", [&] {
+      std::optional<Turnstile::Pass> in_renderer;
+      if (inside) in_renderer.emplace(inside->turnstile.get(), "evaluate: renderer");
+      session_->evaluate(input, inside ? inside->renderer.get() : nullptr, logits, values);
+    });
     return py::make_tuple(LentArray{Array(logits.data(), {batch, kNumActions}, device), answers, {}, false, "logits"},
                           LentArray{Array(values.data(), {batch}, device), answers, {}, false, "values"});
   }

@@ -10,6 +10,8 @@ import signal
 import subprocess
 import sys
 import textwrap
+import threading
+import time
 import types
 
 import numpy as np
@@ -178,6 +180,33 @@ def probed_by_command(probe, folder, out, arguments):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
+
+
+def test_threads_that_share_a_session_or_a_renderer_are_refused(trained, session, town):
+    simulators = [world_of(session, town) for _ in range(2)]
+    renderers = [renderer_of(session, simulator) for simulator in simulators]
+    controllers = [session.make_controller(*pair) for pair in zip(simulators, renderers)]
+    calls = [lambda one=one, by=by: one.run(by, 1) for one, by in zip(simulators, controllers)]
+    calls.append(lambda: session.evaluate(world_of(session, town).observations))
+    if renderers[0] is not None:
+        empty, views = pictura.Scene(np.zeros((0, 3)), [], np.zeros((0, 3)), []), pictura.make_views(np.zeros((200, 3)), np.zeros(200))
+        calls.append(lambda: renderers[0].render(empty, views))
+    errors, end = set(), time.monotonic() + 4
+
+    def repeat(call):
+        while time.monotonic() < end:
+            try:
+                call()
+            except pictura.Error as error:
+                errors.add(str(error))
+
+    threads = [threading.Thread(target=repeat, args=(call,)) for call in calls]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert any("the controller's session: another thread is in a call of this object" in error for error in errors), errors
+    simulators[0].run(controllers[0], 2)
 
 
 def test_evaluation_gives_the_commands_numbers(trained):
