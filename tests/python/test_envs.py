@@ -179,15 +179,35 @@ def test_wrong_options_are_named():
         ({"autoreset": "never"}, "autoreset"),
         ({"array": "jax"}, "array"),
         ({"num_envs": 7, "num_agents": 4}, "num_envs"),
+        ({"maps": []}, "maps"),
+        ({"maps": None}, "maps"),
     ):
         with pytest.raises(pictura.UsageError, match=name):
-            pictura.make_vec("procedural:3", **options)
+            pictura.make_vec(**({"maps": "procedural:3"} | options))
     env = vector()
     for wrong in (np.zeros(24), np.zeros(23, int), np.full(24, 12)):
         with pytest.raises(pictura.Error):
             env.step(wrong)
     with pytest.raises(pictura.Error, match="longitudinal"):
         vector(actions="multi_discrete").step(np.full((24, 2), 3))
+
+
+@pytest.mark.parametrize("array", ["numpy", "torch"])
+def test_wrong_actions_never_become_right_ones(array):
+    if array == "torch":
+        pytest.importorskip("torch")
+    env = vector(array=array)
+    wrong = [np.full(24, 2**40), np.full(24, 2**32 + 3), np.full(24, -(2**32)), np.full(24, -1), np.full(24, 12), np.full(24, np.nan)]
+    for actions in [*wrong, np.full(24, 2**64 - 1, np.uint64), np.ones(24, bool), np.ones(23, int), [7], None, "go"]:
+        with pytest.raises((pictura.Error, TypeError)):
+            env.step(actions)
+    env.step([7] * 24)
+    env.step(np.full(24, 7, np.uint8))
+    env = vector(array=array, actions="multi_discrete")
+    for pair in ([-1, 0], [0, 3], [1, -1], [4, 0], [2**33, 0], [0, 2**62]):
+        with pytest.raises(pictura.Error):
+            env.step(np.tile(pair, (24, 1)))
+    env.step(np.tile([3, 2], (24, 1)))
 
 
 def test_views_without_copies_are_the_simulators_memory():
@@ -248,5 +268,8 @@ def test_pufferlibs_contract():
         assert all(a is b for a, b in zip((seen, rewards, terminals, truncations), buffers))
         assert (env.masks == env.batch.active).all()
         logs += infos
+    for wrong in (np.full(12, 3.7), np.full(12, 12), np.zeros(11, int), None):
+        with pytest.raises(pictura.Error):
+            env.step(wrong)
     assert sum(log["n"] for log in logs) == env.batch.simulator.totals()["finished_agent_episodes"] > 0
     assert not env.done

@@ -22,9 +22,11 @@ RENDER_MODES = ["rgb_array", "human"]
 
 
 def load_maps(maps: str | pictura.Map | Sequence[str | pictura.Map]) -> list[pictura.Map]:
-    """Maps by name or as they are, one or several."""
+    """Maps by name or as they are, one or several. Raises pictura.UsageError for none."""
     if isinstance(maps, (str, pictura.Map)):
         maps = [maps]
+    if not isinstance(maps, Sequence) or not maps:
+        raise pictura.UsageError(f"maps: expected a name, a pictura.Map or several, got {maps!r}")
     return [pictura.Map.load(each) if isinstance(each, str) else each for each in maps]
 
 
@@ -148,24 +150,29 @@ class Batch:
     def action_indices(self, actions: Any) -> Any:
         """Actions as a user has them, as int32 [slots] in [0, 12). Raises pictura.Error for other shapes and for numbers that
         are not integers."""
+        library = self._torch if self.array == "torch" else np
         if self.array == "torch":
-            torch = self._torch
-            actions = torch.as_tensor(actions, device=self._action_memory.device)
-            if actions.dtype.is_floating_point or actions.dtype.is_complex:
-                raise pictura.Error(f"actions: expected integers, got {actions.dtype}")
+            if not isinstance(actions, library.Tensor):
+                actions = library.as_tensor(np.asarray(actions), device=self._action_memory.device)
+            is_integer = not (actions.dtype.is_floating_point or actions.dtype.is_complex or actions.dtype == library.bool)
         else:
             actions = np.asarray(actions)
-            if actions.dtype.kind not in "iu":
-                raise pictura.Error(f"actions: expected integers, got {actions.dtype}")
+            is_integer = actions.dtype.kind in "iu"
+        if not is_integer:
+            raise pictura.Error(f"actions: expected integers, got {actions.dtype}")
         shape = (self.num_slots,) if self.actions == "discrete" else (self.num_slots, 2)
         if tuple(actions.shape) != shape:
             raise pictura.Error(f"actions: expected {list(shape)}, got {list(actions.shape)}")
         if self.actions == "multi_discrete":
-            if self.array == "numpy" and not (
-                (actions >= 0).all() and (actions[:, 0] < NUM_LONGITUDINAL).all() and (actions[:, 1] < NUM_LATERAL).all()
-            ):
+            longitudinal, lateral = actions[:, 0], actions[:, 1]
+            fits = (longitudinal >= 0) & (longitudinal < NUM_LONGITUDINAL) & (lateral >= 0) & (lateral < NUM_LATERAL)
+            if self.array == "numpy" and not fits.all():
                 raise pictura.Error("actions: expected [longitudinal in [0, 4), lateral in [0, 3)]")
-            actions = actions[:, 0] * NUM_LATERAL + actions[:, 1]
+            # On a device the simulator finds the -1, without the host waiting here.
+            actions = library.where(fits, longitudinal * NUM_LATERAL + lateral, -1)
+        elif actions.dtype.itemsize > 4:  # what does not fit must not become what does
+            whole = actions.long() if self.array == "torch" else actions.astype(np.int64, copy=False)
+            actions = whole.clip(-(2**31), 2**31 - 1)
         self._action_memory[:] = actions
         return self._action_memory
 

@@ -63,8 +63,8 @@ class DrivePufferEnv(_Base):
         return self.observations, []
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, list[dict[str, float]]]:
+        results = self.batch.step(actions)
         self.actions[:] = actions
-        results = self.batch.step(self.actions)
         self.rewards[:] = results["reward"]
         self.terminals[:] = results["terminated"]
         self.truncations[:] = results["truncated"]
