@@ -6,13 +6,14 @@ that weights trained in Python run in the `pictura` command.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
 import pathlib
 import struct
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import torch
@@ -254,12 +255,28 @@ def _policy_of(config_toml: str, tensors: dict[str, Tensor], path: str) -> Polic
     return policy
 
 
+@contextlib.contextmanager
+def _named(path: str) -> Iterator[None]:
+    """Whatever else the numbers of a broken file raise becomes a pictura.Error that names the file."""
+    try:
+        yield
+    except (pictura.Error, OSError):
+        raise
+    except Exception as error:
+        raise pictura.Error(f"{path}: damaged, or no policy of this library: {type(error).__name__}: {error}") from error
+
+
 def load_policy(path: str | os.PathLike[str]) -> Policy:
     """A policy from policy.safetensors or a checkpoint (.ckpt), in fp32 on the CPU.
 
     Raises pictura.Error naming what is wrong with the file, pictura.UsageError for a backbone that is a program of its own.
     """
     path = os.fspath(path)
+    with _named(path):
+        return _load(path)
+
+
+def _load(path: str) -> Policy:
     if pathlib.Path(path).suffix != ".ckpt":
         metadata, tensors = _read_safetensors(path)
         return _policy_of(metadata.get("config", ""), tensors, path)
@@ -280,16 +297,18 @@ def save_policy(policy: Policy, path: str | os.PathLike[str], like: str | os.Pat
     """
     path, like = os.fspath(path), os.fspath(like)
     weights = {name: value.detach().to("cpu", torch.float32).contiguous() for name, value in policy.state_dict().items()}
-    if pathlib.Path(like).suffix == ".ckpt":
-        header, data, begin = _read_checkpoint(like)
-        entries = {entry["name"]: (entry["shape"], begin + entry["offset"]) for entry in header["parameters"]}
-    else:
-        data = bytearray(pathlib.Path(like).read_bytes())
-        (length,) = struct.unpack_from("<Q", data)
-        header = json.loads(data[8 : 8 + length])
-        metadata = header.pop("__metadata__", {})
-        entries = {name: (entry["shape"], 8 + length + entry["data_offsets"][0]) for name, entry in header.items()}
-        weights = {name: value.to(_TYPES[header[name]["dtype"]]) if name in header else value for name, value in weights.items()}
+    with _named(like):
+        if pathlib.Path(like).suffix == ".ckpt":
+            header, data, begin = _read_checkpoint(like)
+            entries = {entry["name"]: (entry["shape"], begin + entry["offset"]) for entry in header["parameters"]}
+        else:
+            data = bytearray(pathlib.Path(like).read_bytes())
+            (length,) = struct.unpack_from("<Q", data)
+            header = json.loads(data[8 : 8 + length])
+            metadata = header.pop("__metadata__", {})
+            entries = {name: (entry["shape"], 8 + length + entry["data_offsets"][0]) for name, entry in header.items()}
+            types = {name: _TYPES[entry["dtype"]] for name, entry in header.items()}
+            weights = {name: value.to(types.get(name, value.dtype)) for name, value in weights.items()}
     if {name: shape for name, (shape, _) in entries.items()} != {name: list(value.shape) for name, value in weights.items()}:
         raise pictura.Error(f"{like}: of another architecture than the policy: expected the same names and shapes of weights")
     for name, value in weights.items():

@@ -3,6 +3,8 @@
 import json
 import os
 import pathlib
+import random
+import struct
 import subprocess
 
 import numpy as np
@@ -72,6 +74,29 @@ def test_broken_files_are_named(reference, tmp_path):
     path.write_bytes(whole)
     with pytest.raises(pictura.Error, match="PICTCKPT"):
         load_policy(path)
+
+
+@pytest.mark.skipif(not MODELS, reason="no released policies here")
+def test_broken_headers_are_named(tmp_path):
+    whole = (MODELS[0].parent / "vector_auxiliary_399M.safetensors").read_bytes()
+    (length,) = struct.unpack_from("<Q", whole)
+    draw, refused, path = random.Random(1), 0, tmp_path / "odd.safetensors"
+    odd = [None, 3, "x", [], {}, [-1], [0, 2**60], [5, 3], [1, 2, 3], [0, 4.5], 2**70, "I32", {"config": 3}, {"config": "[policy]"}]
+    odd += [{"config": f'[policy]\nmodality="vector"\nembedding_width={width}\nbackbone_layers=2\nbackbone_width=3'} for width in (-1, 10**12)]
+    for _ in range(300):
+        header = json.loads(whole[8 : 8 + length])
+        name = draw.choice(list(header))
+        changed = draw.choice([header, header[name]])
+        changed[draw.choice([key for key in changed if changed is not header or key == name])] = draw.choice(odd)
+        text = json.dumps(header).encode()
+        path.write_bytes(struct.pack("<Q", len(text)) + text + whole[8 + length :])
+        for work in (load_policy, lambda path: save_policy(torch.nn.Linear(1, 1), tmp_path / "x.safetensors", like=path)):
+            try:
+                work(path)
+            except pictura.Error as error:
+                assert "odd.safetensors" in str(error)
+                refused += 1
+    assert refused > 400
 
 
 def test_a_policy_drives_the_simulator(reference, make):
