@@ -168,16 +168,18 @@ void drop_older(PyObject* capsule) {
   throw py::error_already_set();
 }
 
+constexpr const char* kStream = "a stream as int, or None";
+
 /// Makes what a consumer puts on `stream`, in DLPack's numbers, come after what the library has put on the array's.
 void order_before(const LentArray& lent, const py::object& stream) {
   if (lent.array.device.is_host()) {
-    if (!stream.is_none() && py::cast<int64_t>(stream) != -1) {
+    if (!stream.is_none() && cast_checked<int64_t>(stream, lent.what, kStream) != -1) {
       refuse(fmt::format("{}: expected stream=None for an array on cpu", lent.what));
     }
     return;
   }
 #ifdef PICTURA_HAS_CUDA
-  const int64_t number = stream.is_none() ? 1 : py::cast<int64_t>(stream);
+  const int64_t number = stream.is_none() ? 1 : cast_checked<int64_t>(stream, lent.what, kStream);
   if (number == -1) return;
   if (number == 0 || number < -1) {
     refuse(fmt::format("{}: expected a stream of None, -1, 1, 2 or a cudaStream_t, got {}", lent.what, number));
@@ -189,19 +191,22 @@ void order_before(const LentArray& lent, const py::object& stream) {
 py::object dlpack_of(const LentArray& lent, const py::object& stream, const py::object& max_version,
                      const py::object& dl_device, const py::object& copy) {
   if (!dl_device.is_none()) {
-    const auto wanted = py::cast<std::pair<int32_t, int32_t>>(dl_device);
+    const auto wanted =
+        cast_checked<std::pair<int32_t, int32_t>>(dl_device, lent.what, "dl_device (type, index), or None");
     const std::pair<int32_t, int32_t> own{lent.array.device.is_host() ? kCpu : kCuda, lent.array.device.index};
     if (wanted != own) {
       refuse(fmt::format("{}: is on {}; expected dl_device ({}, {}), got ({}, {})", lent.what,
                          name_of(lent.array.device), own.first, own.second, wanted.first, wanted.second));
     }
   }
-  const bool copies = !copy.is_none() && py::cast<bool>(copy);
+  const bool copies = !copy.is_none() && cast_checked<bool>(copy, lent.what, "copy=True, False or None");
   if (copies && !lent.array.device.is_host()) {
     refuse(fmt::format("{}: is on {}, where it makes no copies: take it without one and copy it", lent.what,
                        name_of(lent.array.device)));
   }
-  const bool is_versioned = !max_version.is_none() && py::cast<std::pair<uint32_t, uint32_t>>(max_version).first >= 1;
+  const bool is_versioned = !max_version.is_none() && cast_checked<std::pair<uint32_t, uint32_t>>(
+                                                          max_version, lent.what, "max_version (major, minor), or None")
+                                                              .first >= 1;
   const bool is_read_only = lent.array.is_read_only && !copies;
   if (is_read_only && !is_versioned) {
     refuse(fmt::format("{}: is read-only, which DLPack before 1.0 cannot say: pass max_version=(1, 0) or copy=True",
@@ -273,7 +278,10 @@ void check_tensor(const DLTensor& tensor, std::string_view what, Array* array_ou
                   "{}: expected lengths of 0 or more that memory can have, got [{}]", what, fmt::join(lengths, ", "));
   }
   const Dims shape = dims_of(lengths);
-  *array_out = Array(static_cast<uint8_t*>(tensor.data) + tensor.byte_offset, *type, shape, device);
+  uint8_t* const first = static_cast<uint8_t*>(tensor.data) + tensor.byte_offset;
+  PICTURA_CHECK(shape.count() == 0 || reinterpret_cast<uintptr_t>(first) % bytes_of(*type) == 0,
+                "{}: expected memory that is aligned for {}", what, name_of(*type));
+  *array_out = Array(first, *type, shape, device);
   if (!tensor.strides) return;
   for (int i = 0; i < tensor.ndim && shape.count() > 0; ++i) {
     // A stride along one element means nothing.

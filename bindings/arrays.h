@@ -13,6 +13,7 @@
 #include "pictura/bindings/dlpack.h"
 #include "pictura/common/array.h"
 #include "pictura/common/device.h"
+#include "pictura/common/error.h"
 
 namespace pictura::python {
 
@@ -56,6 +57,16 @@ BorrowedArray borrow(const py::handle& object, std::string_view what, Stream str
 
 /// A NumPy array of structs as the bytes that it is: [count, size] u8 on the host; anything else as borrow().
 BorrowedArray borrow_structs(const py::handle& object, std::string_view what, size_t size, Stream stream);
+
+/// A value of Python's. Throws UsageError saying what was expected where it is of another kind.
+template <typename T>
+T cast_checked(const py::handle& value, std::string_view what, std::string_view expected) {
+  try {
+    return py::cast<T>(value);
+  } catch (const py::cast_error&) {
+    fail_usage("{}: expected {}, got {}", what, expected, py::cast<std::string>(py::repr(value)));
+  }
+}
 
 /// The name of an object's class, for messages.
 std::string type_name_of(const py::handle& object);

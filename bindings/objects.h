@@ -11,7 +11,6 @@
 
 #include "pictura/bindings/arrays.h"
 #include "pictura/bindings/call.h"
-#include "pictura/common/error.h"
 #include "pictura/common/renderer.h"
 #include "pictura/map/scenario/scenario.h"
 #include "pictura/simulator/compiled_map.h"
@@ -113,16 +112,6 @@ Inside inside_of(const py::handle& object, std::string_view what, std::string_vi
     fail_usage("{}: expected a pictura.{}, got {}", what, expected, type_name_of(object));
   }
   return py::cast<Inside>(inside);
-}
-
-/// A value of Python's. Throws UsageError saying what was expected where it is of another kind.
-template <typename T>
-T cast_checked(const py::handle& value, std::string_view what, std::string_view expected) {
-  try {
-    return py::cast<T>(value);
-  } catch (const py::cast_error&) {
-    fail_usage("{}: expected {}, got {}", what, expected, py::cast<std::string>(py::repr(value)));
-  }
 }
 
 /// "cpu", "cuda" or "cuda:1". Throws UsageError for others.

@@ -57,6 +57,9 @@ def test_dlpack_speaks_both_versions(make):
         ego.__dlpack__(stream=3)
     with pytest.raises(TypeError):
         ego.__dlpack__(color=3)
+    for name, value in (("max_version", "new"), ("max_version", (1,)), ("dl_device", "cpu"), ("stream", "x"), ("copy", "yes")):
+        with pytest.raises(pictura.UsageError, match=name):
+            ego.__dlpack__(**{name: value})
 
 
 def test_strided_arrays_are_lent_with_their_strides(make, idle):
@@ -114,6 +117,7 @@ def test_wrong_actions_are_refused_by_name(make):
     assert refusal(simulator, np.full(12, -1, np.int32)).endswith("got -1")
     assert "DLPack's code 0 with 8 bits" in refusal(simulator, good[:12].astype(np.int8))
     assert "None" in refusal(simulator, None)
+    assert "aligned for i32" in refusal(simulator, np.zeros(12 * 4 + 1, np.uint8)[1:].view(np.int32))
 
 
 def test_an_array_with_one_element_has_any_stride(make):
