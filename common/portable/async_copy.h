@@ -1,5 +1,5 @@
-// Asynchronous copies to shared memory, prefetches, and overlapping launches. On the host, copies are immediate and the
-// rest does nothing.
+// Asynchronous copies to shared memory, prefetches, and overlapping launches. On the host, copies are immediate and
+// nothing is waited for.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -24,10 +24,13 @@ PICTURA_HD inline void wait_for_copies() {
 #endif
 }
 
-/// Prefetches the memory at an address into the L2 cache.
-PICTURA_HD inline void prefetch([[maybe_unused]] const void* address) {
+/// Prefetches the memory at an address: into a device's L2 cache, or a core's first one.
+PICTURA_HD inline void prefetch(const void* address) {
 #if defined(__CUDA_ARCH__)
   asm volatile("prefetch.global.L2 [%0];" : : "l"(address));
+#else
+  __builtin_prefetch(address);
+  asm volatile("");  // else g++ takes callers that do nothing else for functions without effect, and drops the calls
 #endif
 }
 

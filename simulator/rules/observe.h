@@ -2,6 +2,7 @@
 // docs/observation.md is the table of slots, units and scales; the constants here are its source.
 #pragma once
 
+#include "pictura/common/portable/async_copy.h"
 #include "pictura/common/portable/float8.h"
 #include "pictura/simulator/observation.h"
 #include "pictura/simulator/rules/step.h"
@@ -390,6 +391,14 @@ PICTURA_HD inline PieceList pieces_near(const MapView& map, const NearPlace& pla
   }
 }
 
+/// Begins to load what pieces_near() lists: the lists of all places do not fit into a core's caches.
+PICTURA_HD inline void prefetch_list_near(const MapView& map, const NearPlace& place, EntitySet set) {
+  constexpr int kLines = 5, kItemsPerLine = 16;  // as many as most lists take
+  if (set == EntitySet::partners || set == EntitySet::controls) return;
+  const int32_t* items = pieces_near(map, place, set).items.data();
+  for (int line = 0; line < kLines; ++line) prefetch(items + line * kItemsPerLine);
+}
+
 /// The observation that each step writes: of all who are there, over the one of the step before.
 struct StepObservation {
   /// How many rows may hold more than zeros. The memory is lent to callers, who may have written anything to it.
@@ -427,11 +436,19 @@ PICTURA_HD void observe_set(const WorldView& world, int agent, const NearPlace& 
 PICTURA_HD inline void observe(const WorldView& world, int begin, int end, bool entity_sets,
                                const ObservationView& out) {
   for (int agent = begin; agent < end; ++agent) observe_own(world, agent, world.first_slot + agent, out);
-  for (int i = 0; entity_sets && i < num_observed_sets(out); ++i) {
-    const auto set = static_cast<EntitySet>(i);
-    for (int agent = begin; agent < end; ++agent) {
-      const int slot = world.first_slot + agent;
-      observe_set(world, agent, near_place(world, slot), set, set_rows(out, slot, set), StepObservation{});
+  if (!entity_sets) return;
+  constexpr int kBlock = 128, kAhead = 2;  // agents whose places are kept, and how early a list is asked for
+  NearPlace places[kBlock];
+  for (int first = begin; first < end; first += kBlock) {
+    const int count = min_of(kBlock, end - first);
+    for (int i = 0; i < count; ++i) places[i] = near_place(world, world.first_slot + first + i);
+    for (int s = 0; s < num_observed_sets(out); ++s) {
+      const auto set = static_cast<EntitySet>(s);
+      for (int i = 0; i < count; ++i) {
+        prefetch_list_near(world.map, places[min_of(i + kAhead, count - 1)], set);
+        const int slot = world.first_slot + first + i;
+        observe_set(world, first + i, places[i], set, set_rows(out, slot, set), StepObservation{});
+      }
     }
   }
 }
