@@ -97,12 +97,15 @@ inline uint32_t equal8(const int32_t* integers, int32_t value) {
   return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(equal)));
 }
 
-/// Sixteen 64-bit keys in ascending order, each in [0, 0x7FF0...0): ordered as the doubles of the same bits are.
-struct Keys16 {
-  __m256d keys[4];
+/// The least of 64-bit keys, four for each of kFours, in ascending order; each is in [0, 0x7FF0...0): ordered as the
+/// doubles of the same bits are.
+template <int kFours>
+struct LeastKeys {
+  static constexpr int kCount = 4 * kFours;
+  __m256d keys[kFours];
   static constexpr int64_t kNone = 0x7FEFFFFFFFFFFFFF;
 
-  Keys16() {
+  LeastKeys() {
     for (__m256d& four : keys) four = _mm256_castsi256_pd(_mm256_set1_epi64x(kNone));
   }
   /// Drops the last key, which may be the new one.
@@ -117,7 +120,7 @@ struct Keys16 {
     }
   }
   void store(int64_t* to) const {
-    for (int k = 0; k < 4; ++k) _mm256_storeu_pd(reinterpret_cast<double*>(to) + 4 * k, keys[k]);
+    for (int k = 0; k < kFours; ++k) _mm256_storeu_pd(reinterpret_cast<double*>(to) + 4 * k, keys[k]);
   }
 };
 }  // namespace float8_in_a_register
@@ -196,21 +199,23 @@ PICTURA_HD inline uint32_t equal8(const int32_t* integers, int32_t value) {
   return bits;
 }
 
-struct alignas(32) Keys16 {
-  int64_t keys[16];
+template <int kFours>
+struct alignas(32) LeastKeys {
+  static constexpr int kCount = 4 * kFours;
+  int64_t keys[kCount];
   static constexpr int64_t kNone = 0x7FEFFFFFFFFFFFFF;
 
-  PICTURA_HD Keys16() {
+  PICTURA_HD LeastKeys() {
     for (int64_t& key : keys) key = kNone;
   }
   PICTURA_HD void insert(int64_t key) {
-    for (int k = 15; k >= 0; --k) {
+    for (int k = kCount - 1; k >= 0; --k) {
       const int64_t least = keys[k] < key ? keys[k] : key;
       keys[k] = k > 0 && keys[k - 1] > least ? keys[k - 1] : least;
     }
   }
   PICTURA_HD void store(int64_t* to) const {
-    for (int k = 0; k < 16; ++k) to[k] = keys[k];
+    for (int k = 0; k < kCount; ++k) to[k] = keys[k];
   }
 };
 }  // namespace float8_in_memory

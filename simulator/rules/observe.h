@@ -251,10 +251,15 @@ PICTURA_HD inline int find_pieces_in_sight(Span<const Vec2> middles, Span<const 
   };
   int i = 0;
   for (; i + 8 <= num_items && count < capacity; i += 8) look_at(items.data() + i, 0xFF);
-  if (i < num_items && count < capacity) {
-    int32_t last[8];
-    for (int k = 0; k < 8; ++k) last[k] = items[static_cast<size_t>(min_of(i + k, num_items - 1))];
-    look_at(last, (1u << min_of(num_items - i, 8)) - 1);
+  const int left = num_items - i;
+  if (left > 0 && count < capacity) {
+    if (num_items >= 8) {
+      look_at(items.data() + num_items - 8, last_of_eight(left));
+    } else {
+      int32_t few[8];
+      for (int k = 0; k < 8; ++k) few[k] = items[static_cast<size_t>(min_of(k, left - 1))];
+      look_at(few, first_of_eight(left));
+    }
   }
   return count;
 }

@@ -16,15 +16,17 @@ PICTURA_HD Number length2(Number x, Number y) {
   return x * x + y * y;
 }
 
+/// Bits of the first or last `count` of eight: which of them are new where eights overlap or are filled up.
+PICTURA_HD constexpr uint32_t first_of_eight(int count) { return (1u << count) - 1; }
+PICTURA_HD constexpr uint32_t last_of_eight(int count) { return 0xFFu << (8 - count) & 0xFF; }
+
 /// The nearest of the items offered, in ascending order of squared distance, then item; items are not negative.
 /// Without branches, since no processor predicts where an item belongs.
 template <int capacity>
 class NearestOfOneThread {
-  static_assert(capacity <= 16);
-
  public:
   PICTURA_HD void offer(bool is_one, float distance2, int32_t item) {
-    keys_.insert(is_one ? key_of(distance2, item) : Keys16::kNone);
+    keys_.insert(is_one ? key_of(distance2, item) : Keys::kNone);
     count_ += is_one;
   }
   /// Offers all items but one whose places are less than the root of below2 from a point.
@@ -53,21 +55,23 @@ class NearestOfOneThread {
     };
     int i = 0;
     for (; i + 8 <= num_items; i += 8) gather(places + i, items + i, 0xFF);
-    if (i < num_items) {
-      Vec2 last_places[8];
-      int32_t last_items[8];
+    const int left = num_items - i;
+    if (left > 0 && num_items >= 8) {
+      gather(places + num_items - 8, items + num_items - 8, last_of_eight(left));
+    } else if (left > 0) {
+      Vec2 few_places[8];
+      int32_t few_items[8];
       for (int k = 0; k < 8; ++k) {
-        const int at = min_of(i + k, num_items - 1);
-        last_places[k] = places[at];
-        last_items[k] = items[at];
+        few_places[k] = places[min_of(k, left - 1)];
+        few_items[k] = items[min_of(k, left - 1)];
       }
-      gather(last_places, last_items, (1u << (num_items - i)) - 1);
+      gather(few_places, few_items, first_of_eight(left));
     }
     insert_near();
   }
   /// To be called after the last offer, and before what follows.
   PICTURA_HD void settle() {
-    int64_t keys[16];
+    int64_t keys[Keys::kCount];
     keys_.store(keys);
     count_ = min_of(count_, capacity);
     for (int i = 0; i < capacity; ++i) items_[i] = static_cast<int32_t>(keys[i]);
@@ -81,7 +85,8 @@ class NearestOfOneThread {
     return int64_t{static_cast<int32_t>(bits_from_float(distance2))} << 32 | item;
   }
   static constexpr int kGathered = 64;
-  Keys16 keys_;
+  using Keys = LeastKeys<(capacity + 3) / 4>;
+  Keys keys_;
   int count_ = 0;
   int32_t items_[capacity];
 };
