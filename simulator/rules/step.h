@@ -163,7 +163,8 @@ PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& co
   const int32_t lane_before = agents.lane[slot];
   const LaneFit fit =
       fit_agent(world, agent, {motion.x_m, motion.y_m}, level_m, motion.heading_rad, lane_before, group);
-  const AgentBox box = box_at(agents, slot, {motion.x_m, motion.y_m, fit.z_m}, sincos_of(motion.heading_rad));
+  const SinCos heading = sincos_of(motion.heading_rad);
+  const AgentBox box = box_at(agents, slot, {motion.x_m, motion.y_m, fit.z_m}, heading);
 
   int events = kEventNone;
   const OrientedBox print = footprint(box);
@@ -181,7 +182,7 @@ PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& co
   agents.distance_m[slot] += driven_m(motion.speed_mps, world.options.dt_s);
   world.boxes_before[agent] = before;
   world.boxes[agent] = box;
-  store_motion(agents, slot, motion);
+  store_motion(agents, slot, motion, heading);
   store_fit(agents, slot, fit);
   agents.events[slot] = static_cast<uint8_t>(events);
 }

@@ -61,8 +61,8 @@ PICTURA_HD inline Motion motion_of(const AgentStateView& agents, int slot) {
           agents.jerk_lat_mps3[slot]};
 }
 
-PICTURA_HD inline void store_motion(const AgentStateView& agents, int slot, const Motion& motion) {
-  const SinCos heading = sincos_of(motion.heading_rad);
+/// `heading` is sincos_of(motion.heading_rad).
+PICTURA_HD inline void store_motion(const AgentStateView& agents, int slot, const Motion& motion, SinCos heading) {
   agents.x_m[slot] = motion.x_m;
   agents.y_m[slot] = motion.y_m;
   agents.heading_rad[slot] = motion.heading_rad;
@@ -74,6 +74,10 @@ PICTURA_HD inline void store_motion(const AgentStateView& agents, int slot, cons
   agents.steer_rad[slot] = motion.steer_rad;
   agents.jerk_long_mps3[slot] = motion.jerk_long_mps3;
   agents.jerk_lat_mps3[slot] = motion.jerk_lat_mps3;
+}
+
+PICTURA_HD inline void store_motion(const AgentStateView& agents, int slot, const Motion& motion) {
+  store_motion(agents, slot, motion, sincos_of(motion.heading_rad));
 }
 
 PICTURA_HD inline LaneFit fit_of(const AgentStateView& agents, int slot) {
