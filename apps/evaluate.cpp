@@ -105,7 +105,7 @@ void parse_scenarios(const std::string& text, EvaluateOptions* options) {
 std::vector<std::string> driver_names(bool has_scenes) {
   if (!has_scenes) return town_controller_names();
   std::vector<std::string> names = record_controller_names();
-  names.insert(names.end(), {"random", "idle"});
+  names.insert(names.end(), {"random", "idle", "idm_lanes"});
   return names;
 }
 
@@ -157,7 +157,7 @@ void add_evaluate_command(CLI::App& app) {
           ->add_option(
               "--policy", options.controller,
               fmt::format("Who drives instead of the checkpoint's policy, in its world, or, without a "
-                          "checkpoint, in the paper's: {}; in recorded scenes {}, random or idle",
+                          "checkpoint, in the paper's: {}; in recorded scenes {}, random, idle or idm_lanes",
                           fmt::join(town_controller_names(), ", "), fmt::join(record_controller_names(), ", ")))
           ->check(one_of(host_controller_names()));
   command

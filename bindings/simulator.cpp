@@ -737,8 +737,8 @@ What a step returns, one element a slot, in the simulator's memory: every step w
   py::class_<SimulatorInside>(module, "_SimulatorInside");
   py::class_<ControllerInside>(module, "_ControllerInside");
   py::class_<PyController> controller_class(module, "Controller", R"(
-Who drives in one simulator on the CPU: 'lane' (the lane keeper), 'idle' or 'random', in worlds of recorded scenes 'log', 'inverse'
-or 'idm', or a policy of a pictura.PolicySession, or several of them.)");
+Who drives in one simulator on the CPU: 'lane' (the lane keeper), 'idm_lanes' (along lanes, behind others), 'idle' or 'random', in
+worlds of recorded scenes 'log', 'inverse' or 'idm', or a policy of a pictura.PolicySession, or several of them.)");
   py::class_<PySimulator>(module, "Simulator", R"(
 Many worlds, each on one map, stepped together. Arrays have one element a slot: the controlled agents of world 0, then those
 of world 1, and so on. Executors 'cpu' and 'cuda' give the same bits.

@@ -83,10 +83,11 @@ void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_
       ->transform(whole_number(1))
       ->capture_default_str();
   command
-      ->add_option("--policy", *policy_out,
-                   "random, idle, lane, in recorded scenes log (as recorded, the default there), inverse (by the "
-                   "actions that follow the recording) or idm (along recorded paths, behind others), or a checkpoint "
-                   "or safetensors that train wrote")
+      ->add_option(
+          "--policy", *policy_out,
+          "random, idle, lane, idm_lanes (along lanes, behind others), in recorded scenes log (as recorded, the "
+          "default there), inverse (by the actions that follow the recording) or idm (along recorded paths, "
+          "behind others), or a checkpoint or safetensors that train wrote")
       ->capture_default_str();
   add_policy_backend_options(command, "auto, and drawn as in training", backends_out);
 }

@@ -35,16 +35,19 @@ class Tracer {
     for (std::size_t band = 0; band < bands_.size(); ++band) {
       const SurfaceBand& sides = bands_[band];
       band_ = static_cast<int32_t>(band);
-      auto is_narrow = [&](std::size_t i) { return plan_distance_m(sides.left[i], sides.right[i]) < kMaxGap_m; };
       const std::size_t last = sides.left.size() - 1;
+      is_narrow_.clear();
+      for (std::size_t i = 0; i <= last; ++i) {
+        is_narrow_.push_back(plan_distance_m(sides.left[i], sides.right[i]) < kMaxGap_m);
+      }
       for (std::size_t i = 0; i < last; ++i) {
-        trace_side(sides.left[i], sides.left[i + 1], is_narrow(i) && is_narrow(i + 1));
+        trace_side(sides.left[i], sides.left[i + 1], is_narrow_[i] && is_narrow_[i + 1]);
       }
-      trace_side(sides.left[last], sides.right[last], is_narrow(last));
+      trace_side(sides.left[last], sides.right[last], is_narrow_[last]);
       for (std::size_t i = last; i > 0; --i) {
-        trace_side(sides.right[i], sides.right[i - 1], is_narrow(i) && is_narrow(i - 1));
+        trace_side(sides.right[i], sides.right[i - 1], is_narrow_[i] && is_narrow_[i - 1]);
       }
-      trace_side(sides.right[0], sides.left[0], is_narrow(0));
+      trace_side(sides.right[0], sides.left[0], is_narrow_[0]);
       finish_run();
     }
     return std::move(runs_);
@@ -102,8 +105,11 @@ class Tracer {
     if (surface_.any_near(near, at(kSharedBorder_m), p.z(), is_other)) return false;
     if (surface_.any_near(near, at(kMaxGap_m), p.z(), is_other)) return false;
     std::vector<int32_t> adjacent_bands;
-    surface_.any_near(near, at(-kSharedBorder_m), p.z(), [&](int32_t other) {
-      if (other < band && (adjacent_bands.empty() || adjacent_bands.back() != other)) adjacent_bands.push_back(other);
+    const auto is_lower = [&](int32_t other) {
+      return other < band && (adjacent_bands.empty() || adjacent_bands.back() != other);
+    };
+    surface_.any_near(near, at(-kSharedBorder_m), p.z(), is_lower, [&](int32_t other) {
+      adjacent_bands.push_back(other);
       return false;
     });
     for (const int32_t adjacent : adjacent_bands) {
@@ -131,6 +137,7 @@ class Tracer {
   const std::vector<SurfaceBand>& bands_;
   const Surface& surface_;
   int32_t band_ = 0;
+  std::vector<bool> is_narrow_;      // [points of a side]
   Surface::Candidates near_, none_;  // about the place in question; none, so that quads are looked up anew
   std::vector<OutlinePoint> run_;
   std::vector<std::vector<OutlinePoint>> runs_;

@@ -12,19 +12,15 @@ constexpr float kCell_m = 4.0f;
 // Budget of quad tests of a surface: a constant, plus an amount per quad.
 constexpr int64_t kBaseLookups = 10'000'000, kLookupsPerQuad = 5000;  // CARLA's towns need up to 544 per quad
 
-double cross_product(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector2d& p) {
-  const Eigen::Vector2d side = (b - a).head<2>(), to_p = p - a.head<2>();
+double cross_product(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& p) {
+  const Eigen::Vector2d side = b - a, to_p = p - a;
   return side.x() * to_p.y() - side.y() * to_p.x();
 }
 
-bool in_triangle(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+bool in_triangle(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c,
                  const Eigen::Vector2d& p) {
   const double ab = cross_product(a, b, p), bc = cross_product(b, c, p), ca = cross_product(c, a, p);
   return (ab >= 0 && bc >= 0 && ca >= 0) || (ab <= 0 && bc <= 0 && ca <= 0);
-}
-
-double mean_height(const Eigen::Vector3d* corners) {
-  return 0.25 * (corners[0].z() + corners[1].z() + corners[2].z() + corners[3].z());
 }
 
 }  // namespace
@@ -38,9 +34,12 @@ Surface::Surface(const std::vector<SurfaceBand>& bands, double level_m) : level_
   for (std::size_t band = 0; band < bands.size(); ++band) {
     const auto& [left, right] = bands[band];
     for (std::size_t i = 0; i + 1 < left.size(); ++i) {
-      const Quad quad{{left[i], right[i], right[i + 1], left[i + 1]}, static_cast<int32_t>(band)};
+      const Eigen::Vector3d* corners[4] = {&left[i], &right[i], &right[i + 1], &left[i + 1]};
+      Quad quad{.band = static_cast<int32_t>(band)};
+      for (std::size_t k = 0; k < 4; ++k) quad.corners_m[k] = corners[k]->head<2>();
+      quad.mean_z_m = 0.25 * (corners[0]->z() + corners[1]->z() + corners[2]->z() + corners[3]->z());
       Aabb2 box{{1e30f, 1e30f}, {-1e30f, -1e30f}};
-      for (const Eigen::Vector3d& corner : quad.corners) {
+      for (const Eigen::Vector2d& corner : quad.corners_m) {
         const float x = static_cast<float>(corner.x()), y = static_cast<float>(corner.y());
         box.low = {min_of(box.low.x, x), min_of(box.low.y, y)};
         box.high = {max_of(box.high.x, x), max_of(box.high.y, y)};
@@ -51,9 +50,23 @@ Surface::Surface(const std::vector<SurfaceBand>& bands, double level_m) : level_
   }
   grid_ = Grid(boxes, kCell_m);
   const GridView grid = grid_.view();
-  bounds_.reserve(grid.items.size());
+  bounds_.reserve(grid.items.size() + ItemBounds::kPadding);
   for (const int32_t quad : grid.items) bounds_.push_back(bounds_of(quads_[static_cast<std::size_t>(quad)]));
+  for (std::size_t i = 0; i < ItemBounds::kPadding; ++i) bounds_.push_back({});
   remaining_lookups_ = kBaseLookups + kLookupsPerQuad * static_cast<int64_t>(quads_.size());
+}
+
+void Surface::ItemBounds::reserve(std::size_t count) {
+  for (std::vector<float>* side : {&low_x, &high_x, &low_y, &high_y, &low_z, &high_z}) side->reserve(count);
+}
+
+void Surface::ItemBounds::push_back(const QuadBounds& bounds) {
+  low_x.push_back(bounds.low.x);
+  high_x.push_back(bounds.high.x);
+  low_y.push_back(bounds.low.y);
+  high_y.push_back(bounds.high.y);
+  low_z.push_back(bounds.low_z);
+  high_z.push_back(bounds.high_z);
 }
 
 /// The test of a triangle of almost no area is rounding, which may let it cover points far along its line: such quads
@@ -62,13 +75,11 @@ Surface::QuadBounds Surface::bounds_of(const Quad& quad) const {
   constexpr float kMargin_m =
       static_cast<float>(kNear_m) + 0.05f;  // far more than the rounding of coordinates to float
   constexpr double kMinArea_m2 = 0.01;
-  const Eigen::Vector3d* c = quad.corners;
-  const double mean_z = mean_height(c);
+  const Eigen::Vector2d* c = quad.corners_m;
   QuadBounds bounds{{-1e30f, -1e30f}, {1e30f, 1e30f}};
-  bounds.low_z = static_cast<float>(mean_z - level_m_) - kMargin_m;
-  bounds.high_z = static_cast<float>(mean_z + level_m_) + kMargin_m;
-  const double area = std::min(std::abs(cross_product(c[0], c[1], c[2].head<2>())),
-                               std::abs(cross_product(c[0], c[2], c[3].head<2>())));
+  bounds.low_z = static_cast<float>(quad.mean_z_m - level_m_) - kMargin_m;
+  bounds.high_z = static_cast<float>(quad.mean_z_m + level_m_) + kMargin_m;
+  const double area = std::min(std::abs(cross_product(c[0], c[1], c[2])), std::abs(cross_product(c[0], c[2], c[3])));
   if (!(area >= 2 * kMinArea_m2)) return bounds;
   std::swap(bounds.low, bounds.high);
   for (int i = 0; i < 4; ++i) {
@@ -90,18 +101,15 @@ void Surface::find_near(const Eigen::Vector2d& p, double z, Candidates* out) con
   if (!out->are_complete) return;
   const std::size_t cell = static_cast<std::size_t>(grid.cell_y(position.y)) * static_cast<std::size_t>(grid.num_x) +
                            static_cast<std::size_t>(grid.cell_x(position.x));
-  count_lookups(grid.begin[cell + 1] - grid.begin[cell]);
-  const float height = static_cast<float>(z);
-  for (int32_t i = grid.begin[cell]; i < grid.begin[cell + 1]; ++i) {
-    if (!bounds_[static_cast<std::size_t>(i)].contains(position, height)) continue;
-    out->quads.push_back(grid.items[static_cast<std::size_t>(i)]);
-  }
+  any_in_cell(cell, position, z, [&](int32_t quad) {
+    out->quads.push_back(quad);
+    return false;
+  });
 }
 
 /// Two triangles, so that non-convex quads are covered as drawn.
-bool Surface::contains(const Quad& quad, const Eigen::Vector2d& p, double z) const {
-  const Eigen::Vector3d* c = quad.corners;
-  if (std::abs(z - mean_height(c)) >= level_m_) return false;
+bool Surface::covers(const Quad& quad, const Eigen::Vector2d& p) {
+  const Eigen::Vector2d* c = quad.corners_m;
   return in_triangle(c[0], c[1], c[2], p) || in_triangle(c[0], c[2], c[3], p);
 }
 

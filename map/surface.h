@@ -1,11 +1,14 @@
 // Surfaces as bands between two borders, with point queries: which bands cover a position.
 #pragma once
 
+#include <bit>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
 #include "pictura/common/error.h"
 #include "pictura/common/grid.h"
+#include "pictura/common/portable/float8.h"
 #include "pictura/map/polyline.h"
 
 namespace pictura {
@@ -32,13 +35,19 @@ class Surface {
   /// Finds the quads about `p`, so that several questions about one place look them up once.
   void find_near(const Eigen::Vector2d& p, double z, Candidates* out) const;
 
-  /// any_band_at() for a place within kNear_m of where the candidates were found.
-  template <typename Visit>
-  bool any_near(const Candidates& near, const Eigen::Vector2d& p, double z, Visit&& visit) const {
-    if (!near.are_complete) return any_band_at(p, z, visit);
+  /// Whether any of the bands that `is_wanted` names covers `p`, for a place within kNear_m of where the candidates
+  /// were found.
+  template <typename IsWanted>
+  bool any_near(const Candidates& near, const Eigen::Vector2d& p, double z, IsWanted&& is_wanted) const {
+    return any_near(near, p, z, is_wanted, [](int32_t) { return true; });
+  }
+  /// The same of bands for which `visit`, which is called for those that cover `p` alone, returns true.
+  template <typename IsWanted, typename Visit>
+  bool any_near(const Candidates& near, const Eigen::Vector2d& p, double z, IsWanted&& is_wanted, Visit&& visit) const {
+    if (!near.are_complete) return any_band_at(p, z, [&](int32_t band) { return is_wanted(band) && visit(band); });
     for (const int32_t index : near.quads) {
       const Quad& quad = quads_[static_cast<std::size_t>(index)];
-      if (contains(quad, p, z) && visit(quad.band)) return true;
+      if (is_wanted(quad.band) && contains(quad, p, z) && visit(quad.band)) return true;
     }
     return false;
   }
@@ -53,20 +62,16 @@ class Surface {
     if (!grid.contains(position)) return false;
     const std::size_t cell = static_cast<std::size_t>(grid.cell_y(position.y)) * static_cast<std::size_t>(grid.num_x) +
                              static_cast<std::size_t>(grid.cell_x(position.x));
-    count_lookups(grid.begin[cell + 1] - grid.begin[cell]);
-    const float height = static_cast<float>(z);
-    for (int32_t i = grid.begin[cell]; i < grid.begin[cell + 1]; ++i) {
-      const QuadBounds& bounds = bounds_[static_cast<std::size_t>(i)];
-      if (!bounds.contains(position, height)) continue;
-      const Quad& quad = quads_[static_cast<std::size_t>(grid.items[static_cast<std::size_t>(i)])];
-      if (contains(quad, p, z) && visit(quad.band)) return true;
-    }
-    return false;
+    return any_in_cell(cell, position, z, [&](int32_t index) {
+      const Quad& quad = quads_[static_cast<std::size_t>(index)];
+      return contains(quad, p, z) && visit(quad.band);
+    });
   }
 
  private:
   struct Quad {
-    Eigen::Vector3d corners[4];  // counter-clockwise: left, right, next right, next left
+    Eigen::Vector2d corners_m[4];  // counter-clockwise: left, right, next right, next left
+    double mean_z_m = 0;
     int32_t band = 0;
   };
 
@@ -74,14 +79,47 @@ class Surface {
   struct QuadBounds {
     Vec2 low, high;
     float low_z = 0, high_z = 0;
+  };
+  /// Those of the grid's items, in their order, an array for each side: they rule most of a cell's quads out, eight at
+  /// a time.
+  struct ItemBounds {
+    static constexpr std::size_t kPadding = 7;  // eight are read from the last one on
+    std::vector<float> low_x, high_x, low_y, high_y, low_z, high_z;
 
-    bool contains(Vec2 p, float z) const {
-      return p.x >= low.x && p.x <= high.x && p.y >= low.y && p.y <= high.y && z >= low_z && z <= high_z;
+    void reserve(std::size_t count);
+    void push_back(const QuadBounds& bounds);
+    /// Bit k is set where the bounds of item first + k contain a place; bits of what follows the last item are set too.
+    uint32_t that_contain(std::size_t first, const Float8& x, const Float8& y, const Float8& z) const {
+      const auto between = [&](const std::vector<float>& low, const Float8& value, const std::vector<float>& high) {
+        return at_most(load8(&low[first]), value) & at_most(value, load8(&high[first]));
+      };
+      return between(low_x, x, high_x) & between(low_y, y, high_y) & between(low_z, z, high_z);
     }
   };
 
+  /// Calls visit(quad's index) for the quads of a cell whose bounds contain a place, until it returns true; returns
+  /// whether any call did.
+  template <typename Visit>
+  bool any_in_cell(std::size_t cell, Vec2 p, double z_m, Visit&& visit) const {
+    const GridView grid = grid_.view();
+    const auto begin = static_cast<std::size_t>(grid.begin[cell]), end = static_cast<std::size_t>(grid.begin[cell + 1]);
+    count_lookups(static_cast<int64_t>(end - begin));
+    const Float8 x = fill8(p.x), y = fill8(p.y), z = fill8(static_cast<float>(z_m));
+    for (std::size_t first = begin; first < end; first += 8) {
+      uint32_t items = bounds_.that_contain(first, x, y, z);
+      if (end - first < 8) items &= (1u << (end - first)) - 1;
+      for (; items != 0; items &= items - 1) {
+        if (visit(grid.items[first + static_cast<std::size_t>(std::countr_zero(items))])) return true;
+      }
+    }
+    return false;
+  }
+
   QuadBounds bounds_of(const Quad& quad) const;
-  bool contains(const Quad& quad, const Eigen::Vector2d& p, double z) const;
+  bool contains(const Quad& quad, const Eigen::Vector2d& p, double z) const {
+    return !(std::abs(z - quad.mean_z_m) >= level_m_) && covers(quad, p);
+  }
+  static bool covers(const Quad& quad, const Eigen::Vector2d& p);
   void count_lookups(int64_t count) const {
     remaining_lookups_ -= count;
     if (remaining_lookups_ < 0) fail("too many overlapping lanes");
@@ -90,7 +128,7 @@ class Surface {
   double level_m_ = 0;
   std::vector<Quad> quads_;
   Grid grid_;
-  std::vector<QuadBounds> bounds_;  // [items of the grid], in its order: most of a cell's quads are ruled out by them
+  ItemBounds bounds_;
   mutable int64_t remaining_lookups_ = 0;
 };
 

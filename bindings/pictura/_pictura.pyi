@@ -608,8 +608,8 @@ class _ControllerInside:
     pass
 class Controller:
     """
-    Who drives in one simulator on the CPU: 'lane' (the lane keeper), 'idle' or 'random', in worlds of recorded scenes 'log', 'inverse'
-    or 'idm', or a policy of a pictura.PolicySession, or several of them.
+    Who drives in one simulator on the CPU: 'lane' (the lane keeper), 'idm_lanes' (along lanes, behind others), 'idle' or 'random', in
+    worlds of recorded scenes 'log', 'inverse' or 'idm', or a policy of a pictura.PolicySession, or several of them.
     """
     @staticmethod
     def _of(inside: _ControllerInside) -> Controller:

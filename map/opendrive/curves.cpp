@@ -126,9 +126,50 @@ double banked_t(const FileRoad& road, double s, double t) {
   return t;
 }
 
-Station station_at(const FileRoad& road, double s) {
-  const Pose pose = pose_at(road, s);
-  return {s, pose.position_m, {-std::sin(pose.heading), std::cos(pose.heading)}, road.elevation.value(s)};
+/// The change of heading of a spiral from its start to ds.
+double spiral_turn(const GeometryPiece& piece, double ds) {
+  const double rate = (piece.end_curvature - piece.start_curvature) / piece.length;
+  return ds * (piece.start_curvature + 0.5 * rate * ds);
+}
+
+/// The displacement between two positions on a spiral within one panel, in the frame of the spiral's start.
+Eigen::Vector2d spiral_step(const GeometryPiece& piece, double from, double to) {
+  Eigen::Vector2d sum{0, 0};
+  for (const GaussPoint& gauss : kGauss) {
+    const double turn = spiral_turn(piece, from + gauss.position * (to - from));
+    sum += gauss.weight * Eigen::Vector2d{std::cos(turn), std::sin(turn)};
+  }
+  return sum * (to - from);
+}
+
+Pose pose_on(const GeometryPiece& piece, double ds, LastDirection* last) {
+  if (piece.cubic) return pose_on_cubic(piece, ds);
+  const double k0 = piece.start_curvature;
+  const double rate = (piece.end_curvature - k0) / piece.length;
+  if (rate == 0) {
+    // The heading of an arc's chord is the mean of the end headings.
+    const double half_turn = 0.5 * k0 * ds;
+    const double chord = ds * sinc(half_turn);
+    return {Eigen::Vector2d{piece.x, piece.y} + chord * last->of(piece.heading + half_turn), piece.heading + k0 * ds,
+            k0};
+  }
+  const auto last_panel = static_cast<double>(piece.panels.size() - 1);
+  const double panel = std::min(last_panel, std::floor(ds / piece.length * (last_panel + 1)));
+  const auto& [begin_x, begin_y] = piece.panels[static_cast<std::size_t>(panel)];
+  const Eigen::Vector2d in_frame =
+      Eigen::Vector2d{begin_x, begin_y} + spiral_step(piece, panel * piece.length / (last_panel + 1), ds);
+  return {in_file(piece, in_frame), piece.heading + spiral_turn(piece, ds), k0 + rate * ds};
+}
+
+Pose pose_at(const FileRoad& road, double s, LastDirection* last) {
+  const GeometryPiece& piece = last_item_at(road.geometry, s);
+  return pose_on(piece, std::clamp(s - piece.s, 0.0, piece.length), last);
+}
+
+Station station_at(const FileRoad& road, double s, LastDirection* last) {
+  const Pose pose = pose_at(road, s, last);
+  const Eigen::Vector2d& along = last->of(pose.heading);
+  return {s, pose.position_m, {-along.y(), along.x()}, road.elevation.value(s)};
 }
 
 Eigen::Vector3d point_beside(const FileRoad& road, const Station& station, double t) {
@@ -205,22 +246,6 @@ double bend_between(const FileRoad& road, const FileSection& section, int lane, 
          bounds_between(road.elevation, begin, end).bend;
 }
 
-/// The change of heading of a spiral from its start to ds.
-double spiral_turn(const GeometryPiece& piece, double ds) {
-  const double rate = (piece.end_curvature - piece.start_curvature) / piece.length;
-  return ds * (piece.start_curvature + 0.5 * rate * ds);
-}
-
-/// The displacement between two positions on a spiral within one panel, in the frame of the spiral's start.
-Eigen::Vector2d spiral_step(const GeometryPiece& piece, double from, double to) {
-  Eigen::Vector2d sum{0, 0};
-  for (const GaussPoint& gauss : kGauss) {
-    const double turn = spiral_turn(piece, from + gauss.position * (to - from));
-    sum += gauss.weight * Eigen::Vector2d{std::cos(turn), std::sin(turn)};
-  }
-  return sum * (to - from);
-}
-
 }  // namespace
 
 void measure(GeometryPiece* piece) {
@@ -259,28 +284,13 @@ double Profile::slope(double s) const {
 }
 
 Pose pose_on(const GeometryPiece& piece, double ds) {
-  if (piece.cubic) return pose_on_cubic(piece, ds);
-  const double k0 = piece.start_curvature;
-  const double rate = (piece.end_curvature - k0) / piece.length;
-  if (rate == 0) {
-    // The heading of an arc's chord is the mean of the end headings.
-    const double half_turn = 0.5 * k0 * ds;
-    const double chord = ds * sinc(half_turn);
-    const double heading = piece.heading + half_turn;
-    return {Eigen::Vector2d{piece.x, piece.y} + chord * Eigen::Vector2d{std::cos(heading), std::sin(heading)},
-            piece.heading + k0 * ds, k0};
-  }
-  const auto last = static_cast<double>(piece.panels.size() - 1);
-  const double panel = std::min(last, std::floor(ds / piece.length * (last + 1)));
-  const auto& [begin_x, begin_y] = piece.panels[static_cast<std::size_t>(panel)];
-  const Eigen::Vector2d in_frame =
-      Eigen::Vector2d{begin_x, begin_y} + spiral_step(piece, panel * piece.length / (last + 1), ds);
-  return {in_file(piece, in_frame), piece.heading + spiral_turn(piece, ds), k0 + rate * ds};
+  LastDirection none;
+  return pose_on(piece, ds, &none);
 }
 
 Pose pose_at(const FileRoad& road, double s) {
-  const GeometryPiece& piece = last_item_at(road.geometry, s);
-  return pose_on(piece, std::clamp(s - piece.s, 0.0, piece.length));
+  LastDirection none;
+  return pose_at(road, s, &none);
 }
 
 const Station& StationCache::at(const FileRoad& road, double s) {
@@ -290,13 +300,14 @@ const Station& StationCache::at(const FileRoad& road, double s) {
   }
   constexpr std::uint64_t kMultiplier = 0x9e3779b97f4a7c15;  // Fibonacci hashing
   Station& station = stations_[(std::bit_cast<std::uint64_t>(s) * kMultiplier) >> (64 - kLogSize)];
-  if (station.s != s) station = station_at(road, s);
+  if (station.s != s) station = station_at(road, s, &direction_);
   return station;
 }
 
 Eigen::Vector3d point_at(const FileRoad& road, double s, double t) {
   s = std::clamp(s, 0.0, road.length);
-  return point_beside(road, station_at(road, s), t);
+  LastDirection none;
+  return point_beside(road, station_at(road, s, &none), t);
 }
 
 Eigen::Vector3d point_at(const FileRoad& road, double s, double t, StationCache* cache) {

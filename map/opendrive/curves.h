@@ -2,6 +2,9 @@
 // elevation, banking, offsets and widths. In double, in file coordinates.
 #pragma once
 
+#include <cmath>
+#include <limits>
+
 #include "pictura/map/opendrive/model.h"
 #include "pictura/map/polyline.h"
 
@@ -33,6 +36,23 @@ struct Station {
   double elevation_m = 0;
 };
 
+/// The direction of the heading that was asked last: all of a straight line is alike.
+class LastDirection {
+ public:
+  /// (cos, sin) of the heading.
+  const Eigen::Vector2d& of(double heading) {
+    if (heading != heading_) {
+      heading_ = heading;
+      direction_ = {std::cos(heading), std::sin(heading)};
+    }
+    return direction_;
+  }
+
+ private:
+  double heading_ = std::numeric_limits<double>::quiet_NaN();
+  Eigen::Vector2d direction_{0, 0};
+};
+
 /// The last thousand stations of the road that was asked last: lanes beside each other, and both sides of each, are
 /// sampled at the same ones.
 class StationCache {
@@ -44,6 +64,7 @@ class StationCache {
 
   const FileRoad* road_ = nullptr;
   std::vector<Station> stations_;  // by a hash of s; NaN: free
+  LastDirection direction_;
 };
 
 /// The point `t` metres to the left of the reference line at s, measured along the banked road surface, with its

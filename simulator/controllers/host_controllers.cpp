@@ -62,9 +62,9 @@ class RuleController final : public Controller {
 
 }  // namespace
 
-std::vector<std::string> town_controller_names() { return {"random", "idle", "lane"}; }
+std::vector<std::string> town_controller_names() { return {"random", "idle", "lane", "idm_lanes"}; }
 std::vector<std::string> record_controller_names() { return {"log", "inverse", "idm"}; }
-bool drives_on_host(std::string_view name) { return name == "lane" || name == "idm"; }
+bool drives_on_host(std::string_view name) { return name == "lane" || name == "idm" || name == "idm_lanes"; }
 std::vector<std::string> host_controller_names() {
   std::vector<std::string> names = town_controller_names();
   for (const std::string& name : record_controller_names()) names.push_back(name);
@@ -72,8 +72,7 @@ std::vector<std::string> host_controller_names() {
 }
 
 void check_worlds(std::string_view controller, const Simulator& simulator) {
-  const std::vector<std::string> followers = record_controller_names();
-  const bool needs_record = std::find(followers.begin(), followers.end(), controller) != followers.end();
+  const bool needs_record = controller == "log" || controller == "inverse";
   for (const WorldSpec& world : simulator.worlds()) {
     const CompiledMap& map = *simulator.maps()[static_cast<size_t>(world.map)];
     if (needs_record && !map.scenario) {
@@ -95,6 +94,7 @@ std::unique_ptr<Controller> make_host_controller(const std::string& name, const 
   if (name == "log") return std::make_unique<RuleController<RecordedCommands>>("log");
   if (name == "inverse") return std::make_unique<InverseController>(simulator);
   if (name == "idm") return std::make_unique<IdmController>(simulator);
+  if (name == "idm_lanes") return std::make_unique<IdmController>(simulator, IdmPaths::lanes);
   fail_usage("controller: expected one of {}; got '{}'", fmt::join(host_controller_names(), ", "), name);
 }
 

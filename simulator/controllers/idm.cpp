@@ -10,19 +10,49 @@
 namespace pictura {
 namespace {
 
-RecordedPath path_of(const MapRecord& record, size_t agent) {
-  RecordedPath path;
+FollowedPath path_of(const MapRecord& record, size_t agent) {
+  FollowedPath path;
   const auto num_steps = static_cast<size_t>(record.num_steps);
   for (size_t step = 0; step < num_steps; ++step) {
     const RecordedState& state = record.states[agent * num_steps + step];
     if (!state.is_there) continue;
-    const float piece_m = path.points_m.empty() ? 0 : length((state.position_m - path.points_m.back()).xy());
-    if (!path.points_m.empty() && piece_m < RecordedPath::kMinPiece_m) continue;
-    path.s_m.push_back(path.s_m.empty() ? 0 : path.s_m.back() + piece_m);
-    path.points_m.push_back(state.position_m);
-    path.heading_rad.push_back(state.heading_rad);
+    path.add(state.position_m, state.heading_rad);
   }
   return path;
+}
+
+/// Of the drivable lanes that follow one, that which turns least; -1 where there is none.
+int32_t straightest_after(const MapView& map, int32_t lane_index) {
+  const MapLane& lane = map.lanes[static_cast<size_t>(lane_index)];
+  const int32_t count = lane.num_successors > 0 ? lane.num_successors : lane.num_all_successors;
+  int32_t best = -1;
+  float least_rad = INFINITY;
+  for (int32_t i = 0; i < count; ++i) {
+    const int32_t next = map.successors[static_cast<size_t>(lane.first_successor + i)];
+    if (map.lanes[static_cast<size_t>(next)].num_segments == 0) continue;
+    const float end_m = map.lanes[static_cast<size_t>(next)].length_m;
+    const float turn_rad =
+        std::abs(wrap_angle(pose_on_lane(map, next, end_m).heading_rad - pose_on_lane(map, next, 0).heading_rad));
+    if (turn_rad >= least_rad) continue;
+    least_rad = turn_rad;
+    best = next;
+  }
+  return best;
+}
+
+/// The place on the lane's centre line that is nearest to p, and how far that is.
+RoutePoint nearest_on_lane(const MapView& map, int32_t lane_index, Vec2 p, float* apart_m_out) {
+  const MapLane& lane = map.lanes[static_cast<size_t>(lane_index)];
+  RoutePoint nearest{lane_index, 0};
+  *apart_m_out = INFINITY;
+  for (int32_t i = 0; i < lane.num_segments; ++i) {
+    const LaneSegment& segment = map.segments[static_cast<size_t>(lane.first_segment + i)];
+    const Foot foot = foot_on(segment, p);
+    if (foot.distance_m >= *apart_m_out) continue;
+    *apart_m_out = foot.distance_m;
+    nearest.s_m = segment.s_m + foot.along_m;
+  }
+  return nearest;
 }
 
 }  // namespace
@@ -40,7 +70,15 @@ float idm_acceleration(const IdmParameters& parameters, float speed_mps, float g
   return parameters.accel_mps2 * (1 - free - interaction);
 }
 
-float RecordedPath::nearest_m(Vec2 p, float from_s_m) const {
+void FollowedPath::add(Vec3 point_m, float its_heading_rad) {
+  const float piece_m = points_m.empty() ? 0 : length((point_m - points_m.back()).xy());
+  if (!points_m.empty() && piece_m < kMinPiece_m) return;
+  s_m.push_back(s_m.empty() ? 0 : s_m.back() + piece_m);
+  points_m.push_back(point_m);
+  heading_rad.push_back(its_heading_rad);
+}
+
+float FollowedPath::nearest_m(Vec2 p, float from_s_m) const {
   float best_m = from_s_m, least = INFINITY;
   for (size_t i = 0; i + 1 < points_m.size(); ++i) {
     if (s_m[i + 1] + kMinPiece_m < from_s_m) continue;
@@ -54,7 +92,7 @@ float RecordedPath::nearest_m(Vec2 p, float from_s_m) const {
   return best_m;
 }
 
-RecordedPath::Pose RecordedPath::at(float wanted_s_m) const {
+FollowedPath::Pose FollowedPath::at(float wanted_s_m) const {
   const float s = std::clamp(wanted_s_m, 0.0f, length_m());
   const auto next = std::upper_bound(s_m.begin(), s_m.end(), s);
   if (next == s_m.end()) return {points_m.back(), heading_rad.back()};
@@ -64,11 +102,52 @@ RecordedPath::Pose RecordedPath::at(float wanted_s_m) const {
           wrap_angle(heading_rad[i] + t * wrap_angle(heading_rad[i + 1] - heading_rad[i]))};
 }
 
-IdmController::IdmController(const Simulator& simulator, const IdmParameters& parameters)
-    : parameters_(parameters), dt_s_(simulator.config().dt_s) {
+FollowedPath path_along_lanes(const MapView& map, int32_t lane, Vec3 position_m, float heading_rad) {
+  constexpr float kAhead_m = 200, kSpacing_m = 1;
+  constexpr float kMinMerge_m = 6, kMergePerMetre = 4;  // along the lane, for one metre beside its centre line
+  FollowedPath path;
+  path.add(position_m, heading_rad);
+  if (lane < 0) return path;
+  float aside_m = 0;
+  RoutePoint at = nearest_on_lane(map, lane, position_m.xy(), &aside_m);
+  float step_m = std::max(kMinMerge_m, kMergePerMetre * aside_m);
+  for (float ahead_m = 0; ahead_m < kAhead_m; step_m = kSpacing_m) {
+    ahead_m += step_m;
+    for (float rest_m = step_m; rest_m > 0;) {
+      const float length_m = map.lanes[static_cast<size_t>(at.lane)].length_m;
+      const float taken_m = std::min(rest_m, std::max(length_m - at.s_m, 0.0f));
+      at.s_m += taken_m;
+      rest_m -= taken_m;
+      if (rest_m <= 0) break;
+      const int32_t next = straightest_after(map, at.lane);
+      if (next < 0) {
+        const LanePose end = pose_on_lane(map, at.lane, length_m);
+        path.add(end.position_m, end.heading_rad);
+        return path;
+      }
+      at = {next, 0};
+    }
+    const LanePose pose = pose_on_lane(map, at.lane, at.s_m);
+    path.add(pose.position_m, pose.heading_rad);
+  }
+  path.ends = false;
+  return path;
+}
+
+IdmController::IdmController(const Simulator& simulator, IdmPaths paths, const IdmParameters& parameters)
+    : wanted_paths_(paths), parameters_(parameters), dt_s_(simulator.config().dt_s), maps_(simulator.maps()) {
   for (const WorldSpec& world : simulator.worlds()) {
-    const MapRecord& record = simulator.maps()[static_cast<size_t>(world.map)]->rules.record;
-    for (size_t agent = 0; agent < record.agents.size(); ++agent) paths_.push_back(path_of(record, agent));
+    const MapRules& rules = maps_[static_cast<size_t>(world.map)]->rules;
+    views_.push_back(rules.view());
+    for (size_t agent = 0; agent < static_cast<size_t>(world.num_agents); ++agent) {
+      FollowedPath path;
+      if (agent < rules.record.agents.size()) {
+        const bool walks = rules.record.agents[agent].agent_class == static_cast<int32_t>(AgentClass::pedestrian);
+        if (walks || paths == IdmPaths::logged) path = path_of(rules.record, agent);
+      }
+      on_lanes_.push_back(path.points_m.empty());
+      paths_.push_back(std::move(path));
+    }
   }
   progress_m_.assign(paths_.size(), 0);
 }
@@ -78,27 +157,41 @@ void IdmController::act(const ControllerInput& input, Span<const uint8_t> mask, 
   for (size_t slot = 0; slot < commands_out.size(); ++slot) {
     if (!mask.empty() && !mask[slot]) continue;
     commands_out[slot] = {};
-    const bool drives = takes_actions(static_cast<AgentStatus>(input.state.status[slot]));
-    if (drives && !paths_[slot].points_m.empty()) commands_out[slot] = command_of(input, slot);
+    if (takes_actions(static_cast<AgentStatus>(input.state.status[slot]))) commands_out[slot] = command_of(input, slot);
   }
 }
 
-Command IdmController::command_of(const ControllerInput& input, size_t slot) {
-  const RecordedPath& path = paths_[slot];
+/// Where the agent is on its path, which is made anew along lanes where it was put elsewhere or the path runs out.
+float IdmController::place_on_path(const ControllerInput& input, size_t slot) {
+  constexpr float kAstray_m = 1, kLeast_m = 60;
+  const auto world = static_cast<size_t>(input.slots.world_of_slot[slot]);
+  FollowedPath& path = paths_[slot];
+  const Vec3 here{input.state.x_m[slot], input.state.y_m[slot], input.state.z_m[slot]};
+  const bool begins = input.episode_step[world] == 0;
+  // Nobody goes back on the path but who begins anew.
+  float s_m = path.points_m.empty() ? 0.0f : path.nearest_m(here.xy(), begins ? 0.0f : progress_m_[slot]);
+  const auto serves = [&] {
+    return length((path.at(s_m).position_m - here).xy()) <= kAstray_m &&
+           (path.ends || path.length_m() - s_m >= kLeast_m);
+  };
+  if (on_lanes_[slot] && (begins || path.points_m.empty() || !serves())) {
+    const bool walks = static_cast<AgentClass>(input.state.agent_class[slot]) == AgentClass::pedestrian;
+    path = path_along_lanes(views_[world], walks ? -1 : input.state.lane[slot], here, input.state.heading_rad[slot]);
+    s_m = 0;
+  }
+  progress_m_[slot] = s_m;
+  return s_m;
+}
+
+IdmController::Front IdmController::box_ahead(const ControllerInput& input, size_t slot, float s_m) const {
+  const FollowedPath& path = paths_[slot];
   const auto agent = static_cast<int>(slot);
   const auto world = static_cast<size_t>(input.slots.world_of_slot[slot]);
-  const Vec2 here{input.state.x_m[slot], input.state.y_m[slot]};
-  const float speed_mps = std::max(0.0f, input.state.speed_mps[slot]);
-  // Nobody goes back on the path but who begins anew.
-  const float s_m = path.nearest_m(here, input.episode_step[world] == 0 ? 0.0f : progress_m_[slot]);
-  progress_m_[slot] = s_m;
-
-  float gap_m = INFINITY, front_mps = 0;
   const int first_box = input.scene.world_begin[world], end_box = input.scene.world_begin[world + 1];
   const int own_box = first_box + input.slots.agent_of_slot[slot];
-  for (float ahead_m = 1; ahead_m <= parameters_.look_ahead_m && !std::isfinite(gap_m); ++ahead_m) {
+  for (float ahead_m = 1; ahead_m <= parameters_.look_ahead_m; ++ahead_m) {
     if (s_m + ahead_m > path.length_m()) break;
-    const RecordedPath::Pose pose = path.at(s_m + ahead_m);
+    const FollowedPath::Pose pose = path.at(s_m + ahead_m);
     const SinCos heading = sincos_of(pose.heading_rad);
     const AgentBox swept = box_at(input.state, agent, pose.position_m, heading);
     for (int i = first_box; i < end_box; ++i) {
@@ -106,20 +199,75 @@ Command IdmController::command_of(const ControllerInput& input, size_t slot) {
       const Vec2 apart = (other.center_m - swept.center_m).xy();
       if (i == own_box || !other.drawn || dot(apart, apart) > square(radius(swept) + radius(other))) continue;
       if (!same_level(swept, other) || !overlap(footprint(swept), footprint(other))) continue;
-      gap_m = ahead_m - 1;
+      Front front{ahead_m - 1, 0};
       const int other_agent = i - first_box, first_slot = input.slots.slot_begin[world];
       if (other_agent < input.slots.slot_begin[world + 1] - first_slot) {
         const int other_slot = first_slot + other_agent;
         const Vec2 its_way{input.state.cos_heading[other_slot], input.state.sin_heading[other_slot]};
-        front_mps = std::max(0.0f, input.state.speed_mps[other_slot] * dot(its_way, {heading.cos, heading.sin}));
+        front.speed_mps = std::max(0.0f, input.state.speed_mps[other_slot] * dot(its_way, {heading.cos, heading.sin}));
       }
+      return front;
+    }
+  }
+  return {};
+}
+
+/// How far the bumper is from the first line along the path that holds it up; infinite: there is none.
+float IdmController::closed_line_ahead_m(const ControllerInput& input, size_t slot, float s_m) const {
+  constexpr float kLook_m = 45, kBeside_m = 0.5f, kAlike = 0.7f;
+  const FollowedPath& path = paths_[slot];
+  const auto world = static_cast<size_t>(input.slots.world_of_slot[slot]);
+  const Span<const StopLine> lines = views_[world].stop_lines;
+  const Vec3 here = path.at(s_m).position_m;
+  const float brakes_in_m = square(input.state.speed_mps[slot]) / (2 * parameters_.brake_mps2);
+  float nearest_m = INFINITY;
+  for (size_t i = 0; i < lines.size(); ++i) {
+    const StopLine& line = lines[i];
+    const LightState light = input.scene.light_states[static_cast<size_t>(input.scene.light_begin[world]) + i];
+    const bool is_red = light == LightState::red;
+    if (!is_red && light != LightState::yellow) continue;
+    if (length((line.middle_m - here).xy()) > kLook_m + input.state.length_m[slot]) continue;
+    Vec2 before{};
+    for (float ahead_m = 0; ahead_m <= std::min(kLook_m, path.length_m() - s_m) && ahead_m <= nearest_m; ++ahead_m) {
+      const FollowedPath::Pose pose = path.at(s_m + ahead_m);
+      const AgentBox box = box_at(input.state, static_cast<int>(slot), pose.position_m, sincos_of(pose.heading_rad));
+      const Vec2 way{box.cos_heading, box.sin_heading};
+      const Vec2 bumper = box.center_m.xy() + way * (0.5f * box.length_m) - line.middle_m.xy();
+      const bool crosses = ahead_m > 0 && dot(before, line.direction) < 0 && dot(bumper, line.direction) >= 0 &&
+                           std::abs(cross(line.direction, bumper)) <= line.half_length_m + kBeside_m &&
+                           dot(way, line.direction) > kAlike &&
+                           std::abs(pose.position_m.z - line.middle_m.z) < kLevel_m;
+      before = bumper;
+      if (!crosses) continue;
+      if (is_red || ahead_m - 1 >= brakes_in_m) nearest_m = std::min(nearest_m, ahead_m - 1);
       break;
     }
   }
-  float next_mps = std::max(0.0f, speed_mps + dt_s_ * idm_acceleration(parameters_, speed_mps, gap_m, front_mps));
+  return nearest_m;
+}
+
+Command IdmController::command_of(const ControllerInput& input, size_t slot) {
+  const float s_m = place_on_path(input, slot);
+  const FollowedPath& path = paths_[slot];
+  const float speed_mps = std::max(0.0f, input.state.speed_mps[slot]);
+  Front front = box_ahead(input, slot, s_m);
+  IdmParameters parameters = parameters_;
+  if (on_lanes_[slot]) {
+    const auto world = static_cast<size_t>(input.slots.world_of_slot[slot]);
+    const int32_t lane = input.state.lane[slot];
+    const bool walks = static_cast<AgentClass>(input.state.agent_class[slot]) == AgentClass::pedestrian;
+    if (!walks && lane >= 0) {
+      parameters.wanted_mps =
+          std::min(parameters.wanted_mps, views_[world].lanes[static_cast<size_t>(lane)].speed_limit_mps);
+    }
+    const float line_m = closed_line_ahead_m(input, slot, s_m);
+    if (line_m < front.gap_m) front = {line_m, 0};
+  }
+  float next_mps =
+      std::max(0.0f, speed_mps + dt_s_ * idm_acceleration(parameters, speed_mps, front.gap_m, front.speed_mps));
   const float left_m = path.length_m() - s_m;
   next_mps = std::min(next_mps, left_m / dt_s_);
-  const RecordedPath::Pose pose = path.at(s_m + next_mps * dt_s_);
+  const FollowedPath::Pose pose = path.at(s_m + next_mps * dt_s_);
   return {.kind = CommandKind::kinematic_state,
           .x_m = pose.position_m.x,
           .y_m = pose.position_m.y,

@@ -203,7 +203,7 @@ def test_a_run_is_saved_loaded_and_replayed(town, tmp_path):
     assert recorder.num_steps == 30, "another episode"
 
 
-@pytest.mark.parametrize("others", ["log", "idm"])
+@pytest.mark.parametrize("others", ["log", "idm", "idm_lanes"])
 def test_one_road_user_among_the_recorded_is_an_environment(folder, scene, others):
     gymnasium = pytest.importorskip("gymnasium")
     from gymnasium.utils.env_checker import check_env
@@ -216,7 +216,7 @@ def test_one_road_user_among_the_recorded_is_an_environment(folder, scene, other
     walkers = tracks["type"] == pictura.TRACK_TYPES.index("pedestrian")
     for step in range(21, 31):
         seen, reward, terminated, truncated, info = env.step(pictura.IDLE_ACTION)
-        there = tracks["valid"][:, step] & (walkers if others == "idm" else np.arange(12) != scene.sdc_track)
+        there = tracks["valid"][:, step] & (walkers if others != "log" else np.arange(12) != scene.sdc_track)
         np.testing.assert_allclose(feet_of(simulator)[there, :2], tracks["position_m"][there, step, :2], atol=1e-3)
         assert info["active"] != terminated
         if terminated:

@@ -506,6 +506,94 @@ TEST(RecordedWorlds, IdmFollowsThePathAndStopsBehindOthers) {
   }
 }
 
+TEST(RecordedWorlds, IdmFollowsLanesWhereItIsTold) {
+  const auto scene = crossing(kNobodyInTheWay);
+  const int32_t self = mover(*scene, 40);
+  const auto simulator = world_of(scene);
+  const auto idm = make_controller("idm_lanes", *simulator, 0);
+  EXPECT_EQ(idm->name(), "idm_lanes");
+  std::vector<uint8_t> driven(scene->tracks.size());
+  driven[static_cast<size_t>(self)] = 1;
+  constexpr int32_t kTakeover = 15, kMerged = 45;  // it begins in the middle of the record
+  constexpr int32_t kNearsEnd = 80;                // of its lane, where it stops
+  float driven_m = 0;
+  for (int32_t step = 1; step < scene->num_steps; ++step) {
+    std::vector<Command> commands = recorded(*simulator);
+    const AgentStateView state = simulator->state();
+    const float before_mps = state.speed_mps[self];
+    if (step > kTakeover) idm->act(simulator->controller_input(), driven, commands);
+    simulator->step(commands);
+    if (step <= kTakeover) continue;
+    driven_m += 0.1f * state.speed_mps[self];
+    // From the speed of the record it nears the lane's limit, from above or below, and its centre line.
+    if (step > kTakeover + 1 && step < kNearsEnd && before_mps < state.speed_limit_mps[self]) {
+      EXPECT_GE(state.speed_mps[self], before_mps - 0.01f) << step;
+    }
+    if (step > kMerged && state.lane[self] >= 0) {
+      EXPECT_LT(std::abs(state.lane_offset_m[self]), 0.3f) << step;
+    }
+  }
+  EXPECT_GT(driven_m, 20);
+  EXPECT_EQ(simulator->state().speed_mps[self], 0);
+  EXPECT_EQ(simulator->totals().collisions + simulator->totals().off_road, 0);
+}
+
+TEST(RecordedWorlds, IdmFollowsLanesWhereThereIsNoRecord) {
+  SimulatorConfig config;
+  config.pedestrian_fraction = 0.2f;
+  config.cyclist_fraction = 0.1f;
+  config.parked_cars = 0;
+  config.fixed_lights = true;
+  config.reset_inactive_fraction = 1;
+  uint64_t hash[2] = {};
+  for (const bool told : {false, true}) {
+    const auto town = make_simulator("cpu", config, {load_map("procedural:1")}, {{0, 12, 0}, {0, 5, 1}});
+    const auto idm = make_controller(told ? "idm_lanes" : "idm", *town, 0);
+    std::vector<Command> commands(static_cast<size_t>(town->num_slots()));
+    const AgentStateView state = town->state();
+    for (int step = 1; step <= 500; ++step) {
+      idm->act(town->controller_input(), {}, commands);
+      town->step(commands);
+      for (int slot = 0; slot < town->num_slots(); ++slot) {
+        if (status_of(*town, slot) != AgentStatus::active) continue;
+        if (state.agent_class[slot] == static_cast<uint8_t>(AgentClass::pedestrian)) {
+          EXPECT_EQ(state.speed_mps[slot], 0);
+          continue;
+        }
+        if (step < 50) continue;
+        ASSERT_GE(state.lane[slot], 0);
+        EXPECT_LT(std::abs(state.lane_offset_m[slot]), 0.5f) << slot << " at " << step;
+        EXPECT_LE(state.speed_mps[slot], IdmParameters{}.wanted_mps);
+      }
+    }
+    EXPECT_GT(town->totals().distance_m, 1000);
+    EXPECT_EQ(town->totals().red_light, 0);
+    hash[told] = town->state_hash();
+  }
+  EXPECT_EQ(hash[0], hash[1]);
+}
+
+TEST(RecordedWorlds, PathsAlongLanesEndWhereTheyDo) {
+  const auto scene = crossing(kNobodyInTheWay);
+  const auto simulator = world_of(scene);
+  const MapView map = simulator->maps()[0]->rules.view();
+  const Vec3 here{3, 4, 0};
+  const FollowedPath nowhere = path_along_lanes(map, -1, here, 1);
+  ASSERT_EQ(nowhere.points_m.size(), 1u);
+  EXPECT_EQ(nowhere.at(10).position_m.x, here.x);
+  for (int32_t lane = 0; lane < static_cast<int32_t>(map.lanes.size()); ++lane) {
+    const MapLane& about = map.lanes[static_cast<size_t>(lane)];
+    if (about.num_segments == 0) continue;
+    const LanePose begin = pose_on_lane(map, lane, 0);
+    const FollowedPath path = path_along_lanes(map, lane, begin.position_m, begin.heading_rad);
+    EXPECT_TRUE(path.ends);  // as all lanes of the recording do
+    EXPECT_GE(path.length_m(), about.length_m - 1);
+    const float middle_m = 0.5f * std::min(path.length_m(), about.length_m);
+    const Vec3 on_path = path.at(middle_m).position_m;
+    EXPECT_LT(length((on_path - pose_on_lane(map, lane, middle_m).position_m).xy()), 0.5f) << lane;
+  }
+}
+
 TEST(RecordedWorlds, RefuseWhatCannotBe) {
   const auto scene = crossing();
   const SimulatorConfig config = scene_config(*scene);

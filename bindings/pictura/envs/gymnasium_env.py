@@ -85,7 +85,7 @@ class DriveEnv(gymnasium.Env):
 class LogEnv(DriveEnv):
     """One road user of a recorded scene from start_step on: the self-driving car, or the first of `control`, words that
     pictura.Scenario.mask takes. others: as recorded ("log"), or vehicles by the intelligent driver model along their recorded
-    paths ("idm"). scene: a name or a pictura.Scenario, whose world it is; its goal is where its record ends.
+    paths ("idm") or along lanes ("idm_lanes"). scene: a name or a pictura.Scenario, whose world it is; its goal is where its record ends.
 
     Before the first action it is as recorded. Other options are DriveEnv's.
     """
@@ -99,14 +99,14 @@ class LogEnv(DriveEnv):
         others: str = "log",
         **options: Any,
     ) -> None:
-        if others not in ("log", "idm"):
-            raise pictura.UsageError(f"others: expected 'log' or 'idm', got '{others}'")
+        if others not in ("log", "idm", "idm_lanes"):
+            raise pictura.UsageError(f"others: expected 'log', 'idm' or 'idm_lanes', got '{others}'")
         scene = pictura.Scenario.load(scene, start_step=start_step) if isinstance(scene, str) else scene.starting_at(start_step)
         self._tracks = np.flatnonzero(scene.mask(control))
         super().__init__(scene, scene.num_tracks, others="log", **scene.world(**options))
-        if others == "idm":
+        if others != "log":
             simulator = self.batch.simulator
-            log, idm = pictura.Controller("log", simulator), pictura.Controller("idm", simulator)
+            log, idm = pictura.Controller("log", simulator), pictura.Controller(others, simulator)
             vehicles = (scene.tracks()["type"] == pictura.TRACK_TYPES.index("vehicle")) & scene.mask("all").astype(bool)
             self._others = OtherDrivers(pictura.Controller.shared([(log, None), (idm, vehicles)], simulator), self.batch, 0)
 

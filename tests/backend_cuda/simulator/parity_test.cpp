@@ -591,7 +591,8 @@ TEST_F(CudaSimulatorTest, IsDrivenByInverseActionsAndTheDriverModel) {
   const CompiledMaps maps{compile_scenario(scene, map_options(config)),
                           compile_scenario(scene, map_options(config), 20)};
   const std::vector<WorldSpec> worlds{scene_world(*maps[0], 0, 0), scene_world(*maps[1], 1, 1)};
-  for (const auto& [name, on_device] : {std::pair{"inverse", "inverse"}, std::pair{"idm", "idm, on the host"}}) {
+  for (const auto& [name, on_device] : {std::pair{"inverse", "inverse"}, std::pair{"idm", "idm, on the host"},
+                                        std::pair{"idm_lanes", "idm_lanes, on the host"}}) {
     const auto cpu = make_simulator("cpu", config, maps, worlds), cuda = make_simulator("cuda", config, maps, worlds);
     const auto cpu_controller = make_controller(name, *cpu, 0), cuda_controller = make_controller(name, *cuda, 0);
     EXPECT_EQ(cuda_controller->name(), on_device);

@@ -117,7 +117,7 @@ TEST(Controller, RefusesArraysOfAnotherSizeAndUnknownNames) {
       test::message_of([&] { controller->act(simulator->controller_input(), std::vector<uint8_t>(5, 1), commands); }),
       HasSubstr("expected a mask of 4 slots, got 5"));
   EXPECT_THAT(test::message_of<UsageError>([&] { make_controller("pilot", *simulator, 0); }),
-              HasSubstr("expected one of random, idle, lane, log, inverse, idm; got 'pilot'"));
+              HasSubstr("expected one of random, idle, lane, idm_lanes, log, inverse, idm; got 'pilot'"));
 }
 
 TEST(Controller, LaneKeepingNeedsTheEpisodesFirstStep) {
