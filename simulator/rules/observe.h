@@ -284,8 +284,8 @@ PICTURA_HD inline int observe_pieces(const PieceList& near, const EgoFrame& fram
 }
 static_assert(kLaneFeatures == kBoundaryFeatures && kLaneFeatures == kWallFeatures);
 
-/// Red 1, yellow 0.5, green -1, else 0; in integers, since compilers then need no
-/// branches, and the lights around an agent differ.
+/// Red 1, yellow 0.5, green -1, else 0; in integers, since compilers then need no branches, and the lights around an
+/// agent differ.
 PICTURA_HD constexpr float light_code(LightState state) {
   const int halves = 2 * (state == LightState::red) + (state == LightState::yellow) - 2 * (state == LightState::green);
   return 0.5f * static_cast<float>(halves);
