@@ -337,7 +337,7 @@ def test_corner_is_the_commands(trained, tmp_path):
     assert untrained["rows"][0]["speed_curve_mps"][0] == hidden["speed_curve_mps"][0]
     _, case = replay_of(tmp_path / "pair.html")
     shown = row_of_case(cases, 0)
-    assert (case["frame"], case["ego"]) == (int(shown["step"]), int(shown["ego"]))
+    assert (case["frame"], case["ego"]) == (0, int(shown["ego"])), "it begins where the policy takes over"
     theirs = probed_by_command("corner", folder, tmp_path / "out", options)
     assert theirs["rows"] == report["rows"]
     assert (tmp_path / "out" / "cases.csv").read_text() == cases.read_text()
