@@ -189,7 +189,8 @@ void MapLayers::paint_parking_spaces(GroundPen& pen) const {
   }
 }
 
-/// Bars across the longest side's direction, clipped to the outline.
+/// Bars across the longest side's direction, along all of the outline, whose sides recordings divide, and clipped to
+/// it.
 void MapLayers::paint_crosswalk(GroundPen& pen, const Crosswalk& crosswalk) const {
   cairo_t* context = pen.context();
   const int32_t count = crosswalk.outline.size();
@@ -206,7 +207,14 @@ void MapLayers::paint_crosswalk(GroundPen& pen, const Crosswalk& crosswalk) cons
       along = side / longest;
     }
   }
-  if (!pen.is_visible(center, longest)) return;
+  double reach = 0, low = 0, high = 0;  // of corners from the centre: how far, and how far back and ahead along it
+  for (int32_t i = 0; i < count; ++i) {
+    const Vector2d from_center = corner(i) - center;
+    reach = std::max(reach, from_center.norm());
+    low = std::min(low, from_center.dot(along));
+    high = std::max(high, from_center.dot(along));
+  }
+  if (!pen.is_visible(center, reach)) return;
   cairo_save(context);
   cairo_new_path(context);
   for (int32_t i = 0; i < count; ++i) pen.line_to(corner(i));
@@ -214,11 +222,11 @@ void MapLayers::paint_crosswalk(GroundPen& pen, const Crosswalk& crosswalk) cons
   pen.canvas().set_color(paint_color(MarkColor::white), 0.25);
   cairo_fill_preserve(context);
   cairo_clip(context);
-  const Vector2d across = longest * along.unitOrthogonal();
+  const Vector2d across = reach * along.unitOrthogonal();
   pen.canvas().set_color(paint_color(MarkColor::white), 0.95);
   cairo_set_line_width(context, 0.5);
   cairo_set_line_cap(context, CAIRO_LINE_CAP_BUTT);
-  for (double d = -0.5 * longest; d <= 0.5 * longest; d += 1) {
+  for (double d = low; d <= high; d += 1) {
     const Vector2d middle = center + d * along;
     pen.move_to(middle - across);
     pen.line_to(middle + across);

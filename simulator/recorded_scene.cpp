@@ -28,6 +28,14 @@ RecordedState recorded_state(const RecordedTrack& track, const TrackState& state
           1};
 }
 
+/// The state of a track at a step at which it is valid.
+RecordedState recorded_state(const Scenario& scenario, size_t track, size_t step) {
+  const size_t at = track * static_cast<size_t>(scenario.num_steps) + step;
+  if (scenario.driven.empty()) return recorded_state(scenario.tracks[track], scenario.states[at]);
+  const DrivenState& driven = scenario.driven[at];
+  return {driven.reference_m, scenario.states[at].heading_rad, driven.speed_mps, 1};
+}
+
 MapRecord record_of(const Scenario& scenario, int32_t start_step) {
   constexpr float kMaxRecordedRadius_m = 25.0f;  // every barrier so near to a box is looked at
   MapRecord record{.num_steps = scenario.num_steps - start_step, .dt_s = scenario.dt_s};
@@ -36,13 +44,12 @@ MapRecord record_of(const Scenario& scenario, int32_t start_step) {
     PICTURA_CHECK(std::hypot(track.length_m, track.width_m) <= 2 * kMaxRecordedRadius_m,
                   "scene {}: track {} (id {}): expected a box of at most {} m from corner to corner, got {} m by {} m",
                   scenario.id, i, track.id, 2 * kMaxRecordedRadius_m, track.length_m, track.width_m);
-    const Span<const TrackState> states = scenario.states_of(static_cast<int32_t>(i));
     const Span<const uint8_t> valid = scenario.valid_of(static_cast<int32_t>(i));
-    const RecordedState last = recorded_state(track, states[static_cast<size_t>(track.last_valid)]);
+    const RecordedState last = recorded_state(scenario, i, static_cast<size_t>(track.last_valid));
     record.agents.push_back(
         {static_cast<int32_t>(class_of(track.type)), track.length_m, track.width_m, track.height_m, last.position_m});
-    for (auto step = static_cast<size_t>(start_step); step < states.size(); ++step) {
-      record.states.push_back(valid[step] ? recorded_state(track, states[step]) : RecordedState{});
+    for (auto step = static_cast<size_t>(start_step); step < valid.size(); ++step) {
+      record.states.push_back(valid[step] ? recorded_state(scenario, i, step) : RecordedState{});
     }
   }
   return record;

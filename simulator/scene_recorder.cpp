@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "pictura/simulator/rules/limits.h"
+
 namespace pictura {
 namespace {
 
@@ -83,6 +85,7 @@ void SceneRecorder::add_step() {
     const AgentBox& box = now[i];
     valid_.push_back(box.drawn ? 1 : 0);
     states_.emplace_back();
+    driven_.emplace_back();
     if (!box.drawn) continue;
     bodies_[i] = box;
     const bool moves = static_cast<int>(i) < num_agents;
@@ -91,6 +94,10 @@ void SceneRecorder::add_step() {
     states_.back() = {box.center_m,
                       moves ? state.heading_rad[slot] : std::atan2(box.sin_heading, box.cos_heading),
                       {speed_mps * box.cos_heading, speed_mps * box.sin_heading}};
+    const float ahead_m = reference_to_center(box.agent_class, box.length_m);
+    const Vec3 behind_m{box.center_m.x - ahead_m * box.cos_heading, box.center_m.y - ahead_m * box.sin_heading,
+                        box.center_m.z};
+    driven_.back() = {moves ? Vec3{state.x_m[slot], state.y_m[slot], state.z_m[slot]} : behind_m, speed_mps};
   }
   for (int32_t i = scene.light_begin[world_]; i < scene.light_begin[world_ + 1]; ++i) {
     lights_.push_back(recorded_light(scene.light_states[static_cast<size_t>(i)]));
@@ -141,6 +148,7 @@ Scenario SceneRecorder::scenario(std::string id, int self_agent) const {
     for (size_t step = 0; step < steps; ++step) {
       scenario.states.push_back(states_[step * bodies_.size() + i]);
       scenario.valid.push_back(valid_[step * bodies_.size() + i]);
+      scenario.driven.push_back(driven_[step * bodies_.size() + i]);
     }
   }
   if (self_agent >= 0 && scenario.sdc_track < 0) {

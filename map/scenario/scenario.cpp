@@ -29,6 +29,15 @@ void check_track(const Scenario& scenario, int32_t index) {
                     "track {}: step {}: expected numbers of at most {} in magnitude, got {}", index, step,
                     kMaxScenarioRadius_m, value);
     }
+    if (!scenario.driven.empty()) {
+      const DrivenState& driven =
+          scenario.driven[static_cast<std::size_t>(index) * states.size() + static_cast<std::size_t>(step)];
+      for (const float value : {driven.reference_m.x, driven.reference_m.y, driven.reference_m.z, driven.speed_mps}) {
+        PICTURA_CHECK(std::isfinite(value) && std::abs(value) <= kMaxScenarioRadius_m,
+                      "track {}: step {}: driven: expected numbers of at most {} in magnitude, got {}", index, step,
+                      kMaxScenarioRadius_m, value);
+      }
+    }
     if (!valid[static_cast<std::size_t>(step)]) continue;
     PICTURA_CHECK(std::abs(state.heading_rad) <= kPi + 1e-4f,
                   "track {}: step {}: heading_rad: expected a number in [-pi, pi], got {}", index, step,
@@ -127,6 +136,7 @@ void validate(const Scenario& scenario) {
       PICTURA_CHECK(size == expected, "{}: expected {} of them, got {}", what, expected, size);
     };
     check_size("states", scenario.states.size(), scenario.tracks.size() * steps);
+    if (!scenario.driven.empty()) check_size("driven", scenario.driven.size(), scenario.tracks.size() * steps);
     check_size("valid", scenario.valid.size(), scenario.tracks.size() * steps);
     check_size("light_states", scenario.light_states.size(), scenario.lights.size() * steps);
     for (std::size_t i = 0; i < scenario.tracks.size(); ++i) check_track(scenario, static_cast<int32_t>(i));

@@ -23,6 +23,12 @@ struct TrackState {
   Vec2 velocity_mps;
 };
 
+/// Of a run that was saved: what the simulator had besides, so that a replay has the same bits.
+struct DrivenState {
+  Vec3 reference_m;     // the reference point of its class
+  float speed_mps = 0;  // signed, along the heading
+};
+
 /// What a file says of who should drive a track.
 enum class RecordedControl : uint8_t {
   unstated,
@@ -84,8 +90,9 @@ struct Scenario {
   int32_t sdc_track = -1;    // the self-driving car; -1: not known
   RoadMap map;
   std::vector<RecordedTrack> tracks;
-  std::vector<TrackState> states;  // [tracks * num_steps]
-  std::vector<uint8_t> valid;      // [tracks * num_steps] 0 or 1
+  std::vector<TrackState> states;   // [tracks * num_steps]
+  std::vector<uint8_t> valid;       // [tracks * num_steps] 0 or 1
+  std::vector<DrivenState> driven;  // [tracks * num_steps], or empty: recorded on real roads
   std::vector<int32_t> objects_of_interest;
   std::vector<PredictedTrack> tracks_to_predict;
   std::vector<RecordedLight> lights;
