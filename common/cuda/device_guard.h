@@ -12,11 +12,15 @@ namespace pictura {
 /// Makes a device the current one of the calling thread, and restores the one before at the end of the scope.
 class DeviceGuard {
  public:
-  /// Throws Error where this is no CUDA device, or one that does not exist.
+  /// Throws Error naming the device where this is no CUDA device, or one that does not exist.
   explicit DeviceGuard(Device device) : index_(device.index) {
     PICTURA_CHECK(!device.is_host(), "cuda: expected a CUDA device, got {}", name_of(device));
     PICTURA_CUDA(cudaGetDevice(&previous_));
-    if (index_ != previous_) PICTURA_CUDA(cudaSetDevice(index_));
+    if (index_ == previous_) return;
+    if (const cudaError_t status = cudaSetDevice(index_); status != cudaSuccess) {
+      cudaGetLastError();  // else the next call's check finds it
+      fail("{}: {}", name_of(device), cudaGetErrorString(status));
+    }
   }
   ~DeviceGuard() {
     if (index_ != previous_) cudaSetDevice(previous_);

@@ -1237,7 +1237,7 @@ class Training(CommandCase):
         merged = self.json_of("evaluate", "--merge", *parts)
         self.assertEqual(merged["rows"][0]["vehicle_episodes"], 24)
         self.assert_refused(2, "random, idle, lane, idm_lanes, log, inverse, idm; got 'pilot'", *evaluate, "--policy", "pilot")
-        self.assert_refused(2, "random, idle, lane; got 'log'", *evaluate, "--policy", "log")
+        self.assert_refused(2, "random, idle, lane, idm_lanes; got 'log'", *evaluate, "--policy", "log")
         self.assert_refused(2, "excludes", *evaluate, "--policy", "lane", "--sampled")
         self.assert_refused(2, "lane sees no images", *evaluate, "--policy", "lane", "--renderer", "cpu")
         self.assert_refused(2, "expected a CHECKPOINT, --policy, or --merge", *evaluate)
