@@ -32,7 +32,7 @@ RecordedState recorded_state(const RecordedTrack& track, const TrackState& state
 RecordedState recorded_state(const Scenario& scenario, size_t track, size_t step) {
   const size_t at = track * static_cast<size_t>(scenario.num_steps) + step;
   if (scenario.driven.empty()) return recorded_state(scenario.tracks[track], scenario.states[at]);
-  const DrivenState& driven = scenario.driven[at];
+  const SavedMotion& driven = scenario.driven[at];
   return {driven.reference_m, scenario.states[at].heading_rad, driven.speed_mps, 1};
 }
 

@@ -41,7 +41,7 @@ class SceneRecorder {
   bool is_over_ = false;
   std::vector<AgentBox> bodies_;            // [boxes] where they were last seen
   std::vector<TrackState> states_;          // [steps, boxes]
-  std::vector<DrivenState> driven_;         // [steps, boxes]
+  std::vector<SavedMotion> driven_;         // [steps, boxes]
   std::vector<uint8_t> valid_;              // [steps, boxes]
   std::vector<RecordedLightState> lights_;  // [steps, lights]
 };

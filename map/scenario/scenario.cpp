@@ -30,7 +30,7 @@ void check_track(const Scenario& scenario, int32_t index) {
                     kMaxScenarioRadius_m, value);
     }
     if (!scenario.driven.empty()) {
-      const DrivenState& driven =
+      const SavedMotion& driven =
           scenario.driven[static_cast<std::size_t>(index) * states.size() + static_cast<std::size_t>(step)];
       for (const float value : {driven.reference_m.x, driven.reference_m.y, driven.reference_m.z, driven.speed_mps}) {
         PICTURA_CHECK(std::isfinite(value) && std::abs(value) <= kMaxScenarioRadius_m,

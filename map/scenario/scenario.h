@@ -24,7 +24,7 @@ struct TrackState {
 };
 
 /// Of a run that was saved: what the simulator had besides, so that a replay has the same bits.
-struct DrivenState {
+struct SavedMotion {
   Vec3 reference_m;     // the reference point of its class
   float speed_mps = 0;  // signed, along the heading
 };
@@ -92,7 +92,7 @@ struct Scenario {
   std::vector<RecordedTrack> tracks;
   std::vector<TrackState> states;   // [tracks * num_steps]
   std::vector<uint8_t> valid;       // [tracks * num_steps] 0 or 1
-  std::vector<DrivenState> driven;  // [tracks * num_steps], or empty: recorded on real roads
+  std::vector<SavedMotion> driven;  // [tracks * num_steps], or empty: recorded on real roads
   std::vector<int32_t> objects_of_interest;
   std::vector<PredictedTrack> tracks_to_predict;
   std::vector<RecordedLight> lights;

@@ -9,7 +9,7 @@
 namespace pictura {
 
 PICTURA_FIELDS(TrackState, position_m, heading_rad, velocity_mps)
-PICTURA_FIELDS(DrivenState, reference_m, speed_mps)
+PICTURA_FIELDS(SavedMotion, reference_m, speed_mps)
 PICTURA_FIELDS(RecordedTrack, id, type, control, length_m, width_m, height_m, first_valid, last_valid, num_valid)
 PICTURA_FIELDS(RecordedLight, stop_a_m, stop_b_m, stop_heading_rad, lanes)
 PICTURA_FIELDS(PredictedTrack, track, difficulty)
