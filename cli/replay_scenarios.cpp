@@ -168,10 +168,8 @@ Replay record_takeover(const EvaluateOptions& options, const RecordedScenario& s
   if (!keeper.kept()) fail("scenario {} was over before step {}", scenario.number, takeover.step);
   const DrivenScene& scene = keeper.scene(scenario.number);
 
-  const PolicySession trained(takeover.policy, session_options(one));
-  const std::unique_ptr<PolicySession> session =
-      takeover.untrained ? trained.untrained(one.seed)
-                         : std::make_unique<PolicySession>(takeover.policy, session_options(one));
+  auto session = std::make_unique<PolicySession>(takeover.policy, session_options(one));
+  if (takeover.untrained) session = session->untrained(one.seed);
   SimulatorConfig world = session->evaluation_world(one.steps);
   world.seed = one.seed;
   const std::unique_ptr<Simulator> simulator =
