@@ -12,6 +12,8 @@ namespace pictura {
 
 namespace {
 
+constexpr const char* kWhyOtherwise = "the policy's numbers differ in their last bits where batches or devices differ";
+
 // Where a case is, and how fast its ego was there.
 struct CasePlace {
   int32_t scene = 0, driver = 0, step = 0, ego = 0;
@@ -85,10 +87,8 @@ RecordedScenario scenario_of(const ProbeOptions& probe, const ProbeResults& resu
 void compare_speed(const std::string& path, const Replay& replay, int frame, int ego, float probed_mps) {
   const double speed_mps = 0.01 * replay.at(Track::speed_mps, frame, ego);
   if (std::abs(speed_mps - double{probed_mps}) < 0.0051) return;
-  fmt::print(stderr,
-             "notice: {}: the ego drives at {:.2f} m/s, in the probe at {:.2f} m/s: the policy's numbers differ in "
-             "their last bits where batches or devices differ\n",
-             path, speed_mps, probed_mps);
+  fmt::print(stderr, "notice: {}: the ego drives at {:.2f} m/s, in the probe at {:.2f} m/s: {}\n", path, speed_mps,
+             probed_mps, kWhyOtherwise);
 }
 
 // Writes the replay of a case, which is at `frame` of it; `probed` says what the case is about.
@@ -119,10 +119,8 @@ void write_scene(const CaseReplayOptions& options, const ProbeOptions& probe, co
   ScenarioCounts counts;
   Replay replay = record_scenario(driven_by(probe, place), scenario_of(probe, results, place), recording, &counts);
   if (place.step >= replay.num_frames) {
-    fail(
-        "--replay: case {} is at step {} of scenario {}, which was over after {} steps when it was driven again: the "
-        "policy's numbers differ in their last bits where batches or devices differ",
-        number, place.step, place.scene, replay.num_frames - 1);
+    fail("--replay: case {} is at step {} of scenario {}, which was over after {} steps when it was driven again: {}",
+         number, place.step, place.scene, replay.num_frames - 1, kWhyOtherwise);
   }
   write(options, results, number, place, place.step, std::move(probed), std::move(replay));
 }
@@ -185,11 +183,8 @@ void write_case_replay(const CaseReplayOptions& options, const CornerOptions& pr
   write(options, results, pair, place, 0, {.what = what, .removed = state.user}, replay);
   const Takeover& probed = results.takeover(pair, true, CornerCase::hidden, 0);
   if (const int steps = replay.num_frames - 1; steps != probed.steps) {
-    fmt::print(
-        stderr,
-        "notice: {}: the ego drives for {} steps, in the probe for {}: the policy's numbers differ in their last "
-        "bits where batches or devices differ\n",
-        options.path, steps, probed.steps);
+    fmt::print(stderr, "notice: {}: the ego drives for {} steps, in the probe for {}: {}\n", options.path, steps,
+               probed.steps, kWhyOtherwise);
   } else if (probed.ended_by == 0) {
     compare_speed(options.path, replay, steps, state.ego, probed.speed_mps[static_cast<size_t>(steps)]);
   }
