@@ -1,5 +1,7 @@
 #include "pictura/bindings/call.h"
 
+#include <algorithm>
+
 #include <unistd.h>
 
 namespace pictura::python {
@@ -32,15 +34,33 @@ void check_process(std::string_view what, int num_threads, Device device) {
                 what);
 }
 
-void refuse_unmade_objects(const py::module_& module) {
-  for (const auto& [name, value] : py::cast<py::dict>(module.attr("__dict__"))) {
+namespace {
+// Calls f with each class of C++ that a module has, and what pybind11 knows of it.
+template <typename F>
+void for_each_class(const py::module_& module, F&& f) {
+  for (const auto& [name, value] : py::dict(module.attr("__dict__").attr("copy")())) {
     if (!PyType_Check(value.ptr())) continue;
     auto* const info = py::detail::get_type_info(reinterpret_cast<PyTypeObject*>(value.ptr()));
-    if (!info) continue;
+    if (info) f(py::reinterpret_borrow<py::object>(value), info);
+  }
+}
+}  // namespace
+
+void refuse_unmade_objects(const py::module_& module) {
+  for_each_class(module, [](const py::object&, py::detail::type_info* info) {
     info->operator_new = [](size_t) -> void* {
       fail("expected an object that was made by calling its class, got one of __new__ alone");
     };
-  }
+  });
+}
+
+void pickle_by_new_protocols(const py::module_& module) {
+  for_each_class(module, [](const py::object& its_class, py::detail::type_info*) {
+    const auto reduce = [](const py::object& self, int protocol) {
+      return py::module_::import("builtins").attr("object").attr("__reduce_ex__")(self, std::max(protocol, 2));
+    };
+    its_class.attr("__reduce_ex__") = py::cpp_function(reduce, py::name("__reduce_ex__"), py::is_method(its_class));
+  });
 }
 
 }  // namespace pictura::python

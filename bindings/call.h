@@ -51,6 +51,10 @@ class WithoutGil {
 /// pybind11 would hand them memory that nobody has written. For the end of a module's definition.
 void refuse_unmade_objects(const py::module_& module);
 
+/// Makes objects of a module's classes pickle by protocol 2 where 0 or 1 is asked for: those copy the part of an object
+/// that belongs to pybind11's own base class, which ends the process. For the end of a module's definition.
+void pickle_by_new_protocols(const py::module_& module);
+
 /// Lets one thread at a time into calls of an object.
 class Turnstile {
  public:

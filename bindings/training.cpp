@@ -720,4 +720,5 @@ naming what is missing or does not fit.)")
 keyed by seed, world, agent, episode and step as in training. renderer: for a policy that reads images, of make_renderer(), with
 the simulator's geometries. Raises pictura.Error where one is missing.)");
   refuse_unmade_objects(module);
+  pickle_by_new_protocols(module);
 }

@@ -133,9 +133,12 @@ def test_others_take_it_and_act(both, name):
     for step in range(3):
         actions = actions_of(step, 120)
         a, b = cpu.step(actions), cuda.step(make(actions))
-        for theirs, ours in [(take(cuda.observations["ego"]), cpu.observations["ego"]), (take(b.reward), a.reward)]:
-            theirs = theirs.get() if name == "cupy" else np.asarray(theirs)
-            assert (theirs == ours.numpy()).all()
+        shared = [(cuda.observations["ego"], cpu.observations["ego"])]
+        if name == "cupy":  # JAX cannot be told that results are read-only: it asks by DLPack before 1.0
+            shared.append((b.reward, a.reward))
+        for theirs, ours in shared:
+            theirs = take(theirs)
+            assert ((theirs.get() if name == "cupy" else np.asarray(theirs)) == ours.numpy()).all()
 
 
 def test_environments_stay_on_the_device():

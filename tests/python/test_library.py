@@ -37,12 +37,19 @@ def test_maps_from_text_name_what_is_wrong(tmp_path):
         pictura.Map.load("Town99")
 
 
+def test_what_cannot_be_pickled_says_so_in_every_protocol(town):
+    for protocol in range(pickle.HIGHEST_PROTOCOL + 1):
+        with pytest.raises(TypeError, match="cannot pickle 'pictura._pictura.Map' object"):
+            pickle.dumps(town, protocol=protocol)
+
+
 def test_the_papers_rig_and_ones_own():
     rig = pictura.Rig.paper(48, 27)
     assert len(rig) == 4 and rig.cameras[0].width_px == 48
     assert rig.cameras[0].focal_x_px == pytest.approx(1545 * 48 / 1920)
-    again = pickle.loads(pickle.dumps(rig))
-    assert [(c.name, c.yaw_rad, c.position_m) for c in again.cameras] == [(c.name, c.yaw_rad, c.position_m) for c in rig.cameras]
+    for protocol in range(pickle.HIGHEST_PROTOCOL + 1):
+        again = pickle.loads(pickle.dumps(rig, protocol=protocol))
+        assert [(c.name, c.yaw_rad, c.position_m) for c in again.cameras] == [(c.name, c.yaw_rad, c.position_m) for c in rig.cameras]
     with pytest.raises(pictura.Error, match="camera"):
         pictura.Rig([pictura.Camera("wide", 0, 10)])
 
