@@ -27,6 +27,8 @@ Decision decide(Run* run, int64_t step, const at::Tensor& active) {
   return decision;
 }
 
+double teacher_weight(const Run& run) { return teacher_weight_at(run.config.train, run.agent_steps); }
+
 }  // namespace
 
 Collector::Collector(Run* run)
@@ -53,6 +55,7 @@ bool Collector::collect_on_stream() {
     // Act.
     const at::Tensor slots = record(step);
     const Decision decision = decide(&run_, step, slots);
+    ask_teacher(step, slots);
     run_.executor->choose_actions(simulator.controller_input(), span_of<const int64_t>(slots),
                                   span_of<const float>(decision.log_probs),
                                   {.argmax = false, .seed = run_.config.run.seed}, rollout.actions_at(step), stream);
@@ -81,6 +84,13 @@ at::Tensor Collector::record(int64_t step) {
   return slots;
 }
 
+void Collector::ask_teacher(int64_t step, const at::Tensor& slots) {
+  if (teacher_weight(run_) == 0) return;
+  const PhaseTimer::Scope timed(&run_.timer, Phase::forward);
+  run_.rollout.teacher_log_probs.select(0, step).index_copy_(
+      0, slots, run_.teacher->log_probs(run_.simulator->controller_input(), slots));
+}
+
 void Collector::simulate(int64_t step) {
   const PhaseTimer::Scope timed(&run_.timer, Phase::simulate);
   Rollout& rollout = run_.rollout;
@@ -92,7 +102,8 @@ void Collector::simulate(int64_t step) {
 
 UpdateStats improve(Run* run) {
   const Config::Train& config = run->config.train;
-  const UpdateKey key{run->config.run.seed, run->update, learning_rate_at(config, run->agent_steps)};
+  const UpdateKey key{run->config.run.seed, run->update, learning_rate_at(config, run->agent_steps),
+                      teacher_weight(*run)};
   UpdateStats stats;
   run->on_stream([&] {
     run->rollout.compute_advantages(config.gamma, config.gae_lambda, run->executor.get());

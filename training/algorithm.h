@@ -22,6 +22,8 @@ class Collector {
   bool collect_on_stream();
   // Keeps what the simulator shows as what is seen at a step. Returns the slots of active agents.
   at::Tensor record(int64_t step);
+  // Keeps what the teacher would do at a step, as long as it weighs anything.
+  void ask_teacher(int64_t step, const at::Tensor& slots);
   void simulate(int64_t step);
 
   Run& run_;

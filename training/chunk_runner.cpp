@@ -24,7 +24,7 @@ void ChunkRunner::clear() {
 
 // Graphs know addresses, so they are given other numbers there; calls take tensors as they are.
 void ChunkRunner::set(at::Tensor* to, const at::Tensor& value) const {
-  if (!graphs_->are_used())
+  if (!graphs_->are_used() || !value.defined())
     *to = value;
   else if (to->defined() && to->sizes() == value.sizes())
     to->copy_(value);
@@ -74,9 +74,13 @@ Policy::Output ChunkRunner::look(const at::Tensor& rows) {
 }
 
 void ChunkRunner::set_targets(const Targets& targets) {
+  // Graphs of losses with a teacher are others than those without one.
+  if (targets.teacher_log_probs.defined() != targets_.teacher_log_probs.defined()) clear();
   set(&targets_.actions, targets.actions);
   set(&targets_.old_log_probs, targets.old_log_probs);
   set(&targets_.returns, targets.returns);
+  set(&targets_.teacher_log_probs, targets.teacher_log_probs);
+  set(&targets_.teacher_weight, targets.teacher_weight);
 }
 
 void ChunkRunner::begin_minibatch() { stats_.zero_(); }
@@ -104,7 +108,8 @@ void ChunkRunner::learn(const at::Tensor& rows, const at::Tensor& advantages, co
   const PhaseTimer::Scope timed(timer_, Phase::backward);
   work.backward.run(mode, graphs_, [&] {
     const Losses& losses = work.losses;
-    const at::Tensor loss = losses.policy + config.vf_coef * losses.value - config.ent_coef * losses.entropy;
+    at::Tensor loss = losses.policy + config.vf_coef * losses.value - config.ent_coef * losses.entropy;
+    if (losses.imitation.defined()) loss = loss + losses.imitation;
     (loss * work.weight.to(loss.scalar_type())).backward();
     stats_.narrow(0, 0, kNumStats - 1) += work.weight * losses.stats;
   });

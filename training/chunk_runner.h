@@ -34,7 +34,7 @@ class ChunkRunner {
              const Config::Train& config, const std::function<void(const Losses&)>& diagnose = {});
   /// f64 [kNumStats], where those of all chunks since begin_minibatch() are added up; the last, the norm, is 0.
   const at::Tensor& stats() const { return stats_; }
-  static constexpr int64_t kNumStats = 7;  // of LossStats
+  static constexpr int64_t kNumStats = 8;  // of LossStats
 
   /// Forgets all graphs. Must be called where the observations' images move, as with another renderer.
   void clear();

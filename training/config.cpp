@@ -108,6 +108,9 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.number("train.weight_decay", c.train.weight_decay, 0, 100);
   v.number("train.max_grad_norm", c.train.max_grad_norm, 1e-9, inf);
   v.integer("train.sharpen_agent_steps", c.train.sharpen_agent_steps, 0, int64_t{1} << 60);
+  v.text("train.teacher", c.train.teacher);
+  v.number("train.teacher_coef", c.train.teacher_coef, 0, 1e6);
+  v.integer("train.teacher_agent_steps", c.train.teacher_agent_steps, 1, int64_t{1} << 60);
   v.flag("train.norm_adv", c.train.norm_adv);
   v.number("train.adv_filter_threshold", c.train.adv_filter_threshold, 0, 1);
   v.number("train.adv_filter_ema", c.train.adv_filter_ema, 1e-6, 1);
@@ -705,6 +708,7 @@ Config load_config(const std::string& path, const std::vector<std::string>& over
   };
   if (!is_overridden("render.rig")) beside_config(&config.render.rig);
   if (config.policy.backbone != "conv" && !is_overridden("policy.backbone")) beside_config(&config.policy.backbone);
+  if (!is_overridden("train.teacher")) beside_config(&config.train.teacher);
   if (!is_overridden("simulator.maps")) {
     for (std::string& map : config.simulator.maps) {
       if (is_map_file(map)) beside_config(&map);
@@ -719,6 +723,7 @@ Config with_absolute_paths(Config config) {
   };
   if (!config.render.rig.empty()) make_absolute(&config.render.rig);
   if (config.policy.backbone != "conv") make_absolute(&config.policy.backbone);
+  if (!config.train.teacher.empty()) make_absolute(&config.train.teacher);
   for (std::string& map : config.simulator.maps) {
     if (is_map_file(map)) make_absolute(&map);
   }
@@ -764,7 +769,8 @@ bool is_of_schedule(const std::string& key) {
 }
 
 bool is_reported(const std::string& key) {
-  return is_of_schedule(key) || key == "train.reproducible" || key == "render.schedule";
+  return is_of_schedule(key) || key.starts_with("train.teacher") || key == "train.reproducible" ||
+         key == "render.schedule";
 }
 
 bool may_differ(const std::string& key, const Config& saved, const Config& now) {

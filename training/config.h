@@ -97,7 +97,12 @@ struct Config {
     double learning_rate = 5e-4;
     double adam_beta1 = 0.9, adam_beta2 = 0.999, adam_eps = 1e-8, weight_decay = 0.01;
     double max_grad_norm = 0.5;
-    int64_t sharpen_agent_steps = 0;     // over so many the policy's logits double, see training/schedule.h; 0: never
+    int64_t sharpen_agent_steps = 0;  // over so many the policy's logits double, see training/schedule.h; 0: never
+    /// A saved vector policy to imitate, see training/teacher.h: the loss has the KL divergence from its actions times
+    /// teacher_coef, which falls to 0 along a line over so many agent-steps. Relative to the configuration's folder.
+    std::string teacher;
+    double teacher_coef = 1;
+    int64_t teacher_agent_steps = 100'000'000;
     bool norm_adv = true;                // per minibatch
     double adv_filter_threshold = 0.01;  // of the running max |advantage|; 0: keep everything
     double adv_filter_ema = 0.25;        // weight of the newest rollout in the running max
@@ -139,8 +144,9 @@ Config parse_config(const std::string& text, const std::string& source, const st
 /// Reads what a run saved, perhaps with another build: its backends may be any.
 Config parse_saved_config(const std::string& text, const std::string& source);
 
-/// Reads a file. Paths of rigs, map files and policy.backbone are relative to where they are typed: those in the file
-/// to its folder, those of overrides to the caller's. In the result, all are relative to the caller's.
+/// Reads a file. Paths of rigs, map files, policy.backbone and train.teacher are relative to where they are typed:
+/// those in the file to its folder, those of overrides to the caller's. In the result, all are relative to the
+/// caller's.
 Config load_config(const std::string& path, const std::vector<std::string>& overrides = {});
 
 /// The configuration with values of [evaluate.conditioning] replaced; each is "name=value". Throws UsageError that
@@ -151,10 +157,10 @@ Config with_evaluate_conditioning(const Config& config, const std::vector<std::s
 std::string to_toml(const Config& config);
 
 /// Key of the first setting that changes what a run means and in which the two differ, with both values, or empty. What
-/// may differ: when to stop and how often to save; the schedule of the learning rate; where and on how many threads it
-/// runs, as long as images are drawn by the same rules; how many transitions go through the network at once; what is
-/// evaluated; how cameras and backbones are described (compare the rigs and the programs' hashes), and all of [render]
-/// where the policy reads no images.
+/// may differ: when to stop and how often to save; the schedule of the learning rate; the teacher; where and on how
+/// many threads it runs, as long as images are drawn by the same rules; how many transitions go through the network at
+/// once; what is evaluated; how cameras and backbones are described (compare the rigs and the programs' hashes), and
+/// all of [render] where the policy reads no images.
 std::string first_difference(const Config& saved, const Config& now);
 
 /// Key of the first setting in which two ranks of a run differ, with both values, or empty. Where each runs, and on how
@@ -162,7 +168,7 @@ std::string first_difference(const Config& saved, const Config& now);
 std::string first_difference_of_ranks(const Config& first, const Config& other);
 
 /// The settings in which the two differ of those that a run that goes on may change and should say so, the schedules of
-/// learning rate and image size and train.reproducible, as "KEY: OLD became NEW".
+/// learning rate and image size, the teacher and train.reproducible, as "KEY: OLD became NEW".
 std::vector<std::string> differences_to_report(const Config& saved, const Config& now);
 
 /// As in a configuration.

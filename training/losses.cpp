@@ -29,12 +29,18 @@ Losses losses_of(const Policy::Output& output, const Targets& targets, const at:
   losses.policy = -mean_of(at::minimum(advantages * ratio, advantages * clipped), shares);
   losses.value = 0.5 * mean_of((output.value - targets.returns.index_select(0, rows)).square(), shares);
   losses.entropy = -mean_of((all_log_probs.exp() * all_log_probs).sum(1), shares);
+  at::Tensor teacher_kl = at::zeros({}, losses.entropy.options());
+  if (targets.teacher_log_probs.defined()) {
+    const at::Tensor teacher = targets.teacher_log_probs.index_select(0, rows);
+    teacher_kl = mean_of((teacher.exp() * (teacher - all_log_probs)).sum(1), shares);
+    losses.imitation = targets.teacher_weight * teacher_kl;
+  }
   const at::NoGradGuard no_grad;
   // Schulman's estimator of the KL divergence, (ratio - 1) - log ratio: unbiased and never negative.
   const at::Tensor approx_kl = mean_of(ratio - 1 - log_ratio, shares);
   const at::Tensor clip_fraction = mean_of(((ratio - 1).abs() > clip_coef).to(at::kFloat), shares);
   losses.stats = at::stack({losses.policy, losses.value, losses.entropy, approx_kl, clip_fraction,
-                            mean_of(log_ratio.abs(), shares)})
+                            mean_of(log_ratio.abs(), shares), teacher_kl})
                      .detach()
                      .to(at::kDouble);
   return losses;

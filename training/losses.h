@@ -10,11 +10,15 @@ struct Targets {
   at::Tensor actions;        // i64
   at::Tensor old_log_probs;  // of these actions
   at::Tensor returns;
+  // Of all actions by the teacher, [steps * slots, kNumActions], and what the KL divergence from it weighs, []:
+  // undefined where nobody is imitated.
+  at::Tensor teacher_log_probs, teacher_weight;
 };
 
 struct Losses {
-  at::Tensor policy, value, entropy;  // with gradients
-  at::Tensor stats;                   // f64 [6]: LossStats without the norm
+  at::Tensor policy, value, entropy;  // with gradients, as the next
+  at::Tensor imitation;               // weighted; undefined where nobody is imitated
+  at::Tensor stats;                   // f64 [7]: LossStats without the norm
 };
 
 /// Of the chosen actions of some rows; all_log_probs: [rows, kNumActions].

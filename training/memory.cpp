@@ -60,6 +60,7 @@ double estimated_bytes(const Config& config, bool keeps_images) {
   // The simulator has observations of its own, the rollout those of one step more than it takes.
   double bytes =
       boxes * kSimulatorBytesPerBox + agents * (observation_bytes(config) * (steps + 2) + kTransitionBytes * steps);
+  if (!config.train.teacher.empty()) bytes += agents * steps * kNumActions * sizeof(float);
   if (!config.reads_images()) return bytes;
   if (keeps_images) return bytes + kept_image_bytes(config, agents);
   const SceneHistorySize scenes{static_cast<int>(steps) + 1, static_cast<size_t>(worlds), static_cast<size_t>(boxes), 0,

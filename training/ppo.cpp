@@ -86,7 +86,7 @@ constexpr int64_t kNumStats = ChunkRunner::kNumStats;
 
 LossStats loss_stats(const at::Tensor& row) {
   const double* const values = row.const_data_ptr<double>();
-  return {values[0], values[1], values[2], values[3], values[4], values[5], values[6]};
+  return {values[0], values[1], values[2], values[3], values[4], values[5], values[6], values[7]};
 }
 
 bool takes_all(const Config::Train& config) { return config.halted_slots == HaltedSlots::draw; }
@@ -288,6 +288,10 @@ UpdateStats ppo_update(ChunkRunner* runner, const Rollout& rollout, const Config
   UpdateStats stats;
   stats.learning_rate = key.learning_rate;
   Batch batch(rollout);
+  if (key.teacher_weight > 0) {
+    batch.targets.teacher_log_probs = rollout.teacher_log_probs.flatten(0, 1);
+    batch.targets.teacher_weight = at::full({}, key.teacher_weight, batch.advantages.options());
+  }
   const at::Tensor taken = taken_rows(batch, config, key.update, executor, filter, communicator, &stats);
   Minibatches minibatches(taken, rollout, config.minibatch_size, key, executor, communicator);
   if (minibatches.size() == 0) return stats;

@@ -1,5 +1,6 @@
 // Proximal policy optimization (Schulman et al., 2017) with the paper's settings: clipped surrogate, plain value loss,
-// entropy bonus, advantages filtered per rollout and normalised per minibatch, AdamW under a cosine schedule.
+// entropy bonus, advantages filtered per rollout and normalised per minibatch, AdamW under a cosine schedule. Beyond
+// the paper: a teacher to imitate for a while.
 #pragma once
 
 #include <optional>
@@ -49,6 +50,7 @@ class AdamW {
 /// Means over minibatches; docs/training.md defines them.
 struct LossStats {
   double policy_loss = 0, value_loss = 0, entropy = 0, approx_kl = 0, clip_fraction = 0, abs_log_ratio = 0;
+  double teacher_kl = 0;  // from the teacher's actions, unweighted
   double grad_norm = 0;
 };
 
@@ -71,11 +73,12 @@ struct UpdateStats {
   int64_t minibatches = 0;
 };
 
-/// What names an update: its transitions' order, and its rate.
+/// What names an update: its transitions' order, its rate, and what the teacher weighs.
 struct UpdateKey {
   uint64_t seed = 0;
   int64_t update = 0;
   double learning_rate = 0;
+  double teacher_weight = 0;
 };
 
 /// A loss or a gradient was not finite; names update, epoch and minibatch, counted from 1.

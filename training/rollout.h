@@ -57,6 +57,7 @@ struct Rollout {
   at::Tensor rewards;                       // f32
   at::Tensor terminated, truncated, valid;  // u8, as StepResult defines them
   at::Tensor advantages;                    // f32, see rules/gae.h
+  at::Tensor teacher_log_probs;             // f32 [num_steps, num_slots, kNumActions]; undefined without a teacher
 
   Rollout(RolloutObservations its_observations, int64_t num_steps, int64_t num_slots, Device device);
   int64_t num_steps() const { return actions.size(0); }

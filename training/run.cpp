@@ -7,6 +7,7 @@
 #include "pictura/common/error.h"
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/saved_worlds.h"
+#include "pictura/training/ranks/agree.h"
 
 namespace pictura {
 
@@ -18,10 +19,19 @@ std::vector<WorldSpec> draw_training_worlds(const Config& config) {
                      static_cast<int>(section.maps.size()));
 }
 
-std::unique_ptr<Simulator> make_training_simulator(const Config& config, Device device, std::vector<WorldSpec> worlds) {
+std::unique_ptr<const Teacher> make_teacher(const Config& config, Device device, Communicator* communicator) {
+  const std::string& path = config.train.teacher;
+  if (path.empty()) return nullptr;
+  return std::make_unique<const Teacher>(parse_policy(file_of_first(path, communicator), path), config, device);
+}
+
+std::unique_ptr<Simulator> make_training_simulator(const Config& config, Device device, const Teacher* teacher,
+                                                   std::vector<WorldSpec> worlds) {
   std::vector<std::shared_ptr<const RoadMap>> maps;
   for (const std::string& name : config.simulator.maps) maps.push_back(load_map(name));
-  return make_simulator(config.simulator.backend, simulator_config(config, device), std::move(maps), std::move(worlds));
+  SimulatorConfig world = simulator_config(config, device);
+  if (teacher) teacher->add_arrays(&world);
+  return make_simulator(config.simulator.backend, world, std::move(maps), std::move(worlds));
 }
 
 std::unique_ptr<Renderer> make_training_renderer(const Config& config, const Rig& rig, const Simulator& simulator) {
@@ -47,7 +57,8 @@ Run::Run(const Config& its_config, Device its_device, Communicator* its_communic
       communicator(its_communicator),
       all_worlds(draw_training_worlds(config)),
       rig(rig_of(config)),
-      simulator(make_training_simulator(config, device,
+      teacher(make_teacher(config, device, communicator)),
+      simulator(make_training_simulator(config, device, teacher.get(),
                                         worlds_of_part(all_worlds, communicator->rank(), communicator->size()))),
       renderer(make_training_renderer(config, rig, *simulator)),
       executor(make_learner_executor(device)),
@@ -59,6 +70,10 @@ Run::Run(const Config& its_config, Device its_device, Communicator* its_communic
       stream(uses_graphs(config, device, renderer.get()) ? std::optional<OwnStream>(device) : std::nullopt),
       graphs(device, stream.has_value()),
       chunks(*policy, rollout.observations, &timer, &graphs) {
+  if (teacher) {
+    rollout.teacher_log_probs =
+        at::zeros({rollout.num_steps(), rollout.num_slots(), kNumActions}, rollout.log_probs.options());
+  }
   for (const auto& change : config.render.schedule) policy->check_images(rig_of(config, change.agent_steps));
 }
 

@@ -7,6 +7,7 @@
 #include "pictura/training/checkpoint.h"
 #include "pictura/training/ppo.h"
 #include "pictura/training/ranks/communicator.h"
+#include "pictura/training/teacher.h"
 #include "pictura/training/torch_device.h"
 
 namespace pictura {
@@ -42,8 +43,9 @@ struct Run {
   const Config config;
   const Device device;
   Communicator* const communicator;
-  const std::vector<WorldSpec> all_worlds;  // of all ranks
-  Rig rig;                                  // as it is now
+  const std::vector<WorldSpec> all_worlds;       // of all ranks
+  Rig rig;                                       // as it is now
+  const std::unique_ptr<const Teacher> teacher;  // null where nobody is imitated
   const std::unique_ptr<Simulator> simulator;
   std::unique_ptr<Renderer> renderer;  // of policies with images
   const std::unique_ptr<LearnerExecutor> executor;

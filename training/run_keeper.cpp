@@ -23,14 +23,10 @@ RunKeeper::RunKeeper(const TrainOptions& options, Ranks* ranks, Communicator* co
                 fmt::join(old_files_, ", "));
 }
 
-std::string RunKeeper::bytes_everywhere(const std::string& path) const {
-  return communicator_->from_first(communicator_->is_first() ? read_checkpoint_file(path) : "");
-}
-
 std::vector<RecentUpdate> RunKeeper::begin(Run* run) {
   std::vector<RecentUpdate> recent;
   if (options_.old_run == OldRun::resume) {
-    const Checkpoint saved = parse_checkpoint(bytes_everywhere(checkpoint_path()), checkpoint_path());
+    const Checkpoint saved = parse_checkpoint(file_of_first(checkpoint_path(), communicator_), checkpoint_path());
     const std::string why_new_episodes = run->restore(saved);
     if (!why_new_episodes.empty()) {
       options_.notify("the saved episodes cannot go on, new ones begin: " + why_new_episodes);
@@ -40,7 +36,7 @@ std::vector<RecentUpdate> RunKeeper::begin(Run* run) {
     saved_update_ = run->update;
   } else {
     if (!options_.init_from.empty()) {
-      run->begin_with(parse_policy(bytes_everywhere(options_.init_from), options_.init_from));
+      run->begin_with(parse_policy(file_of_first(options_.init_from, communicator_), options_.init_from));
     }
     for (const std::string& name : old_files_) std::filesystem::remove(path(name));
     run->simulator->reset();

@@ -39,7 +39,6 @@ class RunKeeper {
  private:
   void write_with(const std::function<void(const Checkpoint&)>& write, const Run& run,
                   const std::vector<RecentUpdate>& recent) const;
-  std::string bytes_everywhere(const std::string& path) const;
 
   const TrainOptions& options_;
   Ranks* const ranks_;

@@ -50,6 +50,7 @@ Scalars scalars_of(const Config& config, const TrainProgress& progress, const Up
   };
   scalars.emplace_back("losses/policy_loss", stats.all.policy_loss);
   scalars.emplace_back("losses/value_loss", stats.all.value_loss);
+  scalars.emplace_back("losses/teacher_kl", stats.all.teacher_kl);
   add_losses("", stats.all);
   add_losses("_first", stats.first);
   for (int epoch = 0; epoch < config.train.update_epochs; ++epoch) {

@@ -29,4 +29,10 @@ double logit_growth(const Config::Train& config, int64_t agent_steps) {
   return std::exp2(static_cast<double>(agent_steps) / static_cast<double>(config.sharpen_agent_steps));
 }
 
+double teacher_weight_at(const Config::Train& config, int64_t agent_steps) {
+  if (config.teacher.empty()) return 0;
+  const double done = static_cast<double>(agent_steps) / static_cast<double>(config.teacher_agent_steps);
+  return config.teacher_coef * std::max(0.0, 1 - done);
+}
+
 }  // namespace pictura

@@ -1,5 +1,5 @@
 // What changes over a run as agent-steps are done: the learning rate, with a rise at the start and a fall to 0 at the
-// end, and the policy's temperature.
+// end, the policy's temperature, and what a teacher weighs.
 #pragma once
 
 #include "pictura/training/config.h"
@@ -18,5 +18,9 @@ bool schedule_has_ended(const Config::Train& config, int64_t agent_steps);
 /// the softmax's temperature halved. So a policy that starts by chance has to learn to start for certain, and its
 /// likeliest actions become what it has learnt by.
 double logit_growth(const Config::Train& config, int64_t agent_steps);
+
+/// What the KL divergence from the teacher's actions weighs in an update before which `agent_steps` were done: it falls
+/// from teacher_coef to 0 along a line. 0 without a teacher.
+double teacher_weight_at(const Config::Train& config, int64_t agent_steps);
 
 }  // namespace pictura

@@ -127,6 +127,15 @@ TEST_P(EachModality, TheFirstUpdateIsTheHosts) {
   expect_same_first_update(folder_ / "host", folder_ / "device", 1e-6, 2e-2);
 }
 
+TEST_P(EachModality, ATeacherTeachesAsOnTheHost) {
+  train(options("teacher", "cpu", {"policy.modality=vector", "run.seed=5", "train.updates=1"}));
+  const std::vector<std::string> more{modality(), "train.precision=fp32", "train.updates=1", "train.num_steps=30",
+                                      "train.teacher=" + (folder_ / "teacher/policy.safetensors")};
+  train(options("host", "cpu", more));
+  train(options("device", "cuda", more));
+  expect_same_first_update(folder_ / "host", folder_ / "device", 1e-6, 2e-2);
+}
+
 TEST_P(EachModality, EvaluationAgreesWithTheHosts) {
   EvaluateOptions o = test::one_scenario(
       train(options("run", "cpu", {modality(), "train.precision=fp32", "train.updates=1"})).checkpoint, 20);

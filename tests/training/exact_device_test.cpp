@@ -5,6 +5,7 @@
 
 #include "pictura/common/cuda/device_buffer.h"
 #include "pictura/tests/backend_cuda/device_test.h"
+#include "pictura/tests/support/scratch_folder.h"
 #include "pictura/tests/training/exact_policy.h"
 
 namespace pictura {
@@ -46,6 +47,7 @@ TEST_F(DeviceExact, GraphsDriveAsCallsDo) {
 struct Learnt {
   std::vector<std::string> policies;           // hashes, after each update
   std::vector<double> losses;                  // all that is logged of them, after each update
+  std::vector<double> teacher_kl;              // the same
   std::vector<int64_t> collecting, improving;  // launches of graphs, in each update
   std::vector<int64_t> allocations;            // of memory of the device, in each update
 };
@@ -69,7 +71,7 @@ Learnt learn(const std::vector<std::string>& more) {
     return at::getDeviceAllocator(at::kCUDA)->getDeviceStats(index).num_device_alloc + device_allocations;
   };
   Learnt learnt;
-  for (; run.update < 6; ++run.update) {
+  for (; run.update < 6; ++run.update, run.agent_steps += run.rollout.actions.numel()) {
     const auto launches = [&] { return run.graphs.num_launches() + collector.num_graph_launches(); };
     const int64_t launches_before = launches(), allocated = allocations();
     EXPECT_TRUE(collector.collect());
@@ -82,6 +84,7 @@ Learnt learn(const std::vector<std::string>& more) {
                               stats.all.grad_norm, stats.policy_grad_norm}) {
       learnt.losses.push_back(loss);
     }
+    learnt.teacher_kl.push_back(stats.all.teacher_kl);
     learnt.allocations.push_back(allocations() - allocated);
   }
   return learnt;
@@ -115,6 +118,24 @@ TEST_P(DeviceGraphs, TeachWhatCallsTeachToTheBit) {
     EXPECT_GT(graphs.improving[update], 3 * 4) << update;
   }
   EXPECT_NE(calls.policies[5], calls.policies[0]);
+}
+
+TEST_F(DeviceExact, GraphsTeachAsCallsDoWithATeacherAndAfterIt) {
+  const test::ScratchFolder folder;
+  const std::string teacher = folder / "teacher.safetensors";
+  const Config config = load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml", {"policy.modality=vector", "run.seed=5"});
+  write_policy(teacher, pictura::Run(config, Device{}).saved_policy(), WeightType::f32, "");
+  // Of 8,400 agent-steps an update.
+  const std::vector<std::string> more{"train.precision=bf16", "train.teacher=" + teacher,
+                                      "train.teacher_agent_steps=25000"};
+  std::vector<std::string> off = more;
+  off.push_back("train.graphs=off");
+  const Learnt calls = learn(off), graphs = learn(more);
+  EXPECT_EQ(graphs.policies, calls.policies);
+  EXPECT_EQ(graphs.losses, calls.losses);
+  EXPECT_GT(calls.teacher_kl.front(), 0);
+  EXPECT_EQ(calls.teacher_kl.back(), 0);
+  EXPECT_GT(graphs.improving.back(), 3 * 4);
 }
 
 TEST_P(DeviceGraphs, TakeNoMemoryOnceAllSizesHaveCome) {

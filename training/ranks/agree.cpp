@@ -1,6 +1,7 @@
 #include "pictura/training/ranks/agree.h"
 
 #include "pictura/common/support/interrupt.h"
+#include "pictura/training/checkpoint.h"
 #include "pictura/training/ranks/ranks.h"
 
 namespace pictura {
@@ -22,6 +23,10 @@ bool any_rank_interrupted(Communicator* communicator) {
   const auto signal = static_cast<int>(communicator->max_of(interrupting_signal()));
   if (signal != 0) take_interrupt(signal);
   return signal != 0;
+}
+
+std::string file_of_first(const std::string& path, Communicator* communicator) {
+  return communicator->from_first(communicator->is_first() ? read_checkpoint_file(path) : "");
 }
 
 }  // namespace pictura

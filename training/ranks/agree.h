@@ -1,4 +1,5 @@
-// What the ranks of a run must agree on before they go on: their settings, and when to end or save.
+// What the ranks of a run must agree on before they go on: their settings, the files that they begin with, and when to
+// end or save.
 #pragma once
 
 #include <string>
@@ -17,5 +18,8 @@ bool any_rank(bool is_so, Communicator* communicator);
 
 /// Whether ^C or the like came to any rank. From then on it has come to this one (common/support/interrupt.h).
 bool any_rank_interrupted(Communicator* communicator);
+
+/// The bytes of a checkpoint or of weights, which the first rank alone reads.
+std::string file_of_first(const std::string& path, Communicator* communicator);
 
 }  // namespace pictura

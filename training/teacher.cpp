@@ -1,0 +1,37 @@
+#include "pictura/training/teacher.h"
+
+#include "pictura/common/error.h"
+
+namespace pictura {
+
+Teacher::Teacher(const SavedPolicy& saved, const Config& config, Device device)
+    : config_(saved.config),
+      chunks_{config.train.forward_chunk, config.train.reproducible},
+      device_(device),
+      policy_(make_policy(saved.config, saved.rig, device)) {
+  PICTURA_CHECK(!config_.reads_images(),
+                "{}: train.teacher: its policy reads images, expected one of the modality \"vector\"", saved.path);
+  // Images come without those slots; of vectors both would read the same ones.
+  PICTURA_CHECK(config.reads_images() || config.policy.auxiliary == config_.policy.auxiliary,
+                "{}: train.teacher: its policy.auxiliary is {}, expected {}, as the learner's", saved.path,
+                config_.policy.auxiliary, config.policy.auxiliary);
+  restore_policy(saved, *policy_);
+}
+
+void Teacher::add_arrays(SimulatorConfig* config) const {
+  const SimulatorConfig own = simulator_config(config_, device_);
+  config->vector_observations = true;
+  config->auxiliary_observations = own.auxiliary_observations;
+  config->wall_observations = config->wall_observations || own.wall_observations;
+}
+
+at::Tensor Teacher::log_probs(const ControllerInput& input, const at::Tensor& slots) const {
+  const auto num_slots = static_cast<int64_t>(input.slots.world_of_slot.size());
+  return decide(slots, chunks_,
+                [&](const at::Tensor& some) {
+                  return policy_->forward(select_arrays(config_, input.observations, input.device, num_slots, some));
+                })
+      .log_probs;
+}
+
+}  // namespace pictura

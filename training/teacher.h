@@ -1,0 +1,32 @@
+// A saved policy that another one learns to imitate while it drives: for agents that the learner drives it says what it
+// would do, from the observations that it was trained with.
+#pragma once
+
+#include <memory>
+
+#include "pictura/training/policy.h"
+#include "pictura/training/saved_policy.h"
+
+namespace pictura {
+
+class Teacher {
+ public:
+  /// `saved` for a learner of `config`, on `device`. Throws Error naming the teacher's file where it reads images, or
+  /// slots of the ego vector that the learner must not have.
+  Teacher(const SavedPolicy& saved, const Config& config, Device device);
+
+  /// Has the simulator make the arrays that it reads, too.
+  void add_arrays(SimulatorConfig* config_inout) const;
+
+  /// The log-probabilities of all actions for the agents of some slots, i64 [n], of what the simulator shows now: f32
+  /// [n, kNumActions], without gradients.
+  at::Tensor log_probs(const ControllerInput& input, const at::Tensor& slots) const;
+
+ private:
+  const Config config_;  // its own
+  const ChunkSizes chunks_;
+  const Device device_;
+  const std::unique_ptr<const Policy> policy_;
+};
+
+}  // namespace pictura
