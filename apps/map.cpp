@@ -25,7 +25,7 @@ namespace {
 
 constexpr double kQuiet_s = 0.3;  // imports that take less show no progress
 
-struct Arguments {
+struct MapArguments {
   std::string map, png, svg, xodr;
   int size_px = 1600;
   std::vector<double> box, at;
@@ -33,7 +33,7 @@ struct Arguments {
   bool json = false, full = false, strict = false;
 };
 
-std::optional<FileBox> shown_box(const Arguments& arguments) {
+std::optional<FileBox> shown_box(const MapArguments& arguments) {
   if (!arguments.box.empty()) return FileBox{arguments.box[0], arguments.box[1], arguments.box[2], arguments.box[3]};
   if (arguments.at.empty()) return std::nullopt;
   const double x = arguments.at[0], y = arguments.at[1], radius = arguments.radius_m;
@@ -123,18 +123,14 @@ Json mends_of(const RoadMap& map, const std::string& source) {
   return groups;
 }
 
-double seconds_since(std::chrono::steady_clock::time_point begin) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-}
-
 /// A recorded scene: the facts of its map, its tracks and lights, and how its traffic and its edges agree.
-void run_scene(const Arguments& arguments) {
+void run_scene(const MapArguments& arguments) {
   if (!arguments.xodr.empty()) fail_usage("--xodr: {} is a recorded scene, which has no OpenDRIVE", arguments.map);
   const InterruptibleWork work("interrupted");
   SceneReport report;
   const auto begin = std::chrono::steady_clock::now();
   const Scenario scenario = load_scenario(arguments.map, &report);
-  const double load_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  const double load_ms = 1e3 * seconds_since(begin);
   work.check();
   const MapPictureOptions picture{.size_px = arguments.size_px, .box = shown_box(arguments), .scenario = &scenario};
   if (!arguments.png.empty()) draw_map_png(scenario.map, arguments.png, picture);
@@ -156,7 +152,7 @@ void run_scene(const Arguments& arguments) {
   }
 }
 
-void run_map(const CLI::App& command, const Arguments& arguments) {
+void run_map(const CLI::App& command, const MapArguments& arguments) {
   if (arguments.png.empty() && arguments.svg.empty()) {
     for (const char* option : {"--at", "--box", "--size"}) {
       if (command.count(option) > 0) fail_usage("{}: has no effect without --png or --svg", option);
@@ -209,7 +205,7 @@ void run_map(const CLI::App& command, const Arguments& arguments) {
 
 void add_map_command(CLI::App& app) {
   constexpr double kFarthest_m = 1e8;  // from the origin of a map projection
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<MapArguments>();
   CLI::App* command = app.add_subcommand("map", "Print a map's properties, list its elements, draw it from above");
   add_map_or_scene(command, &arguments->map);
   command

@@ -27,7 +27,7 @@ namespace pictura {
 
 namespace {
 
-struct Arguments {
+struct RenderArguments {
   WorldOptions world;
   int steps = 50, views = 4;
   std::string tracks;  // of a recorded scene, whose cameras are drawn
@@ -52,7 +52,7 @@ bool is_scene_file(const std::string& map) {
   return extension == ".toml";
 }
 
-std::unique_ptr<Renderer> open_renderer(const Arguments& arguments, RendererConfig config) {
+std::unique_ptr<Renderer> open_renderer(const RenderArguments& arguments, RendererConfig config) {
   config.num_threads = arguments.world.num_threads;
   if (!arguments.backends.samples.empty()) config.samples = parse_samples("--samples", arguments.backends.samples);
   const std::string name = arguments.backends.renderer.empty() ? "auto" : arguments.backends.renderer;
@@ -75,14 +75,14 @@ double draw(const Subject& subject, Renderer* renderer, HostImages* images_out) 
     work.check();
     const auto begin = std::chrono::steady_clock::now();
     renderer->render(subject.scene, subject.views, images_out->batch());
-    seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+    seconds.push_back(seconds_since(begin));
   }
   std::nth_element(seconds.begin(), seconds.begin() + 2, seconds.end());
   return static_cast<double>(subject.views.size()) / seconds[2];
 }
 
 /// Returns the paths of the contact sheets.
-std::vector<std::string> write_pictures(const Arguments& arguments, const Subject& subject, const Rig& rig,
+std::vector<std::string> write_pictures(const RenderArguments& arguments, const Subject& subject, const Rig& rig,
                                         const HostImages& images) {
   const InterruptibleWork work("interrupted while pictures were written");
   const int num_views = static_cast<int>(subject.views.size());
@@ -115,7 +115,7 @@ std::vector<std::string> write_pictures(const Arguments& arguments, const Subjec
   return sheets;
 }
 
-void draw_and_report(const Arguments& arguments, const Subject& subject, Renderer* renderer) {
+void draw_and_report(const RenderArguments& arguments, const Subject& subject, Renderer* renderer) {
   const Rig& rig = renderer->config().rig;
   const int num_views = static_cast<int>(subject.views.size()), num_cameras = static_cast<int>(rig.cameras.size());
   HostImages images(rig, num_views, PixelFormat::u8, arguments.planes.empty() ? Planes::none : Planes::all);
@@ -140,7 +140,7 @@ void draw_and_report(const Arguments& arguments, const Subject& subject, Rendere
   }
 }
 
-void render_scene_file(const Arguments& arguments) {
+void render_scene_file(const RenderArguments& arguments) {
   const SceneFile file = load_scene(arguments.world.map);
   const auto renderer = open_renderer(arguments, file.config);
   draw_and_report(arguments, {{file.geometry}, file.scene.batch(), file.views, file.view_names, file.view_captions},
@@ -148,7 +148,7 @@ void render_scene_file(const Arguments& arguments) {
 }
 
 /// What a map's worlds are drawn with.
-RendererConfig config_of(const Arguments& arguments) {
+RendererConfig config_of(const RenderArguments& arguments) {
   const Pair size = parse_pair("--size", arguments.size, 8192);
   if (!arguments.rig.empty() && arguments.size_given) fail_usage("--size: the rig of --rig has sizes of its own");
   if (!arguments.rig.empty() && arguments.square_pixels) fail_usage("--square-pixels: has no effect beside --rig");
@@ -159,7 +159,7 @@ RendererConfig config_of(const Arguments& arguments) {
   return config;
 }
 
-void render_world(const Arguments& arguments) {
+void render_world(const RenderArguments& arguments) {
   if (arguments.views > arguments.world.agents) {
     fail_usage("--views: expected 1 to {} (one per agent), got {}", arguments.world.agents, arguments.views);
   }
@@ -183,7 +183,7 @@ void render_world(const Arguments& arguments) {
 }
 
 /// The tracks of a recorded scene that look, in their order.
-std::vector<uint8_t> looking_tracks(const Arguments& arguments, const CompiledMap& map) {
+std::vector<uint8_t> looking_tracks(const RenderArguments& arguments, const CompiledMap& map) {
   const Scenario& scenario = *map.scenario;
   if (arguments.tracks.empty() && scenario.sdc_track < 0) {
     // The file does not say who is the self-driving car.
@@ -198,7 +198,7 @@ std::vector<uint8_t> looking_tracks(const Arguments& arguments, const CompiledMa
   }
 }
 
-void render_recorded_scene(const Arguments& arguments) {
+void render_recorded_scene(const RenderArguments& arguments) {
   const RendererConfig config = config_of(arguments);
   DrivenWorld world = make_world(arguments.world, "log", arguments.backends);
   const CompiledMap& map = *world.simulator->maps()[0];
@@ -229,7 +229,7 @@ void refuse_world_options(const CLI::App& command) {
 }  // namespace
 
 void add_render_command(CLI::App& app) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<RenderArguments>();
   CLI::App* command = app.add_subcommand("render", "Write what the cameras of some agents see");
   add_map_or_scene(command, &arguments->world.map, "a scene file (.toml), ");
   add_world_options(command, &arguments->world);

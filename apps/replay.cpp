@@ -16,7 +16,7 @@ namespace pictura {
 
 namespace {
 
-struct Arguments {
+struct ReplayArguments {
   WorldOptions world;
   int steps = 600, episodes = 10;
   BackendOptions backends;
@@ -39,7 +39,7 @@ Json facts_of(const std::string& path, const Replay& replay) {
           {"metrics", metrics}};
 }
 
-Replay record(Arguments arguments, uint64_t seed, ProgressLine* line_out) {
+Replay record(ReplayArguments arguments, uint64_t seed, ProgressLine* line_out) {
   WorldOptions options = arguments.world;
   options.seed = seed;
   DrivenWorld world = make_world(options, arguments.policy, arguments.backends);
@@ -57,7 +57,7 @@ Replay record(Arguments arguments, uint64_t seed, ProgressLine* line_out) {
   return recording.finish();
 }
 
-void run(const Arguments& arguments) {
+void run_replay(const ReplayArguments& arguments) {
   ProgressLine line;
   if (arguments.gallery.empty()) {
     const Replay replay = record(arguments, arguments.world.seed, &line);
@@ -85,7 +85,7 @@ void run(const Arguments& arguments) {
 }  // namespace
 
 void add_replay_command(CLI::App& app) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ReplayArguments>();
   CLI::App* command = app.add_subcommand("replay", "Record a world as a page that a browser plays");
   add_driving_options(command, &arguments->world, &arguments->steps, &arguments->policy, &arguments->backends);
   add_recording_options(command, &arguments->recording);
@@ -118,7 +118,7 @@ void add_replay_command(CLI::App& app) {
     }
     settle_driving_options(*command, &arguments->world, &arguments->steps, &arguments->policy);
     refuse_idle_backend_options(*command, arguments->policy);
-    run(*arguments);
+    run_replay(*arguments);
   });
 }
 

@@ -25,7 +25,7 @@ namespace pictura {
 
 namespace {
 
-struct Arguments {
+struct SimulateArguments {
   WorldOptions world;
   int steps = 300;
   BackendOptions backends;
@@ -37,10 +37,6 @@ struct Arguments {
   float film_width_m = 150;
   bool json = false;
 };
-
-double seconds_since(std::chrono::steady_clock::time_point begin) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-}
 
 std::array<int64_t, kNumAgentClasses> spawned_by_class(Simulator& simulator) {
   const AgentStateView state = simulator.state();
@@ -71,7 +67,7 @@ struct Displacement {
 };
 
 // Options that would change nothing.
-void refuse_idle_options(const CLI::App& command, const Arguments& arguments) {
+void refuse_idle_options(const CLI::App& command, const SimulateArguments& arguments) {
   if (arguments.video.empty()) {
     for (const char* option : {"--film-width", "--film-agent"}) {
       if (command.count(option) > 0) fail_usage("{}: has no effect without --video", option);
@@ -86,7 +82,7 @@ void refuse_idle_options(const CLI::App& command, const Arguments& arguments) {
   refuse_idle_backend_options(command, arguments.policy);
 }
 
-void run(Arguments arguments) {
+void run_simulate(SimulateArguments arguments) {
   DrivenWorld world = make_world(arguments.world, arguments.policy, arguments.backends);
   Simulator* const simulator = world.simulator.get();
   const Scenario* const scene = simulator->maps()[0]->scenario.get();
@@ -208,7 +204,7 @@ void run(Arguments arguments) {
 }  // namespace
 
 void add_simulate_command(CLI::App& app) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<SimulateArguments>();
   CLI::App* command = app.add_subcommand("simulate", "Drive a world and count what happens");
   add_driving_options(command, &arguments->world, &arguments->steps, &arguments->policy, &arguments->backends);
   command->add_option(
@@ -245,7 +241,7 @@ void add_simulate_command(CLI::App& app) {
     settle_driving_options(*command, &arguments->world, &arguments->steps, &arguments->policy);
     refuse_idle_options(*command, *arguments);
     arguments->endless = arguments->serve.is_asked && command->count("--steps") == 0;
-    run(*arguments);
+    run_simulate(*arguments);
   });
 }
 

@@ -11,6 +11,7 @@
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
 #include "pictura/bench/image_error.h"
+#include "pictura/bench/repeats.h"
 #include "pictura/bench/step_rate.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
@@ -24,8 +25,6 @@ namespace {
 
 // Different random choices that calls take in turn, so that none finds its data in caches.
 constexpr std::size_t kChoices = 8;
-// Calls of a repeat: more than any needs, and below the maximum of an int.
-constexpr double kMaxCalls = 1e9;
 
 // Elements in the memory of a device.
 template <typename T>
@@ -256,10 +255,8 @@ class HistoryBench {
     // Warms up.
     time_of(1, past);
     time_of(1, present);
-    const auto calls_in_repeat = [this](double one_ms) {
-      return static_cast<int>(std::clamp(1e3 * case_.repeat_s / one_ms, 1.0, kMaxCalls));
-    };
-    const int present_calls = calls_in_repeat(time_of(1, present)), past_calls = calls_in_repeat(time_of(1, past));
+    const int present_calls = calls_in_repeat(case_.repeat_s, time_of(1, present));
+    const int past_calls = calls_in_repeat(case_.repeat_s, time_of(1, past));
     for (int repeat = 0; repeat < case_.repeats; ++repeat) {
       if (interrupted()) throw Interrupted("interrupted");
       result_.present_ms.push_back(time_of(present_calls, present));

@@ -6,6 +6,7 @@
 
 #include "pictura/backends/make_renderer.h"
 #include "pictura/backends/upload_maps.h"
+#include "pictura/bench/repeats.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
 #ifdef PICTURA_HAS_CUDA
@@ -15,9 +16,6 @@
 namespace pictura {
 
 namespace {
-
-// Calls of a repeat: more than any needs, and below the maximum of an int.
-constexpr double kMaxCalls = 1e9;
 
 class HostTarget final : public RenderTarget {
  public:
@@ -121,7 +119,7 @@ RenderMeasurement measure_render(const DrivenWorlds& worlds, const RenderCase& r
   if (render_case.repeats > 0) {
     target->fill_unwritten();
     const double one_ms = target->draw(renderer.get(), 1);
-    const int calls = static_cast<int>(std::clamp(1e3 * render_case.repeat_s / one_ms, 1.0, kMaxCalls));
+    const int calls = calls_in_repeat(render_case.repeat_s, one_ms);
     for (int repeat = 0; repeat < render_case.repeats; ++repeat) {
       result.call_ms.push_back(target->draw(renderer.get(), calls));
       if (interrupted()) throw Interrupted("interrupted");

@@ -45,7 +45,7 @@ void settle_evaluation_options(EvaluationArguments* arguments) {
 void EvaluationProgress::update(double done, double eta_s) {
   // The notice comes when the time is long, as soon as a few seconds tell.
   constexpr double kEstimateAfter_s = 5, kLong_s = 600;
-  const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  const double elapsed_s = seconds_since(begin_);
   if (!has_estimate_ && elapsed_s >= kEstimateAfter_s) {
     has_estimate_ = true;
     if (elapsed_s + eta_s > kLong_s) {

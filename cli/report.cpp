@@ -43,6 +43,10 @@ std::string printable(std::string_view message) {
   return text;
 }
 
+double seconds_since(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
 std::string format_duration(double seconds) {
   if (!std::isfinite(seconds)) return "?";
   const auto total = static_cast<long>(std::lround(seconds));
@@ -82,7 +86,7 @@ void ProgressLine::update(const std::string& text) {
 }
 
 void ProgressLine::update(const std::string& text, double done) {
-  const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  const double elapsed_s = seconds_since(begin_);
   update(fmt::format("{}  ETA {}", text, format_duration(elapsed_s * (1 - done) / done)));
 }
 

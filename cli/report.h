@@ -18,6 +18,9 @@ void close_stdout();
 /// A message in one line, in which control characters of names are escaped: "a\nb".
 std::string printable(std::string_view message);
 
+/// Until now.
+double seconds_since(std::chrono::steady_clock::time_point begin);
+
 /// "1 h 02 min", "3 min 05 s" or "12 s".
 std::string format_duration(double seconds);
 

@@ -35,6 +35,8 @@ add_compile_options(
   # g++ 13 assumes that every returned reference refers to a temporary argument, and that fmt's big integers, inlined,
   # copy more than they hold (fmt 9).
   "$<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_HAS_WDANGLING_REFERENCE}>>:-Wno-dangling-reference;-Wno-array-bounds;-Wno-stringop-overflow>"
+  # In a unity build every source is included, and g++ takes it for a header, which many would include.
+  $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>,$<BOOL:${CMAKE_UNITY_BUILD}>>:-Wno-subobject-linkage>
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_WERROR}>>:-Werror>
   # The arithmetic contract: no fused multiply-add and no reordering, on every device.
   "$<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off;-fno-math-errno;-fno-trapping-math>"

@@ -12,13 +12,13 @@ namespace pictura {
 
 namespace {
 
-constexpr int kGap_px = 6, kTop_px = 30, kLeft_px = 64;
+constexpr int kImageGap_px = 6, kCameraNames_px = 30, kViewNames_px = 64;
 constexpr int kPanelWidth_px = 480, kPanelColumns = 3;
 constexpr int kWantedWidth_px = 1600;
 // Of a page, beside what its first camera or its first row takes: Cairo draws 32,767 px a side at most.
 constexpr int kMaxPageWidth_px = 16384, kMaxPageHeight_px = 8192;
-constexpr Rgb kSheetColor = hex(0x24272C), kLabelColor = hex(0xD8DCE2);
-const TextStyle kViewStyle{.size_px = 15, .align = Align::right, .color = kLabelColor};
+constexpr Rgb kSheetColor = hex(0x24272C), kSheetLabelColor = hex(0xD8DCE2);
+const TextStyle kViewStyle{.size_px = 15, .align = Align::right, .color = kSheetLabelColor};
 
 void paste(Canvas& canvas, const HostImages& images, int view, int camera, int x0, int y0, int enlargement) {
   const std::vector<uint8_t> rgb = images.interleaved(view, camera);
@@ -44,7 +44,7 @@ struct SheetRow {
 
 // Rows and sizes of all pages; a rig too wide for one row continues in the next.
 struct SheetLayout {
-  int enlargement = 1, left_px = kLeft_px, row_px = 0, width_px = 0;
+  int enlargement = 1, left_px = kViewNames_px, row_px = 0, width_px = 0;
   std::vector<SheetRow> rows;
 
   /// Whether camera names stand above it: where a page begins, and where the cameras are others than in the row above.
@@ -57,7 +57,7 @@ struct SheetLayout {
     for (const SheetRow *first = rows.data(), *const last = first + rows.size(); first != last;) {
       const SheetRow* row = first;
       for (int height_px = 0; row != last; ++row) {
-        height_px += row_px + (has_names(row, first) ? kTop_px : 0);
+        height_px += row_px + (has_names(row, first) ? kCameraNames_px : 0);
         if (row != first && height_px > kMaxPageHeight_px) break;
       }
       result.emplace_back(first, static_cast<std::size_t>(row - first));
@@ -77,7 +77,7 @@ SheetLayout layout_of(const Rig& rig, const std::vector<std::string>& view_names
     image_height_px = std::max(image_height_px, camera.height_px);
   }
   layout.enlargement = enlargement > 0 ? enlargement : std::max(1, kWantedWidth_px / images_width_px);
-  layout.row_px = image_height_px * layout.enlargement + kGap_px;
+  layout.row_px = image_height_px * layout.enlargement + kImageGap_px;
   const Canvas ruler(1, 1, kSheetColor);
   for (const std::string& name : view_names) {
     layout.left_px = std::max(layout.left_px, 20 + static_cast<int>(ruler.text_width(name, kViewStyle)));
@@ -88,7 +88,7 @@ SheetLayout layout_of(const Rig& rig, const std::vector<std::string>& view_names
     for (int first = 0; first < num_cameras;) {
       int end = first, row_width_px = 0;
       for (; end < num_cameras; ++end) {
-        const int width_px = rig.cameras[static_cast<std::size_t>(end)].width_px * layout.enlargement + kGap_px;
+        const int width_px = rig.cameras[static_cast<std::size_t>(end)].width_px * layout.enlargement + kImageGap_px;
         if (end > first && row_width_px + width_px > kMaxPageWidth_px) break;
         row_width_px += width_px;
       }
@@ -103,14 +103,15 @@ SheetLayout layout_of(const Rig& rig, const std::vector<std::string>& view_names
 RgbImage page_of(const HostImages& images, const Rig& rig, const std::vector<std::string>& view_names,
                  const SheetLayout& layout, Span<const SheetRow> rows) {
   int height_px = 0;
-  for (const SheetRow& row : rows) height_px += layout.row_px + (layout.has_names(&row, rows.data()) ? kTop_px : 0);
+  for (const SheetRow& row : rows)
+    height_px += layout.row_px + (layout.has_names(&row, rows.data()) ? kCameraNames_px : 0);
   Canvas canvas(layout.width_px, height_px, kSheetColor);
   canvas.stop_when_interrupted("contact sheet: interrupted while it was drawn");
   int y = 0;
   for (const SheetRow& row : rows) {
     const bool has_names = layout.has_names(&row, rows.data());
-    if (has_names) y += kTop_px;
-    canvas.text(layout.left_px - 10, y + 0.5 * (layout.row_px - kGap_px) + 5,
+    if (has_names) y += kCameraNames_px;
+    canvas.text(layout.left_px - 10, y + 0.5 * (layout.row_px - kImageGap_px) + 5,
                 view_names[static_cast<std::size_t>(row.view)], kViewStyle);
     int x = layout.left_px;
     for (int camera = row.first_camera; camera < row.end_camera; ++camera) {
@@ -119,9 +120,9 @@ RgbImage page_of(const HostImages& images, const Rig& rig, const std::vector<std
       paste(canvas, images, row.view, camera, x, y, layout.enlargement);
       if (has_names) {
         canvas.text(x + 0.5 * width_px, y - 10, each.name,
-                    {.size_px = 14, .align = Align::center, .color = kLabelColor});
+                    {.size_px = 14, .align = Align::center, .color = kSheetLabelColor});
       }
-      x += width_px + kGap_px;
+      x += width_px + kImageGap_px;
     }
     y += layout.row_px;
   }
@@ -155,9 +156,10 @@ RgbImage captioned(const HostImages& images, int view, int camera, const std::st
   const CameraImages& size = images.camera(camera);
   const int enlargement = std::max(1, kPanelWidth_px / size.width_px);
   const int width_px = size.width_px * enlargement, height_px = size.height_px * enlargement;
-  Canvas canvas(width_px, height_px + kTop_px, kSheetColor);
+  Canvas canvas(width_px, height_px + kCameraNames_px, kSheetColor);
   paste(canvas, images, view, camera, 0, 0, enlargement);
-  canvas.text(0.5 * width_px, height_px + 20, caption, {.size_px = 15, .align = Align::center, .color = kLabelColor});
+  canvas.text(0.5 * width_px, height_px + 20, caption,
+              {.size_px = 15, .align = Align::center, .color = kSheetLabelColor});
   return canvas.image();
 }
 
@@ -174,7 +176,8 @@ RgbImage assembled(const std::vector<RgbImage>& pictures) {
   const int width_px = pictures[0].width_px, height_px = pictures[0].height_px;
   const int columns = std::min(kPanelColumns, static_cast<int>(pictures.size()));
   const int rows = (static_cast<int>(pictures.size()) + columns - 1) / columns;
-  RgbImage all{columns * (width_px + kGap_px) - kGap_px, rows * (height_px + kGap_px) - kGap_px, {}};
+  RgbImage all{
+      columns * (width_px + kImageGap_px) - kImageGap_px, rows * (height_px + kImageGap_px) - kImageGap_px, {}};
   constexpr uint8_t kWhite = 255;
   all.rgb.assign(std::size_t{3} * static_cast<std::size_t>(all.width_px) * static_cast<std::size_t>(all.height_px),
                  kWhite);
@@ -183,8 +186,8 @@ RgbImage assembled(const std::vector<RgbImage>& pictures) {
     PICTURA_CHECK(picture.width_px == width_px && picture.height_px == height_px,
                   "figure: expected pictures of {}x{} pixels, got {}x{}", width_px, height_px, picture.width_px,
                   picture.height_px);
-    const int left_px = static_cast<int>(i) % columns * (width_px + kGap_px);
-    const int top_px = static_cast<int>(i) / columns * (height_px + kGap_px);
+    const int left_px = static_cast<int>(i) % columns * (width_px + kImageGap_px);
+    const int top_px = static_cast<int>(i) / columns * (height_px + kImageGap_px);
     paste(picture, left_px, top_px, &all);
   }
   return all;

@@ -19,8 +19,8 @@ namespace pictura {
 
 namespace {
 
-constexpr int kColumns = 4, kCameraWidth_px = 250, kCameraHeight_px = 140, kGap_px = 8;
-constexpr int kTopWidth_px = kColumns * kCameraWidth_px + (kColumns - 1) * kGap_px, kTopHeight_px = 512;
+constexpr int kColumns = 4, kCameraWidth_px = 250, kCameraHeight_px = 140, kCameraGap_px = 8;
+constexpr int kTopWidth_px = kColumns * kCameraWidth_px + (kColumns - 1) * kCameraGap_px, kTopHeight_px = 512;
 constexpr uint8_t kGapGrey = 40;
 constexpr double kFramesPerSecond = 20;  // twice the pace of the world
 
@@ -82,7 +82,7 @@ struct Film::Parts {
         renderer(make_renderer("cpu", view_of(options))),
         order(film_order(renderer->config().rig)),
         images(renderer->config().rig, 1),
-        row_px(kGap_px + row_height_px(images, renderer->config().rig)),
+        row_px(kCameraGap_px + row_height_px(images, renderer->config().rig)),
         frame{kTopWidth_px, kTopHeight_px + (static_cast<int>(order.size()) + kColumns - 1) / kColumns * row_px, {}},
         video(path, frame.width_px, frame.height_px, kFramesPerSecond) {
     frame.rgb.assign(static_cast<size_t>(frame.width_px) * static_cast<size_t>(frame.height_px) * 3, kGapGrey);
@@ -117,8 +117,8 @@ void Film::add_frame(Simulator& simulator) {
   for (size_t i = 0; i < parts.order.size(); ++i) {
     const int camera = parts.order[i], column = static_cast<int>(i) % kColumns, row = static_cast<int>(i) / kColumns;
     const std::string& name = parts.renderer->config().rig.cameras[static_cast<size_t>(camera)].name;
-    paste(captioned(parts.images, 0, camera, name), column * (kCameraWidth_px + kGap_px),
-          kTopHeight_px + kGap_px + row * parts.row_px, &parts.frame);
+    paste(captioned(parts.images, 0, camera, name), column * (kCameraWidth_px + kCameraGap_px),
+          kTopHeight_px + kCameraGap_px + row * parts.row_px, &parts.frame);
   }
   parts.video.add(parts.frame);
 }

@@ -14,7 +14,6 @@ namespace {
 constexpr float kEyeHeight_m = 1.5f;  // above the road, like the cameras
 // The box of the crossing vehicle: a CARLA car.
 constexpr float kCarLength_m = 4.5f, kCarWidth_m = 2.0f, kCarHeight_m = 1.5f;
-constexpr float kSameLevel_m = 2.0f;
 
 /// A path through a junction, with the lanes that lead to it.
 struct Path {
@@ -83,7 +82,7 @@ bool paths_cross(const Path& path, const Path& other) {
   for (size_t i = path.first_inside; i + 1 < path.points.size(); ++i) {
     for (size_t k = other.first_inside; k + 1 < other.points.size(); ++k) {
       const Vec3 a = path.points[i], b = path.points[i + 1], c = other.points[k], d = other.points[k + 1];
-      if (std::abs(a.z - c.z) < kSameLevel_m && crossing_fraction(a.xy(), b.xy(), c.xy(), d.xy())) return true;
+      if (std::abs(a.z - c.z) < kSameRoadLevel_m && crossing_fraction(a.xy(), b.xy(), c.xy(), d.xy())) return true;
     }
   }
   return false;

@@ -15,6 +15,9 @@
 
 namespace pictura {
 
+/// In the header of every such file: its bytes say on which kind of machine numbers were copied into it.
+constexpr uint32_t kByteOrder = 0x01020304;
+
 template <typename T>
 using FieldsOf = decltype(fields_of(std::declval<T&>()));
 template <typename T>

@@ -18,21 +18,20 @@ namespace {
 
 constexpr std::array<char, 8> kMagic{'P', 'I', 'C', 'T', 'R', 'M', 'A', 'P'};
 constexpr uint32_t kVersion = 1;  // of the header; the payload format is covered by the importer hash
-constexpr uint32_t kByteOrder = 0x01020304;
 
-struct Header {
+struct MapCacheHeader {
   std::array<char, 8> magic = kMagic;
   uint32_t version = kVersion, byte_order = kByteOrder;
   MapCacheKey key;
   uint64_t payload_bytes = 0, payload_hash = 0;
 };
-static_assert(std::has_unique_object_representations_v<Header>, "the header must have no padding");
+static_assert(std::has_unique_object_representations_v<MapCacheHeader>, "the header must have no padding");
 
 static_assert(is_plain<LanePoint>() && is_plain<RoadEdge>() && !is_plain<Lane>() && !is_plain<Sign>());
 
 /// Checks the header and returns the payload.
 std::string_view checked_payload(std::string_view bytes, const MapCacheKey& key) {
-  Header header;
+  MapCacheHeader header;
   const std::size_t magic_bytes = std::min(bytes.size(), kMagic.size());
   PICTURA_CHECK(bytes.substr(0, magic_bytes) == std::string_view(kMagic.data(), magic_bytes),
                 "foreign: expected it to begin with {}", std::string_view(kMagic.data(), kMagic.size()));
@@ -62,7 +61,7 @@ MapCacheKey map_cache_key(std::string_view source_bytes, const OpenDriveOptions&
 }
 
 std::string map_cache_header(std::string_view payload, const MapCacheKey& key) {
-  const Header header{.key = key, .payload_bytes = payload.size(), .payload_hash = hash_of(payload)};
+  const MapCacheHeader header{.key = key, .payload_bytes = payload.size(), .payload_hash = hash_of(payload)};
   return {reinterpret_cast<const char*>(&header), sizeof header};
 }
 

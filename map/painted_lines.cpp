@@ -22,7 +22,7 @@ constexpr float kCoincident_m = 1e-3f;
 constexpr float kThinningTolerance_m = kPaintTolerance_m - 3 * kCoincident_m;
 constexpr float kMaxBend = 0.25f;                // sine of the angle between lines that continue each other
 constexpr float kMaxChord_m = 10 * kMaxPiece_m;  // bounds the time of thinning; chords are drawn in equal pieces
-constexpr float kCell_m = 20.0f;
+constexpr float kPieceCell_m = 20.0f;
 
 bool have_equal_style(const PaintedLine& a, const PaintedLine& b) {
   return a.width_m == b.width_m && a.color == b.color;
@@ -64,7 +64,7 @@ class PieceIndex {
         boxes.push_back(box_around(points[i - 1].xy(), points[i].xy(), kCoincident_m));
       }
     }
-    grid_ = Grid(boxes, kCell_m);
+    grid_ = Grid(boxes, kPieceCell_m);
   }
 
   const std::vector<Piece>& pieces() const { return pieces_; }
@@ -201,7 +201,7 @@ class LineJoiner {
     std::vector<Aabb2> boxes;
     for (std::size_t end = 0; end < partners_.size(); ++end)
       boxes.push_back(box_around(end_point(end).xy(), end_point(end).xy(), kCoincident_m));
-    const Grid grid(boxes, kCell_m);
+    const Grid grid(boxes, kPieceCell_m);
     std::vector<Pair> pairs;
     for (std::size_t a = 0; a < partners_.size(); ++a) {
       const Vec2 here = end_point(a).xy(), out = outward(a);

@@ -10,7 +10,6 @@ namespace pictura {
 
 namespace {
 
-constexpr double kLevel_m = 2.0;
 constexpr double kMaxGap_m = 0.05;               // gaps between two bands up to this width count as closed
 constexpr double kSharedBorder_m = 0.004;        // borders closer than this count as shared
 constexpr double kSampleStep_m = 0.5;            // sampling step along borders
@@ -193,7 +192,7 @@ class Joiner {
   }
 
   static double gap(const OutlinePoint& a, const OutlinePoint& b) {
-    const bool is_level = std::abs(a.position_m.z() - b.position_m.z()) < kLevel_m;
+    const bool is_level = std::abs(a.position_m.z() - b.position_m.z()) < kSameRoadLevel_m;
     return is_level ? plan_distance_m(a.position_m, b.position_m) : 1e300;
   }
 
@@ -228,7 +227,7 @@ std::vector<RoadEdge> outline_of(const std::vector<SurfaceBand>& bands, double c
                                  std::vector<int32_t>* bands_out) {
   std::vector<RoadEdge> edges;
   if (bands.empty()) return edges;
-  const Surface surface(bands, kLevel_m);
+  const Surface surface(bands, kSameRoadLevel_m);
   for (const std::vector<OutlinePoint>& outline : Joiner(Tracer(bands, surface).trace()).join()) {
     std::vector<CurvePoint> points;
     std::vector<int32_t> bands_of_points;

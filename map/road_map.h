@@ -34,6 +34,9 @@ enum class LaneType : uint8_t {
 constexpr bool is_drivable(LaneType type) { return type <= LaneType::ramp; }
 const char* to_string(LaneType type);
 
+/// What differs by more in height is on different levels of road: on a bridge and below it.
+constexpr float kSameRoadLevel_m = 2.0f;
+
 /// A half-open range of elements of one of RoadMap's vectors.
 struct IndexRange {
   int32_t begin = 0, end = 0;

@@ -8,7 +8,7 @@ namespace pictura {
 
 namespace {
 
-constexpr float kCell_m = 4.0f;
+constexpr float kQuadCell_m = 4.0f;
 // Budget of quad tests of a surface: a constant, plus an amount per quad.
 constexpr int64_t kBaseLookups = 10'000'000, kLookupsPerQuad = 5000;  // CARLA's towns need up to 544 per quad
 
@@ -48,7 +48,7 @@ Surface::Surface(const std::vector<SurfaceBand>& bands, double level_m) : level_
       boxes.push_back(box);
     }
   }
-  grid_ = Grid(boxes, kCell_m);
+  grid_ = Grid(boxes, kQuadCell_m);
   const GridView grid = grid_.view();
   bounds_.reserve(grid.items.size() + ItemBounds::kPadding);
   for (const int32_t quad : grid.items) bounds_.push_back(bounds_of(quads_[static_cast<std::size_t>(quad)]));

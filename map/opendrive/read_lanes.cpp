@@ -77,7 +77,7 @@ void read_heights(const Element& element, double section_length, FileLane* lane)
   for (Profile* heights : {&lane->inner_height, &lane->outer_height}) sort_records(&Cubic::s, &heights->cubics);
 }
 
-Profile read_speed_limits(const Element& element, double section_length) {
+Profile read_lane_speed_limits(const Element& element, double section_length) {
   Profile limits;
   each_record(element, "speed", section_length, [&](const Element& speed, double s) {
     if (const std::optional<double> limit = read_speed_mps(speed)) {
@@ -148,7 +148,7 @@ FileLane read_side_lane(const Element& element, double section_length) {
   FileLane lane = read_lane(element, section_length);
   read_width(element, section_length, &lane);
   read_heights(element, section_length, &lane);
-  lane.speed_limit_mps = read_speed_limits(element, section_length);
+  lane.speed_limit_mps = read_lane_speed_limits(element, section_length);
   return lane;
 }
 

@@ -50,7 +50,7 @@ bool is_left_hand(const Element& road_element) {
 }
 
 /// The speed limits of <type>, which apply from its s on.
-Profile read_speed_limits(const Element& road_element, double road_length) {
+Profile read_road_speed_limits(const Element& road_element, double road_length) {
   Profile limits;
   road_element.each("type", [&](const Element& type) {
     const std::optional<double> s = read_station(type, "s", road_length);
@@ -72,7 +72,7 @@ FileRoad read_road(const Element& element, const Offset& offset) {
   road.left_hand = is_left_hand(element);
   read_road_links(element, &road);
   read_reference_line(element, &road);
-  road.speed_limit_mps = read_speed_limits(element, road.length);
+  road.speed_limit_mps = read_road_speed_limits(element, road.length);
   read_lanes(element, &road);
   read_objects(element, &road);
   read_signals(element, &road);

@@ -6,7 +6,7 @@ namespace pictura::opendrive {
 
 namespace {
 
-constexpr double kMinSection_m = 0.5;
+constexpr double kMinSplitSection_m = 0.5;
 
 void shift(Profile* profile, double ds) {
   for (Cubic& cubic : profile->cubics) cubic.s -= ds;
@@ -56,7 +56,7 @@ void split_at_speed_changes(Network* network) {
     for (std::size_t i = 0; i < road.sections.size(); ++i) {
       for (const double change : speed_changes(road, road.sections[i])) {
         FileSection& section = road.sections[i];
-        if (change < section.s + kMinSection_m || change > section.end - kMinSection_m) continue;
+        if (change < section.s + kMinSplitSection_m || change > section.end - kMinSplitSection_m) continue;
         const double ds = change - section.s;
         FileSection rest;
         rest.s = change;

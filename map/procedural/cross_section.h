@@ -21,6 +21,7 @@ struct Side {
   int count() const;
   LaneKind kind_at(int rank) const;
 };
+inline constexpr Side kNoSide{.driving = 0, .has_shoulder = false, .has_sidewalk = false};
 
 /// Properties of a section other than the kinds of its lanes.
 struct SectionStyle {

@@ -5,12 +5,10 @@ namespace pictura::town {
 
 namespace {
 
-constexpr double kNoRadiusLimit_m = 1e9;
 constexpr double kMaxTurnRadius_m = 14;  // of the left border of turns other than right turns
 // Lanes that turn across the junction are wider half-way, so that no sliver is left between adjacent lanes.
 constexpr double kTurningWidth_m = 4;
 constexpr double kCrosswalkBegin_m = 0.6, kCrosswalkEnd_m = 3.4;  // beyond the stop line
-constexpr Side kNoSide{.driving = 0, .has_shoulder = false, .has_sidewalk = false};
 
 }  // namespace
 

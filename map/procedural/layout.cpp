@@ -8,26 +8,6 @@ namespace pictura::town {
 
 namespace {
 
-/// Purposes of random draws; each has its own stream.
-enum DrawPurpose : uint32_t {
-  kSpacing,
-  kJitter,
-  kRingRoad,
-  kAvenues,
-  kAvenueLanes,
-  kOverpasses,
-  kUpperStreet,
-  kRoundabouts,
-  kFiveArms,
-  kDiagonals,
-  kThinning,
-  kSidewalks,
-  kParking,
-  kLights,
-  kFarSide,
-  kCrosswalks,
-};
-
 // Block lengths vary by this fraction of their mean, node positions by this much in each coordinate.
 constexpr double kSpacingSpread = 0.12, kJitter_m = 3.5;
 constexpr int kStepX[kNumDirections] = {1, 1, 0, -1, -1, -1, 0, 1};

@@ -76,6 +76,30 @@ class Layout {
   bool has_slip(const Arm& arm) const;
 
  private:
+  /// Purposes of random draws; each has its own stream.
+  enum DrawPurpose : uint32_t {
+    kSpacing,
+    kJitter,
+    kRingRoad,
+    kAvenues,
+    kAvenueLanes,
+    kOverpasses,
+    kUpperStreet,
+    kRoundabouts,
+    kFiveArms,
+    kDiagonals,
+    kThinning,
+    kSidewalks,
+    kParking,
+    kLights,
+    kFarSide,
+    kCrosswalks,
+    kCurved = 100,
+    kCurveShape,
+    kSlipLanes,
+    kHills = 200,
+  };
+
   // In execution order.
   void place_nodes();
   void plan_streets();

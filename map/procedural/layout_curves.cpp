@@ -7,8 +7,6 @@ namespace pictura::town {
 
 namespace {
 
-enum DrawPurpose : uint32_t { kCurved = 100, kCurveShape, kSlipLanes };
-
 constexpr double degrees(double angle) { return angle * kPi_rad / 180; }
 
 // Minimum angles between arms: at nodes with grid streets only, between opposite arms, and at nodes with a diagonal.

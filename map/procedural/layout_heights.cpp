@@ -8,8 +8,6 @@ namespace pictura::town {
 
 namespace {
 
-enum DrawPurpose : uint32_t { kHills = 200 };
-
 constexpr double kClearance_m = 5.5;  // between the surfaces of an overpass
 constexpr int kSweeps = 2000;
 

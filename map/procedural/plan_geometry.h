@@ -88,6 +88,8 @@ inline Curve biarc(const Pose& from, const Pose& to) {
   return {first, second};
 }
 
+inline constexpr double kNoRadiusLimit_m = 1e9;  // of a fillet
+
 /// A fillet: line, arc and line, tangent to each other, with the largest radius that fits but at most `max_radius_m`; a
 /// biarc if the tangents do not intersect between the poses.
 inline Curve fillet(const Pose& from, const Pose& to, double max_radius_m) {

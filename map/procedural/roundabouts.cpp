@@ -7,8 +7,6 @@ namespace pictura::town {
 
 namespace {
 
-constexpr double kNoRadiusLimit_m = 1e9;
-constexpr Side kNoSide{.driving = 0, .has_shoulder = false, .has_sidewalk = false};
 constexpr Side kBareLane{.driving = 1, .has_shoulder = false, .has_sidewalk = false};
 
 /// A pose on the circle's inner edge, in the direction of traffic.

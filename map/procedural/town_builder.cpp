@@ -111,7 +111,6 @@ void TownBuilder::build_bend(const Node& node, const Arm& from, const Arm& to, d
                   .has_sidewalk = street_of(from).has_sidewalks && street_of(to).has_sidewalks};
   const bool is_corner = node.is_bend();
   const double speed = is_corner ? kJunctionSpeed_mps : street_of(from).is_avenue ? kAvenueSpeed_mps : kStreetSpeed_mps;
-  constexpr double kNoRadiusLimit_m = 1e9;
   const int bend = add_road(fillet(reversed(mouth_of(node, from)), mouth_of(node, to), kNoRadiusLimit_m), height_m, "",
                             speed, side, side, {});
   join({bend, true}, end_of(from));

@@ -8,8 +8,7 @@ namespace pictura {
 
 namespace {
 
-constexpr float kCell_m = 10.0f;
-constexpr float kSameLevel_m = 2.0f;
+constexpr float kEdgeCell_m = 10.0f;
 constexpr float kMeet_m = 0.01f;   // ends of pieces of one polyline
 constexpr float kClosed_m = 1.0f;  // polylines whose ends are this near are rings
 constexpr float kMoving_mps = 0.5f;
@@ -48,7 +47,7 @@ SideEdges side_edges_of(const RoadMap& map) {
     boxes.push_back(box_of(edge.a_m.xy(), edge.b_m.xy(), 0));
   }
   finish(edges.size());
-  sides.cells = Grid(boxes, kCell_m);
+  sides.cells = Grid(boxes, kEdgeCell_m);
   return sides;
 }
 
@@ -75,7 +74,7 @@ bool DrivableArea::touches_edge(const GroundBox& box) const {
     }
     if (begin > end) return;
     const float z = edge.a_m.z + 0.5f * (begin + end) * (edge.b_m.z - edge.a_m.z);
-    touches = std::abs(z - box.center_m.z) < kSameLevel_m;
+    touches = std::abs(z - box.center_m.z) < kSameRoadLevel_m;
   });
   return touches;
 }

@@ -16,7 +16,7 @@ constexpr double kDash_m = 3.0, kDashPeriod_m = 12.0;
 constexpr double kStripeOffset_m = 0.15;  // of the two stripes of a double line from its middle
 /// Edges are dense; longer pieces are gaps of the recording, which are kept unless they cross a lane.
 constexpr double kJump_m = 2.0;
-constexpr float kNearLane_m = 6.0f, kSameLevel_m = 2.0f;
+constexpr float kNearLane_m = 6.0f;
 constexpr int kFewestVotes = 20;
 constexpr float kNearSign_m = 10.0f;
 constexpr double kCell_m = 10.0;  // of segments_of()'s grid
@@ -41,7 +41,7 @@ NearLane nearest_lane(Conversion* conversion, const LaneSegments& lanes, Vec3 p,
     const float t = clamp(dot(p.xy() - a, way) / max_of(dot(way, way), 1e-12f), 0.0f, 1.0f);
     const float z = segment.a_m.z + t * (segment.b_m.z - segment.a_m.z);
     const Vec2 away = p.xy() - (a + way * t);
-    if (std::abs(z - p.z) > kSameLevel_m || length(away) > reach_m || length(away) >= best.distance_m) return;
+    if (std::abs(z - p.z) > kSameRoadLevel_m || length(away) > reach_m || length(away) >= best.distance_m) return;
     best = {length(away), away, way};
   });
   return best;

@@ -13,7 +13,6 @@ namespace conversion {
 
 namespace {
 
-constexpr float kLevel_m = 2.0f;  // lanes whose heights differ by more do not meet
 constexpr float kSegmentCell_m = 10.0f;
 // Stop points this near, of lanes that start in about one direction, are one light's.
 constexpr double kSameStopPoint_m = 0.5, kSameHeading_rad = 0.5;
@@ -85,7 +84,7 @@ std::optional<Vec2> crossing(Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
   if (std::abs(det) <= 1e-9 * u.norm() * v.norm()) return std::nullopt;
   const double s = (w.x() * v.y() - w.y() * v.x()) / det, t = (w.x() * u.y() - w.y() * u.x()) / det;
   if (s < 0 || s > 1 || t < 0 || t > 1) return std::nullopt;
-  if (std::abs((a.z + s * (b.z - a.z)) - (c.z + t * (d.z - c.z))) >= double{kLevel_m}) return std::nullopt;
+  if (std::abs((a.z + s * (b.z - a.z)) - (c.z + t * (d.z - c.z))) >= double{kSameRoadLevel_m}) return std::nullopt;
   return Vec2{static_cast<float>(a.x + s * u.x()), static_cast<float>(a.y + s * u.y())};
 }
 

@@ -15,9 +15,8 @@ namespace {
 constexpr FieldFileKind kCached{.magic = {'P', 'I', 'C', 'T', 'R', 'S', 'C', 'N'},
                                 .layout = PICTURA_MAP_FINGERPRINT,
                                 .other = "stale: made by another version of the importer"};
-constexpr uint32_t kByteOrder = 0x01020304;
 
-struct Header {
+struct FieldFileHeader {
   std::array<char, 8> magic{};
   uint32_t version = 0, byte_order = kByteOrder;
   uint64_t layout = 0;
@@ -25,24 +24,24 @@ struct Header {
   int64_t record = 0;
   uint64_t payload_bytes = 0, payload_crc = 0;
 };
-static_assert(std::has_unique_object_representations_v<Header>, "the header must have no padding");
+static_assert(std::has_unique_object_representations_v<FieldFileHeader>, "the header must have no padding");
 static_assert(is_plain<TrackState>() && is_plain<LanePoint>(), "copied as a whole");
 
 }  // namespace
 
 std::string encode_fields(const FieldFileKind& kind, const SceneCacheKey& key,
                           const std::function<void(FieldWriter*)>& put) {
-  std::string bytes(sizeof(Header), '\0');
+  std::string bytes(sizeof(FieldFileHeader), '\0');
   FieldWriter writer(&bytes);
   put(&writer);
-  const std::string_view payload = std::string_view(bytes).substr(sizeof(Header));
-  const Header header{.magic = kind.magic,
-                      .version = kind.version,
-                      .layout = kind.layout,
-                      .file = key.file,
-                      .record = key.record,
-                      .payload_bytes = payload.size(),
-                      .payload_crc = crc32c(payload)};
+  const std::string_view payload = std::string_view(bytes).substr(sizeof(FieldFileHeader));
+  const FieldFileHeader header{.magic = kind.magic,
+                               .version = kind.version,
+                               .layout = kind.layout,
+                               .file = key.file,
+                               .record = key.record,
+                               .payload_bytes = payload.size(),
+                               .payload_crc = crc32c(payload)};
   std::memcpy(bytes.data(), &header, sizeof header);
   return bytes;
 }
@@ -50,7 +49,7 @@ std::string encode_fields(const FieldFileKind& kind, const SceneCacheKey& key,
 void decode_fields(std::string_view bytes, const FieldFileKind& kind, const SceneCacheKey& key, const std::string& name,
                    const std::function<void(FieldReader*)>& get) {
   try {
-    Header header;
+    FieldFileHeader header;
     PICTURA_CHECK(bytes.size() >= sizeof header, "truncated: {} bytes, expected at least {} for the header",
                   bytes.size(), sizeof header);
     std::memcpy(&header, bytes.data(), sizeof header);

@@ -32,18 +32,18 @@ TEST(Truth, OddSizesDownToOnePixelAndEightCamerasOfEightSizes) {
 }
 
 // The oracle's planes of one image.
-struct Planes {
+struct TruePlanes {
   std::vector<float> depth_m;
   std::vector<uint8_t> class_id;
   std::vector<uint16_t> instance_id;
 };
 
-Planes planes_of(const StaticGeometry& geometry, const SceneOwner& scene, const View& view, const Camera& camera) {
+TruePlanes planes_of(const StaticGeometry& geometry, const SceneOwner& scene, const View& view, const Camera& camera) {
   const RendererConfig config{.rig = {{camera}}, .num_threads = 1};
   const auto renderer = make_renderer("cpu", config);
   renderer->upload(0, geometry);
   const auto pixels = static_cast<std::size_t>(camera.width_px * camera.height_px);
-  Planes planes{std::vector<float>(pixels), std::vector<uint8_t>(pixels), std::vector<uint16_t>(pixels)};
+  TruePlanes planes{std::vector<float>(pixels), std::vector<uint8_t>(pixels), std::vector<uint16_t>(pixels)};
   HostImages images(config.rig, 1);
   CameraImages out = images.camera(0);
   out.depth_m = planes.depth_m.data();
@@ -62,7 +62,7 @@ struct PlaneDifference {
 PlaneDifference compare_planes(const Snapshot& town, const Camera& camera) {
   PlaneDifference difference;
   for (const View& view : town.views) {
-    const Planes planes = planes_of(town.geometry, town.scene, view, camera);
+    const TruePlanes planes = planes_of(town.geometry, town.scene, view, camera);
     const TruthImage truth = trace_image(town.geometry, town.scene.batch(), view, camera,
                                          RendererConfig{}.line_floor_px, TruthSamples::center);
     for (std::size_t i = 0; i < planes.depth_m.size(); ++i) {

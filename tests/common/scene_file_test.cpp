@@ -22,7 +22,7 @@ const std::string kAgent =
     "[[agent]]\nclass = 'cyclist'\nx_m = 5.0\ny_m = -1.0\nheading_deg = 180.0\nlength_m = 1.8\nwidth_m = 0.6\n"
     "height_m = 1.7\n";
 
-std::string message_of(const std::string& text) {
+std::string parse_error(const std::string& text) {
   return test::message_of([&] { parse_scene(text, "s.toml"); });
 }
 
@@ -134,82 +134,82 @@ TEST(SceneFile, WholeNumbersHaveAnyNotation) {
 }
 
 TEST(SceneFile, BadFilesAreRejectedWithTheirLine) {
-  EXPECT_THAT(message_of("[[view\n"), HasSubstr("s.toml:1: "));
-  EXPECT_THAT(message_of(""), HasSubstr("expected one or more [[view]] tables"));
-  EXPECT_THAT(message_of("sky = 1\n" + kView), HasSubstr("s.toml:1: unknown key 'sky'; known here: camera, rig"));
-  EXPECT_THAT(message_of(kView + "heading_degs = 1\n"),
+  EXPECT_THAT(parse_error("[[view\n"), HasSubstr("s.toml:1: "));
+  EXPECT_THAT(parse_error(""), HasSubstr("expected one or more [[view]] tables"));
+  EXPECT_THAT(parse_error("sky = 1\n" + kView), HasSubstr("s.toml:1: unknown key 'sky'; known here: camera, rig"));
+  EXPECT_THAT(parse_error(kView + "heading_degs = 1\n"),
               HasSubstr("s.toml:5: view 0: unknown key 'heading_degs'; did you mean 'heading_deg'?; known here: "));
-  EXPECT_THAT(message_of(kView + "speed_mps = 1\n"), HasSubstr("s.toml:5: view 0: unknown key 'speed_mps'"));
-  EXPECT_THAT(message_of("[[view]]\nx_m = 1.0\ny_m = 2.0\n"), HasSubstr("s.toml:1: view 0: heading_deg: is missing"));
-  EXPECT_THAT(message_of("[[view]]\nx_m = nan\n"), HasSubstr("s.toml:2: view 0: x_m: expected a number in"));
-  EXPECT_THAT(message_of("[[view]]\nx_m = inf\n"), HasSubstr("got inf"));
-  EXPECT_THAT(message_of("[[view]]\nx_m = '1'\n"), HasSubstr("expected a number"));
-  EXPECT_THAT(message_of("view = 3\n"), HasSubstr("view: expected a list, got 3"));
-  EXPECT_THAT(message_of("view = [3]\n"), HasSubstr("view: expected a table, got 3"));
-  EXPECT_THAT(message_of(kView + "ego = 0\n"), HasSubstr("view 0: ego: the scene has no agents"));
-  EXPECT_THAT(message_of(kAgent + kView + "ego = 1\n"),
+  EXPECT_THAT(parse_error(kView + "speed_mps = 1\n"), HasSubstr("s.toml:5: view 0: unknown key 'speed_mps'"));
+  EXPECT_THAT(parse_error("[[view]]\nx_m = 1.0\ny_m = 2.0\n"), HasSubstr("s.toml:1: view 0: heading_deg: is missing"));
+  EXPECT_THAT(parse_error("[[view]]\nx_m = nan\n"), HasSubstr("s.toml:2: view 0: x_m: expected a number in"));
+  EXPECT_THAT(parse_error("[[view]]\nx_m = inf\n"), HasSubstr("got inf"));
+  EXPECT_THAT(parse_error("[[view]]\nx_m = '1'\n"), HasSubstr("expected a number"));
+  EXPECT_THAT(parse_error("view = 3\n"), HasSubstr("view: expected a list, got 3"));
+  EXPECT_THAT(parse_error("view = [3]\n"), HasSubstr("view: expected a table, got 3"));
+  EXPECT_THAT(parse_error(kView + "ego = 0\n"), HasSubstr("view 0: ego: the scene has no agents"));
+  EXPECT_THAT(parse_error(kAgent + kView + "ego = 1\n"),
               HasSubstr("s.toml:13: view 0: ego: expected an integer in [0, 0]"));
-  EXPECT_THAT(message_of(kAgent + kView + "hidden = [0, -1]\n"),
+  EXPECT_THAT(parse_error(kAgent + kView + "hidden = [0, -1]\n"),
               HasSubstr("hidden: expected an integer in [0, 0], got -1"));
-  EXPECT_THAT(message_of(kAgent + kView + "hidden = [0.5]\n"), HasSubstr("expected an integer in [0, 0], got 0.5"));
-  EXPECT_THAT(message_of(kAgent + kView + "hidden = [nan]\n"), HasSubstr("expected an integer"));
-  EXPECT_THAT(message_of("size_px = [1e300, 8]\n" + kView), HasSubstr("expected an integer in [1, 8192], got 1.0"));
-  EXPECT_THAT(message_of(kView + "name = '../a'\n"), HasSubstr("got '../a'"));
-  EXPECT_THAT(message_of(kView + kView + "name = 'view0'\n"), HasSubstr("'view0' is taken"));
-  EXPECT_THAT(message_of(kView + "[[agent]]\nclass = 'tram'\n"),
+  EXPECT_THAT(parse_error(kAgent + kView + "hidden = [0.5]\n"), HasSubstr("expected an integer in [0, 0], got 0.5"));
+  EXPECT_THAT(parse_error(kAgent + kView + "hidden = [nan]\n"), HasSubstr("expected an integer"));
+  EXPECT_THAT(parse_error("size_px = [1e300, 8]\n" + kView), HasSubstr("expected an integer in [1, 8192], got 1.0"));
+  EXPECT_THAT(parse_error(kView + "name = '../a'\n"), HasSubstr("got '../a'"));
+  EXPECT_THAT(parse_error(kView + kView + "name = 'view0'\n"), HasSubstr("'view0' is taken"));
+  EXPECT_THAT(parse_error(kView + "[[agent]]\nclass = 'tram'\n"),
               HasSubstr("s.toml:6: agent 0: class: expected one of vehicle, cyclist, pedestrian, got 'tram'"));
-  EXPECT_THAT(message_of(kView + kAgent + "drawn = 1\n"), HasSubstr("drawn: expected true or false, got 1"));
+  EXPECT_THAT(parse_error(kView + kAgent + "drawn = 1\n"), HasSubstr("drawn: expected true or false, got 1"));
   const std::string wall = kView + "[[wall]]\nheight_m = 2\npoints_m = ";
-  EXPECT_THAT(message_of(wall + "[[0, 0]]\n"), HasSubstr("wall 0: points_m: expected 2 points or more, got 1"));
-  EXPECT_THAT(message_of(wall + "[[0, 0], [1]]\n"), HasSubstr("expected [x, y] or [x, y, z]"));
-  EXPECT_THAT(message_of(wall + "[[0, 0], [1e9, 1]]\n"), HasSubstr("expected a number in [-10000, 10000]"));
-  EXPECT_THAT(message_of(wall + "[[0, 0], [1, 1]]\ncolor_rgb = [1, 2]\n"), HasSubstr("color_rgb: expected 3 numbers"));
-  EXPECT_THAT(message_of(wall + "[[0, 0], [1, 1]]\ncolor_rgb = [1, 2, 256]\n"), HasSubstr("got 256"));
+  EXPECT_THAT(parse_error(wall + "[[0, 0]]\n"), HasSubstr("wall 0: points_m: expected 2 points or more, got 1"));
+  EXPECT_THAT(parse_error(wall + "[[0, 0], [1]]\n"), HasSubstr("expected [x, y] or [x, y, z]"));
+  EXPECT_THAT(parse_error(wall + "[[0, 0], [1e9, 1]]\n"), HasSubstr("expected a number in [-10000, 10000]"));
+  EXPECT_THAT(parse_error(wall + "[[0, 0], [1, 1]]\ncolor_rgb = [1, 2]\n"), HasSubstr("color_rgb: expected 3 numbers"));
+  EXPECT_THAT(parse_error(wall + "[[0, 0], [1, 1]]\ncolor_rgb = [1, 2, 256]\n"), HasSubstr("got 256"));
   const std::string mark = kView + "[[line]]\nkind = 'lane_mark'\nwidth_m = 0.1\npoints_m = [[0, 0], [9, 0]]\n";
-  EXPECT_THAT(message_of(mark + "dash_m = 1\n"), HasSubstr("dash_m: is for broken lines"));
-  EXPECT_THAT(message_of(mark + "spacing_m = 1\n"), HasSubstr("spacing_m: is for double lines"));
-  EXPECT_THAT(message_of(mark + "style = 'broken'\ndash_m = 1\n"), HasSubstr("gap_m: is missing"));
-  EXPECT_THAT(message_of(mark + "style = 'broken'\ndash_m = 0.0\ngap_m = 0.0\n"), HasSubstr("dash_m: expected"));
-  EXPECT_THAT(message_of(mark + "color = 'white'\ncolor_rgb = [1, 2, 3]\n"), HasSubstr("color: is for"));
-  EXPECT_THAT(message_of("rig = 'a.toml'\n[[camera]]\nwidth_px = 8\nheight_px = 8\nfocal_px = 9\n" + kView),
+  EXPECT_THAT(parse_error(mark + "dash_m = 1\n"), HasSubstr("dash_m: is for broken lines"));
+  EXPECT_THAT(parse_error(mark + "spacing_m = 1\n"), HasSubstr("spacing_m: is for double lines"));
+  EXPECT_THAT(parse_error(mark + "style = 'broken'\ndash_m = 1\n"), HasSubstr("gap_m: is missing"));
+  EXPECT_THAT(parse_error(mark + "style = 'broken'\ndash_m = 0.0\ngap_m = 0.0\n"), HasSubstr("dash_m: expected"));
+  EXPECT_THAT(parse_error(mark + "color = 'white'\ncolor_rgb = [1, 2, 3]\n"), HasSubstr("color: is for"));
+  EXPECT_THAT(parse_error("rig = 'a.toml'\n[[camera]]\nwidth_px = 8\nheight_px = 8\nfocal_px = 9\n" + kView),
               HasSubstr("rig: has no effect beside [[camera]]"));
-  EXPECT_THAT(message_of("rig = 'no/such.toml'\n" + kView), HasSubstr("no/such.toml: no such file"));
-  EXPECT_THAT(message_of("size_px = [0, 8]\n" + kView), HasSubstr("size_px: expected an integer in [1, 8192], got 0"));
-  EXPECT_THAT(message_of("[[camera]]\nwidth_px = 8\nheight_px = 8\nfocal_px = 9\nzoom = 2\n" + kView),
+  EXPECT_THAT(parse_error("rig = 'no/such.toml'\n" + kView), HasSubstr("no/such.toml: no such file"));
+  EXPECT_THAT(parse_error("size_px = [0, 8]\n" + kView), HasSubstr("size_px: expected an integer in [1, 8192], got 0"));
+  EXPECT_THAT(parse_error("[[camera]]\nwidth_px = 8\nheight_px = 8\nfocal_px = 9\nzoom = 2\n" + kView),
               HasSubstr("s.toml:5: camera 0 'camera0': unknown key 'zoom'"));
   // A line of millions of pieces is rejected before it is divided.
   std::string zigzag = kView + "[[line]]\nkind = 'lane_mark'\nwidth_m = 0.1\npoints_m = [";
   for (int i = 0; i < 50; ++i) zigzag += "[-9000, 0], [9000, 0], ";
-  EXPECT_THAT(message_of(zigzag + "]\n"), HasSubstr("points_m: expected at most 100000 m of line"));
+  EXPECT_THAT(parse_error(zigzag + "]\n"), HasSubstr("points_m: expected at most 100000 m of line"));
 }
 
 TEST(SceneFile, WhatWouldDrawNothingIsRefused) {
-  EXPECT_THAT(message_of("camera = []\n" + kView),
+  EXPECT_THAT(parse_error("camera = []\n" + kView),
               HasSubstr("s.toml:1: camera: expected one or more [[camera]] tables"));
-  EXPECT_THAT(message_of(kAgent + kView + "hidden = [0, 0]\n"), HasSubstr("hidden: agent 0 is listed twice"));
-  EXPECT_THAT(message_of(kView + "[[agent]]\nclass = 'vehicle'\nx_m = 1\ny_m = 1\nlength_m = 0\n"),
+  EXPECT_THAT(parse_error(kAgent + kView + "hidden = [0, 0]\n"), HasSubstr("hidden: agent 0 is listed twice"));
+  EXPECT_THAT(parse_error(kView + "[[agent]]\nclass = 'vehicle'\nx_m = 1\ny_m = 1\nlength_m = 0\n"),
               HasSubstr("length_m: expected a number in [0.001, 1000], got 0"));
   const std::string wall = kView + "[[wall]]\npoints_m = [[0, 0], [1, 0], [1, 0, 2]]\nheight_m = ";
-  EXPECT_THAT(message_of(wall + "0\n"), HasSubstr("height_m: expected a number in [0.001, 1000], got 0"));
-  EXPECT_THAT(message_of(wall + "2\n"), HasSubstr("points_m: points 1 and 2 are at the same place"));
+  EXPECT_THAT(parse_error(wall + "0\n"), HasSubstr("height_m: expected a number in [0.001, 1000], got 0"));
+  EXPECT_THAT(parse_error(wall + "2\n"), HasSubstr("points_m: points 1 and 2 are at the same place"));
   const std::string line = kView + "[[line]]\nkind = 'lane_mark'\npoints_m = [[1, 1], [1, 1]]\nwidth_m = ";
-  EXPECT_THAT(message_of(line + "0\n"), HasSubstr("width_m: expected a number"));
-  EXPECT_THAT(message_of(line + "0.1\n"), HasSubstr("points_m: expected points at different places"));
-  EXPECT_THAT(message_of(kView + "[[light]]\nx_m = 1\ny_m = 1\nfacing_deg = 0\nhalf_angle_deg = 0\n"),
+  EXPECT_THAT(parse_error(line + "0\n"), HasSubstr("width_m: expected a number"));
+  EXPECT_THAT(parse_error(line + "0.1\n"), HasSubstr("points_m: expected points at different places"));
+  EXPECT_THAT(parse_error(kView + "[[light]]\nx_m = 1\ny_m = 1\nfacing_deg = 0\nhalf_angle_deg = 0\n"),
               HasSubstr("half_angle_deg: expected a number in [0.1, 180], got 0"));
 }
 
 TEST(SceneFile, MessagesAreOneLineAndNameWhatWasMeant) {
-  const std::string one_table = message_of("[view]\nx_m = 1.0\ny_m = 2.0\nheading_deg = 3.0\n");
+  const std::string one_table = parse_error("[view]\nx_m = 1.0\ny_m = 2.0\nheading_deg = 3.0\n");
   EXPECT_THAT(one_table, HasSubstr("s.toml:1: view: expected [[view]] tables, got one [view]"));
-  EXPECT_THAT(message_of(kView + "x = 1\n"), HasSubstr("heading_deg, ego, body_length_m, hidden"));
-  const std::string table = message_of("line_floor_px = {a = 1, b = 2}\n" + kView);
+  EXPECT_THAT(parse_error(kView + "x = 1\n"), HasSubstr("heading_deg, ego, body_length_m, hidden"));
+  const std::string table = parse_error("line_floor_px = {a = 1, b = 2}\n" + kView);
   EXPECT_THAT(table, HasSubstr("line_floor_px: expected a number in [0, 8], got a table"));
-  EXPECT_THAT(message_of("size_px = [8, 4]\n[[camera]]\nwidth_px = 8\nheight_px = 8\nfocal_px = 9\n" + kView),
+  EXPECT_THAT(parse_error("size_px = [8, 4]\n[[camera]]\nwidth_px = 8\nheight_px = 8\nfocal_px = 9\n" + kView),
               HasSubstr("s.toml:1: size_px: is for the paper's cameras alone"));
-  EXPECT_THAT(message_of("sky = 1\n" + kView),
+  EXPECT_THAT(parse_error("sky = 1\n" + kView),
               HasSubstr("known here: camera, rig, size_px, square_pixels, line_floor_px"));
-  EXPECT_THAT(message_of("rig = 'no/such.toml'\n" + kView), HasSubstr("s.toml: rig: "));
+  EXPECT_THAT(parse_error("rig = 'no/such.toml'\n" + kView), HasSubstr("s.toml: rig: "));
 }
 
 TEST(SceneFile, PixelsOfThePapersCamerasCanBeSquareAtAnySize) {

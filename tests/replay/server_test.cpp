@@ -16,7 +16,7 @@
 namespace pictura {
 namespace {
 
-constexpr int kFrames = 60, kRequests = 20, kAgents = 4;
+constexpr int kFrames = 60, kRequests = 20, kServedAgents = 4;
 
 /// What a page was told: frames that did not follow one another are counted.
 struct Told {
@@ -51,7 +51,7 @@ Told listen(const std::string& origin, const std::string& path) {
 
 TEST(LiveServer, TellsItsPagesAllInOrderWhileOthersComeAskAndGo) {
   if (!can_serve()) GTEST_SKIP() << "this build cannot serve";
-  auto server = std::make_unique<LiveServer>(LiveServerOptions{.num_agents = kAgents});
+  auto server = std::make_unique<LiveServer>(LiveServerOptions{.num_agents = kServedAgents});
   const size_t root = server->address().find('/', std::string("http://").size());
   const std::string origin = server->address().substr(0, root), path = server->address().substr(root);
 
@@ -70,7 +70,7 @@ TEST(LiveServer, TellsItsPagesAllInOrderWhileOthersComeAskAndGo) {
   start([&] {
     httplib::Client client(origin);
     for (int i = 0; i < kRequests; ++i) {
-      const std::string body = LiveJson{{"watch", i % kAgents}}.dump();
+      const std::string body = LiveJson{{"watch", i % kServedAgents}}.dump();
       const auto answer = client.Post(path + "control", body, "application/json");
       statuses[static_cast<size_t>(i)] = answer ? answer->status : 0;
     }
@@ -99,7 +99,7 @@ TEST(LiveServer, TellsItsPagesAllInOrderWhileOthersComeAskAndGo) {
   }
   EXPECT_THAT(statuses, ::testing::Each(204));
   ASSERT_EQ(watched.size(), static_cast<size_t>(kRequests));
-  for (int i = 0; i < kRequests; ++i) EXPECT_EQ(watched[static_cast<size_t>(i)], i % kAgents);
+  for (int i = 0; i < kRequests; ++i) EXPECT_EQ(watched[static_cast<size_t>(i)], i % kServedAgents);
 }
 
 }  // namespace

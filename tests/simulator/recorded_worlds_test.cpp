@@ -45,7 +45,7 @@ AgentStatus status_of(Simulator& simulator, int slot) {
 void expect_as_recorded(Simulator& simulator, const Scenario& scene, int32_t step) {
   const Span<const AgentBox> boxes = simulator.scene().agents;
   for (int32_t track = 0; track < static_cast<int32_t>(scene.tracks.size()); ++track) {
-    SCOPED_TRACE(testing::Message() << "track " << track << ", step " << step);
+    SCOPED_TRACE(::testing::Message() << "track " << track << ", step " << step);
     const auto at = static_cast<size_t>(step);
     const AgentBox& box = boxes[static_cast<size_t>(track)];
     const bool is_there = scene.valid_of(track)[at] != 0;

@@ -22,7 +22,7 @@ namespace {
 using test::message_of;
 using ::testing::HasSubstr;
 
-constexpr int kSteps = 60;
+constexpr int kRecordedSteps = 60;
 
 std::unique_ptr<Simulator> town() {
   const SimulatorConfig config{.seed = 3, .num_threads = 1, .parked_cars = 4};
@@ -43,12 +43,12 @@ Scenario drive(Simulator& simulator, std::vector<std::vector<AgentBox>>* boxes_o
     boxes_out->emplace_back(boxes.begin(), boxes.end());
   };
   keep();
-  for (uint32_t step = 0; step < kSteps; ++step) {
+  for (uint32_t step = 0; step < kRecordedSteps; ++step) {
     simulator.step(testing::mixed_actions(simulator.num_slots(), step));
     recorder.after_step();
     keep();
   }
-  EXPECT_EQ(recorder.num_steps(), kSteps + 1);
+  EXPECT_EQ(recorder.num_steps(), kRecordedSteps + 1);
   return recorder.scenario();
 }
 
@@ -64,7 +64,7 @@ TEST(SceneRecorder, WhatWasDrivenIsSavedLoadedAndReplayed) {
   EXPECT_EQ(first_difference(driven, *scene), "");
   EXPECT_EQ(scene->format, "pictura");
   EXPECT_EQ(scene->id, "procedural:3 seed 3 world 1 episode 0");
-  EXPECT_EQ(scene->num_steps, kSteps + 1);
+  EXPECT_EQ(scene->num_steps, kRecordedSteps + 1);
   EXPECT_EQ(index_scenes(folder.path()).scenes.size(), 1u);
 
   const SimulatorConfig config = scene_config(*scene, 0, {.num_threads = 1});
@@ -73,7 +73,7 @@ TEST(SceneRecorder, WhatWasDrivenIsSavedLoadedAndReplayed) {
   const auto log = make_controller("log", *replay, 0);
   std::vector<Command> commands(scene->tracks.size());
   int compared = 0, moved = 0;
-  for (size_t step = 0; step <= kSteps; ++step) {
+  for (size_t step = 0; step <= kRecordedSteps; ++step) {
     for (size_t track = 0; track < scene->tracks.size(); ++track) {
       SCOPED_TRACE(::testing::Message() << "track " << track << ", step " << step);
       const auto box_index = static_cast<size_t>(scene->tracks[track].id);
@@ -97,10 +97,10 @@ TEST(SceneRecorder, WhatWasDrivenIsSavedLoadedAndReplayed) {
       ASSERT_EQ(was.agent_class, is.agent_class);
     }
     log->act(replay->controller_input(), {}, commands, {});
-    if (step < kSteps) replay->step(Span<const Command>(commands));
+    if (step < kRecordedSteps) replay->step(Span<const Command>(commands));
   }
-  EXPECT_GT(compared, 20 * kSteps);
-  EXPECT_GT(moved, 3 * kSteps);
+  EXPECT_GT(compared, 20 * kRecordedSteps);
+  EXPECT_GT(moved, 3 * kRecordedSteps);
 }
 
 TEST(SceneRecorder, LightsBecomeRecordedOnes) {
@@ -110,7 +110,7 @@ TEST(SceneRecorder, LightsBecomeRecordedOnes) {
   const Scenario driven = drive(*simulator, &boxes);
   ASSERT_EQ(driven.lights.size(), simulator->maps()[0]->road->lights.size());
   EXPECT_TRUE(driven.map.lights.empty());
-  const auto last = static_cast<size_t>(kSteps);
+  const auto last = static_cast<size_t>(kRecordedSteps);
   const SceneBatch& scene = simulator->scene();
   for (int32_t light = 0; light < static_cast<int32_t>(driven.lights.size()); ++light) {
     const LightState state = scene.light_states[static_cast<size_t>(scene.light_begin[1] + light)];

@@ -9,6 +9,7 @@
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/agent_state_arrays.h"
 #include "pictura/simulator/rules/observe.h"
+#include "pictura/tests/simulator/cpu_simulator.h"
 #include "pictura/tests/simulator/random_edit.h"
 #include "pictura/tests/simulator/same_bits.h"
 #include "pictura/tests/simulator/test_maps.h"
@@ -18,15 +19,10 @@ namespace pictura {
 namespace {
 
 using ::testing::HasSubstr;
+using testing::run;
 
 std::unique_ptr<Simulator> make(const SimulatorConfig& config, std::vector<WorldSpec> worlds) {
-  return make_simulator("cpu", config, {testing::stadium(200, 2)}, std::move(worlds));
-}
-
-void run(Simulator* simulator, int steps, uint32_t first_step = 0) {
-  for (int i = 0; i < steps; ++i) {
-    simulator->step(testing::mixed_actions(simulator->num_slots(), first_step + static_cast<uint32_t>(i)));
-  }
+  return testing::make(config, testing::stadium(200, 2), std::move(worlds));
 }
 
 NamedArray named(std::string_view name, const auto& values) { return {name, Array(values)}; }

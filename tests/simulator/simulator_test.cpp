@@ -14,6 +14,7 @@
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/observation_arrays.h"
 #include "pictura/simulator/rules/limits.h"
+#include "pictura/tests/simulator/cpu_simulator.h"
 #include "pictura/tests/simulator/same_bits.h"
 #include "pictura/tests/simulator/test_maps.h"
 #include "pictura/tests/support/error_message.h"
@@ -23,16 +24,8 @@ namespace {
 
 constexpr int32_t kCoast = 2 * kNumLatActions + 1;
 
-std::unique_ptr<Simulator> make(const SimulatorConfig& config, std::shared_ptr<const RoadMap> map,
-                                std::vector<WorldSpec> worlds) {
-  return make_simulator("cpu", config, {std::move(map)}, std::move(worlds));
-}
-
-void run(Simulator* simulator, int steps, uint32_t first_step = 0) {
-  for (int i = 0; i < steps; ++i) {
-    simulator->step(testing::mixed_actions(simulator->num_slots(), first_step + static_cast<uint32_t>(i)));
-  }
-}
+using testing::make;
+using testing::run;
 
 TEST(Worlds, FillTheSlotsExactly) {
   const std::vector<WorldSpec> worlds = draw_worlds(3, 20480, 1, 120, 8);

@@ -5,9 +5,9 @@
 #include <gtest/gtest.h>
 
 #include "pictura/backends/make_controller.h"
-#include "pictura/backends/make_simulator.h"
 #include "pictura/common/error.h"
 #include "pictura/simulator/rules/control.h"
+#include "pictura/tests/simulator/cpu_simulator.h"
 #include "pictura/tests/simulator/same_bits.h"
 #include "pictura/tests/simulator/test_maps.h"
 #include "pictura/tests/support/error_message.h"
@@ -16,11 +16,7 @@ namespace pictura {
 namespace {
 
 using ::testing::HasSubstr;
-
-std::unique_ptr<Simulator> make(const SimulatorConfig& config, std::shared_ptr<const RoadMap> map,
-                                std::vector<WorldSpec> worlds) {
-  return make_simulator("cpu", config, {std::move(map)}, std::move(worlds));
-}
+using testing::make;
 
 Command absence() {
   Command command;
