@@ -114,7 +114,7 @@ def test_weights_of_python_run_in_the_command(tmp_path):
         pytest.skip("PICTURA_COMMAND names no command that was built with torch")
     run = tmp_path / "run"
     smoke = pathlib.Path(__file__).parents[2] / "configs" / "smoke.toml"
-    settings = ["policy.modality=vector", "train.updates=1"]
+    settings = ["policy.modality=vector", "train.updates=1", "run.num_threads=1"]
     sets = [part for setting in settings for part in ("--set", setting)]
     train = [command, "train", "--config", str(smoke), "--out", str(run), "--device", "cpu", *sets]
     out = subprocess.run(train, capture_output=True, text=True)
@@ -135,7 +135,7 @@ def test_weights_of_python_run_in_the_command(tmp_path):
     seen = {}
     for checkpoint in (run / "checkpoint.ckpt", tmp_path / "throttle.ckpt", tmp_path / "throttle.safetensors"):
         out = subprocess.run(
-            [command, "simulate", "procedural:1", "--agents", "4", "--steps", "20", "--policy", str(checkpoint), "--json"],
+            [command, "simulate", "procedural:1", "--agents", "4", "--steps", "20", "--threads", "1", "--policy", str(checkpoint), "--json"],
             capture_output=True, text=True,
         )  # fmt: skip
         assert out.returncode == 0, out.stderr
