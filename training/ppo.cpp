@@ -1,5 +1,6 @@
 #include "pictura/training/ppo.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -192,6 +193,28 @@ at::Tensor shares_in(const Chunk& chunk, const at::Tensor& shares, const at::Ten
   return padded * (static_cast<double>(chunk.size()) / static_cast<double>(chunk.count));
 }
 
+// How many transitions of an update's first minibatch are a chunk of their own, by whose gradients the single losses
+// are compared: on the host one of 64 of those that the update passes over in all its epochs, so that three more ways
+// back are at most 3 % of its work. On a device the first chunk is a small part anyway, and chunks have few sizes: 0.
+int64_t diagnosed_rows(const Minibatches& minibatches, const Config::Train& config, bool on_host) {
+  if (!on_host) return 0;
+  constexpr int64_t kPassesPerDiagnosed = 64;
+  return std::clamp<int64_t>(minibatches.size() * config.update_epochs / kPassesPerDiagnosed, 1, config.forward_chunk);
+}
+
+// Calls f(const Chunk&) for all chunks of at most `most` of a minibatch, whose first `head` rows are one where there
+// are more.
+template <typename F>
+void for_each_chunk_after(int64_t head, const at::Tensor& minibatch, int64_t most, const F& f) {
+  const int64_t rest = minibatch.size(0) - head;
+  if (head == 0 || rest <= 0) return for_each_chunk(minibatch, {most}, f);
+  f(Chunk{minibatch.narrow(0, 0, head), 0, head});
+  for_each_chunk(minibatch.narrow(0, head, rest), {most}, [&](Chunk chunk) {
+    chunk.begin += head;
+    f(chunk);
+  });
+}
+
 // The norms of the gradient of the first chunk, or of those of all ranks, by each loss alone: f64 [3].
 at::Tensor norms_over_ranks(std::vector<at::Tensor> gradients, int64_t num_rows, const AdamW& optimizer,
                             Communicator* communicator) {
@@ -203,11 +226,11 @@ at::Tensor norms_over_ranks(std::vector<at::Tensor> gradients, int64_t num_rows,
 }
 
 // Adds this rank's part of a minibatch's gradients, which has `size_of_all` transitions over all ranks, to those of the
-// parameters, `forward_chunk` transitions at a time. Returns the minibatch's LossStats without the norm, f64
-// [kNumStats], until the next minibatch. With `norms`, sets them as norms_over_ranks does.
+// parameters, `forward_chunk` transitions at a time after the first `head`. Returns the minibatch's LossStats without
+// the norm, f64 [kNumStats], until the next minibatch. With `norms`, sets them as norms_over_ranks does.
 at::Tensor add_gradients(ChunkRunner* runner, const Batch& batch, const at::Tensor& minibatch, int64_t size_of_all,
-                         const Config::Train& config, AdamW* optimizer, PhaseTimer* timer, Communicator* communicator,
-                         at::Tensor* norms) {
+                         int64_t head, const Config::Train& config, AdamW* optimizer, PhaseTimer* timer,
+                         Communicator* communicator, at::Tensor* norms) {
   at::Tensor advantages = batch.advantages.index_select(0, minibatch), shares;
   const at::Tensor valid = takes_all(config) ? batch.valid.index_select(0, minibatch).to(at::kDouble)
                                              : at::ones_like(advantages, at::kDouble);
@@ -228,7 +251,7 @@ at::Tensor add_gradients(ChunkRunner* runner, const Batch& batch, const at::Tens
       by_loss.push_back(gradient_of(loss, optimizer));
     }
   };
-  for_each_chunk(minibatch, {config.forward_chunk}, [&](const Chunk& chunk) {
+  for_each_chunk_after(head, minibatch, config.forward_chunk, [&](const Chunk& chunk) {
     const double weight = static_cast<double>(chunk.count) / static_cast<double>(size_of_all);
     const bool is_diagnosed = norms && chunk.begin == 0;
     if (is_diagnosed) num_rows_by_loss = chunk.count;
@@ -250,11 +273,11 @@ bool must_be_recomputed(const LossStats& first) {
 // The log-probabilities of all chosen actions [steps * slots], for kept transitions by the learner's forward pass: in
 // the minibatches and chunks in which they are learned from next, so that not even the batch's size differs.
 at::Tensor recomputed_log_probs(ChunkRunner* runner, const Targets& targets, const Minibatches& minibatches,
-                                int64_t forward_chunk) {
+                                int64_t first_head, int64_t forward_chunk) {
   const at::NoGradGuard no_grad;
   at::Tensor log_probs = targets.old_log_probs.clone();
   for (int64_t m = 0; m < minibatches.count(); ++m) {
-    for_each_chunk(minibatches.rows(m), {forward_chunk}, [&](const Chunk& chunk) {
+    for_each_chunk_after(m == 0 ? first_head : 0, minibatches.rows(m), forward_chunk, [&](const Chunk& chunk) {
       const at::Tensor all = at::log_softmax(runner->look(chunk.rows).logits, 1).narrow(0, 0, chunk.count);
       const at::Tensor rows = chunk.rows.narrow(0, 0, chunk.count);
       log_probs.index_copy_(0, rows, log_probs_of(all, targets, rows));
@@ -318,8 +341,9 @@ UpdateStats ppo_update(ChunkRunner* runner, const Rollout& rollout, const Config
     minibatches.shuffle(epoch);
     for (int64_t m = 0; m < minibatches.count(); ++m) {
       const bool is_first = stats.minibatches == 0;
+      const int64_t head = is_first ? diagnosed_rows(minibatches, config, batch.valid.is_cpu()) : 0;
       const auto add_its_gradients = [&] {
-        return add_gradients(runner, batch, minibatches.rows(m), minibatches.size(m), config, optimizer, timer,
+        return add_gradients(runner, batch, minibatches.rows(m), minibatches.size(m), head, config, optimizer, timer,
                              communicator, is_first ? &first_norms : nullptr);
       };
       at::Tensor minibatch_stats = add_its_gradients();
@@ -327,7 +351,8 @@ UpdateStats ppo_update(ChunkRunner* runner, const Rollout& rollout, const Config
         const LossStats first = loss_stats(minibatch_stats.cpu());
         if (must_be_recomputed(first)) {
           stats.rejected = first;
-          batch.targets.old_log_probs = recomputed_log_probs(runner, batch.targets, minibatches, config.forward_chunk);
+          batch.targets.old_log_probs =
+              recomputed_log_probs(runner, batch.targets, minibatches, head, config.forward_chunk);
           runner->set_targets(batch.targets);
           optimizer->clear_gradients();
           minibatch_stats = add_its_gradients();

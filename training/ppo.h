@@ -65,7 +65,8 @@ struct UpdateStats {
   /// The same by the rollout's log-probabilities, where these were not the learner's and were computed again.
   std::optional<LossStats> rejected;
   std::vector<LossStats> epochs;  // of each
-  /// Of the gradient of the first minibatch's first chunk by each loss alone, with its coefficient.
+  /// Of the gradient of the first minibatch's first chunk by each loss alone, with its coefficient. On the host that
+  /// chunk has a 64th of the transitions that the update passes over.
   double policy_grad_norm = 0, value_grad_norm = 0, entropy_grad_norm = 0;
   double learning_rate = 0;
   double explained_variance = 0;  // over all valid transitions

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 
 #include <ATen/Parallel.h>
 #include <ATen/core/grad_mode.h>
@@ -274,6 +275,53 @@ TEST(Ppo, ChunksChangeNothingButRounding) {
     const at::NoGradGuard no_grad;
     EXPECT_LT((whole.parameters()[i].value - chunked.parameters()[i].value).abs().max().item<double>(), 2e-4);
   }
+}
+
+// A policy that keeps how many transitions each of its forward passes took.
+class CountedPolicy final : public Policy {
+ public:
+  explicit CountedPolicy(const Policy* policy) : policy_(*policy) { parameters_ = policy->parameters(); }
+  Output forward(const Observation& observation) const override {
+    sizes.push_back(observation.ego.size(0));
+    return policy_.forward(observation);
+  }
+  mutable std::vector<int64_t> sizes;
+
+ private:
+  const Policy& policy_;
+};
+
+TEST(Ppo, OneOf64TransitionsTellsTheLossesGradientsApart) {
+  at::set_num_threads(1);
+  Config::PolicySection section;
+  section.modality = Modality::vector;
+  section.embedding_width = section.backbone_width = 8;
+  section.backbone_layers = 1;
+  const PolicyNetwork network(section, 1, 7);
+  const CountedPolicy policy(&network);
+  Config::Train train;
+  train.minibatch_size = 512;
+  train.forward_chunk = 128;  // no chunk is filled up
+  train.update_epochs = 4;
+  train.adv_filter_threshold = 0;
+  Corridor corridor;
+  corridor.play(policy, 0);
+  corridor.rollout.rewards.copy_(
+      at::arange(corridor.rollout.rewards.numel(), at::kFloat).sin().reshape_as(corridor.rollout.rewards));
+  corridor.compute_advantages(0.9, 0.9);
+  AdamW optimizer(policy, train);
+  AdvantageFilter filter;
+  policy.sizes.clear();
+  const UpdateStats stats = corridor.update(policy, train, 0, &optimizer, &filter);
+  ASSERT_FALSE(stats.rejected);
+  ASSERT_GT(policy.sizes.size(), 5u);
+  EXPECT_EQ(policy.sizes[0], 8 * 128 * 4 / 64);
+  EXPECT_EQ(std::accumulate(policy.sizes.begin(), policy.sizes.begin() + 5, int64_t{0}), 512);
+  EXPECT_EQ(std::accumulate(policy.sizes.begin(), policy.sizes.end(), int64_t{0}), 8 * 128 * 4)
+      << "each transition is passed over once an epoch";
+  EXPECT_GT(stats.policy_grad_norm, 0);
+  EXPECT_GT(stats.value_grad_norm, 0);
+  EXPECT_GT(stats.entropy_grad_norm, 0);
 }
 
 TEST(Ppo, InvalidTransitionsTeachNothing) {
