@@ -207,4 +207,25 @@ void largest_members(const float* members, const int32_t* counts, int64_t sets, 
   }
 }
 
+void largest_members_backward(const float* grad, const int32_t* which, int64_t sets, int64_t channels, int64_t hidden,
+                              const float* weight, const float* activations, float* activations_grad_inout,
+                              float* weight_grad_inout) {
+  // By turns, so that one of the two matrices is in the first-level cache.
+  const auto add_all = [&](const auto& add) {
+    for (int64_t i = 0; i < sets * channels; ++i) {
+      if (which[i] >= 0) add(grad[i], i % channels, int64_t{which[i]});
+    }
+  };
+  const auto add_row = [hidden](float factor, const float* from, float* to) {
+#pragma omp simd
+    for (int64_t h = 0; h < hidden; ++h) to[h] += factor * from[h];
+  };
+  add_all([&](float g, int64_t channel, int64_t row) {
+    add_row(g, weight + channel * hidden, activations_grad_inout + row * hidden);
+  });
+  add_all([&](float g, int64_t channel, int64_t row) {
+    add_row(g, activations + row * hidden, weight_grad_inout + channel * hidden);
+  });
+}
+
 }  // namespace pictura::host

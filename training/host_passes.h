@@ -56,4 +56,12 @@ void member_rows(const float* members, const int32_t* counts, int64_t sets, int6
 void largest_members(const float* members, const int32_t* counts, int64_t sets, int64_t channels, float* largest_out,
                      int32_t* which_out);
 
+/// The way back from the largest embeddings of sets through their linear layer, where each channel's gradient goes to
+/// one member alone. grad: [sets, channels]; which: i32 [sets, channels], the row of the member among `activations`,
+/// [rows, hidden], -1 in an empty set; weight: [channels, hidden]. activations_grad_inout, [rows, hidden], and
+/// weight_grad_inout, [channels, hidden], are added to.
+void largest_members_backward(const float* grad, const int32_t* which, int64_t sets, int64_t channels, int64_t hidden,
+                              const float* weight, const float* activations, float* activations_grad_inout,
+                              float* weight_grad_inout);
+
 }  // namespace pictura::host

@@ -371,48 +371,52 @@ struct HostSets : Function<HostSets> {
   static variable_list backward(AutogradContext* context, const variable_list& grads) {
     const variable_list saved = context->get_saved_variables();
     const at::Tensor &rows = saved[0], &which = saved[1], &counts = saved[2], hidden_weight = saved[3].detach(),
-                     hidden_bias = saved[4].detach(), weight = saved[5].detach(), grad = grads[0].contiguous();
+                     hidden_bias = saved[4].detach(), weight = saved[5].detach().contiguous(),
+                     grad = grads[0].contiguous();
     const int64_t sets = which.size(0), channels = which.size(1), hidden = hidden_weight.size(0);
     const std::vector<int64_t> begins = begins_of(counts);
-    const Blocks blocks(sets, host::kBlockNumbers / (channels * (hidden + channels)));
+    // Of a set most members are the largest nowhere: there are a few rows of slopes, activations and their gradients.
+    const Blocks blocks(sets, host::kBlockNumbers / (16 * hidden));
     const auto options = weight.options();
     const at::Tensor hidden_weight_sums = at::zeros({blocks.parts(), hidden, rows.size(1)}, options),
                      hidden_bias_sums = at::zeros({blocks.parts(), hidden}, options),
                      weight_sums = at::zeros({blocks.parts(), channels, hidden}, options);
     const at::Tensor hidden_transposed = hidden_weight.t();
     blocks.run([&](int64_t part) {
-      return [&, part, numbers = std::vector<int64_t>(), chosen = std::vector<int64_t>(),
-              hidden_weight_sum = hidden_weight_sums[part],
-              weight_sum = weight_sums[part]](int64_t begin, int64_t end) mutable {
-        // The members that are the largest somewhere, as rows, and the gradient of each.
+      return [&, part, numbers = std::vector<int32_t>(), places = std::vector<int32_t>(),
+              chosen = std::vector<int64_t>(),
+              hidden_weight_sum = hidden_weight_sums[part]](int64_t begin, int64_t end) mutable {
+        // The members that are the largest somewhere, and where each channel's is among them.
         chosen.clear();
-        const at::Tensor gradients = at::zeros({(end - begin) * channels, channels}, options);
-        float* const gradient = write(gradients);
+        places.clear();
         const int32_t* its_which = which.const_data_ptr<int32_t>() + begin * channels;
-        const float* its_grad = read(grad, begin);
-        for (int64_t set = begin; set < end; ++set, its_which += channels, its_grad += channels) {
+        for (int64_t set = begin; set < end; ++set, its_which += channels) {
           const int64_t first = begins[static_cast<size_t>(set)], count = begins[static_cast<size_t>(set) + 1] - first;
-          if (count == 0) continue;
           numbers.assign(static_cast<size_t>(count), -1);
           for (int64_t c = 0; c < channels; ++c) {
-            int64_t& number = numbers[static_cast<size_t>(its_which[c])];
+            if (count == 0) {
+              places.push_back(-1);
+              continue;
+            }
+            int32_t& number = numbers[static_cast<size_t>(its_which[c])];
             if (number < 0) {
-              number = static_cast<int64_t>(chosen.size());
+              number = static_cast<int32_t>(chosen.size());
               chosen.push_back(first + its_which[c]);
             }
-            gradient[number * channels + c] = its_grad[c];
+            places.push_back(number);
           }
         }
         const auto count = static_cast<int64_t>(chosen.size());
         if (count == 0) return;
         const at::Tensor some = rows.index_select(0, at::from_blob(chosen.data(), {count}, at::kLong)),
-                         its_gradients = gradients.narrow(0, 0, count), slope = at::mm(some, hidden_transposed),
-                         activations = at::empty_like(slope), activation_grads = at::mm(its_gradients, weight);
+                         slope = at::mm(some, hidden_transposed), activations = at::empty_like(slope),
+                         activation_grads = at::zeros_like(slope);
         host::bias_gelu(read(slope), read(hidden_bias), count, hidden, write(activations), write(slope));
-        at::Tensor sum = weight_sum, hidden_sum = hidden_weight_sum;
-        at::addmm_out(sum, sum, its_gradients.t(), activations);
+        host::largest_members_backward(read(grad, begin), places.data(), end - begin, channels, hidden, read(weight),
+                                       read(activations), write(activation_grads), write(weight_sums, part));
         host::bias_gelu_backward(read(slope), read(activation_grads), count, hidden, write(activation_grads),
                                  write(hidden_bias_sums, part));
+        at::Tensor hidden_sum = hidden_weight_sum;
         at::addmm_out(hidden_sum, hidden_sum, activation_grads.t(), some);
       };
     });
