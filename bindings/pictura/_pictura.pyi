@@ -40,6 +40,8 @@ class Array:
         """
     def __len__(self) -> int:
         ...
+    def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        ...
     def __repr__(self) -> str:
         ...
     def numpy(self) -> numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]:
@@ -87,6 +89,8 @@ class Geometry:
         walls: float [n, 7]: both ends of the foot, in metres, and the height.
         Raises pictura.Error for other shapes; a renderer refuses what is not finite.
         """
+    def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        ...
     @property
     def num_lights(self) -> int:
         """
@@ -122,6 +126,8 @@ class Map:
         may lie from true ones.
         Raises pictura.Error naming file, line and element; pictura.UsageError where there is no such map.
         """
+    def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        ...
     def __repr__(self) -> str:
         ...
     def arrays(self) -> dict:
@@ -181,6 +187,8 @@ class Scenario(Map):
         start_step: of the recording, at which episodes begin.
         Raises pictura.Error naming file, record and field; pictura.UsageError where there is no such scene or step.
         """
+    def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        ...
     def __repr__(self) -> str:
         ...
     def draw(self, width_px: typing.SupportsInt | typing.SupportsIndex = 1024, height_px: typing.SupportsInt | typing.SupportsIndex = 1024) -> numpy.typing.NDArray[numpy.uint8]:
@@ -293,6 +301,8 @@ class SceneRecorder:
         """
         Raises pictura.UsageError where there is no such world and where the simulator is on a device.
         """
+    def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        ...
     def scenario(self, *, id: str = '', self_agent: typing.SupportsInt | typing.SupportsIndex = -1) -> Scenario:
         """
         The pictura.Scenario of what was driven until now: controlled agents and parked cars that were there as tracks, with the
@@ -318,6 +328,8 @@ class Camera:
         """
         The principal point is the middle; focal_px defaults to 0.8 times the width, about 64 degrees across.
         """
+    def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        ...
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:
@@ -404,6 +416,8 @@ class Rig:
         """
     def __len__(self) -> int:
         ...
+    def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        ...
     def __setstate__(self, arg0: tuple) -> None:
         ...
     @property
@@ -422,6 +436,8 @@ class Scene:
         green, of all worlds; light_begin [worlds + 1]. Raises pictura.Error for other shapes; render() refuses what does not
         fit together.
         """
+    def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        ...
     @property
     def boxes(self) -> Array:
         """
@@ -440,6 +456,8 @@ class SceneFile:
         """
         Raises pictura.Error naming file, line, table and key.
         """
+    def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        ...
     @property
     def geometry(self) -> Geometry:
         ...
@@ -467,6 +485,8 @@ class Images:
     Images of some views by each camera of a rig, in the renderer's memory, and their planes where they were asked for.
     A renderer draws into it as often as wanted.
     """
+    def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        ...
     def camera(self, index: typing.SupportsInt | typing.SupportsIndex) -> Array:
         """
         [views, 3, height, width] of one camera.
@@ -493,7 +513,8 @@ class Images:
         [views, cameras, 3, height, width], for a rig whose cameras have one size.
         """
 class _RendererInside:
-    pass
+    def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        ...
 class Renderer:
     """
     Draws scenes: 'cpu', 'cuda', 'gl' ('gl:egl', 'gl:osmesa'), 'null', or 'auto'. One thread at a time; several renderers are
@@ -509,6 +530,8 @@ class Renderer:
         '4' (MSAA) or '4x4' (supersampling). stream: a cudaStream_t as int; None: the legacy default stream.
         Raises pictura.UsageError listing the names, pictura.Error where the backend cannot run here.
         """
+    def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        ...
     def _inside(self) -> _RendererInside:
         ...
     def check(self) -> None:
@@ -563,6 +586,8 @@ class StepResult:
     """
     What a step returns, one element a slot, in the simulator's memory: every step writes the same arrays again.
     """
+    def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        ...
     @property
     def distance_m(self) -> typing.Any:
         """
@@ -602,10 +627,14 @@ class Snapshot:
     """
     A state that a simulator keeps in its own memory.
     """
+    def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        ...
 class _SimulatorInside:
-    pass
+    def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        ...
 class _ControllerInside:
-    pass
+    def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        ...
 class Controller:
     """
     Who drives in one simulator on the CPU: 'lane' (the lane keeper), 'idm_lanes' (along lanes, behind others), 'idle' or 'random', in
@@ -626,6 +655,8 @@ class Controller:
         """
         Raises pictura.UsageError listing the names.
         """
+    def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        ...
     def act(self, simulator: Simulator) -> typing.Any:
         """
         Commands for all slots, which may be changed before step_commands() takes them: NumPy's COMMAND_DTYPE [slots], or uint8
@@ -651,6 +682,8 @@ class Simulator:
         as int; None: the legacy default stream. The other defaults are the paper's training world.
         Raises pictura.UsageError naming what cannot be simulated, pictura.Error where there is no device.
         """
+    def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        ...
     def _inside(self) -> _SimulatorInside:
         ...
     def check(self) -> None:
@@ -843,6 +876,8 @@ class Recorder:
         images of every step, drawn by the CPU renderer, without loss; without it the page draws the paper's cameras itself. Raises pictura.UsageError where there is no such world or agent and
         where the simulator is on a device.
         """
+    def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        ...
     def decide(self, logits: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], value: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
         What a policy makes of the followed agent's state, for the next step: logits [12], and its value.
@@ -873,6 +908,8 @@ class LiveView:
         follow: the agent that pages open with. rig: what its images are drawn with; without it pages draw the paper's cameras themselves. wait_for_page: no step is taken before
         a page has come. Raises pictura.UsageError where this package cannot serve, pictura.Error where the port is taken.
         """
+    def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        ...
     def close(self) -> None:
         """
         Tells pages that it is over, and lets the simulator run freely.

@@ -17,6 +17,8 @@ class PolicySession:
         and arrays that it is given work there too. The others as in pictura.evaluate(). Raises pictura.Error naming the file, or
         pictura.UsageError where it cannot see through these cameras.
         """
+    def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        ...
     def evaluate(self, observations: dict, *, scene: pictura._pictura.Scene = None, views: typing.Any = None, renderer: typing.Any = None, is_drawn: typing.Any = None) -> tuple:
         """
         Logits float32 [batch, 12] and values float32 [batch], on its device.
