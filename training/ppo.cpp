@@ -163,6 +163,12 @@ class Minibatches {
     rows_ = shuffled.index_select(0, places);
     const at::Tensor begins = (at::arange(count_ + 1, places.options()) * size_).div(count_, "floor");
     begins_ = at::searchsorted(places, begins).cpu();
+    places_ = places;
+  }
+
+  /// How many of the first `count` transitions of the epoch are this rank's: as many of its rows, from the first.
+  int64_t own_of_first(int64_t count) const {
+    return at::searchsorted(places_, at::full({}, count, places_.options())).item<int64_t>();
   }
 
   /// This rank's rows of one, as the last shuffle() left them.
@@ -181,6 +187,7 @@ class Minibatches {
   int64_t size_ = 0, count_ = 0;
   at::Tensor own_;            // [size_] the row of each of all ranks' transitions, as they are numbered
   at::Tensor rows_, begins_;  // in the order of the epoch; [count_ + 1] where each minibatch begins in it
+  at::Tensor places_;         // of rows_ in the order of all ranks' transitions
 };
 
 // What each row of a chunk counts in the chunk's means: undefined where each counts as one. `shares` are those of the
@@ -193,13 +200,16 @@ at::Tensor shares_in(const Chunk& chunk, const at::Tensor& shares, const at::Ten
   return padded * (static_cast<double>(chunk.size()) / static_cast<double>(chunk.count));
 }
 
-// How many transitions of an update's first minibatch are a chunk of their own, by whose gradients the single losses
-// are compared: on the host one of 64 of those that the update passes over in all its epochs, so that three more ways
-// back are at most 3 % of its work. On a device the first chunk is a small part anyway, and chunks have few sizes: 0.
-int64_t diagnosed_rows(const Minibatches& minibatches, const Config::Train& config, bool on_host) {
-  if (!on_host) return 0;
+// How many of this rank's transitions of an update's first minibatch are a chunk of their own, by whose gradients the
+// single losses are compared: on the host those of the first of all ranks', one of 64 of those that the update passes
+// over in all its epochs, so that three more ways back are at most 3 % of its work. Nothing on a device, where the
+// first chunk is a small part anyway, and chunks have few sizes.
+std::optional<int64_t> diagnosed_rows(const Minibatches& minibatches, const Config::Train& config, bool on_host) {
+  if (!on_host) return std::nullopt;
   constexpr int64_t kPassesPerDiagnosed = 64;
-  return std::clamp<int64_t>(minibatches.size() * config.update_epochs / kPassesPerDiagnosed, 1, config.forward_chunk);
+  const int64_t of_all = minibatches.size() * config.update_epochs / kPassesPerDiagnosed,
+                most = std::min(config.forward_chunk, minibatches.size(0));
+  return minibatches.own_of_first(std::clamp<int64_t>(of_all, 1, most));
 }
 
 // Calls f(const Chunk&) for all chunks of at most `most` of a minibatch, whose first `head` rows are one where there
@@ -226,11 +236,11 @@ at::Tensor norms_over_ranks(std::vector<at::Tensor> gradients, int64_t num_rows,
 }
 
 // Adds this rank's part of a minibatch's gradients, which has `size_of_all` transitions over all ranks, to those of the
-// parameters, `forward_chunk` transitions at a time after the first `head`. Returns the minibatch's LossStats without
-// the norm, f64 [kNumStats], until the next minibatch. With `norms`, sets them as norms_over_ranks does.
+// parameters, `forward_chunk` transitions at a time after the first `diagnosed`. Returns the minibatch's LossStats
+// without the norm, f64 [kNumStats], until the next minibatch. With `norms`, sets them as norms_over_ranks does.
 at::Tensor add_gradients(ChunkRunner* runner, const Batch& batch, const at::Tensor& minibatch, int64_t size_of_all,
-                         int64_t head, const Config::Train& config, AdamW* optimizer, PhaseTimer* timer,
-                         Communicator* communicator, at::Tensor* norms) {
+                         std::optional<int64_t> diagnosed, const Config::Train& config, AdamW* optimizer,
+                         PhaseTimer* timer, Communicator* communicator, at::Tensor* norms) {
   at::Tensor advantages = batch.advantages.index_select(0, minibatch), shares;
   const at::Tensor valid = takes_all(config) ? batch.valid.index_select(0, minibatch).to(at::kDouble)
                                              : at::ones_like(advantages, at::kDouble);
@@ -251,9 +261,9 @@ at::Tensor add_gradients(ChunkRunner* runner, const Batch& batch, const at::Tens
       by_loss.push_back(gradient_of(loss, optimizer));
     }
   };
-  for_each_chunk_after(head, minibatch, config.forward_chunk, [&](const Chunk& chunk) {
+  for_each_chunk_after(diagnosed.value_or(0), minibatch, config.forward_chunk, [&](const Chunk& chunk) {
     const double weight = static_cast<double>(chunk.count) / static_cast<double>(size_of_all);
-    const bool is_diagnosed = norms && chunk.begin == 0;
+    const bool is_diagnosed = norms && chunk.begin == 0 && diagnosed != 0;
     if (is_diagnosed) num_rows_by_loss = chunk.count;
     runner->learn(chunk.rows, chunk.take(advantages), shares_in(chunk, shares, advantages.options()), weight, config,
                   is_diagnosed ? diagnose : std::function<void(const Losses&)>());
@@ -341,10 +351,11 @@ UpdateStats ppo_update(ChunkRunner* runner, const Rollout& rollout, const Config
     minibatches.shuffle(epoch);
     for (int64_t m = 0; m < minibatches.count(); ++m) {
       const bool is_first = stats.minibatches == 0;
-      const int64_t head = is_first ? diagnosed_rows(minibatches, config, batch.valid.is_cpu()) : 0;
+      const std::optional<int64_t> diagnosed =
+          is_first ? diagnosed_rows(minibatches, config, batch.valid.is_cpu()) : std::nullopt;
       const auto add_its_gradients = [&] {
-        return add_gradients(runner, batch, minibatches.rows(m), minibatches.size(m), head, config, optimizer, timer,
-                             communicator, is_first ? &first_norms : nullptr);
+        return add_gradients(runner, batch, minibatches.rows(m), minibatches.size(m), diagnosed, config, optimizer,
+                             timer, communicator, is_first ? &first_norms : nullptr);
       };
       at::Tensor minibatch_stats = add_its_gradients();
       if (is_first) {
@@ -352,7 +363,7 @@ UpdateStats ppo_update(ChunkRunner* runner, const Rollout& rollout, const Config
         if (must_be_recomputed(first)) {
           stats.rejected = first;
           batch.targets.old_log_probs =
-              recomputed_log_probs(runner, batch.targets, minibatches, head, config.forward_chunk);
+              recomputed_log_probs(runner, batch.targets, minibatches, diagnosed.value_or(0), config.forward_chunk);
           runner->set_targets(batch.targets);
           optimizer->clear_gradients();
           minibatch_stats = add_its_gradients();

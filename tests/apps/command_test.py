@@ -822,9 +822,6 @@ class Ranks(CommandCase):
         for name, value, other in zip(*(line.split(",") for line in (rows[0][0], rows[0][1], rows[1][1]))):
             if name.startswith("time/") or name == "charts/agent_steps_per_s" or value == other:
                 continue
-            # On the host these are of a sample, of other transitions on other ranks.
-            if name in ("losses/policy_grad_norm", "losses/value_grad_norm", "losses/entropy_grad_norm"):
-                continue
             self.assertAlmostEqual(float(value), float(other), delta=1e-3 * abs(float(value)) + 1e-5, msg=name)
 
     def test_any_number_of_ranks_goes_on_from_a_checkpoint(self):
