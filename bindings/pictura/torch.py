@@ -248,8 +248,11 @@ def _policy_of(config_toml: str, tensors: dict[str, Tensor], path: str) -> Polic
     except (tomllib.TOMLDecodeError, KeyError) as error:
         raise pictura.Error(f"{path}: expected the configuration of its training, with a table 'policy': {error}") from error
     queries = tensors.get("attention.queries")
-    policy = Policy(config, 0 if queries is None else len(queries), "walls.hidden.weight" in tensors)
-    missing, unexpected = policy.load_state_dict(tensors, strict=False)
+    # Without memory of its own: where the system promises more than there is, a broken file's sizes would fill all of it.
+    with torch.device("meta"):
+        policy = Policy(config, 0 if queries is None else len(queries), "walls.hidden.weight" in tensors)
+    weights = {name: tensor.to(torch.float32) if tensor.is_floating_point() else tensor for name, tensor in tensors.items()}
+    missing, unexpected = policy.load_state_dict(weights, strict=False, assign=True)
     if missing or unexpected:
         raise pictura.Error(f"{path}: of another architecture: expected {sorted(missing)}, got {sorted(unexpected)}")
     return policy

@@ -99,6 +99,21 @@ def test_broken_headers_are_named(tmp_path):
     assert refused > 400
 
 
+@pytest.mark.skipif(not MODELS, reason="no released policies here")
+def test_sizes_of_broken_headers_take_no_memory(tmp_path):
+    """A system that promises more memory than it has gives terabytes, and fills them until it ends the process."""
+    whole, path = MODELS[-1].read_bytes(), tmp_path / "huge.safetensors"
+    (length,) = struct.unpack_from("<Q", whole)
+    header = json.loads(whole[8 : 8 + length])
+    config = header["__metadata__"]["config"]
+    header["__metadata__"]["config"] = config.replace("embedding_width = 64", "embedding_width = 1000000000")
+    assert header["__metadata__"]["config"] != config
+    text = json.dumps(header).encode()
+    path.write_bytes(struct.pack("<Q", len(text)) + text + whole[8 + length :])
+    with pytest.raises(pictura.Error, match=r"(?s)huge\.safetensors: .*size mismatch"):
+        load_policy(path)
+
+
 def test_a_policy_drives_the_simulator(reference, make):
     simulator = make(6)
     policy = load_policy(reference / "vector_points.safetensors")
