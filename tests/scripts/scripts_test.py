@@ -158,6 +158,7 @@ class Runs(unittest.TestCase):
 
     def asked(self, name, *arguments):
         environment = {**os.environ, "PICTURA_VENV": "venv", "PATH": f"{self.root}/venv/bin:/usr/bin:/bin"}
+        environment.pop("PICTURA_PROGRAM", None)  # else the scripts ask that one
         result = subprocess.run([self.root / "scripts" / name, *arguments], env=environment, capture_output=True, text=True,
                                 timeout=60)  # fmt: skip
         self.assertEqual(result.returncode, 3, result.stderr)
