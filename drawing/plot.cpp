@@ -139,6 +139,23 @@ void add_line(std::vector<Point>* points_inout, Point to) {
   }
 }
 
+void set_dashes(cairo_t* context, const PlotSeries& series) {
+  constexpr double kDashes_px[] = {7, 6};
+  cairo_set_dash(context, kDashes_px, series.dashed ? std::size(kDashes_px) : 0, 0);
+}
+
+/// What a legend shows of a series: a piece of its line from (x, y) to the right.
+void draw_sample(Canvas& canvas, const PlotSeries& series, Rgb color, double x, double y, double width_px) {
+  cairo_t* context = canvas.context();
+  canvas.set_color(color);
+  cairo_set_line_width(context, 2.5);
+  set_dashes(context, series);
+  cairo_move_to(context, x, y);
+  cairo_line_to(context, x + width_px, y);
+  cairo_stroke(context);
+  cairo_set_dash(context, nullptr, 0, 0);
+}
+
 /// `points`: along all lines of the panel, in pixels.
 void draw_legend(Canvas& canvas, const PlotPanel& panel, const std::vector<Point>& points, Point top_left, double width,
                  double height) {
@@ -156,7 +173,7 @@ void draw_legend(Canvas& canvas, const PlotPanel& panel, const std::vector<Point
   cairo_stroke(canvas.context());
   for (size_t i = 0; i < panel.series.size(); ++i) {
     const double middle = y + 4 + kRow_px * (static_cast<double>(i) + 0.5);
-    canvas.fill_rectangle(x + 8, middle - 1.25, 20, 2.5, series_color(i));
+    draw_sample(canvas, panel.series[i], series_color(i), x + 8, middle, 20);
     canvas.text(x + 36, middle + 4, panel.series[i].name, style);
   }
 }
@@ -184,7 +201,7 @@ void draw_names(Canvas& canvas, const std::vector<PlotSeries>& all, const std::v
     const Rgb color = series_color(s);
     const double x = places[s].x, middle = top + places[s].y + 0.5 * kNameRow_px;
     if (!all[s].low.empty()) canvas.fill_rectangle(x, middle - 6, kNameLine_px, 12, color, kBandAlpha);
-    canvas.fill_rectangle(x, middle - 1.25, kNameLine_px, 2.5, color);
+    draw_sample(canvas, all[s], color, x, middle, kNameLine_px);
     canvas.text(x + kNameLine_px + 8, middle + 4.5, all[s].name, style);
   }
 }
@@ -290,6 +307,7 @@ void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, do
   for (size_t s = 0; s < panel.series.size(); ++s) {
     const PlotSeries& series = panel.series[s];
     canvas.set_color(series_color(s));
+    set_dashes(context, series);
     for (size_t i = 0; i < series.x.size(); ++i) {
       if (!drawable(series, i)) {
         cairo_stroke(context);

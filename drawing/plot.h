@@ -16,6 +16,7 @@ struct PlotSeries {
   std::string name;
   std::vector<double> x, y;       // of equal length
   std::vector<double> low, high;  // of a band behind the line: as long, or empty where there is none
+  bool dashed = false;
 };
 
 /// A place of the x axis.

@@ -703,6 +703,19 @@ class Plots(CommandCase):
         (folder / "progress.csv").write_text(head + "".join(rows))
         return folder
 
+    def test_evaluations_along_trainings_are_lines_in_bands(self):
+        metrics = ["at_fault_collision_rate", "off_road_rate", "red_light_rate", "goals_per_vehicle", "km_per_infraction"]
+        rows = [{"density": density, **{name: value for name in metrics}} for density, value in (("light", 0.1), ("medium", 0.2))]
+        points = [{"agent_steps": steps, "gpu_hours": steps / 1e6, "rows": rows} for steps in (1e6, 3e6)]
+        curves, picture = self.folder / "curves.json", self.folder / "curves.png"
+        curves.write_text(json.dumps({"lines": [{"name": "agent", "points": points}, {"name": "baseline", "dashed": True, "points": points}]}))
+        facts = self.json_of("plot", "--evaluations", curves, "--x", "hours", "--out", picture)
+        self.assertEqual([(line["name"], line["points"], line["x_last"]) for line in facts["lines"]], [("agent", 2, 3), ("baseline", 2, 3)])
+        self.assertGreater(picture.stat().st_size, 5000)
+        for arguments in ([], ["--evaluations", curves, self.folder], ["--evaluations", curves, "--metrics", "a"]):
+            result = run("plot", *arguments, "--out", picture)
+            self.assertEqual(result.returncode, 2, result.stderr)
+
     def test_seeds_are_one_line_and_the_picture_is_drawn(self):
         a = self.run_folder("town_s1", 1, [1, 2, 3])
         b = self.run_folder("town_s2", 2, [3, 4, 7])

@@ -71,6 +71,25 @@ print(json.dumps({{"rows": [row]}}))
         self.assertIn("a.safetensors --density medium --scenarios 2 --out ", asked[0])
         self.assertIn("--policy lane --density medium", asked[1])
 
+    def test_curves_are_evaluations_along_trainings(self):
+        trainings = self.root / "trainings.toml"
+        policy = self.root / "a.safetensors"
+        points = "".join(f'{{policy = "{policy}", agent_steps = {steps}, gpu_hours = 0.5}},' for steps in (1e6, 2e6))
+        trainings.write_text(f'[[line]]\nname = "an agent"\ndashed = true\npoints = [{points}]\n')
+        for _ in range(2):  # the second time nothing is evaluated
+            result = self.run_script("--curves", trainings, "--scenarios", "2")
+            self.assertEqual((result.returncode, len(self.asked.read_text().splitlines())), (0, 2), result.stderr)
+        curves = json.loads((self.root / "out/curves.json").read_text())
+        (line,) = curves["lines"]
+        self.assertEqual((line["name"], line["dashed"], curves["arguments"]), ("an agent", True, ["--scenarios", "2"]))
+        self.assertEqual([(point["agent_steps"], point["policy"]) for point in line["points"]], [(1e6, "a"), (2e6, "a")])
+        self.assertEqual([row["density"] for row in line["points"][0]["rows"]], ["medium"])
+        trainings.write_text(trainings.read_text().replace("a.safetensors", "b.safetensors"))
+        result = self.run_script("--curves", trainings)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("trainings.toml: line 'an agent'", result.stderr)
+        self.assertIn("b.safetensors: no such file", result.stderr)
+
     def test_what_was_evaluated_is_not_evaluated_again_unless_it_is_asked_otherwise(self):
         first = self.run_script("--density", "medium")
         self.assertEqual(self.run_script("--density", "medium").stdout, first.stdout)
