@@ -21,7 +21,7 @@ SCRIPTS = pathlib.Path(__file__).resolve().parents[2] / "scripts"
 
 class Help(unittest.TestCase):
     def test_it_is_found_from_any_folder(self):
-        for name in ("setup", "format", "test", "demo", "gpu_check", "gpu_lanes", "gpu_ranks", "gpu_train", "gpu_search", "reproduce_table", "docs", "film"):
+        for name in ("setup", "format", "test", "demo", "gpu_check", "gpu_lanes", "gpu_ranks", "gpu_train", "reproduce_table", "docs", "film"):
             with self.subTest(name):
                 result = subprocess.run([f"./{name}", "--help"], cwd=SCRIPTS, capture_output=True, text=True, timeout=60)
                 self.assertEqual((result.returncode, result.stderr), (0, ""))
