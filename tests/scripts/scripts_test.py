@@ -89,6 +89,11 @@ print(json.dumps({{"rows": [row]}}))
         self.assertEqual(result.returncode, 1)
         self.assertIn("trainings.toml: line 'an agent'", result.stderr)
         self.assertIn("b.safetensors: no such file", result.stderr)
+        for text in ("line = 1", "[[line]]\nname = 'a'", "[[line"):
+            trainings.write_text(text)
+            result = self.run_script("--curves", trainings)
+            self.assertEqual((result.returncode, len(result.stderr.splitlines())), (1, 1), result.stderr)
+            self.assertIn("trainings.toml: expected [[line]] with name", result.stderr)
 
     def test_what_was_evaluated_is_not_evaluated_again_unless_it_is_asked_otherwise(self):
         first = self.run_script("--density", "medium")
