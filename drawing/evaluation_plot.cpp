@@ -10,7 +10,7 @@
 namespace pictura {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
 
 struct Metric {
   const char *name, *title, *y_label;
@@ -25,12 +25,12 @@ constexpr Metric kMetrics[] = {{"at_fault_collision_rate", "At-fault collision",
 /// NaN for null: nobody drove, or nothing happened.
 double number_of(const Json& row, const char* metric) {
   const Json& value = row.at(metric);
-  return value.is_null() ? kNan : value.get<double>();
+  return value.is_null() ? kNoValue : value.get<double>();
 }
 
 /// Adds one evaluation to a line of one metric.
 void add_point(const Json& point, RunAxis axis, const char* metric, PlotSeries* series_inout) {
-  double medium = kNan, low = kNan, high = kNan;
+  double medium = kNoValue, low = kNoValue, high = kNoValue;
   for (const Json& row : point.at("rows")) {
     const double value = number_of(row, metric);
     if (row.at("density") == "medium") medium = value;
