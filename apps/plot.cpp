@@ -12,21 +12,23 @@ namespace pictura {
 
 namespace {
 
+void add_extent(const PlotSeries& series, Json* line_inout) {
+  (*line_inout)["points"] = series.x.size();
+  (*line_inout)["x_first"] = series.x.front();
+  (*line_inout)["x_last"] = series.x.back();
+}
+
 Json facts_of(const RunPlot& plot, const std::string& picture, const std::string& x) {
   Json lines = Json::array();
   for (size_t i = 0; i < plot.lines.size(); ++i) {
-    const PlotSeries& first = plot.panels[0].series[i];
     Json last;
     for (size_t panel = 0; panel < plot.panels.size(); ++panel) {
       last[plot.columns[panel]] = finite_or_null(plot.panels[panel].series[i].y.back());
     }
-    lines.push_back({{"name", plot.lines[i].name},
-                     {"runs", plot.lines[i].runs},
-                     {"seeds", plot.lines[i].seeds},
-                     {"points", first.x.size()},
-                     {"x_first", first.x.front()},
-                     {"x_last", first.x.back()},
-                     {"last", last}});
+    Json line{{"name", plot.lines[i].name}, {"runs", plot.lines[i].runs}, {"seeds", plot.lines[i].seeds}};
+    add_extent(plot.panels[0].series[i], &line);
+    line["last"] = last;
+    lines.push_back(line);
   }
   return {{"out", picture}, {"x", x}, {"metrics", plot.columns}, {"band", "lowest to highest seed"}, {"lines", lines}};
 }
@@ -34,10 +36,9 @@ Json facts_of(const RunPlot& plot, const std::string& picture, const std::string
 Json facts_of(const std::vector<PlotPanel>& panels, const std::string& picture, const std::string& x) {
   Json lines = Json::array();
   for (const PlotSeries& series : panels[0].series) {
-    lines.push_back({{"name", series.name},
-                     {"points", series.x.size()},
-                     {"x_first", series.x.front()},
-                     {"x_last", series.x.back()}});
+    Json line{{"name", series.name}};
+    add_extent(series, &line);
+    lines.push_back(line);
   }
   return {{"out", picture}, {"x", x}, {"band", "lowest to highest density"}, {"lines", lines}};
 }

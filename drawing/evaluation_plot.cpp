@@ -68,12 +68,11 @@ std::vector<PlotPanel> plot_evaluations(const std::string& path, RunAxis axis) {
       where = fmt::format("line '{}'", name);
       const Json& points = line.at("points");
       PICTURA_CHECK(points.is_array() && !points.empty(), "{}: {}: expected a point or more", path, where);
+      PICTURA_CHECK(std::all_of(points.begin(), points.end(), has_medium),
+                    "{}: {}: expected a row of medium density in every point", path, where);
       for (size_t m = 0; m < std::size(kMetrics); ++m) {
         PlotSeries series{.name = name, .dashed = line.value("dashed", false)};
-        for (const Json& point : points) {
-          PICTURA_CHECK(has_medium(point), "{}: {}: expected a row of medium density in every point", path, where);
-          add_point(point, axis, kMetrics[m].name, &series);
-        }
+        for (const Json& point : points) add_point(point, axis, kMetrics[m].name, &series);
         PICTURA_CHECK(std::is_sorted(series.x.begin(), series.x.end()), "{}: {}: expected points in ascending order",
                       path, where);
         panels[m].series.push_back(std::move(series));

@@ -1,5 +1,6 @@
 """Policies in Python: the numbers of C++, and weights that the command takes."""
 
+import copy
 import json
 import os
 import pathlib
@@ -76,20 +77,29 @@ def test_broken_files_are_named(reference, tmp_path):
         load_policy(path)
 
 
+def header_and_tensors(path):
+    whole = path.read_bytes()
+    (length,) = struct.unpack_from("<Q", whole)
+    return json.loads(whole[8 : 8 + length]), whole[8 + length :]
+
+
+def write_safetensors(path, header, tensors):
+    text = json.dumps(header).encode()
+    path.write_bytes(struct.pack("<Q", len(text)) + text + tensors)
+
+
 @pytest.mark.skipif(not MODELS, reason="no released policies here")
 def test_broken_headers_are_named(tmp_path):
-    whole = MODELS[-1].read_bytes()
-    (length,) = struct.unpack_from("<Q", whole)
+    whole, tensors = header_and_tensors(MODELS[-1])
     draw, refused, path = random.Random(1), 0, tmp_path / "odd.safetensors"
     odd = [None, 3, "x", [], {}, [-1], [0, 2**60], [5, 3], [1, 2, 3], [0, 4.5], 2**70, "I32", {"config": 3}, {"config": "[policy]"}]
     odd += [{"config": f'[policy]\nmodality="vector"\nembedding_width={width}\nbackbone_layers=2\nbackbone_width=3'} for width in (-1, 10**12)]
     for _ in range(300):
-        header = json.loads(whole[8 : 8 + length])
+        header = copy.deepcopy(whole)
         name = draw.choice(list(header))
         changed = draw.choice([header, header[name]])
         changed[draw.choice([key for key in changed if changed is not header or key == name])] = draw.choice(odd)
-        text = json.dumps(header).encode()
-        path.write_bytes(struct.pack("<Q", len(text)) + text + whole[8 + length :])
+        write_safetensors(path, header, tensors)
         for work in (load_policy, lambda path: save_policy(torch.nn.Linear(1, 1), tmp_path / "x.safetensors", like=path)):
             try:
                 work(path)
@@ -102,14 +112,12 @@ def test_broken_headers_are_named(tmp_path):
 @pytest.mark.skipif(not MODELS, reason="no released policies here")
 def test_sizes_of_broken_headers_take_no_memory(tmp_path):
     """A system that promises more memory than it has gives terabytes, and fills them until it ends the process."""
-    whole, path = MODELS[-1].read_bytes(), tmp_path / "huge.safetensors"
-    (length,) = struct.unpack_from("<Q", whole)
-    header = json.loads(whole[8 : 8 + length])
+    header, tensors = header_and_tensors(MODELS[-1])
+    path = tmp_path / "huge.safetensors"
     config = header["__metadata__"]["config"]
     header["__metadata__"]["config"] = config.replace("embedding_width = 64", "embedding_width = 1000000000")
     assert header["__metadata__"]["config"] != config
-    text = json.dumps(header).encode()
-    path.write_bytes(struct.pack("<Q", len(text)) + text + whole[8 + length :])
+    write_safetensors(path, header, tensors)
     with pytest.raises(pictura.Error, match=r"(?s)huge\.safetensors: .*size mismatch"):
         load_policy(path)
 
