@@ -11,6 +11,7 @@
 #include "pictura/simulator/rules/limits.h"
 #include "pictura/simulator/rules/observe.h"
 #include "pictura/simulator/rules/road.h"
+#include "pictura/simulator/rules/signal.h"
 
 namespace pictura {
 namespace {
@@ -392,6 +393,28 @@ CellLists lists_of_pieces(const MapRules& map, const std::string& map_name, cons
                            });
 }
 
+/// How far beyond an end of a stop line the road's lanes of oncoming traffic reach: as far as the line holds anybody,
+/// but not past lanes that lead its own way, which other lines hold, or none.
+float oncoming_beyond_m(const MapView& map, const StopLine& line, Vec2 outward) {
+  constexpr float kStep_m = 0.25f;
+  float beyond_m = 0;
+  for (float at_m = kStep_m; line.half_length_m + at_m <= kStopLineReach_m; at_m += kStep_m) {
+    const Vec2 p = line.middle_m.xy() + outward * (line.half_length_m + at_m);
+    for (const int32_t item : items_at(map.segment_cells, p)) {
+      const LaneSegment& segment = map.segments[static_cast<size_t>(item)];
+      const Foot foot = foot_on(segment, p);
+      const float height_m = segment.a_m.z + segment.slope * foot.along_m;
+      if (!segment.is_driven || foot.distance_m > segment.half_width_m ||
+          std::fabs(height_m - line.middle_m.z) >= kLevel_m)
+        continue;
+      const float cosine = dot(segment.direction, line.direction);
+      if (cosine >= kStopLineCosine) return beyond_m;
+      if (cosine <= -kStopLineCosine) beyond_m = at_m;
+    }
+  }
+  return beyond_m;
+}
+
 /// Whatever can be among the nearest kMaxControls from anywhere in the cell: as far from its centre as the last of them
 /// and a cell's diagonal.
 CellLists lists_of_stop_lines(const MapRules& map, const std::string& map_name) {
@@ -444,6 +467,12 @@ MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool obs
   out.stop_line_cells = cells_of(out.stop_lines, [](const StopLine& line) {
     return box_of_segment(line.middle_m.xy(), line.middle_m.xy(), kStopLineReach_m);
   });
+
+  for (StopLine& line : out.stop_lines) {
+    const Vec2 left{-line.direction.y, line.direction.x};
+    line.beyond_left_m = oncoming_beyond_m(out.view(), line, left);
+    line.beyond_right_m = oncoming_beyond_m(out.view(), line, left * -1.0f);
+  }
 
   out.walkways = make_walkways(map, out.view());
   std::vector<WalkPiece> pairs;

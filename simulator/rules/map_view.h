@@ -67,6 +67,7 @@ struct StopLine {
   Vec3 middle_m;
   Vec2 direction;  // of the traffic that it stops
   float half_length_m = 0;
+  float beyond_left_m = 0, beyond_right_m = 0;  // from its ends to the far side of the lanes of oncoming traffic
   int32_t junction = -1, phase = 0, num_phases = 1;
 };
 

@@ -75,7 +75,8 @@ PICTURA_HD inline LightState light_state(const MapView& map, int light, const Li
                              static_cast<size_t>(min_of(step, map.recorded_steps - 1))];
 }
 
-/// A stop line holds those who head within 45 degrees of its traffic, and reaches a little beyond its ends.
+/// A stop line holds those who head within 45 degrees of its traffic, and reaches a little beyond its ends, or across
+/// the lanes of oncoming traffic there: nobody drives round a red light on these.
 constexpr float kStopLineCosine = 0.70710678f, kStopLineSideTolerance_m = 0.5f;
 
 /// An agent's step, as far as red lights are concerned.
@@ -129,8 +130,9 @@ PICTURA_HD inline bool violates(const MapView& map, int32_t light, const Crossin
   if (along_before < 0.0f) {
     const float fraction = along_before / (along_before - along_after);
     const Vec2 at = crossing.bumper_before + (crossing.bumper_after - crossing.bumper_before) * fraction;
-    if (fabsf(cross(line.direction, at - line.middle_m.xy())) <= line.half_length_m + kStopLineSideTolerance_m)
-      return true;
+    const float side_m = cross(line.direction, at - line.middle_m.xy());  // positive to the left
+    const float beyond_m = side_m > 0.0f ? line.beyond_left_m : line.beyond_right_m;
+    if (fabsf(side_m) <= line.half_length_m + max_of(kStopLineSideTolerance_m, beyond_m)) return true;
   }
   return is_lane_change(map, crossing.lane_before, crossing.lane_after) &&
          map.lanes[static_cast<size_t>(crossing.lane_before)].light < 0 &&

@@ -226,6 +226,40 @@ TEST(RedLightSection, LaneChangesAreWhatNoRouteDoes) {
   EXPECT_TRUE(is_lane_change(side_by_side.view(), 4, 1));
 }
 
+/// A straight of one lane at y = 0, held at x = 100, and beside it one for oncoming traffic at y = 4; between them a
+/// strip of `median_m`.
+std::shared_ptr<const RoadMap> two_way_road(float median_m) {
+  auto map = testing::stadium(200, 1);
+  Lane lane = map->lanes[0];
+  lane.points.begin = static_cast<int32_t>(map->lane_points.size());
+  for (const float x : {200.0f, 100.0f, 0.0f}) map->lane_points.push_back({{x, 4 + median_m, 0}, kPi, 4, 200 - x});
+  lane.points.end = static_cast<int32_t>(map->lane_points.size());
+  lane.successors = {};
+  map->lanes.push_back(lane);
+  testing::add_light(map.get(), 100, 4, 1, {0});
+  return map;
+}
+
+TEST(RedLightOnATwoWayRoad, DrivingRoundItOnTheOncomingLaneIsAnEvent) {
+  for (const float median_m : {0.0f, 2.0f}) {
+    testing::Stage stage(two_way_road(median_m), 1);
+    const auto events = [&](Vec2 bumper, float heading_rad, LightState state) {
+      stage.put(0, bumper - Vec2{std::cos(heading_rad), std::sin(heading_rad)} * 3.2f, heading_rad, 10);
+      stage.worlds.state.lights[0] = state;
+      stage.step();
+      return stage.events(0) & kEventRedLight;
+    };
+    const float y_m = 4 + median_m;
+    for (const float aside_m : {-1.5f, 0.0f, 1.5f}) {
+      EXPECT_EQ(events({99.5f, y_m + aside_m}, 0, LightState::red), kEventRedLight) << y_m + aside_m;
+      EXPECT_EQ(events({99.5f, y_m + aside_m}, 0.5f, LightState::red), kEventRedLight);
+      EXPECT_EQ(events({99.5f, y_m + aside_m}, 0, LightState::green), kEventNone);
+      EXPECT_EQ(events({100.5f, y_m + aside_m}, kPi, LightState::red), kEventNone);  // who comes the other way
+    }
+    EXPECT_EQ(events({99.5f, -2.8f}, 0, LightState::red), kEventNone);  // to the right there is no such lane
+  }
+}
+
 TEST_F(RedLight, AnotherLevelIsNone) {
   auto map = testing::stadium(200, 2);
   testing::add_light(map.get(), 100, 4, 1, {0});
