@@ -5,13 +5,20 @@
 
 namespace pictura {
 
+#if !defined(__CUDA_ARCH__)
+// Vectors as the compilers know them: from arrays, g++ 12 makes scalar code where functions are inlined. Arithmetic on
+// unsigned elements wraps around.
+using Int16Vector = int16_t __attribute__((vector_size(16)));
+using Uint16Vector = uint16_t __attribute__((vector_size(16)));
+#endif
+
 /// Eight 16-bit integers. On a device, words hold element k and element k + 4 as halves, for instructions on pairs; on
-/// a host, the elements are contiguous, for one register.
+/// a host, the elements are contiguous, in one register.
 struct Int16x8 {
 #if defined(__CUDA_ARCH__)
   uint32_t halves[4];
 #else
-  int16_t value[8];
+  Int16Vector value;
 #endif
 };
 constexpr int kInt16x8Size = 8, kInt16x8Half = 4;
@@ -40,7 +47,8 @@ PICTURA_HD inline Int16x8 arithmetic_sequence(int32_t step, int32_t base) {
   }
   return result;
 #else
-  return make_int16x8([=](int k) { return base + (k - kInt16x8Half) * step; });
+  const Uint16Vector steps{0xFFFC, 0xFFFD, 0xFFFE, 0xFFFF, 0, 1, 2, 3};
+  return {reinterpret_cast<Int16Vector>(steps * static_cast<uint16_t>(step) + static_cast<uint16_t>(base))};
 #endif
 }
 
@@ -55,45 +63,38 @@ PICTURA_HD inline uint32_t broadcast_low16(uint32_t word) {
 
 /// max(a + b, c) and min(a + b, c) for each element; both halves of b must be equal, and sums wrap around at 16 bits.
 PICTURA_HD inline Int16x8 add_max(const Int16x8& a, uint32_t b, const Int16x8& c) {
-  Int16x8 result;
 #if defined(__CUDA_ARCH__)
+  Int16x8 result;
   for (int k = 0; k < kInt16x8Half; ++k) result.halves[k] = __viaddmax_s16x2(a.halves[k], b, c.halves[k]);
-#else
-  for (int k = 0; k < kInt16x8Size; ++k) {
-    const auto sum = static_cast<int16_t>(static_cast<uint16_t>(a.value[k]) + b);
-    result.value[k] = sum > c.value[k] ? sum : c.value[k];
-  }
-#endif
   return result;
+#else
+  const auto sum = reinterpret_cast<Int16Vector>(reinterpret_cast<Uint16Vector>(a.value) + static_cast<uint16_t>(b));
+  return {sum > c.value ? sum : c.value};
+#endif
 }
 PICTURA_HD inline Int16x8 add_min(const Int16x8& a, uint32_t b, const Int16x8& c) {
-  Int16x8 result;
 #if defined(__CUDA_ARCH__)
+  Int16x8 result;
   for (int k = 0; k < kInt16x8Half; ++k) result.halves[k] = __viaddmin_s16x2(a.halves[k], b, c.halves[k]);
-#else
-  for (int k = 0; k < kInt16x8Size; ++k) {
-    const auto sum = static_cast<int16_t>(static_cast<uint16_t>(a.value[k]) + b);
-    result.value[k] = sum < c.value[k] ? sum : c.value[k];
-  }
-#endif
   return result;
+#else
+  const auto sum = reinterpret_cast<Int16Vector>(reinterpret_cast<Uint16Vector>(a.value) + static_cast<uint16_t>(b));
+  return {sum < c.value ? sum : c.value};
+#endif
 }
 
 /// a + b, clamped to [0, high], for each element. Sums must not overflow 16 bits.
 PICTURA_HD inline Int16x8 add_clamp(const Int16x8& a, const Int16x8& b, const Int16x8& high) {
-  Int16x8 result;
 #if defined(__CUDA_ARCH__)
+  Int16x8 result;
   for (int k = 0; k < kInt16x8Half; ++k) {
     result.halves[k] = __viaddmin_s16x2_relu(a.halves[k], b.halves[k], high.halves[k]);
   }
-#else
-  for (int k = 0; k < kInt16x8Size; ++k) {
-    const auto sum = static_cast<int16_t>(a.value[k] + b.value[k]);
-    const int16_t bounded = sum < high.value[k] ? sum : high.value[k];
-    result.value[k] = bounded > 0 ? bounded : int16_t{0};
-  }
-#endif
   return result;
+#else
+  const Int16Vector sum = a.value + b.value, bounded = sum < high.value ? sum : high.value, zero{};
+  return {bounded > zero ? bounded : zero};
+#endif
 }
 
 #if defined(__CUDA_ARCH__)
@@ -127,12 +128,13 @@ PICTURA_HD inline uint64_t bits_between(const Int16x8& from, const Int16x8& to) 
                  high = bytes_of(kTable, begin >> 16) ^ bytes_of(kTable, end >> 16);
   return static_cast<uint64_t>(high ^ (high << 4 & kUpperFour)) << 32 | (low ^ (low << 4 & kUpperFour));
 #else
-  struct Bytes {
-    uint8_t byte[kInt16x8Size];
-  } bytes;
-  for (int k = 0; k < kInt16x8Size; ++k) {
-    bytes.byte[k] = static_cast<uint8_t>((1u << (to.value[k] >> 7)) - (1u << (from.value[k] >> 7)));
-  }
+  using Uint32Vector = uint32_t __attribute__((vector_size(32)));
+  using Bytes = uint8_t __attribute__((vector_size(8)));
+  const Uint32Vector one{1, 1, 1, 1, 1, 1, 1, 1};
+  const Uint32Vector bits = (one << __builtin_convertvector(to.value >> 7, Uint32Vector)) -
+                            (one << __builtin_convertvector(from.value >> 7, Uint32Vector));
+  // By way of 16 bits, for which there are instructions.
+  const auto bytes = __builtin_convertvector(__builtin_convertvector(bits, Uint16Vector), Bytes);
   return __builtin_bit_cast(uint64_t, bytes);
 #endif
 }
