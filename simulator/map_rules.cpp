@@ -469,7 +469,7 @@ MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool obs
   });
 
   for (StopLine& line : out.stop_lines) {
-    const Vec2 left{-line.direction.y, line.direction.x};
+    const Vec2 left = left_normal(line.direction);
     line.beyond_left_m = oncoming_beyond_m(out.view(), line, left);
     line.beyond_right_m = oncoming_beyond_m(out.view(), line, left * -1.0f);
   }
