@@ -403,7 +403,7 @@ float oncoming_beyond_m(const MapView& map, const StopLine& line, Vec2 outward) 
     for (const int32_t item : items_at(map.segment_cells, p)) {
       const LaneSegment& segment = map.segments[static_cast<size_t>(item)];
       const Foot foot = foot_on(segment, p);
-      const float height_m = segment.a_m.z + segment.slope * foot.along_m;
+      const float height_m = height_on(segment, foot.along_m);
       if (!segment.is_driven || foot.distance_m > segment.half_width_m ||
           std::fabs(height_m - line.middle_m.z) >= kLevel_m)
         continue;

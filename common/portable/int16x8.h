@@ -61,6 +61,13 @@ PICTURA_HD inline uint32_t broadcast_low16(uint32_t word) {
 #endif
 }
 
+#if !defined(__CUDA_ARCH__)
+/// a + b for each element, wrapping around; b is 16 bits.
+inline Int16Vector wrapped_sum(const Int16x8& a, uint32_t b) {
+  return reinterpret_cast<Int16Vector>(reinterpret_cast<Uint16Vector>(a.value) + static_cast<uint16_t>(b));
+}
+#endif
+
 /// max(a + b, c) and min(a + b, c) for each element; both halves of b must be equal, and sums wrap around at 16 bits.
 PICTURA_HD inline Int16x8 add_max(const Int16x8& a, uint32_t b, const Int16x8& c) {
 #if defined(__CUDA_ARCH__)
@@ -68,7 +75,7 @@ PICTURA_HD inline Int16x8 add_max(const Int16x8& a, uint32_t b, const Int16x8& c
   for (int k = 0; k < kInt16x8Half; ++k) result.halves[k] = __viaddmax_s16x2(a.halves[k], b, c.halves[k]);
   return result;
 #else
-  const auto sum = reinterpret_cast<Int16Vector>(reinterpret_cast<Uint16Vector>(a.value) + static_cast<uint16_t>(b));
+  const Int16Vector sum = wrapped_sum(a, b);
   return {sum > c.value ? sum : c.value};
 #endif
 }
@@ -78,7 +85,7 @@ PICTURA_HD inline Int16x8 add_min(const Int16x8& a, uint32_t b, const Int16x8& c
   for (int k = 0; k < kInt16x8Half; ++k) result.halves[k] = __viaddmin_s16x2(a.halves[k], b, c.halves[k]);
   return result;
 #else
-  const auto sum = reinterpret_cast<Int16Vector>(reinterpret_cast<Uint16Vector>(a.value) + static_cast<uint16_t>(b));
+  const Int16Vector sum = wrapped_sum(a, b);
   return {sum < c.value ? sum : c.value};
 #endif
 }

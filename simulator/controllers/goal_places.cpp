@@ -17,7 +17,7 @@ bool is_passable(const MapView& map, const WalkPiece& piece) {
     const float along_m = piece.length_m * static_cast<float>(i) / static_cast<float>(steps);
     AgentBox box;
     const Vec2 at = piece.a_m.xy() + piece.direction * along_m;
-    box.center_m = {at.x, at.y, piece.a_m.z + piece.slope * along_m};
+    box.center_m = {at.x, at.y, height_on(piece, along_m)};
     box.cos_heading = piece.direction.x;
     box.sin_heading = piece.direction.y;
     box.length_m = limits.max_length_m;

@@ -59,6 +59,12 @@ struct WalkPiece {
   int32_t to_node = 0;  // where it ends
   int32_t next = 0;     // the only piece to go on to, which at a dead end is the way back; -1: several
 };
+/// The height of a LaneSegment or a WalkPiece, along_m from its start.
+template <typename Piece>
+PICTURA_HD float height_on(const Piece& piece, float along_m) {
+  return piece.a_m.z + piece.slope * along_m;
+}
+
 /// How far from a walkway a pedestrian still stands at its height.
 constexpr float kWalkReach_m = 5.0f;
 

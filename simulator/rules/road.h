@@ -55,7 +55,7 @@ PICTURA_HD LaneFit fit_lane(const MapView& map, Vec2 p, float z_m, float heading
     const LaneSegment& segment = map.segments[static_cast<size_t>(items[static_cast<size_t>(i)])];
     if (!segment.is_driven) continue;
     const Foot foot = foot_on(segment, p);
-    const float height = segment.a_m.z + segment.slope * foot.along_m;
+    const float height = height_on(segment, foot.along_m);
     const float score_without_angle =
         kDistanceWeight * foot.distance_m + (segment.lane == current_lane ? 0.0f : kHysteresis);
     if (foot.distance_m > kLaneReach_m || score_without_angle >= best_score || fabsf(height - z_m) >= kLevel_m)
@@ -83,7 +83,7 @@ PICTURA_HD bool is_on_road(const MapView& map, Vec2 p, float z_m, const ThreadGr
        i += static_cast<size_t>(group.size())) {
     const LaneSegment& segment = map.segments[static_cast<size_t>(items[i])];
     const Foot foot = foot_on(segment, p);
-    const float height = segment.a_m.z + segment.slope * foot.along_m;
+    const float height = height_on(segment, foot.along_m);
     is_on = foot.distance_m <= segment.half_width_m + kSeamTolerance_m && fabsf(height - z_m) < kLevel_m;
   }
   return group.any(is_on);
@@ -116,7 +116,7 @@ PICTURA_HD inline LanePose pose_on_lane(const MapView& map, int32_t lane_index, 
   const LaneSegment& segment = map.segments[static_cast<size_t>(low)];
   const float along = clamp(s_m - segment.s_m, 0.0f, segment.length_m);
   const Vec2 xy = segment.a_m.xy() + segment.direction * along;
-  return {{xy.x, xy.y, segment.a_m.z + segment.slope * along},
+  return {{xy.x, xy.y, height_on(segment, along)},
           wrap_angle(segment.heading_rad + segment.turn_rad * (along / segment.length_m))};
 }
 

@@ -179,7 +179,7 @@ PICTURA_HD bool covers_driven_lane(const MapView& map, const AgentBox& box, cons
     const float half_m = 0.5f * segment.length_m;
     const OrientedBox surface{segment.a_m.xy() + segment.direction * half_m, segment.direction, half_m,
                               segment.half_width_m - kSeamTolerance_m};
-    const float height = segment.a_m.z + segment.slope * half_m;
+    const float height = height_on(segment, half_m);
     covers = segment.is_driven && fabsf(height - box.center_m.z) < kLevel_m && overlap(print, surface);
   }
   return group.any(covers);

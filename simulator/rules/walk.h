@@ -11,7 +11,7 @@ PICTURA_HD inline LanePose pose_on_walk(const MapView& map, int32_t piece_index,
   const WalkPiece& piece = map.walk_pieces[static_cast<size_t>(piece_index)];
   const float along = clamp(s_m, 0.0f, piece.length_m);
   const Vec2 xy = piece.a_m.xy() + piece.direction * along;
-  return {{xy.x, xy.y, piece.a_m.z + piece.slope * along}, piece.heading_rad};
+  return {{xy.x, xy.y, height_on(piece, along)}, piece.heading_rad};
 }
 
 /// The piece to go on to where a piece ends: each way but the one back is as likely.
@@ -57,7 +57,7 @@ PICTURA_HD LaneFit fit_walk(const MapView& map, Vec2 p, float z_m, float heading
     const Vec2 from_a = p - piece.a_m.xy();
     const float along = clamp(dot(from_a, piece.direction), 0.0f, piece.length_m);
     const float distance_m = length(from_a - piece.direction * along);
-    const float height = piece.a_m.z + piece.slope * along;
+    const float height = height_on(piece, along);
     if (distance_m >= nearest_m || fabsf(height - z_m) >= kLevel_m) continue;
     nearest_m = distance_m;
     nearest_item = i;
