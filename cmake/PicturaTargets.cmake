@@ -36,7 +36,7 @@ add_compile_options(
   # copy more than they hold (fmt 9).
   "$<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_HAS_WDANGLING_REFERENCE}>>:-Wno-dangling-reference;-Wno-array-bounds;-Wno-stringop-overflow>"
   # In a unity build every source is included, and g++ takes it for a header, which many would include.
-  $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>,$<BOOL:${CMAKE_UNITY_BUILD}>>:-Wno-subobject-linkage>
+  $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>,$<OR:$<BOOL:${CMAKE_UNITY_BUILD}>,$<BOOL:$<TARGET_PROPERTY:UNITY_BUILD>>>>:-Wno-subobject-linkage>
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_WERROR}>>:-Werror>
   # The arithmetic contract: no fused multiply-add and no reordering, on every device.
   "$<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off;-fno-math-errno;-fno-trapping-math>"
@@ -141,6 +141,9 @@ function(pictura_add_test name)
   pictura_use_headers(${name}_test PRIVATE)
   # OpenMP also for tests that need none: a precompiled header serves only equal flags.
   target_link_libraries(${name}_test PRIVATE ${arg_LINK} OpenMP::OpenMP_CXX GTest::gmock GTest::gtest_main)
+  if(PICTURA_UNITY_TESTS)
+    set_target_properties(${name}_test PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 12)
+  endif()
   if(arg_PRECOMPILED)
     pictura_use_precompiled(${name}_test ${arg_PRECOMPILED})
   else()

@@ -22,7 +22,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
 
-std::string message_of(const std::string& text, const std::vector<std::string>& overrides = {}) {
+std::string error_in(const std::string& text, const std::vector<std::string>& overrides = {}) {
   return test::message_of([&] { parse_config(text, "a.toml", overrides); });
 }
 
@@ -66,16 +66,16 @@ TEST(Config, NumbersMayBeWrittenInAnyDecimalNotation) {
   EXPECT_EQ(parse_config("[train]\nupdates = 1e3\n", "a.toml").train.updates, 1000);
   EXPECT_EQ(parse_config("", "a.toml", {"train.gamma=.5"}).train.gamma, 0.5);
   for (const std::string text : {"1.5", "0x10", "1_000", "-1", "1e30", "18446744073709551616"}) {
-    EXPECT_THAT(message_of("", {"train.updates=" + text}),
+    EXPECT_THAT(error_in("", {"train.updates=" + text}),
                 StartsWith("--set train.updates: expected an integer in [1, 1099511627776], got "));
   }
 }
 
 TEST(Config, UnknownKeysSuggestTheNearest) {
-  EXPECT_THAT(message_of("", {"train.updats=1"}), HasSubstr("did you mean 'train.updates'?"));
-  EXPECT_THAT(message_of("", {"train.precision=bf61"}), HasSubstr("got 'bf61'; did you mean 'bf16'?"));
-  EXPECT_EQ(message_of("", {"trian.updates=1"}), "--set trian.updates: unknown key; did you mean 'train.updates'?");
-  EXPECT_THAT(message_of("", {"train.zebra=1"}), HasSubstr("docs/configuration.md names every key"));
+  EXPECT_THAT(error_in("", {"train.updats=1"}), HasSubstr("did you mean 'train.updates'?"));
+  EXPECT_THAT(error_in("", {"train.precision=bf61"}), HasSubstr("got 'bf61'; did you mean 'bf16'?"));
+  EXPECT_EQ(error_in("", {"trian.updates=1"}), "--set trian.updates: unknown key; did you mean 'train.updates'?");
+  EXPECT_THAT(error_in("", {"train.zebra=1"}), HasSubstr("docs/configuration.md names every key"));
 }
 
 TEST(Config, KeysCanBeUnsetAndARigReplacesTheSizesOfTheFile) {
@@ -84,7 +84,7 @@ TEST(Config, KeysCanBeUnsetAndARigReplacesTheSizesOfTheFile) {
   const Config with_rig = parse_config(text, "a.toml", {"render.rig=a.toml"});
   EXPECT_EQ(with_rig.render.rig, "a.toml");
   EXPECT_EQ(parse_config(text, "a.toml", {"render.rig="}).render.width_px, 32);
-  EXPECT_THAT(message_of(text, {"render.rig=a.toml", "render.width_px=8"}), HasSubstr("has no effect together"));
+  EXPECT_THAT(error_in(text, {"render.rig=a.toml", "render.width_px=8"}), HasSubstr("has no effect together"));
 }
 
 TEST(Config, PathsAreRelativeToWhereTheyAreTyped) {
@@ -103,7 +103,7 @@ TEST(Config, PathsAreRelativeToWhereTheyAreTyped) {
 }
 
 TEST(Config, SettingsWithoutEffectAreSaid) {
-  EXPECT_THAT(message_of("[simulator]\nnum_slots = 4\nmin_agents = 8\nmax_agents = 8\n"),
+  EXPECT_THAT(error_in("[simulator]\nnum_slots = 4\nmin_agents = 8\nmax_agents = 8\n"),
               HasSubstr("simulator.min_agents: expected at most simulator.num_slots (4), got 8"));
   Config config;
   EXPECT_EQ(idle_settings(config).size(), 0u);
@@ -145,53 +145,52 @@ TEST(Config, OverridesWinAndMayNameNewKeysAndBareWords) {
 }
 
 TEST(Config, ErrorsNameFileLineAndKey) {
-  EXPECT_THAT(message_of("[train]\nupdates = 5\nlearning_rat = 1\n"),
+  EXPECT_THAT(error_in("[train]\nupdates = 5\nlearning_rat = 1\n"),
               AllOf(HasSubstr("a.toml:3:"), HasSubstr("train.learning_rat")));
-  EXPECT_THAT(message_of("[run]\ngamma = 0.9\n"),
-              AllOf(HasSubstr("a.toml:2:"), HasSubstr("did you mean 'train.gamma'")));
-  EXPECT_THAT(message_of("[simulator]\nnum_slots = 0\n"),
+  EXPECT_THAT(error_in("[run]\ngamma = 0.9\n"), AllOf(HasSubstr("a.toml:2:"), HasSubstr("did you mean 'train.gamma'")));
+  EXPECT_THAT(error_in("[simulator]\nnum_slots = 0\n"),
               AllOf(HasSubstr("a.toml:2: simulator.num_slots"), HasSubstr("got 0")));
-  EXPECT_THAT(message_of("[simulator]\nnum_slots = 100000000\n"), HasSubstr("got 100000000"));
-  EXPECT_THAT(message_of("[simulator]\nnum_slots = 1.5\n"), HasSubstr("expected an integer"));
-  EXPECT_THAT(message_of("[render]\nwidth_px = 0\nheight_px = 0\n"), HasSubstr("render.width_px"));
+  EXPECT_THAT(error_in("[simulator]\nnum_slots = 100000000\n"), HasSubstr("got 100000000"));
+  EXPECT_THAT(error_in("[simulator]\nnum_slots = 1.5\n"), HasSubstr("expected an integer"));
+  EXPECT_THAT(error_in("[render]\nwidth_px = 0\nheight_px = 0\n"), HasSubstr("render.width_px"));
   for (const char* bad : {"5", "[5]", "[[5, 6]]", "[[5, 6, 7], [5, 8, 9]]", "[[0, 6, 7]]", "[[5, 0, 7]]"}) {
-    EXPECT_THAT(message_of(fmt::format("[render]\nschedule = {}\n", bad)),
+    EXPECT_THAT(error_in(fmt::format("[render]\nschedule = {}\n", bad)),
                 AllOf(HasSubstr("a.toml:2: render.schedule"), HasSubstr("expected")));
   }
-  EXPECT_THAT(message_of("[train]\ngamma = nan\n"), HasSubstr("train.gamma"));
-  EXPECT_THAT(message_of("[train]\ngamma = \"a\"\n"), HasSubstr("expected a number"));
-  EXPECT_THAT(message_of("[policy]\nmodality = \"sonar\"\n"), HasSubstr("perspective"));
-  EXPECT_THAT(message_of("[policy]\nconv_strides = [1, 2]\n"), HasSubstr("policy.conv_strides"));
-  EXPECT_THAT(message_of("[policy]\nattention_heads = 3\n"), HasSubstr("divisor"));
-  EXPECT_THAT(message_of("[simulator.conditioning]\ncollision = [3, 1]\n"), HasSubstr("low <= high"));
-  EXPECT_THAT(message_of("[simulator.conditioning]\nthrottle = [1.1, 1.2]\n"), HasSubstr("low <= 1 <= high"));
-  EXPECT_THAT(message_of("[simulator.conditioning]\nthrottle = [0, 0]\n"), HasSubstr("low = high > 0"));
-  EXPECT_EQ(message_of("[simulator.conditioning]\nthrottle = [0.9, 0.9]\n"), test::kNoError);
-  EXPECT_THAT(message_of("[simulator]\nmin_agents = 9\nmax_agents = 8\n"), HasSubstr("a.toml:2: simulator.min_agents"));
-  EXPECT_THAT(message_of("[train]\nupdates = \n"), HasSubstr("a.toml:2"));
-  EXPECT_THAT(message_of("simulator = 5\n"), HasSubstr("a.toml:1"));
-  EXPECT_THAT(message_of("", {"train.updates=0"}), AllOf(HasSubstr("--set train.updates"), HasSubstr("got 0")));
-  EXPECT_THAT(message_of("", {"train.updates"}), HasSubstr("expected section.key=value"));
-  EXPECT_THAT(message_of("", {"nonsense.key=1"}), HasSubstr("nonsense"));
+  EXPECT_THAT(error_in("[train]\ngamma = nan\n"), HasSubstr("train.gamma"));
+  EXPECT_THAT(error_in("[train]\ngamma = \"a\"\n"), HasSubstr("expected a number"));
+  EXPECT_THAT(error_in("[policy]\nmodality = \"sonar\"\n"), HasSubstr("perspective"));
+  EXPECT_THAT(error_in("[policy]\nconv_strides = [1, 2]\n"), HasSubstr("policy.conv_strides"));
+  EXPECT_THAT(error_in("[policy]\nattention_heads = 3\n"), HasSubstr("divisor"));
+  EXPECT_THAT(error_in("[simulator.conditioning]\ncollision = [3, 1]\n"), HasSubstr("low <= high"));
+  EXPECT_THAT(error_in("[simulator.conditioning]\nthrottle = [1.1, 1.2]\n"), HasSubstr("low <= 1 <= high"));
+  EXPECT_THAT(error_in("[simulator.conditioning]\nthrottle = [0, 0]\n"), HasSubstr("low = high > 0"));
+  EXPECT_EQ(error_in("[simulator.conditioning]\nthrottle = [0.9, 0.9]\n"), test::kNoError);
+  EXPECT_THAT(error_in("[simulator]\nmin_agents = 9\nmax_agents = 8\n"), HasSubstr("a.toml:2: simulator.min_agents"));
+  EXPECT_THAT(error_in("[train]\nupdates = \n"), HasSubstr("a.toml:2"));
+  EXPECT_THAT(error_in("simulator = 5\n"), HasSubstr("a.toml:1"));
+  EXPECT_THAT(error_in("", {"train.updates=0"}), AllOf(HasSubstr("--set train.updates"), HasSubstr("got 0")));
+  EXPECT_THAT(error_in("", {"train.updates"}), HasSubstr("expected section.key=value"));
+  EXPECT_THAT(error_in("", {"nonsense.key=1"}), HasSubstr("nonsense"));
 }
 
 TEST(Config, KeysWithoutEffectAreRefused) {
-  EXPECT_THAT(message_of("[policy]\nmodality = \"perspective\"\nauxiliary = true\n"),
+  EXPECT_THAT(error_in("[policy]\nmodality = \"perspective\"\nauxiliary = true\n"),
               AllOf(HasSubstr("a.toml:3: policy.auxiliary"), HasSubstr("no effect")));
-  EXPECT_EQ(message_of("[policy]\nmodality = \"vector\"\nauxiliary = true\n"), test::kNoError);
-  EXPECT_THAT(message_of("[simulator]\nwall_observations = true\n"),
+  EXPECT_EQ(error_in("[policy]\nmodality = \"vector\"\nauxiliary = true\n"), test::kNoError);
+  EXPECT_THAT(error_in("[simulator]\nwall_observations = true\n"),
               AllOf(HasSubstr("a.toml:2: simulator.wall_observations"), HasSubstr("no effect")));
-  EXPECT_THAT(message_of("[render]\nwidth_px = 96\nrig = \"r.toml\"\n"),
+  EXPECT_THAT(error_in("[render]\nwidth_px = 96\nrig = \"r.toml\"\n"),
               AllOf(HasSubstr("a.toml:2: render.width_px"), HasSubstr("render.rig")));
-  EXPECT_THAT(message_of("[render]\nrig = \"r.toml\"\nschedule = [[5, 6, 7]]\n"),
+  EXPECT_THAT(error_in("[render]\nrig = \"r.toml\"\nschedule = [[5, 6, 7]]\n"),
               AllOf(HasSubstr("a.toml:3: render.schedule"), HasSubstr("render.rig")));
-  EXPECT_THAT(message_of("[render]\nschedule = [[5, 6, 7]]\n[policy]\nmodality = \"vector\"\n"),
+  EXPECT_THAT(error_in("[render]\nschedule = [[5, 6, 7]]\n[policy]\nmodality = \"vector\"\n"),
               AllOf(HasSubstr("a.toml:2: render.schedule"), HasSubstr("vector")));
-  EXPECT_THAT(message_of("[render]\nrig = \"r.toml\"\n", {"render.height_px=9"}),
+  EXPECT_THAT(error_in("[render]\nrig = \"r.toml\"\n", {"render.height_px=9"}),
               AllOf(HasSubstr("--set render.height_px"), HasSubstr("render.rig")));
-  EXPECT_THAT(message_of("[train]\nhalted_slots = \"draw\"\n"),
+  EXPECT_THAT(error_in("[train]\nhalted_slots = \"draw\"\n"),
               AllOf(HasSubstr("a.toml:2: train.halted_slots"), HasSubstr("train.adv_filter_threshold = 0, got 0.01")));
-  EXPECT_EQ(message_of("[train]\nhalted_slots = \"draw\"\nadv_filter_threshold = 0\n"), test::kNoError);
+  EXPECT_EQ(error_in("[train]\nhalted_slots = \"draw\"\nadv_filter_threshold = 0\n"), test::kNoError);
   // What is written for a run with a rig file can be read again.
   const Config c = parse_config("[render]\nrig = \"r.toml\"\n", "a.toml");
   EXPECT_EQ(to_toml(parse_config(to_toml(c), "b.toml")), to_toml(c));
@@ -204,12 +203,12 @@ TEST(Config, BackendsAreCheckedWhereTheyAreRead) {
   EXPECT_EQ(c.simulator.backend, "cpu");
   EXPECT_EQ(c.render.backend, "null");
   EXPECT_EQ(to_toml(parse_config(to_toml(c), "b.toml")), to_toml(c));
-  EXPECT_THAT(message_of("[run]\ndevice = \"gpu\"\n"),
+  EXPECT_THAT(error_in("[run]\ndevice = \"gpu\"\n"),
               AllOf(HasSubstr("a.toml:2: run.device"), HasSubstr("cpu, cuda, cuda:N, auto"), HasSubstr("got 'gpu'")));
-  EXPECT_THAT(message_of("[run]\ndevice = \"cuda:\"\n"), HasSubstr("got 'cuda:'"));
-  EXPECT_THAT(message_of("[simulator]\nbackend = \"null\"\n"),
+  EXPECT_THAT(error_in("[run]\ndevice = \"cuda:\"\n"), HasSubstr("got 'cuda:'"));
+  EXPECT_THAT(error_in("[simulator]\nbackend = \"null\"\n"),
               AllOf(HasSubstr("simulator.backend: expected one of cpu, "), HasSubstr("got 'null'")));
-  EXPECT_THAT(message_of("[render]\nbackend = \"vulkan\"\n"),
+  EXPECT_THAT(error_in("[render]\nbackend = \"vulkan\"\n"),
               AllOf(HasSubstr("render.backend: expected one of cpu, "), HasSubstr("got 'vulkan'")));
   // A run that another build saved is read whatever drew it.
   EXPECT_EQ(parse_saved_config("[render]\nbackend = \"vulkan\"\n", "a.ckpt").render.backend, "vulkan");
@@ -222,10 +221,10 @@ TEST(Config, SamplesAreNumbersOrGridsAndOfGlAlone) {
   };
   EXPECT_EQ(samples_of("4"), (PixelSamples{.grid = 1, .multisample = 4}));
   EXPECT_EQ(samples_of("\"4x4\""), (PixelSamples{.grid = 4, .multisample = 1}));
-  EXPECT_THAT(message_of("[render]\nsamples = \"4x3\"\n"),
+  EXPECT_THAT(error_in("[render]\nsamples = \"4x3\"\n"),
               AllOf(HasSubstr("a.toml:2: render.samples"), HasSubstr("4x3")));
-  EXPECT_THAT(message_of("[render]\nsamples = 65\n"), HasSubstr("got 65"));
-  EXPECT_THAT(message_of("[render]\nbackend = \"cpu\"\nsamples = 4\n"),
+  EXPECT_THAT(error_in("[render]\nsamples = 65\n"), HasSubstr("got 65"));
+  EXPECT_THAT(error_in("[render]\nbackend = \"cpu\"\nsamples = 4\n"),
               AllOf(HasSubstr("a.toml:3: render.samples"), HasSubstr("only gl")));
 }
 
@@ -239,9 +238,9 @@ TEST(Config, TheOldNameOfTheBackendsFillsInWhichIsAbsent) {
   EXPECT_EQ(backends("[run]\nbackend = \"null\"\n"), "cpu null");
   EXPECT_EQ(backends("[run]\nbackend = \"null\"\n[render]\nbackend = \"cpu\"\n"), "cpu cpu");
   EXPECT_EQ(backends("[run]\nbackend = \"cpu\"\n[simulator]\nbackend = \"auto\"\n"), "auto cpu");
-  EXPECT_THAT(message_of("[run]\nbackend = \"vulkan\"\n"),
+  EXPECT_THAT(error_in("[run]\nbackend = \"vulkan\"\n"),
               AllOf(HasSubstr("a.toml:2: run.backend"), HasSubstr("vulkan")));
-  EXPECT_THAT(message_of("[run]\nbackend = \"cpu\"\n", {"simulator.backend=cpu", "render.backend=null"}),
+  EXPECT_THAT(error_in("[run]\nbackend = \"cpu\"\n", {"simulator.backend=cpu", "render.backend=null"}),
               AllOf(HasSubstr("a.toml:2: run.backend"), HasSubstr("no effect")));
 }
 
@@ -322,9 +321,9 @@ TEST(Config, HarmlessDifferencesAreNone) {
 }
 
 TEST(Config, MessagesShowValuesInOneShortLine) {
-  EXPECT_EQ(message_of("[train]\nupdates = {a = 1,  b = 2}\n"),
+  EXPECT_EQ(error_in("[train]\nupdates = {a = 1,  b = 2}\n"),
             "a.toml:2: train.updates: expected an integer in [1, 1099511627776], got a table");
-  const std::string message = message_of("[train]\nupdates = \"" + std::string(200, '1') + "\\n\"\n");
+  const std::string message = error_in("[train]\nupdates = \"" + std::string(200, '1') + "\\n\"\n");
   EXPECT_THAT(message, HasSubstr("got '1111"));
   EXPECT_THAT(message, Not(HasSubstr("\n")));
   EXPECT_LT(message.size(), 160u);

@@ -306,7 +306,7 @@ Takeover run_of(float speed_mps, int32_t steps, int32_t sight_step) {
 }
 
 /// Two pairs of two scenes and two policies, of which the second is 2 m/s faster where somebody is hidden.
-CornerResults made_up() {
+CornerResults made_up_corners() {
   CornerResults all;
   all.setting.maps = {"a"};
   all.policies = {{"one", "one.ckpt", "h", true}, {"two", "two.ckpt", "h", false}};
@@ -330,7 +330,7 @@ CornerResults made_up() {
 }
 
 TEST(CornerResults, AreMeasuredAtTheReveal) {
-  const CornerResults all = made_up();
+  const CornerResults all = made_up_corners();
   const auto reveal = reveal_of(all, 0, true, CornerCase::hidden, 0);
   ASSERT_TRUE(reveal);
   EXPECT_EQ(reveal->step, 20);
@@ -349,7 +349,7 @@ TEST(CornerResults, AreMeasuredAtTheReveal) {
 }
 
 TEST(CornerResults, DifferencesAreOfPairs) {
-  const CornerResults all = made_up();
+  const CornerResults all = made_up_corners();
   const std::vector<CornerRow> rows = summarize(all);
   ASSERT_EQ(rows.size(), 2u * (6 + 3 + 4));
   EXPECT_EQ(rows[0].revealed, 2);
@@ -378,7 +378,7 @@ TEST(CornerResults, DifferencesAreOfPairs) {
 
 TEST(CornerResults, AreWrittenRunByRun) {
   const test::ScratchFolder folder;
-  const CornerResults all = made_up();
+  const CornerResults all = made_up_corners();
   write_corner_cases(folder / "cases.csv", all);
   const auto table = read_table(folder / "cases.csv");
   ASSERT_EQ(table.size(), 1u + 2 * 2 * 3 * 2);

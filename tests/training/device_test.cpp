@@ -81,7 +81,7 @@ class EachModality : public DeviceTraining, public testing::WithParamInterface<c
     return {modality(), "train.precision=fp32", "train.updates=1", "train.num_steps=30", "train.forward_chunk=3"};
   }
 };
-INSTANTIATE_TEST_SUITE_P(All, EachModality, testing::Values("vector", "perspective"),
+INSTANTIATE_TEST_SUITE_P(All, EachModality, ::testing::Values("vector", "perspective"),
                          [](const auto& modality) { return std::string(modality.param); });
 
 TEST_P(EachModality, LearnsInEachPrecision) {

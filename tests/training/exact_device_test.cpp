@@ -92,8 +92,8 @@ Learnt learn(const std::vector<std::string>& more) {
 
 class DeviceGraphs : public DeviceExact, public testing::WithParamInterface<std::tuple<const char*, const char*>> {};
 INSTANTIATE_TEST_SUITE_P(All, DeviceGraphs,
-                         testing::Combine(testing::Values("vector", "perspective"),
-                                          testing::Values("fp32", "tf32", "bf16")),
+                         ::testing::Combine(::testing::Values("vector", "perspective"),
+                                            ::testing::Values("fp32", "tf32", "bf16")),
                          [](const auto& pair) {
                            return std::string(std::get<0>(pair.param)) + "_" + std::get<1>(pair.param);
                          });

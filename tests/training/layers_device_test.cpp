@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "pictura/tests/backend_cuda/device_test.h"
+#include "pictura/tests/training/numbers.h"
 #include "pictura/training/layers.h"
 #include "pictura/training/point_features.h"
 #include "pictura/training/precision.h"
@@ -22,11 +23,8 @@ class DeviceLayers : public test::DeviceTest, public testing::WithParamInterface
     open_learning_device(config);
   }
 
-  // Numbers without a pattern, which the type of activations holds exactly, so that rounding inputs is no difference.
-  static at::Tensor numbers(at::IntArrayRef shape, double phase) {
-    const at::Tensor drawn = (at::arange(at::empty(shape).numel(), at::kDouble) * 1.7 + phase).sin().reshape(shape);
-    return drawn.to(at::kBFloat16).to(at::kDouble);
-  }
+  // So that rounding inputs is no difference.
+  static at::Tensor numbers(at::IntArrayRef shape, double phase) { return test::numbers(shape, phase, at::kBFloat16); }
   at::ScalarType activations() const { return GetParam() == Precision::bf16 ? at::kBFloat16 : at::kFloat; }
 
   /// The value and the gradients of all inputs, on the host.
@@ -69,7 +67,7 @@ class DeviceLayers : public test::DeviceTest, public testing::WithParamInterface
     }
   }
 };
-INSTANTIATE_TEST_SUITE_P(All, DeviceLayers, testing::Values(Precision::fp32, Precision::tf32, Precision::bf16),
+INSTANTIATE_TEST_SUITE_P(All, DeviceLayers, ::testing::Values(Precision::fp32, Precision::tf32, Precision::bf16),
                          [](const auto& precision) {
                            return std::string(precision.param == Precision::fp32   ? "fp32"
                                               : precision.param == Precision::tf32 ? "tf32"

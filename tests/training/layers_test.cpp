@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "pictura/simulator/rules/observe.h"
+#include "pictura/tests/training/numbers.h"
 #include "pictura/training/point_features.h"
 #include "pictura/training/policy.h"
 
@@ -70,17 +71,15 @@ TEST(ConvolveGelu, ReadsNothingFromChannelsBeyondThoseOfItsWeight) {
 
 using Layer = std::function<at::Tensor(const std::vector<at::Tensor>& inputs)>;
 
-at::Tensor numbers(at::IntArrayRef shape, double phase) {
-  const at::Tensor drawn = (at::arange(at::empty(shape).numel(), at::kDouble) * 1.7 + phase).sin().reshape(shape);
-  return drawn.to(at::kFloat).to(at::kDouble);
-}
+// For single precision.
+at::Tensor float_numbers(at::IntArrayRef shape, double phase) { return test::numbers(shape, phase, at::kFloat); }
 
 // The value of a layer and the gradients of its inputs, all of this type.
 std::vector<at::Tensor> results(const Layer& layer, const std::vector<at::Tensor>& inputs, at::ScalarType type) {
   std::vector<at::Tensor> its_inputs;
   for (const at::Tensor& input : inputs) its_inputs.push_back(input.detach().clone().to(type).requires_grad_());
   std::vector<at::Tensor> all{layer(its_inputs)};
-  all[0].backward(numbers(all[0].sizes(), 0.3).to(type));
+  all[0].backward(float_numbers(all[0].sizes(), 0.3).to(type));
   for (const at::Tensor& input : its_inputs) all.push_back(input.grad());
   for (at::Tensor& result : all) result = result.detach().to(at::kDouble);
   return all;
@@ -111,7 +110,7 @@ TEST(HostLayers, LinearGeluIsAtens) {
   for (const int64_t out : {5, 64}) {
     expect_as_in_double([](const auto& in) { return linear_gelu(in[0], in[1], in[2]); },
                         [](const auto& in) { return at::gelu(at::linear(in[0], in[1], in[2])); },
-                        {3 * numbers({7, 300, 6}, 0), numbers({out, 6}, 1), numbers({out}, 2)});
+                        {3 * float_numbers({7, 300, 6}, 0), float_numbers({out, 6}, 1), float_numbers({out}, 2)});
   }
 }
 
@@ -144,14 +143,15 @@ TEST(HostLayers, ConvolveGeluIsAtens) {
     expect_as_in_double(of(convolve_gelu), of([](const auto& x, const auto& w, const auto& b, int64_t stride) {
                           return at::gelu(at::conv2d(x, w, b, {stride}, {w.size(2) / 2}));
                         }),
-                        {numbers({c.images, c.in, c.height, c.width}, 0), numbers({c.out, c.in, c.kernel, c.kernel}, 1),
-                         numbers({c.out}, 2)});
+                        {float_numbers({c.images, c.in, c.height, c.width}, 0),
+                         float_numbers({c.out, c.in, c.kernel, c.kernel}, 1), float_numbers({c.out}, 2)});
   }
 }
 
 TEST(HostLayers, LargestEmbeddingIsTheMaximumOverTheMembersThatThereAre) {
   const int64_t sets = 40, most = 23;
-  const at::Tensor members = numbers({sets, most, 7}, 0.1), counts = at::arange(sets, at::kInt).remainder(most + 1);
+  const at::Tensor members = float_numbers({sets, most, 7}, 0.1),
+                   counts = at::arange(sets, at::kInt).remainder(most + 1);
   for (const int64_t points : {0, 1, 2}) {
     const int64_t features = 7 + 6 * points;
     const auto plain = [&](const std::vector<at::Tensor>& in) {
@@ -163,8 +163,9 @@ TEST(HostLayers, LargestEmbeddingIsTheMaximumOverTheMembersThatThereAre) {
     const auto layer = [&](const std::vector<at::Tensor>& in) {
       return largest_embedding(floats, counts, points, kScalePosition_m, in[0], in[1], in[2], in[3]);
     };
-    expect_as_in_double(layer, plain,
-                        {numbers({16, features}, 1), numbers({16}, 2), numbers({24, 16}, 3), numbers({24}, 4)});
+    expect_as_in_double(
+        layer, plain,
+        {float_numbers({16, features}, 1), float_numbers({16}, 2), float_numbers({24, 16}, 3), float_numbers({24}, 4)});
   }
 }
 

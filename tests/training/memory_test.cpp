@@ -38,10 +38,10 @@ double taken_bytes(const Config& config) {
   return heap_bytes() - before;
 }
 
-class EachRollout : public testing::TestWithParam<std::pair<const char*, const char*>> {};
+class EachRollout : public ::testing::TestWithParam<std::pair<const char*, const char*>> {};
 INSTANTIATE_TEST_SUITE_P(Memory, EachRollout,
-                         testing::Values(std::pair{"vector", "auto"}, std::pair{"perspective", "kept"},
-                                         std::pair{"perspective", "redrawn"}),
+                         ::testing::Values(std::pair{"vector", "auto"}, std::pair{"perspective", "kept"},
+                                           std::pair{"perspective", "redrawn"}),
                          [](const auto& test) { return std::string(test.param.first) + "_" + test.param.second; });
 
 TEST_P(EachRollout, TakesAboutWhatIsEstimated) {
@@ -67,7 +67,7 @@ TEST(Memory, MoreAgentsThanFitAreRefusedWithTheNumberThatWould) {
                     HasSubstr("by estimate"), HasSubstr("cpu has"), HasSubstr("about 250 agents would fit")));
 }
 
-class EachNetwork : public testing::TestWithParam<std::vector<std::string>> {
+class EachNetwork : public ::testing::TestWithParam<std::vector<std::string>> {
  protected:
   // With an update of one chunk of so many transitions.
   Config config_of_chunk(int transitions) const {
@@ -81,14 +81,14 @@ class EachNetwork : public testing::TestWithParam<std::vector<std::string>> {
   }
 };
 INSTANTIATE_TEST_SUITE_P(Memory, EachNetwork,
-                         testing::Values(std::vector<std::string>{"policy.modality=vector"},
-                                         std::vector<std::string>{"policy.modality=vector",
-                                                                  "policy.point_features=false",
-                                                                  "policy.embedding_width=200"},
-                                         std::vector<std::string>{"policy.modality=perspective"},
-                                         std::vector<std::string>{"policy.modality=perspective", "policy.patch_px=1",
-                                                                  "policy.conv_kernels=[5, 3, 3, 3, 3]",
-                                                                  "policy.conv_strides=[2, 2, 2, 1, 1]"}));
+                         ::testing::Values(std::vector<std::string>{"policy.modality=vector"},
+                                           std::vector<std::string>{"policy.modality=vector",
+                                                                    "policy.point_features=false",
+                                                                    "policy.embedding_width=200"},
+                                           std::vector<std::string>{"policy.modality=perspective"},
+                                           std::vector<std::string>{"policy.modality=perspective", "policy.patch_px=1",
+                                                                    "policy.conv_kernels=[5, 3, 3, 3, 3]",
+                                                                    "policy.conv_strides=[2, 2, 2, 1, 1]"}));
 
 TEST_P(EachNetwork, HasTheParametersThatAreCounted) {
   const Config config = config_of_chunk(64);

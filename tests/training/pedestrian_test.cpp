@@ -236,7 +236,7 @@ TEST_F(Pedestrian, RefusesWhatCannotBe) {
 // ---- results
 
 /// Two paths of two scenes: hidden at the first point (of one at the second, too), then seen, then hidden again.
-PedestrianResults made_up() {
+PedestrianResults made_up_pedestrians() {
   PedestrianResults all;
   all.setting.maps = {"a"};
   all.policies = {{"one", "one.ckpt", "h", true}};
@@ -267,7 +267,7 @@ const PedestrianRow& row_at(const std::vector<PedestrianRow>& rows, int offset) 
 }
 
 TEST(PedestrianResults, MeansAreAlignedAtFirstSight) {
-  const std::vector<PedestrianRow> rows = summarize(made_up());
+  const std::vector<PedestrianRow> rows = summarize(made_up_pedestrians());
   ASSERT_EQ(rows.size(), 3u + 5);
   EXPECT_EQ(rows[0].phase, PathPhase::hidden);
   EXPECT_EQ(rows[0].cases, 3);
@@ -289,7 +289,7 @@ TEST(PedestrianResults, MeansAreAlignedAtFirstSight) {
 
 TEST(PedestrianResults, AreWrittenPlaceByPlace) {
   const test::ScratchFolder folder;
-  const PedestrianResults all = made_up();
+  const PedestrianResults all = made_up_pedestrians();
   write_pedestrian_cases(folder / "cases.csv", all);
   const auto table = read_table(folder / "cases.csv");
   ASSERT_EQ(table.size(), 10u);

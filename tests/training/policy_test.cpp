@@ -8,11 +8,14 @@
 #include <gtest/gtest.h>
 
 #include "pictura/common/patches.h"
+#include "pictura/tests/training/numbers.h"
 #include "pictura/training/layers.h"
 #include "pictura/training/point_features.h"
 
 namespace pictura {
 namespace {
+
+using test::numbers;
 
 Config::PolicySection tiny(Modality modality) {
   Config::PolicySection c;
@@ -28,13 +31,6 @@ Config::PolicySection tiny(Modality modality) {
   c.backbone_layers = 2;
   c.backbone_width = 6;
   return c;
-}
-
-// Numbers without a pattern, a function of the index alone.
-at::Tensor numbers(at::IntArrayRef shape, double phase) {
-  int64_t count = 1;
-  for (const int64_t size : shape) count *= size;
-  return (at::arange(count, at::kDouble) * 1.7 + phase).sin().reshape(shape);
 }
 
 Observation observation(Modality modality, int64_t batch) {

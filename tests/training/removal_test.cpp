@@ -243,7 +243,7 @@ TEST_F(Removal, RefusesWhatCannotBe) {
 }
 
 /// Cases of two scenes, with changes that are written down here.
-RemovalResults made_up() {
+RemovalResults made_up_removals() {
   RemovalResults all;
   all.setting.maps = {"a \"b\""};
   all.policies = {{"one", "one.ckpt", "h", true}, {"two", "two.ckpt", "i", false}};
@@ -271,7 +271,7 @@ const RemovalRow& row_of(const std::vector<RemovalRow>& rows, int policy, int bi
 }
 
 TEST(RemovalResults, MeansAreOverScenes) {
-  const std::vector<RemovalRow> rows = summarize(made_up());
+  const std::vector<RemovalRow> rows = summarize(made_up_removals());
   EXPECT_EQ(rows.size(), 2u * 6 * 12);
   const RemovalRow& whole = row_of(rows, 0, 0);
   EXPECT_EQ(whole.cases, 3);
@@ -296,7 +296,7 @@ TEST(RemovalResults, MeansAreOverScenes) {
 
 TEST(RemovalResults, AreWrittenCaseByCase) {
   const test::ScratchFolder folder;
-  const RemovalResults all = made_up();
+  const RemovalResults all = made_up_removals();
   write_removal_cases(folder / "cases.csv", all);
   const std::string text = read_file(folder / "cases.csv");
   EXPECT_THAT(text, StartsWith("case,scene,map,driver,step,ego,user,hidden,class,halted,distance_m"));

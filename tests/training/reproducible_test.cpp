@@ -27,7 +27,7 @@ class Reproducible : public ::testing::Test {
 };
 
 class EachModality : public Reproducible, public testing::WithParamInterface<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Reproducible, EachModality, testing::Values("vector", "perspective"),
+INSTANTIATE_TEST_SUITE_P(Reproducible, EachModality, ::testing::Values("vector", "perspective"),
                          [](const auto& modality) { return std::string(modality.param); });
 
 // On the host, which has fp32 alone, a setting gives one policy. train.reproducible may give another one: it fills
@@ -94,7 +94,7 @@ TEST_F(Reproducible, MayChangeWhenARunGoesOnAndIsSaid) {
   std::vector<std::string> notices;
   run.on_notice = [&notices](const std::string& notice) { notices.push_back(notice); };
   train(run);
-  EXPECT_THAT(notices, testing::ElementsAre("train.reproducible: false became true"));
+  EXPECT_THAT(notices, ::testing::ElementsAre("train.reproducible: false became true"));
 }
 
 }  // namespace

@@ -48,7 +48,7 @@ TEST(Teacher, WeightFallsAlongALine) {
   EXPECT_EQ(teacher_weight_at(train, 101), 0);
 }
 
-class TeacherTest : public testing::Test {
+class TeacherTest : public ::testing::Test {
  protected:
   // Untrained policies: the weights of another seed are another's.
   std::string policy_of(const std::string& name, std::vector<std::string> settings) const {
@@ -90,7 +90,7 @@ TEST_F(TeacherTest, OneThatWeighsNothingChangesNoBit) {
       none{"train.updates=2", "train.teacher=" + teacher, "train.teacher_coef=0"};
   const std::string hash = train(small_run(folder_ / "plain", "cpu", plain)).policy_hash;
   EXPECT_EQ(train(small_run(folder_ / "none", "cpu", none)).policy_hash, hash);
-  EXPECT_THAT(divergences(folder_ / "none"), testing::Each(0));
+  EXPECT_THAT(divergences(folder_ / "none"), ::testing::Each(0));
 }
 
 TEST_F(TeacherTest, RunsGoOnExactly) {
@@ -109,10 +109,10 @@ TEST_F(TeacherTest, OthersAreRefusedByName) {
   };
   const std::string images = policy_of("images", {}), vectors = vector_policy("vectors", {"policy.auxiliary=true"});
   EXPECT_THAT(message(images),
-              testing::HasSubstr(images + ": train.teacher: its policy reads images, expected one of"));
+              ::testing::HasSubstr(images + ": train.teacher: its policy reads images, expected one of"));
   EXPECT_THAT(message(vectors, {"policy.modality=vector"}),
-              testing::HasSubstr(vectors + ": train.teacher: its policy.auxiliary is true, expected false"));
-  EXPECT_THAT(message(folder_ / "absent.safetensors"), testing::HasSubstr("absent.safetensors"));
+              ::testing::HasSubstr(vectors + ": train.teacher: its policy.auxiliary is true, expected false"));
+  EXPECT_THAT(message(folder_ / "absent.safetensors"), ::testing::HasSubstr("absent.safetensors"));
 }
 
 }  // namespace
