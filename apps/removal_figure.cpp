@@ -10,12 +10,13 @@ namespace pictura {
 
 namespace {
 
-struct Quantity {
+struct RemovalQuantity {
   const char *title, *label;
   Estimate RemovalRow::* estimate;
 };
-constexpr Quantity kQuantities[] = {{"Value", "mean |dV|", &RemovalRow::abs_value_change},
-                                    {"Braking probability", "mean |dP(brake)|", &RemovalRow::abs_brake_change}};
+constexpr RemovalQuantity kRemovalQuantities[] = {
+    {"Value", "mean |dV|", &RemovalRow::abs_value_change},
+    {"Braking probability", "mean |dP(brake)|", &RemovalRow::abs_brake_change}};
 
 void add_point(PlotSeries* series, double x, const Estimate& estimate) {
   const double nothing = std::numeric_limits<double>::quiet_NaN();
@@ -32,7 +33,7 @@ void add_point(PlotSeries* series, double x, const Estimate& estimate) {
 void draw_removal_figure(const RemovalResults& results, const std::vector<RemovalRow>& rows, const std::string& path) {
   std::vector<PlotPanel> panels;
   for (const bool by_distance : {false, true}) {
-    for (const Quantity& quantity : kQuantities) {
+    for (const RemovalQuantity& quantity : kRemovalQuantities) {
       PlotPanel panel{.title = fmt::format("{}{}", quantity.title, by_distance ? ", wholly hidden users" : ""),
                       .x_label = by_distance ? "distance of the user (m)" : "occlusion of the user (%)",
                       .y_label = quantity.label};

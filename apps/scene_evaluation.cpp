@@ -28,7 +28,7 @@ double parse_density(const std::string& text) {
   return *percent / 100;
 }
 
-std::string text_of(const Estimate& e) { return fmt::format("{:.3f} +- {:.3f}", e.value, e.half_width_95); }
+std::string interval_text(const Estimate& e) { return fmt::format("{:.3f} +- {:.3f}", e.value, e.half_width_95); }
 
 void print_settings(const SceneProtocol& protocol) {
   fmt::print("protocol {}: control {}, start {}, {} steps\n", protocol.name, protocol.control, protocol.start_step,
@@ -50,8 +50,9 @@ void print_table(const SceneEvaluation& evaluation) {
   for (const SceneRow& row : evaluation.rows) {
     const std::string density = fmt::format("{:g} %", 100 * row.density);
     fmt::print(fmt::runtime(kLine), density, "this", row.scenes, row.vehicle_episodes,
-               text_of(row.at_fault_collision_rate), text_of(row.off_road_rate), text_of(row.goal_rate),
-               text_of(row.collision_rate), text_of(row.mean_displacement_m), fmt::format("{:.2f}", row.km_driven));
+               interval_text(row.at_fault_collision_rate), interval_text(row.off_road_rate),
+               interval_text(row.goal_rate), interval_text(row.collision_rate), interval_text(row.mean_displacement_m),
+               fmt::format("{:.2f}", row.km_driven));
     if (protocol.name != scene_protocols().front().name) continue;
     for (const PaperSceneRow& paper : paper_scene_rows()) {
       if (paper.density != row.density) continue;

@@ -26,7 +26,7 @@ namespace {
 
 constexpr int kNumWorlds = 2;
 
-struct Arguments {
+struct BreakdownArguments {
   TrainingCase measured{.config_path = "configs/paper.toml"};
   std::vector<std::string> backends = {"cuda"}, samples = {"1"},
                            sizes = {"32x18", "64x36", "96x54", "192x108", "384x216"};
@@ -65,7 +65,7 @@ constexpr Column kColumns[] = {
     {"other", other_s},
     {"total", wall_s}};
 
-struct Case {
+struct BreakdownCase {
   std::string backend, samples, size;
   int agents = 0;
   // gl with its samples, the others without.
@@ -74,7 +74,7 @@ struct Case {
 };
 
 // One update of everything in one minibatch: one epoch, no filter, every slot at every step.
-std::vector<std::string> recipe_of(const Arguments& arguments) {
+std::vector<std::string> recipe_of(const BreakdownArguments& arguments) {
   std::vector<std::string> texts{"train.num_steps=128",
                                  "train.update_epochs=1",
                                  "train.minibatch_size=4294967296",
@@ -87,7 +87,7 @@ std::vector<std::string> recipe_of(const Arguments& arguments) {
   return texts;
 }
 
-std::vector<std::string> overrides_of(const Arguments& arguments, const Case& c, int64_t chunk) {
+std::vector<std::string> overrides_of(const BreakdownArguments& arguments, const BreakdownCase& c, int64_t chunk) {
   const Pair pixels = parse_pair("--size", c.size, 8192);
   std::vector<std::string> texts = recipe_of(arguments);
   for (const std::string& text :
@@ -102,8 +102,8 @@ std::vector<std::string> overrides_of(const Arguments& arguments, const Case& c,
 }
 
 // All cases at once, so that errors in any arguments are reported before the first case is measured.
-std::vector<Case> cases_of(const Arguments& arguments) {
-  std::vector<Case> cases;
+std::vector<BreakdownCase> breakdown_cases_of(const BreakdownArguments& arguments) {
+  std::vector<BreakdownCase> cases;
   for (const std::string& backend : arguments.backends) {
     for (const std::string& samples : arguments.samples) {
       if (!backend.starts_with("gl") && samples != arguments.samples.front()) continue;
@@ -120,7 +120,7 @@ std::vector<Case> cases_of(const Arguments& arguments) {
 }
 
 // Compares images of this renderer and size with the oracle's, see measure_render().
-ImageError check_images(const Arguments& arguments, const Config& config, const DrivenWorlds& worlds) {
+ImageError check_images(const BreakdownArguments& arguments, const Config& config, const DrivenWorlds& worlds) {
   RenderCase checked{.backend = config.render.backend,
                      .num_views = static_cast<int>(worlds.views.size()),
                      .checked_views = arguments.checked_views,
@@ -134,7 +134,8 @@ ImageError check_images(const Arguments& arguments, const Config& config, const 
 }
 
 // With the largest chunk that fits into the device's memory: this one, or a half, a quarter, ... of it.
-TrainingMeasurement measure_with_largest_chunk(const Arguments& arguments, const Case& c, int64_t* chunk_out) {
+TrainingMeasurement measure_with_largest_chunk(const BreakdownArguments& arguments, const BreakdownCase& c,
+                                               int64_t* chunk_out) {
   for (int64_t chunk = arguments.chunk;; chunk /= 2) {
     TrainingCase measured = arguments.measured;
     measured.overrides = overrides_of(arguments, c, chunk);
@@ -148,7 +149,7 @@ TrainingMeasurement measure_with_largest_chunk(const Arguments& arguments, const
 }
 
 // The steps of an update by the simulator on the host, on their own: random actions, no copies to a device.
-BenchResult measure_host_steps(const Arguments& arguments, const Case& c) {
+BenchResult measure_host_steps(const BreakdownArguments& arguments, const BreakdownCase& c) {
   const Config config = load_config(arguments.measured.config_path, overrides_of(arguments, c, arguments.chunk));
   std::vector<std::shared_ptr<const RoadMap>> maps;
   for (const std::string& map : config.simulator.maps) maps.push_back(load_map(map));
@@ -170,7 +171,7 @@ void print_table_head() {
   fmt::print("  {:^20} {:>7} | {:>9} {:>7}\n", "(min to max)", "chunk", "rendering", "total");
 }
 
-void print_table_row(const Case& c, const std::vector<BenchResult>& columns, int64_t chunk) {
+void print_table_row(const BreakdownCase& c, const std::vector<BenchResult>& columns, int64_t chunk) {
   fmt::print("{:36}", c.name());
   for (const BenchResult& column : columns) fmt::print(" {:>12.4g}", summary_of(column)["value"].get<double>());
   const Json total = summary_of(columns.back());
@@ -211,9 +212,9 @@ void draw_breakdown(const PlotArguments& plot) {
                  {.panel_height_px = 640, .columns = 3, .title = "Where the time of an update goes"});
 }
 
-void run(const Arguments& arguments) {
+void run_breakdown(const BreakdownArguments& arguments) {
   if (wants_plot(arguments.plot)) return draw_breakdown(arguments.plot);
-  const std::vector<Case> cases = cases_of(arguments);
+  const std::vector<BreakdownCase> cases = breakdown_cases_of(arguments);
   const Config first =
       load_config(arguments.measured.config_path, overrides_of(arguments, cases.front(), arguments.chunk));
   std::vector<std::string> maps = first.simulator.maps;
@@ -233,7 +234,7 @@ void run(const Arguments& arguments) {
       arguments.measured.overrides.empty() ? ""
                                            : fmt::format("; --set {}", fmt::join(arguments.measured.overrides, " ")));
   for (std::size_t i = 0; i < cases.size(); ++i) {
-    const Case& c = cases[i];
+    const BreakdownCase& c = cases[i];
     progress.update(c.name(), static_cast<double>(i) / static_cast<double>(cases.size()));
     ImageError error;
     if (worlds) {
@@ -269,7 +270,7 @@ void run(const Arguments& arguments) {
   }
   if (arguments.host_steps) {
     for (const int agents : arguments.agents) {
-      Case c = cases.front();
+      BreakdownCase c = cases.front();
       c.agents = agents;
       results.push_back(measure_host_steps(arguments, c));
       const Json row = summary_of(results.back());
@@ -286,7 +287,7 @@ void run(const Arguments& arguments) {
 }  // namespace
 
 void add_breakdown_benchmark(CLI::App& bench) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<BreakdownArguments>();
   TrainingCase& measured = arguments->measured;
   CLI::App* command = bench.add_subcommand(
       "breakdown", "Where the time of an update goes, by size and renderer, beside the paper's table");
@@ -330,7 +331,7 @@ void add_breakdown_benchmark(CLI::App& bench) {
       "Examples:\n  pictura bench breakdown --host-steps --json\n"
       "  pictura bench breakdown --backend gl:egl --samples 1,2x2 --size 96x54 --agents 256 --updates 1\n"
       "  pictura bench breakdown --plot RESULTS.json --figure breakdown.png");
-  command->callback([arguments] { run(*arguments); });
+  command->callback([arguments] { run_breakdown(*arguments); });
 }
 
 }  // namespace pictura

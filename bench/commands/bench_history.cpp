@@ -17,7 +17,7 @@ namespace pictura {
 
 namespace {
 
-struct Arguments {
+struct HistoryArguments {
   WorldOptions world{
       .agents = 120, .num_threads = 0, .pedestrian_fraction = 0.1f, .cyclist_fraction = 0.1f, .parked_cars = 32};
   std::vector<std::string> maps;
@@ -27,7 +27,7 @@ struct Arguments {
   RateArguments rate;
 };
 
-void run(Arguments arguments) {
+void run_history(HistoryArguments arguments) {
   HistoryCase& measured = arguments.measured;
   const WorldOptions& world = arguments.world;
   check_backends({measured.backend}, {"cpu", "cuda"});
@@ -79,7 +79,7 @@ void run(Arguments arguments) {
 }  // namespace
 
 void add_history_benchmark(CLI::App& bench) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<HistoryArguments>();
   HistoryCase& measured = arguments->measured;
   CLI::App* command =
       bench.add_subcommand("history", "Images of random agents of random steps, against those of the present scene");
@@ -110,7 +110,7 @@ void add_history_benchmark(CLI::App& bench) {
       "Examples:\n  pictura bench history --slots 240 --views 64 --repeats 3\n"
       "  pictura bench history --size 32x18\n"
       "  pictura bench history --backend cuda --map towns --json");
-  command->callback([arguments] { run(*arguments); });
+  command->callback([arguments] { run_history(*arguments); });
 }
 
 }  // namespace pictura

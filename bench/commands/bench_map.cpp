@@ -20,7 +20,7 @@ namespace {
 // 23 MB of OpenDRIVE.
 constexpr const char* kLargeTown = "procedural:1:blocks=27x26";
 
-struct Arguments {
+struct MapArguments {
   std::string map = kLargeTown;
   int repeats = 5;
   bool json = false;
@@ -34,7 +34,7 @@ double peak_memory_gib() {
   return static_cast<double>(usage.ru_maxrss) / (1 << 20);
 }
 
-void run(const Arguments& arguments) {
+void run_map(const MapArguments& arguments) {
   const MapText text = map_text(arguments.map);
   const MapCacheKey key = map_cache_key(text.text, {});
   BenchResult import{"import", "s", {}}, cached{"from the cache", "s", {}}, compile{"compile", "s", {}};
@@ -72,7 +72,7 @@ void run(const Arguments& arguments) {
 }  // namespace
 
 void add_map_benchmark(CLI::App& bench) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<MapArguments>();
   CLI::App* command = bench.add_subcommand("map", "Time to import, load and compile a large map");
   command->add_option("--map", arguments->map, "A .xodr file, a town's name, or procedural[:SEED]")
       ->capture_default_str();
@@ -85,7 +85,7 @@ void add_map_benchmark(CLI::App& bench) {
       "  pictura bench map\n"
       "  pictura bench map --map Town05 --repeats 3\n"
       "  pictura bench map --map procedural:2 --json");
-  command->callback([arguments] { run(*arguments); });
+  command->callback([arguments] { run_map(*arguments); });
 }
 
 }  // namespace pictura

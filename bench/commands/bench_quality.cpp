@@ -20,7 +20,7 @@ namespace pictura {
 
 namespace {
 
-struct Arguments {
+struct QualityArguments {
   std::vector<std::string> maps;
   std::vector<std::string> sizes = {"32x18", "64x36", "96x54", "192x108", "384x216"};
   SnapshotOptions world{.views = 2};
@@ -30,7 +30,7 @@ struct Arguments {
   bool json = false;
 };
 
-std::vector<Snapshot> drive_all(const Arguments& arguments, ProgressLine* progress) {
+std::vector<Snapshot> drive_all(const QualityArguments& arguments, ProgressLine* progress) {
   std::vector<Snapshot> snapshots;
   for (const std::string& map : arguments.maps) {
     if (interrupted()) throw Interrupted("interrupted");
@@ -43,7 +43,7 @@ std::vector<Snapshot> drive_all(const Arguments& arguments, ProgressLine* progre
 }
 
 // PSNR of each of the random scenes of each kind.
-void run_random(const Arguments& arguments) {
+void run_random(const QualityArguments& arguments) {
   ProgressLine progress;
   std::vector<BenchResult> results;
   for (int kind = 0; kind < kNumRandomKinds; ++kind) {
@@ -71,7 +71,7 @@ void run_random(const Arguments& arguments) {
       results);
 }
 
-void run(Arguments arguments) {
+void run_quality(QualityArguments arguments) {
   if (arguments.random > 0) return run_random(arguments);
   if (arguments.maps.empty()) {
     arguments.maps = known_towns();
@@ -125,7 +125,7 @@ void run(Arguments arguments) {
 }  // namespace
 
 void add_quality_benchmark(CLI::App& bench) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<QualityArguments>();
   CLI::App* command = bench.add_subcommand("quality", "PSNR of images against a ray caster");
   add_maps_option(command, &arguments->maps, "all towns of the map folder and two procedural ones");
   command->add_option("--size", arguments->sizes, "Sizes, WxH; default: the paper's five")->delimiter(',');
@@ -155,7 +155,7 @@ void add_quality_benchmark(CLI::App& bench) {
       "Examples:\n  pictura bench quality --map Town03 --size 96x54 --views 10 --figure quality.png\n"
       "  pictura bench quality --map procedural:1 --views 4 --json\n"
       "  pictura bench quality --random 20 --seed 5");
-  command->callback([arguments] { run(*arguments); });
+  command->callback([arguments] { run_quality(*arguments); });
 }
 
 }  // namespace pictura

@@ -19,7 +19,7 @@ namespace pictura {
 
 namespace {
 
-struct Arguments {
+struct RenderArguments {
   WorldOptions world{
       .agents = 120, .num_threads = 1, .pedestrian_fraction = 0.0f, .cyclist_fraction = 0.0f, .parked_cars = 0};
   std::vector<std::string> maps, backends = {"cpu"}, sizes, samples = {"1"};
@@ -36,7 +36,7 @@ constexpr int kSweptEgos = 2048;
 constexpr const char* kSweptSize = "96x54";
 
 // The paper's cases and larger ones, see bench/README.md.
-void apply_sweep(Arguments* arguments) {
+void apply_sweep(RenderArguments* arguments) {
   const std::string& sweep = arguments->sweep;
   if (sweep.empty()) return;
   if (!arguments->sizes.empty() || (sweep == "egos" && !arguments->egos.empty())) {
@@ -55,7 +55,7 @@ void apply_sweep(Arguments* arguments) {
   if (arguments->egos.empty()) arguments->egos = {kSweptEgos};
 }
 
-void apply_defaults(Arguments* arguments) {
+void apply_defaults(RenderArguments* arguments) {
   apply_sweep(arguments);
   if (arguments->sizes.empty()) arguments->sizes = {kSweptSize};
   if (arguments->egos.empty()) arguments->egos = {0};
@@ -64,7 +64,7 @@ void apply_defaults(Arguments* arguments) {
 
 bool draws_in_device_memory(const std::string& backend) { return backend == "cuda" || backend == "gl:egl"; }
 
-RenderCase case_of(const Arguments& arguments, const std::string& backend, const std::string& size,
+RenderCase case_of(const RenderArguments& arguments, const std::string& backend, const std::string& size,
                    const std::string& samples, int egos) {
   const Pair pixels = parse_pair("--size", size, 8192);
   RenderCase result{.backend = backend, .num_views = egos};
@@ -92,7 +92,7 @@ struct NamedCase {
 };
 
 // All cases at once, so that errors in any arguments are reported before the first case is measured.
-std::vector<NamedCase> cases_of(const Arguments& arguments) {
+std::vector<NamedCase> render_cases_of(const RenderArguments& arguments) {
   check_backends(arguments.backends, renderer_names());
   std::vector<NamedCase> cases;
   for (const std::string& backend : arguments.backends) {
@@ -166,10 +166,10 @@ void draw_rates(const PlotArguments& plot) {
   draw_plots_png({by_size, by_egos, by_square}, plot.figure, {.columns = 3, .title = "Rates of rendering"});
 }
 
-void run(Arguments arguments) {
+void run_render(RenderArguments arguments) {
   if (wants_plot(arguments.rate.plot)) return draw_rates(arguments.rate.plot);
   apply_defaults(&arguments);
-  std::vector<NamedCase> cases = cases_of(arguments);
+  std::vector<NamedCase> cases = render_cases_of(arguments);
   ProgressLine progress;
   progress.update("driving");
   const WorldOptions& world = arguments.world;
@@ -213,7 +213,7 @@ void run(Arguments arguments) {
 }  // namespace
 
 void add_render_benchmark(CLI::App& bench) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<RenderArguments>();
   CLI::App* command = bench.add_subcommand("render", "Images of the agents of many worlds");
   add_maps_option(command, &arguments->maps);
   add_world_options(command, &arguments->world);
@@ -249,7 +249,7 @@ void add_render_benchmark(CLI::App& bench) {
       "Examples:\n  pictura bench render --size 192x108 --threads 0\n"
       "  pictura bench render --sweep sizes --json\n"
       "  pictura bench render --backend cuda,gl:egl --samples 1,4,2x2 --map towns --parked 32 --egos 2048,256 --json");
-  command->callback([arguments] { run(*arguments); });
+  command->callback([arguments] { run_render(*arguments); });
 }
 
 }  // namespace pictura

@@ -16,7 +16,7 @@ namespace pictura {
 
 namespace {
 
-struct Arguments {
+struct ScenesArguments {
   SceneEvaluateOptions evaluate;
   BackendOptions backends;
   std::string protocol = "womd";
@@ -33,7 +33,7 @@ SceneEvaluation measured(const SceneEvaluateOptions& options) {
   return evaluation;
 }
 
-void run(const Arguments& arguments) {
+void run_scenes(const ScenesArguments& arguments) {
   SceneEvaluateOptions options = arguments.evaluate;
   const bool has_policy = options.controller.empty();
   if (options.checkpoint.empty() && has_policy) fail_usage("bench scenes: expected a CHECKPOINT or --policy");
@@ -84,7 +84,7 @@ void run(const Arguments& arguments) {
 }  // namespace
 
 void add_scenes_benchmark(CLI::App& bench) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ScenesArguments>();
   SceneEvaluateOptions& options = arguments->evaluate;
   CLI::App* command = bench.add_subcommand("scenes", "Evaluations in recorded scenes, as evaluate --protocol");
   command->add_option("CHECKPOINT", options.checkpoint, "A checkpoint that train wrote, or safetensors");
@@ -120,7 +120,7 @@ void add_scenes_benchmark(CLI::App& bench) {
       "  pictura bench scenes run.ckpt --scenes validation/ --repeats 3\n"
       "  pictura bench scenes run.ckpt --scenes scene.tfrecord --copies 1000 --device cuda --json\n"
       "  pictura bench scenes --policy idm --protocol waymax --scenes scene.tfrecord --copies 20");
-  command->callback([arguments] { run(*arguments); });
+  command->callback([arguments] { run_scenes(*arguments); });
 }
 
 }  // namespace pictura

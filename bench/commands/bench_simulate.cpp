@@ -21,7 +21,7 @@ namespace pictura {
 
 namespace {
 
-struct Arguments {
+struct SimulateArguments {
   // Vehicles alone, as the peers that rates are compared with; what a world of all classes costs is an option.
   WorldOptions world{
       .agents = 120, .num_threads = 1, .pedestrian_fraction = 0.0f, .cyclist_fraction = 0.0f, .parked_cars = 0};
@@ -34,15 +34,15 @@ struct Arguments {
 };
 
 /// Worlds that are measured together.
-struct Case {
+struct SimulateCase {
   std::string name;  // of the worlds
   std::vector<WorldSpec> worlds;
   bool vector_observations = true;
 };
 
 /// Equal worlds, on the maps in turn.
-Case equal_worlds(int num_worlds, int agents, int num_maps) {
-  Case result{.name = fmt::format("{} worlds of {} agents", num_worlds, agents)};
+SimulateCase equal_worlds(int num_worlds, int agents, int num_maps) {
+  SimulateCase result{.name = fmt::format("{} worlds of {} agents", num_worlds, agents)};
   for (int w = 0; w < num_worlds; ++w) {
     result.worlds.push_back({w % num_maps, agents, static_cast<uint32_t>(w)});
   }
@@ -52,15 +52,15 @@ Case equal_worlds(int num_worlds, int agents, int num_maps) {
 // What the sweeps hold fixed.
 constexpr int kSweptWorlds = 64, kSweptAgents = 60;
 
-std::vector<Case> cases_of(const Arguments& arguments) {
+std::vector<SimulateCase> simulate_cases_of(const SimulateArguments& arguments) {
   const int num_maps = static_cast<int>(arguments.maps.size());
-  std::vector<Case> cases;
+  std::vector<SimulateCase> cases;
   if (arguments.sweep == "agents") {
     for (int agents = 1; agents <= 1024; agents *= 4) cases.push_back(equal_worlds(kSweptWorlds, agents, num_maps));
   } else if (arguments.sweep == "worlds") {
     for (int worlds = 1; worlds <= 4096; worlds *= 4) cases.push_back(equal_worlds(worlds, kSweptAgents, num_maps));
   } else {
-    Case both =
+    SimulateCase both =
         equal_worlds(arguments.num_worlds > 0 ? arguments.num_worlds : num_maps, arguments.world.agents, num_maps);
     if (arguments.slots > 0) {
       both.worlds = draw_worlds(arguments.world.seed, arguments.slots, 1, arguments.world.agents, num_maps);
@@ -74,8 +74,8 @@ std::vector<Case> cases_of(const Arguments& arguments) {
   return cases;
 }
 
-void measure(const Arguments& arguments, const std::string& backend, const CompiledMaps& maps, const Case& measured,
-             std::vector<BenchResult>* results_out) {
+void measure(const SimulateArguments& arguments, const std::string& backend, const CompiledMaps& maps,
+             const SimulateCase& measured, std::vector<BenchResult>* results_out) {
   const WorldOptions& world = arguments.world;
   SimulatorConfig config;
   config.seed = world.seed;
@@ -123,7 +123,7 @@ void draw_cost(const PlotArguments& plot) {
   draw_plots_png({by_agents, by_worlds}, plot.figure, {.title = "What an agent-step costs"});
 }
 
-void run(Arguments arguments) {
+void run_simulate(SimulateArguments arguments) {
   if (wants_plot(arguments.rate.plot)) return draw_cost(arguments.rate.plot);
   check_backends(arguments.backends, simulator_names());
   arguments.maps = named_maps(arguments.maps);
@@ -135,7 +135,7 @@ void run(Arguments arguments) {
   bool on_device = false;
   for (const std::string& backend : arguments.backends) {
     on_device = on_device || backend == "cuda";
-    for (const Case& measured : cases_of(arguments)) {
+    for (const SimulateCase& measured : simulate_cases_of(arguments)) {
       progress.update(fmt::format("{}, {}", backend, measured.name));
       measure(arguments, backend, compiled, measured, &results);
     }
@@ -152,7 +152,7 @@ void run(Arguments arguments) {
 }  // namespace
 
 void add_simulate_benchmark(CLI::App& bench) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<SimulateArguments>();
   CLI::App* command = bench.add_subcommand("simulate", "Steps of worlds, observations included");
   add_maps_option(command, &arguments->maps);
   add_world_options(command, &arguments->world);
@@ -181,7 +181,7 @@ void add_simulate_benchmark(CLI::App& bench) {
       "  pictura bench simulate --map Town01 --agents 120 --compare before.json\n"
       "  pictura bench simulate --map procedural:1 --pedestrians 0.1 --cyclists 0.1\n"
       "  pictura bench simulate --backend cuda --map towns --slots 20480 --pedestrians 0.1 --cyclists 0.1 --parked 32");
-  command->callback([arguments] { run(*arguments); });
+  command->callback([arguments] { run_simulate(*arguments); });
 }
 
 }  // namespace pictura

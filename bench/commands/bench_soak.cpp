@@ -16,14 +16,14 @@ namespace pictura {
 
 namespace {
 
-struct Arguments {
+struct SoakArguments {
   std::string backend = "cuda";
   SoakOptions soak;
   double minutes = 8;
   bool json = false;
 };
 
-void print_result(const Arguments& arguments, const SoakResult& result) {
+void print_result(const SoakArguments& arguments, const SoakResult& result) {
   if (arguments.json) {
     Json faults = Json::array();
     for (const SoakFault& fault : result.faults) {
@@ -83,7 +83,7 @@ void print_result(const Arguments& arguments, const SoakResult& result) {
   }
 }
 
-void run(Arguments arguments) {
+void run_soak(SoakArguments arguments) {
   SoakOptions& options = arguments.soak;
   check_backends({arguments.backend}, renderer_names());
   options.maps = named_maps(options.maps);
@@ -113,7 +113,7 @@ void run(Arguments arguments) {
 }  // namespace
 
 void add_soak_benchmark(CLI::App& bench) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<SoakArguments>();
   SoakOptions& soak = arguments->soak;
   CLI::App* command = bench.add_subcommand("soak", "Compare a renderer with the oracle on random scenes for minutes");
   command->add_option("--backend", arguments->backend, "The renderer")->capture_default_str();
@@ -144,7 +144,7 @@ void add_soak_benchmark(CLI::App& bench) {
       "Examples:\n  pictura bench soak --map towns --minutes 8\n"
       "  pictura bench soak --backend cuda --minutes 1 --json\n"
       "  pictura bench soak --first 17 --scenes 1");
-  command->callback([arguments] { run(*arguments); });
+  command->callback([arguments] { run_soak(*arguments); });
 }
 
 }  // namespace pictura

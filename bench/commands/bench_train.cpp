@@ -15,7 +15,7 @@ namespace pictura {
 
 namespace {
 
-struct Arguments {
+struct TrainArguments {
   TrainingCase measured{.config_path = "configs/smoke.toml"};
   BackendOptions backends;
   bool json = false;
@@ -80,7 +80,7 @@ void add_kernels(const TrainingMeasurement& measurement, std::vector<BenchResult
   }
 }
 
-void run(Arguments arguments) {
+void run_train(TrainArguments arguments) {
   if (wants_plot(arguments.plot)) return draw_rates_of_ranks(arguments.plot);
   TrainingCase& measured = arguments.measured;
   for (const std::string& text : overrides_of(arguments.backends)) measured.overrides.push_back(text);
@@ -125,7 +125,7 @@ void run(Arguments arguments) {
 }  // namespace
 
 void add_train_benchmark(CLI::App& bench) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<TrainArguments>();
   TrainingCase& measured = arguments->measured;
   CLI::App* command = bench.add_subcommand("train", "Whole updates of a configuration");
   command->add_option("--config", measured.config_path, "TOML file")->capture_default_str();
@@ -155,7 +155,7 @@ void add_train_benchmark(CLI::App& bench) {
       "  pictura bench train --plot bench/results/gpu_ranks.json --figure ranks.png\n"
       "  pictura bench train --config configs/paper.toml --set train.forward_chunk=8192 --init-from policy.ckpt "
       "--json");
-  command->callback([arguments] { run(*arguments); });
+  command->callback([arguments] { run_train(*arguments); });
 }
 
 }  // namespace pictura

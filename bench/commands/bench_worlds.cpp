@@ -13,13 +13,13 @@ namespace pictura {
 
 namespace {
 
-struct Arguments {
+struct WorldsArguments {
   std::vector<std::string> maps;
   WorldStatisticsOptions options;
   bool json = false;
 };
 
-void run(Arguments arguments) {
+void run_worlds(WorldsArguments arguments) {
   if (arguments.maps.empty()) arguments.maps = known_towns();
   arguments.maps = named_maps(arguments.maps);
   ProgressLine progress;
@@ -46,7 +46,7 @@ void run(Arguments arguments) {
 }  // namespace
 
 void add_worlds_benchmark(CLI::App& bench) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<WorldsArguments>();
   CLI::App* command =
       bench.add_subcommand("worlds", "Distributions over many episodes: who is there, what befalls them");
   add_maps_option(command, &arguments->maps, "all towns of the map folder, else procedural:1");
@@ -63,7 +63,7 @@ void add_worlds_benchmark(CLI::App& bench) {
       "Examples:\n  pictura bench worlds --map Town03 --episodes 100 --json\n"
       "  pictura bench worlds --map procedural:1 --episodes 5\n"
       "  pictura bench worlds --map towns --agents 60");
-  command->callback([arguments] { run(*arguments); });
+  command->callback([arguments] { run_worlds(*arguments); });
 }
 
 }  // namespace pictura
