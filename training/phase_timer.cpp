@@ -1,16 +1,25 @@
 #include "pictura/training/phase_timer.h"
 
 #include <c10/core/impl/VirtualGuardImpl.h>
+#if defined(PICTURA_HAS_NVTX)
+#include <nvtx3/nvToolsExt.h>
+#endif
 
 #include "pictura/training/torch_device.h"
 
 namespace pictura {
 
 PhaseTimer::Scope::Scope(PhaseTimer* timer, Phase phase) : timer_(timer), phase_(phase) {
+#if defined(PICTURA_HAS_NVTX)
+  nvtxRangePushA(kPhaseNames[static_cast<size_t>(phase_)]);  // nothing without a profiler
+#endif
   if (timer_ && !timer_->device_.is_host()) begin_ = timer_->record();
 }
 
 PhaseTimer::Scope::~Scope() {
+#if defined(PICTURA_HAS_NVTX)
+  nvtxRangePop();
+#endif
   if (!timer_) return;
   if (timer_->device_.is_host())
     timer_->seconds_[static_cast<size_t>(phase_)] += watch_.seconds();

@@ -31,7 +31,8 @@ class PhaseTimer {
  public:
   explicit PhaseTimer(Device device) : device_(device) {}
 
-  /// What its lifetime took belongs to a phase; none is measured where there is no timer. Scopes do not nest.
+  /// What its lifetime took belongs to a phase; none is measured where there is no timer. Scopes do not nest. In
+  /// NVIDIA's profilers each is a range of NVTX with the phase's name.
   class Scope {
    public:
     Scope(PhaseTimer* timer, Phase phase);
