@@ -25,6 +25,8 @@ include(CheckCXXCompilerFlag)
 check_cxx_compiler_flag(-Wdangling-reference PICTURA_HAS_WDANGLING_REFERENCE)
 check_cxx_compiler_flag(-mno-fma PICTURA_HAS_MNO_FMA)
 
+set(CMAKE_UNITY_BUILD_BATCH_SIZE 12)  # sources, in unity builds
+
 # Flags of this build, which nothing that is installed passes on.
 add_compile_options(
   "$<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wpedantic;-Wshadow>"
@@ -36,7 +38,7 @@ add_compile_options(
   # copy more than they hold (fmt 9).
   "$<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_HAS_WDANGLING_REFERENCE}>>:-Wno-dangling-reference;-Wno-array-bounds;-Wno-stringop-overflow>"
   # In a unity build every source is included, and g++ takes it for a header, which many would include.
-  $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>,$<OR:$<BOOL:${CMAKE_UNITY_BUILD}>,$<BOOL:$<TARGET_PROPERTY:UNITY_BUILD>>>>:-Wno-subobject-linkage>
+  $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>,$<BOOL:$<TARGET_PROPERTY:UNITY_BUILD>>>:-Wno-subobject-linkage>
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_WERROR}>>:-Werror>
   # The arithmetic contract: no fused multiply-add and no reordering, on every device.
   "$<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off;-fno-math-errno;-fno-trapping-math>"
@@ -142,7 +144,7 @@ function(pictura_add_test name)
   # OpenMP also for tests that need none: a precompiled header serves only equal flags.
   target_link_libraries(${name}_test PRIVATE ${arg_LINK} OpenMP::OpenMP_CXX GTest::gmock GTest::gtest_main)
   if(PICTURA_UNITY_TESTS)
-    set_target_properties(${name}_test PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 12)
+    set_target_properties(${name}_test PROPERTIES UNITY_BUILD ON)
   endif()
   if(arg_PRECOMPILED)
     pictura_use_precompiled(${name}_test ${arg_PRECOMPILED})
