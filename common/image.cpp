@@ -82,7 +82,9 @@ CameraImages camera_images(const ImageLayout& layout, int camera, void* first) {
   CameraImages images;
   images.width_px = its.size.width_px;
   images.height_px = its.size.height_px;
-  images.data = static_cast<std::byte*>(first) + its.offset * static_cast<int64_t>(bytes_per_value(layout.format));
+  if (first != nullptr) {  // of no views there may be no memory
+    images.data = static_cast<std::byte*>(first) + its.offset * static_cast<int64_t>(bytes_per_value(layout.format));
+  }
   images.view_stride = its.view_stride;
   return images;
 }

@@ -24,12 +24,15 @@ PICTURA_HD inline void wait_for_copies() {
 #endif
 }
 
-/// Prefetches the memory at an address: into a device's L2 cache, or a core's first one.
-PICTURA_HD inline void prefetch(const void* address) {
+/// Prefetches the memory at `first`, or so many bytes after it whether or not it is there: into a device's L2 cache, or
+/// a core's first one.
+PICTURA_HD inline void prefetch(const void* first, int offset_bytes = 0) {
+  // The sum of integers, for one of pointers must stay within an array.
+  const uintptr_t address = reinterpret_cast<uintptr_t>(first) + static_cast<uintptr_t>(offset_bytes);
 #if defined(__CUDA_ARCH__)
   asm volatile("prefetch.global.L2 [%0];" : : "l"(address));
 #else
-  __builtin_prefetch(address);
+  __builtin_prefetch(reinterpret_cast<const void*>(address));
   asm volatile("");  // else g++ takes callers that do nothing else for functions without effect, and drops the calls
 #endif
 }

@@ -399,10 +399,10 @@ PICTURA_HD inline PieceList pieces_near(const MapView& map, const NearPlace& pla
 
 /// Begins to load what pieces_near() lists: the lists of all places do not fit into a core's caches.
 PICTURA_HD inline void prefetch_list_near(const MapView& map, const NearPlace& place, EntitySet set) {
-  constexpr int kLines = 5, kItemsPerLine = 16;  // as many as most lists take
+  constexpr int kLines = 5, kLineBytes = 64;  // as many as most lists take
   if (set == EntitySet::partners || set == EntitySet::controls) return;
   const int32_t* items = pieces_near(map, place, set).items.data();
-  for (int line = 0; line < kLines; ++line) prefetch(items + line * kItemsPerLine);
+  for (int line = 0; line < kLines; ++line) prefetch(items, line * kLineBytes);
 }
 
 /// The observation that each step writes: of all who are there, over the one of the step before.
