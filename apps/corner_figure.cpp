@@ -17,7 +17,7 @@ namespace {
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 constexpr int kDotSteps = 5;  // between dots of a way
 constexpr int kTopSize_px = 560, kGap_px = 8;
-constexpr float kMargin_m = 8;
+constexpr float kCornerMargin_m = 8;
 constexpr Rgb kUserColor = rgb8(73, 80, 87), kRevealColor = rgb8(134, 142, 150), kOtherColor = rgb8(233, 236, 239);
 
 const char* title_of(CornerCase its_case) {
@@ -109,8 +109,8 @@ RgbImage from_above(const CornerResults& results, size_t pair, bool walls) {
                   state.scene, state.step, walls ? "walls" : "no walls");
   const Vec2 size_m = shown.high - shown.low;
   WorldPainter painter(*map.road, kTopSize_px, kTopSize_px, walls ? map.geometry.walls : std::vector<WallFace>{});
-  return painter.draw(frame,
-                      painter.around((shown.low + shown.high) * 0.5f, max_of(size_m.x, size_m.y) + 2 * kMargin_m));
+  return painter.draw(
+      frame, painter.around((shown.low + shown.high) * 0.5f, max_of(size_m.x, size_m.y) + 2 * kCornerMargin_m));
 }
 
 RgbImage speeds_of(const CornerResults& results, size_t pair, bool walls) {

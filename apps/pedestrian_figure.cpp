@@ -22,7 +22,7 @@ namespace pictura {
 namespace {
 
 constexpr int kTopWidth_px = 620, kTopHeight_px = 640, kPlotWidth_px = 612, kGap_px = 8, kEnlargement_px = 288;
-constexpr float kMargin_m = 12;
+constexpr float kPedestrianMargin_m = 12;
 constexpr uint8_t kPageGrey = 255;
 
 struct Quantity {
@@ -119,7 +119,7 @@ class PathFigures {
                                 results_.setting.maps[static_cast<size_t>(path.map)], path.scene, path.step, path.ego,
                                 path.ego_speed_mps);
     const Vec2 size_m = shown.high - shown.low;
-    const float width_m = max_of(size_m.x, size_m.y) + 2 * kMargin_m;
+    const float width_m = max_of(size_m.x, size_m.y) + 2 * kPedestrianMargin_m;
     return painter->draw(frame, painter->around((shown.low + shown.high) * 0.5f, width_m));
   }
 

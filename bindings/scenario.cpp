@@ -38,7 +38,7 @@ std::function<std::shared_ptr<const CompiledMap>()> RecordedScene::compilation(c
 
 namespace {
 
-std::shared_ptr<RecordedScene> load(const std::string& name, int32_t start_step) {
+std::shared_ptr<RecordedScene> load_scene(const std::string& name, int32_t start_step) {
   auto scenario = run_interruptibly("Scenario.load", 1, {},
                                     [name] { return std::make_shared<const Scenario>(load_scenario(name)); });
   return std::make_shared<RecordedScene>(std::move(scenario), name, start_step);
@@ -169,7 +169,7 @@ A recorded scene: a map, the tracks of all road users, and the lights as they we
 It is the map of worlds whose agents are its tracks, in their order, from `start_step` on:
 pictura.Simulator([scene], [(0, scene.num_tracks)], **scene.world()). Commands of kind 3 and the controller 'log' replay it.)")
       .def_static(
-          "load", load, py::arg("name"), py::kw_only(), py::arg("start_step") = 0,
+          "load", load_scene, py::arg("name"), py::kw_only(), py::arg("start_step") = 0,
           R"(Loads a scene by name: FILE.json, FILE.bin, FILE.scenario, a file with '.tfrecord' in its name, or a folder of them; with '#7' or
 '#SCENARIO_ID' one of several.
 

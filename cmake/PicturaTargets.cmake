@@ -88,6 +88,15 @@ function(pictura_optimize_little target)
   target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-O1>)
 endfunction()
 
+# pictura_compile_together(TARGET): several sources as one, for code whose templates, each source's own, take a compiler
+# longer than what they are used for. Libraries that others build upon are compiled source by source, so that a missing
+# include shows.
+function(pictura_compile_together target)
+  if(PICTURA_UNITY)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON)
+  endif()
+endfunction()
+
 # pictura_precompile(NAME HEADERS [LINK libs...]): a precompiled header of libraries' headers, which take a compiler longer
 # than most sources that include them; pictura_use_precompiled(TARGET NAME) reads it. Headers of the project and of the
 # standard are left out, so that a source which lacks one does not compile, as long as HEADERS do not bring it along:
@@ -143,9 +152,7 @@ function(pictura_add_test name)
   pictura_use_headers(${name}_test PRIVATE)
   # OpenMP also for tests that need none: a precompiled header serves only equal flags.
   target_link_libraries(${name}_test PRIVATE ${arg_LINK} OpenMP::OpenMP_CXX GTest::gmock GTest::gtest_main)
-  if(PICTURA_UNITY_TESTS)
-    set_target_properties(${name}_test PROPERTIES UNITY_BUILD ON)
-  endif()
+  pictura_compile_together(${name}_test)
   if(arg_PRECOMPILED)
     pictura_use_precompiled(${name}_test ${arg_PRECOMPILED})
   else()

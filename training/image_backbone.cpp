@@ -16,7 +16,7 @@ namespace pictura {
 namespace {
 
 constexpr const char* kDescription = "pictura_backbone.json";  // in the program's file
-constexpr const char* kFormat = "pictura backbone 1";
+constexpr const char* kBackboneFormat = "pictura backbone 1";
 
 // The first line of what torch throws, which goes on with its own stack.
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
@@ -43,7 +43,7 @@ struct ImageBackbone::Parts {
   void read_description(const std::string& text) {
     try {
       const nlohmann::json json = nlohmann::json::parse(text);
-      PICTURA_CHECK(json.value("format", "") == kFormat, "expected \"format\": \"{}\"", kFormat);
+      PICTURA_CHECK(json.value("format", "") == kBackboneFormat, "expected \"format\": \"{}\"", kBackboneFormat);
       json.at("patch_px").get_to(patch_px);
       json.at("channels").get_to(channels);
       if (const nlohmann::json& size = json.at("size_px"); !size.is_null()) {

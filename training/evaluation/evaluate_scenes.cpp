@@ -37,7 +37,7 @@ std::string name_of(const SceneRef& scene) {
 }
 
 /// Scenes that are simulated together.
-struct Batch {
+struct LoadedScenes {
   CompiledMaps maps;
   std::vector<int> numbers;  // [maps] of each among all scenes
   // What is left out.
@@ -46,8 +46,8 @@ struct Batch {
 };
 
 /// Loads and compiles the scenes [first, end).
-Batch load_batch(const std::vector<SceneRef>& scenes, int first, int end, const SceneProtocol& protocol,
-                 const MapOptions& map_options, int num_threads) {
+LoadedScenes load_batch(const std::vector<SceneRef>& scenes, int first, int end, const SceneProtocol& protocol,
+                        const MapOptions& map_options, int num_threads) {
   const auto count = static_cast<size_t>(end - first);
   std::vector<std::shared_ptr<const CompiledMap>> maps(count);
   std::vector<std::string> faults(count);
@@ -61,7 +61,7 @@ Batch load_batch(const std::vector<SceneRef>& scenes, int first, int end, const 
       faults[i] = what.starts_with(scene.file) ? what : fmt::format("{}: {}", name_of(scene), what);
     }
   });
-  Batch batch;
+  LoadedScenes batch;
   for (size_t i = 0; i < count; ++i) {
     if (!maps[i]) {
       batch.faults.push_back(faults[i]);
@@ -92,7 +92,7 @@ SimulatedState simulated_state(const RoadMap& map, const AgentBox& box, float ri
 /// One rollout of a batch of scenes at one density, from the start to the end.
 class BatchDrive {
  public:
-  BatchDrive(const Batch& batch, const SceneProtocol& protocol, double density, int rollout, uint64_t seed,
+  BatchDrive(const LoadedScenes& batch, const SceneProtocol& protocol, double density, int rollout, uint64_t seed,
              Simulator* simulator)
       : batch_(batch), protocol_(protocol), density_(density), rollout_(rollout), simulator_(*simulator) {
     const std::vector<AgentBox> boxes = host_copy_of_structs(simulator_.scene().agents, device());
@@ -343,7 +343,7 @@ class BatchDrive {
     }
   }
 
-  const Batch& batch_;
+  const LoadedScenes& batch_;
   const SceneProtocol& protocol_;
   double density_;
   int rollout_;
@@ -362,7 +362,7 @@ class BatchDrive {
 
 /// Of one rollout of a batch whose numbers are among the scenes from first_scene on. No two rollouts of any scene have
 /// the same number, by which draws differ.
-std::vector<WorldSpec> worlds_of(const Batch& batch, int first_scene, int rollout, int num_rollouts) {
+std::vector<WorldSpec> worlds_of(const LoadedScenes& batch, int first_scene, int rollout, int num_rollouts) {
   std::vector<WorldSpec> worlds;
   for (size_t i = 0; i < batch.maps.size(); ++i) {
     const auto scene = static_cast<uint32_t>(first_scene + batch.numbers[i]);
@@ -418,7 +418,7 @@ SceneEvaluation evaluate_scenes(const EvaluatedDriver& driver, Renderer* rendere
   const double work = double(evaluation.found) * num_drives * protocol.steps;
   for (int first = 0; first < evaluation.found && !evaluation.interrupted; first += at_once) {
     const int end = std::min(first + at_once, evaluation.found);
-    const Batch batch = load_batch(index.scenes, first, end, protocol, map_options, options.num_threads);
+    const LoadedScenes batch = load_batch(index.scenes, first, end, protocol, map_options, options.num_threads);
     if (renderer && !batch.maps.empty()) upload_maps(batch.maps, {}, renderer);
     std::vector<std::vector<std::vector<SceneAgent>>> agents;  // [drives][scenes][driven]
     std::vector<SceneRollouts> rollouts;                       // [scenes], where they are asked for

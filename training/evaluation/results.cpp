@@ -26,7 +26,7 @@ namespace {
   X(distance_m)                    \
   X(returns)
 
-constexpr const char* kFormat = "pictura evaluation 1";
+constexpr const char* kResultsFormat = "pictura evaluation 1";
 
 Json to_json(const ScenarioCounts& counts) {
   Json json;
@@ -36,7 +36,7 @@ Json to_json(const ScenarioCounts& counts) {
   return json;
 }
 
-ScenarioCounts counts_from(const Json& json) {
+ScenarioCounts scenario_counts_from(const Json& json) {
   ScenarioCounts counts;
 #define X(name) json.at(#name).get_to(counts.name);
   PICTURA_SCENARIO_COUNTS(X)
@@ -154,12 +154,12 @@ void write_results(const std::string& path, const EvaluationResults& results) {
                          {"first_scenario", density.first_scenario},
                          {"scenarios", scenarios}});
   }
-  const Json json = {{"format", kFormat}, {"setting", to_json(results.setting)}, {"densities", densities}};
+  const Json json = {{"format", kResultsFormat}, {"setting", to_json(results.setting)}, {"densities", densities}};
   write_file(path, json.dump(1) + "\n");
 }
 
 EvaluationResults read_results(const std::string& path) {
-  const Json json = read_results_json(path, kFormat);
+  const Json json = read_results_json(path, kResultsFormat);
   EvaluationResults results;
   parse_results(path, [&] {
     results.setting = setting_from(json.at("setting"));
@@ -168,7 +168,7 @@ EvaluationResults read_results(const std::string& path) {
       density.at("density").get_to(result.density);
       density.at("agents_per_world").get_to(result.agents_per_world);
       density.at("first_scenario").get_to(result.first_scenario);
-      for (const Json& counts : density.at("scenarios")) result.scenarios.push_back(counts_from(counts));
+      for (const Json& counts : density.at("scenarios")) result.scenarios.push_back(scenario_counts_from(counts));
       results.densities.push_back(std::move(result));
     }
   });

@@ -27,7 +27,7 @@ namespace {
   X(distance_m)                 \
   X(driven_steps)
 
-constexpr const char* kFormat = "pictura evaluation in scenes 1";
+constexpr const char* kSceneResultsFormat = "pictura evaluation in scenes 1";
 
 Json to_json(const SceneCounts& counts) {
   Json json;
@@ -37,7 +37,7 @@ Json to_json(const SceneCounts& counts) {
   return json;
 }
 
-SceneCounts counts_from(const Json& json) {
+SceneCounts scene_counts_from(const Json& json) {
   SceneCounts counts;
 #define X(name) json.at(#name).get_to(counts.name);
   PICTURA_SCENE_COUNTS(X)
@@ -162,7 +162,7 @@ void write_results(const std::string& path, const SceneResults& results) {
     Json& scenes = counts.emplace_back(Json::array());
     for (const SceneCounts& scene : density) scenes.push_back(to_json(scene));
   }
-  const Json json = {{"format", kFormat},
+  const Json json = {{"format", kSceneResultsFormat},
                      {"setting", to_json(results.setting)},
                      {"protocol", to_json(results.protocol)},
                      {"unread", results.unread},
@@ -175,7 +175,7 @@ void write_results(const std::string& path, const SceneResults& results) {
 }
 
 SceneResults read_scene_results(const std::string& path) {
-  const Json json = read_results_json(path, kFormat);
+  const Json json = read_results_json(path, kSceneResultsFormat);
   SceneResults results;
   parse_results(path, [&] {
     results.setting = setting_from(json.at("setting"));
@@ -187,7 +187,7 @@ SceneResults read_scene_results(const std::string& path) {
     json.at("faults").get_to(results.faults);
     for (const Json& density : json.at("counts")) {
       std::vector<SceneCounts>& scenes = results.counts.emplace_back();
-      for (const Json& scene : density) scenes.push_back(counts_from(scene));
+      for (const Json& scene : density) scenes.push_back(scene_counts_from(scene));
     }
     const size_t num_densities = results.protocol.densities.size();
     PICTURA_CHECK(results.counts.size() == num_densities, "counts: expected {} densities, got {}", num_densities,
@@ -202,7 +202,7 @@ SceneResults read_scene_results(const std::string& path) {
 
 bool has_scene_results(const std::string& path) {
   const Json json = Json::parse(read_file(path), nullptr, /*allow_exceptions=*/false);
-  return json.is_object() && json.value("format", Json()) == kFormat;
+  return json.is_object() && json.value("format", Json()) == kSceneResultsFormat;
 }
 
 std::string scene_agents_csv_head() {
