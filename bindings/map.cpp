@@ -88,7 +88,7 @@ std::vector<std::tuple<std::string, std::string, std::string>> mends_of(const Ma
   return mends;
 }
 
-std::shared_ptr<Map> load_town(const std::string& name, bool strict, float chord_error_m) {
+std::shared_ptr<Map> load_named_map(const std::string& name, bool strict, float chord_error_m) {
   OpenDriveOptions options;
   options.strict = strict;
   options.chord_error_m = chord_error_m;
@@ -204,7 +204,7 @@ Raises pictura.Error for other shapes; a renderer refuses what is not finite.)")
 A road network: lanes, markings, edges, lights. Immutable; simulators and renderers share it.
 
 Positions are metres in the map's frame, z up; `origin_m` is its place in the file's coordinates.)")
-      .def_static("load", load_town, py::arg("name"), py::kw_only(), py::arg("strict") = false,
+      .def_static("load", load_named_map, py::arg("name"), py::kw_only(), py::arg("strict") = false,
                   py::arg("chord_error_m") = OpenDriveOptions{}.chord_error_m,
                   R"(Loads a map by name: an OpenDRIVE file (.xodr), a town of the map folder, or 'procedural:SEED'.
 
