@@ -15,17 +15,21 @@ Motion DrivenAgent::after(const Motion& from, int32_t action) const {
   return move(from, controls_of_action(action), parameters_, limits_, world_.options.dt_s);
 }
 
+LongitudinalMotion DrivenAgent::along_after(LongitudinalMotion from, int32_t action) const {
+  return move_along(from, controls_of_action(action).jerk_long_mps3, parameters_, limits_, world_.options.dt_s);
+}
+
 int32_t DrivenAgent::speed_action(const Motion& from, float wanted_mps) const {
   constexpr float kSlow_mps = 0.5f, kReaction_s = 0.6f, kBraking_mps2 = 4, kAccelerating_mps2 = 1.5f;
-  if (wanted_mps == 0 && std::fabs(from.speed_mps) < kSlow_mps) return halt(from, kStepsToHalt).action;
+  LongitudinalMotion along{from.speed_mps, from.accel_long_mps2};
+  if (wanted_mps == 0 && std::fabs(from.speed_mps) < kSlow_mps) return halt(along, kStepsToHalt).action;
   const float wanted_mps2 = std::clamp((wanted_mps - from.speed_mps) / kReaction_s, -kBraking_mps2, kAccelerating_mps2);
   // What rounding leaves of an acceleration would be stopped at zero first, by any jerk against it alike.
-  Motion rounded = from;
-  if (std::fabs(from.accel_long_mps2) < 1e-3f) rounded.accel_long_mps2 = 0;
+  if (std::fabs(along.accel_mps2) < 1e-3f) along.accel_mps2 = 0;
   int32_t best = kStraight;
   float least = INFINITY;
   for (int32_t action = kStraight; action < kNumActions; action += kNumLatActions) {
-    const float off = std::fabs(after(rounded, action).accel_long_mps2 - wanted_mps2);
+    const float off = std::fabs(along_after(along, action).accel_mps2 - wanted_mps2);
     if (off >= least) continue;
     least = off;
     best = action;
@@ -34,12 +38,13 @@ int32_t DrivenAgent::speed_action(const Motion& from, float wanted_mps) const {
 }
 
 /// Jerks are too coarse to come to rest by ever smaller accelerations: searches so many steps ahead.
-DrivenAgent::Halt DrivenAgent::halt(const Motion& from, int steps) const {
+DrivenAgent::Halt DrivenAgent::halt(LongitudinalMotion from, int steps) const {
   constexpr float kPerAcceleration_s = 0.3f;
-  if (steps == 0) return {kStraight, kPerAcceleration_s * std::fabs(from.accel_long_mps2)};
+  if (steps == 0) return {kStraight, kPerAcceleration_s * std::fabs(from.accel_mps2)};
   Halt best{kStraight, INFINITY};
   for (int32_t action = kStraight; action < kNumActions; action += kNumLatActions) {
-    const Motion next = after(from, action);
+    const LongitudinalMotion next = along_after(from, action);
+    if (std::fabs(next.speed_mps) >= best.cost) continue;
     const float cost = std::fabs(next.speed_mps) + halt(next, steps - 1).cost;
     if (cost < best.cost) best = {action, cost};
   }

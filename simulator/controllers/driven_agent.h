@@ -34,7 +34,8 @@ class DrivenAgent {
     int32_t action = 0;
     float cost = 0;
   };
-  Halt halt(const Motion& from, int steps) const;
+  LongitudinalMotion along_after(LongitudinalMotion from, int32_t action) const;
+  Halt halt(LongitudinalMotion from, int steps) const;
 
   WorldView world_;
   int slot_;

@@ -41,6 +41,23 @@ PICTURA_HD inline float stop_at_zero(float before, float value, float low, float
   return before * value < 0.0f ? 0.0f : clamp(value, low, high);
 }
 
+/// What of a motion is along its heading.
+struct LongitudinalMotion {
+  float speed_mps = 0, accel_mps2 = 0;
+};
+
+/// One step of dt_s along the heading, within `limits`.
+PICTURA_HD inline LongitudinalMotion move_along(LongitudinalMotion from, float jerk_mps3,
+                                                const DynamicsParameters& parameters, const ClassLimits& limits,
+                                                float dt_s) {
+  LongitudinalMotion to;
+  to.accel_mps2 = stop_at_zero(from.accel_mps2, from.accel_mps2 + parameters.throttle * jerk_mps3 * dt_s,
+                               limits.min_accel_mps2, limits.max_accel_mps2 * parameters.acceleration);
+  to.speed_mps = stop_at_zero(from.speed_mps, from.speed_mps + 0.5f * (to.accel_mps2 + from.accel_mps2) * dt_s,
+                              limits.min_speed_mps, limits.max_speed_mps);
+  return to;
+}
+
 /// One step of dt_s. Accelerations, speed and steering respect `limits`; the lateral acceleration is written back from
 /// the steering angle that was reached.
 PICTURA_HD inline Motion move(const Motion& from, Controls controls, const DynamicsParameters& parameters,
@@ -48,15 +65,13 @@ PICTURA_HD inline Motion move(const Motion& from, Controls controls, const Dynam
   constexpr float kMinTurningSpeed_mps = 1.0f;
   constexpr float kStraight = 1e-5f;
   Motion to = from;
-  to.accel_long_mps2 =
-      stop_at_zero(from.accel_long_mps2, from.accel_long_mps2 + parameters.throttle * controls.jerk_long_mps3 * dt_s,
-                   limits.min_accel_mps2, limits.max_accel_mps2 * parameters.acceleration);
+  const LongitudinalMotion along =
+      move_along({from.speed_mps, from.accel_long_mps2}, controls.jerk_long_mps3, parameters, limits, dt_s);
+  to.speed_mps = along.speed_mps;
+  to.accel_long_mps2 = along.accel_mps2;
   const float wanted_lat =
       stop_at_zero(from.accel_lat_mps2, from.accel_lat_mps2 + parameters.steer * controls.jerk_lat_mps3 * dt_s,
                    -limits.max_lat_accel_mps2, limits.max_lat_accel_mps2);
-  to.speed_mps =
-      stop_at_zero(from.speed_mps, from.speed_mps + 0.5f * (to.accel_long_mps2 + from.accel_long_mps2) * dt_s,
-                   limits.min_speed_mps, limits.max_speed_mps);
 
   const float turning_speed = max_of(fabsf(to.speed_mps), kMinTurningSpeed_mps);
   const float wanted_steer = atan_of(wanted_lat / square(turning_speed) * parameters.wheelbase_m);
