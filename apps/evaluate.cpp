@@ -29,13 +29,12 @@ void print_table(const EvaluateReport& report) {
   fmt::print("{:10} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>17} {:>9}\n", "density", "scenarios",
              "steps", "vehicles", "return", "at-fault", "off-road", "red light", "goals", "waypoints", "km/infraction",
              "km");
-  const auto text = [](const Estimate& e) { return fmt::format("{:.3f} +- {:.3f}", e.value, e.half_width_95); };
   for (const EvaluateRow& row : report.rows) {
     fmt::print("{:10} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>17} {:>9.2f}\n", row.density,
-               row.scenarios, row.steps, row.vehicle_episodes, text(row.return_per_vehicle),
-               text(row.at_fault_collision_rate), text(row.off_road_rate), text(row.red_light_rate),
-               text(row.goals_per_vehicle), text(row.waypoints_per_vehicle), text(row.km_per_infraction),
-               row.km_driven);
+               row.scenarios, row.steps, row.vehicle_episodes, interval_text(row.return_per_vehicle),
+               interval_text(row.at_fault_collision_rate), interval_text(row.off_road_rate),
+               interval_text(row.red_light_rate), interval_text(row.goals_per_vehicle),
+               interval_text(row.waypoints_per_vehicle), interval_text(row.km_per_infraction), row.km_driven);
   }
   fmt::print("+- is the half width of a 95 % confidence interval over scenarios\n");
   if (report.agent_steps > 0) {

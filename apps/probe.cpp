@@ -1,7 +1,6 @@
 // `pictura probe`: what policies make of what their cameras see, and of what they do not.
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 #include <fmt/ranges.h>
 
@@ -110,10 +109,8 @@ Results run_probe(Results (*probe)(const Options&), ProbeArguments* arguments, O
   return results;
 }
 
-std::string text_of(const Estimate& estimate) {
-  if (!std::isfinite(estimate.value)) return "-";
-  return fmt::format("{:.4f} +- {:.4f}", estimate.value, estimate.half_width_95);
-}
+/// With a digit more than evaluations have: changes of values are small.
+std::string interval_of(const Estimate& estimate) { return interval_text(estimate, 4); }
 
 size_t name_width(const ProbeResults& results) {
   size_t width = 6;
@@ -132,7 +129,7 @@ void print_table(const RemovalResults& results, const std::vector<RemovalRow>& r
     if (row.group.distance_band || row.cases == 0) continue;
     fmt::print("{:{}} {:>10} {:>8} {:>7} {:>20} {:>20} {:>6.1f} %\n",
                results.policies[static_cast<size_t>(row.policy)].answers_as(), width, row.group.occlusion_name(),
-               row.cases, row.scenes, text_of(row.abs_value_change), text_of(row.abs_brake_change),
+               row.cases, row.scenes, interval_of(row.abs_value_change), interval_of(row.abs_brake_change),
                100 * row.changed_share.value);
   }
   fmt::print("{}\n{} removals in {}\n", kEstimateNote, results.cases.size(), format_duration(results.seconds));
@@ -146,8 +143,8 @@ void print_table(const PedestrianResults& results, const std::vector<PedestrianR
     if (!row.phase || row.cases == 0) continue;
     fmt::print("{:{}} {:>12} {:>8} {:>7} {:>20} {:>20} {:>6.1f} %\n",
                results.policies[static_cast<size_t>(row.policy)].answers_as(), width,
-               kPathPhaseNames[static_cast<size_t>(*row.phase)], row.cases, row.scenes, text_of(row.value_change),
-               text_of(row.brake_change), 100 * row.changed_share.value);
+               kPathPhaseNames[static_cast<size_t>(*row.phase)], row.cases, row.scenes, interval_of(row.value_change),
+               interval_of(row.brake_change), 100 * row.changed_share.value);
   }
   fmt::print("{}\n{} of {} paths found, {} cases in {}\n", kEstimateNote, results.paths.size(), results.paths_asked,
              results.points.size(), format_duration(results.seconds));
@@ -162,8 +159,8 @@ void print_table(const CornerResults& results, const std::vector<CornerRow>& row
     fmt::print("{:{}} {:>8} {:>6} {:>9} {:>5.1f}-{:>5.1f} {:>20} {:>20} {:>20}\n",
                results.policies[row.policy].answers_as(), width, kCornerCaseNames[static_cast<size_t>(row.its_case)],
                kWallNames[row.walls ? 0 : 1], row.revealed, row.reveal_s.front(), row.reveal_s.back(),
-               text_of(row.at_reveal.distance_m), text_of(row.at_reveal.speed_mps),
-               text_of(row.at_reveal.deceleration_mps2));
+               interval_of(row.at_reveal.distance_m), interval_of(row.at_reveal.speed_mps),
+               interval_of(row.at_reveal.deceleration_mps2));
   }
   fmt::print(
       "at the reveal, where line of sight past the walls opens; deceleration over the next 2 s, m/s2\n{}\n"

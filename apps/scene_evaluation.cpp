@@ -28,8 +28,6 @@ double parse_density(const std::string& text) {
   return *percent / 100;
 }
 
-std::string interval_text(const Estimate& e) { return fmt::format("{:.3f} +- {:.3f}", e.value, e.half_width_95); }
-
 void print_settings(const SceneProtocol& protocol) {
   fmt::print("protocol {}: control {}, start {}, {} steps\n", protocol.name, protocol.control, protocol.start_step,
              protocol.steps);

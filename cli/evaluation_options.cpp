@@ -1,13 +1,14 @@
 #include "pictura/cli/evaluation_options.h"
 
+#include <cmath>
+
 #include "pictura/cli/map_options.h"
 #include "pictura/cli/number_options.h"
+#include "pictura/training/config.h"
 
 namespace pictura {
 
-EvaluationArguments::EvaluationArguments() {
-  evaluate.maps = {"Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07", "Town10HD"};
-}
+EvaluationArguments::EvaluationArguments() { evaluate.maps = Config().simulator.maps; }
 
 CLI::Option* add_evaluation_options(CLI::App* command, EvaluationArguments* arguments) {
   EvaluateOptions& options = arguments->evaluate;
@@ -40,6 +41,11 @@ void set_backends(const BackendOptions& backends, DriverOptions* options_out) {
 void settle_evaluation_options(EvaluationArguments* arguments) {
   arguments->evaluate.argmax = !arguments->sampled;
   set_backends(arguments->backends, &arguments->evaluate);
+}
+
+std::string interval_text(const Estimate& estimate, int decimals) {
+  if (!std::isfinite(estimate.value)) return "-";
+  return fmt::format("{:.{}f} +- {:.{}f}", estimate.value, decimals, estimate.half_width_95, decimals);
 }
 
 void EvaluationProgress::update(double done, double eta_s) {

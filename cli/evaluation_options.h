@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <string>
 
 #include "pictura/cli/backend_options.h"
 #include "pictura/cli/report.h"
@@ -27,6 +28,9 @@ void set_backends(const BackendOptions& backends, DriverOptions* options_out);
 
 /// Puts into arguments->evaluate what has been parsed beside it.
 void settle_evaluation_options(EvaluationArguments* arguments);
+
+/// "0.123 +- 0.045": the estimate and the half width of its interval; "-" where there was nothing to divide by.
+std::string interval_text(const Estimate& estimate, int decimals = 3);
 
 /// Says how far an evaluation is, and once, where it takes long, for how long and what can be done about it.
 class EvaluationProgress {
