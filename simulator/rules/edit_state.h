@@ -41,8 +41,10 @@ PICTURA_HD inline AgentField invalid_field(const MapView& map, const RuleOptions
   if (fabsf(agents.y_m[slot]) > kMaxCommanded_m) return AgentField::y_m;
   if (fabsf(agents.z_m[slot]) > kMaxCommanded_m) return AgentField::z_m;
   if (fabsf(agents.heading_rad[slot]) > kMaxCommanded_rad) return AgentField::heading_rad;
-  if (agents.length_m[slot] < 0) return AgentField::length_m;
-  if (agents.width_m[slot] < 0) return AgentField::width_m;
+  // Who is absent has no body.
+  const bool has_body = status != AgentStatus::absent;
+  if (agents.length_m[slot] < 0 || (has_body && agents.length_m[slot] == 0)) return AgentField::length_m;
+  if (agents.width_m[slot] < 0 || (has_body && agents.width_m[slot] == 0)) return AgentField::width_m;
   if (agents.height_m[slot] < 0 || agents.height_m[slot] > kMaxCommanded_m) return AgentField::height_m;
   if (square(agents.length_m[slot]) + square(agents.width_m[slot]) > square(2.0f * map.max_box_radius_m)) {
     return AgentField::length_m;

@@ -197,7 +197,7 @@ TEST(SetState, RefusesWhatCannotBeSteppedOnAndStaysAsItWas) {
     EXPECT_EQ(simulator->save(), before);
     return message;
   };
-  const std::vector<float> one{1}, two{1, 2}, not_a_number{NAN}, far{2e6f}, long_m{9}, turns{1e4f};
+  const std::vector<float> one{1}, two{1, 2}, not_a_number{NAN}, far{2e6f}, long_m{9}, nothing_m{0}, turns{1e4f};
   const std::vector<int32_t> number{3};
   const std::vector<double> wide{1};
   const std::vector<uint8_t> byte{3};
@@ -208,6 +208,10 @@ TEST(SetState, RefusesWhatCannotBeSteppedOnAndStaysAsItWas) {
   EXPECT_EQ(refusal({2}, {named("y_m", far)}), "set_state: slot 2: y_m: the value is out of range");
   EXPECT_EQ(refusal({2}, {named("heading_rad", turns)}), "set_state: slot 2: heading_rad: the value is out of range");
   EXPECT_EQ(refusal({2}, {named("length_m", long_m)}), "set_state: slot 2: length_m: the value is out of range");
+  for (const char* size : {"length_m", "width_m"}) {
+    EXPECT_EQ(refusal({2}, {named(size, nothing_m)}),
+              std::string("set_state: slot 2: ") + size + ": the value is out of range");
+  }
   EXPECT_EQ(refusal({2}, {named("next_waypoint", number)}),
             "set_state: slot 2: next_waypoint: the value is out of range");
   EXPECT_EQ(refusal({2}, {named("agent_class", byte)}), "set_state: slot 2: agent_class: the value is out of range");
