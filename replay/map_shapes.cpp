@@ -4,15 +4,12 @@
 
 #include "pictura/drawing/lane_shapes.h"
 #include "pictura/replay/images.h"
+#include "pictura/replay/units.h"
 
 namespace pictura {
 
 namespace {
 
-int32_t centimetres(float value_m) { return static_cast<int32_t>(std::lround(static_cast<double>(value_m) * 100)); }
-int32_t tenths_of_degree(float angle_rad) {
-  return static_cast<int32_t>(std::lround(static_cast<double>(angle_rad) * 1800 / 3.14159265358979323846));
-}
 ReplayPoint point_of(const Vec3& p) { return {centimetres(p.x), centimetres(p.y), centimetres(p.z)}; }
 std::array<int32_t, 2> point_of(Vec2 p) { return {centimetres(p.x), centimetres(p.y)}; }
 

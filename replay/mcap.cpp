@@ -170,7 +170,7 @@ Json lights_json(const Replay& replay, int frame, uint64_t ns) {
     const auto& [x_cm, y_cm] = shape.points_cm[2];  // the head
     spheres.push_back({{"pose", pose_json(x_cm / 100.0, y_cm / 100.0, 5, 0)},
                        {"size", vector_json(1, 1, 1)},
-                       {"color", color_json(color.r / 255.0, color.g / 255.0, color.b / 255.0)}});
+                       {"color", color_json(color.r, color.g, color.b)}});
   }
   Json entity = entity_json(ns, "lights");
   entity["spheres"] = std::move(spheres);

@@ -8,7 +8,7 @@
 #include "pictura/common/error.h"
 #include "pictura/replay/images.h"
 #include "pictura/replay/map_shapes.h"
-#include "pictura/simulator/agent_state.h"
+#include "pictura/replay/units.h"
 #include "pictura/simulator/rules/episode.h"
 #include "pictura/simulator/simulator_setup.h"
 
@@ -17,13 +17,6 @@ namespace pictura {
 namespace {
 
 constexpr int32_t kTurn_ddeg = 3600;
-constexpr double kDdegPerRad = 1800.0 / 3.14159265358979323846;
-
-int32_t in_units(double value, double unit) { return static_cast<int32_t>(std::lround(value / unit)); }
-int32_t in_cm(float value_m) { return in_units(static_cast<double>(value_m), 0.01); }
-int32_t in_ddeg(float angle_rad) {
-  return static_cast<int32_t>(std::lround(static_cast<double>(angle_rad) * kDdegPerRad));
-}
 
 /// The same heading, at most half a turn from the one before.
 int32_t near_heading(int32_t heading_ddeg, int32_t before_ddeg) {
@@ -32,15 +25,16 @@ int32_t near_heading(int32_t heading_ddeg, int32_t before_ddeg) {
   return heading_ddeg - turns * kTurn_ddeg;
 }
 
-int32_t heading_of(const AgentBox& box) { return in_ddeg(std::atan2(box.sin_heading, box.cos_heading)); }
+int32_t heading_of(const AgentBox& box) { return tenths_of_degree(std::atan2(box.sin_heading, box.cos_heading)); }
 ReplayBody body_of(const AgentBox& box) {
-  return {box.agent_class, in_cm(box.length_m), in_cm(box.width_m), in_cm(box.height_m)};
+  return {box.agent_class, centimetres(box.length_m), centimetres(box.width_m), centimetres(box.height_m)};
 }
 
 }  // namespace
 
 ReplayBox replay_box(const AgentBox& box) {
-  return {body_of(box), in_cm(box.center_m.x), in_cm(box.center_m.y), in_cm(box.center_m.z), heading_of(box)};
+  return {body_of(box), centimetres(box.center_m.x), centimetres(box.center_m.y), centimetres(box.center_m.z),
+          heading_of(box)};
 }
 
 ReplayDecision decision_of(Span<const float> logits, float value) {
@@ -90,8 +84,8 @@ struct Recorder::Parts {
   Parts(Simulator& its_simulator, const RecorderOptions& options)
       : simulator(its_simulator),
         world(options.world),
-        setup(simulator.config(), simulator.maps(), simulator.handles(), simulator.worlds()),
-        before(static_cast<size_t>(setup.num_slots())) {
+        setup(simulator.config(), simulator.maps(), simulator.handles(), simulator.worlds()) {
+    take_seed();
     first_slot = setup.slot_begin[static_cast<size_t>(world)];
     first_box = setup.box_begin[static_cast<size_t>(world)];
     num_boxes = setup.box_begin[static_cast<size_t>(world) + 1] - first_box;
@@ -108,6 +102,8 @@ struct Recorder::Parts {
     replay.images.frames_per_group = kReplayFramesPerGroup;
   }
 
+  // Of the world's random numbers: resets change it.
+  void take_seed() { replay.origin.seed = simulator.controller_input().seed[static_cast<size_t>(world)]; }
   size_t slot(int32_t agent) const { return static_cast<size_t>(first_slot + agent); }
   std::vector<int32_t>& track(Track which) { return replay.tracks[static_cast<size_t>(which)]; }
   ReplayEpisode& episode() { return replay.episodes.back(); }
@@ -168,23 +164,23 @@ struct Recorder::Parts {
     track(Track::halt_reason).push_back(state.halt_reason[at]);
     track(Track::next_waypoint).push_back(absent ? 0 : state.next_waypoint[at]);
     track(Track::events).push_back(begins ? 0 : state.events[at]);
-    track(Track::x_m).push_back(absent ? 0 : in_cm(box.center_m.x));
-    track(Track::y_m).push_back(absent ? 0 : in_cm(box.center_m.y));
-    track(Track::z_m).push_back(absent ? 0 : in_cm(box.center_m.z));
+    track(Track::x_m).push_back(absent ? 0 : centimetres(box.center_m.x));
+    track(Track::y_m).push_back(absent ? 0 : centimetres(box.center_m.y));
+    track(Track::z_m).push_back(absent ? 0 : centimetres(box.center_m.z));
     std::vector<int32_t>& headings = track(Track::heading_deg);
     const auto agents = static_cast<size_t>(replay.num_agents);
     headings.push_back(absent   ? 0
                        : begins ? heading_of(box)
                                 : near_heading(heading_of(box), headings[headings.size() - agents]));
-    track(Track::speed_mps).push_back(absent ? 0 : in_cm(state.speed_mps[at]));
-    track(Track::steer_deg).push_back(absent ? 0 : in_ddeg(state.steer_rad[at]));
+    track(Track::speed_mps).push_back(absent ? 0 : centimetres(state.speed_mps[at]));
+    track(Track::steer_deg).push_back(absent ? 0 : tenths_of_degree(state.steer_rad[at]));
     if (absent || chains[static_cast<size_t>(agent)] == state.goal_chains[at]) return;
     chains[static_cast<size_t>(agent)] = state.goal_chains[at];
     ReplayChain chain{.frame = replay.num_frames, .agent = agent};
     for (size_t i = 0; i < kNumWaypoints; ++i) {
-      chain.x_cm[i] = in_cm(state.waypoint_x_m[at * kNumWaypoints + i]);
-      chain.y_cm[i] = in_cm(state.waypoint_y_m[at * kNumWaypoints + i]);
-      chain.z_cm[i] = in_cm(state.waypoint_z_m[at * kNumWaypoints + i]);
+      chain.x_cm[i] = centimetres(state.waypoint_x_m[at * kNumWaypoints + i]);
+      chain.y_cm[i] = centimetres(state.waypoint_y_m[at * kNumWaypoints + i]);
+      chain.z_cm[i] = centimetres(state.waypoint_z_m[at * kNumWaypoints + i]);
     }
     episode().chains.push_back(chain);
   }
@@ -219,35 +215,27 @@ struct Recorder::Parts {
   /// Action and reward of every agent, in the step that has led to the frame that is next.
   void add_step(const StepResult& result) {
     const AgentStateView state = simulator.state();
-    WorldView view = setup.view(
-        world, setup.map_views[static_cast<size_t>(setup.worlds[static_cast<size_t>(world)].map)], setup.options);
-    view.agents = before.view();
     for (int32_t agent = 0; agent < replay.num_agents; ++agent) {
       const size_t at = slot(agent);
-      RewardTerms terms;
       if (result.valid[at]) {
-        // An infraction has stopped the agent, but its reward is of how it moved.
-        const Command& command = commands[static_cast<size_t>(agent)];
-        float level_m = before.z_m[at];
-        const Motion motion = commanded_motion(view, agent, command, &level_m);
-        terms = reward_terms(step_facts(motion, fit_of(state, static_cast<int>(at)), state.events[at]),
-                             state.conditioning + at * kNumConditioning, setup.options.dt_s);
-        count(state, at, motion, result.reward[at]);
+        count(state.events[at], result.sums[at], result.reward[at]);
         if (replay.first_infraction.frame < 0 && (state.events[at] & kInfractions) != 0) {
           replay.first_infraction = {replay.num_frames, agent};
         }
       }
-      const bool acts = result.valid[at] && commands[static_cast<size_t>(agent)].kind == CommandKind::action;
-      track(Track::action).push_back(acts ? 1 + commands[static_cast<size_t>(agent)].action : 0);
+      const Command& command = commands[static_cast<size_t>(agent)];
+      const bool acts = result.valid[at] && command.kind == CommandKind::action;
+      track(Track::action).push_back(acts ? 1 + command.action : 0);
+      const RewardTerms& terms = result.sums[at].reward_terms;
 #define X(name) track(Track::reward_##name).push_back(in_units(static_cast<double>(terms.name), kRewardUnit));
       PICTURA_REWARD_TERMS(X)
 #undef X
     }
   }
 
-  void count(const AgentStateView& state, size_t at, const Motion& motion, float reward) {
+  void count(int events, const StepSums& sums, float reward) {
     SimulatorTotals totals;
-    count_events(state.events[at], &totals);
+    count_events(events, &totals);
     ReplayMetrics& m = replay.metrics;
     ++m.agent_steps;
     m.collisions += totals.collisions;
@@ -257,14 +245,13 @@ struct Recorder::Parts {
     m.wall_contacts += totals.wall_contacts;
     m.goals_reached += totals.goals_reached;
     m.waypoints_reached += totals.waypoints_reached;
-    m.km_driven += static_cast<double>(driven_m(motion.speed_mps, setup.options.dt_s)) / 1000;
+    m.km_driven += static_cast<double>(sums.distance_m) / 1000;
     m.reward += static_cast<double>(reward);
   }
 
   Simulator& simulator;
   const int world;
   const SimulatorSetup setup;
-  AgentState before;  // of the world's slots, before the step
   std::vector<Command> commands;
   int32_t first_slot = 0, first_box = 0, num_boxes = 0, first_light = 0;
   std::vector<int32_t> chains;  // [agents] the number of the chain that was written last
@@ -299,11 +286,6 @@ void Recorder::before_step(Span<const Command> commands, const std::optional<Rep
   const auto agents = static_cast<size_t>(parts.replay.num_agents);
   const Span<const Command> of_world = commands.subspan(parts.slot(0), agents);
   parts.commands.assign(of_world.begin(), of_world.end());
-  const AgentStateView state = parts.simulator.state();
-  for (int32_t agent = 0; agent < parts.replay.num_agents; ++agent) {
-    const int slot = static_cast<int>(parts.slot(agent));
-    copy_fields(state, slot, parts.before.view(), slot);
-  }
   parts.add_decision(decision);
 }
 
@@ -318,6 +300,7 @@ bool Recorder::after_reset() {
   Parts& parts = *parts_;
   if (parts.simulator.episode_step()[static_cast<size_t>(parts.world)] != 0) return false;
   parts.check_room();
+  parts.take_seed();
   parts.add_no_step();
   parts.add_frame(/*begins_anew=*/true);
   return true;
@@ -330,7 +313,7 @@ void Recorder::set_origin(ReplayOrigin origin) {
   const CompiledMap& map = parts.setup.map_of(parts.world);
   origin.map = map.road->name;
   origin.map_hash = fmt::format("{:016x}", map.fingerprint);
-  origin.seed = parts.setup.config.seed;
+  origin.seed = parts.replay.origin.seed;
   origin.global_world = parts.setup.worlds[static_cast<size_t>(parts.world)].global_world;
   origin.dt_s = parts.setup.config.dt_s;
   parts.replay.origin = std::move(origin);

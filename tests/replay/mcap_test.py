@@ -63,6 +63,10 @@ class Mcap(unittest.TestCase):
                 self.assertAlmostEqual(math.cos(2 * math.atan2(turn["z"], turn["w"]) - heading), 1, 6)
         self.assertEqual(len(self.messages["/agents"]), 81)
 
+    def test_lights_have_their_colours(self):
+        seen = {tuple(sphere["color"][name] for name in "rgb") for _, _, scene in self.messages["/lights"] for sphere in scene["entities"][0]["spheres"]}
+        self.assertLessEqual({(1, 0, 0), (0, 1, 0)}, seen)
+
     def test_the_followed_agent_and_its_images(self):
         speeds = [message["speed_mps"] for _, _, message in self.messages["/agent"]]
         for speed, recorded in zip(speeds, self.page.tracks["speed_mps"][4], strict=True):
