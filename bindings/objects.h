@@ -76,7 +76,9 @@ class Watcher {
   virtual ~Watcher() = default;
   /// Whether the next step may be taken; waits for it a little.
   virtual bool is_due() { return true; }
-  virtual void before_step(Span<Command> commands_inout) = 0;
+  /// Before any watcher sees the commands: gives agents that it drives other ones.
+  virtual void drive(Span<Command> /*commands_inout*/) {}
+  virtual void before_step(Span<const Command> /*commands*/) {}
   virtual void after_step(const StepResult& result) = 0;
   /// After new episodes that no step began.
   virtual void after_reset() = 0;

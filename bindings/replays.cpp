@@ -52,7 +52,7 @@ class PyRecorder final : public Watcher {
     inside_.run("Recorder", [&] { recorder_.emplace(*inside_.simulator, options); });
   }
 
-  void before_step(Span<Command> commands) override {
+  void before_step(Span<const Command> commands) override {
     if (recorder_) recorder_->before_step(commands, decision_);
   }
   void after_step(const StepResult& result) override {
@@ -104,7 +104,7 @@ class PyLiveView final : public Watcher {
   }
 
   bool is_due() override { return !view_ || view_->is_due(kGlance); }
-  void before_step(Span<Command> commands_inout) override {
+  void drive(Span<Command> commands_inout) override {
     if (view_) view_->before_step(commands_inout);
   }
   void after_step(const StepResult& result) override {

@@ -143,7 +143,6 @@ class PySceneRecorder final : public Watcher {
     inside_.run("SceneRecorder", [&] { recorder_.emplace(*inside_.simulator, world); });
   }
 
-  void before_step(Span<Command> /*commands_inout*/) override {}
   void after_step(const StepResult& /*result*/) override { recorder_->after_step(); }
   void after_reset() override { recorder_->after_step(); }
 

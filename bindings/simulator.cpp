@@ -428,6 +428,7 @@ class PySimulator {
       }
     }
     return calls_->run("step", [&] {
+      for (const auto& watcher : watching) watcher->drive(commands);
       for (const auto& watcher : watching) watcher->before_step(commands);
       const StepResult result = simulator_->step(Span<const Command>(commands), stream_);
       for (const auto& watcher : watching) watcher->after_step(result);
@@ -542,7 +543,11 @@ class PySimulator {
 /// A controller, its simulator, and the commands that it writes, in the simulator's memory.
 class PyController {
  public:
-  explicit PyController(ControllerInside inside) : inside_(std::move(inside)), commands_(std::make_shared<Commands>()) {
+  explicit PyController(ControllerInside inside)
+      : inside_(std::move(inside)),
+        maps_(of().maps()),
+        worlds_(of().worlds().begin(), of().worlds().end()),
+        commands_(std::make_shared<Commands>()) {
     const auto count = static_cast<size_t>(of().num_slots());
 #ifdef PICTURA_HAS_CUDA
     if (!of().device().is_host()) {
@@ -560,7 +565,8 @@ class PyController {
   const ControllerInside& inside() const { return inside_; }
   /// Without the GIL.
   void act(const PySimulator& simulator) {
-    PICTURA_CHECK(simulator.shared() == inside_.of && of().num_slots() == static_cast<int>(commands_->span.size()),
+    const bool has_same_worlds = std::ranges::equal(of().maps(), maps_) && std::ranges::equal(of().worlds(), worlds_);
+    PICTURA_CHECK(simulator.shared() == inside_.of && has_same_worlds,
                   "Controller: expected the simulator, and the worlds, that it was made for");
     inside_.controller->act(of().controller_input(), {}, commands_->span, simulator.stream());
   }
@@ -588,6 +594,8 @@ class PyController {
   Simulator& of() const { return *inside_.of; }
 
   ControllerInside inside_;
+  const CompiledMaps maps_;
+  const std::vector<WorldSpec> worlds_;
   std::shared_ptr<Commands> commands_;
 };
 
@@ -817,7 +825,7 @@ Raises pictura.UsageError naming what cannot be simulated, pictura.Error where t
              uint64_t seed) { self.set_worlds(maps, worlds_of(worlds), seed); },
           py::arg("maps"), py::arg("worlds"), py::arg("seed") = 0,
           R"(Other worlds on other maps, at the start of their first episodes: what a new simulator would be. Take the arrays
-anew: those of before stay valid memory and are no longer written. Raises as the constructor does.)")
+anew: those of before stay valid memory, which later calls may write. Raises as the constructor does.)")
       .def(
           "reset", &PySimulator::reset, py::arg("world_mask") = py::none(), py::arg("seed") = py::none(),
           R"(Starts new episodes. world_mask: uint8 or bool [worlds] in the simulator's memory, the worlds that start; all without

@@ -62,6 +62,9 @@ SceneRecorder::SceneRecorder(Simulator& simulator, int world)
   if (world < 0 || world_ >= simulator.worlds().size()) {
     fail_usage("expected a world to record in [0, {}), got {}", simulator.worlds().size(), world);
   }
+  spec_ = simulator.worlds()[world_];
+  map_ = simulator.maps()[static_cast<size_t>(spec_.map)];
+  seed_ = simulator.controller_input().seed[world_];
   first_slot_ = simulator.slots().slot_begin[world_];
   episode_ = simulator.episode_index()[world_];
   first_step_ = simulator.episode_step()[world_];
@@ -79,7 +82,6 @@ Span<const AgentBox> SceneRecorder::boxes() const {
 void SceneRecorder::add_step() {
   const SceneBatch& scene = simulator_.scene();
   const AgentStateView state = simulator_.state();
-  const int num_agents = simulator_.worlds()[world_].num_agents;
   const Span<const AgentBox> now = boxes();
   for (size_t i = 0; i < now.size(); ++i) {
     const AgentBox& box = now[i];
@@ -88,7 +90,7 @@ void SceneRecorder::add_step() {
     driven_.emplace_back();
     if (!box.drawn) continue;
     bodies_[i] = box;
-    const bool moves = static_cast<int>(i) < num_agents;
+    const bool moves = static_cast<int>(i) < spec_.num_agents;
     const auto slot = static_cast<size_t>(first_slot_) + i;
     const float speed_mps = moves ? state.speed_mps[slot] : 0.0f;
     states_.back() = {box.center_m,
@@ -114,13 +116,12 @@ void SceneRecorder::after_step() {
 }
 
 Scenario SceneRecorder::scenario(std::string id, int self_agent) const {
-  const WorldSpec& world = simulator_.worlds()[world_];
-  const CompiledMap& map = *simulator_.maps()[static_cast<size_t>(world.map)];
+  const CompiledMap& map = *map_;
   Scenario scenario;
   scenario.format = "pictura";
-  scenario.id = id.empty() ? fmt::format("{} seed {} world {} episode {}", map.road->name, simulator_.config().seed,
-                                         world.global_world, episode_)
-                           : std::move(id);
+  scenario.id = id.empty()
+                    ? fmt::format("{} seed {} world {} episode {}", map.road->name, seed_, spec_.global_world, episode_)
+                    : std::move(id);
   scenario.dt_s = simulator_.config().dt_s;
   scenario.num_steps = num_steps_;
   scenario.current_step = std::min(10, num_steps_ - 1);
@@ -133,7 +134,7 @@ Scenario SceneRecorder::scenario(std::string id, int self_agent) const {
     RecordedTrack track{
         .id = recorded ? recorded->tracks[i].id : static_cast<int64_t>(i),
         .type = recorded ? recorded->tracks[i].type : type_of(body.agent_class),
-        .control = static_cast<int>(i) < world.num_agents ? RecordedControl::unstated : RecordedControl::still,
+        .control = static_cast<int>(i) < spec_.num_agents ? RecordedControl::unstated : RecordedControl::still,
         .length_m = body.length_m,
         .width_m = body.width_m,
         .height_m = body.height_m};

@@ -37,6 +37,9 @@ class SceneRecorder {
 
   Simulator& simulator_;
   size_t world_;
+  WorldSpec spec_;
+  std::shared_ptr<const CompiledMap> map_;
+  uint64_t seed_;
   int32_t first_slot_ = 0, episode_ = 0, first_step_ = 0, num_steps_ = 0;
   bool is_over_ = false;
   std::vector<AgentBox> bodies_;            // [boxes] where they were last seen

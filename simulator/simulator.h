@@ -62,6 +62,7 @@ struct WorldSpec {
   int map = 0;
   int num_agents = 0;
   uint32_t global_world = 0;  // id across ranks, keys its random numbers
+  friend bool operator==(const WorldSpec&, const WorldSpec&) = default;
 };
 
 /// World sizes drawn from U{min_agents, max_agents} until they fill num_slots exactly (the last is cut to fit); maps

@@ -738,7 +738,7 @@ class Simulator:
     def set_worlds(self, maps: collections.abc.Sequence[Map], worlds: collections.abc.Sequence, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         """
         Other worlds on other maps, at the start of their first episodes: what a new simulator would be. Take the arrays
-        anew: those of before stay valid memory and are no longer written. Raises as the constructor does.
+        anew: those of before stay valid memory, which later calls may write. Raises as the constructor does.
         """
     def snapshot(self) -> Snapshot:
         """

@@ -290,6 +290,18 @@ def test_the_lane_keeper_drives_and_shares(make):
         pictura.Controller("nobody", simulator)
 
 
+@pytest.mark.parametrize("name", ["random", "idm_lanes"])
+def test_a_controller_drives_in_the_worlds_that_it_was_made_for(make, name):
+    simulator = make(8)
+    controller = pictura.Controller(name, simulator)
+    simulator.run(controller, 3)
+    other = pictura.Map.load("procedural:1:blocks=1x1")
+    simulator.set_worlds([other], [(0, 8)])
+    with pytest.raises(pictura.Error, match="the worlds, that it was made for"):
+        simulator.run(controller, 1)
+    simulator.run(pictura.Controller(name, simulator), 3)
+
+
 def test_conditioning_is_set_by_name(town):
     fixed = pictura.Simulator([town], [(0, 8)], conditioning={"collision": 2.5, "v_goal_mps": (3, 4)}, num_threads=1)
     values = fixed.state["conditioning"].numpy()

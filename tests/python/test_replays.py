@@ -76,6 +76,7 @@ def test_an_episode_that_a_reset_begins_is_an_episode(make, tmp_path):
         simulator.reset(seed=seed)
     recorder.write(str(tmp_path / "resets.html"))
     header = header_of(tmp_path / "resets.html")
+    assert header["seed"] == 2, "of the last reset"
     assert header["frames"] == 5, "a first one, two steps and two resets"
     assert header["metrics"]["spawned"] > 8, "three episodes of up to four agents"
 
@@ -113,6 +114,7 @@ def test_what_cannot_be_recorded_is_refused_by_name(make, tmp_path):
 
 def test_a_live_view_shows_steps_and_lets_a_page_drive(make, can_serve):
     simulator = make(5, seed=2)
+    recorder = pictura.Recorder(simulator)  # before whom the view gives other commands
     view = pictura.LiveView(simulator, follow=1, wait_for_page=False)
     events = Events(view.address)
     before = simulator.state["x_m"].numpy().copy()
@@ -133,6 +135,8 @@ def test_a_live_view_shows_steps_and_lets_a_page_drive(make, can_serve):
         simulator.step(idle)
     assert simulator.state["status"].numpy()[0] != 0 or float(speed[0]) > at_first, "the keys accelerate"
     assert not np.array_equal(before, simulator.state["x_m"].numpy())
+    recorded = recorder.metrics
+    assert recorded["km_driven"] == pytest.approx(simulator.totals()["distance_m"] / 1000, rel=1e-5)
     view.close()
     assert events.next("end")["step"] >= 11
     events.close()
@@ -201,6 +205,25 @@ def test_worlds_are_logged_to_rerun(town, make, tmp_path):
         assert name in data, name
     with pytest.raises(pictura.UsageError, match="world of 0 to 0 on cpu, got 1"):
         pictura.rerun.log_world(simulator, 0.0, world=1)
+
+
+def test_rerun_shows_bodies_where_they_are(make, monkeypatch):
+    rerun = pytest.importorskip("rerun")
+    import pictura.rerun
+
+    simulator = make(6, 2)
+    logged = {}
+    monkeypatch.setattr(rerun, "log", lambda entity, what, **_: logged.update({entity: what}))
+    monkeypatch.setattr(rerun, "set_time", lambda *_, **__: None)
+    monkeypatch.setattr(rerun, "Boxes3D", lambda **of: of)
+    pictura.rerun.log_world(simulator, 0.0, world=1)
+    state = {name: array.numpy()[6:] for name, array in simulator.state.items()}
+    there = state["status"] != 3
+    half = 0.5 * state["length_m"][there]
+    centers, x_m = logged["world/agents"]["centers"], state["x_m"][there]
+    ahead = (centers[:, 0] - x_m) * np.cos(state["heading_rad"][there]) + (centers[:, 1] - state["y_m"][there]) * np.sin(state["heading_rad"][there])
+    on_wheels = state["agent_class"][there] != 2
+    assert on_wheels.sum() > 2 and (ahead[on_wheels] > 0.5 * half[on_wheels]).all() and (ahead < half).all(), "a state is the rear axle's"
 
 
 def test_rerun_is_asked_for_by_name_where_it_is_missing():

@@ -201,6 +201,9 @@ def test_a_run_is_saved_loaded_and_replayed(town, tmp_path):
         recorder.scenario(self_agent=99)
     simulator.reset()
     assert recorder.num_steps == 30, "another episode"
+    simulator.set_worlds([pictura.Map.load("procedural:1:blocks=1x1")], [(0, 3)])
+    again = recorder.scenario(self_agent=3)
+    assert again.num_tracks == driven.num_tracks and again.id == "procedural:3 seed 5 world 0 episode 0", "of the world that was recorded"
 
 
 @pytest.mark.parametrize("others", ["log", "idm", "idm_lanes"])
