@@ -8,6 +8,7 @@
 #include "pictura/bindings/call.h"
 #include "pictura/bindings/objects.h"
 #include "pictura/bindings/owned_memory.h"
+#include "pictura/common/pixel_samples.h"
 #include "pictura/common/scene_file.h"
 
 namespace pictura::python {
@@ -213,55 +214,13 @@ class PyRenderer {
 
   py::object render(const Scene& scene, const py::object& views, const py::object& out, const std::string& dtype,
                     bool planes) {
-    const BorrowedArray borrowed = borrow_structs(views, "render: views", sizeof(View), stream_);
-    const Span<const View> span = views_of(borrowed);
-    if (py::isinstance<Images>(out)) {
-      draw(scene, span, py::cast<Images&>(out).batch());
-      return out;
+    BorrowedArray borrowed_views = borrow_structs(views, "render: views", sizeof(View), stream_), borrowed_out;
+    py::object images = draw_into(scene, views_of(borrowed_views), out, dtype, planes, &borrowed_out);
+    if (!renderer_->device().is_host()) {
+      kept_views_ = std::move(borrowed_views);
+      kept_out_ = std::move(borrowed_out);
     }
-    const auto num_views = static_cast<int64_t>(span.size());
-    if (out.is_none()) {
-      auto images = std::make_shared<Images>(renderer_->config().rig, num_views, format_of(dtype), planes,
-                                             renderer_->device(), stream_);
-      draw(scene, span, images->batch());
-      return py::cast(images);
-    }
-    // An array of the caller for a rig of one size.
-    BorrowedArray images = borrow(out, "render: out", stream_);
-    const Array& array = images.array();
-    const PixelFormat format = array.type == ElementType::f32    ? PixelFormat::f32
-                               : array.type == ElementType::f16  ? PixelFormat::f16
-                               : array.type == ElementType::bf16 ? PixelFormat::bf16
-                                                                 : PixelFormat::u8;
-    const ImageLayout layout = image_layout(renderer_->config().rig, num_views, format);
-    PICTURA_CHECK(layout.blocks.size() == 1, "render: out: expected pictura.Images, since the cameras have {} sizes",
-                  layout.blocks.size());
-    const ImageSize size = layout.blocks[0].size;
-    const Dims shape{num_views, static_cast<int64_t>(layout.cameras.size()), 3, size.height_px, size.width_px};
-    void* first = nullptr;
-    switch (format) {
-      case PixelFormat::u8: first = array.checked<uint8_t>("render: out", shape, renderer_->device()).data(); break;
-      case PixelFormat::f32: first = array.checked<float>("render: out", shape, renderer_->device()).data(); break;
-      case PixelFormat::f16:
-      case PixelFormat::bf16: {
-        PICTURA_CHECK(
-            array.shape == shape && array.device == renderer_->device() && array.is_contiguous() && !array.is_read_only,
-            "render: out: expected {} {} on {} that can be written, got {}", name_of(array.type), shape.text(),
-            name_of(renderer_->device()), array.text());
-        first = array.data;
-      }
-    }
-    std::vector<CameraImages> cameras;
-    for (size_t i = 0; i < layout.cameras.size(); ++i) {
-      cameras.push_back(camera_images(layout, static_cast<int>(i), first));
-    }
-    ImageBatch batch;
-    batch.device = renderer_->device();
-    batch.format = format;
-    batch.num_views = static_cast<int>(num_views);
-    batch.cameras = cameras;
-    draw(scene, span, batch);
-    return out;
+    return images;
   }
 
   py::array_t<float> visibility(const Scene& scene, const py::object& views, const IntTable& queries) {
@@ -323,24 +282,71 @@ class PyRenderer {
     }
   }
 
+  /// Into the caller's images, or into an array of the caller, which is then borrowed, or into new ones.
+  py::object draw_into(const Scene& scene, Span<const View> span, const py::object& out, const std::string& dtype,
+                       bool planes, BorrowedArray* borrowed_out) {
+    if (py::isinstance<Images>(out)) {
+      draw(scene, span, py::cast<Images&>(out).batch());
+      return out;
+    }
+    const auto num_views = static_cast<int64_t>(span.size());
+    if (out.is_none()) {
+      auto images = std::make_shared<Images>(renderer_->config().rig, num_views, format_of(dtype), planes,
+                                             renderer_->device(), stream_);
+      draw(scene, span, images->batch());
+      return py::cast(images);
+    }
+    // An array of the caller for a rig of one size.
+    *borrowed_out = borrow(out, "render: out", stream_);
+    const Array& array = borrowed_out->array();
+    const PixelFormat format = array.type == ElementType::f32    ? PixelFormat::f32
+                               : array.type == ElementType::f16  ? PixelFormat::f16
+                               : array.type == ElementType::bf16 ? PixelFormat::bf16
+                                                                 : PixelFormat::u8;
+    const ImageLayout layout = image_layout(renderer_->config().rig, num_views, format);
+    PICTURA_CHECK(layout.blocks.size() == 1, "render: out: expected pictura.Images, since the cameras have {} sizes",
+                  layout.blocks.size());
+    const ImageSize size = layout.blocks[0].size;
+    const Dims shape{num_views, static_cast<int64_t>(layout.cameras.size()), 3, size.height_px, size.width_px};
+    void* first = nullptr;
+    switch (format) {
+      case PixelFormat::u8: first = array.checked<uint8_t>("render: out", shape, renderer_->device()).data(); break;
+      case PixelFormat::f32: first = array.checked<float>("render: out", shape, renderer_->device()).data(); break;
+      case PixelFormat::f16:
+      case PixelFormat::bf16: {
+        PICTURA_CHECK(
+            array.shape == shape && array.device == renderer_->device() && array.is_contiguous() && !array.is_read_only,
+            "render: out: expected {} {} on {} that can be written, got {}", name_of(array.type), shape.text(),
+            name_of(renderer_->device()), array.text());
+        first = array.data;
+      }
+    }
+    std::vector<CameraImages> cameras;
+    for (size_t i = 0; i < layout.cameras.size(); ++i) {
+      cameras.push_back(camera_images(layout, static_cast<int>(i), first));
+    }
+    ImageBatch batch;
+    batch.device = renderer_->device();
+    batch.format = format;
+    batch.num_views = static_cast<int>(num_views);
+    batch.cameras = cameras;
+    draw(scene, span, batch);
+    return out;
+  }
+
   std::string choice_;
   std::shared_ptr<Renderer> renderer_;
   Calls calls_;
   Stream stream_;
+  // Of the last call on a device: the work that reads and writes them may still be to come.
+  BorrowedArray kept_views_, kept_out_;
 };
 
 PixelSamples samples_of(const std::string& text) {
-  PixelSamples samples;
-  if (text == "1" || text.empty()) return samples;
-  if (text.size() == 3 && text[1] == 'x' && text[0] == text[2] && text[0] >= '1' && text[0] <= '9') {
-    samples.grid = text[0] - '0';
-    return samples;
-  }
-  if (text.size() <= 2 && text.find_first_not_of("0123456789") == std::string::npos) {
-    samples.multisample = std::stoi(text);
-    return samples;
-  }
-  fail_usage("Renderer: samples: expected a number or KxK, got '{}'", text);
+  if (text.empty()) return {};
+  const std::optional<PixelSamples> samples = parse_pixel_samples(text);
+  if (!samples) fail_usage("Renderer: samples: expected {}, got '{}'", kPixelSamplesExpected, text);
+  return *samples;
 }
 
 }  // namespace

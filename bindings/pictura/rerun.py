@@ -22,7 +22,7 @@ except ImportError as error:
     raise ImportError("pictura.rerun needs rerun: pip install rerun-sdk") from error
 
 _CLASSES = ("vehicle", "cyclist", "pedestrian")
-_COLORS = np.array([[60, 140, 255], [60, 200, 120], [255, 160, 40]], np.uint8)
+_COLORS = np.array([[60, 140, 255], [255, 160, 40], [60, 200, 120]], np.uint8)
 _HALTED = np.array([150, 150, 150], np.uint8)
 _STATUS_HALTED, _STATUS_ABSENT = 1, 3
 
@@ -56,7 +56,10 @@ def log_world(simulator: pictura.Simulator, time_s: float, world: int = 0, entit
     slots = np.flatnonzero((simulator.world_of_slot.numpy() == world) & (state["status"] != _STATUS_ABSENT))
     heading = state["heading_rad"][slots]
     size = np.stack([state[f"{name}_m"][slots] for name in ("length", "width", "height")], axis=1)
-    center = np.stack([state[f"{axis}_m"][slots] for axis in "xyz"], axis=1)
+    # A state's position is the rear axle's: the boxes of the scene say where bodies are.
+    boxes = np.asarray(simulator.scene.boxes).view(pictura.BOX_DTYPE)[:, 0]
+    views = np.asarray(simulator.views).view(pictura.VIEW_DTYPE)[:, 0]
+    center = boxes["center_m"][views["ego_agent"][slots]]
     center[:, 2] += size[:, 2] / 2
     turn = np.zeros((len(slots), 4), np.float32)  # x, y, z, w
     turn[:, 2], turn[:, 3] = np.sin(heading / 2), np.cos(heading / 2)

@@ -273,3 +273,8 @@ def test_pufferlibs_contract():
             env.step(wrong)
     assert sum(log["n"] for log in logs) == env.batch.simulator.totals()["finished_agent_episodes"] > 0
     assert not env.done
+    of_seed = {}
+    for seed in (0, 1):
+        other = DrivePufferEnv(num_agents=6, num_worlds=1, seed=seed, num_threads=1)
+        of_seed[seed] = other.reset()[0].copy()
+    assert (of_seed[0] != of_seed[1]).any(), "without a seed the environment's own"

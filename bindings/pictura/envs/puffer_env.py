@@ -55,7 +55,7 @@ class DrivePufferEnv(_Base):
         return False
 
     def reset(self, seed: int | None = None) -> tuple[np.ndarray, list[dict[str, float]]]:
-        self.batch.reset(seed or 0)
+        self.batch.reset(seed)
         self._before = self.batch.simulator.totals()
         self._observe()
         for buffer in (self.rewards, self.terminals, self.truncations):
