@@ -24,6 +24,7 @@ Config adapted(const Config& trained, const SessionOptions& options) {
   config.run.num_threads = options.num_threads;
   config.run.device = options.device;
   config.simulator.backend = options.simulator;
+  config.simulator.walls |= options.adds_walls;
   if (!options.backbone.empty()) config.policy.backbone = options.backbone;
   std::string& renderer = config.render.backend;
   if (!options.renderer.empty())

@@ -26,6 +26,7 @@ struct SessionOptions {
   std::string backbone;  // where the program of policy.backbone lies now; empty: where it did
   // Of [evaluate.conditioning], in place of the policy's own: "name=value".
   std::vector<std::string> conditioning;
+  bool adds_walls = false;  // its worlds have walls, also where it was trained without
 };
 
 /// What a batch of agents sees, in the memory of the session's device.

@@ -32,7 +32,8 @@ SessionOptions session_options(const DriverOptions& options) {
           .width_px = options.width_px,
           .height_px = options.height_px,
           .backbone = options.backbone,
-          .conditioning = options.conditioning};
+          .conditioning = options.conditioning,
+          .adds_walls = options.adds_walls};
 }
 
 EvaluatedDriver policy_driver(PolicySession* session, Renderer* renderer, const DriverOptions& options, int steps) {
@@ -53,6 +54,7 @@ EvaluatedDriver controller_driver(const DriverOptions& options, int steps) {
   config.run.num_threads = options.num_threads;
   config.run.device = options.device;
   config.simulator.backend = options.simulator;
+  config.simulator.walls |= options.adds_walls;
   const std::string& name = options.controller;
   const bool is_on_host = drives_on_host(name);
   if (is_on_host && options.device == "auto" && options.simulator == "auto") config.run.device = "cpu";

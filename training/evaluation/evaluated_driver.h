@@ -31,6 +31,7 @@ struct DriverOptions {
   int width_px = 0, height_px = 0;
   std::string backbone;                   // as in SessionOptions
   std::vector<std::string> conditioning;  // as in SessionOptions
+  bool adds_walls = false;                // as in SessionOptions
 };
 
 /// With which the checkpoint's policy is opened.

@@ -29,8 +29,7 @@ class CornerProbe {
       : report_(options.worlds.on_progress),
         options_(with_half_progress(options)),
         results_(*results_out),
-        run_(sessions, options_, results_out,
-             {.walls = true, .untrained = options.control == CornerControl::untrained}) {
+        run_(sessions, options_, results_out, {.untrained = options.control == CornerControl::untrained}) {
     results_.maps = run_.maps();
     for (const auto& map : run_.maps()) {
       corners_.push_back(find_blind_corners(*map->road, map->geometry.walls));

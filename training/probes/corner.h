@@ -13,6 +13,7 @@ struct CornerOptions : ProbeOptions {
   CornerOptions() {
     sample_steps = 5;
     batch = 256;
+    worlds.adds_walls = true;  // they make the corners blind
   }
   int64_t pairs = 200;  // in all, from all scenes in turn; fewer where so many are not found
   CornerSearch search;
@@ -26,7 +27,7 @@ struct CornerOptions : ProbeOptions {
 /// match_corners(). From each state each policy drives the ego for kTakeoverSteps (TakeoverWorlds), in worlds with
 /// walls and without: with who is hidden, without, and from the empty corner. `batch` pairs are run at once. ^C ends it
 /// with the pairs that are done. Throws UsageError where scenes cannot be shared equally, Error naming file and key for
-/// bad input, and where the first policy's world has no walls.
+/// bad input.
 CornerResults probe_corner(const CornerOptions& options);
 /// The same of policies that are open, of one device, whose renderers and cameras are kept; options.policies names
 /// them.

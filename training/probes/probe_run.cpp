@@ -195,7 +195,7 @@ ProbeRun::ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptio
   const EvaluateOptions& worlds = options.worlds;
   SimulatorConfig config = sessions[0]->evaluation_world(worlds.steps);
   config.seed = worlds.seed;
-  config.walls |= kind.walls;
+  config.walls |= worlds.adds_walls;
   for (const PolicySession* session : sessions) {
     PICTURA_CHECK(session->device() == device_, "probe: expected policies on one device, got {} and {}",
                   pictura::name_of(device_), pictura::name_of(session->device()));

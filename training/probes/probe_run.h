@@ -96,7 +96,6 @@ class CaseQuota {
 
 /// What differs between probes.
 struct ProbeKind {
-  bool walls = false;  // worlds have walls also where that of the first policy has none
   // A control: policies with fresh weights, drawn from the seed, answer. The others still drive.
   bool untrained = false;
 };
