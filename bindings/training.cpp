@@ -11,6 +11,7 @@
 #include "pictura/bindings/call.h"
 #include "pictura/bindings/objects.h"
 #include "pictura/cli/replay_cases.h"
+#include "pictura/commit.h"
 #include "pictura/common/error.h"
 #include "pictura/simulator/observation_arrays.h"
 #include "pictura/training/evaluation/evaluate.h"
@@ -183,6 +184,7 @@ py::dict train_from_python(const std::string& config, const std::string& out, co
   options.overrides = overrides;
   options.init_from = init_from;
   options.minutes = minutes;
+  options.commit = PICTURA_COMMIT;
   options.launch = launch_from_environment();
   if (old_run == "resume") {
     options.old_run = OldRun::resume;
@@ -463,7 +465,7 @@ after the present update, saves, and raises KeyboardInterrupt. Raises pictura.Er
       py::arg("height_px") = 0, py::arg("conditioning") = py::dict(), py::arg("on_progress") = py::none(),
       R"(The paper's evaluation, as `pictura evaluate` does it, in worlds that no training has.
 
-checkpoint: of a policy; '' with a controller of the paper's world. maps: names or files. controller: 'lane', 'random' or 'idle',
+checkpoint: of a policy; '' with a controller of the paper's world. maps: names or files. controller: 'lane', 'idm_lanes', 'random' or 'idle',
 which drives instead. densities: 'light', 'medium' and 'dense', 60, 120 and 150 agents a world, or agents_per_world of them.
 device, simulator, renderer: 'auto' or names; renderer '': as it was trained. rig, or width_px and height_px: other cameras.
 conditioning: numbers by name. on_progress: called with the fraction that is done and the seconds to come, from a thread of its
@@ -522,8 +524,8 @@ agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error nami
       py::arg("conditioning") = py::dict(), py::arg("rollouts") = "", py::arg("on_progress") = py::none(),
       R"(The paper's zero-shot evaluation in recorded scenes, as `pictura evaluate --protocol` does it.
 
-checkpoint: of a policy; '' with a controller: 'log', 'inverse', 'idm', 'random' or 'idle', which drives instead. scenes: files,
-folders, 'FILE#K'. protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3', 'waymax' or 'simagents'; control, start_step, steps,
+checkpoint: of a policy; '' with a controller: 'log', 'inverse', 'idm', 'idm_lanes', 'random' or 'idle', which drives
+instead. scenes: files, folders, 'FILE#K'. protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3', 'waymax' or 'simagents'; control, start_step, steps,
 densities (shares of road users that stay) and rules (values by name, docs/evaluation.md) replace what it says.
 first_scene, num_scenes: a part of the scenes; 0: all from the first on. rollouts: a file for them, with the protocol
 'simagents', as the Waymo sim-agents challenge takes them. The others as in evaluate(). Returns a dict: rows, one a
@@ -545,6 +547,7 @@ KeyboardInterrupt. Raises pictura.Error where no scene can be used.)");
         options.removals = removals;
         options.range_m = range_m;
         options.control = removal_control_named(control);
+        check_case_number(shown, options.removals);
         const RemovalResults results = run_to_an_orderly_end("probe_removal", num_threads, {}, [&] {
           RemovalResults found = probe_removal(options);
           if (!cases_file.empty()) write_removal_cases(cases_file, found);
@@ -636,6 +639,7 @@ input.)");
         options.search.user_range_m = user_range_m;
         options.worlds.controller = driver;
         options.control = corner_control_named(control);
+        check_case_number(shown, options.pairs);
         const CornerResults results = run_to_an_orderly_end("probe_corner", num_threads, {}, [&] {
           CornerResults found = probe_corner(options);
           if (!cases_file.empty()) write_corner_cases(cases_file, found);

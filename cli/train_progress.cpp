@@ -5,6 +5,7 @@
 
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
+#include "pictura/training/phases.h"
 
 namespace pictura {
 namespace {
@@ -16,12 +17,12 @@ double scalar(const TrainProgress& progress, std::string_view name) {
   return found->second;
 }
 
-/// "simulate 4 %, render 31 %, forward 9 %, learn 50 %, optimize 2 %, other 4 %", of an update's wall time.
+/// "simulate 4 %, render 31 %, ..., other 4 %": each phase, and what is in none, of an update's wall time.
 std::string phase_shares(const TrainProgress& progress) {
   const double whole_s = scalar(progress, "time/rollout_s") + scalar(progress, "time/update_s");
   std::string text;
   double other = 1;
-  for (const char* phase : {"simulate", "render", "forward", "learn", "optimize"}) {
+  for (const char* phase : kPhaseNames) {
     const double share = scalar(progress, fmt::format("time/{}_s", phase)) / whole_s;
     text += fmt::format("{} {:.0f} %, ", phase, 100 * share);
     other -= share;

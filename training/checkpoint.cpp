@@ -131,7 +131,7 @@ Checkpoint parse_checkpoint(const std::string& file, const std::string& path) {
           bytes *= static_cast<uint64_t>(size);
           PICTURA_CHECK(bytes <= data.size(), "{}: {}: bad shape", path, list);
         }
-        PICTURA_CHECK(offset <= data.size() - bytes, "{}: {}: bad offset", path, list);
+        PICTURA_CHECK(bytes <= data.size() && offset <= data.size() - bytes, "{}: {}: bad offset", path, list);
         at::Tensor value = at::empty(shape, at::kFloat);
         std::memcpy(value.data_ptr(), data.data() + offset, bytes);
         all.push_back({entry.at("name").get<std::string>(), value});

@@ -141,10 +141,11 @@ class TrainingLoop {
   }
 
   void keep(int64_t agent_steps_of_update) {
-    if (keeper_.is_due(run_)) keeper_.save(run_, log_.recent());
+    // The milestone first: a run that goes on from a checkpoint of after it makes it no more.
     const std::string milestone = milestone_name(run_.agent_steps - agent_steps_of_update, run_.agent_steps,
                                                  run_.config.train.milestone_agent_steps);
     if (!milestone.empty()) keeper_.save_as(milestone, run_, log_.recent());
+    if (keeper_.is_due(run_)) keeper_.save(run_, log_.recent());
   }
 
   const TrainOptions& options_;

@@ -12,11 +12,11 @@ namespace pictura {
 namespace fs = std::filesystem;
 
 std::vector<std::string> run_files(const std::string& folder) {
-  // The last are what a killed process leaves of common/support/file.h.
+  // The last are what a killed process leaves of common/support/output_file.h.
   static const std::regex kNames(
       R"(config\.toml|(untrained|checkpoint(\.(\d+|next))?|milestone_\d+[kM]?)\.ckpt|(policy|failed_minibatch)\.safetensors|)"
       R"((progress|evaluation)\.csv(\.\d+)?|)"
-      R"(events\.out\.tfevents\.\d+\.\d+|learning_curve\.png|\.[\w.]+\.\d+\.tmp\.\w+)");
+      R"(events\.out\.tfevents\.\d+\.\d+|learning_curve\.png|\.[\w.]+\.\d+\.\d+\.tmp)");
   std::vector<std::string> names;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
     std::string name = entry.path().filename().string();

@@ -58,7 +58,7 @@ def evaluate(checkpoint: str, maps: collections.abc.Sequence[str], *, controller
     """
     The paper's evaluation, as `pictura evaluate` does it, in worlds that no training has.
     
-    checkpoint: of a policy; '' with a controller of the paper's world. maps: names or files. controller: 'lane', 'random' or 'idle',
+    checkpoint: of a policy; '' with a controller of the paper's world. maps: names or files. controller: 'lane', 'idm_lanes', 'random' or 'idle',
     which drives instead. densities: 'light', 'medium' and 'dense', 60, 120 and 150 agents a world, or agents_per_world of them.
     device, simulator, renderer: 'auto' or names; renderer '': as it was trained. rig, or width_px and height_px: other cameras.
     conditioning: numbers by name. on_progress: called with the fraction that is done and the seconds to come, from a thread of its
@@ -69,8 +69,8 @@ def evaluate_scenes(checkpoint: str, scenes: collections.abc.Sequence[str], *, p
     """
     The paper's zero-shot evaluation in recorded scenes, as `pictura evaluate --protocol` does it.
     
-    checkpoint: of a policy; '' with a controller: 'log', 'inverse', 'idm', 'random' or 'idle', which drives instead. scenes: files,
-    folders, 'FILE#K'. protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3', 'waymax' or 'simagents'; control, start_step, steps,
+    checkpoint: of a policy; '' with a controller: 'log', 'inverse', 'idm', 'idm_lanes', 'random' or 'idle', which drives
+    instead. scenes: files, folders, 'FILE#K'. protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3', 'waymax' or 'simagents'; control, start_step, steps,
     densities (shares of road users that stay) and rules (values by name, docs/evaluation.md) replace what it says.
     first_scene, num_scenes: a part of the scenes; 0: all from the first on. rollouts: a file for them, with the protocol
     'simagents', as the Waymo sim-agents challenge takes them. The others as in evaluate(). Returns a dict: rows, one a

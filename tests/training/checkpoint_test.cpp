@@ -75,12 +75,13 @@ std::string sealed(std::string file) {
   return file;
 }
 
-// The same checkpoint as version 1 wrote it: the hash in the header, of the data alone.
-std::string as_version_1(const std::string& file) {
-  const size_t header_bytes = header_bytes_of(file), data_begin = kPreamble + header_bytes;
-  const std::string data = file.substr(data_begin, file.size() - data_begin - kHashBytes);
-  auto header = nlohmann::ordered_json::parse(file.substr(kPreamble, header_bytes));
-  header["data"]["hash"] = fmt::format("{:016x}", hash_of(data));
+nlohmann::ordered_json header_of(const std::string& file) {
+  return nlohmann::ordered_json::parse(file.substr(kPreamble, header_bytes_of(file)));
+}
+
+// A file of version 1, with the hash of the data alone in its header.
+std::string as_version_1(const std::string& file, nlohmann::ordered_json header, const std::string& data) {
+  header["data"] = {{"bytes", data.size()}, {"hash", fmt::format("{:016x}", hash_of(data))}};
   const std::string text = header.dump();
   const uint32_t version = 1;
   const uint64_t size = text.size();
@@ -88,6 +89,12 @@ std::string as_version_1(const std::string& file) {
   std::memcpy(preamble.data() + 8, &version, sizeof version);
   std::memcpy(preamble.data() + 16, &size, sizeof size);
   return preamble + text + data;
+}
+
+// The same checkpoint as version 1 wrote it.
+std::string as_version_1(const std::string& file) {
+  const size_t data_begin = kPreamble + header_bytes_of(file);
+  return as_version_1(file, header_of(file), file.substr(data_begin, file.size() - data_begin - kHashBytes));
 }
 
 TEST_F(CheckpointFile, ComesBackWhole) {
@@ -185,6 +192,9 @@ TEST_F(CheckpointFile, BrokenFilesAreRefused) {
   changed[changed.size() - 20] = static_cast<char>(changed[changed.size() - 20] ^ 1);
   EXPECT_THAT(refuse(changed), HasSubstr("damaged"));
   EXPECT_THAT(refuse(as_version_1(whole).substr(0, whole.size() - 100)), HasSubstr("truncated"));
+  nlohmann::ordered_json header = header_of(whole);
+  header["parameters"][0]["shape"] = nlohmann::ordered_json::array();
+  EXPECT_THAT(refuse(as_version_1(whole, header, "ab")), HasSubstr("parameters: bad")) << "a number has four bytes";
   changed = whole;
   changed[8] = 9;
   EXPECT_THAT(refuse(changed), HasSubstr("version"));

@@ -47,6 +47,8 @@ Infraction infraction_of_the_first(const Start& first, const Start& second, int 
     observer.before_step(commands);
     observer.after_step(simulator->step(Span<const Command>(commands)));
   }
+  EXPECT_TRUE(observer.found().empty()) << "those of an evaluation that was interrupted are not counted";
+  observer.end();
   for (const Infraction& one : observer.found()) {
     if (one.agent == 0) return one;
   }

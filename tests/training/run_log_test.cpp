@@ -112,7 +112,8 @@ TEST_F(LoggedRun, TheProgressLineShowsRateTimeLeftMetricsAndPhases) {
               ::testing::MatchesRegex("update 1/2  ETA [0-9]+ s  [0-9]+ agent-steps  [0-9.]+[ K]*/s  return [-0-9.]+  "
                                       "in 1,000 steps [0-9.]+ goals, [0-9.]+ at fault, [0-9.]+ off-road, [0-9.]+ red "
                                       "lights  [0-9.]+ m/s  simulate [0-9]+ %, render [0-9]+ %, forward [0-9]+ %, "
-                                      "learn [0-9]+ %, optimize [0-9]+ %, other [0-9]+ %"));
+                                      "learn [0-9]+ %, diagnose [0-9]+ %, backward [0-9]+ %, optimize [0-9]+ %, other "
+                                      "[0-9]+ %"));
   const std::string last = progress_text(seen[1]);
   EXPECT_THAT(last, HasSubstr("update 2/2  ETA 0 s  "));
   EXPECT_THAT(last,

@@ -449,7 +449,7 @@ TEST_F(Training, ARunInTheFolderIsNeitherOverwrittenNorMixedWithUnlessAskedFor) 
       *std::find_if(files.begin(), files.end(), [](const auto& name) { return name.starts_with("events."); });
   // Of an earlier process, and another program's; and what is no run's.
   write_file(folder_ / "run/events.out.tfevents.17.5", "old");
-  write_file(folder_ / "run/.checkpoint.17.tmp.ckpt", "left by a killed process");
+  write_file(folder_ / "run/.checkpoint.next.ckpt.1717.0.tmp", "left by a killed process");
   write_file(folder_ / "run/notes.txt", "mine");
   write_file(folder_ / "run/events.out.tfevents.17.host", "another program's");
 
@@ -468,7 +468,7 @@ TEST_F(Training, ARunInTheFolderIsNeitherOverwrittenNorMixedWithUnlessAskedFor) 
   EXPECT_EQ(read_table(folder_ / "run/progress.csv").size(), 2u);
   EXPECT_EQ(count_events(), 2);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "run/events.out.tfevents.17.5"));
-  EXPECT_FALSE(std::filesystem::exists(folder_ / "run/.checkpoint.17.tmp.ckpt"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "run/.checkpoint.next.ckpt.1717.0.tmp"));
   EXPECT_EQ(read_file(folder_ / "run/notes.txt"), "mine");
   EXPECT_EQ(read_file(folder_ / "run/events.out.tfevents.17.host"), "another program's");
 }
@@ -536,6 +536,17 @@ TEST_F(Training, MilestonesAreKeptAndTheSameAfterResuming) {
   part.old_run = OldRun::resume;
   train(part);
   EXPECT_EQ(milestones("parts"), milestones("whole"));
+
+  // One that cannot be written is made when the run goes on: no checkpoint is of after it.
+  const std::string first = milestones("whole").front().first;
+  const std::string obstacle = folder_ / ("blocked/" + first + "/x");
+  std::filesystem::create_directories(obstacle);
+  TrainOptions blocked = options("blocked", settings);
+  EXPECT_THAT(message_of([&] { train(blocked); }), HasSubstr(first));
+  std::filesystem::remove_all(folder_ / ("blocked/" + first));
+  blocked.old_run = OldRun::resume;
+  train(blocked);
+  EXPECT_EQ(milestones("blocked"), milestones("whole"));
 }
 
 TEST_F(Training, ARunThatDivergesStopsAndKeepsTheMinibatch) {

@@ -141,6 +141,7 @@ EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& op
         if (options.observer) options.observer->after_step(taken);
         if (step % 10 == 0 || step == 1) clock.update((done + double(simulator->num_slots()) * (step + 1)) / work);
       }
+      if (options.observer) options.observer->end();
       done += double(simulator->num_slots()) * options.steps;
       AgentState state = counted_state(*simulator);
       for (int slot = 0; slot < simulator->num_slots(); ++slot) {

@@ -31,6 +31,8 @@ class EvaluationObserver {
   virtual void begin(Simulator& simulator) = 0;
   virtual void before_step(Span<const Command> commands) = 0;
   virtual void after_step(const StepResult& result) = 0;
+  /// All of these worlds are counted. Not called where an interrupt ends them.
+  virtual void end() {}
 };
 
 struct EvaluateOptions : DriverOptions {

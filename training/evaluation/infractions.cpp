@@ -145,6 +145,7 @@ InfractionObserver::~InfractionObserver() = default;
 void InfractionObserver::begin(Simulator& simulator) {
   simulator_ = &simulator;
   step_ = 0;
+  found_now_.clear();
   after_ = std::make_unique<Frame>(simulator);
   lane_change_step_.assign(after_->status.size(), 0);
   red_since_step_.assign(after_->lights.size(), -1);
@@ -237,7 +238,7 @@ void InfractionObserver::after_step(const StepResult& /*result*/) {
           one.stop_line_to_head_m = length(light.head_m.xy() - middle_m);
         }
       }
-      found_.push_back(one);
+      found_now_.push_back(one);
     }
   }
   for (size_t i = 0; i < after.lights.size(); ++i) {
@@ -247,6 +248,11 @@ void InfractionObserver::after_step(const StepResult& /*result*/) {
     else if (red_since_step_[i] < 0)
       red_since_step_[i] = step_;
   }
+}
+
+void InfractionObserver::end() {
+  found_.insert(found_.end(), found_now_.begin(), found_now_.end());
+  found_now_.clear();
 }
 
 std::vector<InfractionGroup> group_infractions(const std::vector<Infraction>& infractions) {

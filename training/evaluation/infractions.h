@@ -60,13 +60,14 @@ class InfractionObserver final : public EvaluationObserver {
   void begin(Simulator& simulator) override;
   void before_step(Span<const Command> commands) override;
   void after_step(const StepResult& result) override;
+  void end() override;
 
-  /// In the order in which they happened, scenario by scenario where they were evaluated together.
+  /// Of worlds that are at their end, in the order in which they happened.
   const std::vector<Infraction>& found() const { return found_; }
 
  private:
   struct Frame;
-  std::vector<Infraction> found_;
+  std::vector<Infraction> found_, found_now_;  // of worlds that were, and that are evaluated
   std::unique_ptr<Frame> before_, after_;
   Simulator* simulator_ = nullptr;
   int step_ = 0;
