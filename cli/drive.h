@@ -86,7 +86,7 @@ struct DrivenWorld {
 };
 
 /// A world of options.agents agents on the map, at the start of its first episode, with evaluation's light timing.
-/// `policy` drives: a controller's name (random, idle, lane), or a checkpoint's path (argmax; needs torch). In a
+/// `policy` drives: a controller of host_controller_names(), or a checkpoint's path (argmax; needs torch). In a
 /// recorded scene it drives the controlled tracks that are there at the start; all others, or with the policy log all,
 /// follow the recording.
 /// Then the world is the one that the policy was trained in, with its walls, population, observations and evaluation's

@@ -1,4 +1,4 @@
-// Options that name several maps, and shares of their agents.
+// Options that name several maps.
 #pragma once
 
 #include <string>

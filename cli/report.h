@@ -24,7 +24,7 @@ double seconds_since(std::chrono::steady_clock::time_point begin);
 /// "1 h 02 min", "3 min 05 s" or "12 s".
 std::string format_duration(double seconds);
 
-/// "1.2 M", "34.5 K" or "678".
+/// "1.20 M", "34.5 K" or "678".
 std::string format_count(double value);
 
 /// One line on stderr, on a terminal rewritten in place and cut off at its width, elsewhere printed every ten seconds.

@@ -20,7 +20,7 @@ std::vector<ConfigKey> config_keys();
 /// What of a configuration has no effect though it is no contradiction, a sentence each.
 std::vector<std::string> idle_settings(const Config& config);
 
-/// The configuration with absolute paths of rigs and map files, for readers in any folder.
+/// The configuration with absolute paths of its files (rig, maps, teacher, backbone), for readers in any folder.
 Config with_absolute_paths(Config config);
 
 }  // namespace pictura

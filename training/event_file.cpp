@@ -1,6 +1,5 @@
 #include "pictura/training/event_file.h"
 
-#include <bit>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -9,6 +8,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/crc32c.h"
+#include "pictura/common/support/protobuf_writer.h"
 
 namespace pictura {
 
@@ -18,45 +18,38 @@ double wall_time_s() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
-template <typename T>
-std::string raw(T value) {
-  static_assert(std::endian::native == std::endian::little, "TFRecords are little endian");
-  return {reinterpret_cast<const char*>(&value), sizeof value};
-}
-
-// The wire format of protocol buffers: a varint (field << 3 | kind), then the value.
-std::string varint(uint64_t value) {
-  std::string bytes;
-  for (; value >= 0x80; value >>= 7) bytes += static_cast<char>(value | 0x80);
-  return bytes + static_cast<char>(value);
-}
-std::string field_varint(uint32_t field, uint64_t value) { return varint(field << 3) + varint(value); }
-std::string field_double(uint32_t field, double value) { return varint(field << 3 | 1) + raw(value); }
-std::string field_float(uint32_t field, float value) { return varint(field << 3 | 5) + raw(value); }
-std::string field_bytes(uint32_t field, std::string_view bytes) {
-  return varint(field << 3 | 2) + varint(bytes.size()) + std::string(bytes);
-}
-
 }  // namespace
 
 EventFile::EventFile(const std::string& folder)
     : path_(fmt::format("{}/events.out.tfevents.{:.0f}.{}", folder, wall_time_s(), getpid())),
       out_(path_, std::ios::binary) {
   PICTURA_CHECK(out_, "{}: cannot be opened for writing", path_);
-  write_record(field_double(1, wall_time_s()) + field_bytes(3, "brain.Event:2"));
+  std::string version;
+  append_double(1, wall_time_s(), &version);
+  append_bytes(3, "brain.Event:2", &version);
+  write_record(version);
 }
 
 void EventFile::write(int64_t step, const Scalars& scalars) {
   std::string summary;
   for (const auto& [tag, value] : scalars) {
-    summary += field_bytes(1, field_bytes(1, tag) + field_float(2, static_cast<float>(value)));
+    std::string scalar;
+    append_bytes(1, tag, &scalar);
+    append_float(2, static_cast<float>(value), &scalar);
+    append_bytes(1, scalar, &summary);
   }
-  write_record(field_double(1, wall_time_s()) + field_varint(2, static_cast<uint64_t>(step)) + field_bytes(5, summary));
+  std::string event;
+  append_double(1, wall_time_s(), &event);
+  append_integer(2, static_cast<uint64_t>(step), &event);
+  append_bytes(5, summary, &event);
+  write_record(event);
 }
 
 void EventFile::write_record(const std::string& event) {
-  const std::string length = raw(static_cast<uint64_t>(event.size()));
-  out_ << length << raw(masked_crc32c(length)) << event << raw(masked_crc32c(event)) << std::flush;
+  const uint64_t size = event.size();
+  const std::string_view length = bytes_of(size);
+  const uint32_t length_crc = masked_crc32c(length), event_crc = masked_crc32c(event);
+  out_ << length << bytes_of(length_crc) << event << bytes_of(event_crc) << std::flush;
   PICTURA_CHECK(out_, "{}: writing failed: {}", path_, std::strerror(errno));
 }
 

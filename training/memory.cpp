@@ -7,6 +7,7 @@
 #include "pictura/common/image.h"
 #include "pictura/common/scene_history.h"
 #include "pictura/simulator/observation_arrays.h"
+#include "pictura/training/network_shape.h"
 #include "pictura/training/observation.h"
 #include "pictura/training/point_features.h"
 
@@ -99,7 +100,7 @@ void add_entity_sets(const Config& config, Device device, LayerSum* sum) {
   const double width = config.policy.embedding_width;
   for (const ObservationArray& array : kObservationArrays) {
     if (!is_set(array) || !config.reads(array.part)) continue;
-    const double points = array.name == "controls" ? 2 : 1;
+    const double points = num_points(array.name);
     const double features = array.features + (config.policy.point_features ? points * kPointFeatures : 0);
     if (device.is_host()) {
       // Of members their features are kept, of a set which are the largest: see largest_embedding().
@@ -130,7 +131,7 @@ void add_images(const Config& config, const Rig& rig, LayerSum* sum) {
     channels = policy.conv_channels[i];
   }
   const double width = channels, rows = cameras * queries, scores = pixels * queries * policy.attention_heads;
-  sum->add_parameters((8 + 1) * width + 4 * width + rows * width + 4 * width * width + 3 * width);
+  sum->add_parameters((kPositionFeatures + 1) * width + 4 * width + rows * width + 4 * width * width + 3 * width);
   sum->add_values(pixels * width, 2);  // tokens before and after their norm
   sum->add_values(scores, 2);
   sum->add_values(rows * policy.attention_heads * width, 1);
@@ -155,7 +156,7 @@ LayerSum layers_of(const Config& config, const Rig& rig, Device device) {
   }
   const double width = policy.embedding_width,
                waypoint = kWaypointFeatures + (policy.point_features ? kPointFeatures : 0);
-  sum.add_group(1, config.reads_images() ? kEgoFeatures - 2 : kEgoFeatures, width);
+  sum.add_group(1, num_ego_features(config.reads_images()), width);
   sum.add_group(1, kNumConditioning + kNumWaypoints * waypoint, width);
   double in = (sets + 2) * width;
   sum.add_values(in, 1);

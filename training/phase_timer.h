@@ -15,11 +15,7 @@ namespace pictura {
 /// Time since it was made or last restarted.
 class Stopwatch {
  public:
-  /// Seconds since then; starts again.
-  double restart() {
-    const auto now = Clock::now();
-    return std::chrono::duration<double>(now - std::exchange(start_, now)).count();
-  }
+  void restart() { start_ = Clock::now(); }
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
 
  private:

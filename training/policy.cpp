@@ -11,6 +11,7 @@
 #include "pictura/simulator/rules/observe.h"
 #include "pictura/training/image_backbone.h"
 #include "pictura/training/layers.h"
+#include "pictura/training/network_shape.h"
 #include "pictura/training/point_features.h"
 #include "pictura/training/precision.h"
 #include "pictura/training/rules/network_passes.h"
@@ -108,7 +109,7 @@ class VectorEncoder final : public SceneEncoder {
     for (size_t i = 0; i < std::size(kObservationArrays); ++i) {
       const ObservationArray& array = kObservationArrays[i];
       if (!is_set(array) || (array.part == ObservationPart::walls && !reads_walls)) continue;
-      const int64_t points = kObservationTensors[i] == &Observation::controls ? 2 : 1;  // a stop line has two ends
+      const int64_t points = num_points(array.name);
       const int64_t features = array.features + (point_features_ ? points * kPointFeatures : 0);
       groups_.push_back({make->group(std::string(array.name), features, embedding_width_), kObservationTensors[i],
                          entity_set_of(i), points});
@@ -204,10 +205,6 @@ class PerspectiveEncoder final : public SceneEncoder {
   }
 
  private:
-  // Sines and cosines of the pixel's position in the image, so that attention knows where a token is whatever the
-  // image's size.
-  static constexpr int64_t kPositionFeatures = 8;
-
   struct Norm {
     at::Tensor weight, bias;
   };
@@ -308,7 +305,7 @@ PolicyNetwork::PolicyNetwork(const Config::PolicySection& config, int num_camera
     scene_ = std::make_unique<PerspectiveEncoder>(config, num_cameras, input_type, &make);
   else
     scene_ = std::make_unique<VectorEncoder>(config, reads_walls, input_type, &make);
-  ego_features_ = sees_images ? kEgoFeatures - 2 : kEgoFeatures;
+  ego_features_ = num_ego_features(sees_images);
   const int64_t width = config.embedding_width;
   ego_ = make.group("ego", ego_features_, width);
   conditioning_ = make.group(

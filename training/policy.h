@@ -1,6 +1,6 @@
 // The two policies of the paper (appendix, table of the policy architecture): one trunk with actor and critic, behind
 // either encoders of four entity sets, or five with walls, or one image branch as wide as four. Plain tensors and
-// functions: ATen alone.
+// functions, no torch modules.
 #pragma once
 
 #include <functional>

@@ -11,7 +11,7 @@
 
 namespace pictura {
 
-/// Road users that follow the recording, and those that the recording has only later than the start.
+/// What the settings of a protocol can be: docs/evaluation.md "Protocols" says what they are.
 enum class Overlapping : uint8_t { replay, drive };
 enum class Others : uint8_t { replay, absent };
 enum class Late : uint8_t { replay, drive, absent };
@@ -52,7 +52,7 @@ SceneProtocol scene_protocol(const std::string& name);
 /// A setting that can be chosen by name.
 struct SceneRule {
   const char* name;
-  const char* values;  // "replay, drive, absent", "0.1 to 2"
+  const char* values;  // "replay, drive, absent", "0 to 2"
   const char* what;
 };
 std::vector<SceneRule> scene_rules();

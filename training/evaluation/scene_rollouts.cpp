@@ -1,12 +1,12 @@
 #include "pictura/training/evaluation/scene_rollouts.h"
 
-#include <bit>
 #include <limits>
 #include <string_view>
 #include <utility>
 
 #include "pictura/common/error.h"
 #include "pictura/common/span.h"
+#include "pictura/common/support/protobuf_writer.h"
 
 namespace pictura {
 
@@ -21,28 +21,9 @@ enum class JointScene : uint8_t { simulated_trajectories = 1 };
 enum class Trajectory : uint8_t { center_x = 2, center_y = 3, center_z = 4, heading = 5, object_id = 6 };
 constexpr uint64_t kSimAgentsSubmission = 1;
 
-void append_varint(uint64_t value, std::string* out) {
-  for (; value >= 0x80; value >>= 7) out->push_back(static_cast<char>(value | 0x80));
-  out->push_back(static_cast<char>(value));
-}
-
-template <typename Field>
-void append_integer(Field field, uint64_t value, std::string* out) {
-  append_varint(static_cast<uint64_t>(field) << 3, out);
-  append_varint(value, out);
-}
-
-template <typename Field>
-void append_bytes(Field field, std::string_view bytes, std::string* out) {
-  append_varint(static_cast<uint64_t>(field) << 3 | 2, out);
-  append_varint(bytes.size(), out);
-  out->append(bytes);
-}
-
 /// A packed field of one member of all states.
 void append_floats(Trajectory field, Span<const SimulatedState> states, float SimulatedState::* member,
                    std::string* out) {
-  static_assert(std::endian::native == std::endian::little, "the wire format is little-endian");
   std::vector<float> numbers;
   numbers.reserve(states.size());
   for (const SimulatedState& state : states) numbers.push_back(state.*member);

@@ -108,7 +108,7 @@ class PedestrianProbe {
       }
     }
     for (size_t i = 0; i < std::min(kMaxTries, all.size()); ++i) {
-      // As rows are drawn in training, whose worlds are others.
+      // The purpose is that of training's minibatches: their draws have other keys, and published ones stay.
       RandomStream random({.seed = options_.worlds.seed,
                            .world = spec.global_world,
                            .agent = static_cast<uint32_t>(i),

@@ -93,7 +93,7 @@ class RemovalProbe {
     for (size_t i = 0; i < order.size(); ++i) order[i] = static_cast<int>(i);
     const auto first = static_cast<std::ptrdiff_t>(out->size());
     for (int i = 0; i < count; ++i) {
-      // As rows are drawn in training, whose worlds are others.
+      // The purpose is that of training's minibatches: their draws have other keys, and published ones stay.
       RandomStream random({.seed = options_.worlds.seed,
                            .world = frame.worlds[pairs[0].world].global_world,
                            .agent = static_cast<uint32_t>(i) % RandomKey::kMaxAgents,

@@ -44,12 +44,15 @@ struct PointSize {
   static constexpr int64_t kMostWidth = 256;
 };
 
-/// One of the features of a point in metres (see training/point_features.h).
+/// What is added to what a point's coordinates are divided by (see training/point_features.h).
+constexpr float kNearPoint_m = 4.0f, kFarPoint_m = 20.0f, kPointDirection_m = 1.0f;
+
+/// One of the features of a point in metres.
 PICTURA_HD inline float point_feature(float x_m, float y_m, int feature) {
   const float its_m = feature % 2 == 0 ? x_m : y_m;
-  return its_m / (feature < 2   ? fabsf(its_m) + 4.0f
-                  : feature < 4 ? fabsf(its_m) + 20.0f
-                                : sqrtf(x_m * x_m + y_m * y_m) + 1.0f);
+  return its_m / (feature < 2   ? fabsf(its_m) + kNearPoint_m
+                  : feature < 4 ? fabsf(its_m) + kFarPoint_m
+                                : sqrtf(x_m * x_m + y_m * y_m) + kPointDirection_m);
 }
 
 /// Matrices [matrices, tokens, columns] of scores; `columns` is even.
