@@ -76,7 +76,7 @@ def test_an_episode_that_a_reset_begins_is_an_episode(make, tmp_path):
         simulator.reset(seed=seed)
     recorder.write(str(tmp_path / "resets.html"))
     header = header_of(tmp_path / "resets.html")
-    assert header["seed"] == 2, "of the last reset"
+    assert header["seed"] == "2", "of the last reset"
     assert header["frames"] == 5, "a first one, two steps and two resets"
     assert header["metrics"]["spawned"] > 8, "three episodes of up to four agents"
 
