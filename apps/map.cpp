@@ -14,6 +14,7 @@
 #include "pictura/drawing/drawing.h"
 #include "pictura/map/blind_approaches.h"
 #include "pictura/map/load_map.h"
+#include "pictura/map/map_fields.h"
 #include "pictura/map/map_geometry.h"
 #include "pictura/map/opendrive/writer.h"
 #include "pictura/map/scenario/drivable_area.h"
@@ -41,23 +42,9 @@ std::optional<FileBox> shown_box(const MapArguments& arguments) {
 }
 
 Json facts_of(const RoadMap& map) {
-  const MapFacts& facts = map.facts;
-  return {{"map", map.name},
-          {"roads", facts.roads},
-          {"junction_roads", facts.junction_roads},
-          {"junctions", facts.junctions},
-          {"signal_junctions", facts.signal_junctions},
-          {"lanes", facts.lanes},
-          {"driving_lanes", facts.driving_lanes},
-          {"driving_lane_km", facts.driving_lane_km},
-          {"traffic_lights", facts.traffic_lights},
-          {"stop_lines", facts.stop_lines},
-          {"painted_stop_lines", facts.painted_stop_lines},
-          {"signs", facts.signs},
-          {"crosswalks", facts.crosswalks},
-          {"parking_spaces", facts.parking_spaces},
-          {"z_min_m", facts.z_min_m},
-          {"z_max_m", facts.z_max_m}};
+  Json object{{"map", map.name}};
+  visit_fields(map.facts, [&object](std::string_view name, const auto& value) { object[std::string(name)] = value; });
+  return object;
 }
 
 /// With the default walls of simulations.
@@ -102,7 +89,7 @@ void add_scene_facts(const Scenario& scenario, Json* object_out) {
 
 void print_table(const Json& object) {
   for (const auto& [key, value] : object.items()) {
-    fmt::print("{:18} {}\n", key,
+    fmt::print("{:28} {}\n", key,
                value.is_string()         ? value.get<std::string>()
                : value.is_number_float() ? fmt::format("{:.2f}", value.get<double>())
                                          : value.dump());

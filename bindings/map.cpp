@@ -8,6 +8,7 @@
 #include "pictura/bindings/objects.h"
 #include "pictura/drawing/world.h"
 #include "pictura/map/load_map.h"
+#include "pictura/map/map_fields.h"
 
 namespace pictura::python {
 
@@ -139,22 +140,7 @@ std::function<std::shared_ptr<const CompiledMap>()> Map::compilation(const MapOp
 
 py::dict facts_of(const MapFacts& facts) {
   py::dict d;
-  d["roads"] = facts.roads;
-  d["junction_roads"] = facts.junction_roads;
-  d["junctions"] = facts.junctions;
-  d["signal_junctions"] = facts.signal_junctions;
-  d["lanes"] = facts.lanes;
-  d["driving_lanes"] = facts.driving_lanes;
-  d["driving_lane_km"] = facts.driving_lane_km;
-  d["driving_lane_km_in_junctions"] = facts.driving_lane_km_in_junctions;
-  d["traffic_lights"] = facts.traffic_lights;
-  d["stop_lines"] = facts.stop_lines;
-  d["crosswalks"] = facts.crosswalks;
-  d["parking_spaces"] = facts.parking_spaces;
-  d["painted_stop_lines"] = facts.painted_stop_lines;
-  d["signs"] = facts.signs;
-  d["z_min_m"] = facts.z_min_m;
-  d["z_max_m"] = facts.z_max_m;
+  visit_fields(facts, [&d](std::string_view name, const auto& value) { d[py::str(std::string(name))] = value; });
   return d;
 }
 

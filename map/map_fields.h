@@ -2,6 +2,7 @@
 // lists. A structured binding must name every field, so an incomplete list does not compile.
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <string_view>
 #include <tuple>
@@ -51,6 +52,18 @@ PICTURA_FIELDS(RoadMap, name, origin_m, geo_reference, road_names, lanes, lane_p
                lights, light_lanes, junctions, building_lines, facts, provenance, mends)
 
 PICTURA_FIELDS(OpenDriveOptions, chord_error_m, strict)
+
+/// Calls visit(name, field) for each field of one of these, in their order.
+template <typename T, typename Visit>
+void visit_fields(const T& value, Visit&& visit) {
+  std::string_view names = field_names_of(value);
+  const auto next_name = [&names] {
+    const std::string_view name = names.substr(0, names.find(','));
+    names.remove_prefix(std::min(name.size() + 2, names.size()));  // ", "
+    return name;
+  };
+  std::apply([&](const auto&... field) { (visit(next_name(), field), ...); }, fields_of(value));
+}
 
 /// The first bitwise difference of two maps, as a path like "lanes[3].length_m" or "lights: 8 and 9 of them"; empty
 /// when they are equal.
