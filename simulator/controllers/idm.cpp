@@ -214,7 +214,7 @@ IdmController::Front IdmController::box_ahead(const ControllerInput& input, size
 
 /// How far the bumper is from the first line along the path that holds it up; infinite: there is none.
 float IdmController::closed_line_ahead_m(const ControllerInput& input, size_t slot, float s_m) const {
-  constexpr float kLook_m = 45, kBeside_m = 0.5f, kAlike = 0.7f;
+  constexpr float kLook_m = 45;
   const FollowedPath& path = paths_[slot];
   const auto world = static_cast<size_t>(input.slots.world_of_slot[slot]);
   const Span<const StopLine> lines = views_[world].stop_lines;
@@ -234,8 +234,8 @@ float IdmController::closed_line_ahead_m(const ControllerInput& input, size_t sl
       const Vec2 way{box.cos_heading, box.sin_heading};
       const Vec2 bumper = box.center_m.xy() + way * (0.5f * box.length_m) - line.middle_m.xy();
       const bool crosses = ahead_m > 0 && dot(before, line.direction) < 0 && dot(bumper, line.direction) >= 0 &&
-                           std::abs(cross(line.direction, bumper)) <= line.half_length_m + kBeside_m &&
-                           dot(way, line.direction) > kAlike &&
+                           std::abs(cross(line.direction, bumper)) <= line.half_length_m + kStopLineSideTolerance_m &&
+                           dot(way, line.direction) >= kStopLineCosine &&
                            std::abs(pose.position_m.z - line.middle_m.z) < kLevel_m;
       before = bumper;
       if (!crosses) continue;
