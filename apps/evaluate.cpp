@@ -132,21 +132,100 @@ EvaluateReport merged(const std::vector<std::string>& paths) {
   return report;
 }
 
+struct EvaluateArguments {
+  EvaluationArguments evaluation;
+  std::vector<std::string> densities{kDensityNames.begin(), kDensityNames.end()};
+  std::vector<std::string> parts;
+  std::string size, scenarios = "200", out, infractions;
+  bool json = false;
+  SceneArguments scenes;
+  std::string replay, gallery;
+  int replays = 0;
+  RecordingOptions recording;
+};
+
+void evaluate_in_scenes(const CLI::App& command, const EvaluateArguments& arguments) {
+  const EvaluateOptions& evaluation = arguments.evaluation.evaluate;
+  check_driver(evaluation, /*has_parts=*/false, /*has_scenes=*/true);
+  refuse_recording_options(command, "--replay or --gallery");
+  SceneEvaluateOptions in_scenes;
+  static_cast<DriverOptions&>(in_scenes) = evaluation;
+  in_scenes.first_scene = evaluation.first_scenario;
+  in_scenes.num_scenes = command.count("--scenarios") > 0 ? evaluation.scenarios : 0;
+  run_scene_evaluation(command, arguments.scenes, evaluation.steps, arguments.densities, std::move(in_scenes),
+                       arguments.out, arguments.json);
+}
+
+// Records the worst scenarios again, where that was asked for.
+void replay_worst(const EvaluateArguments& arguments, const EvaluationResults& results) {
+  const EvaluateOptions& evaluation = arguments.evaluation.evaluate;
+  if (!arguments.replay.empty()) {
+    write_scenario_replay(evaluation, results, arguments.recording, arguments.replay);
+  }
+  if (!arguments.gallery.empty()) {
+    write_scenario_replays(evaluation, results, arguments.recording, arguments.replays, arguments.gallery);
+  }
+}
+
+// In towns, or parts of that joined.
+void evaluate_in_towns(const CLI::App& command, EvaluateArguments* arguments) {
+  EvaluateOptions& evaluation = arguments->evaluation.evaluate;
+  const bool merges = !arguments->parts.empty(), lists_infractions = !arguments->infractions.empty();
+  evaluation.densities.clear();
+  for (const std::string& name : arguments->densities) evaluation.densities.push_back(density_named(name));
+  if (evaluation.agents_per_world > 0) evaluation.densities.resize(1);
+  check_driver(evaluation, merges, /*has_scenes=*/false);
+  const bool records = !arguments->replay.empty() || !arguments->gallery.empty();
+  if (!records) refuse_recording_options(command, "--replay or --gallery");
+  if (records && merges) fail_usage("--replay, --gallery: have no effect with --merge");
+  if (lists_infractions && merges) fail_usage("--infractions: has no effect with --merge");
+  EvaluationProgress progress("the scenarios that are finished");
+  evaluation.on_progress = [&progress](double done, double eta_s) { progress.update(done, eta_s); };
+  InfractionObserver infractions;
+  if (lists_infractions) evaluation.observer = &infractions;
+  const EvaluateReport report = merges ? merged(arguments->parts) : evaluate(evaluation);
+  evaluation.observer = nullptr;
+  progress.finish();
+  const std::vector<InfractionGroup> groups = group_infractions(infractions.found());
+  if (lists_infractions) write_infractions_csv(arguments->infractions, infractions.found());
+  if (!arguments->out.empty()) write_results(arguments->out, report.results);
+  if (arguments->json)
+    print_report(evaluation, report, lists_infractions ? groups_json(groups) : Json(nullptr));
+  else
+    print_table(report);
+  if (lists_infractions && !arguments->json) print_groups(groups);
+  if (!report.interrupted) return replay_worst(*arguments, report.results);
+  int finished = 0;
+  for (const EvaluateRow& row : report.rows) finished += row.scenarios;
+  const size_t num_densities = evaluation.agents_per_world > 0 ? 1 : evaluation.densities.size();
+  throw Interrupted(fmt::format("interrupted; {} of {} scenarios are finished, and counted above", finished,
+                                num_densities * static_cast<size_t>(evaluation.scenarios)));
+}
+
+void run_evaluate(const CLI::App& command, EvaluateArguments* arguments) {
+  settle_evaluation_options(&arguments->evaluation);
+  EvaluateOptions& evaluation = arguments->evaluation.evaluate;
+  if (!arguments->size.empty()) {
+    const Pair pixels = parse_pair("--size", arguments->size, 8192);
+    evaluation.width_px = pixels.first;
+    evaluation.height_px = pixels.second;
+  }
+  refuse_idle_scene_options(command, arguments->scenes);
+  const bool has_scenes = !arguments->scenes.protocol.empty();
+  if (!has_scenes || command.count("--scenarios") > 0) parse_scenarios(arguments->scenarios, &evaluation);
+  if (has_scenes) return evaluate_in_scenes(command, *arguments);
+  if (arguments->parts.empty() || !has_scene_results(arguments->parts.front())) {
+    return evaluate_in_towns(command, arguments);
+  }
+  refuse_recording_options(command, "--replay or --gallery");
+  refuse_options(command, {"--infractions", "--replay", "--replays"}, "on parts of an evaluation in scenes");
+  merge_scene_evaluations(arguments->parts, arguments->out, arguments->json);
+}
+
 }  // namespace
 
 void add_evaluate_command(CLI::App& app) {
-  struct Arguments {
-    EvaluationArguments evaluation;
-    std::vector<std::string> densities{kDensityNames.begin(), kDensityNames.end()};
-    std::vector<std::string> parts;
-    std::string size, scenarios = "200", out, infractions;
-    bool json = false;
-    SceneArguments scenes;
-    std::string replay, gallery;
-    int replays = 0;
-    RecordingOptions recording;
-  };
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<EvaluateArguments>();
   EvaluateOptions& options = arguments->evaluation.evaluate;
   CLI::App* command = app.add_subcommand("evaluate", "Measure a policy's driving (the paper's protocols)");
   CLI::Option* const checkpoint =
@@ -215,72 +294,7 @@ void add_evaluate_command(CLI::App& app) {
       "  pictura evaluate --merge a.json b.json\n"
       "Rollouts for the Waymo sim-agents challenge:\n"
       "  pictura evaluate run.ckpt --protocol simagents --scenes validation --sampled --rollouts rollouts.binproto");
-  command->callback([arguments, command] {
-    settle_evaluation_options(&arguments->evaluation);
-    EvaluateOptions& evaluation = arguments->evaluation.evaluate;
-    if (!arguments->size.empty()) {
-      const Pair pixels = parse_pair("--size", arguments->size, 8192);
-      evaluation.width_px = pixels.first;
-      evaluation.height_px = pixels.second;
-    }
-    refuse_idle_scene_options(*command, arguments->scenes);
-    const bool has_scenes = !arguments->scenes.protocol.empty();
-    if (!has_scenes || command->count("--scenarios") > 0) parse_scenarios(arguments->scenarios, &evaluation);
-    if (has_scenes) {
-      check_driver(evaluation, /*has_parts=*/false, has_scenes);
-      refuse_recording_options(*command, "--replay or --gallery");
-      SceneEvaluateOptions in_scenes;
-      static_cast<DriverOptions&>(in_scenes) = evaluation;
-      in_scenes.first_scene = evaluation.first_scenario;
-      in_scenes.num_scenes = command->count("--scenarios") > 0 ? evaluation.scenarios : 0;
-      run_scene_evaluation(*command, arguments->scenes, evaluation.steps, arguments->densities, std::move(in_scenes),
-                           arguments->out, arguments->json);
-      return;
-    }
-    if (!arguments->parts.empty() && has_scene_results(arguments->parts.front())) {
-      refuse_recording_options(*command, "--replay or --gallery");
-      refuse_options(*command, {"--infractions", "--replay", "--replays"}, "on parts of an evaluation in scenes");
-      merge_scene_evaluations(arguments->parts, arguments->out, arguments->json);
-      return;
-    }
-    evaluation.densities.clear();
-    for (const std::string& name : arguments->densities) evaluation.densities.push_back(density_named(name));
-    if (evaluation.agents_per_world > 0) evaluation.densities.resize(1);
-    check_driver(evaluation, !arguments->parts.empty(), has_scenes);
-    const bool records = !arguments->replay.empty() || !arguments->gallery.empty();
-    if (!records) refuse_recording_options(*command, "--replay or --gallery");
-    if (records && !arguments->parts.empty()) fail_usage("--replay, --gallery: have no effect with --merge");
-    EvaluationProgress progress("the scenarios that are finished");
-    evaluation.on_progress = [&progress](double done, double eta_s) { progress.update(done, eta_s); };
-    const bool lists_infractions = !arguments->infractions.empty();
-    if (lists_infractions && !arguments->parts.empty()) fail_usage("--infractions: has no effect with --merge");
-    InfractionObserver infractions;
-    if (lists_infractions) evaluation.observer = &infractions;
-    const EvaluateReport report = arguments->parts.empty() ? evaluate(evaluation) : merged(arguments->parts);
-    evaluation.observer = nullptr;
-    progress.finish();
-    const std::vector<InfractionGroup> groups = group_infractions(infractions.found());
-    if (lists_infractions) write_infractions_csv(arguments->infractions, infractions.found());
-    if (!arguments->out.empty()) write_results(arguments->out, report.results);
-    if (arguments->json)
-      print_report(evaluation, report, lists_infractions ? groups_json(groups) : Json(nullptr));
-    else
-      print_table(report);
-    if (lists_infractions && !arguments->json) print_groups(groups);
-    if (!report.interrupted && !arguments->replay.empty()) {
-      write_scenario_replay(evaluation, report.results, arguments->recording, arguments->replay);
-    }
-    if (!report.interrupted && !arguments->gallery.empty()) {
-      write_scenario_replays(evaluation, report.results, arguments->recording, arguments->replays, arguments->gallery);
-    }
-    if (report.interrupted) {
-      int finished = 0;
-      for (const EvaluateRow& row : report.rows) finished += row.scenarios;
-      const size_t num_densities = evaluation.agents_per_world > 0 ? 1 : evaluation.densities.size();
-      throw Interrupted(fmt::format("interrupted; {} of {} scenarios are finished, and counted above", finished,
-                                    num_densities * static_cast<size_t>(evaluation.scenarios)));
-    }
-  });
+  command->callback([arguments, command] { run_evaluate(*command, arguments.get()); });
 }
 
 }  // namespace pictura

@@ -82,6 +82,64 @@ void refuse_idle_options(const CLI::App& command, const SimulateArguments& argum
   refuse_idle_backend_options(command, arguments.policy);
 }
 
+struct SimulationRun {
+  SpawnReport spawned;  // in the first episode, as those of each class
+  std::array<int64_t, kNumAgentClasses> of_class{};
+  int steps = 0;
+  double drive_s = 0, simulate_s = 0;  // without filming, recording and serving; of the simulator alone
+  Displacement displacement;           // in a recorded scene
+};
+
+void print_simulation(const SimulationRun& run, const DrivenWorld& world, bool json) {
+  Simulator& simulator = *world.simulator;
+  const Scenario* const scene = simulator.maps()[0]->scenario.get();
+  const SimulatorTotals& totals = simulator.totals();
+  Json object{{"backend", simulator.name()},
+              {"renderer", world.renderer ? Json(world.renderer->name()) : Json(nullptr)},
+              {"map", simulator.maps()[0]->road->name},
+              {"wall_seed", simulator.config().walls ? Json(simulator.config().wall_seed) : Json(nullptr)},
+              {"asked", run.spawned.asked},
+              {"spawned", run.spawned.spawned},
+              {"refused", run.spawned.refused},
+              {"refused_no_place", run.spawned.refused_no_place},
+              {"refused_taken", run.spawned.refused_taken},
+              {"vehicles", run.of_class[static_cast<size_t>(AgentClass::vehicle)]},
+              {"cyclists", run.of_class[static_cast<size_t>(AgentClass::cyclist)]},
+              {"pedestrians", run.of_class[static_cast<size_t>(AgentClass::pedestrian)]},
+              {"parked_asked", run.spawned.parked_asked},
+              {"parked_placed", run.spawned.parked_placed},
+              {"steps", run.steps},
+              {"agent_steps", totals.agent_steps},
+              {"agent_steps_per_s", finite_or_null(static_cast<double>(totals.agent_steps) / run.drive_s)},
+              {"slot_steps_per_s", finite_or_null(static_cast<double>(totals.slot_steps) / run.drive_s)},
+              {"simulator_agent_steps_per_s", finite_or_null(static_cast<double>(totals.agent_steps) / run.simulate_s)},
+              {"episodes", totals.episodes},
+              {"goals_reached", totals.goals_reached},
+              {"waypoints_reached", totals.waypoints_reached},
+              {"collisions", totals.collisions},
+              {"at_fault_collisions", totals.at_fault_collisions},
+              {"off_road", totals.off_road},
+              {"red_light", totals.red_light},
+              {"wall_contacts", totals.wall_contacts},
+              {"km_driven", totals.distance_m / 1000},
+              {"state_hash", fmt::format("{:016x}", simulator.state_hash())}};
+  if (scene) {
+    object["scenario_id"] = scene->id;
+    object["start_step"] = simulator.maps()[0]->start_step;
+    object["displacement_steps"] = run.displacement.steps;
+    object["displacement_mean_m"] =
+        finite_or_null(run.displacement.sum_m / static_cast<double>(run.displacement.steps));
+    object["displacement_max_m"] = run.displacement.max_m;
+  }
+  if (json) {
+    print_json(object);
+  } else {
+    for (const auto& [key, value] : object.items()) {
+      fmt::print("{:20} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+    }
+  }
+}
+
 void run_simulate(SimulateArguments arguments) {
   DrivenWorld world = make_world(arguments.world, arguments.policy, arguments.backends);
   Simulator* const simulator = world.simulator.get();
@@ -92,8 +150,7 @@ void run_simulate(SimulateArguments arguments) {
     fail_usage("--film-agent: expected 0 to {}, got {}", simulator->num_slots() - 1, film_agent);
   }
   settle_followed(world, &arguments.recording);
-  const SpawnReport spawned = simulator->spawn_report();
-  const auto of_class = spawned_by_class(*simulator);
+  SimulationRun run{.spawned = simulator->spawn_report(), .of_class = spawned_by_class(*simulator)};
   std::unique_ptr<Film> film;
   if (!arguments.video.empty()) {
     film = std::make_unique<Film>(arguments.video, *simulator,
@@ -113,10 +170,9 @@ void run_simulate(SimulateArguments arguments) {
   if (arguments.serve.is_asked) live = serve(arguments.serve, *simulator, driver, arguments.recording);
 
   ProgressLine line;
-  Displacement displacement;          // in a recorded scene
-  double simulate_s = 0, film_s = 0;  // filming, recording and serving
+  double film_s = 0;  // filming, recording and serving
   const auto begin_of_all = std::chrono::steady_clock::now();
-  int step = 0;
+  int& step = run.steps;
   for (; (arguments.endless || step < arguments.steps) && !interrupted(); ++step) {
     const auto begin_of_frame = std::chrono::steady_clock::now();
     if (live && !await_step(*live)) break;
@@ -129,17 +185,17 @@ void run_simulate(SimulateArguments arguments) {
     const auto begin = std::chrono::steady_clock::now();
     const StepResult result = world.step();
     const auto end = std::chrono::steady_clock::now();
-    if (scene) displacement.add(*simulator, *scene);
+    if (scene) run.displacement.add(*simulator, *scene);
     if (recording) recording->after_step(result);
     if (saved) saved->after_step();
     if (live) live->after_step(result);
-    simulate_s += std::chrono::duration<double>(end - begin).count();
+    run.simulate_s += std::chrono::duration<double>(end - begin).count();
     film_s += std::chrono::duration<double>(begin - begin_of_recording).count() + seconds_since(end);
     if (!live)
       line.update(fmt::format("step {}/{}", step + 1, arguments.steps),
                   static_cast<double>(step + 1) / arguments.steps);
   }
-  const double drive_s = seconds_since(begin_of_all) - film_s;
+  run.drive_s = seconds_since(begin_of_all) - film_s;
   line.finish();
   if (live) live->finish();
   if (film) film->close();
@@ -153,50 +209,7 @@ void run_simulate(SimulateArguments arguments) {
     fmt::print(stderr, "{}: {} steps of the first episode\n", arguments.scene, saved->num_steps() - 1);
   }
 
-  const SimulatorTotals& totals = simulator->totals();
-  Json object{{"backend", simulator->name()},
-              {"renderer", world.renderer ? Json(world.renderer->name()) : Json(nullptr)},
-              {"map", simulator->maps()[0]->road->name},
-              {"wall_seed", simulator->config().walls ? Json(simulator->config().wall_seed) : Json(nullptr)},
-              {"asked", spawned.asked},
-              {"spawned", spawned.spawned},
-              {"refused", spawned.refused},
-              {"refused_no_place", spawned.refused_no_place},
-              {"refused_taken", spawned.refused_taken},
-              {"vehicles", of_class[static_cast<size_t>(AgentClass::vehicle)]},
-              {"cyclists", of_class[static_cast<size_t>(AgentClass::cyclist)]},
-              {"pedestrians", of_class[static_cast<size_t>(AgentClass::pedestrian)]},
-              {"parked_asked", spawned.parked_asked},
-              {"parked_placed", spawned.parked_placed},
-              {"steps", step},
-              {"agent_steps", totals.agent_steps},
-              {"agent_steps_per_s", finite_or_null(static_cast<double>(totals.agent_steps) / drive_s)},
-              {"slot_steps_per_s", finite_or_null(static_cast<double>(totals.slot_steps) / drive_s)},
-              {"simulator_agent_steps_per_s", finite_or_null(static_cast<double>(totals.agent_steps) / simulate_s)},
-              {"episodes", totals.episodes},
-              {"goals_reached", totals.goals_reached},
-              {"waypoints_reached", totals.waypoints_reached},
-              {"collisions", totals.collisions},
-              {"at_fault_collisions", totals.at_fault_collisions},
-              {"off_road", totals.off_road},
-              {"red_light", totals.red_light},
-              {"wall_contacts", totals.wall_contacts},
-              {"km_driven", totals.distance_m / 1000},
-              {"state_hash", fmt::format("{:016x}", simulator->state_hash())}};
-  if (scene) {
-    object["scenario_id"] = scene->id;
-    object["start_step"] = simulator->maps()[0]->start_step;
-    object["displacement_steps"] = displacement.steps;
-    object["displacement_mean_m"] = finite_or_null(displacement.sum_m / static_cast<double>(displacement.steps));
-    object["displacement_max_m"] = displacement.max_m;
-  }
-  if (arguments.json) {
-    print_json(object);
-  } else {
-    for (const auto& [key, value] : object.items()) {
-      fmt::print("{:20} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
-    }
-  }
+  print_simulation(run, world, arguments.json);
   if (arguments.endless) throw Interrupted(fmt::format("interrupted at step {}", step));
   if (step < arguments.steps) throw Interrupted(fmt::format("interrupted at step {} of {}", step, arguments.steps));
 }
