@@ -43,7 +43,7 @@ std::optional<FileBox> shown_box(const MapArguments& arguments) {
 
 Json facts_of(const RoadMap& map) {
   Json object{{"map", map.name}};
-  visit_fields(map.facts, [&object](std::string_view name, const auto& value) { object[std::string(name)] = value; });
+  visit_fields(map.facts, [&object](const std::string& name, const auto& value) { object[name] = value; });
   return object;
 }
 

@@ -140,7 +140,7 @@ std::function<std::shared_ptr<const CompiledMap>()> Map::compilation(const MapOp
 
 py::dict facts_of(const MapFacts& facts) {
   py::dict d;
-  visit_fields(facts, [&d](std::string_view name, const auto& value) { d[py::str(std::string(name))] = value; });
+  visit_fields(facts, [&d](const std::string& name, const auto& value) { d[py::str(name)] = value; });
   return d;
 }
 

@@ -3,12 +3,13 @@
 
 #include <cstring>
 #include <string>
-#include <string_view>
 #include <tuple>
 #include <type_traits>
 #include <utility>
 
 #include <fmt/format.h>
+
+#include "pictura/map/map_fields.h"
 
 namespace pictura {
 
@@ -17,12 +18,6 @@ namespace field_difference {
 template <typename T>
 std::string difference(const T& a, const T& b);
 
-/// The i-th name passed to PICTURA_FIELDS.
-inline std::string name_at(std::string_view names, std::size_t i) {
-  for (; i > 0; --i) names.remove_prefix(names.find(',') + 2);
-  return std::string(names.substr(0, names.find(',')));
-}
-
 template <typename T, std::size_t... I>
 std::string difference_of_fields(const T& a, const T& b, std::index_sequence<I...>) {
   std::string found;
@@ -30,7 +25,7 @@ std::string difference_of_fields(const T& a, const T& b, std::index_sequence<I..
     const std::string inside = difference(field_a, field_b);
     if (inside.empty()) return false;
     const bool is_path = inside[0] == '[' || inside[0] == ':' || inside[0] == '.';
-    found = fmt::format(".{}{}{}", name_at(field_names_of(a), i), is_path ? "" : ": ", inside);
+    found = fmt::format(".{}{}{}", field_name_at(field_names_of(a), i), is_path ? "" : ": ", inside);
     return true;
   };
   const auto fields_a = fields_of(a), fields_b = fields_of(b);

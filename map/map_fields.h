@@ -2,7 +2,6 @@
 // lists. A structured binding must name every field, so an incomplete list does not compile.
 #pragma once
 
-#include <algorithm>
 #include <string>
 #include <string_view>
 #include <tuple>
@@ -24,6 +23,12 @@
   constexpr std::string_view field_names_of(const Type&) { return #__VA_ARGS__; }
 
 namespace pictura {
+
+/// The i-th name passed to PICTURA_FIELDS.
+inline std::string field_name_at(std::string_view names, std::size_t i) {
+  for (; i > 0; --i) names.remove_prefix(names.find(',') + 2);
+  return std::string(names.substr(0, names.find(',')));
+}
 
 PICTURA_FIELDS(Vec2, x, y)
 PICTURA_FIELDS(Vec3, x, y, z)
@@ -56,13 +61,9 @@ PICTURA_FIELDS(OpenDriveOptions, chord_error_m, strict)
 /// Calls visit(name, field) for each field of one of these, in their order.
 template <typename T, typename Visit>
 void visit_fields(const T& value, Visit&& visit) {
-  std::string_view names = field_names_of(value);
-  const auto next_name = [&names] {
-    const std::string_view name = names.substr(0, names.find(','));
-    names.remove_prefix(std::min(name.size() + 2, names.size()));  // ", "
-    return name;
-  };
-  std::apply([&](const auto&... field) { (visit(next_name(), field), ...); }, fields_of(value));
+  std::size_t i = 0;
+  std::apply([&](const auto&... field) { (visit(field_name_at(field_names_of(value), i++), field), ...); },
+             fields_of(value));
 }
 
 /// The first bitwise difference of two maps, as a path like "lanes[3].length_m" or "lights: 8 and 9 of them"; empty
