@@ -139,7 +139,7 @@ void add_case_replay_options(CLI::App* command, CaseReplayOptions* options_out, 
 
 void check_case_number(const CaseReplayOptions& options, int64_t count) {
   if (options.number && *options.number >= count)
-    fail_usage("case: expected 0 to {}, got {}", count - 1, *options.number);
+    fail_usage("--case: expected 0 to {}, got {}", count - 1, *options.number);
 }
 
 void write_case_replay(const CaseReplayOptions& options, const RemovalOptions& probe, const RemovalResults& results) {

@@ -1039,7 +1039,7 @@ class Replays(CommandCase):
                     self.assertIn([shown["inserted"]["x_cm"], shown["inserted"]["y_cm"]], shown["inserted"]["path_cm"])
             self.assertEqual([c["width_px"] for c in header["cameras"]], [96] * 4)  # the vectors' driver has the paper's
         result = run(*probe, "--replay", path, "--case", len(cases))  # how many there are is known in the end
-        self.assertEqual((result.returncode, f"case: expected 0 to {len(cases) - 1}, got {len(cases)}" in result.stderr), (2, True), result.stderr)
+        self.assertEqual((result.returncode, f"--case: expected 0 to {len(cases) - 1}, got {len(cases)}" in result.stderr), (2, True), result.stderr)
         self.assert_refused(2, "--replay", *probe, "--case", 1)
         corner = ["probe", "corner", policies[0], "--map", "procedural:1", "--agents", 90, "--scenes", 2, "--steps", 300, "--pairs", 1, "--driver", "lane"]
         out = ["--seed", 3, "--device", "cpu", "--out", self.folder / "corner", "--replay", path]
@@ -1055,8 +1055,8 @@ class Replays(CommandCase):
         self.assertNotIn("notice", result.stderr)  # it takes over as it did
         self.assertEqual((case["policy"], case["walls"], case["case"]), ("images", "on", "hidden"))
         self.assertEqual(header["frames"], round(10 * float(case["lasted_s"])) + 1)
-        self.assert_refused(2, "case: expected 0 to 0, got 1", *corner, *out, "--case", 1)
-        self.assert_refused(2, "case: expected 0 to 79, got 80", "probe", "removal", *world, "--removals", 80, "--replay", path, "--case", 80)
+        self.assert_refused(2, "--case: expected 0 to 0, got 1", *corner, *out, "--case", 1)
+        self.assert_refused(2, "--case: expected 0 to 79, got 80", "probe", "removal", *world, "--removals", 80, "--replay", path, "--case", 80)
 
     def test_a_policys_decisions_are_those_that_it_drives_by(self):
         if not has_torch():
