@@ -95,9 +95,8 @@ template <typename Results, typename Options>
 Results run_probe(Results (*probe)(const Options&), ProbeArguments* arguments, Options* options) {
   settle_evaluation_options(&arguments->evaluation);
   EvaluateOptions& driven = options->worlds;
-  const bool adds_walls = driven.adds_walls;  // the probe's own
+  arguments->evaluation.evaluate.adds_walls = driven.adds_walls;  // the probe's own
   driven = arguments->evaluation.evaluate;
-  driven.adds_walls = adds_walls;
   driven.densities = {density_named(arguments->density)};
   driven.scenarios =
       arguments->scenes > 0 ? arguments->scenes : default_probe_scenes(options->policies.size(), driven.maps.size());
