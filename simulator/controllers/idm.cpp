@@ -234,9 +234,7 @@ float IdmController::closed_line_ahead_m(const ControllerInput& input, size_t sl
       const Vec2 way{box.cos_heading, box.sin_heading};
       const Vec2 bumper = box.center_m.xy() + way * (0.5f * box.length_m) - line.middle_m.xy();
       const bool crosses = ahead_m > 0 && dot(before, line.direction) < 0 && dot(bumper, line.direction) >= 0 &&
-                           std::abs(cross(line.direction, bumper)) <= line.half_length_m + kStopLineSideTolerance_m &&
-                           dot(way, line.direction) >= kStopLineCosine &&
-                           std::abs(pose.position_m.z - line.middle_m.z) < kLevel_m;
+                           is_within_ends(line, bumper) && holds(line, way, pose.position_m.z);
       before = bumper;
       if (!crosses) continue;
       if (is_red || ahead_m - 1 >= brakes_in_m) nearest_m = std::min(nearest_m, ahead_m - 1);

@@ -201,10 +201,8 @@ float LaneKeepingAgent::to_closed_line(const Motion& now) const {
       if (world_.lights[light] == LightState::yellow && !can_stop) continue;
       const Vec2 from = a.position_m.xy() - line.middle_m.xy(), to = b.position_m.xy() - line.middle_m.xy();
       const bool is_past = to_line_m < kAt_m && dot(bumper - line.middle_m.xy(), line.direction) >= 0;
-      if (!is_past && dot(from, line.direction) < 0 && dot(to, line.direction) >= 0 &&
-          std::fabs(cross(line.direction, to)) <= line.half_length_m + kStopLineSideTolerance_m &&
-          dot(Vec2{heading.cos, heading.sin}, line.direction) >= kStopLineCosine &&
-          std::fabs(line.middle_m.z - b.position_m.z) < kLevel_m) {
+      if (!is_past && dot(from, line.direction) < 0 && dot(to, line.direction) >= 0 && is_within_ends(line, to) &&
+          holds(line, {heading.cos, heading.sin}, b.position_m.z)) {
         return to_line_m;
       }
     }

@@ -79,6 +79,16 @@ PICTURA_HD inline LightState light_state(const MapView& map, int light, const Li
 /// the lanes of oncoming traffic there: nobody drives round a red light on these.
 constexpr float kStopLineCosine = 0.70710678f, kStopLineSideTolerance_m = 0.5f;
 
+/// Whether the line is one for who heads `forward` (a unit vector) at height z_m.
+PICTURA_HD inline bool holds(const StopLine& line, Vec2 forward, float z_m) {
+  return dot(forward, line.direction) >= kStopLineCosine && fabsf(line.middle_m.z - z_m) < kLevel_m;
+}
+
+/// Whether a point, given from the line's middle, lies no farther to its side than the line holds its own lanes.
+PICTURA_HD inline bool is_within_ends(const StopLine& line, Vec2 from_middle_m) {
+  return fabsf(cross(line.direction, from_middle_m)) <= line.half_length_m + kStopLineSideTolerance_m;
+}
+
 /// An agent's step, as far as red lights are concerned.
 struct Crossing {
   Vec2 bumper_before, bumper_after;  // middle of the front bumper
@@ -120,10 +130,7 @@ PICTURA_HD inline bool violates(const MapView& map, int32_t light, const Crossin
   if (state != LightState::red) return false;
   const StopLine& line = map.stop_lines[static_cast<size_t>(light)];
   const Vec2 past = crossing.bumper_after - line.middle_m.xy();
-  if (dot(past, past) > square(kStopLineReach_m) || dot(crossing.forward, line.direction) < kStopLineCosine ||
-      fabsf(line.middle_m.z - crossing.z_m) >= kLevel_m) {
-    return false;
-  }
+  if (dot(past, past) > square(kStopLineReach_m) || !holds(line, crossing.forward, crossing.z_m)) return false;
   const float along_before = dot(crossing.bumper_before - line.middle_m.xy(), line.direction);
   const float along_after = dot(past, line.direction);
   if (along_after < 0.0f) return false;

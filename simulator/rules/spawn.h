@@ -257,11 +257,11 @@ PICTURA_HD inline bool straddles_stop_line(const MapView& map, const AgentBox& b
   const Span<const int32_t> lights = items_at(map.stop_line_cells, bumper);
   for (size_t i = 0; i < lights.size(); ++i) {
     const StopLine& line = map.stop_lines[static_cast<size_t>(lights[i])];
-    if (dot(forward, line.direction) < kStopLineCosine || fabsf(line.middle_m.z - box.center_m.z) >= kLevel_m) continue;
+    if (!holds(line, forward, box.center_m.z)) continue;
     const Vec2 past = bumper - line.middle_m.xy();
     const bool is_across =
         dot(past, line.direction) >= 0.0f && dot(reference - line.middle_m.xy(), line.direction) < 0.0f;
-    if (is_across && fabsf(cross(line.direction, past)) <= line.half_length_m + kStopLineSideTolerance_m) return true;
+    if (is_across && is_within_ends(line, past)) return true;
   }
   return false;
 }
