@@ -137,6 +137,85 @@ struct InfractionObserver::Frame {
   }
 
   AgentStatus status_of(size_t slot) const { return static_cast<AgentStatus>(status[slot]); }
+  bool is_red(size_t light) const { return lights[light] == static_cast<uint8_t>(LightState::red); }
+};
+
+// One world's step: what was before it and what is after it. Agents, boxes and lights are the world's own.
+struct InfractionObserver::WorldStep {
+  const WorldSpec& spec;
+  const RoadMap& map;
+  const std::vector<StopLine>& stop_lines;  // of the map's lights
+  const Frame &before, &after;
+  size_t first_slot, num_agents, first_box, num_boxes, first_light;
+
+  WorldStep(Simulator& simulator, size_t world, const Frame& before_step, const Frame& after_step)
+      : spec(simulator.worlds()[world]),
+        map(*simulator.maps()[static_cast<size_t>(spec.map)]->road),
+        stop_lines(simulator.maps()[static_cast<size_t>(spec.map)]->rules.stop_lines),
+        before(before_step),
+        after(after_step),
+        first_slot(static_cast<size_t>(after.slot_begin[world])),
+        num_agents(static_cast<size_t>(after.slot_begin[world + 1]) - first_slot),
+        first_box(static_cast<size_t>(after.box_begin[world])),
+        num_boxes(static_cast<size_t>(after.box_begin[world + 1]) - first_box),
+        first_light(static_cast<size_t>(after.light_begin[world])) {}
+
+  // Whether the agent is in a neighbour of the lane that it was in.
+  bool has_changed_lane(size_t slot) const {
+    const int32_t from = before.lane[slot], to = after.lane[slot];
+    if (from < 0 || to < 0 || from == to) return false;
+    const Lane& lane = map.lanes[static_cast<size_t>(from)];
+    return to == lane.left_neighbor || to == lane.right_neighbor;
+  }
+
+  void describe_place(size_t agent, Infraction* out) const {
+    out->position_m = before.boxes[first_box + agent].center_m;
+    const int32_t lane = before.lane[first_slot + agent];
+    if (lane < 0) return;
+    const Lane& on = map.lanes[static_cast<size_t>(lane)];
+    const LanePlace place = place_on(map, on, out->position_m.xy());
+    out->shape = shape_of(map, on, place);
+    out->before_merge = is_before_merge(map, on, place.s_m);
+  }
+
+  // The nearest of those that it collided with.
+  void describe_partner(size_t agent, Infraction* out) const {
+    const AgentBox &own = before.boxes[first_box + agent], &own_after = after.boxes[first_box + agent];
+    float least_m = std::numeric_limits<float>::infinity();
+    for (size_t other = 0; other < num_boxes; ++other) {
+      const bool is_parked = other >= num_agents;
+      if (other == agent) continue;
+      if (!is_parked && before.status_of(first_slot + other) == AgentStatus::absent) continue;
+      const AgentBox &its = before.boxes[first_box + other], &its_after = after.boxes[first_box + other];
+      const float apart_m = length((its.center_m - own.center_m).xy());
+      if (apart_m >= least_m || !collide(own, own_after, its, its_after)) continue;
+      least_m = apart_m;
+      out->partner_agent = static_cast<int>(other);
+      out->partner = is_parked ? CollisionPartner::parked_car : partner_of(its.agent_class);
+      out->contact = contact_of(own, its);
+      out->partner_speed_mps = is_parked ? 0 : before.speed_mps[first_slot + other];
+      out->partner_motion = PartnerMotion::standing;
+      if (!is_parked && before.status_of(first_slot + other) == AgentStatus::halted)
+        out->partner_motion = PartnerMotion::halted;
+      else if (std::fabs(out->partner_speed_mps) > kRest_mps)
+        out->partner_motion = PartnerMotion::moving;
+    }
+  }
+
+  // The red light whose stop line is nearest to the agent's bumper; -1: none is red.
+  int32_t nearest_red_light(size_t agent) const {
+    const Vec2 bumper = front_bumper(before.boxes[first_box + agent]);
+    float least_m = std::numeric_limits<float>::infinity();
+    int32_t nearest = -1;
+    for (size_t i = 0; i < stop_lines.size(); ++i) {
+      if (!after.is_red(first_light + i)) continue;
+      const float apart_m = length(stop_lines[i].middle_m.xy() - bumper);
+      if (apart_m >= least_m) continue;
+      least_m = apart_m;
+      nearest = static_cast<int32_t>(i);
+    }
+    return nearest;
+  }
 };
 
 InfractionObserver::InfractionObserver() = default;
@@ -150,7 +229,7 @@ void InfractionObserver::begin(Simulator& simulator) {
   lane_change_step_.assign(after_->status.size(), 0);
   red_since_step_.assign(after_->lights.size(), -1);
   for (size_t i = 0; i < after_->lights.size(); ++i) {
-    if (after_->lights[i] == static_cast<uint8_t>(LightState::red)) red_since_step_[i] = 0;
+    if (after_->is_red(i)) red_since_step_[i] = 0;
   }
 }
 
@@ -159,95 +238,50 @@ void InfractionObserver::before_step(Span<const Command> /*commands*/) { std::sw
 void InfractionObserver::after_step(const StepResult& /*result*/) {
   ++step_;
   after_ = std::make_unique<Frame>(*simulator_);
-  const Frame &before = *before_, &after = *after_;
-  const float dt_s = simulator_->config().dt_s;
   for (size_t world = 0; world < simulator_->worlds().size(); ++world) {
-    const WorldSpec& spec = simulator_->worlds()[world];
-    const RoadMap& map = *simulator_->maps()[static_cast<size_t>(spec.map)]->road;
-    const auto first_slot = static_cast<size_t>(after.slot_begin[world]);
-    const auto num_agents = static_cast<size_t>(after.slot_begin[world + 1]) - first_slot;
-    const auto first_box = static_cast<size_t>(after.box_begin[world]);
-    const auto num_boxes = static_cast<size_t>(after.box_begin[world + 1]) - first_box;
-    const auto first_light = static_cast<size_t>(after.light_begin[world]);
-    for (size_t agent = 0; agent < num_agents; ++agent) {
-      const size_t slot = first_slot + agent;
-      if (before.status_of(slot) != AgentStatus::active) continue;
-      const int32_t lane = before.lane[slot];
-      if (lane >= 0 && after.lane[slot] >= 0 && lane != after.lane[slot]) {
-        const Lane& from = map.lanes[static_cast<size_t>(lane)];
-        if (after.lane[slot] == from.left_neighbor || after.lane[slot] == from.right_neighbor) {
-          lane_change_step_[slot] = step_;
-        }
-      }
-      if (after.status_of(slot) != AgentStatus::halted) continue;
-
-      Infraction one;
-      one.agents_per_world = spec.num_agents;
-      one.scenario = static_cast<int>(spec.global_world - kFirstEvaluationWorld);
-      one.map = map.name;
-      one.agent = static_cast<int>(agent);
-      one.step = step_;
-      one.agent_class = static_cast<AgentClass>(before.agent_class[slot]);
-      one.events = after.events[slot] & (kInfractions | kEventAtFault);
-      const AgentBox &own = before.boxes[first_box + agent], &own_after = after.boxes[first_box + agent];
-      one.position_m = own.center_m;
-      one.speed_mps = before.speed_mps[slot];
-      one.lane_offset_m = before.lane_offset_m[slot];
-      one.lane_angle_rad = before.lane_angle_rad[slot];
-      const int changed = lane_change_step_[slot];
-      one.changed_lane = changed > 0 && static_cast<float>(step_ - changed) * dt_s <= kLaneChange_s;
-      if (lane >= 0) {
-        const Lane& on = map.lanes[static_cast<size_t>(lane)];
-        const LanePlace place = place_on(map, on, own.center_m.xy());
-        one.shape = shape_of(map, on, place);
-        one.before_merge = is_before_merge(map, on, place.s_m);
-      }
-      if (one.is(kEventCollision)) {
-        float least_m = std::numeric_limits<float>::infinity();
-        for (size_t other = 0; other < num_boxes; ++other) {
-          const bool is_parked = other >= num_agents;
-          if (other == agent) continue;
-          if (!is_parked && before.status_of(first_slot + other) == AgentStatus::absent) continue;
-          const AgentBox &its = before.boxes[first_box + other], &its_after = after.boxes[first_box + other];
-          const float apart_m = length((its.center_m - own.center_m).xy());
-          if (apart_m >= least_m || !collide(own, own_after, its, its_after)) continue;
-          least_m = apart_m;
-          one.partner_agent = static_cast<int>(other);
-          one.partner = is_parked ? CollisionPartner::parked_car : partner_of(its.agent_class);
-          one.contact = contact_of(own, its);
-          one.partner_speed_mps = is_parked ? 0 : before.speed_mps[first_slot + other];
-          one.partner_motion = PartnerMotion::standing;
-          if (!is_parked && before.status_of(first_slot + other) == AgentStatus::halted)
-            one.partner_motion = PartnerMotion::halted;
-          else if (std::fabs(one.partner_speed_mps) > kRest_mps)
-            one.partner_motion = PartnerMotion::moving;
-        }
-      }
-      if (one.is(kEventRedLight)) {
-        float least_m = std::numeric_limits<float>::infinity();
-        for (size_t i = 0; i < map.lights.size(); ++i) {
-          if (after.lights[first_light + i] != static_cast<uint8_t>(LightState::red)) continue;
-          const TrafficLight& light = map.lights[i];
-          const Vec2 middle_m = (light.stop_a_m.xy() + light.stop_b_m.xy()) * 0.5f;
-          const float apart_m = length(middle_m - front_bumper(own));
-          if (apart_m >= least_m) continue;
-          least_m = apart_m;
-          const int since = red_since_step_[first_light + i];
-          one.red_for_s = since > 0 ? static_cast<float>(step_ - since) * dt_s
-                                    : (since < 0 ? 0.0f : std::numeric_limits<float>::infinity());
-          one.stop_line_to_head_m = length(light.head_m.xy() - middle_m);
-        }
-      }
-      found_now_.push_back(one);
+    const WorldStep step(*simulator_, world, *before_, *after_);
+    for (size_t agent = 0; agent < step.num_agents; ++agent) {
+      const size_t slot = step.first_slot + agent;
+      if (before_->status_of(slot) != AgentStatus::active) continue;
+      if (step.has_changed_lane(slot)) lane_change_step_[slot] = step_;
+      if (after_->status_of(slot) == AgentStatus::halted) found_now_.push_back(describe(step, agent));
     }
   }
-  for (size_t i = 0; i < after.lights.size(); ++i) {
-    const bool is_red = after.lights[i] == static_cast<uint8_t>(LightState::red);
-    if (!is_red)
+  for (size_t i = 0; i < after_->lights.size(); ++i) {
+    if (!after_->is_red(i))
       red_since_step_[i] = -1;
     else if (red_since_step_[i] < 0)
       red_since_step_[i] = step_;
   }
+}
+
+Infraction InfractionObserver::describe(const WorldStep& step, size_t agent) const {
+  const size_t slot = step.first_slot + agent;
+  const float dt_s = simulator_->config().dt_s;
+  Infraction one;
+  one.agents_per_world = step.spec.num_agents;
+  one.scenario = static_cast<int>(step.spec.global_world - kFirstEvaluationWorld);
+  one.map = step.map.name;
+  one.agent = static_cast<int>(agent);
+  one.step = step_;
+  one.agent_class = static_cast<AgentClass>(before_->agent_class[slot]);
+  one.events = after_->events[slot] & (kInfractions | kEventAtFault);
+  one.speed_mps = before_->speed_mps[slot];
+  one.lane_offset_m = before_->lane_offset_m[slot];
+  one.lane_angle_rad = before_->lane_angle_rad[slot];
+  const int changed = lane_change_step_[slot];
+  one.changed_lane = changed > 0 && static_cast<float>(step_ - changed) * dt_s <= kLaneChange_s;
+  step.describe_place(agent, &one);
+  if (one.is(kEventCollision)) step.describe_partner(agent, &one);
+  if (!one.is(kEventRedLight)) return one;
+  const int32_t light = step.nearest_red_light(agent);
+  if (light < 0) return one;
+  const int since = red_since_step_[step.first_light + static_cast<size_t>(light)];
+  one.red_for_s = since > 0 ? static_cast<float>(step_ - since) * dt_s
+                            : (since < 0 ? 0.0f : std::numeric_limits<float>::infinity());
+  const Vec3 head_m = step.map.lights[static_cast<size_t>(light)].head_m;
+  one.stop_line_to_head_m = length((head_m - step.stop_lines[static_cast<size_t>(light)].middle_m).xy());
+  return one;
 }
 
 void InfractionObserver::end() {

@@ -67,6 +67,9 @@ class InfractionObserver final : public EvaluationObserver {
 
  private:
   struct Frame;
+  struct WorldStep;
+  Infraction describe(const WorldStep& step, size_t agent) const;
+
   std::vector<Infraction> found_, found_now_;  // of worlds that were, and that are evaluated
   std::unique_ptr<Frame> before_, after_;
   Simulator* simulator_ = nullptr;
