@@ -372,7 +372,9 @@ Stream stream_of(const py::object& handle) {
   return {reinterpret_cast<void*>(static_cast<intptr_t>(address))};
 }
 
-void bind_rendering(py::module_& module) {
+namespace {
+
+void bind_dtypes(py::module_& module) {
   const py::object dtype = py::module_::import("numpy").attr("dtype");
   const auto field = [](const char* name, const char* type) { return py::make_tuple(name, type); };
   py::list fields;
@@ -390,7 +392,9 @@ void bind_rendering(py::module_& module) {
   for (const char* name : {"agent_class", "palette", "drawn", "padding"}) box.append(field(name, "u1"));
   module.attr("BOX_DTYPE") = dtype(box);
   PICTURA_CHECK(py::cast<size_t>(module.attr("BOX_DTYPE").attr("itemsize")) == sizeof(AgentBox), "a box's layout");
+}
 
+void bind_rig(py::module_& module) {
   py::class_<Camera>(module, "Camera", R"(
 A pinhole camera on a body: x forward, y left, z up, in metres from the rig's origin. Angles are radians: yaw is
 counter-clockwise, pitch positive looks up, roll positive turns it clockwise as seen from behind.)")
@@ -464,7 +468,9 @@ counter-clockwise, pitch positive looks up, roll positive turns it clockwise as 
       .def(py::pickle([](const Rig& rig) { return py::make_tuple(rig.cameras); },
                       [made](const py::tuple& t) { return made(py::cast<std::vector<Camera>>(t[0])); }))
       .def("__len__", [](const Rig& rig) { return rig.cameras.size(); });
+}
 
+void bind_scene(py::module_& module) {
   py::class_<Scene, std::shared_ptr<Scene>>(module, "Scene", R"(
 What moves: boxes of agents and states of lights, for one or more worlds. A simulator's `scene` is what it shows at each
 call; a scene of arrays is a copy of them.)")
@@ -512,7 +518,9 @@ fit together.)")
 
 origin_m [n, 3]: of the rig, on the ground. heading_rad [n]. world [n]: 0 without it. ego_agent [n]: the box of the
 scene that is left out, -1 for none. body_length_m [n]: shorter bodies than 4.5 m draw cameras nearer to their origin.)");
+}
 
+void bind_images(py::module_& module) {
   py::class_<Images, std::shared_ptr<Images>>(module, "Images", R"(
 Images of some views by each camera of a rig, in the renderer's memory, and their planes where they were asked for.
 A renderer draws into it as often as wanted.)")
@@ -560,7 +568,9 @@ A renderer draws into it as often as wanted.)")
           R"(Of the front surface at each pixel's centre, [views, height, width]: depth_m float32 (infinite where nothing is),
 class_id uint8 (0: nothing), instance_id uint16 (1 + the agent's index in its world, 0: no agent). Raises pictura.Error
 for images without planes.)");
+}
 
+void bind_renderer(py::module_& module) {
   py::class_<RendererInside>(module, "_RendererInside");
   py::class_<PyRenderer>(module, "Renderer", R"(
 Draws scenes: 'cpu', 'cuda', 'gl' ('gl:egl', 'gl:osmesa'), 'null', or 'auto'. One thread at a time; several renderers are
@@ -630,6 +640,16 @@ images over the coverage when drawn alone, float32 [n], NaN where it is in no ca
           "check", [](PyRenderer& self) { self.calls().run("check", [&] { self.renderer().check(self.stream()); }); },
           "Waits for the work on the stream; raises pictura.Error for faults that a device found.");
   module.def("renderer_names", renderer_names, "Names that this build knows.");
+}
+
+}  // namespace
+
+void bind_rendering(py::module_& module) {
+  bind_dtypes(module);
+  bind_rig(module);
+  bind_scene(module);
+  bind_images(module);
+  bind_renderer(module);
 }
 
 }  // namespace pictura::python

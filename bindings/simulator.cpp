@@ -720,10 +720,7 @@ void bind_names(py::module_& module) {
   module.attr("EVENTS") = events;
 }
 
-}  // namespace
-
-void bind_simulator(py::module_& module) {
-  bind_names(module);
+void bind_step_result(py::module_& module) {
   py::class_<StepArraysOfPython>(module, "StepResult", R"(
 What a step returns, one element a slot, in the simulator's memory: every step writes the same arrays again.)")
       .def_readonly("reward", &StepArraysOfPython::reward, "float32 [slots].")
@@ -738,21 +735,11 @@ What a step returns, one element a slot, in the simulator's memory: every step w
       .def_readonly("reward_terms", &StepArraysOfPython::reward_terms,
                     "float32 [slots, 11]: of which the reward is made, in the order of pictura.REWARD_TERMS.")
       .def_readonly("distance_m", &StepArraysOfPython::distance_m, "float32 [slots]: driven in this step.");
+}
 
-  py::class_<Snapshot>(module, "Snapshot", "A state that a simulator keeps in its own memory.");
-
-  // Declared first, so that signatures can name it.
-  py::class_<SimulatorInside>(module, "_SimulatorInside");
-  py::class_<ControllerInside>(module, "_ControllerInside");
-  py::class_<PyController> controller_class(module, "Controller", R"(
-Who drives in one simulator on the CPU: 'lane' (the lane keeper), 'idm_lanes' (along lanes, behind others), 'idle' or 'random', in
-worlds of recorded scenes 'log', 'inverse' or 'idm', or a policy of a pictura.PolicySession, or several of them.)");
-  py::class_<PySimulator>(module, "Simulator", R"(
-Many worlds, each on one map, stepped together. Arrays have one element a slot: the controlled agents of world 0, then those
-of world 1, and so on. Executors 'cpu' and 'cuda' give the same bits.
-
-One thread at a time; several simulators are independent. The GIL is released while C++ works. On CUDA its work is put on
-`stream`, calls return before it is done, and what is wrong with values is raised by check() or a later call.)")
+// How one is made, and what it is made of.
+void define_construction(py::class_<PySimulator>* simulator) {
+  (*simulator)
       .def(
           py::init([](const std::vector<std::shared_ptr<Map>>& maps, const py::sequence& worlds,
                       const std::string& executor, const std::string& device, uint64_t seed, int num_threads,
@@ -818,7 +805,12 @@ Raises pictura.UsageError naming what cannot be simulated, pictura.Error where t
       .def_property(
           "stream", [](const PySimulator& self) { return reinterpret_cast<intptr_t>(self.stream().handle); },
           [](PySimulator& self, const py::object& stream) { self.set_stream(stream_of(stream)); },
-          py::doc("The cudaStream_t that work is put on, as int; 0: the legacy default stream."))
+          py::doc("The cudaStream_t that work is put on, as int; 0: the legacy default stream."));
+}
+
+// What changes its state, and what its agents would observe.
+void define_steps(py::class_<PySimulator>* simulator) {
+  (*simulator)
       .def(
           "set_worlds",
           [](PySimulator& self, const std::vector<std::shared_ptr<Map>>& maps, const py::sequence& worlds,
@@ -856,7 +848,12 @@ queries: QUERY_DTYPE [n], or uint8 [n, 24]: a slot, its ranges [begin, end) of t
 hidden: int32 [m], indices into the scene's boxes. inserted: INSERTED_DTYPE [k], or uint8 [k, 40]: a box of BOX_DTYPE and its
 speed_mps. out: arrays of the caller by the names of `observations`, with n in place of the slots; new ones without it. All lie
 in the simulator's memory. Returns out, arrays by name. Raises pictura.Error naming what is wrong with an array or a query, and
-then writes nothing; on CUDA queries are checked as in step().)")
+then writes nothing; on CUDA queries are checked as in step().)");
+}
+
+// The arrays of its present state.
+void define_arrays(py::class_<PySimulator>* simulator) {
+  (*simulator)
       .def_property_readonly(
           "observations", &PySimulator::observations,
           py::doc("Arrays [slots, ...] by name, of the state after the last call: ego, partners, lanes, "
@@ -886,7 +883,12 @@ then writes nothing; on CUDA queries are checked as in step().)")
       .def_property_readonly(
           "agent_of_slot",
           [](PySimulator& self) { return self.lend_span(self.simulator().slots().agent_of_slot, "agent_of_slot"); },
-          py::doc("int32 [slots]: the agent's index in its world."))
+          py::doc("int32 [slots]: the agent's index in its world."));
+}
+
+// Counts, and copies of the state.
+void define_totals_and_copies(py::class_<PySimulator>* simulator) {
+  (*simulator)
       .def(
           "spawn_report",
           [](PySimulator& self) {
@@ -940,7 +942,12 @@ then writes nothing; on CUDA queries are checked as in step().)")
           "A copy of the state in the simulator's memory.")
       .def(
           "check", [](PySimulator& self) { self.calls().run("check", [&] { self.simulator().check(self.stream()); }); },
-          "Waits for the work on the stream; raises pictura.Error for what a device found wrong.")
+          "Waits for the work on the stream; raises pictura.Error for what a device found wrong.");
+}
+
+// A picture, and loops in C++.
+void define_drawing_and_loops(py::class_<PySimulator>* simulator) {
+  (*simulator)
       .def(
           "draw", &PySimulator::draw, py::arg("world") = 0, py::arg("agent") = -1, py::kw_only(),
           py::arg("width_px") = 640, py::arg("height_px") = 480, py::arg("width_m") = 150.0f,
@@ -974,8 +981,10 @@ waypoints; -1 shows the whole map. width_m: what is shown around it.)")
             return geometries;
           },
           py::doc("Of its maps, by the handles that its scene names them by."));
+}
 
-  controller_class
+void define_controller(py::class_<PyController>* controller) {
+  (*controller)
       .def(py::init([](const std::string& name, const PySimulator& simulator, uint64_t seed) {
              return std::make_unique<PyController>(controller_by_name(name, simulator, seed));
            }),
@@ -1003,7 +1012,9 @@ array and for a controller of another simulator.)")
           py::arg("simulator"),
           R"(Commands for all slots, which may be changed before step_commands() takes them: NumPy's COMMAND_DTYPE [slots], or uint8
 [slots, 28] on CUDA. The same memory at every call.)");
+}
 
+void bind_functions(py::module_& module) {
   module.def(
       "draw_worlds",
       [](uint64_t seed, int num_slots, int min_agents, int max_agents, int num_maps) {
@@ -1016,6 +1027,34 @@ array and for a controller of another simulator.)")
       py::arg("seed"), py::arg("num_slots"), py::arg("min_agents"), py::arg("max_agents"), py::arg("num_maps"),
       "Worlds of sizes drawn from U{min, max} until they fill the slots; maps are taken in turn.");
   module.def("simulator_names", simulator_names, "Executors that this build knows.");
+}
+
+}  // namespace
+
+void bind_simulator(py::module_& module) {
+  bind_names(module);
+  bind_step_result(module);
+  py::class_<Snapshot>(module, "Snapshot", "A state that a simulator keeps in its own memory.");
+
+  // All declared first, so that signatures can name them.
+  py::class_<SimulatorInside>(module, "_SimulatorInside");
+  py::class_<ControllerInside>(module, "_ControllerInside");
+  py::class_<PyController> controller_class(module, "Controller", R"(
+Who drives in one simulator on the CPU: 'lane' (the lane keeper), 'idm_lanes' (along lanes, behind others), 'idle' or 'random', in
+worlds of recorded scenes 'log', 'inverse' or 'idm', or a policy of a pictura.PolicySession, or several of them.)");
+  py::class_<PySimulator> simulator_class(module, "Simulator", R"(
+Many worlds, each on one map, stepped together. Arrays have one element a slot: the controlled agents of world 0, then those
+of world 1, and so on. Executors 'cpu' and 'cuda' give the same bits.
+
+One thread at a time; several simulators are independent. The GIL is released while C++ works. On CUDA its work is put on
+`stream`, calls return before it is done, and what is wrong with values is raised by check() or a later call.)");
+  define_construction(&simulator_class);
+  define_steps(&simulator_class);
+  define_arrays(&simulator_class);
+  define_totals_and_copies(&simulator_class);
+  define_drawing_and_loops(&simulator_class);
+  define_controller(&controller_class);
+  bind_functions(module);
 }
 
 }  // namespace pictura::python

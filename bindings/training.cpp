@@ -404,16 +404,7 @@ class PySession {
   Calls calls_;
 };
 
-}  // namespace
-
-}  // namespace pictura::python
-
-PYBIND11_MODULE(_training, module) {
-  using namespace pictura;          // NOLINT
-  using namespace pictura::python;  // NOLINT
-  // Types and exceptions are that extension's.
-  py::module_::import("pictura._pictura");
-  module.doc() = "Training, evaluation and saved policies, with torch. Use them as names of `pictura`.";
+void bind_train(py::module_& module) {
   module.def("train", &train_from_python, py::arg("config"), py::arg("out"), py::kw_only(),
              py::arg("overrides") = std::vector<std::string>(), py::arg("old_run") = "refuse",
              py::arg("init_from") = "", py::arg("minutes") = 0.0, py::arg("on_progress") = py::none(),
@@ -426,6 +417,9 @@ after every update with a dict: update, updates, agent_steps, agent_steps_per_s,
 progress.csv). on_notice: called with a text. They are called from a thread of training's own, and what they raise ends it.
 Returns a dict: agent_steps, updates, agent_steps_per_s, episode_return, km_driven, checkpoint, policy_hash and more. ^C ends it
 after the present update, saves, and raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
+}
+
+void bind_evaluation(py::module_& module) {
   module.def(
       "evaluate",
       [](const std::string& checkpoint, const std::vector<std::string>& maps, const std::string& controller,
@@ -532,6 +526,9 @@ first_scene, num_scenes: a part of the scenes; 0: all from the first on. rollout
 density, with each metric as (value, half of its 95 % interval); agents, one for every driven road user of a scene, density and rollout;
 scenes, scored, without_drivers, faults (scenes that are left out, and why); seconds, agent_steps, policy_hash. ^C raises
 KeyboardInterrupt. Raises pictura.Error where no scene can be used.)");
+}
+
+void bind_probes(py::module_& module) {
   module.def(
       "probe_removal",
       [](const std::vector<std::string>& policies, const std::vector<std::string>& maps, const std::string& density,
@@ -669,6 +666,9 @@ user_range_m: how far before the junction that one may be. driver: 'lane' drives
 'permuted' or 'untrained'. batch: pairs that are run at once. cases_file: a CSV file for every run. replay, case, cameras: as
 in probe_removal(); a case is a pair, by default that of the example's figure. Returns a dict, that of the command's summary.json
 (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
+}
+
+void bind_session(py::module_& module) {
   py::class_<PySession>(module, "PolicySession", R"(
 A saved policy: what it makes of scenes and observations, and the world and cameras that it was trained with. One thread at a
 time, also for a renderer that it is given.)")
@@ -723,6 +723,22 @@ naming what is missing or does not fit.)")
           R"(A pictura.Controller that drives in this simulator, which works on the session's device: the most likely action, or draws
 keyed by seed, world, agent, episode and step as in training. renderer: for a policy that reads images, of make_renderer(), with
 the simulator's geometries. Raises pictura.Error where one is missing.)");
+}
+
+}  // namespace
+
+}  // namespace pictura::python
+
+PYBIND11_MODULE(_training, module) {
+  using namespace pictura;          // NOLINT
+  using namespace pictura::python;  // NOLINT
+  // Types and exceptions are that extension's.
+  py::module_::import("pictura._pictura");
+  module.doc() = "Training, evaluation and saved policies, with torch. Use them as names of `pictura`.";
+  bind_train(module);
+  bind_evaluation(module);
+  bind_probes(module);
+  bind_session(module);
   refuse_unmade_objects(module);
   pickle_by_new_protocols(module);
 }
