@@ -176,6 +176,42 @@ void paint_legend(Canvas& canvas, const WorldFrame& frame) {
 
 Rgb lamp_color(LightState state) { return state == LightState::off ? hex(0x4A4F57) : light_color(state); }
 
+// The agent in the middle of its circle, and its way along its waypoints, of which the next one is the largest.
+void paint_highlight(Canvas& canvas, const Vector2d& position, double length_px,
+                     const std::vector<Vector2d>& waypoints) {
+  cairo_t* const context = canvas.context();
+  const double dashes[] = {6, 5};
+  cairo_set_dash(context, dashes, 2, 0);
+  cairo_set_line_width(context, 2);
+  canvas.set_color(kHaloColor, 0.9);
+  cairo_move_to(context, position.x(), position.y());
+  for (const Vector2d& p : waypoints) cairo_line_to(context, p.x(), p.y());
+  cairo_stroke(context);
+  cairo_set_dash(context, nullptr, 0, 0);
+  for (size_t i = 0; i < waypoints.size(); ++i) {
+    cairo_arc(context, waypoints[i].x(), waypoints[i].y(), i == 0 ? 7 : 5, 0, kTwoPi);
+    canvas.set_color(kHaloColor);
+    cairo_fill_preserve(context);
+    canvas.set_color(hex(0x14161A));
+    cairo_set_line_width(context, 1.2);
+    cairo_stroke(context);
+  }
+  cairo_arc(context, position.x(), position.y(), std::max(0.75 * length_px, 9.0), 0, kTwoPi);
+  canvas.set_color(kHaloColor, 0.28);
+  cairo_fill_preserve(context);
+  canvas.set_color(kHaloColor);
+  cairo_set_line_width(context, 2);
+  cairo_stroke(context);
+}
+
+void paint_caption(Canvas& canvas, const std::string& caption) {
+  const TextStyle style{.size_px = 15, .bold = true, .color = hex(0xFFFFFF)};
+  canvas.round_rectangle_path(10, 10, canvas.text_width(caption, style) + 22, 28, 6);
+  canvas.set_color(hex(0x14161A), 0.72);
+  cairo_fill(canvas.context());
+  canvas.text(21, 29.5, caption, style);
+}
+
 }  // namespace
 
 struct WorldPainter::Impl {
@@ -276,7 +312,6 @@ RgbImage WorldPainter::draw(const WorldFrame& frame, const TopCamera& camera) {
                 "picture of a world: expected a recorded step below {}, got {}",
                 impl_->scenario ? impl_->scenario->num_steps : 0, frame.recorded_step);
   Canvas canvas(impl_->width_px, impl_->height_px, kGroundColor);
-  cairo_t* context = canvas.context();
   const Corner corner = corner_of(camera, impl_->width_px, impl_->height_px);
   impl_->paint_ground(canvas, corner, camera.px_per_m);
   const Vector2d left_top = left_top_of(corner, camera.px_per_m);
@@ -296,35 +331,10 @@ RgbImage WorldPainter::draw(const WorldFrame& frame, const TopCamera& camera) {
 
   const bool has_highlight = frame.highlighted >= 0 && static_cast<size_t>(frame.highlighted) < frame.agents.size();
   if (has_highlight) {
-    const Vector2d position = pixel_at(frame.agents[static_cast<size_t>(frame.highlighted)].center_m);
-    const double dashes[] = {6, 5};
-    cairo_set_dash(context, dashes, 2, 0);
-    cairo_set_line_width(context, 2);
-    canvas.set_color(kHaloColor, 0.9);
-    cairo_move_to(context, position.x(), position.y());
-    for (const Vec2 waypoint : frame.waypoints_m) {
-      const Vector2d p = pixel_at(waypoint);
-      cairo_line_to(context, p.x(), p.y());
-    }
-    cairo_stroke(context);
-    cairo_set_dash(context, nullptr, 0, 0);
-    for (size_t i = 0; i < frame.waypoints_m.size(); ++i) {
-      const Vector2d p = pixel_at(frame.waypoints_m[i]);
-      cairo_arc(context, p.x(), p.y(), i == 0 ? 7 : 5, 0, kTwoPi);
-      canvas.set_color(kHaloColor);
-      cairo_fill_preserve(context);
-      canvas.set_color(hex(0x14161A));
-      cairo_set_line_width(context, 1.2);
-      cairo_stroke(context);
-    }
-    const double radius =
-        std::max(0.75 * frame.agents[static_cast<size_t>(frame.highlighted)].length_m * camera.px_per_m, 9.0);
-    cairo_arc(context, position.x(), position.y(), radius, 0, kTwoPi);
-    canvas.set_color(kHaloColor, 0.28);
-    cairo_fill_preserve(context);
-    canvas.set_color(kHaloColor);
-    cairo_set_line_width(context, 2);
-    cairo_stroke(context);
+    const AgentBox& agent = frame.agents[static_cast<size_t>(frame.highlighted)];
+    std::vector<Vector2d> waypoints;
+    for (const Vec2 waypoint : frame.waypoints_m) waypoints.push_back(pixel_at(waypoint));
+    paint_highlight(canvas, pixel_at(agent.center_m), double{agent.length_m} * camera.px_per_m, waypoints);
   }
 
   for (size_t i = 0; i < frame.agents.size(); ++i) {
@@ -339,13 +349,7 @@ RgbImage WorldPainter::draw(const WorldFrame& frame, const TopCamera& camera) {
 
   for (const WorldMark& mark : frame.marks) paint_mark(canvas, mark, pixel_at(mark.position_m));
   if (!frame.halt_reason.empty()) paint_legend(canvas, frame);
-  if (!frame.caption.empty()) {
-    const TextStyle style{.size_px = 15, .bold = true, .color = hex(0xFFFFFF)};
-    canvas.round_rectangle_path(10, 10, canvas.text_width(frame.caption, style) + 22, 28, 6);
-    canvas.set_color(hex(0x14161A), 0.72);
-    cairo_fill(context);
-    canvas.text(21, 29.5, frame.caption, style);
-  }
+  if (!frame.caption.empty()) paint_caption(canvas, frame.caption);
   return canvas.image();
 }
 

@@ -68,11 +68,15 @@ struct Batch {
   at::Tensor advantages, values, valid;
   Targets targets;
 
-  explicit Batch(const Rollout& rollout)
+  Batch(const Rollout& rollout, double teacher_weight)
       : advantages(rollout.advantages.flatten()),
         values(rollout.values.narrow(0, 0, rollout.num_steps()).flatten()),
         valid(rollout.valid.flatten()),
-        targets{rollout.actions.flatten().to(at::kLong), rollout.log_probs.flatten(), advantages + values} {}
+        targets{rollout.actions.flatten().to(at::kLong), rollout.log_probs.flatten(), advantages + values} {
+    if (teacher_weight <= 0) return;
+    targets.teacher_log_probs = rollout.teacher_log_probs.flatten(0, 1);
+    targets.teacher_weight = at::full({}, teacher_weight, advantages.options());
+  }
 };
 
 // A loss's gradient over all parameters, as one vector. Before and after there is none.
@@ -313,6 +317,22 @@ std::vector<NamedTensor> contents_of(const at::Tensor& minibatch, const Batch& b
   return contents;
 }
 
+// From sums over the minibatches of each epoch, f64 [epochs + 1, kNumStats], whose last row is the first minibatch, and
+// that one's gradient norms of policy, value and entropy.
+void store_means(const at::Tensor& sums, const at::Tensor& first_norms, UpdateStats* stats) {
+  const int64_t num_epochs = sums.size(0) - 1;
+  const at::Tensor epochs = sums.narrow(0, 0, num_epochs);
+  stats->all = loss_stats(epochs.sum(0) / static_cast<double>(stats->minibatches));
+  stats->first = loss_stats(sums[num_epochs]);
+  const double num_per_epoch = static_cast<double>(stats->minibatches) / static_cast<double>(num_epochs);
+  for (int64_t epoch = 0; epoch < num_epochs; ++epoch) {
+    stats->epochs.push_back(loss_stats(epochs[epoch] / num_per_epoch));
+  }
+  stats->policy_grad_norm = first_norms[0].item<double>();
+  stats->value_grad_norm = first_norms[1].item<double>();
+  stats->entropy_grad_norm = first_norms[2].item<double>();
+}
+
 }  // namespace
 
 UpdateStats ppo_update(ChunkRunner* runner, const Rollout& rollout, const Config::Train& config, const UpdateKey& key,
@@ -320,11 +340,7 @@ UpdateStats ppo_update(ChunkRunner* runner, const Rollout& rollout, const Config
                        Communicator* communicator) {
   UpdateStats stats;
   stats.learning_rate = key.learning_rate;
-  Batch batch(rollout);
-  if (key.teacher_weight > 0) {
-    batch.targets.teacher_log_probs = rollout.teacher_log_probs.flatten(0, 1);
-    batch.targets.teacher_weight = at::full({}, key.teacher_weight, batch.advantages.options());
-  }
+  Batch batch(rollout, key.teacher_weight);
   const at::Tensor taken = taken_rows(batch, config, key.update, executor, filter, communicator, &stats);
   Minibatches minibatches(taken, rollout, config.minibatch_size, key, executor, communicator);
   if (minibatches.size() == 0) return stats;
@@ -380,17 +396,7 @@ UpdateStats ppo_update(ChunkRunner* runner, const Rollout& rollout, const Config
     }
   }
   check();
-
-  const at::Tensor all = sums.cpu(), epochs = all.narrow(0, 0, config.update_epochs);
-  stats.all = loss_stats(epochs.sum(0) / static_cast<double>(stats.minibatches));
-  stats.first = loss_stats(all[config.update_epochs]);
-  for (int epoch = 0; epoch < config.update_epochs; ++epoch) {
-    stats.epochs.push_back(loss_stats(epochs[epoch] / static_cast<double>(minibatches.count())));
-  }
-  const at::Tensor norms = first_norms.cpu();
-  stats.policy_grad_norm = norms[0].item<double>();
-  stats.value_grad_norm = norms[1].item<double>();
-  stats.entropy_grad_norm = norms[2].item<double>();
+  store_means(sums.cpu(), first_norms.cpu(), &stats);
   return stats;
 }
 

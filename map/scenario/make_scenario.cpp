@@ -186,83 +186,106 @@ void make_tracks(Conversion* conversion) {
   }
 }
 
-void make_lights(Conversion* conversion) {
+namespace {
+
+// One light, or several whose lines coincide and that always show the same.
+struct FoundLight {
+  std::vector<int32_t> lanes;
+  const LoggedLight* light;
+  double heading_rad;  // of the traffic that it stops
+  LanePoint start;     // of its widest lane
+};
+
+// Those of a light's lanes that it may hold.
+std::vector<int32_t> held_lanes(const LoggedLight& light, Conversion* conversion) {
   LoggedScene& scene = conversion->scene;
-  Scenario& out = *conversion->out;
-  const RoadMap& map = out.map;
-  struct Found {
-    std::vector<int32_t> lanes;
-    const LoggedLight* light;
-    double heading_rad;
-    LanePoint start;  // of its widest lane
-  };
-  std::vector<Found> found;
-  conversion->count_work(scene.lights.size() * static_cast<std::size_t>(scene.num_steps));
-  for (std::size_t i = 0; i < scene.lights.size(); ++i) {
-    const LoggedLight& light = scene.lights[i];
-    std::vector<int32_t> lanes;
-    for (const int64_t id : light.lanes) {
-      const auto lane = conversion->lane_of_id.find(id);
-      if (lane == conversion->lane_of_id.end()) {
-        scene.note("lanes of lights that the map does not have", fmt::format("lane {}", id));
-      } else if (map.lanes[static_cast<std::size_t>(lane->second)].type == LaneType::biking) {
-        scene.note("lights of bike lanes left out", fmt::format("lane {}", id));
-      } else {
-        lanes.push_back(lane->second);
-      }
-    }
-    if (lanes.empty()) continue;
-    // The mean direction in which traffic comes to the line: of the lanes before, else of the lane itself.
-    Eigen::Vector2d direction(0, 0);
-    LanePoint widest{};
-    for (const int32_t index : lanes) {
-      const Lane& lane = map.lanes[static_cast<std::size_t>(index)];
-      const LanePoint start = map.points_of(lane)[0];
-      if (start.width_m > widest.width_m) widest = start;
-      Span<const int32_t> before = map.links(lane.predecessors);
-      for (const int32_t other : before) {
-        const Span<const LanePoint> points = map.points_of(map.lanes[static_cast<std::size_t>(other)]);
-        const double heading = points[points.size() - 1].heading_rad;
-        direction += Eigen::Vector2d(std::cos(heading), std::sin(heading));
-      }
-      if (before.empty()) {
-        direction += Eigen::Vector2d(std::cos(double{start.heading_rad}), std::sin(double{start.heading_rad}));
-      }
-    }
-    const double heading = std::atan2(direction.y(), direction.x());
-    // Lights whose lines coincide and that always show the same are one.
-    conversion->count_work(found.size());
-    const auto same = std::find_if(found.begin(), found.end(), [&](const Found& other) {
-      return !light.has_stop_line && !other.light->has_stop_line && other.light->states == light.states &&
-             length(other.start.position_m - widest.position_m) < kSameStopPoint_m &&
-             std::abs(std::remainder(other.heading_rad - heading, 2 * std::numbers::pi)) < kSameHeading_rad;
-    });
-    if (same == found.end()) {
-      found.push_back({lanes, &light, heading, widest});
+  std::vector<int32_t> lanes;
+  for (const int64_t id : light.lanes) {
+    const auto lane = conversion->lane_of_id.find(id);
+    if (lane == conversion->lane_of_id.end()) {
+      scene.note("lanes of lights that the map does not have", fmt::format("lane {}", id));
+    } else if (conversion->out->map.lanes[static_cast<std::size_t>(lane->second)].type == LaneType::biking) {
+      scene.note("lights of bike lanes left out", fmt::format("lane {}", id));
     } else {
-      same->lanes.insert(same->lanes.end(), lanes.begin(), lanes.end());
-      if (widest.width_m > same->start.width_m) same->start = widest;
+      lanes.push_back(lane->second);
     }
   }
-  for (const Found& light : found) {
-    RecordedLight recorded;
-    recorded.stop_heading_rad = wrapped(light.heading_rad);
-    if (light.light->has_stop_line) {
-      for (const Eigen::Vector3d& p : {light.light->stop_a_m, light.light->stop_b_m}) {
-        check_radius(*conversion, "stop line", conversion->from_origin(p));
-      }
-      recorded.stop_a_m = to_vec3(conversion->from_origin(light.light->stop_a_m));
-      recorded.stop_b_m = to_vec3(conversion->from_origin(light.light->stop_b_m));
-      const Vec3 way = recorded.stop_b_m - recorded.stop_a_m;
-      const double to_right = std::sin(light.heading_rad) * way.x - std::cos(light.heading_rad) * way.y;
-      if (to_right < 0) std::swap(recorded.stop_a_m, recorded.stop_b_m);
-    } else {
-      const float half = 0.5f * light.start.width_m;
-      const Vec3 left{-static_cast<float>(std::sin(light.heading_rad)) * half,
-                      static_cast<float>(std::cos(light.heading_rad)) * half, 0};
-      recorded.stop_a_m = light.start.position_m + left;
-      recorded.stop_b_m = light.start.position_m - left;
+  return lanes;
+}
+
+FoundLight find_light(const RoadMap& map, const LoggedLight& light, std::vector<int32_t> lanes) {
+  // The mean direction in which traffic comes to the line: of the lanes before, else of the lane itself.
+  Eigen::Vector2d direction(0, 0);
+  const auto add_heading = [&direction](double heading) {
+    direction += Eigen::Vector2d(std::cos(heading), std::sin(heading));
+  };
+  LanePoint widest{};
+  for (const int32_t index : lanes) {
+    const Lane& lane = map.lanes[static_cast<std::size_t>(index)];
+    const LanePoint start = map.points_of(lane)[0];
+    if (start.width_m > widest.width_m) widest = start;
+    const Span<const int32_t> before = map.links(lane.predecessors);
+    for (const int32_t other : before) {
+      const Span<const LanePoint> points = map.points_of(map.lanes[static_cast<std::size_t>(other)]);
+      add_heading(points[points.size() - 1].heading_rad);
     }
+    if (before.empty()) add_heading(start.heading_rad);
+  }
+  return {std::move(lanes), &light, std::atan2(direction.y(), direction.x()), widest};
+}
+
+bool are_one(const FoundLight& a, const FoundLight& b) {
+  return !a.light->has_stop_line && !b.light->has_stop_line && a.light->states == b.light->states &&
+         length(a.start.position_m - b.start.position_m) < kSameStopPoint_m &&
+         std::abs(std::remainder(a.heading_rad - b.heading_rad, 2 * std::numbers::pi)) < kSameHeading_rad;
+}
+
+// Its line, from left to right, without its lanes.
+RecordedLight recorded_light(const FoundLight& found, const Conversion& conversion) {
+  RecordedLight recorded;
+  recorded.stop_heading_rad = wrapped(found.heading_rad);
+  if (found.light->has_stop_line) {
+    for (const Eigen::Vector3d& p : {found.light->stop_a_m, found.light->stop_b_m}) {
+      check_radius(conversion, "stop line", conversion.from_origin(p));
+    }
+    recorded.stop_a_m = to_vec3(conversion.from_origin(found.light->stop_a_m));
+    recorded.stop_b_m = to_vec3(conversion.from_origin(found.light->stop_b_m));
+    const Vec3 way = recorded.stop_b_m - recorded.stop_a_m;
+    const double to_right = std::sin(found.heading_rad) * way.x - std::cos(found.heading_rad) * way.y;
+    if (to_right < 0) std::swap(recorded.stop_a_m, recorded.stop_b_m);
+  } else {
+    const float half = 0.5f * found.start.width_m;
+    const Vec3 left{-static_cast<float>(std::sin(found.heading_rad)) * half,
+                    static_cast<float>(std::cos(found.heading_rad)) * half, 0};
+    recorded.stop_a_m = found.start.position_m + left;
+    recorded.stop_b_m = found.start.position_m - left;
+  }
+  return recorded;
+}
+
+}  // namespace
+
+void make_lights(Conversion* conversion) {
+  const LoggedScene& scene = conversion->scene;
+  Scenario& out = *conversion->out;
+  std::vector<FoundLight> found;
+  conversion->count_work(scene.lights.size() * static_cast<std::size_t>(scene.num_steps));
+  for (const LoggedLight& light : scene.lights) {
+    std::vector<int32_t> lanes = held_lanes(light, conversion);
+    if (lanes.empty()) continue;
+    FoundLight one = find_light(out.map, light, std::move(lanes));
+    conversion->count_work(found.size());
+    const auto same =
+        std::find_if(found.begin(), found.end(), [&](const FoundLight& other) { return are_one(other, one); });
+    if (same == found.end()) {
+      found.push_back(std::move(one));
+    } else {
+      same->lanes.insert(same->lanes.end(), one.lanes.begin(), one.lanes.end());
+      if (one.start.width_m > same->start.width_m) same->start = one.start;
+    }
+  }
+  for (const FoundLight& light : found) {
+    RecordedLight recorded = recorded_light(light, *conversion);
     recorded.lanes.begin = static_cast<int32_t>(out.light_lanes.size());
     out.light_lanes.insert(out.light_lanes.end(), light.lanes.begin(), light.lanes.end());
     recorded.lanes.end = static_cast<int32_t>(out.light_lanes.size());

@@ -78,6 +78,42 @@ void check(const EvaluateOptions& options) {
   }
 }
 
+// Of so many scenarios from `first` of the options' ones on, which take the maps in turn.
+std::vector<WorldSpec> worlds_of(const EvaluateOptions& options, size_t num_maps, int agents, int first, int count) {
+  std::vector<WorldSpec> worlds;
+  for (int i = first; i < std::min(first + count, options.scenarios); ++i) {
+    const int scenario = options.first_scenario + i;
+    worlds.push_back(
+        {scenario % static_cast<int>(num_maps), agents, kFirstEvaluationWorld + static_cast<uint32_t>(scenario)});
+  }
+  return worlds;
+}
+
+// Drives the simulator's worlds from the start of their episodes to the last step, or until no agent is active, since
+// halted ones stay as they are. False: it was interrupted. Calls on_steps with the steps that are done, now and then.
+template <typename OnSteps>
+bool drive_to_the_end(const EvaluatedDriver& driver, const EvaluateOptions& options, Simulator* simulator,
+                      const OnSteps& on_steps, int64_t* agent_steps_inout) {
+  const Driving driving = driver.drive(*simulator);
+  EvaluationObserver* const observer = options.observer;
+  if (observer) observer->begin(*simulator);
+  DeviceCopy<Command> command_memory(std::vector<Command>(static_cast<size_t>(simulator->num_slots())), driver.device);
+  const Span<Command> commands = command_memory.span();
+  for (int step = 0; step < options.steps; ++step) {
+    if (interrupted()) return false;
+    driving.controller->act(simulator->controller_input(), {}, commands);
+    const int64_t num_driven = driving.num_driven();
+    if (num_driven == 0) break;
+    *agent_steps_inout += num_driven;
+    if (observer) observer->before_step(commands);
+    const StepResult taken = simulator->step(Span<const Command>(commands));
+    if (observer) observer->after_step(taken);
+    if (step % 10 == 0 || step == 1) on_steps(step + 1);
+  }
+  if (observer) observer->end();
+  return true;
+}
+
 EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& options, EvaluationWorlds* shared) {
   const CompiledMaps& maps = shared->maps;
   SimulatorConfig simulator_config = driver.world;
@@ -102,57 +138,34 @@ EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& op
     DensityResult result{density.name, density.agents, options.first_scenario, {}};
     result.scenarios.resize(static_cast<size_t>(options.scenarios));
     const int per_batch = worlds_per_batch(driver.device, density.agents);
-    for (int first = 0; first < options.scenarios; first += per_batch) {
-      std::vector<WorldSpec> worlds;
-      for (int i = first; i < std::min(first + per_batch, options.scenarios); ++i) {
-        const int scenario = options.first_scenario + i;
-        worlds.push_back({scenario % static_cast<int>(maps.size()), density.agents,
-                          kFirstEvaluationWorld + static_cast<uint32_t>(scenario)});
-      }
+    for (int first = 0; first < options.scenarios && !report.interrupted; first += per_batch) {
+      const std::vector<WorldSpec> worlds = worlds_of(options, maps.size(), density.agents, first, per_batch);
       std::unique_ptr<Simulator>& simulator = shared->simulator;
       if (simulator)
         simulator->set_worlds(maps, {}, worlds, options.seed);
       else
         simulator = make_simulator(options.simulator, simulator_config, maps, worlds);
-      const Driving driving = driver.drive(*simulator);
-      if (options.observer) options.observer->begin(*simulator);
-      const auto num_slots = static_cast<size_t>(simulator->num_slots());
-      DeviceCopy<Command> command_memory(std::vector<Command>(num_slots), driver.device);
-      const Span<Command> commands = command_memory.span();
-      for (int step = 0; step < options.steps; ++step) {
-        if (interrupted()) {
-          report.interrupted = true;
-          report.seconds = clock.seconds();
-          // The scenarios of this batch are not finished, those before are.
-          if (first > 0) {
-            result.scenarios.resize(static_cast<size_t>(first));
-            report.rows.push_back(row_of(result, options.steps));
-            report.results.densities.push_back(std::move(result));
-          }
-          return report;
-        }
-        driving.controller->act(simulator->controller_input(), {}, commands);
-        // Halted agents stay as they are, so a batch is over when no agent is active.
-        const int64_t num_driven = driving.num_driven();
-        if (num_driven == 0) break;
-        report.agent_steps += num_driven;
-        if (options.observer) options.observer->before_step(commands);
-        const StepResult taken = simulator->step(Span<const Command>(commands));
-        if (options.observer) options.observer->after_step(taken);
-        if (step % 10 == 0 || step == 1) clock.update((done + double(simulator->num_slots()) * (step + 1)) / work);
+      const auto num_slots = double(simulator->num_slots());
+      const auto on_steps = [&](int steps) { clock.update((done + num_slots * steps) / work); };
+      if (!drive_to_the_end(driver, options, simulator.get(), on_steps, &report.agent_steps)) {
+        report.interrupted = true;
+        result.scenarios.resize(static_cast<size_t>(first));  // those of the batches before are finished
+        break;
       }
-      if (options.observer) options.observer->end();
-      done += double(simulator->num_slots()) * options.steps;
+      done += num_slots * options.steps;
       AgentState state = counted_state(*simulator);
       for (int slot = 0; slot < simulator->num_slots(); ++slot) {
         add(state.view(), slot, &result.scenarios[static_cast<size_t>(first + slot / density.agents)]);
       }
     }
-    report.rows.push_back(row_of(result, options.steps));
-    report.results.densities.push_back(std::move(result));
+    if (!result.scenarios.empty()) {
+      report.rows.push_back(row_of(result, options.steps));
+      report.results.densities.push_back(std::move(result));
+    }
+    if (report.interrupted) break;
   }
   report.seconds = clock.seconds();
-  clock.finish();
+  if (!report.interrupted) clock.finish();
   return report;
 }
 

@@ -390,6 +390,22 @@ SceneIndex find_all(const SceneEvaluateOptions& options) {
   return all;
 }
 
+/// Adds those of a batch's scene, of [drives][scenes][driven], to the counts of each density.
+void count_agents(const std::vector<std::vector<std::vector<SceneAgent>>>& agents, size_t scene,
+                  const SceneEvaluateOptions& options, SceneResults* results) {
+  const auto num_rollouts = static_cast<size_t>(options.protocol.rollouts);
+  for (size_t density = 0; density < options.protocol.densities.size(); ++density) {
+    SceneCounts& counts = results->counts[density].emplace_back();
+    for (size_t drive = density * num_rollouts; drive < (density + 1) * num_rollouts; ++drive) {
+      for (const SceneAgent& agent : agents[drive][scene]) {
+        const bool is_vehicle = agent.type != TrackType::pedestrian && agent.type != TrackType::cyclist;
+        add(agent, is_vehicle, &counts);
+        if (options.on_agent) options.on_agent(agent);
+      }
+    }
+  }
+}
+
 SceneEvaluation evaluate_scenes(const EvaluatedDriver& driver, Renderer* renderer,
                                 const SceneEvaluateOptions& options) {
   const SceneProtocol& protocol = options.protocol;
@@ -446,17 +462,7 @@ SceneEvaluation evaluate_scenes(const EvaluatedDriver& driver, Renderer* rendere
     }
     if (evaluation.interrupted) break;
     for (size_t scene = 0; scene < batch.maps.size(); ++scene) {
-      for (size_t density = 0; density < protocol.densities.size(); ++density) {
-        SceneCounts& counts = results.counts[density].emplace_back();
-        for (int rollout = 0; rollout < protocol.rollouts; ++rollout) {
-          const size_t drive = density * static_cast<size_t>(protocol.rollouts) + static_cast<size_t>(rollout);
-          for (const SceneAgent& agent : agents[drive][scene]) {
-            const bool is_vehicle = agent.type != TrackType::pedestrian && agent.type != TrackType::cyclist;
-            add(agent, is_vehicle, &counts);
-            if (options.on_agent) options.on_agent(agent);
-          }
-        }
-      }
+      count_agents(agents, scene, options, &results);
       if (options.on_rollouts) options.on_rollouts(rollouts[scene]);
     }
     results.faults.insert(results.faults.end(), batch.faults.begin(), batch.faults.end());

@@ -218,25 +218,63 @@ struct Exchange {
   }
 };
 
-}  // namespace
+double seconds_since(Clock::time_point time) { return std::chrono::duration<double>(Clock::now() - time).count(); }
 
-void Ranks::watch() {
+// What the ranks' beats have told so far.
+class BeatHistory {
+ public:
+  BeatHistory(int num_ranks, const Patience& patience) : patience_(patience), seen_(static_cast<size_t>(num_ranks)) {}
+
+  // Takes the last round's beats, of all ranks, and says why one is lost; empty: none is.
+  std::string add(const std::vector<Beat>& beats) {
+    bool may_hang = true;
+    std::optional<int64_t> least;
+    for (size_t r = 0; r < seen_.size(); ++r) {
+      const Beat& beat = beats[r];
+      if (beat.number != seen_[r].beat.number) seen_[r].changed = Clock::now();
+      seen_[r].beat = beat;
+      may_hang = may_hang && !beat.is_busy && beat.steps > 0;
+      if (beat.has_left) continue;
+      least = std::min(least.value_or(beat.steps), beat.steps);
+      if (seconds_since(seen_[r].changed) > patience_.silent_s) {
+        return fmt::format("rank {}: no sign of life for {:.0f} s: it was killed or stopped, or its host is gone", r,
+                           patience_.silent_s);
+      }
+    }
+    if (!may_hang || least.value_or(-1) != least_steps_) {
+      least_steps_ = least.value_or(-1);
+      progressed_ = Clock::now();
+    }
+    if (seconds_since(progressed_) <= patience_.no_progress_s) return "";
+    std::vector<size_t> behind;
+    for (size_t r = 0; r < seen_.size(); ++r) {
+      if (!seen_[r].beat.has_left && seen_[r].beat.steps == least_steps_) behind.push_back(r);
+    }
+    return fmt::format("rank {}: alive, but not a step further for {:.0f} s: it hangs", fmt::join(behind, ", "),
+                       patience_.no_progress_s);
+  }
+
+ private:
   struct Seen {
     Beat beat;
     Clock::time_point changed = Clock::now();  // its number
   };
-  std::vector<Seen> seen(static_cast<size_t>(size()));
-  int64_t least_steps = -1;
-  Clock::time_point progressed = Clock::now();  // when the least number of steps changed
+  Patience patience_;
+  std::vector<Seen> seen_;
+  int64_t least_steps_ = -1;
+  Clock::time_point progressed_ = Clock::now();  // when the least number of steps changed
+};
+
+}  // namespace
+
+void Ranks::watch() {
+  BeatHistory history(size(), patience_);
   std::vector<std::string> keys = keys_of_ranks("beat", size());
   keys.push_back(kFault);
   const auto exchange = std::make_shared<Exchange>();
   std::thread exchanges([exchange, keys, own_key = keys[static_cast<size_t>(rank())], store = watch_store_] {
     exchange->run(store.get(), own_key, keys);
   });
-  const auto seconds_since = [](Clock::time_point time) {
-    return std::chrono::duration<double>(Clock::now() - time).count();
-  };
   // Why a rank is lost, as far as is known.
   const auto look = [&]() -> std::string {
     std::vector<std::vector<uint8_t>> values;
@@ -254,37 +292,11 @@ void Ranks::watch() {
       }
     }
     if (values.empty()) return "";
-    if (const std::string fault(values.back().begin(), values.back().end());
-        !fault.empty() && !fault.starts_with(fmt::format("rank {} ", rank()))) {
-      return fault;
-    }
-    bool may_hang = true;
-    std::optional<int64_t> least;
-    for (size_t r = 0; r < seen.size(); ++r) {
-      const Beat beat = Beat::of(values[r]);
-      if (beat.number != seen[r].beat.number) seen[r].changed = Clock::now();
-      seen[r].beat = beat;
-      may_hang = may_hang && !beat.is_busy && beat.steps > 0;
-      if (beat.has_left) continue;
-      least = std::min(least.value_or(beat.steps), beat.steps);
-      if (seconds_since(seen[r].changed) > patience_.silent_s) {
-        return fmt::format("rank {}: no sign of life for {:.0f} s: it was killed or stopped, or its host is gone", r,
-                           patience_.silent_s);
-      }
-    }
-    if (!may_hang || least.value_or(-1) != least_steps) {
-      least_steps = least.value_or(-1);
-      progressed = Clock::now();
-    }
-    if (seconds_since(progressed) > patience_.no_progress_s) {
-      std::vector<size_t> behind;
-      for (size_t r = 0; r < seen.size(); ++r) {
-        if (!seen[r].beat.has_left && seen[r].beat.steps == least_steps) behind.push_back(r);
-      }
-      return fmt::format("rank {}: alive, but not a step further for {:.0f} s: it hangs", fmt::join(behind, ", "),
-                         patience_.no_progress_s);
-    }
-    return "";
+    const std::string fault(values.back().begin(), values.back().end());
+    if (!fault.empty() && !fault.starts_with(fmt::format("rank {} ", rank()))) return fault;
+    std::vector<Beat> beats;
+    for (size_t r = 0; r + 1 < values.size(); ++r) beats.push_back(Beat::of(values[r]));
+    return history.add(beats);
   };
 
   std::unique_lock lock(mutex_);
