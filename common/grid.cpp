@@ -25,8 +25,15 @@ Grid::Grid(Span<const Aabb2> boxes, float cell_m) : cell_m_(cell_m), num_boxes_(
   num_x_ = static_cast<int>(cells_x);
   num_y_ = static_cast<int>(cells_y);
 
-  // Counting sort: the number of items of each cell, the start of its range, then the items in order.
   const GridView grid = view();
+  constexpr int64_t kMaxEntries = int64_t{1} << 27;  // half a gigabyte
+  int64_t num_entries = 0;
+  for (const Aabb2& box : boxes) num_entries += num_cells(grid, box);
+  PICTURA_CHECK(num_entries <= kMaxEntries,
+                "grid: {} items over {} x {} m lie in {} cells of {} m, expected at most {}", boxes.size(),
+                high.x - low.x, high.y - low.y, num_entries, cell_m, kMaxEntries);
+
+  // Counting sort: the number of items of each cell, the start of its range, then the items in order.
   begin_.assign(static_cast<std::size_t>(num_x_) * static_cast<std::size_t>(num_y_) + 1, 0);
   for (const Aabb2& box : boxes) visit_cells(grid, box, [&](std::size_t cell) { ++begin_[cell + 1]; });
   for (std::size_t cell = 1; cell < begin_.size(); ++cell) begin_[cell] += begin_[cell - 1];

@@ -11,8 +11,8 @@ namespace pictura {
 class Grid {
  public:
   Grid() = default;
-  /// Puts item i into every cell that boxes[i] touches. Throws if a box is not finite, or if the area would need more
-  /// than 2^26 cells.
+  /// Puts item i into every cell that boxes[i] touches. Throws if a box is not finite, if the area would need more than
+  /// 2^26 cells, or if all items together touch more than 2^27.
   Grid(Span<const Aabb2> boxes, float cell_m);
   GridView view() const { return {origin_m_, cell_m_, num_x_, num_y_, begin_, items_}; }
   /// Number of boxes that it was built from.
@@ -27,6 +27,11 @@ class Grid {
   std::vector<int32_t> items_;
 };
 
+/// Of the grid that a box touches.
+inline int64_t num_cells(const GridView& grid, const Aabb2& box) {
+  const int64_t columns = grid.cell_x(box.high.x) - grid.cell_x(box.low.x) + 1;
+  return columns * (grid.cell_y(box.high.y) - grid.cell_y(box.low.y) + 1);
+}
 /// Calls visit(cell) with the index of each cell that a box touches.
 template <typename Visit>
 void visit_cells(const GridView& grid, const Aabb2& box, Visit&& visit) {

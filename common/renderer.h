@@ -69,8 +69,9 @@ class Renderer {
   /// Draws every camera of the rig for every view and writes each pixel of their images. Views at and beyond
   /// views.num_views are not read or drawn, and their images are not written. Throws Error where an array lies on the
   /// wrong device, a handle, an index or the number of views is out of range, or the images do not fit the rig and all
-  /// views. On a CUDA device a wrong handle, index or pose is a latched fault, and the images of that view are black;
-  /// so is a wrong number of views, which is clamped.
+  /// views. On a CUDA device a view whose world, handle, pose or range of hidden agents is wrong is a latched fault,
+  /// and its images are black; so is a wrong number of views, which is clamped. Boxes, egos and the order of ranges are
+  /// checked on the host alone: on a device they must be right.
   virtual void render(const SceneBatch& scene, const ViewBatch& views, const ImageBatch& images_out,
                       Stream stream = {}) = 0;
 

@@ -123,6 +123,7 @@ void try_to_cache(const std::string& path, std::string_view bytes) {
 }
 
 void make_output_folder(const std::string& path) {
+  PICTURA_CHECK(!path.empty(), "expected the name of a folder to write into, got an empty one");
   std::error_code making, asking;
   fs::create_directories(path, making);
   const bool is_folder = fs::is_directory(path, asking);
@@ -130,12 +131,11 @@ void make_output_folder(const std::string& path) {
                 making   ? making.message()
                 : asking ? asking.message()
                          : "it is a file");
-  PICTURA_CHECK(!path.empty() || is_folder, "expected the name of a folder to write into, got an empty one");
   // Ask by trying: permission bits say nothing of read-only mounts, and a superuser passes access().
   try {
     const OutputFile probe((fs::path(path) / ".probe").string());
-  } catch (const Error&) {
-    fail("{}: cannot be written to: {}", path, std::strerror(errno));
+  } catch (const Error& error) {
+    fail("{}: cannot be written to: {}", path, error.what());
   }
 }
 

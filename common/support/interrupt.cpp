@@ -40,7 +40,9 @@ void catch_interrupts() {
 }
 
 void take_interrupt(int signal) {
-  if (!first_signal) first_signal = signal;
+  if (first_signal) return;
+  first_came_ms = now_ms();  // this process may be told as well a moment later: the same request
+  first_signal = signal;
 }
 
 void forget_interrupt() { first_signal = 0; }

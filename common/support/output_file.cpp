@@ -100,6 +100,9 @@ void Descriptor::reset(int fd) {
 
 OutputFile::OutputFile(const std::string& path, Staging staging) : path_(path) {
   PICTURA_CHECK(!path.empty(), "expected the name of a file to write, got an empty one");
+  // The system's calls would end the name there.
+  PICTURA_CHECK(path.find('\0') == std::string::npos, "{}: expected the name of a file, got one with a zero byte in it",
+                path.substr(0, path.find('\0')));
   struct stat status{};
   const bool exists = ::stat(path.c_str(), &status) == 0;
   PICTURA_CHECK(!exists || !S_ISDIR(status.st_mode), "{}: cannot be written: expected a file, got a folder", path);

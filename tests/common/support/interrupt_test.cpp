@@ -1,0 +1,54 @@
+// Signals that ask a process to end: kept once, and not taken for a second request a moment later.
+#include "pictura/common/support/interrupt.h"
+
+#include <csignal>
+
+#include <gtest/gtest.h>
+
+#include "pictura/common/error.h"
+
+namespace pictura {
+namespace {
+
+class Interrupts : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) before_[signal] = std::signal(signal, SIG_DFL);
+    forget_interrupt();
+    catch_interrupts();
+  }
+  void TearDown() override {
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, before_[signal]);
+    forget_interrupt();
+  }
+
+ private:
+  void (*before_[NSIG])(int) = {};
+};
+
+TEST_F(Interrupts, TheFirstSignalIsKept) {
+  EXPECT_FALSE(interrupted());
+  std::raise(SIGTERM);
+  std::raise(SIGINT);
+  EXPECT_EQ(interrupting_signal(), SIGTERM);
+  forget_interrupt();
+  EXPECT_FALSE(interrupted());
+}
+
+// Of several processes that work together each is told by the others and, a moment later, itself.
+TEST_F(Interrupts, ASignalThatAnotherProcessHasToldOfIsTheSameRequest) {
+  take_interrupt(SIGTERM);
+  std::raise(SIGTERM);
+  EXPECT_EQ(interrupting_signal(), SIGTERM);
+}
+
+TEST_F(Interrupts, WorkThatBeganBeforeIsStopped) {
+  const InterruptibleWork before("drawing was interrupted");
+  EXPECT_NO_THROW(before.check());
+  std::raise(SIGINT);
+  EXPECT_THROW(before.check(), Interrupted);
+  EXPECT_NO_THROW(InterruptibleWork("").check());
+}
+
+}  // namespace
+}  // namespace pictura
