@@ -120,9 +120,10 @@ class EglContext final : public Context {
     // EGL returns the current context of the bound API, which is per thread.
     before_ = {egl_.query_api(), egl_.get_current_display(), egl_.get_current_context(),
                egl_.get_current_surface(EGL_DRAW), egl_.get_current_surface(EGL_READ)};
-    PICTURA_CHECK(
-        egl_.bind_api(EGL_OPENGL_API) && egl_.make_current(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_),
-        "renderer {}: cannot make its context current: EGL error {:#x}", kName, egl_.get_error());
+    if (egl_.bind_api(EGL_OPENGL_API) && egl_.make_current(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_)) return;
+    const EGLint error = egl_.get_error();
+    egl_.bind_api(before_.api);
+    fail("renderer {}: cannot make its context current: EGL error {:#x}", kName, error);
   }
   void leave() override {
     egl_.make_current(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);

@@ -15,7 +15,7 @@ namespace pictura::gl {
   X(CheckNamedFramebufferStatus) X(ClearNamedFramebufferfv) X(ClipControl) X(CompileShader) X(CreateBuffers) \
   X(CreateFramebuffers) X(CreateProgram) X(CreateShader) X(CreateTextures) X(CreateVertexArrays) \
   X(DeleteBuffers) X(DeleteFramebuffers) X(DeleteProgram) X(DeleteShader) X(DeleteTextures) \
-  X(DeleteVertexArrays) X(DepthFunc) X(DispatchCompute) X(DrawArraysInstancedBaseInstance) X(Enable) \
+  X(DepthFunc) X(DispatchCompute) X(DrawArraysInstancedBaseInstance) X(Enable) \
   X(EnableVertexArrayAttrib) X(GetError) X(GetIntegerv) X(GetProgramInfoLog) X(GetProgramiv) X(GetShaderInfoLog) \
   X(GetShaderiv) X(GetString) X(GetStringi) X(GetTextureLevelParameteriv) X(GetUniformLocation) X(LinkProgram) \
   X(MapNamedBufferRange) X(MemoryBarrier) X(NamedBufferData) X(NamedBufferStorage) \

@@ -84,8 +84,9 @@ class CudaRenderer final : public Renderer {
     const auto on_stream = static_cast<cudaStream_t>(stream.handle);
     clear_counters(on_stream);
     // In as few parts as the scratch memory allows, of equal size.
+    if (views.size() == 0) return;
     const std::size_t max_views = scratch_.plan.views, parts = (views.size() + max_views - 1) / max_views;
-    const auto views_at_once = static_cast<int32_t>((views.size() + parts - 1) / std::max(parts, std::size_t{1}));
+    const auto views_at_once = static_cast<int32_t>((views.size() + parts - 1) / parts);
     for (int32_t left = task.num_views; left > 0; left -= task.num_views, task.first_view += task.num_views) {
       task.num_views = std::min(left, views_at_once);
       counters_are_clear_ = false;  // where a launch fails

@@ -21,7 +21,8 @@ std::unique_ptr<Controller> make_cuda_controller(const std::string& name, const 
 
 namespace {
 
-void write(const auto& rule, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) {
+void write(Device device, const auto& rule, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) {
+  const DeviceGuard guard(device);
   cuda::launch_commands(rule, static_cast<int32_t>(commands_out.size()), mask.data(), commands_out.data(),
                         static_cast<cudaStream_t>(stream.handle));
   PICTURA_CUDA(cudaGetLastError());
@@ -33,7 +34,7 @@ class CudaRandomController final : public Controller {
   std::string_view name() const override { return "random"; }
   void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
     check_controller_arrays(name(), input, device_, mask, commands_out);
-    write(RandomCommands{seed_, input.slots, input.world_totals}, mask, commands_out, stream);
+    write(device_, RandomCommands{seed_, input.slots, input.world_totals}, mask, commands_out, stream);
   }
 
  private:
@@ -49,7 +50,7 @@ class CudaRuleController final : public Controller {
   std::string_view name() const override { return name_; }
   void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
     check_controller_arrays(name(), input, device_, mask, commands_out);
-    write(Rule{}, mask, commands_out, stream);
+    write(device_, Rule{}, mask, commands_out, stream);
   }
 
  private:
@@ -69,7 +70,8 @@ class CudaInverseController final : public Controller {
   std::string_view name() const override { return "inverse"; }
   void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
     check_controller_arrays(name(), input, device_, mask, commands_out);
-    write(TabledCommands{input.slots, input.episode_step, worlds_.span(), actions_.span()}, mask, commands_out, stream);
+    write(device_, TabledCommands{input.slots, input.episode_step, worlds_.span(), actions_.span()}, mask, commands_out,
+          stream);
   }
 
  private:

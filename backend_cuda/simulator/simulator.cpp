@@ -1,5 +1,5 @@
-// The simulator in device memory: SimulatorSetup checks and describes it on the host, kernels step the state. Steps and
-// snapshots neither wait nor allocate; what copies to or from the host waits for its stream.
+// The simulator in device memory: SimulatorSetup checks and describes it on the host, kernels step the state. Steps,
+// and going back to a snapshot, neither wait nor allocate; what copies to or from the host waits for its stream.
 #include "pictura/simulator/simulator.h"
 
 #include <memory>
