@@ -106,7 +106,9 @@ double DeviceMemoryMeter::max_bytes() const {
 
 std::string cuda_device_name() {
   cudaDeviceProp properties{};
-  return cudaGetDeviceProperties(&properties, 0) == cudaSuccess ? properties.name : "";
+  if (cudaGetDeviceProperties(&properties, 0) == cudaSuccess) return properties.name;
+  cudaGetLastError();  // the next call's is its own
+  return "";
 }
 
 std::string cuda_driver_name() {

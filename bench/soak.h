@@ -1,5 +1,5 @@
 // A long comparison of a renderer with the oracle, over scenes, views, rigs and settings drawn from a seed: of colours
-// in every format, planes and visibility.
+// (u8, f16 and f32, planar), planes and visibility.
 #pragma once
 
 #include <functional>

@@ -9,6 +9,7 @@
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
+#include "pictura/common/support/interrupt.h"
 #include "pictura/map/load_map.h"
 #include "pictura/map/map_cache.h"
 #include "pictura/simulator/compiled_map.h"
@@ -43,6 +44,7 @@ void run_map(const MapArguments& arguments) {
   for (int i = 0; i < arguments.repeats; ++i) {
     progress.update(fmt::format("{}: repeat {} of {}", arguments.map, i + 1, arguments.repeats),
                     static_cast<double>(i) / arguments.repeats);
+    if (interrupted()) throw Interrupted("interrupted");
     double begin = processor_s();
     const auto measure = [&](BenchResult* result) {
       result->values.push_back(processor_s() - begin);
@@ -61,12 +63,11 @@ void run_map(const MapArguments& arguments) {
     measure(&compile);
   }
   progress.finish();
-  report_benchmark(
-      arguments.json,
-      {.workload = fmt::format("map: {}, {:.1f} MB of OpenDRIVE, {:.0f} km of lanes; processor time of one thread",
-                               arguments.map, 1e-6 * static_cast<double>(text.text.size()), lane_km),
-       .backend = "cpu"},
-      {import, cached, compile, {"peak memory", "GiB", {peak_memory_gib()}}});
+  report_benchmark(arguments.json,
+                   {.workload = fmt::format("map: {}, {:.1f} MB of OpenDRIVE, {:.0f} km of lanes; processor time",
+                                            arguments.map, 1e-6 * static_cast<double>(text.text.size()), lane_km),
+                    .backend = "cpu"},
+                   {import, cached, compile, {"peak memory", "GiB", {peak_memory_gib()}}});
 }
 
 }  // namespace

@@ -74,6 +74,17 @@ std::vector<SimulateCase> simulate_cases_of(const SimulateArguments& arguments) 
   return cases;
 }
 
+/// Takes some steps of both. Throws Error unless the CPU's simulator comes to the same state, to the bit.
+void check_against_oracle(const SimulatorConfig& config, const CompiledMaps& maps, const std::vector<WorldSpec>& worlds,
+                          Simulator* simulator, StepBench* bench) {
+  constexpr int64_t kSteps = 16;
+  const auto oracle = make_simulator("cpu", config, maps, worlds);
+  StepBench(oracle.get(), config.seed).run(kSteps);
+  bench->run(kSteps);
+  PICTURA_CHECK(simulator->state_hash() == oracle->state_hash(),
+                "simulate: after {} steps the state of {} differs from the CPU's", kSteps, simulator->name());
+}
+
 void measure(const SimulateArguments& arguments, const std::string& backend, const CompiledMaps& maps,
              const SimulateCase& measured, std::vector<BenchResult>* results_out) {
   const WorldOptions& world = arguments.world;
@@ -87,6 +98,7 @@ void measure(const SimulateArguments& arguments, const std::string& backend, con
   config.vector_observations = measured.vector_observations;
   const auto simulator = make_simulator(backend, config, maps, measured.worlds);
   StepBench bench(simulator.get(), world.seed);
+  if (!simulator->device().is_host()) check_against_oracle(config, maps, measured.worlds, simulator.get(), &bench);
   const StepTiming warm_up = bench.run(arguments.warm_up_steps);
   const double steps_per_s = static_cast<double>(warm_up.steps) / warm_up.elapsed_s;
   const int64_t steps = std::max<int64_t>(1, static_cast<int64_t>(arguments.rate.repeat_s * steps_per_s));

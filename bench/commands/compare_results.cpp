@@ -76,7 +76,9 @@ EarlierReport::EarlierReport(const std::string& path) : path_(path) {
   report_ = Json::parse(read_file(path), nullptr, /*allow_exceptions=*/false);
   const bool is_report = report_.is_object() && report_.value("results", Json()).is_array() &&
                          !report_["results"].empty() && std::ranges::all_of(report_["results"], is_row);
-  PICTURA_CHECK(is_report, "{}: expected what a benchmark printed with --json, an object with \"results\"", path);
+  const auto is_text = [this](const char* key) { return !report_.contains(key) || report_[key].is_string(); };
+  PICTURA_CHECK(is_report && is_text("commit") && is_text("device") && is_text("workload"),
+                "{}: expected what a benchmark printed with --json, an object with \"results\"", path);
 }
 
 void EarlierReport::add_comparison(Json* report_inout) const {
