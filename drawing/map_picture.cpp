@@ -237,6 +237,12 @@ void draw_scale_bar(Canvas& canvas, const Layout& layout) {
   canvas.text(x + width, y - m.px(7), fmt::format("{:g} m", length_m), {.size_px = m.px(14), .align = Align::right});
 }
 
+/// As many decimals as tell ticks apart that are `step_m` from each other.
+std::string coordinate_text(double at_m, double step_m) {
+  const int decimals = std::clamp(static_cast<int>(std::ceil(-std::log10(step_m) - 1e-9)), 0, 6);
+  return fmt::format("{:.{}f}", at_m + 0.0, decimals);
+}
+
 /// The file's coordinates along the upper and the left side, for --box and --at.
 void draw_coordinates(Canvas& canvas, const Layout& layout, const RoadMap& map) {
   const Metrics& m = layout.m;
@@ -244,18 +250,22 @@ void draw_coordinates(Canvas& canvas, const Layout& layout, const RoadMap& map) 
   const TextStyle style{.size_px = m.px(11), .align = Align::center, .color = kQuietText};
   const double corner_px = m.px(40);  // where labels of both sides would meet
   const double right_m = left_m + canvas.width_px() / layout.px_per_m;
-  for (const double x_m : round_ticks(left_m, right_m, 8)) {
+  const std::vector<double> columns = round_ticks(left_m, right_m, 8);
+  const double x_step_m = columns.size() > 1 ? columns[1] - columns[0] : 1;
+  for (const double x_m : columns) {
     const double x = (x_m - left_m) * layout.px_per_m;
     if (x < corner_px || x > canvas.width_px() - corner_px) continue;
     canvas.fill_rectangle(x, layout.band_px, 1, m.px(5), kQuietText);
-    canvas.text(x, layout.band_px + m.px(16), fmt::format("{:g}", x_m + 0.0), style);
+    canvas.text(x, layout.band_px + m.px(16), coordinate_text(x_m, x_step_m), style);
   }
   const double lowest_m = top_m - canvas.height_px() / layout.px_per_m;
-  for (const double y_m : round_ticks(lowest_m, top_m, 8)) {
+  const std::vector<double> rows = round_ticks(lowest_m, top_m, 8);
+  const double y_step_m = rows.size() > 1 ? rows[1] - rows[0] : 1;
+  for (const double y_m : rows) {
     const double y = (top_m - y_m) * layout.px_per_m;
     if (y < layout.band_px + corner_px || y > canvas.height_px() - corner_px) continue;
     canvas.fill_rectangle(0, y, m.px(5), 1, kQuietText);
-    canvas.text(m.px(16), y, fmt::format("{:g}", y_m + 0.0), style, 0.5 * static_cast<double>(kPi));
+    canvas.text(m.px(16), y, coordinate_text(y_m, y_step_m), style, 0.5 * static_cast<double>(kPi));
   }
 }
 

@@ -30,10 +30,11 @@ struct Range {
     low = std::min(low, value);
     high = std::max(high, value);
   }
-  /// Padded by a share of its size, or by single_padding around a single value; never empty.
+  /// Padded by a share of its size, or by single_padding around what is a single value but for rounding; never empty.
   Range padded(double share, double single_padding) const {
     if (!(low <= high)) return {0, 1};
-    const double padding = high > low ? share * (high - low) : single_padding;
+    const bool is_single = high - low <= 1e-12 * std::max(std::abs(low), std::abs(high));
+    const double padding = is_single ? single_padding : share * (high - low);
     return {low - padding, high + padding};
   }
 };
@@ -248,52 +249,95 @@ void fill_band(Canvas& canvas, const PlotSeries& series, const Axis& x_axis, con
   }
 }
 
-void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, double width_px, double height_px,
-                bool with_legend) {
-  Axis x_axis(panel.x_scale), y_axis(panel.y_scale);
-  const auto drawable = [&](const PlotSeries& series, size_t i) {
-    return x_axis.shows(series.x[i]) && y_axis.shows(series.y[i]);
-  };
-  for (const PlotSeries& series : panel.series) {
+bool is_drawable(const PlotSeries& series, size_t i, const Axis& x_axis, const Axis& y_axis) {
+  return x_axis.shows(series.x[i]) && y_axis.shows(series.y[i]);
+}
+
+/// What the axes show of the series and their bands.
+void add_values(const std::vector<PlotSeries>& all, Axis* x_axis, Axis* y_axis) {
+  for (const PlotSeries& series : all) {
     for (size_t i = 0; i < series.x.size(); ++i) {
-      if (!drawable(series, i)) continue;
-      x_axis.add(series.x[i]);
-      y_axis.add(series.y[i]);
+      if (!is_drawable(series, i, *x_axis, *y_axis)) continue;
+      x_axis->add(series.x[i]);
+      y_axis->add(series.y[i]);
     }
     for (const std::vector<double>* bound : {&series.low, &series.high}) {
       for (const double y : *bound) {
-        if (y_axis.shows(y)) y_axis.add(y);
+        if (y_axis->shows(y)) y_axis->add(y);
       }
     }
   }
-  const double left = x0 + kLeft_px, top = y0 + kTop_px;
-  const double width = width_px - kLeft_px - kRight_px, height = height_px - kTop_px - kBottom_px;
-  x_axis.set_pixels(0.0, left, left + width);
-  y_axis.set_pixels(0.06, top + height, top);
-  cairo_t* context = canvas.context();
+}
 
-  canvas.text(x0 + 0.5 * (kLeft_px + width_px - kRight_px), y0 + 24, panel.title,
-              {.size_px = 15, .bold = true, .align = Align::center});
-  const TextStyle tick_style{.size_px = 11.5, .align = Align::center, .color = kLabelColor};
-  const TextStyle y_tick_style{.size_px = 11.5, .align = Align::right, .color = kLabelColor};
+/// The lines and numbers of both axes' ticks, and the axes themselves.
+void draw_axes(Canvas& canvas, const Axis& x_axis, const Axis& y_axis, double left, double top, double width,
+               double height) {
+  const TextStyle x_style{.size_px = 11.5, .align = Align::center, .color = kLabelColor};
+  const TextStyle y_style{.size_px = 11.5, .align = Align::right, .color = kLabelColor};
   for (const Axis::Tick& tick : x_axis.ticks(std::max(2, static_cast<int>(width / 80)))) {
     const double x = x_axis.at_px(tick.value);
     canvas.fill_rectangle(std::round(x), top, 1, height, kGridColor);
-    canvas.text(x, top + height + 17, tick.text, tick_style);
+    canvas.text(x, top + height + 17, tick.text, x_style);
   }
   for (const Axis::Tick& tick : y_axis.ticks(std::max(2, static_cast<int>(height / 45)))) {
     const double y = y_axis.at_px(tick.value);
     canvas.fill_rectangle(left, std::round(y), width, 1, kGridColor);
-    canvas.text(left - 8, y + 4, tick.text, y_tick_style);
+    canvas.text(left - 8, y + 4, tick.text, y_style);
   }
   canvas.fill_rectangle(left - 1, top, 1, height + 1, kAxisColor);
   canvas.fill_rectangle(left - 1, top + height, width + 1, 1, kAxisColor);
+}
+
+/// A line from gap to gap, and a dot where a point stands alone. Adds where it runs to `along`.
+void draw_line(Canvas& canvas, const PlotSeries& series, const Axis& x_axis, const Axis& y_axis, Rgb color,
+               std::vector<Point>* along) {
+  cairo_t* context = canvas.context();
+  const auto drawable = [&](size_t i) { return is_drawable(series, i, x_axis, y_axis); };
+  canvas.set_color(color);
+  set_dashes(context, series);
+  for (size_t i = 0; i < series.x.size(); ++i) {
+    if (!drawable(i)) {
+      cairo_stroke(context);
+      continue;
+    }
+    const Point at{x_axis.at_px(series.x[i]), y_axis.at_px(series.y[i])};
+    const bool starts = i == 0 || !drawable(i - 1);
+    const bool alone = starts && (i + 1 == series.x.size() || !drawable(i + 1));
+    if (starts) {
+      cairo_move_to(context, at.x, at.y);
+      along->push_back(at);
+    } else {
+      add_line(along, at);
+    }
+    cairo_line_to(context, at.x, at.y);
+    if (alone) {
+      cairo_stroke(context);
+      cairo_arc(context, at.x, at.y, 3, 0, kTwoPi);
+      cairo_fill(context);
+    }
+  }
+  cairo_stroke(context);
+}
+
+void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, double width_px, double height_px,
+                bool with_legend) {
+  Axis x_axis(panel.x_scale), y_axis(panel.y_scale);
+  add_values(panel.series, &x_axis, &y_axis);
+  const double left = x0 + kLeft_px, top = y0 + kTop_px;
+  const double width = width_px - kLeft_px - kRight_px, height = height_px - kTop_px - kBottom_px;
+  x_axis.set_pixels(0.0, left, left + width);
+  y_axis.set_pixels(0.06, top + height, top);
+
+  canvas.text(x0 + 0.5 * (kLeft_px + width_px - kRight_px), y0 + 24, panel.title,
+              {.size_px = 15, .bold = true, .align = Align::center});
+  draw_axes(canvas, x_axis, y_axis, left, top, width, height);
   draw_strip(canvas, panel.strip, x_axis, top + height + 1);
   draw_marks(canvas, panel.marks, x_axis, top, height);
   const TextStyle label_style{.size_px = 12.5, .align = Align::center, .color = kAxisColor};
   canvas.text(left + 0.5 * width, y0 + height_px - 12, panel.x_label, label_style);
   canvas.text(x0 + 17, top + 0.5 * height, panel.y_label, label_style, 0.5 * static_cast<double>(kPi));
 
+  cairo_t* context = canvas.context();
   cairo_save(context);
   cairo_rectangle(context, left - 1, top - 2, width + 3, height + 4);
   cairo_clip(context);
@@ -305,31 +349,7 @@ void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, do
   }
   std::vector<Point> along;
   for (size_t s = 0; s < panel.series.size(); ++s) {
-    const PlotSeries& series = panel.series[s];
-    canvas.set_color(series_color(s));
-    set_dashes(context, series);
-    for (size_t i = 0; i < series.x.size(); ++i) {
-      if (!drawable(series, i)) {
-        cairo_stroke(context);
-        continue;
-      }
-      const Point at{x_axis.at_px(series.x[i]), y_axis.at_px(series.y[i])};
-      const bool starts = i == 0 || !drawable(series, i - 1);
-      const bool alone = starts && (i + 1 == series.x.size() || !drawable(series, i + 1));
-      if (starts) {
-        cairo_move_to(context, at.x, at.y);
-        along.push_back(at);
-      } else {
-        add_line(&along, at);
-      }
-      cairo_line_to(context, at.x, at.y);
-      if (alone) {
-        cairo_stroke(context);
-        cairo_arc(context, at.x, at.y, 3, 0, kTwoPi);
-        cairo_fill(context);
-      }
-    }
-    cairo_stroke(context);
+    draw_line(canvas, panel.series[s], x_axis, y_axis, series_color(s), &along);
   }
   cairo_restore(context);
   if (with_legend) draw_legend(canvas, panel, along, {left, top}, width, height);
@@ -345,7 +365,9 @@ std::vector<double> round_ticks(double low, double high, int wanted) {
   const double ratio = raw / power;
   const double step = power * (ratio < 1.5 ? 1 : (ratio < 3.5 ? 2 : (ratio < 7.5 ? 5 : 10)));
   const double first = std::ceil(low / step - 1e-9), last = std::floor(high / step + 1e-9);
-  for (double i = first; i <= last; ++i) ticks.push_back(i * step);
+  // Counted, since adding one to a number as large as `first` may be changes nothing.
+  const auto count = static_cast<int>(std::min(last - first + 1, 4.0 * wanted));
+  for (int i = 0; i < count; ++i) ticks.push_back((first + i) * step);
   return ticks;
 }
 

@@ -19,8 +19,8 @@ ProgressTable::ProgressTable(const std::string& run_folder) : path_(run_folder +
   std::string line, cell;
   std::getline(lines, line);
   for (std::istringstream cells(line); std::getline(cells, cell, ',');) {
+    PICTURA_CHECK(columns_.try_emplace(cell).second, "{}:1: column '{}' stands twice", path_, cell);
     names_.push_back(cell);
-    columns_[cell];
   }
   for (int number = 2; std::getline(lines, line); ++number) {
     size_t column = 0;

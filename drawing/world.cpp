@@ -19,7 +19,7 @@ using Eigen::Vector2d;
 namespace {
 
 constexpr int kTile_px = 512;
-constexpr size_t kMaxTiles = 160;  // 160 MiB
+constexpr size_t kMaxTiles = 160;  // 160 MiB, beside those of one picture
 constexpr Rgb kHaloColor = hex(0xFFE45C);
 
 /// Whole pixels from the origin of the map to the top left corner of the picture.

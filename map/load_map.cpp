@@ -65,6 +65,7 @@ RoadMap load_file(const std::string& path, const OpenDriveOptions& options, cons
   if (fs::exists(cache_path, error)) {
     try {
       RoadMap map = decode_map(read_file(cache_path), key, cache_path);
+      map.name = fs::path(path).stem().string();  // another link may have named the file that was cached
       report->cached = true;
       return map;
     } catch (const Error& rejection) {

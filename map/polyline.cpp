@@ -1,5 +1,7 @@
 #include "pictura/map/polyline.h"
 
+#include <algorithm>
+
 namespace pictura {
 
 std::vector<std::size_t> thin_polyline(const std::vector<CurvePoint>& points, double tolerance_m, double max_piece_m) {
@@ -7,7 +9,9 @@ std::vector<std::size_t> thin_polyline(const std::vector<CurvePoint>& points, do
   std::size_t first = 0;
   while (first + 1 < points.size()) {
     std::size_t last = first + 1;
-    for (std::size_t next = last + 1; next < points.size(); ++next) {
+    // Every point of a piece is looked at again with each further one.
+    constexpr std::size_t kMaxPoints = 1024;
+    for (std::size_t next = last + 1; next < std::min(points.size(), first + kMaxPoints); ++next) {
       const CurvePoint &a = points[first], &b = points[next];
       if (!is_within(a.position_m, b.position_m, max_piece_m + kPieceRounding)) break;
       bool close = true;

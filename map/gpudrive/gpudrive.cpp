@@ -39,15 +39,18 @@ double number_in(const Json& value, const char* field) {
 
 double number_of(const Json& object, const char* field) { return number_in(member(object, field), field); }
 
-int64_t integer_of(const Json& object, const char* field) {
-  const Json& value = member(object, field);
+int64_t integer_in(const Json& value, const char* field) {
   if (!value.is_number_integer()) fail_field(field, "expected a whole number, got {}", value.type_name());
-  const auto number = value.get<int64_t>();
-  if (number < -kMaxId || number > kMaxId) {
+  // Beyond int64_t a number would come out as another one.
+  const bool is_too_large = value.is_number_unsigned() && value.get<uint64_t>() > static_cast<uint64_t>(kMaxId);
+  const int64_t number = is_too_large ? 0 : value.get<int64_t>();
+  if (is_too_large || number < -kMaxId || number > kMaxId) {
     fail_field(field, "expected a number of at most {} in magnitude, got {}", kMaxId, value.dump());
   }
   return number;
 }
+
+int64_t integer_of(const Json& object, const char* field) { return integer_in(member(object, field), field); }
 
 std::string text_of(const Json& object, const char* field) {
   const Json& value = member(object, field);
@@ -205,8 +208,7 @@ void read_metadata(const Json& metadata, LoggedScene* scene) {
   }
   if (metadata.contains("objects_of_interest")) {
     for (const Json& id : array_of(metadata, "objects_of_interest")) {
-      if (!id.is_number_integer()) fail_field("objects_of_interest", "expected whole numbers, got {}", id.type_name());
-      scene->objects_of_interest.push_back(id.get<int64_t>());
+      scene->objects_of_interest.push_back(integer_in(id, "objects_of_interest"));
     }
   }
   if (metadata.contains("tracks_to_predict")) {

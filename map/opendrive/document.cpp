@@ -7,7 +7,7 @@ namespace pictura::opendrive {
 namespace {
 
 constexpr int kMaxDepth = 64;
-constexpr std::size_t kMaxAttribute_bytes = std::size_t{1} << 16;
+constexpr std::size_t kMaxAttribute_bytes = std::size_t{1} << 12;  // copied with every object and mark
 
 /// The length of the UTF-8 sequence at the beginning of `text`, 0 if it is invalid.
 std::size_t sequence_length(std::string_view text) {
@@ -39,6 +39,7 @@ class ShapeCheck : public pugi::xml_tree_walker {
 
   bool for_each(pugi::xml_node& node) override {
     if (node.type() == pugi::node_doctype) fail_at(node, "a document type (<!DOCTYPE>) is not supported");
+    if (std::strcmp(node.name(), "include") == 0) fail_at(node, "<include>: files of several parts are not supported");
     if (depth() > kMaxDepth) fail_at(node, fmt::format("elements are nested more than {} deep", kMaxDepth));
     for (const pugi::xml_attribute attribute : node.attributes()) {
       const std::size_t bytes = std::strlen(attribute.value());

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
 
+#include "pictura/common/error.h"
 #include "pictura/map/opendrive/build.h"
 #include "pictura/map/opendrive/reader.h"
 #include "pictura/map/opendrive/sections.h"
@@ -18,17 +20,10 @@ SampleBudget budget_for(std::size_t text_bytes, const std::string& source) {
   return {std::min(kMaxSamples, kBaseSamples + kSamplesPerByte * static_cast<std::int64_t>(text_bytes)), source};
 }
 
-}  // namespace
-
-RoadMap parse_opendrive(std::string_view text, const std::string& source, const OpenDriveOptions& options,
-                        const ImportProgress& progress) {
-  PICTURA_CHECK(options.chord_error_m >= 1e-3f && options.chord_error_m <= 10.0f,
-                "OpenDRIVE options: expected a chord error in [0.001, 10] m, got {}", options.chord_error_m);
-  // Shares as large networks have them.
-  const auto begin = [&](const char* stage, double done) {
-    if (progress) progress(stage, done);
-  };
-  begin("reading", 0);
+/// Reads and builds it; `begin` is told each stage, with shares as large networks have them. Faults of the network as a
+/// whole do not name the file.
+RoadMap import_network(std::string_view text, const std::string& source, const OpenDriveOptions& options,
+                       const std::function<void(const char* stage, double done)>& begin) {
   opendrive::Faults faults(options.strict);
   opendrive::Network network;
   opendrive::read_network(text, source, &faults, &network);
@@ -56,6 +51,29 @@ RoadMap parse_opendrive(std::string_view text, const std::string& source, const 
   map.mends = faults.take();
   validate(map);
   return map;
+}
+
+}  // namespace
+
+RoadMap parse_opendrive(std::string_view text, const std::string& source, const OpenDriveOptions& options,
+                        const ImportProgress& progress) {
+  PICTURA_CHECK(options.chord_error_m >= 1e-3f && options.chord_error_m <= 10.0f,
+                "OpenDRIVE options: expected a chord error in [0.001, 10] m, got {}", options.chord_error_m);
+  const auto begin = [&](const char* stage, double done) {
+    if (progress) progress(stage, done);
+  };
+  begin("reading", 0);
+  try {
+    return import_network(text, source, options, begin);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const UsageError&) {
+    throw;
+  } catch (const Error& error) {
+    const std::string message = error.what();
+    if (message.starts_with(source)) throw;
+    fail("{}: {}", source, message);
+  }
 }
 
 }  // namespace pictura

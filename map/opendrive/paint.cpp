@@ -91,6 +91,7 @@ class MarkPainter {
       }
       const double last = stripe.once ? 0 : std::floor((end - stripe.origin) / stripe.period);
       for (double i = stripe.once ? 0 : std::floor((begin - stripe.origin) / stripe.period); i <= last; ++i) {
+        build_.budget.count_sample();  // also for dashes that are too short to be painted
         const double dash_begin = stripe.origin + i * stripe.period;
         add(mark, stripe, std::max(dash_begin, begin), std::min(dash_begin + stripe.dash, end));
       }
@@ -206,7 +207,12 @@ void add_crosswalk(Build* build, std::size_t road, const FileObject& object) {
 
 /// The stop line runs along the longer extent of the corners, centred in the shorter one, which is its width.
 void add_stop_line(Build* build, std::size_t road, const FileObject& object) {
+  constexpr std::size_t kMaxCorners = 64;
   const std::vector<Vec3> corners = corners_of(build, build->network.roads[road], object);
+  if (corners.size() > kMaxCorners) {
+    return object.where.mend(build->faults, MendKind::shapeless_object,
+                             "expected a stop line of at most {} corners, got {}", kMaxCorners, corners.size());
+  }
   Vec2 along{};
   for (const Vec3 a : corners) {
     for (const Vec3 b : corners) {

@@ -68,11 +68,11 @@ void each_record(const Element& lane, const char* name, double section_length, R
 
 void read_heights(const Element& element, double section_length, FileLane* lane) {
   each_record(element, "height", section_length, [&](const Element& height, double s) {
-    const auto limit = [&](const char* side) {
+    const auto height_at = [&](const char* side) {
       return Cubic{.s = s, .a = height.number_or_zero_in(side, -kMaxLaneHeight_m, kMaxLaneHeight_m)};
     };
-    append_record(height, "sOffset", &Cubic::s, limit("inner"), &lane->inner_height.cubics);
-    lane->outer_height.cubics.push_back(limit("outer"));
+    append_record(height, "sOffset", &Cubic::s, height_at("inner"), &lane->inner_height.cubics);
+    lane->outer_height.cubics.push_back(height_at("outer"));
   });
   for (Profile* heights : {&lane->inner_height, &lane->outer_height}) sort_records(&Cubic::s, &heights->cubics);
 }
@@ -209,10 +209,13 @@ void bridge_section(std::vector<FileSection>* sections, std::size_t index) {
   auto link_across = [&](FileSection& section, std::vector<int> FileLane::* links) {
     for (std::vector<FileLane>* side : {&section.left, &section.right}) {
       for (FileLane& lane : *side) {
+        // Each once: links given twice would double with every section that is removed.
         std::vector<int> targets;
         for (const int id : lane.*links) {
-          if (const FileLane* through = removed.lane(id)) {
-            targets.insert(targets.end(), (through->*links).begin(), (through->*links).end());
+          const FileLane* through = removed.lane(id);
+          if (!through) continue;
+          for (const int target : through->*links) {
+            if (std::find(targets.begin(), targets.end(), target) == targets.end()) targets.push_back(target);
           }
         }
         lane.*links = targets;

@@ -68,7 +68,11 @@ void read_line(const Element& element, bool is_explicit, std::vector<MarkLine>* 
 RoadMark read_mark(const Element& element, double section_length) {
   RoadMark mark;
   mark.where = element.where();
-  mark.s_offset = element.number("sOffset", 0);
+  mark.s_offset = element.number_in("sOffset", -kMaxRoadLength_m, kMaxRoadLength_m, 0);
+  if (mark.s_offset < 0) {
+    element.mend(MendKind::record_before_start, "attribute sOffset: expected a number from 0 on, got {}",
+                 mark.s_offset);
+  }
   mark.type = element.text("type");
   check_type(element, mark.type);
   mark.bold = element.text("weight", "standard") == "bold";

@@ -15,6 +15,7 @@ constexpr double kMaxOverhang_m = 10;
 // Smaller distances mean one continuous object.
 constexpr double kMinRepeat_m = 0.1;
 constexpr std::size_t kMaxCopies = 10'000;
+constexpr std::size_t kMaxCopiedCorners = 1'000'000;
 constexpr double kMaxSize_m = 1e3;
 
 bool contains_word(std::string text, std::string_view word) {
@@ -153,6 +154,9 @@ std::vector<FileObject> repeated(const Element& element, const FileObject& objec
       copy.length = between("lengthStart", "lengthEnd", object.length, u);
       copies.push_back(std::move(copy));
       if (copies.size() > kMaxCopies) repeat.fail("expected at most {} copies of an object", kMaxCopies);
+      if (copies.size() * object.outline.size() > kMaxCopiedCorners) {
+        repeat.fail("expected copies with at most {} corners in all", kMaxCopiedCorners);
+      }
     }
   });
   if (copies.empty()) copies.push_back(object);

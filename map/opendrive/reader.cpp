@@ -39,8 +39,10 @@ void apply(const Offset& offset, FileRoad* road) {
     piece.heading += offset.heading;
   }
   if (offset.z == 0) return;
-  if (road->elevation.cubics.empty()) road->elevation.cubics.push_back({});
-  for (Cubic& cubic : road->elevation.cubics) cubic.a += offset.z;
+  // The height is 0 before the first record.
+  std::vector<Cubic>& heights = road->elevation.cubics;
+  if (heights.empty() || heights.front().s > 0) heights.insert(heights.begin(), Cubic{});
+  for (Cubic& cubic : heights) cubic.a += offset.z;
 }
 
 bool is_left_hand(const Element& road_element) {
@@ -121,7 +123,6 @@ void read_network(std::string_view text, const std::string& source_name, Faults*
     pictura::fail("{}: expected OpenDRIVE, got an XML file whose root is <{}>", source_name,
                   document.document_element().name());
   }
-  if (const Element include = root.child("include")) include.fail("files of several parts are not supported");
   const Offset offset = read_header(root.child("header"), &network.geo_reference);
   root.each("road", [&](const Element& element) {
     const std::string name = name_of(element);

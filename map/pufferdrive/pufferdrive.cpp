@@ -101,7 +101,7 @@ LoggedPoints read_points(Cursor* cursor, int32_t count) {
   return points;
 }
 
-/// Adds what is no lane to the scene: lines, edges and polygons. Files since v2 have ids.
+/// Adds an edge or a polygon to the scene.
 void add_feature(LoggedScene* scene, int32_t id, LoggedPoints points, bool is_edge) {
   if (is_edge) {
     scene->edges.push_back({.id = id, .points = std::move(points)});

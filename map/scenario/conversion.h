@@ -37,8 +37,8 @@ struct Conversion {
   Eigen::Vector3d from_origin(const Eigen::Vector3d& p) const { return p - origin; }
 };
 
-/// The points about the origin, without duplicates, none farther than max_piece_m from the next, and thinned. Throws
-/// Error naming `what` where a point is too far from the origin. Empty if there are fewer than two points.
+/// The points about the origin, without duplicates, none farther than a piece may be long from the next, and thinned.
+/// Throws Error naming `what` where a point is too far from the origin. Empty if there are fewer than two points.
 std::vector<CurvePoint> resampled(Conversion* conversion, const LoggedPoints& points, const std::vector<double>& widths,
                                   const std::string& what);
 

@@ -170,10 +170,10 @@ LaneType type_of(LoggedLaneType type) {
 void append_points(const std::vector<CurvePoint>& points, RoadMap* map, Lane* lane) {
   lane->points.begin = static_cast<int32_t>(map->lane_points.size());
   const auto heading_of = [&](std::size_t i) {
-    const Eigen::Vector2d before =
+    const Eigen::Vector2d chord =
         (points[std::min(i + 1, points.size() - 1)].position_m - points[i + 1 < points.size() ? i : i - 1].position_m)
             .head<2>();
-    return std::atan2(before.y(), before.x());
+    return std::atan2(chord.y(), chord.x());
   };
   double s_m = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {

@@ -56,7 +56,7 @@ std::vector<CurvePoint> resampled(Conversion* conversion, const LoggedPoints& po
   }
   if (dense.size() < 2) return {};
   std::vector<CurvePoint> thinned;
-  // Thinning tests each point against at most the points of a piece, which are at least kSamePoint_m apart.
+  // Thinning tests each point against the others of its piece, of which a straight one has some twenty.
   conversion->count_work(dense.size() * 20);
   for (const std::size_t index : thin_polyline(dense, kTolerance_m, kMaxPiece_m)) thinned.push_back(dense[index]);
   return thinned;

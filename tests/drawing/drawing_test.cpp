@@ -658,6 +658,8 @@ TEST(Plots, TicksAreRound) {
   EXPECT_THAT(round_ticks(-1, 1, 4), testing::ElementsAre(-1, -0.5, 0, 0.5, 1));
   EXPECT_THAT(round_ticks(1.3e6, 2.9e6, 3), testing::ElementsAre(1.5e6, 2e6, 2.5e6));
   EXPECT_TRUE(round_ticks(1, 1, 4).empty());
+  EXPECT_LT(round_ticks(1 - 1e-16, 1, 5).size(), 21u) << "a range that a double hardly tells from its ends";
+  EXPECT_LT(round_ticks(1e17, std::nextafter(1e17, 2e17), 5).size(), 21u);
   EXPECT_TRUE(round_ticks(0, std::numeric_limits<double>::infinity(), 4).empty());
   EXPECT_THAT(binary_ticks(32, 768, 6), testing::ElementsAre(32, 64, 128, 256, 512));
   EXPECT_THAT(binary_ticks(1, 1024, 6), testing::ElementsAre(1, 4, 16, 64, 256, 1024));

@@ -134,6 +134,8 @@ TEST_F(RunPlots, WhatIsMissingIsNamed) {
               AllOf(HasSubstr("a/progress.csv: expected a column 'speed'"), HasSubstr("time/rollout_s")));
   EXPECT_THAT(message({a}, {.metrics = {"kept"}}), HasSubstr("'kept' may be a/kept or b/kept"));
   EXPECT_THAT(message({a}, {.metrics = {"a/kept"}}), Not(HasSubstr("may be")));
+  write_file(a + "/progress.csv", "update,charts/agent_steps,charts/agent_steps\n1,2,3\n");
+  EXPECT_THAT(message({a}), HasSubstr("a/progress.csv:1: column 'charts/agent_steps' stands twice"));
   write_file(a + "/progress.csv", "update,charts/agent_steps,driving/goals_per_1000_steps\n1,2,3\n2,x,3\n");
   EXPECT_THAT(message({a}), HasSubstr("a/progress.csv:3: expected 3 numbers, got 'x' as number 2"));
   write_file(a + "/progress.csv", "update,charts/agent_steps,driving/goals_per_1000_steps\n1,2,3\n");

@@ -235,6 +235,18 @@ TEST_F(MapCacheFolder, TheSecondLoadComesFromTheCache) {
   EXPECT_TRUE(fs::exists(cache_file()));
 }
 
+TEST_F(MapCacheFolder, AMapIsNamedByTheLinkThatItIsLoadedBy) {
+  write_source(small_file());
+  const std::string file = source_;
+  source_ = folder_ / "alias.xodr";
+  fs::create_symlink(file, source_);
+  EXPECT_EQ(outcome(), "imported");
+  EXPECT_EQ(map_->name, "alias");
+  source_ = file;
+  EXPECT_EQ(outcome(), "cached");
+  EXPECT_EQ(map_->name, "small");
+}
+
 TEST_F(MapCacheFolder, ChangedFilesAreImportedAgain) {
   write_source(small_file(1));
   outcome();

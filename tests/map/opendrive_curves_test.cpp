@@ -123,6 +123,17 @@ RoadMap banked(const std::string& lateral, const std::string& sidewalk_attribute
 
 Vec3 first_of(const RoadMap& map, int lane) { return map.points_of(lane_named(map, "1", 0, lane))[0].position_m; }
 
+TEST(OpenDriveOffset, RaisesARoadAlsoBeforeItsFirstHeight) {
+  test::RoadText road;
+  road.right = test::lane_of(-1, "driving", 3);
+  road.elevation = R"(<elevation s="40" a="2" b="0" c="0" d="0"/>)";
+  const std::string text = test::replaced(test::file_of(road.text()), R"(<header revMajor="1" revMinor="4"/>)",
+                                          R"(<header revMajor="1" revMinor="4"><offset x="0" y="0" z="50"/></header>)");
+  const RoadMap map = parse_opendrive(text, "raised.xodr");
+  EXPECT_FLOAT_EQ(map.lane_points.front().position_m.z, 50);
+  EXPECT_FLOAT_EQ(map.lane_points.back().position_m.z, 52);
+}
+
 TEST(OpenDriveBanking, SuperelevationRotatesTheRoadAboutItsReferenceLine) {
   const RoadMap map = banked(R"(<superelevation s="0" a="0.1" b="0" c="0" d="0"/>)");
   const double c = std::cos(0.1), s = std::sin(0.1);

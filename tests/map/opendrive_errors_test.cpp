@@ -187,7 +187,9 @@ TEST(OpenDriveErrors, UnsupportedFeaturesAreRejectedByName) {
   road.link = R"(<successor elementType="road" elementId="1" elementS="5" elementDir="+"/>)";
   EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("<successor>: attribute elementS: links to the middle"));
   road.link = "";
-  EXPECT_THAT(message_of(file_of("<include file=\"other.xodr\"/>" + road.text())), HasSubstr("<include>"));
+  EXPECT_THAT(message_of(file_of("<include file=\"other.xodr\"/>" + road.text())), HasSubstr("bad.xodr:4: <include>"));
+  road.rest = R"(<objects><include file="other.xodr"/></objects>)";
+  EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("<include>: files of several parts"));
 }
 
 TEST(OpenDriveErrors, MaliciousFilesAreRejected) {
@@ -207,7 +209,7 @@ TEST(OpenDriveErrors, MaliciousFilesAreRejected) {
   }
   EXPECT_THAT(message_of(replaced(text, "<header", nested + closed + "<header")), HasSubstr("more than 64 deep"));
   EXPECT_THAT(message_of(replaced(text, "type=\"driving\"", "type=\"" + std::string(1 << 20, 'x') + "\"")),
-              HasSubstr("bad.xodr:13: <lane> attribute type: expected at most 65536 bytes, got 1048576"));
+              HasSubstr("bad.xodr:13: <lane> attribute type: expected at most 4096 bytes, got 1048576"));
 }
 
 TEST(OpenDriveErrors, ObjectsAndSignalsAreNearTheirRoad) {
@@ -230,6 +232,60 @@ TEST(OpenDriveErrors, ObjectsAndSignalsAreNearTheirRoad) {
     road.rest = rest;
     EXPECT_THAT(message_of(file_of(road.text())), HasSubstr(expected)) << rest;
   }
+}
+
+// Files of a few kilobytes that once took minutes or gigabytes.
+TEST(OpenDriveErrors, WhatSmallFilesRepeatIsBounded) {
+  RoadText road;
+  road.length = 1e5;
+  const auto mark = [](const std::string& offset, double length, double space) {
+    return fmt::format(R"(<roadMark sOffset="{}" type="broken" width="0.1"><type name="x" width="0.1">)"
+                       R"(<line length="{}" space="{}" tOffset="0" sOffset="0"/></type></roadMark>)",
+                       offset, length, space);
+  };
+  // A number to which adding one changes nothing.
+  road.right = lane_of(-1, "driving", 3, mark("-1e17", 0.04, 0.06));
+  EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("attribute sOffset: expected a number in"));
+  // Dashes that are too short to be painted.
+  road.right = lane_of(-1, "driving", 3, mark("0", 0.001, 0.049));
+  EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("its curves need more than the"));
+
+  // Sections without length, with every link given twice: links would double with each.
+  RoadText sections;
+  for (int i = 0; i < 60; ++i) {
+    sections.sections +=
+        fmt::format("<laneSection s=\"{}\"><center><lane id=\"0\" type=\"none\"/></center><right>", i * 1e-5) +
+        lane_of(-1, "driving", 3,
+                R"(<link><predecessor id="-1"/><predecessor id="-1"/>)"
+                R"(<successor id="-1"/><successor id="-1"/></link>)") +
+        "</right></laneSection>";
+  }
+  EXPECT_EQ(parse_opendrive(file_of(sections.text()), "short.xodr").lanes.size(), 1u);
+
+  std::string corners;
+  for (int i = 0; i < 1000; ++i) corners += fmt::format(R"(<cornerLocal u="{}" v="{}"/>)", i * 0.01, i % 2);
+  const auto object = [&](const std::string& type, const std::string& more) {
+    RoadText with;
+    with.right = lane_of(-1, "driving", 3);
+    with.rest =
+        fmt::format(R"(<objects><object id="1" type="{}" s="5" t="0">{}<outline>{}</outline></object></objects>)", type,
+                    more, corners);
+    return file_of(with.text());
+  };
+  EXPECT_THAT(
+      message_of(object("crosswalk",
+                        R"(<repeat s="0" length="100" distance="0.1"/><repeat s="0" length="100" distance="0.1"/>)")),
+      HasSubstr("copies with at most 1000000 corners in all"));
+  EXPECT_THAT(message_of(object("stopLine", "")), HasSubstr("a stop line of at most 64 corners, got"));
+}
+
+TEST(OpenDriveErrors, FaultsOfTheWholeNetworkNameTheFile) {
+  RoadText near, far;
+  near.right = far.right = lane_of(-1, "driving", 3);
+  far.id = "2";
+  far.geometry = line_at(0, 60'000, 60'000, 0, 100);
+  EXPECT_THAT(message_of(file_of(near.text() + far.text())),
+              AllOf(testing::StartsWith("bad.xodr: "), HasSubstr("is too large for cells")));
 }
 
 TEST(OpenDriveErrors, WindingCurvesUseBoundedMemory) {

@@ -142,6 +142,16 @@ TEST(OpenDriveMends, RecordsBeforeTheStartApplyFromThere) {
   EXPECT_FLOAT_EQ(map.lanes.front().speed_limit_mps, 9);
 }
 
+TEST(OpenDriveMends, MarksBeforeTheirSectionApplyFromItsStart) {
+  const auto road_with = [](const std::string& offset) {
+    return straight(lane_with(width(0, 3) + "<roadMark sOffset=\"" + offset + "\" type=\"broken\" color=\"white\"/>"))
+        .text();
+  };
+  const RoadMap map = mended(road_with("-2"), MendKind::record_before_start);
+  EXPECT_FALSE(map.markings.empty());
+  EXPECT_FALSE(sound(road_with("0")).markings.empty());
+}
+
 TEST(OpenDriveMends, WidthsBeginWithTheirSection) {
   const RoadMap map = mended(straight(lane_with(width(4, 3, 0.01))).text(), MendKind::late_width);
   EXPECT_FLOAT_EQ(map.lane_points.front().width_m, 3);

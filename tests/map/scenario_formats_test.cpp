@@ -99,6 +99,9 @@ TEST(GpuDrive, FaultsAreNamed) {
   EXPECT_EQ(reason("\"heading\":[", "\"heading\":[null,"), "scene.json: objects[0].heading: expected 3 steps, got 4");
   EXPECT_EQ(reason("\"map_element_id\":2", "\"map_element_id\":\"lane\""),
             "scene.json: roads[0].map_element_id: expected a whole number, got string");
+  EXPECT_EQ(reason("\"map_element_id\":2", "\"map_element_id\":18446744073709551615"),
+            "scene.json: roads[0].map_element_id: expected a number of at most 1000000000 in magnitude, got "
+            "18446744073709551615");
   EXPECT_THAT(reason("{\"name\"", "{name"), HasSubstr("scene.json: expected JSON, got a parse error at line 1"));
   EXPECT_THAT(reason("\"x\":", "\"x\":NaN,\"y\":"), HasSubstr("scene.json: expected JSON"));
   EXPECT_THAT(reason("\"x\":", "\"x\":1e300,\"u\":"), HasSubstr("scene.json: objects[0].position[0].x: expected"));
