@@ -44,6 +44,7 @@ Replay record(ReplayArguments arguments, uint64_t seed, ProgressLine* line_out) 
   options.seed = seed;
   DrivenWorld world = make_world(options, arguments.policy, arguments.backends);
   if (arguments.steps == 0) arguments.steps = world.simulator->config().episode_steps;
+  check_replay_room(world.simulator->num_slots(), arguments.steps);
   settle_followed(world, &arguments.recording);
   Recording recording(*world.simulator, {arguments.policy, world.session.get(), world.renderer.get()},
                       arguments.recording);
@@ -68,17 +69,26 @@ void run_replay(const ReplayArguments& arguments) {
     return;
   }
   make_output_folder(arguments.gallery);
+  check_gallery(arguments.gallery);
   Json replays = Json::array();
-  for (int episode = 0; episode < arguments.episodes; ++episode) {
-    const uint64_t seed = arguments.world.seed + static_cast<uint64_t>(episode);
-    const Replay replay = record(arguments, seed, &line);
-    line.finish();
-    const std::string path = (std::filesystem::path(arguments.gallery) / fmt::format("seed_{}.html", seed)).string();
-    write_replay_and_say_so(path, replay);
-    replays.push_back(facts_of(path, replay));
+  const auto write_index = [&] {
+    const int count = write_gallery(arguments.gallery);
+    fmt::print(stderr, "{}: {} replays\n", (std::filesystem::path(arguments.gallery) / "index.html").string(), count);
+  };
+  try {
+    for (int episode = 0; episode < arguments.episodes; ++episode) {
+      const uint64_t seed = arguments.world.seed + static_cast<uint64_t>(episode);
+      const Replay replay = record(arguments, seed, &line);
+      line.finish();
+      const std::string path = (std::filesystem::path(arguments.gallery) / fmt::format("seed_{}.html", seed)).string();
+      write_replay_and_say_so(path, replay);
+      replays.push_back(facts_of(path, replay));
+    }
+  } catch (const Interrupted&) {
+    if (!replays.empty()) write_index();  // of those that are finished
+    throw;
   }
-  const int count = write_gallery(arguments.gallery);
-  fmt::print(stderr, "{}: {} replays\n", (std::filesystem::path(arguments.gallery) / "index.html").string(), count);
+  write_index();
   if (arguments.json) print_json({{"gallery", arguments.gallery}, {"replays", replays}});
 }
 

@@ -80,8 +80,8 @@ class Watcher {
   virtual void drive(Span<Command> /*commands_inout*/) {}
   virtual void before_step(Span<const Command> /*commands*/) {}
   virtual void after_step(const StepResult& result) = 0;
-  /// After new episodes that no step began.
-  virtual void after_reset() = 0;
+  /// After new episodes that no step began, of the worlds of the mask [worlds]; empty: of all.
+  virtual void after_reset(Span<const uint8_t> world_mask) = 0;
 };
 
 /// What is inside a pictura.Simulator.

@@ -59,8 +59,8 @@ class PyRecorder final : public Watcher {
     if (recorder_) recorder_->after_step(result);
     decision_.reset();
   }
-  void after_reset() override {
-    if (recorder_) recorder_->after_reset();
+  void after_reset(Span<const uint8_t> world_mask) override {
+    if (recorder_) recorder_->after_reset(world_mask);
     decision_.reset();
   }
 
@@ -110,8 +110,8 @@ class PyLiveView final : public Watcher {
   void after_step(const StepResult& result) override {
     if (view_) view_->after_step(result);
   }
-  void after_reset() override {
-    if (view_) view_->after_reset();
+  void after_reset(Span<const uint8_t> world_mask) override {
+    if (view_) view_->after_reset(world_mask);
   }
 
   void decide(int agent, const ReplayDecision& decision) {

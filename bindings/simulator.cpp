@@ -147,7 +147,16 @@ class PySimulator {
 
   void reset(const py::object& world_mask, const std::optional<uint64_t>& seed) {
     reset_unwatched(world_mask, seed);
-    for (const auto& watcher : watchers()) calls_->run("reset", [&] { watcher->after_reset(); });
+    const auto watching = watchers();
+    if (watching.empty()) return;
+    Span<const uint8_t> mask;
+    std::optional<BorrowedArray> borrowed;
+    if (!world_mask.is_none()) {
+      borrowed.emplace(borrow(world_mask, "reset: world_mask", stream_));
+      mask = borrowed->array().checked<const uint8_t>(
+          "reset: world_mask", {static_cast<int64_t>(simulator_->worlds().size())}, simulator_->device());
+    }
+    for (const auto& watcher : watching) calls_->run("reset", [&] { watcher->after_reset(mask); });
   }
 
   py::object step(const py::object& actions) {

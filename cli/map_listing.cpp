@@ -6,6 +6,7 @@
 #include <string>
 
 #include "pictura/common/error.h"
+#include "pictura/common/support/json_text.h"
 
 namespace pictura {
 
@@ -16,7 +17,7 @@ double rounded(double metres) { return std::round(metres * 1e3) / 1e3; }
 
 class Listing {
  public:
-  Listing(const Json& facts, const RoadMap& map) : map_(map), text_(facts.dump(2)) {
+  Listing(const Json& facts, const RoadMap& map) : map_(map), text_(json_text(facts, 2)) {
     text_.erase(text_.size() - 2);  // the newline and bracket that end it
     text_ += ",\n  \"elements\": {";
   }
@@ -29,7 +30,7 @@ class Listing {
       Json element{{"index", i}};
       element.update(describe(i));
       if (i < sources.size()) add_source(sources[i], &element["source"]);
-      text_ += (i ? ",\n      " : "\n      ") + element.dump();
+      text_ += (i ? ",\n      " : "\n      ") + json_text(element);
     }
     text_ += count ? "\n    ]" : "]";
   }

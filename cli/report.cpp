@@ -11,12 +11,13 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/pixel_samples.h"
+#include "pictura/common/support/json_text.h"
 #include "pictura/common/support/numbers.h"
 
 namespace pictura {
 
 void print_json(const Json& object) {
-  const std::string text = object.dump(2) + "\n";
+  const std::string text = json_text(object, 2) + "\n";
   std::fwrite(text.data(), 1, text.size(), stdout);
 }
 

@@ -1,7 +1,7 @@
 #include "pictura/replay/encoding.h"
 
+#include <algorithm>
 #include <array>
-#include <limits>
 
 #include <zlib.h>
 

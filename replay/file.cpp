@@ -403,10 +403,10 @@ Json header_of(const Replay& replay, const std::vector<Section>& sections) {
   Json list = Json::array();
   for (const Section& section : sections) list.push_back({{"name", section.name}, {"bytes", section.bytes.size()}});
   Json images = nullptr;
-  if (!replay.images.groups.empty()) {
+  if (const Span<const std::string> groups = written_groups(replay.images); !groups.empty()) {
     images = {
         {"frames_per_group", replay.images.frames_per_group}, {"hues", replay_hues()}, {"group_bytes", Json::array()}};
-    for (const std::string& group : written_groups(replay.images)) images["group_bytes"].push_back(group.size());
+    for (const std::string& group : groups) images["group_bytes"].push_back(group.size());
   }
   Json cameras = Json::array(), classes = Json::array(), light_hues = Json::array();
   for (const ReplayCamera& camera : replay.cameras) cameras.push_back(camera_json(camera));

@@ -17,6 +17,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kIndex = "index.html";
+constexpr const char* kIndexElement = R"(id="entries">)";  // by which one of ours is known
 
 int64_t infractions_of(const Json& header) {
   int64_t sum = 0;
@@ -26,9 +27,8 @@ int64_t infractions_of(const Json& header) {
   return sum;
 }
 
-}  // namespace
-
-int write_gallery(const std::string& folder) {
+// What the index says of each page of the folder, in the order of their names.
+std::vector<Json> entries_of(const std::string& folder) {
   PICTURA_CHECK(std::filesystem::is_directory(folder), "{}: expected a folder of replays", folder);
   std::vector<std::string> names;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
@@ -38,15 +38,41 @@ int write_gallery(const std::string& folder) {
   std::sort(names.begin(), names.end());
   std::vector<Json> entries;
   for (const std::string& name : names) {
-    const Json header = read_replay_header((std::filesystem::path(folder) / name).string());
+    const std::string path = (std::filesystem::path(folder) / name).string();
+    const Json header = read_replay_header(path);
     Json entry{{"file", name}};
-    for (const char* key :
-         {"map", "policy", "seed", "global_world", "agents", "frames", "dt_s", "metrics", "first_infraction"}) {
-      entry[key] = header.at(key);
+    try {
+      for (const char* key :
+           {"map", "policy", "seed", "global_world", "agents", "frames", "dt_s", "metrics", "first_infraction"}) {
+        entry[key] = header.at(key);
+      }
+      entry["infractions"] = infractions_of(header);
+    } catch (const Json::exception&) {
+      fail("{}: expected a replay's header, got one in which a value is missing", path);
     }
-    entry["infractions"] = infractions_of(header);
     entries.push_back(std::move(entry));
   }
+  return entries;
+}
+
+// What is no index of replays is not overwritten.
+void check_index(const std::string& folder) {
+  const std::string index = (std::filesystem::path(folder) / kIndex).string();
+  if (!std::filesystem::exists(index)) return;
+  PICTURA_CHECK(read_file(index).find(kIndexElement) != std::string::npos,
+                "{}: expected an index of replays, or none: another page would be lost", index);
+}
+
+}  // namespace
+
+void check_gallery(const std::string& folder) {
+  entries_of(folder);
+  check_index(folder);
+}
+
+int write_gallery(const std::string& folder) {
+  std::vector<Json> entries = entries_of(folder);
+  check_index(folder);
   std::stable_sort(entries.begin(), entries.end(), [](const Json& a, const Json& b) {
     return a.at("infractions").get<int64_t>() > b.at("infractions").get<int64_t>();
   });

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 
-#include "pictura/common/support/suggestion.h"
 #include "pictura/replay/encoding.h"
 #include "pictura/replay/file.h"
 
@@ -69,9 +68,9 @@ void LiveWorld::after_step(const StepResult& result) {
   keep_newest(num_episodes);
 }
 
-bool LiveWorld::after_reset() {
+bool LiveWorld::after_reset(Span<const uint8_t> world_mask) {
   const size_t num_episodes = recorder_.recorded().episodes.size();
-  if (!recorder_.after_reset()) return false;
+  if (!recorder_.after_reset(world_mask)) return false;
   keep_newest(num_episodes);
   return true;
 }
@@ -124,7 +123,7 @@ LiveRequest parse_live_request(std::string_view text, int num_agents) {
   LiveJson asked;
   try {
     asked = LiveJson::parse(text);
-  } catch (const LiveJson::parse_error&) {
+  } catch (const LiveJson::exception&) {  // also for a number beyond what a double holds
     fail("expected JSON");
   }
   PICTURA_CHECK(asked.is_object(), "expected an object of JSON, got {}", asked.type_name());

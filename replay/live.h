@@ -26,7 +26,7 @@ class LiveWorld {
   void before_step(Span<const Command> commands) { recorder_.before_step(commands); }
   void after_step(const StepResult& result);
   /// After a reset by the caller: as Recorder::after_reset().
-  bool after_reset();
+  bool after_reset(Span<const uint8_t> world_mask);
 
   /// All that a page needs to begin at this frame.
   LiveJson begin() const;

@@ -127,8 +127,8 @@ void LiveView::after_step(const StepResult& result) {
   parts_->tell_of_frame();
 }
 
-void LiveView::after_reset() {
-  if (parts_->world.after_reset()) parts_->tell_of_frame();
+void LiveView::after_reset(Span<const uint8_t> world_mask) {
+  if (parts_->world.after_reset(world_mask)) parts_->tell_of_frame();
 }
 
 void LiveView::finish() {

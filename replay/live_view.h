@@ -44,8 +44,8 @@ class LiveView {
   void before_step(Span<Command> commands_inout);
   /// After it.
   void after_step(const StepResult& result);
-  /// After a reset by the caller.
-  void after_reset();
+  /// After a reset by the caller, of the worlds of the mask [worlds]; empty: of all.
+  void after_reset(Span<const uint8_t> world_mask);
   /// Tells pages that it is over; they keep what they have seen.
   void finish();
 

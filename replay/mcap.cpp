@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <png.h>
 
+#include "pictura/common/support/json_text.h"
 #include "pictura/replay/encoding.h"
 #include "pictura/replay/images.h"
 #include "pictura/replay/mcap_writer.h"
@@ -60,11 +61,13 @@ Json scene_schema() {
                                      {"id", kText},
                                      {"lifetime", time_schema()},
                                      {"frame_locked", {{"type", "boolean"}}},
+                                     {"metadata", array_schema(object_schema({{"key", kText}, {"value", kText}}))},
                                      {"cubes", array_schema(solid)},
                                      {"spheres", array_schema(solid)},
                                      {"lines", array_schema(line)},
                                      {"texts", array_schema(text)}});
-  return object_schema({{"deletions", array_schema(object_schema({}))}, {"entities", array_schema(entity)}});
+  return object_schema(
+      {{"deletions", array_schema(object_schema(Json::object()))}, {"entities", array_schema(entity)}});
 }
 Json log_schema() {
   return object_schema(
@@ -240,7 +243,7 @@ void write_mcap(const std::string& path, const Replay& replay) {
     if (num_pictured == 0) break;
     cameras.push_back(writer.add_channel("/camera/" + camera.name, "foxglove.CompressedImage", image_schema().dump()));
   }
-  writer.add_message(map, 0, map_json(replay).dump());
+  writer.add_message(map, 0, json_text(map_json(replay)));
 
   // A float's 0.1 s is not 0.1 s to the nanosecond.
   const auto step_ns = static_cast<uint64_t>(std::llround(static_cast<double>(origin.dt_s) * 1e6)) * 1000;
@@ -250,14 +253,14 @@ void write_mcap(const std::string& path, const Replay& replay) {
     const uint64_t ns = static_cast<uint64_t>(frame) * step_ns;
     const auto index = static_cast<size_t>(frame);
     while (frame >= replay.episodes[episode].first_frame + replay.episodes[episode].num_frames) ++episode;
-    writer.add_message(agents, ns, agents_json(replay, replay.episodes[episode], frame, ns).dump());
+    writer.add_message(agents, ns, json_text(agents_json(replay, replay.episodes[episode], frame, ns)));
     const auto num_lights = static_cast<size_t>(replay.num_lights);
     const auto now = replay.lights.begin() + static_cast<ptrdiff_t>(index * num_lights);
     if (frame == 0 ||
         !std::equal(now, now + static_cast<ptrdiff_t>(num_lights), now - static_cast<ptrdiff_t>(num_lights))) {
-      writer.add_message(lights, ns, lights_json(replay, frame, ns).dump());
+      writer.add_message(lights, ns, json_text(lights_json(replay, frame, ns)));
     }
-    writer.add_message(agent_channel, ns, agent_json(replay, frame, followed).dump());
+    writer.add_message(agent_channel, ns, json_text(agent_json(replay, frame, followed)));
     for (int agent = 0; agent < replay.num_agents; ++agent) {
       const int32_t bits = replay.at(Track::events, frame, agent);
       std::string names;
@@ -266,11 +269,10 @@ void write_mcap(const std::string& path, const Replay& replay) {
       }
       if (names.empty()) continue;
       writer.add_message(events, ns,
-                         Json{{"timestamp", time_json(ns)},
-                              {"level", (bits & kInfractions) != 0 ? kWarning : kInfo},
-                              {"message", fmt::format("agent {}: {}", agent, names)},
-                              {"name", origin.map}}
-                             .dump());
+                         json_text(Json{{"timestamp", time_json(ns)},
+                                        {"level", (bits & kInfractions) != 0 ? kWarning : kInfo},
+                                        {"message", fmt::format("agent {}: {}", agent, names)},
+                                        {"name", origin.map}}));
     }
     if (frame >= num_pictured) continue;
     const int per_group = replay.images.frames_per_group, in_group = frame % per_group;

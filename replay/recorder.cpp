@@ -185,12 +185,7 @@ struct Recorder::Parts {
     episode().chains.push_back(chain);
   }
 
-  void check_room() const {
-    const int64_t numbers = (int64_t{replay.num_frames} + 1) * replay.num_agents * int64_t{kNumTracks};
-    PICTURA_CHECK(numbers <= kMaxReplayNumbers,
-                  "replay: {} agents are too many for more than {} steps: record fewer steps", replay.num_agents,
-                  replay.num_frames - 1);
-  }
+  void check_room() const { check_replay_room(replay.num_agents, int64_t{replay.num_frames}); }
 
   void add_images() {
     group += cameras->draw(static_cast<int>(slot(replay.followed)));
@@ -260,6 +255,13 @@ struct Recorder::Parts {
   Replay replay;
 };
 
+void check_replay_room(int num_agents, int64_t num_steps) {
+  const int64_t max_frames = kMaxReplayNumbers / (std::max(1, num_agents) * int64_t{kNumTracks});
+  PICTURA_CHECK(num_steps + 1 <= max_frames,
+                "replay: {} agents are too many for more than {} steps: record fewer steps", num_agents,
+                max_frames - 1);
+}
+
 Recorder::Recorder(Simulator& simulator, const RecorderOptions& options) {
   if (!simulator.device().is_host()) {
     fail_usage("replay: expected a simulator in host memory, got one on {}", name_of(simulator.device()));
@@ -296,9 +298,9 @@ void Recorder::after_step(const StepResult& result) {
   parts.add_frame();
 }
 
-bool Recorder::after_reset() {
+bool Recorder::after_reset(Span<const uint8_t> world_mask) {
   Parts& parts = *parts_;
-  if (parts.simulator.episode_step()[static_cast<size_t>(parts.world)] != 0) return false;
+  if (!world_mask.empty() && !world_mask[static_cast<size_t>(parts.world)]) return false;
   parts.check_room();
   parts.take_seed();
   parts.add_no_step();

@@ -50,6 +50,10 @@ ReplayDecision decision_of(Span<const float> logits, float value);
 /// A box in a replay's units.
 ReplayBox replay_box(const AgentBox& box);
 
+/// Throws Error where a replay of so many agents and steps would hold more numbers than one may: at the door, what
+/// Recorder::after_step() throws at last.
+void check_replay_room(int num_agents, int64_t num_steps);
+
 /// Throws UsageError where the simulator does not work in host memory, or has no such world or agent.
 class Recorder {
  public:
@@ -61,9 +65,9 @@ class Recorder {
   void before_step(Span<const Command> commands, const std::optional<ReplayDecision>& decision = {});
   /// After it. Throws Error where the replay would take more memory than it may.
   void after_step(const StepResult& result);
-  /// After a reset by the caller, not by a step: a new episode begins if the world is at the start of one. Whether it
-  /// is.
-  bool after_reset();
+  /// After a reset by the caller, not by a step, of the worlds of the mask [worlds] (empty: of all): a new episode
+  /// begins if this recorder's world is among them. Whether it is.
+  bool after_reset(Span<const uint8_t> world_mask = {});
 
   /// What was recorded until now, without images that wait to be compressed; its last frame is the simulator's state.
   const Replay& recorded() const;

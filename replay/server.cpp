@@ -13,7 +13,10 @@
 
 #include <httplib.h>
 #include <sys/random.h>
+#include <sys/socket.h>
 
+#include "pictura/common/error.h"
+#include "pictura/common/support/json_text.h"
 #include "pictura/replay/page_sources.h"
 #include "pictura/replay/template.h"
 #endif
@@ -49,10 +52,23 @@ bool is_equal(std::string_view a, std::string_view b) {
   return difference == 0;
 }
 
+// As browsers send it. Throws UsageError unless it is a name or an address that they could.
+std::string host_name_of(std::string name) {
+  for (char& c : name) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    const bool is_allowed = (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '.' || c == '-';
+    if (!is_allowed) {
+      fail_usage("serve: host name '{}': expected letters, digits, dots and hyphens, as a name or an IPv4 address",
+                 name);
+    }
+  }
+  return name;
+}
+
 using Text = std::shared_ptr<const std::string>;
 
 Text event_text(std::string_view event, const LiveJson& data) {
-  return std::make_shared<const std::string>(fmt::format("event: {}\ndata: {}\n\n", event, data.dump()));
+  return std::make_shared<const std::string>(fmt::format("event: {}\ndata: {}\n\n", event, json_text(data)));
 }
 
 /// A page that listens.
@@ -66,13 +82,19 @@ struct Listener {
 }  // namespace
 
 struct LiveServer::Parts {
-  explicit Parts(const LiveServerOptions& its_options) : options(its_options), token(random_token()) {
+  explicit Parts(const LiveServerOptions& its_options)
+      : options(its_options), host_name(host_name_of(its_options.host_name)), token(random_token()) {
     server.new_task_queue = [] { return new httplib::ThreadPool(kMaxLivePages + 8); };
     server.set_payload_max_length(kMaxRequestBytes);
     server.set_read_timeout(kMaxReadTime);
     server.set_write_timeout(kMaxWriteTime);
     server.set_keep_alive_timeout(kKeepAlive.count());
     server.set_tcp_nodelay(true);
+    // The library's own also lets several servers share a port.
+    server.set_socket_options([](socket_t socket) {
+      const int yes = 1;
+      setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+    });
     server.set_default_headers(
         {{"Cache-Control", "no-store"},
          {"Content-Security-Policy",
@@ -94,7 +116,7 @@ struct LiveServer::Parts {
     server.Post(root + "/control", [this](const httplib::Request& request, httplib::Response& response) {
       take_request(request, response);
     });
-    const bool everywhere = !options.host_name.empty();
+    const bool everywhere = !host_name.empty();
     const std::string listened = everywhere ? "0.0.0.0" : "127.0.0.1";
     port = options.port;
     if (port == 0) {
@@ -103,9 +125,11 @@ struct LiveServer::Parts {
       port = -1;
     }
     PICTURA_CHECK(port > 0, "serve: cannot listen on {}:{}: is the port taken?", listened, options.port);
-    address = fmt::format("http://{}:{}/{}/", everywhere ? options.host_name : "127.0.0.1", port, token);
-    for (const std::string& name : {std::string("127.0.0.1"), std::string("localhost"), options.host_name}) {
-      if (!name.empty()) hosts.push_back(fmt::format("{}:{}", name, port));
+    address = fmt::format("http://{}:{}/{}/", everywhere ? host_name : "127.0.0.1", port, token);
+    for (const std::string& name : {std::string("127.0.0.1"), std::string("localhost"), host_name}) {
+      if (name.empty()) continue;
+      hosts.push_back(fmt::format("{}:{}", name, port));
+      if (port == 80) hosts.push_back(name);  // as browsers say it
     }
     thread = std::thread([this] { server.listen_after_bind(); });
     // stop() does nothing before this.
@@ -200,7 +224,9 @@ struct LiveServer::Parts {
       response.set_content(why + "\n", "text/plain");
     };
     // Forms of other sites cannot send this type without asking first.
-    if (request.get_header_value("Content-Type") != "application/json") {
+    std::string type = request.get_header_value("Content-Type");
+    type.resize(std::min(type.size(), type.find_first_of("; ")));  // without its character set
+    if (type != "application/json") {
       refuse(415, "expected Content-Type: application/json");
       return;
     }
@@ -235,6 +261,7 @@ struct LiveServer::Parts {
   static constexpr const char* kLiveElement = "<script type=\"text/plain\" id=\"replay-live\">events</script>";
 
   const LiveServerOptions options;
+  const std::string host_name;  // in lower case
   const std::string token;
   httplib::Server server;
   std::thread thread;

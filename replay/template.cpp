@@ -1,6 +1,9 @@
 #include "pictura/replay/template.h"
 
+#include <map>
+
 #include "pictura/common/error.h"
+#include "pictura/common/support/json_text.h"
 
 namespace pictura {
 
@@ -20,7 +23,7 @@ std::string html_text(std::string_view text) {
 
 std::string script_text(const nlohmann::ordered_json& json) {
   std::string text;
-  for (const char c : json.dump()) {
+  for (const char c : json_text(json)) {
     if (c == '<')
       text += "\\u003c";
     else
@@ -30,14 +33,22 @@ std::string script_text(const nlohmann::ordered_json& json) {
 }
 
 std::string filled(std::string_view html, const std::vector<std::pair<std::string, std::string>>& values) {
-  std::string page(html);
+  // Found in the template, not in a value that has taken another one's place.
+  std::map<size_t, std::pair<size_t, const std::string*>> places;  // by where they begin: length, and what comes there
   for (const auto& [name, text] : values) {
     const std::string mark = "{{" + name + "}}";
-    const size_t at = page.find(mark);
-    PICTURA_CHECK(at != std::string::npos, "template: expected {} in it", mark);
-    page.replace(at, mark.size(), text);
+    const size_t at = html.find(mark);
+    PICTURA_CHECK(at != std::string_view::npos, "template: expected {} in it", mark);
+    places[at] = {mark.size(), &text};
   }
-  return page;
+  std::string page;
+  size_t end = 0;
+  for (const auto& [begin, place] : places) {
+    page += html.substr(end, begin - end);
+    page += *place.second;
+    end = begin + place.first;
+  }
+  return page += html.substr(end);
 }
 
 }  // namespace pictura

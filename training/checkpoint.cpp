@@ -5,6 +5,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/hash.h"
+#include "pictura/common/support/json_text.h"
 #include "pictura/training/policy_json.h"
 
 namespace pictura {
@@ -72,7 +73,7 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
   data.append(reinterpret_cast<const char*>(checkpoint.simulator.data()), checkpoint.simulator.size());
   header["data"] = {{"bytes", data.size()}};
 
-  const std::string text = header.dump();
+  const std::string text = json_text(header);
   std::string file(kMagic, sizeof kMagic);
   append(&file, kVersion);
   append(&file, kByteOrder);

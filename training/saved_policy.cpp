@@ -10,6 +10,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/hash.h"
+#include "pictura/common/support/json_text.h"
 #include "pictura/training/checkpoint.h"
 #include "pictura/training/policy_json.h"
 
@@ -48,7 +49,7 @@ std::string safetensors(const std::vector<NamedTensor>& tensors, WeightType weig
     header[tensor.name] = {
         {"dtype", stored.name}, {"shape", tensor.value.sizes().vec()}, {"data_offsets", {begin, data.size()}}};
   }
-  std::string text = header.dump();
+  std::string text = json_text(header);
   text.append((8 - text.size() % 8) % 8, ' ');  // data begin on a multiple of eight bytes
   const uint64_t length = text.size();
   std::string file(reinterpret_cast<const char*>(&length), sizeof length);

@@ -25,7 +25,7 @@ def wrong_torch() -> str | None:
     if built is None:
         return None
     spec = importlib.util.find_spec("torch")
-    if spec is None:
+    if spec is None or spec.origin is None:  # a folder of that name is no torch
         return f"built with torch {built}, and no torch is installed: pip install torch=={built.split('+')[0]}"
     (found,) = re.findall(r"^__version__ = '(.*)'$", (pathlib.Path(spec.origin).parent / "version.py").read_text(), re.M)
     return None if found == built else f"built with torch {built}, and torch {found} is installed: build it again: {_HOW}"

@@ -22,7 +22,7 @@ uniform vec4 projection;  // scale of x and y, offset of x and y
 uniform vec2 focal, positions;
 uniform float floor_px;
 flat out vec3 face_color;
-const float near_m = 0.1, range_m = 120.0;
+const float near_m = float(${NEAR_M}), range_m = float(${RANGE_M});
 
 vec3 seen(vec3 world) { vec3 d = world - eye; return vec3(dot(right, d), dot(down, d), dot(ahead, d)); }
 // What is before the near plane is cut off, so that the side leads from there to the other end.

@@ -51,9 +51,12 @@ class NumberReader {
     } while (byte > 127);
     return (bits >>> 1) ^ -(bits & 1);
   }
+  get isAtEnd() { return this.at === this.bytes.length; }
   many(count) { return Array.from({ length: count }, () => this.next()); }
   // Of `columns` columns, one after the other, each through all frames.
   columns(columns, frames, order) {
+    // Each number has a byte at least: this is known before room is made for a count that was changed.
+    if (columns * frames > this.bytes.length) throw new Damaged("its numbers end too early");
     const values = new Int32Array(columns * frames);
     for (let column = 0, i = 0; column < columns; ++column) {
       let value = 0, difference = 0;
@@ -119,6 +122,9 @@ function episodesOf(reader, agents) {
   });
 }
 
+// The sections that every replay has, with one for each of its tracks.
+const SECTIONS = ["map", "scenery", "episodes", "conditioning", "lights"];
+
 // The whole replay: everything of it that views read.
 class Replay {
   constructor(header, bytes, imageBytes) {
@@ -140,11 +146,18 @@ class Replay {
       else if (name === "decisions") this.decisions = reader.columns(13, frames, 1);
       else {
         const track = orders.get(name);
+        if (!track) throw new Damaged(`it has an unknown section ${name}`);
         this.tracks[name] = reader.columns(agents, frames, track.order);
         this.units[name] = track.unit;
       }
+      // What is left over was written for another header.
+      if (name !== "conditioning" && !reader.isAtEnd) throw new Damaged(`its section ${name} has more numbers than its header says`);
+    }
+    for (const name of [...SECTIONS, ...orders.keys()]) {
+      if (!header.sections.some(section => section.name === name)) throw new Damaged(`it lacks the section ${name}`);
     }
     const perEpisode = agents * header.conditioning.length;
+    if (conditioning.length !== this.episodes.length * perEpisode) throw new Damaged("its conditioning is not that of its agents and episodes");
     this.episodes.forEach((episode, i) => { episode.conditioning = conditioning.subarray(i * perEpisode, (i + 1) * perEpisode); });
     this.stride = frames;
     this.episodeOf = new Uint16Array(frames);
@@ -162,6 +175,7 @@ class Replay {
   body(agent, frame) { return this.episode(frame).bodies[agent]; }
   light(light, frame) { return this.lights[light * this.stride + frame]; }
   isFollowed(agent) { return agent === this.followed; }
+  imagesOf(frame) { return this.images.frame(frame); }
   // Whether the file has what an agent's cameras saw.
   hasImages(agent, frame) { return agent === this.followed && Boolean(this.images) && frame < this.images.frames; }
   // The road user of a probe's case, where an agent is asked about it: whether it is inserted, and the change of the images
@@ -249,6 +263,46 @@ class Images {
   }
 }
 
+// What a header must have, all of it; header_of() in replay/file.cpp writes it. A list holds the kind of its members; what ends in "?"
+// may be null.
+const HUE = ["number"], numbers = (...names) => Object.fromEntries(names.map(name => [name, "number"]));
+const HEADER = {
+  command: "string", program: "string", commit: "string", map: "string", map_hash: "string", policy: "string", policy_hash: "string", seed: "string",
+  global_world: "count", dt_s: "number", agents: "count", frames: "count", lights: "count", followed: "number",
+  metrics: numbers("spawned", "agent_steps", "collisions", "at_fault_collisions", "off_road", "red_light", "wall_contacts", "goals_reached", "waypoints_reached", "km_driven", "reward"),
+  "first_infraction?": numbers("frame", "agent"),
+  "case?": { what: "string", frame: "count", ego: "count", "removed?": "count", "inserted?": { ...numbers("length_cm", "width_cm", "height_cm", "x_cm", "y_cm", "z_cm", "heading_ddeg"), class: "count", path_cm: [["number"]] },
+    answers: [{ policy: "string", ...numbers("value", "value_without", "brake", "brake_without") }] },
+  conditioning: ["string"], decision_unit: "number", tracks: [{ name: "string", unit: "number", order: "count" }], sections: [{ name: "string", bytes: "count" }],
+  cameras: [{ name: "string", width_px: "count", height_px: "count",
+    ...numbers("focal_x_px", "focal_y_px", "center_x_px", "center_y_px", "x_m", "y_m", "z_m", "yaw_rad", "pitch_rad", "roll_rad") }],
+  line_floor_px: "number", classes: [{ reference_to_center: "number", hues: [HUE] }], light_hues: [HUE],
+  "images?": { frames_per_group: "count", hues: [HUE], group_bytes: ["count"] },
+};
+
+function checkHeader(header) {
+  const check = (value, kind, where) => {
+    const refuse = wanted => { throw new Damaged(`its header: ${where.join(".")}: expected ${wanted}, got ${value === undefined ? "nothing" : JSON.stringify(value).slice(0, 40)}`); };
+    if (kind === "count") { if (!Number.isInteger(value) || value < 0) refuse("a whole number"); }
+    else if (typeof kind === "string") { if (typeof value !== kind) refuse(`a ${kind}`); }
+    else if (Array.isArray(kind)) {
+      if (!Array.isArray(value)) refuse("a list");
+      value.forEach((member, i) => check(member, kind[0], [...where, i]));
+    } else {
+      if (typeof value !== "object" || value === null) refuse("an object");
+      for (const [key, member] of Object.entries(kind)) {
+        const name = key.replace("?", "");
+        if (value[name] !== null || name === key) check(value[name], member, [...where, name]);
+      }
+    }
+  };
+  check(header, HEADER, []);
+  const { agents, frames, followed, case: probed } = header;
+  if (followed < -1 || followed >= agents) throw new Damaged(`its header: followed: expected an agent below ${agents}, got ${followed}`);
+  if (probed && probed.frame >= frames) throw new Damaged(`its header: case: expected a frame below ${frames}, got ${probed.frame}`);
+  if (probed && Math.max(probed.ego, probed.removed) >= agents) throw new Damaged(`its header: case: expected an agent below ${agents}`);
+}
+
 async function readReplay() {
   const text = id => {
     const element = document.getElementById(id);
@@ -264,6 +318,7 @@ async function readReplay() {
   }
   if (header.format !== "pictura replay") throw new Damaged("its header is of something else");
   if (header.version !== 2) throw new Damaged(`it is of version ${header.version}, this page reads version 2`);
+  checkHeader(header);
   const whole = header.sections.reduce((sum, section) => sum + section.bytes, 0);
   try {
     const bytes = await inflated(bytesOfBase64(text("replay-data")), whole);

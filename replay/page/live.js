@@ -1,6 +1,10 @@
 // A replay that grows while a world runs elsewhere, and the connection to it.
 
 const MAX_LIVE_FRAMES = 8192, LIVE_PICTURES = 600;
+// An EventSource does not say why it is refused. The number is kMaxLivePages of replay/server.h.
+const REFUSED = "8 pages listen already, or the simulation has ended";
+
+class Refused extends Error {}
 
 class LiveReplay extends Replay {
   static async of({ step, header, data, images }) {
@@ -9,8 +13,7 @@ class LiveReplay extends Replay {
   }
   constructor(header, bytes, step, sendsImages) {
     super(header, bytes, null);
-    Object.assign(this, { firstStep: step, looks: new Map(), version: 0, watched: -1, imageSource: "drawn by the simulation" });
-    if (sendsImages) this.images = { frame: async frame => this.looks.get(frame)?.images ?? null };
+    Object.assign(this, { firstStep: step, looks: new Map(), version: 0, watched: -1, sendsImages, imageSource: "drawn by the simulation" });
     this.grow(512);
   }
   // Begins anew, for views that hold this object: the page has missed some steps.
@@ -94,7 +97,9 @@ class LiveReplay extends Replay {
   // A frame whose look has not come yet is taken for the watched agent's.
   isFollowed(agent, frame) { return (this.looks.get(frame)?.agent ?? this.watched) === agent; }
   // One that has not come yet will.
-  hasImages(agent, frame) { return Boolean(this.images && this.isFollowed(agent, frame) && (this.looks.get(frame)?.images ?? !this.looks.has(frame))); }
+  hasImages(agent, frame) { return Boolean(this.sendsImages && this.isFollowed(agent, frame) && (this.looks.get(frame)?.images ?? !this.looks.has(frame))); }
+  // From what this object holds now: restart() and drop() give it other looks.
+  async imagesOf(frame) { return this.looks.get(frame)?.images ?? null; }
   decision(agent, frame) {
     const look = this.looks.get(frame);
     return look?.agent === agent ? look.decision : null;
@@ -109,14 +114,15 @@ class LiveConnection {
   constructor(on) {
     Object.assign(this, { on, state: "connecting", paused: false, pace: 1, driven: -1, mine: -1, isMine: false, held: new Set(), sending: Promise.resolve() });
   }
-  // Resolves with the replay once the world has been described.
+  // Resolves with the replay once the world has been described; rejects where it will not be.
   begin() {
-    return new Promise(resolve => {
-      const source = new EventSource("events");
+    return new Promise((resolve, reject) => {
+      const source = this.source = new EventSource("events");
+      const giveUp = error => { this.close(); reject(error); };
       // In their order, though the first takes its time to be unpacked.
       let work = Promise.resolve();
       const listen = (name, act) => source.addEventListener(name, event => {
-        work = work.then(() => act(JSON.parse(event.data))).catch(error => this.on.fault(error));
+        work = work.then(() => act(JSON.parse(event.data))).catch(error => this.replay ? this.on.fault(error) : giveUp(error));
       });
       listen("begin", async message => {
         const replay = await LiveReplay.of(message);
@@ -140,11 +146,19 @@ class LiveConnection {
       listen("end", () => { this.state = "ended"; source.close(); this.on.change(); });
       source.addEventListener("error", () => {
         if (this.state === "ended") return;
-        this.state = source.readyState === EventSource.CLOSED ? "refused" : "lost";
+        // One that is only lost is tried again.
+        const isRefused = source.readyState === EventSource.CLOSED;
+        if (isRefused && !this.replay) { giveUp(new Refused(REFUSED)); return; }
+        this.state = isRefused ? "refused" : "lost";
         this.on.change();
       });
-      setInterval(() => { if (this.mine >= 0) this.sendKeys(); }, 250);
+      this.timer = setInterval(() => { if (this.mine >= 0) this.sendKeys(); }, 250);
     });
+  }
+  // A page that cannot show the world leaves its place to another.
+  close() {
+    this.source?.close();
+    clearInterval(this.timer);
   }
   ask(request) {
     if (this.state === "ended") return;

@@ -3,25 +3,30 @@
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16];
 
 function fail(message) {
-  const box = byId("message");
+  const box = byId("message"), what = byId("replay-live") ? "This page cannot show the simulation" : "This replay is damaged";
   box.className = "error";
-  box.replaceChildren(make("p", `This replay is damaged: ${message}.`));
+  box.replaceChildren(make("p", `${what}: ${message}.`));
   box.hidden = false;
   byId("app").hidden = true;
 }
 
 async function main() {
-  let replay;
   // What happens at once, before there are views: nothing.
   const live = byId("replay-live") && new LiveConnection({ fault: error => { throw error; }, restart() {}, frame() {}, change() {} });
   if (live) byId("message").firstElementChild.textContent = "Waiting for the simulation ...";
   try {
-    replay = await (live ? live.begin() : readReplay());
+    show(await (live ? live.begin() : readReplay()), live);
   } catch (error) {
-    fail(error.message.replace(/\.$/, ""));
+    if (live) live.close();
+    const isForeseen = error instanceof Damaged || error instanceof Refused;
+    fail(isForeseen ? error.message.replace(/\.$/, "") : `a part of it cannot be shown (${error.message})`);
     window.pictura = { damaged: error.message };
-    return;
+    if (!isForeseen) console.error(error);  // which says where it was
   }
+}
+
+// Makes the views, and plays. Throws where they cannot be made of what the replay holds.
+function show(replay, live) {
   const header = replay.header, last = () => replay.frames - 1;
   byId("message").hidden = true;
   byId("app").hidden = false;
@@ -320,7 +325,7 @@ async function main() {
   });
 
   // A world that runs.
-  const LIVE_TEXTS = { lost: "connection lost, trying again", refused: "this address serves no simulation any more", ended: "the simulation has ended" };
+  const LIVE_TEXTS = { lost: "connection lost, trying again", refused: REFUSED, failed: "this page cannot read what it was sent", ended: "the simulation has ended" };
   function showLive() {
     byId("live-state").textContent = LIVE_TEXTS[live.state] ?? (live.paused ? "paused" : "live");
     byId("live-state").className = live.state === "live" && !live.paused ? "on" : "";
@@ -337,7 +342,7 @@ async function main() {
     window.addEventListener("keyup", event => live.key(event.key.length === 1 ? event.key.toLowerCase() : event.key, false));
     window.addEventListener("blur", () => live.release());
     live.on = {
-      fault(error) { live.state = "refused"; dirty(); throw error; },
+      fault(error) { live.close(); live.state = "failed"; dirty(); throw error; },
       restart() { state.time = last(); counted = -1; dirty(); },
       frame(dropped) {
         state.time = Math.max(0, state.time - dropped);
@@ -424,6 +429,7 @@ async function main() {
   readAddress();
   if (live) live.ask({ watch: state.agent });
   fillHeader();
+  render();  // here, where a fault is still caught
   requestAnimationFrame(now => { before = now; frame(now); });
 }
 

@@ -147,7 +147,7 @@ class Panel {
       const reasons = reasonsOf(replay.raw("halt_reason", agent, frame));
       let since = frame;
       while (since > replay.episode(frame).first && replay.raw("status", agent, since - 1) === HALTED) --since;
-      line.replaceChildren(`${size}, halted since ${(since * replay.dt_s).toFixed(1)} s: `, ...reasons.map((reason, i) => {
+      line.replaceChildren(`${size}, halted since ${((replay.firstStep + since) * replay.dt_s).toFixed(1)} s: `, ...reasons.map((reason, i) => {
         const word = make("b", (i ? ", " : "") + reason.name);
         word.style.color = theme[reason.color];
         return word;
@@ -231,7 +231,7 @@ class Panel {
     let bytes = null, fault = "";
     if (isKept) {
       try {
-        bytes = await replay.images.frame(frame);
+        bytes = await replay.imagesOf(frame);
       } catch (error) {
         this.actions.fail(`its images cannot be read (${error.message})`);
         return;

@@ -84,11 +84,16 @@ def test_an_episode_that_a_reset_begins_is_an_episode(make, tmp_path):
 def test_a_reset_of_another_world_is_none_of_the_recorded_one(make):
     simulator = make(3, 2)
     recorder = pictura.Recorder(simulator, world=1)
+    scenes = pictura.SceneRecorder(simulator, world=1)
+    simulator.reset(np.array([1, 0], np.uint8))  # both are at the start of an episode
+    assert recorder.num_steps == scenes.num_steps == 0
     simulator.step(actions_of(0, 6))
     simulator.reset(np.array([1, 0], np.uint8))
-    assert recorder.num_steps == 1
+    assert recorder.num_steps == scenes.num_steps == 1
+    simulator.step(actions_of(1, 6))
+    assert recorder.num_steps == scenes.num_steps == 2
     simulator.reset(np.array([0, 1], np.uint8))
-    assert recorder.num_steps == 2
+    assert (recorder.num_steps, scenes.num_steps) == (3, 2), "a scene is of one episode"
 
 
 def test_what_cannot_be_recorded_is_refused_by_name(make, tmp_path):
@@ -104,6 +109,8 @@ def test_what_cannot_be_recorded_is_refused_by_name(make, tmp_path):
         recorder.write("a.gif")
     with pytest.raises(pictura.Error, match="nowhere"):
         recorder.write(str(tmp_path / "nowhere/a.html"))
+    with pytest.raises(pictura.Error, match="zero byte"):
+        recorder.write(str(tmp_path / "a\0.html"))
     followed = pictura.Recorder(simulator, follow=0)
     with pytest.raises(pictura.Error, match="logits: expected \\[12\\], got 11"):
         followed.decide(np.zeros(11))

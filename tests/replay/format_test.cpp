@@ -1,4 +1,5 @@
 // The format of replays: what is written is read back, and damage is named.
+#include <filesystem>
 #include <random>
 
 #include <gmock/gmock.h>
@@ -9,6 +10,7 @@
 #include "pictura/replay/file.h"
 #include "pictura/replay/gallery.h"
 #include "pictura/replay/images.h"
+#include "pictura/replay/mcap.h"
 #include "pictura/simulator/conditioning.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
@@ -272,11 +274,19 @@ TEST(ReplayFormat, NoHeaderMakesTheReaderFailOtherwiseThanByAnError) {
       ++k;
     }
     write_file(path, damaged);
+    Replay replay;
     try {
-      const Replay replay = read_replay(path);
-      for (const std::string& group : replay.images.groups) unpack_images(replay.cameras, group, 1);
+      replay = read_replay(path);
     } catch (const Error&) {
       ++refused;
+      continue;
+    }
+    try {
+      for (const std::string& group : replay.images.groups) {
+        unpack_images(replay.cameras, group, replay.images.frames_per_group);
+      }
+    } catch (const Error&) {
+      // Images are looked at only when they are shown.
     }
   }
   EXPECT_GT(refused, kTries / 4);
@@ -295,7 +305,45 @@ TEST(ReplayFormat, AGalleryListsTheWorstFirst) {
   EXPECT_LT(index.find("c.html"), index.find("a.html"));
   EXPECT_EQ(write_gallery(folder.path()), 3);  // the index is none of them
   write_file(folder / "other.html", "<p>no replay</p>");
+  EXPECT_THAT(message_of([&] { check_gallery(folder.path()); }), HasSubstr("other.html: expected a page of pictura"));
   EXPECT_THAT(message_of([&] { write_gallery(folder.path()); }), HasSubstr("other.html: expected a page of pictura"));
+}
+
+TEST(ReplayFormat, AGalleryTakesNoOtherPagesPlaceAndNamesAHeaderThatLacksAValue) {
+  const ScratchFolder folder;
+  write_replay(folder / "a.html", any_replay());
+  write_file(folder / "index.html", "<p>mine</p>");
+  EXPECT_THAT(message_of([&] { check_gallery(folder.path()); }), HasSubstr("index.html: expected an index of replays"));
+  EXPECT_THAT(message_of([&] { write_gallery(folder.path()); }), HasSubstr("index.html: expected an index of replays"));
+  EXPECT_EQ(read_file(folder / "index.html"), "<p>mine</p>");
+  std::filesystem::remove(folder / "index.html");
+  std::string page = read_file(folder / "a.html");
+  page.replace(page.find("\"metrics\"", page.find("id=\"replay-header\">")), 9, "\"metrix_\"");
+  write_file(folder / "a.html", page);
+  EXPECT_THAT(message_of([&] { write_gallery(folder.path()); }), HasSubstr("a.html: expected a replay's header"));
+}
+
+TEST(ReplayFormat, TextsFromOutsideMayHoldAnything) {
+  const ScratchFolder folder;
+  Replay replay = any_replay();
+  replay.origin.map = "{{elements}}</script>";
+  replay.origin.policy = "caf\xe9";  // no UTF-8
+  write_replay(folder / "a.html", replay);
+  const Replay read = read_replay(folder / "a.html");
+  EXPECT_EQ(read.origin.map, replay.origin.map);
+  EXPECT_EQ(read.origin.policy, "caf\uFFFD");
+  EXPECT_THAT(read_file(folder / "a.html"), HasSubstr("<title>{{elements}}&lt;/script&gt;"));
+  write_mcap(folder / "a.mcap", replay);
+  EXPECT_EQ(write_gallery(folder.path()), 1);
+}
+
+TEST(ReplayFormat, AFirstGroupOfImagesThatIsTooLargeLeavesNone) {
+  const ScratchFolder folder;
+  Replay replay = any_replay();
+  replay.images.groups = {std::string(size_t{8} << 20, 'x'), "y"};
+  write_replay(folder / "a.html", replay);
+  EXPECT_TRUE(read_replay_header(folder / "a.html").at("images").is_null());
+  EXPECT_TRUE(read_replay(folder / "a.html").images.groups.empty());
 }
 
 }  // namespace

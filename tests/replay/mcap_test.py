@@ -21,6 +21,26 @@ except ImportError:
 
 PICTURA = ""
 
+TYPES = {"object": dict, "array": list, "string": str, "boolean": bool, "integer": int, "number": (int, float)}
+
+
+def differences(value, schema, path=""):
+    """What a value and its schema do not agree on, as (what, where) of members: undeclared, lacking, or of another type."""
+    is_true_or_false = isinstance(value, bool)  # which is a number to Python
+    if is_true_or_false != (schema["type"] == "boolean") or not isinstance(value, TYPES[schema["type"]]):
+        return {("type", path)}
+    found = set()
+    if schema["type"] == "object":
+        declared = schema["properties"]
+        found |= {("undeclared", f"{path}.{name}") for name in value.keys() - declared.keys()}
+        found |= {("lacking", f"{path}.{name}") for name in declared.keys() - value.keys()}
+        for name in value.keys() & declared.keys():
+            found |= differences(value[name], declared[name], f"{path}.{name}")
+    if schema["type"] == "array":
+        for member in value:
+            found |= differences(member, schema["items"], path)
+    return found
+
 
 @unittest.skipIf(SeekingReader is None, "needs PyPI's mcap: scripts/setup installs it")
 class Mcap(unittest.TestCase):
@@ -43,10 +63,28 @@ class Mcap(unittest.TestCase):
         cameras = {f"/camera/{name}": "foxglove.CompressedImage" for name in (c["name"] for c in self.page.header["cameras"])}
         self.assertEqual(schemas, {"/map": "foxglove.SceneUpdate", "/agents": "foxglove.SceneUpdate", "/lights": "foxglove.SceneUpdate",
                                    "/events": "foxglove.Log", "/agent": "pictura.Agent", **cameras})  # fmt: skip
-        for messages in self.messages.values():
-            schema = json.loads(messages[0][0].data)
-            self.assertLessEqual(set(schema["required"]) if "required" in schema else set(), set(messages[0][2]))
-            self.assertLessEqual(set(messages[0][2]), set(schema["properties"]))
+
+    def test_messages_have_what_their_schemas_declare(self):
+        # A scene has what is drawn in it alone, and nobody asks random actions for probabilities.
+        parts = {".entities." + name for name in ("cubes", "spheres", "lines", "texts")}
+        absent = {"/map": parts - {".entities.lines"}, "/agents": parts - {".entities.cubes", ".entities.texts"}, "/lights": parts - {".entities.spheres"},
+                  "/agent": {".probabilities", ".value"}}  # fmt: skip
+        for topic, messages in self.messages.items():
+            schema, wanted = json.loads(messages[0][0].data), {("lacking", path) for path in absent.get(topic, ())}
+            for _, _, message in messages:
+                self.assertEqual(differences(message, schema), wanted, topic)
+        self.assertEqual(set(self.messages["/agent"][0][2]), {"agent", *self.page.tracks})
+
+    def test_what_schemas_and_messages_differ_in_is_found(self):
+        point = {"type": "object", "properties": {"x": {"type": "number"}}}
+        schema = {"type": "object", "properties": {"points": {"type": "array", "items": point}, "name": {"type": "string"}}}
+        for message, wanted in [
+            ({"points": [{"x": 1}], "name": "a"}, set()),
+            ({"points": [{"x": 1}, {"x": 2, "y": 3}], "name": "a"}, {("undeclared", ".points.y")}),
+            ({"points": [{}]}, {("lacking", ".points.x"), ("lacking", ".name")}),
+            ({"points": [{"x": True}], "name": 1}, {("type", ".points.x"), ("type", ".name")}),
+        ]:
+            self.assertEqual(differences(message, schema), wanted)
 
     def test_agents_are_where_the_page_has_them(self):
         tracks = self.page.tracks

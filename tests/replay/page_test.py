@@ -398,13 +398,52 @@ class Chromium(PageCase):
         }
         for name, text in damaged.items():
             with self.subTest(name):
-                path = self.folder / "damaged.html"
-                path.write_text(text)
-                self.browser.open(path)
-                self.browser.wait_for("document.querySelector('#message.error')")
-                message = self.browser.run("document.getElementById('message').innerText")
-                self.assertIn("This replay is damaged", message)
-                self.assertTrue(self.browser.run("document.getElementById('app').hidden"))
+                self.assert_damaged(text, "This replay is damaged")
+
+    def assert_damaged(self, text, message):
+        path = self.folder / "damaged.html"
+        path.write_text(text)
+        self.browser.open(path)
+        self.browser.wait_for("document.querySelector('#message.error')")
+        self.assertIn(message, self.browser.run("document.getElementById('message').innerText"))
+        self.assertTrue(self.browser.run("document.getElementById('app').hidden"))
+        self.assertFalse(self.browser.run("document.getElementById('message').hidden"))
+
+    def test_a_header_that_was_changed_says_so(self):
+        page = self.path.read_text()
+        at = page.index('id="replay-header">')
+
+        def changed(old, new):  # in the header, not in the script before it
+            self.assertIn(old, page[at:])
+            return page[:at] + page[at:].replace(old, new, 1)
+
+        for old, new, message in [
+            ('"frames":91,', '"frames":90,', "has more numbers than its header says"),
+            ('"frames":91,', '"frames":92,', "its numbers end too early"),
+            ('"frames":91,', '"frames":900000000,', "its numbers end too early"),
+            ('"agents":24,', '"agents":23,', "This replay is damaged"),
+            ('"name":"y_m","bytes"', '"name":"why_m","bytes"', "unknown section why_m"),
+            ('"followed":4,', '"followed":24,', "followed: expected an agent below 24, got 24"),
+            ('"dt_s":', '"dt_s":"0.1","was":', 'dt_s: expected a number, got "0.1"'),
+            ('"width_px":', '"width":', "cameras.0.width_px: expected a whole number, got nothing"),
+        ]:
+            with self.subTest(new):
+                self.assert_damaged(changed(old, new), message)
+        header = self.recorded.header
+        for name in ["metrics", "cameras", "lights", "dt_s", "classes", "conditioning", "tracks", "sections", "case", "images", "decision_unit", "light_hues"]:
+            with self.subTest(name):
+                self.assertIn(name, header)
+                self.assert_damaged(changed(f'"{name}":', f'"other_{name}":'), f"its header: {name}: expected")
+        for name in header["metrics"]:
+            with self.subTest(name):
+                self.assert_damaged(changed(f'"{name}":', f'"other_{name}":'), f"its header: metrics.{name}: expected")
+
+    def test_what_cannot_be_shown_says_so(self):
+        # A header that has all that it must have, but tracks that no view knows.
+        page = self.path.read_text()
+        at = page.index('id="replay-header">')
+        self.assert_damaged(page[:at] + page[at:].replace('"name":"steer_deg"', '"name":"steering"'), "This replay is damaged: a part of it cannot be shown")
+        self.assertTrue(self.browser.errors)
 
     def test_the_gallery_filters_and_leads_to_replays(self):
         folder = self.folder / "gallery"

@@ -13,6 +13,8 @@
 #include <gtest/gtest.h>
 #include <httplib.h>
 
+#include "pictura/tests/support/error_message.h"
+
 namespace pictura {
 namespace {
 
@@ -100,6 +102,23 @@ TEST(LiveServer, TellsItsPagesAllInOrderWhileOthersComeAskAndGo) {
   EXPECT_THAT(statuses, ::testing::Each(204));
   ASSERT_EQ(watched.size(), static_cast<size_t>(kRequests));
   for (int i = 0; i < kRequests; ++i) EXPECT_EQ(watched[static_cast<size_t>(i)], i % kServedAgents);
+}
+
+TEST(LiveServer, HasItsPortForItselfAndRefusesNamesThatNoBrowserSends) {
+  if (!can_serve()) GTEST_SKIP() << "this build cannot serve";
+  const LiveServer first(LiveServerOptions{.num_agents = 1});
+  const std::string address = first.address();
+  const int port = std::stoi(address.substr(address.rfind(':') + 1));
+  EXPECT_THAT(test::message_of([&] { LiveServer(LiveServerOptions{.port = port, .num_agents = 1}); }),
+              testing::HasSubstr("is the port taken?"));
+  const LiveServer named(LiveServerOptions{.host_name = "LocalHost", .num_agents = 1});
+  EXPECT_THAT(named.address(), testing::StartsWith("http://localhost:"));
+  for (const char* name : {"a b", "x/y", "a:1", "\"><script>"}) {
+    EXPECT_THAT(
+        test::message_of<UsageError>([&] { LiveServer(LiveServerOptions{.host_name = name, .num_agents = 1}); }),
+        testing::HasSubstr("expected letters, digits, dots and hyphens"))
+        << name;
+  }
 }
 
 }  // namespace

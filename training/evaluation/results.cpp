@@ -7,6 +7,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/json_text.h"
 #include "pictura/training/evaluation/results_json.h"
 
 namespace pictura {
@@ -155,7 +156,7 @@ void write_results(const std::string& path, const EvaluationResults& results) {
                          {"scenarios", scenarios}});
   }
   const Json json = {{"format", kResultsFormat}, {"setting", to_json(results.setting)}, {"densities", densities}};
-  write_file(path, json.dump(1) + "\n");
+  write_file(path, json_text(json, 1) + "\n");
 }
 
 EvaluationResults read_results(const std::string& path) {

@@ -6,6 +6,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/json_text.h"
 #include "pictura/simulator/fields.h"
 #include "pictura/training/evaluation/csv.h"
 #include "pictura/training/evaluation/results_json.h"
@@ -171,7 +172,7 @@ void write_results(const std::string& path, const SceneResults& results) {
                      {"without_drivers", results.without_drivers},
                      {"faults", results.faults},
                      {"counts", counts}};
-  write_file(path, json.dump(1) + "\n");
+  write_file(path, json_text(json, 1) + "\n");
 }
 
 SceneResults read_scene_results(const std::string& path) {

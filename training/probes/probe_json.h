@@ -1,6 +1,7 @@
 // What the summaries of all probes have in common, as JSON.
 #pragma once
 
+#include "pictura/common/support/json_text.h"
 #include "pictura/training/evaluation/estimate_json.h"
 #include "pictura/training/probes/probe_results.h"
 
@@ -22,7 +23,7 @@ std::string summary_text(const ProbeResults& results, Json json, const std::vect
   Json rows_json = Json::array();
   for (const Row& row : rows) rows_json.push_back(to_json(row));
   json["rows"] = std::move(rows_json);
-  return json.dump(1);
+  return json_text(json, 1);
 }
 
 }  // namespace pictura
