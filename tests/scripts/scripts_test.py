@@ -1,5 +1,6 @@
-"""The scripts: their help from any folder, what scripts/setup links, what they do with a run that is there, and the
-results of scripts/gpu_check_record.py.
+"""The scripts: their help from any folder, what they refuse, what scripts/setup links, what scripts/format formats, what
+scripts/gpu_carry leaves when it fails, what those that train do with a run that is there, the status of those that measure and
+of lists of work, and the results of scripts/gpu_check_record.py.
 
 Run by ctest: python3 scripts_test.py [unittest arguments].
 """
@@ -12,6 +13,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tarfile
 import tempfile
 import time
 import unittest
@@ -19,13 +21,272 @@ import unittest
 SCRIPTS = pathlib.Path(__file__).resolve().parents[2] / "scripts"
 
 
-class Help(unittest.TestCase):
-    def test_it_is_found_from_any_folder(self):
-        for name in ("setup", "format", "test", "demo", "gpu_check", "gpu_lanes", "gpu_ranks", "gpu_train", "reproduce_table", "docs", "film"):
+class Scratch(unittest.TestCase):
+    """Copies of scripts in a folder of their own, with programs in the place of others."""
+
+    COPIED = ()
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="pictura-test-")
+        self.addCleanup(folder.cleanup)
+        self.root = pathlib.Path(folder.name)
+        (self.root / "scripts").mkdir()
+        for name in self.COPIED:
+            shutil.copy(SCRIPTS / name, self.root / "scripts" / name)
+
+    def write(self, name, text):
+        path = self.root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        return path
+
+    def write_program(self, name, script):
+        self.write(name, f"#!/bin/sh\n{script}\n").chmod(0o755)
+
+    def run_script(self, name, *arguments, **variables):
+        environment = {**self.environment(), "PICTURA_VENV": "venv", "PATH": f"{self.root}/bin:{os.environ['PATH']}", **variables}
+        return subprocess.run([self.root / "scripts" / name, *arguments], env=environment, capture_output=True, text=True, timeout=60)
+
+    def environment(self):
+        """Without what would lead to programs, data or a checkout elsewhere."""
+        return {name: value for name, value in os.environ.items() if not name.startswith(("GIT_", "PICTURA_"))}
+
+
+class Help(Scratch):
+    COPIED = [path.name for path in SCRIPTS.iterdir() if path.is_file()]
+    EXECUTABLE = sorted(name for name in COPIED if os.access(SCRIPTS / name, os.X_OK))
+    SHELL = [name for name in EXECUTABLE if (SCRIPTS / name).read_bytes().startswith(b"#!/usr/bin/env bash\n")]
+    NEEDS_TORCH = ("export_backbone",)
+    PASSES_OPTIONS_ON = ("gpu_ranks",)  # to `pictura train`
+
+    def setUp(self):
+        super().setUp()
+        for name in ("apt-get", "cmake", "python3"):  # a script that does begin ends soon, and installs nothing
+            self.write_program(f"bin/{name}", "echo nothing is done here >&2; exit 1")
+
+    def assert_nothing_was_done(self):
+        self.assertEqual(sorted(path.name for path in self.root.iterdir()), ["bin", "scripts"])
+
+    def test_it_is_found_from_any_folder_and_does_nothing_else(self):
+        self.assertGreater(len(self.SHELL), 10)
+        for name in self.EXECUTABLE:
+            if name in self.NEEDS_TORCH:
+                continue
+            for option in ("--help", "-h"):
+                with self.subTest(name, option=option):
+                    programs = f"{self.root}/bin:" if name in self.SHELL else ""
+                    result = subprocess.run([f"./{name}", option], cwd=self.root / "scripts", capture_output=True, text=True, timeout=60,
+                                            env={**os.environ, "PATH": programs + os.environ["PATH"]})  # fmt: skip
+                    self.assertEqual((result.returncode, result.stderr), (0, ""))
+                    self.assertGreater(len(result.stdout.splitlines()), 1)
+                    self.assert_nothing_was_done()
+
+    def test_of_a_shell_script_it_is_the_comment_at_its_beginning(self):
+        for name in self.SHELL:
             with self.subTest(name):
-                result = subprocess.run([f"./{name}", "--help"], cwd=SCRIPTS, capture_output=True, text=True, timeout=60)
-                self.assertEqual((result.returncode, result.stderr), (0, ""))
-                self.assertGreater(len(result.stdout.splitlines()), 1)
+                comment = (SCRIPTS / name).read_text().partition("\nset ")[0].splitlines()[1:]
+                help_lines = self.run_script(name, "--help").stdout.splitlines()
+                self.assertEqual(help_lines, [line.removeprefix("#").removeprefix(" ") for line in comment])
+
+    def test_what_a_shell_script_does_not_know_is_refused_before_it_does_anything(self):
+        unknown = [(name, "--bogus") for name in self.SHELL if name not in self.PASSES_OPTIONS_ON]
+        more = [("demo", "--seed", "3", "extra"), ("demo", "out", "extra"), ("demo", "--seeds", "2", "out", "extra"), ("figures", "a", "b"),
+                ("film", "a", "b"), ("python_stubs", "a", "b"), ("gpu_carry", "a"), ("format", "--check", "a")]  # fmt: skip
+        for name, *arguments in unknown + more:
+            with self.subTest(name, arguments=arguments):
+                result = self.run_script(name, *arguments)
+                self.assertEqual((result.returncode, result.stdout, len(result.stderr.splitlines())), (2, "", 1), result.stderr)
+                self.assertRegex(result.stderr, f"^error: {name}: expected .*, got '")
+                self.assert_nothing_was_done()
+
+
+class Format(Scratch):
+    """A checkout of its own, with a clang-format that says which files it gets."""
+
+    COPIED = ("format",)
+
+    def setUp(self):
+        super().setUp()
+        self.write("requirements.txt", "clang-format==1.2.3\n")
+        self.write_program("venv/bin/clang-format", f"""
+            case $1 in
+              --version) echo 1.2.3 ;;
+              *) for file; do case $file in -*) ;; *) cat "$file" >/dev/null || exit 1; echo "$file" >>{self.root}/formatted ;; esac; done ;;
+            esac""")  # fmt: skip
+
+    def git(self, *arguments):
+        subprocess.run(["git", *arguments], cwd=self.root, env=self.environment(), check=True, capture_output=True, timeout=60)
+
+    def formatted(self):
+        (self.root / "formatted").write_text("")
+        result = self.run_script("format", "--check")
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        return sorted((self.root / "formatted").read_text().splitlines())
+
+    def test_names_may_be_any_and_what_was_deleted_is_left_out(self):
+        if shutil.which("git") is None:
+            self.skipTest("needs git")
+        self.git("init")
+        self.assertEqual(self.formatted(), [])
+        for name in ("a.cpp", "gone.cpp", "Stra\u00dfe.h", "two words.cu", "text.md"):
+            self.write(name, "")
+        self.git("add", ".")
+        self.write("untracked.cuh", "")
+        (self.root / "gone.cpp").unlink()
+        self.assertEqual(self.formatted(), ["Stra\u00dfe.h", "a.cpp", "two words.cu", "untracked.cuh"])
+
+    def test_without_a_checkout_it_skips(self):
+        result = self.run_script("format", "--check", GIT_DIR=str(self.root / "none"))
+        self.assertEqual(result.returncode, 77)
+        self.assertIn("not a git checkout", result.stderr)
+
+
+class Carry(Scratch):
+    """With programs that fetch nothing, in the place of apt-get and pip."""
+
+    COPIED = ("gpu_carry",)
+
+    def setUp(self):
+        super().setUp()
+        self.fetch("first")
+
+    def fetch(self, content, pip="true", **variables):
+        self.write_program("bin/apt-get", f"echo {content} >{content}.deb")
+        self.write_program("venv/bin/python", f"""
+            while [ "$1" != --dest ]; do shift; done
+            echo {content} >"$2/{content}.whl"
+            {pip}""")  # fmt: skip
+        shutil.rmtree(self.root / "data", ignore_errors=True)
+        self.write(f"data/carla/{content}.xodr", content)
+        return self.run_script("gpu_carry", PICTURA_DATA="data", **variables)
+
+    def names(self):
+        return sorted(str(path.relative_to(self.root / "carry")) for path in (self.root / "carry").rglob("*") if path.is_file())
+
+    def test_what_is_fetched_takes_the_place_of_what_was_there(self):
+        self.assertEqual(self.names(), ["debs/first.deb", "maps/carla/first.xodr.gz", "wheels/first.whl"])
+        for name in ("root/unpacked", "bin/pictura", "maps/mine.xodr", "new/of_a_killed_call"):
+            self.write(f"carry/{name}", "")
+        result = self.fetch("second")
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        fetched = ["debs/second.deb", "maps/carla/second.xodr.gz", "wheels/second.whl"]
+        self.assertEqual(self.names(), sorted([*fetched, "bin/pictura", "maps/mine.xodr"]))
+
+    def test_a_call_that_fails_leaves_what_was_there(self):
+        self.write("carry/root/unpacked", "")
+        before = self.names()
+        self.assertEqual(self.fetch("second", pip="exit 5").returncode, 5)
+        self.assertEqual(self.names(), before)
+        self.assertFalse((self.root / "carry/new").exists())
+
+
+class OnADevice(Scratch):
+    """Scripts for a machine with a GPU, with a `pictura` that was built elsewhere, and a package that stands for torch."""
+
+    COPIED = ("gpu_check", "gpu_check_record.py", "gpu_env", "gpu_lanes")
+
+    def setUp(self):
+        super().setUp()
+        self.write("CMakeLists.txt", "project(nothing)")
+        self.write("python/torch/__init__.py", "")
+        # Trains until there is no time, or fails, as its first argument says; exports what is no broken checkpoint.
+        self.write_program("pictura", """
+            case "$1 $2" in
+              "train late") echo '{"out_of_time": true}' ;;
+              "train done") echo '{"out_of_time": false}' ;;
+              "train "*) echo "no such training" >&2; exit 3 ;;
+              "export runs/broken/"*) echo "error: broken" >&2; exit 1 ;;
+              "export "*) echo weights >"$4" ;;
+              *) echo '{}' ;;
+            esac""")  # fmt: skip
+
+    def run_script(self, name, *arguments, **variables):
+        elsewhere = {"PICTURA_PROGRAM": str(self.root / "pictura"), "PYTHONPATH": str(self.root / "python")}
+        return super().run_script(name, *arguments, **elsewhere | variables)
+
+
+class Lanes(OnADevice):
+    def work(self, *lines, seconds=100, **variables):
+        list_of_work = self.write("list", "".join(f"{line}\n" for line in lines))
+        result = self.run_script("gpu_lanes", "--out", self.root / "out", str(seconds), list_of_work, **variables)
+        return result.returncode, result.stdout, result.stderr
+
+    def packed(self):
+        whole = self.root / "whole.tar.gz"
+        whole.write_bytes(b"".join(path.read_bytes() for path in sorted((self.root / "out").iterdir())))
+        with tarfile.open(whole) as tar:
+            return {member.name for member in tar if member.isfile()}
+
+    def test_a_lane_that_fails_sets_the_status_and_ends_only_its_own_work(self):
+        status, said, _ = self.work("0 good 1 true", "1 bad 1 sh -c 'echo wrong >&2; exit 7'", "1 after 1 true", "0 last 1 true")
+        self.assertEqual(status, 1)
+        self.assertIn("GPU 1: bad has failed: wrong", said)
+        self.assertEqual({name for name in self.packed() if name.endswith(".done")}, {"runs/lanes/good.done", "runs/lanes/last.done"})
+        self.assertEqual(self.work("0 good 1 true", "1 bad 1 true")[0], 0)
+        self.assertIn("runs/lanes/bad.done", self.packed())
+
+    def test_a_single_lane_that_fails_sets_it_too(self):
+        for command in ("false", "sh -c 'exit 124'", "no_such_command", "pictura train wrong", "pictura"):
+            with self.subTest(command):
+                status, said, _ = self.work(f"0 only 1 {command}")
+                is_done = command == "pictura"
+                self.assertEqual((status, "only has failed" in said), (0, False) if is_done else (1, True), said)
+
+    def test_what_the_time_ends_has_not_failed(self):
+        status, said, _ = self.work("0 long 1000 true", "1 training 1 pictura train late", "2 trained 1 pictura train done")
+        self.assertEqual(status, 0, said)
+        for what in ("GPU 0: no time for long", "GPU 1: training is not done: out of time", "GPU 2: trained is done"):
+            self.assertIn(what, said)
+        self.write_program("bin/timeout", "exit 124")  # as it ends what takes too long
+        status, said, _ = self.work("0 slow -50 true", seconds=0)
+        self.assertEqual(status, 0, said)
+        self.assertIn("slow is not done: out of time", said)
+        self.assertFalse({name for name in self.packed() if name.endswith(".done")} - {"runs/lanes/trained.done"})
+
+    def test_weights_that_cannot_be_exported_leave_the_others_packed(self):
+        for name in ("broken", "whole"):
+            self.write(f"runs/{name}/checkpoint.ckpt", "")
+        status, said, errors = self.work("0 good 1 true")
+        self.assertEqual((status, errors), (1, "error: broken\n"))
+        self.assertIn("the weights of runs/broken/checkpoint.ckpt are not exported", said)
+        self.assertEqual({name for name in self.packed() if name.endswith(".safetensors")}, {"runs/lanes/whole.safetensors"})
+
+    def test_a_program_without_torch_ends_at_once(self):
+        self.write("python/torch/__init__.py", "raise ImportError('no torch')")
+        status, said, errors = self.work("0 good 1 true")
+        self.assertEqual((status, said), (1, ""))
+        self.assertIn("no torch", errors)
+
+
+class Check(OnADevice):
+    def measured(self, stage):
+        return [entry["name"] for entry in json.loads((self.root / f"out/gpu_check_{stage}.json").read_text()).get("bench", [])]
+
+    def check(self, *arguments):
+        result = self.run_script("gpu_check", "--out", self.root / "out", *arguments)
+        return result.returncode, result.stderr
+
+    def test_only_chooses_measurements(self):
+        self.assertEqual(self.check("--only", "^pl|qua", "benches", "squares"), (0, ""))
+        self.assertEqual((self.measured("benches"), self.measured("squares")), (["planes"], ["squares"]))
+        self.assertEqual(self.check("--only", "^history$", "benches", "squares"), (0, ""))
+        self.assertEqual((self.measured("benches"), self.measured("squares")), (["planes", "history"], ["squares"]))
+        self.assertEqual(self.check("squares"), (0, ""))
+        self.assertEqual(self.measured("squares"), ["squares"])
+
+    def test_only_that_matches_nothing_is_an_error(self):
+        error = "error: gpu_check: --only: expected what matches one of 'draw', 'squares', got 'plains'\n"
+        self.assertEqual(self.check("--only", "plains", "profile", "squares"), (1, error))
+
+    def test_only_is_a_regular_expression(self):
+        for bad in (["("], ["["], ["*("], []):
+            error = f"error: gpu_check: --only: expected a regular expression, got '{''.join(bad)}' (see --help)\n"
+            self.assertEqual(self.check("squares", "--only", *bad), (2, error))
+            self.assertFalse((self.root / "out").exists())
+
+    def test_a_measurement_that_fails_sets_the_status(self):
+        self.write_program("pictura", 'test "$1" = --version')
+        self.assertEqual(self.check("squares"), (1, ""))
 
 
 class ReproduceTable(unittest.TestCase):
@@ -213,7 +474,7 @@ class Runs(unittest.TestCase):
         self.assertEqual(trained.split()[2:8], ["2.00", "+-", "1.00", "2.00", "+-", "0.00"])
         for bad in ("1", "0", "x", "100"):
             result = demo("--seeds", bad)
-            self.assertEqual((result.returncode, result.stderr), (2, f"demo: --seeds: expected 2 to 99, got '{bad}'\n"))
+            self.assertEqual((result.returncode, result.stderr), (2, f"error: demo: --seeds: expected 2 to 99, got '{bad}'\n"))
 
     def test_training_goes_on_exactly_where_there_is_a_checkpoint(self):
         train = ("gpu_train", "run", "--minutes", "8")
