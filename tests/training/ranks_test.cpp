@@ -196,6 +196,19 @@ TEST(RanksLoseEachOther, WhenOneHangsButNotWhenItWorksForLong) {
   EXPECT_THAT(errors[1], HasSubstr("rank 1: alive"));
 }
 
+TEST(RanksLoseEachOther, NotWhereStepsMayTakeLonger) {
+  const std::vector<std::string> errors = run_ranks(2,
+                                                    [](Ranks& ranks) {
+                                                      ranks.set_no_progress_s(60);
+                                                      ranks.step();
+                                                      if (ranks.rank() == 0) ranks.step();
+                                                      std::this_thread::sleep_for(std::chrono::seconds(3));
+                                                      ranks.step();
+                                                    },
+                                                    {.silent_s = 10, .no_progress_s = 0.5});
+  EXPECT_THAT(errors, ::testing::Each(test::kNoError));
+}
+
 TEST(Communicators, GiveEveryRankTheSameBits) {
   std::vector<at::Tensor> sums(3);
   const std::vector<std::string> errors = run_ranks(3, [&](Ranks& ranks) {

@@ -52,7 +52,8 @@ const std::string kFault = "fault";
 
 }  // namespace
 
-Ranks::Ranks(const Launch& launch, const Patience& patience) : launch_(launch), patience_(patience) {
+Ranks::Ranks(const Launch& launch, const Patience& patience)
+    : launch_(launch), patience_(patience), no_progress_s_(patience.no_progress_s) {
   if (size() == 1) return;
   join();
   watcher_ = std::thread([this] { watch(); });
@@ -223,10 +224,10 @@ double seconds_since(Clock::time_point time) { return std::chrono::duration<doub
 // What the ranks' beats have told so far.
 class BeatHistory {
  public:
-  BeatHistory(int num_ranks, const Patience& patience) : patience_(patience), seen_(static_cast<size_t>(num_ranks)) {}
+  BeatHistory(int num_ranks, double silent_s) : silent_s_(silent_s), seen_(static_cast<size_t>(num_ranks)) {}
 
   // Takes the last round's beats, of all ranks, and says why one is lost; empty: none is.
-  std::string add(const std::vector<Beat>& beats) {
+  std::string add(const std::vector<Beat>& beats, double no_progress_s) {
     bool may_hang = true;
     std::optional<int64_t> least;
     for (size_t r = 0; r < seen_.size(); ++r) {
@@ -236,22 +237,22 @@ class BeatHistory {
       may_hang = may_hang && !beat.is_busy && beat.steps > 0;
       if (beat.has_left) continue;
       least = std::min(least.value_or(beat.steps), beat.steps);
-      if (seconds_since(seen_[r].changed) > patience_.silent_s) {
+      if (seconds_since(seen_[r].changed) > silent_s_) {
         return fmt::format("rank {}: no sign of life for {:.0f} s: it was killed or stopped, or its host is gone", r,
-                           patience_.silent_s);
+                           silent_s_);
       }
     }
     if (!may_hang || least.value_or(-1) != least_steps_) {
       least_steps_ = least.value_or(-1);
       progressed_ = Clock::now();
     }
-    if (seconds_since(progressed_) <= patience_.no_progress_s) return "";
+    if (seconds_since(progressed_) <= no_progress_s) return "";
     std::vector<size_t> behind;
     for (size_t r = 0; r < seen_.size(); ++r) {
       if (!seen_[r].beat.has_left && seen_[r].beat.steps == least_steps_) behind.push_back(r);
     }
     return fmt::format("rank {}: alive, but not a step further for {:.0f} s: it hangs", fmt::join(behind, ", "),
-                       patience_.no_progress_s);
+                       no_progress_s);
   }
 
  private:
@@ -259,7 +260,7 @@ class BeatHistory {
     Beat beat;
     Clock::time_point changed = Clock::now();  // its number
   };
-  Patience patience_;
+  double silent_s_;
   std::vector<Seen> seen_;
   int64_t least_steps_ = -1;
   Clock::time_point progressed_ = Clock::now();  // when the least number of steps changed
@@ -268,7 +269,7 @@ class BeatHistory {
 }  // namespace
 
 void Ranks::watch() {
-  BeatHistory history(size(), patience_);
+  BeatHistory history(size(), patience_.silent_s);
   std::vector<std::string> keys = keys_of_ranks("beat", size());
   keys.push_back(kFault);
   const auto exchange = std::make_shared<Exchange>();
@@ -296,7 +297,7 @@ void Ranks::watch() {
     if (!fault.empty() && !fault.starts_with(fmt::format("rank {} ", rank()))) return fault;
     std::vector<Beat> beats;
     for (size_t r = 0; r + 1 < values.size(); ++r) beats.push_back(Beat::of(values[r]));
-    return history.add(beats);
+    return history.add(beats, no_progress_s_);
   };
 
   std::unique_lock lock(mutex_);

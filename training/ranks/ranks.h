@@ -27,7 +27,7 @@ class RankLost : public Error {
 struct Patience {
   double join_s = 300;        // until all are there
   double silent_s = 20;       // without a sign of life: the process was killed or stopped, or its host is gone
-  double no_progress_s = 45;  // with signs of life, but without a step: it hangs
+  double no_progress_s = 45;  // with signs of life, but without a step: it hangs; Ranks::set_no_progress_s
 };
 
 class Ranks {
@@ -54,6 +54,9 @@ class Ranks {
   void find_lost() const;
   /// Says to the others why this process ends. The first to do so is heard.
   void announce(const std::string& why) noexcept;
+
+  /// Another time without a step after which a rank is taken for one that hangs, where steps may take longer.
+  void set_no_progress_s(double seconds) { no_progress_s_ = seconds; }
 
   /// While it lives this process takes no step for long, and is not taken for one that hangs.
   class LongWork {
@@ -83,6 +86,7 @@ class Ranks {
   const Launch launch_;
   const Patience patience_;
   c10::intrusive_ptr<c10d::Store> store_, watch_store_;  // the latter for the thread alone
+  std::atomic<double> no_progress_s_;
   std::atomic<int64_t> steps_ = 0;
   std::atomic<int> busy_ = 0;
   std::atomic<bool> is_lost_ = false;
