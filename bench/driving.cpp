@@ -14,7 +14,7 @@ void step_randomly(Simulator* simulator, uint64_t seed, int steps) {
   const auto controller = make_controller("random", *simulator, seed);
   std::vector<Command> commands(static_cast<std::size_t>(simulator->num_slots()));
   for (int step = 0; step < steps; ++step) {
-    if (interrupted()) throw Interrupted("interrupted");
+    throw_if_interrupted();
     controller->act(simulator->controller_input(), {}, commands);
     simulator->step(commands);
   }

@@ -165,7 +165,7 @@ class HistoryBench {
     Images image(case_.rig, 1, device_);
     int kept = 0;
     for (int step = 0; step < case_.num_steps; ++step) {
-      if (interrupted()) throw Interrupted("interrupted");
+      throw_if_interrupted();
       steps.run(1);
       history_->put(step, simulator_->scene(), simulator_->views());
       views_ = to_host(simulator_->views(), device_);
@@ -258,7 +258,7 @@ class HistoryBench {
     const int present_calls = calls_in_repeat(case_.repeat_s, time_of(1, present));
     const int past_calls = calls_in_repeat(case_.repeat_s, time_of(1, past));
     for (int repeat = 0; repeat < case_.repeats; ++repeat) {
-      if (interrupted()) throw Interrupted("interrupted");
+      throw_if_interrupted();
       result_.present_ms.push_back(time_of(present_calls, present));
       result_.history_ms.push_back(time_of(past_calls, past));
     }

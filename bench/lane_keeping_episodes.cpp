@@ -1,7 +1,6 @@
 #include "pictura/bench/lane_keeping_episodes.h"
 
 #include "pictura/backends/make_simulator.h"
-#include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/simulator/controllers/lane_keeping.h"
 
@@ -23,7 +22,7 @@ std::vector<DrivenEpisode> drive_lane_keeping_episodes(const std::shared_ptr<con
   LaneKeepingController controller(*simulator);
   std::vector<Command> commands(static_cast<size_t>(simulator->num_slots()));
   for (int step = 0; step < steps; ++step) {
-    if (interrupted()) throw Interrupted("interrupted");
+    throw_if_interrupted();
     controller.act(simulator->controller_input(), {}, commands);
     simulator->step(commands);
   }

@@ -6,7 +6,6 @@
 
 #include "pictura/backend_cpu/renderer/image_drawer.h"
 #include "pictura/bench/driving.h"
-#include "pictura/common/error.h"
 #include "pictura/common/raster/check.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/parallel_for.h"
@@ -101,7 +100,7 @@ Quality measure_quality(const StaticGeometry& geometry, const SceneBatch& scene,
   const std::size_t cameras = config.rig.cameras.size(), images = views.size() * cameras;
   std::vector<MethodImages> drawn(images);
   parallel_for(resolve_num_threads(config.num_threads), static_cast<int64_t>(images), [&](int64_t i) {
-    if (interrupted()) throw Interrupted("interrupted");
+    throw_if_interrupted();
     const auto image = static_cast<std::size_t>(i);
     drawn[image] = draw_all_methods(geometry, scene, views[image / cameras], config.rig.cameras[image % cameras],
                                     config.line_floor_px);

@@ -122,7 +122,7 @@ RenderMeasurement measure_render(const DrivenWorlds& worlds, const RenderCase& r
     const int calls = calls_in_repeat(render_case.repeat_s, one_ms);
     for (int repeat = 0; repeat < render_case.repeats; ++repeat) {
       result.call_ms.push_back(target->draw(renderer.get(), calls));
-      if (interrupted()) throw Interrupted("interrupted");
+      throw_if_interrupted();
     }
     renderer->check();
     if (check) check->compare(target.get(), &result.error);

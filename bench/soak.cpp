@@ -231,7 +231,7 @@ SoakResult soak(const SoakOptions& options, const MakeRenderer& make,
   Scenes scenes(options);
   const std::vector<Rig> rigs = draw_rigs(options);
   for (int64_t scene = options.first_scene;; ++scene) {
-    if (interrupted()) throw Interrupted("interrupted");
+    throw_if_interrupted();
     try {
       compare_scene(options, make, scene, rigs, &scenes, &result);
     } catch (const UsageError&) {

@@ -7,7 +7,6 @@
 #include "pictura/backends/make_controller.h"
 #include "pictura/backends/make_simulator.h"
 #include "pictura/bench/lane_keeping_episodes.h"
-#include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/simulator/controllers/goal_places.h"
 #include "pictura/simulator/controllers/lane_keeping.h"
@@ -60,7 +59,7 @@ void count_population(HostWorlds& worlds, const LaneGraph& graph, Counts* counts
     count("waypoints of the first chains", "waypoints",
           static_cast<double>(on_roads.waypoints + on_walkways.waypoints));
     count("of these out of reach", "waypoints", static_cast<double>(on_roads.unreachable + on_walkways.unreachable));
-    if (interrupted()) throw Interrupted("interrupted");
+    throw_if_interrupted();
   }
 }
 
@@ -90,7 +89,7 @@ void count_random_policy(Simulator& simulator, const WorldStatisticsOptions& opt
         }
       }
     }
-    if (interrupted()) throw Interrupted("interrupted");
+    throw_if_interrupted();
     if (options.on_progress && step % 10 == 0) options.on_progress(fmt::format("random policy, step {}", step));
   }
 }

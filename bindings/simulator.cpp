@@ -146,17 +146,21 @@ class PySimulator {
   }
 
   void reset(const py::object& world_mask, const std::optional<uint64_t>& seed) {
-    reset_unwatched(world_mask, seed);
-    const auto watching = watchers();
-    if (watching.empty()) return;
-    Span<const uint8_t> mask;
-    std::optional<BorrowedArray> borrowed;
+    const uint64_t its_seed = seed.value_or(simulator_->config().seed);
+    Span<const uint8_t> mask;  // empty: of all
     if (!world_mask.is_none()) {
-      borrowed.emplace(borrow(world_mask, "reset: world_mask", stream_));
-      mask = borrowed->array().checked<const uint8_t>(
+      BorrowedArray borrowed = borrow(world_mask, "reset: world_mask", stream_);
+      mask = borrowed.array().checked<const uint8_t>(
           "reset: world_mask", {static_cast<int64_t>(simulator_->worlds().size())}, simulator_->device());
+      calls_->run("reset", [&] { simulator_->reset(borrowed.array(), its_seed, stream_); });
+      keep(std::move(borrowed));
+    } else if (seed) {
+      const Array all = all_worlds();
+      calls_->run("reset", [&] { simulator_->reset(all, its_seed, stream_); });
+    } else {
+      calls_->run("reset", [&] { simulator_->reset(stream_); });
     }
-    for (const auto& watcher : watching) calls_->run("reset", [&] { watcher->after_reset(mask); });
+    for (const auto& watcher : watchers()) calls_->run("reset", [&] { watcher->after_reset(mask); });
   }
 
   py::object step(const py::object& actions) {
@@ -393,22 +397,6 @@ class PySimulator {
     PICTURA_CHECK(arrays.size() == num_known, "observe: out: expected {} arrays, those of observations, got {}",
                   num_known, arrays.size());
     return view;
-  }
-
-  void reset_unwatched(const py::object& world_mask, const std::optional<uint64_t>& seed) {
-    if (world_mask.is_none() && !seed) {
-      calls_->run("reset", [&] { simulator_->reset(stream_); });
-      return;
-    }
-    const uint64_t its_seed = seed.value_or(simulator_->config().seed);
-    if (world_mask.is_none()) {
-      const Array all = all_worlds();
-      calls_->run("reset", [&] { simulator_->reset(all, its_seed, stream_); });
-      return;
-    }
-    BorrowedArray mask = borrow(world_mask, "reset: world_mask", stream_);
-    calls_->run("reset", [&] { simulator_->reset(mask.array(), its_seed, stream_); });
-    keep(std::move(mask));
   }
 
   // Those that are gone see nothing more.

@@ -237,10 +237,16 @@ void draw_scale_bar(Canvas& canvas, const Layout& layout) {
   canvas.text(x + width, y - m.px(7), fmt::format("{:g} m", length_m), {.size_px = m.px(14), .align = Align::right});
 }
 
-/// As many decimals as tell ticks apart that are `step_m` from each other.
-std::string coordinate_text(double at_m, double step_m) {
-  const int decimals = std::clamp(static_cast<int>(std::ceil(-std::log10(step_m) - 1e-9)), 0, 6);
-  return fmt::format("{:.{}f}", at_m + 0.0, decimals);
+struct Coordinate {
+  double at_m;
+  std::string text;
+};
+std::vector<Coordinate> round_coordinates(double low_m, double high_m) {
+  const std::vector<double> ticks = round_ticks(low_m, high_m, 8);
+  const int decimals = ticks.size() > 1 ? tick_decimals(ticks[1] - ticks[0]) : 0;
+  std::vector<Coordinate> coordinates;
+  for (const double at_m : ticks) coordinates.push_back({at_m, fmt::format("{:.{}f}", at_m + 0.0, decimals)});
+  return coordinates;
 }
 
 /// The file's coordinates along the upper and the left side, for --box and --at.
@@ -250,22 +256,18 @@ void draw_coordinates(Canvas& canvas, const Layout& layout, const RoadMap& map) 
   const TextStyle style{.size_px = m.px(11), .align = Align::center, .color = kQuietText};
   const double corner_px = m.px(40);  // where labels of both sides would meet
   const double right_m = left_m + canvas.width_px() / layout.px_per_m;
-  const std::vector<double> columns = round_ticks(left_m, right_m, 8);
-  const double x_step_m = columns.size() > 1 ? columns[1] - columns[0] : 1;
-  for (const double x_m : columns) {
+  for (const auto& [x_m, text] : round_coordinates(left_m, right_m)) {
     const double x = (x_m - left_m) * layout.px_per_m;
     if (x < corner_px || x > canvas.width_px() - corner_px) continue;
     canvas.fill_rectangle(x, layout.band_px, 1, m.px(5), kQuietText);
-    canvas.text(x, layout.band_px + m.px(16), coordinate_text(x_m, x_step_m), style);
+    canvas.text(x, layout.band_px + m.px(16), text, style);
   }
   const double lowest_m = top_m - canvas.height_px() / layout.px_per_m;
-  const std::vector<double> rows = round_ticks(lowest_m, top_m, 8);
-  const double y_step_m = rows.size() > 1 ? rows[1] - rows[0] : 1;
-  for (const double y_m : rows) {
+  for (const auto& [y_m, text] : round_coordinates(lowest_m, top_m)) {
     const double y = (top_m - y_m) * layout.px_per_m;
     if (y < layout.band_px + corner_px || y > canvas.height_px() - corner_px) continue;
     canvas.fill_rectangle(0, y, m.px(5), 1, kQuietText);
-    canvas.text(m.px(16), y, coordinate_text(y_m, y_step_m), style, 0.5 * static_cast<double>(kPi));
+    canvas.text(m.px(16), y, text, style, 0.5 * static_cast<double>(kPi));
   }
 }
 

@@ -53,8 +53,7 @@ std::string tick_text(double value, double step) {
   }
   if (std::abs(value) < 1e-9 * step) return "0";
   if (magnitude < 1e-4) return fmt::format("{:.2g}", value);
-  const int decimals = std::clamp(static_cast<int>(std::ceil(-std::log10(step / unit) - 1e-9)), 0, 6);
-  return fmt::format("{:.{}f}{}", value / unit, decimals, suffix);
+  return fmt::format("{:.{}f}{}", value / unit, tick_decimals(step / unit), suffix);
 }
 
 /// "2M", "50k", "16384", "0.25": a tick of a logarithmic axis, exactly.
@@ -370,6 +369,8 @@ std::vector<double> round_ticks(double low, double high, int wanted) {
   for (int i = 0; i < count; ++i) ticks.push_back((first + i) * step);
   return ticks;
 }
+
+int tick_decimals(double step) { return std::clamp(static_cast<int>(std::ceil(-std::log10(step) - 1e-9)), 0, 6); }
 
 std::vector<double> binary_ticks(double low, double high, int wanted) {
   std::vector<double> ticks;

@@ -58,6 +58,8 @@ void draw_plots_png(const std::vector<PlotPanel>& panels, const std::string& pat
 
 /// Round positions for axis ticks: a step of 1, 2 or 5 times a power of ten, about `wanted` of them within [low, high].
 std::vector<double> round_ticks(double low, double high, int wanted);
+/// As many decimals as tell ticks apart that are `step` from each other, at most six.
+int tick_decimals(double step);
 
 /// ... of a logarithmic axis, 0 < low: at most `wanted`, evenly spaced powers of two; or 1, 2 and 5 times powers of
 /// ten, or only powers of ten if those are too many. If only one would remain, the ticks of a linear axis.

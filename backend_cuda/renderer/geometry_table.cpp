@@ -119,16 +119,14 @@ void GeometryTable::swap_map(std::size_t index, Map* map_inout) {
 
 void GeometryTable::grow(std::size_t entries, cudaStream_t stream) {
   entries = std::min(entries, static_cast<std::size_t>(kNumGeometryHandles));
-  std::vector<Map> maps(entries);
-  std::vector<DeviceGeometry> host;
-  for (std::size_t i = 0; i < entries; ++i) host.push_back(i < maps_.size() ? maps_[i].entry : maps[i].entry);
+  maps_.reserve(entries);
+  std::vector<DeviceGeometry> host(entries, empty_entry());
+  for (std::size_t i = 0; i < maps_.size(); ++i) host[i] = maps_[i].entry;
   DeviceBuffer<DeviceGeometry> table(entries);
   PICTURA_CUDA(
       cudaMemcpyAsync(table.data(), host.data(), entries * sizeof(DeviceGeometry), cudaMemcpyHostToDevice, stream));
   PICTURA_CUDA(cudaStreamSynchronize(stream));
-  // Only what cannot fail from here on, so that a failure leaves both as they were.
-  std::move(maps_.begin(), maps_.end(), maps.begin());
-  maps_ = std::move(maps);
+  maps_.resize(entries);      // here, where it cannot fail: a failure before leaves both as they were
   table_ = std::move(table);  // the old one is freed: nothing on the stream reads it any more
   ++generation_;
 }

@@ -83,8 +83,8 @@ class CudaRenderer final : public Renderer {
     cuda::DrawTask task = draw_task(scene, views, &images_out);
     const auto on_stream = static_cast<cudaStream_t>(stream.handle);
     clear_counters(on_stream);
-    // In as few parts as the scratch memory allows, of equal size.
     if (views.size() == 0) return;
+    // In as few parts as the scratch memory allows, of equal size.
     const std::size_t max_views = scratch_.plan.views, parts = (views.size() + max_views - 1) / max_views;
     const auto views_at_once = static_cast<int32_t>((views.size() + parts - 1) / parts);
     for (int32_t left = task.num_views; left > 0; left -= task.num_views, task.first_view += task.num_views) {

@@ -8,7 +8,6 @@
 #include "pictura/bench/commands/bench.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
-#include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/map/load_map.h"
 #include "pictura/map/map_cache.h"
@@ -44,7 +43,7 @@ void run_map(const MapArguments& arguments) {
   for (int i = 0; i < arguments.repeats; ++i) {
     progress.update(fmt::format("{}: repeat {} of {}", arguments.map, i + 1, arguments.repeats),
                     static_cast<double>(i) / arguments.repeats);
-    if (interrupted()) throw Interrupted("interrupted");
+    throw_if_interrupted();
     double begin = processor_s();
     const auto measure = [&](BenchResult* result) {
       result->values.push_back(processor_s() - begin);

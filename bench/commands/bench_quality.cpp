@@ -10,7 +10,6 @@
 #include "pictura/cli/file_options.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
-#include "pictura/common/error.h"
 #include "pictura/common/raster/camera.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/parallel_for.h"
@@ -33,7 +32,7 @@ struct QualityArguments {
 std::vector<Snapshot> drive_all(const QualityArguments& arguments, ProgressLine* progress) {
   std::vector<Snapshot> snapshots;
   for (const std::string& map : arguments.maps) {
-    if (interrupted()) throw Interrupted("interrupted");
+    throw_if_interrupted();
     progress->update(fmt::format("driving on {}", map));
     SnapshotOptions world = arguments.world;
     world.map = map;
@@ -50,7 +49,7 @@ void run_random(const QualityArguments& arguments) {
     const char* name = kRandomKindNames[kind];
     std::vector<double> psnr_db(static_cast<std::size_t>(arguments.random));
     parallel_for(resolve_num_threads(arguments.world.num_threads), arguments.random, [&](int64_t i) {
-      if (interrupted()) throw Interrupted("interrupted");
+      throw_if_interrupted();
       const auto seed = arguments.world.seed + static_cast<uint64_t>(i);
       // Infinite where nothing is in the image.
       constexpr double kMost_db = 99;
@@ -90,7 +89,7 @@ void run_quality(QualityArguments arguments) {
     config.line_floor_px = arguments.line_floor_px;
     Quality quality;
     for (std::size_t i = 0; i < snapshots.size(); ++i) {
-      if (interrupted()) throw Interrupted("interrupted");
+      throw_if_interrupted();
       progress.update(fmt::format("{} on {}", text, arguments.maps[i]));
       quality.add(measure_quality(snapshots[i].geometry, snapshots[i].scene.batch(), snapshots[i].views, config));
     }

@@ -106,7 +106,7 @@ void measure(const SimulateArguments& arguments, const std::string& backend, con
   BenchResult live{name, "agent_steps_per_s", {}}, slots{name + ", slots", "slot_steps_per_s", {}},
       step{name + ", one step", "ms", {}};
   for (int repeat = 0; repeat < arguments.rate.repeats; ++repeat) {
-    if (interrupted()) throw Interrupted("interrupted");
+    throw_if_interrupted();
     const StepTiming timing = bench.run(steps);
     live.values.push_back(static_cast<double>(timing.agent_steps) / timing.elapsed_s);
     slots.values.push_back(static_cast<double>(timing.slot_steps) / timing.elapsed_s);

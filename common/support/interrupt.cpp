@@ -49,6 +49,10 @@ void forget_interrupt() { first_signal = 0; }
 
 int interrupting_signal() { return first_signal; }
 
+void throw_if_interrupted() {
+  if (interrupted()) throw Interrupted("interrupted");
+}
+
 void InterruptibleWork::check() const {
   if (!began_after_ && interrupted()) throw Interrupted(message_);
 }

@@ -21,6 +21,8 @@ void take_interrupt(int signal);
 void forget_interrupt();
 
 inline bool interrupted() { return interrupting_signal() != 0; }
+/// Throws Interrupted where one has come.
+void throw_if_interrupted();
 
 /// A piece of work that a signal stops. One that came before the work began does not: then the work is part of an
 /// orderly end, such as the curve of what was learnt until now.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <functional>
 
 #include "pictura/common/error.h"
 #include "pictura/map/opendrive/build.h"
@@ -20,10 +19,14 @@ SampleBudget budget_for(std::size_t text_bytes, const std::string& source) {
   return {std::min(kMaxSamples, kBaseSamples + kSamplesPerByte * static_cast<std::int64_t>(text_bytes)), source};
 }
 
-/// Reads and builds it; `begin` is told each stage, with shares as large networks have them. Faults of the network as a
-/// whole do not name the file.
+/// Faults of the network as a whole do not name the file.
 RoadMap import_network(std::string_view text, const std::string& source, const OpenDriveOptions& options,
-                       const std::function<void(const char* stage, double done)>& begin) {
+                       const ImportProgress& progress) {
+  // Shares as large networks have them.
+  const auto begin = [&](const char* stage, double done) {
+    if (progress) progress(stage, done);
+  };
+  begin("reading", 0);
   opendrive::Faults faults(options.strict);
   opendrive::Network network;
   opendrive::read_network(text, source, &faults, &network);
@@ -59,12 +62,8 @@ RoadMap parse_opendrive(std::string_view text, const std::string& source, const 
                         const ImportProgress& progress) {
   PICTURA_CHECK(options.chord_error_m >= 1e-3f && options.chord_error_m <= 10.0f,
                 "OpenDRIVE options: expected a chord error in [0.001, 10] m, got {}", options.chord_error_m);
-  const auto begin = [&](const char* stage, double done) {
-    if (progress) progress(stage, done);
-  };
-  begin("reading", 0);
   try {
-    return import_network(text, source, options, begin);
+    return import_network(text, source, options, progress);
   } catch (const Interrupted&) {
     throw;
   } catch (const UsageError&) {
