@@ -21,9 +21,9 @@ struct Checkpoint : SavedPolicy {
   int64_t adam_steps = 0;
   double filter_average = -1;  // of AdvantageFilter
   std::vector<RecentUpdate> recent;
-  std::map<std::string, double> longest_update_s;  // see Run
-  std::vector<NamedTensor> first_moments, second_moments;
-  std::vector<uint8_t> simulator;  // Simulator::save(), at the start of update `update`
+  std::map<std::string, double> longest_update_s;          // see Run
+  std::vector<NamedTensor> first_moments, second_moments;  // see Optimizer
+  std::vector<uint8_t> simulator;                          // Simulator::save(), at the start of update `update`
 };
 
 /// Writes the file under another name and renames it to path. Throws Error naming the path.

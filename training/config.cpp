@@ -33,6 +33,7 @@ const Choices<Modality> kModalities{{"perspective", Modality::perspective}, {"ve
 const Choices<Precision> kPrecisions{{"fp32", Precision::fp32}, {"tf32", Precision::tf32}, {"bf16", Precision::bf16}};
 const Choices<Schedule> kSchedules{
     {"constant", Schedule::constant}, {"linear", Schedule::linear}, {"cosine", Schedule::cosine}};
+const Choices<OptimizerKind> kOptimizers{{"adamw", OptimizerKind::adamw}, {"muon", OptimizerKind::muon}};
 const Choices<HaltedSlots> kHaltedSlots{{"skip", HaltedSlots::skip}, {"draw", HaltedSlots::draw}};
 
 constexpr const char* kDevices = "cpu, cuda, cuda:N, auto";
@@ -101,6 +102,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.number("train.clip_coef", c.train.clip_coef, 1e-6, 100);
   v.number("train.vf_coef", c.train.vf_coef, 0, 1e6);
   v.number("train.ent_coef", c.train.ent_coef, 0, 1e6);
+  v.choice("train.optimizer", c.train.optimizer, kOptimizers);
   v.number("train.learning_rate", c.train.learning_rate, 0, 100);
   v.number("train.adam_beta1", c.train.adam_beta1, 0, 0.999999);
   v.number("train.adam_beta2", c.train.adam_beta2, 0, 0.99999999);
@@ -770,7 +772,7 @@ bool is_of_schedule(const std::string& key) {
 
 bool is_reported(const std::string& key) {
   return is_of_schedule(key) || key.starts_with("train.teacher") || key == "train.reproducible" ||
-         key == "render.schedule";
+         key == "render.schedule" || key == "train.optimizer";
 }
 
 bool may_differ(const std::string& key, const Config& saved, const Config& now) {
@@ -844,10 +846,18 @@ bool Config::reads(ObservationPart part) const {
          (policy.modality == Modality::vector && (part != ObservationPart::walls || simulator.wall_observations));
 }
 
-std::string name_of(Precision precision) {
-  return std::find_if(kPrecisions.begin(), kPrecisions.end(), [&](const auto& p) { return p.second == precision; })
+namespace {
+
+template <typename Enum>
+std::string name_among(const Choices<Enum>& choices, Enum value) {
+  return std::find_if(choices.begin(), choices.end(), [&](const auto& choice) { return choice.second == value; })
       ->first;
 }
+
+}  // namespace
+
+std::string name_of(Precision precision) { return name_among(kPrecisions, precision); }
+std::string name_of(OptimizerKind kind) { return name_among(kOptimizers, kind); }
 
 Rig rig_of(const Config& config, int64_t agent_steps) {
   if (!config.render.rig.empty()) return load_rig(config.render.rig);

@@ -24,6 +24,9 @@ enum class HaltedSlots { skip, draw };
 /// How the learning rate falls to 0, or not.
 enum class Schedule { constant, linear, cosine };
 
+/// What steps the parameters: see training/optimizer.h.
+enum class OptimizerKind { adamw, muon };
+
 struct Config {
   struct Run {
     uint64_t seed = 1;            // names the whole run
@@ -94,6 +97,7 @@ struct Config {
     double gamma = 0.999, gae_lambda = 0.95;
     double clip_coef = 0.2;
     double vf_coef = 0.5, ent_coef = 0.01;
+    OptimizerKind optimizer = OptimizerKind::adamw;
     double learning_rate = 5e-4;
     double adam_beta1 = 0.9, adam_beta2 = 0.999, adam_eps = 1e-8, weight_decay = 0.01;
     double max_grad_norm = 0.5;
@@ -168,11 +172,12 @@ std::string first_difference(const Config& saved, const Config& now);
 std::string first_difference_of_ranks(const Config& first, const Config& other);
 
 /// The settings in which the two differ of those that a run that goes on may change and should say so, the schedules of
-/// learning rate and image size, the teacher and train.reproducible, as "KEY: OLD became NEW".
+/// learning rate and image size, the optimizer, the teacher and train.reproducible, as "KEY: OLD became NEW".
 std::vector<std::string> differences_to_report(const Config& saved, const Config& now);
 
-/// As in a configuration.
+/// Names as in a configuration.
 std::string name_of(Precision precision);
+std::string name_of(OptimizerKind kind);
 
 /// The rig that render describes for a run that has done `agent_steps`.
 Rig rig_of(const Config& config, int64_t agent_steps = 0);

@@ -19,43 +19,6 @@ float AdvantageFilter::threshold(float max_advantage, double ema, double fractio
   return filter_threshold(average, fraction);
 }
 
-AdamW::AdamW(const Policy& policy, const Config::Train& config) : parameters_(policy.parameters()), config_(config) {
-  gradients_ = at::zeros({policy.num_parameters()}, parameters_.front().value.options().requires_grad(false));
-  int64_t begin = 0;
-  for (const NamedTensor& parameter : parameters_) {
-    const at::Tensor& value = parameter.value;
-    first_moments.push_back({parameter.name, at::zeros_like(value)});
-    second_moments.push_back({parameter.name, at::zeros_like(value)});
-    value.mutable_grad() = gradients_.narrow(0, begin, value.numel()).view(value.sizes());
-    begin += value.numel();
-  }
-}
-
-void AdamW::clear_gradients() { gradients_.zero_(); }
-
-AdamW::Step AdamW::step(double learning_rate, const at::Tensor& loss, Communicator* communicator) {
-  const at::NoGradGuard no_grad;
-  // Summed over the ranks and only then scaled down: every rank takes the same step, to the bit.
-  communicator->sum(gradients_);
-  std::vector<at::Tensor> values, gradients, first, second;
-  for (size_t i = 0; i < parameters_.size(); ++i) {
-    values.push_back(parameters_[i].value);
-    gradients.push_back(parameters_[i].value.grad());
-    first.push_back(first_moments[i].value);
-    second.push_back(second_moments[i].value);
-  }
-  const at::Tensor norm = gradients_.norm();
-  const at::Tensor failed = (norm + loss).isfinite().logical_not().to(at::kFloat);
-  gradients_.mul_((config_.max_grad_norm / (norm + 1e-6)).clamp_max(1.0));
-  ++steps;
-  const std::vector<at::Tensor> counts(values.size(), at::full({}, static_cast<double>(steps), norm.options()));
-  at::_fused_adamw_(values, gradients, first, second, {}, counts, learning_rate, config_.adam_beta1, config_.adam_beta2,
-                    config_.weight_decay, config_.adam_eps, /*amsgrad=*/false, /*maximize=*/false, /*grad_scale=*/{},
-                    failed);
-  clear_gradients();
-  return {norm, failed};
-}
-
 namespace {
 
 // The variance of n numbers, from their sum and that of their squares.
@@ -80,7 +43,7 @@ struct Batch {
 };
 
 // A loss's gradient over all parameters, as one vector. Before and after there is none.
-at::Tensor gradient_of(const at::Tensor& loss, AdamW* optimizer) {
+at::Tensor gradient_of(const at::Tensor& loss, Optimizer* optimizer) {
   loss.backward(/*gradient=*/{}, /*retain_graph=*/true);
   const at::Tensor gradient = optimizer->gradients().clone();
   optimizer->clear_gradients();
@@ -230,7 +193,7 @@ void for_each_chunk_after(int64_t head, const at::Tensor& minibatch, int64_t mos
 }
 
 // The norms of the gradient of the first chunk, or of those of all ranks, by each loss alone: f64 [3].
-at::Tensor norms_over_ranks(std::vector<at::Tensor> gradients, int64_t num_rows, const AdamW& optimizer,
+at::Tensor norms_over_ranks(std::vector<at::Tensor> gradients, int64_t num_rows, const Optimizer& optimizer,
                             Communicator* communicator) {
   constexpr int64_t kNumLosses = 3;
   if (gradients.empty()) gradients.resize(kNumLosses, at::zeros_like(optimizer.gradients()));
@@ -243,7 +206,7 @@ at::Tensor norms_over_ranks(std::vector<at::Tensor> gradients, int64_t num_rows,
 // parameters, `forward_chunk` transitions at a time after the first `diagnosed`. Returns the minibatch's LossStats
 // without the norm, f64 [kNumStats], until the next minibatch. With `norms`, sets them as norms_over_ranks does.
 at::Tensor add_gradients(ChunkRunner* runner, const Batch& batch, const at::Tensor& minibatch, int64_t size_of_all,
-                         std::optional<int64_t> diagnosed, const Config::Train& config, AdamW* optimizer,
+                         std::optional<int64_t> diagnosed, const Config::Train& config, Optimizer* optimizer,
                          PhaseTimer* timer, Communicator* communicator, at::Tensor* norms) {
   at::Tensor advantages = batch.advantages.index_select(0, minibatch), shares;
   const at::Tensor valid = takes_all(config) ? batch.valid.index_select(0, minibatch).to(at::kDouble)
@@ -336,7 +299,7 @@ void store_means(const at::Tensor& sums, const at::Tensor& first_norms, UpdateSt
 }  // namespace
 
 UpdateStats ppo_update(ChunkRunner* runner, const Rollout& rollout, const Config::Train& config, const UpdateKey& key,
-                       LearnerExecutor* executor, AdamW* optimizer, AdvantageFilter* filter, PhaseTimer* timer,
+                       LearnerExecutor* executor, Optimizer* optimizer, AdvantageFilter* filter, PhaseTimer* timer,
                        Communicator* communicator) {
   UpdateStats stats;
   stats.learning_rate = key.learning_rate;
@@ -386,7 +349,7 @@ UpdateStats ppo_update(ChunkRunner* runner, const Rollout& rollout, const Config
         }
       }
       const PhaseTimer::Scope timed(timer, Phase::optimize);
-      const AdamW::Step step = optimizer->step(key.learning_rate, sums.sum() + minibatch_stats.sum(), communicator);
+      const Optimizer::Step step = optimizer->step(key.learning_rate, sums.sum() + minibatch_stats.sum(), communicator);
       minibatch_stats[kNumStats - 1] = step.norm;
       sums[epoch] += minibatch_stats;
       if (is_first) sums[config.update_epochs] += minibatch_stats;

@@ -7,7 +7,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/training/chunk_runner.h"
-#include "pictura/training/ranks/communicator.h"
+#include "pictura/training/optimizer.h"
 #include "pictura/training/rollout.h"
 
 namespace pictura {
@@ -18,33 +18,6 @@ class AdvantageFilter {
   /// Takes in the newest rollout's max |advantage|. Returns the least |advantage| that is kept.
   float threshold(float max_advantage, double ema, double fraction);
   double average = -1;  // of the rollouts' maxima; negative before the first
-};
-
-class AdamW {
- public:
-  /// Gives the parameters gradients of 0, which are parts of one vector and to which backward passes add.
-  AdamW(const Policy& policy, const Config::Train& config);
-  /// Scalars on the parameters' device, which nothing has waited for.
-  struct Step {
-    at::Tensor norm;    // of the gradients before they were scaled
-    at::Tensor failed;  // f32: 1 where it or the loss is not finite, and no step was taken
-  };
-  /// One step along the parameters' gradients, summed over all ranks and then scaled down to max_grad_norm; clears
-  /// them. The loss must be that of all ranks.
-  Step step(double learning_rate, const at::Tensor& loss, Communicator* communicator = alone());
-
-  /// Of all parameters, in their order: f32 [num_parameters].
-  const at::Tensor& gradients() const { return gradients_; }
-  /// Sets them to 0.
-  void clear_gradients();
-
-  std::vector<NamedTensor> first_moments, second_moments;  // in the order of the policy's parameters
-  int64_t steps = 0;
-
- private:
-  const std::vector<NamedTensor>& parameters_;
-  Config::Train config_;
-  at::Tensor gradients_;
 };
 
 /// Means over minibatches; docs/training.md defines them.
@@ -96,7 +69,7 @@ class NotFinite : public Error {
 /// NotFinite, with the policy as it was before that minibatch: in it on the host, at the end on a device. `runner` is
 /// of the policy and of the rollout's observations.
 UpdateStats ppo_update(ChunkRunner* runner, const Rollout& rollout, const Config::Train& config, const UpdateKey& key,
-                       LearnerExecutor* executor, AdamW* optimizer_inout, AdvantageFilter* filter_inout,
+                       LearnerExecutor* executor, Optimizer* optimizer_inout, AdvantageFilter* filter_inout,
                        PhaseTimer* timer = nullptr, Communicator* communicator = alone());
 
 }  // namespace pictura

@@ -143,9 +143,11 @@ std::string Run::restore(const Checkpoint& saved) {
   PICTURA_CHECK(rig_difference.empty(), "{}: saved with other cameras than {} has: {}", saved.path,
                 config.render.rig.empty() ? "the paper's rig" : config.render.rig, rig_difference);
   restore_policy(saved, *policy);
-  restore_tensors(saved.path, saved.first_moments, optimizer.first_moments);
-  restore_tensors(saved.path, saved.second_moments, optimizer.second_moments);
-  optimizer.steps = saved.adam_steps;
+  if (saved.config.train.optimizer == config.train.optimizer) {
+    restore_tensors(saved.path, saved.first_moments, optimizer.first_moments);
+    restore_tensors(saved.path, saved.second_moments, optimizer.second_moments);
+    optimizer.steps = saved.adam_steps;
+  }
   filter.average = saved.filter_average;
   update = saved.update;
   distance_m = saved.distance_m;

@@ -29,7 +29,8 @@ struct Run {
   /// What is to be saved, at the start of an update: of all ranks, for rank 0 to write; the others' has no simulator.
   Checkpoint checkpoint(const std::vector<RecentUpdate>& recent) const;
   /// Goes on from a checkpoint, of any number of ranks. Where the simulator cannot read its saved state, because its
-  /// rules or maps have changed since, new episodes begin; the return value says why, else it is empty. Throws Error
+  /// rules or maps have changed since, new episodes begin; the return value says why, else it is empty. Moments of
+  /// another optimizer are left, and new ones start. Throws Error
   /// naming what differs when the checkpoint was saved under another configuration or with other cameras.
   std::string restore(const Checkpoint& saved);
   /// Throws Error naming a parameter in which the ranks' policies differ by a bit.
@@ -51,7 +52,7 @@ struct Run {
   const std::unique_ptr<LearnerExecutor> executor;
   PhaseTimer timer;
   const std::unique_ptr<const Policy> policy;
-  AdamW optimizer;
+  Optimizer optimizer;
   AdvantageFilter filter;
   Rollout rollout;
   const std::optional<OwnStream> stream;  // where graphs are used

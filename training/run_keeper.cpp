@@ -32,6 +32,11 @@ std::vector<RecentUpdate> RunKeeper::begin(Run* run) {
       options_.notify("the saved episodes cannot go on, new ones begin: " + why_new_episodes);
     }
     for (const std::string& change : differences_to_report(saved.config, run->config)) options_.notify(change);
+    const OptimizerKind before = saved.config.train.optimizer, now = run->config.train.optimizer;
+    if (before != now) {
+      options_.notify(fmt::format("{}: holds moments of {}: new moments of {} start", checkpoint_path(),
+                                  name_of(before), name_of(now)));
+    }
     recent = saved.recent;
     saved_update_ = run->update;
   } else {

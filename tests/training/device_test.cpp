@@ -255,6 +255,32 @@ bool equal(const std::vector<NamedTensor>& a, const std::vector<NamedTensor>& b)
   });
 }
 
+// Three weights, from 0, after one step along gradients that are the same on every device.
+std::vector<at::Tensor> after_step_of_muon(at::Device device, at::ScalarType type) {
+  at::manual_seed(5);
+  std::vector<at::Tensor> weights;
+  for (const at::IntArrayRef shape : {at::IntArrayRef{512, 384}, {64, 20}, {128, 64}}) {
+    const at::Tensor gradient = at::randn(shape);
+    at::Tensor weight = at::zeros(shape, at::kFloat).to(device);
+    weight.requires_grad_();
+    weight.mutable_grad() = gradient.to(device);
+    weights.push_back(weight);
+  }
+  Muon(weights, type, 0).step(1, at::zeros({}, at::kFloat).to(device));
+  for (at::Tensor& weight : weights) weight = weight.detach().cpu();
+  return weights;
+}
+
+TEST(MuonOnADevice, StepsAsOnTheHost) {
+  const std::vector<at::Tensor> host = after_step_of_muon(at::kCPU, at::kFloat),
+                                fp32 = after_step_of_muon(at::kCUDA, at::kFloat),
+                                bf16 = after_step_of_muon(at::kCUDA, at::kBFloat16);
+  for (size_t i = 0; i < host.size(); ++i) {
+    EXPECT_LT((fp32[i] - host[i]).norm().item<double>() / host[i].norm().item<double>(), 2e-2) << i;
+    EXPECT_LT((bf16[i] - host[i]).norm().item<double>() / host[i].norm().item<double>(), 2e-1) << i;
+  }
+}
+
 TEST_P(EachModality, WhatOneDeviceSavesTheOtherGoesOnFrom) {
   for (const auto& [first, second] : {std::pair{"cuda", "cpu"}, {"cpu", "cuda"}}) {
     const std::string run = std::string("from_") + first;

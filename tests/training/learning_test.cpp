@@ -30,7 +30,7 @@ Curve learn(Precision precision, uint64_t seed) {
   train.learning_rate = 3e-3;
   train.schedule = Schedule::constant;
   train.gamma = 0.9;
-  AdamW optimizer(policy, train);
+  Optimizer optimizer(policy, train);
   AdvantageFilter filter;
   Corridor corridor(seed);
   Curve curve{};

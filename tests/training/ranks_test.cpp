@@ -280,7 +280,7 @@ std::vector<Learnt> learn(const std::vector<int64_t>& ends, const Config::Train&
     std::vector<at::Tensor> before;
     for (const NamedTensor& parameter : policy.parameters()) before.push_back(parameter.value.detach().clone());
     test::Corridor corridor;
-    AdamW optimizer(policy, train);
+    Optimizer optimizer(policy, train);
     AdvantageFilter filter;
     for (int64_t update = 0; update < 3; ++update) {
       corridor.play(policy, update);
@@ -315,6 +315,14 @@ Config::Train plain_steps() {
   train.forward_chunk = 32;
   train.adv_filter_threshold = 0.02;
   return train;
+}
+
+TEST(RanksLearn, WithMuonTheSameToTheBit) {
+  Config::Train train = plain_steps();
+  train.optimizer = OptimizerKind::muon;
+  const std::vector<Learnt> ranks = learn({10, 100, test::Corridor::kSlots}, train);
+  for (const Learnt& rank : ranks) EXPECT_EQ(rank.hashes, ranks[0].hashes);
+  EXPECT_NE(ranks[0].hashes[0], ranks[0].hashes[2]);
 }
 
 TEST(RanksLearn, WhatOneWouldHaveLearntAndTheSameToTheBit) {
@@ -379,7 +387,7 @@ TEST(RanksLearn, AndStopTogetherWhenOneMeetsNaN) {
     const PolicyNetwork policy(tiny_policy(), 4, 3);
     const std::string before = policy.hash();
     test::Corridor corridor;
-    AdamW optimizer(policy, train);
+    Optimizer optimizer(policy, train);
     AdvantageFilter filter;
     corridor.play(policy, 0);
     corridor.compute_advantages(0.9, 0.9);

@@ -1,0 +1,55 @@
+// Muon (Jordan et al., 2024): momentum whose matrices are made orthogonal before each step, for the weights of hidden
+// layers. Scaled as by Liu et al., "Muon is scalable for LLM training" (2025), so that AdamW's rates and decay carry
+// over.
+#pragma once
+
+#include <vector>
+
+#include "pictura/training/policy.h"
+
+namespace pictura {
+
+/// Whether Muon steps a parameter: the weights of hidden layers. Biases, norms, queries, what reads positions or
+/// pixels, and the two heads are AdamW's.
+bool is_stepped_by_muon(const NamedTensor& parameter);
+
+/// Matrices [n, rows, columns] with the singular vectors of those given and singular values near 1 (.7 to 1.2, for
+/// values of 1/200 of the Frobenius norm or more), by five Newton-Schulz steps computed in `type`. A zero matrix stays
+/// zero.
+at::Tensor orthogonalized(const at::Tensor& matrices, at::ScalarType type);
+
+class Muon {
+ public:
+  /// weights: f32 leaves with gradients, [out, ...]; each steps as the matrix [out, rest]. type: of the products.
+  Muon(std::vector<at::Tensor> weights, at::ScalarType type, double weight_decay);
+
+  /// One step along the weights' gradients. failed: f32 scalar; where it is not 0, neither weights nor momentum change,
+  /// whatever the gradients are. Waits for no device.
+  void step(double learning_rate, const at::Tensor& failed);
+
+  /// Momentum of weight i, of its shape.
+  at::Tensor momentum(size_t i) const { return parts_of(momentum_)[i]; }
+
+ private:
+  // Matrices multiplied together: filled up with zeros to one size, and turned where they are taller than wide.
+  struct Batch {
+    int64_t rows = 0, columns = 0;
+    std::vector<size_t> weights;
+    double cost() const;
+  };
+  static std::vector<Batch> make_batches(const std::vector<at::Tensor>& weights);
+  void index_batches();
+  // Parts of a vector of all weights' elements, of their shapes.
+  std::vector<at::Tensor> parts_of(const at::Tensor& flat) const;
+
+  std::vector<at::Tensor> weights_;
+  const at::ScalarType type_;
+  const double weight_decay_;
+  at::Tensor momentum_;  // [elements of all weights]
+  std::vector<Batch> batches_;
+  // Where each element of the batches lies in such a vector, whose size stands for filling; and the inverse.
+  at::Tensor element_of_place_, place_of_element_;
+  std::vector<at::Tensor> scales_;  // of each batch [weights, 1, 1]
+};
+
+}  // namespace pictura
