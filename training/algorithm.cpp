@@ -13,7 +13,7 @@ at::Tensor seen_slots(const Run& run, const at::Tensor& active) {
                                                             : at::arange(run.rollout.num_slots(), active.options());
 }
 
-// What the policy makes of the active slots at a step that has been recorded.
+// What the policy makes of some active slots at a step that has been recorded.
 Decision decide(Run* run, int64_t step, const at::Tensor& active) {
   const Config::Train& config = run->config.train;
   const at::Tensor rows = run->rollout.rows_of(step, seen_slots(*run, active));
@@ -33,6 +33,7 @@ double teacher_weight(const Run& run) { return teacher_weight_at(run.config.trai
 
 Collector::Collector(Run* run)
     : run_(*run),
+      clock_(run->config.policy.decision_steps),
       graphs_(run->device, run->graphs.are_used()),
       records_(static_cast<size_t>(run->rollout.num_steps()) + 1),
       simulations_(static_cast<size_t>(run->rollout.num_steps())) {}
@@ -56,6 +57,7 @@ bool Collector::collect_on_stream() {
     const at::Tensor slots = record(step);
     const Decision decision = decide(&run_, step, slots);
     ask_teacher(step, slots);
+    hold_actions(step, slots);
     run_.executor->choose_actions(simulator.controller_input(), span_of<const int64_t>(slots),
                                   span_of<const float>(decision.log_probs),
                                   {.argmax = false, .seed = run_.config.run.seed}, rollout.actions_at(step), stream);
@@ -75,13 +77,22 @@ bool Collector::collect_on_stream() {
 
 at::Tensor Collector::record(int64_t step) {
   RolloutObservations& observations = run_.rollout.observations;
-  const at::Tensor slots = active_slots(run_.simulator->controller_input(), {}, run_.executor.get());
+  const ControllerInput input = run_.simulator->controller_input();
+  const at::Tensor slots =
+      clock_.deciding(input, active_slots(input, {}, run_.executor.get()), step, run_.simulator->episode_over());
   // Those whose images are kept are others every time.
   if (observations.keep_images())
     observations.record(step, seen_slots(run_, slots));
   else
     records_[static_cast<size_t>(step)].run(&graphs_, [&] { observations.record(step, slots); });
   return slots;
+}
+
+void Collector::hold_actions(int64_t step, const at::Tensor& deciding) {
+  Rollout& rollout = run_.rollout;
+  if (!rollout.decides.defined()) return;
+  rollout.decides.select(0, step).zero_().index_fill_(0, deciding, 1);
+  if (step > 0) rollout.actions.select(0, step).copy_(rollout.actions.select(0, step - 1));
 }
 
 void Collector::ask_teacher(int64_t step, const at::Tensor& slots) {

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "pictura/training/decision_clock.h"
 #include "pictura/training/run.h"
 
 namespace pictura {
@@ -20,13 +21,16 @@ class Collector {
 
  private:
   bool collect_on_stream();
-  // Keeps what the simulator shows as what is seen at a step. Returns the slots of active agents.
+  // Keeps what the simulator shows as what is seen at a step. Returns the slots of the agents that decide.
   at::Tensor record(int64_t step);
+  // Has the agents that do not decide at a step go on with their actions of the step before.
+  void hold_actions(int64_t step, const at::Tensor& deciding);
   // Keeps what the teacher would do at a step, as long as it weighs anything.
   void ask_teacher(int64_t step, const at::Tensor& slots);
   void simulate(int64_t step);
 
   Run& run_;
+  DecisionClock clock_;
   Graphs graphs_;
   std::vector<RepeatedWork> records_, simulations_;  // of each step, whose part of the rollout they write
 };

@@ -87,6 +87,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.flag("policy.point_features", c.policy.point_features);
   v.integer("policy.backbone_layers", c.policy.backbone_layers, 1, 64);
   v.integer("policy.backbone_width", c.policy.backbone_width, 1, 1 << 14);
+  v.integer("policy.decision_steps", c.policy.decision_steps, 1, 1000);
 
   v.integer("train.updates", c.train.updates, 1, int64_t{1} << 40);
   v.choice("train.schedule", c.train.schedule, kSchedules);
@@ -576,6 +577,13 @@ void check_contradictions(const Config& c, const Reader& reader) {
       reader.refuse(key,
                     fmt::format("expected {} values, as policy.conv_channels has, got {}", layers, values->size()));
     }
+  }
+  if (c.train.num_steps % c.policy.decision_steps != 0) {
+    reader.refuse("train.num_steps", fmt::format("expected a multiple of policy.decision_steps ({}), got {}",
+                                                 c.policy.decision_steps, c.train.num_steps));
+  }
+  if (c.policy.decision_steps > 1 && c.train.halted_slots == HaltedSlots::draw) {
+    reader.refuse("train.halted_slots", "\"draw\" expects policy.decision_steps = 1");
   }
   for (const int kernel : c.policy.conv_kernels) {
     if (kernel % 2 == 0) reader.refuse("policy.conv_kernels", fmt::format("expected odd sizes, got {}", kernel));

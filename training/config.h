@@ -81,6 +81,7 @@ struct Config {
     std::string backbone = "conv";
     bool backbone_frozen = true;  // the program's weights stay as they are
     int backbone_layers = 4, backbone_width = 512;
+    int decision_steps = 1;  // steps for which an action is held, see training/decision_clock.h
   } policy;
 
   struct Train {

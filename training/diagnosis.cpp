@@ -10,7 +10,7 @@ Diagnosis diagnose(const Rollout& rollout, double adv_threshold, Communicator* c
   const at::NoGradGuard no_grad;
   const at::Tensor speed_mps =
       rollout.observations.arrays().ego.narrow(0, 0, rollout.num_steps()).select(2, 0) * kScaleSpeed_mps;
-  const at::Tensor valid = rollout.valid.to(at::kBool), rests = speed_mps.abs() <= kRest_mps;
+  const at::Tensor valid = rollout.decisions().to(at::kBool), rests = speed_mps.abs() <= kRest_mps;
   const at::Tensor is_kept = rollout.advantages.abs() >= adv_threshold;
 
   // One copy to the host: of each group its size, kept, sum of advantages, and the count of each action.

@@ -34,7 +34,7 @@ struct Batch {
   Batch(const Rollout& rollout, double teacher_weight)
       : advantages(rollout.advantages.flatten()),
         values(rollout.values.narrow(0, 0, rollout.num_steps()).flatten()),
-        valid(rollout.valid.flatten()),
+        valid(rollout.decisions().flatten()),
         targets{rollout.actions.flatten().to(at::kLong), rollout.log_probs.flatten(), advantages + values} {
     if (teacher_weight <= 0) return;
     targets.teacher_log_probs = rollout.teacher_log_probs.flatten(0, 1);

@@ -91,7 +91,8 @@ void Rollout::set_result(int64_t step, const StepResult& result, Device device) 
 void Rollout::compute_advantages(double gamma, double gae_lambda, LearnerExecutor* executor) {
   executor->compute_advantages(
       {span_of<const float>(rewards), span_of<const float>(values), span_of<const uint8_t>(terminated),
-       span_of<const uint8_t>(truncated), span_of<const uint8_t>(valid), num_steps(), num_slots()},
+       span_of<const uint8_t>(truncated), span_of<const uint8_t>(valid),
+       decides.defined() ? span_of<const uint8_t>(decides) : Span<const uint8_t>(), num_steps(), num_slots()},
       static_cast<float>(gamma), static_cast<float>(gae_lambda), span_of<float>(advantages),
       current_stream(executor->device()));
 }

@@ -56,6 +56,7 @@ struct Rollout {
   at::Tensor log_probs;                     // f32, of the chosen actions
   at::Tensor rewards;                       // f32
   at::Tensor terminated, truncated, valid;  // u8, as StepResult defines them
+  at::Tensor decides;                       // u8, 0 where an action is held; undefined where none is
   at::Tensor advantages;                    // f32, see rules/gae.h
   at::Tensor teacher_log_probs;             // f32 [num_steps, num_slots, kNumActions]; undefined without a teacher
 
@@ -63,6 +64,8 @@ struct Rollout {
   int64_t num_steps() const { return actions.size(0); }
   int64_t num_slots() const { return actions.size(1); }
 
+  /// The steps that are learned from, u8 [num_steps, num_slots]: valid ones at which the agent decided.
+  at::Tensor decisions() const { return decides.defined() ? valid * decides : valid; }
   /// The row of each of these slots, i64 [n], at a step.
   at::Tensor rows_of(int64_t step, const at::Tensor& slots) const { return slots + step * num_slots(); }
   /// The actions of one step, to be filled. [num_slots]

@@ -74,6 +74,7 @@ Run::Run(const Config& its_config, Device its_device, Communicator* its_communic
     rollout.teacher_log_probs =
         at::zeros({rollout.num_steps(), rollout.num_slots(), kNumActions}, rollout.log_probs.options());
   }
+  if (config.policy.decision_steps > 1) rollout.decides = at::ones_like(rollout.valid);
   for (const auto& change : config.render.schedule) policy->check_images(rig_of(config, change.agent_steps));
 }
 

@@ -8,6 +8,7 @@
 #include "pictura/common/pixel_samples.h"
 #include "pictura/common/support/parallel_for.h"
 #include "pictura/simulator/controllers/host_controllers.h"
+#include "pictura/training/decision_clock.h"
 #include "pictura/training/observation.h"
 #include "pictura/training/precision.h"
 #include "pictura/training/saved_policy.h"
@@ -146,7 +147,7 @@ struct PolicySession::Parts {
 class SessionController final : public PolicyController {
  public:
   SessionController(const PolicySession::Parts* parts, Renderer* renderer, const ActionChoice& choice)
-      : parts_(*parts), renderer_(renderer), choice_(choice) {}
+      : parts_(*parts), renderer_(renderer), choice_(choice), clock_(parts->config.policy.decision_steps) {}
 
   std::string_view name() const override { return "policy"; }
 
@@ -156,8 +157,9 @@ class SessionController final : public PolicyController {
     if (!actions_.defined() || actions_.size(0) != num_slots) {
       actions_ = at::zeros({num_slots}, at::TensorOptions(at::kInt).device(torch_device(parts_.device)));
     }
-    const at::Tensor slots = active_slots(input, mask, parts_.executor.get());
-    num_driven_ = slots.size(0);
+    const at::Tensor active = active_slots(input, mask, parts_.executor.get());
+    num_driven_ = active.size(0);
+    const at::Tensor slots = clock_.deciding(input, active, step_++);
     const Decision decision =
         parts_.decide({input.observations, &input.scene, input.views, {}}, num_slots, slots, renderer_);
     const Span<int32_t> actions = span_of<int32_t>(actions_);
@@ -172,7 +174,9 @@ class SessionController final : public PolicyController {
   const PolicySession::Parts& parts_;
   Renderer* renderer_;
   ActionChoice choice_;
-  at::Tensor actions_;  // i32 [slots]
+  DecisionClock clock_;
+  int64_t step_ = 0;    // calls of act()
+  at::Tensor actions_;  // i32 [slots], held until the next decision
   int64_t num_driven_ = 0;
 };
 

@@ -40,10 +40,10 @@ struct PolicyInput {
   int64_t full_chunk = 0;
 };
 
-/// A policy that drives. On a device act() waits for one number: how many agents it drives.
+/// A policy that drives. On a device act() waits for how many agents it drives, and how many of these decide.
 class PolicyController : public Controller {
  public:
-  /// How many agents the last act() chose actions for: those of its mask that were active.
+  /// How many agents the last act() commanded: those of its mask that were active.
   virtual int64_t num_driven() const = 0;
 };
 
@@ -88,8 +88,9 @@ class PolicySession {
   void evaluate(const PolicyInput& input, Renderer* renderer, Span<float> logits_out, Span<float> values_out);
 
   /// Drives in a simulator on device(): the most likely action, or a draw keyed by (seed, global world, agent,
-  /// episode, step) as in training. Session and renderer, which is as for evaluate(), must outlive it. Images are drawn
-  /// for active agents alone.
+  /// episode, step) as in training. Actions are held for the steps that the policy was trained with (policy.
+  /// decision_steps), counted from the first act(). Session and renderer, which is as for evaluate(), must outlive it.
+  /// Images are drawn for agents that decide alone.
   std::unique_ptr<PolicyController> make_controller(Renderer* renderer, bool argmax, uint64_t seed);
 
  private:

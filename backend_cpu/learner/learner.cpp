@@ -44,13 +44,12 @@ class LearnerExecutorCpu final : public LearnerExecutor {
   void compute_advantages(const TransitionArrays& transitions, float gamma, float gae_lambda,
                           Span<float> advantages_out, Stream) override {
     // Steps are walked backwards and slots forwards: the inner loop runs over consecutive memory.
-    std::vector<float> next(static_cast<size_t>(transitions.num_slots), 0.0f);
+    std::vector<GaeTail> tails;
+    for (int64_t slot = 0; slot < transitions.num_slots; ++slot) tails.push_back(transitions.tail(slot));
     for (int64_t step = transitions.num_steps - 1; step >= 0; --step) {
       float* const of_step = advantages_out.data() + step * transitions.num_slots;
       for (int64_t slot = 0; slot < transitions.num_slots; ++slot) {
-        float& advantage = next[static_cast<size_t>(slot)];
-        advantage = gae_advantage(transitions.at(step, slot), advantage, gamma, gae_lambda);
-        of_step[slot] = advantage;
+        of_step[slot] = gae_advantage(transitions.at(step, slot), gamma, gae_lambda, &tails[static_cast<size_t>(slot)]);
       }
     }
   }

@@ -43,10 +43,10 @@ struct ComputeAdvantages {
   float gamma, gae_lambda;
   float* advantages_out;
   __device__ void operator()(int64_t slot) const {
-    float advantage = 0;
+    GaeTail tail = transitions.tail(slot);
     for (int64_t step = transitions.num_steps - 1; step >= 0; --step) {
-      advantage = gae_advantage(transitions.at(step, slot), advantage, gamma, gae_lambda);
-      advantages_out[step * transitions.num_slots + slot] = advantage;
+      advantages_out[step * transitions.num_slots + slot] =
+          gae_advantage(transitions.at(step, slot), gamma, gae_lambda, &tail);
     }
   }
 };

@@ -1,41 +1,66 @@
-// Generalized advantage estimation (Schulman et al., 2016) with next-step autoreset: the recursion of one slot, from
-// its last step to its first. Callers loop over slots and steps.
+// Generalized advantage estimation (Schulman et al., 2016) with next-step autoreset, over actions that may be held for
+// several steps: the recursion of one slot, from its last step to its first. Callers loop over slots and steps.
 #pragma once
 
 #include "pictura/common/span.h"
 
 namespace pictura {
 
-/// One transition. One that is
+/// One step of one agent. One that is
 ///   terminated  does not bootstrap;
 ///   truncated   bootstraps from the value of the next row, which is the final observation's: the world is reset by the
 ///               next call, whose transition is not valid; nothing flows back over the end of an episode;
-///   not valid   (its agent had halted, or its world was being reset) gets 0 and ends what comes before it.
+///   not valid   (its agent had halted, or its world was being reset) gets 0 and ends what comes before it;
+///   no decision continues the action of the step before: it gets 0, and its reward is part of that decision's return.
 struct GaeTransition {
   float reward, value, next_value;
-  bool is_terminated, is_truncated, is_valid;
+  bool is_terminated, is_truncated, is_valid, is_decision;
 };
 
-/// The advantage of a transition, given that of the slot's next one (0 after the last).
-PICTURA_HD inline float gae_advantage(const GaeTransition& transition, float next_advantage, float gamma,
-                                      float gae_lambda) {
-  const float bootstrap = transition.is_terminated ? 0.0f : transition.next_value;
-  const float delta = transition.reward + gamma * bootstrap - transition.value;
+/// What comes after a step, as seen from it: the discounted rewards up to the next decision with the value there, and
+/// the discounted advantage of that decision.
+struct GaeTail {
+  float value = 0, advantage = 0;
+};
+
+/// The advantage of a step's decision, 0 where there is none, given what comes after the slot's next step; sets that to
+/// what comes after the step before. Discounts by gamma each step, by gae_lambda each decision: an action held for k
+/// steps returns the sum of gamma^i r_i and bootstraps with gamma^k.
+PICTURA_HD inline float gae_advantage(const GaeTransition& transition, float gamma, float gae_lambda,
+                                      GaeTail* tail_inout) {
   const bool goes_on = !transition.is_terminated && !transition.is_truncated;
-  const float advantage = delta + gamma * gae_lambda * (goes_on ? next_advantage : 0.0f);
-  return transition.is_valid ? advantage : 0.0f;
+  const float next_advantage = goes_on ? tail_inout->advantage : 0.0f;
+  const float bootstrap =
+      transition.is_terminated ? 0.0f : (transition.is_truncated ? transition.next_value : tail_inout->value);
+  const float discounted = transition.reward + gamma * bootstrap;
+  if (!transition.is_valid) {
+    *tail_inout = {transition.value, 0.0f};
+    return 0.0f;
+  }
+  if (!transition.is_decision) {
+    *tail_inout = {discounted, gamma * next_advantage};
+    return 0.0f;
+  }
+  const float advantage = discounted - transition.value + gamma * gae_lambda * next_advantage;
+  *tail_inout = {transition.value, advantage};
+  return advantage;
 }
 
-/// A rollout's transitions, [steps, slots] each, but for `values`, which has one step more.
+/// A rollout's steps, [steps, slots] each, but for `values`, which has one step more.
 struct TransitionArrays {
   Span<const float> rewards, values;
   Span<const uint8_t> terminated, truncated, valid;
+  Span<const uint8_t> decides;  // or empty: every step is a decision
   int64_t num_steps = 0, num_slots = 0;
 
   PICTURA_HD GaeTransition at(int64_t step, int64_t slot) const {
     const auto i = static_cast<size_t>(step * num_slots + slot);
-    return {rewards[i],         values[i],         values[i + static_cast<size_t>(num_slots)],
-            terminated[i] != 0, truncated[i] != 0, valid[i] != 0};
+    return {rewards[i],        values[i],     values[i + static_cast<size_t>(num_slots)], terminated[i] != 0,
+            truncated[i] != 0, valid[i] != 0, decides.empty() || decides[i] != 0};
+  }
+  /// What comes after the last step.
+  PICTURA_HD GaeTail tail(int64_t slot) const {
+    return {values[static_cast<size_t>(num_steps * num_slots + slot)], 0.0f};
   }
 };
 

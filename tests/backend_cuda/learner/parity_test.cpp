@@ -235,9 +235,9 @@ TEST_F(CudaLearnerTest, WritesTheCommandsThatTheMaskHas) {
 /// A rollout's transitions on both, without any sense.
 struct Transitions {
   std::vector<float> rewards, values;
-  std::vector<uint8_t> terminated, truncated, valid;
+  std::vector<uint8_t> terminated, truncated, valid, decides;
   DeviceBuffer<float> reward_copy, value_copy;
-  DeviceBuffer<uint8_t> terminated_copy, truncated_copy, valid_copy;
+  DeviceBuffer<uint8_t> terminated_copy, truncated_copy, valid_copy, decides_copy;
   int64_t num_steps, num_slots;
 
   Transitions(int64_t steps, int64_t slots, std::mt19937_64* random) : num_steps(steps), num_slots(slots) {
@@ -247,16 +247,26 @@ struct Transitions {
     terminated = random_flags(size, 0.05, random);
     truncated = random_flags(size, 0.05, random);
     valid = random_flags(size, 0.8, random);
+    decides = random_flags(size, 0.4, random);
     reward_copy = on_device(rewards);
     value_copy = on_device(values);
     terminated_copy = on_device(terminated);
     truncated_copy = on_device(truncated);
     valid_copy = on_device(valid);
+    decides_copy = on_device(decides);
   }
-  TransitionArrays host() const { return {rewards, values, terminated, truncated, valid, num_steps, num_slots}; }
+  TransitionArrays host() const {
+    return {rewards, values, terminated, truncated, valid, decides, num_steps, num_slots};
+  }
   TransitionArrays device() const {
-    return {reward_copy.span(), value_copy.span(), terminated_copy.span(), truncated_copy.span(), valid_copy.span(),
-            num_steps,          num_slots};
+    return {reward_copy.span(),
+            value_copy.span(),
+            terminated_copy.span(),
+            truncated_copy.span(),
+            valid_copy.span(),
+            decides_copy.span(),
+            num_steps,
+            num_slots};
   }
 };
 
