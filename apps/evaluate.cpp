@@ -26,15 +26,17 @@ namespace {
 constexpr int kShownGroups = 6;  // of each kind of infraction
 
 void print_table(const EvaluateReport& report) {
-  fmt::print("{:10} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>17} {:>9}\n", "density", "scenarios",
-             "steps", "vehicles", "return", "at-fault", "off-road", "red light", "goals", "waypoints", "km/infraction",
-             "km");
+  fmt::print("{:10} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>17} {:>19} {:>9}\n",
+             "density", "scenarios", "steps", "vehicles", "return", "collision", "at-fault", "off-road", "red light",
+             "wall", "goals", "waypoints", "km/infraction", "km/at-fault infr.", "km");
   for (const EvaluateRow& row : report.rows) {
-    fmt::print("{:10} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>17} {:>9.2f}\n", row.density,
-               row.scenarios, row.steps, row.vehicle_episodes, interval_text(row.return_per_vehicle),
-               interval_text(row.at_fault_collision_rate), interval_text(row.off_road_rate),
-               interval_text(row.red_light_rate), interval_text(row.goals_per_vehicle),
-               interval_text(row.waypoints_per_vehicle), interval_text(row.km_per_infraction), row.km_driven);
+    fmt::print(
+        "{:10} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>17} {:>19} {:>9.2f}\n",
+        row.density, row.scenarios, row.steps, row.vehicle_episodes, interval_text(row.return_per_vehicle),
+        interval_text(row.collision_rate), interval_text(row.at_fault_collision_rate), interval_text(row.off_road_rate),
+        interval_text(row.red_light_rate), interval_text(row.wall_contact_rate), interval_text(row.goals_per_vehicle),
+        interval_text(row.waypoints_per_vehicle), interval_text(row.km_per_infraction),
+        interval_text(row.km_per_at_fault_infraction), row.km_driven);
   }
   fmt::print("+- is the half width of a 95 % confidence interval over scenarios\n");
   if (report.agent_steps > 0) {
@@ -126,8 +128,11 @@ EvaluateReport merged(const std::vector<std::string>& paths) {
   for (const std::string& path : paths) parts.push_back(read_results(path));
   EvaluateReport report;
   report.results = merge(parts, paths);
-  for (const DensityResult& density : report.results.densities) {
-    report.rows.push_back(row_of(density, report.results.setting.steps));
+  report.rows = rows_of(report.results);
+  if (!report.results.counts_all_collisions) {
+    fmt::print(stderr,
+               "notice: --merge: files of an earlier version count collisions at fault alone: collisions, walls and km "
+               "per infraction are unknown, km per at-fault infraction is what they called km per infraction\n");
   }
   return report;
 }

@@ -106,8 +106,8 @@ ScenarioCounts drive(const EvaluateOptions& options, const RecordedScenario& sce
   return report.results.densities[0].scenarios[0];
 }
 
-double infractions_per_vehicle(const ScenarioCounts& counts) {
-  return static_cast<double>(counts.infractions) / static_cast<double>(std::max<int64_t>(1, counts.vehicles));
+double at_fault_infractions_per_vehicle(const ScenarioCounts& counts) {
+  return static_cast<double>(counts.at_fault_infraction) / static_cast<double>(std::max<int64_t>(1, counts.vehicles));
 }
 
 const ScenarioCounts& counts_of(const EvaluationResults& results, const ScenarioPlace& place) {
@@ -123,11 +123,11 @@ void write(const EvaluateOptions& options, const EvaluationResults& results, con
                                   .agents_per_world = results.densities[place.density].agents_per_world};
   write_replay_and_say_so(path, record_scenario(options, scenario, recording, &counts));
   const ScenarioCounts& evaluated = counts_of(results, place);
-  if (counts.infractions == evaluated.infractions && counts.goals == evaluated.goals) return;
+  if (counts.any_infraction == evaluated.any_infraction && counts.goals == evaluated.goals) return;
   fmt::print(stderr,
              "notice: {}: {} infractions and {} goals, in the evaluation {} and {}: the policy's numbers differ in "
              "their last bits where batches or devices differ\n",
-             path, counts.infractions, counts.goals, evaluated.infractions, evaluated.goals);
+             path, counts.any_infraction, counts.goals, evaluated.any_infraction, evaluated.goals);
 }
 
 }  // namespace
@@ -141,7 +141,8 @@ std::vector<ScenarioPlace> worst_scenarios(const EvaluationResults& results, int
     }
   }
   std::stable_sort(places.begin(), places.end(), [&](const ScenarioPlace& a, const ScenarioPlace& b) {
-    return infractions_per_vehicle(counts_of(results, a)) > infractions_per_vehicle(counts_of(results, b));
+    return at_fault_infractions_per_vehicle(counts_of(results, a)) >
+           at_fault_infractions_per_vehicle(counts_of(results, b));
   });
   places.resize(std::min(places.size(), static_cast<size_t>(count)));
   return places;

@@ -15,7 +15,8 @@ struct ScenarioPlace {
   int scenario = 0;    // its number
 };
 
-/// The scenarios with the most infractions of vehicles a vehicle, worst first; `count` of them, or all.
+/// Returns the scenarios with the largest share of vehicles with an at-fault infraction, worst first; `count` of them,
+/// or all.
 std::vector<ScenarioPlace> worst_scenarios(const EvaluationResults& results, int count);
 
 /// A scenario to drive again.

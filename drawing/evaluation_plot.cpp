@@ -14,22 +14,25 @@ constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
 
 struct Metric {
   const char *name, *title, *y_label;
+  bool is_optional = false;  // without a panel where no row has it
 };
 // As the columns of the paper's tables.
 constexpr Metric kMetrics[] = {{"at_fault_collision_rate", "At-fault collision", "share of vehicles"},
                                {"off_road_rate", "Off-road", "share of vehicles"},
                                {"red_light_rate", "Red light", "share of vehicles"},
                                {"goals_per_vehicle", "Goals", "a vehicle"},
-                               {"km_per_infraction", "Distance per infraction", "km"}};
+                               {"km_per_infraction", "Distance per infraction", "km", true},
+                               {"km_per_at_fault_infraction", "Distance per at-fault infraction", "km", true}};
 
-/// NaN for null: nobody drove, or nothing happened.
-double number_of(const Json& row, const char* metric) {
-  const Json& value = row.at(metric);
+/// Returns NaN for null, where there is nothing to divide by, and for optional metrics that the row lacks.
+double number_of(const Json& row, const Metric& metric) {
+  if (metric.is_optional && !row.contains(metric.name)) return kNoValue;
+  const Json& value = row.at(metric.name);
   return value.is_null() ? kNoValue : value.get<double>();
 }
 
 /// Adds one evaluation to a line of one metric.
-void add_point(const Json& point, RunAxis axis, const char* metric, PlotSeries* series_inout) {
+void add_point(const Json& point, RunAxis axis, const Metric& metric, PlotSeries* series_inout) {
   double medium = kNoValue, low = kNoValue, high = kNoValue;
   for (const Json& row : point.at("rows")) {
     const double value = number_of(row, metric);
@@ -46,6 +49,17 @@ void add_point(const Json& point, RunAxis axis, const char* metric, PlotSeries* 
 bool has_medium(const Json& point) {
   const Json& rows = point.at("rows");
   return std::any_of(rows.begin(), rows.end(), [](const Json& row) { return row.at("density") == "medium"; });
+}
+
+bool has_metric(const Json& lines, const Metric& metric) {
+  for (const Json& line : lines) {
+    for (const Json& point : line.at("points")) {
+      for (const Json& row : point.at("rows")) {
+        if (row.contains(metric.name)) return true;
+      }
+    }
+  }
+  return false;
 }
 
 }  // namespace
@@ -72,11 +86,15 @@ std::vector<PlotPanel> plot_evaluations(const std::string& path, RunAxis axis) {
                     "{}: {}: expected a row of medium density in every point", path, where);
       for (size_t m = 0; m < std::size(kMetrics); ++m) {
         PlotSeries series{.name = name, .dashed = line.value("dashed", false)};
-        for (const Json& point : points) add_point(point, axis, kMetrics[m].name, &series);
+        for (const Json& point : points) add_point(point, axis, kMetrics[m], &series);
         PICTURA_CHECK(std::is_sorted(series.x.begin(), series.x.end()), "{}: {}: expected points in ascending order",
                       path, where);
         panels[m].series.push_back(std::move(series));
       }
+    }
+    for (size_t m = std::size(kMetrics); m-- > 0;) {
+      if (kMetrics[m].is_optional && !has_metric(lines, kMetrics[m]))
+        panels.erase(panels.begin() + static_cast<int>(m));
     }
   } catch (const nlohmann::json::exception& error) {
     throw Error(fmt::format("{}: {}: {}", path, where, error.what()));

@@ -8,11 +8,11 @@
 
 namespace pictura {
 
-/// Panels of at-fault collisions, off-road, red lights, goals and distance per infraction over the agent-steps or hours
-/// (of one GPU) of trainings. A line is medium traffic, its band reaches from the lowest to the highest density.
-/// `path`: {"lines": [{"name": TEXT, "dashed": BOOL, "points": [{"agent_steps": N, "gpu_hours": N, "rows": ROWS}]}]},
-/// where ROWS are those of `pictura evaluate --json`, one of them medium. Throws Error naming the file, the line and
-/// what is missing there.
+/// Returns panels of at-fault collisions, off-road, red lights, goals and distance per infraction over the agent-steps
+/// or hours (of one GPU) of trainings; of distances per infraction and per at-fault infraction those that rows have. A
+/// line is medium traffic, its band reaches from the lowest to the highest density. `path`: {"lines": [{"name": TEXT,
+/// "dashed": BOOL, "points": [{"agent_steps": N, "gpu_hours": N, "rows": ROWS}]}]}, where ROWS are those of `pictura
+/// evaluate --json`, one of them medium. Throws Error naming the file, the line and what is missing there.
 std::vector<PlotPanel> plot_evaluations(const std::string& path, RunAxis axis);
 
 }  // namespace pictura

@@ -989,7 +989,7 @@ class Replays(CommandCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertNotIn("notice", result.stderr)  # they count what the evaluation did
         scenarios = json.loads(out.read_text())["densities"][0]["scenarios"]
-        rates = [s["infractions"] / s["vehicles"] for s in scenarios]
+        rates = [s["at_fault_infraction"] / s["vehicles"] for s in scenarios]
         worst = sorted(range(4), key=lambda i: -rates[i])[:2]
         self.assertEqual(sorted(p.name for p in folder.iterdir()), sorted(["index.html", *(f"custom_{i}.html" for i in worst)]))
         self.assertEqual(header_of(self.folder / "worst.html")["map"], f"procedural:{1 + worst[0] % 2}:blocks=2x2")
@@ -1445,7 +1445,7 @@ class Training(CommandCase):
         result = self.json_of("evaluate", "--map", "procedural:1", out / "checkpoint.ckpt", "--density", "light", "--agents", 8,
                               "--scenarios", 2, "--steps", 40, "--device", "cpu")  # fmt: skip
         keys = """density scenarios steps at_fault_collision_rate off_road_rate red_light_rate goals_per_vehicle
-                  km_per_infraction km_driven""".split()
+                  collision_rate wall_contact_rate km_per_infraction km_per_at_fault_infraction km_driven""".split()
         self.assertEqual([key for key in keys if key not in result["rows"][0]], [])
 
 

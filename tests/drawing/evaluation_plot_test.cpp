@@ -77,6 +77,29 @@ TEST_F(EvaluationPlots, LinesAreMediumTrafficInABandOfAllDensities) {
   EXPECT_LT(colored(draw_plots({solid})), 0.8 * colored(draw_plots({panels[3]})));
 }
 
+TEST_F(EvaluationPlots, DistancesPerInfractionArePanelsWhereRowsHaveThem) {
+  const auto titles_of_distances = [&](const std::string& rows) {
+    std::vector<std::string> titles;
+    const std::string path = file(fmt::format(R"({{"name": "agent", "points": [{}]}})", point(1000, rows)));
+    for (const PlotPanel& panel : plot_evaluations(path, RunAxis::agent_steps)) titles.push_back(panel.title);
+    titles.erase(titles.begin(), titles.begin() + 4);
+    return titles;
+  };
+  const std::string both = row("medium", 1, R"(2, "km_per_at_fault_infraction": 3)");
+  std::string old = row("medium", 1);
+  old.replace(old.find("km_per_infraction"), 17, "km_per_at_fault_infraction");
+  EXPECT_THAT(titles_of_distances(row("medium", 1)), ElementsAre("Distance per infraction"));
+  EXPECT_THAT(titles_of_distances(old), ElementsAre("Distance per at-fault infraction"));
+  EXPECT_THAT(titles_of_distances(both), ElementsAre("Distance per infraction", "Distance per at-fault infraction"));
+  // A line of both kinds has a gap where a point lacks one.
+  const std::string path =
+      file(fmt::format(R"({{"name": "agent", "points": [{}, {}]}})", point(1000, old), point(2000, both)));
+  const std::vector<PlotPanel> panels = plot_evaluations(path, RunAxis::agent_steps);
+  EXPECT_TRUE(std::isnan(panels[4].series[0].y[0]));
+  EXPECT_EQ(panels[4].series[0].y[1], 2);
+  EXPECT_THAT(panels[5].series[0].y, ElementsAre(1, 3));
+}
+
 TEST_F(EvaluationPlots, WhatIsMissingIsNamed) {
   const auto message = [&](const std::string& lines) {
     return message_of([&] { plot_evaluations(file(lines), RunAxis::agent_steps); });

@@ -109,20 +109,25 @@ TEST(Infractions, OfAnEvaluationAreThoseThatItCounts) {
   EvaluateOptions options;
   options.controller = "random";
   options.maps = {"procedural:1", "procedural:2"};
-  options.agents_per_world = 25;
+  options.agents_per_world = 250;
   options.first_scenario = 3;
   options.scenarios = 4;
-  options.steps = 200;
+  options.steps = 60;
   options.num_threads = 1;
   options.device = options.simulator = "cpu";
   options.observer = &observer;
   const EvaluateReport report = evaluate(options);
-  int64_t at_fault = 0, off_road = 0, red_light = 0, vehicles = 0;
+  int64_t at_fault = 0, off_road = 0, red_light = 0, vehicles = 0, collision = 0, wall_contact = 0;
+  int64_t any_infraction = 0, at_fault_infraction = 0;
   for (const ScenarioCounts& counts : report.results.densities[0].scenarios) {
     at_fault += counts.at_fault;
     off_road += counts.off_road;
     red_light += counts.red_light;
     vehicles += counts.vehicles;
+    collision += counts.collision;
+    wall_contact += counts.wall_contact;
+    any_infraction += counts.any_infraction;
+    at_fault_infraction += counts.at_fault_infraction;
   }
   ASSERT_GT(at_fault, 0);
   ASSERT_GT(off_road, 0);
@@ -134,6 +139,17 @@ TEST(Infractions, OfAnEvaluationAreThoseThatItCounts) {
   EXPECT_EQ(by_kind["red_light"], red_light);
   EXPECT_TRUE(std::is_sorted(groups.begin(), groups.end(),
                              [](const InfractionGroup& a, const InfractionGroup& b) { return a.count > b.count; }));
+  // Vehicles halt at their first event, so each is counted where its one entry says.
+  const auto entries_with = [&observer](int any_of) {
+    return std::count_if(observer.found().begin(), observer.found().end(), [any_of](const Infraction& one) {
+      return one.agent_class == AgentClass::vehicle && (one.events & any_of) != 0;
+    });
+  };
+  EXPECT_EQ(collision, entries_with(kEventCollision));
+  EXPECT_EQ(wall_contact, entries_with(kEventWall));
+  EXPECT_EQ(any_infraction, entries_with(kEventCollision | kEventOffRoad | kEventRedLight));
+  EXPECT_EQ(at_fault_infraction, entries_with(kEventAtFault | kEventOffRoad | kEventRedLight));
+  EXPECT_GT(any_infraction, at_fault_infraction);
   for (const Infraction& one : observer.found()) {
     EXPECT_EQ(one.is(kEventCollision), one.partner != CollisionPartner::none) << one.scenario << " " << one.agent;
     EXPECT_GE(one.scenario, 3);

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -16,11 +17,12 @@ namespace {
 using test::message_of;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 ScenarioCounts counts(int64_t vehicles, int64_t at_fault, double distance_m) {
   ScenarioCounts c;
   c.vehicles = vehicles;
-  c.at_fault = c.infractions = at_fault;
+  c.collision = c.at_fault = c.any_infraction = c.at_fault_infraction = at_fault;
   c.distance_m = distance_m;
   return c;
 }
@@ -32,6 +34,24 @@ EvaluationResults part(int first_scenario, std::vector<ScenarioCounts> scenarios
   results.setting.steps = 100;
   results.densities.push_back({"light", 8, first_scenario, std::move(scenarios)});
   return results;
+}
+
+/// Returns a file of format 1, which counted collisions at fault alone: `infractions` of 4 vehicles in 1 km.
+std::string file_of_format_1(int first_scenario, int infractions) {
+  test::ScratchFolder folder;
+  const std::string path = folder / "empty.json";
+  write_results(path, part(first_scenario, {}));
+  std::string text = read_file(path);
+  const auto replace = [&text](const std::string& old_text, const std::string& new_text) {
+    text.replace(text.find(old_text), old_text.size(), new_text);
+  };
+  replace("pictura evaluation 2", "pictura evaluation 1");
+  replace(R"("scenarios": [])",
+          fmt::format(R"("scenarios": [{{"vehicles": 4, "at_fault": {}, "off_road": 0, "red_light": 0, )"
+                      R"("infractions": {}, "active_at_end": 1, "goals": 2, "waypoints": 3, "distance_m": 1000.0, )"
+                      R"("returns": 1.5}}])",
+                      infractions, infractions));
+  return text;
 }
 
 std::string merged_message(const EvaluationResults& a, const EvaluationResults& b) {
@@ -49,6 +69,48 @@ TEST(Results, RatesAreOverVehiclesAndIntervalsOverScenarios) {
   EXPECT_DOUBLE_EQ(row.km_per_infraction.value, 1);
   EXPECT_DOUBLE_EQ(row.km_per_infraction.half_width_95, 0);
   EXPECT_DOUBLE_EQ(row.off_road_rate.value, 0);
+}
+
+TEST(Results, DistancePerInfractionIsOverAnyCollision) {
+  ScenarioCounts c = counts(10, 0, 12000);
+  c.collision = 4;
+  c.at_fault = 1;
+  c.off_road = 2;
+  c.wall_contact = 5;
+  c.any_infraction = 6;
+  c.at_fault_infraction = 3;
+  const EvaluateRow row = row_of(part(0, {c, c}).densities[0], 100);
+  EXPECT_DOUBLE_EQ(row.collision_rate.value, 0.4);
+  EXPECT_DOUBLE_EQ(row.at_fault_collision_rate.value, 0.1);
+  EXPECT_DOUBLE_EQ(row.wall_contact_rate.value, 0.5);
+  EXPECT_DOUBLE_EQ(row.km_per_infraction.value, 2);
+  EXPECT_DOUBLE_EQ(row.km_per_at_fault_infraction.value, 4);
+}
+
+TEST(Results, FilesOfFormat1LackWhatTheyDidNotCount) {
+  test::ScratchFolder folder;
+  const std::string old_path = folder / "old.json", next_path = folder / "next.json", again = folder / "again.json";
+  write_file(old_path, file_of_format_1(0, 2));
+  write_file(next_path, file_of_format_1(1, 0));
+  const EvaluationResults old = read_results(old_path);
+  EXPECT_FALSE(old.counts_all_collisions);
+  const EvaluateRow row = rows_of(old)[0];
+  EXPECT_TRUE(std::isnan(row.km_per_infraction.value));
+  EXPECT_TRUE(std::isnan(row.collision_rate.value));
+  EXPECT_TRUE(std::isnan(row.wall_contact_rate.value));
+  EXPECT_DOUBLE_EQ(row.km_per_at_fault_infraction.value, 0.5);
+  EXPECT_DOUBLE_EQ(row.at_fault_collision_rate.value, 0.5);
+  // A part that counts everything makes the whole count no more than the other does, in that one's format.
+  for (const EvaluationResults& rest : {read_results(next_path), part(1, {counts(4, 0, 1000)})}) {
+    const EvaluationResults whole = merge({old, rest}, {"old.json", "rest.json"});
+    EXPECT_FALSE(whole.counts_all_collisions);
+    EXPECT_DOUBLE_EQ(rows_of(whole)[0].km_per_at_fault_infraction.value, 1);
+    write_results(again, whole);
+    EXPECT_THAT(read_file(again), AllOf(HasSubstr("pictura evaluation 1"), HasSubstr("\"infractions\": 2"),
+                                        Not(HasSubstr("any_infraction"))));
+    EXPECT_DOUBLE_EQ(rows_of(read_results(again))[0].km_per_at_fault_infraction.value, 1);
+  }
+  EXPECT_TRUE(rows_of(part(0, {counts(4, 1, 1000)}))[0].km_per_infraction.value == 1);
 }
 
 TEST(Results, WhatCannotBeKnownIsInfinite) {
@@ -93,7 +155,8 @@ TEST(Results, PartsThatDoNotFitAreRefusedByName) {
 TEST(Results, OtherFilesAreRefusedByName) {
   test::ScratchFolder folder;
   const std::string path = folder / "x.json";
-  for (const char* text : {"", "[1]", "{}", R"({"format": "pictura evaluation 1"})"}) {
+  for (const char* text :
+       {"", "[1]", "{}", R"({"format": "pictura evaluation 1"})", R"({"format": "pictura evaluation 3"})"}) {
     write_file(path, text);
     EXPECT_THAT(message_of([&] { read_results(path); }), AllOf(HasSubstr("x.json"), HasSubstr("evaluate --out")))
         << text;

@@ -12,12 +12,15 @@
 
 namespace pictura {
 
-/// Of the vehicles of one scenario.
+/// Counts over the vehicles of one scenario. An event counts once a vehicle, however often it happens.
 struct ScenarioCounts {
   int64_t vehicles = 0;
-  int64_t at_fault = 0, off_road = 0, red_light = 0;  // that did so at least once
-  int64_t infractions = 0;                            // that did any of the three
-  int64_t active_at_end = 0;                          // that have not halted by the last step
+  int64_t collision = 0, at_fault = 0;  // any collision; collisions at fault alone
+  int64_t off_road = 0, red_light = 0;
+  int64_t wall_contact = 0;         // belongs to neither kind of infraction below
+  int64_t any_infraction = 0;       // a collision, off-road or a red light: the paper's (appendix, metric definitions)
+  int64_t at_fault_infraction = 0;  // a collision at fault, off-road or a red light
+  int64_t active_at_end = 0;        // vehicles that have not halted by the last step
   int64_t goals = 0, waypoints = 0;
   double distance_m = 0, returns = 0;
 };
@@ -46,6 +49,8 @@ struct EvaluationSetting {
 
 struct EvaluationResults {
   EvaluationSetting setting;
+  /// False for files of format 1, which lack collision, wall_contact and any_infraction.
+  bool counts_all_collisions = true;
   std::vector<DensityResult> densities;
 };
 
@@ -71,29 +76,36 @@ Estimate estimate_ratio(const std::vector<Counts>& scenarios, const Part& part_o
   return estimate_ratio(terms);
 }
 
-/// The paper's five metrics (appendix, metric definitions) over the vehicles of one density, and more.
+/// The paper's five metrics (appendix, metric definitions) over the vehicles of one density, and more. Metrics of what
+/// was not counted are NaN.
 struct EvaluateRow {
   std::string density;
   int scenarios = 0, steps = 0;
   int64_t vehicle_episodes = 0;
   Estimate at_fault_collision_rate, off_road_rate, red_light_rate, goals_per_vehicle;
-  Estimate km_per_infraction;  // infinite when there was none
+  Estimate km_per_infraction;  // over vehicles with any_infraction; infinite when there was none
   double km_driven = 0;
   Estimate km_per_vehicle, waypoints_per_vehicle, return_per_vehicle;
   Estimate active_at_end_share;
+  Estimate collision_rate, wall_contact_rate;
+  Estimate km_per_at_fault_infraction;  // over vehicles with at_fault_infraction; infinite when there was none
 };
 
 /// Its metrics with the names that they have in files.
 std::vector<std::pair<std::string, Estimate>> metrics_of(const EvaluateRow& row);
 
 EvaluateRow row_of(const DensityResult& result, int steps);
+/// Returns one row a density, in the order of the results.
+std::vector<EvaluateRow> rows_of(const EvaluationResults& results);
 
-/// Joins the parts of each density, which must be of one setting and together scenarios without gap or overlap. Throws
-/// Error naming the parts, by the names given, and what differs.
+/// Joins the parts of each density, which must be of one setting and together scenarios without gap or overlap. The
+/// result counts all collisions where every part does. Throws Error naming the parts, by the names given, and what
+/// differs.
 EvaluationResults merge(const std::vector<EvaluationResults>& parts, const std::vector<std::string>& names);
 
-/// As one JSON object, exactly. read_results throws Error naming the file and what it lacks.
+/// Writes the results as one JSON object, exactly: of format 2, or of format 1 where not all collisions are counted.
 void write_results(const std::string& path, const EvaluationResults& results);
+/// Reads files of both formats. Throws Error naming the file and what it lacks.
 EvaluationResults read_results(const std::string& path);
 
 }  // namespace pictura

@@ -1,5 +1,7 @@
 #include "pictura/training/evaluation/results_json.h"
 
+#include <algorithm>
+
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 
@@ -52,7 +54,7 @@ void check_same(const Json& first, const std::string& first_name, const Json& ot
   }
 }
 
-Json read_results_json(const std::string& path, const std::string& format) {
+Json read_results_json(const std::string& path, const std::vector<std::string>& formats) {
   const std::string text = read_file(path);
   Json json;
   try {
@@ -60,8 +62,10 @@ Json read_results_json(const std::string& path, const std::string& format) {
   } catch (const Json::parse_error& error) {
     fail("{}: {}, got no JSON from byte {}", path, kExpected, error.byte);
   }
-  parse_results(path,
-                [&] { PICTURA_CHECK(json.value("format", "") == format, "expected \"format\": \"{}\"", format); });
+  parse_results(path, [&] {
+    PICTURA_CHECK(std::find(formats.begin(), formats.end(), json.value("format", "")) != formats.end(),
+                  "expected \"format\": \"{}\"", fmt::join(formats, "\" or \""));
+  });
   return json;
 }
 

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "pictura/common/support/json.h"
 #include "pictura/training/evaluation/results.h"
@@ -15,8 +16,9 @@ EvaluationSetting setting_from(const Json& json);
 /// Throws Error naming the first key whose values differ in two parts' objects, and the parts.
 void check_same(const Json& first, const std::string& first_name, const Json& other, const std::string& other_name);
 
-/// A file's JSON. Throws Error naming the file unless it is that of this format.
-Json read_results_json(const std::string& path, const std::string& format);
+/// A file's JSON. Throws Error naming the file unless it is that of one of these formats, the first being the present
+/// one.
+Json read_results_json(const std::string& path, const std::vector<std::string>& formats);
 /// Calls parse, and throws Error naming the file where that misses a value of the JSON, or throws one.
 void parse_results(const std::string& path, const std::function<void()>& parse);
 

@@ -176,7 +176,7 @@ void write_results(const std::string& path, const SceneResults& results) {
 }
 
 SceneResults read_scene_results(const std::string& path) {
-  const Json json = read_results_json(path, kSceneResultsFormat);
+  const Json json = read_results_json(path, {kSceneResultsFormat});
   SceneResults results;
   parse_results(path, [&] {
     results.setting = setting_from(json.at("setting"));
