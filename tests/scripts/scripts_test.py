@@ -299,17 +299,26 @@ class ReproduceTable(unittest.TestCase):
         self.asked = self.root / "asked"
         program = self.root / "pictura"
         program.write_text(f"""#!{sys.executable}
-import json, sys
+import json, os, sys
+if sys.argv[1] == "--version":
+    print("pictura 1.2.3")
+    sys.exit()
 with open({str(self.asked)!r}, "a") as asked:
     print(" ".join(sys.argv[1:]), file=asked)
+if "dense" in sys.argv and os.path.exists({str(self.root / "broken")!r}):
+    sys.exit(3)
 names = ["at_fault_collision_rate", "off_road_rate", "red_light_rate", "goals_per_vehicle", "km_per_infraction",
-         "km_per_vehicle"]
-row = {{"density": "medium"}}
-for name in names:
-    row[name], row[name + "_half_width_95"] = 0.25, 0.125
-if "idle" in sys.argv:
-    row["km_per_infraction"] = None
-print(json.dumps({{"rows": [row]}}))
+         "km_per_at_fault_infraction", "collision_rate", "wall_contact_rate", "km_per_vehicle"]
+densities = sys.argv[sys.argv.index("--density") + 1].split(",") if "--density" in sys.argv else ["medium"]
+rows = []
+for density in densities:
+    row = {{"density": density}}
+    for name in names:
+        row[name], row[name + "_half_width_95"] = 0.25, 0.125
+    if "idle" in sys.argv:
+        row["km_per_infraction"] = None
+    rows.append(row)
+print(json.dumps({{"rows": rows, "policy_hash": "abc", "device": "cpu", "precision": "fp32", "seed": 1}}))
 """)
         program.chmod(0o755)
         (self.root / "a.safetensors").write_text("")
@@ -318,19 +327,102 @@ print(json.dumps({{"rows": [row]}}))
         return subprocess.run([SCRIPTS / "reproduce_table", "--pictura", self.root / "pictura", "--out", self.root / "out",
                                "--policies", self.root / "a.safetensors", *arguments], capture_output=True, text=True, timeout=60)  # fmt: skip
 
+    def table(self, cycles, folder="out"):
+        """The facts and the cells of a table, without its head."""
+        facts = json.loads((self.root / folder / f"table_{cycles}.json").read_text())
+        lines = (self.root / folder / f"table_{cycles}.md").read_text().splitlines()
+        return facts, [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines[2:]]
+
     def test_policies_and_baselines_stand_beside_the_papers(self):
         result = self.run_script("--density", "medium", "--scenarios", "2")
         self.assertEqual(result.returncode, 0, result.stderr)
-        rows = [line.split(" | ") for line in result.stdout.splitlines()[2:]]
-        self.assertEqual([row[1] for row in rows], ["a", "lane keeper", "idle", "paper: vectorized",
-                                                    "paper: vectorized without auxiliary", "paper: perspective"])  # fmt: skip
-        self.assertEqual(rows[0][2], "0.250 +- 0.125")
-        self.assertEqual(rows[2][6], "none")
-        self.assertEqual(rows[5][2:7], [".060", ".018", ".058", "11.21", "11.61"])
+        drivers = [("towns", "a"), ("towns", "lane keeper"), ("towns", "idle"),
+                   ("procedural", "a"), ("procedural", "lane keeper"), ("procedural", "idle")]  # fmt: skip
+        paper = [("towns", "paper: vectorized"), ("towns", "paper: vectorized without auxiliary"), ("towns", "paper: perspective")]
+        for cycles in ("independent", "phases"):
+            facts, rows = self.table(cycles)
+            self.assertIn(f"Light cycles: {cycles}\n", result.stdout)
+            self.assertEqual([(row[1], row[2]) for row in rows], drivers + paper)
+            self.assertEqual(rows[0], ["medium", "towns", "a", "argmax", *["0.250 +- 0.125"] * 9])
+            self.assertEqual(rows[2][8], "none")
+            self.assertEqual(rows[-1][3:], ["argmax", ".060", ".018", ".058", "11.21", "11.61", "", "", "", ""])
+            self.assertEqual((facts["light_cycles"], facts["complete"], facts["program"]), (cycles, True, "pictura 1.2.3"))
+            self.assertEqual([(row["worlds"], row["policy"]) for row in facts["rows"]], drivers)
+            self.assertEqual((facts["rows"][0]["policy_hash"], facts["rows"][0]["actions"]), ("abc", "argmax"))
         asked = self.asked.read_text().splitlines()
-        self.assertEqual(len(asked), 3)
-        self.assertIn("a.safetensors --density medium --scenarios 2 --out ", asked[0])
-        self.assertIn("--policy lane --density medium", asked[1])
+        self.assertEqual(len(asked), 12)
+        self.assertIn("a.safetensors --density medium --light-cycles independent --scenarios 2 --out ", asked[0])
+        self.assertIn("--policy lane --density medium --light-cycles independent --scenarios 2", asked[1])
+        procedural = "--map " + ",".join(f"procedural:{seed}" for seed in range(1, 7))
+        self.assertEqual(sum(procedural in line for line in asked), 6)
+
+    def test_a_table_is_what_was_chosen_and_grows(self):
+        small = ["--light-cycles", "as_trained", "--worlds", "procedural", "--procedural", "procedural:1"]
+        result = self.run_script(*small, "--density", "dense", "--actions", "argmax", "sampled", "--results", self.root / "results",
+                                 "--scenarios", "9", "--baseline-scenarios", "2")  # fmt: skip
+        self.assertEqual(result.returncode, 0, result.stderr)
+        facts, rows = self.table("as_trained", "results")
+        self.assertEqual([row[:4] for row in rows[:4]], [["dense", "procedural", "a", "argmax"], ["dense", "procedural", "a", "sampled"],
+                                                         ["dense", "procedural", "lane keeper", ""], ["dense", "procedural", "idle", ""]])  # fmt: skip
+        asked = self.asked.read_text().splitlines()
+        self.assertEqual([line.split(" --out")[0].removeprefix("evaluate ") for line in asked],
+                         [f"{self.root}/a.safetensors --density dense --map procedural:1 --scenarios 9",
+                          f"{self.root}/a.safetensors --density dense --map procedural:1 --sampled --scenarios 9",
+                          "--policy lane --density dense --map procedural:1 --scenarios 2",
+                          "--policy idle --density dense --map procedural:1 --scenarios 2"])  # fmt: skip
+        self.run_script(*small, "--density", "light,dense", "--scenarios", "9", "--baseline-scenarios", "2")
+        self.assertEqual(len(self.asked.read_text().splitlines()), 7)
+        self.assertEqual([row[:3] for row in self.table("as_trained")[1] if row[1] == "procedural"],
+                         [[density, "procedural", name] for density in ("light", "dense") for name in ("a", "lane keeper", "idle")])  # fmt: skip
+
+    def test_devices_evaluate_at_once_and_baselines_drive_on_the_host(self):
+        policies = [self.root / f"{name}.safetensors" for name in "abcd"]
+        for policy in policies:
+            policy.write_text(policy.stem)
+        result = self.run_script("--light-cycles", "phases", "--density", "medium", "--devices", "cuda:0", "cuda:1", "--policies", *policies)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        asked = self.asked.read_text().splitlines()
+        self.assertEqual(len(asked), 12)
+        for line in asked:
+            self.assertEqual("--device cuda:" in line, "--policy" not in line, line)
+        first, _ = self.table("phases")
+        self.assertEqual([row["policy"] for row in first["rows"][:6]], ["a", "b", "c", "d", "lane keeper", "idle"])
+        # On which device is no reason to evaluate again.
+        self.assertEqual(self.run_script("--light-cycles", "phases", "--density", "medium", "--policies", *policies).returncode, 0)
+        self.assertEqual(len(self.asked.read_text().splitlines()), 12)
+        self.assertEqual(self.run_script("--devices", "cuda:0", "--device", "cuda").returncode, 1)
+
+    def test_an_evaluation_that_fails_is_named_and_what_was_done_is_kept(self):
+        (self.root / "broken").write_text("")
+        result = self.run_script("--light-cycles", "phases", "--density", "medium,dense")
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("a_towns_phases_dense_argmax: pictura evaluate ends with status 3", result.stderr)
+        facts, rows = self.table("phases")
+        self.assertFalse(facts["complete"])
+        self.assertEqual({row["density"] for row in facts["rows"]}, {"medium"})
+
+    def test_arguments_that_the_script_has_names_of_its_own_for_are_refused(self):
+        for argument, instead in {"--map": "--towns or --procedural", "--sampled": "--actions sampled"}.items():
+            result = self.run_script(argument)
+            self.assertEqual((result.returncode, result.stderr), (1, f"error: reproduce_table: {argument}: expected {instead}\n"))
+        result = self.run_script("--density", "thick")
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("got 'thick'", result.stderr)
+
+    def test_the_program_itself_fills_a_small_table(self):
+        program = os.environ.get("PICTURA_PROGRAM_WITH_TORCH")
+        if not program:
+            self.skipTest("this build has no torch")
+        small = ["--light-cycles", "as_trained", "--density", "light", "--towns", "procedural:1:blocks=2x2", "--worlds", "towns",
+                 "--agents", "6", "--scenarios", "2", "--steps", "20", "--device", "cpu", "--threads", "1"]  # fmt: skip
+        result = subprocess.run([SCRIPTS / "reproduce_table", "--pictura", program, "--out", self.root / "out", "--policies",
+                                 SCRIPTS.parent / "models/vector.safetensors", *small], capture_output=True, text=True, timeout=200)  # fmt: skip
+        self.assertEqual(result.returncode, 0, result.stderr)
+        facts, rows = self.table("as_trained")
+        self.assertEqual([row[:4] for row in rows], [["custom", "towns", "vector", "argmax"], ["custom", "towns", "lane keeper", ""],
+                                                     ["custom", "towns", "idle", ""]])  # fmt: skip
+        self.assertEqual({row["scenarios"] for row in facts["rows"]}, {2})
+        self.assertGreater(facts["rows"][0]["vehicle_episodes"], 0)
 
     def test_curves_are_evaluations_along_trainings(self):
         trainings = self.root / "trainings.toml"
@@ -357,13 +449,14 @@ print(json.dumps({{"rows": [row]}}))
             self.assertIn("trainings.toml: expected [[line]] with name", result.stderr)
 
     def test_what_was_evaluated_is_not_evaluated_again_unless_it_is_asked_otherwise(self):
-        first = self.run_script("--density", "medium")
-        self.assertEqual(self.run_script("--density", "medium").stdout, first.stdout)
+        chosen = ["--density", "medium", "--light-cycles", "phases", "--worlds", "towns"]
+        first = self.run_script(*chosen)
+        self.assertEqual(self.run_script(*chosen).stdout, first.stdout)
         self.assertEqual(len(self.asked.read_text().splitlines()), 3)
-        self.run_script("--density", "medium", "--steps", "600")
+        self.run_script(*chosen, "--steps", "600")
         self.assertEqual(len(self.asked.read_text().splitlines()), 6)
         (self.root / "a.safetensors").write_text("other weights")
-        self.run_script("--density", "medium", "--steps", "600")
+        self.run_script(*chosen, "--steps", "600")
         self.assertEqual(len(self.asked.read_text().splitlines()), 7)
 
     def test_a_policy_that_is_missing_is_named(self):
