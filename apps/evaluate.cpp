@@ -249,6 +249,7 @@ void add_evaluate_command(CLI::App& app) {
       ->excludes(checkpoint)
       ->excludes(policy);
   add_evaluation_options(command, &arguments->evaluation)->excludes(policy);
+  add_average_option(command, &options.average)->excludes(policy);
   command
       ->add_option("--density", arguments->densities,
                    "light, medium, dense: 60, 120, 150 agents a world; with --protocol the shares of road users that "

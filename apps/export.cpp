@@ -2,6 +2,7 @@
 // tools.
 #include "pictura/apps/commands.h"
 #include "pictura/cli/backend_options.h"
+#include "pictura/cli/evaluation_options.h"
 #include "pictura/cli/file_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/commit.h"
@@ -12,7 +13,7 @@ namespace pictura {
 void add_export_command(CLI::App& app) {
   struct Arguments {
     std::string policy, out, weights = "bf16";
-    bool json = false;
+    bool json = false, average = false;
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("export", "Write the weights of a policy as safetensors");
@@ -23,6 +24,7 @@ void add_export_command(CLI::App& app) {
                    "bf16: rounded to 8 significant bits, half the size; f32: as they are")
       ->check(one_of({"bf16", "f32"}).description("{bf16,f32}"))
       ->capture_default_str();
+  add_average_option(command, &arguments->average);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "The file holds what the policy needs to drive: weights, configuration, cameras. simulate, evaluate, replay and\n"
@@ -30,10 +32,12 @@ void add_export_command(CLI::App& app) {
       "Examples:\n"
       "  pictura export runs/town01/checkpoint.ckpt --out town01.safetensors\n"
       "  pictura export runs/town01/checkpoint.ckpt --weights f32 --out town01.safetensors\n"
+      "  pictura export runs/town01/checkpoint.ckpt --average --out town01_average.safetensors\n"
       "  pictura simulate Town01 --policy town01.safetensors --video drive.mp4");
   command->callback([arguments] {
     const WeightType type = arguments->weights == "bf16" ? WeightType::bf16 : WeightType::f32;
-    const ExportedPolicy exported = export_policy(arguments->policy, type, PICTURA_COMMIT, arguments->out);
+    const ExportedPolicy exported =
+        export_policy(arguments->policy, type, PICTURA_COMMIT, arguments->out, arguments->average);
     if (arguments->json) {
       print_json({{"out", arguments->out},
                   {"weights", arguments->weights},

@@ -31,6 +31,13 @@ CLI::Option* add_evaluation_options(CLI::App* command, EvaluationArguments* argu
   return sampled;
 }
 
+CLI::Option* add_average_option(CLI::App* command, bool* average_out) {
+  return command->add_flag(
+      "--average", *average_out,
+      "The average of the weights that a checkpoint holds (train.weight_average), instead of those "
+      "after its last update");
+}
+
 void set_backends(const BackendOptions& backends, DriverOptions* options_out) {
   if (!backends.device.empty()) options_out->device = backends.device;
   if (!backends.simulator.empty()) options_out->simulator = backends.simulator;

@@ -23,6 +23,9 @@ struct EvaluationArguments {
 /// --threads. Returns --sampled.
 CLI::Option* add_evaluation_options(CLI::App* command, EvaluationArguments* arguments);
 
+/// Adds --average, which chooses the average of weights that a checkpoint holds.
+CLI::Option* add_average_option(CLI::App* command, bool* average_out);
+
 /// Lets those that were named compute.
 void set_backends(const BackendOptions& backends, DriverOptions* options_out);
 

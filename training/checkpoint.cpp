@@ -69,6 +69,10 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
   header["parameters"] = describe(checkpoint.parameters);
   header["first_moments"] = describe(checkpoint.first_moments);
   header["second_moments"] = describe(checkpoint.second_moments);
+  if (!checkpoint.average.empty()) {
+    header["average"] = describe(checkpoint.average);
+    header["counters"]["averaged_updates"] = checkpoint.averaged_updates;
+  }
   header["simulator"] = {{"offset", data.size()}, {"bytes", checkpoint.simulator.size()}};
   data.append(reinterpret_cast<const char*>(checkpoint.simulator.data()), checkpoint.simulator.size());
   header["data"] = {{"bytes", data.size()}};
@@ -142,6 +146,10 @@ Checkpoint parse_checkpoint(const std::string& file, const std::string& path) {
     result.parameters = tensors("parameters");
     result.first_moments = tensors("first_moments");
     result.second_moments = tensors("second_moments");
+    if (header.contains("average")) {
+      result.average = tensors("average");
+      result.averaged_updates = header.at("counters").at("averaged_updates");
+    }
     const auto offset = header.at("simulator").at("offset").get<uint64_t>();
     const auto size = header.at("simulator").at("bytes").get<uint64_t>();
     PICTURA_CHECK(size <= data.size() && offset <= data.size() - size, "{}: simulator: bad offset", path);

@@ -23,6 +23,8 @@ struct Checkpoint : SavedPolicy {
   std::vector<RecentUpdate> recent;
   std::map<std::string, double> longest_update_s;          // see Run
   std::vector<NamedTensor> first_moments, second_moments;  // see Optimizer
+  std::vector<NamedTensor> average;                        // WeightAverage::values; empty for runs without one
+  int64_t averaged_updates = 0;                            // in it
   std::vector<uint8_t> simulator;                          // Simulator::save(), at the start of update `update`
 };
 

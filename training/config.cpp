@@ -110,6 +110,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.number("train.adam_eps", c.train.adam_eps, 1e-30, 1);
   v.number("train.weight_decay", c.train.weight_decay, 0, 100);
   v.number("train.max_grad_norm", c.train.max_grad_norm, 1e-9, inf);
+  v.number("train.weight_average", c.train.weight_average, 0, 1e9);
   v.integer("train.sharpen_agent_steps", c.train.sharpen_agent_steps, 0, int64_t{1} << 60);
   v.text("train.teacher", c.train.teacher);
   v.number("train.teacher_coef", c.train.teacher_coef, 0, 1e6);
@@ -780,7 +781,7 @@ bool is_of_schedule(const std::string& key) {
 
 bool is_reported(const std::string& key) {
   return is_of_schedule(key) || key.starts_with("train.teacher") || key == "train.reproducible" ||
-         key == "render.schedule" || key == "train.optimizer";
+         key == "train.optimizer" || key == "train.weight_average" || key == "render.schedule";
 }
 
 bool may_differ(const std::string& key, const Config& saved, const Config& now) {

@@ -102,6 +102,8 @@ struct Config {
     double learning_rate = 5e-4;
     double adam_beta1 = 0.9, adam_beta2 = 0.999, adam_eps = 1e-8, weight_decay = 0.01;
     double max_grad_norm = 0.5;
+    double weight_average =
+        0;  // half-life in updates of the average of weights, see training/weight_average.h; 0: none
     int64_t sharpen_agent_steps = 0;  // over so many the policy's logits double, see training/schedule.h; 0: never
     /// A saved vector policy to imitate, see training/teacher.h: the loss has the KL divergence from its actions times
     /// teacher_coef, which falls to 0 along a line over so many agent-steps. Relative to the configuration's folder.
@@ -162,7 +164,8 @@ Config with_evaluate_conditioning(const Config& config, const std::vector<std::s
 std::string to_toml(const Config& config);
 
 /// Key of the first setting that changes what a run means and in which the two differ, with both values, or empty. What
-/// may differ: when to stop and how often to save; the schedule of the learning rate; the teacher; where and on how
+/// may differ: when to stop and how often to save; the schedule of the learning rate; the teacher; the average of
+/// weights; where and on how
 /// many threads it runs, as long as images are drawn by the same rules; how many transitions go through the network at
 /// once; what is evaluated; how cameras and backbones are described (compare the rigs and the programs' hashes), and
 /// all of [render] where the policy reads no images.
@@ -173,7 +176,8 @@ std::string first_difference(const Config& saved, const Config& now);
 std::string first_difference_of_ranks(const Config& first, const Config& other);
 
 /// The settings in which the two differ of those that a run that goes on may change and should say so, the schedules of
-/// learning rate and image size, the optimizer, the teacher and train.reproducible, as "KEY: OLD became NEW".
+/// learning rate and image size, the optimizer, the teacher, train.weight_average and train.reproducible, as "KEY: OLD
+/// became NEW".
 std::vector<std::string> differences_to_report(const Config& saved, const Config& now);
 
 /// Names as in a configuration.

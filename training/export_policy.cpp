@@ -7,8 +7,8 @@
 namespace pictura {
 
 ExportedPolicy export_policy(const std::string& policy_path, WeightType type, const std::string& commit,
-                             const std::string& out) {
-  write_policy(out, read_policy(policy_path), type, commit);
+                             const std::string& out, bool average) {
+  write_policy(out, read_policy(policy_path, average), type, commit);
   const SavedPolicy written = read_policy(out);
   ExportedPolicy result;
   for (const NamedTensor& parameter : written.parameters) result.parameters += parameter.value.numel();

@@ -18,9 +18,9 @@ struct ExportedPolicy {
   std::string policy_hash;               // of the weights as they are in the file
 };
 
-/// Writes the policy of a checkpoint, or of safetensors, to `out`, as write_policy does. Throws Error naming the file
-/// that cannot be read or written.
+/// Writes the policy of a checkpoint, with the average of its weights where `average` is set, or of safetensors, to
+/// `out`, as write_policy does. Throws Error naming the file that cannot be read or written, or that holds no average.
 ExportedPolicy export_policy(const std::string& policy_path, WeightType type, const std::string& commit,
-                             const std::string& out);
+                             const std::string& out, bool average = false);
 
 }  // namespace pictura

@@ -106,7 +106,10 @@ class TrainingLoop {
       write_safetensors(path, error.minibatch, to_toml(run_.config));
       fail("{}; see {}", error.what(), path);
     }
-    run_.on_stream([&] { scale_logits(*run_.policy, logit_growth(run_.config.train, record->totals.agent_steps)); });
+    run_.on_stream([&] {
+      scale_logits(*run_.policy, logit_growth(run_.config.train, record->totals.agent_steps));
+      if (run_.average) run_.average->update();
+    });
     record->update_s = watch.seconds();
     record->phases_s = run_.timer.take();
     record->diagnosis = diagnose(run_.rollout, record->stats.adv_threshold, run_.communicator);

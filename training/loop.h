@@ -81,12 +81,12 @@ class OutOfMemory : public Error {
 
 /// Trains as the configuration says and writes into out_folder: config.toml (resolved), untrained.ckpt (the policy
 /// before its first update), checkpoint.ckpt, older ones and milestones as train.keep_checkpoints and
-/// milestone_agent_steps say, policy.safetensors, progress.csv, evaluation.csv where train.evaluate_every asks for it,
-/// and TensorBoard events. After ^C or the like (common/support/interrupt.h) it saves and returns with `interrupted`;
-/// where another update, as long as the longest of this process (before its first one: of an earlier one on such a
-/// device), would not end within `minutes`, with `out_of_time`. Throws Error naming file and key for bad input, and
-/// naming the folder where another run is at work, and where one lies that old_run does not speak of; OutOfMemory where
-/// the device's memory is too small.
+/// milestone_agent_steps say, policy.safetensors, policy_average.safetensors where train.weight_average asks for it,
+/// progress.csv, evaluation.csv where train.evaluate_every does, and TensorBoard events. After ^C or the like
+/// (common/support/interrupt.h) it saves and returns with `interrupted`; where another update, as long as the longest
+/// of this process (before its first one: of an earlier one on such a device), would not end within `minutes`, with
+/// `out_of_time`. Throws Error naming file and key for bad input, and naming the folder where another run is at work,
+/// and where one lies that old_run does not speak of; OutOfMemory where the device's memory is too small.
 ///
 /// Several processes train one policy where each calls this with its `launch` and equal settings. Rank 0 alone reads
 /// and writes files. What asks one of them to end ends all after the same update. Throws Error in all naming the rank

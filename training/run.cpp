@@ -70,6 +70,7 @@ Run::Run(const Config& its_config, Device its_device, Communicator* its_communic
       stream(uses_graphs(config, device, renderer.get()) ? std::optional<OwnStream>(device) : std::nullopt),
       graphs(device, stream.has_value()),
       chunks(*policy, rollout.observations, &timer, &graphs) {
+  if (config.train.weight_average > 0) average.emplace(*policy, config.train.weight_average);
   if (teacher) {
     rollout.teacher_log_probs =
         at::zeros({rollout.num_steps(), rollout.num_slots(), kNumActions}, rollout.log_probs.options());
@@ -91,6 +92,12 @@ SavedPolicy Run::saved_policy() const {
   return saved;
 }
 
+SavedPolicy Run::averaged_policy() const {
+  SavedPolicy saved = saved_policy();
+  saved.parameters = average->values;
+  return saved;
+}
+
 Checkpoint Run::checkpoint(const std::vector<RecentUpdate>& recent) const {
   Checkpoint checkpoint{saved_policy()};
   checkpoint.distance_m = distance_m;
@@ -100,6 +107,10 @@ Checkpoint Run::checkpoint(const std::vector<RecentUpdate>& recent) const {
   checkpoint.longest_update_s = longest_update_s;
   checkpoint.first_moments = optimizer.first_moments;
   checkpoint.second_moments = optimizer.second_moments;
+  if (average) {
+    checkpoint.average = average->values;
+    checkpoint.averaged_updates = average->updates;
+  }
   checkpoint.simulator = simulator->save();
   if (communicator->size() > 1) {
     const std::vector<std::vector<uint8_t>> parts = communicator->gather(checkpoint.simulator);
@@ -133,6 +144,7 @@ void Run::begin_with(const SavedPolicy& other) {
       "{}: its policy sees through {} cameras, expected {}, as {} has", other.path, other.rig.cameras.size(),
       rig.cameras.size(), config.render.rig.empty() ? "the paper's rig" : config.render.rig);
   restore_policy(other, *policy);
+  if (average) average->restart();
 }
 
 std::string Run::restore(const Checkpoint& saved) {
@@ -148,6 +160,12 @@ std::string Run::restore(const Checkpoint& saved) {
     restore_tensors(saved.path, saved.first_moments, optimizer.first_moments);
     restore_tensors(saved.path, saved.second_moments, optimizer.second_moments);
     optimizer.steps = saved.adam_steps;
+  }
+  if (average && saved.average.empty()) {
+    average->restart();
+  } else if (average) {
+    restore_tensors(saved.path, saved.average, average->values);
+    average->updates = saved.averaged_updates;
   }
   filter.average = saved.filter_average;
   update = saved.update;

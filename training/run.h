@@ -9,6 +9,7 @@
 #include "pictura/training/ranks/communicator.h"
 #include "pictura/training/teacher.h"
 #include "pictura/training/torch_device.h"
+#include "pictura/training/weight_average.h"
 
 namespace pictura {
 
@@ -26,6 +27,8 @@ struct Run {
   void begin_with(const SavedPolicy& other);
   /// Its policy as it is now.
   SavedPolicy saved_policy() const;
+  /// Returns its policy with the average of weights; only for runs that have one.
+  SavedPolicy averaged_policy() const;
   /// What is to be saved, at the start of an update: of all ranks, for rank 0 to write; the others' has no simulator.
   Checkpoint checkpoint(const std::vector<RecentUpdate>& recent) const;
   /// Goes on from a checkpoint, of any number of ranks. Where the simulator cannot read its saved state, because its
@@ -53,6 +56,7 @@ struct Run {
   PhaseTimer timer;
   const std::unique_ptr<const Policy> policy;
   Optimizer optimizer;
+  std::optional<WeightAverage> average;  // of runs with train.weight_average
   AdvantageFilter filter;
   Rollout rollout;
   const std::optional<OwnStream> stream;  // where graphs are used

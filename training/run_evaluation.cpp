@@ -26,7 +26,15 @@ std::optional<EvaluationRecord> RunEvaluation::evaluate() {
   PolicySession session(config, run_.rig, run_.device, *run_.policy);
   const EvaluateReport report = pictura::evaluate(&session, options, &worlds_);
   if (report.interrupted) return std::nullopt;
-  return EvaluationRecord{report.rows.at(0), watch.seconds(), run_.image_size()};
+  EvaluationRecord record{report.rows.at(0), {}, 0, run_.image_size()};
+  if (run_.average) {
+    const ReplacedWeights averaged(*run_.policy, run_.average->values);
+    const EvaluateReport of_average = pictura::evaluate(&session, options, &worlds_);
+    if (of_average.interrupted) return std::nullopt;
+    record.average_row = of_average.rows.at(0);
+  }
+  record.seconds = watch.seconds();
+  return record;
 }
 
 }  // namespace pictura

@@ -18,7 +18,8 @@ class RunEvaluation {
   /// Whether one is made after as many updates as the run has done.
   bool is_due() const;
   /// train.evaluate_scenarios worlds of train.evaluate_agents agents for train.evaluate_steps steps: what `pictura
-  /// evaluate --scenarios --agents --steps` measures of the checkpoint. Nothing when ^C came.
+  /// evaluate --scenarios --agents --steps` measures of the checkpoint, and with --average where the run has an average
+  /// of weights. Nothing when ^C came.
   std::optional<EvaluationRecord> evaluate();
 
  private:

@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 std::vector<std::string> run_files(const std::string& folder) {
   // The last are what a killed process leaves of common/support/output_file.h.
   static const std::regex kNames(
-      R"(config\.toml|(untrained|checkpoint(\.(\d+|next))?|milestone_\d+[kM]?)\.ckpt|(policy|failed_minibatch)\.safetensors|)"
+      R"(config\.toml|(untrained|checkpoint(\.(\d+|next))?|milestone_\d+[kM]?)\.ckpt|(policy|policy_average|failed_minibatch)\.safetensors|)"
       R"((progress|evaluation)\.csv(\.\d+)?|)"
       R"(events\.out\.tfevents\.\d+\.\d+|learning_curve\.png|\.[\w.]+\.\d+\.\d+\.tmp)");
   std::vector<std::string> names;

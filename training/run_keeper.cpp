@@ -82,8 +82,10 @@ void RunKeeper::write_with(const std::function<void(const Checkpoint&)>& write, 
 }
 
 void RunKeeper::write_weights(const Run& run) const {
-  if (communicator_->is_first()) {
-    write_policy(path("policy.safetensors"), run.saved_policy(), WeightType::f32, options_.commit);
+  if (!communicator_->is_first()) return;
+  write_policy(path("policy.safetensors"), run.saved_policy(), WeightType::f32, options_.commit);
+  if (run.average) {
+    write_policy(path("policy_average.safetensors"), run.averaged_policy(), WeightType::f32, options_.commit);
   }
 }
 

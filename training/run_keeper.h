@@ -30,7 +30,7 @@ class RunKeeper {
   void save(const Run& run, const std::vector<RecentUpdate>& recent);
   /// Saves it under another name of the folder, once and for all.
   void save_as(const std::string& name, const Run& run, const std::vector<RecentUpdate>& recent) const;
-  /// Writes the weights as policy.safetensors.
+  /// Writes the weights as policy.safetensors, and their average, where there is one, as policy_average.safetensors.
   void write_weights(const Run& run) const;
 
   std::string path(const std::string& name) const { return options_.out_folder + "/" + name; }

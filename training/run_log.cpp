@@ -92,12 +92,16 @@ Scalars scalars_of_evaluation(int64_t agent_steps, const EvaluationRecord& recor
   Scalars scalars{{"charts/agent_steps", static_cast<double>(agent_steps)},
                   {"evaluation/image_width_px", record.image_size.width_px},
                   {"evaluation/image_height_px", record.image_size.height_px}};
-  for (const auto& [name, estimate] : metrics_of(record.row)) {
-    scalars.emplace_back("evaluation/" + name, estimate.value);
-    scalars.emplace_back(fmt::format("evaluation/{}_half_width_95", name), estimate.half_width_95);
-  }
-  scalars.emplace_back("evaluation/vehicle_episodes", static_cast<double>(record.row.vehicle_episodes));
-  scalars.emplace_back("evaluation/km_driven", record.row.km_driven);
+  const auto add = [&scalars](const std::string& group, const EvaluateRow& row) {
+    for (const auto& [name, estimate] : metrics_of(row)) {
+      scalars.emplace_back(fmt::format("{}/{}", group, name), estimate.value);
+      scalars.emplace_back(fmt::format("{}/{}_half_width_95", group, name), estimate.half_width_95);
+    }
+    scalars.emplace_back(group + "/vehicle_episodes", static_cast<double>(row.vehicle_episodes));
+    scalars.emplace_back(group + "/km_driven", row.km_driven);
+  };
+  add("evaluation", record.row);
+  if (record.average_row) add("evaluation_average", *record.average_row);
   scalars.emplace_back("time/evaluation_s", record.seconds);
   return scalars;
 }
@@ -175,7 +179,9 @@ RunLog::RunLog(const std::string& folder, const Config& config, int64_t updates_
   events_.emplace(folder);
   csv_.emplace(folder + "/progress.csv", scalars_of(config, {}, {}), updates_done, on_notice);
   if (config_.train.evaluate_every > 0) {
-    evaluation_csv_.emplace(folder + "/evaluation.csv", scalars_of_evaluation(0, {}), updates_done, on_notice);
+    EvaluationRecord columns;
+    if (config_.train.weight_average > 0) columns.average_row.emplace();
+    evaluation_csv_.emplace(folder + "/evaluation.csv", scalars_of_evaluation(0, columns), updates_done, on_notice);
   }
 }
 

@@ -46,8 +46,9 @@ struct UpdateRecord {
 /// What an evaluation within a run gave.
 struct EvaluationRecord {
   EvaluateRow row;
-  double seconds = 0;    // wall time
-  ImageSize image_size;  // of the first camera; 0 without images
+  std::optional<EvaluateRow> average_row;  // of the average of weights, for runs that have one
+  double seconds = 0;                      // wall time
+  ImageSize image_size;                    // of the first camera; 0 without images
 };
 
 class RunLog {

@@ -129,12 +129,22 @@ SavedPolicy parse_safetensors(const std::string& file, const std::string& path) 
 
 }  // namespace
 
-SavedPolicy parse_policy(const std::string& file, const std::string& path) {
-  if (is_checkpoint(file)) return parse_checkpoint(file, path);
-  return parse_safetensors(file, path);
+SavedPolicy parse_policy(const std::string& file, const std::string& path, bool average) {
+  PICTURA_CHECK(!average || is_checkpoint(file),
+                "{}: holds one set of weights: expected a checkpoint to choose the average of", path);
+  if (!is_checkpoint(file)) return parse_safetensors(file, path);
+  Checkpoint checkpoint = parse_checkpoint(file, path);
+  if (average) {
+    PICTURA_CHECK(!checkpoint.average.empty(),
+                  "{}: holds no average of weights: expected a checkpoint of a run with train.weight_average", path);
+    checkpoint.parameters = std::move(checkpoint.average);
+  }
+  return checkpoint;
 }
 
-SavedPolicy read_policy(const std::string& path) { return parse_policy(read_checkpoint_file(path), path); }
+SavedPolicy read_policy(const std::string& path, bool average) {
+  return parse_policy(read_checkpoint_file(path), path, average);
+}
 
 void write_policy(const std::string& path, const SavedPolicy& policy, WeightType type, const std::string& commit) {
   const ordered_json metadata = {{"format", "pt"},

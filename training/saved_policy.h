@@ -19,10 +19,11 @@ struct SavedPolicy {
 };
 
 /// The policy of a checkpoint, or of safetensors that write_policy wrote. Throws Error naming the file when it is
-/// neither, truncated, damaged, or of another observation schema (naming the entry that differs).
-SavedPolicy read_policy(const std::string& path);
+/// neither, truncated, damaged, or of another observation schema (naming the entry that differs), and with `average`,
+/// which asks for the average of weights that a checkpoint holds, where it holds none.
+SavedPolicy read_policy(const std::string& path, bool average = false);
 /// What the bytes of such a file say.
-SavedPolicy parse_policy(const std::string& file, const std::string& path);
+SavedPolicy parse_policy(const std::string& file, const std::string& path, bool average = false);
 
 /// Writes safetensors under another name and renames them to path. Their metadata are text: config (TOML), schema and
 /// rig (JSON), backbone_hash, update, agent_steps, commit (of the program that writes), and hash: FNV-1a of the whole

@@ -181,7 +181,7 @@ class SessionController final : public PolicyController {
 };
 
 PolicySession::PolicySession(const std::string& path, const SessionOptions& options)
-    : parts_(std::make_unique<Parts>(read_policy(path), options)) {}
+    : parts_(std::make_unique<Parts>(read_policy(path, options.average), options)) {}
 
 PolicySession::PolicySession(const Config& config, const Rig& rig, Device device, const Policy& policy)
     : parts_(std::make_unique<Parts>(config, rig, device, policy)) {}

@@ -27,6 +27,7 @@ struct SessionOptions {
   // Of [evaluate.conditioning], in place of the policy's own: "name=value".
   std::vector<std::string> conditioning;
   bool adds_walls = false;  // its worlds have walls, also where it was trained without
+  bool average = false;     // drives with the average of weights that a checkpoint holds (train.weight_average)
 };
 
 /// What a batch of agents sees, in the memory of the session's device.

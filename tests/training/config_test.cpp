@@ -284,12 +284,14 @@ TEST(Config, DifferencesThatChangeTheRunAreNamed) {
   b = a;
   b.train.schedule_agent_steps = 3;
   b.train.learning_rate = 1;
+  b.train.weight_average = 50;
   b.train.reproducible = true;
   b.render.schedule = {{5, 6, 7}};
   EXPECT_EQ(first_difference(a, b), "");
   EXPECT_THAT(differences_to_report(a, b),
               ElementsAre("render.schedule: [] became [[5, 6, 7]]", "train.schedule_agent_steps: 50000000000 became 3",
-                          "train.learning_rate: 0.0005 became 1.0", "train.reproducible: false became true"));
+                          "train.learning_rate: 0.0005 became 1.0", "train.weight_average: 0.0 became 50.0",
+                          "train.reproducible: false became true"));
   b = a;
   b.simulator.wall_seed = 3;
   EXPECT_THAT(first_difference(a, b), HasSubstr("simulator.wall_seed"));

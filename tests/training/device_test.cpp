@@ -15,7 +15,7 @@
 #include "pictura/map/load_map.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
-#include "pictura/tests/training/small_runs.h"
+#include "pictura/tests/training/averaged_runs.h"
 #include "pictura/training/probes/corner.h"
 #include "pictura/training/probes/removal.h"
 #include "pictura/training/ranks/ranks.h"
@@ -411,6 +411,11 @@ TEST_F(DeviceTraining, EndsWhenItsMinutesAreOverAndGoesOn) {
   EXPECT_EQ(resumed.updates, 2);
   EXPECT_GT(resumed.agent_steps, 0);
   EXPECT_EQ(Progress(folder_ / "run/progress.csv").num_updates(), 2u);
+}
+
+TEST_F(DeviceTraining, TheAverageOfWeightsIsByHandAndResumesExactly) {
+  test::check_average_by_hand(folder_.path(), "cuda");
+  test::check_average_resumes_exactly(folder_.path(), "cuda");
 }
 
 TEST_F(DeviceTraining, ARunThatDivergesStopsAndKeepsTheMinibatch) {

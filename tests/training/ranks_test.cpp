@@ -282,6 +282,7 @@ std::vector<Learnt> learn(const std::vector<int64_t>& ends, const Config::Train&
     test::Corridor corridor;
     Optimizer optimizer(policy, train);
     AdvantageFilter filter;
+    WeightAverage average(policy, 2);
     for (int64_t update = 0; update < 3; ++update) {
       corridor.play(policy, update);
       // Of the last slots nothing is valid in the second update: the last rank has nothing to learn from.
@@ -291,7 +292,8 @@ std::vector<Learnt> learn(const std::vector<int64_t>& ends, const Config::Train&
       ChunkRunner runner(policy, own.observations);
       learnt.last = ppo_update(&runner, own, train, {9, update, train.learning_rate}, corridor.executor.get(),
                                &optimizer, &filter, nullptr, communicator.get());
-      learnt.hashes.push_back(policy.hash());
+      average.update();
+      learnt.hashes.push_back(policy.hash() + hash_of_parameters(average.values));
       if (update > 0) continue;
       for (size_t i = 0; i < before.size(); ++i) {
         learnt.steps.push_back(policy.parameters()[i].value.detach() - before[i]);

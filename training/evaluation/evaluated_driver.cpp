@@ -33,7 +33,8 @@ SessionOptions session_options(const DriverOptions& options) {
           .height_px = options.height_px,
           .backbone = options.backbone,
           .conditioning = options.conditioning,
-          .adds_walls = options.adds_walls};
+          .adds_walls = options.adds_walls,
+          .average = options.average};
 }
 
 EvaluatedDriver policy_driver(PolicySession* session, Renderer* renderer, const DriverOptions& options, int steps) {

@@ -32,6 +32,7 @@ struct DriverOptions {
   std::string backbone;                   // as in SessionOptions
   std::vector<std::string> conditioning;  // as in SessionOptions
   bool adds_walls = false;                // as in SessionOptions
+  bool average = false;                   // as in SessionOptions
 };
 
 /// With which the checkpoint's policy is opened.

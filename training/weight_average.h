@@ -1,0 +1,45 @@
+// The exponential average of a policy's weights over updates (train.weight_average): it drives more steadily than the
+// weights after any one update, whose noise it averages out.
+#pragma once
+
+#include "pictura/training/policy.h"
+
+namespace pictura {
+
+/// Average of a policy's parameters, in f32 on their device. Elementwise, so that ranks with equal parameters have
+/// equal averages, to the bit.
+class WeightAverage {
+ public:
+  /// Begins with the policy's parameters as they are. The policy must outlive this; half_life_updates > 0.
+  WeightAverage(const Policy& policy, double half_life_updates);
+
+  /// Begins again with the policy's parameters, with no update averaged.
+  void restart();
+  /// Adds the parameters after an update: average += w (parameters - average), with w = max(1 / n, 1 - 2^(-1 /
+  /// half_life_updates)) for the n-th one. So the first replaces what the average began with, the mean of all updates
+  /// follows, and the exponential average once its window is full: initial weights, which are noise, never count.
+  /// Nothing waits for the device.
+  void update();
+
+  std::vector<NamedTensor> values;  // f32, in the order of the policy's parameters
+  int64_t updates = 0;              // averaged so far
+
+ private:
+  const std::vector<NamedTensor>& parameters_;
+  double weight_;
+};
+
+/// Gives a policy other parameters in place for as long as it lives, and then its own again, to the bit.
+class ReplacedWeights {
+ public:
+  /// `values` are in the order of the policy's parameters.
+  ReplacedWeights(const Policy& policy, const std::vector<NamedTensor>& values);
+  ~ReplacedWeights();
+  ReplacedWeights(const ReplacedWeights&) = delete;
+  ReplacedWeights& operator=(const ReplacedWeights&) = delete;
+
+ private:
+  std::vector<at::Tensor> parameters_, own_;
+};
+
+}  // namespace pictura
