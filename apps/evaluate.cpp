@@ -38,6 +38,7 @@ void print_table(const EvaluateReport& report) {
         interval_text(row.waypoints_per_vehicle), interval_text(row.km_per_infraction),
         interval_text(row.km_per_at_fault_infraction), row.km_driven);
   }
+  fmt::print("traffic lights: {}\n", name_of(report.results.setting.light_cycles));
   fmt::print("+- is the half width of a 95 % confidence interval over scenarios\n");
   if (report.agent_steps > 0) {
     const auto steps = static_cast<double>(report.agent_steps);
@@ -58,7 +59,8 @@ void print_report(const EvaluateOptions& options, const EvaluateReport& report, 
     table.push_back(std::move(json));
   }
   Json json = driver_json(options, report.results.setting);
-  json.update({{"interrupted", report.interrupted},
+  json.update({{"light_cycles", name_of(report.results.setting.light_cycles)},
+               {"interrupted", report.interrupted},
                {"agent_steps", report.agent_steps > 0 ? Json(report.agent_steps) : Json(nullptr)},
                {"seconds", report.agent_steps > 0 ? Json(report.seconds) : Json(nullptr)},
                {"rows", table},

@@ -219,11 +219,11 @@ void render_recorded_scene(const RenderArguments& arguments) {
 
 // A scene file says these itself.
 void refuse_world_options(const CLI::App& command) {
-  refuse_options(
-      command,
-      {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--steps", "--views", "--size",
-       "--square-pixels", "--rig", "--line-floor", "--simulator", "--start", "--recorded-lights", "--tracks"},
-      "on a scene file, which says that itself");
+  refuse_options(command,
+                 {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--light-cycles",
+                  "--steps", "--views", "--size", "--square-pixels", "--rig", "--line-floor", "--simulator", "--start",
+                  "--recorded-lights", "--tracks"},
+                 "on a scene file, which says that itself");
 }
 
 }  // namespace
@@ -233,6 +233,7 @@ void add_render_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("render", "Write what the cameras of some agents see");
   add_map_or_scene(command, &arguments->world.map, "a scene file (.toml), ");
   add_world_options(command, &arguments->world);
+  add_light_cycles_option(command, &arguments->world.light_cycles, name_of(SimulatorConfig{}.light_cycles));
   command->add_option("--steps", arguments->steps, "Steps of random actions before the pictures")
       ->transform(whole_number(0))
       ->capture_default_str();
@@ -276,10 +277,10 @@ void add_render_command(CLI::App& app) {
     arguments->size_given = size->count() > 0;
     arguments->world.vector_observations = false;
     if (is_scene_name(arguments->world.map)) {
-      refuse_options(
-          *command,
-          {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--steps", "--views"},
-          "on a recorded scene, which says that itself: --start and --tracks choose of it");
+      refuse_options(*command,
+                     {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--light-cycles",
+                      "--steps", "--views"},
+                     "on a recorded scene, which says that itself: --start and --tracks choose of it");
       return render_recorded_scene(*arguments);
     }
     refuse_scene_options(*command, arguments->world.map, {"--tracks"});

@@ -168,7 +168,7 @@ void refuse_idle_scene_options(const CLI::App& command, const SceneArguments& ar
                    "without --protocol");
     return;
   }
-  refuse_options(command, {"--map", "--agents", "--merge", "--infractions", "--replay", "--replays"},
+  refuse_options(command, {"--map", "--agents", "--merge", "--infractions", "--replay", "--replays", "--light-cycles"},
                  "with --protocol");
   if (arguments.scenes.empty()) fail_usage("--protocol: expected --scenes as well");
 }

@@ -87,6 +87,7 @@ py::dict dict_of(const EvaluateReport& report) {
   d["seconds"] = report.seconds;
   d["agent_steps"] = report.agent_steps;
   d["policy_hash"] = report.results.setting.policy_hash;
+  d["light_cycles"] = name_of(report.results.setting.light_cycles);
   return d;
 }
 
@@ -160,6 +161,7 @@ py::dict dict_of(const SimulatorConfig& config) {
   d["walls"] = config.walls;
   d["wall_seed"] = config.wall_seed;
   d["fixed_lights"] = config.fixed_lights;
+  d["light_cycles"] = name_of(config.light_cycles);
   d["auxiliary_observations"] = config.auxiliary_observations;
   d["vector_observations"] = config.vector_observations;
   d["wall_observations"] = config.wall_observations;
@@ -426,7 +428,7 @@ void bind_evaluation(py::module_& module) {
          const std::vector<std::string>& densities, int agents_per_world, int first_scenario, int scenarios, int steps,
          bool argmax, uint64_t seed, int num_threads, const std::string& device, const std::string& simulator,
          const std::string& renderer, const std::string& samples, const std::string& rig, int width_px, int height_px,
-         const py::dict& conditioning, const py::object& on_progress) {
+         const py::dict& conditioning, const std::string& light_cycles, const py::object& on_progress) {
         EvaluateOptions options;
         options.checkpoint = checkpoint;
         options.controller = controller;
@@ -447,6 +449,7 @@ void bind_evaluation(py::module_& module) {
         options.width_px = width_px;
         options.height_px = height_px;
         options.conditioning = texts_of(conditioning);
+        options.light_cycles = light_cycles;
         options.on_progress = progress_to(on_progress);
         return dict_of(
             run_to_an_orderly_end("evaluate", num_threads, {}, [&options] { return pictura::evaluate(options); }));
@@ -456,15 +459,16 @@ void bind_evaluation(py::module_& module) {
       py::arg("first_scenario") = 0, py::arg("scenarios") = 200, py::arg("steps") = 3000, py::arg("argmax") = true,
       py::arg("seed") = 1, py::arg("num_threads") = 0, py::arg("device") = "auto", py::arg("simulator") = "auto",
       py::arg("renderer") = "", py::arg("samples") = "", py::arg("rig") = "", py::arg("width_px") = 0,
-      py::arg("height_px") = 0, py::arg("conditioning") = py::dict(), py::arg("on_progress") = py::none(),
+      py::arg("height_px") = 0, py::arg("conditioning") = py::dict(), py::arg("light_cycles") = "",
+      py::arg("on_progress") = py::none(),
       R"(The paper's evaluation, as `pictura evaluate` does it, in worlds that no training has.
 
 checkpoint: of a policy; '' with a controller of the paper's world. maps: names or files. controller: 'lane', 'idm_lanes', 'random' or 'idle',
 which drives instead. densities: 'light', 'medium' and 'dense', 60, 120 and 150 agents a world, or agents_per_world of them.
 device, simulator, renderer: 'auto' or names; renderer '': as it was trained. rig, or width_px and height_px: other cameras.
-conditioning: numbers by name. on_progress: called with the fraction that is done and the seconds to come, from a thread of its
-own. Returns a dict: rows, one a density: its counts, and each metric as (value, half of its 95 % interval); seconds,
-agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
+conditioning: numbers by name. light_cycles: 'phases' or 'independent'; '': as it was trained. on_progress: called with the
+fraction that is done and the seconds to come, from a thread of its own. Returns a dict: rows, one a density: its counts, and
+each metric as (value, half of its 95 % interval); seconds, agent_steps, policy_hash, light_cycles. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
   module.def(
       "evaluate_scenes",
       [](const std::string& checkpoint, const std::vector<std::string>& scenes, const std::string& protocol,
@@ -676,7 +680,7 @@ time, also for a renderer that it is given.)")
           py::init([](const std::string& checkpoint, int num_threads, const std::string& device,
                       const std::string& simulator, const std::string& renderer, const std::string& samples,
                       const std::string& rig, int width_px, int height_px, const std::string& backbone,
-                      const py::dict& conditioning) {
+                      const py::dict& conditioning, const std::string& light_cycles) {
             SessionOptions options;
             options.num_threads = num_threads;
             options.device = device;
@@ -688,13 +692,14 @@ time, also for a renderer that it is given.)")
             options.height_px = height_px;
             options.backbone = backbone;
             options.conditioning = texts_of(conditioning);
+            options.light_cycles = light_cycles;
             check_process("PolicySession", num_threads, {});
             return std::make_unique<PySession>(checkpoint, options);
           }),
           py::arg("checkpoint"), py::kw_only(), py::arg("num_threads") = 0, py::arg("device") = "auto",
           py::arg("simulator") = "auto", py::arg("renderer") = "", py::arg("samples") = "", py::arg("rig") = "",
           py::arg("width_px") = 0, py::arg("height_px") = 0, py::arg("backbone") = "",
-          py::arg("conditioning") = py::dict(),
+          py::arg("conditioning") = py::dict(), py::arg("light_cycles") = "",
           R"(checkpoint: a .ckpt file. num_threads: 0 for all. device: 'auto', 'cpu' or 'cuda', where it computes; simulators, renderers
 and arrays that it is given work there too. The others as in pictura.evaluate(). Raises pictura.Error naming the file, or
 pictura.UsageError where it cannot see through these cameras.)")

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
 
 #include "pictura/backends/make_controller.h"
 #include "pictura/backends/make_simulator.h"
@@ -48,6 +49,16 @@ void add_world_options(CLI::App* command, WorldOptions* options_out) {
   command->add_flag("!--no-walls", options_out->walls, "Leave out the walls along the building lines");
 }
 
+void add_light_cycles_option(CLI::App* command, std::string* name_out, const std::string& otherwise) {
+  const std::vector<std::string> names(std::begin(kLightCyclesNames), std::end(kLightCyclesNames));
+  command
+      ->add_option("--light-cycles", *name_out,
+                   fmt::format("How traffic lights cycle: phases (those of a junction take turns) or independent (each "
+                               "alone); default: {}",
+                               otherwise))
+      ->check(one_of(names));
+}
+
 void add_scene_options(CLI::App* command, WorldOptions* options_out) {
   command->add_option("--start", options_out->start_step, "The step of a recorded scene to start at")
       ->transform(whole_number(0, kMaxScenarioSteps - 1))
@@ -72,6 +83,9 @@ void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_
                          BackendOptions* backends_out) {
   add_map_or_scene(command, &world_out->map);
   add_world_options(command, world_out);
+  add_light_cycles_option(
+      command, &world_out->light_cycles,
+      fmt::format("{}, or, with a trained policy, as it was trained", name_of(SimulatorConfig{}.light_cycles)));
   command
       ->add_option("--control", world_out->controlled,
                    "Of a recorded scene, which tracks --policy drives: self, vehicles (the others), others (who is no "
@@ -97,7 +111,7 @@ void settle_driving_options(const CLI::App& command, WorldOptions* world_inout, 
   if (!is_scene_name(world_inout->map)) {
     return refuse_scene_options(command, world_inout->map, {"--control"});
   }
-  refuse_options(command, {"--agents", "--pedestrians", "--cyclists", "--parked", "--no-walls"},
+  refuse_options(command, {"--agents", "--pedestrians", "--cyclists", "--parked", "--no-walls", "--light-cycles"},
                  "on a recorded scene, which says that itself");
   if (command.count("--policy") == 0) *policy_inout = "log";
   if (*policy_inout == "log") {
@@ -183,6 +197,7 @@ DrivenWorld make_world(const WorldOptions& options, const std::string& policy, c
   config.num_threads = options.num_threads;
   config.walls = config.walls && options.walls;
   config.fixed_lights = true;
+  if (!options.light_cycles.empty()) config.light_cycles = light_cycles_named(options.light_cycles);
   set_population(options, &config);
   config.parked_cars = options.parked_cars.value_or(config.parked_cars);
   const std::string simulator = backends.simulator.empty() ? "cpu" : backends.simulator;

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "pictura/cli/drive.h"
 #include "pictura/cli/map_options.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/training/config.h"
@@ -27,6 +28,7 @@ CLI::Option* add_evaluation_options(CLI::App* command, EvaluationArguments* argu
                    "What every agent is told, as collision=1, in place of a value of the configuration's "
                    "[evaluate.conditioning]; may be given many times")
       ->allow_extra_args(false);
+  add_light_cycles_option(command, &options.light_cycles, "as the policy was trained");
   add_threads_option(command, &options.num_threads);
   return sampled;
 }

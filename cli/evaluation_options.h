@@ -19,8 +19,8 @@ struct EvaluationArguments {
   bool sampled = false;
 };
 
-/// Adds --map, --agents, --steps, --sampled, --seed, --device, --simulator, --renderer, --samples, --conditioning and
-/// --threads. Returns --sampled.
+/// Adds --map, --agents, --steps, --sampled, --seed, --device, --simulator, --renderer, --samples, --conditioning,
+/// --light-cycles and --threads. Returns --sampled.
 CLI::Option* add_evaluation_options(CLI::App* command, EvaluationArguments* arguments);
 
 /// Adds --average, which chooses the average of weights that a checkpoint holds.

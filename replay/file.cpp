@@ -430,6 +430,7 @@ Json header_of(const Replay& replay, const std::vector<Section>& sections) {
           {"map_hash", origin.map_hash},
           {"policy", origin.policy},
           {"policy_hash", origin.policy_hash},
+          {"light_cycles", origin.light_cycles},
           {"seed", fmt::format("{}", origin.seed)},  // exact in readers whose numbers are doubles
           {"global_world", origin.global_world},
           {"dt_s", origin.dt_s},
@@ -493,6 +494,7 @@ void read_header_values(const Json& header, Replay* replay_out) {
   header.at("map_hash").get_to(origin.map_hash);
   header.at("policy").get_to(origin.policy);
   header.at("policy_hash").get_to(origin.policy_hash);
+  origin.light_cycles = header.value("light_cycles", "");
   const std::optional<uint64_t> seed = parse_unsigned(header.at("seed").get<std::string>());
   PICTURA_CHECK(seed, "header: seed: expected a number, got {}", header.at("seed").dump());
   origin.seed = *seed;

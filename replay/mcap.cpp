@@ -298,6 +298,7 @@ void write_mcap(const std::string& path, const Replay& replay) {
                                   {"map_hash", origin.map_hash},
                                   {"policy", origin.policy},
                                   {"policy_hash", origin.policy_hash},
+                                  {"light_cycles", origin.light_cycles},
                                   {"seed", std::to_string(origin.seed)}});
   writer.finish();
 }

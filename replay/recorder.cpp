@@ -318,6 +318,7 @@ void Recorder::set_origin(ReplayOrigin origin) {
   origin.seed = parts.replay.origin.seed;
   origin.global_world = parts.setup.worlds[static_cast<size_t>(parts.world)].global_world;
   origin.dt_s = parts.setup.config.dt_s;
+  origin.light_cycles = light_cycles_text(parts.setup.config, map);
   parts.replay.origin = std::move(origin);
 }
 

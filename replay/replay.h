@@ -177,6 +177,7 @@ struct ReplayOrigin {
   std::string command, commit, version;
   std::string map, map_hash;
   std::string policy, policy_hash;
+  std::string light_cycles;  // as light_cycles_text() says; empty in files of versions that do not name them
   uint64_t seed = 0;
   uint32_t global_world = 0;
   float dt_s = 0.1f;

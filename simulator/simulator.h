@@ -20,6 +20,7 @@
 #include "pictura/simulator/fields.h"
 #include "pictura/simulator/observation.h"
 #include "pictura/simulator/observation_query.h"
+#include "pictura/simulator/rule_choices.h"
 #include "pictura/simulator/state_edit.h"
 #include "pictura/simulator/totals.h"
 
@@ -44,7 +45,8 @@ struct SimulatorConfig {
   int parked_cars = 32;                                       // per episode and world
   bool walls = true;
   uint64_t wall_seed = 0;
-  bool fixed_lights = false;           // evaluation: 10/3/2 s; else timings are drawn per episode
+  bool fixed_lights = false;  // evaluation: 10/3/2 s; else timings are drawn per episode
+  LightCycles light_cycles = LightCycles::phases;
   bool auxiliary_observations = true;  // false: the auxiliary slots hold zeros (the like-for-like baseline)
   bool vector_observations = true;     // false: entity sets are not computed (perspective training)
   bool wall_observations = false;      // with them the set of walls, which is empty where walls are off
@@ -56,6 +58,13 @@ struct SimulatorConfig {
            (vector_observations && (part != ObservationPart::walls || wall_observations));
   }
 };
+
+/// The light cycles of a name of kLightCyclesNames. Throws UsageError listing the names.
+LightCycles light_cycles_named(std::string_view name);
+
+/// How the lights of a map in worlds of this configuration cycle: the name of its light cycles, "recorded" where the
+/// map has a record of its lights, "none" where it has no lights.
+std::string light_cycles_text(const SimulatorConfig& config, const CompiledMap& map);
 
 /// One world: which of the simulator's maps it is on, and how many controlled agents are requested.
 struct WorldSpec {

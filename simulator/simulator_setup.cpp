@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "pictura/common/error.h"
+#include "pictura/common/support/suggestion.h"
 #include "pictura/map/scenario/scenario.h"
 #include "pictura/simulator/rules/limits.h"
 
@@ -115,6 +116,7 @@ RuleOptions rule_options(const SimulatorConfig& config) {
   options.pedestrian_fraction = config.pedestrian_fraction;
   options.cyclist_fraction = config.cyclist_fraction;
   options.fixed_lights = config.fixed_lights;
+  options.light_cycles = config.light_cycles;
   options.auxiliary_observations = config.auxiliary_observations;
   std::copy(config.conditioning.begin(), config.conditioning.end(), options.conditioning);
   std::copy(std::begin(kPaperConditioning), std::end(kPaperConditioning), options.conditioning_scale);
@@ -138,6 +140,16 @@ void check_box_cells(const CompiledMaps& maps, const std::vector<WorldSpec>& wor
 }
 
 }  // namespace
+
+LightCycles light_cycles_named(std::string_view name) {
+  return static_cast<LightCycles>(
+      index_of_word("light_cycles", name, {kLightCyclesNames, std::size(kLightCyclesNames)}));
+}
+
+std::string light_cycles_text(const SimulatorConfig& config, const CompiledMap& map) {
+  if (map.rules.stop_lines.empty()) return "none";
+  return map.rules.record.light_states.empty() ? name_of(config.light_cycles) : "recorded";
+}
 
 SimulatorCapacity SimulatorCapacity::joined(const SimulatorCapacity& other) const {
   return {std::max(worlds, other.worlds), std::max(slots, other.slots), std::max(lights, other.lights),

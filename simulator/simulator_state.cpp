@@ -38,6 +38,14 @@ std::vector<Fingerprint> fingerprints(const SimulatorSetup& setup) {
     add_values(&hash, values...);
     prints.push_back({std::move(name), hash.value()});
   };
+  // Rules of which one choice is the usual one count where they are another: states of the usual rules, those of
+  // earlier versions among them, carry no mark of them.
+  const auto add_unusual = [&prints](bool is_unusual, const auto& value) {
+    if (!is_unusual) return;
+    Hash64 hash;
+    add_values(&hash, prints.back().value, value);
+    prints.back().value = hash.value();
+  };
   const SimulatorConfig& config = setup.config;
   add("seed", config.seed);
   add("time (dt_s, episode_steps, reset_inactive_fraction)", config.dt_s, config.episode_steps,
@@ -45,7 +53,8 @@ std::vector<Fingerprint> fingerprints(const SimulatorSetup& setup) {
   add("population (pedestrian_fraction, cyclist_fraction, parked_cars)", config.pedestrian_fraction,
       config.cyclist_fraction, config.parked_cars);
   add("walls (walls, wall_seed)", config.walls, config.wall_seed);
-  add("fixed_lights", config.fixed_lights);
+  add("timing of the lights (fixed_lights, light_cycles)", config.fixed_lights);
+  add_unusual(config.light_cycles != LightCycles::phases, config.light_cycles);
   Hash64 conditioning, worlds;
   for (const ConditioningRange& range : config.conditioning) {
     add_values(&conditioning, range.low, range.high, range.mixture);
@@ -55,7 +64,6 @@ std::vector<Fingerprint> fingerprints(const SimulatorSetup& setup) {
   prints.push_back({"worlds", worlds.value()});
   add("number of maps", setup.maps.size());
   for (const auto& map : setup.maps) prints.push_back({fmt::format("map {}", map->road->name), map->fingerprint});
-  // States of the usual rules carry no mark of them, so that those of earlier versions are restored.
   if (config.after_infraction != AfterInfraction::halt || config.leave_at_goal) {
     add("way to end (after_infraction, leave_at_goal)", config.after_infraction, config.leave_at_goal);
   }

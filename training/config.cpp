@@ -34,6 +34,8 @@ const Choices<Precision> kPrecisions{{"fp32", Precision::fp32}, {"tf32", Precisi
 const Choices<Schedule> kSchedules{
     {"constant", Schedule::constant}, {"linear", Schedule::linear}, {"cosine", Schedule::cosine}};
 const Choices<OptimizerKind> kOptimizers{{"adamw", OptimizerKind::adamw}, {"muon", OptimizerKind::muon}};
+const Choices<LightCycles> kLightCycles{{name_of(LightCycles::phases), LightCycles::phases},
+                                        {name_of(LightCycles::independent), LightCycles::independent}};
 const Choices<HaltedSlots> kHaltedSlots{{"skip", HaltedSlots::skip}, {"draw", HaltedSlots::draw}};
 
 constexpr const char* kDevices = "cpu, cuda, cuda:N, auto";
@@ -57,6 +59,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.number("simulator.pedestrian_fraction", c.simulator.pedestrian_fraction, 0, 1);
   v.number("simulator.cyclist_fraction", c.simulator.cyclist_fraction, 0, 1);
   v.integer("simulator.parked_cars", c.simulator.parked_cars, 0, kMaxAgentsPerWorld);
+  v.choice("simulator.light_cycles", c.simulator.light_cycles, kLightCycles);
   v.flag("simulator.walls", c.simulator.walls);
   v.integer("simulator.wall_seed", c.simulator.wall_seed, 0, std::numeric_limits<int64_t>::max());
   v.flag("simulator.wall_observations", c.simulator.wall_observations);
@@ -705,6 +708,11 @@ Config with_evaluate_conditioning(const Config& config, const std::vector<std::s
   return result;
 }
 
+Config with_light_cycles(Config config, const std::string& name) {
+  if (!name.empty()) config.simulator.light_cycles = light_cycles_named(name);
+  return config;
+}
+
 Config load_config(const std::string& path, const std::vector<std::string>& overrides) {
   Config config = parse_config(read_file(path, 1 << 20), path, overrides);
   const auto is_overridden = [&overrides](std::string_view key) {
@@ -897,6 +905,7 @@ SimulatorConfig simulator_config(const Config& config, Device device) {
   result.pedestrian_fraction = static_cast<float>(config.simulator.pedestrian_fraction);
   result.cyclist_fraction = static_cast<float>(config.simulator.cyclist_fraction);
   result.parked_cars = config.simulator.parked_cars;
+  result.light_cycles = config.simulator.light_cycles;
   result.walls = config.simulator.walls;
   result.wall_seed = config.simulator.wall_seed;
   result.auxiliary_observations = config.policy.modality == Modality::vector && config.policy.auxiliary;

@@ -43,6 +43,7 @@ struct Config {
     double reset_inactive_fraction = 0.4;  // a world resets when this part of its agents is inactive
     double pedestrian_fraction = 0.1, cyclist_fraction = 0.1;
     int parked_cars = 32;  // per episode and world
+    LightCycles light_cycles = LightCycles::phases;
     bool walls = true;
     uint64_t wall_seed = 0;
     bool wall_observations = false;  // the vector policy also reads the set of walls
@@ -159,6 +160,10 @@ Config load_config(const std::string& path, const std::vector<std::string>& over
 /// The configuration with values of [evaluate.conditioning] replaced; each is "name=value". Throws UsageError that
 /// names the option --conditioning.
 Config with_evaluate_conditioning(const Config& config, const std::vector<std::string>& values);
+
+/// The configuration with simulator.light_cycles replaced; an empty name keeps them. Throws UsageError listing the
+/// names.
+Config with_light_cycles(Config config, const std::string& name);
 
 /// Every key with its value, as TOML that parse_config reads back to an equal Config.
 std::string to_toml(const Config& config);

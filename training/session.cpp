@@ -21,7 +21,7 @@ namespace {
 // The settings of training with what the options change. Those of devices are of the machine that trained it: here
 // whatever draws the same images will do.
 Config adapted(const Config& trained, const SessionOptions& options) {
-  Config config = with_evaluate_conditioning(trained, options.conditioning);
+  Config config = with_light_cycles(with_evaluate_conditioning(trained, options.conditioning), options.light_cycles);
   config.run.num_threads = options.num_threads;
   config.run.device = options.device;
   config.simulator.backend = options.simulator;
@@ -219,6 +219,7 @@ EvaluationSetting PolicySession::evaluation_setting() const {
   EvaluationSetting setting;
   setting.policy_hash = parts_->policy.hash();
   setting.conditioning = config.evaluate.conditioning;
+  setting.light_cycles = config.simulator.light_cycles;
   setting.device = parts_->device.is_host() ? "cpu" : "cuda";
   setting.precision = parts_->device.is_host() ? "fp32" : name_of(config.train.precision);
   if (!reads_images()) return setting;

@@ -26,8 +26,9 @@ struct SessionOptions {
   std::string backbone;  // where the program of policy.backbone lies now; empty: where it did
   // Of [evaluate.conditioning], in place of the policy's own: "name=value".
   std::vector<std::string> conditioning;
-  bool adds_walls = false;  // its worlds have walls, also where it was trained without
-  bool average = false;     // drives with the average of weights that a checkpoint holds (train.weight_average)
+  bool adds_walls = false;   // its worlds have walls, also where it was trained without
+  bool average = false;      // drives with the average of weights that a checkpoint holds (train.weight_average)
+  std::string light_cycles;  // of its worlds, by their names in a configuration; empty: as the policy was trained
 };
 
 /// What a batch of agents sees, in the memory of the session's device.

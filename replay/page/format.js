@@ -267,7 +267,7 @@ class Images {
 // may be null.
 const HUE = ["number"], numbers = (...names) => Object.fromEntries(names.map(name => [name, "number"]));
 const HEADER = {
-  command: "string", program: "string", commit: "string", map: "string", map_hash: "string", policy: "string", policy_hash: "string", seed: "string",
+  command: "string", program: "string", commit: "string", map: "string", map_hash: "string", policy: "string", policy_hash: "string", light_cycles: "string", seed: "string",
   global_world: "count", dt_s: "number", agents: "count", frames: "count", lights: "count", followed: "number",
   metrics: numbers("spawned", "agent_steps", "collisions", "at_fault_collisions", "off_road", "red_light", "wall_contacts", "goals_reached", "waypoints_reached", "km_driven", "reward"),
   "first_infraction?": numbers("frame", "agent"),

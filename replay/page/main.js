@@ -156,7 +156,7 @@ function show(replay, live) {
     byId("policy-name").title = header.policy;
     fillMetrics();
     const command = make("code", header.command), about = byId("about").querySelector("dl");
-    const facts = [["Command", command], ["Policy", header.policy], ["Policy's hash", header.policy_hash], ["Map", header.map], ["Map's hash", header.map_hash], ["Seed", header.seed],
+    const facts = [["Command", command], ["Policy", header.policy], ["Policy's hash", header.policy_hash], ["Map", header.map], ["Map's hash", header.map_hash], ["Traffic lights", header.light_cycles], ["Seed", header.seed],
       ["World", header.global_world], ["Agents", replay.agents], ["Steps", live ? `of ${header.dt_s.toFixed(2)} s` : `${last()} of ${header.dt_s.toFixed(2)} s`], ...(live ? [] : [["Episodes", replay.episodes.length]]),
       ["Commit", header.commit], ["Program", header.program], ["Quantised to", "1 cm, 0.1 degree, 1 cm/s"],
       ...(live ? [] : Object.entries(header.metrics).map(([name, value]) => [name.replace(/_/g, " "), Number(value.toFixed(3))]))];

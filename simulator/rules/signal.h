@@ -3,6 +3,7 @@
 
 #include "pictura/common/color.h"
 #include "pictura/common/rng.h"
+#include "pictura/simulator/rule_choices.h"
 #include "pictura/simulator/rules/map_view.h"
 
 namespace pictura {
@@ -18,18 +19,21 @@ struct LightPlan {
 };
 
 /// Draws a stop line's plan. Training: green U(1, 10) s, yellow U(1.5, 2.25) s, red U(0.3, 10) s and the offset are
-/// drawn per junction and episode; in a fifth of the episodes every light is off, else a fifth of the lights are.
-/// Evaluation (`fixed`): 10, 3 and 2 s, only the offset is drawn and no light is off. Lines without a junction cycle
-/// alone.
-PICTURA_HD inline LightPlan draw_light_plan(const StopLine& line, int32_t light, bool fixed, float dt_s, uint64_t seed,
-                                            uint32_t world, uint32_t episode) {
-  constexpr float kOffFraction = 0.2f;
+/// drawn per episode and junction, or per episode and light where cycles are independent; in a fifth of the episodes
+/// every light is off, else a fifth of the lights are. Where cycles are independent, a light is always green with a
+/// probability of 5 % in each episode, unless it is off. Evaluation (`fixed`): 10, 3 and 2 s, only the offset is drawn,
+/// no light is off and none is always green. Lines without a junction cycle alone in either case.
+PICTURA_HD inline LightPlan draw_light_plan(const StopLine& line, int32_t light, LightCycles cycles, bool fixed,
+                                            float dt_s, uint64_t seed, uint32_t world, uint32_t episode) {
+  constexpr float kOffFraction = 0.2f, kAlwaysGreenFraction = 0.05f;
   constexpr uint32_t kEpisodeKey = 0, kJunctionKey = 1, kLightKey = 2, kLoneLightKey = 3;
   // The stream's agent and step say whose draws these are: the episode's, a junction's, a light's.
-  const uint32_t group = static_cast<uint32_t>(line.junction >= 0 ? line.junction : light);
+  const bool is_independent = cycles == LightCycles::independent;
+  const bool is_alone = is_independent || line.junction < 0;
+  const uint32_t group = static_cast<uint32_t>(is_alone ? light : line.junction);
   RandomStream timing({.seed = seed,
                        .world = world,
-                       .agent = line.junction >= 0 ? kJunctionKey : kLoneLightKey,
+                       .agent = is_alone ? kLoneLightKey : kJunctionKey,
                        .episode = episode,
                        .step = group,
                        .purpose = Purpose::lights});
@@ -40,8 +44,8 @@ PICTURA_HD inline LightPlan draw_light_plan(const StopLine& line, int32_t light,
   plan.green_steps = max_of(1, static_cast<int>((fixed ? 10.0f : green_s) / dt_s + 0.5f));
   plan.yellow_steps = max_of(1, static_cast<int>((fixed ? 3.0f : yellow_s) / dt_s + 0.5f));
   plan.red_steps = max_of(1, static_cast<int>((fixed ? 2.0f : red_s) / dt_s + 0.5f));
-  plan.phase = line.phase;
-  plan.num_phases = line.num_phases;
+  plan.phase = is_independent ? 0 : line.phase;
+  plan.num_phases = is_independent ? 1 : line.num_phases;
   plan.offset_steps = timing.below(plan.num_phases * (plan.green_steps + plan.yellow_steps + plan.red_steps));
   if (!fixed) {
     RandomStream whole_episode(
@@ -52,7 +56,12 @@ PICTURA_HD inline LightPlan draw_light_plan(const StopLine& line, int32_t light,
                       .episode = episode,
                       .step = static_cast<uint32_t>(light),
                       .purpose = Purpose::lights});
-    plan.is_off = whole_episode.uniform() < kOffFraction || own.uniform() < kOffFraction;
+    const bool is_off_alone = own.uniform() < kOffFraction;
+    plan.is_off = whole_episode.uniform() < kOffFraction || is_off_alone;
+    if (is_independent && own.uniform() < kAlwaysGreenFraction) {
+      plan.green_steps = 1;  // the whole cycle
+      plan.yellow_steps = plan.red_steps = plan.offset_steps = 0;
+    }
   }
   return plan;
 }

@@ -1237,6 +1237,9 @@ class Training(CommandCase):
         self.assertEqual((lane["checkpoint"], lane["controller"], lane["device"]), (None, "lane", "cpu"))
         self.assertGreater(lane["rows"][0]["goals_per_vehicle"], 0)
         self.assertEqual(lane["rows"][0]["red_light_rate"], 0)
+        alone = self.json_of(*evaluate, "--policy", "lane", "--light-cycles", "independent")
+        self.assertEqual((lane["light_cycles"], alone["light_cycles"]), ("phases", "independent"))
+        self.assertNotEqual(lane["rows"], alone["rows"])
         idle = self.json_of(*evaluate, "--policy", "idle", "--device", "cpu")
         self.assertEqual(idle["rows"][0]["km_driven"], 0)
         # In parts, and in the world of a checkpoint, here without cyclists and pedestrians.
@@ -1280,7 +1283,8 @@ class Training(CommandCase):
                      "--set", "simulator.wall_seed=9", "--set", "simulator.parked_cars=2", "--out", out)  # fmt: skip
         drive = ["simulate", "procedural:1", "--agents", 4, "--steps", 5, "--policy", out / "checkpoint.ckpt"]
         driven = self.json_of(*drive)
-        self.assertEqual((driven["wall_seed"], driven["parked_asked"]), (9, 2))
+        self.assertEqual((driven["wall_seed"], driven["parked_asked"], driven["light_cycles"]), (9, 2, "phases"))
+        self.assertEqual(self.json_of(*drive, "--light-cycles", "independent")["light_cycles"], "independent")
         self.assertEqual(self.json_of(*drive, "--no-walls")["wall_seed"], None)
         self.assertEqual(self.json_of(*drive, "--renderer", "null")["renderer"], "null")
         if shutil.which("ffmpeg"):

@@ -125,6 +125,7 @@ def test_worlds_of_its_training_and_of_evaluations(session, town):
     assert training["episode_steps"] == 60 and evaluation["episode_steps"] == 77
     assert set(training["conditioning"]) == set(pictura.CONDITIONING_NAMES)
     assert all(isinstance(value, float) for value in evaluation["conditioning"].values()) and evaluation["fixed_lights"]
+    assert training["light_cycles"] == "phases"
     simulator = pictura.Simulator([town], [(0, 4)], **evaluation)
     assert len(np.unique(simulator.observations["conditioning"].numpy(), axis=0)) == 1
 
@@ -355,7 +356,9 @@ def test_the_documents_code_runs(tmp_path, monkeypatch, town):
 
 def test_a_controller_is_evaluated_without_a_policy():
     report = pictura.evaluate("", ["procedural:1"], controller="lane", scenarios=1, steps=100, agents_per_world=8, device="cpu")
-    assert report["rows"][0]["km_driven"] > 0.05 and report["policy_hash"] == "lane"
+    assert report["rows"][0]["km_driven"] > 0.05 and (report["policy_hash"], report["light_cycles"]) == ("lane", "phases")
+    with pytest.raises(pictura.UsageError, match="light_cycles: expected phases, independent, got 'alone'"):
+        pictura.evaluate("", ["procedural:1"], controller="lane", light_cycles="alone")
     with pytest.raises(pictura.UsageError, match="expected one map"):
         pictura.evaluate("", [], controller="lane")
     with pytest.raises(pictura.UsageError, match="densities: expected light, medium, dense, got 'thick'"):

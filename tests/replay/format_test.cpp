@@ -45,6 +45,7 @@ Replay any_replay() {
                    .map_hash = "00ff00ff00ff00ff",
                    .policy = "lane",
                    .policy_hash = "lane",
+                   .light_cycles = "independent",
                    .seed = 18446744073709551615u,
                    .global_world = 3,
                    .dt_s = 0.05f};

@@ -134,6 +134,7 @@ class Mcap(unittest.TestCase):
         with open(self.path, "rb") as file:
             self.assertEqual(sum(1 for _ in NonSeekingReader(file, validate_crcs=True).iter_messages()), count)
         self.assertEqual(summary.statistics.metadata_count, len(metadata))
+        self.assertEqual(metadata[0].metadata["light_cycles"], "phases")
         with open(self.path, "rb") as file:
             between = list(SeekingReader(file).iter_messages(topics=["/agent"], start_time=2_000_000_000, end_time=3_000_000_000))
         self.assertEqual(len(between), 10)

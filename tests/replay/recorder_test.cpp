@@ -81,6 +81,15 @@ TEST(Recorder, SceneryIsTheMapsGeometryToACentimetre) {
   EXPECT_TRUE(near(scenery.heads[0].position_cm, geometry.heads[0].position_m));
 }
 
+TEST(Recorder, TheOriginSaysHowLightsCycle) {
+  const auto recorded = [](const SimulatorConfig& config, const std::string& map) {
+    const auto simulator = make_simulator("cpu", config, {load_map(map)}, {{0, 2, 0}});
+    return record(*simulator, "idle", 1, {}, [](auto&&...) {}).origin.light_cycles;
+  };
+  EXPECT_EQ(recorded({}, "procedural:1:blocks=2x2"), "phases");
+  EXPECT_EQ(recorded({.light_cycles = LightCycles::independent}, "procedural:1:blocks=2x2"), "independent");
+}
+
 TEST(Recorder, PlacesAreWithinHalfAUnitOfTheSimulators) {
   for (const char* policy : {"random", "lane"}) {
     const std::unique_ptr<Simulator> simulator = town(kAgents);

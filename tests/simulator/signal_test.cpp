@@ -1,6 +1,10 @@
 #include "pictura/simulator/rules/signal.h"
 
+#include <array>
+#include <cmath>
 #include <map>
+#include <numeric>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -22,7 +26,7 @@ TEST(Signal, FixedTimingSharesTheCycleAmongPhases) {
   // Three phases of 10 + 3 + 2 s: in 90 s each is green for 20 s, yellow for 6 s and red for the rest.
   std::vector<LightPlan> plans;
   for (int phase = 0; phase < 3; ++phase) {
-    plans.push_back(draw_light_plan(line_of_phase(phase, 3), phase, true, 0.1f, 7, 0, 0));
+    plans.push_back(draw_light_plan(line_of_phase(phase, 3), phase, LightCycles::phases, true, 0.1f, 7, 0, 0));
   }
   std::vector<std::map<LightState, int>> counts(3);
   for (int step = 0; step < 900; ++step) {
@@ -46,8 +50,8 @@ TEST(Signal, TrainingTimingIsDrawnPerJunctionAndEpisode) {
   double green_s = 0;
   constexpr int kEpisodes = 2000;
   for (uint32_t episode = 0; episode < kEpisodes; ++episode) {
-    LightPlan first = draw_light_plan(line_of_phase(0, 2), 0, false, 0.1f, 7, 0, episode);
-    LightPlan second = draw_light_plan(line_of_phase(1, 2), 1, false, 0.1f, 7, 0, episode);
+    LightPlan first = draw_light_plan(line_of_phase(0, 2), 0, LightCycles::phases, false, 0.1f, 7, 0, episode);
+    LightPlan second = draw_light_plan(line_of_phase(1, 2), 1, LightCycles::phases, false, 0.1f, 7, 0, episode);
     EXPECT_EQ(first.green_steps, second.green_steps);
     EXPECT_EQ(first.offset_steps, second.offset_steps);
     EXPECT_GE(first.green_steps, 10);
@@ -63,6 +67,103 @@ TEST(Signal, TrainingTimingIsDrawnPerJunctionAndEpisode) {
   EXPECT_NEAR(green_s, 5.5, 0.3);
   EXPECT_NEAR(episodes_off / double{kEpisodes}, 0.2 + 0.8 * 0.04, 0.04);
   EXPECT_NEAR(lights_off / double{kEpisodes}, 0.8 * 2 * 0.2 * 0.8, 0.04);
+}
+
+/// The plans of two lights of one junction and of different phases, in an episode of independent cycles.
+std::array<LightPlan, 2> independent_pair(bool fixed, uint32_t episode) {
+  std::array<LightPlan, 2> plans;
+  for (int light = 0; light < 2; ++light) {
+    plans[static_cast<size_t>(light)] =
+        draw_light_plan(line_of_phase(light, 2), light, LightCycles::independent, fixed, 0.1f, 7, 0, episode);
+  }
+  return plans;
+}
+
+/// Pearson's correlation of two samples of one length.
+double correlation(const std::vector<double>& a, const std::vector<double>& b) {
+  const auto n = static_cast<double>(a.size());
+  const double mean_a = std::accumulate(a.begin(), a.end(), 0.0) / n;
+  const double mean_b = std::accumulate(b.begin(), b.end(), 0.0) / n;
+  double ab = 0, aa = 0, bb = 0;
+  for (size_t i = 0; i < a.size(); ++i) {
+    ab += (a[i] - mean_a) * (b[i] - mean_b);
+    aa += (a[i] - mean_a) * (a[i] - mean_a);
+    bb += (b[i] - mean_b) * (b[i] - mean_b);
+  }
+  return ab / std::sqrt(aa * bb);
+}
+
+TEST(Signal, IndependentLightsOfAJunctionShareNoDraw) {
+  constexpr int kEpisodes = 4000;
+  int always_green = 0, both_always_green = 0;
+  std::array<std::vector<double>, 2> green_steps, red_steps, offsets;
+  for (uint32_t episode = 0; episode < kEpisodes; ++episode) {
+    const std::array<LightPlan, 2> plans = independent_pair(false, episode);
+    int in_episode = 0;
+    for (size_t light = 0; light < 2; ++light) {
+      const LightPlan& plan = plans[light];
+      EXPECT_EQ(plan.num_phases, 1);
+      EXPECT_EQ(plan.phase, 0);
+      // Lights are off as where phases take turns.
+      const LightPlan in_turns =
+          draw_light_plan(line_of_phase(int(light), 2), int(light), LightCycles::phases, false, 0.1f, 7, 0, episode);
+      EXPECT_EQ(plan.is_off, in_turns.is_off);
+      in_episode += plan.red_steps == 0;
+    }
+    always_green += in_episode;
+    both_always_green += in_episode == 2;
+    if (in_episode > 0) continue;
+    for (size_t light = 0; light < 2; ++light) {
+      const LightPlan& plan = plans[light];
+      green_steps[light].push_back(plan.green_steps);
+      red_steps[light].push_back(plan.red_steps);
+      offsets[light].push_back(plan.offset_steps /
+                               static_cast<double>(plan.green_steps + plan.yellow_steps + plan.red_steps));
+    }
+  }
+  // Three standard deviations: sqrt(.05 x .95 / 8000) = .0024 of the share, 1 / sqrt(3610) = .017 of correlations.
+  EXPECT_NEAR(always_green / (2.0 * kEpisodes), 0.05, 0.0075);
+  EXPECT_NEAR(both_always_green / double{kEpisodes}, 0.05 * 0.05, 0.0025);
+  EXPECT_NEAR(correlation(green_steps[0], green_steps[1]), 0, 0.05);
+  EXPECT_NEAR(correlation(red_steps[0], red_steps[1]), 0, 0.05);
+  EXPECT_NEAR(correlation(offsets[0], offsets[1]), 0, 0.05);
+  EXPECT_NEAR(std::accumulate(green_steps[0].begin(), green_steps[0].end(), 0.0) / double(green_steps[0].size()), 55,
+              1.5);
+}
+
+TEST(Signal, AnAlwaysGreenLightIsGreenUnlessItIsOff) {
+  int seen = 0, off = 0;
+  for (uint32_t episode = 0; episode < 2000; ++episode) {
+    for (const LightPlan& plan : independent_pair(false, episode)) {
+      if (plan.red_steps > 0) continue;
+      ++seen;
+      off += plan.is_off;
+      for (const int step : {0, 1, 99, 1279, 1 << 24}) {
+        EXPECT_EQ(light_state(plan, step), plan.is_off ? LightState::off : LightState::green) << step;
+      }
+    }
+  }
+  EXPECT_GT(seen, 100);
+  EXPECT_NEAR(off / double(seen), 0.36, 0.12);
+}
+
+TEST(Signal, IndependentLightsOfAnEvaluationAreRedForTwoOfFifteenSeconds) {
+  constexpr int kEpisodes = 1000, kCycle = 150;
+  int both_red = 0;
+  for (uint32_t episode = 0; episode < kEpisodes; ++episode) {
+    const std::array<LightPlan, 2> plans = independent_pair(true, episode);
+    std::map<LightState, int> counts;
+    for (int step = 0; step < kCycle; ++step) {
+      const LightState first = light_state(plans[0], step), second = light_state(plans[1], step);
+      ++counts[first];
+      both_red += first == LightState::red && second == LightState::red;
+    }
+    EXPECT_EQ(counts[LightState::green], 100);
+    EXPECT_EQ(counts[LightState::yellow], 30);
+    EXPECT_EQ(counts[LightState::red], 20);
+  }
+  // Independent lights are red together in the product of their shares.
+  EXPECT_NEAR(both_red / double{kEpisodes * kCycle}, (2.0 / 15) * (2.0 / 15), 0.004);
 }
 
 /// A straight of two lanes at y = 0 and y = 4; at x = 100 a line holds the right one (lane 0), and only it.

@@ -469,6 +469,7 @@ TEST(Simulator, RestoreSaysWhatDiffers) {
   EXPECT_THAT(difference({.cyclist_fraction = 0.5f}, make_map()), HasSubstr("cyclist_fraction"));
   EXPECT_THAT(difference({.wall_seed = 1}, make_map()), HasSubstr("wall_seed"));
   EXPECT_THAT(difference({.fixed_lights = true}, make_map()), HasSubstr("fixed_lights"));
+  EXPECT_THAT(difference({.light_cycles = LightCycles::independent}, make_map()), HasSubstr("light_cycles"));
   SimulatorConfig config;
   config.conditioning[3].high = 2;
   EXPECT_THAT(difference(config, make_map()), HasSubstr("conditioning"));

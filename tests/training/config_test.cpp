@@ -348,6 +348,22 @@ TEST(Config, ConditioningOfAnEvaluationIsReadAndRefusedUnderItsOption) {
   EXPECT_EQ(message({"collision=1", "collision=2"}), "--conditioning: collision is given twice");
 }
 
+TEST(Config, LightCyclesAreReadAndAnEvaluationMayChooseOthers) {
+  EXPECT_EQ(parse_config("", "a.toml").simulator.light_cycles, LightCycles::phases);
+  const Config independent = parse_config("[simulator]\nlight_cycles = \"independent\"\n", "a.toml");
+  EXPECT_EQ(simulator_config(independent).light_cycles, LightCycles::independent);
+  EXPECT_EQ(evaluation_simulator_config(independent, 9).light_cycles, LightCycles::independent);
+  EXPECT_EQ(parse_config(to_toml(independent), "b.toml").simulator.light_cycles, LightCycles::independent);
+  EXPECT_EQ(first_difference(Config{}, independent), "simulator.light_cycles: 'phases' became 'independent'");
+  EXPECT_THAT(error_in("[simulator]\nlight_cycles = \"independant\"\n"),
+              AllOf(HasSubstr("a.toml:2: simulator.light_cycles: expected one of phases, independent"),
+                    HasSubstr("did you mean 'independent'")));
+  EXPECT_EQ(with_light_cycles(independent, "").simulator.light_cycles, LightCycles::independent);
+  EXPECT_EQ(with_light_cycles(independent, "phases").simulator.light_cycles, LightCycles::phases);
+  EXPECT_EQ(test::message_of([&] { with_light_cycles(independent, "alone"); }),
+            "light_cycles: expected phases, independent, got 'alone'");
+}
+
 TEST(Config, EvaluationFixesConditioningAndLightsAndEndsNothingEarly) {
   const SimulatorConfig s = evaluation_simulator_config(Config{}, 3000);
   EXPECT_EQ(s.episode_steps, 3000);

@@ -146,10 +146,31 @@ TEST(Results, PartsThatDoNotFitAreRefusedByName) {
   EvaluationResults bold = part(2, {counts(4, 1, 10)});
   bold.setting.conditioning[static_cast<size_t>(Conditioning::collision)] = 0.5;
   EXPECT_THAT(merged_message(first, bold), AllOf(HasSubstr("b.json: conditioning is"), HasSubstr("\"collision\":0.5")));
+  EvaluationResults lit = part(2, {counts(4, 1, 10)});
+  lit.setting.light_cycles = LightCycles::independent;
+  EXPECT_THAT(merged_message(first, lit), HasSubstr("b.json: light_cycles is \"independent\", in a.json \"phases\""));
   EvaluationResults crowd = part(2, {counts(4, 1, 10)});
   crowd.densities[0].agents_per_world = 9;
   EXPECT_THAT(merged_message(first, crowd), HasSubstr("has 9 agents a world, a.json has 8"));
   EXPECT_THAT(message_of([] { merge({}, {}); }), HasSubstr("one part or more"));
+}
+
+TEST(Results, FilesSayTheLightCyclesAndThoseOfBeforeHavePhases) {
+  test::ScratchFolder folder;
+  const std::string path = folder / "x.json";
+  EvaluationResults results = part(0, {counts(4, 1, 10)});
+  results.setting.light_cycles = LightCycles::independent;
+  write_results(path, results);
+  EXPECT_EQ(read_results(path).setting.light_cycles, LightCycles::independent);
+  const std::string text = read_file(path), key = "\"light_cycles\": \"independent\"";
+  const size_t at = text.find(key);
+  ASSERT_NE(at, std::string::npos) << text;
+  const auto with = [&](const std::string& other) { return std::string(text).replace(at, key.size(), other); };
+  write_file(path, with("\"version_of_before\": 0"));
+  EXPECT_EQ(read_results(path).setting.light_cycles, LightCycles::phases);
+  write_file(path, with("\"light_cycles\": \"alone\""));
+  EXPECT_THAT(message_of([&] { read_results(path); }),
+              AllOf(HasSubstr("x.json"), HasSubstr("expected phases, independent, got 'alone'")));
 }
 
 TEST(Results, OtherFilesAreRefusedByName) {

@@ -736,7 +736,8 @@ TEST_F(Training, PoliciesDriveInTheWorldAndSeeTheImagesThatTheyWereTrainedOn) {
   write_file(
       folder_ / "config.toml",
       fmt::format("[simulator]\nmaps = [\"procedural\"]\nmax_agents = 8\nwalls = true\nwall_seed = 77\nparked_cars "
-                  "= 3\npedestrian_fraction = 0.25\n[render]\nrig = \"{}\"\nline_floor_px = 1.5\n"
+                  "= 3\nlight_cycles = \"independent\"\npedestrian_fraction = 0.25\n[render]\nrig = "
+                  "\"{}\"\nline_floor_px = 1.5\n"
                   "[policy]\nbackbone_width = 32\n[train]\nminibatch_size = 64\nforward_chunk = 64\n",
                   rig));
   TrainOptions o = options("run", {"train.updates=1"});
@@ -750,6 +751,11 @@ TEST_F(Training, PoliciesDriveInTheWorldAndSeeTheImagesThatTheyWereTrainedOn) {
   EXPECT_EQ(session.renderer_config().rig.cameras.at(0).name, "ahead");
   EXPECT_EQ(session.evaluation_world(9).wall_seed, 77u);
   EXPECT_EQ(session.evaluation_world(9).episode_steps, 9);
+  EXPECT_EQ(session.evaluation_world(9).light_cycles, LightCycles::independent);
+  EXPECT_EQ(session.evaluation_setting().light_cycles, LightCycles::independent);
+  const PolicySession in_turns(checkpoint, {.num_threads = 1, .light_cycles = "phases"});
+  EXPECT_EQ(in_turns.evaluation_world(9).light_cycles, LightCycles::phases);
+  EXPECT_EQ(in_turns.evaluation_setting().light_cycles, LightCycles::phases);
   EXPECT_EQ(session.training_world().conditioning[0].high,
             simulator_config(load_config(o.config_path)).conditioning[0].high);
   EXPECT_EQ(session.make_renderer()->config().rig.cameras.size(), 1u);
@@ -761,6 +767,7 @@ TEST_F(Training, PoliciesDriveInTheWorldAndSeeTheImagesThatTheyWereTrainedOn) {
   DrivenWorld world = make_world(world_options, checkpoint, {});
   EXPECT_EQ(world.simulator->config().wall_seed, 77u);
   EXPECT_EQ(world.simulator->config().parked_cars, 3);
+  EXPECT_EQ(world.simulator->config().light_cycles, LightCycles::independent);
   EXPECT_EQ(world.simulator->config().pedestrian_fraction, 0.25f);
   EXPECT_FALSE(world.simulator->config().vector_observations);
   ASSERT_TRUE(world.renderer && world.trained_view);
@@ -773,9 +780,11 @@ TEST_F(Training, PoliciesDriveInTheWorldAndSeeTheImagesThatTheyWereTrainedOn) {
   // What is said on the command line wins.
   world_options.walls = false;
   world_options.parked_cars = 1;
+  world_options.light_cycles = "phases";
   world = make_world(world_options, checkpoint, {.renderer = "null"});
   EXPECT_FALSE(world.simulator->config().walls);
   EXPECT_EQ(world.simulator->config().parked_cars, 1);
+  EXPECT_EQ(world.simulator->config().light_cycles, LightCycles::phases);
   EXPECT_EQ(world.renderer->name(), "null");
   EXPECT_THROW(make_world(world_options, checkpoint, {.simulator = "cuda"}), UsageError);
   EXPECT_THAT(message_of([&] { make_world(world_options, checkpoint, {.device = "cuda"}); }), HasSubstr("run.device"));

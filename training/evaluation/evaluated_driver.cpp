@@ -34,7 +34,8 @@ SessionOptions session_options(const DriverOptions& options) {
           .backbone = options.backbone,
           .conditioning = options.conditioning,
           .adds_walls = options.adds_walls,
-          .average = options.average};
+          .average = options.average,
+          .light_cycles = options.light_cycles};
 }
 
 EvaluatedDriver policy_driver(PolicySession* session, Renderer* renderer, const DriverOptions& options, int steps) {
@@ -49,7 +50,7 @@ EvaluatedDriver policy_driver(PolicySession* session, Renderer* renderer, const 
 
 EvaluatedDriver controller_driver(const DriverOptions& options, int steps) {
   Config config = options.checkpoint.empty() ? Config() : read_policy(options.checkpoint).config;
-  config = with_evaluate_conditioning(config, options.conditioning);
+  config = with_light_cycles(with_evaluate_conditioning(config, options.conditioning), options.light_cycles);
   config.policy.modality = Modality::perspective;  // nobody reads vectors,
   config.render.backend = "auto";                  // and nothing is drawn
   config.run.num_threads = options.num_threads;
@@ -64,6 +65,7 @@ EvaluatedDriver controller_driver(const DriverOptions& options, int steps) {
   driver.world = evaluation_simulator_config(config, steps, driver.device);
   driver.setting.policy_hash = name;
   driver.setting.conditioning = config.evaluate.conditioning;
+  driver.setting.light_cycles = config.simulator.light_cycles;
   driver.setting.device = driver.device.is_host() ? "cpu" : is_on_host ? "cuda, driven from the host" : "cuda";
   driver.drive = [&options](Simulator& simulator) {
     return Driving{make_controller(options.controller, simulator, options.seed),

@@ -33,6 +33,7 @@ struct DriverOptions {
   std::vector<std::string> conditioning;  // as in SessionOptions
   bool adds_walls = false;                // as in SessionOptions
   bool average = false;                   // as in SessionOptions
+  std::string light_cycles;               // as in SessionOptions
 };
 
 /// With which the checkpoint's policy is opened.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "pictura/simulator/conditioning.h"
+#include "pictura/simulator/rule_choices.h"
 
 namespace pictura {
 
@@ -44,6 +45,7 @@ struct EvaluationSetting {
   std::string renderer, samples;                        // empty for policies without images
   std::vector<std::string> image_sizes;                 // "96x54", of each camera
   std::array<double, kNumConditioning> conditioning{};  // of every agent, in the order of simulator/conditioning.h
+  LightCycles light_cycles = LightCycles::phases;
   friend bool operator==(const EvaluationSetting&, const EvaluationSetting&) = default;
 };
 

@@ -4,6 +4,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/simulator/simulator.h"
 
 namespace pictura {
 
@@ -26,7 +27,8 @@ Json to_json(const EvaluationSetting& s) {
           {"renderer", s.renderer},
           {"samples", s.samples},
           {"image_sizes", s.image_sizes},
-          {"conditioning", conditioning}};
+          {"conditioning", conditioning},
+          {"light_cycles", name_of(s.light_cycles)}};
 }
 
 EvaluationSetting setting_from(const Json& json) {
@@ -44,6 +46,8 @@ EvaluationSetting setting_from(const Json& json) {
   for (size_t i = 0; i < kNumConditioning; ++i) {
     json.at("conditioning").at(kConditioningNames[i]).get_to(s.conditioning[i]);
   }
+  // Results of versions that knew one kind of cycles do not name it.
+  s.light_cycles = light_cycles_named(json.value("light_cycles", name_of(LightCycles::phases)));
   return s;
 }
 

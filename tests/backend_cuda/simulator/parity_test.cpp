@@ -207,6 +207,16 @@ TEST_F(CudaSimulatorTest, CarlaTownsOver1000Steps) {
   }
 }
 
+TEST_F(CudaSimulatorTest, LightsThatCycleAlone) {
+  SimulatorConfig config = whole_world();
+  config.episode_steps = 200;
+  config.light_cycles = LightCycles::independent;
+  for (const bool fixed : {false, true}) {
+    config.fixed_lights = fixed;
+    expect_parity(config, {load_map("procedural:1")}, draw_worlds(5, 120, 1, 60, 1), 500);
+  }
+}
+
 TEST_F(CudaSimulatorTest, TenThousandSteps) {
   expect_parity(whole_world(), {load_map("procedural:4")}, {{0, 120, 0}}, 10'000, 1000);
 }

@@ -74,6 +74,16 @@ TEST(Phases, GiveTheBitsOfTheCpuExecutorInAnyOrderOfThreads) {
   expect_same(config, maps, draw_worlds(6, 100, 1, 60, 3), 70, 2);
 }
 
+TEST(Phases, LetEachLightCycleAlone) {
+  SimulatorConfig config;
+  config.episode_steps = 40;
+  config.light_cycles = LightCycles::independent;
+  for (const bool fixed : {false, true}) {
+    config.fixed_lights = fixed;
+    expect_same(config, {load_map("procedural:1"), load_map("procedural:2")}, draw_worlds(5, 60, 1, 30, 2), 100, 12);
+  }
+}
+
 TEST(Phases, PlaceCrowdsAsOneAfterTheOtherWould) {
   // A ring of 251 m takes some forty cars: almost every choice depends on the ones before it.
   const SimulatorConfig config = testing::cars({.episode_steps = 3});
