@@ -740,10 +740,11 @@ void define_construction(py::class_<PySimulator>* simulator) {
       .def(
           py::init([](const std::vector<std::shared_ptr<Map>>& maps, const py::sequence& worlds,
                       const std::string& executor, const std::string& device, uint64_t seed, int num_threads,
-                      float dt_s, int episode_steps, float reset_inactive_fraction, float pedestrian_fraction,
-                      float cyclist_fraction, int parked_cars, bool walls, uint64_t wall_seed, bool fixed_lights,
-                      const std::string& light_cycles, bool auxiliary_observations, bool vector_observations,
-                      bool wall_observations, const py::dict& conditioning, const py::object& stream) {
+                      float dt_s, int episode_steps, float reset_inactive_fraction, bool stagger_episodes,
+                      float pedestrian_fraction, float cyclist_fraction, int parked_cars, bool walls,
+                      uint64_t wall_seed, bool fixed_lights, const std::string& light_cycles,
+                      bool auxiliary_observations, bool vector_observations, bool wall_observations,
+                      const py::dict& conditioning, const py::object& stream) {
             SimulatorConfig config;
             config.seed = seed;
             config.device = device_of(device);
@@ -751,6 +752,7 @@ void define_construction(py::class_<PySimulator>* simulator) {
             config.dt_s = dt_s;
             config.episode_steps = episode_steps;
             config.reset_inactive_fraction = reset_inactive_fraction;
+            config.stagger_episodes = stagger_episodes;
             config.pedestrian_fraction = pedestrian_fraction;
             config.cyclist_fraction = cyclist_fraction;
             config.parked_cars = parked_cars;
@@ -768,7 +770,7 @@ void define_construction(py::class_<PySimulator>* simulator) {
           py::arg("seed") = 0, py::arg("num_threads") = 0, py::arg("dt_s") = SimulatorConfig{}.dt_s,
           py::arg("episode_steps") = SimulatorConfig{}.episode_steps,
           py::arg("reset_inactive_fraction") = SimulatorConfig{}.reset_inactive_fraction,
-          py::arg("pedestrian_fraction") = SimulatorConfig{}.pedestrian_fraction,
+          py::arg("stagger_episodes") = false, py::arg("pedestrian_fraction") = SimulatorConfig{}.pedestrian_fraction,
           py::arg("cyclist_fraction") = SimulatorConfig{}.cyclist_fraction,
           py::arg("parked_cars") = SimulatorConfig{}.parked_cars, py::arg("walls") = true, py::arg("wall_seed") = 0,
           py::arg("fixed_lights") = false, py::arg("light_cycles") = name_of(SimulatorConfig{}.light_cycles),
@@ -777,7 +779,8 @@ void define_construction(py::class_<PySimulator>* simulator) {
           R"(maps: of pictura.Map. worlds: of (index of the map, agents), or (map, agents, global world), which keys the
 world's random numbers. executor: 'cpu', 'cuda' or 'auto'. device: where observations and scenes are wanted. num_threads: of
 the host, 0 for all. reset_inactive_fraction: a world resets when this part of its agents is inactive; more than 1: never.
-light_cycles: 'phases', those of a junction take turns, or 'independent', each light cycles alone.
+stagger_episodes: the first episode of each world ends after a drawn number of steps. light_cycles: 'phases', those of a junction
+take turns, or 'independent', each light cycles alone.
 conditioning: a number or (low, high) by name, see CONDITIONING_NAMES; the paper's ranges otherwise. stream: a cudaStream_t
 as int; None: the legacy default stream. The other defaults are the paper's training world.
 Raises pictura.UsageError naming what cannot be simulated, pictura.Error where there is no device.)")

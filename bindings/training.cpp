@@ -155,6 +155,7 @@ py::dict dict_of(const SimulatorConfig& config) {
   d["dt_s"] = config.dt_s;
   d["episode_steps"] = config.episode_steps;
   d["reset_inactive_fraction"] = config.reset_inactive_fraction;
+  d["stagger_episodes"] = config.stagger_episodes;
   d["pedestrian_fraction"] = config.pedestrian_fraction;
   d["cyclist_fraction"] = config.cyclist_fraction;
   d["parked_cars"] = config.parked_cars;

@@ -43,6 +43,7 @@ enum class Purpose : uint8_t {
   parameters,
   town,
   soak,
+  first_episode,
 };
 
 /// Whose draws they are, when, and what for. Ids are global across ranks. Fields that are not given are 0.

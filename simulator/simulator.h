@@ -39,6 +39,7 @@ struct SimulatorConfig {
   float dt_s = 0.1f;    // in [0.01, 0.1]
   int episode_steps = 1280;
   float reset_inactive_fraction = 0.4f;  // a world resets when this part of its agents is inactive; > 1: never
+  bool stagger_episodes = false;         // first episodes have lengths of their own, see max_steps_of()
   AfterInfraction after_infraction = AfterInfraction::halt;
   bool leave_at_goal = false;  // whoever passes a goal within 2 m is absent for the rest of the episode
   float pedestrian_fraction = 0.1f, cyclist_fraction = 0.1f;  // of the agents; the rest are vehicles

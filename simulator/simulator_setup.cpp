@@ -111,6 +111,7 @@ RuleOptions rule_options(const SimulatorConfig& config) {
   options.dt_s = config.dt_s;
   options.episode_steps = config.episode_steps;
   options.reset_inactive_fraction = config.reset_inactive_fraction;
+  options.stagger_episodes = config.stagger_episodes;
   options.after_infraction = config.after_infraction;
   options.leave_at_goal = config.leave_at_goal;
   options.pedestrian_fraction = config.pedestrian_fraction;

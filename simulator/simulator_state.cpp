@@ -48,8 +48,9 @@ std::vector<Fingerprint> fingerprints(const SimulatorSetup& setup) {
   };
   const SimulatorConfig& config = setup.config;
   add("seed", config.seed);
-  add("time (dt_s, episode_steps, reset_inactive_fraction)", config.dt_s, config.episode_steps,
+  add("time (dt_s, episode_steps, reset_inactive_fraction, stagger_episodes)", config.dt_s, config.episode_steps,
       config.reset_inactive_fraction);
+  add_unusual(config.stagger_episodes, config.stagger_episodes);
   add("population (pedestrian_fraction, cyclist_fraction, parked_cars)", config.pedestrian_fraction,
       config.cyclist_fraction, config.parked_cars);
   add("walls (walls, wall_seed)", config.walls, config.wall_seed);

@@ -98,6 +98,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.integer("train.decay_agent_steps", c.train.decay_agent_steps, 0, int64_t{1} << 60);
   v.integer("train.warm_up_agent_steps", c.train.warm_up_agent_steps, 0, int64_t{1} << 60);
   v.integer("train.num_steps", c.train.num_steps, 1, 1 << 16);
+  v.flag("train.stagger_episodes", c.train.stagger_episodes);
   v.integer("train.minibatch_size", c.train.minibatch_size, 1, int64_t{1} << 32);
   v.integer("train.update_epochs", c.train.update_epochs, 1, 1000);
   v.integer("train.forward_chunk", c.train.forward_chunk, 1, int64_t{1} << 32);
@@ -902,6 +903,7 @@ SimulatorConfig simulator_config(const Config& config, Device device) {
   result.num_threads = config.run.num_threads;
   result.episode_steps = config.simulator.episode_steps;
   result.reset_inactive_fraction = static_cast<float>(config.simulator.reset_inactive_fraction);
+  result.stagger_episodes = config.train.stagger_episodes;
   result.pedestrian_fraction = static_cast<float>(config.simulator.pedestrian_fraction);
   result.cyclist_fraction = static_cast<float>(config.simulator.cyclist_fraction);
   result.parked_cars = config.simulator.parked_cars;
@@ -919,6 +921,7 @@ SimulatorConfig evaluation_simulator_config(const Config& config, int steps, Dev
   SimulatorConfig result = simulator_config(config, device);
   result.episode_steps = steps;
   result.reset_inactive_fraction = 2;
+  result.stagger_episodes = false;
   result.fixed_lights = true;
   for (size_t i = 0; i < result.conditioning.size(); ++i) {
     const auto value = static_cast<float>(config.evaluate.conditioning[i]);

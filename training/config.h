@@ -92,7 +92,8 @@ struct Config {
     int64_t schedule_agent_steps = 50'000'000'000;
     int64_t decay_agent_steps = 0;  // 0: all of them
     int64_t warm_up_agent_steps = 0;
-    int num_steps = 128;  // steps of a rollout
+    int num_steps = 128;            // steps of a rollout
+    bool stagger_episodes = false;  // the worlds' first episodes end at different times, see max_steps_of()
     int64_t minibatch_size = 65536;
     int update_epochs = 2;
     int64_t forward_chunk = 2048;  // transitions that go through the network at once; gradients accumulate

@@ -312,7 +312,7 @@ class SimulatorCpu final : public Simulator {
     for (int light = 0; light < static_cast<int>(world.map.stop_lines.size()); ++light) {
       world.lights[light] = light_state(world.map, light, world.light_plans[light], steps);
     }
-    const bool ends = episode_ends(world.options, steps, worlds_.state.spawned[index], active);
+    const bool ends = episode_ends(world, steps, worlds_.state.spawned[index], active);
     worlds_.state.episode_over[index] = ends;
     for (int agent = 0; agent < world.num_agents; ++agent) finish_agent(world, agent, ends, results, bin_of(agent));
     SimulatorTotals sum;

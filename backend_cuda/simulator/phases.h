@@ -377,7 +377,7 @@ struct FinishStep {
       count_agent(world, agent, arrays.results, part);
       active += keeps_episode(world, agent);
     });
-    const bool ends = episode_ends(world.options, steps, arrays.spawned[w], group.sum(active));
+    const bool ends = episode_ends(world, steps, arrays.spawned[w], group.sum(active));
     for_each_agent([&](int agent, SimulatorTotals* part) { finish_agent(world, agent, ends, arrays.results, part); });
     add_up(group, parts, totals_out);
     for (int i = group.rank(); i < static_cast<int>(world.map.stop_lines.size()); i += group.size()) {

@@ -101,12 +101,23 @@ PICTURA_HD inline void count_agent(const WorldView& world, int agent, const Step
   count_events(world.agents.events[slot], totals_inout);
 }
 
+/// Steps after which the world's episode ends, if nothing ends it before: episode_steps of the options. Of staggered
+/// worlds the first episode has U{64, ..., episode_steps} steps instead, drawn per world, so that worlds which begin
+/// together do not end together for ever. Where episode_steps is at most 64 all episodes are whole.
+PICTURA_HD inline int max_steps_of(const WorldView& world) {
+  constexpr int kMinSteps = 64;
+  const int episode_steps = world.options.episode_steps;
+  if (!world.options.stagger_episodes || world.episode > 0 || episode_steps <= kMinSteps) return episode_steps;
+  RandomStream random({.seed = world.seed, .world = world.global_world, .purpose = Purpose::first_episode});
+  return kMinSteps + random.below(episode_steps - kMinSteps + 1);
+}
+
 /// After `steps` steps, with `spawned` agents of which `active` still drive: time is up, too many are inactive, or
 /// there is nobody.
-PICTURA_HD inline bool episode_ends(const RuleOptions& options, int steps, int spawned, int active) {
-  if (steps >= options.episode_steps || spawned == 0) return true;
+PICTURA_HD inline bool episode_ends(const WorldView& world, int steps, int spawned, int active) {
+  if (steps >= max_steps_of(world) || spawned == 0) return true;
   const float inactive = static_cast<float>(spawned - active);
-  return inactive >= options.reset_inactive_fraction * static_cast<float>(spawned);
+  return inactive >= world.options.reset_inactive_fraction * static_cast<float>(spawned);
 }
 
 /// Once it is known whether the world's episode ends with this step: cuts off who still drives, and counts whose

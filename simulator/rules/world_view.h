@@ -16,6 +16,7 @@ struct RuleOptions {
   float dt_s = 0.1f;
   int episode_steps = 1280;
   float reset_inactive_fraction = 0.4f;
+  bool stagger_episodes = false;
   AfterInfraction after_infraction = AfterInfraction::halt;
   bool leave_at_goal = false;
   float pedestrian_fraction = 0, cyclist_fraction = 0;

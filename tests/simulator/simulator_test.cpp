@@ -1,9 +1,12 @@
 // The simulator as its users see it: worlds, spawning, episodes, determinism, saving, bad input.
 #include "pictura/simulator/simulator.h"
 
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <functional>
+#include <numeric>
+#include <set>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -449,6 +452,77 @@ TEST(Simulator, ASnapshotIsTheStateThatWas) {
   EXPECT_THROW(simulator->restore(*snapshot), Error);
 }
 
+/// The steps of the first and of the second episode of each world of one agent, under no jerk.
+std::array<std::vector<int32_t>, 2> episode_lengths(Simulator* simulator, int episode_steps) {
+  const auto num_worlds = simulator->worlds().size();
+  std::array<std::vector<int32_t>, 2> lengths{std::vector<int32_t>(num_worlds), std::vector<int32_t>(num_worlds)};
+  const std::vector<int32_t> actions(num_worlds, kIdleAction);
+  int truncated = 0;
+  for (int step = 0; step < 2 * episode_steps + 1; ++step) {
+    const StepResult result = simulator->step(actions);
+    for (size_t w = 0; w < num_worlds; ++w) {
+      if (!simulator->episode_over()[w]) continue;
+      lengths[static_cast<size_t>(simulator->episode_index()[w])][w] = simulator->episode_step()[w];
+      const bool drives = simulator->state().status[w] == static_cast<uint8_t>(AgentStatus::active);
+      EXPECT_EQ(result.truncated[w], drives) << w;  // agents that still drive at the end bootstrap
+      truncated += drives;
+    }
+  }
+  EXPECT_GT(truncated, 0);
+  return lengths;
+}
+
+TEST(Simulator, StaggeredWorldsEndTheirFirstEpisodesAtDifferentTimes) {
+  constexpr int kSteps = 100, kWorlds = 200, kMinSteps = 64;
+  SimulatorConfig config = testing::cars({.seed = 3, .episode_steps = kSteps, .reset_inactive_fraction = 2});
+  std::vector<WorldSpec> worlds;  // of one agent each, so that slots are worlds
+  for (uint32_t w = 0; w < kWorlds; ++w) worlds.push_back({0, 1, w});
+  const auto plain = make(config, testing::ring_road(40), worlds);
+  for (const std::vector<int32_t>& whole : episode_lengths(plain.get(), kSteps)) {
+    EXPECT_THAT(whole, ::testing::Each(kSteps));
+  }
+
+  config.stagger_episodes = true;
+  const auto simulator = make(config, testing::ring_road(40), worlds);
+  const auto [first, second] = episode_lengths(simulator.get(), kSteps);
+  EXPECT_THAT(first, ::testing::Each(::testing::AllOf(::testing::Ge(kMinSteps), ::testing::Le(kSteps))));
+  EXPECT_THAT(second, ::testing::Each(kSteps));
+  // The mean of 200 draws of U{64, ..., 100} is 82 +- 0.75.
+  EXPECT_NEAR(std::accumulate(first.begin(), first.end(), 0.0) / kWorlds, 82, 3);
+  EXPECT_GE(std::set<int32_t>(first.begin(), first.end()).size(), 30u);  // of 37
+
+  // Another seed has other lengths, and a reset to it those of a new simulator.
+  config.seed = 4;
+  const auto other = make(config, testing::ring_road(40), worlds);
+  const std::vector<uint8_t> all(kWorlds, 1);
+  simulator->reset(all, 4);
+  const auto after_reset = episode_lengths(simulator.get(), kSteps), fresh = episode_lengths(other.get(), kSteps);
+  EXPECT_EQ(after_reset, fresh);
+  EXPECT_NE(fresh[0], first);
+}
+
+TEST(Simulator, StaggeredWorldsGoOnFromASavedStateAsTheyWould) {
+  const SimulatorConfig config =
+      testing::cars({.episode_steps = 90, .reset_inactive_fraction = 2, .stagger_episodes = true});
+  const std::vector<WorldSpec> worlds = draw_worlds(2, 30, 1, 3, 1);
+  const auto simulator = make(config, testing::ring_road(40), worlds),
+             copy = make(config, testing::ring_road(40), worlds);
+  run(simulator.get(), 50);
+  copy->restore(simulator->save());
+  run(simulator.get(), 100, 50);
+  run(copy.get(), 100, 50);
+  EXPECT_EQ(copy->save(), simulator->save());
+}
+
+TEST(Simulator, ShortEpisodesAreNotStaggered) {
+  const auto simulator =
+      make(testing::cars({.episode_steps = 64, .reset_inactive_fraction = 2, .stagger_episodes = true}),
+           testing::ring_road(40), {{0, 1, 0}, {0, 1, 1}, {0, 1, 2}});
+  for (const std::vector<int32_t>& lengths : episode_lengths(simulator.get(), 64)) {
+    EXPECT_THAT(lengths, ::testing::Each(64));
+  }
+}
+
 TEST(Simulator, RestoreSaysWhatDiffers) {
   using ::testing::HasSubstr;
   const auto make_map = [] {
@@ -469,6 +543,7 @@ TEST(Simulator, RestoreSaysWhatDiffers) {
   EXPECT_THAT(difference({.cyclist_fraction = 0.5f}, make_map()), HasSubstr("cyclist_fraction"));
   EXPECT_THAT(difference({.wall_seed = 1}, make_map()), HasSubstr("wall_seed"));
   EXPECT_THAT(difference({.fixed_lights = true}, make_map()), HasSubstr("fixed_lights"));
+  EXPECT_THAT(difference({.stagger_episodes = true}, make_map()), HasSubstr("stagger_episodes"));
   EXPECT_THAT(difference({.light_cycles = LightCycles::independent}, make_map()), HasSubstr("light_cycles"));
   SimulatorConfig config;
   config.conditioning[3].high = 2;

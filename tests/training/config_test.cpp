@@ -364,6 +364,13 @@ TEST(Config, LightCyclesAreReadAndAnEvaluationMayChooseOthers) {
             "light_cycles: expected phases, independent, got 'alone'");
 }
 
+TEST(Config, StaggeringIsOfTrainingAlone) {
+  const Config c = parse_config("[train]\nstagger_episodes = true\n", "a.toml");
+  EXPECT_TRUE(simulator_config(c).stagger_episodes);
+  EXPECT_FALSE(evaluation_simulator_config(c, 9).stagger_episodes);
+  EXPECT_EQ(first_difference(Config{}, c), "train.stagger_episodes: false became true");
+}
+
 TEST(Config, EvaluationFixesConditioningAndLightsAndEndsNothingEarly) {
   const SimulatorConfig s = evaluation_simulator_config(Config{}, 3000);
   EXPECT_EQ(s.episode_steps, 3000);

@@ -217,6 +217,14 @@ TEST_F(CudaSimulatorTest, LightsThatCycleAlone) {
   }
 }
 
+TEST_F(CudaSimulatorTest, StaggeredEpisodes) {
+  SimulatorConfig config = whole_world();
+  config.episode_steps = 200;
+  config.stagger_episodes = true;
+  config.reset_inactive_fraction = 2;
+  expect_parity(config, {load_map("procedural:1")}, draw_worlds(5, 120, 1, 20, 1), 500);
+}
+
 TEST_F(CudaSimulatorTest, TenThousandSteps) {
   expect_parity(whole_world(), {load_map("procedural:4")}, {{0, 120, 0}}, 10'000, 1000);
 }

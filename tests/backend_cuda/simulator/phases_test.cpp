@@ -84,6 +84,14 @@ TEST(Phases, LetEachLightCycleAlone) {
   }
 }
 
+TEST(Phases, StaggerEpisodes) {
+  SimulatorConfig config;
+  config.episode_steps = 90;
+  config.stagger_episodes = true;
+  config.reset_inactive_fraction = 2;
+  expect_same(config, {load_map("procedural:1"), testing::stadium(200, 2)}, draw_worlds(5, 60, 1, 8, 2), 200, 13);
+}
+
 TEST(Phases, PlaceCrowdsAsOneAfterTheOtherWould) {
   // A ring of 251 m takes some forty cars: almost every choice depends on the ones before it.
   const SimulatorConfig config = testing::cars({.episode_steps = 3});
