@@ -742,9 +742,9 @@ void define_construction(py::class_<PySimulator>* simulator) {
                       const std::string& executor, const std::string& device, uint64_t seed, int num_threads,
                       float dt_s, int episode_steps, float reset_inactive_fraction, bool stagger_episodes,
                       float pedestrian_fraction, float cyclist_fraction, int parked_cars, bool walls,
-                      uint64_t wall_seed, bool fixed_lights, const std::string& light_cycles,
-                      bool auxiliary_observations, bool vector_observations, bool wall_observations,
-                      const py::dict& conditioning, const py::object& stream) {
+                      uint64_t wall_seed, bool fixed_lights, const std::string& light_cycles, bool reset_at_standstill,
+                      bool forbid_reversing, bool auxiliary_observations, bool vector_observations,
+                      bool wall_observations, const py::dict& conditioning, const py::object& stream) {
             SimulatorConfig config;
             config.seed = seed;
             config.device = device_of(device);
@@ -760,6 +760,7 @@ void define_construction(py::class_<PySimulator>* simulator) {
             config.wall_seed = wall_seed;
             config.fixed_lights = fixed_lights;
             config.light_cycles = light_cycles_named(light_cycles);
+            config.dynamics = {reset_at_standstill, forbid_reversing};
             config.auxiliary_observations = auxiliary_observations;
             config.vector_observations = vector_observations;
             config.wall_observations = wall_observations;
@@ -774,13 +775,15 @@ void define_construction(py::class_<PySimulator>* simulator) {
           py::arg("cyclist_fraction") = SimulatorConfig{}.cyclist_fraction,
           py::arg("parked_cars") = SimulatorConfig{}.parked_cars, py::arg("walls") = true, py::arg("wall_seed") = 0,
           py::arg("fixed_lights") = false, py::arg("light_cycles") = name_of(SimulatorConfig{}.light_cycles),
+          py::arg("reset_at_standstill") = false, py::arg("forbid_reversing") = false,
           py::arg("auxiliary_observations") = true, py::arg("vector_observations") = true,
           py::arg("wall_observations") = false, py::arg("conditioning") = py::dict(), py::arg("stream") = py::none(),
           R"(maps: of pictura.Map. worlds: of (index of the map, agents), or (map, agents, global world), which keys the
 world's random numbers. executor: 'cpu', 'cuda' or 'auto'. device: where observations and scenes are wanted. num_threads: of
 the host, 0 for all. reset_inactive_fraction: a world resets when this part of its agents is inactive; more than 1: never.
 stagger_episodes: the first episode of each world ends after a drawn number of steps. light_cycles: 'phases', those of a junction
-take turns, or 'independent', each light cycles alone.
+take turns, or 'independent', each light cycles alone. reset_at_standstill: accelerations end where the speed changes its sign.
+forbid_reversing: agents at rest do not begin to drive backwards.
 conditioning: a number or (low, high) by name, see CONDITIONING_NAMES; the paper's ranges otherwise. stream: a cudaStream_t
 as int; None: the legacy default stream. The other defaults are the paper's training world.
 Raises pictura.UsageError naming what cannot be simulated, pictura.Error where there is no device.)")

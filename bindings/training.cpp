@@ -163,6 +163,8 @@ py::dict dict_of(const SimulatorConfig& config) {
   d["wall_seed"] = config.wall_seed;
   d["fixed_lights"] = config.fixed_lights;
   d["light_cycles"] = name_of(config.light_cycles);
+  d["reset_at_standstill"] = config.dynamics.reset_at_standstill;
+  d["forbid_reversing"] = config.dynamics.forbid_reversing;
   d["auxiliary_observations"] = config.auxiliary_observations;
   d["vector_observations"] = config.vector_observations;
   d["wall_observations"] = config.wall_observations;

@@ -118,6 +118,7 @@ RuleOptions rule_options(const SimulatorConfig& config) {
   options.cyclist_fraction = config.cyclist_fraction;
   options.fixed_lights = config.fixed_lights;
   options.light_cycles = config.light_cycles;
+  options.dynamics = config.dynamics;
   options.auxiliary_observations = config.auxiliary_observations;
   std::copy(config.conditioning.begin(), config.conditioning.end(), options.conditioning);
   std::copy(std::begin(kPaperConditioning), std::end(kPaperConditioning), options.conditioning_scale);

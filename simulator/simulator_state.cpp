@@ -60,7 +60,8 @@ std::vector<Fingerprint> fingerprints(const SimulatorSetup& setup) {
   for (const ConditioningRange& range : config.conditioning) {
     add_values(&conditioning, range.low, range.high, range.mixture);
   }
-  prints.push_back({"conditioning", conditioning.value()});
+  prints.push_back({"conditioning or dynamics (reset_at_standstill, forbid_reversing)", conditioning.value()});
+  add_unusual(config.dynamics != DynamicsRules{}, config.dynamics);
   for (const WorldSpec& world : setup.worlds) add_values(&worlds, world.map, world.num_agents, world.global_world);
   prints.push_back({"worlds", worlds.value()});
   add("number of maps", setup.maps.size());

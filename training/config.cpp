@@ -63,6 +63,8 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.flag("simulator.walls", c.simulator.walls);
   v.integer("simulator.wall_seed", c.simulator.wall_seed, 0, std::numeric_limits<int64_t>::max());
   v.flag("simulator.wall_observations", c.simulator.wall_observations);
+  v.flag("simulator.dynamics.reset_at_standstill", c.simulator.dynamics.reset_at_standstill);
+  v.flag("simulator.dynamics.forbid_reversing", c.simulator.dynamics.forbid_reversing);
   for (int i = 0; i < kNumConditioning; ++i) {
     v.range(std::string("simulator.conditioning.") + kConditioningNames[i], c.simulator.conditioning[size_t(i)]);
   }
@@ -908,6 +910,7 @@ SimulatorConfig simulator_config(const Config& config, Device device) {
   result.cyclist_fraction = static_cast<float>(config.simulator.cyclist_fraction);
   result.parked_cars = config.simulator.parked_cars;
   result.light_cycles = config.simulator.light_cycles;
+  result.dynamics = config.simulator.dynamics;
   result.walls = config.simulator.walls;
   result.wall_seed = config.simulator.wall_seed;
   result.auxiliary_observations = config.policy.modality == Modality::vector && config.policy.auxiliary;

@@ -47,6 +47,7 @@ struct Config {
     bool walls = true;
     uint64_t wall_seed = 0;
     bool wall_observations = false;  // the vector policy also reads the set of walls
+    DynamicsRules dynamics;          // [simulator.dynamics]
     /// Training distributions: [simulator.conditioning] NAME = [low, high]; see simulator/conditioning.h for the names.
     std::array<ConditioningRange, kNumConditioning> conditioning = SimulatorConfig::default_conditioning();
   } simulator;

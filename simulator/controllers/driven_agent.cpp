@@ -8,7 +8,7 @@ namespace pictura {
 DrivenAgent::DrivenAgent(const WorldView& world, int agent)
     : world_(world),
       slot_(world.first_slot + agent),
-      parameters_(dynamics_of(world.agents, slot_)),
+      parameters_(dynamics_of(world, slot_)),
       limits_(class_limits(class_of(world.agents, slot_))) {}
 
 Motion DrivenAgent::after(const Motion& from, int32_t action) const {

@@ -62,9 +62,10 @@ std::vector<Sequence> next_beam(const std::vector<Sequence>& beam, const Recorde
 }
 
 /// Writes the actions of an unbroken run of states; those are `out`'s elements from `first` on.
-void follow_run(Span<const RecordedState> run, const RecordedAgent& agent, float dt_s, size_t first,
-                InverseActions* out) {
+void follow_run(Span<const RecordedState> run, const RecordedAgent& agent, const DynamicsRules& rules, float dt_s,
+                size_t first, InverseActions* out) {
   DynamicsParameters parameters;
+  parameters.rules = rules;
   parameters.wheelbase_m = kWheelbasePerLength * agent.length_m;
   const ClassLimits limits = class_limits(static_cast<AgentClass>(agent.agent_class));
   Sequence start;
@@ -88,7 +89,7 @@ void follow_run(Span<const RecordedState> run, const RecordedAgent& agent, float
 
 }  // namespace
 
-InverseActions find_inverse_actions(const CompiledMap& scene, float dt_s, int num_threads) {
+InverseActions find_inverse_actions(const CompiledMap& scene, float dt_s, int num_threads, const DynamicsRules& rules) {
   const MapRecord& record = scene.rules.record;
   if (record.agents.empty()) fail_usage("inverse actions: expected a recorded scene, got map {}", scene.road->name);
   InverseActions out{.num_steps = record.num_steps};
@@ -103,8 +104,8 @@ InverseActions find_inverse_actions(const CompiledMap& scene, float dt_s, int nu
       size_t end = begin;
       while (end < num_steps && states[end].is_there) ++end;
       if (end > begin + 1) {
-        follow_run(states.subspan(begin, end - begin), record.agents[static_cast<size_t>(agent)], dt_s, first + begin,
-                   &out);
+        follow_run(states.subspan(begin, end - begin), record.agents[static_cast<size_t>(agent)], rules, dt_s,
+                   first + begin, &out);
       }
       begin = end + 1;
     }
@@ -122,7 +123,8 @@ InverseTable::InverseTable(const Simulator& simulator) {
   }
   std::vector<ActionTable> of_map;
   for (const auto& map : simulator.maps()) {
-    const InverseActions found = find_inverse_actions(*map, simulator.config().dt_s, simulator.config().num_threads);
+    const SimulatorConfig& config = simulator.config();
+    const InverseActions found = find_inverse_actions(*map, config.dt_s, config.num_threads, config.dynamics);
     of_map.push_back({static_cast<int64_t>(actions.size()), found.num_steps});
     actions.insert(actions.end(), found.actions.begin(), found.actions.end());
   }

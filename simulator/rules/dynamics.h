@@ -4,6 +4,7 @@
 
 #include "pictura/common/math.h"
 #include "pictura/simulator/actions.h"
+#include "pictura/simulator/rule_choices.h"
 #include "pictura/simulator/rules/limits.h"
 
 namespace pictura {
@@ -27,10 +28,11 @@ PICTURA_HD constexpr Controls controls_of_action(int action) {
   return {jerk_long[action / kNumLatActions], jerk_lat[action % kNumLatActions]};
 }
 
-/// Multipliers of the conditioning, and the body.
+/// Multipliers of the conditioning, the body, and the world's rules.
 struct DynamicsParameters {
   float throttle = 1, steer = 1, acceleration = 1;
   float wheelbase_m = 2.7f;
+  DynamicsRules rules{};
 };
 
 /// What a step adds to the distance driven, at the speed that it reached.
@@ -53,8 +55,11 @@ PICTURA_HD inline LongitudinalMotion move_along(LongitudinalMotion from, float j
   LongitudinalMotion to;
   to.accel_mps2 = stop_at_zero(from.accel_mps2, from.accel_mps2 + parameters.throttle * jerk_mps3 * dt_s,
                                limits.min_accel_mps2, limits.max_accel_mps2 * parameters.acceleration);
-  to.speed_mps = stop_at_zero(from.speed_mps, from.speed_mps + 0.5f * (to.accel_mps2 + from.accel_mps2) * dt_s,
-                              limits.min_speed_mps, limits.max_speed_mps);
+  const float wanted_mps = from.speed_mps + 0.5f * (to.accel_mps2 + from.accel_mps2) * dt_s;
+  to.speed_mps = stop_at_zero(from.speed_mps, wanted_mps, limits.min_speed_mps, limits.max_speed_mps);
+  const bool changes_sign = from.speed_mps * wanted_mps < 0.0f;
+  if (parameters.rules.reset_at_standstill && changes_sign) to.accel_mps2 = 0.0f;
+  if (parameters.rules.forbid_reversing && from.speed_mps >= 0.0f && to.speed_mps < 0.0f) to = {};
   return to;
 }
 

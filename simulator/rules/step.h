@@ -74,10 +74,12 @@ PICTURA_HD int pass_waypoints(const WorldView& world, int agent, Vec3 from, Vec3
   return events | kEventWaypoint;
 }
 
-/// The multipliers of an agent's conditioning, and its body.
-PICTURA_HD inline DynamicsParameters dynamics_of(const AgentStateView& agents, int slot) {
+/// The multipliers of an agent's conditioning, its body, and the world's rules.
+PICTURA_HD inline DynamicsParameters dynamics_of(const WorldView& world, int slot) {
+  const AgentStateView& agents = world.agents;
   const float* conditioning = agents.conditioning + slot * kNumConditioning;
   DynamicsParameters parameters;
+  parameters.rules = world.options.dynamics;
   parameters.throttle = conditioning[static_cast<int>(Conditioning::throttle)];
   parameters.steer = conditioning[static_cast<int>(Conditioning::steer)];
   parameters.acceleration = conditioning[static_cast<int>(Conditioning::acceleration)];
@@ -114,7 +116,7 @@ PICTURA_HD inline bool may_follow_record(const WorldView& world, int agent) {
 /// Where an agent is told to be after the step. Which level it is then on is looked for around *z_m_inout.
 PICTURA_HD inline Motion commanded_motion(const WorldView& world, int agent, int32_t action, float*) {
   const int slot = world.first_slot + agent;
-  return move(motion_of(world.agents, slot), controls_of_action(action), dynamics_of(world.agents, slot),
+  return move(motion_of(world.agents, slot), controls_of_action(action), dynamics_of(world, slot),
               class_limits(class_of(world.agents, slot)), world.options.dt_s);
 }
 PICTURA_HD inline Motion commanded_motion(const WorldView& world, int agent, const Command& command, float* z_m_inout) {

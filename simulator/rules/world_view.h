@@ -22,6 +22,7 @@ struct RuleOptions {
   float pedestrian_fraction = 0, cyclist_fraction = 0;
   bool fixed_lights = false;
   LightCycles light_cycles = LightCycles::phases;
+  DynamicsRules dynamics{};
   bool auxiliary_observations = true;
   ConditioningRange conditioning[kNumConditioning] = {};        // to draw from
   ConditioningRange conditioning_scale[kNumConditioning] = {};  // what the policy sees as [-1, 1]

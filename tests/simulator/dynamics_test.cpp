@@ -59,6 +59,72 @@ TEST(Dynamics, StopsAtZeroBeforeItReverses) {
   EXPECT_EQ(m.speed_mps, -2.0f);
 }
 
+DynamicsParameters with_rules(bool reset_at_standstill, bool forbid_reversing) {
+  DynamicsParameters parameters;
+  parameters.rules = {reset_at_standstill, forbid_reversing};
+  return parameters;
+}
+
+TEST(Dynamics, ResetAtStandstillEndsTheAccelerationWhereTheSpeedChangesItsSign) {
+  const DynamicsParameters resets = with_rules(true, false);
+  Motion m;
+  m.speed_mps = 0.1f;
+  m.accel_long_mps2 = -5;
+  m.steer_rad = 0.2f;
+  m = move(m, {}, resets, kVehicle, 0.1f);
+  EXPECT_EQ(m.speed_mps, 0.0f);
+  EXPECT_EQ(m.accel_long_mps2, 0.0f);
+  EXPECT_EQ(m.accel_lat_mps2, 0.0f);
+  EXPECT_FLOAT_EQ(m.jerk_long_mps3, 50.0f);  // from -5 to 0 m/s2 in 0.1 s
+  EXPECT_NEAR(m.x_m, 0.5 * 0.1 * 0.1, 1e-6);
+  m = move(m, {}, resets, kVehicle, 0.1f);  // and it stays where it stands
+  EXPECT_EQ(m.speed_mps, 0.0f);
+  m = move(m, {-4, 0}, resets, kVehicle, 0.1f);  // until it is told to reverse: 0.5 x 0.4 m/s2 x 0.1 s
+  EXPECT_FLOAT_EQ(m.speed_mps, -0.02f);
+  EXPECT_FLOAT_EQ(m.accel_long_mps2, -0.4f);
+  // The same from behind: -0.02 + 0.5 x (2.5 + 2.5) x 0.1 > 0.
+  m.accel_long_mps2 = 2.5f;
+  m = move(m, {}, resets, kVehicle, 0.1f);
+  EXPECT_EQ(m.speed_mps, 0.0f);
+  EXPECT_EQ(m.accel_long_mps2, 0.0f);
+}
+
+TEST(Dynamics, WithoutAChangeOfSignNothingIsReset) {
+  Motion a, b;
+  a.speed_mps = b.speed_mps = 3;
+  for (int step = 0; step < 12; ++step) {
+    const Controls controls = controls_of_action(step < 6 ? 10 : 4);  // never slower than 2 m/s
+    a = move(a, controls, {}, kVehicle, 0.1f);
+    b = move(b, controls, with_rules(true, true), kVehicle, 0.1f);
+    ASSERT_GT(a.speed_mps, 2.0f);
+    EXPECT_EQ(a.speed_mps, b.speed_mps);
+    EXPECT_EQ(a.accel_long_mps2, b.accel_long_mps2);
+    EXPECT_EQ(a.x_m, b.x_m);
+  }
+}
+
+TEST(Dynamics, ForbidReversingKeepsAgentsAtRestWithoutAcceleration) {
+  const DynamicsParameters forbids = with_rules(false, true);
+  Motion m;
+  m.speed_mps = 0.1f;
+  m.accel_long_mps2 = -5;
+  m = move(m, {}, forbids, kVehicle, 0.1f);
+  EXPECT_EQ(m.speed_mps, 0.0f);
+  EXPECT_EQ(m.accel_long_mps2, -5.0f);  // lasts, since it is not reset
+  for (int step = 0; step < 20; ++step) {
+    m = move(m, controls_of_action(1), forbids, kVehicle, 0.1f);
+    EXPECT_EQ(m.speed_mps, 0.0f);
+    EXPECT_EQ(m.accel_long_mps2, 0.0f);
+  }
+  m = move(m, {4, 0}, forbids, kVehicle, 0.1f);  // so it starts at once: 0.5 x 0.4 m/s2 x 0.1 s
+  EXPECT_FLOAT_EQ(m.speed_mps, 0.02f);
+  // An agent that reverses already may go on.
+  m = {};
+  m.speed_mps = -1;
+  m = move(m, {-4, 0}, forbids, kVehicle, 0.1f);
+  EXPECT_FLOAT_EQ(m.speed_mps, -1.02f);
+}
+
 TEST(Dynamics, RespectsLimitsAndMultipliers) {
   Motion m;
   const DynamicsParameters strong{1.0f, 1.0f, 1.5f, 2.7f};

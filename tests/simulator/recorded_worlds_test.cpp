@@ -430,11 +430,11 @@ TEST(RecordedWorlds, ControllersShareThemByMasks) {
   EXPECT_EQ(simulator->totals().agent_steps, 1);
 }
 
-TEST(RecordedWorlds, InverseActionsFollowTheRecord) {
+void expect_inverse_actions_to_follow_the_record(const DynamicsRules& rules) {
   const auto scene = crossing(kNobodyInTheWay);
   const int32_t self = mover(*scene, 40);
-  const auto simulator = world_of(scene);
-  const InverseActions inverse = find_inverse_actions(*simulator->maps()[0], simulator->config().dt_s);
+  const auto simulator = world_of(scene, 0, {.dynamics = rules});
+  const InverseActions inverse = find_inverse_actions(*simulator->maps()[0], simulator->config().dt_s, 0, rules);
   std::vector<Driver> drivers;
   drivers.push_back({.controller = make_controller("log", *simulator, 0)});
   std::vector<uint8_t> driven(scene->tracks.size());
@@ -457,6 +457,11 @@ TEST(RecordedWorlds, InverseActionsFollowTheRecord) {
     EXPECT_LT(error_m, 0.1) << step;
   }
   EXPECT_EQ(simulator->totals().agent_steps, 40);
+}
+
+TEST(RecordedWorlds, InverseActionsFollowTheRecord) {
+  expect_inverse_actions_to_follow_the_record({});
+  expect_inverse_actions_to_follow_the_record({.reset_at_standstill = true, .forbid_reversing = true});
 }
 
 TEST(RecordedWorlds, IdmFollowsThePathAndStopsBehindOthers) {

@@ -364,11 +364,22 @@ TEST(Config, LightCyclesAreReadAndAnEvaluationMayChooseOthers) {
             "light_cycles: expected phases, independent, got 'alone'");
 }
 
-TEST(Config, StaggeringIsOfTrainingAlone) {
-  const Config c = parse_config("[train]\nstagger_episodes = true\n", "a.toml");
-  EXPECT_TRUE(simulator_config(c).stagger_episodes);
-  EXPECT_FALSE(evaluation_simulator_config(c, 9).stagger_episodes);
-  EXPECT_EQ(first_difference(Config{}, c), "train.stagger_episodes: false became true");
+TEST(Config, StaggeringIsOfTrainingAloneAndDynamicsOfEveryWorld) {
+  const Config c = parse_config(
+      "[simulator.dynamics]\nreset_at_standstill = true\nforbid_reversing = true\n[train]\nstagger_episodes = true\n",
+      "a.toml");
+  const SimulatorConfig training = simulator_config(c), evaluation = evaluation_simulator_config(c, 9);
+  EXPECT_TRUE(training.stagger_episodes);
+  EXPECT_FALSE(evaluation.stagger_episodes);
+  EXPECT_TRUE(training.dynamics.reset_at_standstill && training.dynamics.forbid_reversing);
+  EXPECT_EQ(evaluation.dynamics, training.dynamics);
+  EXPECT_EQ(simulator_config(Config{}).dynamics, DynamicsRules{});
+  Config slow;
+  slow.simulator.dynamics.reset_at_standstill = true;
+  EXPECT_EQ(first_difference(Config{}, slow), "simulator.dynamics.reset_at_standstill: false became true");
+  slow = {};
+  slow.train.stagger_episodes = true;
+  EXPECT_EQ(first_difference(Config{}, slow), "train.stagger_episodes: false became true");
 }
 
 TEST(Config, EvaluationFixesConditioningAndLightsAndEndsNothingEarly) {
