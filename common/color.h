@@ -15,8 +15,8 @@ struct Rgb {
 /// exactly.
 enum class PixelFormat : uint8_t { u8, f16, f32, bf16 };
 
-/// How the channels of an image are stored: [3, height, width]; [height, width, 3]; or [rows, columns, kPatchValues] of
-/// patches (patches.h), black beyond the image.
+/// How the channels of an image are stored: [3, height, width]; [height, width, 3]; or [rows, columns, values of a
+/// patch] of patches (patches.h), black beyond the image.
 enum class ChannelOrder : uint8_t { planar, interleaved, patches };
 
 PICTURA_HD constexpr Rgb rgb8(int r, int g, int b) {

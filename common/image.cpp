@@ -32,16 +32,25 @@ std::string_view name_of(ChannelOrder order) {
 
 constexpr int64_t kChannels = 3;
 
-int64_t image_values(ImageSize size, ChannelOrder order) {
+int64_t image_values(ImageSize size, ChannelOrder order, int patch_px) {
   if (order != ChannelOrder::patches) return kChannels * size.pixels();
-  return int64_t{kPatchValues} * patches_along(size.width_px) * patches_along(size.height_px);
+  return int64_t{patch_values(patch_px)} * patches_along(patch_px, size.width_px) *
+         patches_along(patch_px, size.height_px);
 }
 
-ImageLayout image_layout(Span<const ImageSize> sizes, int64_t num_views, PixelFormat format, ChannelOrder order) {
+void check_patch_px(std::string_view what, ChannelOrder order, int patch_px) {
+  PICTURA_CHECK(order != ChannelOrder::patches || is_drawn_patch(patch_px),
+                "{}: expected patches of 4, 8, 12 or 16 pixels squared, got {}", what, patch_px);
+}
+
+ImageLayout image_layout(Span<const ImageSize> sizes, int64_t num_views, PixelFormat format, ChannelOrder order,
+                         int patch_px) {
   PICTURA_CHECK(num_views >= 0, "images: expected 0 views or more, got {}", num_views);
+  check_patch_px("images", order, patch_px);
   ImageLayout layout;
   layout.format = format;
   layout.order = order;
+  layout.patch_px = patch_px;
   layout.num_views = num_views;
   for (std::size_t i = 0; i < sizes.size(); ++i) {
     const auto block = std::find_if(layout.blocks.begin(), layout.blocks.end(),
@@ -54,7 +63,7 @@ ImageLayout image_layout(Span<const ImageSize> sizes, int64_t num_views, PixelFo
   const bool is_planar = order == ChannelOrder::planar;
   for (BlockLayout& block : layout.blocks) {
     block.offset = layout.num_values;
-    const int64_t values = image_values(block.size, order);
+    const int64_t values = image_values(block.size, order, patch_px);
     for (std::size_t i = 0; i < block.cameras.size(); ++i) {
       CameraLayout& camera = layout.cameras[static_cast<std::size_t>(block.cameras[i])];
       camera.offset = block.offset + static_cast<int64_t>(i) * values;
@@ -70,11 +79,11 @@ ImageLayout image_layout(Span<const ImageSize> sizes, int64_t num_views, PixelFo
   return layout;
 }
 
-ImageLayout image_layout(const Rig& rig, int64_t num_views, PixelFormat format, ChannelOrder order) {
+ImageLayout image_layout(const Rig& rig, int64_t num_views, PixelFormat format, ChannelOrder order, int patch_px) {
   validate(rig);
   std::vector<ImageSize> sizes;
   for (const Camera& camera : rig.cameras) sizes.push_back({camera.width_px, camera.height_px});
-  return image_layout(sizes, num_views, format, order);
+  return image_layout(sizes, num_views, format, order, patch_px);
 }
 
 CameraImages camera_images(const ImageLayout& layout, int camera, void* first) {
@@ -89,8 +98,9 @@ CameraImages camera_images(const ImageLayout& layout, int camera, void* first) {
   return images;
 }
 
-HostImages::HostImages(const Rig& rig, int num_views, PixelFormat format, Planes planes, ChannelOrder order)
-    : layout_(image_layout(rig, num_views, format, order)), bytes_(layout_.bytes()) {
+HostImages::HostImages(const Rig& rig, int num_views, PixelFormat format, Planes planes, ChannelOrder order,
+                       int patch_px)
+    : layout_(image_layout(rig, num_views, format, order, patch_px)), bytes_(layout_.bytes()) {
   for (int i = 0; i < static_cast<int>(layout_.cameras.size()); ++i) {
     cameras_.push_back(camera_images(layout_, i, bytes_.data()));
   }
@@ -114,7 +124,7 @@ HostImages::HostImages(const Rig& rig, int num_views, PixelFormat format, Planes
 }
 
 ImageBatch HostImages::batch() {
-  return {Device{}, layout_.format, static_cast<int>(layout_.num_views), cameras_, layout_.order};
+  return {Device{}, layout_.format, static_cast<int>(layout_.num_views), cameras_, layout_.order, layout_.patch_px};
 }
 
 std::vector<uint8_t> HostImages::interleaved(int view, int camera_index) const {

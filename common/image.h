@@ -26,12 +26,14 @@ struct ImageSize {
   bool operator==(const ImageSize&) const = default;
   int64_t pixels() const { return int64_t{width_px} * height_px; }
 };
-/// How many values one image of this size has: channels of pixels, and what patches add to them.
-int64_t image_values(ImageSize size, ChannelOrder order);
+/// How many values one image of this size has: channels of pixels, and what patches of `patch_px` add to them.
+int64_t image_values(ImageSize size, ChannelOrder order, int patch_px = kDefaultPatch_px);
+/// Throws Error naming `what` unless renderers write patches of this side, or the order is another.
+void check_patch_px(std::string_view what, ChannelOrder order, int patch_px);
 
 /// Where one camera's images lie in the memory of a layout. Channel c of pixel (x, y) of a view is the value
 /// offset + view * view_stride + c * channel_stride + y * row_stride + x * pixel_stride; all of these count values. In
-/// patches it is offset + view * view_stride + place_in_patches(width, c, x, y), and the last three are 0.
+/// patches it is offset + view * view_stride + place_in_patches(patch_px, width, c, x, y), and the last three are 0.
 struct CameraLayout {
   ImageSize size;
   int block = 0;  // index into ImageLayout::blocks
@@ -49,20 +51,21 @@ struct ImageLayout {
   std::vector<BlockLayout> blocks;    // one per distinct size, in the order of first appearance, without gaps
   PixelFormat format = PixelFormat::u8;
   ChannelOrder order = ChannelOrder::planar;
+  int patch_px = kDefaultPatch_px;  // side of the patches, where the order is of patches
   int64_t num_views = 0, num_values = 0;
   std::size_t bytes() const { return static_cast<std::size_t>(num_values) * bytes_per_value(format); }
 };
 
-/// Throws Error unless there are 0 views or more.
+/// Throws Error unless there are 0 views or more, and patches of 4, 8, 12 or 16 px where the order is of patches.
 ImageLayout image_layout(Span<const ImageSize> sizes, int64_t num_views, PixelFormat format,
-                         ChannelOrder order = ChannelOrder::planar);
+                         ChannelOrder order = ChannelOrder::planar, int patch_px = kDefaultPatch_px);
 /// Throws Error as validate(rig) does, too.
 ImageLayout image_layout(const Rig& rig, int64_t num_views, PixelFormat format,
-                         ChannelOrder order = ChannelOrder::planar);
+                         ChannelOrder order = ChannelOrder::planar, int patch_px = kDefaultPatch_px);
 
 /// Memory of one camera's images. In planar images value (view, channel, y, x) is element
 /// view * view_stride + (channel * height + y) * width + x of `data`, in patches view * view_stride +
-/// place_in_patches(width, channel, x, y): there are no gaps within.
+/// place_in_patches(patch_px, width, channel, x, y): there are no gaps within.
 struct CameraImages {
   int width_px = 0, height_px = 0;
   void* data = nullptr;             // colour, of ImageBatch::format
@@ -75,14 +78,15 @@ struct CameraImages {
 /// A camera's images in the memory of a whole layout, without planes.
 CameraImages camera_images(const ImageLayout& layout, int camera, void* first);
 
-/// What render() fills. All renderers draw planar images, those that say so (Renderer::draws_all_formats) patches too;
-/// others are refused.
+/// What render() fills. All renderers draw planar images, those that say so (Renderer::draws_all_formats) patches of 4,
+/// 8, 12 or 16 px too; others are refused.
 struct ImageBatch {
   Device device;  // of all that follows
   PixelFormat format = PixelFormat::u8;
   int num_views = 0;
   Span<const CameraImages> cameras;  // [cameras of the rig]
   ChannelOrder order = ChannelOrder::planar;
+  int patch_px = kDefaultPatch_px;  // side of the patches, where the order is of patches
 };
 
 enum class Planes : uint8_t { none, all };  // depth, class and instance
@@ -91,7 +95,7 @@ enum class Planes : uint8_t { none, all };  // depth, class and instance
 class HostImages {
  public:
   HostImages(const Rig& rig, int num_views, PixelFormat format = PixelFormat::u8, Planes planes = Planes::none,
-             ChannelOrder order = ChannelOrder::planar);
+             ChannelOrder order = ChannelOrder::planar, int patch_px = kDefaultPatch_px);
   // A copy's cameras would point into the original's memory.
   HostImages(const HostImages&) = delete;
   HostImages& operator=(const HostImages&) = delete;

@@ -6,18 +6,23 @@
 
 namespace pictura {
 
-/// The side of a patch of ChannelOrder::patches, and how many values one has: three channels of its pixels.
-constexpr int kPatch_px = 4;
-constexpr int kPatchValues = 3 * kPatch_px * kPatch_px;
+/// Side of the patches that a request for images asks for unless it names another.
+constexpr int kDefaultPatch_px = 4;
+/// Whether renderers write patches of this side: 4, 8, 12 or 16 px. A thread of a kernel writes four neighbouring
+/// pixels at once, which such a patch never divides.
+PICTURA_HD constexpr bool is_drawn_patch(int patch_px) { return patch_px > 0 && patch_px <= 16 && patch_px % 4 == 0; }
 
-/// Patches along a side of so many pixels; the last one may reach beyond the image.
-PICTURA_HD constexpr int patches_along(int size_px) { return (size_px + kPatch_px - 1) / kPatch_px; }
+/// Number of values of a patch: three channels of its pixels.
+PICTURA_HD constexpr int patch_values(int patch_px) { return 3 * patch_px * patch_px; }
 
-/// Where a channel of a pixel lies in an image of this width: [rows, columns, kPatchValues], where value
-/// (channel * kPatch_px + y) * kPatch_px + x of a patch is the channel of pixel (x, y) of the patch.
-PICTURA_HD constexpr int64_t place_in_patches(int width_px, int channel, int x, int y) {
-  const int64_t patch = static_cast<int64_t>(y / kPatch_px) * patches_along(width_px) + x / kPatch_px;
-  return patch * kPatchValues + (channel * kPatch_px + y % kPatch_px) * kPatch_px + x % kPatch_px;
+/// Number of patches along a side of so many pixels; the last one may reach beyond the image.
+PICTURA_HD constexpr int patches_along(int patch_px, int size_px) { return (size_px + patch_px - 1) / patch_px; }
+
+/// Index of a channel of a pixel in an image of this width: [rows, columns, patch_values(patch_px)], where value
+/// (channel * patch_px + y) * patch_px + x of a patch is the channel of pixel (x, y) of the patch.
+PICTURA_HD constexpr int64_t place_in_patches(int patch_px, int width_px, int channel, int x, int y) {
+  const int64_t patch = static_cast<int64_t>(y / patch_px) * patches_along(patch_px, width_px) + x / patch_px;
+  return patch * patch_values(patch_px) + (channel * patch_px + y % patch_px) * patch_px + x % patch_px;
 }
 
 }  // namespace pictura

@@ -53,7 +53,8 @@ ChunkRunner::Work& ChunkRunner::observe(const at::Tensor& rows) {
   const PhaseTimer::Scope timed(observations_.draws_when_gathered() ? timer_ : nullptr, Phase::render);
   const Mode mode = work.observe.next_mode(*graphs_, observations_.are_complete());
   if (mode != Mode::launch) work.observation = {};  // before there is another
-  work.observe.run(mode, graphs_, [&] { work.observation = observations_.gather(work.rows, policy_.reads_patches()); });
+  work.observe.run(mode, graphs_,
+                   [&] { work.observation = observations_.gather(work.rows, policy_.drawn_patch_px()); });
   return work;
 }
 

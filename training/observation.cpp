@@ -82,8 +82,9 @@ std::vector<ImageBlock> allocate_patches(const ImageLayout& layout, Device devic
   std::vector<ImageBlock> blocks;
   for (const BlockLayout& block : layout.blocks) {
     const at::Tensor pixels =
-        at::empty({static_cast<int64_t>(block.cameras.size()), layout.num_views, patches_along(block.size.height_px),
-                   patches_along(block.size.width_px), kPatchValues},
+        at::empty({static_cast<int64_t>(block.cameras.size()), layout.num_views,
+                   patches_along(layout.patch_px, block.size.height_px),
+                   patches_along(layout.patch_px, block.size.width_px), patch_values(layout.patch_px)},
                   at::TensorOptions(at::kBFloat16).device(torch_device(device)));
     blocks.push_back({pixels.transpose(0, 1), {block.cameras.begin(), block.cameras.end()}});
   }
@@ -92,14 +93,13 @@ std::vector<ImageBlock> allocate_patches(const ImageLayout& layout, Device devic
 
 }  // namespace
 
-std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> views, Renderer* renderer,
-                                    bool wants_patches) {
-  const bool as_patches = wants_patches && renderer->draws_all_formats();
+std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> views, Renderer* renderer, int patch_px) {
+  const bool as_patches = patch_px > 0 && renderer->draws_all_formats();
   const Rig& rig = renderer->config().rig;
   const auto num_views = static_cast<int64_t>(views.size());
   const PixelFormat format = as_patches ? PixelFormat::bf16 : PixelFormat::u8;
   const ChannelOrder order = as_patches ? ChannelOrder::patches : ChannelOrder::planar;
-  const ImageLayout layout = image_layout(rig, num_views, format, order);
+  const ImageLayout layout = image_layout(rig, num_views, format, order, as_patches ? patch_px : kDefaultPatch_px);
   std::vector<ImageBlock> blocks =
       as_patches ? allocate_patches(layout, renderer->device()) : allocate_images(rig, {num_views}, renderer->device());
   // Each block is a tensor of its own, whose strides say where an image of a view and a camera begins.
@@ -112,7 +112,8 @@ std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> vi
                         num_placed[block]++ * pixels.stride(1) * static_cast<int64_t>(pixels.element_size());
     cameras.push_back({camera.size.width_px, camera.size.height_px, first, pixels.stride(0)});
   }
-  renderer->render(scene, views, {renderer->device(), format, static_cast<int>(num_views), cameras, order},
+  renderer->render(scene, views,
+                   {renderer->device(), format, static_cast<int>(num_views), cameras, order, layout.patch_px},
                    current_stream(renderer->device()));
   return blocks;
 }

@@ -15,7 +15,7 @@
 namespace pictura {
 
 /// The images of the cameras that share one size: u8 [batch, cameras of this size, 3, height, width]; or bf16 [batch,
-/// cameras, rows, columns, kPatchValues], the patches of common/patches.h, in memory [cameras, batch, ...].
+/// cameras, rows, columns, values of a patch], the patches of common/patches.h, in memory [cameras, batch, ...].
 struct ImageBlock {
   at::Tensor pixels;
   std::vector<int64_t> cameras;  // their indices in the rig
@@ -79,10 +79,10 @@ Observation select_arrays(const Config& config, const ObservationView& view, Dev
 /// Uninitialised memory for images of a rig, [batch..., cameras of one size, 3, height, width].
 std::vector<ImageBlock> allocate_images(const Rig& rig, std::vector<int64_t> batch, Device device);
 
-/// The images of these views, [views, ...], in the renderer's memory: as patches where they are wanted and the renderer
-/// draws them, else planar.
+/// The images of these views, [views, ...], in the renderer's memory: as patches of `patch_px` where that is not 0 and
+/// the renderer draws them, else planar.
 std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> views, Renderer* renderer,
-                                    bool wants_patches = false);
+                                    int patch_px = 0);
 
 /// The slots whose agents are active and that the mask [slots] has (empty: all), i64 [n], in ascending order.
 at::Tensor active_slots(const ControllerInput& input, Span<const uint8_t> mask, LearnerExecutor* executor);

@@ -188,9 +188,11 @@ class PerspectiveEncoder final : public SceneEncoder {
 
   int64_t width() const override { return 4 * int64_t{config_.embedding_width}; }
   const ImageBackbone* image_backbone() const override { return backbone_.get(); }
-  static_assert(PatchSize::channels_of(kPatch_px) == kPatchValues, "renderers draw what image_patches() makes");
-  bool reads_patches() const override {
-    return !backbone_ && config_.patch_px == kPatch_px && image_type_ == at::kBFloat16;
+  static_assert(PatchSize::channels_of(4) == patch_values(4) && PatchSize::channels_of(8) == patch_values(8) &&
+                    PatchSize::channels_of(12) == patch_values(12) && PatchSize::channels_of(16) == patch_values(16),
+                "renderers draw what image_patches() makes");
+  int drawn_patch_px() const override {
+    return !backbone_ && is_drawn_patch(config_.patch_px) && image_type_ == at::kBFloat16 ? config_.patch_px : 0;
   }
 
   at::Tensor forward(const Observation& o) const override {
@@ -374,7 +376,7 @@ void PolicyNetwork::check_images(const Rig& rig) const {
   if (scene_->image_backbone()) scene_->image_backbone()->check_images(rig);
 }
 
-bool PolicyNetwork::reads_patches() const { return scene_->reads_patches(); }
+int PolicyNetwork::drawn_patch_px() const { return scene_->drawn_patch_px(); }
 
 std::unique_ptr<const Policy> make_policy(const Config& config, const Rig& rig, Device device) {
   auto policy = std::make_unique<PolicyNetwork>(config.policy, static_cast<int>(rig.cameras.size()), config.run.seed,

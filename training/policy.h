@@ -36,8 +36,8 @@ class SceneEncoder {
   virtual int64_t width() const = 0;
   /// The program in the place of its convolutions, or null.
   virtual const ImageBackbone* image_backbone() const { return nullptr; }
-  /// See Policy::reads_patches.
-  virtual bool reads_patches() const { return false; }
+  /// See Policy::drawn_patch_px.
+  virtual int drawn_patch_px() const { return 0; }
 };
 
 /// What learning asks of a policy.
@@ -62,9 +62,9 @@ class Policy {
   virtual std::string backbone_hash() const { return ""; }
   /// Throws Error naming camera and file where the program of policy.backbone does not take such images.
   virtual void check_images(const Rig& /*rig*/) const {}
-  /// Whether it reads images as patches too (ImageBlock): what its first convolution takes, so that nothing is left to
-  /// do between drawing and that.
-  virtual bool reads_patches() const { return false; }
+  /// Side of the patches as which it also reads images (ImageBlock), 0: it reads planar images alone. Its first
+  /// convolution takes such patches, so that nothing is left to do between drawing and that.
+  virtual int drawn_patch_px() const { return 0; }
 
  protected:
   std::vector<NamedTensor> parameters_;
@@ -82,7 +82,7 @@ class PolicyNetwork final : public Policy {
   Output forward(const Observation& observation) const override;
   std::string backbone_hash() const override;
   void check_images(const Rig& rig) const override;
-  bool reads_patches() const override;
+  int drawn_patch_px() const override;
 
  private:
   std::unique_ptr<SceneEncoder> scene_;

@@ -55,12 +55,12 @@ void RolloutObservations::record(int64_t step, const at::Tensor& slots) {
   are_complete_ = are_complete_ || step + 1 == arrays_.ego.size(0);
 }
 
-Observation RolloutObservations::gather(const at::Tensor& rows, bool wants_patches) const {
+Observation RolloutObservations::gather(const at::Tensor& rows, int patch_px) const {
   Observation result = arrays_.map([&rows](const at::Tensor& t) { return t.flatten(0, 1).index_select(0, rows); });
   if (scenes_) {
     SelectedViews selected(rows.size(0), scenes_->device());
     scenes_->gather(span_of<const int64_t>(rows), selected.views(), current_stream(scenes_->device()));
-    result.images = draw_images(scenes_->scene(), selected.views(), renderer_, wants_patches);
+    result.images = draw_images(scenes_->scene(), selected.views(), renderer_, patch_px);
   }
   return result;
 }

@@ -27,8 +27,8 @@ class RolloutObservations {
   void record(int64_t step, const at::Tensor& slots);
 
   /// What some agents saw. rows: i64 [batch] of step * slots + slot, of agents that were active at those steps. Images
-  /// that are drawn for it are patches where those are wanted and drawn.
-  Observation gather(const at::Tensor& rows, bool wants_patches = false) const;
+  /// that are drawn for it are as draw_images() draws them.
+  Observation gather(const at::Tensor& rows, int patch_px = 0) const;
 
   /// Whether images are kept as they are seen, or drawn in gather().
   bool keep_images() const { return keeps_images_; }

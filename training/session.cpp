@@ -130,7 +130,7 @@ struct PolicySession::Parts {
   std::vector<ImageBlock> draw(const PolicyInput& input, const at::Tensor& indices, Renderer* renderer) const {
     if (input.is_drawn.empty()) {
       return draw_images(*input.scene, SelectedViews(input.views, device, indices).views(), renderer,
-                         policy.reads_patches());
+                         policy.drawn_patch_px());
     }
     const auto batch = static_cast<int64_t>(input.is_drawn.size());
     const at::Tensor drawn =

@@ -201,9 +201,10 @@ void ImageDrawer::draw(const ImageTarget& target) {
   const int band_rows = max_of(1, min_of(height, kBandPixels / width));
   const bool in_patches = target.order == ChannelOrder::patches;
   // From one channel of a pixel to the next.
-  const int64_t step = in_patches ? place_in_patches(width, 1, 0, 0) : int64_t{width} * height;
+  const int64_t step = in_patches ? place_in_patches(target.patch_px, width, 1, 0, 0) : int64_t{width} * height;
   auto draw_as = [&](auto* out, auto&& value_of) {
-    if (in_patches) std::fill_n(out, image_values({width, height}, target.order), 0);  // what reaches beyond the image
+    // What reaches beyond the image.
+    if (in_patches) std::fill_n(out, image_values({width, height}, target.order, target.patch_px), 0);
     for (int y_begin = 0; y_begin < height; y_begin += band_rows) {
       const RowRange rows{y_begin, min_of(height, y_begin + band_rows)};
       make_fragments({0, static_cast<int32_t>(faces_.size())}, rows);
@@ -212,7 +213,8 @@ void ImageDrawer::draw(const ImageTarget& target) {
           rows, [](int, const Fragment&, float) {},
           [&](int pixel, Rgb color) {
             auto* const to =
-                in_patches ? out + place_in_patches(width, 0, pixel % width, y_begin + pixel / width) : first + pixel;
+                in_patches ? out + place_in_patches(target.patch_px, width, 0, pixel % width, y_begin + pixel / width)
+                           : first + pixel;
             to[0] = value_of(color.r);
             to[step] = value_of(color.g);
             to[2 * step] = value_of(color.b);

@@ -30,6 +30,7 @@ struct ImageTarget {
   uint8_t* class_id = nullptr;
   uint16_t* instance_id = nullptr;
   ChannelOrder order = ChannelOrder::planar;  // or patches
+  int patch_px = kDefaultPatch_px;            // side of the patches
 };
 
 /// Draws images one after another. An object serves one thread.

@@ -86,7 +86,7 @@ class CpuRenderer final : public Renderer {
     const CameraImages& out = images.cameras[camera];
     const int64_t offset = static_cast<int64_t>(view) * out.view_stride;
     const std::size_t pixels = static_cast<std::size_t>(out.width_px) * static_cast<std::size_t>(out.height_px);
-    ImageTarget target{.format = images.format, .order = images.order};
+    ImageTarget target{.format = images.format, .order = images.order, .patch_px = images.patch_px};
     target.color = static_cast<std::byte*>(out.data) + offset * static_cast<int64_t>(bytes_per_value(images.format));
     if (out.depth_m) target.depth_m = out.depth_m + view * pixels;
     if (out.class_id) target.class_id = out.class_id + view * pixels;

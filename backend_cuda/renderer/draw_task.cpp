@@ -55,7 +55,7 @@ DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeC
     slot.planes = {out.depth_m, out.class_id, out.instance_id};
     task.wants_planes = task.wants_planes || slot.planes.are_wanted();
   }
-  if (images) task.format = images->format, task.order = images->order;
+  if (images) task.format = images->format, task.order = images->order, task.patch_px = images->patch_px;
   return task;
 }
 

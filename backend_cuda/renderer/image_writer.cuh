@@ -15,6 +15,7 @@ struct ImageWriter {
   void* images;
   int64_t first, plane;  // in elements: the image's offset, and the stride of planes
   int width_px, height_px;
+  int patch_px;  // side of the patches, where the order is of patches
 
   /// Stores the colour of a pixel with a fragment list at the first of its fragments.
   template <typename Memory>
@@ -50,6 +51,16 @@ struct ImageWriter {
   struct Place {
     int x, y, count;
   };
+  // Where a place lies in patches. Constant divisors are several times as fast as patch_px, and all threads take one
+  // branch.
+  __device__ int64_t place_in_patch(const Place& place) const {
+    switch (patch_px) {
+      case 8: return place_in_patches(8, width_px, 0, place.x, place.y);
+      case 12: return place_in_patches(12, width_px, 0, place.x, place.y);
+      case 16: return place_in_patches(16, width_px, 0, place.x, place.y);
+      default: return place_in_patches(4, width_px, 0, place.x, place.y);
+    }
+  }
 
   __device__ bool has_bytes() const { return format == PixelFormat::u8 || format == PixelFormat::bf16; }
 
@@ -90,26 +101,46 @@ struct ImageWriter {
   // value_of(i, channel) is a channel of the i-th pixel.
   template <typename Value, typename ValueOf>
   __device__ void store_channels(Value* image, const Place& place, ValueOf&& value_of) const {
-    auto store_each = [&](Value* to, int64_t step, int count, int rows_beyond) {
+    auto store_each = [&](Value* to, int64_t step, int count) {
       PICTURA_NO_UNROLL
       for (int channel = 0; channel < 3; ++channel, to += step) {
         PixelVector<Value> values;
         for (int i = 0; i < kPixelsPerWrite; ++i) values.value[i] = value_of(i, channel);
         store(to, count, values);
-        PICTURA_NO_UNROLL
-        for (int row = 1; row <= rows_beyond; ++row) store(to + row * kPatch_px, count, PixelVector<Value>{});
       }
     };
     // Planes have a loop of their own: without it, each store asks whether a patch ends there.
     if (order != ChannelOrder::patches) {
-      store_each(image + static_cast<int64_t>(place.y) * width_px + place.x, plane, place.count, 0);
+      store_each(image + static_cast<int64_t>(place.y) * width_px + place.x, plane, place.count);
       return;
     }
-    static_assert(kPixelsPerWrite == kPatch_px);
-    // Neighbours lie in one patch (plan_next_part). What it has beyond the image is black, as are words beyond a part.
-    const int count = place.x + place.count == width_px ? kPatch_px - place.x % kPatch_px : place.count;
-    const int rows_beyond = place.y + 1 == height_px ? patches_along(height_px) * kPatch_px - height_px : 0;
-    store_each(image + place_in_patches(width_px, 0, place.x, place.y), kPatch_px * kPatch_px, count, rows_beyond);
+    // Neighbours lie in one patch (plan_next_part), and words beyond a part are black.
+    static_assert(kDefaultPatch_px % kPixelsPerWrite == 0);
+    const bool is_right = place.x + place.count == width_px;
+    store_each(image + place_in_patch(place), patch_px * patch_px,
+               is_right ? kPixelsPerWrite - place.x % kPixelsPerWrite : place.count);
+    if (is_right || place.y + 1 == height_px) blacken_beyond(image, place, width_px, height_px, patch_px);
+  }
+
+  // Blackens what the patch of such pixels has beyond the image, to their right and below them. Not inlined: few
+  // threads need it, and all would keep its registers.
+  template <typename Value>
+  __device__ __noinline__ static void blacken_beyond(Value* image, Place place, int width_px, int height_px,
+                                                     int patch_px) {
+    const int columns = place.x + place.count == width_px ? patch_px - place.x % patch_px : place.count;
+    const int rows = place.y + 1 == height_px ? patch_px - place.y % patch_px : 1;
+    Value* to = image + place_in_patches(patch_px, width_px, 0, place.x, place.y);
+    PICTURA_NO_UNROLL
+    for (int channel = 0; channel < 3; ++channel, to += patch_px * patch_px) {
+      PICTURA_NO_UNROLL
+      for (int row = 0; row < rows; ++row) {
+        // The pixels themselves are written, up to the next multiple of kPixelsPerWrite.
+        PICTURA_NO_UNROLL
+        for (int x = row == 0 ? kPixelsPerWrite - place.x % kPixelsPerWrite : 0; x < columns; x += kPixelsPerWrite) {
+          store(to + row * patch_px + x, min_of(columns - x, kPixelsPerWrite), PixelVector<Value>{});
+        }
+      }
+    }
   }
 
   // One vector store if all pixels are written and the address is aligned.

@@ -3,6 +3,7 @@
 // What exceeds a block's memory goes to a last launch of few blocks, whose memory holds all of a world.
 #pragma once
 
+#include "pictura/common/patches.h"
 #include "pictura/common/raster/face_setup.h"
 
 namespace pictura::cuda {
@@ -213,6 +214,7 @@ struct DrawTask {
   bool debug_palette = false;
   PixelFormat format = PixelFormat::u8;
   ChannelOrder order = ChannelOrder::planar;  // or patches
+  int32_t patch_px = kDefaultPatch_px;        // side of the patches
   bool wants_planes = false;
   FaultWord* fault = nullptr;
   FacePool pool;

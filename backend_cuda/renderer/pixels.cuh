@@ -2,7 +2,6 @@
 #pragma once
 
 #include "pictura/backend_cuda/renderer/fragments.cuh"
-#include "pictura/common/patches.h"
 
 namespace pictura::cuda {
 
@@ -289,7 +288,7 @@ __device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn
     } else {
       // It begins at a multiple of its width, so that the pixels that a thread writes lie in one patch
       // (common/patches.h).
-      plan.wide_px = columns > kPatch_px ? kPatch_px : columns > 2 ? 2 : 1;
+      plan.wide_px = columns > kPixelsPerWrite ? kPixelsPerWrite : columns > 2 ? 2 : 1;
     }
     plan.part = {x, min_of(x + plan.wide_px, min_of(plan.band_begin + plan.band_px, whole.x_end)), y,
                  min_of(y + plan.rows, whole.y_end)};

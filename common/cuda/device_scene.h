@@ -64,7 +64,7 @@ class DeviceImages {
   ImageBatch like(const ImageBatch& host) {
     std::vector<ImageSize> sizes;
     for (const CameraImages& camera : host.cameras) sizes.push_back({camera.width_px, camera.height_px});
-    layout_ = image_layout(sizes, host.num_views, host.format, host.order);
+    layout_ = image_layout(sizes, host.num_views, host.format, host.order, host.patch_px);
     const Span<uint8_t> color = color_.resize(layout_.bytes());
     planes_.resize(sizes.size());
     cameras_.assign(host.cameras.begin(), host.cameras.end());
@@ -79,7 +79,7 @@ class DeviceImages {
       if (camera.instance_id) camera.instance_id = planes_[k].instance_id.resize(pixels).data();
     }
     color_bytes_ = color;
-    return {current_device(), host.format, host.num_views, cameras_, host.order};
+    return {current_device(), host.format, host.num_views, cameras_, host.order, host.patch_px};
   }
 
   /// All colour of what like() made.

@@ -52,6 +52,7 @@ void check_images(const Renderer& renderer, std::size_t num_views, const ImageBa
   PICTURA_CHECK(images.order == ChannelOrder::planar || (draws_all && images.order == ChannelOrder::patches),
                 "renderer {}: images: expected planar channels{}, got {} ones", name, draws_all ? " or patches" : "",
                 name_of(images.order));
+  check_patch_px(fmt::format("renderer {}: images", name), images.order, images.patch_px);
   PICTURA_CHECK(images.num_views >= 0 && static_cast<std::size_t>(images.num_views) == num_views,
                 "renderer {}: images: expected images of {} views, got {}", name, num_views, images.num_views);
   PICTURA_CHECK(images.cameras.size() == rig.cameras.size(), "renderer {}: images: expected {} cameras, got {}", name,
@@ -64,7 +65,7 @@ void check_images(const Renderer& renderer, std::size_t num_views, const ImageBa
                   wanted.height_px, camera.width_px, camera.height_px);
     PICTURA_CHECK(num_views == 0 || camera.data != nullptr, "renderer {}: images: camera {}: no memory for colour",
                   name, i);
-    const int64_t values = image_values({camera.width_px, camera.height_px}, images.order);
+    const int64_t values = image_values({camera.width_px, camera.height_px}, images.order, images.patch_px);
     PICTURA_CHECK(num_views < 2 || camera.view_stride >= values,
                   "renderer {}: images: camera {}: expected a view stride of at least {} values, got {}", name, i,
                   values, camera.view_stride);

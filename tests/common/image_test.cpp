@@ -46,6 +46,28 @@ TEST(ImageLayout, InterleavedChannelsAreNextToEachOther) {
   EXPECT_EQ(camera.row_stride, 3 * 8);
 }
 
+// 54 rows in patches of 12 px make five rows of patches, as 18 rows in patches of 4 px do.
+TEST(ImageLayout, PatchesPutPixelsByHand) {
+  static_assert(patches_along(12, 54) == 5 && patches_along(4, 18) == 5 && patches_along(12, 96) == 8);
+  static_assert(patch_values(8) == 192 && patch_values(12) == 432 && patch_values(16) == 768);
+  EXPECT_EQ(place_in_patches(4, 10, 2, 9, 5), (1 * 3 + 2) * 48 + (2 * 4 + 1) * 4 + 1);
+  EXPECT_EQ(place_in_patches(8, 20, 1, 17, 10), (1 * 3 + 2) * 192 + (1 * 8 + 2) * 8 + 1);
+  EXPECT_EQ(place_in_patches(12, 96, 2, 95, 53), (4 * 8 + 7) * 432 + (2 * 12 + 5) * 12 + 11);
+  EXPECT_EQ(place_in_patches(16, 33, 0, 32, 15), 2 * 768 + 15 * 16);
+  const ImageLayout layout = image_layout(paper_rig(96, 54), 2, PixelFormat::bf16, ChannelOrder::patches, 12);
+  EXPECT_EQ(layout.patch_px, 12);
+  EXPECT_EQ(layout.cameras[1].offset, 40 * 432);
+  EXPECT_EQ(layout.num_values, 2 * 4 * 40 * 432);
+}
+
+TEST(ImageLayout, PatchesOfOtherSidesAreRefused) {
+  for (const int patch_px : {0, 2, 6, 20, -4}) {
+    EXPECT_THAT(
+        test::message_of([&] { image_layout(paper_rig(), 1, PixelFormat::bf16, ChannelOrder::patches, patch_px); }),
+        testing::HasSubstr(fmt::format("images: expected patches of 4, 8, 12 or 16 pixels squared, got {}", patch_px)));
+  }
+}
+
 TEST(ImageLayout, EveryValueHasOnePlace) {
   for (const ChannelOrder order : {ChannelOrder::planar, ChannelOrder::interleaved}) {
     const ImageLayout layout = image_layout(rig_of_two_sizes(), 2, PixelFormat::u8, order);

@@ -87,7 +87,31 @@ inline void expect_refused_handles(const MakeForRig& make) {
   }
 }
 
-/// Images as patches, and bytes as bfloat16s, hold what planar ones hold, and black beyond the image.
+/// The bytes of planar images in the patches of another layout, black beyond the images.
+inline std::vector<uint8_t> as_patches(const HostImages& planar, const ImageLayout& layout) {
+  const std::size_t size = bytes_per_value(layout.format);
+  std::vector<uint8_t> result(layout.bytes());
+  for (std::size_t k = 0; k < layout.cameras.size(); ++k) {
+    const CameraLayout &from = planar.layout().cameras[k], &to = layout.cameras[k];
+    for (int64_t view = 0; view < layout.num_views; ++view) {
+      for (int channel = 0; channel < 3; ++channel) {
+        for (int y = 0; y < from.size.height_px; ++y) {
+          for (int x = 0; x < from.size.width_px; ++x) {
+            const int64_t source = from.offset + view * from.view_stride + channel * from.channel_stride +
+                                   y * from.row_stride + x * from.pixel_stride;
+            const int64_t target = to.offset + view * to.view_stride +
+                                   place_in_patches(layout.patch_px, from.size.width_px, channel, x, y);
+            std::memcpy(&result[static_cast<std::size_t>(target) * size],
+                        &planar.bytes()[static_cast<std::size_t>(source) * size], size);
+          }
+        }
+      }
+    }
+  }
+  return result;
+}
+
+/// Images as patches of any side, and bytes as bfloat16s, hold what planar ones hold, and black beyond the image.
 inline void expect_patches(const MakeForRig& make) {
   Rig rig = paper_rig(33, 19);  // neither side is a multiple of a patch's
   rig.cameras[1] = paper_rig(32, 18).cameras[1];
@@ -97,35 +121,20 @@ inline void expect_patches(const MakeForRig& make) {
   const auto renderer = make(rig);
   ASSERT_TRUE(renderer->draws_all_formats());
   renderer->upload(0, town.geometry);
-  const auto drawn = [&](PixelFormat format, ChannelOrder order) {
-    HostImages images(rig, 2, format, Planes::none, order);
+  const auto drawn = [&](PixelFormat format, ChannelOrder order, int patch_px = kDefaultPatch_px) {
+    HostImages images(rig, 2, format, Planes::none, order, patch_px);
     std::ranges::fill(images.bytes(), uint8_t{0xA5});
     renderer->render(town.scene.batch(), town.views, images.batch());
     renderer->check();
     return images;
   };
   for (const PixelFormat format : {PixelFormat::u8, PixelFormat::f16, PixelFormat::f32, PixelFormat::bf16}) {
-    const HostImages planar = drawn(format, ChannelOrder::planar), patches = drawn(format, ChannelOrder::patches);
-    const std::size_t size = bytes_per_value(format);
-    std::vector<uint8_t> expected(patches.bytes().size());
-    for (std::size_t k = 0; k < rig.cameras.size(); ++k) {
-      const CameraLayout &from = planar.layout().cameras[k], &to = patches.layout().cameras[k];
-      for (int view = 0; view < 2; ++view) {
-        for (int channel = 0; channel < 3; ++channel) {
-          for (int y = 0; y < from.size.height_px; ++y) {
-            for (int x = 0; x < from.size.width_px; ++x) {
-              const int64_t source = from.offset + view * from.view_stride + channel * from.channel_stride +
-                                     y * from.row_stride + x * from.pixel_stride;
-              const int64_t target =
-                  to.offset + view * to.view_stride + place_in_patches(from.size.width_px, channel, x, y);
-              std::memcpy(&expected[static_cast<std::size_t>(target) * size],
-                          &planar.bytes()[static_cast<std::size_t>(source) * size], size);
-            }
-          }
-        }
-      }
+    const HostImages planar = drawn(format, ChannelOrder::planar);
+    for (const int patch_px : {4, 8, 12, 16}) {
+      const HostImages patches = drawn(format, ChannelOrder::patches, patch_px);
+      EXPECT_TRUE(std::ranges::equal(patches.bytes(), as_patches(planar, patches.layout())))
+          << static_cast<int>(format) << ", " << patch_px;
     }
-    EXPECT_TRUE(std::ranges::equal(patches.bytes(), expected)) << static_cast<int>(format);
   }
   const HostImages bytes = drawn(PixelFormat::u8, ChannelOrder::planar),
                    floats = drawn(PixelFormat::bf16, ChannelOrder::planar);
@@ -146,7 +155,13 @@ inline void expect_refused_order(const MakeForRig& make) {
   const auto renderer = make(rig);
   EXPECT_THAT(message_of([&] { renderer->render({}, views, batch); }),
               testing::ContainsRegex("images: expected planar channels.*, got interleaved ones"));
-  if (renderer->draws_all_formats()) return;
+  if (renderer->draws_all_formats()) {
+    batch.order = ChannelOrder::patches;
+    batch.patch_px = 6;
+    EXPECT_THAT(message_of([&] { renderer->render({}, views, batch); }),
+                testing::HasSubstr("images: expected patches of 4, 8, 12 or 16 pixels squared, got 6"));
+    return;
+  }
   HostImages patches(rig, 1, PixelFormat::u8, Planes::none, ChannelOrder::patches);
   EXPECT_THAT(message_of([&] { renderer->render({}, views, patches.batch()); }),
               testing::HasSubstr("images: expected planar channels, got patches ones"));

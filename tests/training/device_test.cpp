@@ -340,7 +340,7 @@ TEST_F(DeviceTraining, WhatARolloutKeepsIsWhatItKeepsOnTheHost) {
   constexpr int64_t kSteps = 4;
   struct Kept {
     at::Tensor rows;
-    std::vector<Observation> saw;  // kept, redrawn, and redrawn as patches
+    std::vector<Observation> saw;  // kept, redrawn, and redrawn as patches of 4, 8, 12 and 16 px
   };
   const auto config_of = [](const std::string& device, const std::string& images) {
     return load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml",
@@ -372,8 +372,9 @@ TEST_F(DeviceTraining, WhatARolloutKeepsIsWhatItKeepsOnTheHost) {
     for (const RolloutObservations& observations : all) {
       result.saw.push_back(observations.gather(result.rows).map([](const at::Tensor& t) { return t.cpu(); }));
     }
-    result.saw.push_back(
-        all[1].gather(result.rows, /*wants_patches=*/true).map([](const at::Tensor& t) { return t.cpu(); }));
+    for (const int patch_px : {4, 8, 12, 16}) {
+      result.saw.push_back(all[1].gather(result.rows, patch_px).map([](const at::Tensor& t) { return t.cpu(); }));
+    }
     renderer->check();
     result.rows = result.rows.cpu();
     return result;

@@ -145,7 +145,7 @@ TEST_P(DeviceLayers, PointFeatures) {
 TEST_P(DeviceLayers, ImagePatchesAreTheHostsWithChannelsOfZeros) {
   const at::Tensor images =
       at::arange(3 * 2 * 3 * 10 * 13, at::kInt).remainder(251).to(at::kByte).reshape({3, 2, 3, 10, 13});
-  for (const int64_t patch_px : {1, 2, 3, 4}) {
+  for (const int64_t patch_px : {1, 2, 3, 4, 8, 12}) {
     const at::Tensor expected = image_patches(images, patch_px, activations());
     const at::Tensor got = image_patches(images.to(at::kCUDA), patch_px, activations()).to(at::kCPU);
     EXPECT_TRUE(got.narrow(1, 0, expected.size(1)).equal(expected)) << patch_px;

@@ -7,7 +7,6 @@
 #include <ATen/core/grad_mode.h>
 #include <gtest/gtest.h>
 
-#include "pictura/common/patches.h"
 #include "pictura/tests/training/numbers.h"
 #include "pictura/training/layers.h"
 #include "pictura/training/point_features.h"
@@ -69,29 +68,33 @@ double scalar_of(const Policy& policy, const Observation& o, bool with_gradient)
 // Images as u8, and as the patches that renderers draw.
 TEST(PolicyPatches, GiveTheBitsThatImagesGive) {
   Config::PolicySection config = tiny(Modality::perspective);
-  config.patch_px = 4;
   config.conv_kernels = {1, 3};
-  const PolicyNetwork policy(config, 3, 1, at::kFloat, false, {}, Precision::bf16);
-  ASSERT_TRUE(policy.reads_patches());
   const Observation images = observation(Modality::perspective, 3).map([](const at::Tensor& t) {
     return t.scalar_type() == at::kByte ? t : t.to(at::kFloat);
   });
-  Observation patches = images;
-  for (ImageBlock& block : patches.images) {
-    const int64_t batch = block.pixels.size(0), cameras = block.pixels.size(1);
-    block.pixels = image_patches(block.pixels, kPatch_px, at::kBFloat16)
-                       .permute({0, 2, 3, 1})
-                       .unflatten(0, {cameras, batch})
-                       .transpose(0, 1);
-  }
   const at::NoGradGuard no_grad;
-  const Policy::Output expected = policy.forward(images), got = policy.forward(patches);
-  EXPECT_TRUE(got.logits.equal(expected.logits));
-  EXPECT_TRUE(got.value.equal(expected.value));
-  config.patch_px = 2;
-  EXPECT_FALSE(PolicyNetwork(config, 3, 1, at::kFloat, false, {}, Precision::bf16).reads_patches());
+  for (const int patch_px : {4, 8, 12, 16}) {
+    config.patch_px = patch_px;
+    const PolicyNetwork policy(config, 3, 1, at::kFloat, false, {}, Precision::bf16);
+    ASSERT_EQ(policy.drawn_patch_px(), patch_px);
+    Observation patches = images;
+    for (ImageBlock& block : patches.images) {
+      const int64_t batch = block.pixels.size(0), cameras = block.pixels.size(1);
+      block.pixels = image_patches(block.pixels, patch_px, at::kBFloat16)
+                         .permute({0, 2, 3, 1})
+                         .unflatten(0, {cameras, batch})
+                         .transpose(0, 1);
+    }
+    const Policy::Output expected = policy.forward(images), got = policy.forward(patches);
+    EXPECT_TRUE(got.logits.equal(expected.logits)) << patch_px;
+    EXPECT_TRUE(got.value.equal(expected.value)) << patch_px;
+  }
+  for (const int patch_px : {2, 6}) {
+    config.patch_px = patch_px;
+    EXPECT_EQ(PolicyNetwork(config, 3, 1, at::kFloat, false, {}, Precision::bf16).drawn_patch_px(), 0);
+  }
   config.patch_px = 4;
-  EXPECT_FALSE(PolicyNetwork(config, 3, 1).reads_patches()) << "in single precision";
+  EXPECT_EQ(PolicyNetwork(config, 3, 1).drawn_patch_px(), 0) << "in single precision";
 }
 
 class BothModalities : public ::testing::TestWithParam<Modality> {};

@@ -323,16 +323,19 @@ TEST_F(Training, WhatARolloutKeepsIsWhatTheActiveAgentsSaw) {
     EXPECT_EQ(0, std::memcmp(saw.ego.const_data_ptr<float>(), egos.data(), egos.size() * sizeof(float)));
     EXPECT_TRUE(mixed_saw.images[0].pixels.equal(saw.images[0].pixels.index_select(0, mixed)));
     EXPECT_TRUE(mixed_saw.ego.equal(saw.ego.index_select(0, mixed)));
-    const at::Tensor pixels = observations.gather(in_order, /*wants_patches=*/true).images.at(0).pixels;
-    if (observations.keep_images()) {
-      EXPECT_TRUE(pixels.equal(saw.images[0].pixels)) << "kept as they are";
-      continue;
+    for (const int patch_px : {4, 8, 12, 16}) {
+      const at::Tensor pixels = observations.gather(in_order, patch_px).images.at(0).pixels;
+      if (observations.keep_images()) {
+        EXPECT_TRUE(pixels.equal(saw.images[0].pixels)) << "kept as they are";
+        continue;
+      }
+      EXPECT_TRUE(pixels.transpose(0, 1).is_contiguous());
+      EXPECT_TRUE(pixels.transpose(0, 1)
+                      .flatten(0, 1)
+                      .permute({0, 3, 1, 2})
+                      .equal(image_patches(saw.images[0].pixels, patch_px, at::kBFloat16)))
+          << patch_px;
     }
-    EXPECT_TRUE(pixels.transpose(0, 1).is_contiguous());
-    EXPECT_TRUE(pixels.transpose(0, 1)
-                    .flatten(0, 1)
-                    .permute({0, 3, 1, 2})
-                    .equal(image_patches(saw.images[0].pixels, kPatch_px, at::kBFloat16)));
   }
 }
 

@@ -238,14 +238,15 @@ TEST(EmulatedKernels, WriteTheOraclesFormatsAndOrders) {
   emulated.upload(0, town.geometry);
   oracle->upload(0, town.geometry);
   for (const PixelFormat format : {PixelFormat::u8, PixelFormat::f16, PixelFormat::bf16}) {
-    for (const ChannelOrder order : {ChannelOrder::planar, ChannelOrder::patches}) {
-      HostImages result(config.rig, 1, format, Planes::none, order),
-          expected(config.rig, 1, format, Planes::none, order);
+    // 0: planar.
+    for (const int patch_px : {0, 4, 8, 12, 16}) {
+      const ChannelOrder order = patch_px == 0 ? ChannelOrder::planar : ChannelOrder::patches;
+      HostImages result(config.rig, 1, format, Planes::none, order, patch_px),
+          expected(config.rig, 1, format, Planes::none, order, patch_px);
       std::ranges::fill(result.bytes(), uint8_t{0xA5});
       emulated.render(town.scene.batch(), town.views, result.batch(), {});
       oracle->render(town.scene.batch(), town.views, expected.batch(), {});
-      EXPECT_TRUE(std::ranges::equal(result.bytes(), expected.bytes()))
-          << static_cast<int>(format) << ", " << name_of(order);
+      EXPECT_TRUE(std::ranges::equal(result.bytes(), expected.bytes())) << static_cast<int>(format) << ", " << patch_px;
     }
   }
 }
@@ -256,6 +257,26 @@ TEST(EmulatedKernels, DrawTooManyFragmentsInParts) {
   EmulatedRenderer renderer(config_of(rig), 4);
   expect_oracles(&renderer, make_crowd(), Planes::all);
   EXPECT_GT(renderer.overflow(), 0);
+}
+
+// Parts are as narrow as one pixel; patches have some beyond the image at its right and below.
+TEST(EmulatedKernels, DrawPartsIntoPatches) {
+  const RendererConfig config = config_of(front_rig(30, 21));
+  Snapshot crowd = make_crowd();
+  crowd.views.resize(1);
+  EmulatedRenderer emulated(config, 19);
+  const auto oracle = make_renderer("cpu", config);
+  emulated.upload(0, crowd.geometry);
+  oracle->upload(0, crowd.geometry);
+  for (const int patch_px : {4, 12, 16}) {
+    HostImages result(config.rig, 1, PixelFormat::bf16, Planes::none, ChannelOrder::patches, patch_px),
+        expected(config.rig, 1, PixelFormat::bf16, Planes::none, ChannelOrder::patches, patch_px);
+    std::ranges::fill(result.bytes(), uint8_t{0xA5});
+    emulated.render(crowd.scene.batch(), crowd.views, result.batch(), {});
+    oracle->render(crowd.scene.batch(), crowd.views, expected.batch(), {});
+    EXPECT_TRUE(std::ranges::equal(result.bytes(), expected.bytes())) << patch_px;
+  }
+  EXPECT_GT(emulated.overflow(), 0);
 }
 
 // The last launch draws images in tiles as high as its memory allows.
