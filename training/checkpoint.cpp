@@ -66,6 +66,7 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
     header["recent"].push_back({{"finished", r.finished}, {"finished_return", r.finished_return}});
   }
   header["longest_update_s"] = checkpoint.longest_update_s;
+  if (!checkpoint.rate_factors.empty()) header["rate_factors"] = checkpoint.rate_factors;
   header["parameters"] = describe(checkpoint.parameters);
   header["first_moments"] = describe(checkpoint.first_moments);
   header["second_moments"] = describe(checkpoint.second_moments);
@@ -167,6 +168,7 @@ Checkpoint parse_checkpoint(const std::string& file, const std::string& path) {
       result.recent.push_back({json.at("finished"), json.at("finished_return")});
     }
     result.longest_update_s = header.value("longest_update_s", result.longest_update_s);
+    result.rate_factors = header.value("rate_factors", result.rate_factors);
     result.rig = rig_from_json(header.at("rig"));
     if (header.contains("backbone")) result.backbone_hash = header["backbone"].at("hash");
   } catch (const nlohmann::json::exception& error) {

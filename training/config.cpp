@@ -39,6 +39,8 @@ const Choices<LightCycles> kLightCycles{{name_of(LightCycles::phases), LightCycl
 const Choices<HaltedSlots> kHaltedSlots{{"skip", HaltedSlots::skip}, {"draw", HaltedSlots::draw}};
 
 constexpr const char* kDevices = "cpu, cuda, cuda:N, auto";
+constexpr const char* kSizeChangesExpected =
+    "a list of [agent_steps, width_px, height_px] or [agent_steps, width_px, height_px, patch_px, line_floor_px]";
 
 // The list of keys, in the order in which they are written. Reader and writer both walk it, so no key can be read and
 // not written. A visitor takes (key, value, range...).
@@ -75,13 +77,13 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.integer_unless("render.rig", !c.render.rig.empty(), "render.width_px", c.render.width_px, 1, 8192);
   v.integer_unless("render.rig", !c.render.rig.empty(), "render.height_px", c.render.height_px, 1, 8192);
   v.size_changes("render.schedule", c.render.schedule);
-  v.number("render.line_floor_px", c.render.line_floor_px, 0, 16);
+  v.number("render.line_floor_px", c.render.line_floor_px, 0, kMaxLineFloor_px);
 
   v.choice("policy.modality", c.policy.modality, kModalities);
   v.flag("policy.auxiliary", c.policy.auxiliary);
   v.text("policy.backbone", c.policy.backbone);
   v.flag("policy.backbone_frozen", c.policy.backbone_frozen);
-  v.integer("policy.patch_px", c.policy.patch_px, 1, 16);
+  v.integer("policy.patch_px", c.policy.patch_px, 1, kMaxPatch_px);
   v.integers("policy.conv_channels", c.policy.conv_channels, 1, 4096);
   v.integers("policy.conv_kernels", c.policy.conv_kernels, 1, 31);
   v.integers("policy.conv_strides", c.policy.conv_strides, 1, 16);
@@ -253,19 +255,24 @@ class Reader {
     }
   }
 
-  /// [[agent_steps, width_px, height_px], ...]
+  /// [[agent_steps, width_px, height_px] or [agent_steps, width_px, height_px, patch_px, line_floor_px], ...]
   void size_changes(const std::string& key, std::vector<Config::Render::SizeChange>& value) {
     const toml::node* node = find(key);
     if (!node) return;
-    if (!node->is_array()) refuse(key, *node, "expected a list of [agent_steps, width_px, height_px]");
+    const std::string expected = fmt::format("expected {}", kSizeChangesExpected);
+    if (!node->is_array()) refuse(key, *node, expected);
     value.clear();
     for (const toml::node& element : *node->as_array()) {
       const toml::array* const change = element.as_array();
-      if (!change || change->size() != 3) refuse(key, *node, "expected a list of [agent_steps, width_px, height_px]");
+      if (!change || (change->size() != 3 && change->size() != 5)) refuse(key, *node, expected);
       constexpr int64_t kMostPixels = 8192;
       value.push_back({integer_of(key, (*change)[0], 1, int64_t{1} << 60),
                        static_cast<int>(integer_of(key, (*change)[1], 1, kMostPixels)),
                        static_cast<int>(integer_of(key, (*change)[2], 1, kMostPixels))});
+      if (change->size() == 5) {
+        value.back().patch_px = static_cast<int>(integer_of(key, (*change)[3], 1, kMaxPatch_px));
+        value.back().line_floor_px = number_of(key, (*change)[4], 0, kMaxLineFloor_px);
+      }
       if (value.size() > 1 && value.back().agent_steps <= value[value.size() - 2].agent_steps) {
         refuse(key, *node, "expected ascending agent_steps");
       }
@@ -422,7 +429,9 @@ class Writer {
   void size_changes(const std::string& key, const std::vector<Config::Render::SizeChange>& values) {
     std::vector<std::string> all;
     for (const auto& change : values) {
-      all.push_back(fmt::format("[{}, {}, {}]", change.agent_steps, change.width_px, change.height_px));
+      all.push_back(fmt::format(
+          "[{}, {}, {}{}]", change.agent_steps, change.width_px, change.height_px,
+          change.has_patches() ? fmt::format(", {}, {}", change.patch_px, shortest(change.line_floor_px)) : ""));
     }
     line(key, fmt::format("[{}]", fmt::join(all, ", ")));
   }
@@ -488,7 +497,7 @@ class Describer {
     add(key, fmt::format("a list of {} to {}", low, high));
   }
   void size_changes(const std::string& key, const std::vector<Config::Render::SizeChange>&) {
-    add(key, "a list of [agent_steps, width_px, height_px], in ascending order");
+    add(key, fmt::format("{}, in ascending order", kSizeChangesExpected));
   }
   template <typename Enum>
   void choice(const std::string& key, const Enum&, const Choices<Enum>& choices) {
@@ -564,6 +573,29 @@ void drop_sizes_beside_rig(const std::set<std::string>& overridden, toml::table*
   if (!render || !overridden.count("render.rig") || (*render)["rig"].value_or(std::string()).empty()) return;
   for (const char* key : {"width_px", "height_px"}) {
     if (!overridden.count(fmt::format("render.{}", key))) render->erase(key);
+  }
+}
+
+void check_patch_changes(const Config& c, const Reader& reader) {
+  ImageSize size{c.render.width_px, c.render.height_px};
+  int patch_px = c.policy.patch_px;
+  for (const Config::Render::SizeChange& change : c.render.schedule) {
+    const ImageSize next{change.width_px, change.height_px};
+    if (change.has_patches() && c.policy.backbone != "conv") {
+      reader.refuse("render.schedule", "patches have no effect with a program in policy.backbone");
+    }
+    if (change.has_patches() && change.patch_px != patch_px) {
+      const int factor = whole_factor(size, next);
+      if (factor == 0 || change.patch_px != factor * patch_px) {
+        reader.refuse("render.schedule",
+                      fmt::format("from {} agent-steps on: expected images and patches that are both one whole number "
+                                  "of times {}x{} in patches of {}, got {}x{} in patches of {}",
+                                  change.agent_steps, size.width_px, size.height_px, patch_px, next.width_px,
+                                  next.height_px, change.patch_px));
+      }
+      patch_px = change.patch_px;
+    }
+    size = next;
   }
 }
 
@@ -675,6 +707,8 @@ Config parse(const std::string& text, const std::string& source, const std::vect
                       config.train.schedule_agent_steps);
   reader.refuse_unknown(table);
   check_contradictions(config, reader);
+  // What a run saves has the sizes that are in force, which the rows of the schedule before do not lead to.
+  if (!any_name) check_patch_changes(config, reader);
   // Earlier versions took it without a word, so what they saved may hold it.
   if (!any_name && config.simulator.min_agents > config.simulator.num_slots) {
     reader.refuse("simulator.min_agents", fmt::format("expected at most simulator.num_slots ({}), got {}",
@@ -879,13 +913,28 @@ std::string name_among(const Choices<Enum>& choices, Enum value) {
 std::string name_of(Precision precision) { return name_among(kPrecisions, precision); }
 std::string name_of(OptimizerKind kind) { return name_among(kOptimizers, kind); }
 
+Config config_at(const Config& config, int64_t agent_steps) {
+  Config result = config;
+  for (const Config::Render::SizeChange& change : config.render.schedule) {
+    if (change.agent_steps > agent_steps) break;
+    result.render.width_px = change.width_px;
+    result.render.height_px = change.height_px;
+    if (!change.has_patches()) continue;
+    result.policy.patch_px = change.patch_px;
+    result.render.line_floor_px = change.line_floor_px;
+  }
+  return result;
+}
+
+int whole_factor(ImageSize from, ImageSize to) {
+  const int factor = to.width_px / from.width_px;
+  return to == ImageSize{factor * from.width_px, factor * from.height_px} ? factor : 0;
+}
+
 Rig rig_of(const Config& config, int64_t agent_steps) {
   if (!config.render.rig.empty()) return load_rig(config.render.rig);
-  int width_px = config.render.width_px, height_px = config.render.height_px;
-  for (const Config::Render::SizeChange& change : config.render.schedule) {
-    if (change.agent_steps <= agent_steps) width_px = change.width_px, height_px = change.height_px;
-  }
-  return paper_rig(width_px, height_px);
+  const Config in_force = config_at(config, agent_steps);
+  return paper_rig(in_force.render.width_px, in_force.render.height_px);
 }
 
 RendererConfig renderer_config(const Config& config, const Rig& rig, Device device) {

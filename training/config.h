@@ -27,6 +27,10 @@ enum class Schedule { constant, linear, cosine };
 /// What steps the parameters: see training/optimizer.h.
 enum class OptimizerKind { adamw, muon };
 
+/// Largest side of a policy's patches, and largest line floor, that a configuration may have.
+constexpr int kMaxPatch_px = 16;
+constexpr double kMaxLineFloor_px = 16;
+
 struct Config {
   struct Run {
     uint64_t seed = 1;            // names the whole run
@@ -57,10 +61,15 @@ struct Config {
     PixelSamples samples;               // of gl; the others compute exact coverage
     std::string rig;                    // a rig file (docs/image.md)
     int width_px = 96, height_px = 54;  // without one: of each camera of the paper's rig
-    /// Other sizes, each from so many agent-steps of the run on, in ascending order; not with a rig file.
+    /// Other sizes, each from so many agent-steps of the run on, in ascending order; not with a rig file. Where
+    /// patch_px is not 0, policy.patch_px and line_floor_px are these from then on, and the first convolution is spread
+    /// over the larger patches (training/patch_spread.h).
     struct SizeChange {
       int64_t agent_steps = 0;
       int width_px = 0, height_px = 0;
+      int patch_px = 0;  // 0: patches and line floor stay
+      double line_floor_px = 0;
+      bool has_patches() const { return patch_px > 0; }
     };
     std::vector<SizeChange> schedule;
     double line_floor_px = 0.35;  // least width of a line on screen
@@ -190,6 +199,13 @@ std::vector<std::string> differences_to_report(const Config& saved, const Config
 /// Names as in a configuration.
 std::string name_of(Precision precision);
 std::string name_of(OptimizerKind kind);
+
+/// The configuration in force after `agent_steps`: sizes, policy.patch_px and render.line_floor_px are those of
+/// render.schedule.
+Config config_at(const Config& config, int64_t agent_steps);
+
+/// How many times as wide and as high as `from` the size `to` is, where that is one whole number, else 0.
+int whole_factor(ImageSize from, ImageSize to);
 
 /// The rig that render describes for a run that has done `agent_steps`.
 Rig rig_of(const Config& config, int64_t agent_steps = 0);

@@ -175,7 +175,8 @@ NetworkSize network_size(const Config& config, Device device) {
   NetworkSize size;
   const double value_bytes = !device.is_host() && config.train.precision == Precision::bf16 ? 2 : 4;
   const auto add = [&](int64_t agent_steps) {
-    const LayerSum sum = layers_of(config, rig_of(config, agent_steps), device);
+    const Config in_force = config_at(config, agent_steps);
+    const LayerSum sum = layers_of(in_force, rig_of(in_force, agent_steps), device);
     size.parameters = sum.parameters();
     size.transition_bytes = std::max(size.transition_bytes, sum.values() * value_bytes + observation_bytes(config));
   };

@@ -12,7 +12,7 @@ namespace pictura {
 
 class Optimizer {
  public:
-  /// Gives the parameters gradients of 0, which are parts of one vector and to which backward passes add.
+  /// Gives the parameters gradients as allocate_gradients() does.
   Optimizer(const Policy& policy, const Config::Train& config);
   /// Scalars on the parameters' device, which nothing has waited for.
   struct Step {
@@ -27,19 +27,26 @@ class Optimizer {
   const at::Tensor& gradients() const { return gradients_; }
   /// Sets them to 0.
   void clear_gradients();
+  /// Gives the parameters gradients of 0, which are parts of one vector and to which backward passes add. Must be
+  /// called after a parameter has taken another shape.
+  void allocate_gradients();
 
   /// AdamW's first moments and Muon's momentum, in the order of the policy's parameters.
   std::vector<NamedTensor> first_moments;
-  /// Of the parameters that AdamW steps, in their order.
+  /// Second moments of the parameters that AdamW steps, in their order.
   std::vector<NamedTensor> second_moments;
+  /// Factors of AdamW's learning rate, in the order of the policy's parameters: 1 but for weights that move together
+  /// (training/patch_spread.h). Weight decay keeps the whole rate.
+  std::vector<double> rate_factors;
   int64_t steps = 0;
 
  private:
+  bool is_of_muon(size_t parameter) const { return muon_ && is_stepped_by_muon(parameters_[parameter]); }
   void step_adamw(double learning_rate, const at::Tensor& failed);
 
+  const std::vector<NamedTensor>& parameters_;
   Config::Train config_;
   at::Tensor gradients_;
-  std::vector<at::Tensor> adamw_values_, adamw_first_moments_, adamw_second_moments_;
   std::optional<Muon> muon_;
 };
 

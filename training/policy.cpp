@@ -12,6 +12,7 @@
 #include "pictura/training/image_backbone.h"
 #include "pictura/training/layers.h"
 #include "pictura/training/network_shape.h"
+#include "pictura/training/patch_spread.h"
 #include "pictura/training/point_features.h"
 #include "pictura/training/precision.h"
 #include "pictura/training/rules/network_passes.h"
@@ -192,7 +193,7 @@ class PerspectiveEncoder final : public SceneEncoder {
                     PatchSize::channels_of(12) == patch_values(12) && PatchSize::channels_of(16) == patch_values(16),
                 "renderers draw what image_patches() makes");
   int drawn_patch_px() const override {
-    return !backbone_ && is_drawn_patch(config_.patch_px) && image_type_ == at::kBFloat16 ? config_.patch_px : 0;
+    return !backbone_ && is_drawn_patch(patch_px()) && image_type_ == at::kBFloat16 ? patch_px() : 0;
   }
 
   at::Tensor forward(const Observation& o) const override {
@@ -235,11 +236,14 @@ class PerspectiveEncoder final : public SceneEncoder {
     return backbone;
   }
 
+  // Side of the patches that the first convolution takes: policy.patch_px, or more after it was spread.
+  int patch_px() const { return patch_side_px(convolutions_[0].weight.size(1)); }
+
   // [cameras * batch, width, rows, columns], channels last in memory. images: as an ImageBlock has them.
   at::Tensor convolve(const at::Tensor& images) const {
     const bool are_patches = images.scalar_type() != at::kByte;
     at::Tensor x = are_patches ? images.transpose(0, 1).flatten(0, 1).permute({0, 3, 1, 2})
-                               : image_patches(images, config_.patch_px, image_type_);
+                               : image_patches(images, patch_px(), image_type_);
     for (size_t i = 0; i < convolutions_.size(); ++i) {
       // Pixels are 0 to 255. Scaling a few weights is cheaper than scaling them.
       const at::Tensor weight = i == 0 ? convolutions_[i].weight / 255.0 : convolutions_[i].weight;

@@ -7,6 +7,7 @@
 #include "pictura/common/error.h"
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/saved_worlds.h"
+#include "pictura/training/patch_spread.h"
 #include "pictura/training/ranks/agree.h"
 
 namespace pictura {
@@ -53,6 +54,7 @@ bool uses_graphs(const Config& config, Device device, const Renderer* renderer) 
 Run::Run(const Config& its_config, Device its_device, Communicator* its_communicator,
          std::unique_ptr<const Policy> its_policy)
     : config(its_config),
+      in_force(config),
       device(its_device),
       communicator(its_communicator),
       all_worlds(draw_training_worlds(config)),
@@ -83,12 +85,15 @@ void Run::on_stream(const std::function<void()>& work) const { stream ? stream->
 
 SavedPolicy Run::saved_policy() const {
   SavedPolicy saved;
-  saved.config = config;
+  saved.config = in_force;
   saved.rig = rig;
   saved.backbone_hash = policy->backbone_hash();
   saved.update = update;
   saved.agent_steps = agent_steps;
   saved.parameters = policy->parameters();
+  for (size_t i = 0; i < saved.parameters.size(); ++i) {
+    if (optimizer.rate_factors[i] != 1) saved.rate_factors[saved.parameters[i].name] = optimizer.rate_factors[i];
+  }
   return saved;
 }
 
@@ -122,16 +127,40 @@ Checkpoint Run::checkpoint(const std::vector<RecentUpdate>& recent) const {
 
 std::string Run::update_image_size() {
   if (config.render.schedule.empty()) return "";
-  const Rig now = rig_of(config, agent_steps);
-  const ImageSize before = image_size(), after{now.cameras[0].width_px, now.cameras[0].height_px};
-  if (before == after) return "";
-  rig = now;
+  const Config before = in_force;
+  in_force = config_at(config, agent_steps);
+  const auto size_of = [](const Config& c) { return fmt::format("{}x{}", c.render.width_px, c.render.height_px); };
+  const auto patches_of = [](const Config& c) {
+    return fmt::format(" in patches of {} px, lines of {} px or more,", c.policy.patch_px, c.render.line_floor_px);
+  };
+  const bool has_other_patches = patches_of(before) != patches_of(in_force);
+  if (size_of(before) == size_of(in_force) && !has_other_patches) return "";
+  rig = rig_of(config, agent_steps);
   renderer.reset();  // its memory goes before another's comes
-  renderer = make_training_renderer(config, rig, *simulator);
+  renderer = make_training_renderer(in_force, rig, *simulator);
   rollout.observations.set_renderer(renderer.get());
   chunks.clear();
-  return fmt::format("from {} agent-steps on images are {}x{} instead of {}x{}", agent_steps, after.width_px,
-                     after.height_px, before.width_px, before.height_px);
+  if (in_force.policy.patch_px != before.policy.patch_px) {
+    on_stream([&] {
+      spread_first_convolution(*policy, in_force.policy.patch_px / before.policy.patch_px, &optimizer,
+                               average ? &*average : nullptr);
+    });
+  }
+  return fmt::format("from {} agent-steps on images are {}{} instead of {}{}", agent_steps, size_of(in_force),
+                     has_other_patches ? patches_of(in_force) : "", size_of(before),
+                     has_other_patches ? fmt::format(" in patches of {} px", before.policy.patch_px) : "");
+}
+
+void Run::restore_rate_factors(const SavedPolicy& saved) {
+  std::map<std::string, double> left = saved.rate_factors;
+  for (size_t i = 0; i < optimizer.rate_factors.size(); ++i) {
+    const auto its = left.extract(policy->parameters()[i].name);
+    optimizer.rate_factors[i] = its.empty() ? 1 : its.mapped();
+    PICTURA_CHECK(optimizer.rate_factors[i] > 0 && optimizer.rate_factors[i] <= 1,
+                  "{}: rate_factors: {}: expected a number in (0, 1], got {}", saved.path, policy->parameters()[i].name,
+                  optimizer.rate_factors[i]);
+  }
+  PICTURA_CHECK(left.empty(), "{}: rate_factors: the policy has no parameter '{}'", saved.path, left.begin()->first);
 }
 
 ImageSize Run::image_size() const {
@@ -144,11 +173,12 @@ void Run::begin_with(const SavedPolicy& other) {
       "{}: its policy sees through {} cameras, expected {}, as {} has", other.path, other.rig.cameras.size(),
       rig.cameras.size(), config.render.rig.empty() ? "the paper's rig" : config.render.rig);
   restore_policy(other, *policy);
+  restore_rate_factors(other);
   if (average) average->restart();
 }
 
 std::string Run::restore(const Checkpoint& saved) {
-  const std::string difference = first_difference(saved.config, config);
+  const std::string difference = first_difference(saved.config, config_at(config, saved.agent_steps));
   PICTURA_CHECK(difference.empty(), "{}: saved under another configuration: {}", saved.path, difference);
   agent_steps = saved.agent_steps;
   update_image_size();
@@ -156,6 +186,7 @@ std::string Run::restore(const Checkpoint& saved) {
   PICTURA_CHECK(rig_difference.empty(), "{}: saved with other cameras than {} has: {}", saved.path,
                 config.render.rig.empty() ? "the paper's rig" : config.render.rig, rig_difference);
   restore_policy(saved, *policy);
+  restore_rate_factors(saved);
   if (saved.config.train.optimizer == config.train.optimizer) {
     restore_tensors(saved.path, saved.first_moments, optimizer.first_moments);
     restore_tensors(saved.path, saved.second_moments, optimizer.second_moments);

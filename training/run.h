@@ -39,12 +39,14 @@ struct Run {
   /// Throws Error naming a parameter in which the ranks' policies differ by a bit.
   void check_ranks_agree() const;
 
-  /// Draws images of the size that render.schedule has for the agent-steps done. Says which, where it changes.
+  /// Draws images of the size that render.schedule has for the agent-steps done, and spreads the first convolution
+  /// where their patches grow. Returns a sentence that says what changes, or an empty text.
   std::string update_image_size();
   /// Of the first camera, as images are drawn now; 0 without images.
   ImageSize image_size() const;
 
   const Config config;
+  Config in_force;  // config_at(config, agent_steps), as of the last update_image_size()
   const Device device;
   Communicator* const communicator;
   const std::vector<WorldSpec> all_worlds;       // of all ranks
@@ -68,6 +70,10 @@ struct Run {
   // By device and agents, as "NVIDIA H100 80GB HBM3, 20480 agents": wall time of the longest update of the last process
   // that made one there; and with ", evaluation" after it, of the longest evaluation of itself.
   std::map<std::string, double> longest_update_s;
+
+ private:
+  /// Gives the parameters the rate factors of a saved policy, and the others 1.
+  void restore_rate_factors(const SavedPolicy& saved);
 };
 
 }  // namespace pictura

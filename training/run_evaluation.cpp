@@ -13,7 +13,7 @@ bool RunEvaluation::is_due() const {
 
 std::optional<EvaluationRecord> RunEvaluation::evaluate() {
   const Stopwatch watch;
-  const Config& config = run_.config;
+  const Config& config = run_.in_force;
   EvaluateOptions options;
   options.maps = config.simulator.maps;
   options.scenarios = config.train.evaluate_scenarios;

@@ -113,6 +113,7 @@ SavedPolicy parse_safetensors(const std::string& file, const std::string& path) 
     result.backbone_hash = text("backbone_hash");
     result.update = std::stoll(text("update"));
     result.agent_steps = std::stoll(text("agent_steps"));
+    if (metadata.contains("rate_factors")) ordered_json::parse(text("rate_factors")).get_to(result.rate_factors);
     const std::string_view data = std::string_view(file).substr(kLengthBytes + length);
     for (const auto& [name, entry] : header.items()) {
       if (name != "__metadata__") {
@@ -147,15 +148,16 @@ SavedPolicy read_policy(const std::string& path, bool average) {
 }
 
 void write_policy(const std::string& path, const SavedPolicy& policy, WeightType type, const std::string& commit) {
-  const ordered_json metadata = {{"format", "pt"},
-                                 {"config", to_toml(policy.config)},
-                                 {"schema", schema_to_json(policy.config).dump()},
-                                 {"rig", rig_to_json(policy.rig).dump()},
-                                 {"backbone_hash", policy.backbone_hash},
-                                 {"update", std::to_string(policy.update)},
-                                 {"agent_steps", std::to_string(policy.agent_steps)},
-                                 {"commit", commit},
-                                 {"hash", kNoHash}};
+  ordered_json metadata = {{"format", "pt"},
+                           {"config", to_toml(policy.config)},
+                           {"schema", schema_to_json(policy.config).dump()},
+                           {"rig", rig_to_json(policy.rig).dump()},
+                           {"backbone_hash", policy.backbone_hash},
+                           {"update", std::to_string(policy.update)},
+                           {"agent_steps", std::to_string(policy.agent_steps)},
+                           {"commit", commit},
+                           {"hash", kNoHash}};
+  if (!policy.rate_factors.empty()) metadata["rate_factors"] = ordered_json(policy.rate_factors).dump();
   std::string file = safetensors(policy.parameters, type, metadata);
   const std::string hash = hash_of_file(file, std::string(kNoHash));
   file.replace(file.find(fmt::format(R"("hash":"{}")", kNoHash)) + 8, hash.size(), hash);

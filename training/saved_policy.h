@@ -3,6 +3,8 @@
 // JSON header, raw data.
 #pragma once
 
+#include <map>
+
 #include "pictura/training/export_policy.h"
 #include "pictura/training/policy.h"
 
@@ -16,6 +18,8 @@ struct SavedPolicy {
   int64_t update = 0;         // of its run: updates done
   int64_t agent_steps = 0;
   std::vector<NamedTensor> parameters;
+  /// Factors of the learning rate by parameter, where they are not 1: see Optimizer::rate_factors.
+  std::map<std::string, double> rate_factors;
 };
 
 /// The policy of a checkpoint, or of safetensors that write_policy wrote. Throws Error naming the file when it is
@@ -26,8 +30,8 @@ SavedPolicy read_policy(const std::string& path, bool average = false);
 SavedPolicy parse_policy(const std::string& file, const std::string& path, bool average = false);
 
 /// Writes safetensors under another name and renames them to path. Their metadata are text: config (TOML), schema and
-/// rig (JSON), backbone_hash, update, agent_steps, commit (of the program that writes), and hash: FNV-1a of the whole
-/// file with the 16 digits of this hash as zeros. Throws Error naming the path.
+/// rig (JSON), rate_factors (JSON) where there are any, backbone_hash, update, agent_steps, commit (of the program that
+/// writes), and hash: FNV-1a of the whole file with the 16 digits of this hash as zeros. Throws Error naming the path.
 void write_policy(const std::string& path, const SavedPolicy& policy, WeightType type, const std::string& commit);
 
 /// Copies `saved`, of the file `path`, into `parameters` in place. Throws Error naming the file and the first tensor

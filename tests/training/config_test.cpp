@@ -125,12 +125,15 @@ TEST(Config, WrittenTextReadsBackEqual) {
   c.train.learning_rate = 1.0 / 3.0;
   c.train.ent_coef = 0;
   c.policy.modality = Modality::perspective;
-  c.render.schedule = {{800, 20, 12}, {900, 40, 20}};
+  c.render.schedule = {{800, 20, 12}, {900, 40, 24, 8, 0.7}};
   const Config back = parse_config(to_toml(c), "b.toml");
   EXPECT_EQ(to_toml(back), to_toml(c));
   EXPECT_EQ(back.simulator.maps, c.simulator.maps);
   EXPECT_EQ(back.train.learning_rate, c.train.learning_rate);
   EXPECT_EQ(back.render.schedule.at(1).width_px, 40);
+  EXPECT_FALSE(back.render.schedule.at(0).has_patches());
+  EXPECT_EQ(back.render.schedule.at(1).patch_px, 8);
+  EXPECT_EQ(back.render.schedule.at(1).line_floor_px, 0.7);
   EXPECT_EQ(back.simulator.conditioning[0].low, 3.3f);
 }
 
@@ -153,7 +156,9 @@ TEST(Config, ErrorsNameFileLineAndKey) {
   EXPECT_THAT(error_in("[simulator]\nnum_slots = 100000000\n"), HasSubstr("got 100000000"));
   EXPECT_THAT(error_in("[simulator]\nnum_slots = 1.5\n"), HasSubstr("expected an integer"));
   EXPECT_THAT(error_in("[render]\nwidth_px = 0\nheight_px = 0\n"), HasSubstr("render.width_px"));
-  for (const char* bad : {"5", "[5]", "[[5, 6]]", "[[5, 6, 7], [5, 8, 9]]", "[[0, 6, 7]]", "[[5, 0, 7]]"}) {
+  for (const char* bad :
+       {"5", "[5]", "[[5, 6]]", "[[5, 6, 7], [5, 8, 9]]", "[[0, 6, 7]]", "[[5, 0, 7]]", "[[5, 192, 108, 8]]",
+        "[[5, 192, 108, 17, 1]]", "[[5, 192, 108, 8, -1]]", "[[5, 192, 108, 8, 17]]", "[[5, 192, 108, 8, 1, 1]]"}) {
     EXPECT_THAT(error_in(fmt::format("[render]\nschedule = {}\n", bad)),
                 AllOf(HasSubstr("a.toml:2: render.schedule"), HasSubstr("expected")));
   }
@@ -172,6 +177,46 @@ TEST(Config, ErrorsNameFileLineAndKey) {
   EXPECT_THAT(error_in("", {"train.updates=0"}), AllOf(HasSubstr("--set train.updates"), HasSubstr("got 0")));
   EXPECT_THAT(error_in("", {"train.updates"}), HasSubstr("expected section.key=value"));
   EXPECT_THAT(error_in("", {"nonsense.key=1"}), HasSubstr("nonsense"));
+}
+
+// By default images are 96x54 in patches of 4.
+TEST(Config, PatchesGrowAsImagesDo) {
+  const auto error_of = [](const std::string& schedule, const std::string& more = "") {
+    return error_in(fmt::format("[render]\nschedule = {}\n{}", schedule, more));
+  };
+  for (const char* good : {"[[5, 192, 108, 8, 0.7]]", "[[5, 192, 108, 8, 0.7], [9, 384, 216, 16, 1.4]]",
+                           "[[5, 64, 36, 4, 0.35], [6, 192, 108, 12, 1.05]]"}) {
+    EXPECT_EQ(error_of(good), test::kNoError) << good;
+  }
+  for (const char* bad : {"[[5, 192, 108, 6, 1]]", "[[5, 144, 81, 6, 1]]", "[[5, 192, 54, 8, 1]]",
+                          "[[5, 96, 54, 8, 1]]", "[[5, 48, 27, 2, 1]]"}) {
+    EXPECT_THAT(error_of(bad), AllOf(HasSubstr("a.toml:2: render.schedule: from 5 agent-steps on"),
+                                     HasSubstr("one whole number of times 96x54 in patches of 4, got")))
+        << bad;
+  }
+  EXPECT_THAT(error_of("[[5, 64, 36], [6, 192, 108, 8, 1]]"), HasSubstr("64x36 in patches of 4, got 192x108"));
+  EXPECT_THAT(error_of("[[5, 192, 108, 8, 1]]", "[policy]\nbackbone = \"vit.pt\"\n"), HasSubstr("policy.backbone"));
+}
+
+TEST(Config, TheScheduleSaysWhatIsInForce) {
+  Config c;
+  c.render.schedule = {{10, 192, 108, 8, 0.7}, {20, 64, 36}};
+  const auto images_at = [&c](int64_t agent_steps) {
+    const Config at = config_at(c, agent_steps);
+    const Camera camera = rig_of(c, agent_steps).cameras[0];
+    EXPECT_EQ(at.render.width_px, camera.width_px);
+    return fmt::format("{}x{} {} {}", camera.width_px, at.render.height_px, at.policy.patch_px,
+                       at.render.line_floor_px);
+  };
+  EXPECT_EQ(images_at(9), "96x54 4 0.35");
+  EXPECT_EQ(images_at(10), "192x108 8 0.7");
+  EXPECT_EQ(images_at(20), "64x36 8 0.7");
+  // What a run saves can be read, though its rows lead to its sizes no more.
+  EXPECT_EQ(to_toml(parse_saved_config(to_toml(config_at(c, 20)), "s.toml")), to_toml(config_at(c, 20)));
+  EXPECT_EQ(first_difference(config_at(c, 9), config_at(c, 10)), "render.line_floor_px: 0.35 became 0.7");
+  EXPECT_EQ(whole_factor({32, 18}, {96, 54}), 3);
+  EXPECT_EQ(whole_factor({32, 18}, {96, 36}), 0);
+  EXPECT_EQ(whole_factor({32, 18}, {16, 9}), 0);
 }
 
 TEST(Config, KeysWithoutEffectAreRefused) {

@@ -393,6 +393,23 @@ TEST_F(DeviceTraining, WhatARolloutKeepsIsWhatItKeepsOnTheHost) {
   }
 }
 
+// The renderer writes the patches, graphs are captured anew, and the learner's first probabilities are the rollout's.
+TEST_F(DeviceTraining, GoesOnInLargerPatches) {
+  TrainOptions o =
+      options("run", "cuda",
+              {"policy.patch_px=4", "policy.conv_kernels=[1, 3]", "policy.conv_strides=[1, 1]", "train.precision=bf16",
+               "train.images=redrawn", "train.updates=8", "render.schedule=[[250, 48, 27, 12, 1.05]]"});
+  o.on_progress = [](const TrainProgress& progress) { EXPECT_LT(progress.cost.first_kl, 0.01) << progress.update; };
+  std::vector<std::string> notices;
+  o.on_notice = [&notices](const std::string& notice) { notices.push_back(notice); };
+  const Checkpoint saved = read_checkpoint(train(o).checkpoint);
+  ASSERT_EQ(notices.size(), 1u);
+  EXPECT_THAT(notices[0], HasSubstr("images are 48x27 in patches of 12 px"));
+  EXPECT_EQ(saved.config.policy.patch_px, 12);
+  EXPECT_EQ(saved.rate_factors, (std::map<std::string, double>{{"conv.0.weight", 1.0 / 9}}));
+  EXPECT_EQ(saved.update, 8);
+}
+
 TEST_F(DeviceTraining, EndsWhenItsMinutesAreOverAndGoesOn) {
   TrainOptions o = options("run", "cuda", {"train.updates=2"});
   o.minutes = 1e-9;

@@ -150,6 +150,47 @@ TEST_F(RunWithImageSizes, ChangesThemBetweenUpdatesAndGoesOnExactly) {
   EXPECT_NE(train(options("small", {})).policy_hash, whole.policy_hash);
 }
 
+TEST_F(RunWithImageSizes, SpreadsTheFirstConvolutionAndGoesOnExactly) {
+  const std::string schedule = "[[100, 32, 18, 2, 0.7]]";
+  const TrainReport whole = train(scheduled("whole", schedule, 4));
+  ASSERT_EQ(notices_.size(), 1u);
+  EXPECT_THAT(notices_[0], HasSubstr("images are 32x18 in patches of 2 px, lines of 0.7 px or more, instead of 16x9 in "
+                                     "patches of 1 px"));
+  const Checkpoint saved = read_checkpoint(whole.checkpoint);
+  const SavedPolicy weights = read_policy(folder_ / "whole/policy.safetensors");
+  for (const SavedPolicy& policy : {static_cast<const SavedPolicy&>(saved), weights}) {
+    EXPECT_EQ(policy.config.policy.patch_px, 2);
+    EXPECT_EQ(policy.config.render.line_floor_px, 0.7);
+    EXPECT_EQ(policy.config.render.width_px, 32);
+    EXPECT_EQ(first_difference(policy.rig, paper_rig(32, 18)), "");
+    EXPECT_EQ(policy.rate_factors, (std::map<std::string, double>{{"conv.0.weight", 0.25}}));
+    EXPECT_EQ(hash_of_parameters(policy.parameters), whole.policy_hash);
+  }
+  const Table progress = read_table(folder_ / "whole/progress.csv");
+  const std::vector<std::string> width_px = column(progress, "charts/image_width_px");
+  const auto changed_after = std::count(width_px.begin(), width_px.end(), "16");
+  ASSERT_GT(changed_after, 1);
+  ASSERT_LT(changed_after, 4);
+  for (const int64_t updates : {changed_after - 1, changed_after, changed_after + 1}) {
+    const std::string run = fmt::format("parts {}", updates);
+    train(scheduled(run, schedule, static_cast<int>(updates)));
+    TrainOptions rest = scheduled(run, schedule, 4);
+    rest.old_run = OldRun::resume;
+    EXPECT_EQ(train(rest).policy_hash, whole.policy_hash) << updates;
+  }
+  // A checkpoint of before the change goes on with what the schedule has for later, and with nothing else.
+  train(scheduled("late", "[]", 2));
+  TrainOptions rest = scheduled("late", schedule, 4);
+  rest.old_run = OldRun::resume;
+  EXPECT_THAT(message_of([&] { train(rest); }),
+              AllOf(HasSubstr("checkpoint.ckpt"), HasSubstr("render.line_floor_px: 0.35 became 0.7")));
+  // Another run that begins with the weights keeps the rate of those that move together.
+  TrainOptions next = options("next", {"train.updates=1", "render.width_px=32", "render.height_px=18",
+                                       "policy.patch_px=2", "render.line_floor_px=0.7"});
+  next.init_from = whole.checkpoint;
+  EXPECT_EQ(read_checkpoint(train(next).checkpoint).rate_factors, saved.rate_factors);
+}
+
 TEST_F(RunWithImageSizes, MayChangeTheirFutureOnResumeButNotTheirPast) {
   train(scheduled("run", "[]", 2));
   TrainOptions rest = scheduled("run", "[[100, 20, 12]]", 4);

@@ -1,0 +1,118 @@
+// The first convolution at larger images: weights by hand, and the function before and after a step.
+#include "pictura/training/patch_spread.h"
+
+#include <ATen/core/grad_mode.h>
+#include <gmock/gmock.h>
+
+#include "pictura/common/error.h"
+#include "pictura/tests/support/error_message.h"
+#include "pictura/tests/training/numbers.h"
+#include "pictura/training/ppo.h"
+
+namespace pictura {
+namespace {
+
+using test::message_of;
+using ::testing::HasSubstr;
+
+Config::PolicySection small_section(int patch_px) {
+  Config::PolicySection c;
+  c.patch_px = patch_px;
+  c.conv_channels = {8, 8};
+  c.conv_kernels = {1, 3};
+  c.conv_strides = {1, 2};
+  c.num_queries = 2;
+  c.attention_heads = 2;
+  c.attention_mlp = 8;
+  c.embedding_width = 8;
+  c.backbone_layers = 2;
+  c.backbone_width = 16;
+  return c;
+}
+
+TEST(PatchSpread, PutsSharesOfAWeightAtThePlacesOfItsPixel) {
+  EXPECT_EQ(patch_side_px(3), 1);
+  EXPECT_EQ(patch_side_px(432), 12);
+  EXPECT_THAT(message_of([] { patch_side_px(50); }), HasSubstr("conv.0.weight: expected 3 p^2 inputs"));
+  constexpr int kPatch = 2, kFactor = 3, kLarge = kPatch * kFactor;
+  const at::Tensor weight = test::numbers({2, 3 * kPatch * kPatch, 3, 3}, 1);
+  const at::Tensor spread = spread_over_patches(weight, kFactor), repeated = repeat_over_patches(weight, kFactor);
+  ASSERT_EQ(spread.sizes().vec(), (std::vector<int64_t>{2, 3 * kLarge * kLarge, 3, 3}));
+  for (int color = 0; color < 3; ++color) {
+    for (int y = 0; y < kLarge; ++y) {
+      for (int x = 0; x < kLarge; ++x) {
+        const at::Tensor from = weight.select(1, (color * kPatch + y / kFactor) * kPatch + x / kFactor);
+        const int64_t to = (color * kLarge + y) * kLarge + x;
+        EXPECT_TRUE(at::allclose(spread.select(1, to), from / 9, 1e-15, 0)) << color << y << x;
+        EXPECT_TRUE(repeated.select(1, to).equal(from)) << color << y << x;
+      }
+    }
+  }
+  EXPECT_TRUE(spread_over_patches(weight, 1).equal(weight));
+}
+
+// What an agent sees whose images are constant in blocks of so many pixels squared: 7x5 blocks, which patches of two
+// blocks do not divide.
+Observation blocks_of(int64_t pixels) {
+  constexpr int64_t kBatch = 6;
+  Observation o;
+  o.ego = test::numbers({kBatch, kEgoFeatures}, 0).to(at::kFloat);
+  o.conditioning = test::numbers({kBatch, kNumConditioning}, 1).to(at::kFloat);
+  o.waypoints = test::numbers({kBatch, kNumWaypoints * kWaypointFeatures}, 2).to(at::kFloat);
+  const at::Tensor bytes = (test::numbers({kBatch, 3, 3, 5, 7}, 3) * 120 + 128).to(at::kByte);
+  o.images = {{bytes.repeat_interleave(pixels, 3).repeat_interleave(pixels, 4), {0, 1, 2}}};
+  return o;
+}
+
+struct Learner {
+  explicit Learner(int its_pixels) : pixels(its_pixels), policy(small_section(2), 3, 1), optimizer(policy, setting()) {}
+  static Config::Train setting() {
+    Config::Train train;
+    train.max_grad_norm = 1e9;
+    train.weight_decay = 0.1;
+    return train;
+  }
+  at::Tensor logits() const {
+    const at::NoGradGuard no_grad;
+    return policy.forward(blocks_of(pixels)).logits;
+  }
+  void step() {
+    const Policy::Output output = policy.forward(blocks_of(pixels));
+    const at::Tensor targets = test::numbers(output.logits.sizes(), 9).to(at::kFloat);
+    const at::Tensor loss = (at::log_softmax(output.logits, 1) * targets).sum() + output.value.square().sum();
+    loss.backward();
+    optimizer.step(1e-2, loss.detach());
+  }
+  void grow(int factor) {
+    spread_first_convolution(policy, factor, &optimizer);
+    pixels *= factor;
+  }
+  int pixels;
+  PolicyNetwork policy;
+  Optimizer optimizer;
+};
+
+double largest_difference(const at::Tensor& a, const at::Tensor& b) { return (a - b).abs().max().item<double>(); }
+
+TEST(PatchSpread, KeepsLogitsAndHowAStepChangesThem) {
+  Learner small(1), large(1), at_whole_rate(1);
+  for (Learner* each : {&small, &large, &at_whole_rate}) {
+    each->step();
+    each->step();
+  }
+  for (Learner* each : {&large, &at_whole_rate}) {
+    each->grow(3);
+    EXPECT_LT(largest_difference(each->logits(), small.logits()), 1e-5);
+  }
+  EXPECT_EQ(large.optimizer.rate_factors.front(), 1.0 / 9);
+  EXPECT_EQ(large.optimizer.gradients().size(0), large.policy.num_parameters());
+  at_whole_rate.optimizer.rate_factors.front() = 1;
+  const at::Tensor before = small.logits();
+  for (Learner* each : {&small, &large, &at_whole_rate}) each->step();
+  EXPECT_GT(largest_difference(small.logits(), before), 1e-2);
+  EXPECT_LT(largest_difference(large.logits(), small.logits()), 1e-5);
+  EXPECT_GT(largest_difference(at_whole_rate.logits(), small.logits()), 1e-3);
+}
+
+}  // namespace
+}  // namespace pictura
