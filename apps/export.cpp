@@ -12,7 +12,7 @@ namespace pictura {
 
 void add_export_command(CLI::App& app) {
   struct Arguments {
-    std::string policy, out, weights = "bf16";
+    std::string policy, out, weights = "bf16", size;
     bool json = false, average = false;
   };
   auto arguments = std::make_shared<Arguments>();
@@ -25,6 +25,9 @@ void add_export_command(CLI::App& app) {
       ->check(one_of({"bf16", "f32"}).description("{bf16,f32}"))
       ->capture_default_str();
   add_average_option(command, &arguments->average);
+  command->add_option("--size", arguments->size,
+                      "Pixels of an image, WxH, a whole number of times those of the policy: its first convolution is "
+                      "spread over patches as many times as large; default: as they are");
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "The file holds what the policy needs to drive: weights, configuration, cameras. simulate, evaluate, replay and\n"
@@ -33,11 +36,16 @@ void add_export_command(CLI::App& app) {
       "  pictura export runs/town01/checkpoint.ckpt --out town01.safetensors\n"
       "  pictura export runs/town01/checkpoint.ckpt --weights f32 --out town01.safetensors\n"
       "  pictura export runs/town01/checkpoint.ckpt --average --out town01_average.safetensors\n"
+      "  pictura export models/perspective.safetensors --size 96x54 --weights f32 --out perspective_96x54.safetensors\n"
       "  pictura simulate Town01 --policy town01.safetensors --video drive.mp4");
   command->callback([arguments] {
-    const WeightType type = arguments->weights == "bf16" ? WeightType::bf16 : WeightType::f32;
-    const ExportedPolicy exported =
-        export_policy(arguments->policy, type, PICTURA_COMMIT, arguments->out, arguments->average);
+    ExportOptions options{.commit = PICTURA_COMMIT, .average = arguments->average};
+    options.weights = arguments->weights == "bf16" ? WeightType::bf16 : WeightType::f32;
+    if (!arguments->size.empty()) {
+      const Pair pixels = parse_pair("--size", arguments->size, 8192);
+      options.size = ImageSize{pixels.first, pixels.second};
+    }
+    const ExportedPolicy exported = export_policy(arguments->policy, arguments->out, options);
     if (arguments->json) {
       print_json({{"out", arguments->out},
                   {"weights", arguments->weights},

@@ -2,7 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
+
+#include "pictura/common/image.h"
 
 namespace pictura {
 
@@ -18,9 +21,18 @@ struct ExportedPolicy {
   std::string policy_hash;               // of the weights as they are in the file
 };
 
-/// Writes the policy of a checkpoint, with the average of its weights where `average` is set, or of safetensors, to
-/// `out`, as write_policy does. Throws Error naming the file that cannot be read or written, or that holds no average.
-ExportedPolicy export_policy(const std::string& policy_path, WeightType type, const std::string& commit,
-                             const std::string& out, bool average = false);
+/// How a policy is exported.
+struct ExportOptions {
+  WeightType weights = WeightType::bf16;
+  std::string commit;             // of the program, for the metadata
+  bool average = false;           // the average of its weights, which a checkpoint may hold
+  std::optional<ImageSize> size;  // of images, one whole number k of times as wide and as high as its own
+};
+
+/// Writes the policy of a checkpoint, or of safetensors, to `out`, as write_policy does. With a size, patches and line
+/// floor are k times as large, and the first convolution is spread over the larger patches (training/patch_spread.h).
+/// Throws Error naming the file that cannot be read or written, or that holds no average; UsageError naming `size`
+/// where the policy cannot have it.
+ExportedPolicy export_policy(const std::string& policy_path, const std::string& out, const ExportOptions& options);
 
 }  // namespace pictura

@@ -1163,6 +1163,20 @@ class Training(CommandCase):
         self.assert_refused(1, "none.ckpt", "export", "none.ckpt", "--out", self.folder / "x.safetensors")
         self.assert_refused(2, ".safetensors", "export", weights, "--out", self.folder / "x.bin")
 
+    def test_a_policy_is_exported_for_larger_images(self):
+        checkpoint, larger = self.folder / "run" / "checkpoint.ckpt", self.folder / "larger.safetensors"
+        self.json_of("train", *TINY, "--set", "train.updates=1", "--out", self.folder / "run")
+        exported = self.json_of("export", checkpoint, "--size", "48x27", "--weights", "f32", "--out", larger)
+        small = self.json_of("export", checkpoint, "--weights", "f32", "--out", self.folder / "small.safetensors")
+        self.assertGreater(exported["parameters"], small["parameters"])
+        self.json_of("simulate", "procedural:1", "--agents", 4, "--steps", 5, "--policy", larger)
+        at_its_size = [*TINY, "--set", "render.width_px=48", "--set", "render.height_px=27", "--set", "train.updates=1"]
+        begin = ["train", *at_its_size, "--init-from", larger]
+        self.json_of(*begin, "--set", "policy.patch_px=3", "--out", self.folder / "next")
+        self.assert_refused(1, "'conv.0.weight'", *begin, "--out", self.folder / "other")
+        for size, expected in ("40x27", "whole number of times 16x9, got 40x27"), ("many", "--size"):
+            self.assert_refused(2, expected, "export", checkpoint, "--size", size, "--out", self.folder / "x.safetensors")
+
     def test_a_folder_with_a_run_asks_what_to_do_with_it(self):
         one = ["train", *TINY, "--set", "train.updates=1", "--out", self.folder / "run"]
         first = self.json_of(*one)

@@ -339,7 +339,7 @@ TEST_F(CheckpointFile, APolicyDrivesFromSafetensorsAsFromItsCheckpoint) {
   EXPECT_EQ(hash_of_parameters(from_checkpoint.parameters), policy.hash());
   EXPECT_EQ(PolicySession(path).evaluation_setting().policy_hash, policy.hash());
 
-  const ExportedPolicy half = export_policy(path, WeightType::bf16, "abc123", folder_ / "half.safetensors");
+  const ExportedPolicy half = export_policy(path, folder_ / "half.safetensors", {.commit = "abc123"});
   EXPECT_EQ(half.parameters, policy.num_parameters());
   EXPECT_LT(half.file_bytes, static_cast<int64_t>(std::filesystem::file_size(path)) - 19 * half.parameters / 10);
   const SavedPolicy rounded = read_policy(folder_ / "half.safetensors");

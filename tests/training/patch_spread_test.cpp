@@ -1,4 +1,4 @@
-// The first convolution at larger images: weights by hand, and the function before and after a step.
+// The first convolution at larger images: weights by hand, the function before and after a step, and exported files.
 #include "pictura/training/patch_spread.h"
 
 #include <ATen/core/grad_mode.h>
@@ -6,13 +6,17 @@
 
 #include "pictura/common/error.h"
 #include "pictura/tests/support/error_message.h"
+#include "pictura/tests/support/scratch_folder.h"
 #include "pictura/tests/training/numbers.h"
 #include "pictura/training/ppo.h"
+#include "pictura/training/saved_policy.h"
+#include "pictura/training/session.h"
 
 namespace pictura {
 namespace {
 
 using test::message_of;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 Config::PolicySection small_section(int patch_px) {
@@ -112,6 +116,77 @@ TEST(PatchSpread, KeepsLogitsAndHowAStepChangesThem) {
   EXPECT_GT(largest_difference(small.logits(), before), 1e-2);
   EXPECT_LT(largest_difference(large.logits(), small.logits()), 1e-5);
   EXPECT_GT(largest_difference(at_whole_rate.logits(), small.logits()), 1e-3);
+}
+
+class ExportedSize : public ::testing::Test {
+ protected:
+  // A policy of 16x9 px in patches of 2, and what it is exported to.
+  std::string write(const Config& config) {
+    SavedPolicy saved;
+    saved.config = config;
+    saved.rig = paper_rig(16, 9);
+    saved.update = 5;
+    const PolicyNetwork policy(config.policy, 4, 1);
+    saved.parameters = policy.parameters();
+    write_policy(folder_ / "small.safetensors", saved, WeightType::f32, "");
+    return folder_ / "small.safetensors";
+  }
+  static Config config() {
+    Config c;
+    c.policy = small_section(2);
+    c.render.width_px = 4;  // the run began with another size
+    c.render.height_px = 3;
+    c.render.schedule = {{10, 16, 9}};
+    return c;
+  }
+  SavedPolicy resized(const std::string& from, const std::string& to, ImageSize size) {
+    export_policy(from, folder_ / to, {.weights = WeightType::f32, .size = size});
+    return read_policy(folder_ / to);
+  }
+  std::string refusal(const std::string& from, ImageSize size) {
+    return message_of([&] { resized(from, "none.safetensors", size); });
+  }
+  test::ScratchFolder folder_;
+};
+
+TEST_F(ExportedSize, SpreadsTheFirstConvolutionOfAFile) {
+  const SavedPolicy small = read_policy(write(config())), large = resized(small.path, "large.safetensors", {48, 27}),
+                    again = resized(large.path, "again.safetensors", {96, 54});
+  EXPECT_EQ(large.config.policy.patch_px, 6);
+  EXPECT_EQ(large.config.render.line_floor_px, 1.05);
+  EXPECT_EQ(large.config.render.width_px, 48);
+  EXPECT_TRUE(large.config.render.schedule.empty());
+  EXPECT_EQ(first_difference(large.rig, paper_rig(48, 27)), "");
+  EXPECT_EQ(large.update, 5);
+  EXPECT_EQ(large.rate_factors, (std::map<std::string, double>{{kFirstConvolution, 1.0 / 9}}));
+  EXPECT_EQ(again.config.policy.patch_px, 12);
+  EXPECT_EQ(again.config.render.line_floor_px, 2.1);
+  EXPECT_EQ(again.rate_factors.at(kFirstConvolution), 1.0 / 9 / 4);
+  ASSERT_EQ(large.parameters.size(), small.parameters.size());
+  for (size_t i = 0; i < small.parameters.size(); ++i) {
+    const NamedTensor &before = small.parameters[i], &after = large.parameters[i];
+    const bool is_first = before.name == kFirstConvolution;
+    EXPECT_TRUE(after.value.equal(is_first ? spread_over_patches(before.value, 3) : before.value)) << before.name;
+  }
+  EXPECT_EQ(PolicySession(large.path, {.device = "cpu"}).rig().cameras[0].width_px, 48);
+  EXPECT_TRUE(resized(small.path, "same.safetensors", {16, 9}).rate_factors.empty());
+}
+
+TEST_F(ExportedSize, IsRefusedWhereAPolicyCannotHaveIt) {
+  const std::string path = write(config());
+  EXPECT_THAT(refusal(path, {40, 27}),
+              AllOf(HasSubstr(path), HasSubstr("size: expected one whole number of times 16x9, got 40x27")));
+  EXPECT_THAT(refusal(path, {32, 27}), HasSubstr("got 32x27"));
+  EXPECT_THAT(refusal(path, {8, 4}), HasSubstr("got 8x4"));
+  EXPECT_THAT(refusal(path, {160, 90}), HasSubstr("expected patches of at most 16 px"));
+  Config vector = config();
+  vector.policy.modality = Modality::vector;
+  vector.render.schedule.clear();
+  EXPECT_THAT(refusal(write(vector), {32, 18}), HasSubstr("size: its policy reads no images"));
+  Config with_rig = config();
+  with_rig.render.schedule.clear();
+  with_rig.render.rig = "cameras.toml";
+  EXPECT_THAT(refusal(write(with_rig), {32, 18}), HasSubstr("the cameras of cameras.toml"));
 }
 
 }  // namespace

@@ -94,7 +94,7 @@ TEST_F(RunWithAverage, LearnsTheSameAndKeepsTheAverageBeside) {
   EXPECT_TRUE(read_checkpoint(without.checkpoint).average.empty());
   const Checkpoint last = read_checkpoint(with.checkpoint);
   EXPECT_TRUE(are_equal(read_policy(with.checkpoint, /*average=*/true).parameters, last.average));
-  export_policy(with.checkpoint, WeightType::f32, "", path("exported.safetensors"), /*average=*/true);
+  export_policy(with.checkpoint, path("exported.safetensors"), {.weights = WeightType::f32, .average = true});
   EXPECT_TRUE(are_equal(read_policy(path("exported.safetensors")).parameters, last.average));
   EXPECT_THAT(message_of([&] { read_policy(without.checkpoint, true); }),
               AllOf(HasSubstr("without/checkpoint.ckpt"), HasSubstr("train.weight_average")));
