@@ -50,9 +50,11 @@ bool ImageError::is_within_tolerance() const {
          static_cast<double>(differing_plane_pixels) <= kShareBeyond * static_cast<double>(plane_pixels);
 }
 
-ImageError compare_image(const CameraImages& actual, const CameraImages& expected, PixelFormat format, int view) {
+ImageError compare_image(const CameraImages& actual, const CameraImages& expected, PixelFormat format, int view,
+                         ChannelOrder order, int patch_px) {
   ImageError error;
-  error.values = int64_t{3} * expected.width_px * expected.height_px;
+  const ImageSize size{expected.width_px, expected.height_px};
+  error.values = image_values(size, order, patch_px);
   for (int64_t i = 0; i < error.values; ++i) {
     const double off = value_error(channel_at(actual, format, view * actual.view_stride + i),
                                    channel_at(expected, format, view * expected.view_stride + i));
@@ -61,7 +63,7 @@ ImageError compare_image(const CameraImages& actual, const CameraImages& expecte
     error.beyond += off > kKernelError + kRounding ? 1 : 0;
   }
   if (!expected.depth_m) return error;
-  error.plane_pixels = error.values / 3;
+  error.plane_pixels = size.pixels();
   for (int64_t i = view * error.plane_pixels; i < (view + 1) * error.plane_pixels; ++i) {
     const bool is_same = actual.class_id[i] == expected.class_id[i] &&
                          actual.instance_id[i] == expected.instance_id[i] &&

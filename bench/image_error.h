@@ -20,8 +20,9 @@ struct ImageError {
   bool is_within_tolerance() const;
 };
 
-/// The error of one view's image of one camera, and of its planes if it has them; both of one format and size.
-ImageError compare_image(const CameraImages& actual, const CameraImages& expected, PixelFormat format, int view);
+/// The error of one view's image of one camera, and of its planes if it has them; both of one format, size and order.
+ImageError compare_image(const CameraImages& actual, const CameraImages& expected, PixelFormat format, int view,
+                         ChannelOrder order = ChannelOrder::planar, int patch_px = kDefaultPatch_px);
 
 /// Fills images before they are drawn, so that unwritten values are found: far from any colour as a float or a half,
 /// and no valid depth, class or instance.
@@ -34,7 +35,9 @@ void visit_memory(const ImageBatch& images, Visit&& visit) {
   for (const CameraImages& camera : images.cameras) {
     const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
     const std::size_t value_bytes = bytes_per_value(images.format);
-    visit(camera.data, static_cast<std::size_t>(camera.view_stride) * value_bytes, 3 * pixels * value_bytes, views);
+    const int64_t values = image_values({camera.width_px, camera.height_px}, images.order, images.patch_px);
+    visit(camera.data, static_cast<std::size_t>(camera.view_stride) * value_bytes,
+          static_cast<std::size_t>(values) * value_bytes, views);
     auto visit_plane = [&](auto* plane) {
       if (plane) visit(static_cast<void*>(plane), pixels * sizeof *plane, pixels * sizeof *plane, views);
     };

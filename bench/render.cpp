@@ -22,7 +22,7 @@ class HostTarget final : public RenderTarget {
   HostTarget(const DrivenWorlds& worlds, const RenderCase& render_case)
       : scene_(worlds.simulator->scene()),
         views_(worlds.views.data(), static_cast<std::size_t>(render_case.num_views)),
-        images_(render_case.config.rig, render_case.num_views, render_case.format, render_case.planes) {}
+        images_(images_of(render_case, render_case.num_views)) {}
   void fill_unwritten() override { pictura::fill_unwritten(images_.batch()); }
   double draw(Renderer* renderer, int calls) override {
     const auto begin = std::chrono::steady_clock::now();
@@ -43,7 +43,7 @@ class OracleCheck {
   OracleCheck(const DrivenWorlds& worlds, const RenderCase& render_case)
       : render_case_(render_case),
         num_views_(std::min(render_case.checked_views, render_case.num_views)),
-        expected_(render_case.config.rig, num_views_, render_case.format, render_case.planes) {
+        expected_(images_of(render_case, num_views_)) {
     const RendererConfig config{.rig = render_case.config.rig, .line_floor_px = render_case.config.line_floor_px};
     const auto oracle = make_renderer("cpu", config);
     upload_maps(*worlds.simulator, oracle.get());
@@ -57,7 +57,8 @@ class OracleCheck {
     ImageError error;
     for (int k = 0; k < static_cast<int>(render_case_.config.rig.cameras.size()); ++k) {
       for (int view = 0; view < num_views_; ++view) {
-        error.add(compare_image(actual.camera(k), expected_.camera(k), render_case_.format, view));
+        error.add(compare_image(actual.camera(k), expected_.camera(k), render_case_.format, view, render_case_.order,
+                                render_case_.patch_px));
       }
     }
     error_inout->add(error);
@@ -84,10 +85,17 @@ std::unique_ptr<RenderTarget> make_target(const DrivenWorlds& worlds, const Rend
 }
 
 std::size_t image_bytes_of(const RenderCase& render_case) {
-  return image_layout(render_case.config.rig, render_case.num_views, render_case.format).bytes();
+  return image_layout(render_case.config.rig, render_case.num_views, render_case.format, render_case.order,
+                      render_case.patch_px)
+      .bytes();
 }
 
 }  // namespace
+
+HostImages images_of(const RenderCase& render_case, int num_views) {
+  return HostImages(render_case.config.rig, num_views, render_case.format, render_case.planes, render_case.order,
+                    render_case.patch_px);
+}
 
 std::unique_ptr<RenderTarget> make_host_target(const DrivenWorlds& worlds, const RenderCase& render_case) {
   return std::make_unique<HostTarget>(worlds, render_case);

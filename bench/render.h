@@ -18,9 +18,11 @@ struct RenderCase {
   int num_views = 0;      // the first views of the driven worlds
   PixelFormat format = PixelFormat::u8;
   Planes planes = Planes::none;
-  int checked_views = 8;  // compared with the oracle, before and after timing; 0: none
-  int repeats = 7;        // 0: no timing
-  double repeat_s = 1.0;  // approximate duration of the calls of a repeat
+  ChannelOrder order = ChannelOrder::planar;
+  int patch_px = kDefaultPatch_px;  // side of the patches, where the order is of patches
+  int checked_views = 8;            // compared with the oracle, before and after timing; 0: none
+  int repeats = 7;                  // 0: no timing
+  double repeat_s = 1.0;            // approximate duration of the calls of a repeat
   bool measures_memory = false;
 };
 
@@ -32,6 +34,9 @@ struct RenderMeasurement {
   // images.
   double up_front_bytes = 0, max_bytes = 0, image_bytes = 0;
 };
+
+/// Host memory for the images of so many views of the case.
+HostImages images_of(const RenderCase& render_case, int num_views);
 
 /// Throws Error if `cuda` is out of tolerance, or a backend cannot run here.
 RenderMeasurement measure_render(const DrivenWorlds& worlds, const RenderCase& render_case);

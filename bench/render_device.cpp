@@ -23,7 +23,7 @@ class DeviceTarget final : public RenderTarget {
       : render_case_(render_case), scene_(worlds.simulator->scene()) {
     views_ = view_copy_.assign({worlds.views.data(), static_cast<std::size_t>(render_case.num_views)}, nullptr);
     // One image per camera defines the sizes and planes.
-    HostImages one(render_case.config.rig, 1, render_case.format, render_case.planes);
+    HostImages one = images_of(render_case, 1);
     ImageBatch shape = one.batch();
     shape.num_views = render_case.num_views;
     batch_ = staged_.like(shape);
@@ -54,8 +54,7 @@ class DeviceTarget final : public RenderTarget {
     return static_cast<double>(total_ms) / calls;
   }
   const HostImages& images(int num_views) override {
-    on_host_ =
-        std::make_unique<HostImages>(render_case_.config.rig, num_views, render_case_.format, render_case_.planes);
+    on_host_ = std::make_unique<HostImages>(images_of(render_case_, num_views));
     staged_.copy_to_host(on_host_->batch());
     PICTURA_CUDA(cudaDeviceSynchronize());
     return *on_host_;

@@ -25,6 +25,7 @@ struct RenderArguments {
   std::vector<std::string> maps, backends = {"cpu"}, sizes, samples = {"1"};
   std::vector<int> egos;
   std::string sweep, format = "u8";
+  int patch_px = 0;  // 0: planar images
   int checked_views = 8;
   bool planes = false, host_memory = false, memory = false;
   RateArguments rate;
@@ -74,9 +75,14 @@ RenderCase case_of(const RenderArguments& arguments, const std::string& backend,
   if (in_device_memory) result.config.device = {MemorySpace::cuda, 0};
   result.config.num_threads = arguments.world.num_threads;
   result.config.samples = parse_samples("--samples", samples);
-  result.format = arguments.format == "u8"    ? PixelFormat::u8
-                  : arguments.format == "f16" ? PixelFormat::f16
-                                              : PixelFormat::f32;
+  result.format = arguments.format == "u8"     ? PixelFormat::u8
+                  : arguments.format == "f16"  ? PixelFormat::f16
+                  : arguments.format == "bf16" ? PixelFormat::bf16
+                                               : PixelFormat::f32;
+  if (arguments.patch_px > 0) {
+    result.order = ChannelOrder::patches;
+    result.patch_px = arguments.patch_px;
+  }
   result.planes = arguments.planes ? Planes::all : Planes::none;
   result.checked_views = arguments.checked_views;
   result.repeats = arguments.memory ? 0 : arguments.rate.repeats;
@@ -195,9 +201,10 @@ void run_render(RenderArguments arguments) {
   }
   progress.finish();
   BenchContext context{
-      .workload = fmt::format("render: {}, {} in each of {} worlds, walls {}, {} cameras, {}{}, {} threads; {}",
+      .workload = fmt::format("render: {}, {} in each of {} worlds, walls {}, {} cameras, {}{}{}, {} threads; {}",
                               fmt::join(arguments.maps, " "), population_of(world), worlds.simulator->worlds().size(),
                               world.walls ? "on" : "off", paper_rig().cameras.size(), arguments.format,
+                              arguments.patch_px > 0 ? fmt::format(" in patches of {} px", arguments.patch_px) : "",
                               arguments.planes ? " and planes" : "", world.num_threads, fmt::join(choices, "; ")),
       .backend = fmt::format("{}", fmt::join(arguments.backends, ","))};
   // In host memory any driver may run gl:egl; its choice names it.
@@ -228,8 +235,12 @@ void add_render_benchmark(CLI::App& bench) {
       ->delimiter(',')
       ->capture_default_str();
   command->add_option("--format", arguments->format, "Type of a channel's value")
-      ->check(one_of({"u8", "f16", "f32"}).description("{u8,f16,f32}"))
+      ->check(one_of({"u8", "f16", "f32", "bf16"}).description("{u8,f16,f32,bf16}"))
       ->capture_default_str();
+  command
+      ->add_option("--patch", arguments->patch_px,
+                   "Draw patches of 4, 8, 12 or 16 px squared, as first convolutions take them; default: planar images")
+      ->check(one_of({"4", "8", "12", "16"}).description("{4,8,12,16}"));
   command->add_flag("--planes", arguments->planes, "Draw depth, class and instance planes too");
   command->add_flag("--host-memory", arguments->host_memory,
                     "Keep scenes and images in host memory for cuda and gl:egl, which otherwise use device memory");
@@ -248,6 +259,7 @@ void add_render_benchmark(CLI::App& bench) {
   command->footer(
       "Examples:\n  pictura bench render --size 192x108 --threads 0\n"
       "  pictura bench render --sweep sizes --json\n"
+      "  pictura bench render --backend cuda --size 96x54 --egos 2048 --format bf16 --patch 12\n"
       "  pictura bench render --backend cuda,gl:egl --samples 1,4,2x2 --map towns --parked 32 --egos 2048,256 --json");
   command->callback([arguments] { run_render(*arguments); });
 }
