@@ -54,7 +54,6 @@ SavedPolicy resized_policy(const SavedPolicy& policy, ImageSize size) {
 
 }  // namespace
 
-ExportedPolicy export_policy(const std::string& policy_path, WeightType type, const std::string& commit,
 ExportedPolicy export_policy(const std::string& policy_path, const std::string& out, const ExportOptions& options) {
   const SavedPolicy policy = read_policy(policy_path, options.average);
   write_policy(out, options.size ? resized_policy(policy, *options.size) : policy, options.weights, options.commit);
