@@ -1,5 +1,5 @@
-// The exponential average of a policy's weights over updates (train.weight_average): it drives more steadily than the
-// weights after any one update, whose noise it averages out.
+// The exponential average of a policy's weights over updates (train.weight_average), which smooths the noise of single
+// updates.
 #pragma once
 
 #include "pictura/training/policy.h"
