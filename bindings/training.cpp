@@ -431,8 +431,9 @@ void bind_evaluation(py::module_& module) {
          const std::vector<std::string>& densities, int agents_per_world, int first_scenario, int scenarios, int steps,
          bool argmax, uint64_t seed, int num_threads, const std::string& device, const std::string& simulator,
          const std::string& renderer, const std::string& samples, const std::string& rig, int width_px, int height_px,
-         const py::dict& conditioning, const std::string& light_cycles, const py::object& on_progress) {
+         const py::dict& conditioning, const std::string& light_cycles, bool average, const py::object& on_progress) {
         EvaluateOptions options;
+        options.average = average;
         options.checkpoint = checkpoint;
         options.controller = controller;
         options.maps = maps;
@@ -462,16 +463,17 @@ void bind_evaluation(py::module_& module) {
       py::arg("first_scenario") = 0, py::arg("scenarios") = 200, py::arg("steps") = 3000, py::arg("argmax") = true,
       py::arg("seed") = 1, py::arg("num_threads") = 0, py::arg("device") = "auto", py::arg("simulator") = "auto",
       py::arg("renderer") = "", py::arg("samples") = "", py::arg("rig") = "", py::arg("width_px") = 0,
-      py::arg("height_px") = 0, py::arg("conditioning") = py::dict(), py::arg("light_cycles") = "",
+      py::arg("height_px") = 0, py::arg("conditioning") = py::dict(), py::arg("light_cycles") = "", py::arg("average") = false,
       py::arg("on_progress") = py::none(),
       R"(The paper's evaluation, as `pictura evaluate` does it, in worlds that no training has.
 
 checkpoint: of a policy; '' with a controller of the paper's world. maps: names or files. controller: 'lane', 'idm_lanes', 'random' or 'idle',
 which drives instead. densities: 'light', 'medium' and 'dense', 60, 120 and 150 agents a world, or agents_per_world of them.
 device, simulator, renderer: 'auto' or names; renderer '': as it was trained. rig, or width_px and height_px: other cameras.
-conditioning: numbers by name. light_cycles: 'phases' or 'independent'; '': as it was trained. on_progress: called with the
-fraction that is done and the seconds to come, from a thread of its own. Returns a dict: rows, one a density: its counts, and
-each metric as (value, half of its 95 % interval); seconds, agent_steps, policy_hash, light_cycles. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
+conditioning: numbers by name. light_cycles: 'phases' or 'independent'; '': as it was trained. average: with the average of
+weights that the checkpoint holds. on_progress: called with the fraction that is done and the seconds to come, from a thread of
+its own. Returns a dict: rows, one a density: its counts, and each metric as (value, half of its 95 % interval); seconds,
+agent_steps, policy_hash, light_cycles. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
   module.def(
       "evaluate_scenes",
       [](const std::string& checkpoint, const std::vector<std::string>& scenes, const std::string& protocol,
@@ -479,8 +481,9 @@ each metric as (value, half of its 95 % interval); seconds, agent_steps, policy_
          const std::optional<int>& steps, const std::optional<std::vector<double>>& densities, const py::dict& rules,
          int first_scene, int num_scenes, bool argmax, uint64_t seed, int num_threads, const std::string& device,
          const std::string& simulator, const std::string& renderer, const std::string& samples,
-         const py::dict& conditioning, const std::string& rollouts, const py::object& on_progress) {
+         const py::dict& conditioning, bool average, const std::string& rollouts, const py::object& on_progress) {
         SceneEvaluateOptions options;
+        options.average = average;
         options.checkpoint = checkpoint;
         options.controller = controller;
         options.scenes = scenes;
@@ -522,7 +525,8 @@ each metric as (value, half of its 95 % interval); seconds, agent_steps, policy_
       py::arg("densities") = py::none(), py::arg("rules") = py::dict(), py::arg("first_scene") = 0,
       py::arg("num_scenes") = 0, py::arg("argmax") = true, py::arg("seed") = 1, py::arg("num_threads") = 0,
       py::arg("device") = "auto", py::arg("simulator") = "auto", py::arg("renderer") = "", py::arg("samples") = "",
-      py::arg("conditioning") = py::dict(), py::arg("rollouts") = "", py::arg("on_progress") = py::none(),
+      py::arg("conditioning") = py::dict(), py::arg("average") = false, py::arg("rollouts") = "",
+      py::arg("on_progress") = py::none(),
       R"(The paper's zero-shot evaluation in recorded scenes, as `pictura evaluate --protocol` does it.
 
 checkpoint: of a policy; '' with a controller: 'log', 'inverse', 'idm', 'idm_lanes', 'random' or 'idle', which drives
@@ -683,8 +687,9 @@ time, also for a renderer that it is given.)")
           py::init([](const std::string& checkpoint, int num_threads, const std::string& device,
                       const std::string& simulator, const std::string& renderer, const std::string& samples,
                       const std::string& rig, int width_px, int height_px, const std::string& backbone,
-                      const py::dict& conditioning, const std::string& light_cycles) {
+                      const py::dict& conditioning, const std::string& light_cycles, bool average) {
             SessionOptions options;
+            options.average = average;
             options.num_threads = num_threads;
             options.device = device;
             options.simulator = simulator;
@@ -702,7 +707,7 @@ time, also for a renderer that it is given.)")
           py::arg("checkpoint"), py::kw_only(), py::arg("num_threads") = 0, py::arg("device") = "auto",
           py::arg("simulator") = "auto", py::arg("renderer") = "", py::arg("samples") = "", py::arg("rig") = "",
           py::arg("width_px") = 0, py::arg("height_px") = 0, py::arg("backbone") = "",
-          py::arg("conditioning") = py::dict(), py::arg("light_cycles") = "",
+          py::arg("conditioning") = py::dict(), py::arg("light_cycles") = "", py::arg("average") = false,
           R"(checkpoint: a .ckpt file. num_threads: 0 for all. device: 'auto', 'cpu' or 'cuda', where it computes; simulators, renderers
 and arrays that it is given work there too. The others as in pictura.evaluate(). Raises pictura.Error naming the file, or
 pictura.UsageError where it cannot see through these cameras.)")

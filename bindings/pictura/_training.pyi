@@ -11,7 +11,7 @@ class PolicySession:
     A saved policy: what it makes of scenes and observations, and the world and cameras that it was trained with. One thread at a
     time, also for a renderer that it is given.
     """
-    def __init__(self, checkpoint: str, *, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, backbone: str = '', conditioning: dict = {}, light_cycles: str = '') -> None:
+    def __init__(self, checkpoint: str, *, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, backbone: str = '', conditioning: dict = {}, light_cycles: str = '', average: bool = False) -> None:
         """
         checkpoint: a .ckpt file. num_threads: 0 for all. device: 'auto', 'cpu' or 'cuda', where it computes; simulators, renderers
         and arrays that it is given work there too. The others as in pictura.evaluate(). Raises pictura.Error naming the file, or
@@ -54,18 +54,19 @@ class PolicySession:
     @property
     def rig(self) -> pictura._pictura.Rig:
         ...
-def evaluate(checkpoint: str, maps: collections.abc.Sequence[str], *, controller: str = '', densities: collections.abc.Sequence[str] = ['light', 'medium', 'dense'], agents_per_world: typing.SupportsInt | typing.SupportsIndex = 0, first_scenario: typing.SupportsInt | typing.SupportsIndex = 0, scenarios: typing.SupportsInt | typing.SupportsIndex = 200, steps: typing.SupportsInt | typing.SupportsIndex = 3000, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, conditioning: dict = {}, light_cycles: str = '', on_progress: typing.Any = None) -> dict:
+def evaluate(checkpoint: str, maps: collections.abc.Sequence[str], *, controller: str = '', densities: collections.abc.Sequence[str] = ['light', 'medium', 'dense'], agents_per_world: typing.SupportsInt | typing.SupportsIndex = 0, first_scenario: typing.SupportsInt | typing.SupportsIndex = 0, scenarios: typing.SupportsInt | typing.SupportsIndex = 200, steps: typing.SupportsInt | typing.SupportsIndex = 3000, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, conditioning: dict = {}, light_cycles: str = '', average: bool = False, on_progress: typing.Any = None) -> dict:
     """
     The paper's evaluation, as `pictura evaluate` does it, in worlds that no training has.
     
     checkpoint: of a policy; '' with a controller of the paper's world. maps: names or files. controller: 'lane', 'idm_lanes', 'random' or 'idle',
     which drives instead. densities: 'light', 'medium' and 'dense', 60, 120 and 150 agents a world, or agents_per_world of them.
     device, simulator, renderer: 'auto' or names; renderer '': as it was trained. rig, or width_px and height_px: other cameras.
-    conditioning: numbers by name. light_cycles: 'phases' or 'independent'; '': as it was trained. on_progress: called with the
-    fraction that is done and the seconds to come, from a thread of its own. Returns a dict: rows, one a density: its counts, and
-    each metric as (value, half of its 95 % interval); seconds, agent_steps, policy_hash, light_cycles. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.
+    conditioning: numbers by name. light_cycles: 'phases' or 'independent'; '': as it was trained. average: with the average of
+    weights that the checkpoint holds. on_progress: called with the fraction that is done and the seconds to come, from a thread of
+    its own. Returns a dict: rows, one a density: its counts, and each metric as (value, half of its 95 % interval); seconds,
+    agent_steps, policy_hash, light_cycles. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.
     """
-def evaluate_scenes(checkpoint: str, scenes: collections.abc.Sequence[str], *, protocol: str = 'womd', controller: str = '', control: str | None = None, start_step: typing.SupportsInt | typing.SupportsIndex | None = None, steps: typing.SupportsInt | typing.SupportsIndex | None = None, densities: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, rules: dict = {}, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, num_scenes: typing.SupportsInt | typing.SupportsIndex = 0, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', conditioning: dict = {}, rollouts: str = '', on_progress: typing.Any = None) -> dict:
+def evaluate_scenes(checkpoint: str, scenes: collections.abc.Sequence[str], *, protocol: str = 'womd', controller: str = '', control: str | None = None, start_step: typing.SupportsInt | typing.SupportsIndex | None = None, steps: typing.SupportsInt | typing.SupportsIndex | None = None, densities: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, rules: dict = {}, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, num_scenes: typing.SupportsInt | typing.SupportsIndex = 0, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', conditioning: dict = {}, average: bool = False, rollouts: str = '', on_progress: typing.Any = None) -> dict:
     """
     The paper's zero-shot evaluation in recorded scenes, as `pictura evaluate --protocol` does it.
     

@@ -269,23 +269,29 @@ def _named(path: str) -> Iterator[None]:
         raise pictura.Error(f"{path}: damaged, or no policy of this library: {type(error).__name__}: {error}") from error
 
 
-def load_policy(path: str | os.PathLike[str]) -> Policy:
+def load_policy(path: str | os.PathLike[str], average: bool = False) -> Policy:
     """A policy from policy.safetensors or a checkpoint (.ckpt), in fp32 on the CPU.
+
+    average: with the average of weights that a checkpoint of a run with train.weight_average holds.
 
     Raises pictura.Error naming what is wrong with the file, pictura.UsageError for a backbone that is a program of its own.
     """
     path = os.fspath(path)
     with _named(path):
-        return _load(path)
+        return _load(path, average)
 
 
-def _load(path: str) -> Policy:
+def _load(path: str, average: bool) -> Policy:
     if pathlib.Path(path).suffix != ".ckpt":
+        if average:
+            raise pictura.Error(f"{path}: holds one set of weights: expected a checkpoint to choose the average of")
         metadata, tensors = _read_safetensors(path)
         return _policy_of(metadata.get("config", ""), tensors, path)
     header, data, begin = _read_checkpoint(path)
     tensors = {}
-    for entry in header["parameters"]:
+    if average and "average" not in header:
+        raise pictura.Error(f"{path}: holds no average of weights: expected a checkpoint of a run with train.weight_average")
+    for entry in header["average" if average else "parameters"]:
         count = math.prod(entry["shape"])
         values = torch.frombuffer(data, dtype=torch.float32, count=count, offset=begin + entry["offset"])
         tensors[entry["name"]] = values.reshape(entry["shape"]).clone()

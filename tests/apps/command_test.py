@@ -1457,6 +1457,18 @@ class Training(CommandCase):
         process.communicate(timeout=120)
         self.assertEqual(process.returncode, 143)
 
+    def test_the_average_of_weights_is_evaluated_and_exported(self):
+        out, exported = self.folder / "run", self.folder / "average.safetensors"
+        trained = self.json_of("train", *TINY, "--set", "train.updates=2", "--set", "train.weight_average=2", "--out", out)
+        report = self.json_of("export", out / "checkpoint.ckpt", "--average", "--weights", "f32", "--out", exported)
+        small = ["--map", "procedural:1", "--agents", 4, "--scenarios", 1, "--steps", 5, "--device", "cpu"]
+        hashes = {report["policy_hash"], *(self.json_of("evaluate", *policy, *small)["policy_hash"] for policy in (
+            [out / "checkpoint.ckpt", "--average"], [out / "policy_average.safetensors"], [exported]))}  # fmt: skip
+        self.assertEqual(len(hashes), 1, hashes)
+        self.assertNotIn(trained["policy_hash"], hashes)
+        self.assert_refused(1, "policy.safetensors: holds one set of weights", "evaluate", out / "policy.safetensors", "--average", *small)
+        self.assert_refused(2, "--policy excludes --average", "evaluate", "--policy", "lane", "--average", *small)
+
     def test_evaluation_has_its_keys(self):
         out = self.folder / "run"
         self.json_of("train", *TINY, "--set", "train.updates=1", "--out", out)

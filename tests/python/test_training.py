@@ -26,7 +26,7 @@ from pictura.torch import load_policy  # noqa: E402
 MODELS = sorted((pathlib.Path(__file__).parents[2] / "models").glob("*.safetensors"))
 SMOKE = str(pathlib.Path(__file__).parents[2] / "configs" / "smoke.toml")
 # First values are so small that logits say nothing: a high rate for a few updates gives others.
-TRAIN = ["train.updates=3", "train.learning_rate=0.01", "run.device=cpu", "run.num_threads=2"]
+TRAIN = ["train.updates=3", "train.learning_rate=0.01", "train.weight_average=2", "run.device=cpu", "run.num_threads=2"]
 
 
 @pytest.fixture(scope="module", params=["perspective", "vector"])
@@ -208,6 +208,24 @@ def test_threads_that_share_a_session_or_a_renderer_are_refused(trained, session
         thread.join()
     assert any("the controller's session: another thread is in a call of this object" in error for error in errors), errors
     simulators[0].run(controllers[0], 2)
+
+
+def test_the_average_of_weights_is_loaded_and_evaluated(trained):
+    folder = trained[1]
+    checkpoint, average = str(folder / "checkpoint.ckpt"), str(folder / "policy_average.safetensors")
+    weights, last = load_policy(checkpoint, average=True).state_dict(), load_policy(checkpoint).state_dict()
+    assert all(torch.equal(value, weights[name]) for name, value in load_policy(average).state_dict().items())
+    assert any(not torch.equal(value, weights[name]) for name, value in last.items())
+    options = {"scenarios": 1, "steps": 5, "agents_per_world": 4, "num_threads": 2, "device": "cpu"}
+    hashes = [
+        pictura.evaluate(path, ["procedural:1"], average=of_average, **options)["policy_hash"]
+        for path, of_average in [(checkpoint, True), (average, False), (checkpoint, False)]
+    ]
+    assert hashes[0] == hashes[1] != hashes[2]
+    pictura.PolicySession(checkpoint, average=True, device="cpu")
+    for refuse in (load_policy, pictura.PolicySession):
+        with pytest.raises(pictura.Error, match=r"policy_average\.safetensors: holds one set of weights"):
+            refuse(average, average=True)
 
 
 def test_evaluation_gives_the_commands_numbers(trained):
