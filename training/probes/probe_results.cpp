@@ -103,6 +103,7 @@ void add_setting(const ProbeResults& results, Json* json_out) {
   json["device"] = setting.device;
   json["precision"] = setting.precision;
   for (size_t i = 0; i < kNumConditioning; ++i) json["conditioning"][kConditioningNames[i]] = setting.conditioning[i];
+  json["light_cycles"] = name_of(setting.light_cycles);
   json["interrupted"] = results.interrupted;
   json["seconds"] = results.seconds;
 }
