@@ -466,6 +466,13 @@ print(json.dumps({{"rows": rows, "policy_hash": "abc", "device": "cpu", "precisi
         self.assertEqual(result.returncode, 1)
         self.assertIn("none.safetensors: no such file", result.stderr)
 
+    def test_policies_of_one_name_are_refused(self):
+        (self.root / "b").mkdir()
+        (self.root / "b/a.safetensors").write_text("")
+        result = self.run_script("--policies", self.root / "a.safetensors", self.root / "b/a.safetensors")
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("a.safetensors: expected names that differ, got 'a' twice", result.stderr)
+
 
 class Setup(unittest.TestCase):
     """A copy of scripts/setup that finds everything installed."""
