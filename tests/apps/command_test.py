@@ -501,6 +501,8 @@ class Benchmarks(CommandCase):
         facts = self.json_of("bench", "render", *self.QUICK, "--backend", "cpu,null", "--size", "8x8,9x5", "--egos", "3,5")
         self.assertLessEqual({"workload", "backend", "device", "commit", "results"}, facts.keys())
         self.assertIn("6 agents in each of 1 worlds", facts["workload"])
+        patches = ["--size", "8x8", "--egos", 3, "--format", "bf16", "--patch", 12]
+        self.assertIn("bf16 in patches of 12 px", self.json_of("bench", "render", *self.QUICK, *patches)["workload"])
         rows = {row["name"]: row for row in facts["results"]}
         cases = [f"{b} {s} {e} egos" for b in ["cpu", "null"] for s in ["8x8", "9x5"] for e in [3, 5]]
         self.assertEqual(rows.keys(), {f"{case}{of}" for case in cases for of in ["", ", one call", ", one image"]})
@@ -545,6 +547,10 @@ class Benchmarks(CommandCase):
         rows = {row["name"]: row["value"] for row in facts["results"]}
         self.assertGreater(rows["cuda 8x8 3 egos"], 0)
         self.assertEqual(rows["cuda 8x8 3 egos, values unlike the oracle's"], 0)
+        patches = ["--size", "30x21", "--egos", 3, "--format", "bf16", "--patch", 12]
+        facts = self.json_of("bench", "render", *self.QUICK, "--backend", "cuda", *patches)
+        rows = {row["name"]: row["value"] for row in facts["results"]}
+        self.assertEqual(rows["cuda 30x21 3 egos, values unlike the oracle's"], 0)
 
     def test_steps_are_measured_with_and_without_entity_sets(self):
         facts = self.json_of("bench", "simulate", *self.QUICK, "--worlds", 3)

@@ -45,6 +45,16 @@ TEST(ImageError, EachFormatIsReadInItsOwnUnits) {
   EXPECT_EQ(error_with(PixelFormat::f16, uint16_t{0x8000}).differing, 0);           // -0
 }
 
+TEST(ImageError, UnwrittenValuesOfPatchesAreDetectedBeyondTheImageToo) {
+  HostImages actual(kRig, 2, PixelFormat::bf16, Planes::none, ChannelOrder::patches, 12),
+      expected(kRig, 2, PixelFormat::bf16, Planes::none, ChannelOrder::patches, 12);
+  fill_unwritten(actual.batch());
+  const ImageError error =
+      compare_image(actual.camera(0), expected.camera(0), PixelFormat::bf16, 1, ChannelOrder::patches, 12);
+  EXPECT_EQ(error.values, 3 * 12 * 12);
+  EXPECT_EQ(error.beyond, error.values);
+}
+
 TEST(ImageError, UnwrittenValuesAreDetectedInEveryFormatAndPlane) {
   for (const PixelFormat format : {PixelFormat::u8, PixelFormat::f16, PixelFormat::f32}) {
     HostImages actual(kRig, 2, format, Planes::all), expected(kRig, 2, format, Planes::all);
