@@ -57,7 +57,8 @@ std::shared_ptr<Scene> make_scene(const FloatTable& center_m, const FloatTable& 
   const size_t num_worlds = owner->world_begin.empty() ? 0 : owner->world_begin.size() - 1;
   owner->geometry = copy(geometry, std::vector<int32_t>(num_worlds, 0));
   for (const int32_t state : copy(light_states, {})) {
-    PICTURA_CHECK(state >= 0 && state <= 3, "Scene: light_states: expected 0 (off) to 3 (green), got {}", state);
+    PICTURA_CHECK(state >= 0 && state < kNumLightStates,
+                  "Scene: light_states: expected 0 (off) to {} (unknown), got {}", kNumLightStates - 1, state);
     owner->light_states.push_back(static_cast<LightState>(state));
   }
   owner->light_begin = copy(light_begin, std::vector<int32_t>(num_worlds + 1, 0));
@@ -481,8 +482,8 @@ call; a scene of arrays is a copy of them.)")
           R"(center_m [n, 3]: of the box's foot. heading_rad [n]. size_m [n, 3]: length, width, height. agent_class [n]: 0
 vehicle, 1 cyclist, 2 pedestrian. world_begin [worlds + 1]: the first box of each world; all are in one without it.
 geometry [worlds]: the handles that geometries were uploaded to; 0 without it. light_states: 0 off, 1 red, 2 yellow, 3
-green, of all worlds; light_begin [worlds + 1]. Raises pictura.Error for other shapes; render() refuses what does not
-fit together.)")
+green, 4 unknown, of all worlds; light_begin [worlds + 1]. Raises pictura.Error for other shapes; render() refuses what
+does not fit together.)")
       .def_property_readonly(
           "num_worlds", [](const Scene& self) { return self.batch().geometry.size(); }, py::doc("Worlds."))
       .def_property_readonly(

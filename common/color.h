@@ -50,11 +50,14 @@ PICTURA_HD constexpr Rgb agent_color(AgentClass agent_class, BoxFace face) {
   }
 }
 
-/// State of a traffic light; `off` (or no state) draws nothing.
-enum class LightState : uint8_t { off, red, yellow, green };
+/// State of a traffic light. `unknown` (a recording has no record of it) is not drawn, nor are lights of worlds without
+/// states. Saved files hold these numbers.
+enum class LightState : uint8_t { off, red, yellow, green, unknown };
+constexpr int kNumLightStates = 5;
 
 PICTURA_HD constexpr Rgb light_color(LightState state) {
   switch (state) {
+    case LightState::off: return rgb8(80, 80, 80);
     case LightState::red: return rgb8(255, 0, 0);
     case LightState::yellow: return rgb8(255, 200, 0);
     case LightState::green: return rgb8(0, 255, 0);

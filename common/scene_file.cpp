@@ -139,7 +139,7 @@ void read_wall(TomlFields* row, std::vector<WallFace>* walls_out) {
 }
 
 void read_light(TomlFields* row, SceneFile* out) {
-  constexpr std::array<std::string_view, 4> kStates{"off", "red", "yellow", "green"};
+  constexpr std::array<std::string_view, kNumLightStates> kStates{"off", "red", "yellow", "green", "unknown"};
   LightHead head;
   head.position_m = position_of(row);
   const SinCos facing = sincos_of(radians_of(row->number("facing_deg", kHeading_deg)));

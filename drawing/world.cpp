@@ -174,7 +174,9 @@ void paint_legend(Canvas& canvas, const WorldFrame& frame) {
   }
 }
 
-Rgb lamp_color(LightState state) { return state == LightState::off ? hex(0x4A4F57) : light_color(state); }
+Rgb lamp_color(LightState state) {
+  return state == LightState::off || state == LightState::unknown ? hex(0x4A4F57) : light_color(state);
+}
 
 // The agent in the middle of its circle, and its way along its waypoints, of which the next one is the largest.
 void paint_highlight(Canvas& canvas, const Vector2d& position, double length_px,

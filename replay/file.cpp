@@ -418,8 +418,8 @@ Json header_of(const Replay& replay, const std::vector<Section>& sections) {
     }
     classes.push_back({{"reference_to_center", reference_to_center(agent_class, 1.0f)}, {"hues", hues}});
   }
-  for (const LightState state : {LightState::off, LightState::red, LightState::yellow, LightState::green}) {
-    light_hues.push_back(replay_hue(light_color(state)));
+  for (int state = 0; state < kNumLightStates; ++state) {
+    light_hues.push_back(replay_hue(light_color(static_cast<LightState>(state))));
   }
   return {{"format", kFormat},
           {"version", kReplayVersion},

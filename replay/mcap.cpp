@@ -168,7 +168,7 @@ Json lights_json(const Replay& replay, int frame, uint64_t ns) {
   for (const ReplayShape& shape : replay.map) {
     if (shape.kind != ShapeKind::light) continue;
     const auto state = static_cast<LightState>(replay.lights[light++]);
-    if (state == LightState::off) continue;
+    if (state == LightState::unknown) continue;
     const Rgb color = light_color(state);
     const auto& [x_cm, y_cm] = shape.points_cm[2];  // the head
     spheres.push_back({{"pose", pose_json(x_cm / 100.0, y_cm / 100.0, 5, 0)},

@@ -68,7 +68,7 @@ LightState light_state(RecordedLightState state) {
     case RecordedLightState::arrow_go: return LightState::green;
     case RecordedLightState::none: break;
   }
-  return LightState::off;
+  return LightState::unknown;
 }
 
 std::vector<LightState> light_states_of(const Scenario& scenario, int32_t start_step) {

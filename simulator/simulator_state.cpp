@@ -109,7 +109,7 @@ void check_restored(const SimulatorSetup& setup, const SimulatorState& state, co
                       plan.num_phases >= 1 && plan.phase >= 0 && plan.offset_steps >= 0 &&
                       plan.offset_steps < slot_steps * plan.num_phases && slot_steps * plan.num_phases <= INT32_MAX / 2,
                   "simulator state: light_plans: light {}: the plan is out of range", i);
-    PICTURA_CHECK(state.lights[i] <= LightState::green, "simulator state: lights: light {}: {} is out of range", i,
+    PICTURA_CHECK(state.lights[i] <= LightState::unknown, "simulator state: lights: light {}: {} is out of range", i,
                   static_cast<int>(state.lights[i]));
   }
 }

@@ -216,7 +216,7 @@ __device__ inline void cull_agents(const BlockState& state, const DrawTask& task
   }
 }
 
-// Lists the light heads that are lit, face the camera and may be visible.
+// Lists the light heads whose state is known, that face the camera and may be visible.
 __device__ inline void cull_lights(const BlockState& state, EntryList* list) {
   const ImageSetting& setting = state.context.setting;
   const Span<const LightHead> heads = state.view.geometry->pieces.heads;

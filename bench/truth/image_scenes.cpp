@@ -67,7 +67,7 @@ Snapshot make_synthetic_town(uint64_t seed, int num_agents) {
         head.facing = along_y ? Vec2{0, -1} : Vec2{-1, 0};
         head.signal = geometry.num_signals++;
         geometry.heads.push_back(head);
-        town.scene.light_states.push_back(static_cast<LightState>(random() % 4));
+        town.scene.light_states.push_back(static_cast<LightState>(random() % kNumLightStates));
         // Houses on one side of the sidewalk, with gaps.
         for (float u = begin + 4; u + 8 < end; u += 12) {
           if (random() % 4 == 0) continue;

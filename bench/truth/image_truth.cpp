@@ -201,7 +201,7 @@ void add_wall(Tracer* tracer, const Eye& eye, const WallFace& wall) {
 }
 
 void add_light(Tracer* tracer, const Eye& eye, const LightHead& head, LightState state) {
-  if (state == LightState::off) return;
+  if (state == LightState::unknown) return;
   const Vector3d center = point(head.position_m), facing{head.facing.x, head.facing.y, 0};
   Vector3d to_eye = eye.position() - center;
   to_eye.z() = 0;

@@ -433,8 +433,8 @@ class Scene:
         center_m [n, 3]: of the box's foot. heading_rad [n]. size_m [n, 3]: length, width, height. agent_class [n]: 0
         vehicle, 1 cyclist, 2 pedestrian. world_begin [worlds + 1]: the first box of each world; all are in one without it.
         geometry [worlds]: the handles that geometries were uploaded to; 0 without it. light_states: 0 off, 1 red, 2 yellow, 3
-        green, of all worlds; light_begin [worlds + 1]. Raises pictura.Error for other shapes; render() refuses what does not
-        fit together.
+        green, 4 unknown, of all worlds; light_begin [worlds + 1]. Raises pictura.Error for other shapes; render() refuses what
+        does not fit together.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...

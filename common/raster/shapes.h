@@ -164,9 +164,10 @@ PICTURA_HD inline void wall_faces(const WallFace& wall, const PinholeCamera& cam
   emit_quad(wall_quad(wall), camera, 0.0f, emit);
 }
 
-/// Whether a light is on and visible from position_m: from the front and within its half-angle, on the ground plane.
+/// Whether a light's state is known and its head is visible from position_m: from the front and within its half-angle,
+/// on the ground plane.
 PICTURA_HD inline bool light_is_visible(const LightHead& head, LightState state, Vec3 position_m) {
-  if (state == LightState::off) return false;
+  if (state == LightState::unknown) return false;
   const Vec2 to_eye = position_m.xy() - head.position_m.xy();
   const float ahead_m = dot(to_eye, head.facing);
   // Compares the squares of cosines.
@@ -183,7 +184,7 @@ PICTURA_HD inline Vec3 light_corner(const LightHead& head, int corner) {
   return {ground.x, ground.y, head.position_m.z + kRadius_m * at.sin};
 }
 
-/// The disk of a lit head: its plane in camera coordinates, and its colour, faded by the depth of its centre.
+/// The disk of a head: its plane in camera coordinates, and its colour, faded by the depth of its centre.
 struct LightDisk {
   FacePlane plane;
   Rgb color;

@@ -278,8 +278,9 @@ class CameraView {
       BOX_FACES.forEach((face, i) => { if (turned[i]) faces.add(face.map(corner => corners[corner]), SOLID, hues[Math.min(i, 4)]); });
     }
     for (const { signal, facing_rad, half_angle_rad, position: [x, y, z] } of this.heads) {
-      const state = signal < this.replay.numLights ? this.replay.light(signal, frame) : 0, hue = this.header.light_hues[state];
-      if (!state) continue;
+      // A state whose hue is black is not drawn: one that is unknown, and in files of earlier versions one that is off.
+      const hue = signal < this.replay.numLights ? this.header.light_hues[this.replay.light(signal, frame)] : undefined;
+      if (!hue?.some(channel => channel > 0)) continue;
       const fx = Math.cos(facing_rad), fy = Math.sin(facing_rad), dx = eye[0] - x, dy = eye[1] - y, ahead = dx * fx + dy * fy;
       const cosine = Math.max(Math.cos(half_angle_rad), 0);
       if (ahead <= 0 || ahead * ahead < cosine * cosine * (dx * dx + dy * dy)) continue;

@@ -1,6 +1,7 @@
 // The world from above: the map, lights, agents, goal chains, and the camera that people move.
 
-const LIGHT_COLORS = ["", "#ff3b3b", "#ffc400", "#25d366"];
+// By state; a light whose state is unknown is not drawn.
+const LIGHT_COLORS = ["#6b7078", "#ff3b3b", "#ffc400", "#25d366"];
 const THEME = ["--ground", "--road", "--road-ramp", "--parking", "--sidewalk", "--green", "--side", "--mark-white", "--mark-yellow", "--mark-other",
   "--edge", "--wall", "--stop", "--crosswalk", "--line", "--text", "--dim", "--accent", "--panel", "--raised", "--vehicle", "--cyclist", "--pedestrian",
   "--parked", "--outline", "--collision", "--off-road", "--red-light", "--wall-contact", "--goal", "--case", "--positive", "--negative", "--font"];
@@ -145,7 +146,7 @@ class WorldView {
     const { context, scale } = this;
     context.lineCap = "butt";
     this.map.lights.forEach((light, i) => {
-      const color = LIGHT_COLORS[i < this.replay.numLights ? this.replay.light(i, frame) : 0];
+      const color = i < this.replay.numLights ? LIGHT_COLORS[this.replay.light(i, frame)] : undefined;
       if (!color) return;
       const [ax, ay] = this.pixelOf(light.ax, light.ay), [bx, by] = this.pixelOf(light.bx, light.by), [x, y] = this.pixelOf(light.x, light.y);
       context.strokeStyle = color;

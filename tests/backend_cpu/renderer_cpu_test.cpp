@@ -227,8 +227,10 @@ TEST(CpuRenderer, LightsShowTheirStateOnlyToTheFront) {
   const float fade = 1 - 20.0f / 120;
   expect_color(center(LightState::red, {0, 0, 0}, 0), rgb8(255, 0, 0) * fade, 1e-4f);
   expect_color(center(LightState::yellow, {0, 0, 0}, 0), rgb8(255, 200, 0) * fade, 1e-4f);
-  expect_color(center(LightState::off, {0, 0, 0}, 0), {});
-  expect_color(center(LightState::red, {40, 0, 0}, kPi), {});                          // from behind
+  expect_color(center(LightState::off, {0, 0, 0}, 0), rgb8(80, 80, 80) * fade, 1e-4f);
+  expect_color(center(LightState::unknown, {0, 0, 0}, 0), {});
+  expect_color(center(LightState::red, {40, 0, 0}, kPi), {});  // from behind
+  expect_color(center(LightState::off, {40, 0, 0}, kPi), {});
   EXPECT_GT(center(LightState::red, {10.5f, 16, 0}, atan2_of(-16, 9.5f)).r, 0.5f);     // 59 degrees off
   EXPECT_EQ(center(LightState::red, {11.0f, 16.5f, 0}, atan2_of(-16.5f, 9)).r, 0.0f);  // 61 degrees off
   // Area of the disk: a circle of 0.5 m at 20 m is 3.75 px in radius.

@@ -74,21 +74,22 @@ TEST(SceneFile, WallsAndLights) {
                       "[[wall]]\npoints_m = [[0, 1], [2, 3, 1], [4, 5]]\nheight_m = 2.5\n"
                       "[[wall]]\npoints_m = [[0, 1], [2, 3]]\nheight_m = 1\ncolor_rgb = [255, 51, 0]\n"
                       "[[light]]\nx_m = 7\ny_m = 8\nz_m = 5\nfacing_deg = -90\nstate = 'yellow'\nhalf_angle_deg = 90\n"
-                      "[[light]]\nx_m = 7\ny_m = 8\nfacing_deg = 0\nstate = 'off'\n",
+                      "[[light]]\nx_m = 7\ny_m = 8\nfacing_deg = 0\nstate = 'off'\n"
+                      "[[light]]\nx_m = 9\ny_m = 8\nfacing_deg = 0\nstate = 'unknown'\n",
                   "s.toml");
   ASSERT_EQ(scene.geometry.walls.size(), 3u);
   EXPECT_EQ(scene.geometry.walls[0].b_m.z, 1);
   EXPECT_EQ(scene.geometry.walls[1].a_m.x, 2);
   EXPECT_EQ(scene.geometry.walls[1].color.r, kWallColor.r);
   EXPECT_EQ(scene.geometry.walls[2].color.g, 0.2f);
-  ASSERT_EQ(scene.geometry.heads.size(), 2u);
-  EXPECT_EQ(scene.geometry.num_signals, 2);
+  ASSERT_EQ(scene.geometry.heads.size(), 3u);
+  EXPECT_EQ(scene.geometry.num_signals, 3);
   EXPECT_NEAR(scene.geometry.heads[0].facing.y, -1, 1e-6);
   EXPECT_NEAR(scene.geometry.heads[0].cos_half_angle, 0, 1e-6);
   EXPECT_NEAR(scene.geometry.heads[1].cos_half_angle, 0.5, 1e-6);
   EXPECT_EQ(scene.geometry.heads[1].signal, 1);
-  EXPECT_EQ(scene.scene.light_states, (std::vector{LightState::yellow, LightState::off}));
-  EXPECT_EQ(scene.scene.light_begin, (std::vector<int32_t>{0, 2}));
+  EXPECT_EQ(scene.scene.light_states, (std::vector{LightState::yellow, LightState::off, LightState::unknown}));
+  EXPECT_EQ(scene.scene.light_begin, (std::vector<int32_t>{0, 3}));
 }
 
 std::vector<Strip> line(const std::string& keys) {

@@ -62,7 +62,8 @@ Step make_step(int step) {
     }
     if (world.has_lights) {
       for (const LightState state : town.scene.light_states) {
-        result.scene.light_states.push_back(static_cast<LightState>((static_cast<int>(state) + step) % 4));
+        result.scene.light_states.push_back(
+            static_cast<LightState>((static_cast<int>(state) + step) % kNumLightStates));
       }
     }
     result.scene.end_world(world.map);

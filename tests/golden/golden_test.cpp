@@ -149,6 +149,8 @@ const std::vector<Fault>& faults() {
        [](SceneFile* s) { s->geometry.strips.back().kind = StripKind::road_edge; }},
       {"green for red", "lights", [](SceneFile* s) { s->scene.light_states[1] = LightState::green; }},
       {"a light seen from behind", "light_from_behind", [](SceneFile* s) { s->geometry.heads[0].facing = {-1, 0}; }},
+      {"a light that is off not drawn", "lights", [](SceneFile* s) { s->scene.light_states[4] = LightState::unknown; }},
+      {"an unknown light drawn", "lights", [](SceneFile* s) { s->scene.light_states[5] = LightState::off; }},
       {"half-angles ignored", "lights", [](SceneFile* s) { s->geometry.heads[3].cos_half_angle = -1; }},
       {"no floor", "taper", [](SceneFile* s) { s->config.line_floor_px = 0; }},
       {"a floor where there is none", "taper_without_floor", [](SceneFile* s) { s->config.line_floor_px = 0.35f; }},

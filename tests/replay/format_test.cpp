@@ -79,7 +79,7 @@ Replay any_replay() {
     for (int i = 0; i < replay.num_frames * replay.num_agents; ++i) track.push_back(any_number(&random));
   }
   for (int i = 0; i < replay.num_frames * replay.num_lights; ++i) {
-    replay.lights.push_back(static_cast<uint8_t>(random() % 4));
+    replay.lights.push_back(static_cast<uint8_t>(random() % kNumLightStates));
   }
   for (size_t i = 0; i < 50 * kDecisionValues; ++i) replay.decisions.push_back(any_number(&random));
   replay.scenery.lines = {{StripKind::crosswalk, {206, 131, 63}, 300, {{-100, 200, 3}, {-1100, 200, 7}, {5, 6, 8}}},

@@ -116,6 +116,11 @@ TEST_F(Observation, ControlsAreStopLinesWithStateAndWhetherTheyHoldTheEgo) {
   stage.worlds.state.lights[0] = LightState::yellow;
   look();
   EXPECT_EQ(out.controls[5], 0.5f);
+  for (const LightState state : {LightState::off, LightState::unknown}) {
+    stage.worlds.state.lights[0] = state;
+    look();
+    EXPECT_EQ(out.controls[5], 0);
+  }
   for (size_t i = kControlFeatures; i < kMaxControls * kControlFeatures; ++i) EXPECT_EQ(out.controls[i], 0);
 }
 

@@ -137,7 +137,7 @@ TEST(RecordedWorlds, RecordedLightsShowWhatWasRecordedWhereTheyAreAskedFor) {
           << light << ", " << step;
       EXPECT_EQ(is == LightState::green,
                 states[at] == RecordedLightState::go || states[at] == RecordedLightState::arrow_go);
-      EXPECT_EQ(is == LightState::off, states[at] == RecordedLightState::none);
+      EXPECT_EQ(is == LightState::unknown, states[at] == RecordedLightState::none);
       changes += step > kStart && states[at] != states[at - 1];
     }
     simulator->step(recorded(*simulator));

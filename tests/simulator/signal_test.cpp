@@ -198,7 +198,7 @@ TEST_F(RedLight, CrossingOnRedIsAnEvent) {
 }
 
 TEST_F(RedLight, OtherColoursAreNone) {
-  for (const LightState state : {LightState::green, LightState::yellow, LightState::off}) {
+  for (const LightState state : {LightState::green, LightState::yellow, LightState::off, LightState::unknown}) {
     put_bumper(99.5f, 0, 0, 10);
     EXPECT_EQ(step_with(state), kEventNone);
   }

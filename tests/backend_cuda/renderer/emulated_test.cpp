@@ -187,7 +187,7 @@ TEST(EmulatedKernels, ClipLightsOnAllSides) {
     head.facing = {-at.cos, -at.sin};
     head.signal = i;
     town.geometry.heads.push_back(head);
-    town.scene.light_states.push_back(static_cast<LightState>(1 + i % 3));
+    town.scene.light_states.push_back(static_cast<LightState>(i % 4));
   }
   town.geometry.num_signals = 300;
   town.geometry.build_grids();
