@@ -155,6 +155,7 @@ void evaluate_in_scenes(const CLI::App& command, const EvaluateArguments& argume
   const EvaluateOptions& evaluation = arguments.evaluation.evaluate;
   check_driver(evaluation, /*has_parts=*/false, /*has_scenes=*/true);
   refuse_recording_options(command, "--replay or --gallery");
+  refuse_options(command, {"--light-heads"}, "in recorded scenes, whose heads all stand beyond their line");
   SceneEvaluateOptions in_scenes;
   static_cast<DriverOptions&>(in_scenes) = evaluation;
   in_scenes.first_scene = evaluation.first_scenario;

@@ -220,7 +220,7 @@ void render_recorded_scene(const RenderArguments& arguments) {
 // A scene file says these itself.
 void refuse_world_options(const CLI::App& command) {
   refuse_options(command,
-                 {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--light-cycles",
+                 {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--light-cycles", "--light-heads",
                   "--steps", "--views", "--size", "--square-pixels", "--rig", "--line-floor", "--simulator", "--start",
                   "--recorded-lights", "--tracks"},
                  "on a scene file, which says that itself");
@@ -234,6 +234,7 @@ void add_render_command(CLI::App& app) {
   add_map_or_scene(command, &arguments->world.map, "a scene file (.toml), ");
   add_world_options(command, &arguments->world);
   add_light_cycles_option(command, &arguments->world.light_cycles, name_of(SimulatorConfig{}.light_cycles));
+  add_light_heads_option(command, &arguments->world.light_heads);
   command->add_option("--steps", arguments->steps, "Steps of random actions before the pictures")
       ->transform(whole_number(0))
       ->capture_default_str();
@@ -278,7 +279,7 @@ void add_render_command(CLI::App& app) {
     arguments->world.vector_observations = false;
     if (is_scene_name(arguments->world.map)) {
       refuse_options(*command,
-                     {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--light-cycles",
+                     {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--light-cycles", "--light-heads",
                       "--steps", "--views"},
                      "on a recorded scene, which says that itself: --start and --tracks choose of it");
       return render_recorded_scene(*arguments);

@@ -97,6 +97,7 @@ void print_simulation(const SimulationRun& run, const DrivenWorld& world, bool j
   Json object{{"backend", simulator.name()},
               {"renderer", world.renderer ? Json(world.renderer->name()) : Json(nullptr)},
               {"map", simulator.maps()[0]->road->name},
+              {"light_heads", name_of(simulator.config().light_heads)},
               {"wall_seed", simulator.config().walls ? Json(simulator.config().wall_seed) : Json(nullptr)},
               {"light_cycles", light_cycles_text(simulator.config(), *simulator.maps()[0])},
               {"asked", run.spawned.asked},

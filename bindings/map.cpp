@@ -223,12 +223,15 @@ whose they are. Ranges are half-open. lane_type uint8 [lanes] counts pictura.LAN
 predecessors; road_edges, stop_lines and building_lines float32 [n, 6] are two ends each. Lengths are metres.)")
       .def(
           "geometry",
-          [](Map& self, bool walls, uint64_t wall_seed) {
-            const auto compiled = self.compiled({walls, wall_seed, false});
+          [](Map& self, bool walls, uint64_t wall_seed, const std::string& light_heads) {
+            const auto compiled =
+                self.compiled({.walls = walls, .wall_seed = wall_seed, .light_heads = light_heads_named(light_heads)});
             return Geometry{std::shared_ptr<const StaticGeometry>(compiled, &compiled->geometry)};
           },
-          py::arg("walls") = true, py::arg("wall_seed") = 0,
-          "What renderers draw of it. walls: along the building lines, of heights drawn from wall_seed.")
+          py::arg("walls") = true, py::arg("wall_seed") = 0, py::arg("light_heads") = name_of(MapOptions{}.light_heads),
+          "What renderers draw of it. walls: along the building lines, of heights drawn from wall_seed. light_heads: "
+          "as "
+          "Simulator takes it.")
       .def(
           "draw", [](const Map& self, int width_px, int height_px) { return draw(*self.road(), width_px, height_px); },
           py::arg("width_px") = 1024, py::arg("height_px") = 1024,

@@ -742,7 +742,7 @@ void define_construction(py::class_<PySimulator>* simulator) {
                       const std::string& executor, const std::string& device, uint64_t seed, int num_threads,
                       float dt_s, int episode_steps, float reset_inactive_fraction, bool stagger_episodes,
                       float pedestrian_fraction, float cyclist_fraction, int parked_cars, bool walls,
-                      uint64_t wall_seed, bool fixed_lights, const std::string& light_cycles, bool reset_at_standstill,
+                      uint64_t wall_seed, const std::string& light_heads, bool fixed_lights, const std::string& light_cycles, bool reset_at_standstill,
                       bool forbid_reversing, bool auxiliary_observations, bool vector_observations,
                       bool wall_observations, const py::dict& conditioning, const py::object& stream) {
             SimulatorConfig config;
@@ -758,6 +758,7 @@ void define_construction(py::class_<PySimulator>* simulator) {
             config.parked_cars = parked_cars;
             config.walls = walls;
             config.wall_seed = wall_seed;
+            config.light_heads = light_heads_named(light_heads);
             config.fixed_lights = fixed_lights;
             config.light_cycles = light_cycles_named(light_cycles);
             config.dynamics = {reset_at_standstill, forbid_reversing};
@@ -774,7 +775,7 @@ void define_construction(py::class_<PySimulator>* simulator) {
           py::arg("stagger_episodes") = false, py::arg("pedestrian_fraction") = SimulatorConfig{}.pedestrian_fraction,
           py::arg("cyclist_fraction") = SimulatorConfig{}.cyclist_fraction,
           py::arg("parked_cars") = SimulatorConfig{}.parked_cars, py::arg("walls") = true, py::arg("wall_seed") = 0,
-          py::arg("fixed_lights") = false, py::arg("light_cycles") = name_of(SimulatorConfig{}.light_cycles),
+          py::arg("light_heads") = name_of(SimulatorConfig{}.light_heads), py::arg("fixed_lights") = false, py::arg("light_cycles") = name_of(SimulatorConfig{}.light_cycles),
           py::arg("reset_at_standstill") = false, py::arg("forbid_reversing") = false,
           py::arg("auxiliary_observations") = true, py::arg("vector_observations") = true,
           py::arg("wall_observations") = false, py::arg("conditioning") = py::dict(), py::arg("stream") = py::none(),
@@ -784,6 +785,7 @@ the host, 0 for all. reset_inactive_fraction: a world resets when this part of i
 stagger_episodes: the first episode of each world ends after a drawn number of steps. light_cycles: 'phases', those of a junction
 take turns, or 'independent', each light cycles alone. reset_at_standstill: accelerations end where the speed changes its sign.
 forbid_reversing: agents at rest do not begin to drive backwards.
+light_heads: 'as_mapped', or 'visible': heads beside or before their stop line stand 10 m beyond it, 3.5 m high.
 conditioning: a number or (low, high) by name, see CONDITIONING_NAMES; the paper's ranges otherwise. stream: a cudaStream_t
 as int; None: the legacy default stream. The other defaults are the paper's training world.
 Raises pictura.UsageError naming what cannot be simulated, pictura.Error where there is no device.)")

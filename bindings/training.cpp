@@ -161,6 +161,7 @@ py::dict dict_of(const SimulatorConfig& config) {
   d["parked_cars"] = config.parked_cars;
   d["walls"] = config.walls;
   d["wall_seed"] = config.wall_seed;
+  d["light_heads"] = name_of(config.light_heads);
   d["fixed_lights"] = config.fixed_lights;
   d["light_cycles"] = name_of(config.light_cycles);
   d["reset_at_standstill"] = config.dynamics.reset_at_standstill;

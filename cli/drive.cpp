@@ -59,6 +59,16 @@ void add_light_cycles_option(CLI::App* command, std::string* name_out, const std
       ->check(one_of(names));
 }
 
+void add_light_heads_option(CLI::App* command, std::optional<LightHeads>* heads_out) {
+  command
+      ->add_option_function<std::string>(
+          "--light-heads", [heads_out](const std::string& name) { *heads_out = light_heads_named(name); },
+          fmt::format("Where heads of lights stand: as_mapped, or visible: those beside or before their stop line {} m "
+                      "beyond it; default: {}, or, with a trained policy, what it was trained with",
+                      kVisibleHeadAhead_m, name_of(SimulatorConfig{}.light_heads)))
+      ->check(one_of({kLightHeadsNames.begin(), kLightHeadsNames.end()}));
+}
+
 void add_scene_options(CLI::App* command, WorldOptions* options_out) {
   command->add_option("--start", options_out->start_step, "The step of a recorded scene to start at")
       ->transform(whole_number(0, kMaxScenarioSteps - 1))
@@ -86,6 +96,7 @@ void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_
   add_light_cycles_option(
       command, &world_out->light_cycles,
       fmt::format("{}, or, with a trained policy, as it was trained", name_of(SimulatorConfig{}.light_cycles)));
+  add_light_heads_option(command, &world_out->light_heads);
   command
       ->add_option("--control", world_out->controlled,
                    "Of a recorded scene, which tracks --policy drives: self, vehicles (the others), others (who is no "
@@ -196,6 +207,7 @@ DrivenWorld make_world(const WorldOptions& options, const std::string& policy, c
   config.seed = options.seed;
   config.num_threads = options.num_threads;
   config.walls = config.walls && options.walls;
+  config.light_heads = options.light_heads.value_or(config.light_heads);
   config.fixed_lights = true;
   if (!options.light_cycles.empty()) config.light_cycles = light_cycles_named(options.light_cycles);
   set_population(options, &config);

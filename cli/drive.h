@@ -28,6 +28,7 @@ struct WorldOptions {
   std::optional<float> pedestrian_fraction, cyclist_fraction;
   std::optional<int> parked_cars;
   std::string light_cycles;  // a name of kLightCyclesNames
+  std::optional<LightHeads> light_heads;
   // Of recorded scenes: which tracks the policy drives, where the recording starts, and whether its lights are there.
   // An episode is as long as what is left of the recording, or as so many steps.
   std::string controlled = "self";
@@ -42,6 +43,9 @@ void add_world_options(CLI::App* command, WorldOptions* options_out);
 /// Adds --light-cycles. `otherwise` says what holds where it is not given.
 void add_light_cycles_option(CLI::App* command, std::string* name_out, const std::string& otherwise);
 
+/// Adds --light-heads, for commands whose worlds are seen by cameras.
+void add_light_heads_option(CLI::App* command, std::optional<LightHeads>* heads_out);
+
 /// Adds what chooses of a recorded scene: --start and --recorded-lights.
 void add_scene_options(CLI::App* command, WorldOptions* options_out);
 /// Throws UsageError where one of these, or of `more` options of recorded scenes, was given for another map.
@@ -50,7 +54,7 @@ void refuse_scene_options(const CLI::App& command, const std::string& map, std::
 /// Throws UsageError where one of these options was given; `why` says where it would have no effect.
 void refuse_options(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why);
 
-/// Adds MAP, which may be a recorded scene, those options, --light-cycles, --control, --start, --steps, --policy and
+/// Adds MAP, which may be a recorded scene, those options, --light-cycles, --light-heads, --control, --start, --steps, --policy and
 /// where the policy runs.
 void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_out, std::string* policy_out,
                          BackendOptions* backends_out);

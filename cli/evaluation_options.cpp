@@ -29,6 +29,7 @@ CLI::Option* add_evaluation_options(CLI::App* command, EvaluationArguments* argu
                    "[evaluate.conditioning]; may be given many times")
       ->allow_extra_args(false);
   add_light_cycles_option(command, &options.light_cycles, "as the policy was trained");
+  add_light_heads_option(command, &options.light_heads);
   add_threads_option(command, &options.num_threads);
   return sampled;
 }
@@ -79,6 +80,7 @@ Json driver_json(const DriverOptions& options, const EvaluationSetting& setting)
           {"policy_hash", setting.policy_hash},
           {"argmax", setting.argmax},
           {"seed", setting.seed},
+          {"light_heads", setting.light_heads},
           {"device", setting.device},
           {"precision", setting.precision}};
 }

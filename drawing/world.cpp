@@ -307,6 +307,9 @@ RgbImage WorldPainter::draw(const WorldFrame& frame, const TopCamera& camera) {
   PICTURA_CHECK(frame.lights.empty() || frame.lights.size() == impl_->map.lights.size(),
                 "picture of a world: expected the states of {} lights, got {}", impl_->map.lights.size(),
                 frame.lights.size());
+  PICTURA_CHECK(frame.heads.empty() || frame.heads.size() == impl_->map.lights.size(),
+                "picture of a world: expected the heads of {} lights, got {}", impl_->map.lights.size(),
+                frame.heads.size());
   PICTURA_CHECK(frame.halt_reason.empty() || (frame.halt_reason.size() == frame.agents.size() && !frame.status.empty()),
                 "picture of a world: expected status and halt reason of {} agents, got {} and {}", frame.agents.size(),
                 frame.status.size(), frame.halt_reason.size());
@@ -320,7 +323,9 @@ RgbImage WorldPainter::draw(const WorldFrame& frame, const TopCamera& camera) {
   const Eigen::Affine2d map_to_pixels = to_pixels(left_top, camera.px_per_m);
   const auto pixel_at = [&](auto position_m) -> Vector2d { return map_to_pixels * in_plan(position_m); };
   for (size_t i = 0; i < frame.lights.size(); ++i) {
-    paint_light(canvas, impl_->map.lights[i], left_top, camera.px_per_m, lamp_color(frame.lights[i]));
+    TrafficLight light = impl_->map.lights[i];
+    if (!frame.heads.empty()) light.head_m = frame.heads[i].position_m;
+    paint_light(canvas, light, left_top, camera.px_per_m, lamp_color(frame.lights[i]));
   }
 
   if (frame.recorded_step >= 0) {
@@ -377,6 +382,8 @@ RgbImage draw_world(WorldPainter& painter, Simulator& simulator, int world, int 
   WorldFrame frame;
   frame.agents = range(scene.world_begin, scene.agents);
   frame.lights = range(scene.light_begin, scene.light_states);
+  const int map = simulator.worlds()[static_cast<size_t>(world)].map;
+  frame.heads = simulator.maps()[static_cast<size_t>(map)]->geometry.heads;
   std::vector<uint8_t> status(frame.agents.size(), static_cast<uint8_t>(AgentStatus::parked));
   std::copy_n(state.status + first_slot, std::min(num_slots, status.size()), status.begin());
   frame.status = status;

@@ -37,6 +37,7 @@ struct WorldMark {
 struct WorldFrame {
   Span<const AgentBox> agents;      // of this world
   Span<const LightState> lights;    // [map.lights]
+  Span<const LightHead> heads;      // [map.lights] where heads stand, or empty: as mapped
   Span<const uint8_t> status;       // [agents] AgentStatus, or empty: all active
   Span<const uint8_t> halt_reason;  // [agents] Event bits: a ring in the colour of the reason, and a legend that counts
   Span<const AgentGoal> goals;      // a thin line leads to each

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "pictura/common/rng.h"
+#include "pictura/common/support/suggestion.h"
 #include "pictura/map/painted_lines.h"
 
 namespace pictura {
@@ -60,6 +61,34 @@ void append_road_edges(const std::vector<RoadEdge>& edges, std::vector<Strip>* s
   flush();
 }
 
+/// Height of the road of the light's lanes where they pass `at_m`, or of its stop line if they are nowhere nearer.
+float road_height_m(const RoadMap& map, const TrafficLight& light, Vec2 at_m) {
+  Vec3 nearest = (light.stop_a_m + light.stop_b_m) * 0.5f;
+  const auto apart_m = [at_m](Vec3 p) { return length(p.xy() - at_m); };
+  for (int32_t i = light.lanes.begin; i < light.lanes.end; ++i) {
+    const Lane& lane = map.lanes[static_cast<size_t>(map.light_lanes[static_cast<size_t>(i)])];
+    const Span<const LanePoint> points = map.points_of(lane);
+    for (size_t k = 1; k < points.size(); ++k) {
+      const Vec3 a = points[k - 1].position_m, piece = points[k].position_m - a;
+      const float length2_m2 = dot(piece.xy(), piece.xy());
+      const float fraction = length2_m2 > 0 ? std::clamp(dot(at_m - a.xy(), piece.xy()) / length2_m2, 0.0f, 1.0f) : 0;
+      const Vec3 p = a + piece * fraction;
+      if (apart_m(p) < apart_m(nearest)) nearest = p;
+    }
+  }
+  return nearest.z;
+}
+
+Vec3 head_position(const RoadMap& map, const TrafficLight& light, LightHeads heads) {
+  if (heads == LightHeads::as_mapped) return light.head_m;
+  const SinCos direction = sincos_of(light.stop_heading_rad);
+  const Vec2 forward{direction.cos, direction.sin}, middle = (light.stop_a_m.xy() + light.stop_b_m.xy()) * 0.5f;
+  const float ahead_m = dot(light.head_m.xy() - middle, forward);
+  if (ahead_m >= kVisibleHeadAhead_m) return light.head_m;
+  const Vec2 at = light.head_m.xy() + forward * (kVisibleHeadAhead_m - ahead_m);
+  return {at.x, at.y, road_height_m(map, light, at) + kVisibleHeadHeight_m};
+}
+
 /// Removes duplicate strips: overlapping roads of a junction may repeat a crosswalk. painted_lines() has already
 /// removed duplicate lane marks.
 void remove_duplicates(std::vector<Strip>* strips_inout) {
@@ -89,6 +118,12 @@ void remove_duplicates(std::vector<Strip>* strips_inout) {
 
 }  // namespace
 
+LightHeads light_heads_named(const std::string& name) {
+  return static_cast<LightHeads>(index_of_word("light_heads", name, kLightHeadsNames));
+}
+
+std::string name_of(LightHeads heads) { return kLightHeadsNames[static_cast<size_t>(heads)]; }
+
 StaticGeometry make_static_geometry(const RoadMap& map, const MapGeometryOptions& options) {
   StaticGeometry geometry;
   const std::vector<PaintedLine> lines = painted_lines(map);
@@ -111,8 +146,8 @@ StaticGeometry make_static_geometry(const RoadMap& map, const MapGeometryOptions
     const TrafficLight& light = map.lights[i];
     const std::array<Vec3, 2> stop_line{light.stop_a_m, light.stop_b_m};
     append_strips(stop_line, kStopLineWidth_m, kStopLineColor, StripKind::stop_line, &geometry.strips);
-    geometry.heads.push_back(
-        {light.head_m, light.head_facing, cos_of(options.light_half_angle_rad), static_cast<int32_t>(i)});
+    geometry.heads.push_back({head_position(map, light, options.light_heads), light.head_facing,
+                              cos_of(options.light_half_angle_rad), static_cast<int32_t>(i)});
   }
   remove_duplicates(&geometry.strips);
   if (options.walls) geometry.walls = make_walls(map, options);

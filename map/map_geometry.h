@@ -1,15 +1,32 @@
 // The StaticGeometry of a RoadMap: markings, edges, crosswalks, stop lines, walls and light heads.
 #pragma once
 
+#include <array>
+#include <string>
+
+#include "pictura/common/error.h"
 #include "pictura/common/scene.h"
 #include "pictura/map/road_map.h"
 
 namespace pictura {
 
+/// Where the heads of lights stand. `as_mapped`: where the map has them. `visible`: a head less than
+/// kVisibleHeadAhead_m beyond the middle of its stop line, or before it, is moved along the line's traffic until it is
+/// so far beyond it, and stands kVisibleHeadHeight_m above the road of its lanes there. It keeps its side of the lanes
+/// and its facing. So cameras of a vehicle that waits at the line see it.
+enum class LightHeads : uint8_t { as_mapped, visible };
+constexpr std::array<const char*, 2> kLightHeadsNames{"as_mapped", "visible"};
+constexpr float kVisibleHeadAhead_m = 10.0f, kVisibleHeadHeight_m = 3.5f;
+
+/// Throws UsageError listing the names if `name` is none.
+LightHeads light_heads_named(const std::string& name);
+std::string name_of(LightHeads heads);
+
 struct MapGeometryOptions {
   bool walls = true;                        // draw walls along the building lines
   uint64_t wall_seed = 0;                   // selects the pieces of building lines that get walls
   float light_half_angle_rad = kPi / 3.0f;  // half of the angle within which a head is visible (60 degrees)
+  LightHeads light_heads = LightHeads::as_mapped;
 };
 
 /// The map's static geometry; signal i of a head is map.lights[i].

@@ -73,11 +73,11 @@ std::vector<ReplayShape> map_shapes(const CompiledMap& map) {
   }
   append_lines(ShapeKind::road_edge, road.road_edges, &shapes);
   append_lines(ShapeKind::wall, map.geometry.walls, &shapes);
-  for (const TrafficLight& light : road.lights) {
+  for (const LightHead& head : map.geometry.heads) {
+    const TrafficLight& light = road.lights[static_cast<size_t>(head.signal)];
     ReplayShape shape = line(ShapeKind::light, light.stop_a_m, light.stop_b_m);
-    const Vec2 head = light.head_m.xy();
-    shape.points_cm.push_back(point_of(head));
-    shape.points_cm.push_back(point_of(head + light.head_facing));
+    shape.points_cm.push_back(point_of(head.position_m.xy()));
+    shape.points_cm.push_back(point_of(head.position_m.xy() + head.facing));
     shapes.push_back(std::move(shape));
   }
   return shapes;

@@ -2,7 +2,6 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/parallel_for.h"
-#include "pictura/map/map_geometry.h"
 #include "pictura/simulator/hash_values.h"
 #include "pictura/simulator/simulator.h"
 
@@ -64,7 +63,8 @@ std::shared_ptr<CompiledMap> compile_map(std::shared_ptr<const RoadMap> road, co
                                          MapRecord record) {
   if (!road) fail_usage("simulator: expected maps, got a null pointer");
   auto map = std::make_shared<CompiledMap>();
-  const MapGeometryOptions geometry_options{.walls = options.walls, .wall_seed = options.wall_seed};
+  const MapGeometryOptions geometry_options{
+      .walls = options.walls, .wall_seed = options.wall_seed, .light_heads = options.light_heads};
   const std::vector<WallFace> walls = options.walls ? make_walls(*road, geometry_options) : std::vector<WallFace>{};
   map->fingerprint = record.agents.empty() ? fingerprint_of(*road) : fingerprint_of(*road, record);
   map->rules = make_map_rules(*road, walls, options.observe_walls, std::move(record), options.observed_span_m);
@@ -85,7 +85,7 @@ std::vector<std::shared_ptr<const CompiledMap>> compile_maps(const std::vector<s
 }
 
 MapOptions map_options(const SimulatorConfig& config) {
-  return {config.walls, config.wall_seed, config.observes(ObservationPart::walls)};
+  return {config.walls, config.wall_seed, config.light_heads, config.observes(ObservationPart::walls)};
 }
 
 }  // namespace pictura

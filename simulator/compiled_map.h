@@ -6,6 +6,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/scene.h"
+#include "pictura/map/map_geometry.h"
 #include "pictura/map/road_map.h"
 #include "pictura/simulator/map_rules.h"
 
@@ -17,6 +18,7 @@ struct SimulatorConfig;
 struct MapOptions {
   bool walls = true;  // along the building lines
   uint64_t wall_seed = 0;
+  LightHeads light_heads = LightHeads::as_mapped;
   bool observe_walls = false;    // rules.near_wall_pieces is made
   bool recorded_lights = false;  // those of a recorded scene are there, see compile_scenario()
   // How long observed pieces of lanes and boundaries are. 0: at most 10 m, and they follow curves within 0.25 m, as in

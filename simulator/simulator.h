@@ -46,6 +46,7 @@ struct SimulatorConfig {
   int parked_cars = 32;                                       // per episode and world
   bool walls = true;
   uint64_t wall_seed = 0;
+  LightHeads light_heads = LightHeads::as_mapped;  // where heads of lights are drawn; no rule reads it
   bool fixed_lights = false;  // evaluation: 10/3/2 s; else timings are drawn per episode
   LightCycles light_cycles = LightCycles::phases;
   DynamicsRules dynamics{};

@@ -54,6 +54,10 @@ void check(const SimulatorConfig& config, const CompiledMaps& maps, const std::v
       fail_usage("simulator: map {}: expected one compiled with walls {}, wall seed {}; got walls {}, wall seed {}",
                  map->road->name, expected.walls, expected.wall_seed, map->options.walls, map->options.wall_seed);
     }
+    if (map->options.light_heads != expected.light_heads) {
+      fail_usage("simulator: map {}: expected one compiled with light heads {}, got {}", map->road->name,
+                 name_of(expected.light_heads), name_of(map->options.light_heads));
+    }
     if (expected.observe_walls && !map->options.observe_walls) {
       fail_usage("simulator: map {}: expected one compiled with observe_walls, since walls are observed",
                  map->road->name);

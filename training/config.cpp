@@ -36,6 +36,8 @@ const Choices<Schedule> kSchedules{
 const Choices<OptimizerKind> kOptimizers{{"adamw", OptimizerKind::adamw}, {"muon", OptimizerKind::muon}};
 const Choices<LightCycles> kLightCycles{{name_of(LightCycles::phases), LightCycles::phases},
                                         {name_of(LightCycles::independent), LightCycles::independent}};
+const Choices<LightHeads> kLightHeads{{name_of(LightHeads::as_mapped), LightHeads::as_mapped},
+                                      {name_of(LightHeads::visible), LightHeads::visible}};
 const Choices<HaltedSlots> kHaltedSlots{{"skip", HaltedSlots::skip}, {"draw", HaltedSlots::draw}};
 
 constexpr const char* kDevices = "cpu, cuda, cuda:N, auto";
@@ -64,6 +66,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.choice("simulator.light_cycles", c.simulator.light_cycles, kLightCycles);
   v.flag("simulator.walls", c.simulator.walls);
   v.integer("simulator.wall_seed", c.simulator.wall_seed, 0, std::numeric_limits<int64_t>::max());
+  v.choice("simulator.light_heads", c.simulator.light_heads, kLightHeads);
   v.flag("simulator.wall_observations", c.simulator.wall_observations);
   v.flag("simulator.dynamics.reset_at_standstill", c.simulator.dynamics.reset_at_standstill);
   v.flag("simulator.dynamics.forbid_reversing", c.simulator.dynamics.forbid_reversing);
@@ -962,6 +965,7 @@ SimulatorConfig simulator_config(const Config& config, Device device) {
   result.dynamics = config.simulator.dynamics;
   result.walls = config.simulator.walls;
   result.wall_seed = config.simulator.wall_seed;
+  result.light_heads = config.simulator.light_heads;
   result.auxiliary_observations = config.policy.modality == Modality::vector && config.policy.auxiliary;
   result.vector_observations = config.policy.modality == Modality::vector;
   result.wall_observations = config.simulator.wall_observations;

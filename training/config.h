@@ -50,6 +50,7 @@ struct Config {
     LightCycles light_cycles = LightCycles::phases;
     bool walls = true;
     uint64_t wall_seed = 0;
+    LightHeads light_heads = LightHeads::as_mapped;
     bool wall_observations = false;  // the vector policy also reads the set of walls
     DynamicsRules dynamics;          // [simulator.dynamics]
     /// Training distributions: [simulator.conditioning] NAME = [low, high]; see simulator/conditioning.h for the names.

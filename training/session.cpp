@@ -26,6 +26,7 @@ Config adapted(const Config& trained, const SessionOptions& options) {
   config.run.device = options.device;
   config.simulator.backend = options.simulator;
   config.simulator.walls |= options.adds_walls;
+  config.simulator.light_heads = options.light_heads.value_or(config.simulator.light_heads);
   if (!options.backbone.empty()) config.policy.backbone = options.backbone;
   std::string& renderer = config.render.backend;
   if (!options.renderer.empty())

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "pictura/common/renderer.h"
@@ -26,9 +27,10 @@ struct SessionOptions {
   std::string backbone;  // where the program of policy.backbone lies now; empty: where it did
   // Of [evaluate.conditioning], in place of the policy's own: "name=value".
   std::vector<std::string> conditioning;
-  bool adds_walls = false;   // its worlds have walls, also where it was trained without
-  bool average = false;      // drives with the average of weights that a checkpoint holds (train.weight_average)
-  std::string light_cycles;  // of its worlds, by their names in a configuration; empty: as the policy was trained
+  bool adds_walls = false;                // its worlds have walls, also where it was trained without
+  bool average = false;                   // drives with the average of weights that a checkpoint holds
+  std::string light_cycles;               // of its worlds, by their names; empty: as the policy was trained
+  std::optional<LightHeads> light_heads;  // of its worlds; without a value as it was trained
 };
 
 /// What a batch of agents sees, in the memory of the session's device.

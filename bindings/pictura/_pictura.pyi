@@ -142,9 +142,9 @@ class Map:
         """
         A picture from above, uint8 [height, width, 3], north up. Sizes of 16 to 8192 px.
         """
-    def geometry(self, walls: bool = True, wall_seed: typing.SupportsInt | typing.SupportsIndex = 0) -> Geometry:
+    def geometry(self, walls: bool = True, wall_seed: typing.SupportsInt | typing.SupportsIndex = 0, light_heads: str = 'as_mapped') -> Geometry:
         """
-        What renderers draw of it. walls: along the building lines, of heights drawn from wall_seed.
+        What renderers draw of it. walls: along the building lines, of heights drawn from wall_seed. light_heads: as Simulator takes it.
         """
     @property
     def facts(self) -> dict:
@@ -673,7 +673,7 @@ class Simulator:
     One thread at a time; several simulators are independent. The GIL is released while C++ works. On CUDA its work is put on
     `stream`, calls return before it is done, and what is wrong with values is raised by check() or a later call.
     """
-    def __init__(self, maps: collections.abc.Sequence[Map], worlds: collections.abc.Sequence, *, executor: str = 'auto', device: str = 'cpu', seed: typing.SupportsInt | typing.SupportsIndex = 0, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, dt_s: typing.SupportsFloat | typing.SupportsIndex = 0.10000000149011612, episode_steps: typing.SupportsInt | typing.SupportsIndex = 1280, reset_inactive_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.4000000059604645, stagger_episodes: bool = False, pedestrian_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.10000000149011612, cyclist_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.10000000149011612, parked_cars: typing.SupportsInt | typing.SupportsIndex = 32, walls: bool = True, wall_seed: typing.SupportsInt | typing.SupportsIndex = 0, fixed_lights: bool = False, light_cycles: str = 'phases', reset_at_standstill: bool = False, forbid_reversing: bool = False, auxiliary_observations: bool = True, vector_observations: bool = True, wall_observations: bool = False, conditioning: dict = {}, stream: typing.Any = None) -> None:
+    def __init__(self, maps: collections.abc.Sequence[Map], worlds: collections.abc.Sequence, *, executor: str = 'auto', device: str = 'cpu', seed: typing.SupportsInt | typing.SupportsIndex = 0, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, dt_s: typing.SupportsFloat | typing.SupportsIndex = 0.10000000149011612, episode_steps: typing.SupportsInt | typing.SupportsIndex = 1280, reset_inactive_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.4000000059604645, stagger_episodes: bool = False, pedestrian_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.10000000149011612, cyclist_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.10000000149011612, parked_cars: typing.SupportsInt | typing.SupportsIndex = 32, walls: bool = True, wall_seed: typing.SupportsInt | typing.SupportsIndex = 0, light_heads: str = 'as_mapped', fixed_lights: bool = False, light_cycles: str = 'phases', reset_at_standstill: bool = False, forbid_reversing: bool = False, auxiliary_observations: bool = True, vector_observations: bool = True, wall_observations: bool = False, conditioning: dict = {}, stream: typing.Any = None) -> None:
         """
         maps: of pictura.Map. worlds: of (index of the map, agents), or (map, agents, global world), which keys the
         world's random numbers. executor: 'cpu', 'cuda' or 'auto'. device: where observations and scenes are wanted. num_threads: of
@@ -681,6 +681,7 @@ class Simulator:
         stagger_episodes: the first episode of each world ends after a drawn number of steps. light_cycles: 'phases', those of a junction
         take turns, or 'independent', each light cycles alone. reset_at_standstill: accelerations end where the speed changes its sign.
         forbid_reversing: agents at rest do not begin to drive backwards.
+        light_heads: 'as_mapped', or 'visible': heads beside or before their stop line stand 10 m beyond it, 3.5 m high.
         conditioning: a number or (low, high) by name, see CONDITIONING_NAMES; the paper's ranges otherwise. stream: a cudaStream_t
         as int; None: the legacy default stream. The other defaults are the paper's training world.
         Raises pictura.UsageError naming what cannot be simulated, pictura.Error where there is no device.

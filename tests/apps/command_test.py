@@ -1300,11 +1300,13 @@ class Training(CommandCase):
     def test_a_policy_is_driven_in_the_world_that_it_was_trained_in(self):
         out = self.folder / "run"
         self.json_of("train", *TINY, "--set", "train.updates=1", "--set", "simulator.walls=true",
-                     "--set", "simulator.wall_seed=9", "--set", "simulator.parked_cars=2", "--out", out)  # fmt: skip
+                     "--set", "simulator.wall_seed=9", "--set", "simulator.parked_cars=2",
+                     "--set", "simulator.light_heads=visible", "--out", out)  # fmt: skip
         drive = ["simulate", "procedural:1", "--agents", 4, "--steps", 5, "--policy", out / "checkpoint.ckpt"]
         driven = self.json_of(*drive)
-        self.assertEqual((driven["wall_seed"], driven["parked_asked"], driven["light_cycles"]), (9, 2, "phases"))
+        self.assertEqual((driven["wall_seed"], driven["parked_asked"], driven["light_cycles"], driven["light_heads"]), (9, 2, "phases", "visible"))
         self.assertEqual(self.json_of(*drive, "--light-cycles", "independent")["light_cycles"], "independent")
+        self.assertEqual(self.json_of(*drive, "--light-heads", "as_mapped")["light_heads"], "as_mapped")
         self.assertEqual(self.json_of(*drive, "--no-walls")["wall_seed"], None)
         self.assertEqual(self.json_of(*drive, "--renderer", "null")["renderer"], "null")
         if shutil.which("ffmpeg"):

@@ -267,8 +267,16 @@ TEST(WorldPainter, LightsShowTheirState) {
   EXPECT_EQ(head(LightState::red), (Pixel{255, 0, 0}));
   EXPECT_EQ(head(LightState::yellow), (Pixel{255, 200, 0}));
   EXPECT_EQ(head(LightState::green), (Pixel{0, 255, 0}));
-  EXPECT_EQ(head(LightState::off).r, head(LightState::off).r);
+  EXPECT_EQ(head(LightState::off), head(LightState::unknown));
   EXPECT_LT(head(LightState::off).g, 100);
+  const LightHead moved{.position_m = {508, 400, 5}, .facing = {-1, 0}};
+  WorldFrame frame_of_moved;
+  const LightState red = LightState::red;
+  frame_of_moved.lights = {&red, 1};
+  frame_of_moved.heads = {&moved, 1};
+  const RgbImage image = painter.draw(frame_of_moved, painter.around({500, 400}, 40));
+  EXPECT_EQ(at(image, 280, 150), (Pixel{255, 0, 0}));
+  EXPECT_NE(at(image, 250, 150), (Pixel{255, 0, 0}));
   const std::vector<LightState> two(2);
   WorldFrame frame;
   frame.lights = two;

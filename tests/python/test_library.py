@@ -24,6 +24,9 @@ def test_a_map_has_facts_geometry_and_a_picture(town):
     np.testing.assert_allclose(np.diff(points[:, 5]), steps, rtol=0.02)
     assert town.geometry().num_strips > 1000
     assert town.geometry(walls=False).num_walls == 0 < town.geometry().num_walls
+    assert town.geometry(light_heads="visible").num_lights == facts["traffic_lights"]
+    with pytest.raises(pictura.UsageError, match="as_mapped"):
+        town.geometry(light_heads="seen")
     picture = town.draw(200, 150)
     assert picture.shape == (150, 200, 3) and len(np.unique(picture)) > 10
 

@@ -19,7 +19,7 @@ inline std::string missing(const std::string& map) {
 }
 
 /// Names tests by their map.
-inline std::string map_name(const testing::TestParamInfo<const char*>& map) {
+inline std::string map_name(const ::testing::TestParamInfo<const char*>& map) {
   std::string name = map.param;
   std::replace(name.begin(), name.end(), ':', '_');
   return name;

@@ -340,6 +340,9 @@ TEST(Config, DifferencesThatChangeTheRunAreNamed) {
   b = a;
   b.simulator.wall_seed = 3;
   EXPECT_THAT(first_difference(a, b), HasSubstr("simulator.wall_seed"));
+  b = a;
+  b.simulator.light_heads = LightHeads::visible;
+  EXPECT_EQ(first_difference(a, b), "simulator.light_heads: 'as_mapped' became 'visible'");
 }
 
 TEST(Config, HarmlessDifferencesAreNone) {

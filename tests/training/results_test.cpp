@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/json.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 
@@ -149,6 +150,9 @@ TEST(Results, PartsThatDoNotFitAreRefusedByName) {
   EvaluationResults lit = part(2, {counts(4, 1, 10)});
   lit.setting.light_cycles = LightCycles::independent;
   EXPECT_THAT(merged_message(first, lit), HasSubstr("b.json: light_cycles is \"independent\", in a.json \"phases\""));
+  EvaluationResults moved = part(2, {counts(4, 1, 10)});
+  moved.setting.light_heads = "visible";
+  EXPECT_THAT(merged_message(first, moved), HasSubstr("b.json: light_heads is \"visible\", in a.json \"as_mapped\""));
   EvaluationResults crowd = part(2, {counts(4, 1, 10)});
   crowd.densities[0].agents_per_world = 9;
   EXPECT_THAT(merged_message(first, crowd), HasSubstr("has 9 agents a world, a.json has 8"));
@@ -171,6 +175,19 @@ TEST(Results, FilesSayTheLightCyclesAndThoseOfBeforeHavePhases) {
   write_file(path, with("\"light_cycles\": \"alone\""));
   EXPECT_THAT(message_of([&] { read_results(path); }),
               AllOf(HasSubstr("x.json"), HasSubstr("expected phases, independent, got 'alone'")));
+}
+
+TEST(Results, FilesBeforeLightHeadsCouldMoveAreRead) {
+  test::ScratchFolder folder;
+  const std::string path = folder / "x.json";
+  EvaluationResults moved = part(0, {counts(4, 1, 10)});
+  moved.setting.light_heads = "visible";
+  write_results(path, moved);
+  EXPECT_EQ(read_results(path).setting.light_heads, "visible");
+  Json json = Json::parse(read_file(path));
+  ASSERT_EQ(json.at("setting").erase("light_heads"), 1u);
+  write_file(path, json.dump());
+  EXPECT_EQ(read_results(path).setting.light_heads, "as_mapped");
 }
 
 TEST(Results, OtherFilesAreRefusedByName) {

@@ -138,6 +138,7 @@ EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& op
   setting.steps = options.steps;
   setting.argmax = options.argmax;
   setting.seed = options.seed;
+  setting.light_heads = name_of(maps.front()->options.light_heads);
   for (const DensityOf& density : densities) {
     DensityResult result{density.name, density.agents, options.first_scenario, {}};
     result.scenarios.resize(static_cast<size_t>(options.scenarios));

@@ -35,7 +35,8 @@ SessionOptions session_options(const DriverOptions& options) {
           .conditioning = options.conditioning,
           .adds_walls = options.adds_walls,
           .average = options.average,
-          .light_cycles = options.light_cycles};
+          .light_cycles = options.light_cycles,
+          .light_heads = options.light_heads};
 }
 
 EvaluatedDriver policy_driver(PolicySession* session, Renderer* renderer, const DriverOptions& options, int steps) {
@@ -57,6 +58,7 @@ EvaluatedDriver controller_driver(const DriverOptions& options, int steps) {
   config.run.device = options.device;
   config.simulator.backend = options.simulator;
   config.simulator.walls |= options.adds_walls;
+  config.simulator.light_heads = options.light_heads.value_or(config.simulator.light_heads);
   const std::string& name = options.controller;
   const bool is_on_host = drives_on_host(name);
   if (is_on_host && options.device == "auto" && options.simulator == "auto") config.run.device = "cpu";

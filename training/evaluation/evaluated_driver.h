@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,7 @@ struct DriverOptions {
   bool adds_walls = false;                // as in SessionOptions
   bool average = false;                   // as in SessionOptions
   std::string light_cycles;               // as in SessionOptions
+  std::optional<LightHeads> light_heads;  // as in SessionOptions
 };
 
 /// With which the checkpoint's policy is opened.

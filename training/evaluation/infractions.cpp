@@ -145,6 +145,7 @@ struct InfractionObserver::WorldStep {
   const WorldSpec& spec;
   const RoadMap& map;
   const std::vector<StopLine>& stop_lines;  // of the map's lights
+  const std::vector<LightHead>& heads;      // likewise
   const Frame &before, &after;
   size_t first_slot, num_agents, first_box, num_boxes, first_light;
 
@@ -152,6 +153,7 @@ struct InfractionObserver::WorldStep {
       : spec(simulator.worlds()[world]),
         map(*simulator.maps()[static_cast<size_t>(spec.map)]->road),
         stop_lines(simulator.maps()[static_cast<size_t>(spec.map)]->rules.stop_lines),
+        heads(simulator.maps()[static_cast<size_t>(spec.map)]->geometry.heads),
         before(before_step),
         after(after_step),
         first_slot(static_cast<size_t>(after.slot_begin[world])),
@@ -279,7 +281,7 @@ Infraction InfractionObserver::describe(const WorldStep& step, size_t agent) con
   const int since = red_since_step_[step.first_light + static_cast<size_t>(light)];
   one.red_for_s = since > 0 ? static_cast<float>(step_ - since) * dt_s
                             : (since < 0 ? 0.0f : std::numeric_limits<float>::infinity());
-  const Vec3 head_m = step.map.lights[static_cast<size_t>(light)].head_m;
+  const Vec3 head_m = step.heads[static_cast<size_t>(light)].position_m;
   one.stop_line_to_head_m = length((head_m - step.stop_lines[static_cast<size_t>(light)].middle_m).xy());
   return one;
 }

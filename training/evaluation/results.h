@@ -44,6 +44,7 @@ struct EvaluationSetting {
   std::string precision, device;                        // of the network; "cpu" or "cuda"
   std::string renderer, samples;                        // empty for policies without images
   std::vector<std::string> image_sizes;                 // "96x54", of each camera
+  std::string light_heads = "as_mapped";                // see map/map_geometry.h; files without it have this one
   std::array<double, kNumConditioning> conditioning{};  // of every agent, in the order of simulator/conditioning.h
   LightCycles light_cycles = LightCycles::phases;
   friend bool operator==(const EvaluationSetting&, const EvaluationSetting&) = default;

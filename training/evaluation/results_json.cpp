@@ -28,7 +28,8 @@ Json to_json(const EvaluationSetting& s) {
           {"samples", s.samples},
           {"image_sizes", s.image_sizes},
           {"conditioning", conditioning},
-          {"light_cycles", name_of(s.light_cycles)}};
+          {"light_cycles", name_of(s.light_cycles)},
+          {"light_heads", s.light_heads}};
 }
 
 EvaluationSetting setting_from(const Json& json) {
@@ -43,6 +44,7 @@ EvaluationSetting setting_from(const Json& json) {
   json.at("renderer").get_to(s.renderer);
   json.at("samples").get_to(s.samples);
   json.at("image_sizes").get_to(s.image_sizes);
+  s.light_heads = json.value("light_heads", s.light_heads);
   for (size_t i = 0; i < kNumConditioning; ++i) {
     json.at("conditioning").at(kConditioningNames[i]).get_to(s.conditioning[i]);
   }

@@ -100,6 +100,7 @@ void add_setting(const ProbeResults& results, Json* json_out) {
   json["driver"] = results.controller.empty() ? "policies" : results.controller;
   json["argmax"] = setting.argmax;
   json["seed"] = setting.seed;
+  json["light_heads"] = setting.light_heads;
   json["device"] = setting.device;
   json["precision"] = setting.precision;
   for (size_t i = 0; i < kNumConditioning; ++i) json["conditioning"][kConditioningNames[i]] = setting.conditioning[i];

@@ -343,6 +343,7 @@ void ProbeRun::drive_by_controller() {
   results_.setting.steps = driven.steps;
   results_.setting.argmax = driven.argmax;
   results_.setting.seed = driven.seed;
+  results_.setting.light_heads = driven.light_heads;
 }
 
 void ProbeRun::ask(const ProbeFrame& frame, Span<const ProbePair> pairs) {
