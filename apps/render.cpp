@@ -220,9 +220,9 @@ void render_recorded_scene(const RenderArguments& arguments) {
 // A scene file says these itself.
 void refuse_world_options(const CLI::App& command) {
   refuse_options(command,
-                 {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--light-cycles", "--light-heads",
-                  "--steps", "--views", "--size", "--square-pixels", "--rig", "--line-floor", "--simulator", "--start",
-                  "--recorded-lights", "--tracks"},
+                 {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--light-cycles",
+                  "--light-heads", "--steps", "--views", "--size", "--square-pixels", "--rig", "--line-floor",
+                  "--simulator", "--start", "--recorded-lights", "--tracks"},
                  "on a scene file, which says that itself");
 }
 
@@ -279,8 +279,8 @@ void add_render_command(CLI::App& app) {
     arguments->world.vector_observations = false;
     if (is_scene_name(arguments->world.map)) {
       refuse_options(*command,
-                     {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--light-cycles", "--light-heads",
-                      "--steps", "--views"},
+                     {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--light-cycles",
+                      "--light-heads", "--steps", "--views"},
                      "on a recorded scene, which says that itself: --start and --tracks choose of it");
       return render_recorded_scene(*arguments);
     }

@@ -742,9 +742,10 @@ void define_construction(py::class_<PySimulator>* simulator) {
                       const std::string& executor, const std::string& device, uint64_t seed, int num_threads,
                       float dt_s, int episode_steps, float reset_inactive_fraction, bool stagger_episodes,
                       float pedestrian_fraction, float cyclist_fraction, int parked_cars, bool walls,
-                      uint64_t wall_seed, const std::string& light_heads, bool fixed_lights, const std::string& light_cycles, bool reset_at_standstill,
-                      bool forbid_reversing, bool auxiliary_observations, bool vector_observations,
-                      bool wall_observations, const py::dict& conditioning, const py::object& stream) {
+                      uint64_t wall_seed, const std::string& light_heads, bool fixed_lights,
+                      const std::string& light_cycles, bool reset_at_standstill, bool forbid_reversing,
+                      bool auxiliary_observations, bool vector_observations, bool wall_observations,
+                      const py::dict& conditioning, const py::object& stream) {
             SimulatorConfig config;
             config.seed = seed;
             config.device = device_of(device);
@@ -775,10 +776,11 @@ void define_construction(py::class_<PySimulator>* simulator) {
           py::arg("stagger_episodes") = false, py::arg("pedestrian_fraction") = SimulatorConfig{}.pedestrian_fraction,
           py::arg("cyclist_fraction") = SimulatorConfig{}.cyclist_fraction,
           py::arg("parked_cars") = SimulatorConfig{}.parked_cars, py::arg("walls") = true, py::arg("wall_seed") = 0,
-          py::arg("light_heads") = name_of(SimulatorConfig{}.light_heads), py::arg("fixed_lights") = false, py::arg("light_cycles") = name_of(SimulatorConfig{}.light_cycles),
-          py::arg("reset_at_standstill") = false, py::arg("forbid_reversing") = false,
-          py::arg("auxiliary_observations") = true, py::arg("vector_observations") = true,
-          py::arg("wall_observations") = false, py::arg("conditioning") = py::dict(), py::arg("stream") = py::none(),
+          py::arg("light_heads") = name_of(SimulatorConfig{}.light_heads), py::arg("fixed_lights") = false,
+          py::arg("light_cycles") = name_of(SimulatorConfig{}.light_cycles), py::arg("reset_at_standstill") = false,
+          py::arg("forbid_reversing") = false, py::arg("auxiliary_observations") = true,
+          py::arg("vector_observations") = true, py::arg("wall_observations") = false,
+          py::arg("conditioning") = py::dict(), py::arg("stream") = py::none(),
           R"(maps: of pictura.Map. worlds: of (index of the map, agents), or (map, agents, global world), which keys the
 world's random numbers. executor: 'cpu', 'cuda' or 'auto'. device: where observations and scenes are wanted. num_threads: of
 the host, 0 for all. reset_inactive_fraction: a world resets when this part of its agents is inactive; more than 1: never.

@@ -464,8 +464,8 @@ void bind_evaluation(py::module_& module) {
       py::arg("first_scenario") = 0, py::arg("scenarios") = 200, py::arg("steps") = 3000, py::arg("argmax") = true,
       py::arg("seed") = 1, py::arg("num_threads") = 0, py::arg("device") = "auto", py::arg("simulator") = "auto",
       py::arg("renderer") = "", py::arg("samples") = "", py::arg("rig") = "", py::arg("width_px") = 0,
-      py::arg("height_px") = 0, py::arg("conditioning") = py::dict(), py::arg("light_cycles") = "", py::arg("average") = false,
-      py::arg("on_progress") = py::none(),
+      py::arg("height_px") = 0, py::arg("conditioning") = py::dict(), py::arg("light_cycles") = "",
+      py::arg("average") = false, py::arg("on_progress") = py::none(),
       R"(The paper's evaluation, as `pictura evaluate` does it, in worlds that no training has.
 
 checkpoint: of a policy; '' with a controller of the paper's world. maps: names or files. controller: 'lane', 'idm_lanes', 'random' or 'idle',

@@ -54,8 +54,8 @@ void refuse_scene_options(const CLI::App& command, const std::string& map, std::
 /// Throws UsageError where one of these options was given; `why` says where it would have no effect.
 void refuse_options(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why);
 
-/// Adds MAP, which may be a recorded scene, those options, --light-cycles, --light-heads, --control, --start, --steps, --policy and
-/// where the policy runs.
+/// Adds MAP, which may be a recorded scene, those options, --light-cycles, --light-heads, --control, --start, --steps,
+/// --policy and where the policy runs.
 void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_out, std::string* policy_out,
                          BackendOptions* backends_out);
 

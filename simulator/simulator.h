@@ -47,7 +47,7 @@ struct SimulatorConfig {
   bool walls = true;
   uint64_t wall_seed = 0;
   LightHeads light_heads = LightHeads::as_mapped;  // where heads of lights are drawn; no rule reads it
-  bool fixed_lights = false;  // evaluation: 10/3/2 s; else timings are drawn per episode
+  bool fixed_lights = false;                       // evaluation: 10/3/2 s; else timings are drawn per episode
   LightCycles light_cycles = LightCycles::phases;
   DynamicsRules dynamics{};
   bool auxiliary_observations = true;  // false: the auxiliary slots hold zeros (the like-for-like baseline)
