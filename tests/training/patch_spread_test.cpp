@@ -8,7 +8,8 @@
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/tests/training/numbers.h"
-#include "pictura/training/ppo.h"
+#include "pictura/training/checkpoint.h"
+#include "pictura/training/optimizer.h"
 #include "pictura/training/saved_policy.h"
 #include "pictura/training/session.h"
 
