@@ -16,7 +16,7 @@ class Optimizer {
   Optimizer(const Policy& policy, const Config::Train& config);
   /// Scalars on the parameters' device, which nothing has waited for.
   struct Step {
-    at::Tensor norm;    // of the gradients before they were scaled
+    at::Tensor norm;    // of the gradients before they were scaled, see rate_factors
     at::Tensor failed;  // f32: 1 where it or the loss is not finite, and no step was taken
   };
   /// One step along the parameters' gradients, summed over all ranks and then scaled down to max_grad_norm; clears
@@ -36,7 +36,8 @@ class Optimizer {
   /// Second moments of the parameters that AdamW steps, in their order.
   std::vector<NamedTensor> second_moments;
   /// Factors of AdamW's learning rate, in the order of the policy's parameters: 1 but for weights that move together
-  /// (training/patch_spread.h). Weight decay keeps the whole rate.
+  /// (training/patch_spread.h), whose squares the gradient's norm counts by the same factor. Weight decay keeps the
+  /// whole rate.
   std::vector<double> rate_factors;
   int64_t steps = 0;
 

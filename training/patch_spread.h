@@ -28,7 +28,8 @@ at::Tensor spread_over_patches(const at::Tensor& weight, int factor);
 at::Tensor repeat_over_patches(const at::Tensor& moments, int factor);
 
 /// Factor of the learning rate of weights that are spread: 1 / k^2, by which a step moves the features as far as it
-/// moved them before. Weight decay keeps the whole rate, since it scales the sum as it scales each weight.
+/// moved them before. Weight decay keeps the whole rate, since it scales the sum as it scales each weight. In the
+/// gradient's norm k^2 equal gradients count as one, so that it is clipped as before.
 constexpr double rate_factor_of_spread(int factor) { return 1.0 / (double(factor) * factor); }
 
 /// Spreads the first convolution of a policy, in place, what its optimizer keeps of it (moments, rate factor and memory

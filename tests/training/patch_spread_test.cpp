@@ -70,10 +70,10 @@ Observation blocks_of(int64_t pixels) {
 }
 
 struct Learner {
-  explicit Learner(int its_pixels) : pixels(its_pixels), policy(small_section(2), 3, 1), optimizer(policy, setting()) {}
-  static Config::Train setting() {
+  explicit Learner(double max_grad_norm) : policy(small_section(2), 3, 1), optimizer(policy, setting(max_grad_norm)) {}
+  static Config::Train setting(double max_grad_norm) {
     Config::Train train;
-    train.max_grad_norm = 1e9;
+    train.max_grad_norm = max_grad_norm;
     train.weight_decay = 0.1;
     return train;
   }
@@ -86,21 +86,22 @@ struct Learner {
     const at::Tensor targets = test::numbers(output.logits.sizes(), 9).to(at::kFloat);
     const at::Tensor loss = (at::log_softmax(output.logits, 1) * targets).sum() + output.value.square().sum();
     loss.backward();
-    optimizer.step(1e-2, loss.detach());
+    norm = optimizer.step(1e-2, loss.detach()).norm.item<double>();
   }
   void grow(int factor) {
     spread_first_convolution(policy, factor, &optimizer);
     pixels *= factor;
   }
-  int pixels;
+  int pixels = 1;
+  double norm = 0;  // of the last step's gradient
   PolicyNetwork policy;
   Optimizer optimizer;
 };
 
 double largest_difference(const at::Tensor& a, const at::Tensor& b) { return (a - b).abs().max().item<double>(); }
 
-TEST(PatchSpread, KeepsLogitsAndHowAStepChangesThem) {
-  Learner small(1), large(1), at_whole_rate(1);
+void expect_equal_learning(double max_grad_norm) {
+  Learner small(max_grad_norm), large(max_grad_norm), at_whole_rate(max_grad_norm);
   for (Learner* each : {&small, &large, &at_whole_rate}) {
     each->step();
     each->step();
@@ -114,10 +115,17 @@ TEST(PatchSpread, KeepsLogitsAndHowAStepChangesThem) {
   at_whole_rate.optimizer.rate_factors.front() = 1;
   const at::Tensor before = small.logits();
   for (Learner* each : {&small, &large, &at_whole_rate}) each->step();
+  EXPECT_GT(small.norm, 0.1);
+  EXPECT_NEAR(large.norm, small.norm, 1e-4 * small.norm);
+  EXPECT_GT(at_whole_rate.norm, 1.01 * small.norm);
   EXPECT_GT(largest_difference(small.logits(), before), 1e-2);
   EXPECT_LT(largest_difference(large.logits(), small.logits()), 1e-5);
   EXPECT_GT(largest_difference(at_whole_rate.logits(), small.logits()), 1e-3);
 }
+
+TEST(PatchSpread, KeepsLogitsAndHowAStepChangesThem) { expect_equal_learning(1e9); }
+
+TEST(PatchSpread, KeepsHowAClippedStepChangesLogits) { expect_equal_learning(0.1); }
 
 class ExportedSize : public ::testing::Test {
  protected:
