@@ -34,6 +34,8 @@ const Choices<Precision> kPrecisions{{"fp32", Precision::fp32}, {"tf32", Precisi
 const Choices<Schedule> kSchedules{
     {"constant", Schedule::constant}, {"linear", Schedule::linear}, {"cosine", Schedule::cosine}};
 const Choices<OptimizerKind> kOptimizers{{"adamw", OptimizerKind::adamw}, {"muon", OptimizerKind::muon}};
+const Choices<ValueHead> kValueHeads{
+    {"linear", ValueHead::linear}, {"symlog", ValueHead::symlog}, {"two_hot", ValueHead::two_hot}};
 const Choices<LightCycles> kLightCycles{{name_of(LightCycles::phases), LightCycles::phases},
                                         {name_of(LightCycles::independent), LightCycles::independent}};
 const Choices<LightHeads> kLightHeads{{name_of(LightHeads::as_mapped), LightHeads::as_mapped},
@@ -97,6 +99,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.flag("policy.point_features", c.policy.point_features);
   v.integer("policy.backbone_layers", c.policy.backbone_layers, 1, 64);
   v.integer("policy.backbone_width", c.policy.backbone_width, 1, 1 << 14);
+  v.choice("policy.value_head", c.policy.value_head, kValueHeads);
   v.integer("policy.decision_steps", c.policy.decision_steps, 1, 1000);
 
   v.integer("train.updates", c.train.updates, 1, int64_t{1} << 40);
@@ -915,6 +918,7 @@ std::string name_among(const Choices<Enum>& choices, Enum value) {
 
 std::string name_of(Precision precision) { return name_among(kPrecisions, precision); }
 std::string name_of(OptimizerKind kind) { return name_among(kOptimizers, kind); }
+std::string name_of(ValueHead head) { return name_among(kValueHeads, head); }
 
 Config config_at(const Config& config, int64_t agent_steps) {
   Config result = config;

@@ -27,6 +27,10 @@ enum class Schedule { constant, linear, cosine };
 /// What steps the parameters: see training/optimizer.h.
 enum class OptimizerKind { adamw, muon };
 
+/// What the critic's head predicts, see training/value_head.h: values; their symlog; or how probable each of a row of
+/// values is.
+enum class ValueHead { linear, symlog, two_hot };
+
 /// Largest side of a policy's patches, and largest line floor, that a configuration may have.
 constexpr int kMaxPatch_px = 16;
 constexpr double kMaxLineFloor_px = 16;
@@ -93,6 +97,7 @@ struct Config {
     std::string backbone = "conv";
     bool backbone_frozen = true;  // the program's weights stay as they are
     int backbone_layers = 4, backbone_width = 512;
+    ValueHead value_head = ValueHead::linear;
     int decision_steps = 1;  // steps for which an action is held, see training/decision_clock.h
   } policy;
 
@@ -200,6 +205,7 @@ std::vector<std::string> differences_to_report(const Config& saved, const Config
 /// Names as in a configuration.
 std::string name_of(Precision precision);
 std::string name_of(OptimizerKind kind);
+std::string name_of(ValueHead head);
 
 /// The configuration in force after `agent_steps`: sizes, policy.patch_px and render.line_floor_px are those of
 /// render.schedule.

@@ -2,12 +2,25 @@
 
 #include <ATen/core/grad_mode.h>
 
+#include "pictura/common/error.h"
+#include "pictura/training/value_head.h"
+
 namespace pictura {
 
 namespace {
 
 at::Tensor mean_of(const at::Tensor& values, const at::Tensor& shares) {
   return shares.defined() ? (values * shares).mean() : values.mean();
+}
+
+// The value's loss of each row.
+at::Tensor value_losses(const Policy::Output& output, const at::Tensor& returns) {
+  switch (output.value_head) {
+    case ValueHead::linear: return 0.5 * (output.value - returns).square();
+    case ValueHead::symlog: return 0.5 * (output.value_outputs.squeeze(1) - symlog(returns)).square();
+    case ValueHead::two_hot: return -(two_hot(returns) * at::log_softmax(output.value_outputs, 1)).sum(1);
+  }
+  fail("losses: unknown value head");
 }
 
 }  // namespace
@@ -27,7 +40,7 @@ Losses losses_of(const Policy::Output& output, const Targets& targets, const at:
   const at::Tensor clipped = ratio.clamp(1 - clip_coef, 1 + clip_coef);
   Losses losses;
   losses.policy = -mean_of(at::minimum(advantages * ratio, advantages * clipped), shares);
-  losses.value = 0.5 * mean_of((output.value - targets.returns.index_select(0, rows)).square(), shares);
+  losses.value = mean_of(value_losses(output, targets.returns.index_select(0, rows)), shares);
   losses.entropy = -mean_of((all_log_probs.exp() * all_log_probs).sum(1), shares);
   at::Tensor teacher_kl = at::zeros({}, losses.entropy.options());
   if (targets.teacher_log_probs.defined()) {

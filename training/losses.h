@@ -9,7 +9,7 @@ namespace pictura {
 struct Targets {
   at::Tensor actions;        // i64
   at::Tensor old_log_probs;  // of these actions
-  at::Tensor returns;
+  at::Tensor returns;        // in units of rewards
   // Of all actions by the teacher, [steps * slots, kNumActions], and what the KL divergence from it weighs, []:
   // undefined where nobody is imitated.
   at::Tensor teacher_log_probs, teacher_weight;

@@ -165,7 +165,7 @@ LayerSum layers_of(const Config& config, const Rig& rig, Device device) {
     in = policy.backbone_width;
   }
   sum.add(1, in, kNumActions, 3);
-  sum.add(1, in, 1, 1);
+  sum.add(1, in, num_value_outputs(policy.value_head), policy.value_head == ValueHead::two_hot ? 3 : 1);
   return sum;
 }
 

@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "pictura/simulator/observation.h"
+#include "pictura/training/config.h"
 
 namespace pictura {
 
@@ -16,5 +17,9 @@ constexpr int num_points(std::string_view set) { return set == "controls" ? 2 : 
 /// Sines and cosines of a pixel's position in the image, so that attention knows where a token is whatever the image's
 /// size.
 constexpr int kPositionFeatures = 8;
+
+/// Outputs of the critic's head: one, or those of as many bins (training/value_head.h).
+constexpr int kValueBins = 101;
+constexpr int num_value_outputs(ValueHead head) { return head == ValueHead::two_hot ? kValueBins : 1; }
 
 }  // namespace pictura

@@ -17,6 +17,7 @@
 #include "pictura/training/precision.h"
 #include "pictura/training/rules/network_passes.h"
 #include "pictura/training/torch_device.h"
+#include "pictura/training/value_head.h"
 
 namespace pictura {
 
@@ -303,7 +304,7 @@ class PerspectiveEncoder final : public SceneEncoder {
 
 PolicyNetwork::PolicyNetwork(const Config::PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type,
                              bool reads_walls, Device device, Precision precision)
-    : type_(type), precision_(precision), point_features_(config.point_features) {
+    : type_(type), precision_(precision), value_head_(config.value_head), point_features_(config.point_features) {
   ParameterMaker make(seed, at::TensorOptions(type).device(torch_device(device)), &parameters_);
   const bool sees_images = config.modality == Modality::perspective;
   const at::ScalarType input_type = precision == Precision::bf16 ? at::kBFloat16 : type;
@@ -322,9 +323,12 @@ PolicyNetwork::PolicyNetwork(const Config::PolicySection& config, int num_camera
     backbone_.push_back(make.linear(fmt::format("backbone.{}", i), in, config.backbone_width, std::numbers::sqrt2));
     in = config.backbone_width;
   }
-  // A small actor head: every action is about as likely as any other at first.
-  actor_ = make.linear("actor", in, kNumActions, 0.01);
-  critic_ = make.linear("critic", in, 1, 1.0);
+  // A small actor head: every action is about as likely as any other at first. So is every bin of a critic, whose value
+  // is then near 0.
+  constexpr double kGainOfLikelihoods = 0.01;
+  actor_ = make.linear("actor", in, kNumActions, kGainOfLikelihoods);
+  critic_ = make.linear("critic", in, num_value_outputs(value_head_),
+                        value_head_ == ValueHead::two_hot ? kGainOfLikelihoods : 1.0);
 }
 
 Policy::Output PolicyNetwork::forward(const Observation& o) const {
@@ -343,7 +347,8 @@ Policy::Output PolicyNetwork::forward(const Observation& o) const {
     for (const Linear& layer : backbone_) x = apply_gelu(layer, x);
   }
   x = x.to(type_);
-  return {apply(actor_, x), apply(critic_, x).squeeze(1)};
+  const at::Tensor value_outputs = apply(critic_, x);
+  return {apply(actor_, x), values_of(value_head_, value_outputs), value_outputs, value_head_};
 }
 
 int64_t Policy::num_parameters() const {

@@ -27,6 +27,8 @@ _SCALE_POSITION_M = 120.0  # of x and y in observations
 _NUM_ACTIONS = 12
 # The entity sets, as the columns of set_counts.
 _SETS = {"partners": (8, 1), "lanes": (7, 1), "boundaries": (7, 1), "controls": (7, 2), "walls": (7, 1)}
+_VALUE_OUTPUTS = {"linear": 1, "symlog": 1, "two_hot": 101}  # of the critic, by policy.value_head
+_LARGEST_BIN_SYMLOG = 6.0
 _MAGIC = b"PICTCKPT"
 _PREAMBLE = "<8sIIQ"
 
@@ -36,6 +38,20 @@ def point_features(rows: Tensor, points: int) -> Tensor:
     xy_m = (rows[..., : 2 * points] * _SCALE_POSITION_M).unflatten(-1, (points, 2))
     size_m, distance_m = xy_m.abs(), xy_m.norm(dim=-1, keepdim=True)
     return torch.cat([xy_m / (size_m + 4.0), xy_m / (size_m + 20.0), xy_m / (distance_m + 1.0)], -1).flatten(-2)
+
+
+def _symexp(x: Tensor) -> Tensor:
+    return x.sign() * x.abs().expm1()
+
+
+def _values(head: str, outputs: Tensor) -> Tensor:
+    """Values [batch] in units of rewards, of the critic's outputs [batch, outputs]."""
+    if head == "two_hot":
+        largest = _LARGEST_BIN_SYMLOG
+        bins = _symexp(torch.linspace(-largest, largest, outputs.shape[1], dtype=outputs.dtype, device=outputs.device))
+        return (outputs.softmax(1) * bins).sum(1)
+    values = outputs.squeeze(1)
+    return _symexp(values) if head == "symlog" else values
 
 
 class _Encoder(nn.Module):
@@ -130,7 +146,10 @@ class Policy(nn.Module):
         self.conditioning = _Encoder(17 + 3 * (3 + 6 * self.points), width)
         layers, inside = config["backbone_layers"], config["backbone_width"]
         self.backbone = nn.ModuleList(nn.Linear(around + 2 * width if i == 0 else inside, inside) for i in range(layers))
-        self.actor, self.critic = nn.Linear(inside, _NUM_ACTIONS), nn.Linear(inside, 1)
+        self.value_head = config.get("value_head", "linear")
+        if self.value_head not in _VALUE_OUTPUTS:
+            raise pictura.UsageError(f"policy.value_head: expected one of {', '.join(_VALUE_OUTPUTS)}, got '{self.value_head}'")
+        self.actor, self.critic = nn.Linear(inside, _NUM_ACTIONS), nn.Linear(inside, _VALUE_OUTPUTS[self.value_head])
 
     def forward(self, observation: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
         waypoints = observation["waypoints"].flatten(1)
@@ -142,7 +161,7 @@ class Policy(nn.Module):
         x = torch.cat([around, self.ego(ego), self.conditioning(torch.cat(own, 1))], 1)
         for layer in self.backbone:
             x = functional.gelu(layer(x))
-        return self.actor(x), self.critic(x).squeeze(1)
+        return self.actor(x), _values(self.value_head, self.critic(x))
 
     def act(self, observation: Mapping[str, Tensor], argmax: bool = True) -> Tensor:
         """Actions int32 [batch], which pictura.Simulator.step takes; without gradients."""

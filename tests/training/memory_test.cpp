@@ -80,15 +80,15 @@ class EachNetwork : public ::testing::TestWithParam<std::vector<std::string>> {
     return load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml", overrides);
   }
 };
-INSTANTIATE_TEST_SUITE_P(Memory, EachNetwork,
-                         ::testing::Values(std::vector<std::string>{"policy.modality=vector"},
-                                           std::vector<std::string>{"policy.modality=vector",
-                                                                    "policy.point_features=false",
-                                                                    "policy.embedding_width=200"},
-                                           std::vector<std::string>{"policy.modality=perspective"},
-                                           std::vector<std::string>{"policy.modality=perspective", "policy.patch_px=1",
-                                                                    "policy.conv_kernels=[5, 3, 3, 3, 3]",
-                                                                    "policy.conv_strides=[2, 2, 2, 1, 1]"}));
+INSTANTIATE_TEST_SUITE_P(
+    Memory, EachNetwork,
+    ::testing::Values(
+        std::vector<std::string>{"policy.modality=vector"},
+        std::vector<std::string>{"policy.modality=vector", "policy.value_head=two_hot"},
+        std::vector<std::string>{"policy.modality=vector", "policy.point_features=false", "policy.embedding_width=200"},
+        std::vector<std::string>{"policy.modality=perspective"},
+        std::vector<std::string>{"policy.modality=perspective", "policy.patch_px=1",
+                                 "policy.conv_kernels=[5, 3, 3, 3, 3]", "policy.conv_strides=[2, 2, 2, 1, 1]"}));
 
 TEST_P(EachNetwork, HasTheParametersThatAreCounted) {
   const Config config = config_of_chunk(64);

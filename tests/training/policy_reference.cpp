@@ -73,6 +73,13 @@ int main(int argc, char** argv) try {
     config.policy.modality = Modality::perspective;
     pictura::write_reference(argv[1], "perspective" + suffix, config);
   }
+  config.policy.modality = Modality::vector;
+  for (const pictura::ValueHead head : {pictura::ValueHead::symlog, pictura::ValueHead::two_hot}) {
+    config.policy.value_head = head;
+    pictura::write_reference(argv[1], pictura::name_of(head), config);
+  }
+  config.policy.value_head = pictura::ValueHead::linear;
+  config.policy.modality = Modality::perspective;
   config.policy.patch_px = 4;
   config.policy.conv_channels = {24, 32};
   config.policy.conv_kernels = {1, 3};

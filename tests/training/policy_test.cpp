@@ -127,6 +127,14 @@ TEST_P(BothModalities, GradientsEqualDifferenceQuotients) {
   expect_gradients(PolicyNetwork(tiny(GetParam()), 3, 5, at::kDouble), observation(GetParam(), 2));
 }
 
+TEST(Policy, GradientsOfValuesOfOtherHeadsEqualDifferenceQuotients) {
+  Config::PolicySection section = tiny(Modality::vector);
+  for (const ValueHead head : {ValueHead::symlog, ValueHead::two_hot}) {
+    section.value_head = head;
+    expect_gradients(PolicyNetwork(section, 3, 5, at::kDouble), observation(Modality::vector, 2));
+  }
+}
+
 TEST(Policy, GradientsOfPatchesEqualDifferenceQuotients) {
   Config::PolicySection section = tiny(Modality::perspective);
   section.patch_px = 2;
