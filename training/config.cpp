@@ -36,6 +36,8 @@ const Choices<Schedule> kSchedules{
 const Choices<OptimizerKind> kOptimizers{{"adamw", OptimizerKind::adamw}, {"muon", OptimizerKind::muon}};
 const Choices<ValueHead> kValueHeads{
     {"linear", ValueHead::linear}, {"symlog", ValueHead::symlog}, {"two_hot", ValueHead::two_hot}};
+const Choices<FilterThreshold> kFilterThresholds{{"maximum", FilterThreshold::maximum},
+                                                 {"quantile", FilterThreshold::quantile}};
 const Choices<LightCycles> kLightCycles{{name_of(LightCycles::phases), LightCycles::phases},
                                         {name_of(LightCycles::independent), LightCycles::independent}};
 const Choices<LightHeads> kLightHeads{{name_of(LightHeads::as_mapped), LightHeads::as_mapped},
@@ -130,7 +132,9 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.number("train.teacher_coef", c.train.teacher_coef, 0, 1e6);
   v.integer("train.teacher_agent_steps", c.train.teacher_agent_steps, 1, int64_t{1} << 60);
   v.flag("train.norm_adv", c.train.norm_adv);
+  v.choice("train.adv_filter", c.train.adv_filter, kFilterThresholds);
   v.number("train.adv_filter_threshold", c.train.adv_filter_threshold, 0, 1);
+  v.number("train.adv_filter_quantile", c.train.adv_filter_quantile, 0, 0.999);
   v.number("train.adv_filter_ema", c.train.adv_filter_ema, 1e-6, 1);
   v.integer("train.checkpoint_every", c.train.checkpoint_every, 1, int64_t{1} << 40);
   v.number("train.checkpoint_minutes", c.train.checkpoint_minutes, 0.01, 1e6);
@@ -657,6 +661,10 @@ void check_contradictions(const Config& c, const Reader& reader) {
   if (c.train.decay_agent_steps > c.train.schedule_agent_steps) {
     reader.refuse("train.decay_agent_steps", fmt::format("expected at most train.schedule_agent_steps ({}), got {}",
                                                          c.train.schedule_agent_steps, c.train.decay_agent_steps));
+  }
+  if (c.train.halted_slots == HaltedSlots::draw && c.train.adv_filter == FilterThreshold::quantile) {
+    reader.refuse("train.halted_slots",
+                  "\"draw\" takes every transition: expected train.adv_filter = \"maximum\", got \"quantile\"");
   }
   if (c.train.halted_slots == HaltedSlots::draw && c.train.adv_filter_threshold > 0) {
     reader.refuse("train.halted_slots",

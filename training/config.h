@@ -31,6 +31,10 @@ enum class OptimizerKind { adamw, muon };
 /// values is.
 enum class ValueHead { linear, symlog, two_hot };
 
+/// What the advantage filter's threshold follows, see training/rules/advantage_filter.h: a fraction of the largest
+/// |advantage|, or a quantile of them.
+enum class FilterThreshold { maximum, quantile };
+
 /// Largest side of a policy's patches, and largest line floor, that a configuration may have.
 constexpr int kMaxPatch_px = 16;
 constexpr double kMaxLineFloor_px = 16;
@@ -128,9 +132,11 @@ struct Config {
     std::string teacher;
     double teacher_coef = 1;
     int64_t teacher_agent_steps = 100'000'000;
-    bool norm_adv = true;                // per minibatch
-    double adv_filter_threshold = 0.01;  // of the running max |advantage|; 0: keep everything
-    double adv_filter_ema = 0.25;        // weight of the newest rollout in the running max
+    bool norm_adv = true;  // per minibatch
+    FilterThreshold adv_filter = FilterThreshold::maximum;
+    double adv_filter_threshold = 0.01;  // maximum: of the running max |advantage|; 0: keep everything
+    double adv_filter_quantile = 0.5;    // quantile: share of the valid transitions that is dropped
+    double adv_filter_ema = 0.25;        // weight of the newest rollout in the running max or quantile
     int64_t checkpoint_every = 20;       // updates
     double checkpoint_minutes = 2;       // or as soon as these have passed
     int64_t keep_checkpoints = 1;        // the newest and those before it, as checkpoint.1.ckpt, ...

@@ -14,8 +14,8 @@
 
 namespace pictura {
 
-float AdvantageFilter::threshold(float max_advantage, double ema, double fraction) {
-  average = filter_average(average, max_advantage, ema);
+float AdvantageFilter::threshold(float newest, double ema, double fraction) {
+  average = filter_average(average, newest, ema);
   return filter_threshold(average, fraction);
 }
 
@@ -59,16 +59,35 @@ LossStats loss_stats(const at::Tensor& row) {
 
 bool takes_all(const Config::Train& config) { return config.halted_slots == HaltedSlots::draw; }
 
+// The largest |advantage| of all ranks; not finite where one of them is not. Waits for the device.
+float largest_advantage(const Batch& batch, Communicator* communicator) {
+  // Not every communicator's maximum knows NaN.
+  const at::Tensor max = batch.advantages.abs().max().nan_to_num(std::numeric_limits<double>::infinity());
+  communicator->max(max);
+  return max.item<float>();
+}
+
+// The quantile of the valid |advantages| of all ranks; not finite where one of them is not. Waits for the device.
+float quantile_of_advantages(const Batch& batch, double share, LearnerExecutor* executor, Communicator* communicator) {
+  const at::Tensor counts = at::zeros({kNumFilterBins}, batch.advantages.options().dtype(at::kLong));
+  executor->count_advantages(span_of<const float>(batch.advantages), span_of<const uint8_t>(batch.valid),
+                             span_of<int64_t>(counts), current_stream(executor->device()));
+  communicator->sum(counts);
+  const at::Tensor host = counts.cpu();
+  const auto of_bins = span_of<const int64_t>(host);
+  return of_bins[kNotFiniteBin] > 0 ? std::numeric_limits<float>::infinity() : filter_quantile(of_bins, share);
+}
+
 // The rows of this rank's transitions that are learned from, i64 [n]: those that the filter keeps, or all, of which
 // those that are not valid have no share. Says in the stats what the filter did on all ranks.
 at::Tensor taken_rows(const Batch& batch, const Config::Train& config, int64_t update, LearnerExecutor* executor,
                       AdvantageFilter* filter, Communicator* communicator, UpdateStats* stats) {
-  // Not every communicator's maximum knows NaN.
-  const at::Tensor max = batch.advantages.abs().max().nan_to_num(std::numeric_limits<double>::infinity());
-  communicator->max(max);
-  const float max_advantage = max.item<float>();
-  PICTURA_CHECK(std::isfinite(max_advantage), "update {}: an advantage is not finite", update + 1);
-  const float threshold = filter->threshold(max_advantage, config.adv_filter_ema, config.adv_filter_threshold);
+  const bool by_quantile = config.adv_filter == FilterThreshold::quantile;
+  const float newest = by_quantile ? quantile_of_advantages(batch, config.adv_filter_quantile, executor, communicator)
+                                   : largest_advantage(batch, communicator);
+  PICTURA_CHECK(std::isfinite(newest), "update {}: an advantage is not finite", update + 1);
+  const float threshold =
+      filter->threshold(newest, config.adv_filter_ema, by_quantile ? 1 : config.adv_filter_threshold);
   stats->adv_threshold = static_cast<double>(threshold);
   const at::Tensor kept_and_unused = at::empty_like(batch.advantages, at::kLong);
   const int64_t num_kept =

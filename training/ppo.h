@@ -15,9 +15,10 @@ namespace pictura {
 /// The memory of the advantage filter (rules/advantage_filter.h) from rollout to rollout.
 class AdvantageFilter {
  public:
-  /// Takes in the newest rollout's max |advantage|. Returns the least |advantage| that is kept.
-  float threshold(float max_advantage, double ema, double fraction);
-  double average = -1;  // of the rollouts' maxima; negative before the first
+  /// Takes in the newest rollout's largest |advantage|, or its quantile. Returns the least |advantage| that is kept:
+  /// that fraction of the average.
+  float threshold(float newest, double ema, double fraction);
+  double average = -1;  // of the rollouts' maxima or quantiles; negative before the first
 };
 
 /// Means over minibatches; docs/training.md defines them.

@@ -54,6 +54,13 @@ class LearnerExecutorCpu final : public LearnerExecutor {
     }
   }
 
+  void count_advantages(Span<const float> advantages, Span<const uint8_t> valid, Span<int64_t> counts_inout,
+                        Stream) override {
+    for (size_t i = 0; i < advantages.size(); ++i) {
+      if (valid[i] != 0) ++counts_inout[static_cast<size_t>(filter_bin(advantages[i]))];
+    }
+  }
+
   int64_t select_kept(Span<const float> advantages, Span<const uint8_t> valid, float threshold, Span<int64_t> kept_out,
                       Stream) override {
     return select(static_cast<int64_t>(advantages.size()), kept_out, [&](int64_t i) {

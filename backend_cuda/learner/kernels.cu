@@ -51,6 +51,15 @@ struct ComputeAdvantages {
   }
 };
 
+struct CountAdvantage {
+  const float* advantages;
+  const uint8_t* valid;
+  unsigned long long* counts_inout;
+  __device__ void operator()(int64_t i) const {
+    if (valid[i] != 0) atomicAdd(counts_inout + filter_bin(advantages[i]), 1ull);
+  }
+};
+
 struct Permute {
   Permutation permutation;
   const int64_t* items;
@@ -93,6 +102,12 @@ void launch_write_commands(Span<const int32_t> actions, Span<const uint8_t> mask
 void launch_compute_advantages(const TransitionArrays& transitions, float gamma, float gae_lambda,
                                float* advantages_out, cudaStream_t stream) {
   launch(transitions.num_slots, ComputeAdvantages{transitions, gamma, gae_lambda, advantages_out}, stream);
+}
+
+void launch_count_advantages(Span<const float> advantages, Span<const uint8_t> valid, int64_t* counts_inout,
+                             cudaStream_t stream) {
+  launch(static_cast<int64_t>(advantages.size()),
+         CountAdvantage{advantages.data(), valid.data(), reinterpret_cast<unsigned long long*>(counts_inout)}, stream);
 }
 
 void launch_permute(const Permutation& permutation, Span<const int64_t> items, int64_t* items_out,

@@ -16,6 +16,8 @@ void launch_write_commands(Span<const int32_t> actions, Span<const uint8_t> mask
                            cudaStream_t stream);
 void launch_compute_advantages(const TransitionArrays& transitions, float gamma, float gae_lambda,
                                float* advantages_out, cudaStream_t stream);
+void launch_count_advantages(Span<const float> advantages, Span<const uint8_t> valid, int64_t* counts_inout,
+                             cudaStream_t stream);
 void launch_permute(const Permutation& permutation, Span<const int64_t> items, int64_t* items_out, cudaStream_t stream);
 
 /// Those of [0, count) that are active, or kept, in ascending order, and how many. Where `scratch` is null they only

@@ -56,6 +56,13 @@ class LearnerExecutorCuda final : public LearnerExecutor {
     PICTURA_CUDA(cudaGetLastError());
   }
 
+  void count_advantages(Span<const float> advantages, Span<const uint8_t> valid, Span<int64_t> counts_inout,
+                        Stream stream) override {
+    const DeviceGuard guard(device_);
+    cuda::launch_count_advantages(advantages, valid, counts_inout.data(), handle_of(stream));
+    PICTURA_CUDA(cudaGetLastError());
+  }
+
   int64_t select_kept(Span<const float> advantages, Span<const uint8_t> valid, float threshold, Span<int64_t> kept_out,
                       Stream stream) override {
     return select(cuda::KeptTransitions{advantages, valid, threshold}, advantages.size(), kept_out, handle_of(stream));

@@ -236,6 +236,8 @@ TEST(Config, KeysWithoutEffectAreRefused) {
   EXPECT_THAT(error_in("[train]\nhalted_slots = \"draw\"\n"),
               AllOf(HasSubstr("a.toml:2: train.halted_slots"), HasSubstr("train.adv_filter_threshold = 0, got 0.01")));
   EXPECT_EQ(error_in("[train]\nhalted_slots = \"draw\"\nadv_filter_threshold = 0\n"), test::kNoError);
+  EXPECT_THAT(error_in("[train]\nhalted_slots = \"draw\"\nadv_filter_threshold = 0\nadv_filter = \"quantile\"\n"),
+              AllOf(HasSubstr("a.toml:2: train.halted_slots"), HasSubstr("train.adv_filter = \"maximum\"")));
   // What is written for a run with a rig file can be read again.
   const Config c = parse_config("[render]\nrig = \"r.toml\"\n", "a.toml");
   EXPECT_EQ(to_toml(parse_config(to_toml(c), "b.toml")), to_toml(c));

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numeric>
 
@@ -14,6 +15,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
 #include "pictura/tests/training/corridor.h"
+#include "pictura/training/rules/advantage_filter.h"
 #include "pictura/training/rules/choose_action.h"
 #include "pictura/training/schedule.h"
 
@@ -103,6 +105,76 @@ TEST(AdvantageFilter, FollowsTheExponentialAverageOfTheMaxima) {
   EXPECT_FLOAT_EQ(filter.threshold(8, 0.25, 0.01), 0.08f);
   EXPECT_FLOAT_EQ(filter.threshold(4, 0.25, 0.01), 0.07f);  // 0.25 * 4 + 0.75 * 8 = 7
   EXPECT_FLOAT_EQ(filter.threshold(0, 0.25, 0.01), 0.0525f);
+}
+
+// Bins of 1, 2, 3 and 4 begin at these numbers.
+TEST(AdvantageFilter, QuantilesLieInTheBinsOfTheCounts) {
+  EXPECT_EQ(filter_bin(0), 0);
+  EXPECT_EQ(filter_bin(-0.0f), 0);
+  EXPECT_EQ(filter_bin(1), filter_bin(-1));
+  EXPECT_EQ(filter_bin(1) + 128, filter_bin(2));
+  EXPECT_EQ(filter_bin(-1.0078124f), filter_bin(1));
+  EXPECT_EQ(filter_bin(1.0078125f), filter_bin(1) + 1);
+  EXPECT_EQ(filter_bin(std::numeric_limits<float>::max()), kNotFiniteBin - 1);
+  EXPECT_EQ(filter_bin(-std::numeric_limits<float>::infinity()), kNotFiniteBin);
+  EXPECT_EQ(filter_bin(std::nanf("")), kNotFiniteBin);
+
+  std::vector<int64_t> counts(kNumFilterBins);
+  EXPECT_EQ(filter_quantile(counts, 0.5), 0);
+  const std::vector<float> advantages{4, -1, 3, -2, 1000};
+  const std::vector<uint8_t> valid{1, 1, 1, 1, 0};
+  make_learner_executor(Device{})->count_advantages(advantages, valid, counts);
+  EXPECT_EQ(std::accumulate(counts.begin(), counts.end(), int64_t{0}), 4);
+  EXPECT_EQ(filter_quantile(counts, 0), 1);
+  EXPECT_EQ(filter_quantile(counts, 0.25), 2);
+  EXPECT_EQ(filter_quantile(counts, 0.5), 3);
+  EXPECT_FLOAT_EQ(filter_quantile(counts, 0.3), 2 + 0.2f * 2 / 128) << "a fifth of the one in its bin, 1.2 of 4";
+}
+
+TEST(AdvantageFilter, QuantileIsThatOfTheSortedAdvantages) {
+  std::vector<float> advantages;
+  RandomStream stream({.seed = 3, .purpose = Purpose::initial_state});
+  for (int i = 0; i < 20000; ++i) advantages.push_back(std::exp(stream.uniform(-6, 3)) * (stream.below(2) ? 1 : -1));
+  std::vector<int64_t> counts(kNumFilterBins);
+  make_learner_executor(Device{})->count_advantages(advantages, std::vector<uint8_t>(advantages.size(), 1), counts);
+  for (float& advantage : advantages) advantage = std::abs(advantage);
+  std::sort(advantages.begin(), advantages.end());
+  for (const double share : {0.01, 0.3, 0.5, 0.9, 0.99}) {
+    const float exact = advantages[static_cast<size_t>(share * static_cast<double>(advantages.size()))];
+    EXPECT_NEAR(filter_quantile(counts, share), exact, 0.003f * exact) << share;
+  }
+}
+
+TEST(AdvantageFilter, DropsTheShareOfItsQuantile) {
+  at::set_num_threads(1);
+  Config::PolicySection section;
+  section.modality = Modality::vector;
+  section.embedding_width = section.backbone_width = 8;
+  section.backbone_layers = 1;
+  const PolicyNetwork policy(section, 1, 7);
+  Config::Train train;
+  train.adv_filter = FilterThreshold::quantile;
+  Corridor corridor;
+  corridor.play(policy, 0);
+  corridor.rollout.valid.narrow(1, 0, 40).zero_();
+  for (const double share : {0.0, 0.3, 0.8}) {
+    train.adv_filter_quantile = share;
+    corridor.rollout.rewards.copy_(
+        at::arange(corridor.rollout.rewards.numel(), at::kFloat).sin().reshape_as(corridor.rollout.rewards));
+    // One that is very large, which would move the maximum, does not count.
+    corridor.rollout.rewards[7][127] = 1e6;
+    corridor.compute_advantages(0.9, 0.9);
+    Optimizer optimizer(policy, train);
+    AdvantageFilter filter;
+    const UpdateStats stats = corridor.update(policy, train, 0, &optimizer, &filter);
+    EXPECT_NEAR(stats.kept_fraction, 1 - share, 0.01);
+    EXPECT_EQ(stats.adv_threshold, filter.average);
+  }
+  corridor.rollout.rewards[7][127] = std::numeric_limits<float>::infinity();
+  corridor.compute_advantages(0.9, 0.9);
+  Optimizer optimizer(policy, train);
+  AdvantageFilter filter;
+  EXPECT_THROW(corridor.update(policy, train, 0, &optimizer, &filter), Error);
 }
 
 TEST(Schedule, FallsToZeroOverItsLastPart) {

@@ -265,7 +265,7 @@ Rollout part_of(const Rollout& whole, int64_t begin, int64_t end) {
 struct Learnt {
   std::vector<std::string> hashes;  // after each update
   std::vector<at::Tensor> steps;    // of each parameter, in the first update
-  UpdateStats last;
+  UpdateStats first, last;
 };
 
 // Three updates on the corridor by ranks that have its slots up to each of these ends, in which each plays all of it.
@@ -295,6 +295,7 @@ std::vector<Learnt> learn(const std::vector<int64_t>& ends, const Config::Train&
       average.update();
       learnt.hashes.push_back(policy.hash() + hash_of_parameters(average.values));
       if (update > 0) continue;
+      learnt.first = learnt.last;
       for (size_t i = 0; i < before.size(); ++i) {
         learnt.steps.push_back(policy.parameters()[i].value.detach() - before[i]);
       }
@@ -325,6 +326,21 @@ TEST(RanksLearn, WithMuonTheSameToTheBit) {
   const std::vector<Learnt> ranks = learn({10, 100, test::Corridor::kSlots}, train);
   for (const Learnt& rank : ranks) EXPECT_EQ(rank.hashes, ranks[0].hashes);
   EXPECT_NE(ranks[0].hashes[0], ranks[0].hashes[2]);
+}
+
+TEST(RanksLearn, ByAQuantileOfAllAdvantages) {
+  Config::Train train = plain_steps();
+  train.adv_filter = FilterThreshold::quantile;
+  const Learnt one = learn({test::Corridor::kSlots}, train).front();
+  for (const std::vector<int64_t>& ends : {std::vector<int64_t>{48, 128}, std::vector<int64_t>{10, 100, 128}}) {
+    const std::vector<Learnt> ranks = learn(ends, train);
+    for (const Learnt& rank : ranks) {
+      EXPECT_EQ(rank.hashes, ranks[0].hashes);
+      EXPECT_EQ(rank.first.adv_threshold, one.first.adv_threshold) << "of the same bits by counts alone";
+      EXPECT_EQ(rank.first.kept_fraction, one.first.kept_fraction);
+    }
+  }
+  EXPECT_NEAR(one.first.kept_fraction, 0.5, 0.01);
 }
 
 TEST(RanksLearn, WhatOneWouldHaveLearntAndTheSameToTheBit) {

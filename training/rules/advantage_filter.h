@@ -1,15 +1,19 @@
 // Which transitions are learnt from (paper, appendix, optimization; after Gigaflow): those whose advantage is not small
-// against an exponential average of the rollouts' largest ones.
+// against an exponential average over rollouts, of their largest |advantage| or of a quantile of their |advantages|.
 #pragma once
 
-#include "pictura/common/portable/hd.h"
+#include <algorithm>
+#include <cstdint>
+
+#include "pictura/common/portable/intrinsics.h"
+#include "pictura/common/span.h"
 
 namespace pictura {
 
-/// The average after a rollout whose largest |advantage| is `max_advantage`; a negative average means: none before.
-PICTURA_HD inline double filter_average(double average, float max_advantage, double ema) {
-  return average < 0 ? static_cast<double>(max_advantage)
-                     : ema * static_cast<double>(max_advantage) + (1 - ema) * average;
+/// The average after a rollout whose largest |advantage|, or quantile, is `newest`; a negative average means: none
+/// before.
+PICTURA_HD inline double filter_average(double average, float newest, double ema) {
+  return average < 0 ? static_cast<double>(newest) : ema * static_cast<double>(newest) + (1 - ema) * average;
 }
 
 /// The least |advantage| that is kept.
@@ -19,6 +23,39 @@ PICTURA_HD inline float filter_threshold(double average, double fraction) {
 
 PICTURA_HD inline bool filter_keeps(float advantage, bool is_valid, float threshold) {
   return is_valid && (advantage < 0 ? -advantage : advantage) >= threshold;
+}
+
+/// Bins in which |advantages| are counted for a quantile: by the upper half of their bits, so that each power of two
+/// has 128 of equal width. The last bin is of what is not finite. Counts are whole numbers, so ranks add theirs up
+/// exactly.
+constexpr int kNotFiniteBin = 0x7f80;
+constexpr int kNumFilterBins = kNotFiniteBin + 1;
+
+PICTURA_HD inline int filter_bin(float advantage) {
+  const auto bin = static_cast<int>((bits_from_float(advantage) & 0x7fffffffu) >> 16);
+  return bin < kNotFiniteBin ? bin : kNotFiniteBin;
+}
+
+/// The least |advantage| of a bin.
+inline float filter_bin_begin(int bin) { return __builtin_bit_cast(float, static_cast<uint32_t>(bin) << 16); }
+
+/// The |advantage| below which a share of those lies that were counted in finite bins, assuming that each bin's are
+/// spread evenly over it; 0 where there are none.
+inline float filter_quantile(Span<const int64_t> counts, double share) {
+  int64_t all = 0;
+  for (int bin = 0; bin < kNotFiniteBin; ++bin) all += counts[static_cast<size_t>(bin)];
+  const double wanted = share * static_cast<double>(all);
+  double below = 0;
+  for (int bin = 0; bin < kNotFiniteBin; ++bin) {
+    const auto count = static_cast<double>(counts[static_cast<size_t>(bin)]);
+    if (below + count > wanted) {
+      const double begin = static_cast<double>(filter_bin_begin(bin)),
+                   width = static_cast<double>(filter_bin_begin(bin + 1)) - begin;
+      return static_cast<float>(begin + (wanted - below) / count * width);
+    }
+    below += count;
+  }
+  return 0;
 }
 
 }  // namespace pictura

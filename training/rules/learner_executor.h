@@ -36,6 +36,10 @@ class LearnerExecutor {
   /// Generalized advantages, see gae.h. advantages_out: [steps, slots].
   virtual void compute_advantages(const TransitionArrays& transitions, float gamma, float gae_lambda,
                                   Span<float> advantages_out, Stream stream = {}) = 0;
+  /// Adds the valid transitions to the bins of their |advantages|, see advantage_filter.h. counts_inout:
+  /// [kNumFilterBins].
+  virtual void count_advantages(Span<const float> advantages, Span<const uint8_t> valid, Span<int64_t> counts_inout,
+                                Stream stream = {}) = 0;
   /// The transitions that the advantage filter keeps, in ascending order, see advantage_filter.h. kept_out has room for
   /// all. Returns their number.
   virtual int64_t select_kept(Span<const float> advantages, Span<const uint8_t> valid, float threshold,

@@ -3,6 +3,8 @@
 // one.
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 #include <random>
 
 #include <gmock/gmock.h>
@@ -18,6 +20,7 @@
 #include "pictura/tests/backend_cuda/device_test.h"
 #include "pictura/tests/backend_cuda/on_host.h"
 #include "pictura/tests/support/error_message.h"
+#include "pictura/training/rules/advantage_filter.h"
 
 namespace pictura {
 namespace {
@@ -282,6 +285,26 @@ TEST_F(CudaLearnerTest, ComputesAdvantages) {
     executors.host->compute_advantages(transitions.host(), 0.99f, 0.95f, advantages);
     executors.device->compute_advantages(transitions.device(), 0.99f, 0.95f, room_in(device_advantages));
     EXPECT_TRUE(same_bits(advantages, device_advantages));
+  }
+}
+
+TEST_F(CudaLearnerTest, CountsAdvantages) {
+  std::mt19937_64 random(8);
+  const Executors executors;
+  for (const size_t size : {size_t{128 * 4096}, size_t{1}, size_t{0}, size_t{1000}}) {
+    SCOPED_TRACE(size);
+    std::vector<float> advantages = random_numbers(size, &random);
+    if (size > 2) advantages[0] = std::numeric_limits<float>::infinity(), advantages[1] = std::nanf("");
+    const std::vector<uint8_t> valid = random_flags(size, 0.8, &random);
+    const DeviceBuffer<float> advantage_copy = on_device(advantages);
+    const DeviceBuffer<uint8_t> valid_copy = on_device(valid);
+    std::vector<int64_t> counts(kNumFilterBins, 3);
+    const DeviceBuffer<int64_t> device_counts = on_device(counts);
+    executors.host->count_advantages(advantages, valid, counts);
+    executors.device->count_advantages(advantage_copy.span(), valid_copy.span(), room_in(device_counts));
+    EXPECT_EQ(on_host(device_counts.span()), counts);
+    EXPECT_EQ(std::accumulate(counts.begin(), counts.end(), int64_t{0}),
+              3 * kNumFilterBins + std::count(valid.begin(), valid.end(), 1));
   }
 }
 
