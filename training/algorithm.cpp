@@ -120,6 +120,7 @@ UpdateStats improve(Run* run) {
     run->rollout.compute_advantages(config.gamma, config.gae_lambda, run->executor.get());
     stats = ppo_update(&run->chunks, run->rollout, config, key, run->executor.get(), &run->optimizer, &run->filter,
                        &run->timer, run->communicator);
+    stats.weights = weight_rms(run->policy->parameters());
   });
   return stats;
 }

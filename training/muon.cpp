@@ -27,6 +27,26 @@ bool is_stepped_by_muon(const NamedTensor& parameter) {
                       [&](const char* layer) { return parameter.name.starts_with(layer); });
 }
 
+WeightRms weight_rms(const std::vector<NamedTensor>& parameters) {
+  const at::NoGradGuard no_grad;
+  std::vector<at::Tensor> weights;
+  for (const NamedTensor& parameter : parameters) {
+    if (is_stepped_by_muon(parameter)) weights.push_back(parameter.value);
+  }
+  if (weights.empty()) return {};
+  const at::Tensor norms = at::stack(at::_foreach_norm(weights)).cpu().to(at::kDouble);
+  double squares = 0, elements = 0;
+  WeightRms rms;
+  for (size_t i = 0; i < weights.size(); ++i) {
+    const double norm = norms[static_cast<int64_t>(i)].item<double>(), its_elements = double(weights[i].numel());
+    squares += norm * norm;
+    elements += its_elements;
+    rms.largest = std::max(rms.largest, norm / std::sqrt(its_elements));
+  }
+  rms.all = std::sqrt(squares / elements);
+  return rms;
+}
+
 at::Tensor orthogonalized(const at::Tensor& matrices, at::ScalarType type) {
   const at::Tensor norms = at::linalg_vector_norm(matrices, 2, at::IntArrayRef{1, 2}, /*keepdim=*/true);
   at::Tensor x = (matrices / norms.clamp_min(std::numeric_limits<float>::min())).to(type);

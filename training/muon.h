@@ -13,6 +13,14 @@ namespace pictura {
 /// pixels, and the two heads are AdamW's.
 bool is_stepped_by_muon(const NamedTensor& parameter);
 
+/// Root mean squares of the weights of hidden layers (is_stepped_by_muon), whichever optimizer steps them: of all, and
+/// the largest of one matrix. 0 where there are none.
+struct WeightRms {
+  double all = 0, largest = 0;
+};
+/// Waits for the parameters' device.
+WeightRms weight_rms(const std::vector<NamedTensor>& parameters);
+
 /// Matrices [n, rows, columns] with the singular vectors of those given and singular values near 1 (.7 to 1.2, for
 /// values of 1/200 of the Frobenius norm or more), by five Newton-Schulz steps computed in `type`. A zero matrix stays
 /// zero.

@@ -46,6 +46,7 @@ struct UpdateStats {
   double explained_variance = 0;  // over all valid transitions
   double kept_fraction = 0, adv_threshold = 0;
   int64_t minibatches = 0;
+  WeightRms weights;  // after the update
 };
 
 /// What names an update: its transitions' order, its rate, and what the teacher weighs.

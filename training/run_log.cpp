@@ -24,6 +24,8 @@ Scalars scalars_of(const Config& config, const TrainProgress& progress, const Up
       {"charts/agent_steps", static_cast<double>(progress.agent_steps)},
       {"charts/agent_steps_per_s", progress.agent_steps_per_s},
       {"charts/learning_rate", stats.learning_rate},
+      {"charts/weight_rms", stats.weights.all},
+      {"charts/weight_rms_largest", stats.weights.largest},
       {"charts/image_width_px", record.image_size.width_px},
       {"charts/image_height_px", record.image_size.height_px},
       {"charts/episode_return", progress.episode_return},

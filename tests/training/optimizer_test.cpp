@@ -188,6 +188,17 @@ TEST(Muon, StepsTheWeightsOfHiddenLayers) {
                   "attention.query_norm.weight", "attention.mlp_norm.weight", "actor.weight", "critic.weight"));
 }
 
+TEST(WeightRms, IsOfHiddenLayersAlone) {
+  const std::vector<NamedTensor> parameters{{"backbone.0.weight", at::full({2, 2}, 3.0f)},
+                                            {"backbone.0.bias", at::full({2}, 50.0f)},
+                                            {"conv.1.weight", at::full({2, 1, 2, 1}, -1.0f)},
+                                            {"critic.weight", at::full({1, 2}, 100.0f)}};
+  const WeightRms rms = weight_rms(parameters);
+  EXPECT_DOUBLE_EQ(rms.all, std::sqrt((4 * 9 + 4 * 1) / 8.0));
+  EXPECT_DOUBLE_EQ(rms.largest, 3);
+  EXPECT_EQ(weight_rms({parameters[3]}).all, 0);
+}
+
 TEST(Muon, LearnsATaskWithDelayedReward) {
   at::set_num_threads(1);
   const PolicyNetwork policy(small_section(Modality::vector), 1, 7);

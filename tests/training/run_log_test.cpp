@@ -98,6 +98,10 @@ TEST_F(LoggedRun, LogsReturnByTermAndWhenAgentsBeganToMove) {
   EXPECT_GE(logged(run, "agents/first_waypoint_share"), 0);
   EXPECT_LT(logged(run, "agents/first_waypoint_share"), 1);
   EXPECT_EQ(report.updates, 1);
+  const WeightRms weights = weight_rms(read_policy(report.checkpoint).parameters);
+  EXPECT_GT(weights.all, 0);
+  EXPECT_NEAR(logged(run, "charts/weight_rms"), weights.all, 1e-6 * weights.all);
+  EXPECT_NEAR(logged(run, "charts/weight_rms_largest"), weights.largest, 1e-6 * weights.largest);
 }
 
 TEST_F(LoggedRun, TheProgressLineShowsRateTimeLeftMetricsAndPhases) {
