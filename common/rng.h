@@ -44,6 +44,7 @@ enum class Purpose : uint8_t {
   town,
   soak,
   first_episode,
+  map_copies,
 };
 
 /// Whose draws they are, when, and what for. Ids are global across ranks. Fields that are not given are 0.

@@ -8,8 +8,10 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/parallel_for.h"
 #include "pictura/common/support/suggestion.h"
 #include "pictura/map/map_cache.h"
+#include "pictura/map/map_copy.h"
 #include "pictura/map/procedural/procedural_town.h"
 
 namespace pictura {
@@ -20,6 +22,8 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kProcedural = "procedural";
 constexpr std::string_view kExtension = ".xodr";
+// Of a procedural town's text, for each of its crossings.
+constexpr int64_t kTownBytesPerCrossing = 40'000;
 constexpr std::size_t kMaxFile_bytes = std::size_t{1} << 29;
 
 std::vector<fs::path> town_folders() { return {fs::path(map_folder()), fs::path(map_folder()) / "carla"}; }
@@ -80,7 +84,7 @@ RoadMap load_file(const std::string& path, const OpenDriveOptions& options, cons
 }  // namespace
 
 bool is_map_file(std::string_view name) {
-  return !name.starts_with(fmt::format("{}:", kProcedural)) && name.ends_with(kExtension);
+  return !name.starts_with(fmt::format("{}:", kProcedural)) && parse_map_copy(name).map.ends_with(kExtension);
 }
 
 std::vector<std::string> known_towns() {
@@ -111,16 +115,51 @@ std::shared_ptr<const RoadMap> load_map(const std::string& name, const OpenDrive
   LoadReport unused;
   LoadReport& report = report_out ? *report_out : unused;
   report = {};
-  if (const std::optional<TownOptions> town = procedural_options(name)) {
-    report.source = name;
-    auto map = std::make_shared<RoadMap>(parse_opendrive(procedural_town(*town), name, options, progress));
-    map->name = name == kProcedural ? fmt::format("{}:{}", kProcedural, town->seed) : name;
-    return map;
+  const MapCopy asked = parse_map_copy(name);
+  const std::string original(asked.map);
+  OpenDriveOptions its_options = options;
+  const auto set_plan = [&](const std::string& map_name) {
+    if (asked.copy > 0) its_options.plan = draw_map_copy(map_name, asked.copy);
+  };
+  auto map = std::make_shared<RoadMap>();
+  if (const std::optional<TownOptions> town = procedural_options(original)) {
+    report.source = original;
+    const std::string map_name = original == kProcedural ? fmt::format("{}:{}", kProcedural, town->seed) : original;
+    set_plan(map_name);
+    *map = parse_opendrive(procedural_town(*town), original, its_options, progress);
+    map->name = map_name;
+  } else {
+    const std::string path = file_path_of(original);
+    set_plan(fs::path(path).stem().string());
+    *map = load_file(path, its_options, progress, &report);
   }
-  return std::make_shared<RoadMap>(load_file(file_path_of(name), options, progress, &report));
+  if (asked.copy > 0) map->name = map_copy_name(map->name, asked.copy);
+  return map;
+}
+
+std::vector<std::shared_ptr<const RoadMap>> load_maps(const std::vector<std::string>& names, int num_threads) {
+  std::vector<std::shared_ptr<const RoadMap>> maps(names.size());
+  parallel_for(num_threads, static_cast<int64_t>(names.size()), [&](int64_t index) {
+    const auto i = static_cast<std::size_t>(index);
+    maps[i] = load_map(names[i]);
+  });
+  return maps;
+}
+
+int64_t map_text_bytes(const std::string& name) {
+  const std::string original(parse_map_copy(name).map);
+  if (const std::optional<TownOptions> town = procedural_options(original)) {
+    return kTownBytesPerCrossing * (town->blocks_x + 1) * (town->blocks_y + 1);
+  }
+  std::error_code error;
+  const std::uintmax_t bytes = fs::file_size(file_path_of(original), error);
+  return error ? 0 : static_cast<int64_t>(bytes);  // what cannot be read is refused when it is loaded
 }
 
 MapText map_text(const std::string& name) {
+  if (parse_map_copy(name).copy > 0) {
+    fail_usage("map '{}': expected a map with a text of its own, got a copy, which is deformed after reading", name);
+  }
   if (const std::optional<TownOptions> town = procedural_options(name)) return {procedural_town(*town), name};
   const std::string path = file_path_of(name);
   return {read_file(path, kMaxFile_bytes), path};

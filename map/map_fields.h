@@ -56,7 +56,8 @@ PICTURA_FIELDS(RoadMap, name, origin_m, geo_reference, road_names, lanes, lane_p
                marking_points, road_edges, crosswalks, outline_points, parking_spaces, stop_lines, signs, sign_lanes,
                lights, light_lanes, junctions, building_lines, facts, provenance, mends)
 
-PICTURA_FIELDS(OpenDriveOptions, chord_error_m, strict)
+PICTURA_FIELDS(PlanMap, xx, xy, yx, yy)
+PICTURA_FIELDS(OpenDriveOptions, chord_error_m, strict, plan)
 
 /// Calls visit(name, field) for each field of one of these, in their order.
 template <typename T, typename Visit>

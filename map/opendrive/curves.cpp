@@ -161,9 +161,40 @@ Pose pose_on(const GeometryPiece& piece, double ds, LastDirection* last) {
   return {in_file(piece, in_frame), piece.heading + spiral_turn(piece, ds), k0 + rate * ds};
 }
 
+/// The shift of a deformed road at s, and its first two derivatives by s.
+struct Shift {
+  Eigen::Vector2d value_m{0, 0}, slope{0, 0}, bend{0, 0};
+};
+
+Shift shift_at(const FileRoad& road, double s) {
+  const RoadDeformation& deformation = *road.deformation;
+  const Eigen::Vector2d start{deformation.start_shift_m[0], deformation.start_shift_m[1]};
+  const Eigen::Vector2d change = Eigen::Vector2d{deformation.end_shift_m[0], deformation.end_shift_m[1]} - start;
+  if (!(road.length > 0)) return {start};
+  const double x = std::clamp(s / road.length, 0.0, 1.0);
+  return {start + x * x * (3 - 2 * x) * change, 6 * x * (1 - x) / road.length * change,
+          (6 - 12 * x) / (road.length * road.length) * change};
+}
+
+Eigen::Matrix2d plan_of(const FileRoad& road) {
+  const PlanMap& plan = road.deformation->plan;
+  return Eigen::Matrix2d{{plan.xx, plan.xy}, {plan.yx, plan.yy}};
+}
+
+Pose deformed(const FileRoad& road, double s, const Pose& pose) {
+  const Eigen::Matrix2d plan = plan_of(road);
+  const Shift shift = shift_at(road, s);
+  const Eigen::Vector2d along{std::cos(pose.heading), std::sin(pose.heading)}, left{-along.y(), along.x()};
+  const Eigen::Vector2d first = plan * along + shift.slope, second = pose.curvature * (plan * left) + shift.bend;
+  const double stretch = std::max(first.norm(), 1e-9);
+  return {plan * pose.position_m + shift.value_m, std::atan2(first.y(), first.x()),
+          (first.x() * second.y() - first.y() * second.x()) / (stretch * stretch * stretch), stretch};
+}
+
 Pose pose_at(const FileRoad& road, double s, LastDirection* last) {
   const GeometryPiece& piece = last_item_at(road.geometry, s);
-  return pose_on(piece, std::clamp(s - piece.s, 0.0, piece.length), last);
+  const Pose pose = pose_on(piece, std::clamp(s - piece.s, 0.0, piece.length), last);
+  return road.deformation ? deformed(road, s, pose) : pose;
 }
 
 Station station_at(const FileRoad& road, double s, LastDirection* last) {
@@ -218,7 +249,7 @@ double bend_between(const FileRoad& road, const FileSection& section, int lane, 
   constexpr double kUnknown = std::numeric_limits<double>::infinity();
   constexpr double kZero_m = -1e-9;  // widths below zero count as zero, with a kink
   const GeometryPiece& piece = last_item_at(road.geometry, 0.5 * (begin + end));
-  if (piece.cubic || end <= begin) return kUnknown;
+  if (piece.cubic || road.deformation || end <= begin) return kUnknown;
   const Bounds offset = bounds_between(road.lane_offset, begin, end);
   double near = 0, far = 0, slope = offset.slope,
          bend = offset.bend;  // distances of the lane's borders from the center
@@ -293,6 +324,25 @@ Pose pose_at(const FileRoad& road, double s) {
   return pose_at(road, s, &none);
 }
 
+Eigen::Vector2d deformed_point(const FileRoad& road, double s, const Eigen::Vector2d& point_m) {
+  if (!road.deformation) return point_m;
+  return plan_of(road) * point_m + shift_at(road, s).value_m;
+}
+
+double length_between(const FileRoad& road, double begin, double end) {
+  if (!road.deformation) return end - begin;
+  constexpr double kPanel_m = 2;
+  const int panels = 1 + static_cast<int>((end - begin) / kPanel_m);
+  const double step = (end - begin) / panels;
+  double sum = 0;
+  for (int i = 0; i < panels; ++i) {
+    for (const GaussPoint& gauss : kGauss) {
+      sum += gauss.weight * pose_at(road, begin + (i + gauss.position) * step).stretch;
+    }
+  }
+  return sum * step;
+}
+
 const Station& StationCache::at(const FileRoad& road, double s) {
   if (road_ != &road) {
     road_ = &road;
@@ -340,7 +390,7 @@ double heading_between(const FileRoad& road, const FileSection& section, int inn
   const Pose pose = pose_at(road, s);
   // A lateral slope turns the line away from the reference line, more so on the inside of a curve. Slopes are the
   // formulae's derivatives, since files have steps between cubics.
-  return pose.heading + std::atan2(lateral_slope, 1.0 - pose.curvature * lateral);
+  return pose.heading + std::atan2(lateral_slope, pose.stretch * (1.0 - pose.curvature * lateral));
 }
 
 double lane_width(const FileRoad& road, const FileSection& section, const FileLane& lane, double s) {

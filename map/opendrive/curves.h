@@ -13,6 +13,7 @@ namespace pictura::opendrive {
 struct Pose {
   Eigen::Vector2d position_m{0, 0};
   double heading = 0, curvature = 0;
+  double stretch = 1;  // metres of the line for each metre of s: of deformed roads
 };
 
 /// Fills the table of arc lengths of a cubic up to its p_end.
@@ -28,6 +29,12 @@ Pose pose_on(const GeometryPiece& piece, double ds);
 
 /// The pose of the reference line at s; s is clamped to the road.
 Pose pose_at(const FileRoad& road, double s);
+
+/// Where a deformed road has the point that was at s of its reference line; of another road that point.
+Eigen::Vector2d deformed_point(const FileRoad& road, double s, const Eigen::Vector2d& point_m);
+
+/// Length of the reference line from `begin` to `end`: their difference unless the road is deformed.
+double length_between(const FileRoad& road, double begin, double end);
 
 /// A place on the reference line: its position, the unit vector to its left, and its elevation.
 struct Station {

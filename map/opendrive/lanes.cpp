@@ -63,9 +63,12 @@ void join_neighbors(Build* build, const FileRoad& road, const FileSection& secti
 
 void choose_origin(Build* build) {
   double low[2] = {1e300, 1e300}, high[2] = {-1e300, -1e300};
+  const auto start_of = [](const FileRoad& road, const GeometryPiece& piece) {
+    return deformed_point(road, piece.s, {piece.x, piece.y});
+  };
   for (const FileRoad& road : build->network.roads) {
     for (const GeometryPiece& piece : road.geometry) {
-      const double xy[2] = {piece.x, piece.y};
+      const Eigen::Vector2d xy = start_of(road, piece);
       for (int axis = 0; axis < 2; ++axis) {
         low[axis] = std::min(low[axis], xy[axis]);
         high[axis] = std::max(high[axis], xy[axis]);
@@ -76,7 +79,8 @@ void choose_origin(Build* build) {
     build->map->origin_m[static_cast<std::size_t>(axis)] = std::round(0.5 * (low[axis] + high[axis]));
   for (const FileRoad& road : build->network.roads) {
     for (const GeometryPiece& piece : road.geometry) {
-      const double radius_m = std::hypot(piece.x - build->map->origin_m[0], piece.y - build->map->origin_m[1]);
+      const Eigen::Vector2d xy = start_of(road, piece);
+      const double radius_m = std::hypot(xy.x() - build->map->origin_m[0], xy.y() - build->map->origin_m[1]);
       if (radius_m > kMaxMapRadius_m) {
         road.where.fail("lies {:.0f} m from the middle of the map; expected at most {} m", radius_m, kMaxMapRadius_m);
       }

@@ -13,6 +13,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/map/opendrive/faults.h"
+#include "pictura/map/plan_map.h"
 #include "pictura/map/road_map.h"
 
 namespace pictura::opendrive {
@@ -195,6 +196,13 @@ struct CrossSection {
   Profile height;
 };
 
+/// Where the points of a road go in a copy of its map; see deform.h. The shift of the reference line changes from start
+/// to end as a smoothstep of s, so that headings at both ends are those of the plan.
+struct RoadDeformation {
+  PlanMap plan;
+  std::array<double, 2> start_shift_m{}, end_shift_m{};
+};
+
 struct FileRoad {
   std::string id, junction;  // junction is empty if the road belongs to none
   double length = 0;
@@ -202,6 +210,7 @@ struct FileRoad {
   RoadLink predecessor, successor;
   Profile speed_limit_mps;  // constants; 0: no limit
   std::vector<GeometryPiece> geometry;
+  std::optional<RoadDeformation> deformation;  // where it is there, s is a parameter and no longer an arc length
   Profile elevation, lane_offset;
   Profile superelevation;                   // rad, about the reference line, left side up
   Profile left_crossfall, right_crossfall;  // rad, down from the reference line

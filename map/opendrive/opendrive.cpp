@@ -1,10 +1,12 @@
 #include "pictura/map/opendrive/opendrive.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include "pictura/common/error.h"
 #include "pictura/map/opendrive/build.h"
+#include "pictura/map/opendrive/deform.h"
 #include "pictura/map/opendrive/reader.h"
 #include "pictura/map/opendrive/sections.h"
 
@@ -17,6 +19,17 @@ namespace {
 SampleBudget budget_for(std::size_t text_bytes, const std::string& source) {
   constexpr std::int64_t kBaseSamples = 500'000, kSamplesPerByte = 10, kMaxSamples = 60'000'000;
   return {std::min(kMaxSamples, kBaseSamples + kSamplesPerByte * static_cast<std::int64_t>(text_bytes)), source};
+}
+
+/// Throws Error unless the singular values of the plan are in [0.5, 1.5] and it does not mirror.
+void check_plan(const PlanMap& plan) {
+  const double sum = std::hypot(plan.xx + plan.yy, plan.yx - plan.xy);
+  const double difference = std::hypot(plan.xx - plan.yy, plan.yx + plan.xy);
+  PICTURA_CHECK(
+      plan.determinant() > 0 && sum + difference <= 3 && sum - difference >= 1,
+      "OpenDRIVE options: expected a plan that does not mirror and stretches by 0.5 to 1.5, got rows ({}, {}) "
+      "and ({}, {})",
+      plan.xx, plan.xy, plan.yx, plan.yy);
 }
 
 /// Faults of the network as a whole do not name the file.
@@ -34,7 +47,11 @@ RoadMap import_network(std::string_view text, const std::string& source, const O
 
   RoadMap map;
   map.name = std::filesystem::path(source).stem().string();
-  map.geo_reference = network.geo_reference;
+  if (options.plan == PlanMap{}) {
+    map.geo_reference = network.geo_reference;
+  } else {
+    opendrive::deform(options.plan, &network);  // a copy lies nowhere on Earth
+  }
   opendrive::Build build{network, options, &faults, &map, budget_for(text.size(), source), {}, {}, {}};
   begin("lanes", 0.1);
   opendrive::choose_origin(&build);
@@ -62,6 +79,7 @@ RoadMap parse_opendrive(std::string_view text, const std::string& source, const 
                         const ImportProgress& progress) {
   PICTURA_CHECK(options.chord_error_m >= 1e-3f && options.chord_error_m <= 10.0f,
                 "OpenDRIVE options: expected a chord error in [0.001, 10] m, got {}", options.chord_error_m);
+  check_plan(options.plan);
   try {
     return import_network(text, source, options, progress);
   } catch (const Interrupted&) {

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "pictura/common/error.h"
+#include "pictura/map/plan_map.h"
 #include "pictura/map/road_map.h"
 
 namespace pictura {
@@ -13,6 +14,9 @@ namespace pictura {
 struct OpenDriveOptions {
   float chord_error_m = 0.02f;  // maximum distance of a sampled curve from the true one
   bool strict = false;          // refuse every fault, also those that have one sensible meaning
+  // What else than the identity imports a copy whose lanes keep their widths; it stretches and shrinks every length at
+  // most by half, and does not mirror.
+  PlanMap plan;
 };
 
 /// Told before each stage of an import: its name, and the share of the work that is done by then.

@@ -250,18 +250,29 @@ void add_stop_line(Build* build, std::size_t road, const FileObject& object) {
   build->map->provenance.stop_lines.push_back(source_of(road, object.where));
 }
 
+/// Metres of a deformed road for each metre in a direction, as an angle from the road's heading.
+double stretch_towards(const Pose& pose, double angle) {
+  return std::hypot(pose.stretch * std::cos(angle), std::sin(angle));
+}
+
 void add_parking_space(Build* build, std::size_t road_index, const FileObject& object) {
   const FileRoad& road = build->network.roads[road_index];
   ParkingSpace space;
   Eigen::Vector3d center = point_at(road, object.s, object.t);
   center.z() += object.z_offset;
   space.center_m = build->to_map(center);
-  double heading = pose_at(road, object.s).heading + object.heading;
+  const Pose pose = pose_at(road, object.s);
+  double heading = pose.heading + object.heading;
   double length_m = object.length, width_m = object.width;
   if (!(length_m >= kMinParking_m && width_m >= kMinParking_m)) {
     return object.where.mend(build->faults, MendKind::shapeless_object,
                              "expected a parking space with a length and a width of at least {} m, got {} and {}",
                              kMinParking_m, length_m, width_m);
+  }
+  // Rows of spaces keep their number: along the road each becomes as much longer or shorter as the road.
+  if (road.deformation) {
+    length_m *= stretch_towards(pose, object.heading);
+    width_m *= stretch_towards(pose, object.heading + 0.5 * std::numbers::pi);
   }
   // Cars park along the longer side, whichever dimension the file calls length.
   if (width_m > length_m) {
@@ -270,7 +281,7 @@ void add_parking_space(Build* build, std::size_t road_index, const FileObject& o
   }
   // Of the two headings take that of the traffic on this side of the road.
   const bool forward = travels_forward(road, object.t > 0 ? 1 : -1);
-  const double traffic = pose_at(road, object.s).heading + (forward ? 0.0 : std::numbers::pi);
+  const double traffic = pose.heading + (forward ? 0.0 : std::numbers::pi);
   if (std::cos(heading - traffic) < 0) heading += std::numbers::pi;
   space.heading_rad = static_cast<float>(std::remainder(heading, 2 * std::numbers::pi));
   space.length_m = static_cast<float>(length_m);

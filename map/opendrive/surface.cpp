@@ -125,7 +125,8 @@ void build_building_lines(Build* build) {
         auto at = [&](double s) {
           return build->from_origin(point_at(road, s, border_at(road, section, outermost, s).t + sign * kSetback_m));
         };
-        const int pieces = std::max(1, static_cast<int>(std::round((section.end - section.s) / kBuildingPiece_m)));
+        const int pieces =
+            std::max(1, static_cast<int>(std::round(length_between(road, section.s, section.end) / kBuildingPiece_m)));
         const double step = (section.end - section.s) / pieces;
         for (int i = 0; i < pieces; ++i) {
           build->budget.count_sample();
