@@ -13,6 +13,7 @@
 #include "pictura/cli/replay_cases.h"
 #include "pictura/commit.h"
 #include "pictura/common/error.h"
+#include "pictura/map/map_copy.h"
 #include "pictura/simulator/observation_arrays.h"
 #include "pictura/training/evaluation/evaluate.h"
 #include "pictura/training/evaluation/evaluate_scenes.h"
@@ -239,11 +240,11 @@ void fill_probe(ProbeOptions* options, const std::vector<std::string>& policies,
   options->sample_steps = sample_steps;
   options->batch = batch;
   EvaluateOptions& worlds = options->worlds;
-  worlds.maps = maps;
+  worlds.maps = expand_map_names(maps);
   worlds.densities = {density_named(density)};
   worlds.agents_per_world = agents_per_world;
   worlds.first_scenario = first_scene;
-  worlds.scenarios = scenes > 0 ? scenes : default_probe_scenes(policies.size(), maps.size());
+  worlds.scenarios = scenes > 0 ? scenes : default_probe_scenes(policies.size(), worlds.maps.size());
   worlds.steps = steps;
   worlds.argmax = argmax;
   worlds.seed = seed;
@@ -437,7 +438,7 @@ void bind_evaluation(py::module_& module) {
         options.average = average;
         options.checkpoint = checkpoint;
         options.controller = controller;
-        options.maps = maps;
+        options.maps = expand_map_names(maps);
         options.densities = densities_of(densities);
         options.agents_per_world = agents_per_world;
         options.first_scenario = first_scenario;
@@ -468,7 +469,7 @@ void bind_evaluation(py::module_& module) {
       py::arg("average") = false, py::arg("on_progress") = py::none(),
       R"(The paper's evaluation, as `pictura evaluate` does it, in worlds that no training has.
 
-checkpoint: of a policy; '' with a controller of the paper's world. maps: names or files. controller: 'lane', 'idm_lanes', 'random' or 'idle',
+checkpoint: of a policy; '' with a controller of the paper's world. maps: names, files or ranges as procedural:1-64. controller: 'lane', 'idm_lanes', 'random' or 'idle',
 which drives instead. densities: 'light', 'medium' and 'dense', 60, 120 and 150 agents a world, or agents_per_world of them.
 device, simulator, renderer: 'auto' or names; renderer '': as it was trained. rig, or width_px and height_px: other cameras.
 conditioning: numbers by name. light_cycles: 'phases' or 'independent'; '': as it was trained. average: with the average of

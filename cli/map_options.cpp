@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "pictura/map/map_copy.h"
+
 namespace pictura {
 
 namespace {
@@ -29,6 +31,7 @@ CLI::Option* add_map_list_option(CLI::App* command, std::vector<std::string>* ma
         begin = end + 1;
       }
     }
+    *maps = expand_map_names(*maps);
   };
   std::string otherwise;
   for (const std::string& map : *maps) otherwise += (otherwise.empty() ? "" : ",") + map;

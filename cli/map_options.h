@@ -9,8 +9,8 @@
 namespace pictura {
 
 /// Adds --map, which takes names with commas between them, and may be given several times. The commas within
-/// procedural:7:blocks=4x3,roundabouts=1 separate its options. It takes one word, so that what follows is left to
-/// others.
+/// procedural:7:blocks=4x3,roundabouts=1 separate its options; ranges of seeds are expanded. It takes one word, so that
+/// what follows is left to others.
 CLI::Option* add_map_list_option(CLI::App* command, std::vector<std::string>* maps, const std::string& help);
 
 }  // namespace pictura

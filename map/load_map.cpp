@@ -22,8 +22,8 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kProcedural = "procedural";
 constexpr std::string_view kExtension = ".xodr";
-// Of a procedural town's text, for each of its crossings.
-constexpr int64_t kTownBytesPerCrossing = 40'000;
+// Bytes for each crossing of a procedural town with streets of default length, in a file as large as CARLA's.
+constexpr double kFileBytesPerCrossing = 80e3;
 constexpr std::size_t kMaxFile_bytes = std::size_t{1} << 29;
 
 std::vector<fs::path> town_folders() { return {fs::path(map_folder()), fs::path(map_folder()) / "carla"}; }
@@ -146,14 +146,15 @@ std::vector<std::shared_ptr<const RoadMap>> load_maps(const std::vector<std::str
   return maps;
 }
 
-int64_t map_text_bytes(const std::string& name) {
+int64_t map_file_bytes(const std::string& name) {
   const std::string original(parse_map_copy(name).map);
   if (const std::optional<TownOptions> town = procedural_options(original)) {
-    return kTownBytesPerCrossing * (town->blocks_x + 1) * (town->blocks_y + 1);
+    const double crossings = (town->blocks_x + 1.0) * (town->blocks_y + 1.0);
+    return static_cast<int64_t>(kFileBytesPerCrossing * crossings * town->block_m / TownOptions().block_m);
   }
   std::error_code error;
   const std::uintmax_t bytes = fs::file_size(file_path_of(original), error);
-  return error ? 0 : static_cast<int64_t>(bytes);  // what cannot be read is refused when it is loaded
+  return error ? 0 : static_cast<int64_t>(bytes);  // a file that cannot be read is refused when it is loaded
 }
 
 MapText map_text(const std::string& name) {

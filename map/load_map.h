@@ -38,8 +38,9 @@ std::vector<std::shared_ptr<const RoadMap>> load_maps(const std::vector<std::str
 /// have none.
 MapText map_text(const std::string& name);
 
-/// The size of that text: of a procedural town by estimate. Throws as load_map() does.
-int64_t map_text_bytes(const std::string& name);
+/// The size of a map's file; of a procedural town, about that of a CARLA file with as much road. Memory is estimated
+/// from it. Throws as load_map() does.
+int64_t map_file_bytes(const std::string& name);
 
 /// Whether a name is a file's or its copy's, rather than a town's or a procedural map's.
 bool is_map_file(std::string_view name);

@@ -20,6 +20,7 @@
 #include "pictura/common/support/suggestion.h"
 #include "pictura/common/support/toml_fields.h"
 #include "pictura/map/load_map.h"
+#include "pictura/map/map_copy.h"
 #include "pictura/simulator/conditioning_lookup.h"
 #include "pictura/training/config_keys.h"
 
@@ -59,6 +60,7 @@ void visit(AnyConfig& c, Visitor&& v) {
 
   v.name("simulator.backend", c.simulator.backend, simulator_names());
   v.texts("simulator.maps", c.simulator.maps);
+  v.integer("simulator.map_copies", c.simulator.map_copies, 0, kMaxMapCopies);
   v.integer("simulator.num_slots", c.simulator.num_slots, 1, 1 << 22);
   v.integer("simulator.min_agents", c.simulator.min_agents, 1, kMaxAgentsPerWorld);
   v.integer("simulator.max_agents", c.simulator.max_agents, 1, kMaxAgentsPerWorld);
@@ -720,6 +722,11 @@ Config parse(const std::string& text, const std::string& source, const std::vect
   reader.old_schedule("train.schedule_updates", int64_t{config.simulator.num_slots} * config.train.num_steps,
                       config.train.schedule_agent_steps);
   reader.refuse_unknown(table);
+  try {
+    config.simulator.maps = expand_map_names(config.simulator.maps);
+  } catch (const UsageError& error) {
+    reader.refuse("simulator.maps", error.what());
+  }
   check_contradictions(config, reader);
   // What a run saves has the sizes that are in force, which the rows of the schedule before do not lead to.
   if (!any_name) check_patch_changes(config, reader);

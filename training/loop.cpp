@@ -179,6 +179,7 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
       config, fmt::format("old_run {}, init_from '{}'", static_cast<int>(options.old_run), options.init_from), ranks);
   const Device device = open_learning_device(config, options.launch.local_rank);
   check_memory(config, device, available_bytes(device), ranks->size());
+  check_map_memory(config, device, available_bytes(device), available_bytes(Device{}), ranks->size());
   // A rollout step or a minibatch of the paper's size takes minutes of a few cores.
   constexpr double kHostNoProgress_s = 900;
   if (device.is_host()) ranks->set_no_progress_s(kHostNoProgress_s);

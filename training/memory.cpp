@@ -6,10 +6,12 @@
 #include "pictura/common/error.h"
 #include "pictura/common/image.h"
 #include "pictura/common/scene_history.h"
+#include "pictura/map/load_map.h"
 #include "pictura/simulator/observation_arrays.h"
 #include "pictura/training/network_shape.h"
 #include "pictura/training/observation.h"
 #include "pictura/training/point_features.h"
+#include "pictura/training/training_maps.h"
 
 namespace pictura {
 
@@ -41,6 +43,9 @@ constexpr double kSimulatorBytesPerBox = 700;
 // Of a transition: the scalars of a rollout (values, actions, log-probabilities, rewards, advantages, three flags), and
 // those that an update makes of them (returns, actions and five lists of rows as i64).
 constexpr double kTransitionBytes = 5 * 4 + 3 + 4 + 6 * 8;
+
+// Of a map, for each byte of its file: above what was measured of CARLA's towns, of procedural ones, and of copies.
+constexpr double kHostBytesPerFileByte = 17, kDeviceBytesPerFileByte = 11;
 
 double kept_image_bytes(const Config& config, double agents) {
   return agents * image_bytes(config) * (config.train.num_steps + 1);
@@ -210,6 +215,37 @@ void check_memory(const Config& config, Device device, int64_t memory_bytes, int
       config.simulator.num_slots, config.train.num_steps, needed / 1e9,
       num_ranks > 1 ? fmt::format("on each of {} ranks ", num_ranks) : "", network.bytes(chunk) / 1e9, name_of(device),
       available / 1e9, static_cast<int64_t>(config.simulator.num_slots * (left / needed)));
+}
+
+MapMemory estimated_map_memory(const std::vector<std::string>& names) {
+  MapMemory memory;
+  for (const std::string& name : names) {
+    const auto file_bytes = static_cast<double>(map_file_bytes(name));
+    memory.host += kHostBytesPerFileByte * file_bytes;
+    memory.device += kDeviceBytesPerFileByte * file_bytes;
+  }
+  return memory;
+}
+
+void check_map_memory(const Config& config, Device device, int64_t memory_bytes, int64_t host_memory_bytes,
+                      int num_ranks) {
+  const std::vector<std::string> names = training_maps(config);
+  const MapMemory maps = estimated_map_memory(names);
+  const auto check = [&](Device where, double needed, double available) {
+    if (needed <= available) return;
+    fail(
+        "train: {} maps (simulator.maps, and simulator.map_copies of each) need {:.3g} GB by estimate; {} has {:.3g} "
+        "GB "
+        "for them: about {} such maps would fit",
+        names.size(), needed / 1e9, name_of(where), available / 1e9,
+        static_cast<int64_t>(static_cast<double>(names.size()) * std::max(available, 0.0) / needed));
+  };
+  const auto chunk = static_cast<double>(std::min(config.train.forward_chunk, config.train.minibatch_size));
+  const bool keeps = keeps_images(config, config.simulator.num_slots / num_ranks, device, memory_bytes);
+  const double left = static_cast<double>(memory_bytes) - network_size(config, device).bytes(chunk) -
+                      estimated_bytes(config, keeps) / num_ranks;
+  check(device, device.is_host() ? maps.host : maps.device, left);
+  if (!device.is_host()) check(Device{}, maps.host, static_cast<double>(host_memory_bytes));
 }
 
 }  // namespace pictura

@@ -31,4 +31,19 @@ NetworkSize network_size(const Config& config, Device device);
 /// one's part.
 void check_memory(const Config& config, Device device, int64_t memory_bytes, int num_ranks = 1);
 
+/// What maps take by estimate, in bytes.
+struct MapMemory {
+  double host = 0;    // as they are loaded, with what rules and renderers read
+  double device = 0;  // what rules and renderers read of them, on a device
+};
+/// Of these maps, as training_maps() names them, from the sizes of their files and towns; seldom less than
+/// they take. Throws as map_file_bytes()
+/// does.
+MapMemory estimated_map_memory(const std::vector<std::string>& names);
+
+/// Throws Error saying how many maps would fit where those of a run do not: neither beside the agents and the network
+/// in `memory_bytes` of the device, nor, of a device that is not the host, in `host_memory_bytes`.
+void check_map_memory(const Config& config, Device device, int64_t memory_bytes, int64_t host_memory_bytes,
+                      int num_ranks = 1);
+
 }  // namespace pictura

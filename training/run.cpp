@@ -9,16 +9,11 @@
 #include "pictura/simulator/saved_worlds.h"
 #include "pictura/training/patch_spread.h"
 #include "pictura/training/ranks/agree.h"
+#include "pictura/training/training_maps.h"
 
 namespace pictura {
 
 namespace {
-
-std::vector<WorldSpec> draw_training_worlds(const Config& config) {
-  const Config::SimulatorSection& section = config.simulator;
-  return draw_worlds(config.run.seed, section.num_slots, section.min_agents, section.max_agents,
-                     static_cast<int>(section.maps.size()));
-}
 
 std::unique_ptr<const Teacher> make_teacher(const Config& config, Device device, Communicator* communicator) {
   const std::string& path = config.train.teacher;
@@ -28,11 +23,10 @@ std::unique_ptr<const Teacher> make_teacher(const Config& config, Device device,
 
 std::unique_ptr<Simulator> make_training_simulator(const Config& config, Device device, const Teacher* teacher,
                                                    std::vector<WorldSpec> worlds) {
-  std::vector<std::shared_ptr<const RoadMap>> maps;
-  for (const std::string& name : config.simulator.maps) maps.push_back(load_map(name));
   SimulatorConfig world = simulator_config(config, device);
   if (teacher) teacher->add_arrays(&world);
-  return make_simulator(config.simulator.backend, world, std::move(maps), std::move(worlds));
+  return make_simulator(config.simulator.backend, world, load_maps(training_maps(config), config.run.num_threads),
+                        std::move(worlds));
 }
 
 std::unique_ptr<Renderer> make_training_renderer(const Config& config, const Rig& rig, const Simulator& simulator) {

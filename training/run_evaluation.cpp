@@ -4,7 +4,11 @@
 
 namespace pictura {
 
-RunEvaluation::RunEvaluation(const Run& run) : run_(run) { worlds_.maps = run.simulator->maps(); }
+RunEvaluation::RunEvaluation(const Run& run) : run_(run) {
+  // Copies come after the maps themselves.
+  const CompiledMaps& maps = run.simulator->maps();
+  worlds_.maps.assign(maps.begin(), maps.begin() + static_cast<ptrdiff_t>(run.config.simulator.maps.size()));
+}
 
 bool RunEvaluation::is_due() const {
   const int64_t every = run_.config.train.evaluate_every;

@@ -12,6 +12,7 @@
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/training/config_keys.h"
 #include "pictura/training/torch_device.h"
+#include "pictura/training/training_maps.h"
 
 namespace pictura {
 namespace {
@@ -345,6 +346,32 @@ TEST(Config, DifferencesThatChangeTheRunAreNamed) {
   b = a;
   b.simulator.light_heads = LightHeads::visible;
   EXPECT_EQ(first_difference(a, b), "simulator.light_heads: 'as_mapped' became 'visible'");
+}
+
+TEST(Config, RangesOfTownsAreExpandedAndCopiesAreOfEachMap) {
+  const auto with = [](const std::vector<std::string>& overrides) {
+    return parse_config(
+        "[simulator]\nmaps = [\"Town01\", \"procedural:8-9\"]\nnum_slots = 40\nmin_agents = 4\n"
+        "max_agents = 4\n",
+        "file.toml", overrides);
+  };
+  const Config plain = with({}), copied = with({"simulator.map_copies=2"});
+  EXPECT_THAT(plain.simulator.maps, ElementsAre("Town01", "procedural:8", "procedural:9"));
+  EXPECT_EQ(training_maps(plain), plain.simulator.maps);
+  EXPECT_THAT(training_maps(copied), ElementsAre("Town01", "procedural:8", "procedural:9", "Town01#1", "procedural:8#1",
+                                                 "procedural:9#1", "Town01#2", "procedural:8#2", "procedural:9#2"));
+  const std::vector<WorldSpec> worlds = draw_training_worlds(copied), before = draw_training_worlds(plain);
+  ASSERT_EQ(worlds.size(), 10u);
+  for (size_t i = 0; i < worlds.size(); ++i) {
+    EXPECT_EQ(worlds[i].map, static_cast<int>(i % 9));
+    EXPECT_EQ(before[i].map, static_cast<int>(i % 3));
+  }
+  // Copies that no world is on are left out, maps are not.
+  EXPECT_EQ(training_maps(with({"simulator.map_copies=2", "simulator.num_slots=16"})).size(), 4u);
+  EXPECT_EQ(training_maps(with({"simulator.map_copies=2", "simulator.num_slots=4"})).size(), 3u);
+  EXPECT_EQ(first_difference(plain, copied), "simulator.map_copies: 0 became 2");
+  EXPECT_THAT(test::message_of([&] { with({"simulator.maps=[\"procedural:9-8\"]"}); }),
+              AllOf(HasSubstr("simulator.maps"), HasSubstr("'procedural:9-8'")));
 }
 
 TEST(Config, HarmlessDifferencesAreNone) {

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <malloc.h>
 
+#include "pictura/map/load_map.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/training/run.h"
 
@@ -183,6 +184,42 @@ TEST(Memory, ImagesAreKeptOnADeviceWhereTheyTakeAQuarterOfItsMemory) {
   // The largest that the run will draw count.
   EXPECT_FALSE(keeps({"render.schedule=[[1000, 192, 108]]"}, 4 * bytes));
   EXPECT_TRUE(keeps({"render.schedule=[[1000, 192, 108]]"}, 16 * bytes));
+}
+
+TEST(Memory, MapsTakeLessThanIsEstimatedAndNotMuchLess) {
+  const std::vector<std::string> names{"procedural:1", "procedural:1#1", "procedural:2:blocks=2x2", "procedural:5"};
+  const MapMemory estimate = estimated_map_memory(names);
+  const double before = heap_bytes();
+  const CompiledMaps maps = compile_maps(load_maps(names, 1), {}, 1);
+  const double host_bytes = heap_bytes() - before;
+  double device_bytes = 0;
+  for (const auto& map : maps) device_bytes += static_cast<double>(map->rules.size_bytes());
+  EXPECT_GT(estimate.host, host_bytes);
+  EXPECT_LT(estimate.host, 3 * host_bytes);
+  EXPECT_GT(estimate.device, device_bytes);
+  EXPECT_LT(estimate.device, 3 * device_bytes);
+}
+
+TEST(Memory, MoreMapsThanFitAreRefusedWithTheNumberThatWould) {
+  const auto config = [](int copies) {
+    return load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml",
+                       {"run.device=cpu", "simulator.maps=[\"procedural:1-4\"]", "simulator.num_slots=4000",
+                        "simulator.max_agents=8", fmt::format("simulator.map_copies={}", copies)});
+  };
+  constexpr int64_t kPlenty_bytes = 64'000'000'000;
+  EXPECT_NO_THROW(check_map_memory(config(9), Device{}, kPlenty_bytes, kPlenty_bytes));
+  const double one_map = estimated_map_memory({"procedural:1"}).host, agents = estimated_bytes(config(0), true),
+               network = network_size(config(0), Device{})
+                             .bytes(std::min(config(0).train.forward_chunk, config(0).train.minibatch_size));
+  const auto memory_bytes = static_cast<int64_t>(10.5 * one_map + agents + network);
+  EXPECT_NO_THROW(check_map_memory(config(0), Device{}, memory_bytes, 0));
+  EXPECT_THAT(message_of([&] { check_map_memory(config(9), Device{}, memory_bytes, 0); }),
+              AllOf(HasSubstr("40 maps (simulator.maps, and simulator.map_copies of each)"), HasSubstr("by estimate"),
+                    HasSubstr("cpu has"), HasSubstr("about 10 such maps would fit")));
+  // A device holds less of a map than the host, which holds it too.
+  EXPECT_THAT(
+      message_of([&] { check_map_memory(config(9), Device{MemorySpace::cuda, 0}, kPlenty_bytes, memory_bytes); }),
+      HasSubstr("cpu has"));
 }
 
 TEST(Memory, ANetworkThatCannotFitIsRefusedBeforeItIsMade) {

@@ -181,9 +181,7 @@ Density density_named(const std::string& name) {
 }
 
 CompiledMaps compile_maps_of(const EvaluateOptions& options, const SimulatorConfig& world) {
-  std::vector<std::shared_ptr<const RoadMap>> roads;
-  for (const std::string& name : options.maps) roads.push_back(load_map(name));
-  return compile_maps(roads, map_options(world), options.num_threads);
+  return compile_maps(load_maps(options.maps, options.num_threads), map_options(world), options.num_threads);
 }
 
 EvaluateReport evaluate(const EvaluateOptions& options) {

@@ -6,15 +6,21 @@
 
 #include "pictura/bench/lane_keeping_episodes.h"
 #include "pictura/map/load_map.h"
+#include "pictura/map/map_copy.h"
 #include "pictura/tests/simulator/stage.h"
 
 namespace pictura {
 namespace {
 
-/// Nothing may halt an agent, and it seldom leaves the middle of the lane.
-void drive_everywhere(float cyclist_fraction, int drivers, int drivers_each, int steps) {
+std::vector<std::string> towns_to_drive() {
   std::vector<std::string> towns = known_towns();
   for (const char* town : {"procedural:1", "procedural:2"}) towns.emplace_back(town);
+  return towns;
+}
+
+/// Nothing may halt an agent, and it seldom leaves the middle of the lane.
+void drive_everywhere(const std::vector<std::string>& towns, float cyclist_fraction, int drivers, int drivers_each,
+                      int steps) {
   for (const std::string& town : towns) {
     SCOPED_TRACE(town);
     const auto map = load_map(town);
@@ -38,11 +44,21 @@ void drive_everywhere(float cyclist_fraction, int drivers, int drivers_each, int
   }
 }
 
-TEST(LaneKeeping, OfABicycleKeepsItsLaneAndStopsAtRedLightsInEveryTown) { drive_everywhere(1, 16, 1, 600); }
+TEST(LaneKeeping, OfABicycleKeepsItsLaneAndStopsAtRedLightsInEveryTown) {
+  drive_everywhere(towns_to_drive(), 1, 16, 1, 600);
+}
 
-TEST(LaneKeeping, OfACarKeepsItsLaneAndStopsAtRedLightsInEveryTown) { drive_everywhere(0, 24, 1, 1280); }
+TEST(LaneKeeping, OfACarKeepsItsLaneAndStopsAtRedLightsInEveryTown) {
+  drive_everywhere(towns_to_drive(), 0, 24, 1, 1280);
+}
 
-TEST(LaneKeeping, OfThreeTouchesNoOtherInEveryTown) { drive_everywhere(0.2f, 48, 3, 600); }
+TEST(LaneKeeping, OfACarKeepsItsLaneAndStopsAtRedLightsInACopyOfEveryTown) {
+  std::vector<std::string> copies;
+  for (const std::string& town : towns_to_drive()) copies.push_back(map_copy_name(town, 1));
+  drive_everywhere(copies, 0, 12, 1, 1280);
+}
+
+TEST(LaneKeeping, OfThreeTouchesNoOtherInEveryTown) { drive_everywhere(towns_to_drive(), 0.2f, 48, 3, 600); }
 
 /// As many as in evaluation's medium density. Of these 1,080 agents 277 halted as long as they relied on the one ahead
 /// to brake and did not look beside them before changing lanes; now 17: five pairs where one changes lanes in a bend,
