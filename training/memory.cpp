@@ -146,7 +146,10 @@ void add_images(const Config& config, const Rig& rig, LayerSum* sum) {
     sum->add(rows, width, policy.attention_mlp, 2);
     sum->add(rows, policy.attention_mlp, width, 2);
   }
-  sum->add(1, cameras * width, 4.0 * policy.embedding_width, 1);
+  const bool concatenates = policy.query_pooling == QueryPooling::concatenated;
+  const double features = (concatenates ? rows : cameras) * width;
+  sum->add_values(features, 1);
+  sum->add(1, features, 4.0 * policy.embedding_width, 1);
 }
 
 LayerSum layers_of(const Config& config, const Rig& rig, Device device) {

@@ -8,6 +8,7 @@
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/saved_worlds.h"
 #include "pictura/training/patch_spread.h"
+#include "pictura/training/query_spread.h"
 #include "pictura/training/ranks/agree.h"
 #include "pictura/training/training_maps.h"
 
@@ -169,7 +170,10 @@ void Run::begin_with(const SavedPolicy& other) {
   PICTURA_CHECK(other.config.policy.value_head == config.policy.value_head,
                 "{}: policy.value_head: its policy has \"{}\", expected \"{}\"", other.path,
                 name_of(other.config.policy.value_head), name_of(config.policy.value_head));
-  restore_policy(other, *policy);
+  const bool concatenates = config.reads_images() && other.config.reads_images() &&
+                            config.policy.query_pooling == QueryPooling::concatenated &&
+                            other.config.policy.query_pooling == QueryPooling::averaged;
+  restore_policy(concatenates ? with_concatenated_queries(other) : other, *policy);
   restore_rate_factors(other);
   if (average) average->restart();
 }

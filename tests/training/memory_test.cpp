@@ -88,6 +88,7 @@ INSTANTIATE_TEST_SUITE_P(
         std::vector<std::string>{"policy.modality=vector", "policy.value_head=two_hot"},
         std::vector<std::string>{"policy.modality=vector", "policy.point_features=false", "policy.embedding_width=200"},
         std::vector<std::string>{"policy.modality=perspective"},
+        std::vector<std::string>{"policy.modality=perspective", "policy.query_pooling=concatenated"},
         std::vector<std::string>{"policy.modality=perspective", "policy.patch_px=1",
                                  "policy.conv_kernels=[5, 3, 3, 3, 3]", "policy.conv_strides=[2, 2, 2, 1, 1]"}));
 
