@@ -107,6 +107,8 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.integer("policy.backbone_layers", c.policy.backbone_layers, 1, 64);
   v.integer("policy.backbone_width", c.policy.backbone_width, 1, 1 << 14);
   v.choice("policy.value_head", c.policy.value_head, kValueHeads);
+  v.flag("policy.layer_norm", c.policy.layer_norm);
+  v.flag("policy.residual", c.policy.residual);
   v.integer("policy.decision_steps", c.policy.decision_steps, 1, 1000);
 
   v.integer("train.updates", c.train.updates, 1, int64_t{1} << 40);

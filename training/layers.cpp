@@ -481,6 +481,16 @@ at::Tensor linear_gelu(const at::Tensor& x, const at::Tensor& weight, const at::
   return BiasGelu::apply(at::linear(x, weight), bias);
 }
 
+at::Tensor normalize(const at::Tensor& x) {
+  // Autocast would convert to fp32 and back, two passes more each way. Sums are fp32 without it, too.
+  const c10::impl::ExcludeDispatchKeyGuard no_autocast(c10::autocast_dispatch_keyset);
+  return at::layer_norm(x, {x.size(-1)});
+}
+
+at::Tensor linear_norm_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias) {
+  return gelu(normalize(at::linear(x, weight, bias)));
+}
+
 at::Tensor convolve_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias, int64_t stride) {
   const int64_t padding = weight.size(2) / 2, missing = x.size(1) - weight.size(1);
   const at::Tensor padded = missing > 0 ? at::constant_pad_nd(weight, {0, 0, 0, 0, 0, missing}) : weight;

@@ -10,6 +10,12 @@ namespace pictura {
 /// GELU of a linear layer. x: [..., in]; weight: [out, in]; bias: [out].
 at::Tensor linear_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias);
 
+/// Layer norm without parameters over the last dimension, in the type of x at any precision.
+at::Tensor normalize(const at::Tensor& x);
+
+/// GELU of a linear layer whose outputs are normalized before it. Shapes as those of linear_gelu().
+at::Tensor linear_norm_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias);
+
 /// GELU of a convolution whose input is padded by half the kernel. x: [n, in, height, width]; weight: [out, in, kernel,
 /// kernel], or with fewer inputs where the last channels of x are 0; bias: [out].
 at::Tensor convolve_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias, int64_t stride);

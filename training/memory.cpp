@@ -86,8 +86,9 @@ class LayerSum {
     add_values(rows * out, kept);
     largest_ = std::max(largest_, rows * (in + out));
   }
-  void add_group(double rows, double in, double width, double kept = 1) {
-    add(rows, in, width, 2);
+  /// With a norm, what goes into the activation is kept beside the first layer's results.
+  void add_group(double rows, double in, double width, bool has_norm, double kept = 1) {
+    add(rows, in, width, has_norm ? 3 : 2);
     add(rows, width, width, kept);
   }
   void add_parameters(double count) { parameters_ += count; }
@@ -107,7 +108,7 @@ void add_entity_sets(const Config& config, Device device, LayerSum* sum) {
     if (!is_set(array) || !config.reads(array.part)) continue;
     const double points = num_points(array.name);
     const double features = array.features + (config.policy.point_features ? points * kPointFeatures : 0);
-    if (device.is_host()) {
+    if (device.is_host() && !config.policy.layer_norm) {
       // Of members their features are kept, of a set which are the largest: see largest_embedding().
       sum->add_parameters((features + 1) * width + (width + 1) * width);
       sum->add_values(array.rows * features, 1);
@@ -115,7 +116,7 @@ void add_entity_sets(const Config& config, Device device, LayerSum* sum) {
       continue;
     }
     sum->add_values(array.rows * features, 2);
-    sum->add_group(array.rows, features, width, 2);
+    sum->add_group(array.rows, features, width, config.policy.layer_norm, 2);
   }
 }
 
@@ -164,12 +165,12 @@ LayerSum layers_of(const Config& config, const Rig& rig, Device device) {
   }
   const double width = policy.embedding_width,
                waypoint = kWaypointFeatures + (policy.point_features ? kPointFeatures : 0);
-  sum.add_group(1, num_ego_features(config.reads_images()), width);
-  sum.add_group(1, kNumConditioning + kNumWaypoints * waypoint, width);
+  sum.add_group(1, num_ego_features(config.reads_images()), width, policy.layer_norm);
+  sum.add_group(1, kNumConditioning + kNumWaypoints * waypoint, width, policy.layer_norm);
   double in = (sets + 2) * width;
   sum.add_values(in, 1);
   for (int i = 0; i < policy.backbone_layers; ++i) {
-    sum.add(1, in, policy.backbone_width, 2);
+    sum.add(1, in, policy.backbone_width, policy.layer_norm ? 3 : 2);
     in = policy.backbone_width;
   }
   sum.add(1, in, kNumActions, 3);

@@ -71,8 +71,10 @@ class ParameterMaker {
     return {normal(name + ".weight", {out, in}, gain), constant(name + ".bias", {out}, 0)};
   }
   /// The paper's per-group encoder, a 2-layer MLP.
-  PolicyNetwork::GroupEncoder group(const std::string& name, int64_t in, int64_t width) {
-    return {linear(name + ".hidden", in, width, std::numbers::sqrt2), linear(name + ".out", width, width, 1.0)};
+  PolicyNetwork::GroupEncoder group(const std::string& name, int64_t in, const Config::PolicySection& config) {
+    const int64_t width = config.embedding_width;
+    return {linear(name + ".hidden", in, width, std::numbers::sqrt2), linear(name + ".out", width, width, 1.0),
+            config.layer_norm};
   }
 
  private:
@@ -94,7 +96,8 @@ at::Tensor apply_gelu(const Linear& layer, const at::Tensor& x) {
 
 template <typename GroupEncoder>
 at::Tensor encode(const GroupEncoder& group, const at::Tensor& x) {
-  return apply(group.out, apply_gelu(group.hidden, x));
+  const auto hidden = group.layer_norm ? linear_norm_gelu : linear_gelu;
+  return apply(group.out, hidden(x, group.hidden.weight, group.hidden.bias));
 }
 
 }  // namespace
@@ -118,7 +121,7 @@ class VectorEncoder final : public SceneEncoder {
       if (!is_set(array) || (array.part == ObservationPart::walls && !reads_walls)) continue;
       const int64_t points = num_points(array.name);
       const int64_t features = array.features + (point_features_ ? points * kPointFeatures : 0);
-      groups_.push_back({make->group(std::string(array.name), features, embedding_width_), kObservationTensors[i],
+      groups_.push_back({make->group(std::string(array.name), features, config), kObservationTensors[i],
                          entity_set_of(i), points});
     }
   }
@@ -128,7 +131,7 @@ class VectorEncoder final : public SceneEncoder {
     for (const Group& group : groups_) {
       at::Tensor members = o.*group.members;
       const at::Tensor counts = o.set_counts.select(1, group.set);
-      if (takes_sets(members)) {
+      if (!group.encoder.layer_norm && takes_sets(members)) {
         const PolicyNetwork::Linear &hidden = group.encoder.hidden, &out = group.encoder.out;
         embeddings.push_back(largest_embedding(members, counts, point_features_ ? group.points : 0, kScalePosition_m,
                                                hidden.weight, hidden.bias, out.weight, out.bias));
@@ -313,7 +316,12 @@ class PerspectiveEncoder final : public SceneEncoder {
 
 PolicyNetwork::PolicyNetwork(const Config::PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type,
                              bool reads_walls, Device device, Precision precision)
-    : type_(type), precision_(precision), value_head_(config.value_head), point_features_(config.point_features) {
+    : type_(type),
+      precision_(precision),
+      value_head_(config.value_head),
+      point_features_(config.point_features),
+      layer_norm_(config.layer_norm),
+      residual_(config.residual) {
   ParameterMaker make(seed, at::TensorOptions(type).device(torch_device(device)), &parameters_);
   const bool sees_images = config.modality == Modality::perspective;
   const at::ScalarType input_type = precision == Precision::bf16 ? at::kBFloat16 : type;
@@ -322,12 +330,11 @@ PolicyNetwork::PolicyNetwork(const Config::PolicySection& config, int num_camera
   else
     scene_ = std::make_unique<VectorEncoder>(config, reads_walls, input_type, &make);
   ego_features_ = num_ego_features(sees_images);
-  const int64_t width = config.embedding_width;
-  ego_ = make.group("ego", ego_features_, width);
+  ego_ = make.group("ego", ego_features_, config);
   conditioning_ = make.group(
       "conditioning", kNumConditioning + kNumWaypoints * (kWaypointFeatures + (point_features_ ? kPointFeatures : 0)),
-      width);
-  int64_t in = scene_->width() + 2 * width;
+      config);
+  int64_t in = scene_->width() + 2 * int64_t{config.embedding_width};
   for (int i = 0; i < config.backbone_layers; ++i) {
     backbone_.push_back(make.linear(fmt::format("backbone.{}", i), in, config.backbone_width, std::numbers::sqrt2));
     in = config.backbone_width;
@@ -338,6 +345,16 @@ PolicyNetwork::PolicyNetwork(const Config::PolicySection& config, int num_camera
   actor_ = make.linear("actor", in, kNumActions, kGainOfLikelihoods);
   critic_ = make.linear("critic", in, num_value_outputs(value_head_),
                         value_head_ == ValueHead::two_hot ? kGainOfLikelihoods : 1.0);
+}
+
+at::Tensor PolicyNetwork::run_trunk(const std::vector<Linear>& layers, at::Tensor x) const {
+  for (size_t i = 0; i < layers.size(); ++i) {
+    // The first layer's input is of another width, and made of what encoders give.
+    const bool is_first = i == 0;
+    const at::Tensor y = apply_gelu(layers[i], layer_norm_ && !is_first ? normalize(x) : x);
+    x = residual_ && !is_first ? x + y : y;
+  }
+  return layer_norm_ ? normalize(x) : x;
 }
 
 Policy::Output PolicyNetwork::forward(const Observation& o) const {
@@ -353,7 +370,7 @@ Policy::Output PolicyNetwork::forward(const Observation& o) const {
     x = at::cat(
         {scene_->forward(o), encode(ego_, o.ego.narrow(1, 0, ego_features_)), encode(conditioning_, at::cat(own, 1))},
         1);
-    for (const Linear& layer : backbone_) x = apply_gelu(layer, x);
+    x = run_trunk(backbone_, x);
   }
   x = x.to(type_);
   const at::Tensor value_outputs = apply(critic_, x);

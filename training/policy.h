@@ -101,8 +101,12 @@ class PolicyNetwork final : public Policy {
   };
   struct GroupEncoder {
     Linear hidden, out;
+    bool layer_norm = false;
   };
+  at::Tensor run_trunk(const std::vector<Linear>& layers, at::Tensor x) const;
+
   GroupEncoder ego_, conditioning_;
+  bool layer_norm_, residual_;  // of the trunk
   std::vector<Linear> backbone_;
   Linear actor_, critic_;
 

@@ -1,5 +1,7 @@
 #include "pictura/training/run.h"
 
+#include <tuple>
+
 #include "pictura/backends/make_learner.h"
 #include "pictura/backends/make_renderer.h"
 #include "pictura/backends/make_simulator.h"
@@ -170,6 +172,13 @@ void Run::begin_with(const SavedPolicy& other) {
   PICTURA_CHECK(other.config.policy.value_head == config.policy.value_head,
                 "{}: policy.value_head: its policy has \"{}\", expected \"{}\"", other.path,
                 name_of(other.config.policy.value_head), name_of(config.policy.value_head));
+  // These have no parameters, whose names and shapes would show them.
+  for (const auto& [key, got, expected] :
+       {std::tuple{"policy.layer_norm", other.config.policy.layer_norm, config.policy.layer_norm},
+        std::tuple{"policy.residual", other.config.policy.residual, config.policy.residual}}) {
+    PICTURA_CHECK(got == expected, "{}: of another architecture: {}: expected {}, got {}", other.path, key, expected,
+                  got);
+  }
   const bool concatenates = config.reads_images() && other.config.reads_images() &&
                             config.policy.query_pooling == QueryPooling::concatenated &&
                             other.config.policy.query_pooling == QueryPooling::averaged;

@@ -40,6 +40,10 @@ def point_features(rows: Tensor, points: int) -> Tensor:
     return torch.cat([xy_m / (size_m + 4.0), xy_m / (size_m + 20.0), xy_m / (distance_m + 1.0)], -1).flatten(-2)
 
 
+def _normalize(x: Tensor) -> Tensor:
+    return functional.layer_norm(x, x.shape[-1:])
+
+
 def _symexp(x: Tensor) -> Tensor:
     return x.sign() * x.abs().expm1()
 
@@ -55,12 +59,13 @@ def _values(head: str, outputs: Tensor) -> Tensor:
 
 
 class _Encoder(nn.Module):
-    def __init__(self, features: int, width: int) -> None:
+    def __init__(self, features: int, width: int, layer_norm: bool) -> None:
         super().__init__()
-        self.hidden, self.out = nn.Linear(features, width), nn.Linear(width, width)
+        self.hidden, self.out, self.layer_norm = nn.Linear(features, width), nn.Linear(width, width), layer_norm
 
     def forward(self, x: Tensor) -> Tensor:
-        return self.out(functional.gelu(self.hidden(x)))
+        x = self.hidden(x)
+        return self.out(functional.gelu(_normalize(x) if self.layer_norm else x))
 
 
 class _Attention(nn.Module):
@@ -120,6 +125,7 @@ class Policy(nn.Module):
         self.config = dict(config)
         self.modality = config["modality"]
         self.points = bool(config.get("point_features", False))
+        self.layer_norm, self.residual = bool(config.get("layer_norm", False)), bool(config.get("residual", False))
         width = config["embedding_width"]
         self.num_cameras = num_cameras
         if self.modality == "perspective":
@@ -140,13 +146,13 @@ class Policy(nn.Module):
             self.sets = [name for name in _SETS if name != "walls" or walls]
             for name in self.sets:
                 features, points = _SETS[name]
-                self.add_module(name, _Encoder(features + 6 * points * self.points, width))
+                self.add_module(name, _Encoder(features + 6 * points * self.points, width, self.layer_norm))
             around, ego = len(self.sets) * width, 9
         else:
             raise pictura.UsageError(f"policy.modality: expected 'perspective' or 'vector', got '{self.modality}'")
         self.ego_features = ego
-        self.ego = _Encoder(ego, width)
-        self.conditioning = _Encoder(17 + 3 * (3 + 6 * self.points), width)
+        self.ego = _Encoder(ego, width, self.layer_norm)
+        self.conditioning = _Encoder(17 + 3 * (3 + 6 * self.points), width, self.layer_norm)
         layers, inside = config["backbone_layers"], config["backbone_width"]
         self.backbone = nn.ModuleList(nn.Linear(around + 2 * width if i == 0 else inside, inside) for i in range(layers))
         self.value_head = config.get("value_head", "linear")
@@ -162,8 +168,7 @@ class Policy(nn.Module):
         around = self._images(observation["rgb"]) if self.modality == "perspective" else self._entities(observation)
         ego = observation["ego"].flatten(1)[:, : self.ego_features]
         x = torch.cat([around, self.ego(ego), self.conditioning(torch.cat(own, 1))], 1)
-        for layer in self.backbone:
-            x = functional.gelu(layer(x))
+        x = self._trunk(self.backbone, x)
         return self.actor(x), _values(self.value_head, self.critic(x))
 
     def act(self, observation: Mapping[str, Tensor], argmax: bool = True) -> Tensor:
@@ -172,6 +177,12 @@ class Policy(nn.Module):
             logits = self(observation)[0]
             chosen = logits.argmax(1) if argmax else torch.distributions.Categorical(logits=logits).sample()
         return chosen.to(torch.int32)
+
+    def _trunk(self, layers: nn.ModuleList, x: Tensor) -> Tensor:
+        for i, layer in enumerate(layers):
+            y = functional.gelu(layer(_normalize(x) if self.layer_norm and i > 0 else x))
+            x = x + y if self.residual and i > 0 else y
+        return _normalize(x) if self.layer_norm else x
 
     def _entities(self, observation: Mapping[str, Tensor]) -> Tensor:
         counts = observation["set_counts"].flatten(1)

@@ -17,7 +17,9 @@ torch = pytest.importorskip("torch")
 from pictura.torch import _read_safetensors, load_policy, save_policy  # noqa: E402
 
 MODELS = sorted((pathlib.Path(__file__).parents[2] / "models").glob("*.safetensors"))
-NAMES = ("vector", "vector_points", "perspective", "perspective_points", "patches", "symlog", "two_hot", "concatenated")
+NAMES = (
+    "vector", "vector_points", "perspective", "perspective_points", "patches", "symlog", "two_hot", "concatenated", "normalized",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="session")

@@ -87,6 +87,7 @@ INSTANTIATE_TEST_SUITE_P(
         std::vector<std::string>{"policy.modality=vector"},
         std::vector<std::string>{"policy.modality=vector", "policy.value_head=two_hot"},
         std::vector<std::string>{"policy.modality=vector", "policy.point_features=false", "policy.embedding_width=200"},
+        std::vector<std::string>{"policy.modality=vector", "policy.layer_norm=true", "policy.residual=true"},
         std::vector<std::string>{"policy.modality=perspective"},
         std::vector<std::string>{"policy.modality=perspective", "policy.query_pooling=concatenated"},
         std::vector<std::string>{"policy.modality=perspective", "policy.patch_px=1",

@@ -146,6 +146,55 @@ TEST(Policy, GradientsOfPatchesEqualDifferenceQuotients) {
   expect_gradients(PolicyNetwork(section, 3, 5, at::kDouble), observation(Modality::perspective, 2));
 }
 
+TEST_P(BothModalities, GradientsOfNormalizedLayersEqualDifferenceQuotients) {
+  Config::PolicySection section = tiny(GetParam());
+  section.layer_norm = section.residual = true;
+  section.backbone_layers = 3;
+  const PolicyNetwork policy(section, 3, 5, at::kDouble);
+  expect_gradients(policy, observation(GetParam(), 2));
+  section.layer_norm = section.residual = false;
+  EXPECT_EQ(policy.hash(), PolicyNetwork(section, 3, 5, at::kDouble).hash()) << "norms and residuals have no parameters";
+}
+
+// Whatever the scale of the layers before it, what the heads read has a mean of 0 and a variance of 1.
+TEST(Policy, HeadsReadNormalizedActivations) {
+  Config::PolicySection section = tiny(Modality::vector);
+  section.layer_norm = true;
+  const PolicyNetwork policy(section, 3, 5, at::kDouble);
+  const at::NoGradGuard no_grad;
+  for (const NamedTensor& parameter : policy.parameters()) {
+    at::Tensor value = parameter.value;
+    if (parameter.name == "backbone.1.weight") value.mul_(30);
+    if (parameter.name == "critic.weight") value.fill_(1);
+  }
+  EXPECT_LT(policy.forward(observation(Modality::vector, 3)).value.abs().max().item<double>(), 1e-9);
+}
+
+// A layer of zeros gives gelu(0) = 0, so that only its input is left.
+TEST(Policy, ResidualsPassOverLayersOfTheTrunk) {
+  Config::PolicySection section = tiny(Modality::vector);
+  section.residual = true;
+  section.backbone_layers = 1;
+  const PolicyNetwork shallow(section, 3, 5, at::kDouble);
+  section.backbone_layers = 3;
+  const PolicyNetwork deep(section, 3, 6, at::kDouble);
+  const at::NoGradGuard no_grad;
+  for (const NamedTensor& parameter : deep.parameters()) {
+    at::Tensor value = parameter.value;
+    if (parameter.name.starts_with("backbone.") && !parameter.name.starts_with("backbone.0.")) {
+      value.zero_();
+      continue;
+    }
+    for (const NamedTensor& other : shallow.parameters()) {
+      if (other.name == parameter.name) value.copy_(other.value);
+    }
+  }
+  const Observation seen = observation(Modality::vector, 3);
+  const Policy::Output expected = shallow.forward(seen), got = deep.forward(seen);
+  EXPECT_TRUE(got.logits.equal(expected.logits));
+  EXPECT_TRUE(got.value.equal(expected.value));
+}
+
 TEST(Policy, GradientsOfConcatenatedQueriesEqualDifferenceQuotients) {
   Config::PolicySection section = tiny(Modality::perspective);
   section.query_pooling = QueryPooling::concatenated;

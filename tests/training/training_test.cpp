@@ -619,6 +619,10 @@ TEST_F(Training, BeginsWithTheWeightsOfAnotherRunAtAnyImageSize) {
   pressed.init_from = first;
   EXPECT_THAT(message_of([&] { train(pressed); }),
               AllOf(HasSubstr(first), HasSubstr("policy.value_head: its policy has \"linear\", expected \"symlog\"")));
+  TrainOptions normalized = options("normalized", {"policy.layer_norm=true"});
+  normalized.init_from = first;
+  EXPECT_THAT(message_of([&] { train(normalized); }),
+              AllOf(HasSubstr(first), HasSubstr("policy.layer_norm: expected true, got false")));
 }
 
 TEST_F(Training, BeginsWithConcatenatedQueriesAsTheirAverageEnded) {
