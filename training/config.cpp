@@ -106,6 +106,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.flag("policy.point_features", c.policy.point_features);
   v.integer("policy.backbone_layers", c.policy.backbone_layers, 1, 64);
   v.integer("policy.backbone_width", c.policy.backbone_width, 1, 1 << 14);
+  v.integer("policy.critic_layers", c.policy.critic_layers, 0, 64);
   v.choice("policy.value_head", c.policy.value_head, kValueHeads);
   v.flag("policy.layer_norm", c.policy.layer_norm);
   v.flag("policy.residual", c.policy.residual);

@@ -107,10 +107,11 @@ struct Config {
     std::string backbone = "conv";
     bool backbone_frozen = true;  // the program's weights stay as they are
     int backbone_layers = 4, backbone_width = 512;
+    int critic_layers = 0;    // of a trunk that the critic has for itself; 0: it shares the actor's
     ValueHead value_head = ValueHead::linear;
     bool layer_norm = false;  // layers of groups and trunk are normalized, see docs/network.md
     bool residual = false;    // every layer of the trunk but the first adds its input
-    int decision_steps = 1;  // steps for which an action is held, see training/decision_clock.h
+    int decision_steps = 1;   // steps for which an action is held, see training/decision_clock.h
   } policy;
 
   struct Train {

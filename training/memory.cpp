@@ -167,14 +167,13 @@ LayerSum layers_of(const Config& config, const Rig& rig, Device device) {
                waypoint = kWaypointFeatures + (policy.point_features ? kPointFeatures : 0);
   sum.add_group(1, num_ego_features(config.reads_images()), width, policy.layer_norm);
   sum.add_group(1, kNumConditioning + kNumWaypoints * waypoint, width, policy.layer_norm);
-  double in = (sets + 2) * width;
+  const double in = (sets + 2) * width, inside = policy.backbone_width;
   sum.add_values(in, 1);
-  for (int i = 0; i < policy.backbone_layers; ++i) {
-    sum.add(1, in, policy.backbone_width, policy.layer_norm ? 3 : 2);
-    in = policy.backbone_width;
+  for (const int layers : {policy.backbone_layers, policy.critic_layers}) {
+    for (int i = 0; i < layers; ++i) sum.add(1, i == 0 ? in : inside, inside, policy.layer_norm ? 3 : 2);
   }
-  sum.add(1, in, kNumActions, 3);
-  sum.add(1, in, num_value_outputs(policy.value_head), policy.value_head == ValueHead::two_hot ? 3 : 1);
+  sum.add(1, inside, kNumActions, 3);
+  sum.add(1, inside, num_value_outputs(policy.value_head), policy.value_head == ValueHead::two_hot ? 3 : 1);
   return sum;
 }
 

@@ -76,6 +76,13 @@ class ParameterMaker {
     return {linear(name + ".hidden", in, width, std::numbers::sqrt2), linear(name + ".out", width, width, 1.0),
             config.layer_norm};
   }
+  std::vector<PolicyNetwork::Linear> trunk(const std::string& name, int64_t in, int num_layers, int64_t width) {
+    std::vector<PolicyNetwork::Linear> layers;
+    for (int i = 0; i < num_layers; ++i) {
+      layers.push_back(linear(fmt::format("{}.{}", name, i), i == 0 ? in : width, width, std::numbers::sqrt2));
+    }
+    return layers;
+  }
 
  private:
   uint64_t seed_;
@@ -334,17 +341,16 @@ PolicyNetwork::PolicyNetwork(const Config::PolicySection& config, int num_camera
   conditioning_ = make.group(
       "conditioning", kNumConditioning + kNumWaypoints * (kWaypointFeatures + (point_features_ ? kPointFeatures : 0)),
       config);
-  int64_t in = scene_->width() + 2 * int64_t{config.embedding_width};
-  for (int i = 0; i < config.backbone_layers; ++i) {
-    backbone_.push_back(make.linear(fmt::format("backbone.{}", i), in, config.backbone_width, std::numbers::sqrt2));
-    in = config.backbone_width;
-  }
+  const int64_t in = scene_->width() + 2 * int64_t{config.embedding_width}, inside = config.backbone_width;
+  backbone_ = make.trunk("backbone", in, config.backbone_layers, inside);
   // A small actor head: every action is about as likely as any other at first. So is every bin of a critic, whose value
   // is then near 0.
   constexpr double kGainOfLikelihoods = 0.01;
-  actor_ = make.linear("actor", in, kNumActions, kGainOfLikelihoods);
-  critic_ = make.linear("critic", in, num_value_outputs(value_head_),
+  actor_ = make.linear("actor", inside, kNumActions, kGainOfLikelihoods);
+  critic_ = make.linear("critic", inside, num_value_outputs(value_head_),
                         value_head_ == ValueHead::two_hot ? kGainOfLikelihoods : 1.0);
+  // Drawn last, so that the actor begins as it does without.
+  critic_backbone_ = make.trunk("critic_backbone", in, config.critic_layers, inside);
 }
 
 at::Tensor PolicyNetwork::run_trunk(const std::vector<Linear>& layers, at::Tensor x) const {
@@ -364,17 +370,17 @@ Policy::Output PolicyNetwork::forward(const Observation& o) const {
         point_features(o.waypoints.unflatten(1, {kNumWaypoints, kWaypointFeatures}), 1, o.waypoints.scalar_type())
             .flatten(1));
   }
-  at::Tensor x;
+  at::Tensor for_actor, for_critic;
   {
     const LayerPrecision precision(precision_, o.ego.device().type());
-    x = at::cat(
+    const at::Tensor x = at::cat(
         {scene_->forward(o), encode(ego_, o.ego.narrow(1, 0, ego_features_)), encode(conditioning_, at::cat(own, 1))},
         1);
-    x = run_trunk(backbone_, x);
+    for_actor = run_trunk(backbone_, x);
+    for_critic = critic_backbone_.empty() ? for_actor : run_trunk(critic_backbone_, x);
   }
-  x = x.to(type_);
-  const at::Tensor value_outputs = apply(critic_, x);
-  return {apply(actor_, x), values_of(value_head_, value_outputs), value_outputs, value_head_};
+  const at::Tensor value_outputs = apply(critic_, for_critic.to(type_));
+  return {apply(actor_, for_actor.to(type_)), values_of(value_head_, value_outputs), value_outputs, value_head_};
 }
 
 int64_t Policy::num_parameters() const {

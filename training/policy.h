@@ -106,8 +106,8 @@ class PolicyNetwork final : public Policy {
   at::Tensor run_trunk(const std::vector<Linear>& layers, at::Tensor x) const;
 
   GroupEncoder ego_, conditioning_;
-  bool layer_norm_, residual_;  // of the trunk
-  std::vector<Linear> backbone_;
+  bool layer_norm_, residual_;                      // of trunks
+  std::vector<Linear> backbone_, critic_backbone_;  // the latter empty where the critic reads what the actor does
   Linear actor_, critic_;
 
   friend class ParameterMaker;

@@ -154,7 +154,10 @@ class Policy(nn.Module):
         self.ego = _Encoder(ego, width, self.layer_norm)
         self.conditioning = _Encoder(17 + 3 * (3 + 6 * self.points), width, self.layer_norm)
         layers, inside = config["backbone_layers"], config["backbone_width"]
-        self.backbone = nn.ModuleList(nn.Linear(around + 2 * width if i == 0 else inside, inside) for i in range(layers))
+        self.backbone, self.critic_backbone = (
+            nn.ModuleList(nn.Linear(around + 2 * width if i == 0 else inside, inside) for i in range(n))
+            for n in (layers, config.get("critic_layers", 0))
+        )
         self.value_head = config.get("value_head", "linear")
         if self.value_head not in _VALUE_OUTPUTS:
             raise pictura.UsageError(f"policy.value_head: expected one of {', '.join(_VALUE_OUTPUTS)}, got '{self.value_head}'")
@@ -168,8 +171,9 @@ class Policy(nn.Module):
         around = self._images(observation["rgb"]) if self.modality == "perspective" else self._entities(observation)
         ego = observation["ego"].flatten(1)[:, : self.ego_features]
         x = torch.cat([around, self.ego(ego), self.conditioning(torch.cat(own, 1))], 1)
-        x = self._trunk(self.backbone, x)
-        return self.actor(x), _values(self.value_head, self.critic(x))
+        for_actor = self._trunk(self.backbone, x)
+        for_critic = self._trunk(self.critic_backbone, x) if len(self.critic_backbone) > 0 else for_actor
+        return self.actor(for_actor), _values(self.value_head, self.critic(for_critic))
 
     def act(self, observation: Mapping[str, Tensor], argmax: bool = True) -> Tensor:
         """Actions int32 [batch], which pictura.Simulator.step takes; without gradients."""
