@@ -51,24 +51,28 @@ const float* floats_of(const at::Tensor& parameter) { return parameter.const_dat
 /// The gradient that arrives, laid out as x is.
 at::Tensor arranged(const at::Tensor& grad, const at::Tensor& x) { return grad.to(x.scalar_type()).contiguous(); }
 
-// x: [..., channels] without gaps.
-struct BiasGelu : Function<BiasGelu> {
+// x: [..., channels] without gaps. With kHasNorm x + bias is normalized before the GELU.
+template <bool kHasNorm>
+struct BiasGelu : Function<BiasGelu<kHasNorm>> {
   static at::Tensor forward(AutogradContext* context, const at::Tensor& x, const at::Tensor& bias) {
     context->save_for_backward({x, bias});
     at::Tensor out = at::empty_like(x);
-    passes_on(x.device())
-        .bias_gelu(size_of(x), x.const_data_ptr(), floats_of(bias), out.mutable_data_ptr(), stream_on(x.device()));
+    constexpr auto kPass = kHasNorm ? &NetworkPasses::bias_norm_gelu : &NetworkPasses::bias_gelu;
+    (passes_on(x.device()).*kPass)(size_of(x), x.const_data_ptr(), floats_of(bias), out.mutable_data_ptr(),
+                                   stream_on(x.device()));
     return out;
   }
 
   static variable_list backward(AutogradContext* context, const variable_list& grads) {
     const variable_list saved = context->get_saved_variables();
     const at::Tensor &x = saved[0], &bias = saved[1], grad = arranged(grads[0], x);
+    const ActivationSize size = size_of(x);
+    const int64_t num_sums = kHasNorm ? NetworkPasses::num_norm_sums(size.rows, 1) : NetworkPasses::kBiasSums;
     const at::Tensor grad_x = at::empty_like(x),
-                     sums = at::empty({NetworkPasses::kBiasSums, bias.size(0)}, bias.options().requires_grad(false));
-    passes_on(x.device())
-        .bias_gelu_backward(size_of(x), x.const_data_ptr(), floats_of(bias), grad.const_data_ptr(),
-                            grad_x.mutable_data_ptr(), sums.mutable_data_ptr<float>(), stream_on(x.device()));
+                     sums = at::empty({num_sums, size.channels}, bias.options().requires_grad(false));
+    constexpr auto kPass = kHasNorm ? &NetworkPasses::bias_norm_gelu_backward : &NetworkPasses::bias_gelu_backward;
+    (passes_on(x.device()).*kPass)(size, x.const_data_ptr(), floats_of(bias), grad.const_data_ptr(),
+                                   grad_x.mutable_data_ptr(), sums.mutable_data_ptr<float>(), stream_on(x.device()));
     return {grad_x, sums.sum(0)};
   }
 };
@@ -478,7 +482,7 @@ at::Tensor space_to_depth(const at::Tensor& images, int64_t patch_px) {
 at::Tensor linear_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias) {
   if (is_on_host(x)) return host_bias_gelu(at::linear(x, weight), bias);
   if (!x.is_cuda() || !NetworkPasses::gelu_takes(bias.size(0))) return gelu(at::linear(x, weight, bias));
-  return BiasGelu::apply(at::linear(x, weight), bias);
+  return BiasGelu<false>::apply(at::linear(x, weight), bias);
 }
 
 at::Tensor normalize(const at::Tensor& x) {
@@ -488,7 +492,8 @@ at::Tensor normalize(const at::Tensor& x) {
 }
 
 at::Tensor linear_norm_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias) {
-  return gelu(normalize(at::linear(x, weight, bias)));
+  if (!x.is_cuda() || !NetworkPasses::norm_takes(bias.size(0))) return gelu(normalize(at::linear(x, weight, bias)));
+  return BiasGelu<true>::apply(at::linear(x, weight), bias);
 }
 
 at::Tensor convolve_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias, int64_t stride) {
@@ -509,7 +514,7 @@ at::Tensor convolve_gelu(const at::Tensor& x, const at::Tensor& weight, const at
     return gelu(at::conv2d(x, padded, bias, {stride}, {padding}));
   }
   const at::Tensor rows = at::conv2d(x, padded, {}, {stride}, {padding}).permute({0, 2, 3, 1}).contiguous();
-  return BiasGelu::apply(rows, bias).permute({0, 3, 1, 2});
+  return BiasGelu<false>::apply(rows, bias).permute({0, 3, 1, 2});
 }
 
 at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tensor& weight, const at::Tensor& bias) {

@@ -11,6 +11,7 @@
 #include "pictura/training/network_shape.h"
 #include "pictura/training/observation.h"
 #include "pictura/training/point_features.h"
+#include "pictura/training/rules/network_passes.h"
 #include "pictura/training/training_maps.h"
 
 namespace pictura {
@@ -86,9 +87,9 @@ class LayerSum {
     add_values(rows * out, kept);
     largest_ = std::max(largest_, rows * (in + out));
   }
-  /// With a norm, what goes into the activation is kept beside the first layer's results.
-  void add_group(double rows, double in, double width, bool has_norm, double kept = 1) {
-    add(rows, in, width, has_norm ? 3 : 2);
+  /// Where a norm is a pass of its own, what goes into the activation is kept beside the first layer's results.
+  void add_group(double rows, double in, double width, bool keeps_norm, double kept = 1) {
+    add(rows, in, width, keeps_norm ? 3 : 2);
     add(rows, width, width, kept);
   }
   void add_parameters(double count) { parameters_ += count; }
@@ -116,7 +117,9 @@ void add_entity_sets(const Config& config, Device device, LayerSum* sum) {
       continue;
     }
     sum->add_values(array.rows * features, 2);
-    sum->add_group(array.rows, features, width, config.policy.layer_norm, 2);
+    const bool keeps_norm = config.policy.layer_norm &&
+                            (device.is_host() || !NetworkPasses::norm_takes(config.policy.embedding_width));
+    sum->add_group(array.rows, features, width, keeps_norm, 2);
   }
 }
 

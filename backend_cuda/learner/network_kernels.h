@@ -11,6 +11,10 @@ namespace pictura::cuda {
 void launch_bias_gelu(const ActivationSize& size, const void* x, const float* bias, void* out, cudaStream_t stream);
 void launch_bias_gelu_backward(const ActivationSize& size, const void* x, const float* bias, const void* grad_out,
                                void* grad_x_out, float* grad_bias_sums_out, cudaStream_t stream);
+void launch_bias_norm_gelu(const ActivationSize& size, const void* x, const float* bias, void* out,
+                           cudaStream_t stream);
+void launch_bias_norm_gelu_backward(const ActivationSize& size, const void* x, const float* bias, const void* grad_out,
+                                    void* grad_x_out, float* grad_bias_sums_out, cudaStream_t stream);
 void launch_norm(const ActivationSize& size, const void* x, const void* position, int64_t period, const float* weight,
                  const float* bias, void* out, cudaStream_t stream);
 void launch_norm_backward(const ActivationSize& size, const void* x, const void* position, int64_t period,

@@ -27,6 +27,17 @@ class NetworkPassesCuda final : public NetworkPasses {
     launch(cuda::launch_bias_gelu_backward, stream, size, x, bias, grad_out, grad_x_out, grad_bias_sums_out);
   }
 
+  void bias_norm_gelu(const ActivationSize& size, const void* x, const float* bias, void* out, Stream stream) override {
+    PICTURA_CHECK(norm_takes(size.channels), "bias_norm_gelu: rows of {} channels", size.channels);
+    launch(cuda::launch_bias_norm_gelu, stream, size, x, bias, out);
+  }
+
+  void bias_norm_gelu_backward(const ActivationSize& size, const void* x, const float* bias, const void* grad_out,
+                               void* grad_x_out, float* grad_bias_sums_out, Stream stream) override {
+    PICTURA_CHECK(norm_takes(size.channels), "bias_norm_gelu_backward: rows of {} channels", size.channels);
+    launch(cuda::launch_bias_norm_gelu_backward, stream, size, x, bias, grad_out, grad_x_out, grad_bias_sums_out);
+  }
+
   void norm(const ActivationSize& size, const void* x, const void* position, int64_t period, const float* weight,
             const float* bias, void* out, Stream stream) override {
     PICTURA_CHECK(norm_takes(size.channels), "norm: rows of {} channels", size.channels);

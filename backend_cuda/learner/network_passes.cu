@@ -133,7 +133,73 @@ struct WarpRow {
   }
 };
 
-/// Loads x + position and makes its mean 0 and its variance 1; returns 1 / its deviation.
+/// Makes the row's mean 0 and its variance 1; returns 1 / its deviation.
+template <int kPairs>
+__device__ float normalize(WarpRow<kPairs>* row_inout) {
+  WarpRow<kPairs>& row = *row_inout;
+  const float mean = row.mean();
+  row.each([&](int, float v) { return v - mean; });
+  WarpRow<kPairs> squares = row;
+  squares.each([](int, float v) { return v * v; });
+  const float inverse_deviation = rsqrtf(squares.mean() + kNormEpsilon);
+  row.each([&](int, float v) { return v * inverse_deviation; });
+  return inverse_deviation;
+}
+
+/// The gradient of a row from that of what normalize() made of it.
+template <int kPairs>
+__device__ void normalize_backward(const WarpRow<kPairs>& normalized, float inverse_deviation,
+                                   WarpRow<kPairs>* grad_inout) {
+  WarpRow<kPairs>& grad = *grad_inout;
+  WarpRow<kPairs> products = grad;
+  products.each([&](int k, float g) { return g * normalized.values[k]; });
+  const float mean = grad.mean(), product_mean = products.mean();
+  grad.each([&](int k, float g) { return (g - mean - normalized.values[k] * product_mean) * inverse_deviation; });
+}
+
+/// Loads x + bias and normalizes it; returns 1 / its deviation.
+template <typename T, int kPairs>
+__device__ float load_biased_normalized(const T* x, const WarpRow<kPairs>& bias, WarpRow<kPairs>* row_out) {
+  row_out->load(x);
+  row_out->each([&](int k, float v) { return v + bias.values[k]; });
+  return normalize(row_out);
+}
+
+template <typename T, int kPairs>
+__global__ void __launch_bounds__(kThreads) bias_norm_gelu(int64_t rows, const T* x, const float* bias, T* out) {
+  const int64_t row = (blockIdx.x * int64_t{kThreads} + threadIdx.x) / kWarp;
+  if (row >= rows) return;
+  constexpr int kChannels = WarpRow<kPairs>::kChannels;
+  WarpRow<kPairs> biases, values;
+  biases.load(bias);
+  load_biased_normalized(x + row * kChannels, biases, &values);
+  values.each([](int, float v) { return gelu(v); });
+  values.store(out + row * kChannels);
+}
+
+// A warp has every num_sums-th row.
+template <typename T, int kPairs>
+__global__ void __launch_bounds__(kThreads)
+    bias_norm_gelu_backward(int64_t rows, int64_t num_sums, const T* x, const float* bias, const T* grad_out,
+                            T* grad_x_out, float* sums_out) {
+  const int64_t warp = (blockIdx.x * int64_t{kThreads} + threadIdx.x) / kWarp;
+  if (warp >= num_sums) return;
+  constexpr int kChannels = WarpRow<kPairs>::kChannels;
+  WarpRow<kPairs> biases, sums{};
+  biases.load(bias);
+  for (int64_t row = warp; row < rows; row += num_sums) {
+    WarpRow<kPairs> normalized, grad;
+    const float inverse_deviation = load_biased_normalized(x + row * kChannels, biases, &normalized);
+    grad.load(grad_out + row * kChannels);
+    grad.each([&](int k, float g) { return g * gelu_derivative(normalized.values[k]); });
+    normalize_backward(normalized, inverse_deviation, &grad);
+    sums.each([&](int k, float sum) { return sum + grad.values[k]; });
+    grad.store(grad_x_out + row * kChannels);
+  }
+  sums.store(sums_out + warp * kChannels);
+}
+
+/// Loads x + position and normalizes it; returns 1 / its deviation.
 template <typename T, int kPairs>
 __device__ float load_normalized(const T* x, const T* position, WarpRow<kPairs>* row_out) {
   WarpRow<kPairs>& row = *row_out;
@@ -144,13 +210,7 @@ __device__ float load_normalized(const T* x, const T* position, WarpRow<kPairs>*
     // Rounded as the sum is that ATen stores.
     row.each([&](int k, float v) { return to_float(from_float<T>(v + added.values[k])); });
   }
-  const float mean = row.mean();
-  row.each([&](int, float v) { return v - mean; });
-  WarpRow<kPairs> squares = row;
-  squares.each([](int, float v) { return v * v; });
-  const float inverse_deviation = rsqrtf(squares.mean() + kNormEpsilon);
-  row.each([&](int, float v) { return v * inverse_deviation; });
-  return inverse_deviation;
+  return normalize(row_out);
 }
 
 template <typename T, int kPairs>
@@ -186,10 +246,7 @@ __global__ void __launch_bounds__(kThreads)
     weight_sums.each([&](int k, float sum) { return sum + grad.values[k] * normalized.values[k]; });
     bias_sums.each([&](int k, float sum) { return sum + grad.values[k]; });
     grad.each([&](int k, float g) { return g * weights.values[k]; });
-    WarpRow<kPairs> products = grad;
-    products.each([&](int k, float g) { return g * normalized.values[k]; });
-    const float mean = grad.mean(), product_mean = products.mean();
-    grad.each([&](int k, float g) { return (g - mean - normalized.values[k] * product_mean) * inverse_deviation; });
+    normalize_backward(normalized, inverse_deviation, &grad);
     position_sums.each([&](int k, float sum) { return sum + grad.values[k]; });
     grad.store(grad_x_out + row * kChannels);
   }
@@ -392,6 +449,30 @@ void launch_bias_gelu_backward(const ActivationSize& size, const void* x, const 
     launch(NetworkPasses::kBiasSums * kThreads, stream, bias_gelu_backward<T>, size.rows,
            static_cast<int>(size.channels), static_cast<const T*>(x), bias, static_cast<const T*>(grad_out),
            static_cast<T*>(grad_x_out), grad_bias_sums_out);
+  });
+}
+
+void launch_bias_norm_gelu(const ActivationSize& size, const void* x, const float* bias, void* out,
+                           cudaStream_t stream) {
+  with_type(size.type, [&](auto type) {
+    with_pairs(size.channels, [&](auto pairs) {
+      using T = decltype(type);
+      launch(size.rows * kWarp, stream, bias_norm_gelu<T, decltype(pairs)::value>, size.rows, static_cast<const T*>(x),
+             bias, static_cast<T*>(out));
+    });
+  });
+}
+
+void launch_bias_norm_gelu_backward(const ActivationSize& size, const void* x, const float* bias, const void* grad_out,
+                                    void* grad_x_out, float* grad_bias_sums_out, cudaStream_t stream) {
+  const int64_t num_sums = NetworkPasses::num_norm_sums(size.rows, 1);
+  with_type(size.type, [&](auto type) {
+    with_pairs(size.channels, [&](auto pairs) {
+      using T = decltype(type);
+      launch(num_sums * kWarp, stream, bias_norm_gelu_backward<T, decltype(pairs)::value>, size.rows, num_sums,
+             static_cast<const T*>(x), bias, static_cast<const T*>(grad_out), static_cast<T*>(grad_x_out),
+             grad_bias_sums_out);
+    });
   });
 }
 

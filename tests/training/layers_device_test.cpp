@@ -85,6 +85,33 @@ TEST_P(DeviceLayers, LinearGelu) {
   }
 }
 
+TEST_P(DeviceLayers, LinearNormGelu) {
+  // 36: ATen's own.
+  for (const int64_t out : {64, 128, 192, 256, 384, 512, 36}) {
+    for (const int64_t rows : {1, 7, 20'000}) {
+      expect_as_on_the_host([](const auto& in) { return linear_norm_gelu(in[0], in[1], in[2]); },
+                            [](const auto& in) {
+                              const at::Tensor x = at::linear(in[0], in[1], in[2]);
+                              return gelu(at::layer_norm(x, {x.size(-1)})).to(x.scalar_type());
+                            },
+                            {numbers({rows, 16}, 1), 0.3 * numbers({out, 16}, 2), numbers({out}, 3)}, 1);
+    }
+  }
+}
+
+TEST_P(DeviceLayers, NormalizeKeepsTheTypeOfActivations) {
+  for (const int64_t channels : {6, 512, 1024}) {
+    expect_as_on_the_host(
+        [](const auto& in) {
+          const at::Tensor out = normalize(in[0]);
+          EXPECT_EQ(out.scalar_type(), in[0].scalar_type());
+          return out;
+        },
+        [](const auto& in) { return at::layer_norm(in[0], {in[0].size(-1)}).to(in[0].scalar_type()); },
+        {numbers({300, channels}, 1)}, 1);
+  }
+}
+
 TEST_P(DeviceLayers, ConvolveGelu) {
   for (const int64_t stride : {1, 2}) {
     const auto layer = [stride](const auto& in) {

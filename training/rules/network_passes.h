@@ -69,7 +69,7 @@ class NetworkPasses {
   NetworkPasses(const NetworkPasses&) = delete;
   NetworkPasses& operator=(const NetworkPasses&) = delete;
 
-  /// Whether bias_gelu() and norm() take rows of so many channels.
+  /// Whether bias_gelu() takes rows of so many channels, and norm() and bias_norm_gelu().
   static constexpr bool gelu_takes(int64_t channels) { return channels % 8 == 0 && channels <= 1024; }
   static constexpr bool norm_takes(int64_t channels) {
     return channels % 64 == 0 && channels <= 512 && channels != 320 && channels != 448;
@@ -81,6 +81,14 @@ class NetworkPasses {
   virtual void bias_gelu_backward(const ActivationSize& size, const void* x, const float* bias, const void* grad_out,
                                   void* grad_x_out, float* grad_bias_sums_out, Stream stream) = 0;
   static constexpr int64_t kBiasSums = 528;
+
+  /// out = GELU(layer norm of x + bias), whose norm is over channels and has no parameters and an epsilon of 1e-5.
+  virtual void bias_norm_gelu(const ActivationSize& size, const void* x, const float* bias, void* out,
+                              Stream stream) = 0;
+  /// The gradients of x and, as partial sums [num_norm_sums(rows, 1), channels], of the bias.
+  virtual void bias_norm_gelu_backward(const ActivationSize& size, const void* x, const float* bias,
+                                       const void* grad_out, void* grad_x_out, float* grad_bias_sums_out,
+                                       Stream stream) = 0;
 
   /// out = layer norm of x + position, over channels, with an epsilon of 1e-5. weight, bias: [channels]; position
   /// [period, channels] is that of row r in r % period, null for none (then period is 1).
