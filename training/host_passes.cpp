@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <limits>
 
@@ -76,6 +77,54 @@ void bias_gelu_backward(const float* slope, const float* grad_out, int64_t rows,
 #pragma omp simd
     for (int64_t c = 0; c < channels; ++c) {
       const float g = grad[c] * its_slope[c];
+      to[c] = g;
+      bias_grad_inout[c] += g;
+    }
+  }
+}
+
+void bias_norm(const float* x, const float* bias, int64_t rows, int64_t channels, float* out,
+               float* inverse_deviations_out) {
+  constexpr float kNormEpsilon = 1e-5f;
+  const auto count = static_cast<float>(channels);
+  for (int64_t row = 0; row < rows; ++row) {
+    const float* const from = x + row * channels;
+    float* const to = out + row * channels;
+    float sum = 0, squares = 0;
+#pragma omp simd reduction(+ : sum)
+    for (int64_t c = 0; c < channels; ++c) {
+      to[c] = from[c] + bias[c];
+      sum += to[c];
+    }
+    const float mean = sum / count;
+#pragma omp simd reduction(+ : squares)
+    for (int64_t c = 0; c < channels; ++c) {
+      to[c] -= mean;
+      squares += to[c] * to[c];
+    }
+    const float inverse_deviation = 1.0f / std::sqrt(squares / count + kNormEpsilon);
+#pragma omp simd
+    for (int64_t c = 0; c < channels; ++c) to[c] *= inverse_deviation;
+    if (inverse_deviations_out) inverse_deviations_out[row] = inverse_deviation;
+  }
+}
+
+void bias_norm_backward(const float* normalized, const float* inverse_deviations, const float* grad_out, int64_t rows,
+                        int64_t channels, float* grad_x_out, float* bias_grad_inout) {
+  const auto count = static_cast<float>(channels);
+  for (int64_t row = 0; row < rows; ++row) {
+    const float *const values = normalized + row * channels, *const grad = grad_out + row * channels;
+    float* const to = grad_x_out + row * channels;
+    float sum = 0, products = 0;
+#pragma omp simd reduction(+ : sum, products)
+    for (int64_t c = 0; c < channels; ++c) {
+      sum += grad[c];
+      products += grad[c] * values[c];
+    }
+    const float mean = sum / count, product_mean = products / count;
+#pragma omp simd
+    for (int64_t c = 0; c < channels; ++c) {
+      const float g = (grad[c] - mean - values[c] * product_mean) * inverse_deviations[row];
       to[c] = g;
       bias_grad_inout[c] += g;
     }

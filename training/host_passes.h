@@ -22,6 +22,17 @@ void bias_gelu(const float* x, const float* bias, int64_t rows, int64_t channels
 void bias_gelu_backward(const float* slope, const float* grad_out, int64_t rows, int64_t channels, float* grad_x_out,
                         float* bias_grad_inout);
 
+/// out = the layer norm, without parameters, of x + bias over channels, with an epsilon of 1e-5; and 1 over the
+/// deviation of each row, [rows], where inverse_deviations_out is not null. x, out: [rows, channels]; either may be x.
+/// bias: [channels].
+void bias_norm(const float* x, const float* bias, int64_t rows, int64_t channels, float* out,
+               float* inverse_deviations_out);
+
+/// The gradient of x from that of what bias_norm() made of it, `normalized`; and that of the bias added to
+/// bias_grad_inout, [channels]. grad_x_out may be grad_out.
+void bias_norm_backward(const float* normalized, const float* inverse_deviations, const float* grad_out, int64_t rows,
+                        int64_t channels, float* grad_x_out, float* bias_grad_inout);
+
 /// A convolution over images whose pixels have their channels together, padded by zeros by half the kernel on all
 /// sides.
 struct ConvolutionSize {

@@ -326,14 +326,15 @@ struct HostConvolution : Function<HostConvolution> {
   }
 };
 
-// Sets of members in blocks, each member through a layer with GELU and one without; of each set the largest in each
-// channel. That channel's gradient goes to that member alone, so the way back knows these alone: a few of a set.
+// Sets of members in blocks, each member through a layer with GELU, normalized before it or not, and one without; of
+// each set the largest in each channel. That channel's gradient goes to that member alone, so the way back knows these
+// alone: a few of a set.
 struct HostSets : Function<HostSets> {
   /// Returns {the largest, [sets, channels]; the members that there are with their points' features, [all, features];
   /// which member of its set is the largest, i32 [sets, channels]}.
   static variable_list compute(const at::Tensor& members, const at::Tensor& counts, int64_t points, float unit_m,
-                               const at::Tensor& hidden_weight, const at::Tensor& hidden_bias, const at::Tensor& weight,
-                               const at::Tensor& bias) {
+                               bool has_norm, const at::Tensor& hidden_weight, const at::Tensor& hidden_bias,
+                               const at::Tensor& weight, const at::Tensor& bias) {
     const int64_t sets = members.size(0), most = members.size(1), hidden = hidden_weight.size(0),
                   channels = weight.size(0);
     const PointSize size = point_size(members, points, unit_m, /*keeps_rows=*/true);
@@ -343,7 +344,8 @@ struct HostSets : Function<HostSets> {
                      largest = at::empty({sets, channels}, options),
                      which = at::empty({sets, channels}, counts.options());
     const Blocks blocks(sets, host::kBlockNumbers / (most * (hidden + channels)));
-    const at::Tensor hidden_transposed = hidden_weight.detach().t(), transposed = weight.detach().t();
+    const at::Tensor hidden_transposed = hidden_weight.detach().t(), transposed = weight.detach().t(),
+                     gelu_bias = gelu_bias_of(hidden_bias.detach(), has_norm);
     blocks.run([&](int64_t) {
       return [&, hidden_memory = at::empty({blocks.most() * most, hidden}, options),
               memory = at::empty({blocks.most() * most, channels}, options)](int64_t begin, int64_t end) {
@@ -353,7 +355,8 @@ struct HostSets : Function<HostSets> {
         host::member_rows(read(members, begin), its_counts, end - begin, most, size, write(some));
         at::Tensor activations = hidden_memory.narrow(0, 0, count), embeddings = memory.narrow(0, 0, count);
         at::mm_out(activations, some, hidden_transposed);
-        host::bias_gelu(read(activations), read(hidden_bias), count, hidden, write(activations), nullptr);
+        if (has_norm) host::bias_norm(read(activations), read(hidden_bias), count, hidden, write(activations), nullptr);
+        host::bias_gelu(read(activations), read(gelu_bias), count, hidden, write(activations), nullptr);
         at::mm_out(embeddings, activations, transposed);
         host::largest_members(read(embeddings), its_counts, end - begin, channels, write(largest, begin),
                               which.mutable_data_ptr<int32_t>() + begin * channels);
@@ -364,11 +367,12 @@ struct HostSets : Function<HostSets> {
   }
 
   static at::Tensor forward(AutogradContext* context, const at::Tensor& members, const at::Tensor& counts,
-                            int64_t points, double unit_m, const at::Tensor& hidden_weight,
+                            int64_t points, double unit_m, bool has_norm, const at::Tensor& hidden_weight,
                             const at::Tensor& hidden_bias, const at::Tensor& weight, const at::Tensor& bias) {
-    const variable_list made =
-        compute(members, counts, points, static_cast<float>(unit_m), hidden_weight, hidden_bias, weight, bias);
+    const variable_list made = compute(members, counts, points, static_cast<float>(unit_m), has_norm, hidden_weight,
+                                       hidden_bias, weight, bias);
     context->save_for_backward({made[1], made[2], counts, hidden_weight, hidden_bias, weight});
+    context->saved_data["has_norm"] = has_norm;
     return made[0];
   }
 
@@ -378,14 +382,16 @@ struct HostSets : Function<HostSets> {
                      hidden_bias = saved[4].detach(), weight = saved[5].detach().contiguous(),
                      grad = grads[0].contiguous();
     const int64_t sets = which.size(0), channels = which.size(1), hidden = hidden_weight.size(0);
+    const bool has_norm = context->saved_data["has_norm"].toBool();
     const std::vector<int64_t> begins = begins_of(counts);
     // Of a set most members are the largest nowhere: there are a few rows of slopes, activations and their gradients.
     const Blocks blocks(sets, host::kBlockNumbers / (16 * hidden));
     const auto options = weight.options();
     const at::Tensor hidden_weight_sums = at::zeros({blocks.parts(), hidden, rows.size(1)}, options),
                      hidden_bias_sums = at::zeros({blocks.parts(), hidden}, options),
-                     weight_sums = at::zeros({blocks.parts(), channels, hidden}, options);
-    const at::Tensor hidden_transposed = hidden_weight.t();
+                     gelu_bias_sums = at::zeros({blocks.parts(), hidden}, options),  // of zeros: not asked for
+        weight_sums = at::zeros({blocks.parts(), channels, hidden}, options);
+    const at::Tensor hidden_transposed = hidden_weight.t(), gelu_bias = gelu_bias_of(hidden_bias, has_norm);
     blocks.run([&](int64_t part) {
       return [&, part, numbers = std::vector<int32_t>(), places = std::vector<int32_t>(),
               chosen = std::vector<int64_t>(),
@@ -415,17 +421,28 @@ struct HostSets : Function<HostSets> {
         const at::Tensor some = rows.index_select(0, at::from_blob(chosen.data(), {count}, at::kLong)),
                          slope = at::mm(some, hidden_transposed), activations = at::empty_like(slope),
                          activation_grads = at::zeros_like(slope);
-        host::bias_gelu(read(slope), read(hidden_bias), count, hidden, write(activations), write(slope));
+        at::Tensor normalized, inverse_deviations;
+        if (has_norm) {
+          inverse_deviations = at::empty({count}, options);
+          host::bias_norm(read(slope), read(hidden_bias), count, hidden, write(slope), write(inverse_deviations));
+          normalized = slope.clone();
+        }
+        host::bias_gelu(read(slope), read(gelu_bias), count, hidden, write(activations), write(slope));
         host::largest_members_backward(read(grad, begin), places.data(), end - begin, channels, hidden, read(weight),
                                        read(activations), write(activation_grads), write(weight_sums, part));
         host::bias_gelu_backward(read(slope), read(activation_grads), count, hidden, write(activation_grads),
-                                 write(hidden_bias_sums, part));
+                                 write(has_norm ? gelu_bias_sums : hidden_bias_sums, part));
+        if (has_norm) {
+          host::bias_norm_backward(read(normalized), read(inverse_deviations), read(activation_grads), count, hidden,
+                                   write(activation_grads), write(hidden_bias_sums, part));
+        }
         at::Tensor hidden_sum = hidden_weight_sum;
         at::addmm_out(hidden_sum, hidden_sum, activation_grads.t(), some);
       };
     });
     const at::Tensor none;
     return {none,
+            none,
             none,
             none,
             none,
@@ -436,6 +453,10 @@ struct HostSets : Function<HostSets> {
   }
 
  private:
+  // What the GELU adds: the norm before it has added the bias already.
+  static at::Tensor gelu_bias_of(const at::Tensor& hidden_bias, bool has_norm) {
+    return has_norm ? at::zeros_like(hidden_bias) : hidden_bias;
+  }
   // Where the members of each set begin among those of all, and how many there are.
   static std::vector<int64_t> begins_of(const at::Tensor& counts) {
     std::vector<int64_t> begins{0};
@@ -529,12 +550,12 @@ at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tenso
 bool takes_sets(const at::Tensor& members) { return is_on_host(members); }
 
 at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& counts, int64_t points, float unit_m,
-                             const at::Tensor& hidden_weight, const at::Tensor& hidden_bias, const at::Tensor& weight,
-                             const at::Tensor& bias) {
+                             bool has_norm, const at::Tensor& hidden_weight, const at::Tensor& hidden_bias,
+                             const at::Tensor& weight, const at::Tensor& bias) {
   const at::Tensor all = members.contiguous(), its_counts = counts.contiguous();
   if (keeps_gradients({hidden_weight, hidden_bias, weight, bias}))
-    return HostSets::apply(all, its_counts, points, double{unit_m}, hidden_weight, hidden_bias, weight, bias);
-  return HostSets::compute(all, its_counts, points, unit_m, hidden_weight, hidden_bias, weight, bias)[0];
+    return HostSets::apply(all, its_counts, points, double{unit_m}, has_norm, hidden_weight, hidden_bias, weight, bias);
+  return HostSets::compute(all, its_counts, points, unit_m, has_norm, hidden_weight, hidden_bias, weight, bias)[0];
 }
 
 at::Tensor token_softmax(const at::Tensor& scores) {

@@ -109,7 +109,7 @@ void add_entity_sets(const Config& config, Device device, LayerSum* sum) {
     if (!is_set(array) || !config.reads(array.part)) continue;
     const double points = num_points(array.name);
     const double features = array.features + (config.policy.point_features ? points * kPointFeatures : 0);
-    if (device.is_host() && !config.policy.layer_norm) {
+    if (device.is_host()) {
       // Of members their features are kept, of a set which are the largest: see largest_embedding().
       sum->add_parameters((features + 1) * width + (width + 1) * width);
       sum->add_values(array.rows * features, 1);
@@ -117,8 +117,7 @@ void add_entity_sets(const Config& config, Device device, LayerSum* sum) {
       continue;
     }
     sum->add_values(array.rows * features, 2);
-    const bool keeps_norm = config.policy.layer_norm &&
-                            (device.is_host() || !NetworkPasses::norm_takes(config.policy.embedding_width));
+    const bool keeps_norm = config.policy.layer_norm && !NetworkPasses::norm_takes(config.policy.embedding_width);
     sum->add_group(array.rows, features, width, keeps_norm, 2);
   }
 }

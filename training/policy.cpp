@@ -128,8 +128,8 @@ class VectorEncoder final : public SceneEncoder {
       if (!is_set(array) || (array.part == ObservationPart::walls && !reads_walls)) continue;
       const int64_t points = num_points(array.name);
       const int64_t features = array.features + (point_features_ ? points * kPointFeatures : 0);
-      groups_.push_back({make->group(std::string(array.name), features, config), kObservationTensors[i],
-                         entity_set_of(i), points});
+      groups_.push_back(
+          {make->group(std::string(array.name), features, config), kObservationTensors[i], entity_set_of(i), points});
     }
   }
 
@@ -138,10 +138,11 @@ class VectorEncoder final : public SceneEncoder {
     for (const Group& group : groups_) {
       at::Tensor members = o.*group.members;
       const at::Tensor counts = o.set_counts.select(1, group.set);
-      if (!group.encoder.layer_norm && takes_sets(members)) {
+      if (takes_sets(members)) {
         const PolicyNetwork::Linear &hidden = group.encoder.hidden, &out = group.encoder.out;
         embeddings.push_back(largest_embedding(members, counts, point_features_ ? group.points : 0, kScalePosition_m,
-                                               hidden.weight, hidden.bias, out.weight, out.bias));
+                                               group.encoder.layer_norm, hidden.weight, hidden.bias, out.weight,
+                                               out.bias));
         continue;
       }
       if (point_features_) members = with_point_features(members, group.points, input_type_);

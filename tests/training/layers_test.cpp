@@ -154,18 +154,21 @@ TEST(HostLayers, LargestEmbeddingIsTheMaximumOverTheMembersThatThereAre) {
                    counts = at::arange(sets, at::kInt).remainder(most + 1);
   for (const int64_t points : {0, 1, 2}) {
     const int64_t features = 7 + 6 * points;
-    const auto plain = [&](const std::vector<at::Tensor>& in) {
-      const at::Tensor rows = points > 0 ? with_point_features(members, points, at::kDouble) : members;
-      return masked_max(at::linear(at::gelu(at::linear(rows, in[0], in[1])), in[2], in[3]), counts);
-    };
     const at::Tensor floats = members.to(at::kFloat);
     ASSERT_TRUE(takes_sets(floats));
-    const auto layer = [&](const std::vector<at::Tensor>& in) {
-      return largest_embedding(floats, counts, points, kScalePosition_m, in[0], in[1], in[2], in[3]);
-    };
-    expect_as_in_double(
-        layer, plain,
-        {float_numbers({16, features}, 1), float_numbers({16}, 2), float_numbers({24, 16}, 3), float_numbers({24}, 4)});
+    for (const bool has_norm : {false, true}) {
+      const auto plain = [&](const std::vector<at::Tensor>& in) {
+        const at::Tensor rows = points > 0 ? with_point_features(members, points, at::kDouble) : members;
+        const at::Tensor hidden = at::linear(rows, in[0], in[1]);
+        return masked_max(at::linear(at::gelu(has_norm ? at::layer_norm(hidden, {16}) : hidden), in[2], in[3]), counts);
+      };
+      const auto layer = [&](const std::vector<at::Tensor>& in) {
+        return largest_embedding(floats, counts, points, kScalePosition_m, has_norm, in[0], in[1], in[2], in[3]);
+      };
+      expect_as_in_double(layer, plain,
+                          {float_numbers({16, features}, 1), float_numbers({16}, 2), float_numbers({24, 16}, 3),
+                           float_numbers({24}, 4)});
+    }
   }
 }
 
@@ -174,8 +177,8 @@ TEST(HostLayers, LargestEmbeddingGivesWayToNoNumberThatIsNone) {
   members[0][1][0] = std::numeric_limits<float>::quiet_NaN();
   const at::Tensor one = at::ones({1, 2});
   const auto largest = [&](int count) {
-    return largest_embedding(members, at::full({1}, count, at::kInt), 0, 1.0f, one, at::zeros({1}), at::ones({1, 1}),
-                             at::zeros({1}))
+    return largest_embedding(members, at::full({1}, count, at::kInt), 0, 1.0f, /*has_norm=*/false, one, at::zeros({1}),
+                             at::ones({1, 1}), at::zeros({1}))
         .item<float>();
   };
   EXPECT_TRUE(std::isnan(largest(3)));
