@@ -86,9 +86,9 @@ TEST_P(DeviceLayers, LinearGelu) {
 }
 
 TEST_P(DeviceLayers, LinearNormGelu) {
-  // 36: ATen's own.
+  // 36: ATen's own. 9,000 rows are more than there are partial sums.
   for (const int64_t out : {64, 128, 192, 256, 384, 512, 36}) {
-    for (const int64_t rows : {1, 7, 20'000}) {
+    for (const int64_t rows : {1, 7, 9000}) {
       expect_as_on_the_host([](const auto& in) { return linear_norm_gelu(in[0], in[1], in[2]); },
                             [](const auto& in) {
                               const at::Tensor x = at::linear(in[0], in[1], in[2]);
