@@ -240,6 +240,7 @@ void add_render_benchmark(CLI::App& bench) {
   command
       ->add_option("--patch", arguments->patch_px,
                    "Draw patches of 4, 8, 12 or 16 px squared, as first convolutions take them; default: planar images")
+      ->transform(whole_number(4, 16))
       ->check(one_of({"4", "8", "12", "16"}).description("{4,8,12,16}"));
   command->add_flag("--planes", arguments->planes, "Draw depth, class and instance planes too");
   command->add_flag("--host-memory", arguments->host_memory,
