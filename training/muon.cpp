@@ -60,11 +60,17 @@ at::Tensor orthogonalized(const at::Tensor& matrices, at::ScalarType type) {
   return x.to(matrices.scalar_type());
 }
 
-Muon::Muon(std::vector<at::Tensor> weights, at::ScalarType type, double weight_decay)
-    : weights_(std::move(weights)), type_(type), weight_decay_(weight_decay), batches_(make_batches(weights_)) {
+Muon::Muon(std::vector<at::Tensor> weights, at::ScalarType type, double weight_decay, Device device, bool uses_graphs)
+    : weights_(std::move(weights)),
+      type_(type),
+      weight_decay_(weight_decay),
+      batches_(make_batches(weights_)),
+      graphs_(device, uses_graphs) {
   int64_t num_elements = 0;
   for (const at::Tensor& weight : weights_) num_elements += weight.numel();
   momentum_ = at::zeros({num_elements}, weights_.front().options().requires_grad(false));
+  rate_ = at::zeros({}, momentum_.options());
+  failed_ = at::zeros({}, momentum_.options());
   index_batches();
 }
 
@@ -151,7 +157,18 @@ std::vector<at::Tensor> Muon::parts_of(const at::Tensor& flat) const {
 
 void Muon::step(double learning_rate, const at::Tensor& failed) {
   const at::NoGradGuard no_grad;
-  const at::Tensor has_failed = failed.to(at::kBool);
+  rate_.fill_(learning_rate);
+  failed_.copy_(failed);
+  step_.run(&graphs_, [this] { take_step(); });
+}
+
+void Muon::forget_addresses() {
+  step_ = {};
+  graphs_.release_memory();
+}
+
+void Muon::take_step() {
+  const at::Tensor has_failed = failed_.to(at::kBool);
   std::vector<at::Tensor> gradients;
   for (const at::Tensor& weight : weights_) gradients.push_back(weight.grad().flatten());
   const at::Tensor gradient = at::cat(gradients), momentum = momentum_.lerp(gradient, 1 - kMomentum);
@@ -169,8 +186,8 @@ void Muon::step(double learning_rate, const at::Tensor& failed) {
     begin += size;
   }
   const at::Tensor step = at::cat(steps).index_select(0, place_of_element_);
-  at::_foreach_mul_(weights_, 1 - (1 - failed) * (learning_rate * weight_decay_));
-  at::_foreach_add_(weights_, parts_of(at::where(has_failed, at::zeros_like(step), step)), -learning_rate);
+  at::_foreach_mul_(weights_, 1 - (1 - failed_) * rate_ * weight_decay_);
+  at::_foreach_add_(weights_, parts_of(at::where(has_failed, at::zeros_like(step), step * -rate_)));
 }
 
 }  // namespace pictura

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pictura/training/policy.h"
+#include "pictura/training/repeated_work.h"
 
 namespace pictura {
 
@@ -28,12 +29,16 @@ at::Tensor orthogonalized(const at::Tensor& matrices, at::ScalarType type);
 
 class Muon {
  public:
-  /// weights: f32 leaves with gradients, [out, ...]; each steps as the matrix [out, rest]. type: of the products.
-  Muon(std::vector<at::Tensor> weights, at::ScalarType type, double weight_decay);
+  /// weights: f32 leaves with gradients, [out, ...], on `device`; each steps as the matrix [out, rest]. type: of the
+  /// products. uses_graphs: steps are launched as one CUDA graph, on a stream that can be captured from.
+  Muon(std::vector<at::Tensor> weights, at::ScalarType type, double weight_decay, Device device = {},
+       bool uses_graphs = false);
 
   /// One step along the weights' gradients. failed: f32 scalar; where it is not 0, neither weights nor momentum change,
   /// whatever the gradients are. Waits for no device.
   void step(double learning_rate, const at::Tensor& failed);
+  /// Must be called when gradients come to lie elsewhere.
+  void forget_addresses();
 
   /// Momentum of weight i, of its shape.
   at::Tensor momentum(size_t i) const { return parts_of(momentum_)[i]; }
@@ -45,6 +50,7 @@ class Muon {
     std::vector<size_t> weights;
     double cost() const;
   };
+  void take_step();
   static std::vector<Batch> make_batches(const std::vector<at::Tensor>& weights);
   void index_batches();
   // Parts of a vector of all weights' elements, of their shapes.
@@ -58,6 +64,9 @@ class Muon {
   // Where each element of the batches lies in such a vector, whose size stands for filling; and the inverse.
   at::Tensor element_of_place_, place_of_element_;
   std::vector<at::Tensor> scales_;  // of each batch [weights, 1, 1]
+  at::Tensor rate_, failed_;        // f32 scalars, of this step
+  Graphs graphs_;
+  RepeatedWork step_;
 };
 
 }  // namespace pictura

@@ -6,7 +6,7 @@
 
 namespace pictura {
 
-Optimizer::Optimizer(const Policy& policy, const Config::Train& config)
+Optimizer::Optimizer(const Policy& policy, const Config::Train& config, Device device, bool uses_graphs)
     : rate_factors(policy.parameters().size(), 1), parameters_(policy.parameters()), config_(config) {
   allocate_gradients();
   std::vector<at::Tensor> of_muon;
@@ -15,7 +15,7 @@ Optimizer::Optimizer(const Policy& policy, const Config::Train& config)
   }
   if (!of_muon.empty()) {
     const bool in_bf16 = gradients_.is_cuda() && !config.reproducible;
-    muon_.emplace(std::move(of_muon), in_bf16 ? at::kBFloat16 : at::kFloat, config.weight_decay);
+    muon_.emplace(std::move(of_muon), in_bf16 ? at::kBFloat16 : at::kFloat, config.weight_decay, device, uses_graphs);
   }
   size_t num_of_muon = 0;
   for (size_t i = 0; i < parameters_.size(); ++i) {
@@ -35,6 +35,7 @@ void Optimizer::allocate_gradients() {
     value.mutable_grad() = gradients_.narrow(0, begin, value.numel()).view(value.sizes());
     begin += value.numel();
   }
+  if (muon_) muon_->forget_addresses();
 }
 
 void Optimizer::clear_gradients() { gradients_.zero_(); }

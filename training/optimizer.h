@@ -12,8 +12,8 @@ namespace pictura {
 
 class Optimizer {
  public:
-  /// Gives the parameters gradients as allocate_gradients() does.
-  Optimizer(const Policy& policy, const Config::Train& config);
+  /// Gives the parameters, which lie on `device`, gradients as allocate_gradients() does. uses_graphs: see Muon.
+  Optimizer(const Policy& policy, const Config::Train& config, Device device = {}, bool uses_graphs = false);
   /// Scalars on the parameters' device, which nothing has waited for.
   struct Step {
     at::Tensor norm;    // of the gradients before they were scaled, see rate_factors

@@ -63,7 +63,7 @@ Run::Run(const Config& its_config, Device its_device, Communicator* its_communic
       executor(make_learner_executor(device)),
       timer(device),
       policy(its_policy ? std::move(its_policy) : make_policy(config, rig, device)),
-      optimizer(*policy, config.train),
+      optimizer(*policy, config.train, device, uses_graphs(config, device, renderer.get())),
       rollout(RolloutObservations(config, simulator.get(), renderer.get(), &timer), config.train.num_steps,
               simulator->num_slots(), device),
       stream(uses_graphs(config, device, renderer.get()) ? std::optional<OwnStream>(device) : std::nullopt),

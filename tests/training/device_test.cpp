@@ -255,6 +255,8 @@ bool equal(const std::vector<NamedTensor>& a, const std::vector<NamedTensor>& b)
   });
 }
 
+using MuonOnADevice = test::DeviceTest;
+
 // Three weights, from 0, after one step along gradients that are the same on every device.
 std::vector<at::Tensor> after_step_of_muon(at::Device device, at::ScalarType type) {
   at::manual_seed(5);
@@ -271,7 +273,7 @@ std::vector<at::Tensor> after_step_of_muon(at::Device device, at::ScalarType typ
   return weights;
 }
 
-TEST(MuonOnADevice, StepsAsOnTheHost) {
+TEST_F(MuonOnADevice, StepsAsOnTheHost) {
   const std::vector<at::Tensor> host = after_step_of_muon(at::kCPU, at::kFloat),
                                 fp32 = after_step_of_muon(at::kCUDA, at::kFloat),
                                 bf16 = after_step_of_muon(at::kCUDA, at::kBFloat16);
@@ -279,6 +281,36 @@ TEST(MuonOnADevice, StepsAsOnTheHost) {
     EXPECT_LT((fp32[i] - host[i]).norm().item<double>() / host[i].norm().item<double>(), 2e-2) << i;
     EXPECT_LT((bf16[i] - host[i]).norm().item<double>() / host[i].norm().item<double>(), 2e-1) << i;
   }
+}
+
+// A weight after four steps from 0, the third of which fails.
+at::Tensor after_steps_of_muon(bool uses_graphs) {
+  at::manual_seed(5);
+  const Device device{MemorySpace::cuda, 0};
+  at::Tensor weight = at::zeros({64, 96}, at::TensorOptions(at::kFloat).device(at::kCUDA));
+  weight.requires_grad_();
+  weight.mutable_grad() = at::zeros_like(weight);
+  OwnStream(device).run([&] {
+    Muon muon({weight}, at::kBFloat16, 0.1, device, uses_graphs);
+    for (int step = 0; step < 4; ++step) {
+      weight.mutable_grad().copy_(step == 2 ? at::full({64, 96}, std::nan("")) : at::randn({64, 96}));
+      muon.step(0.1 / (1 + step), at::full({}, step == 2 ? 1.0 : 0.0, at::TensorOptions(at::kFloat).device(at::kCUDA)));
+    }
+  });
+  return weight.detach().cpu();
+}
+
+TEST_F(MuonOnADevice, GraphsGiveTheSameBits) {
+  const at::Tensor calls = after_steps_of_muon(false), graphs = after_steps_of_muon(true);
+  EXPECT_TRUE(calls.equal(graphs));
+  EXPECT_GT(calls.abs().max().item<float>(), 0.01);
+}
+
+TEST_P(EachModality, ARunWithMuonGoesOnExactly) {
+  const auto [whole, again, resumed] = test::policies_of_equal_runs(
+      folder_ / "muon", "cuda", {modality(), "train.optimizer=muon", "train.reproducible=true"});
+  EXPECT_EQ(again, whole);
+  EXPECT_EQ(resumed, whole);
 }
 
 TEST_P(EachModality, WhatOneDeviceSavesTheOtherGoesOnFrom) {
