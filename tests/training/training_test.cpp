@@ -641,6 +641,14 @@ TEST_F(Training, BeginsWithConcatenatedQueriesAsTheirAverageEnded) {
   EXPECT_THAT(message_of([&] { train(back); }), HasSubstr("parameter 'project.weight'"));
 }
 
+TEST_F(Training, ANormalizedPolicyWithACriticOfItsOwnGoesOnExactly) {
+  const auto [whole, again, resumed] = test::policies_of_equal_runs(
+      folder_ / "runs", "cpu",
+      {"policy.modality=vector", "policy.layer_norm=true", "policy.residual=true", "policy.critic_layers=1"});
+  EXPECT_EQ(whole, again);
+  EXPECT_EQ(whole, resumed);
+}
+
 TEST_F(Training, VectorPolicyTrainsAndIsEvaluated) {
   const TrainReport report = train(options("run", {"train.updates=1", "policy.modality=vector"}));
   EvaluateOptions o;
