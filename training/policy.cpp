@@ -344,12 +344,12 @@ PolicyNetwork::PolicyNetwork(const Config::PolicySection& config, int num_camera
       config);
   const int64_t in = scene_->width() + 2 * int64_t{config.embedding_width}, inside = config.backbone_width;
   backbone_ = make.trunk("backbone", in, config.backbone_layers, inside);
-  // A small actor head: every action is about as likely as any other at first. So is every bin of a critic, whose value
-  // is then near 0.
-  constexpr double kGainOfLikelihoods = 0.01;
-  actor_ = make.linear("actor", inside, kNumActions, kGainOfLikelihoods);
+  // A small actor head: every action is about as likely as any other at first. A critic whose values grow exponentially
+  // with its outputs begins as small, with values near 0.
+  constexpr double kSmallGain = 0.01;
+  actor_ = make.linear("actor", inside, kNumActions, kSmallGain);
   critic_ = make.linear("critic", inside, num_value_outputs(value_head_),
-                        value_head_ == ValueHead::two_hot ? kGainOfLikelihoods : 1.0);
+                        value_head_ == ValueHead::linear ? 1.0 : kSmallGain);
   // Drawn last, so that the actor begins as it does without.
   critic_backbone_ = make.trunk("critic_backbone", in, config.critic_layers, inside);
 }

@@ -129,8 +129,8 @@ TEST_P(EachValueHead, LearnsReturns) {
   double reward = 0;
   for (int64_t update = 0; update < 40; ++update) {
     reward = corridor.play(policy, update);
-    if (update == 0 && GetParam() == ValueHead::two_hot) {
-      EXPECT_LT(corridor.rollout.values.abs().max().item<float>(), 1) << "every bin is about as likely as any other";
+    if (update == 0 && GetParam() != ValueHead::linear) {
+      EXPECT_LT(corridor.rollout.values.abs().max().item<float>(), 1);
     }
     // Ten times the reward: of a size at which symlog presses together.
     corridor.rollout.rewards *= 10;
