@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <unordered_map>
+#include <utility>
 
 #include "pictura/map/opendrive/curves.h"
 
@@ -31,12 +33,12 @@ class LinkedEnds {
     }
   }
 
-  /// The ends that are linked with an end, itself included, in ascending order; [ends].
-  std::vector<std::vector<std::size_t>> groups() {
-    std::vector<std::vector<std::size_t>> of_root(parent_.size()), of_end;
-    for (std::size_t end = 0; end < parent_.size(); ++end) of_root[root_of(end)].push_back(end);
-    for (std::size_t end = 0; end < parent_.size(); ++end) of_end.push_back(of_root[root_of(end)]);
-    return of_end;
+  std::size_t size() const { return parent_.size(); }
+
+  /// One of the ends that are linked with `end`: the same for all of them.
+  std::size_t group_of(std::size_t end) {
+    while (parent_[end] != end) end = parent_[end] = parent_[parent_[end]];
+    return end;
   }
 
  private:
@@ -48,12 +50,7 @@ class LinkedEnds {
     if (link.kind == RoadLink::Kind::road) join(end, end_of(link.id, link.contact));
   }
 
-  void join(std::size_t a, std::size_t b) { parent_[root_of(a)] = root_of(b); }
-
-  std::size_t root_of(std::size_t end) {
-    while (parent_[end] != end) end = parent_[end] = parent_[parent_[end]];
-    return end;
-  }
+  void join(std::size_t a, std::size_t b) { parent_[group_of(a)] = group_of(b); }
 
   const Network& network_;
   std::vector<std::size_t> parent_;
@@ -63,7 +60,8 @@ class LinkedEnds {
 class ShiftSolver {
  public:
   ShiftSolver(const Eigen::Matrix2d& plan, const Network& network)
-      : plan_(plan), network_(network), groups_(LinkedEnds(network).groups()), shifts_(groups_.size()) {
+      : plan_(plan), network_(network), ends_(network), members_(ends_.size()), shifts_(ends_.size()) {
+    for (std::size_t end = 0; end < ends_.size(); ++end) members_[ends_.group_of(end)].push_back(end);
     for (const FileRoad& road : network.roads) {
       for (const double s : {0.0, road.length}) poses_.push_back(pose_at(road, s));
     }
@@ -71,38 +69,45 @@ class ShiftSolver {
 
   /// [ends]
   std::vector<Eigen::Vector2d> solve() {
-    // Roads outside junctions carry the shift that they begin with to their other end, however short they are.
+    // Roads outside junctions keep the shift that they begin with, however short they are, and their neighbours follow.
     for (std::size_t road = 0; road < network_.roads.size(); ++road) {
-      if (is_in_junction(2 * road) || shifts_[2 * road] || shifts_[2 * road + 1]) continue;
-      shifts_[2 * road] = shifts_[2 * road + 1] = Eigen::Vector2d::Zero();
-      std::vector<std::size_t> reached{2 * road, 2 * road + 1};
-      while (!reached.empty()) {
-        const std::size_t from = reached.back();
-        reached.pop_back();
-        for (const std::size_t end : groups_[from]) {
-          if (is_in_junction(end) || shifts_[end]) continue;
-          shifts_[end] = shift_beside(from, end);
-          const std::size_t other = end ^ 1;
-          if (!shifts_[other]) shifts_[other] = shifts_[end];
-          reached.push_back(other);
+      if (is_in_junction(2 * road)) continue;
+      for (const std::size_t end : {2 * road, 2 * road + 1}) set_shift(end, Eigen::Vector2d::Zero());
+      while (!reached_.empty()) {
+        const std::size_t anchor = reached_.back();
+        reached_.pop_back();
+        for (const std::size_t end : take_members(anchor)) {
+          if (!is_in_junction(end)) set_shift(end, shift_beside(anchor, end));
         }
       }
     }
-    // Those of junctions lead from road to road.
+    // What is left are ends of roads between junctions' own roads: the first of a group stays.
+    for (std::size_t end = 0; end < ends_.size(); ++end) take_members(end);
     std::vector<Eigen::Vector2d> all;
-    for (std::size_t end = 0; end < groups_.size(); ++end) {
-      const auto anchor = std::find_if(groups_[end].begin(), groups_[end].end(),
-                                       [&](std::size_t other) { return !is_in_junction(other); });
-      if (shifts_[end])
-        all.push_back(*shifts_[end]);
-      else
-        all.push_back(shift_beside(anchor == groups_[end].end() ? groups_[end].front() : *anchor, end));
+    for (std::size_t end = 0; end < ends_.size(); ++end) {
+      all.push_back(shifts_[end].value_or(shift_beside(anchors_.at(ends_.group_of(end)), end)));
     }
     return all;
   }
 
  private:
   bool is_in_junction(std::size_t end) const { return !network_.roads[end / 2].junction.empty(); }
+
+  /// Sets the shift of an end, and of the road's other end if that has none, unless the end has one.
+  void set_shift(std::size_t end, const Eigen::Vector2d& shift_m) {
+    for (const std::size_t each : {end, end ^ 1}) {
+      if (shifts_[each]) return;
+      shifts_[each] = shift_m;
+      reached_.push_back(each);
+    }
+  }
+
+  /// The group of an end, which becomes its anchor, the first time that it is asked for; nothing later.
+  std::vector<std::size_t> take_members(std::size_t end) {
+    const std::size_t group = ends_.group_of(end);
+    anchors_.try_emplace(group, end);
+    return std::exchange(members_[group], {});
+  }
 
   /// The shift by which `end` keeps its distance to the left of `anchor`, in metres.
   Eigen::Vector2d shift_beside(std::size_t anchor, std::size_t end) const {
@@ -117,9 +122,12 @@ class ShiftSolver {
 
   const Eigen::Matrix2d plan_;
   const Network& network_;
-  std::vector<std::vector<std::size_t>> groups_;
-  std::vector<std::optional<Eigen::Vector2d>> shifts_;
-  std::vector<Pose> poses_;
+  LinkedEnds ends_;
+  std::vector<std::vector<std::size_t>> members_;         // [ends], of groups by the end that names them
+  std::vector<std::optional<Eigen::Vector2d>> shifts_;    // [ends]
+  std::unordered_map<std::size_t, std::size_t> anchors_;  // by group
+  std::vector<Pose> poses_;                               // [ends], of the network before
+  std::vector<std::size_t> reached_;                      // ends whose groups have yet to follow them
 };
 
 }  // namespace

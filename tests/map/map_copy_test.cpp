@@ -3,7 +3,6 @@
 #include "pictura/map/map_copy.h"
 
 #include <cmath>
-#include <filesystem>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,6 +12,7 @@
 #include "pictura/map/map_fields.h"
 #include "pictura/tests/map/driven_lanes.h"
 #include "pictura/tests/support/error_message.h"
+#include "pictura/tests/support/named_maps.h"
 #include "pictura/tests/support/scratch_folder.h"
 
 namespace pictura {
@@ -106,11 +106,8 @@ class Copies : public ::testing::TestWithParam<const char*> {
   static constexpr int kCopies = 3;
 
   void SetUp() override {
-    const std::string town = GetParam();
-    if (!town.starts_with("procedural") && !std::filesystem::exists(map_folder() + "/carla/" + town + ".xodr")) {
-      GTEST_SKIP() << "needs " << town << ".xodr in " << map_folder() << "/carla; set PICTURA_DATA";
-    }
-    original_ = load_map(town);
+    if (const std::string what = test::missing(GetParam()); !what.empty()) GTEST_SKIP() << what;
+    original_ = load_map(GetParam());
   }
 
   std::shared_ptr<const RoadMap> copy(int number) const { return load_map(map_copy_name(GetParam(), number)); }
@@ -120,12 +117,8 @@ class Copies : public ::testing::TestWithParam<const char*> {
 
 INSTANTIATE_TEST_SUITE_P(All, Copies,
                          ::testing::Values("Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07",
-                                           "Town10HD", "procedural:1", "procedural:5:blocks=4x3"),
-                         [](const ::testing::TestParamInfo<const char*>& town) {
-                           std::string name = town.param;
-                           std::erase_if(name, [](char c) { return !std::isalnum(static_cast<unsigned char>(c)); });
-                           return name;
-                         });
+                                           "Town10HD", "procedural:1", "procedural:5"),
+                         test::map_name);
 
 TEST_P(Copies, KeepConnectionsWidthsHeightsAndLimits) {
   for (int number = 1; number <= kCopies; ++number) {
