@@ -11,6 +11,7 @@
 #include "pictura/common/cuda/device_buffer.h"
 #include "pictura/common/error.h"
 #include "pictura/map/load_map.h"
+#include "pictura/map/map_copy.h"
 #include "pictura/simulator/recorded_scene.h"
 #include "pictura/tests/backend_cuda/device_test.h"
 #include "pictura/tests/backend_cuda/on_host.h"
@@ -192,7 +193,7 @@ SimulatorConfig whole_world() {
 }
 
 TEST_F(CudaSimulatorTest, ProceduralTownsOver1000Steps) {
-  for (const char* name : {"procedural:1", "procedural:2", "procedural:3"}) {
+  for (const char* name : {"procedural:1", "procedural:2", "procedural:3", "procedural:3#3"}) {
     SCOPED_TRACE(name);
     expect_parity(whole_world(), {load_map(name)}, {{0, 120, 0}}, 1000);
   }
@@ -236,6 +237,14 @@ TEST_F(CudaSimulatorTest, ThousandsOfSmallWorldsOnManyMaps) {
   config.episode_steps = 40;
   const Maps maps{load_map("procedural:1"), load_map("procedural:2"), load_map("procedural:3")};
   expect_parity(config, maps, draw_worlds(1, 8000, 1, 5, 3), 100, 25);
+}
+
+TEST_F(CudaSimulatorTest, WorldsOnManyCopies) {
+  SimulatorConfig config = whole_world();
+  config.episode_steps = 40;
+  const std::vector<std::string> names =
+      with_map_copies(expand_map_names({"procedural:1-2:blocks=2x2"}), /*copies=*/19);
+  expect_parity(config, load_maps(names), draw_worlds(1, 2000, 1, 20, static_cast<int>(names.size())), 100, 25);
 }
 
 TEST_F(CudaSimulatorTest, CrowdsUpToTheLargestWorld) {
