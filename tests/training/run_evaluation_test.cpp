@@ -41,6 +41,21 @@ class RunWithEvaluations : public ::testing::Test {
   }
   std::string evaluations(const std::string& run) const { return folder_ / (run + "/evaluation.csv"); }
 
+  /// The last evaluation of a run is that of evaluate() with its last checkpoint.
+  void expect_last_row_as_evaluate_measures(const std::string& run, const std::string& checkpoint) const {
+    const Table table = read_table(evaluations(run));
+    EvaluateOptions o = test::one_scenario(checkpoint, 10);
+    o.scenarios = 2;
+    o.agents_per_world = 3;
+    const EvaluateRow row = evaluate(o).rows.at(0);
+    EXPECT_EQ(column(table, "evaluation/km_driven").back(), fmt::format("{:.9g}", row.km_driven));
+    for (const auto& [name, estimate] : metrics_of(row)) {
+      EXPECT_EQ(column(table, "evaluation/" + name).back(), fmt::format("{:.9g}", estimate.value)) << name;
+      EXPECT_EQ(column(table, "evaluation/" + name + "_half_width_95").back(),
+                fmt::format("{:.9g}", estimate.half_width_95));
+    }
+  }
+
   test::ScratchFolder folder_;
 };
 
@@ -57,16 +72,27 @@ TEST_F(RunWithEvaluations, LearnsTheSameAndMeasuresWhatEvaluateMeasures) {
   ASSERT_THAT(column(table, "update"), ElementsAre("2", "4"));
   const std::vector<std::string> agent_steps = column(progress, "charts/agent_steps");
   EXPECT_THAT(column(table, "charts/agent_steps"), ElementsAre(agent_steps[1], agent_steps[3]));
-  EvaluateOptions o = test::one_scenario(with.checkpoint, 10);
-  o.scenarios = 2;
-  o.agents_per_world = 3;
-  const EvaluateRow row = evaluate(o).rows.at(0);
-  EXPECT_GT(row.km_driven, 0);
-  EXPECT_EQ(column(table, "evaluation/km_driven")[1], fmt::format("{:.9g}", row.km_driven));
-  for (const auto& [name, estimate] : metrics_of(row)) {
-    EXPECT_EQ(column(table, "evaluation/" + name)[1], fmt::format("{:.9g}", estimate.value)) << name;
-    EXPECT_EQ(column(table, "evaluation/" + name + "_half_width_95")[1], fmt::format("{:.9g}", estimate.half_width_95));
+  EXPECT_NE(column(table, "evaluation/km_driven")[1], "0");
+  expect_last_row_as_evaluate_measures("with", with.checkpoint);
+}
+
+TEST_F(RunWithEvaluations, WithCopiesOfMapsAreOnTheMapsAlone) {
+  TrainOptions plain = evaluating("plain", 4), copied = evaluating("copied", 4);
+  for (TrainOptions* one : {&plain, &copied}) {
+    one->overrides.insert(one->overrides.end(), {"simulator.min_agents=4", "simulator.max_agents=4", "run.seed=2"});
   }
+  copied.overrides.emplace_back("simulator.map_copies=1");
+  const TrainReport with = train(copied);
+  EXPECT_NE(with.policy_hash, train(plain).policy_hash);
+  expect_last_row_as_evaluate_measures("copied", with.checkpoint);
+
+  TrainOptions parts = copied;
+  parts.out_folder = folder_ / "parts";
+  parts.overrides.emplace_back("train.updates=2");
+  train(parts);
+  parts.overrides.back() = "train.updates=4";
+  parts.old_run = OldRun::resume;
+  EXPECT_EQ(train(parts).policy_hash, with.policy_hash);
 }
 
 TEST_F(RunWithEvaluations, GoesOnWithTornAndMissingRows) {
