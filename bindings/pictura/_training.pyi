@@ -58,7 +58,7 @@ def evaluate(checkpoint: str, maps: collections.abc.Sequence[str], *, controller
     """
     The paper's evaluation, as `pictura evaluate` does it, in worlds that no training has.
     
-    checkpoint: of a policy; '' with a controller of the paper's world. maps: names or files. controller: 'lane', 'idm_lanes', 'random' or 'idle',
+    checkpoint: of a policy; '' with a controller of the paper's world. maps: names, files or ranges as procedural:1-64. controller: 'lane', 'idm_lanes', 'random' or 'idle',
     which drives instead. densities: 'light', 'medium' and 'dense', 60, 120 and 150 agents a world, or agents_per_world of them.
     device, simulator, renderer: 'auto' or names; renderer '': as it was trained. rig, or width_px and height_px: other cameras.
     conditioning: numbers by name. light_cycles: 'phases' or 'independent'; '': as it was trained. average: with the average of
