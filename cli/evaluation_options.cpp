@@ -13,7 +13,9 @@ EvaluationArguments::EvaluationArguments() { evaluate.maps = Config().simulator.
 
 CLI::Option* add_evaluation_options(CLI::App* command, EvaluationArguments* arguments) {
   EvaluateOptions& options = arguments->evaluate;
-  add_map_list_option(command, &options.maps, "Maps that the scenarios are spread over, with commas between them");
+  add_map_list_option(
+      command, &options.maps,
+      "Maps that the scenarios are spread over, with commas between them; procedural:1-64 is a town for each seed");
   command->add_option("--agents", options.agents_per_world, "Agents a world, instead of the densities' own numbers")
       ->transform(whole_number(1, kMaxAgentsPerWorld));
   command->add_option("--steps", options.steps, "Steps of 0.1 s per scenario")
