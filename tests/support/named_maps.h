@@ -8,20 +8,22 @@
 #include <gtest/gtest.h>
 
 #include "pictura/map/load_map.h"
+#include "pictura/map/map_copy.h"
 
 namespace pictura::test {
 
 /// What a test of a map lacks; empty if the map exists.
 inline std::string missing(const std::string& map) {
   const std::vector<std::string> towns = known_towns();
-  const bool is_there = !map.starts_with("Town") || std::binary_search(towns.begin(), towns.end(), map);
-  return is_there ? "" : "needs " + map + ".xodr; set PICTURA_DATA";
+  const std::string town(parse_map_copy(map).map);
+  const bool is_there = !town.starts_with("Town") || std::binary_search(towns.begin(), towns.end(), town);
+  return is_there ? "" : "needs " + town + ".xodr; set PICTURA_DATA";
 }
 
 /// Names tests by their map.
 inline std::string map_name(const ::testing::TestParamInfo<const char*>& map) {
   std::string name = map.param;
-  std::replace(name.begin(), name.end(), ':', '_');
+  for (const char mark : {':', '#'}) std::replace(name.begin(), name.end(), mark, '_');
   return name;
 }
 
