@@ -9,11 +9,6 @@ namespace pictura {
 /// and knows nothing of the others.
 enum class LightCycles : uint8_t { phases, independent };
 
-/// Names as configuration files and options spell them, in the order of LightCycles.
-constexpr const char* kLightCyclesNames[] = {"phases", "independent"};
-
-constexpr const char* name_of(LightCycles cycles) { return kLightCyclesNames[static_cast<int>(cycles)]; }
-
 /// What happens to an agent's motion at rest, on top of its dynamics (rules/dynamics.h).
 struct DynamicsRules {
   /// The longitudinal acceleration ends in the step in which the speed would change its sign, and becomes 0 as the
@@ -22,7 +17,7 @@ struct DynamicsRules {
   /// An agent at rest does not begin to drive backwards: a step that would take it below speed 0 leaves it at rest,
   /// without acceleration. So speeds of 0 or more never fall below 0.
   bool forbid_reversing = false;
-  friend bool operator==(const DynamicsRules&, const DynamicsRules&) = default;
+  bool operator==(const DynamicsRules&) const = default;
 };
 
 }  // namespace pictura

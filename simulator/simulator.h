@@ -62,6 +62,9 @@ struct SimulatorConfig {
   }
 };
 
+/// Names as configuration files and options spell them, in the order of LightCycles.
+constexpr const char* kLightCyclesNames[] = {"phases", "independent"};
+constexpr const char* name_of(LightCycles cycles) { return kLightCyclesNames[static_cast<int>(cycles)]; }
 /// The light cycles of a name of kLightCyclesNames. Throws UsageError listing the names.
 LightCycles light_cycles_named(std::string_view name);
 

@@ -246,7 +246,7 @@ TEST_P(Copies, ARotationAloneRotatesTheMap) {
 
 TEST(MapCopy, FilesAndTheirCopiesAreCachedApart) {
   const test::ScratchFolder folder;
-  const test::EnvironmentVariable cache("XDG_CACHE_HOME", folder.path());
+  const test::EnvironmentVariable cache("XDG_CACHE_HOME", folder.path()), on("PICTURA_CACHE", std::nullopt);
   const std::string file = folder.path() + "/a.xodr";
   write_file(file, map_text("procedural:3:blocks=1x1").text);
   const auto original = load_map(file), first = load_map(file + "#1"), second = load_map(file + "#2");
