@@ -38,15 +38,16 @@ int64_t image_values(ImageSize size, ChannelOrder order, int patch_px) {
          patches_along(patch_px, size.height_px);
 }
 
-void check_patch_px(std::string_view what, ChannelOrder order, int patch_px) {
+void check_patch_px(std::string_view renderer, ChannelOrder order, int patch_px) {
   PICTURA_CHECK(order != ChannelOrder::patches || is_drawn_patch(patch_px),
-                "{}: expected patches of 4, 8, 12 or 16 pixels squared, got {}", what, patch_px);
+                "{}images: expected patches of 4, 8, 12 or 16 pixels squared, got {}",
+                renderer.empty() ? "" : fmt::format("renderer {}: ", renderer), patch_px);
 }
 
 ImageLayout image_layout(Span<const ImageSize> sizes, int64_t num_views, PixelFormat format, ChannelOrder order,
                          int patch_px) {
   PICTURA_CHECK(num_views >= 0, "images: expected 0 views or more, got {}", num_views);
-  check_patch_px("images", order, patch_px);
+  check_patch_px("", order, patch_px);
   ImageLayout layout;
   layout.format = format;
   layout.order = order;

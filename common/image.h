@@ -28,8 +28,9 @@ struct ImageSize {
 };
 /// How many values one image of this size has: channels of pixels, and what patches of `patch_px` add to them.
 int64_t image_values(ImageSize size, ChannelOrder order, int patch_px = kDefaultPatch_px);
-/// Throws Error naming `what` unless renderers write patches of this side, or the order is another.
-void check_patch_px(std::string_view what, ChannelOrder order, int patch_px);
+/// Throws Error, which begins with the renderer's name if there is one, unless renderers write patches of this side, or
+/// the order is another. Allocates nothing else.
+void check_patch_px(std::string_view renderer, ChannelOrder order, int patch_px);
 
 /// Where one camera's images lie in the memory of a layout. Channel c of pixel (x, y) of a view is the value
 /// offset + view * view_stride + c * channel_stride + y * row_stride + x * pixel_stride; all of these count values. In

@@ -52,7 +52,7 @@ void check_images(const Renderer& renderer, std::size_t num_views, const ImageBa
   PICTURA_CHECK(images.order == ChannelOrder::planar || (draws_all && images.order == ChannelOrder::patches),
                 "renderer {}: images: expected planar channels{}, got {} ones", name, draws_all ? " or patches" : "",
                 name_of(images.order));
-  check_patch_px(fmt::format("renderer {}: images", name), images.order, images.patch_px);
+  check_patch_px(name, images.order, images.patch_px);
   PICTURA_CHECK(images.num_views >= 0 && static_cast<std::size_t>(images.num_views) == num_views,
                 "renderer {}: images: expected images of {} views, got {}", name, num_views, images.num_views);
   PICTURA_CHECK(images.cameras.size() == rig.cameras.size(), "renderer {}: images: expected {} cameras, got {}", name,

@@ -372,7 +372,7 @@ class StillSimulator final : public Simulator {
 
   SimulatorConfig config_;
   SimulatorTotals totals_;
-  CompiledMaps maps_;
+  CompiledMaps maps_{std::make_shared<const CompiledMap>()};  // heads stand as mapped
   std::vector<GeometryHandle> handles_;
   std::vector<WorldSpec> worlds_{{0, 2, 0}, {0, 2, 1}};
   std::vector<AgentBox> agents_;

@@ -271,7 +271,15 @@ bool equal(const std::vector<NamedTensor>& a, const std::vector<NamedTensor>& b)
   });
 }
 
-using MuonOnADevice = test::DeviceTest;
+class MuonOnADevice : public test::DeviceTest {
+ protected:
+  void SetUp() override {
+    DeviceTest::SetUp();
+    if (IsSkipped() || HasFatalFailure()) return;
+    open_learning_device(
+        load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml", {"run.device=cuda", "render.backend=auto"}));
+  }
+};
 
 // Three weights, from 0, after one step along gradients that are the same on every device.
 std::vector<at::Tensor> after_step_of_muon(at::Device device, at::ScalarType type) {
