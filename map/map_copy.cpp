@@ -13,7 +13,7 @@ namespace pictura {
 
 namespace {
 
-constexpr std::string_view kProcedural = "procedural:";
+constexpr std::string_view kTownPrefix = "procedural:";
 
 bool is_digits(std::string_view text) {
   return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
@@ -21,9 +21,9 @@ bool is_digits(std::string_view text) {
 
 /// Appends the towns of procedural:FIRST-LAST[REST]; false for other names.
 bool append_range(const std::string& name, std::vector<std::string>* names_out) {
-  if (!name.starts_with(kProcedural)) return false;
-  const std::size_t end = std::min(name.find_first_of(":#", kProcedural.size()), name.size());
-  const std::string seeds = name.substr(kProcedural.size(), end - kProcedural.size());
+  if (!name.starts_with(kTownPrefix)) return false;
+  const std::size_t end = std::min(name.find_first_of(":#", kTownPrefix.size()), name.size());
+  const std::string seeds = name.substr(kTownPrefix.size(), end - kTownPrefix.size());
   const std::size_t dash = seeds.find('-');
   if (dash == std::string::npos) return false;
   const std::optional<uint64_t> first = parse_unsigned(seeds.substr(0, dash)),
@@ -33,7 +33,7 @@ bool append_range(const std::string& name, std::vector<std::string>* names_out) 
                kMaxTownRange, seeds);
   }
   for (uint64_t i = 0; i <= *last - *first; ++i) {
-    names_out->push_back(fmt::format("{}{}{}", kProcedural, *first + i, name.substr(end)));
+    names_out->push_back(fmt::format("{}{}{}", kTownPrefix, *first + i, name.substr(end)));
   }
   return true;
 }
