@@ -14,7 +14,7 @@ namespace pictura::opendrive {
 namespace {
 
 // Reference lines of linked roads that are further apart do not belong together.
-constexpr double kMaxOffset_m = 40.0;
+constexpr double kMaxLinkOffset_m = 40.0;
 
 /// Ends of roads, numbered 2 * road + (0: start, 1: end), in groups of linked ones.
 class LinkedEnds {
@@ -115,7 +115,7 @@ class ShiftSolver {
     const Eigen::Vector2d along{std::cos(pose.heading), std::sin(pose.heading)}, left{-along.y(), along.x()};
     const Eigen::Vector2d offset = poses_[end].position_m - pose.position_m;
     const Eigen::Vector2d shift = shifts_[anchor].value_or(Eigen::Vector2d::Zero());
-    if (offset.norm() > kMaxOffset_m) return shift;
+    if (offset.norm() > kMaxLinkOffset_m) return shift;
     const Eigen::Vector2d mapped = (plan_ * along).normalized(), mapped_left{-mapped.y(), mapped.x()};
     return shift + offset.dot(left) * (mapped_left - plan_ * left);
   }
