@@ -7,8 +7,9 @@
 
 namespace pictura {
 
-/// All agents decide at steps divisible by policy.decision_steps. One that has just begun (its world was reset, or it
-/// was inactive at the step before) decides at once, and holds that action until the next such step.
+/// Clock of one simulator's decisions. All agents decide at steps divisible by policy.decision_steps. An agent that has
+/// just begun (its world was reset, or the agent was inactive at the step before) decides at once, and holds that
+/// action until the next such step.
 class DecisionClock {
  public:
   explicit DecisionClock(int64_t decision_steps) : decision_steps_(decision_steps) {}

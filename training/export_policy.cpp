@@ -32,7 +32,7 @@ SavedPolicy resized_policy(const SavedPolicy& policy, ImageSize size) {
   }
   SavedPolicy result = policy;
   result.config.policy.patch_px *= factor;
-  // As it would be written by hand: .35 times 3 is 1.05, not 1.0499999999999998.
+  // Rounded to what would be written by hand: .35 times 3 is 1.05, not 1.0499999999999998.
   result.config.render.line_floor_px = std::round(1e6 * factor * config.render.line_floor_px) / 1e6;
   if (result.config.policy.patch_px > kMaxPatch_px || result.config.render.line_floor_px > kMaxLineFloor_px) {
     fail_usage("{}: size: expected patches of at most {} px and lines of at most {} px, got {} and {} for {}x{}",

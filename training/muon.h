@@ -37,7 +37,7 @@ class Muon {
   /// One step along the weights' gradients. failed: f32 scalar; where it is not 0, neither weights nor momentum change,
   /// whatever the gradients are. Waits for no device.
   void step(double learning_rate, const at::Tensor& failed);
-  /// Must be called when gradients come to lie elsewhere.
+  /// Discards the captured graph; must be called when gradients come to lie elsewhere.
   void forget_addresses();
 
   /// Momentum of weight i, of its shape.

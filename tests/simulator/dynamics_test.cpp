@@ -79,10 +79,10 @@ TEST(Dynamics, ResetAtStandstillEndsTheAccelerationWhereTheSpeedChangesItsSign) 
   EXPECT_NEAR(m.x_m, 0.5 * 0.1 * 0.1, 1e-6);
   m = move(m, {}, resets, kVehicle, 0.1f);  // and it stays where it stands
   EXPECT_EQ(m.speed_mps, 0.0f);
-  m = move(m, {-4, 0}, resets, kVehicle, 0.1f);  // until it is told to reverse: 0.5 x 0.4 m/s2 x 0.1 s
+  m = move(m, {-4, 0}, resets, kVehicle, 0.1f);  // until it reverses: 0.5 x 0.4 m/s2 x 0.1 s
   EXPECT_FLOAT_EQ(m.speed_mps, -0.02f);
   EXPECT_FLOAT_EQ(m.accel_long_mps2, -0.4f);
-  // The same from behind: -0.02 + 0.5 x (2.5 + 2.5) x 0.1 > 0.
+  // Forwards from reverse: -0.02 + 0.5 x (2.5 + 2.5) x 0.1 > 0.
   m.accel_long_mps2 = 2.5f;
   m = move(m, {}, resets, kVehicle, 0.1f);
   EXPECT_EQ(m.speed_mps, 0.0f);

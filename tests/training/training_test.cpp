@@ -614,7 +614,7 @@ TEST_F(Training, BeginsWithTheWeightsOfAnotherRunAtAnyImageSize) {
   TrainOptions wider = options("wider", {"policy.backbone_width=64"});
   wider.init_from = first;
   EXPECT_THAT(message_of([&] { train(wider); }), AllOf(HasSubstr(first), HasSubstr("another architecture")));
-  // Its critic has the same shape but predicts something else.
+  // A critic of the same shape that predicts something else.
   TrainOptions pressed = options("pressed", {"policy.value_head=symlog"});
   pressed.init_from = first;
   EXPECT_THAT(message_of([&] { train(pressed); }),
