@@ -122,8 +122,9 @@ void settle_driving_options(const CLI::App& command, WorldOptions* world_inout, 
   if (!is_scene_name(world_inout->map)) {
     return refuse_scene_options(command, world_inout->map, {"--control"});
   }
-  refuse_options(command, {"--agents", "--pedestrians", "--cyclists", "--parked", "--no-walls", "--light-cycles"},
-                 "on a recorded scene, which says that itself");
+  refuse_options(
+      command, {"--agents", "--pedestrians", "--cyclists", "--parked", "--no-walls", "--light-cycles", "--light-heads"},
+      "on a recorded scene, which says that itself");
   if (command.count("--policy") == 0) *policy_inout = "log";
   if (*policy_inout == "log") {
     refuse_options(command, {"--control"}, "with the policy log, which drives everybody as recorded");

@@ -20,7 +20,7 @@ struct EvaluationArguments {
 };
 
 /// Adds --map, --agents, --steps, --sampled, --seed, --device, --simulator, --renderer, --samples, --conditioning,
-/// --light-cycles and --threads. Returns --sampled.
+/// --light-cycles, --light-heads and --threads. Returns --sampled.
 CLI::Option* add_evaluation_options(CLI::App* command, EvaluationArguments* arguments);
 
 /// Adds --average, which chooses the average of weights that a checkpoint holds.

@@ -109,6 +109,8 @@ with tempfile.TemporaryDirectory() as name:
         assert (folder / "scene.mp4").stat().st_size > 2000
 
     assert "--agents: has no effect on a recorded scene" in refusal(scene, "--agents", 4)
+    assert "--light-cycles: has no effect on a recorded scene" in refusal(scene, "--light-cycles", "independent")
+    assert "--light-heads: has no effect on a recorded scene" in refusal(scene, "--light-heads", "visible")
     assert "--control: has no effect with the policy log" in refusal(scene, "--control", "self")
     assert "--start: has no effect on procedural:1, which is no recorded scene" in refusal("procedural:1", "--start", 4)
     assert "--control: expected self (or sdc), vehicles" in refusal(scene, "--policy", "idle", "--control", "cars")
