@@ -9,7 +9,7 @@ namespace pictura {
 /// Side of the patches that a request for images asks for unless it names another.
 constexpr int kDefaultPatch_px = 4;
 /// Whether renderers write patches of this side: 4, 8, 12 or 16 px. A thread of a kernel writes four neighbouring
-/// pixels at once, which such a patch never divides.
+/// pixels at once, which never cross an edge of such a patch.
 PICTURA_HD constexpr bool is_drawn_patch(int patch_px) { return patch_px > 0 && patch_px <= 16 && patch_px % 4 == 0; }
 
 /// Number of values of a patch: three channels of its pixels.

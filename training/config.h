@@ -201,11 +201,10 @@ Config with_light_cycles(Config config, const std::string& name);
 std::string to_toml(const Config& config);
 
 /// Key of the first setting that changes what a run means and in which the two differ, with both values, or empty. What
-/// may differ: when to stop and how often to save; the schedule of the learning rate; the teacher; the average of
-/// weights; where and on how
-/// many threads it runs, as long as images are drawn by the same rules; how many transitions go through the network at
-/// once; what is evaluated; how cameras and backbones are described (compare the rigs and the programs' hashes), and
-/// all of [render] where the policy reads no images.
+/// may differ: when to stop and how often to save; the schedule of the learning rate; the optimizer; the teacher; the
+/// average of weights; where and on how many threads it runs, as long as images are drawn by the same rules; how many
+/// transitions go through the network at once; what is evaluated; how cameras and backbones are described (compare the
+/// rigs and the programs' hashes), and all of [render] where the policy reads no images.
 std::string first_difference(const Config& saved, const Config& now);
 
 /// Key of the first setting in which two ranks of a run differ, with both values, or empty. Where each runs, and on how

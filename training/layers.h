@@ -26,10 +26,10 @@ at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tenso
 
 /// Whether largest_embedding() takes such members: f32 on the host.
 bool takes_sets(const at::Tensor& members);
-/// Of sets of members, each of which goes through a linear layer with GELU, as linear_norm_gelu() with `has_norm`, and
-/// a second one, the largest of each channel: [sets, channels], 0 for an empty set. members: [sets, most, features],
-/// without gradient, each followed by the features of its points, of which it begins with so many (see PointSize);
-/// counts: i32 [sets], how many there are of each.
+/// Largest value of each channel over the members of a set: [sets, channels], 0 for an empty set. Each member goes
+/// through a linear layer with GELU, as linear_norm_gelu() with `has_norm`, and a second linear layer. members: [sets,
+/// maximum, features], without gradient, each followed by the features of its points, of which it begins with `points`
+/// (see PointSize); counts: i32 [sets], the members of each set.
 at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& counts, int64_t points, float unit_m,
                              bool has_norm, const at::Tensor& hidden_weight, const at::Tensor& hidden_bias,
                              const at::Tensor& weight, const at::Tensor& bias);

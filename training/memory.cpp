@@ -45,7 +45,8 @@ constexpr double kSimulatorBytesPerBox = 700;
 // those that an update makes of them (returns, actions and five lists of rows as i64).
 constexpr double kTransitionBytes = 5 * 4 + 3 + 4 + 6 * 8;
 
-// Of a map, for each byte of its file: above what was measured of CARLA's towns, of procedural ones, and of copies.
+// Bytes of a map for each byte of its file: above what was measured of CARLA's towns, of procedural ones, and of
+// copies.
 constexpr double kHostBytesPerFileByte = 17, kDeviceBytesPerFileByte = 11;
 
 double kept_image_bytes(const Config& config, double agents) {

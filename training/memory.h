@@ -36,9 +36,8 @@ struct MapMemory {
   double host = 0;    // as they are loaded, with what rules and renderers read
   double device = 0;  // what rules and renderers read of them, on a device
 };
-/// Of these maps, as training_maps() names them, from the sizes of their files and towns; seldom less than
-/// they take. Throws as map_file_bytes()
-/// does.
+/// Estimate of the memory of these maps, as training_maps() names them, from the sizes of their files and towns; seldom
+/// less than they take. Throws as map_file_bytes() does.
 MapMemory estimated_map_memory(const std::vector<std::string>& names);
 
 /// Throws Error saying how many maps would fit where those of a run do not: neither beside the agents and the network

@@ -23,7 +23,7 @@ class Optimizer {
   /// them. The loss must be that of all ranks.
   Step step(double learning_rate, const at::Tensor& loss, Communicator* communicator = alone());
 
-  /// Of all parameters, in their order: f32 [num_parameters].
+  /// Gradients of all parameters, in their order: f32 [num_parameters].
   const at::Tensor& gradients() const { return gradients_; }
   /// Sets them to 0.
   void clear_gradients();

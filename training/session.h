@@ -30,7 +30,7 @@ struct SessionOptions {
   bool adds_walls = false;                // its worlds have walls, also where it was trained without
   bool average = false;                   // drives with the average of weights that a checkpoint holds
   std::string light_cycles;               // of its worlds, by their names; empty: as the policy was trained
-  std::optional<LightHeads> light_heads;  // of its worlds; without a value as it was trained
+  std::optional<LightHeads> light_heads;  // of its worlds; no value: those of its training
 };
 
 /// What a batch of agents sees, in the memory of the session's device.

@@ -449,7 +449,7 @@ TEST_F(DeviceTraining, WhatARolloutKeepsIsWhatItKeepsOnTheHost) {
   }
 }
 
-// The renderer writes the patches, graphs are captured anew, and the learner's first probabilities are the rollout's.
+// The renderer writes the patches, graphs are captured again, and the learner's first probabilities are the rollout's.
 TEST_F(DeviceTraining, GoesOnInLargerPatches) {
   TrainOptions o =
       options("run", "cuda",
