@@ -104,6 +104,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.integer("policy.attention_mlp", c.policy.attention_mlp, 0, 1 << 16);
   v.integer("policy.embedding_width", c.policy.embedding_width, 1, 1 << 14);
   v.flag("policy.point_features", c.policy.point_features);
+  v.flag("policy.segment_features", c.policy.segment_features);
   v.integer("policy.backbone_layers", c.policy.backbone_layers, 1, 64);
   v.integer("policy.backbone_width", c.policy.backbone_width, 1, 1 << 14);
   v.integer("policy.critic_layers", c.policy.critic_layers, 0, 64);
@@ -661,6 +662,10 @@ void check_contradictions(const Config& c, const Reader& reader) {
   }
   if (c.policy.auxiliary && c.policy.modality == Modality::perspective) {
     reader.refuse("policy.auxiliary", "has no effect with the modality \"perspective\": images have no such slots");
+  }
+  if (c.policy.segment_features && c.policy.modality == Modality::perspective) {
+    reader.refuse("policy.segment_features",
+                  "has no effect with the modality \"perspective\", which reads no lists of segments");
   }
   if (c.simulator.wall_observations && c.policy.modality == Modality::perspective) {
     reader.refuse("simulator.wall_observations",

@@ -99,9 +99,10 @@ struct Config {
     int num_queries = 16;  // learned queries per camera
     QueryPooling query_pooling = QueryPooling::averaged;
     int attention_heads = 4;
-    int attention_mlp = 256;     // hidden width of the block's MLP; 0: none
-    int embedding_width = 64;    // of every group
-    bool point_features = true;  // encoders read points near the agent apart, see training/point_features.h
+    int attention_mlp = 256;        // hidden width of the block's MLP; 0: none
+    int embedding_width = 64;       // of every group
+    bool point_features = true;     // encoders read points near the agent apart, see training/row_features.h
+    bool segment_features = false;  // vector: encoders read the agent's place beside lanes, boundaries and walls
     /// "conv": the convolutions; or the path of a program of scripts/export_backbone, relative to the configuration's
     /// folder.
     std::string backbone = "conv";

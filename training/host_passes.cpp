@@ -222,18 +222,13 @@ void patches(const uint8_t* images, int64_t views, int64_t cameras, int64_t came
   }
 }
 
-void member_rows(const float* members, const int32_t* counts, int64_t sets, int64_t most, const PointSize& size,
+void member_rows(const float* members, const int32_t* counts, int64_t sets, int64_t most, const RowSize& size,
                  float* out) {
-  const int64_t width = size.width();
   for (int64_t set = 0; set < sets; ++set) {
-    for (int32_t member = 0; member < counts[set]; ++member, out += width) {
-      const float* const row = members + (set * most + member) * size.features;
-      for (int64_t i = 0; i < size.features; ++i) out[i] = row[i];
-      for (int64_t point = 0; point < size.points; ++point) {
-        const float x_m = row[2 * point] * size.unit_m, y_m = row[2 * point + 1] * size.unit_m;
-        float* const features = out + size.features + point * PointSize::kFeatures;
-        for (int i = 0; i < static_cast<int>(PointSize::kFeatures); ++i) features[i] = point_feature(x_m, y_m, i);
-      }
+    for (int32_t member = 0; member < counts[set]; ++member) {
+      const float* const row = members + (set * most + member) * size.columns;
+      out = std::copy_n(row, size.columns, out);
+      for (int i = 0; i < size.features.count(); ++i) *out++ = row_feature(size.features, row, i);
     }
   }
 }

@@ -56,10 +56,10 @@ void fold(const ConvolutionSize& size, const float* taps_grad, int64_t n, float*
 void patches(const uint8_t* images, int64_t views, int64_t cameras, int64_t camera, int64_t height, int64_t width,
              int64_t patch_px, float* out);
 
-/// The members that there are of sets, those of one set after those of the one before, each followed by the features of
-/// its points. members: [sets, most, size.features]; counts: [sets], at most `most`; size.keeps_rows must be set, its
-/// rows are not read. out: [sum of counts, size.width()].
-void member_rows(const float* members, const int32_t* counts, int64_t sets, int64_t most, const PointSize& size,
+/// The members that there are of sets, those of one set after those of the one before, each followed by its
+/// features. members: [sets, most, size.columns]; counts: [sets], at most `most`; size.keeps_rows must be set, its rows
+/// are not read. out: [sum of counts, size.width()].
+void member_rows(const float* members, const int32_t* counts, int64_t sets, int64_t most, const RowSize& size,
                  float* out);
 
 /// Of each set the largest of its members in each channel, and which member that is, the first of equal ones; 0 and -1

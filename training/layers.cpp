@@ -138,9 +138,9 @@ struct TokenSoftmax : Function<TokenSoftmax> {
   }
 };
 
-PointSize point_size(const at::Tensor& rows, int64_t points, float unit_m, bool keeps_rows) {
-  const int64_t features = rows.size(-1);
-  return {rows.numel() / features, features, points, unit_m, keeps_rows};
+RowSize row_size(const at::Tensor& rows, const RowFeatures& features, bool keeps_rows) {
+  const int64_t columns = rows.size(-1);
+  return {rows.numel() / columns, columns, features, keeps_rows};
 }
 
 // Whether the host's own passes (host_passes.h) take it: those are fp32, which layers in bf16 are not.
@@ -330,14 +330,14 @@ struct HostConvolution : Function<HostConvolution> {
 // each set the largest in each channel. That channel's gradient goes to that member alone, so the way back knows these
 // alone: a few of a set.
 struct HostSets : Function<HostSets> {
-  /// Returns {the largest, [sets, channels]; the members that there are with their points' features, [all, features];
+  /// Returns {the largest, [sets, channels]; the members that there are with their features, [all, width];
   /// which member of its set is the largest, i32 [sets, channels]}.
-  static variable_list compute(const at::Tensor& members, const at::Tensor& counts, int64_t points, float unit_m,
+  static variable_list compute(const at::Tensor& members, const at::Tensor& counts, const RowFeatures& features,
                                bool has_norm, const at::Tensor& hidden_weight, const at::Tensor& hidden_bias,
                                const at::Tensor& weight, const at::Tensor& bias) {
     const int64_t sets = members.size(0), most = members.size(1), hidden = hidden_weight.size(0),
                   channels = weight.size(0);
-    const PointSize size = point_size(members, points, unit_m, /*keeps_rows=*/true);
+    const RowSize size = row_size(members, features, /*keeps_rows=*/true);
     const std::vector<int64_t> begins = begins_of(counts);
     const auto options = members.options().requires_grad(false);
     const at::Tensor rows = at::empty({begins.back(), size.width()}, options),
@@ -367,10 +367,9 @@ struct HostSets : Function<HostSets> {
   }
 
   static at::Tensor forward(AutogradContext* context, const at::Tensor& members, const at::Tensor& counts,
-                            int64_t points, double unit_m, bool has_norm, const at::Tensor& hidden_weight,
+                            const RowFeatures& features, bool has_norm, const at::Tensor& hidden_weight,
                             const at::Tensor& hidden_bias, const at::Tensor& weight, const at::Tensor& bias) {
-    const variable_list made = compute(members, counts, points, static_cast<float>(unit_m), has_norm, hidden_weight,
-                                       hidden_bias, weight, bias);
+    const variable_list made = compute(members, counts, features, has_norm, hidden_weight, hidden_bias, weight, bias);
     context->save_for_backward({made[1], made[2], counts, hidden_weight, hidden_bias, weight});
     context->saved_data["has_norm"] = has_norm;
     return made[0];
@@ -442,7 +441,6 @@ struct HostSets : Function<HostSets> {
     });
     const at::Tensor none;
     return {none,
-            none,
             none,
             none,
             none,
@@ -549,13 +547,13 @@ at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tenso
 
 bool takes_sets(const at::Tensor& members) { return is_on_host(members); }
 
-at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& counts, int64_t points, float unit_m,
+at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& counts, const RowFeatures& features,
                              bool has_norm, const at::Tensor& hidden_weight, const at::Tensor& hidden_bias,
                              const at::Tensor& weight, const at::Tensor& bias) {
   const at::Tensor all = members.contiguous(), its_counts = counts.contiguous();
   if (keeps_gradients({hidden_weight, hidden_bias, weight, bias}))
-    return HostSets::apply(all, its_counts, points, double{unit_m}, has_norm, hidden_weight, hidden_bias, weight, bias);
-  return HostSets::compute(all, its_counts, points, unit_m, has_norm, hidden_weight, hidden_bias, weight, bias)[0];
+    return HostSets::apply(all, its_counts, features, has_norm, hidden_weight, hidden_bias, weight, bias);
+  return HostSets::compute(all, its_counts, features, has_norm, hidden_weight, hidden_bias, weight, bias)[0];
 }
 
 at::Tensor token_softmax(const at::Tensor& scores) {
@@ -563,19 +561,19 @@ at::Tensor token_softmax(const at::Tensor& scores) {
   return TokenSoftmax::apply(scores.contiguous());
 }
 
-bool takes_point_rows(const at::Tensor& rows, int64_t points) {
+bool takes_feature_rows(const at::Tensor& rows, const RowFeatures& features) {
   return rows.is_cuda() && rows.scalar_type() == at::kFloat &&
-         point_size(rows, points, 1, /*keeps_rows=*/true).width() <= PointSize::kMostWidth;
+         row_size(rows, features, /*keeps_rows=*/true).width() <= RowSize::kMostWidth;
 }
 
-at::Tensor point_rows(const at::Tensor& rows, int64_t points, float unit_m, bool keeps_rows, at::ScalarType type) {
-  const PointSize size = point_size(rows, points, unit_m, keeps_rows);
+at::Tensor feature_rows(const at::Tensor& rows, const RowFeatures& features, bool keeps_rows, at::ScalarType type) {
+  const RowSize size = row_size(rows, features, keeps_rows);
   std::vector<int64_t> shape = rows.sizes().vec();
   shape.back() = size.width();
   at::Tensor out = at::empty(shape, rows.options().dtype(type));
   passes_on(rows.device())
-      .point_features(size, rows.contiguous().const_data_ptr<float>(), activation_type_of(type), out.mutable_data_ptr(),
-                      stream_on(rows.device()));
+      .row_features(size, rows.contiguous().const_data_ptr<float>(), activation_type_of(type), out.mutable_data_ptr(),
+                    stream_on(rows.device()));
   return out;
 }
 

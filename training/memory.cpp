@@ -10,7 +10,6 @@
 #include "pictura/simulator/observation_arrays.h"
 #include "pictura/training/network_shape.h"
 #include "pictura/training/observation.h"
-#include "pictura/training/point_features.h"
 #include "pictura/training/rules/network_passes.h"
 #include "pictura/training/training_maps.h"
 
@@ -108,8 +107,7 @@ void add_entity_sets(const Config& config, Device device, LayerSum* sum) {
   const double width = config.policy.embedding_width;
   for (const ObservationArray& array : kObservationArrays) {
     if (!is_set(array) || !config.reads(array.part)) continue;
-    const double points = num_points(array.name);
-    const double features = array.features + (config.policy.point_features ? points * kPointFeatures : 0);
+    const double features = array.features + row_features_of(config.policy, array.name).count();
     if (device.is_host()) {
       // Of members their features are kept, of a set which are the largest: see largest_embedding().
       sum->add_parameters((features + 1) * width + (width + 1) * width);
@@ -167,7 +165,7 @@ LayerSum layers_of(const Config& config, const Rig& rig, Device device) {
     sets = config.reads(ObservationPart::walls) ? 5 : 4;
   }
   const double width = policy.embedding_width,
-               waypoint = kWaypointFeatures + (policy.point_features ? kPointFeatures : 0);
+               waypoint = kWaypointFeatures + row_features_of(policy, "waypoints").count();
   sum.add_group(1, num_ego_features(config.reads_images()), width, policy.layer_norm);
   sum.add_group(1, kNumConditioning + kNumWaypoints * waypoint, width, policy.layer_norm);
   const double in = (sets + 2) * width, inside = policy.backbone_width;

@@ -4,15 +4,23 @@
 #include <string_view>
 
 #include "pictura/simulator/observation.h"
+#include "pictura/simulator/rules/observe.h"
 #include "pictura/training/config.h"
+#include "pictura/training/rules/network_passes.h"
 
 namespace pictura {
 
 /// Of its own state: beside images without the two auxiliary slots, which come last.
 constexpr int num_ego_features(bool sees_images) { return sees_images ? kEgoFeatures - 2 : kEgoFeatures; }
 
-/// Points that a member of a set begins with: a stop line has two ends.
-constexpr int num_points(std::string_view set) { return set == "controls" ? 2 : 1; }
+/// Features that are read of each row of an array of the observation, by its name: of a set, or of the waypoints.
+inline RowFeatures row_features_of(const Config::PolicySection& policy, std::string_view array) {
+  const int points = array == "controls" ? 2 : 1;  // a stop line has two ends
+  const bool is_segment = array == "lanes" || array == "boundaries" || array == "walls";
+  return {.points = policy.point_features ? points : 0,
+          .of_segment = policy.segment_features && is_segment,
+          .position_unit_m = kScalePosition_m};
+}
 
 /// Sines and cosines of a pixel's position in the image, so that attention knows where a token is whatever the image's
 /// size.

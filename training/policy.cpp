@@ -8,14 +8,13 @@
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
 #include "pictura/common/support/hash.h"
-#include "pictura/simulator/rules/observe.h"
 #include "pictura/training/image_backbone.h"
 #include "pictura/training/layers.h"
 #include "pictura/training/network_shape.h"
 #include "pictura/training/patch_spread.h"
-#include "pictura/training/point_features.h"
 #include "pictura/training/precision.h"
 #include "pictura/training/query_spread.h"
+#include "pictura/training/row_features.h"
 #include "pictura/training/rules/network_passes.h"
 #include "pictura/training/torch_device.h"
 #include "pictura/training/value_head.h"
@@ -120,16 +119,15 @@ at::Tensor masked_max(const at::Tensor& members, const at::Tensor& counts) {
 /// The entity sets of simulator/observation.h, each through its own MLP and a masked max over its members.
 class VectorEncoder final : public SceneEncoder {
  public:
-  /// Members with features of points are converted to `input_type`.
+  /// Members with features are converted to `input_type`.
   VectorEncoder(const Config::PolicySection& config, bool reads_walls, at::ScalarType input_type, ParameterMaker* make)
-      : embedding_width_(config.embedding_width), point_features_(config.point_features), input_type_(input_type) {
+      : embedding_width_(config.embedding_width), input_type_(input_type) {
     for (size_t i = 0; i < std::size(kObservationArrays); ++i) {
       const ObservationArray& array = kObservationArrays[i];
       if (!is_set(array) || (array.part == ObservationPart::walls && !reads_walls)) continue;
-      const int64_t points = num_points(array.name);
-      const int64_t features = array.features + (point_features_ ? points * kPointFeatures : 0);
-      groups_.push_back(
-          {make->group(std::string(array.name), features, config), kObservationTensors[i], entity_set_of(i), points});
+      const RowFeatures features = row_features_of(config, array.name);
+      groups_.push_back({make->group(std::string(array.name), array.features + features.count(), config),
+                         kObservationTensors[i], entity_set_of(i), features});
     }
   }
 
@@ -140,12 +138,11 @@ class VectorEncoder final : public SceneEncoder {
       const at::Tensor counts = o.set_counts.select(1, group.set);
       if (takes_sets(members)) {
         const PolicyNetwork::Linear &hidden = group.encoder.hidden, &out = group.encoder.out;
-        embeddings.push_back(largest_embedding(members, counts, point_features_ ? group.points : 0, kScalePosition_m,
-                                               group.encoder.layer_norm, hidden.weight, hidden.bias, out.weight,
-                                               out.bias));
+        embeddings.push_back(largest_embedding(members, counts, group.features, group.encoder.layer_norm, hidden.weight,
+                                               hidden.bias, out.weight, out.bias));
         continue;
       }
-      if (point_features_) members = with_point_features(members, group.points, input_type_);
+      if (group.features.count() > 0) members = with_row_features(members, group.features, input_type_);
       embeddings.push_back(masked_max(encode(group.encoder, members), counts));
     }
     return at::cat(embeddings, 1);
@@ -158,10 +155,9 @@ class VectorEncoder final : public SceneEncoder {
     PolicyNetwork::GroupEncoder encoder;
     at::Tensor Observation::* members;
     int64_t set;  // its column of set_counts
-    int64_t points;
+    RowFeatures features;
   };
   int64_t embedding_width_;
-  bool point_features_;
   at::ScalarType input_type_;
   std::vector<Group> groups_;
 };
@@ -327,7 +323,7 @@ PolicyNetwork::PolicyNetwork(const Config::PolicySection& config, int num_camera
     : type_(type),
       precision_(precision),
       value_head_(config.value_head),
-      point_features_(config.point_features),
+      waypoint_features_(row_features_of(config, "waypoints")),
       layer_norm_(config.layer_norm),
       residual_(config.residual) {
   ParameterMaker make(seed, at::TensorOptions(type).device(torch_device(device)), &parameters_);
@@ -340,8 +336,7 @@ PolicyNetwork::PolicyNetwork(const Config::PolicySection& config, int num_camera
   ego_features_ = num_ego_features(sees_images);
   ego_ = make.group("ego", ego_features_, config);
   conditioning_ = make.group(
-      "conditioning", kNumConditioning + kNumWaypoints * (kWaypointFeatures + (point_features_ ? kPointFeatures : 0)),
-      config);
+      "conditioning", kNumConditioning + kNumWaypoints * (kWaypointFeatures + waypoint_features_.count()), config);
   const int64_t in = scene_->width() + 2 * int64_t{config.embedding_width}, inside = config.backbone_width;
   backbone_ = make.trunk("backbone", in, config.backbone_layers, inside);
   // A small actor head: every action is about as likely as any other at first. A critic whose values grow exponentially
@@ -366,10 +361,10 @@ at::Tensor PolicyNetwork::run_trunk(const std::vector<Linear>& layers, at::Tenso
 
 Policy::Output PolicyNetwork::forward(const Observation& o) const {
   std::vector<at::Tensor> own{o.conditioning, o.waypoints};
-  if (point_features_) {
-    own.push_back(
-        point_features(o.waypoints.unflatten(1, {kNumWaypoints, kWaypointFeatures}), 1, o.waypoints.scalar_type())
-            .flatten(1));
+  if (waypoint_features_.count() > 0) {
+    own.push_back(row_features(o.waypoints.unflatten(1, {kNumWaypoints, kWaypointFeatures}), waypoint_features_,
+                               o.waypoints.scalar_type())
+                      .flatten(1));
   }
   at::Tensor for_actor, for_critic;
   {

@@ -13,6 +13,7 @@
 #include "pictura/training/chunks.h"
 #include "pictura/training/config.h"
 #include "pictura/training/observation.h"
+#include "pictura/training/rules/network_passes.h"
 
 namespace pictura {
 
@@ -94,7 +95,7 @@ class PolicyNetwork final : public Policy {
   Precision precision_;
   ValueHead value_head_;
   int64_t ego_features_;  // the image branch comes without the auxiliary slots
-  bool point_features_;
+  RowFeatures waypoint_features_;
 
   struct Linear {
     at::Tensor weight, bias;

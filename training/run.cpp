@@ -172,9 +172,10 @@ void Run::begin_with(const SavedPolicy& other) {
   PICTURA_CHECK(other.config.policy.value_head == config.policy.value_head,
                 "{}: policy.value_head: its policy has \"{}\", expected \"{}\"", other.path,
                 name_of(other.config.policy.value_head), name_of(config.policy.value_head));
-  // These have no parameters, whose names and shapes would show them.
+  // Those without parameters would not show, and shapes of parameters would not say why they differ.
   for (const auto& [key, got, expected] :
-       {std::tuple{"policy.layer_norm", other.config.policy.layer_norm, config.policy.layer_norm},
+       {std::tuple{"policy.segment_features", other.config.policy.segment_features, config.policy.segment_features},
+        std::tuple{"policy.layer_norm", other.config.policy.layer_norm, config.policy.layer_norm},
         std::tuple{"policy.residual", other.config.policy.residual, config.policy.residual}}) {
     PICTURA_CHECK(got == expected, "{}: of another architecture: {}: expected {}, got {}", other.path, key, expected,
                   got);

@@ -51,10 +51,9 @@ class NetworkPassesCuda final : public NetworkPasses {
     launch(cuda::launch_norm_backward, stream, size, x, position, period, weight, grad_out, grad_x_out, sums_out);
   }
 
-  void point_features(const PointSize& size, const float* rows, ActivationType type, void* out,
-                      Stream stream) override {
-    PICTURA_CHECK(size.width() <= PointSize::kMostWidth, "point_features: {} numbers a row", size.width());
-    launch(cuda::launch_point_features, stream, size, rows, type, out);
+  void row_features(const RowSize& size, const float* rows, ActivationType type, void* out, Stream stream) override {
+    PICTURA_CHECK(size.width() <= RowSize::kMostWidth, "row_features: {} numbers a row", size.width());
+    launch(cuda::launch_row_features, stream, size, rows, type, out);
   }
 
   void patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, Stream stream) override {

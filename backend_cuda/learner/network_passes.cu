@@ -260,21 +260,13 @@ __global__ void __launch_bounds__(kThreads)
 // A thread writes a number. A block has whole rows, so that none is divided by in 64 bits.
 template <typename T>
 __global__ void __launch_bounds__(kThreads)
-    point_features(PointSize size, int width, int rows_a_block, const float* rows, T* out) {
+    row_features(RowSize size, int width, int rows_a_block, const float* rows, T* out) {
   const int i = static_cast<int>(threadIdx.x), kept = static_cast<int>(size.kept());
   const int64_t row = blockIdx.x * int64_t{rows_a_block} + i / width;
   if (i >= rows_a_block * width || row >= size.rows) return;
-  const float* const its_row = rows + row * size.features;
+  const float* const its_row = rows + row * size.columns;
   const int column = i % width;
-  float value = 0;
-  if (column < kept) {
-    value = its_row[column];
-  } else {
-    constexpr int kFeatures = static_cast<int>(PointSize::kFeatures);
-    const int feature = (column - kept) % kFeatures, point = (column - kept) / kFeatures;
-    const float x_m = its_row[2 * point] * size.unit_m, y_m = its_row[2 * point + 1] * size.unit_m;
-    value = point_feature(x_m, y_m, feature);
-  }
+  const float value = column < kept ? its_row[column] : row_feature(size.features, its_row, column - kept);
   out[row * width + column] = from_float<T>(value);
 }
 
@@ -501,14 +493,13 @@ void launch_norm_backward(const ActivationSize& size, const void* x, const void*
   });
 }
 
-void launch_point_features(const PointSize& size, const float* rows, ActivationType type, void* out,
-                           cudaStream_t stream) {
+void launch_row_features(const RowSize& size, const float* rows, ActivationType type, void* out, cudaStream_t stream) {
   if (size.rows == 0) return;
   const int width = static_cast<int>(size.width()), rows_a_block = kThreads / width;
   const auto blocks = static_cast<unsigned>((size.rows + rows_a_block - 1) / rows_a_block);
   with_type(type, [&](auto element) {
     using T = decltype(element);
-    point_features<T><<<blocks, kThreads, 0, stream>>>(size, width, rows_a_block, rows, static_cast<T*>(out));
+    row_features<T><<<blocks, kThreads, 0, stream>>>(size, width, rows_a_block, rows, static_cast<T*>(out));
   });
 }
 

@@ -25,19 +25,31 @@ from pictura._pictura import _hash64
 
 _SCALE_POSITION_M = 120.0  # of x and y in observations
 _NUM_ACTIONS = 12
-# The entity sets, as the columns of set_counts.
+# The entity sets, as the columns of set_counts: numbers of a row and points that it begins with.
 _SETS = {"partners": (8, 1), "lanes": (7, 1), "boundaries": (7, 1), "controls": (7, 2), "walls": (7, 1)}
+_SEGMENTS = {"lanes", "boundaries", "walls"}  # the sets of them
 _VALUE_OUTPUTS = {"linear": 1, "symlog": 1, "two_hot": 101}  # of the critic, by policy.value_head
 _LARGEST_BIN_SYMLOG = 6.0
 _MAGIC = b"PICTCKPT"
 _PREAMBLE = "<8sIIQ"
 
 
+def _near_and_far(pairs_m: Tensor) -> Tensor:
+    size_m = pairs_m.abs()
+    return torch.cat([pairs_m / (size_m + 4.0), pairs_m / (size_m + 20.0)], -1)
+
+
 def point_features(rows: Tensor, points: int) -> Tensor:
     """Features [..., 6 points] of the first `points` pairs of rows [..., n], which tell points near the agent apart."""
     xy_m = (rows[..., : 2 * points] * _SCALE_POSITION_M).unflatten(-1, (points, 2))
-    size_m, distance_m = xy_m.abs(), xy_m.norm(dim=-1, keepdim=True)
-    return torch.cat([xy_m / (size_m + 4.0), xy_m / (size_m + 20.0), xy_m / (distance_m + 1.0)], -1).flatten(-2)
+    return torch.cat([_near_and_far(xy_m), xy_m / (xy_m.norm(dim=-1, keepdim=True) + 1.0)], -1).flatten(-2)
+
+
+def segment_features(rows: Tensor) -> Tensor:
+    """Features [..., 4] of the agent's place beside the segments of rows [..., 7]: along them and to their left."""
+    x_m, y_m = (rows[..., :2] * -_SCALE_POSITION_M).unbind(-1)  # of the agent from the middle
+    cos, sin = rows[..., 4:6].unbind(-1)
+    return _near_and_far(torch.stack([x_m * cos + y_m * sin, cos * y_m - sin * x_m], -1))
 
 
 def _normalize(x: Tensor) -> Tensor:
@@ -124,7 +136,7 @@ class Policy(nn.Module):
             raise pictura.UsageError(f"policy.backbone: expected 'conv', got '{config['backbone']}', which is a program of its own")
         self.config = dict(config)
         self.modality = config["modality"]
-        self.points = bool(config.get("point_features", False))
+        self.points, self.segments = bool(config.get("point_features", False)), bool(config.get("segment_features", False))
         self.layer_norm, self.residual = bool(config.get("layer_norm", False)), bool(config.get("residual", False))
         width = config["embedding_width"]
         self.num_cameras = num_cameras
@@ -146,7 +158,8 @@ class Policy(nn.Module):
             self.sets = [name for name in _SETS if name != "walls" or walls]
             for name in self.sets:
                 features, points = _SETS[name]
-                self.add_module(name, _Encoder(features + 6 * points * self.points, width, self.layer_norm))
+                features += 6 * points * self.points + 4 * (self.segments and name in _SEGMENTS)
+                self.add_module(name, _Encoder(features, width, self.layer_norm))
             around, ego = len(self.sets) * width, 9
         else:
             raise pictura.UsageError(f"policy.modality: expected 'perspective' or 'vector', got '{self.modality}'")
@@ -192,9 +205,13 @@ class Policy(nn.Module):
         counts = observation["set_counts"].flatten(1)
         embeddings = []
         for name in self.sets:
-            members = observation[name]
+            rows = observation[name]
+            parts = [rows]
             if self.points:
-                members = torch.cat([members, point_features(members, _SETS[name][1])], 2)
+                parts.append(point_features(rows, _SETS[name][1]))
+            if self.segments and name in _SEGMENTS:
+                parts.append(segment_features(rows))
+            members = torch.cat(parts, 2)
             column = list(_SETS).index(name)
             there = torch.arange(members.shape[1], device=members.device) < counts[:, column : column + 1]
             embedded = getattr(self, name)(members).masked_fill(~there.unsqueeze(2), -math.inf)

@@ -2,11 +2,12 @@
 // as near as those of ATen's own layers on the device.
 #include <gtest/gtest.h>
 
+#include "pictura/simulator/rules/observe.h"
 #include "pictura/tests/backend_cuda/device_test.h"
 #include "pictura/tests/training/numbers.h"
 #include "pictura/training/layers.h"
-#include "pictura/training/point_features.h"
 #include "pictura/training/precision.h"
+#include "pictura/training/row_features.h"
 #include "pictura/training/torch_device.h"
 
 namespace pictura {
@@ -154,18 +155,25 @@ TEST_P(DeviceLayers, TokenSoftmax) {
   }
 }
 
-TEST_P(DeviceLayers, PointFeatures) {
-  for (const auto& [features, points] : {std::pair<int64_t, int64_t>{7, 1}, {4, 2}, {2, 1}, {40, 20}}) {
-    const at::Tensor rows = numbers({31, 17, features}, 1).to(at::kFloat), on_device = rows.to(at::kCUDA);
-    const at::Tensor expected = with_point_features(rows.to(at::kDouble), points, at::kDouble);
-    const at::Tensor got = with_point_features(on_device, points, activations());
+TEST_P(DeviceLayers, RowFeatures) {
+  struct Case {
+    int64_t columns;
+    int points;
+    bool of_segment;
+  };
+  for (const Case& c : {Case{7, 1, false}, Case{4, 2, false}, Case{2, 1, false}, Case{40, 20, false}, Case{7, 0, true},
+                        Case{7, 1, true}}) {
+    const RowFeatures features{.points = c.points, .of_segment = c.of_segment, .position_unit_m = kScalePosition_m};
+    const at::Tensor rows = numbers({31, 17, c.columns}, 1).to(at::kFloat), on_device = rows.to(at::kCUDA);
+    const at::Tensor expected = with_row_features(rows.to(at::kDouble), features, at::kDouble);
+    ASSERT_TRUE(takes_feature_rows(on_device, features));
+    const at::Tensor got = with_row_features(on_device, features, activations());
     ASSERT_EQ(got.sizes(), expected.sizes());
     EXPECT_EQ(got.scalar_type(), activations());
-    EXPECT_TRUE(got.narrow(-1, 0, features).to(at::kCPU, at::kFloat).equal(rows)) << "bf16 holds these";
+    EXPECT_TRUE(got.narrow(-1, 0, c.columns).to(at::kCPU, at::kFloat).equal(rows)) << "bf16 holds these";
     const double error = (got.to(at::kCPU, at::kDouble) - expected).abs().max().item<double>();
-    EXPECT_LE(error, activations() == at::kBFloat16 ? 1.0 / 500 : 1e-6) << features;
-    EXPECT_TRUE(
-        got.narrow(-1, features, points * kPointFeatures).equal(point_features(on_device, points, activations())));
+    EXPECT_LE(error, activations() == at::kBFloat16 ? 1.0 / 500 : 1e-5) << c.columns << " " << c.points;
+    EXPECT_TRUE(got.narrow(-1, c.columns, features.count()).equal(row_features(on_device, features, activations())));
   }
 }
 

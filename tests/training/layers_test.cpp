@@ -1,4 +1,4 @@
-// Layers on the host: patches of images, what padding of channels means, features of points, and the host's own passes
+// Layers on the host: patches of images, what padding of channels means, features of rows, and the host's own passes
 // in single precision against ATen's layers in double.
 #include "pictura/training/layers.h"
 
@@ -8,8 +8,8 @@
 
 #include "pictura/simulator/rules/observe.h"
 #include "pictura/tests/training/numbers.h"
-#include "pictura/training/point_features.h"
 #include "pictura/training/policy.h"
+#include "pictura/training/row_features.h"
 
 namespace pictura {
 namespace {
@@ -43,23 +43,59 @@ TEST(ImagePatches, AOneByOneConvolutionOfThemIsOneOfTheImageWithTheirStride) {
   EXPECT_TRUE(at::allclose(features, expected));
 }
 
-TEST(PointFeatures, AreNearCoordinatesAndTheBearingOfEachPoint) {
+constexpr float kUnit_m = kScalePosition_m;
+
+TEST(RowFeatures, OfAPointAreNearCoordinatesAndTheBearing) {
   // A row with two points, (3, -4) m and (0, 20) m, and a number that is none. 120 m are 1.
   const at::Tensor row = at::tensor({3.0 / 120, -4.0 / 120, 0.0, 20.0 / 120, 0.5}, at::kDouble).unsqueeze(0);
-  const at::Tensor features = point_features(row, 2, at::kDouble);
+  const at::Tensor features = row_features(row, {.points = 2, .position_unit_m = kUnit_m}, at::kDouble);
   const std::vector<double> expected{3.0 / 7, -4.0 / 8,  3.0 / 23, -4.0 / 24, 3.0 / 6, -4.0 / 6,
                                      0.0,     20.0 / 24, 0.0,      20.0 / 40, 0.0,     20.0 / 21};
-  ASSERT_EQ(features.sizes().vec(), (std::vector<int64_t>{1, 2 * kPointFeatures}));
+  ASSERT_EQ(features.sizes().vec(), (std::vector<int64_t>{1, 2 * RowFeatures::kOfPoint}));
   for (int64_t i = 0; i < features.numel(); ++i) {
     EXPECT_NEAR(features[0][i].item<double>(), expected[static_cast<size_t>(i)], 1e-6) << i;
   }
 }
 
-TEST(PointFeatures, TellAMetreApartNearAndStayWithinOneFar) {
-  const at::Tensor features =
-      point_features(at::tensor({0.0f, 1.0f / 120, 100.0f, -100.0f}).view({2, 2}), 1, at::kFloat);
+TEST(RowFeatures, OfAPointTellAMetreApartNearAndStayWithinOneFar) {
+  const at::Tensor features = row_features(at::tensor({0.0f, 1.0f / 120, 100.0f, -100.0f}).view({2, 2}),
+                                           {.points = 1, .position_unit_m = kUnit_m}, at::kFloat);
   EXPECT_GT(features[0][1].item<float>(), 0.19f);
   EXPECT_LE(features.abs().max().item<float>(), 1.0f);
+}
+
+// The row of a segment: its middle in the ego frame, in metres, and its direction.
+at::Tensor segment_row(double x_m, double y_m, double half_length_m, double heading_rad) {
+  return at::tensor({x_m / 120, y_m / 120, 0.0, half_length_m / 5, std::cos(heading_rad), std::sin(heading_rad), 0.7},
+                    at::kDouble);
+}
+
+TEST(RowFeatures, OfASegmentAreTheOffsetAlongItAndTheDistanceToItsLineAtTwoScales) {
+  const at::Tensor rows = at::stack({
+      segment_row(6, 1.75, 5, 0),       // ahead, to the left: its line passes 1.75 m left of the ego
+      segment_row(6, 1.75, 5, kPi),     // the same line in the other direction, which sees the ego on its left
+      segment_row(0, 16, 5, kPi / 2),   // begins to the left and leads away from it
+      segment_row(-3, 0, 2, -kPi / 6),  // behind, to the right
+  });
+  const double along_m[]{-6, 6, -16, 3 * std::sqrt(0.75)}, left_m[]{-1.75, 1.75, 0, 1.5};
+  const at::Tensor features = row_features(rows, {.of_segment = true, .position_unit_m = kUnit_m}, at::kDouble);
+  ASSERT_EQ(features.sizes().vec(), (std::vector<int64_t>{4, RowFeatures::kOfSegment}));
+  for (int64_t i = 0; i < 4; ++i) {
+    const double along = along_m[i], left = left_m[i];
+    const double expected[]{along / (std::abs(along) + 4), left / (std::abs(left) + 4), along / (std::abs(along) + 20),
+                            left / (std::abs(left) + 20)};
+    for (int64_t k = 0; k < 4; ++k) EXPECT_NEAR(features[i][k].item<double>(), expected[k], 1e-6) << i << " " << k;
+  }
+}
+
+TEST(RowFeatures, FollowTheRowAndEachOther) {
+  const at::Tensor row = segment_row(6, 1.75, 5, 0.3).unsqueeze(0);
+  const RowFeatures points{.points = 1, .position_unit_m = kUnit_m},
+      segment{.of_segment = true, .position_unit_m = kUnit_m},
+      both{.points = 1, .of_segment = true, .position_unit_m = kUnit_m};
+  EXPECT_EQ(both.count(), points.count() + segment.count());
+  const at::Tensor parts[]{row, row_features(row, points, at::kDouble), row_features(row, segment, at::kDouble)};
+  EXPECT_TRUE(with_row_features(row, both, at::kDouble).equal(at::cat(parts, 1)));
 }
 
 TEST(ConvolveGelu, ReadsNothingFromChannelsBeyondThoseOfItsWeight) {
@@ -152,22 +188,24 @@ TEST(HostLayers, LargestEmbeddingIsTheMaximumOverTheMembersThatThereAre) {
   const int64_t sets = 40, most = 23;
   const at::Tensor members = float_numbers({sets, most, 7}, 0.1),
                    counts = at::arange(sets, at::kInt).remainder(most + 1);
-  for (const int64_t points : {0, 1, 2}) {
-    const int64_t features = 7 + 6 * points;
+  for (const RowFeatures& features : {RowFeatures{}, RowFeatures{.points = 1, .position_unit_m = kUnit_m},
+                                      RowFeatures{.points = 2, .position_unit_m = kUnit_m},
+                                      RowFeatures{.of_segment = true, .position_unit_m = kUnit_m},
+                                      RowFeatures{.points = 1, .of_segment = true, .position_unit_m = kUnit_m}}) {
     const at::Tensor floats = members.to(at::kFloat);
     ASSERT_TRUE(takes_sets(floats));
     for (const bool has_norm : {false, true}) {
       const auto plain = [&](const std::vector<at::Tensor>& in) {
-        const at::Tensor rows = points > 0 ? with_point_features(members, points, at::kDouble) : members;
+        const at::Tensor rows = features.count() > 0 ? with_row_features(members, features, at::kDouble) : members;
         const at::Tensor hidden = at::linear(rows, in[0], in[1]);
         return masked_max(at::linear(at::gelu(has_norm ? at::layer_norm(hidden, {16}) : hidden), in[2], in[3]), counts);
       };
       const auto layer = [&](const std::vector<at::Tensor>& in) {
-        return largest_embedding(floats, counts, points, kScalePosition_m, has_norm, in[0], in[1], in[2], in[3]);
+        return largest_embedding(floats, counts, features, has_norm, in[0], in[1], in[2], in[3]);
       };
       expect_as_in_double(layer, plain,
-                          {float_numbers({16, features}, 1), float_numbers({16}, 2), float_numbers({24, 16}, 3),
-                           float_numbers({24}, 4)});
+                          {float_numbers({16, 7 + features.count()}, 1), float_numbers({16}, 2),
+                           float_numbers({24, 16}, 3), float_numbers({24}, 4)});
     }
   }
 }
@@ -177,7 +215,7 @@ TEST(HostLayers, LargestEmbeddingGivesWayToNoNumberThatIsNone) {
   members[0][1][0] = std::numeric_limits<float>::quiet_NaN();
   const at::Tensor one = at::ones({1, 2});
   const auto largest = [&](int count) {
-    return largest_embedding(members, at::full({1}, count, at::kInt), 0, 1.0f, /*has_norm=*/false, one, at::zeros({1}),
+    return largest_embedding(members, at::full({1}, count, at::kInt), {}, /*has_norm=*/false, one, at::zeros({1}),
                              at::ones({1, 1}), at::zeros({1}))
         .item<float>();
   };

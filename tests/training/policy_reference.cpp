@@ -79,6 +79,9 @@ int main(int argc, char** argv) try {
     pictura::write_reference(argv[1], pictura::name_of(head), config);
   }
   config.policy.value_head = pictura::ValueHead::linear;
+  config.policy.segment_features = true;
+  pictura::write_reference(argv[1], "segments", config);
+  config.policy.segment_features = false;
   config.policy.layer_norm = config.policy.residual = true;
   config.policy.critic_layers = 2;
   config.policy.modality = Modality::vector;

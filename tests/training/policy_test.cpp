@@ -10,7 +10,6 @@
 #include "pictura/common/error.h"
 #include "pictura/tests/training/numbers.h"
 #include "pictura/training/layers.h"
-#include "pictura/training/point_features.h"
 #include "pictura/training/query_spread.h"
 #include "pictura/training/saved_policy.h"
 
@@ -136,6 +135,12 @@ TEST(Policy, GradientsOfValuesOfOtherHeadsEqualDifferenceQuotients) {
     section.value_head = head;
     expect_gradients(PolicyNetwork(section, 3, 5, at::kDouble), observation(Modality::vector, 2));
   }
+}
+
+TEST(Policy, GradientsOfFeaturesOfSegmentsEqualDifferenceQuotients) {
+  Config::PolicySection section = tiny(Modality::vector);
+  section.segment_features = true;
+  expect_gradients(PolicyNetwork(section, 3, 5, at::kDouble, /*reads_walls=*/true), observation(Modality::vector, 2));
 }
 
 TEST(Policy, GradientsOfPatchesEqualDifferenceQuotients) {
@@ -286,22 +291,57 @@ TEST_P(BothModalities, HasThePapersShapes) {
   }
 }
 
+// What the encoder of a group reads of a row.
+int64_t inputs_of(const Policy& policy, const std::string& group) {
+  for (const NamedTensor& p : policy.parameters()) {
+    if (p.name == group + ".hidden.weight") return p.value.size(1);
+  }
+  return -1;
+}
+
 TEST_P(BothModalities, ReadsFeaturesOfPointsBesideTheirCoordinates) {
   Config::PolicySection config;
   config.modality = GetParam();
   const PolicyNetwork policy(config, 4, 1);
-  const auto inputs_of = [&](const std::string& name) {
-    for (const NamedTensor& p : policy.parameters()) {
-      if (p.name == name + ".hidden.weight") return p.value.size(1);
-    }
-    return int64_t{-1};
-  };
-  EXPECT_EQ(inputs_of("conditioning"), kNumConditioning + kNumWaypoints * (kWaypointFeatures + kPointFeatures));
+  constexpr int kOfPoint = RowFeatures::kOfPoint;
+  EXPECT_EQ(inputs_of(policy, "conditioning"), kNumConditioning + kNumWaypoints * (kWaypointFeatures + kOfPoint));
   if (GetParam() == Modality::vector) {
-    EXPECT_EQ(inputs_of("partners"), kPartnerFeatures + kPointFeatures);
-    EXPECT_EQ(inputs_of("boundaries"), kBoundaryFeatures + kPointFeatures);
-    EXPECT_EQ(inputs_of("controls"), kControlFeatures + 2 * kPointFeatures);  // a stop line has two ends
+    EXPECT_EQ(inputs_of(policy, "partners"), kPartnerFeatures + kOfPoint);
+    EXPECT_EQ(inputs_of(policy, "boundaries"), kBoundaryFeatures + kOfPoint);
+    EXPECT_EQ(inputs_of(policy, "controls"), kControlFeatures + 2 * kOfPoint);  // a stop line has two ends
   }
+}
+
+TEST(Policy, ReadsItsPlaceBesideLanesBoundariesAndWalls) {
+  Config::PolicySection config;
+  config.modality = Modality::vector;
+  config.segment_features = true;
+  for (const int of_point : {0, RowFeatures::kOfPoint}) {
+    config.point_features = of_point > 0;
+    const PolicyNetwork policy(config, 4, 1, at::kFloat, /*reads_walls=*/true);
+    EXPECT_EQ(inputs_of(policy, "partners"), kPartnerFeatures + of_point);
+    EXPECT_EQ(inputs_of(policy, "lanes"), kLaneFeatures + of_point + RowFeatures::kOfSegment);
+    EXPECT_EQ(inputs_of(policy, "boundaries"), kBoundaryFeatures + of_point + RowFeatures::kOfSegment);
+    EXPECT_EQ(inputs_of(policy, "walls"), kWallFeatures + of_point + RowFeatures::kOfSegment);
+    EXPECT_EQ(inputs_of(policy, "controls"), kControlFeatures + 2 * of_point);
+    EXPECT_EQ(inputs_of(policy, "conditioning"), kNumConditioning + kNumWaypoints * (kWaypointFeatures + of_point));
+  }
+}
+
+// The host's own passes in fp32 against ATen's layers in fp64.
+TEST(Policy, FeaturesOfRowsAreTheSameInSingleAndDoublePrecision) {
+  Config::PolicySection config = tiny(Modality::vector);
+  config.segment_features = true;
+  const PolicyNetwork doubles(config, 3, 5, at::kDouble, /*reads_walls=*/true), floats(config, 3, 5, at::kFloat, true);
+  const Observation seen = observation(Modality::vector, 6);
+  const at::NoGradGuard no_grad;
+  const at::Tensor expected = doubles.forward(seen).value,
+                   got = floats
+                             .forward(seen.map(
+                                 [](const at::Tensor& t) { return t.is_floating_point() ? t.to(at::kFloat) : t; }))
+                             .value;
+  EXPECT_GT(expected.std().item<double>(), 1e-2);
+  EXPECT_LT((got - expected).abs().max().item<double>(), 1e-5);
 }
 
 TEST(Policy, WallsAreAFifthGroupOfTheVectorPolicy) {

@@ -623,6 +623,10 @@ TEST_F(Training, BeginsWithTheWeightsOfAnotherRunAtAnyImageSize) {
   normalized.init_from = first;
   EXPECT_THAT(message_of([&] { train(normalized); }),
               AllOf(HasSubstr(first), HasSubstr("policy.layer_norm: expected true, got false")));
+  TrainOptions beside = options("beside", {"policy.modality=vector", "policy.segment_features=true"});
+  beside.init_from = first;
+  EXPECT_THAT(message_of([&] { train(beside); }),
+              AllOf(HasSubstr(first), HasSubstr("policy.segment_features: expected true, got false")));
 }
 
 TEST_F(Training, BeginsWithConcatenatedQueriesAsTheirAverageEnded) {

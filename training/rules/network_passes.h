@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "pictura/common/device.h"
+#include "pictura/common/math.h"
 #include "pictura/common/portable/hd.h"
 
 namespace pictura {
@@ -31,28 +32,55 @@ struct PatchSize {
   PICTURA_HD int64_t columns() const { return (width_px + patch_px - 1) / patch_px; }
 };
 
-/// What is read of points. Rows of f32 without gaps, each of which begins with `points` pairs (x, y) in units of
-/// unit_m, become the kFeatures numbers of each of its points (see training/point_features.h), behind the row itself
-/// where keeps_rows says so.
-struct PointSize {
-  int64_t rows = 0, features = 0, points = 1;
-  float unit_m = 1;
+/// Where a segment's row (docs/observation.md) holds what features are made of, after the x and y of its middle.
+struct SegmentColumn {
+  static constexpr int kCos = 4, kSin = 5;  // of its direction
+};
+
+/// Features that are read of a row beside its numbers (see training/row_features.h): those of each of the `points`
+/// pairs (x, y) that the row begins with, and those of a segment where the row is one.
+struct RowFeatures {
+  int points = 0;
+  bool of_segment = false;
+  float position_unit_m = 1;  // of x and y
+  static constexpr int kOfPoint = 6, kOfSegment = 4;
+  PICTURA_HD constexpr int count() const { return points * kOfPoint + (of_segment ? kOfSegment : 0); }
+};
+
+/// Rows of f32 without gaps that become their features, each behind the row itself where keeps_rows says so.
+struct RowSize {
+  int64_t rows = 0, columns = 0;
+  RowFeatures features;
   bool keeps_rows = false;
-  static constexpr int64_t kFeatures = 6;
-  PICTURA_HD int64_t kept() const { return keeps_rows ? features : 0; }
-  PICTURA_HD int64_t width() const { return kept() + points * kFeatures; }
+  PICTURA_HD int64_t kept() const { return keeps_rows ? columns : 0; }
+  PICTURA_HD int64_t width() const { return kept() + features.count(); }
   static constexpr int64_t kMostWidth = 256;
 };
 
-/// What is added to what a point's coordinates are divided by (see training/point_features.h).
+/// What is added to what lengths are divided by (see training/row_features.h).
 constexpr float kNearPoint_m = 4.0f, kFarPoint_m = 20.0f, kPointDirection_m = 1.0f;
 
-/// One of the features of a point in metres.
-PICTURA_HD inline float point_feature(float x_m, float y_m, int feature) {
-  const float its_m = feature % 2 == 0 ? x_m : y_m;
+/// A feature of a point in metres. The first four are of x and y alone.
+PICTURA_HD inline float point_feature(Vec2 point_m, int feature) {
+  const float its_m = feature % 2 == 0 ? point_m.x : point_m.y;
   return its_m / (feature < 2   ? fabsf(its_m) + kNearPoint_m
                   : feature < 4 ? fabsf(its_m) + kFarPoint_m
-                                : sqrtf(x_m * x_m + y_m * y_m) + kPointDirection_m);
+                                : length(point_m) + kPointDirection_m);
+}
+
+/// A place relative to the segment of a row, in metres: x along the segment from its middle, y to the left of its line.
+PICTURA_HD inline Vec2 beside_segment(const RowFeatures& features, const float* row, Vec2 place_m) {
+  const Vec2 from_middle_m = place_m - Vec2{row[0], row[1]} * features.position_unit_m,
+             direction{row[SegmentColumn::kCos], row[SegmentColumn::kSin]};
+  return {dot(from_middle_m, direction), cross(direction, from_middle_m)};
+}
+
+/// One of the features of a row.
+PICTURA_HD inline float row_feature(const RowFeatures& features, const float* row, int feature) {
+  const int of_points = features.points * RowFeatures::kOfPoint;
+  if (feature >= of_points) return point_feature(beside_segment(features, row, Vec2{}), feature - of_points);
+  const float* const point = row + 2 * (feature / RowFeatures::kOfPoint);
+  return point_feature(Vec2{point[0], point[1]} * features.position_unit_m, feature % RowFeatures::kOfPoint);
 }
 
 /// Matrices [matrices, tokens, columns] of scores; `columns` is even.
@@ -104,8 +132,7 @@ class NetworkPasses {
   }
 
   /// out: [rows, width()], at most kMostWidth wide.
-  virtual void point_features(const PointSize& size, const float* rows, ActivationType type, void* out,
-                              Stream stream) = 0;
+  virtual void row_features(const RowSize& size, const float* rows, ActivationType type, void* out, Stream stream) = 0;
 
   virtual void patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, Stream stream) = 0;
 
