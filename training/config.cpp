@@ -105,6 +105,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.integer("policy.embedding_width", c.policy.embedding_width, 1, 1 << 14);
   v.flag("policy.point_features", c.policy.point_features);
   v.flag("policy.segment_features", c.policy.segment_features);
+  v.flag("policy.goal_features", c.policy.goal_features);
   v.integer("policy.backbone_layers", c.policy.backbone_layers, 1, 64);
   v.integer("policy.backbone_width", c.policy.backbone_width, 1, 1 << 14);
   v.integer("policy.critic_layers", c.policy.critic_layers, 0, 64);
@@ -663,9 +664,11 @@ void check_contradictions(const Config& c, const Reader& reader) {
   if (c.policy.auxiliary && c.policy.modality == Modality::perspective) {
     reader.refuse("policy.auxiliary", "has no effect with the modality \"perspective\": images have no such slots");
   }
-  if (c.policy.segment_features && c.policy.modality == Modality::perspective) {
-    reader.refuse("policy.segment_features",
-                  "has no effect with the modality \"perspective\", which reads no lists of segments");
+  for (const auto& [key, is_set] : {std::pair{"policy.segment_features", c.policy.segment_features},
+                                    std::pair{"policy.goal_features", c.policy.goal_features}}) {
+    if (is_set && c.policy.modality == Modality::perspective) {
+      reader.refuse(key, "has no effect with the modality \"perspective\", which reads no lists of segments");
+    }
   }
   if (c.simulator.wall_observations && c.policy.modality == Modality::perspective) {
     reader.refuse("simulator.wall_observations",

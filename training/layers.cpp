@@ -138,9 +138,14 @@ struct TokenSoftmax : Function<TokenSoftmax> {
   }
 };
 
-RowSize row_size(const at::Tensor& rows, const RowFeatures& features, bool keeps_rows) {
+RowSize row_size(const at::Tensor& rows, const at::Tensor& goals, const RowFeatures& features, bool keeps_rows) {
   const int64_t columns = rows.size(-1);
-  return {rows.numel() / columns, columns, features, keeps_rows};
+  RowSize size{rows.numel() / columns, columns, features, keeps_rows};
+  if (features.of_goal) {
+    size.rows_per_goal = rows.size(-2);
+    size.goal_columns = goals.size(-1);
+  }
+  return size;
 }
 
 // Whether the host's own passes (host_passes.h) take it: those are fp32, which layers in bf16 are not.
@@ -332,12 +337,12 @@ struct HostConvolution : Function<HostConvolution> {
 struct HostSets : Function<HostSets> {
   /// Returns {the largest, [sets, channels]; the members that there are with their features, [all, width];
   /// which member of its set is the largest, i32 [sets, channels]}.
-  static variable_list compute(const at::Tensor& members, const at::Tensor& counts, const RowFeatures& features,
-                               bool has_norm, const at::Tensor& hidden_weight, const at::Tensor& hidden_bias,
-                               const at::Tensor& weight, const at::Tensor& bias) {
+  static variable_list compute(const at::Tensor& members, const at::Tensor& goals, const at::Tensor& counts,
+                               const RowFeatures& features, bool has_norm, const at::Tensor& hidden_weight,
+                               const at::Tensor& hidden_bias, const at::Tensor& weight, const at::Tensor& bias) {
     const int64_t sets = members.size(0), most = members.size(1), hidden = hidden_weight.size(0),
                   channels = weight.size(0);
-    const RowSize size = row_size(members, features, /*keeps_rows=*/true);
+    const RowSize size = row_size(members, goals, features, /*keeps_rows=*/true);
     const std::vector<int64_t> begins = begins_of(counts);
     const auto options = members.options().requires_grad(false);
     const at::Tensor rows = at::empty({begins.back(), size.width()}, options),
@@ -352,7 +357,8 @@ struct HostSets : Function<HostSets> {
         const auto first = begins[static_cast<size_t>(begin)], count = begins[static_cast<size_t>(end)] - first;
         const int32_t* const its_counts = counts.const_data_ptr<int32_t>() + begin;
         const at::Tensor some = rows.narrow(0, first, count);
-        host::member_rows(read(members, begin), its_counts, end - begin, most, size, write(some));
+        host::member_rows(read(members, begin), features.of_goal ? read(goals, begin) : nullptr, its_counts,
+                          end - begin, most, size, write(some));
         at::Tensor activations = hidden_memory.narrow(0, 0, count), embeddings = memory.narrow(0, 0, count);
         at::mm_out(activations, some, hidden_transposed);
         if (has_norm) host::bias_norm(read(activations), read(hidden_bias), count, hidden, write(activations), nullptr);
@@ -366,10 +372,12 @@ struct HostSets : Function<HostSets> {
     return {largest + bias.detach() * counts.gt(0).unsqueeze(1), rows, which};
   }
 
-  static at::Tensor forward(AutogradContext* context, const at::Tensor& members, const at::Tensor& counts,
-                            const RowFeatures& features, bool has_norm, const at::Tensor& hidden_weight,
-                            const at::Tensor& hidden_bias, const at::Tensor& weight, const at::Tensor& bias) {
-    const variable_list made = compute(members, counts, features, has_norm, hidden_weight, hidden_bias, weight, bias);
+  static at::Tensor forward(AutogradContext* context, const at::Tensor& members, const std::optional<at::Tensor>& goals,
+                            const at::Tensor& counts, const RowFeatures& features, bool has_norm,
+                            const at::Tensor& hidden_weight, const at::Tensor& hidden_bias, const at::Tensor& weight,
+                            const at::Tensor& bias) {
+    const variable_list made = compute(members, goals.value_or(at::Tensor()), counts, features, has_norm, hidden_weight,
+                                       hidden_bias, weight, bias);
     context->save_for_backward({made[1], made[2], counts, hidden_weight, hidden_bias, weight});
     context->saved_data["has_norm"] = has_norm;
     return made[0];
@@ -441,6 +449,7 @@ struct HostSets : Function<HostSets> {
     });
     const at::Tensor none;
     return {none,
+            none,
             none,
             none,
             none,
@@ -547,13 +556,15 @@ at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tenso
 
 bool takes_sets(const at::Tensor& members) { return is_on_host(members); }
 
-at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& counts, const RowFeatures& features,
-                             bool has_norm, const at::Tensor& hidden_weight, const at::Tensor& hidden_bias,
-                             const at::Tensor& weight, const at::Tensor& bias) {
-  const at::Tensor all = members.contiguous(), its_counts = counts.contiguous();
+at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& goals, const at::Tensor& counts,
+                             const RowFeatures& features, bool has_norm, const at::Tensor& hidden_weight,
+                             const at::Tensor& hidden_bias, const at::Tensor& weight, const at::Tensor& bias) {
+  const at::Tensor all = members.contiguous(), its_counts = counts.contiguous(),
+                   its_goals = features.of_goal ? goals.contiguous() : at::Tensor();
   if (keeps_gradients({hidden_weight, hidden_bias, weight, bias}))
-    return HostSets::apply(all, its_counts, features, has_norm, hidden_weight, hidden_bias, weight, bias);
-  return HostSets::compute(all, its_counts, features, has_norm, hidden_weight, hidden_bias, weight, bias)[0];
+    return HostSets::apply(all, std::optional(its_goals), its_counts, features, has_norm, hidden_weight, hidden_bias,
+                           weight, bias);
+  return HostSets::compute(all, its_goals, its_counts, features, has_norm, hidden_weight, hidden_bias, weight, bias)[0];
 }
 
 at::Tensor token_softmax(const at::Tensor& scores) {
@@ -562,18 +573,20 @@ at::Tensor token_softmax(const at::Tensor& scores) {
 }
 
 bool takes_feature_rows(const at::Tensor& rows, const RowFeatures& features) {
-  return rows.is_cuda() && rows.scalar_type() == at::kFloat &&
-         row_size(rows, features, /*keeps_rows=*/true).width() <= RowSize::kMostWidth;
+  return rows.is_cuda() && rows.scalar_type() == at::kFloat && rows.size(-1) + features.count() <= RowSize::kMostWidth;
 }
 
-at::Tensor feature_rows(const at::Tensor& rows, const RowFeatures& features, bool keeps_rows, at::ScalarType type) {
-  const RowSize size = row_size(rows, features, keeps_rows);
+at::Tensor feature_rows(const at::Tensor& rows, const at::Tensor& goals, const RowFeatures& features, bool keeps_rows,
+                        at::ScalarType type) {
+  const RowSize size = row_size(rows, goals, features, keeps_rows);
+  const at::Tensor its_goals = features.of_goal ? goals.contiguous() : at::Tensor();
   std::vector<int64_t> shape = rows.sizes().vec();
   shape.back() = size.width();
   at::Tensor out = at::empty(shape, rows.options().dtype(type));
   passes_on(rows.device())
-      .row_features(size, rows.contiguous().const_data_ptr<float>(), activation_type_of(type), out.mutable_data_ptr(),
-                    stream_on(rows.device()));
+      .row_features(size, rows.contiguous().const_data_ptr<float>(),
+                    features.of_goal ? its_goals.const_data_ptr<float>() : nullptr, activation_type_of(type),
+                    out.mutable_data_ptr(), stream_on(rows.device()));
   return out;
 }
 

@@ -20,7 +20,8 @@ void launch_norm(const ActivationSize& size, const void* x, const void* position
 void launch_norm_backward(const ActivationSize& size, const void* x, const void* position, int64_t period,
                           const float* weight, const void* grad_out, void* grad_x_out, float* sums_out,
                           cudaStream_t stream);
-void launch_row_features(const RowSize& size, const float* rows, ActivationType type, void* out, cudaStream_t stream);
+void launch_row_features(const RowSize& size, const float* rows, const float* goals, ActivationType type, void* out,
+                         cudaStream_t stream);
 void launch_patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, cudaStream_t stream);
 
 void launch_token_softmax(const TokenSize& size, const void* scores, void* out, cudaStream_t stream);

@@ -51,9 +51,10 @@ class NetworkPassesCuda final : public NetworkPasses {
     launch(cuda::launch_norm_backward, stream, size, x, position, period, weight, grad_out, grad_x_out, sums_out);
   }
 
-  void row_features(const RowSize& size, const float* rows, ActivationType type, void* out, Stream stream) override {
+  void row_features(const RowSize& size, const float* rows, const float* goals, ActivationType type, void* out,
+                    Stream stream) override {
     PICTURA_CHECK(size.width() <= RowSize::kMostWidth, "row_features: {} numbers a row", size.width());
-    launch(cuda::launch_row_features, stream, size, rows, type, out);
+    launch(cuda::launch_row_features, stream, size, rows, goals, type, out);
   }
 
   void patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, Stream stream) override {

@@ -224,9 +224,11 @@ TEST(Config, KeysWithoutEffectAreRefused) {
   EXPECT_THAT(error_in("[policy]\nmodality = \"perspective\"\nauxiliary = true\n"),
               AllOf(HasSubstr("a.toml:3: policy.auxiliary"), HasSubstr("no effect")));
   EXPECT_EQ(error_in("[policy]\nmodality = \"vector\"\nauxiliary = true\n"), test::kNoError);
-  EXPECT_THAT(error_in("[policy]\nsegment_features = true\n"),
-              AllOf(HasSubstr("a.toml:2: policy.segment_features"), HasSubstr("no effect")));
-  EXPECT_EQ(error_in("[policy]\nmodality = \"vector\"\nsegment_features = true\n"), test::kNoError);
+  for (const std::string key : {"segment_features", "goal_features"}) {
+    EXPECT_THAT(error_in("[policy]\n" + key + " = true\n"),
+                AllOf(HasSubstr("a.toml:2: policy." + key), HasSubstr("no effect")));
+    EXPECT_EQ(error_in("[policy]\nmodality = \"vector\"\n" + key + " = true\n"), test::kNoError);
+  }
   EXPECT_THAT(error_in("[simulator]\nwall_observations = true\n"),
               AllOf(HasSubstr("a.toml:2: simulator.wall_observations"), HasSubstr("no effect")));
   EXPECT_THAT(error_in("[render]\nwidth_px = 96\nrig = \"r.toml\"\n"),

@@ -147,6 +147,19 @@ TEST_P(EachModality, OtherCriticsAndAQuantileFilterLearnAsOnTheHost) {
   }
 }
 
+TEST_F(DeviceTraining, SegmentsAndGoalsAreReadAsOnTheHost) {
+  std::vector<std::string> more{
+      "policy.modality=vector", "policy.segment_features=true", "policy.goal_features=true", "train.precision=fp32",
+      "train.updates=1",        "train.num_steps=30",           "train.forward_chunk=3"};
+  train(options("host", "cpu", more));
+  train(options("device", "cuda", more));
+  expect_same_first_update(folder_ / "host", folder_ / "device", 1e-6, 2e-2);
+  more.insert(more.end(), {"train.reproducible=true", "train.precision=bf16"});
+  const auto [whole, again, resumed] = test::policies_of_equal_runs(folder_ / "bf16", "cuda", more);
+  EXPECT_EQ(again, whole);
+  EXPECT_EQ(resumed, whole);
+}
+
 TEST_P(EachModality, ATeacherTeachesAsOnTheHost) {
   train(options("teacher", "cpu", {"policy.modality=vector", "run.seed=5", "train.updates=1"}));
   std::vector<std::string> more = one_update();

@@ -159,21 +159,29 @@ TEST_P(DeviceLayers, RowFeatures) {
   struct Case {
     int64_t columns;
     int points;
-    bool of_segment;
+    bool of_segment, of_goal;
   };
-  for (const Case& c : {Case{7, 1, false}, Case{4, 2, false}, Case{2, 1, false}, Case{40, 20, false}, Case{7, 0, true},
-                        Case{7, 1, true}}) {
-    const RowFeatures features{.points = c.points, .of_segment = c.of_segment, .position_unit_m = kScalePosition_m};
+  for (const Case& c :
+       {Case{7, 1, false, false}, Case{4, 2, false, false}, Case{2, 1, false, false}, Case{40, 20, false, false},
+        Case{7, 0, true, false}, Case{7, 0, false, true}, Case{7, 1, true, true}}) {
+    const RowFeatures features{.points = c.points,
+                               .of_segment = c.of_segment,
+                               .of_goal = c.of_goal,
+                               .position_unit_m = kScalePosition_m,
+                               .half_length_unit_m = kScaleHalfPiece_m};
     const at::Tensor rows = numbers({31, 17, c.columns}, 1).to(at::kFloat), on_device = rows.to(at::kCUDA);
-    const at::Tensor expected = with_row_features(rows.to(at::kDouble), features, at::kDouble);
+    const at::Tensor goals = numbers({31, 9}, 2).to(at::kFloat),
+                     device_goals = c.of_goal ? goals.to(at::kCUDA) : at::Tensor();
+    const at::Tensor expected = with_row_features(rows.to(at::kDouble), features, at::kDouble, goals.to(at::kDouble));
     ASSERT_TRUE(takes_feature_rows(on_device, features));
-    const at::Tensor got = with_row_features(on_device, features, activations());
+    const at::Tensor got = with_row_features(on_device, features, activations(), device_goals);
     ASSERT_EQ(got.sizes(), expected.sizes());
     EXPECT_EQ(got.scalar_type(), activations());
     EXPECT_TRUE(got.narrow(-1, 0, c.columns).to(at::kCPU, at::kFloat).equal(rows)) << "bf16 holds these";
     const double error = (got.to(at::kCPU, at::kDouble) - expected).abs().max().item<double>();
     EXPECT_LE(error, activations() == at::kBFloat16 ? 1.0 / 500 : 1e-5) << c.columns << " " << c.points;
-    EXPECT_TRUE(got.narrow(-1, c.columns, features.count()).equal(row_features(on_device, features, activations())));
+    EXPECT_TRUE(got.narrow(-1, c.columns, features.count())
+                    .equal(row_features(on_device, features, activations(), device_goals)));
   }
 }
 

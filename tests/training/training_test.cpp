@@ -623,10 +623,12 @@ TEST_F(Training, BeginsWithTheWeightsOfAnotherRunAtAnyImageSize) {
   normalized.init_from = first;
   EXPECT_THAT(message_of([&] { train(normalized); }),
               AllOf(HasSubstr(first), HasSubstr("policy.layer_norm: expected true, got false")));
-  TrainOptions beside = options("beside", {"policy.modality=vector", "policy.segment_features=true"});
-  beside.init_from = first;
-  EXPECT_THAT(message_of([&] { train(beside); }),
-              AllOf(HasSubstr(first), HasSubstr("policy.segment_features: expected true, got false")));
+  for (const std::string key : {"policy.segment_features", "policy.goal_features"}) {
+    TrainOptions reads_more = options("reads more", {"policy.modality=vector", key + "=true"});
+    reads_more.init_from = first;
+    EXPECT_THAT(message_of([&] { train(reads_more); }),
+                AllOf(HasSubstr(first), HasSubstr(key + ": expected true, got false")));
+  }
 }
 
 TEST_F(Training, BeginsWithConcatenatedQueriesAsTheirAverageEnded) {
@@ -651,6 +653,16 @@ TEST_F(Training, ANormalizedPolicyWithACriticOfItsOwnGoesOnExactly) {
       {"policy.modality=vector", "policy.layer_norm=true", "policy.residual=true", "policy.critic_layers=1"});
   EXPECT_EQ(whole, again);
   EXPECT_EQ(whole, resumed);
+}
+
+TEST_F(Training, APolicyThatReadsSegmentsAndGoalsGoesOnExactlyAndIsEvaluatedAsSaved) {
+  const auto [whole, again, resumed] = test::policies_of_equal_runs(
+      folder_ / "runs", "cpu", {"policy.modality=vector", "policy.segment_features=true", "policy.goal_features=true"});
+  EXPECT_EQ(whole, again);
+  EXPECT_EQ(whole, resumed);
+  const SavedPolicy saved = read_policy(folder_ / "runs/whole/policy.safetensors");
+  EXPECT_TRUE(saved.config.policy.segment_features && saved.config.policy.goal_features);
+  EXPECT_GT(evaluate(test::one_scenario(folder_ / "runs/whole/policy.safetensors", 10)).agent_steps, 0);
 }
 
 TEST_F(Training, VectorPolicyTrainsAndIsEvaluated) {

@@ -34,24 +34,29 @@ struct PatchSize {
 
 /// Where a segment's row (docs/observation.md) holds what features are made of, after the x and y of its middle.
 struct SegmentColumn {
-  static constexpr int kCos = 4, kSin = 5;  // of its direction
+  static constexpr int kHalfLength = 3, kCos = 4, kSin = 5;  // the latter of its direction
 };
 
 /// Features that are read of a row beside its numbers (see training/row_features.h): those of each of the `points`
-/// pairs (x, y) that the row begins with, and those of a segment where the row is one.
+/// pairs (x, y) that the row begins with; where the row is a segment, those of the agent's place beside it, and those
+/// of its distance to a goal.
 struct RowFeatures {
   int points = 0;
-  bool of_segment = false;
-  float position_unit_m = 1;  // of x and y
-  static constexpr int kOfPoint = 6, kOfSegment = 4;
-  PICTURA_HD constexpr int count() const { return points * kOfPoint + (of_segment ? kOfSegment : 0); }
+  bool of_segment = false, of_goal = false;
+  float position_unit_m = 1, half_length_unit_m = 1;  // of x and y, goals' too, and of half lengths
+  static constexpr int kOfPoint = 6, kOfSegment = 4, kOfGoal = 2;
+  PICTURA_HD constexpr int count() const {
+    return points * kOfPoint + (of_segment ? kOfSegment : 0) + (of_goal ? kOfGoal : 0);
+  }
 };
 
-/// Rows of f32 without gaps that become their features, each behind the row itself where keeps_rows says so.
+/// Rows of f32 without gaps that become their features, each behind the row itself where keeps_rows says so. With
+/// features.of_goal every rows_per_goal of them share a goal, of goal_columns numbers, x and y first.
 struct RowSize {
   int64_t rows = 0, columns = 0;
   RowFeatures features;
   bool keeps_rows = false;
+  int64_t rows_per_goal = 1, goal_columns = 0;
   PICTURA_HD int64_t kept() const { return keeps_rows ? columns : 0; }
   PICTURA_HD int64_t width() const { return kept() + features.count(); }
   static constexpr int64_t kMostWidth = 256;
@@ -60,12 +65,14 @@ struct RowSize {
 /// What is added to what lengths are divided by (see training/row_features.h).
 constexpr float kNearPoint_m = 4.0f, kFarPoint_m = 20.0f, kPointDirection_m = 1.0f;
 
+/// A length, or a coordinate, between -1 and 1.
+PICTURA_HD inline float bounded_length(float length_m, float added_m) { return length_m / (fabsf(length_m) + added_m); }
+
 /// A feature of a point in metres. The first four are of x and y alone.
 PICTURA_HD inline float point_feature(Vec2 point_m, int feature) {
   const float its_m = feature % 2 == 0 ? point_m.x : point_m.y;
-  return its_m / (feature < 2   ? fabsf(its_m) + kNearPoint_m
-                  : feature < 4 ? fabsf(its_m) + kFarPoint_m
-                                : length(point_m) + kPointDirection_m);
+  if (feature >= 4) return its_m / (length(point_m) + kPointDirection_m);
+  return bounded_length(its_m, feature < 2 ? kNearPoint_m : kFarPoint_m);
 }
 
 /// A place relative to the segment of a row, in metres: x along the segment from its middle, y to the left of its line.
@@ -75,12 +82,24 @@ PICTURA_HD inline Vec2 beside_segment(const RowFeatures& features, const float* 
   return {dot(from_middle_m, direction), cross(direction, from_middle_m)};
 }
 
-/// One of the features of a row.
-PICTURA_HD inline float row_feature(const RowFeatures& features, const float* row, int feature) {
-  const int of_points = features.points * RowFeatures::kOfPoint;
-  if (feature >= of_points) return point_feature(beside_segment(features, row, Vec2{}), feature - of_points);
-  const float* const point = row + 2 * (feature / RowFeatures::kOfPoint);
-  return point_feature(Vec2{point[0], point[1]} * features.position_unit_m, feature % RowFeatures::kOfPoint);
+/// The distance of a place from the segment of a row, between its ends.
+PICTURA_HD inline float segment_distance_m(const RowFeatures& features, const float* row, Vec2 place_m) {
+  const Vec2 beside_m = beside_segment(features, row, place_m);
+  const float half_length_m = row[SegmentColumn::kHalfLength] * features.half_length_unit_m;
+  return length(Vec2{max_of(fabsf(beside_m.x) - half_length_m, 0.0f), beside_m.y});
+}
+
+/// One of the features of a row. `goal` is read with features.of_goal alone.
+PICTURA_HD inline float row_feature(const RowFeatures& features, const float* row, const float* goal, int feature) {
+  const auto place_m = [&features](const float* xy) { return Vec2{xy[0], xy[1]} * features.position_unit_m; };
+  const int end_of_points = features.points * RowFeatures::kOfPoint;
+  if (feature < end_of_points) {
+    return point_feature(place_m(row + 2 * (feature / RowFeatures::kOfPoint)), feature % RowFeatures::kOfPoint);
+  }
+  const int end_of_segment = end_of_points + (features.of_segment ? RowFeatures::kOfSegment : 0);
+  if (feature < end_of_segment) return point_feature(beside_segment(features, row, Vec2{}), feature - end_of_points);
+  return bounded_length(segment_distance_m(features, row, place_m(goal)),
+                        feature == end_of_segment ? kNearPoint_m : kFarPoint_m);
 }
 
 /// Matrices [matrices, tokens, columns] of scores; `columns` is even.
@@ -131,8 +150,9 @@ class NetworkPasses {
     return std::clamp<int64_t>((8448 + period - 1) / period, 1, std::max<int64_t>(1, rows / period));
   }
 
-  /// out: [rows, width()], at most kMostWidth wide.
-  virtual void row_features(const RowSize& size, const float* rows, ActivationType type, void* out, Stream stream) = 0;
+  /// out: [rows, width()], at most kMostWidth wide. goals: [rows / rows_per_goal, goal_columns], null for none.
+  virtual void row_features(const RowSize& size, const float* rows, const float* goals, ActivationType type, void* out,
+                            Stream stream) = 0;
 
   virtual void patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, Stream stream) = 0;
 
