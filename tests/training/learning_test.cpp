@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 
 #include "pictura/tests/training/corridor.h"
+#include "pictura/tests/training/small_policy.h"
 
 namespace pictura {
 namespace {
@@ -18,12 +19,7 @@ constexpr int kUpdates = 100, kWindow = 10;
 using Curve = std::array<double, kUpdates / kWindow>;
 
 Curve learn(Precision precision, uint64_t seed) {
-  Config::PolicySection section;
-  section.modality = Modality::vector;
-  section.embedding_width = 8;
-  section.backbone_layers = 2;
-  section.backbone_width = 32;
-  const PolicyNetwork policy(section, 1, seed, at::kFloat, /*reads_walls=*/false, Device{}, precision);
+  const PolicyNetwork policy(test::learning_section(), 1, seed, at::kFloat, /*reads_walls=*/false, Device{}, precision);
   Config::Train train;
   train.minibatch_size = 512;
   train.update_epochs = 1;

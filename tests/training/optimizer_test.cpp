@@ -8,6 +8,7 @@
 
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/tests/training/corridor.h"
+#include "pictura/tests/training/small_policy.h"
 #include "pictura/tests/training/small_runs.h"
 
 namespace pictura {
@@ -49,20 +50,6 @@ at::Tensor leaf(const at::Tensor& value) {
   return result;
 }
 
-Config::PolicySection small_section(Modality modality) {
-  Config::PolicySection section;
-  section.modality = modality;
-  section.embedding_width = section.backbone_width = 8;
-  section.backbone_layers = 2;
-  section.conv_channels = {8, 8};
-  section.conv_kernels = {1, 3};
-  section.conv_strides = {1, 1};
-  section.num_queries = 2;
-  section.attention_heads = 2;
-  section.attention_mlp = 8;
-  return section;
-}
-
 Config::Train muon_config() {
   Config::Train train;
   train.optimizer = OptimizerKind::muon;
@@ -70,10 +57,7 @@ Config::Train muon_config() {
 }
 
 TEST(AdamW, StepsAsLoshchilovAndHutterDefineIt) {
-  Config::PolicySection section;
-  section.modality = Modality::vector;
-  section.embedding_width = section.backbone_width = section.backbone_layers = 1;
-  const PolicyNetwork policy(section, 1, 3);
+  const PolicyNetwork policy(test::tiny_section(Modality::vector), 1, 3);
   Config::Train train;
   train.weight_decay = 0.1;
   train.max_grad_norm = 1e9;
@@ -96,10 +80,7 @@ TEST(AdamW, StepsAsLoshchilovAndHutterDefineIt) {
 }
 
 TEST(AdamW, TakesNoStepWhereTheLossOrAGradientIsNotFinite) {
-  Config::PolicySection section;
-  section.modality = Modality::vector;
-  section.embedding_width = section.backbone_width = section.backbone_layers = 1;
-  const PolicyNetwork policy(section, 1, 3);
+  const PolicyNetwork policy(test::tiny_section(Modality::vector), 1, 3);
   const std::string before = policy.hash();
   Optimizer optimizer(policy, Config::Train{});
   at::Tensor weight = policy.parameters()[0].value;
@@ -172,7 +153,7 @@ TEST(Muon, ChangesNothingWhereAGradientIsNotFinite) {
 
 // The names of the parameters that AdamW steps beside Muon, where the critic has a trunk of its own.
 std::vector<std::string> stepped_by_adamw(Modality modality) {
-  Config::PolicySection section = small_section(modality);
+  Config::PolicySection section = test::tiny_section(modality);
   section.critic_layers = 2;
   const PolicyNetwork policy(section, 1, 3);
   std::vector<std::string> names;
@@ -203,7 +184,7 @@ TEST(WeightRms, IsOfHiddenLayersAlone) {
 
 TEST(Muon, LearnsATaskWithDelayedReward) {
   at::set_num_threads(1);
-  const PolicyNetwork policy(small_section(Modality::vector), 1, 7);
+  const PolicyNetwork policy(test::learning_section(), 1, 7);
   Config::Train train = muon_config();
   train.minibatch_size = 256;
   train.learning_rate = 3e-3;

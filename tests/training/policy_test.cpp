@@ -9,6 +9,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/tests/training/numbers.h"
+#include "pictura/tests/training/small_policy.h"
 #include "pictura/training/layers.h"
 #include "pictura/training/query_spread.h"
 #include "pictura/training/saved_policy.h"
@@ -17,22 +18,7 @@ namespace pictura {
 namespace {
 
 using test::numbers;
-
-Config::PolicySection tiny(Modality modality) {
-  Config::PolicySection c;
-  c.modality = modality;
-  c.patch_px = 1;
-  c.conv_channels = {3, 4};
-  c.conv_kernels = {3, 3};
-  c.conv_strides = {2, 1};
-  c.num_queries = 2;
-  c.attention_heads = 2;
-  c.attention_mlp = 5;
-  c.embedding_width = 4;
-  c.backbone_layers = 2;
-  c.backbone_width = 6;
-  return c;
-}
+using test::tiny_section;
 
 Observation observation(Modality modality, int64_t batch) {
   Observation o;
@@ -69,7 +55,7 @@ double scalar_of(const Policy& policy, const Observation& o, bool with_gradient)
 
 // Images as u8, and as the patches that renderers draw.
 TEST(PolicyPatches, GiveTheBitsThatImagesGive) {
-  Config::PolicySection config = tiny(Modality::perspective);
+  Config::PolicySection config = tiny_section(Modality::perspective);
   config.conv_kernels = {1, 3};
   const Observation images = observation(Modality::perspective, 3).map([](const at::Tensor& t) {
     return t.scalar_type() == at::kByte ? t : t.to(at::kFloat);
@@ -126,11 +112,11 @@ void expect_gradients(const Policy& policy, const Observation& o) {
 }
 
 TEST_P(BothModalities, GradientsEqualDifferenceQuotients) {
-  expect_gradients(PolicyNetwork(tiny(GetParam()), 3, 5, at::kDouble), observation(GetParam(), 2));
+  expect_gradients(PolicyNetwork(tiny_section(GetParam()), 3, 5, at::kDouble), observation(GetParam(), 2));
 }
 
 TEST(Policy, GradientsOfValuesOfOtherHeadsEqualDifferenceQuotients) {
-  Config::PolicySection section = tiny(Modality::vector);
+  Config::PolicySection section = tiny_section(Modality::vector);
   for (const ValueHead head : {ValueHead::symlog, ValueHead::two_hot}) {
     section.value_head = head;
     expect_gradients(PolicyNetwork(section, 3, 5, at::kDouble), observation(Modality::vector, 2));
@@ -138,13 +124,13 @@ TEST(Policy, GradientsOfValuesOfOtherHeadsEqualDifferenceQuotients) {
 }
 
 TEST(Policy, GradientsOfFeaturesOfSegmentsEqualDifferenceQuotients) {
-  Config::PolicySection section = tiny(Modality::vector);
+  Config::PolicySection section = tiny_section(Modality::vector);
   section.segment_features = section.goal_features = true;
   expect_gradients(PolicyNetwork(section, 3, 5, at::kDouble, /*reads_walls=*/true), observation(Modality::vector, 2));
 }
 
 TEST(Policy, GradientsOfPatchesEqualDifferenceQuotients) {
-  Config::PolicySection section = tiny(Modality::perspective);
+  Config::PolicySection section = tiny_section(Modality::perspective);
   section.patch_px = 2;
   section.conv_kernels = {1, 3};
   section.conv_strides = {1, 2};
@@ -152,7 +138,7 @@ TEST(Policy, GradientsOfPatchesEqualDifferenceQuotients) {
 }
 
 TEST_P(BothModalities, GradientsOfNormalizedLayersEqualDifferenceQuotients) {
-  Config::PolicySection section = tiny(GetParam());
+  Config::PolicySection section = tiny_section(GetParam());
   section.layer_norm = section.residual = true;
   section.backbone_layers = 3;
   const PolicyNetwork policy(section, 3, 5, at::kDouble);
@@ -164,7 +150,7 @@ TEST_P(BothModalities, GradientsOfNormalizedLayersEqualDifferenceQuotients) {
 
 // Whatever the scale of the layers before it, what the heads read has a mean of 0 and a variance of 1.
 TEST(Policy, HeadsReadNormalizedActivations) {
-  Config::PolicySection section = tiny(Modality::vector);
+  Config::PolicySection section = tiny_section(Modality::vector);
   section.layer_norm = true;
   const PolicyNetwork policy(section, 3, 5, at::kDouble);
   const at::NoGradGuard no_grad;
@@ -177,13 +163,13 @@ TEST(Policy, HeadsReadNormalizedActivations) {
 }
 
 TEST_P(BothModalities, GradientsOfACriticWithATrunkOfItsOwnEqualDifferenceQuotients) {
-  Config::PolicySection section = tiny(GetParam());
+  Config::PolicySection section = tiny_section(GetParam());
   section.critic_layers = 2;
   expect_gradients(PolicyNetwork(section, 3, 5, at::kDouble), observation(GetParam(), 2));
 }
 
 TEST_P(BothModalities, ACriticWithATrunkOfItsOwnLeavesTheActorAsItIs) {
-  Config::PolicySection section = tiny(GetParam());
+  Config::PolicySection section = tiny_section(GetParam());
   const PolicyNetwork shared(section, 3, 5, at::kDouble);
   section.critic_layers = 1;
   const PolicyNetwork apart(section, 3, 5, at::kDouble);
@@ -200,7 +186,7 @@ TEST_P(BothModalities, ACriticWithATrunkOfItsOwnLeavesTheActorAsItIs) {
 
 // A layer of zeros gives gelu(0) = 0, so that only its input is left.
 TEST(Policy, ResidualsPassOverLayersOfTheTrunk) {
-  Config::PolicySection section = tiny(Modality::vector);
+  Config::PolicySection section = tiny_section(Modality::vector);
   section.residual = true;
   section.backbone_layers = 1;
   const PolicyNetwork shallow(section, 3, 5, at::kDouble);
@@ -224,7 +210,7 @@ TEST(Policy, ResidualsPassOverLayersOfTheTrunk) {
 }
 
 TEST(Policy, GradientsOfConcatenatedQueriesEqualDifferenceQuotients) {
-  Config::PolicySection section = tiny(Modality::perspective);
+  Config::PolicySection section = tiny_section(Modality::perspective);
   section.query_pooling = QueryPooling::concatenated;
   expect_gradients(PolicyNetwork(section, 3, 5, at::kDouble), observation(Modality::perspective, 2));
 }
@@ -235,7 +221,7 @@ TEST(Policy, ConcatenatedQueriesComputeWhatTheirAverageDoes) {
     return t.is_floating_point() ? t.to(at::kFloat) : t;
   });
   Config config;
-  config.policy = tiny(Modality::perspective);
+  config.policy = tiny_section(Modality::perspective);
   config.policy.num_queries = 5;
   const PolicyNetwork average(config.policy, 3, 5);
   config.policy.query_pooling = QueryPooling::concatenated;
@@ -251,7 +237,7 @@ TEST(Policy, ConcatenatedQueriesComputeWhatTheirAverageDoes) {
   expect_equal_outputs();
 
   SavedPolicy saved;
-  saved.config.policy = tiny(Modality::perspective);
+  saved.config.policy = tiny_section(Modality::perspective);
   saved.config.policy.num_queries = 5;
   saved.rig.cameras.resize(3);
   for (const NamedTensor& parameter : average.parameters()) {
@@ -313,7 +299,7 @@ TEST_P(BothModalities, ReadsFeaturesOfPointsBesideTheirCoordinates) {
 }
 
 TEST(Policy, ReadsTheDistanceOfLanesToTheActiveWaypointAlone) {
-  Config::PolicySection config = tiny(Modality::vector);
+  Config::PolicySection config = tiny_section(Modality::vector);
   const Observation seen = observation(Modality::vector, 4);
   const auto moved = [&seen](int64_t number) {
     Observation result = seen.map([](const at::Tensor& t) { return t.clone(); });
@@ -356,7 +342,7 @@ TEST(Policy, ReadsItsPlaceBesideLanesBoundariesAndWalls) {
 
 // The host's own passes in fp32 against ATen's layers in fp64.
 TEST(Policy, FeaturesOfRowsAreTheSameInSingleAndDoublePrecision) {
-  Config::PolicySection config = tiny(Modality::vector);
+  Config::PolicySection config = tiny_section(Modality::vector);
   config.segment_features = config.goal_features = true;
   const PolicyNetwork doubles(config, 3, 5, at::kDouble, /*reads_walls=*/true), floats(config, 3, 5, at::kFloat, true);
   const Observation seen = observation(Modality::vector, 6);
@@ -406,7 +392,7 @@ TEST(Policy, WallsAreAFifthGroupOfTheVectorPolicy) {
 }
 
 TEST_P(BothModalities, FirstPolicyIsNearlyUniformAndDoesNotDependOnThreads) {
-  Config::PolicySection config = tiny(GetParam());
+  Config::PolicySection config = tiny_section(GetParam());
   at::set_num_threads(1);
   const PolicyNetwork one(config, 3, 42);
   at::set_num_threads(2);
@@ -423,7 +409,7 @@ TEST_P(BothModalities, FirstPolicyIsNearlyUniformAndDoesNotDependOnThreads) {
 }
 
 TEST(Policy, ScaledLogitsAreTheSameTimesAFactor) {
-  const PolicyNetwork policy(tiny(Modality::vector), 3, 5, at::kDouble);
+  const PolicyNetwork policy(tiny_section(Modality::vector), 3, 5, at::kDouble);
   const Observation seen = observation(Modality::vector, 2);
   const at::NoGradGuard no_grad;
   const Policy::Output before = policy.forward(seen);
@@ -434,7 +420,7 @@ TEST(Policy, ScaledLogitsAreTheSameTimesAFactor) {
 }
 
 TEST(Policy, AgentsOfABatchDoNotMix) {
-  const PolicyNetwork policy(tiny(Modality::perspective), 3, 5, at::kDouble);
+  const PolicyNetwork policy(tiny_section(Modality::perspective), 3, 5, at::kDouble);
   const at::NoGradGuard no_grad;
   const Observation o = observation(Modality::perspective, 3);
   const at::Tensor all = policy.forward(o).logits;
@@ -443,7 +429,7 @@ TEST(Policy, AgentsOfABatchDoNotMix) {
 }
 
 TEST(Policy, EveryCameraCounts) {
-  const PolicyNetwork policy(tiny(Modality::perspective), 3, 5, at::kDouble);
+  const PolicyNetwork policy(tiny_section(Modality::perspective), 3, 5, at::kDouble);
   const at::NoGradGuard no_grad;
   const Observation o = observation(Modality::perspective, 1);
   const at::Tensor before = policy.forward(o).value;

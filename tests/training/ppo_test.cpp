@@ -15,6 +15,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
 #include "pictura/tests/training/corridor.h"
+#include "pictura/tests/training/small_policy.h"
 #include "pictura/training/rules/advantage_filter.h"
 #include "pictura/training/rules/choose_action.h"
 #include "pictura/training/schedule.h"
@@ -147,11 +148,7 @@ TEST(AdvantageFilter, QuantileIsThatOfTheSortedAdvantages) {
 
 TEST(AdvantageFilter, DropsTheShareOfItsQuantile) {
   at::set_num_threads(1);
-  Config::PolicySection section;
-  section.modality = Modality::vector;
-  section.embedding_width = section.backbone_width = 8;
-  section.backbone_layers = 1;
-  const PolicyNetwork policy(section, 1, 7);
+  const PolicyNetwork policy(test::learning_section(), 1, 7);
   Config::Train train;
   train.adv_filter = FilterThreshold::quantile;
   Corridor corridor;
@@ -266,12 +263,7 @@ TEST(DrawAction, FollowsTheCumulativeProbabilities) {
 TEST(Ppo, LearnsATaskWithDelayedReward) {
   at::set_num_threads(1);
   const at::AutoGradMode mode(true);
-  Config::PolicySection section;
-  section.modality = Modality::vector;
-  section.embedding_width = 8;
-  section.backbone_layers = 2;
-  section.backbone_width = 32;
-  const PolicyNetwork policy(section, 1, 7);
+  const PolicyNetwork policy(test::learning_section(), 1, 7);
   Config::Train train;
   train.minibatch_size = 256;
   train.forward_chunk = 100;
@@ -298,11 +290,7 @@ TEST(Ppo, LearnsATaskWithDelayedReward) {
 
 TEST(Ppo, ChunksChangeNothingButRounding) {
   at::set_num_threads(1);
-  Config::PolicySection section;
-  section.modality = Modality::vector;
-  section.embedding_width = 8;
-  section.backbone_layers = 1;
-  section.backbone_width = 16;
+  const Config::PolicySection section = test::learning_section();
   const PolicyNetwork whole(section, 1, 7), chunked(section, 1, 7);
   Config::Train train;
   train.minibatch_size = 512;
@@ -339,11 +327,7 @@ class CountedPolicy final : public Policy {
 
 TEST(Ppo, OneOf64TransitionsTellsTheLossesGradientsApart) {
   at::set_num_threads(1);
-  Config::PolicySection section;
-  section.modality = Modality::vector;
-  section.embedding_width = section.backbone_width = 8;
-  section.backbone_layers = 1;
-  const PolicyNetwork network(section, 1, 7);
+  const PolicyNetwork network(test::learning_section(), 1, 7);
   const CountedPolicy policy(&network);
   Config::Train train;
   train.minibatch_size = 512;
@@ -372,10 +356,7 @@ TEST(Ppo, OneOf64TransitionsTellsTheLossesGradientsApart) {
 
 TEST(Ppo, InvalidTransitionsTeachNothing) {
   at::set_num_threads(1);
-  Config::PolicySection section;
-  section.modality = Modality::vector;
-  section.embedding_width = section.backbone_width = 8;
-  section.backbone_layers = 1;
+  const Config::PolicySection section = test::learning_section();
   const PolicyNetwork a(section, 1, 7), b(section, 1, 7);
   Config::Train train;
   for (const Policy* policy : {&a, &b}) {
@@ -395,10 +376,7 @@ TEST(Ppo, InvalidTransitionsTeachNothing) {
 }
 
 TEST(Ppo, StopsBeforeTheStepOfAMinibatchThatIsNotFinite) {
-  Config::PolicySection section;
-  section.modality = Modality::vector;
-  section.embedding_width = section.backbone_width = 8;
-  const PolicyNetwork policy(section, 1, 7);
+  const PolicyNetwork policy(test::learning_section(), 1, 7);
   const std::string before = policy.hash();
   Corridor corridor;
   corridor.play(policy, 0);
@@ -440,17 +418,13 @@ TEST(Ppo, StopsBeforeTheStepOfAMinibatchThatIsNotFinite) {
 // Both rollouts kept log-probabilities that are not the policy's: the update takes the policy's own.
 TEST(Ppo, LogProbabilitiesThatAreNotTheLearnersAreComputedAgain) {
   at::set_num_threads(1);
-  Config::PolicySection section;
-  section.modality = Modality::vector;
-  section.embedding_width = section.backbone_width = 8;
-  section.backbone_layers = 1;
   Config::Train train;
   train.minibatch_size = 200;
   train.forward_chunk = 60;
   std::vector<std::string> policies;
   for (const double error : {0.0, 5e-4, 2e-3, 0.5}) {
     SCOPED_TRACE(error);
-    const PolicyNetwork policy(section, 1, 7);
+    const PolicyNetwork policy(test::learning_section(), 1, 7);
     Corridor corridor;
     corridor.play(policy, 0);
     corridor.rollout.rewards.copy_(
@@ -479,10 +453,7 @@ TEST(Ppo, LogProbabilitiesThatAreNotTheLearnersAreComputedAgain) {
 }
 
 TEST(Ppo, NanIsAnError) {
-  Config::PolicySection section;
-  section.modality = Modality::vector;
-  section.embedding_width = section.backbone_width = 8;
-  const PolicyNetwork policy(section, 1, 7);
+  const PolicyNetwork policy(test::learning_section(), 1, 7);
   Config::Train train;
   Corridor corridor;
   corridor.play(policy, 0);

@@ -10,6 +10,7 @@
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/tests/training/corridor.h"
 #include "pictura/tests/training/numbers.h"
+#include "pictura/tests/training/small_policy.h"
 #include "pictura/tests/training/small_runs.h"
 #include "pictura/training/losses.h"
 
@@ -108,11 +109,7 @@ INSTANTIATE_TEST_SUITE_P(ValueHead, EachValueHead,
 TEST_P(EachValueHead, LearnsReturns) {
   at::set_num_threads(1);
   const at::AutoGradMode mode(true);
-  Config::PolicySection section;
-  section.modality = Modality::vector;
-  section.embedding_width = 8;
-  section.backbone_layers = 2;
-  section.backbone_width = 32;
+  Config::PolicySection section = test::learning_section();
   section.value_head = GetParam();
   const PolicyNetwork policy(section, 1, 7);
   Config::Train train;

@@ -1,0 +1,33 @@
+// Policies that are small enough for hundreds of passes.
+#pragma once
+
+#include "pictura/training/config.h"
+
+namespace pictura::test {
+
+/// A policy of either modality, with layers of uneven widths. Its images are small, with patches of a pixel.
+inline Config::PolicySection tiny_section(Modality modality) {
+  Config::PolicySection c;
+  c.modality = modality;
+  c.patch_px = 1;
+  c.conv_channels = {3, 4};
+  c.conv_kernels = {3, 3};
+  c.conv_strides = {2, 1};
+  c.num_queries = 2;
+  c.attention_heads = 2;
+  c.attention_mlp = 5;
+  c.embedding_width = 4;
+  c.backbone_layers = 2;
+  c.backbone_width = 6;
+  return c;
+}
+
+/// A vector policy that learns the task of corridor.h.
+inline Config::PolicySection learning_section() {
+  Config::PolicySection c = tiny_section(Modality::vector);
+  c.embedding_width = 8;
+  c.backbone_width = 32;
+  return c;
+}
+
+}  // namespace pictura::test
