@@ -861,25 +861,18 @@ bool is_of_schedule(const std::string& key) {
 
 bool is_reported(const std::string& key) {
   return is_of_schedule(key) || key.starts_with("train.teacher") || key == "train.reproducible" ||
-         key == "train.optimizer" || key == "train.weight_average" || key == "render.schedule";
+         key == "train.weight_average" || key == "render.schedule";
 }
 
 bool may_differ(const std::string& key, const Config& saved, const Config& now) {
-  static const std::set<std::string> kHarmless{"train.updates",
-                                               "train.checkpoint_every",
-                                               "train.checkpoint_minutes",
-                                               "train.keep_checkpoints",
-                                               "train.milestone_agent_steps",
-                                               "train.forward_chunk",
-                                               "train.images",
-                                               "train.graphs",
-                                               "train.halted_slots",
-                                               "run.num_threads",
-                                               "run.device",
-                                               "policy.backbone",
-                                               "render.rig",
-                                               "render.width_px",
-                                               "render.height_px",
+  static const std::set<std::string> kHarmless{"train.updates",          "train.optimizer",
+                                               "train.checkpoint_every", "train.checkpoint_minutes",
+                                               "train.keep_checkpoints", "train.milestone_agent_steps",
+                                               "train.forward_chunk",    "train.images",
+                                               "train.graphs",           "train.halted_slots",
+                                               "run.num_threads",        "run.device",
+                                               "policy.backbone",        "render.rig",
+                                               "render.width_px",        "render.height_px",
                                                "simulator.backend"};
   if (kHarmless.count(key) || key.starts_with("evaluate.") || key.starts_with("train.evaluate_") || is_reported(key)) {
     return true;

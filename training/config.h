@@ -213,9 +213,9 @@ std::string first_difference(const Config& saved, const Config& now);
 /// many threads, may differ.
 std::string first_difference_of_ranks(const Config& first, const Config& other);
 
-/// The settings in which the two differ of those that a run that goes on may change and should say so, the schedules of
-/// learning rate and image size, the optimizer, the teacher, train.weight_average and train.reproducible, as "KEY: OLD
-/// became NEW".
+/// The settings in which the two differ of those that a run that goes on may change and should report, the schedules of
+/// learning rate and image size, the teacher, train.weight_average and train.reproducible, as "KEY: OLD became NEW".
+/// The optimizer is reported with its moments, see RunKeeper::begin().
 std::vector<std::string> differences_to_report(const Config& saved, const Config& now);
 
 /// Names as in a configuration.

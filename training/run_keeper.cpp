@@ -34,7 +34,7 @@ std::vector<RecentUpdate> RunKeeper::begin(Run* run) {
     for (const std::string& change : differences_to_report(saved.config, run->config)) options_.notify(change);
     const OptimizerKind before = saved.config.train.optimizer, now = run->config.train.optimizer;
     if (before != now) {
-      options_.notify(fmt::format("{}: holds moments of {}: new moments of {} start", checkpoint_path(),
+      options_.notify(fmt::format("train.optimizer: {} holds moments of {}: new moments of {} start", checkpoint_path(),
                                   name_of(before), name_of(now)));
     }
     recent = saved.recent;
