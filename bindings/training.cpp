@@ -174,6 +174,12 @@ py::dict dict_of(const SimulatorConfig& config) {
   return d;
 }
 
+// Light cycles by their name; none for an empty one.
+std::optional<LightCycles> light_cycles_or_none(const std::string& name) {
+  if (name.empty()) return std::nullopt;
+  return light_cycles_named(name);
+}
+
 std::vector<std::string> texts_of(const py::dict& conditioning) {
   std::vector<std::string> texts;
   for (const auto& [name, value] : conditioning) {
@@ -455,7 +461,7 @@ void bind_evaluation(py::module_& module) {
         options.width_px = width_px;
         options.height_px = height_px;
         options.conditioning = texts_of(conditioning);
-        options.light_cycles = light_cycles;
+        options.light_cycles = light_cycles_or_none(light_cycles);
         options.on_progress = progress_to(on_progress);
         return dict_of(
             run_to_an_orderly_end("evaluate", num_threads, {}, [&options] { return pictura::evaluate(options); }));
@@ -702,7 +708,7 @@ time, also for a renderer that it is given.)")
             options.height_px = height_px;
             options.backbone = backbone;
             options.conditioning = texts_of(conditioning);
-            options.light_cycles = light_cycles;
+            options.light_cycles = light_cycles_or_none(light_cycles);
             check_process("PolicySession", num_threads, {});
             return std::make_unique<PySession>(checkpoint, options);
           }),

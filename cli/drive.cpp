@@ -49,14 +49,14 @@ void add_world_options(CLI::App* command, WorldOptions* options_out) {
   command->add_flag("!--no-walls", options_out->walls, "Leave out the walls along the building lines");
 }
 
-void add_light_cycles_option(CLI::App* command, std::string* name_out, const std::string& otherwise) {
-  const std::vector<std::string> names(std::begin(kLightCyclesNames), std::end(kLightCyclesNames));
+void add_light_cycles_option(CLI::App* command, std::optional<LightCycles>* cycles_out, const std::string& otherwise) {
   command
-      ->add_option("--light-cycles", *name_out,
-                   fmt::format("How traffic lights cycle: phases (those of a junction take turns) or independent (each "
-                               "alone); default: {}",
-                               otherwise))
-      ->check(one_of(names));
+      ->add_option_function<std::string>(
+          "--light-cycles", [cycles_out](const std::string& name) { *cycles_out = light_cycles_named(name); },
+          fmt::format("How traffic lights cycle: phases (those of a junction take turns) or independent (each "
+                      "alone); default: {}",
+                      otherwise))
+      ->check(one_of({std::begin(kLightCyclesNames), std::end(kLightCyclesNames)}));
 }
 
 void add_light_heads_option(CLI::App* command, std::optional<LightHeads>* heads_out) {
@@ -209,8 +209,8 @@ DrivenWorld make_world(const WorldOptions& options, const std::string& policy, c
   config.num_threads = options.num_threads;
   config.walls = config.walls && options.walls;
   config.light_heads = options.light_heads.value_or(config.light_heads);
+  config.light_cycles = options.light_cycles.value_or(config.light_cycles);
   config.fixed_lights = true;
-  if (!options.light_cycles.empty()) config.light_cycles = light_cycles_named(options.light_cycles);
   set_population(options, &config);
   config.parked_cars = options.parked_cars.value_or(config.parked_cars);
   const std::string simulator = backends.simulator.empty() ? "cpu" : backends.simulator;

@@ -27,7 +27,7 @@ struct WorldOptions {
   // Where nothing is said, as the policy was trained, or as in the paper.
   std::optional<float> pedestrian_fraction, cyclist_fraction;
   std::optional<int> parked_cars;
-  std::string light_cycles;  // a name of kLightCyclesNames
+  std::optional<LightCycles> light_cycles;
   std::optional<LightHeads> light_heads;
   // Of recorded scenes: which tracks the policy drives, where the recording starts, and whether its lights are there.
   // An episode is as long as what is left of the recording, or as so many steps.
@@ -41,7 +41,7 @@ struct WorldOptions {
 void add_world_options(CLI::App* command, WorldOptions* options_out);
 
 /// Adds --light-cycles. `otherwise` says what holds where it is not given.
-void add_light_cycles_option(CLI::App* command, std::string* name_out, const std::string& otherwise);
+void add_light_cycles_option(CLI::App* command, std::optional<LightCycles>* cycles_out, const std::string& otherwise);
 
 /// Adds --light-heads, for commands whose worlds are seen by cameras.
 void add_light_heads_option(CLI::App* command, std::optional<LightHeads>* heads_out);

@@ -780,11 +780,6 @@ Config with_evaluate_conditioning(const Config& config, const std::vector<std::s
   return result;
 }
 
-Config with_light_cycles(Config config, const std::string& name) {
-  if (!name.empty()) config.simulator.light_cycles = light_cycles_named(name);
-  return config;
-}
-
 Config load_config(const std::string& path, const std::vector<std::string>& overrides) {
   Config config = parse_config(read_file(path, 1 << 20), path, overrides);
   const auto is_overridden = [&overrides](std::string_view key) {

@@ -195,10 +195,6 @@ Config load_config(const std::string& path, const std::vector<std::string>& over
 /// names the option --conditioning.
 Config with_evaluate_conditioning(const Config& config, const std::vector<std::string>& values);
 
-/// The configuration with simulator.light_cycles replaced; an empty name keeps them. Throws UsageError listing the
-/// names.
-Config with_light_cycles(Config config, const std::string& name);
-
 /// Every key with its value, as TOML that parse_config reads back to an equal Config.
 std::string to_toml(const Config& config);
 

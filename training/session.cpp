@@ -21,11 +21,12 @@ namespace {
 // The settings of training with what the options change. Those of devices are of the machine that trained it: here
 // whatever draws the same images will do.
 Config adapted(const Config& trained, const SessionOptions& options) {
-  Config config = with_light_cycles(with_evaluate_conditioning(trained, options.conditioning), options.light_cycles);
+  Config config = with_evaluate_conditioning(trained, options.conditioning);
   config.run.num_threads = options.num_threads;
   config.run.device = options.device;
   config.simulator.backend = options.simulator;
   config.simulator.walls |= options.adds_walls;
+  config.simulator.light_cycles = options.light_cycles.value_or(config.simulator.light_cycles);
   config.simulator.light_heads = options.light_heads.value_or(config.simulator.light_heads);
   if (!options.backbone.empty()) config.policy.backbone = options.backbone;
   std::string& renderer = config.render.backend;

@@ -27,10 +27,11 @@ struct SessionOptions {
   std::string backbone;  // where the program of policy.backbone lies now; empty: where it did
   // Of [evaluate.conditioning], in place of the policy's own: "name=value".
   std::vector<std::string> conditioning;
-  bool adds_walls = false;                // its worlds have walls, also where it was trained without
-  bool average = false;                   // drives with the average of weights that a checkpoint holds
-  std::string light_cycles;               // of its worlds, by their names; empty: as the policy was trained
-  std::optional<LightHeads> light_heads;  // of its worlds; no value: those of its training
+  bool adds_walls = false;  // its worlds have walls, also where it was trained without
+  bool average = false;     // drives with the average of weights that a checkpoint holds
+  // Of its worlds; no value: those of its training.
+  std::optional<LightCycles> light_cycles;
+  std::optional<LightHeads> light_heads;
 };
 
 /// What a batch of agents sees, in the memory of the session's device.

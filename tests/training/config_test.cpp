@@ -430,7 +430,7 @@ TEST(Config, ConditioningOfAnEvaluationIsReadAndRefusedUnderItsOption) {
   EXPECT_EQ(message({"collision=1", "collision=2"}), "--conditioning: collision is given twice");
 }
 
-TEST(Config, LightCyclesAreReadAndAnEvaluationMayChooseOthers) {
+TEST(Config, LightCyclesAreReadByTheirNames) {
   EXPECT_EQ(parse_config("", "a.toml").simulator.light_cycles, LightCycles::phases);
   const Config independent = parse_config("[simulator]\nlight_cycles = \"independent\"\n", "a.toml");
   EXPECT_EQ(simulator_config(independent).light_cycles, LightCycles::independent);
@@ -440,9 +440,8 @@ TEST(Config, LightCyclesAreReadAndAnEvaluationMayChooseOthers) {
   EXPECT_THAT(error_in("[simulator]\nlight_cycles = \"independant\"\n"),
               AllOf(HasSubstr("a.toml:2: simulator.light_cycles: expected one of phases, independent"),
                     HasSubstr("did you mean 'independent'")));
-  EXPECT_EQ(with_light_cycles(independent, "").simulator.light_cycles, LightCycles::independent);
-  EXPECT_EQ(with_light_cycles(independent, "phases").simulator.light_cycles, LightCycles::phases);
-  EXPECT_EQ(test::message_of([&] { with_light_cycles(independent, "alone"); }),
+  EXPECT_EQ(light_cycles_named("independent"), LightCycles::independent);
+  EXPECT_EQ(test::message_of([&] { light_cycles_named("alone"); }),
             "light_cycles: expected phases, independent, got 'alone'");
 }
 

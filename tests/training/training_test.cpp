@@ -806,7 +806,7 @@ TEST_F(Training, PoliciesDriveInTheWorldAndSeeTheImagesThatTheyWereTrainedOn) {
   EXPECT_EQ(session.evaluation_world(9).episode_steps, 9);
   EXPECT_EQ(session.evaluation_world(9).light_cycles, LightCycles::independent);
   EXPECT_EQ(session.evaluation_setting().light_cycles, LightCycles::independent);
-  const PolicySession in_turns(checkpoint, {.num_threads = 1, .light_cycles = "phases"});
+  const PolicySession in_turns(checkpoint, {.num_threads = 1, .light_cycles = LightCycles::phases});
   EXPECT_EQ(in_turns.evaluation_world(9).light_cycles, LightCycles::phases);
   EXPECT_EQ(in_turns.evaluation_setting().light_cycles, LightCycles::phases);
   EXPECT_EQ(session.training_world().conditioning[0].high,
@@ -833,7 +833,7 @@ TEST_F(Training, PoliciesDriveInTheWorldAndSeeTheImagesThatTheyWereTrainedOn) {
   // What is said on the command line wins.
   world_options.walls = false;
   world_options.parked_cars = 1;
-  world_options.light_cycles = "phases";
+  world_options.light_cycles = LightCycles::phases;
   world = make_world(world_options, checkpoint, {.renderer = "null"});
   EXPECT_FALSE(world.simulator->config().walls);
   EXPECT_EQ(world.simulator->config().parked_cars, 1);

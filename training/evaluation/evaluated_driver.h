@@ -30,12 +30,13 @@ struct DriverOptions {
   // Cameras other than those of training, see SessionOptions.
   std::string rig;
   int width_px = 0, height_px = 0;
-  std::string backbone;                   // as in SessionOptions
-  std::vector<std::string> conditioning;  // as in SessionOptions
-  bool adds_walls = false;                // as in SessionOptions
-  bool average = false;                   // as in SessionOptions
-  std::string light_cycles;               // as in SessionOptions
-  std::optional<LightHeads> light_heads;  // as in SessionOptions
+  // As in SessionOptions.
+  std::string backbone;
+  std::vector<std::string> conditioning;
+  bool adds_walls = false;
+  bool average = false;
+  std::optional<LightCycles> light_cycles;
+  std::optional<LightHeads> light_heads;
 };
 
 /// With which the checkpoint's policy is opened.
