@@ -1,5 +1,6 @@
 #include "pictura/training/layers.h"
 
+#include <cstring>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -473,6 +474,79 @@ struct HostSets : Function<HostSets> {
   }
 };
 
+// Whether layers on a device compute in bf16.
+bool is_bf16_on_device(const at::Tensor& x) {
+  return x.is_cuda() && at::autocast::is_autocast_enabled(at::kCUDA) &&
+         at::autocast::get_autocast_dtype(at::kCUDA) == at::kBFloat16;
+}
+
+// As HostSets, in one pass each way on a device. The way back computes anew what it needs of the members that are the
+// largest somewhere.
+struct DeviceSets : Function<DeviceSets> {
+  /// Sets which member is the largest, u8 [sets, channels], where `which_out` is not null.
+  static at::Tensor compute(const at::Tensor& members, const at::Tensor& goals, const at::Tensor& counts,
+                            const SetSize& size, const at::Tensor& hidden_weight, const at::Tensor& hidden_bias,
+                            const at::Tensor& weight, const at::Tensor& bias, at::Tensor* which_out) {
+    const at::TensorOptions options = members.options().requires_grad(false);
+    at::Tensor out = at::empty({size.sets(), SetSize::kChannels}, options.dtype(at::kBFloat16));
+    if (which_out) *which_out = at::empty(out.sizes(), options.dtype(at::kByte));
+    passes_on(members.device())
+        .largest_embedding(size, floats_of(members), goals.defined() ? floats_of(goals) : nullptr,
+                           counts.const_data_ptr<int32_t>(),
+                           {floats_of(hidden_weight), floats_of(hidden_bias), floats_of(weight), floats_of(bias)},
+                           out.mutable_data_ptr(), which_out ? which_out->mutable_data_ptr<uint8_t>() : nullptr,
+                           stream_on(members.device()));
+    return out;
+  }
+
+  static at::Tensor forward(AutogradContext* context, const at::Tensor& members, const std::optional<at::Tensor>& goals,
+                            const at::Tensor& counts, const SetSize& size, const at::Tensor& hidden_weight,
+                            const at::Tensor& hidden_bias, const at::Tensor& weight, const at::Tensor& bias) {
+    at::Tensor which;
+    const at::Tensor out =
+        compute(members, goals.value_or(at::Tensor()), counts, size, hidden_weight, hidden_bias, weight, bias, &which);
+    // A context keeps tensors: the size is kept as its bytes.
+    const at::Tensor size_bytes = at::empty({sizeof(SetSize)}, at::kByte);
+    std::memcpy(size_bytes.mutable_data_ptr(), &size, sizeof(SetSize));
+    context->save_for_backward(
+        {members, goals.value_or(at::Tensor()), which, hidden_weight, hidden_bias, weight, bias, size_bytes});
+    return out;
+  }
+
+  static variable_list backward(AutogradContext* context, const variable_list& grads) {
+    const variable_list saved = context->get_saved_variables();
+    const at::Tensor &members = saved[0], &goals = saved[1], &which = saved[2],
+                     grad = grads[0].to(at::kBFloat16).contiguous();
+    SetSize size;
+    std::memcpy(&size, saved[7].const_data_ptr(), sizeof(SetSize));
+    const auto sums_of = [&](const at::Tensor& parameter) {
+      std::vector<int64_t> shape{SetSize::kSums};
+      shape.insert(shape.end(), parameter.sizes().begin(), parameter.sizes().end());
+      return at::empty(shape, parameter.options().requires_grad(false));
+    };
+    const at::Tensor &hidden_weight = saved[3], &hidden_bias = saved[4], &weight = saved[5], &bias = saved[6];
+    const at::Tensor hidden_weight_sums = sums_of(hidden_weight), hidden_bias_sums = sums_of(hidden_bias),
+                     weight_sums = sums_of(weight), bias_sums = sums_of(bias);
+    passes_on(members.device())
+        .largest_embedding_backward(
+            size, floats_of(members), goals.defined() ? floats_of(goals) : nullptr,
+            {floats_of(hidden_weight), floats_of(hidden_bias), floats_of(weight), floats_of(bias)},
+            which.const_data_ptr<uint8_t>(), grad.const_data_ptr(),
+            {hidden_weight_sums.mutable_data_ptr<float>(), hidden_bias_sums.mutable_data_ptr<float>(),
+             weight_sums.mutable_data_ptr<float>(), bias_sums.mutable_data_ptr<float>()},
+            stream_on(members.device()));
+    const at::Tensor none;
+    return {none,
+            none,
+            none,
+            none,
+            hidden_weight_sums.sum(0),
+            hidden_bias_sums.sum(0),
+            weight_sums.sum(0),
+            bias_sums.sum(0)};
+  }
+};
+
 // [views, cameras, 3, ...] -> [cameras * views, 3, ...]
 at::Tensor by_camera(const at::Tensor& images) { return images.transpose(0, 1).flatten(0, 1); }
 
@@ -554,14 +628,27 @@ at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tenso
   return Norm::apply(x.contiguous(), added, weight, bias);
 }
 
-bool takes_sets(const at::Tensor& members) { return is_on_host(members); }
+bool takes_sets(const at::Tensor& members, const RowFeatures& features, const at::Tensor& hidden_weight,
+                const at::Tensor& weight) {
+  if (is_on_host(members)) return true;
+  return is_bf16_on_device(members) && members.scalar_type() == at::kFloat &&
+         SetSize::takes(weight.size(0), hidden_weight.size(0), members.size(2) + features.count(), members.size(1));
+}
 
 at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& goals, const at::Tensor& counts,
                              const RowFeatures& features, bool has_norm, const at::Tensor& hidden_weight,
                              const at::Tensor& hidden_bias, const at::Tensor& weight, const at::Tensor& bias) {
-  const at::Tensor all = members.contiguous(), its_counts = counts.contiguous(),
-                   its_goals = features.of_goal ? goals.contiguous() : at::Tensor();
-  if (keeps_gradients({hidden_weight, hidden_bias, weight, bias}))
+  const at::Tensor all = members.contiguous(), its_goals = features.of_goal ? goals.contiguous() : at::Tensor();
+  const bool has_way_back = keeps_gradients({hidden_weight, hidden_bias, weight, bias});
+  if (members.is_cuda()) {
+    const SetSize size{row_size(members, goals, features, /*keeps_rows=*/true), members.size(1), counts.stride(0),
+                       has_norm};
+    if (has_way_back)
+      return DeviceSets::apply(all, std::optional(its_goals), counts, size, hidden_weight, hidden_bias, weight, bias);
+    return DeviceSets::compute(all, its_goals, counts, size, hidden_weight, hidden_bias, weight, bias, nullptr);
+  }
+  const at::Tensor its_counts = counts.contiguous();
+  if (has_way_back)
     return HostSets::apply(all, std::optional(its_goals), its_counts, features, has_norm, hidden_weight, hidden_bias,
                            weight, bias);
   return HostSets::compute(all, its_goals, its_counts, features, has_norm, hidden_weight, hidden_bias, weight, bias)[0];

@@ -26,8 +26,10 @@ at::Tensor convolve_gelu(const at::Tensor& x, const at::Tensor& weight, const at
 /// undefined for none; weight, bias: [channels].
 at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tensor& weight, const at::Tensor& bias);
 
-/// Whether largest_embedding() takes such members: f32 on the host.
-bool takes_sets(const at::Tensor& members);
+/// Whether largest_embedding() takes such members: f32 on the host, or on a CUDA device that computes in bf16, for
+/// layers as SetSize has them.
+bool takes_sets(const at::Tensor& members, const RowFeatures& features, const at::Tensor& hidden_weight,
+                const at::Tensor& weight);
 /// Largest value of each channel over the members of a set: [sets, channels], 0 for an empty set. Each member goes
 /// through a linear layer with GELU, as linear_norm_gelu() with `has_norm`, and a second linear layer. members: [sets,
 /// maximum, columns], without gradient, each followed by its features; goals: [sets, columns], undefined without

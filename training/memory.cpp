@@ -108,7 +108,11 @@ void add_entity_sets(const Config& config, Device device, LayerSum* sum) {
   for (const ObservationArray& array : kObservationArrays) {
     if (!is_set(array) || !config.reads(array.part)) continue;
     const double features = array.features + row_features_of(config.policy, array.name).count();
-    if (device.is_host()) {
+    const bool is_one_pass =
+        device.is_host() || (config.train.precision == Precision::bf16 &&
+                             SetSize::takes(config.policy.embedding_width, config.policy.embedding_width,
+                                            static_cast<int64_t>(features), array.rows));
+    if (is_one_pass) {
       // Of members their features are kept, of a set which are the largest: see largest_embedding().
       sum->add_parameters((features + 1) * width + (width + 1) * width);
       sum->add_values(array.rows * features, 1);

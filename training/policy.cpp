@@ -137,8 +137,8 @@ class VectorEncoder final : public SceneEncoder {
       at::Tensor members = o.*group.members;
       const at::Tensor counts = o.set_counts.select(1, group.set);
       const at::Tensor& goals = o.waypoints;  // each begins with the active one
-      if (takes_sets(members)) {
-        const PolicyNetwork::Linear &hidden = group.encoder.hidden, &out = group.encoder.out;
+      const PolicyNetwork::Linear &hidden = group.encoder.hidden, &out = group.encoder.out;
+      if (takes_sets(members, group.features, hidden.weight, out.weight)) {
         embeddings.push_back(largest_embedding(members, goals, counts, group.features, group.encoder.layer_norm,
                                                hidden.weight, hidden.bias, out.weight, out.bias));
         continue;

@@ -23,6 +23,12 @@ void launch_norm_backward(const ActivationSize& size, const void* x, const void*
 void launch_row_features(const RowSize& size, const float* rows, const float* goals, ActivationType type, void* out,
                          cudaStream_t stream);
 void launch_patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, cudaStream_t stream);
+void launch_largest_embedding(const SetSize& size, const float* members, const float* goals, const int32_t* counts,
+                              const SetParameters<const float>& parameters, void* out, uint8_t* which_out,
+                              cudaStream_t stream);
+void launch_largest_embedding_backward(const SetSize& size, const float* members, const float* goals,
+                                       const SetParameters<const float>& parameters, const uint8_t* which,
+                                       const void* grad_out, const SetParameters<float>& sums_out, cudaStream_t stream);
 
 void launch_token_softmax(const TokenSize& size, const void* scores, void* out, cudaStream_t stream);
 void launch_token_softmax_backward(const TokenSize& size, const void* out, const void* grad_out, void* grad_scores_out,

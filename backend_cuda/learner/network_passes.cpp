@@ -62,6 +62,21 @@ class NetworkPassesCuda final : public NetworkPasses {
     launch(cuda::launch_patches, stream, size, images, type, out);
   }
 
+  void largest_embedding(const SetSize& size, const float* members, const float* goals, const int32_t* counts,
+                         const SetParameters<const float>& parameters, void* out, uint8_t* which_out,
+                         Stream stream) override {
+    check(size);
+    launch(cuda::launch_largest_embedding, stream, size, members, goals, counts, parameters, out, which_out);
+  }
+
+  void largest_embedding_backward(const SetSize& size, const float* members, const float* goals,
+                                  const SetParameters<const float>& parameters, const uint8_t* which,
+                                  const void* grad_out, const SetParameters<float>& sums_out, Stream stream) override {
+    check(size);
+    launch(cuda::launch_largest_embedding_backward, stream, size, members, goals, parameters, which, grad_out,
+           sums_out);
+  }
+
   void token_softmax(const TokenSize& size, const void* scores, void* out, Stream stream) override {
     PICTURA_CHECK(size.columns % 2 == 0, "token_softmax: {} columns", size.columns);
     launch(cuda::launch_token_softmax, stream, size, scores, out);
@@ -74,6 +89,11 @@ class NetworkPassesCuda final : public NetworkPasses {
   }
 
  private:
+  static void check(const SetSize& size) {
+    PICTURA_CHECK(SetSize::takes(SetSize::kChannels, SetSize::kChannels, size.members.width(), size.most),
+                  "largest_embedding: {} members of {} numbers", size.most, size.members.width());
+  }
+
   template <typename Launcher, typename... Arguments>
   void launch(Launcher launcher, Stream stream, const Arguments&... arguments) const {
     const DeviceGuard guard(device_);

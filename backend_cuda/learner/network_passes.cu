@@ -3,6 +3,7 @@
 
 #include <cuda_bf16.h>
 
+#include "pictura/backend_cuda/learner/activation.cuh"
 #include "pictura/backend_cuda/learner/network_kernels.h"
 
 namespace pictura::cuda {
@@ -10,8 +11,6 @@ namespace pictura::cuda {
 namespace {
 
 constexpr int kThreads = 256;
-constexpr int kWarp = 32;
-constexpr float kNormEpsilon = 1e-5f;
 
 __device__ float to_float(float x) { return x; }
 __device__ float to_float(__nv_bfloat16 x) { return __bfloat162float(x); }
@@ -28,12 +27,6 @@ template <typename T, int kSize>
 struct alignas(sizeof(T) * kSize) Vector {
   T values[kSize];
 };
-
-__device__ float gelu(float x) { return 0.5f * x * (1.0f + erff(x * 0.70710678f)); }
-// Phi(x) + x phi(x).
-__device__ float gelu_derivative(float x) {
-  return 0.5f * (1.0f + erff(x * 0.70710678f)) + x * 0.39894228f * __expf(-0.5f * x * x);
-}
 
 template <typename T>
 __global__ void __launch_bounds__(kThreads)

@@ -6,6 +6,7 @@
 #include "pictura/tests/backend_cuda/device_test.h"
 #include "pictura/tests/training/numbers.h"
 #include "pictura/training/layers.h"
+#include "pictura/training/policy.h"
 #include "pictura/training/precision.h"
 #include "pictura/training/row_features.h"
 #include "pictura/training/torch_device.h"
@@ -144,6 +145,78 @@ TEST_P(DeviceLayers, Norm) {
     }
     expect_as_on_the_host(without, plain_without, {numbers({2, 50, channels}, 1), weight, bias}, 1);
   }
+}
+
+TEST_P(DeviceLayers, LargestEmbedding) {
+  const int64_t sets = 300, goal_columns = 9;
+  const RowFeatures all{.points = 1,
+                        .of_segment = true,
+                        .of_goal = true,
+                        .position_unit_m = kScalePosition_m,
+                        .half_length_unit_m = kScaleHalfPiece_m};
+  for (const RowFeatures& features :
+       {RowFeatures{}, RowFeatures{.points = 1, .position_unit_m = kScalePosition_m}, all}) {
+    for (const int64_t most : {1, 10, 80}) {
+      for (const bool has_norm : {false, true}) {
+        const at::Tensor members = numbers({sets, most, 7}, 1).to(at::kFloat),
+                         goals = features.of_goal ? numbers({sets, goal_columns}, 2).to(at::kFloat) : at::Tensor(),
+                         // Empty sets and full ones; what lies beyond a column of counts is not read.
+            counts = at::arange(2 * sets, at::kInt).view({sets, 2}).remainder(most + 1).select(1, 0);
+        const int64_t width = 7 + features.count();
+        const std::vector<at::Tensor> parameters{numbers({64, width}, 1), numbers({64}, 2), 0.3 * numbers({64, 64}, 3),
+                                                 numbers({64}, 4)};
+        const auto on = [](const at::Tensor& t, const at::Tensor& where) {
+          return t.defined() ? t.to(where.device()) : at::Tensor();
+        };
+        const Layer plain = [&](const auto& in) {
+          const bool is_double = in[0].scalar_type() == at::kDouble;
+          const at::ScalarType type = is_double ? at::kDouble : activations();
+          const at::Tensor its_members = on(members, in[0]), its_goals = on(goals, in[0]);
+          const at::Tensor rows =
+              features.count() > 0
+                  ? with_row_features(its_members.to(is_double ? at::kDouble : at::kFloat), features, type,
+                                      its_goals.defined() && is_double ? its_goals.to(at::kDouble) : its_goals)
+                  : its_members.to(type);
+          const at::Tensor before = at::linear(rows, in[0], in[1]);
+          const at::Tensor hidden = gelu(has_norm ? at::layer_norm(before, {64}).to(before.scalar_type()) : before);
+          return masked_max(at::linear(hidden, in[2], in[3]), on(counts, in[0]));
+        };
+        const Layer layer = [&](const auto& in) {
+          if (!in[0].is_cuda()) return plain(in);
+          const at::Tensor its_members = on(members, in[0]), its_counts = on(counts, in[0]);
+          EXPECT_EQ(takes_sets(its_members, features, in[0], in[2]), GetParam() == Precision::bf16);
+          if (GetParam() != Precision::bf16) return plain(in);
+          return largest_embedding(its_members, on(goals, in[0]), its_counts, features, has_norm, in[0], in[1], in[2],
+                                   in[3]);
+        };
+        expect_as_on_the_host(layer, plain, parameters, 0);
+        if (GetParam() != Precision::bf16) continue;
+        // Without a way back: the same bits.
+        const LayerPrecision precision(Precision::bf16, at::kCUDA);
+        std::vector<at::Tensor> on_device;
+        for (const at::Tensor& p : parameters) on_device.push_back(p.to(at::kCUDA, at::kFloat));
+        const at::Tensor value = layer(on_device);
+        for (at::Tensor& p : on_device) p.requires_grad_();
+        EXPECT_TRUE(layer(on_device).equal(value));
+      }
+    }
+  }
+}
+
+TEST_P(DeviceLayers, LargestEmbeddingGivesWayToNoNumberThatIsNone) {
+  if (GetParam() != Precision::bf16) GTEST_SKIP() << "one pass in bf16 alone";
+  const LayerPrecision precision(Precision::bf16, at::kCUDA);
+  const auto options = at::TensorOptions(at::kCUDA).dtype(at::kFloat);
+  at::Tensor members = at::zeros({1, 40, 2}, options);
+  members[0][20][0] = std::numeric_limits<float>::quiet_NaN();
+  const auto largest = [&](int count) {
+    return largest_embedding(members, {}, at::full({1}, count, options.dtype(at::kInt)), {}, /*has_norm=*/false,
+                             at::ones({64, 2}, options), at::zeros({64}, options), at::ones({64, 64}, options),
+                             at::zeros({64}, options))
+        .to(at::kCPU, at::kFloat);
+  };
+  EXPECT_TRUE(largest(40).isnan().all().item<bool>());
+  EXPECT_TRUE(largest(20).eq(0).all().item<bool>());
 }
 
 TEST_P(DeviceLayers, TokenSoftmax) {

@@ -219,7 +219,8 @@ TEST(HostLayers, LargestEmbeddingIsTheMaximumOverTheMembersThatThereAre) {
                                                   .half_length_unit_m = kScaleHalfPiece_m}}) {
     const at::Tensor floats = members.to(at::kFloat),
                      float_goals = features.of_goal ? goals.to(at::kFloat) : at::Tensor();
-    ASSERT_TRUE(takes_sets(floats));
+    const at::Tensor hidden_weight = float_numbers({16, 7 + features.count()}, 1), weight = float_numbers({24, 16}, 3);
+    ASSERT_TRUE(takes_sets(floats, features, hidden_weight, weight));
     for (const bool has_norm : {false, true}) {
       const auto plain = [&](const std::vector<at::Tensor>& in) {
         const at::Tensor rows =
@@ -230,9 +231,7 @@ TEST(HostLayers, LargestEmbeddingIsTheMaximumOverTheMembersThatThereAre) {
       const auto layer = [&](const std::vector<at::Tensor>& in) {
         return largest_embedding(floats, float_goals, counts, features, has_norm, in[0], in[1], in[2], in[3]);
       };
-      expect_as_in_double(layer, plain,
-                          {float_numbers({16, 7 + features.count()}, 1), float_numbers({16}, 2),
-                           float_numbers({24, 16}, 3), float_numbers({24}, 4)});
+      expect_as_in_double(layer, plain, {hidden_weight, float_numbers({16}, 2), weight, float_numbers({24}, 4)});
     }
   }
 }

@@ -102,6 +102,30 @@ PICTURA_HD inline float row_feature(const RowFeatures& features, const float* ro
                         feature == end_of_segment ? kNearPoint_m : kFarPoint_m);
 }
 
+/// Sets of members, each read by a linear layer, GELU, and a second linear layer, both of kChannels outputs. With
+/// has_norm the first layer's outputs are normalized before the GELU.
+struct SetSize {
+  RowSize members;  // of all sets, `most` of each, whether there are as many or not; keeps_rows is set
+  int64_t most = 0;
+  int64_t counts_stride = 1;  // from the number of members of a set to that of the next
+  bool has_norm = false;
+  static constexpr int kChannels = 64, kMostWidth = 32, kMostMembers = 254, kNoMember = 255;
+  PICTURA_HD int64_t sets() const { return members.rows / most; }
+  static constexpr bool takes(int64_t channels, int64_t hidden_channels, int64_t width, int64_t most) {
+    return channels == kChannels && hidden_channels == kChannels && width <= kMostWidth && most >= 1 &&
+           most <= kMostMembers;
+  }
+  /// How many partial sums there are of a gradient.
+  static constexpr int64_t kSums = 264;
+};
+
+/// What belongs to each parameter of a set's layers: hidden_weight [kChannels, members.width()], weight [kChannels,
+/// kChannels], biases [kChannels].
+template <typename Number>
+struct SetParameters {
+  Number *hidden_weight, *hidden_bias, *weight, *bias;
+};
+
 /// Matrices [matrices, tokens, columns] of scores; `columns` is even.
 struct TokenSize {
   ActivationType type = ActivationType::f32;
@@ -155,6 +179,18 @@ class NetworkPasses {
                             Stream stream) = 0;
 
   virtual void patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, Stream stream) = 0;
+
+  /// The largest value of each channel over the members of each set, bf16 [sets, kChannels], 0 for an empty set, and
+  /// which member has it, [sets, kChannels], the first of equal ones, kNoMember in an empty set; null where nobody
+  /// asks. members: f32; goals: as row_features() has them; counts: as size.counts_stride says. Products are in bf16.
+  virtual void largest_embedding(const SetSize& size, const float* members, const float* goals, const int32_t* counts,
+                                 const SetParameters<const float>& parameters, void* out, uint8_t* which_out,
+                                 Stream stream) = 0;
+  /// The gradients of the parameters as partial sums [kSums, ...], from that of `out`, bf16.
+  virtual void largest_embedding_backward(const SetSize& size, const float* members, const float* goals,
+                                          const SetParameters<const float>& parameters, const uint8_t* which,
+                                          const void* grad_out, const SetParameters<float>& sums_out,
+                                          Stream stream) = 0;
 
   /// out = softmax over tokens; and the gradient of scores by way of `out`.
   virtual void token_softmax(const TokenSize& size, const void* scores, void* out, Stream stream) = 0;
