@@ -39,8 +39,6 @@ const Choices<ValueHead> kValueHeads{
     {"linear", ValueHead::linear}, {"symlog", ValueHead::symlog}, {"two_hot", ValueHead::two_hot}};
 const Choices<FilterThreshold> kFilterThresholds{{"maximum", FilterThreshold::maximum},
                                                  {"quantile", FilterThreshold::quantile}};
-const Choices<QueryPooling> kQueryPoolings{{"averaged", QueryPooling::averaged},
-                                           {"concatenated", QueryPooling::concatenated}};
 const Choices<LightCycles> kLightCycles{{name_of(LightCycles::phases), LightCycles::phases},
                                         {name_of(LightCycles::independent), LightCycles::independent}};
 const Choices<LightHeads> kLightHeads{{name_of(LightHeads::as_mapped), LightHeads::as_mapped},
@@ -99,7 +97,6 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.integers("policy.conv_kernels", c.policy.conv_kernels, 1, 31);
   v.integers("policy.conv_strides", c.policy.conv_strides, 1, 16);
   v.integer("policy.num_queries", c.policy.num_queries, 1, 4096);
-  v.choice("policy.query_pooling", c.policy.query_pooling, kQueryPoolings);
   v.integer("policy.attention_heads", c.policy.attention_heads, 1, 64);
   v.integer("policy.attention_mlp", c.policy.attention_mlp, 0, 1 << 16);
   v.integer("policy.embedding_width", c.policy.embedding_width, 1, 1 << 14);

@@ -37,7 +37,6 @@ enum class FilterThreshold { maximum, quantile };
 
 /// What becomes of the queries that a camera's images are asked: their average is its feature, or all of them are, one
 /// after another.
-enum class QueryPooling { averaged, concatenated };
 
 /// Largest side of a policy's patches, and largest line floor, that a configuration may have.
 constexpr int kMaxPatch_px = 16;
@@ -97,7 +96,6 @@ struct Config {
     std::vector<int> conv_kernels{1, 3, 3, 3, 3};
     std::vector<int> conv_strides{1, 1, 2, 1, 1};
     int num_queries = 16;  // learned queries per camera
-    QueryPooling query_pooling = QueryPooling::averaged;
     int attention_heads = 4;
     int attention_mlp = 256;        // hidden width of the block's MLP; 0: none
     int embedding_width = 64;       // of every group

@@ -13,7 +13,6 @@
 #include "pictura/training/network_shape.h"
 #include "pictura/training/patch_spread.h"
 #include "pictura/training/precision.h"
-#include "pictura/training/query_spread.h"
 #include "pictura/training/row_features.h"
 #include "pictura/training/rules/network_passes.h"
 #include "pictura/training/torch_device.h"
@@ -27,9 +26,8 @@ class ParameterMaker {
   ParameterMaker(uint64_t seed, const at::TensorOptions& options, std::vector<NamedTensor>* parameters_out)
       : seed_(seed), options_(options), parameters_(parameters_out) {}
 
-  /// Normal with standard deviation gain / sqrt(fan_in), fan_in being all dimensions but the first: fp32 on the host,
-  /// for the parameter that is added next.
-  at::Tensor draw(at::IntArrayRef shape, double gain) const {
+  /// Normal with standard deviation gain / sqrt(fan_in), fan_in being all dimensions but the first.
+  at::Tensor normal(const std::string& name, at::IntArrayRef shape, double gain) {
     const at::Tensor drawn = at::empty(shape, at::kFloat);
     const double deviation = gain / std::sqrt(static_cast<double>(drawn.numel() / shape[0]));
     float* values = drawn.data_ptr<float>();
@@ -43,10 +41,7 @@ class ParameterMaker {
       const double angle = 2.0 * std::numbers::pi * stream.uniform();
       values[i] = static_cast<float>(deviation * radius * std::cos(angle));
     }
-    return drawn;
-  }
-  at::Tensor normal(const std::string& name, at::IntArrayRef shape, double gain) {
-    return add(name, draw(shape, gain));
+    return add(name, drawn);
   }
   at::Tensor constant(const std::string& name, at::IntArrayRef shape, double value) {
     return add(name, at::full(shape, value, at::kFloat));
@@ -164,7 +159,7 @@ class VectorEncoder final : public SceneEncoder {
 };
 
 /// A convolutional stack or a pretrained program, shared by all cameras; per camera, learned queries that cross-attend
-/// over its feature map and are averaged or concatenated; all cameras concatenated and projected to the width of the
+/// over its feature map and are averaged; all cameras concatenated and projected to the width of the
 /// four sets that they replace.
 class PerspectiveEncoder final : public SceneEncoder {
  public:
@@ -198,9 +193,7 @@ class PerspectiveEncoder final : public SceneEncoder {
       mlp_hidden_ = make->linear("attention.mlp_hidden", width_, config.attention_mlp, std::numbers::sqrt2);
       mlp_out_ = make->linear("attention.mlp_out", config.attention_mlp, width_, 1.0);
     }
-    at::Tensor projection = make->draw({width(), num_cameras * width_}, 1.0);
-    if (concatenates_queries()) projection = spread_over_queries(projection, num_cameras, config.num_queries);
-    project_ = {make->add(kProjection, projection), make->constant("project.bias", {width()}, 0)};
+    project_ = make->linear("project", num_cameras * width_, width(), 1.0);
   }
 
   int64_t width() const override { return 4 * int64_t{config_.embedding_width}; }
@@ -252,8 +245,6 @@ class PerspectiveEncoder final : public SceneEncoder {
     return backbone;
   }
 
-  bool concatenates_queries() const { return config_.query_pooling == QueryPooling::concatenated; }
-
   // Side of the patches that the first convolution takes: policy.patch_px, or more after it was spread.
   int patch_px() const { return patch_side_px(convolutions_[0].weight.size(1)); }
 
@@ -270,7 +261,8 @@ class PerspectiveEncoder final : public SceneEncoder {
     return x;
   }
 
-  // The features of a block's cameras, [cameras, batch, width], or [cameras, batch, queries * width].
+  // The features of a block's cameras, [cameras, batch, width]. The mean over queries comes before the MLP's last
+  // layer, which is linear: a product with one row instead of num_queries.
   at::Tensor pool(const ImageBlock& block) const {
     const int64_t batch = block.pixels.size(0), cameras = block.pixels.size(1);
     const at::Tensor x = backbone_ ? backbone_->forward(block.pixels) : convolve(block.pixels);
@@ -282,10 +274,9 @@ class PerspectiveEncoder final : public SceneEncoder {
     const at::Tensor queries = at::stack(of_cameras);
     at::Tensor pooled = attend(queries, tokens).unflatten(0, {cameras, batch});
     pooled = pooled + queries.unsqueeze(1).to(pooled.scalar_type());
-    if (config_.attention_mlp > 0) {
-      pooled = pooled + apply(mlp_out_, apply_gelu(mlp_hidden_, apply_norm(mlp_norm_, pooled, {})));
-    }
-    return concatenates_queries() ? pooled.flatten(2) : pooled.mean(2);
+    if (config_.attention_mlp == 0) return pooled.mean(2);
+    const at::Tensor hidden = apply_gelu(mlp_hidden_, apply_norm(mlp_norm_, pooled, {}));
+    return pooled.mean(2) + apply(mlp_out_, hidden.mean(2));
   }
 
   // Attention of each camera's queries [cameras, queries, width] over the tokens of its images [cameras * batch,

@@ -10,7 +10,6 @@
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/saved_worlds.h"
 #include "pictura/training/patch_spread.h"
-#include "pictura/training/query_spread.h"
 #include "pictura/training/ranks/agree.h"
 #include "pictura/training/training_maps.h"
 
@@ -181,10 +180,7 @@ void Run::begin_with(const SavedPolicy& other) {
     PICTURA_CHECK(got == expected, "{}: of another architecture: {}: expected {}, got {}", other.path, key, expected,
                   got);
   }
-  const bool concatenates = config.reads_images() && other.config.reads_images() &&
-                            config.policy.query_pooling == QueryPooling::concatenated &&
-                            other.config.policy.query_pooling == QueryPooling::averaged;
-  restore_policy(concatenates ? with_concatenated_queries(other) : other, *policy);
+  restore_policy(other, *policy);
   restore_rate_factors(other);
   if (average) average->restart();
 }

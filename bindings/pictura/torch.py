@@ -99,9 +99,9 @@ class _Attention(nn.Module):
     sums of tokens (docs/network.md): neither keys nor values are computed for each token.
     """
 
-    def __init__(self, cameras: int, queries: int, width: int, heads: int, mlp: int, concatenates: bool) -> None:
+    def __init__(self, cameras: int, queries: int, width: int, heads: int, mlp: int) -> None:
         super().__init__()
-        self.heads, self.concatenates = heads, concatenates
+        self.heads = heads
         self.position = nn.Linear(8, width)
         self.token_norm, self.query_norm = nn.LayerNorm(width), nn.LayerNorm(width)
         self.queries = nn.Parameter(torch.randn(cameras, queries, width))
@@ -111,8 +111,7 @@ class _Attention(nn.Module):
             self.mlp_norm, self.mlp_hidden, self.mlp_out = nn.LayerNorm(width), nn.Linear(width, mlp), nn.Linear(mlp, width)
 
     def forward(self, maps: Tensor, first: int) -> Tensor:
-        """maps [cameras, batch, width, rows, columns] of cameras from number `first` on; returns [cameras, batch, width],
-        or [cameras, batch, queries x width] where queries are concatenated."""
+        """maps [cameras, batch, width, rows, columns] of cameras from number `first` on; returns [cameras, batch, width]."""
         cameras, rows, columns = maps.shape[0], *maps.shape[-2:]
         y = (torch.arange(rows, device=maps.device) + 0.5) * (math.pi / rows)
         x = (torch.arange(columns, device=maps.device) + 0.5) * (math.pi / columns)
@@ -128,9 +127,9 @@ class _Attention(nn.Module):
         scores = (tokens.flatten(1, 2) @ asked.transpose(1, 2)).unflatten(1, tokens.shape[1:3])
         sums = (scores.softmax(2).transpose(2, 3) @ tokens).unflatten(2, (-1, self.heads)).flatten(3)
         z = queries.unsqueeze(1) + functional.linear(sums, (out @ value).transpose(0, 1).flatten(1), self.out(self.value.bias))
-        if hasattr(self, "mlp_norm"):
-            z = z + self.mlp_out(functional.gelu(self.mlp_hidden(self.mlp_norm(z))))
-        return z.flatten(2) if self.concatenates else z.mean(2)
+        if not hasattr(self, "mlp_norm"):
+            return z.mean(2)
+        return z.mean(2) + self.mlp_out(functional.gelu(self.mlp_hidden(self.mlp_norm(z))).mean(2))
 
 
 class Policy(nn.Module):
@@ -161,12 +160,10 @@ class Policy(nn.Module):
                 nn.Conv2d(i, o, kernel, stride, kernel // 2)
                 for i, o, kernel, stride in zip(channels, channels[1:], config["conv_kernels"], self.strides)
             )
-            concatenates = config.get("query_pooling", "averaged") == "concatenated"
-            queries = config["num_queries"]
             self.attention = _Attention(
-                num_cameras, queries, channels[-1], config["attention_heads"], config["attention_mlp"], concatenates
+                num_cameras, config["num_queries"], channels[-1], config["attention_heads"], config["attention_mlp"]
             )
-            self.project = nn.Linear(num_cameras * (queries if concatenates else 1) * channels[-1], 4 * width)
+            self.project = nn.Linear(num_cameras * channels[-1], 4 * width)
             around, ego = 4 * width, 7
         elif self.modality == "vector":
             self.sets = [name for name in _SETS if name != "walls" or walls]

@@ -18,7 +18,7 @@ from pictura.torch import _read_safetensors, load_policy, save_policy  # noqa: E
 
 MODELS = sorted((pathlib.Path(__file__).parents[2] / "models").glob("*.safetensors"))
 NAMES = (
-    "vector", "vector_points", "perspective", "perspective_points", "patches", "symlog", "two_hot", "concatenated", "normalized", "segments",
+    "vector", "vector_points", "perspective", "perspective_points", "patches", "symlog", "two_hot", "normalized", "segments",
     "goals",
 )  # fmt: skip
 

@@ -92,7 +92,6 @@ INSTANTIATE_TEST_SUITE_P(
         std::vector<std::string>{"policy.modality=vector", "policy.layer_norm=true", "policy.residual=true",
                                  "policy.critic_layers=3"},
         std::vector<std::string>{"policy.modality=perspective"},
-        std::vector<std::string>{"policy.modality=perspective", "policy.query_pooling=concatenated"},
         std::vector<std::string>{"policy.modality=perspective", "policy.patch_px=1",
                                  "policy.conv_kernels=[5, 3, 3, 3, 3]", "policy.conv_strides=[2, 2, 2, 1, 1]"}));
 

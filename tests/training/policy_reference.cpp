@@ -99,8 +99,6 @@ int main(int argc, char** argv) try {
   config.policy.attention_mlp = 0;
   config.policy.num_queries = 3;
   pictura::write_reference(argv[1], "patches", config);
-  config.policy.query_pooling = pictura::QueryPooling::concatenated;
-  pictura::write_reference(argv[1], "concatenated", config);
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "error: %s\n", error.what());

@@ -11,7 +11,6 @@
 #include "pictura/tests/training/numbers.h"
 #include "pictura/tests/training/small_policy.h"
 #include "pictura/training/layers.h"
-#include "pictura/training/query_spread.h"
 #include "pictura/training/saved_policy.h"
 
 namespace pictura {
@@ -207,49 +206,6 @@ TEST(Policy, ResidualsPassOverLayersOfTheTrunk) {
   const Policy::Output expected = shallow.forward(seen), got = deep.forward(seen);
   EXPECT_TRUE(got.logits.equal(expected.logits));
   EXPECT_TRUE(got.value.equal(expected.value));
-}
-
-TEST(Policy, GradientsOfConcatenatedQueriesEqualDifferenceQuotients) {
-  Config::PolicySection section = tiny_section(Modality::perspective);
-  section.query_pooling = QueryPooling::concatenated;
-  expect_gradients(PolicyNetwork(section, 3, 5, at::kDouble), observation(Modality::perspective, 2));
-}
-
-// Fresh ones, and those that another policy's weights make.
-TEST(Policy, ConcatenatedQueriesComputeWhatTheirAverageDoes) {
-  const Observation seen = observation(Modality::perspective, 4).map([](const at::Tensor& t) {
-    return t.is_floating_point() ? t.to(at::kFloat) : t;
-  });
-  Config config;
-  config.policy = tiny_section(Modality::perspective);
-  config.policy.num_queries = 5;
-  const PolicyNetwork average(config.policy, 3, 5);
-  config.policy.query_pooling = QueryPooling::concatenated;
-  const PolicyNetwork all(config.policy, 3, 5);
-  const at::NoGradGuard no_grad;
-  const auto expect_equal_outputs = [&] {
-    const Policy::Output expected = average.forward(seen), got = all.forward(seen);
-    EXPECT_GT(expected.value.std().item<double>(), 1e-2);
-    EXPECT_LT((got.value - expected.value).abs().max().item<double>(), 1e-5);
-    EXPECT_LT((got.logits - expected.logits).abs().max().item<double>(), 1e-5);
-  };
-  for (const PolicyNetwork* policy : {&average, &all}) scale_logits(*policy, 100);
-  expect_equal_outputs();
-
-  SavedPolicy saved;
-  saved.config.policy = tiny_section(Modality::perspective);
-  saved.config.policy.num_queries = 5;
-  saved.rig.cameras.resize(3);
-  for (const NamedTensor& parameter : average.parameters()) {
-    at::Tensor value = parameter.value;
-    value.add_(0.2 * numbers(value.sizes(), 11).to(at::kFloat));
-    saved.parameters.push_back({parameter.name, value.detach()});
-  }
-  restore_policy(with_concatenated_queries(saved), all);
-  EXPECT_TRUE(all.parameters()[0].value.equal(average.parameters()[0].value));
-  expect_equal_outputs();
-  std::erase_if(saved.parameters, [](const NamedTensor& parameter) { return parameter.name == kProjection; });
-  EXPECT_THROW(with_concatenated_queries(saved), Error);
 }
 
 TEST_P(BothModalities, HasThePapersShapes) {

@@ -25,7 +25,6 @@
 #include "pictura/training/evaluation/evaluate.h"
 #include "pictura/training/layers.h"
 #include "pictura/training/observation.h"
-#include "pictura/training/query_spread.h"
 #include "pictura/training/run.h"
 #include "pictura/training/run_folder.h"
 #include "pictura/training/session.h"
@@ -629,22 +628,6 @@ TEST_F(Training, BeginsWithTheWeightsOfAnotherRunAtAnyImageSize) {
     EXPECT_THAT(message_of([&] { train(reads_more); }),
                 AllOf(HasSubstr(first), HasSubstr(key + ": expected true, got false")));
   }
-}
-
-TEST_F(Training, BeginsWithConcatenatedQueriesAsTheirAverageEnded) {
-  const std::string first = train(options("first", {"train.updates=1"})).checkpoint;
-  TrainOptions o = options("second", {"train.updates=1", "policy.query_pooling=concatenated"});
-  o.init_from = first;
-  train(o);
-  const SavedPolicy expected = with_concatenated_queries(read_policy(first)),
-                    begun = read_policy(o.out_folder + "/untrained.ckpt");
-  ASSERT_EQ(begun.parameters.size(), expected.parameters.size());
-  for (size_t i = 0; i < expected.parameters.size(); ++i) {
-    EXPECT_TRUE(begun.parameters[i].value.equal(expected.parameters[i].value)) << expected.parameters[i].name;
-  }
-  TrainOptions back = options("back", {"train.updates=1"});
-  back.init_from = o.out_folder + "/checkpoint.ckpt";
-  EXPECT_THAT(message_of([&] { train(back); }), HasSubstr("parameter 'project.weight'"));
 }
 
 TEST_F(Training, ANormalizedPolicyWithACriticOfItsOwnGoesOnExactly) {
