@@ -25,17 +25,28 @@ Text text_of(MendKind kind) {
     case MendKind::lane_gap: return {"lane ids with gaps", "filled by lanes without surface"};
     case MendKind::center_id: return {"center lanes with another id than 0", "counted as 0"};
     case MendKind::short_road: return {"roads of no length", "they are 1 mm long"};
+    case MendKind::short_section: return {"lane sections of no length", "left out; links lead through them"};
     case MendKind::empty_geometry: return {"geometries of no length", "left out"};
+    case MendKind::parameter_range:
+      return {"parameter ranges that do not fit the length", "the range that fits counts"};
     case MendKind::line_length: return {"curves of another length than stated", "the curve's own length counts"};
     case MendKind::geometry_station:
       return {"geometries that do not begin where the one before ends", "the one before is cut or extended"};
+    case MendKind::moved_geometry: return {"geometries far from where the one before ends along s", "moved along s"};
+    case MendKind::geometry_jump:
+      return {"jumps of the reference line", "spread over ten metres, or ten times their size"};
     case MendKind::geometry_gap: return {"gaps between geometries", "bridged by a straight line"};
+    case MendKind::strip_surface: return {"cross-sections of strips", "flattened"};
+    case MendKind::missing_lane_type:
+      return {"lanes without a type", "counted as none in the center, as special lanes elsewhere"};
     case MendKind::unknown_lane_type: return {"unknown lane types", "counted as special lanes"};
     case MendKind::unknown_direction: return {"unknown lane directions", "counted as standard"};
+    case MendKind::unknown_flag: return {"flags that are neither true nor false", "counted as false"};
     case MendKind::unknown_mark: return {"unknown types of road marks", "painted by their lines; without lines, not"};
     case MendKind::unknown_color: return {"unknown colors of road marks", "painted white"};
     case MendKind::unknown_lane_change: return {"unknown lane-change rules of road marks", "counted as both"};
     case MendKind::unknown_orientation: return {"unknown orientations of signals", "they face both ways"};
+    case MendKind::negative_size: return {"sizes below zero", "the default size counts"};
     case MendKind::endless_dash: return {"dashes of no length", "painted without gaps"};
     case MendKind::empty_line: return {"single mark lines of no length", "left out"};
     case MendKind::self_crossing_mark: return {"road marks that run back on themselves", "that part is left out"};
@@ -53,6 +64,11 @@ Text text_of(MendKind kind) {
     case MendKind::one_sided_link: return {"links of roads that are not returned", "made mutual"};
     case MendKind::unreturned_link: return {"links of roads that are returned elsewhere", "kept, since the ends touch"};
     case MendKind::contrary_link: return {"links of roads that do not touch and are returned elsewhere", "left out"};
+    case MendKind::dangling_link:
+      return {"links of lanes at an end of their road that is linked to nothing", "left out"};
+    case MendKind::unlike_link: return {"links of lanes of unlike types", "left out"};
+    case MendKind::opposed_link: return {"links of lanes of opposite traffic", "left out"};
+    case MendKind::distant_link: return {"links of lanes that do not touch", "left out"};
     case MendKind::missing_junction: return {"references to junctions that do not exist", "left out"};
     case MendKind::unconnected_road: return {"connections of roads that do not meet the junction", "left out"};
     case MendKind::repeated_signal: return {"signal ids used twice", "all stand; references mean the first"};

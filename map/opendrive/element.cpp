@@ -2,6 +2,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <limits>
 
 namespace pictura::opendrive {
 
@@ -33,8 +34,10 @@ std::string Element::text(const char* attribute) const {
 }
 
 std::string Element::text(const char* attribute, const char* fallback) const {
-  return node_.attribute(attribute).as_string(fallback);
+  return has(attribute) ? node_.attribute(attribute).value() : fallback;
 }
+
+bool Element::has(const char* attribute) const { return !trim(node_.attribute(attribute).value()).empty(); }
 
 std::optional<double> Element::finite_number(const char* attribute) const {
   std::string_view digits = trim(node_.attribute(attribute).value());
@@ -59,6 +62,13 @@ double Element::number_in(const char* attribute, double low, double high) const 
   return value;
 }
 
+double Element::size(const char* attribute, double high) const {
+  const double value = number_in(attribute, std::numeric_limits<double>::lowest(), high, 0);
+  if (value >= 0) return value;
+  mend(MendKind::negative_size, "attribute {}: expected a number in [0, {}], got {}", attribute, high, value);
+  return 0;
+}
+
 bool Element::has_or_zero(const char* attribute) const {
   if (has(attribute)) return true;
   mend(MendKind::missing_zero, "attribute {} is missing", attribute);
@@ -74,8 +84,10 @@ double Element::number_or_zero_in(const char* attribute, double low, double high
 bool Element::flag(const char* attribute) const {
   const std::string value = text(attribute, "false");
   if (value == "true" || value == "1") return true;
-  if (value == "false" || value == "0") return false;
-  fail("attribute {}: expected true or false, got '{}'", attribute, value);
+  if (value != "false" && value != "0") {
+    mend(MendKind::unknown_flag, "attribute {}: expected true or false, got '{}'", attribute, value);
+  }
+  return false;
 }
 
 int Element::integer(const char* attribute) const {

@@ -50,7 +50,8 @@ class Element {
   std::string_view name() const { return node_.name(); }
   Element with_owner(const std::string* owner) const { return {node_, source_, faults_, owner}; }
 
-  bool has(const char* attribute) const { return static_cast<bool>(node_.attribute(attribute)); }
+  /// Whether the attribute is there and has a value: some writers leave those empty that they do not set.
+  bool has(const char* attribute) const;
   std::string text(const char* attribute) const;
   std::string text(const char* attribute, const char* fallback) const;
   /// A finite number.
@@ -65,8 +66,12 @@ class Element {
   /// The same, where a missing attribute is mended: it counts as 0.
   double number_or_zero(const char* attribute) const;
   double number_or_zero_in(const char* attribute, double low, double high) const;
+  /// A size in [0, high]; 0, for which the default counts, where it is missing. Mended: one below zero counts as
+  /// missing, since some writers set -1.
+  double size(const char* attribute, double high) const;
   int integer(const char* attribute) const;
-  bool flag(const char* attribute) const;  // false if absent
+  /// False where it is missing. Mended: what is neither true nor false counts as false.
+  bool flag(const char* attribute) const;
 
   /// The text between the element's tags.
   std::string content() const { return node_.text().as_string(); }

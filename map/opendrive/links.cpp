@@ -74,10 +74,15 @@ class Linker {
     LaneEnd target{road, next, target_id, at_end ? ContactPoint::start : ContactPoint::end};
     if (next < 0 || next >= static_cast<int>(file_road.sections.size())) {
       const RoadLink& link = at_end ? file_road.successor : file_road.predecessor;
-      if (link.kind != RoadLink::Kind::road) return;
+      if (link.kind == RoadLink::Kind::none && !link.where.source && is_drivable(lane.type)) {
+        lane.where.mend(build_.faults, MendKind::dangling_link,
+                        "is linked to lane {} beyond the {} of its road, which is linked to nothing there", target_id,
+                        at_end ? "end" : "start");
+      }
+      if (link.kind != RoadLink::Kind::road) return;  // connections link the lanes of a junction
       target = end_of_road(road_named(link.id), link.contact, target_id);
     }
-    if (exists(target, lane.where)) add({road, section, lane.id, end}, target);
+    if (exists(target, lane.where)) add({road, section, lane.id, end}, target, lane.where);
   }
 
   void link_connection(const Connection& connection) {
@@ -85,28 +90,44 @@ class Linker {
     for (const LaneLink& link : connection.lane_links) {
       const LaneEnd from = end_of_road(incoming, connection.incoming_end, link.from);
       const LaneEnd to = end_of_road(connecting, connection.contact, link.to);
-      if (exists(from, link.where) && exists(to, link.where)) add(from, to);
+      if (exists(from, link.where) && exists(to, link.where)) add(from, to, link.where);
     }
   }
 
-  /// Links two lanes that meet, in the order in which traffic passes them.
-  void add(const LaneEnd& a, const LaneEnd& b) {
+  /// Links two lanes that meet, in the order in which traffic passes them. Links that traffic cannot follow are mended:
+  /// they are left out. Those of sidewalks and the like go without a word.
+  void add(const LaneEnd& a, const LaneEnd& b, const SourceLocation& where) {
     const int32_t lane_a = lane_at(a), lane_b = lane_at(b);
     if (lane_a < 0 || lane_b < 0) return;
     const LaneType type_a = build_.map->lanes[static_cast<std::size_t>(lane_a)].type;
     const LaneType type_b = build_.map->lanes[static_cast<std::size_t>(lane_b)].type;
-    if (type_a != type_b && !(is_drivable(type_a) && is_drivable(type_b))) return;
-    if (is_exit(a) && !is_exit(b)) add_in_order(lane_a, lane_b);
-    if (is_exit(b) && !is_exit(a)) add_in_order(lane_b, lane_a);
+    const auto leave_out = [&](MendKind kind, const std::string& reason) {
+      if (!is_drivable(type_a) && !is_drivable(type_b)) return;
+      if (!left_out_.emplace(std::minmax(lane_a, lane_b)).second) return;
+      where.mend(build_.faults, kind, "links lane {} of road {} with lane {} of road {}, {}", a.id, road_of(a.road).id,
+                 b.id, road_of(b.road).id, reason);
+    };
+    if (type_a != type_b && !(is_drivable(type_a) && is_drivable(type_b))) {
+      return leave_out(MendKind::unlike_link, fmt::format("which are {} and {}", to_string(type_a), to_string(type_b)));
+    }
+    if (is_exit(a) == is_exit(b)) return leave_out(MendKind::opposed_link, "whose traffic meets head on there");
+    const auto [from, to] = is_exit(a) ? std::pair(lane_a, lane_b) : std::pair(lane_b, lane_a);
+    const float gap_m = length(end_of(from) - begin_of(to));
+    if (!(gap_m <= kMaxLinkGap_m)) {
+      return leave_out(MendKind::distant_link, fmt::format("which are {:.2f} m apart there", gap_m));
+    }
+    links_.emplace(from, to);
   }
 
-  void add_in_order(int32_t from, int32_t to) {
+  Vec3 begin_of(int32_t lane) const {
     const RoadMap& map = *build_.map;
-    const Vec3 end =
-        map.lane_points[static_cast<std::size_t>(map.lanes[static_cast<std::size_t>(from)].points.end) - 1].position_m;
-    const Vec3 begin =
-        map.lane_points[static_cast<std::size_t>(map.lanes[static_cast<std::size_t>(to)].points.begin)].position_m;
-    if (length(end - begin) <= kMaxLinkGap_m) links_.emplace(from, to);
+    return map.points_of(map.lanes[static_cast<std::size_t>(lane)])[0].position_m;
+  }
+
+  Vec3 end_of(int32_t lane) const {
+    const RoadMap& map = *build_.map;
+    return map.lane_points[static_cast<std::size_t>(map.lanes[static_cast<std::size_t>(lane)].points.end) - 1]
+        .position_m;
   }
 
   int32_t lane_at(const LaneEnd& end) const {
@@ -135,7 +156,7 @@ class Linker {
   }
 
   Build& build_;
-  std::set<std::pair<int32_t, int32_t>> links_;
+  std::set<std::pair<int32_t, int32_t>> links_, left_out_;
 };
 
 }  // namespace

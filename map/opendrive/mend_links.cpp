@@ -27,6 +27,12 @@ RoadLink* link_at(FileRoad* road, ContactPoint end) {
   return end == ContactPoint::start ? &road->predecessor : &road->successor;
 }
 
+/// Its location remains, by which lanes know that their road's link was there.
+void leave_out(RoadLink* link) {
+  link->kind = RoadLink::Kind::none;
+  link->id.clear();
+}
+
 /// Where the lanes of a road begin or end: its reference line, moved by the lane offset.
 Eigen::Vector3d position_of(const FileRoad& road, ContactPoint end) {
   const FileSection& section = end == ContactPoint::start ? road.sections.front() : road.sections.back();
@@ -76,13 +82,13 @@ class LinkMender {
     RoadLink* const link = link_at(road, end);
     if (link->kind == RoadLink::Kind::junction && !network_.junction_index.contains(link->id)) {
       link->where.mend(faults_, MendKind::missing_junction, "refers to junction {}, which does not exist", link->id);
-      *link = {};
+      leave_out(link);
     }
     if (link->kind != RoadLink::Kind::road) return;
     const FileRoad* const target = road_named(link->id);
     if (!target) {
       link->where.mend(faults_, MendKind::missing_road, "refers to road {}, which does not exist", link->id);
-      *link = {};
+      leave_out(link);
       return;
     }
     if (!link->has_contact) {
@@ -109,7 +115,7 @@ class LinkMender {
       link->where.mend(faults_, MendKind::contrary_link,
                        "its {} is linked to the road's own {}, which is not linked back", name_of(end),
                        name_of(link->contact));
-      *link = {};
+      leave_out(link);
       return;
     }
     if (back->kind == RoadLink::Kind::none) {
@@ -123,7 +129,7 @@ class LinkMender {
     link->where.mend(faults_, touches ? MendKind::unreturned_link : MendKind::contrary_link,
                      "the {} of road {} is linked to the {} of road {} instead of the {} of this one",
                      name_of(link->contact), link->id, name_of(back->contact), back->id, name_of(end));
-    if (!touches) *link = {};
+    if (!touches) leave_out(link);
   }
 
   /// Finds both ends of a connection: by the connecting road's link, else by the incoming road's link to the junction,

@@ -137,6 +137,7 @@ struct FileSection {
   double s = 0, end = 0;
   FileLane center;
   std::vector<FileLane> left, right;  // outwards: ids 1, 2, ... and -1, -2, ...
+  SourceLocation where;
 
   const FileLane* lane(int id) const;
 };
@@ -149,7 +150,7 @@ struct RoadLink {
   std::string id;
   ContactPoint contact = ContactPoint::start;
   bool has_contact = true;  // false: the file does not say; mend_links() finds it
-  SourceLocation where;
+  SourceLocation where;     // also of a link that was left out
 };
 
 /// The traffic to which a signal applies: along s ("+"), against it ("-"), or either.

@@ -6,6 +6,7 @@
 
 #include "pictura/map/opendrive/curves.h"
 #include "pictura/map/opendrive/read_parts.h"
+#include "pictura/map/opendrive/spread_jumps.h"
 
 namespace pictura::opendrive {
 
@@ -15,18 +16,27 @@ constexpr double kMaxCoordinate_m = 1e8, kMaxHeading_rad = 1e3;
 constexpr double kMaxTurn_rad = 100.0;    // of one geometry: 16 turns, enough for a helix
 constexpr double kMaxGap_m = 0.1;         // between two geometries of a reference line, and of its length
 constexpr double kMaxLengthError = 0.01;  // relative error of a <paramPoly3>'s length, in addition to kMaxGap_m
-// Larger errors up to these are mended; what is further off has no one meaning.
-constexpr double kMaxMended_m = 0.5, kMaxMendedShare = 0.01;
+constexpr double kMaxJump_m = 5.0;        // larger gaps have no one meaning
+constexpr std::size_t kMaxJumps = 1000;   // of a road: bounds the time to spread them
+// A length that is off by at most this much, or by this share, is cut or extended to fit.
+constexpr double kMaxCut_m = 0.5, kMaxCutShare = 0.01;
 
-/// Whether a length that is off by this much is mended.
-bool can_mend(double error_m, double length_m) {
-  return std::abs(error_m) <= std::max(kMaxMended_m, kMaxMendedShare * length_m);
+bool can_cut(double error_m, double length_m) {
+  return std::abs(error_m) <= std::max(kMaxCut_m, kMaxCutShare * length_m);
 }
+
+/// A <geometry> and what was read from it.
+struct Geometry {
+  double s = 0;  // as the file states it
+  Element element;
+  GeometryPiece piece;
+};
 
 std::array<double, 4> coefficients(const Element& element, const char* suffix) {
   std::array<double, 4> result{};
   for (std::size_t i = 0; i < 4; ++i) {
-    result[i] = element.number_in(fmt::format("{}{}", "abcd"[i], suffix).c_str(), -kMaxCoordinate_m, kMaxCoordinate_m);
+    result[i] =
+        element.number_or_zero_in(fmt::format("{}{}", "abcd"[i], suffix).c_str(), -kMaxCoordinate_m, kMaxCoordinate_m);
   }
   return result;
 }
@@ -49,14 +59,23 @@ PlaneCubic read_param_poly3(const Element& element, double length) {
   if (range != "normalized" && range != "arcLength") {
     element.fail("attribute pRange: expected normalized or arcLength, got '{}'", range);
   }
-  cubic.p_end = range == "arcLength" ? length : 1.0;
-  measure(&cubic);
-  const double curve_m = cubic.arc_length.back();
-  if (!(std::abs(curve_m - length) <= kMaxGap_m + kMaxLengthError * length)) {
-    constexpr const char* kMessage = "its curve is {:.3f} m long; expected the geometry's length, {} m";
-    if (!can_mend(curve_m - length, length)) element.fail(kMessage, curve_m, length);
-    element.mend(MendKind::line_length, kMessage, curve_m, length);
+  const auto measure_to = [&](double p_end) {
+    cubic.p_end = p_end;
+    measure(&cubic);
+    return cubic.arc_length.back();
+  };
+  const auto fits = [&](double curve_m) { return std::abs(curve_m - length) <= kMaxGap_m + kMaxLengthError * length; };
+  const double stated = range == "arcLength" ? length : 1.0, other = range == "arcLength" ? 1.0 : length;
+  const double curve_m = measure_to(stated);
+  if (fits(curve_m)) return cubic;
+  constexpr const char* kMessage = "its curve is {:.3f} m long; expected the geometry's length, {} m";
+  if (fits(measure_to(other))) {
+    element.mend(MendKind::parameter_range, kMessage, curve_m, length);
+    return cubic;
   }
+  if (!(curve_m >= kMinRoadLength_m && curve_m <= kMaxRoadLength_m)) element.fail(kMessage, curve_m, length);
+  element.mend(MendKind::line_length, kMessage, curve_m, length);
+  measure_to(stated);
   return cubic;
 }
 
@@ -90,47 +109,81 @@ GeometryPiece read_geometry(const Element& element) {
   return piece;
 }
 
-/// Checks that a geometry begins at the s and position where the one before it ends.
-void check_joint(const Element& element, const GeometryPiece& piece, GeometryPiece* before) {
-  const double error_m = piece.s - (before->s + before->length);
-  if (std::abs(error_m) > kStationTolerance_m) {
-    constexpr const char* kMessage = "attribute s: expected {}, where the one before it ends, got {}";
-    const double expected = before->s + before->length;
-    if (!can_mend(error_m, before->length) || !(piece.s > before->s)) element.fail(kMessage, expected, piece.s);
-    element.mend(MendKind::geometry_station, kMessage, expected, piece.s);
-    before->length = piece.s - before->s;
-    measure(before);
-  }
-  const Eigen::Vector2d end = pose_on(*before, before->length).position_m;
-  const double gap_m = std::hypot(piece.x - end.x(), piece.y - end.y());
-  if (gap_m > kMaxGap_m) {
-    constexpr const char* kMessage =
-        "begins {:.3f} m from the end of the one before it, at ({}, {}); expected at most {} m";
-    if (!(gap_m <= kMaxMended_m)) element.fail(kMessage, gap_m, end.x(), end.y(), kMaxGap_m);
-    element.mend(MendKind::geometry_gap, kMessage, gap_m, end.x(), end.y(), kMaxGap_m);
-  }
+double distance_m(const GeometryPiece& before, const GeometryPiece& piece) {
+  return (Eigen::Vector2d{piece.x, piece.y} - pose_on(before, before.length).position_m).norm();
 }
 
-/// Checks that the geometries join, and that together they are as long as the road.
-void check_geometry(const std::vector<Element>& elements, FileRoad* road) {
-  GeometryPiece& first = road->geometry.front();
-  if (first.s > kStationTolerance_m) {
-    constexpr const char* kMessage = "attribute s: expected 0 for the first one, got {}";
-    if (!can_mend(first.s, first.length)) elements[0].fail(kMessage, first.s);
-    elements[0].mend(MendKind::geometry_station, kMessage, first.s);
-    first.s = 0;
+/// Makes a geometry begin at the s where the one before it ends: the one before is cut or extended by a little, or, by
+/// more, where its end is then no further away. Otherwise the geometry is moved along s: returns by how much.
+double join_stations(const Geometry& geometry, GeometryPiece* before, GeometryPiece* piece) {
+  const double end = before->s + before->length, error = piece->s - end;
+  if (std::abs(error) <= kStationTolerance_m) return 0;
+  constexpr const char* kMessage = "attribute s: expected {}, where the one before it ends, got {}";
+  if (piece->s > before->s) {
+    GeometryPiece cut = *before;
+    cut.length = piece->s - before->s;
+    measure(&cut);
+    if (can_cut(error, before->length) ||
+        distance_m(cut, *piece) <= distance_m(*before, *piece) + kStationTolerance_m) {
+      geometry.element.mend(MendKind::geometry_station, kMessage, end, piece->s);
+      *before = std::move(cut);
+      return 0;
+    }
   }
-  for (std::size_t i = 1; i < elements.size(); ++i) {
-    check_joint(elements[i], road->geometry[i], &road->geometry[i - 1]);
+  geometry.element.mend(MendKind::moved_geometry, kMessage, end, piece->s);
+  piece->s = end;
+  return -error;
+}
+
+/// Where a geometry does not begin where the one before it ends.
+std::optional<Jump> jump_between(const Geometry& geometry, std::size_t index, const FileRoad& road) {
+  const GeometryPiece& before = road.geometry[index - 1];
+  const double gap_m = distance_m(before, road.geometry[index]);
+  if (gap_m <= kMaxGap_m) return std::nullopt;
+  const Eigen::Vector2d end = pose_on(before, before.length).position_m;
+  constexpr const char* kMessage =
+      "begins {:.3f} m from the end of the one before it, at ({}, {}); expected at most {} m";
+  const bool can_spread = can_spread_jump(gap_m, road.length);
+  if (!(gap_m <= (can_spread ? kMaxJump_m : kMaxCut_m))) {
+    geometry.element.fail(kMessage, gap_m, end.x(), end.y(), kMaxGap_m);
+  }
+  geometry.element.mend(can_spread ? MendKind::geometry_jump : MendKind::geometry_gap, kMessage, gap_m, end.x(),
+                        end.y(), kMaxGap_m);
+  if (!can_spread) return std::nullopt;
+  return Jump{.piece = index, .shift_m = Eigen::Vector2d{road.geometry[index].x, road.geometry[index].y} - end};
+}
+
+/// Joins the geometries: together they are the road, whatever length it states.
+void join_geometry(const std::vector<Geometry>& geometries, FileRoad* road) {
+  double moved = 0;  // stations by the geometries before
+  for (const Geometry& geometry : geometries) {
+    GeometryPiece piece = geometry.piece;
+    piece.s += moved;
+    if (!road->geometry.empty()) {
+      moved += join_stations(geometry, &road->geometry.back(), &piece);
+    } else if (piece.s > kStationTolerance_m) {
+      const bool is_near = can_cut(piece.s, piece.length);
+      geometry.element.mend(is_near ? MendKind::geometry_station : MendKind::moved_geometry,
+                            "attribute s: expected 0 for the first one, got {}", piece.s);
+      if (!is_near) moved = -piece.s;
+      piece.s = 0;
+    }
+    road->geometry.push_back(std::move(piece));
   }
   const GeometryPiece& last = road->geometry.back();
   const double end = last.s + last.length;
   if (std::abs(end - road->length) > kMaxGap_m) {
     constexpr const char* kMessage = "the reference line ends at {}; expected the road's length, {}";
-    if (!can_mend(end - road->length, road->length)) elements.back().fail(kMessage, end, road->length);
-    elements.back().mend(MendKind::line_length, kMessage, end, road->length);
+    if (!(end <= kMaxRoadLength_m)) geometries.back().element.fail(kMessage, end, road->length);
+    geometries.back().element.mend(MendKind::line_length, kMessage, end, road->length);
     road->length = end;
   }
+  std::vector<Jump> jumps;
+  for (std::size_t i = 1; i < geometries.size(); ++i) {
+    if (const std::optional<Jump> jump = jump_between(geometries[i], i, *road)) jumps.push_back(*jump);
+    if (jumps.size() > kMaxJumps) geometries[i].element.fail("expected at most {} gaps in a road", kMaxJumps);
+  }
+  if (!jumps.empty()) spread_jumps(jumps, road);
 }
 
 /// A straight road from where the first geometry begins.
@@ -183,7 +236,8 @@ std::vector<CrossSection> read_shape(const Element& lateral, double road_length)
 void read_banking(const Element& lateral, FileRoad* road) {
   if (!lateral) return;
   if (const Element strips = lateral.child("crossSectionSurface")) {
-    strips.fail("cross-sections as strips are not supported; expected <superelevation> or <shape>");
+    strips.mend(MendKind::strip_surface,
+                "cross-sections as strips are not supported; expected <superelevation> or <shape>");
   }
   road->superelevation = read_profile(lateral, "superelevation", "s", road->length);
   lateral.each("crossfall", [&](const Element& element) {
@@ -207,28 +261,34 @@ void read_banking(const Element& lateral, FileRoad* road) {
 
 }  // namespace
 
-void read_reference_line(const Element& road_element, FileRoad* road) {
+double read_reference_line(const Element& road_element, FileRoad* road) {
   const Element plan_view = road_element.required_child("planView");
-  if (road->length < kMinRoadLength_m) {
-    road_element.mend(MendKind::short_road, "attribute length: expected at least {}, got {}", kMinRoadLength_m,
-                      road->length);
+  const double stated = road->length;
+  double drawn = 0;
+  plan_view.each("geometry",
+                 [&](const Element& element) { drawn += element.number_in("length", 0, kMaxRoadLength_m); });
+  const bool is_short = drawn < kMinRoadLength_m;
+  if (is_short) {
+    road_element.mend(MendKind::short_road, "attribute length: expected at least {} with <geometry>, got {}",
+                      kMinRoadLength_m, drawn);
     road->length = kMinRoadLength_m;
     road->geometry.push_back(straight_piece(plan_view, road->length));
   } else {
-    std::vector<Element> elements;
+    std::vector<Geometry> geometries;
     plan_view.each("geometry", [&](const Element& element) {
       GeometryPiece piece = read_geometry(element);
       if (piece.length == 0) {
         return element.mend(MendKind::empty_geometry, "attribute length: expected more than 0");
       }
-      elements.push_back(element);
-      road->geometry.push_back(std::move(piece));
+      const double s = piece.s;
+      append_record(element, "s", &Geometry::s, {s, element, std::move(piece)}, &geometries);
     });
-    if (elements.empty()) plan_view.fail("expected a <geometry> with a length in it, found none");
-    check_geometry(elements, road);
+    sort_records(&Geometry::s, &geometries);
+    join_geometry(geometries, road);
   }
   road->elevation = read_profile(road_element.child("elevationProfile"), "elevation", "s", road->length);
   read_banking(road_element.child("lateralProfile"), road);
+  return is_short ? 0 : stated;
 }
 
 }  // namespace pictura::opendrive

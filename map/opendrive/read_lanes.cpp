@@ -99,8 +99,10 @@ LaneDirection read_direction(const Element& element) {
   return LaneDirection::standard;
 }
 
-void read_type(const Element& element, FileLane* lane) {
-  lane->type_name = element.text("type");
+/// A center lane has no surface of any type; a lane without a type is a special one.
+void read_type(const Element& element, bool is_center, FileLane* lane) {
+  lane->type_name = element.text("type", is_center ? "none" : "special1");
+  if (!element.has("type")) element.mend(MendKind::missing_lane_type, "attribute type is missing");
   lane->type = lane_type(element, lane->type_name);
   lane->is_void = lane->type_name == "none";
   lane->is_level = element.flag("level");
@@ -131,11 +133,11 @@ void read_width(const Element& element, double section_length, FileLane* lane) {
   (by_border ? lane->border : lane->width) = std::move(profile);
 }
 
-FileLane read_lane(const Element& element, double section_length) {
+FileLane read_lane(const Element& element, bool is_center, double section_length) {
   FileLane lane;
   lane.where = element.where();
   lane.id = element.integer("id");
-  read_type(element, &lane);
+  read_type(element, is_center, &lane);
   if (const Element link = element.child("link")) {
     link.each("predecessor", [&](const Element& end) { lane.predecessors.push_back(end.integer("id")); });
     link.each("successor", [&](const Element& end) { lane.successors.push_back(end.integer("id")); });
@@ -145,7 +147,7 @@ FileLane read_lane(const Element& element, double section_length) {
 }
 
 FileLane read_side_lane(const Element& element, double section_length) {
-  FileLane lane = read_lane(element, section_length);
+  FileLane lane = read_lane(element, false, section_length);
   read_width(element, section_length, &lane);
   read_heights(element, section_length, &lane);
   lane.speed_limit_mps = read_lane_speed_limits(element, section_length);
@@ -153,7 +155,7 @@ FileLane read_side_lane(const Element& element, double section_length) {
 }
 
 FileLane read_center_lane(const Element& element, double section_length) {
-  FileLane lane = read_lane(element, section_length);
+  FileLane lane = read_lane(element, true, section_length);
   if (lane.id != 0) {
     element.mend(MendKind::center_id, "attribute id: expected 0 for the center lane, got {}", lane.id);
     lane.id = 0;
@@ -203,37 +205,6 @@ void read_side(const Element& section, const char* side, int sign, double sectio
   if (std::abs(before) != static_cast<int>(lanes_out->size())) fill_gaps(sign, lanes_out);
 }
 
-/// Removes a section from the road and connects its neighbours' lane links across it.
-void bridge_section(std::vector<FileSection>* sections, std::size_t index) {
-  const FileSection removed = (*sections)[index];
-  auto link_across = [&](FileSection& section, std::vector<int> FileLane::* links) {
-    for (std::vector<FileLane>* side : {&section.left, &section.right}) {
-      for (FileLane& lane : *side) {
-        // Each once: links given twice would double with every section that is removed.
-        std::vector<int> targets;
-        for (const int id : lane.*links) {
-          const FileLane* through = removed.lane(id);
-          if (!through) continue;
-          for (const int target : through->*links) {
-            if (std::find(targets.begin(), targets.end(), target) == targets.end()) targets.push_back(target);
-          }
-        }
-        lane.*links = targets;
-      }
-    }
-  };
-  if (index > 0) {
-    link_across((*sections)[index - 1], &FileLane::successors);
-    (*sections)[index - 1].end = removed.end;
-  }
-  if (index + 1 < sections->size()) {
-    FileSection& next = (*sections)[index + 1];
-    link_across(next, &FileLane::predecessors);
-    // The next section keeps its start, to which its cubics and marks are relative.
-  }
-  sections->erase(sections->begin() + static_cast<std::ptrdiff_t>(index));
-}
-
 /// The <laneSection> elements and where they begin on the road, sorted. One beyond the end is moved there, so that it
 /// has no length and read_lanes() bridges it.
 struct SectionElement {
@@ -267,6 +238,7 @@ std::vector<FileSection> read_sections(const Element& lanes, double road_length)
   for (std::size_t i = 0; i < elements.size(); ++i) {
     const Element& element = elements[i].element;
     FileSection section;
+    section.where = element.where();
     section.s = elements[i].s;
     section.end = i + 1 < elements.size() ? elements[i + 1].s : road_length;
     std::size_t both_sided = i + 1;
@@ -293,14 +265,18 @@ std::vector<FileSection> read_sections(const Element& lanes, double road_length)
 
 }  // namespace
 
-void read_lanes(const Element& road_element, FileRoad* road) {
+void read_lanes(const Element& road_element, Faults* faults, FileRoad* road) {
   const Element lanes = road_element.required_child("lanes");
   road->lane_offset = read_profile(lanes, "laneOffset", "s", road->length);
   road->sections = read_sections(lanes, road->length);
   for (std::size_t i = road->sections.size(); i-- > 0;) {
-    if (road->sections.size() > 1 && road->sections[i].end - road->sections[i].s < kMinSection_m) {
-      bridge_section(&road->sections, i);
+    const FileSection& section = road->sections[i];
+    const double length = section.end - section.s;
+    if (road->sections.size() == 1 || length >= kMinSection_m) continue;
+    if (section.s < road->length) {  // sections beyond the end are noted
+      section.where.mend(faults, MendKind::short_section, "is {} m long; expected at least {}", length, kMinSection_m);
     }
+    bridge_section(i, road);
   }
 }
 

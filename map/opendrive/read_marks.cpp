@@ -60,7 +60,7 @@ void read_line(const Element& element, bool is_explicit, std::vector<MarkLine>* 
   }
   line.t_offset = element.number_or_zero_in("tOffset", -kMaxMarkWidth_m, kMaxMarkWidth_m);
   line.s_offset = element.number_or_zero_in("sOffset", -kMaxRoadLength_m, kMaxRoadLength_m);
-  line.width = element.number_in("width", 0, kMaxMarkWidth_m, 0);
+  line.width = element.size("width", kMaxMarkWidth_m);
   if (element.has("color")) line.color = mark_color(element, element.text("color"));
   lines_out->push_back(line);
 }
@@ -77,10 +77,10 @@ RoadMark read_mark(const Element& element, double section_length) {
   check_type(element, mark.type);
   mark.bold = element.text("weight", "standard") == "bold";
   mark.color = mark_color(element, element.text("color", "standard"));
-  mark.width = element.number_in("width", 0, kMaxMarkWidth_m, 0);
+  mark.width = element.size("width", kMaxMarkWidth_m);
   mark.lane_change = lane_change(element);
   if (const Element type = element.child("type")) {
-    if (mark.width == 0) mark.width = type.number_in("width", 0, kMaxMarkWidth_m, 0);
+    if (mark.width == 0) mark.width = type.size("width", kMaxMarkWidth_m);
     type.each("line", [&](const Element& line) { read_line(line, false, &mark.lines); });
   }
   if (const Element lines = element.child("explicit")) {
@@ -96,8 +96,10 @@ std::vector<RoadMark> read_marks(const Element& lane_element, double section_len
   std::vector<RoadMark> marks;
   lane_element.each("roadMark", [&](const Element& element) {
     RoadMark mark = read_mark(element, section_length);
-    // Marks that begin after the section's end occur in CARLA's towns; they are invisible.
-    if (mark.s_offset > section_length + kStationTolerance_m) return;
+    if (mark.s_offset > section_length + kStationTolerance_m) {
+      return element.mend(MendKind::record_beyond_end, "attribute sOffset: expected a number in [0, {}], got {}",
+                          section_length, mark.s_offset);
+    }
     append_record(element, "sOffset", &RoadMark::s_offset, std::move(mark), &marks);
   });
   sort_records(&RoadMark::s_offset, &marks);

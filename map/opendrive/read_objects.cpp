@@ -102,8 +102,8 @@ std::optional<FileObject> read_object(const Element& element, FileObject::Kind k
   object.t = element.number("t", 0);
   object.z_offset = read_height(element, "zOffset");
   object.heading = element.number_in("hdg", -1e3, 1e3, 0);
-  object.length = element.number_in("length", 0, kMaxSize_m, 0);
-  object.width = element.number_in("width", 0, kMaxSize_m, 0);
+  object.length = element.size("length", kMaxSize_m);
+  object.width = element.size("width", kMaxSize_m);
   std::optional<std::vector<FileObject::Corner>> outline = read_outline(element, road_length);
   if (!outline) return std::nullopt;
   object.outline = std::move(*outline);
@@ -222,7 +222,8 @@ void read_signals(const Element& road_element, FileRoad* road) {
   signals.each("signalReference", [&](const Element& element) {
     if (!is_near_road(element, road->length)) return;
     road->signal_references.push_back({element.text("id"), element.number("s"), element.number("t", 0),
-                                       read_orientation(element), read_validity(element), element.where()});
+                                       read_orientation(element), read_validity(element), std::nullopt,
+                                       element.where()});
   });
 }
 

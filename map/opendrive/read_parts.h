@@ -11,11 +11,12 @@ inline constexpr double kMinRoadLength_m = 1e-3, kMaxRoadLength_m = 1e5;
 inline constexpr double kMaxOffset_m = 1e4, kMaxHeight_m = 1e4;
 
 /// <planView>, <elevationProfile> and <lateralProfile>: the reference line, its elevation and banking. Needs the road's
-/// length, which becomes that of the line where they differ a little: read the other parts afterwards.
-void read_reference_line(const Element& road_element, FileRoad* road);
+/// length, which becomes that of the line: read the other parts afterwards. Returns the s up to which the file
+/// describes the road; see hold_profiles().
+double read_reference_line(const Element& road_element, FileRoad* road);
 
 /// <lanes>: lane offset, sections, lanes with their marks.
-void read_lanes(const Element& road_element, FileRoad* road);
+void read_lanes(const Element& road_element, Faults* faults, FileRoad* road);
 
 /// The <roadMark> elements of a lane in a section of the given length.
 std::vector<RoadMark> read_marks(const Element& lane_element, double section_length);

@@ -9,6 +9,7 @@
 #include "pictura/map/opendrive/extent.h"
 #include "pictura/map/opendrive/mend_links.h"
 #include "pictura/map/opendrive/read_parts.h"
+#include "pictura/map/opendrive/sections.h"
 
 namespace pictura::opendrive {
 
@@ -64,7 +65,7 @@ Profile read_road_speed_limits(const Element& road_element, double road_length) 
   return limits;
 }
 
-FileRoad read_road(const Element& element, const Offset& offset) {
+FileRoad read_road(const Element& element, const Offset& offset, Faults* faults) {
   FileRoad road;
   road.where = element.where();
   road.id = element.text("id");
@@ -73,9 +74,10 @@ FileRoad read_road(const Element& element, const Offset& offset) {
   if (junction != "-1") road.junction = junction;
   road.left_hand = is_left_hand(element);
   read_road_links(element, &road);
-  read_reference_line(element, &road);
+  const double described = read_reference_line(element, &road);
   road.speed_limit_mps = read_road_speed_limits(element, road.length);
-  read_lanes(element, &road);
+  read_lanes(element, faults, &road);
+  hold_profiles(described, &road);
   read_objects(element, &road);
   read_signals(element, &road);
   apply(offset, &road);
@@ -127,7 +129,7 @@ void read_network(std::string_view text, const std::string& source_name, Faults*
   root.each("road", [&](const Element& element) {
     const std::string name = name_of(element);
     const Element road = element.with_owner(&name);
-    append(read_road(road, offset), road, &network.roads, &network.road_index);
+    append(read_road(road, offset, faults), road, &network.roads, &network.road_index);
     check_extent(network.roads.back(), faults);
   });
   if (network.roads.empty()) root.fail("expected at least one <road> in it, found none");

@@ -2,11 +2,24 @@
 
 #include <algorithm>
 
+#include "pictura/map/opendrive/element.h"
+
 namespace pictura::opendrive {
 
 namespace {
 
 constexpr double kMinSplitSection_m = 0.5;
+constexpr double kSameStation_m = 1e-6;  // what writers round
+
+/// The same cubic as one that begins at s.
+Cubic moved_to(double s, const Cubic& cubic) {
+  const double ds = s - cubic.s;
+  return {.s = s,
+          .a = cubic.a + ds * (cubic.b + ds * (cubic.c + ds * cubic.d)),
+          .b = cubic.b + ds * (2 * cubic.c + ds * 3 * cubic.d),
+          .c = cubic.c + ds * 3 * cubic.d,
+          .d = cubic.d};
+}
 
 void shift(Profile* profile, double ds) {
   for (Cubic& cubic : profile->cubics) cubic.s -= ds;
@@ -40,7 +53,81 @@ std::vector<double> speed_changes(const FileRoad& road, const FileSection& secti
   return changes;
 }
 
+/// Connects the links of a section's lanes through the lanes of one beside it, which is removed.
+void link_across(const FileSection& removed, std::vector<int> FileLane::* links, FileSection* section) {
+  for (std::vector<FileLane>* side : {&section->left, &section->right}) {
+    for (FileLane& lane : *side) {
+      // Each once: links given twice would double with every section that is removed.
+      std::vector<int> targets;
+      for (const int id : lane.*links) {
+        const FileLane* through = removed.lane(id);
+        if (!through) continue;
+        for (const int target : through->*links) {
+          if (std::find(targets.begin(), targets.end(), target) == targets.end()) targets.push_back(target);
+        }
+      }
+      lane.*links = targets;
+    }
+  }
+}
+
+/// Ends a profile's records within [begin, end): the last of them goes on from `end`, if anything does.
+void cut_out(double begin, double end, bool goes_on, Profile* profile) {
+  std::vector<Cubic>& cubics = profile->cubics;
+  const auto from = [&](double s) {
+    return std::lower_bound(cubics.begin(), cubics.end(), s - kSameStation_m,
+                            [](const Cubic& cubic, double at) { return cubic.s < at; });
+  };
+  auto first = from(begin);
+  const auto last = from(end);
+  if (first == last) return;
+  if (goes_on && (last == cubics.end() || last->s > end + kSameStation_m)) {
+    *first = moved_to(end, *(last - 1));
+    ++first;
+  }
+  cubics.erase(first, last);
+}
+
+/// Makes a profile constant from s on, unless it has records more than a millimetre beyond.
+void hold(double s, Profile* profile) {
+  std::vector<Cubic>& cubics = profile->cubics;
+  if (cubics.empty() || cubics.back().s > s + kStationTolerance_m) return;
+  const double value = profile->value(s);
+  std::erase_if(cubics, [s](const Cubic& cubic) { return cubic.s >= s; });
+  cubics.push_back({.s = s, .a = value});
+}
+
 }  // namespace
+
+void bridge_section(std::size_t index, FileRoad* road) {
+  std::vector<FileSection>& sections = road->sections;
+  const FileSection removed = std::move(sections[index]);
+  const bool goes_on = index + 1 < sections.size();
+  // What is offset in the section alone would shift the ends of those beside it.
+  cut_out(removed.s, removed.end, goes_on, &road->lane_offset);
+  if (index > 0) {
+    link_across(removed, &FileLane::successors, &sections[index - 1]);
+    sections[index - 1].end = removed.end;
+  }
+  // The next section keeps its start, to which its cubics and marks are relative.
+  if (goes_on) link_across(removed, &FileLane::predecessors, &sections[index + 1]);
+  sections.erase(sections.begin() + static_cast<std::ptrdiff_t>(index));
+}
+
+void hold_profiles(double s, FileRoad* road) {
+  if (s >= road->length) return;
+  for (Profile* profile :
+       {&road->elevation, &road->lane_offset, &road->superelevation, &road->left_crossfall, &road->right_crossfall}) {
+    hold(s, profile);
+  }
+  FileSection& last = road->sections.back();
+  if (last.s > s + kStationTolerance_m) return;
+  for (std::vector<FileLane>* side : {&last.left, &last.right}) {
+    for (FileLane& lane : *side) {
+      for (Profile* profile : {&lane.width, &lane.border}) hold(std::max(s - last.s, 0.0), profile);
+    }
+  }
+}
 
 std::vector<FileLane> continue_lanes(std::vector<FileLane>* lanes, double ds) {
   std::vector<FileLane> rest;
@@ -51,21 +138,33 @@ std::vector<FileLane> continue_lanes(std::vector<FileLane>* lanes, double ds) {
   return rest;
 }
 
+const FileSection& section_at(const FileRoad& road, double s) {
+  std::size_t section = road.sections.size() - 1;
+  while (section > 0 && road.sections[section].s > s) --section;
+  return road.sections[section];
+}
+
+bool split_section(double s, FileRoad* road) {
+  const std::ptrdiff_t index = &section_at(*road, s) - road->sections.data();
+  FileSection& section = road->sections[static_cast<std::size_t>(index)];
+  if (s < section.s + kMinSplitSection_m || s > section.end - kMinSplitSection_m) return false;
+  const double ds = s - section.s;
+  FileSection rest;
+  rest.s = s;
+  rest.end = section.end;
+  rest.center = continue_lane(section.center, ds);
+  rest.left = continue_lanes(&section.left, ds);
+  rest.right = continue_lanes(&section.right, ds);
+  section.end = s;
+  road->sections.insert(road->sections.begin() + index + 1, std::move(rest));
+  return true;
+}
+
 void split_at_speed_changes(Network* network) {
   for (FileRoad& road : network->roads) {
     for (std::size_t i = 0; i < road.sections.size(); ++i) {
       for (const double change : speed_changes(road, road.sections[i])) {
-        FileSection& section = road.sections[i];
-        if (change < section.s + kMinSplitSection_m || change > section.end - kMinSplitSection_m) continue;
-        const double ds = change - section.s;
-        FileSection rest;
-        rest.s = change;
-        rest.end = section.end;
-        rest.center = continue_lane(section.center, ds);
-        rest.left = continue_lanes(&section.left, ds);
-        rest.right = continue_lanes(&section.right, ds);
-        section.end = change;
-        road.sections.insert(road.sections.begin() + static_cast<std::ptrdiff_t>(++i), std::move(rest));
+        if (change > road.sections[i].s && change < road.sections[i].end && split_section(change, &road)) ++i;
       }
     }
   }

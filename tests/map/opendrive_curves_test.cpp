@@ -8,6 +8,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/scene.h"
+#include "pictura/map/map_fields.h"
 #include "pictura/map/opendrive/curves.h"
 #include "pictura/map/opendrive/opendrive.h"
 #include "pictura/tests/map/small_roads.h"
@@ -67,11 +68,32 @@ TEST(OpenDriveCurves, StationsOnCubicsAreArcLengths) {
   expect_at(map, map.points_of(lane_named(map, "1", 1, -1))[0].position_m, 40, 16);
 }
 
-TEST(OpenDriveCurves, ACurveOfAnotherLengthThanItsGeometryIsRejected) {
-  EXPECT_THROW(
-      parse(parabola(R"(<paramPoly3 pRange="normalized" aU="0" bU="30" cU="0" dU="0" aV="0" bV="0" cV="9" dV="0"/>)")
-                .text()),
-      Error);
+TEST(OpenDriveCurves, ACurveOfAnotherLengthThanItsGeometryKeepsItsShape) {
+  // Twice as long as the curve: stations are those of the file, and the lane is as long as the curve.
+  const RoadMap map = parse(
+      parabola(R"(<paramPoly3 pRange="normalized" aU="0" bU="30" cU="0" dU="0" aV="0" bV="0" cV="9" dV="0"/>)").text());
+  ASSERT_EQ(map.mends.size(), 1u);
+  EXPECT_EQ(map.mends[0].kind, MendKind::line_length);
+  expect_at(map, map.lane_points.front().position_m, 0, 0);
+  expect_at(map, map.lane_points.back().position_m, 30, 9);
+  EXPECT_NEAR(map.lanes[0].length_m, parabola_length(30), 0.02);
+  EXPECT_NEAR(map.facts.driving_lane_km, 1e-3 * parabola_length(60), 1e-4);
+}
+
+TEST(OpenDriveCurves, TheParameterRangeThatFitsCounts) {
+  const char* const curve = R"(<paramPoly3 pRange="{}" aU="0" bU="60" cU="0" dU="0" aV="0" bV="0" cV="36" dV="0"/>)";
+  RoadMap map = parse(parabola(fmt::format(fmt::runtime(curve), "arcLength")).text());
+  ASSERT_EQ(map.mends.size(), 1u);
+  EXPECT_EQ(map.mends[0].kind, MendKind::parameter_range);
+  map.mends.clear();
+  map.provenance = {};
+  RoadMap same = parse(parabola(fmt::format(fmt::runtime(curve), "normalized")).text());
+  same.provenance = {};
+  EXPECT_EQ(first_difference(map, same), "");
+}
+
+TEST(OpenDriveCurves, ACurveWithoutAMeaningIsRejected) {
+  EXPECT_THROW(parse(parabola("<paramPoly3 pRange=\"normalized\"/>").text()), Error);
   EXPECT_THROW(
       parse(parabola(R"(<paramPoly3 pRange="metres" aU="0" bU="60" cU="0" dU="0" aV="0" bV="0" cV="36" dV="0"/>)")
                 .text()),
@@ -193,13 +215,15 @@ TEST(OpenDriveBanking, RoadEdgesLieOnTheBankedRoad) {
   for (const RoadEdge& edge : map.road_edges) EXPECT_NEAR(edge.a_m.z, edge.a_m.y * std::tan(0.1), 1e-3);
 }
 
-TEST(OpenDriveBanking, CrossSectionsOfStripsAreRejectedByName) {
-  try {
-    banked("<crossSectionSurface/>");
-    ADD_FAILURE();
-  } catch (const Error& error) {
-    EXPECT_THAT(error.what(), ::testing::HasSubstr("<crossSectionSurface>: cross-sections as strips"));
-  }
+TEST(OpenDriveBanking, CrossSectionsOfStripsAreFlattened) {
+  RoadMap map = banked("<crossSectionSurface><tOffset><coefficients s=\"0\" a=\"0\"/></tOffset></crossSectionSurface>");
+  ASSERT_EQ(map.mends.size(), 1u);
+  EXPECT_THAT(map.mends[0].message, ::testing::HasSubstr("<crossSectionSurface>: cross-sections as strips"));
+  EXPECT_EQ(map.mends[0].kind, MendKind::strip_surface);
+  map.mends.clear();
+  RoadMap flat = banked("");
+  for (RoadMap* each : {&map, &flat}) each->provenance = {};
+  EXPECT_EQ(first_difference(map, flat), "");
 }
 
 }  // namespace

@@ -1,5 +1,8 @@
 // Faults that have one sensible meaning: each is mended and noted by default, and refused by strict reading with file,
 // line, owner and element.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <random>
 #include <set>
 #include <string>
@@ -26,6 +29,7 @@ using test::lane_of;
 using test::line_at;
 using test::list;
 using test::replaced;
+using test::ring_with;
 using test::RoadText;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
@@ -186,13 +190,13 @@ TEST(OpenDriveMends, MissingCoefficientsAndHeightsAreZero) {
 // Sections and lanes.
 
 TEST(OpenDriveMends, SectionsAreSortedAndBeginWithTheRoad) {
-  const auto section = [](double s, double lane_width) {
-    return fmt::format(
-        "<laneSection s=\"{}\"><center/><right>{}</right></laneSection>\n", s,
-        lane_of(-1, "driving", lane_width, R"(<link><predecessor id="-1"/><successor id="-1"/></link>)"));
+  const std::string before = R"(<predecessor id="-1"/>)", after = R"(<successor id="-1"/>)";
+  const auto section = [](double s, double lane_width, const std::string& link = "") {
+    return fmt::format("<laneSection s=\"{}\"><center/><right>{}</right></laneSection>\n", s,
+                       lane_of(-1, "driving", lane_width, "<link>" + link + "</link>"));
   };
   RoadText road;
-  road.sections = section(0, 3) + section(60, 5) + section(30, 4);
+  road.sections = section(0, 3, after) + section(60, 5, before) + section(30, 4, before + after);
   RoadMap map = mended(road.text(), MendKind::record_order);
   ASSERT_EQ(map.lanes.size(), 3u);
   EXPECT_FLOAT_EQ(first_point(map, map.lanes[1]).width_m, 4);
@@ -222,12 +226,99 @@ TEST(OpenDriveMends, TheCenterLaneIsZero) {
 
 // Reference lines.
 
+/// Road 3 of a ring.
+RoadText between_the_halves(double length, double drawn) {
+  RoadText road;
+  road.id = "3";
+  road.length = length;
+  road.geometry = line_at(0, 0, 40, std::numbers::pi, drawn);
+  road.link = R"(<predecessor elementType="road" elementId="1" contactPoint="end"/>)"
+              R"(<successor elementType="road" elementId="2" contactPoint="start"/>)";
+  road.right = lane_of(-1, "driving", 3.5, R"(<link><predecessor id="-1"/><successor id="-1"/></link>)");
+  return road;
+}
+
+int num_endless(const RoadMap& map) {
+  return static_cast<int>(
+      std::count_if(map.lanes.begin(), map.lanes.end(), [](const Lane& lane) { return lane.is_endless; }));
+}
+
 TEST(OpenDriveMends, RoadsOfNoLengthAreAMillimetreLong) {
   RoadText road = straight();
   road.length = 1e-5;
   EXPECT_NEAR(mended(road.text(), MendKind::short_road).lanes[0].length_m, 1e-3, 1e-6);
   road.length = 0;
   EXPECT_EQ(mended(road.text(), MendKind::short_road).lanes.size(), 1u);
+}
+
+TEST(OpenDriveMends, ProfilesOfRoadsOfNoLengthAreConstant) {
+  RoadText road = between_the_halves(2e-10, 2e-10);
+  road.elevation = R"(<elevation s="0" a="0.5" b="-0.008" c="-4e9" d="1.5e19"/>)"
+                   R"(<elevation s="1e-10" a="-700" b="0" c="0" d="0"/>)";
+  road.lateral = R"(<superelevation s="0" a="0" b="9e9" c="0" d="0"/>)";
+  road.lane_offset = R"(<laneOffset s="0" a="0" b="-3e6" c="0" d="4e18"/>)";
+  road.right = lane_with(R"(<link><predecessor id="-1"/><successor id="-1"/></link>)" + width(0, 3.5, 7e12));
+  const RoadMap map = mended(ring_with(road.text()), MendKind::short_road);
+  const Lane& lane = lane_named(map, "3", 0, -1);
+  EXPECT_EQ(num_endless(map), 3);
+  EXPECT_FLOAT_EQ(first_point(map, lane).width_m, 3.5);
+  EXPECT_FLOAT_EQ(last_point(map, lane).width_m, 3.5);
+  EXPECT_NEAR(last_point(map, lane).position_m.z, 0.5, 1e-6);
+  EXPECT_EQ(map.facts.z_max_m, 0.5);
+  EXPECT_EQ(map.facts.z_min_m, 0);
+}
+
+TEST(OpenDriveMends, RoadsWithoutADrawnLengthHaveNone) {
+  const RoadMap map = mended(ring_with(between_the_halves(0.1, 0).text()), MendKind::short_road);
+  EXPECT_EQ(num_endless(map), 3);
+  EXPECT_NEAR(map.facts.driving_lane_km, 0.251, 1e-3);
+  EXPECT_THAT(said(map), HasSubstr("road 3: <road>: attribute length: expected at least 0.001 with <geometry>, got 0"));
+}
+
+TEST(OpenDriveMends, SectionsOfNoLengthLeaveTheLaneOffset) {
+  // In the last 20 um the lane is the second beside a center line 3.5 m further to the left.
+  const auto section = [](double s, const std::string& lanes) {
+    return fmt::format("<laneSection s=\"{}\"><center/><right>{}</right></laneSection>", s, lanes);
+  };
+  const auto in_sections = [&](const std::string& offsets, const std::string& sections) {
+    return mended(ring_with("",
+                            [&](RoadText* road) {
+                              road->lane_offset = offsets;
+                              road->sections = sections;
+                            }),
+                  MendKind::short_section);
+  };
+  const std::string offset = R"(<laneOffset s="{}" a="{}" b="0" c="0" d="0"/>)";
+  const double near_end = 40 * std::numbers::pi - 2e-5;
+  const std::string beside = lane_of(-1, "none", 3.5) +
+                             lane_of(-2, "driving", 3.5, R"(<link><predecessor id="-1"/><successor id="-1"/></link>)");
+  const auto lane_to = [](int id, int next) {
+    return lane_of(id, "driving", 3.5, fmt::format(R"(<link><predecessor id="-1"/><successor id="{}"/></link>)", next));
+  };
+  const RoadMap at_end =
+      in_sections(fmt::format(fmt::runtime(offset), 0, 0) + fmt::format(fmt::runtime(offset), near_end, 3.5),
+                  section(0, lane_to(-1, -2)) + section(near_end, beside));
+  const RoadMap at_start = in_sections(
+      fmt::format(fmt::runtime(offset), 0, 3.5) + fmt::format(fmt::runtime(offset), 2e-5, 0),
+      section(0, beside) +
+          section(2e-5, lane_of(-1, "driving", 3.5, R"(<link><predecessor id="-2"/><successor id="-1"/></link>)")));
+  for (const RoadMap& map : {at_end, at_start}) {
+    const Lane& lane = lane_named(map, "1", map.lanes[0].source_section, -1);
+    EXPECT_EQ(num_endless(map), 2);
+    EXPECT_NEAR(lane.length_m, 41.75 * std::numbers::pi, 0.02);
+    test::expect_at(map, first_point(map, lane).position_m, 0, -41.75);
+    test::expect_at(map, last_point(map, lane).position_m, 0, 41.75);
+  }
+  // An offset that goes on beyond the section does so from its end.
+  const RoadMap shifted =
+      in_sections(fmt::format(fmt::runtime(offset), 0, 0) + fmt::format(fmt::runtime(offset), 50, 0.5),
+                  section(0, lane_to(-1, -1)) + section(50, lane_to(-1, -1)) + section(50.0005, lane_to(-1, -1)));
+  const Lane& before = lane_named(shifted, "1", 0, -1);
+  const auto radius_of = [&](const LanePoint& point) {
+    return std::hypot(point.position_m.x + shifted.origin_m[0], point.position_m.y + shifted.origin_m[1]);
+  };
+  EXPECT_NEAR(radius_of(last_point(shifted, before)), 41.75, 1e-3);
+  EXPECT_NEAR(radius_of(first_point(shifted, lane_named(shifted, "1", 2, -1))), 41.25, 1e-3);
 }
 
 TEST(OpenDriveMends, GeometriesOfNoLengthAreLeftOut) {
@@ -238,38 +329,152 @@ TEST(OpenDriveMends, GeometriesOfNoLengthAreLeftOut) {
   EXPECT_FLOAT_EQ(map.lanes[0].length_m, 100);
 }
 
-TEST(OpenDriveMends, TheLinesLengthCountsWhereItDiffersALittle) {
-  for (const double length : {99.55, 100.45, 99.05, 100.95}) {
+TEST(OpenDriveMends, TheRoadIsWhatItsGeometrySays) {
+  for (const double length : {99.55, 100.45, 98.0, 101.1, 50.0, 500.0}) {
     RoadText road = straight();
     road.geometry = line_at(0, 0, 0, 0, length);
-    EXPECT_NEAR(mended(road.text(), MendKind::line_length).lanes[0].length_m, length, 1e-3);
-    EXPECT_NEAR(parse_opendrive(file_of(road.text()), "bad.xodr").facts.driving_lane_km, 1e-3 * length, 1e-9);
+    const RoadMap map = mended(road.text(), MendKind::line_length);
+    EXPECT_NEAR(map.lanes[0].length_m, length, 1e-3);
+    EXPECT_NEAR(map.facts.driving_lane_km, 1e-3 * length, 1e-9);
+    EXPECT_THAT(said(map), HasSubstr(fmt::format("bad.xodr:7: road 1: <geometry>: the reference line ends at {}; "
+                                                 "expected the road's length, 100",
+                                                 length)));
   }
-  for (const double length : {98.9, 101.1, 50.0}) {
-    RoadText road = straight();
-    road.geometry = line_at(0, 0, 0, 0, length);
-    EXPECT_THAT(test::message_of([&] { parse_opendrive(file_of(road.text()), "bad.xodr"); }),
-                HasSubstr(fmt::format("bad.xodr:7: road 1: <geometry>: the reference line ends at {}; expected the "
-                                      "road's length, 100",
-                                      length)));
-  }
+  RoadText endless = straight();
+  for (int i = 0; i < 11; ++i) endless.geometry += line_at(1e4 * i, 1e4 * i, 0, 0, 1e4);
+  EXPECT_THAT(test::message_of([&] { parse_opendrive(file_of(endless.text()), "bad.xodr"); }),
+              HasSubstr("ends at 110000"));
 }
 
-TEST(OpenDriveMends, GapsOfGeometriesAreBridged) {
+TEST(OpenDriveMends, ProfilesAreHeldBeyondTheStatedLength) {
+  // The lane tapers off, and the road climbs, within the 20 m that the road states.
+  RoadText road = straight(lane_with(width(0, 4, -0.1)));
+  road.length = 20;
+  road.geometry = line_at(0, 0, 0, 0, 100);
+  road.elevation = R"(<elevation s="0" a="1" b="0.05" c="0" d="0"/>)";
+  road.lane_offset = R"(<laneOffset s="0" a="0" b="0.1" c="0" d="0"/>)";
+  const RoadMap map = mended(road.text(), MendKind::line_length);
+  EXPECT_FLOAT_EQ(last_point(map, map.lanes[0]).width_m, 2);
+  test::expect_at(map, last_point(map, map.lanes[0]).position_m, 100, 1, 2);
+  // What the file describes further on counts.
+  road.elevation += R"(<elevation s="60" a="7" b="0" c="0" d="0"/>)";
+  EXPECT_NEAR(mended(road.text(), MendKind::line_length).facts.z_max_m, 7, 1e-6);
+}
+
+TEST(OpenDriveMends, SmallGapsOfShortRoadsAreBridged) {
   RoadText road = straight();
-  road.geometry = line_at(0, 0, 0, 0, 50) + line_at(50, 50, 0.3, 0, 50);
+  road.length = 2;
+  road.geometry = line_at(0, 0, 0, 0, 1) + line_at(1, 1, 0.3, 0, 1);
   const RoadMap map = mended(road.text(), MendKind::geometry_gap);
   EXPECT_THAT(said(map), HasSubstr("bad.xodr:8: road 1: <geometry>: begins 0.300 m from the end of the one before it"));
   EXPECT_NEAR(last_point(map, map.lanes[0]).position_m.y - first_point(map, map.lanes[0]).position_m.y, 0.3, 1e-4);
-  road.geometry = line_at(0, 0, 0, 0, 50) + line_at(50.3, 50.3, 0, 0, 49.7);
-  EXPECT_FLOAT_EQ(mended(road.text(), MendKind::geometry_station).lanes[0].length_m, 100);
-  road.geometry = line_at(0, 0, 0, 0, 50) + line_at(50, 50, 0.7, 0, 50);
-  EXPECT_THROW(parse_opendrive(file_of(road.text()), "bad.xodr"), Error);
-  road.geometry = line_at(0, 0, 0, 0, 50) + line_at(53, 53, 0, 0, 47);
+  road.geometry = line_at(0, 0, 0, 0, 1) + line_at(1, 1, 0.7, 0, 1);
   EXPECT_THROW(parse_opendrive(file_of(road.text()), "bad.xodr"), Error);
 }
 
+TEST(OpenDriveMends, JumpsAreSpreadOverTheRoad) {
+  struct Case {
+    double along, aside;
+  };
+  for (const auto& [along, aside] : std::vector<Case>{{0, 0.63}, {0, -4.9}, {3, 0}, {-3, 0}, {2, 2}}) {
+    RoadText road = straight();
+    road.length = 200;
+    road.geometry = line_at(0, 0, 0, 0, 100) + line_at(100, 100 + along, aside, 0, 100);
+    const RoadMap map = mended(road.text(), MendKind::geometry_jump);
+    const Lane& lane = map.lanes[0];
+    const Span<const LanePoint> points = map.points_of(lane);
+    test::expect_at(map, points[0].position_m, 0, -1.5);
+    test::expect_at(map, points[points.size() - 1].position_m, 200 + along, aside - 1.5);
+    EXPECT_NEAR(map.facts.driving_lane_km, 0.2, 1e-12) << "stations stay";
+    const double span = std::max(10.0, 10 * std::hypot(along, aside));
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const double x = points[i].position_m.x + map.origin_m[0], y = points[i].position_m.y + map.origin_m[1];
+      EXPECT_LE(std::abs(points[i].heading_rad), 0.2);
+      if (std::abs(x - 100 - 0.5 * along) > 0.5 * (span + std::abs(along))) {
+        EXPECT_NEAR(y, x < 100 ? -1.5 : aside - 1.5, 1e-4);
+      }
+      if (i == 0) continue;
+      const Vec2 step = (points[i].position_m - points[i - 1].position_m).xy();
+      EXPECT_GT(step.x, 0) << "never back";
+      EXPECT_LE(std::abs(step.y / step.x), std::tan(0.2));
+    }
+  }
+}
+
+TEST(OpenDriveMends, JumpsNearAnEndLeaveTheEnd) {
+  RoadText road = straight();
+  road.geometry = line_at(0, 0, 0, 0, 2) + line_at(2, 2, 1, 0, 49) + line_at(51, 51, 0, 0, 49);
+  const RoadMap map = mended(road.text(), MendKind::geometry_jump, 2);
+  test::expect_at(map, first_point(map, map.lanes[0]).position_m, 0, -1.5);
+  test::expect_at(map, last_point(map, map.lanes[0]).position_m, 100, -1.5);
+}
+
+TEST(OpenDriveMends, LargeJumpsAreRefused) {
+  RoadText road = straight();
+  road.geometry = line_at(0, 0, 0, 0, 50) + line_at(50, 50, 5.1, 0, 50);
+  EXPECT_THAT(
+      test::message_of([&] { parse_opendrive(file_of(road.text()), "bad.xodr"); }),
+      HasSubstr("bad.xodr:8: road 1: <geometry>: begins 5.100 m from the end of the one before it, at (50, 0)"));
+  std::string jumps;
+  for (int i = 0; i < 1100; ++i) jumps += line_at(i, i, i % 2, 0, 1);
+  road.length = 1100;
+  road.geometry = jumps;
+  EXPECT_THAT(test::message_of([&] { parse_opendrive(file_of(road.text()), "bad.xodr"); }),
+              HasSubstr("expected at most 1000 gaps in a road"));
+}
+
+TEST(OpenDriveMends, GeometriesFollowEachOther) {
+  RoadText road = straight();
+  road.geometry = line_at(0, 0, 0, 0, 50) + line_at(50.3, 50.3, 0, 0, 49.7);
+  EXPECT_FLOAT_EQ(mended(road.text(), MendKind::geometry_station).lanes[0].length_m, 100);
+  // The line before ends where the next one begins if it is as long as the station says.
+  road.geometry = line_at(0, 0, 0, 0, 50) + line_at(53, 53, 0, 0, 47);
+  EXPECT_FLOAT_EQ(mended(road.text(), MendKind::geometry_station).lanes[0].length_m, 100);
+  // Lengths fit, stations do not: all later ones move. Or they are out of order.
+  const auto expect_straight = [](const RoadMap& map) {
+    test::expect_at(map, first_point(map, map.lanes[0]).position_m, 0, -1.5);
+    test::expect_at(map, last_point(map, map.lanes[0]).position_m, 100, -1.5);
+    EXPECT_NEAR(map.facts.driving_lane_km, 0.1, 1e-12);
+  };
+  road.geometry = line_at(0, 0, 0, 0, 50) + line_at(70, 50, 0, 0, 20) + line_at(90, 70, 0, 0, 30);
+  const RoadMap moved = mended(road.text(), MendKind::moved_geometry);
+  expect_straight(moved);
+  EXPECT_THAT(said(moved), HasSubstr("attribute s: expected 50, where the one before it ends, got 70"));
+  road.geometry = line_at(40, 0, 0, 0, 50) + line_at(90, 50, 0, 0, 50);
+  expect_straight(mended(road.text(), MendKind::moved_geometry));
+  road.geometry = line_at(50, 50, 0, 0, 50) + line_at(0, 0, 0, 0, 50);
+  expect_straight(mended(road.text(), MendKind::record_order));
+}
+
 // Names.
+
+TEST(OpenDriveMends, LanesWithoutATypeHaveOne) {
+  const RoadMap center = mended(ring_with("",
+                                          [](RoadText* road) {
+                                            road->sections =
+                                                R"(<laneSection s="0"><center><lane id="0"/></center><right>)" +
+                                                road->right + "</right></laneSection>";
+                                          }),
+                                MendKind::missing_lane_type);
+  EXPECT_EQ(difference(center, sound(ring_with())), "");
+  EXPECT_EQ(num_endless(center), 2);
+  const RoadMap side = mended(replaced(straight().text(), "id=\"-1\" type=\"driving\"", "id=\"-1\" type=\"\""),
+                              MendKind::missing_lane_type);
+  EXPECT_EQ(side.lanes.at(0).type, LaneType::other);
+  EXPECT_THAT(said(side), HasSubstr("road 1: <lane>: attribute type is missing"));
+}
+
+TEST(OpenDriveMends, UnknownFlagsAreFalse) {
+  const RoadMap map = mended(replaced(straight().text(), "type=\"driving\"", "type=\"driving\" level=\"none\""),
+                             MendKind::unknown_flag);
+  EXPECT_EQ(difference(map, sound(straight().text())), "");
+}
+
+TEST(OpenDriveMends, AttributesWithoutAValueAreMissing) {
+  const RoadMap map =
+      sound(replaced(straight().text(), "type=\"driving\"", "type=\"driving\" level=\"\" direction=\"\""));
+  EXPECT_EQ(difference(map, sound(straight().text())), "");
+}
 
 TEST(OpenDriveMends, UnknownNamesHaveAMeaning) {
   const RoadMap lanes =
@@ -301,6 +506,23 @@ TEST(OpenDriveMends, UnknownMarksArePaintedByTheirLines) {
       mended(with_mark(R"(<roadMark sOffset="0" type="solid" laneChange="some"/>)"), MendKind::unknown_lane_change)
           .markings.size(),
       1u);
+}
+
+TEST(OpenDriveMends, SizesBelowZeroAreTheDefault) {
+  const std::string line = R"(<type name=""{}><line length="5" space="5" tOffset="0" sOffset="0"{}/></type>)";
+  const auto mark = [&](const std::string& of_mark, const std::string& of_type, const std::string& of_line) {
+    return with_mark("<roadMark sOffset=\"0\" type=\"solid\"" + of_mark + ">" +
+                     (of_type.empty() && of_line.empty() ? "" : fmt::format(fmt::runtime(line), of_type, of_line)) +
+                     "</roadMark>");
+  };
+  const std::string minus = R"( width="-1")", ten = R"( width="0.1")";
+  EXPECT_EQ(difference(mended(mark(minus, "", ""), MendKind::negative_size), sound(mark("", "", ""))), "");
+  EXPECT_EQ(difference(mended(mark(minus, ten, minus), MendKind::negative_size, 2), sound(mark(ten, ten, ten))), "");
+}
+
+TEST(OpenDriveMends, MarksBeyondTheirSectionAreLeftOut) {
+  EXPECT_EQ(mended(with_mark(R"(<roadMark sOffset="105" type="solid"/>)"), MendKind::record_beyond_end).markings.size(),
+            0u);
 }
 
 TEST(OpenDriveMends, MarksOutOfOrderAreSorted) {
@@ -435,6 +657,27 @@ TEST(OpenDriveMends, LinksToWhatIsAbsentAreLeftOut) {
       num_links(mended(two_roads(R"(<successor elementType="road" elementId="2" elementS="5" elementDir="+"/>)", ""),
                        MendKind::link_into_road)),
       0);
+}
+
+TEST(OpenDriveMends, LinksThatTrafficCannotFollowAreLeftOut) {
+  const std::string to_2 = link_to("successor", "2", "start"), to_1 = link_to("predecessor", "1", "end");
+  const std::string sound_text = two_roads(to_2, to_1);
+  const RoadMap dangling = mended(two_roads("", ""), MendKind::dangling_link);
+  EXPECT_EQ(num_links(dangling), 0);
+  EXPECT_THAT(said(dangling), HasSubstr("road 1: <lane>: is linked to lane -1 beyond the end of its road, which is "
+                                        "linked to nothing there"));
+  const std::string second = "<lane id=\"-1\" type=\"";
+  const auto with_second = [&](const std::string& type) {
+    std::string text = sound_text;
+    const std::size_t at = text.rfind(second) + second.size();
+    return text.replace(at, std::string("driving").size(), type);
+  };
+  EXPECT_THAT(said(mended(with_second("shoulder"), MendKind::unlike_link)),
+              HasSubstr("links lane -1 of road 1 with lane -1 of road 2, which are driving and shoulder"));
+  EXPECT_THAT(said(mended(with_second("driving\" direction=\"reversed"), MendKind::opposed_link)),
+              HasSubstr("whose traffic meets head on there"));
+  EXPECT_THAT(said(mended(replaced(sound_text, "x=\"100\" y=\"0\"", "x=\"100\" y=\"1.5\""), MendKind::distant_link)),
+              HasSubstr("which are 1.50 m apart there"));
 }
 
 TEST(OpenDriveMends, OneSidedLinksBecomeMutual) {

@@ -1,6 +1,8 @@
 // Small OpenDRIVE files for tests.
 #pragma once
 
+#include <functional>
+#include <numbers>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -90,6 +92,31 @@ inline std::string three_roads(const std::string& rest_of_2 = "", const std::str
          R"(<junction id="7" name=""><connection id="0" incomingRoad="1" connectingRoad="2" contactPoint="start">)"
          R"(<laneLink from="-1" to="-1"/><laneLink from="-2" to="-2"/></connection>)" +
          junction_more + "</junction>\n";
+}
+
+/// A ring of 40 m radius around the origin: two half circles with one lane each, and between the second and the first
+/// the road 3, of which the text is given; without a text the half circles meet.
+inline std::string ring_with(const std::string& road_3 = "", const std::function<void(RoadText*)>& change = {}) {
+  RoadText half;
+  half.length = 40 * std::numbers::pi;
+  half.right = lane_of(-1, "driving", 3.5, R"(<link><predecessor id="-1"/><successor id="-1"/></link>)");
+  const auto link = [](const std::string& before, const std::string& after) {
+    return fmt::format(R"(<predecessor elementType="road" elementId="{}" contactPoint="end"/>)"
+                       R"(<successor elementType="road" elementId="{}" contactPoint="start"/>)",
+                       before, after);
+  };
+  const auto arc = [&](double y, double heading) {
+    return fmt::format(R"(<geometry s="0" x="0" y="{}" hdg="{}" length="{}"><arc curvature="0.025"/></geometry>)", y,
+                       heading, half.length);
+  };
+  RoadText first = half, second = half;
+  first.geometry = arc(-40, 0);
+  first.link = link("2", road_3.empty() ? "2" : "3");
+  second.id = "2";
+  second.geometry = arc(40, std::numbers::pi);
+  second.link = link(road_3.empty() ? "1" : "3", "1");
+  if (change) change(&first);
+  return first.text() + second.text() + road_3;
 }
 
 /// The text with the first `from` in it as `to`.

@@ -1,0 +1,120 @@
+#include "pictura/map/opendrive/spread_jumps.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pictura/map/opendrive/curves.h"
+
+namespace pictura::opendrive {
+
+namespace {
+
+constexpr double kMinSpan_m = 10, kSpanPerJump = 10;
+// A smoothstep is 1.5 times as steep as its chord: over this many times the jump it turns by less than 0.2 rad.
+constexpr double kMinSpanPerJump = 7.5;
+constexpr double kMaxCubic_m = 1;  // length of the cubics that replace a moved line: within 0.1 mm of it
+
+/// A jump with the stretch of s over which it is spread.
+struct Spread {
+  Jump jump;
+  double begin = 0, end = 0;
+};
+
+Spread spread_of(const Jump& jump, const FileRoad& road) {
+  const double span = std::min(road.length, std::max(kMinSpan_m, kSpanPerJump * jump.shift_m.norm()));
+  const double begin = std::clamp(road.geometry[jump.piece].s - 0.5 * span, 0.0, road.length - span);
+  return {jump, begin, begin + span};
+}
+
+/// A point of the moved line and its derivative by s.
+struct Knot {
+  Eigen::Vector2d position_m, slope;
+};
+
+/// The cubic between two knots that are `length` apart in s.
+GeometryPiece cubic_between(const Knot& a, const Knot& b, double s, double length) {
+  GeometryPiece piece;
+  piece.s = s;
+  piece.x = a.position_m.x();
+  piece.y = a.position_m.y();
+  piece.heading = std::atan2(a.slope.y(), a.slope.x());
+  piece.length = length;
+  const Eigen::Vector2d along{std::cos(piece.heading), std::sin(piece.heading)}, left{-along.y(), along.x()};
+  const Eigen::Vector2d chord = b.position_m - a.position_m;
+  const auto coefficients = [&](const Eigen::Vector2d& axis) -> std::array<double, 4> {
+    const double first = length * axis.dot(a.slope), last = length * axis.dot(b.slope), way = axis.dot(chord);
+    return {0, first, 3 * way - 2 * first - last, first + last - 2 * way};
+  };
+  piece.cubic = PlaneCubic{.u = coefficients(along), .v = coefficients(left), .p_end = 1};
+  measure(&*piece.cubic);
+  return piece;
+}
+
+class JumpSpreader {
+ public:
+  JumpSpreader(const std::vector<Jump>& jumps, FileRoad* road) : road_(*road) {
+    for (const Jump& jump : jumps) spreads_.push_back(spread_of(jump, road_));
+  }
+
+  void run() {
+    for (std::size_t i = 0; i < road_.geometry.size(); ++i) replace(i);
+    road_.geometry = std::move(moved_);
+  }
+
+ private:
+  /// Appends the geometry itself, or cubics in its place where it touches a stretch.
+  void replace(std::size_t index) {
+    const GeometryPiece& piece = road_.geometry[index];
+    const double piece_end = piece.s + piece.length;
+    active_.clear();
+    std::vector<double> stations{piece.s, piece_end};
+    for (const Spread& spread : spreads_) {
+      if (spread.begin >= piece_end || spread.end <= piece.s) continue;
+      active_.push_back(&spread);
+      for (const double s : {spread.begin, spread.end}) {
+        if (s > piece.s && s < piece_end) stations.push_back(s);
+      }
+    }
+    if (active_.empty()) return moved_.push_back(piece);
+    std::sort(stations.begin(), stations.end());
+    for (std::size_t i = 1; i < stations.size(); ++i) {
+      const double begin = stations[i - 1], length = stations[i] - begin;
+      if (length <= 0) continue;
+      const int count = static_cast<int>(std::ceil(length / kMaxCubic_m));
+      Knot knot = knot_at(index, begin);
+      for (int step = 1; step <= count; ++step) {
+        const Knot next = knot_at(index, begin + length * step / count);
+        moved_.push_back(cubic_between(knot, next, begin + length * (step - 1) / count, length / count));
+        knot = next;
+      }
+    }
+  }
+
+  Knot knot_at(std::size_t index, double s) const {
+    const GeometryPiece& piece = road_.geometry[index];
+    const Pose pose = pose_on(piece, std::clamp(s - piece.s, 0.0, piece.length));
+    const double speed = piece.cubic ? piece.cubic->arc_length.back() / piece.length : 1;
+    Knot knot{pose.position_m, speed * Eigen::Vector2d{std::cos(pose.heading), std::sin(pose.heading)}};
+    for (const Spread* spread : active_) {
+      const double span = spread->end - spread->begin;
+      const double x = std::clamp((s - spread->begin) / span, 0.0, 1.0);
+      const double share = x * x * (3 - 2 * x) - (index >= spread->jump.piece ? 1 : 0);
+      knot.position_m += share * spread->jump.shift_m;
+      knot.slope += 6 * x * (1 - x) / span * spread->jump.shift_m;
+    }
+    return knot;
+  }
+
+  FileRoad& road_;
+  std::vector<Spread> spreads_;
+  std::vector<const Spread*> active_;  // those that touch the present geometry
+  std::vector<GeometryPiece> moved_;
+};
+
+}  // namespace
+
+bool can_spread_jump(double jump_m, double road_length_m) { return road_length_m >= kMinSpanPerJump * jump_m; }
+
+void spread_jumps(const std::vector<Jump>& jumps, FileRoad* road) { JumpSpreader(jumps, road).run(); }
+
+}  // namespace pictura::opendrive
