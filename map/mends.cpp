@@ -75,6 +75,10 @@ Text text_of(MendKind kind) {
     case MendKind::missing_signal: return {"references to signals that do not exist", "left out"};
     case MendKind::repeated_controller: return {"controller ids used twice", "the first counts"};
     case MendKind::missing_controller: return {"references to controllers that do not exist", "left out"};
+    case MendKind::uncontrolled_light:
+      return {"lights without a controller", "they cycle by heading at junctions, alone elsewhere"};
+    case MendKind::unlisted_light: return {"lights that the controllers of their junction leave out", "left out"};
+    case MendKind::laneless_light: return {"lights without a lane", "left out"};
   }
   return {"unknown", "unknown"};
 }
@@ -86,7 +90,7 @@ const char* action_of(MendKind kind) { return text_of(kind).action; }
 
 std::vector<MendKind> mend_kinds() {
   std::vector<MendKind> kinds;
-  for (int i = 0; i <= static_cast<int>(MendKind::missing_controller); ++i) kinds.push_back(static_cast<MendKind>(i));
+  for (int i = 0; i <= static_cast<int>(MendKind::laneless_light); ++i) kinds.push_back(static_cast<MendKind>(i));
   return kinds;
 }
 

@@ -69,6 +69,9 @@ enum class MendKind : uint8_t {
   missing_signal,
   repeated_controller,
   missing_controller,
+  uncontrolled_light,
+  unlisted_light,
+  laneless_light,
 };
 
 /// The fault, as "records out of order", and what is done about it, as "sorted".

@@ -149,9 +149,9 @@ void validate_lights(const RoadMap& map) {
     check_number("light", i, "stop_heading_rad", light.stop_heading_rad, -kPi - 1e-4f, kPi + 1e-4f);
     check_number("light", i, "length of its facing", length(light.head_facing), 0.999f, 1.001f);
     check_number("light", i, "length of its stop line", length(light.stop_b_m.xy() - light.stop_a_m.xy()), 0.1f, 1e3f);
-    check_index("light", i, "junction", light.junction, map.junctions.size(), 0);
-    check_index("light", i, "phase", light.phase,
-                static_cast<std::size_t>(map.junctions[static_cast<std::size_t>(light.junction)].num_phases), 0);
+    check_index("light", i, "junction", light.junction, map.junctions.size(), -1);
+    const int32_t phases = light.junction < 0 ? 1 : map.junctions[static_cast<std::size_t>(light.junction)].num_phases;
+    check_index("light", i, "phase", light.phase, static_cast<std::size_t>(phases), 0);
     check_range("light", i, "lanes", light.lanes, map.light_lanes.size(), 1);
   }
   for (std::size_t i = 0; i < map.light_lanes.size(); ++i) {

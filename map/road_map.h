@@ -112,10 +112,10 @@ struct TrafficLight {
   float stop_heading_rad = 0;  // travel direction of the controlled traffic
   Vec3 head_m;                 // centre of the head
   Vec2 head_facing;            // unit vector towards the controlled traffic
-  int32_t junction = -1;
-  int32_t phase = 0;  // rank of its controller in the junction
-  IndexRange lanes;   // RoadMap::light_lanes, incoming lanes first, then connecting ones
-  std::string name;   // the signal's id in the file
+  int32_t junction = -1;       // -1: it stands alone on a road
+  int32_t phase = 0;           // rank of its controller in the junction; without controllers, by heading
+  IndexRange lanes;            // RoadMap::light_lanes, incoming lanes first, then connecting ones
+  std::string name;            // the signal's id in the file
 };
 
 struct Junction {

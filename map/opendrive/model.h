@@ -166,6 +166,7 @@ struct FileSignal {
   bool is_dynamic = false;
   Orientation orientation = Orientation::either;
   std::vector<LaneRange> validity;  // empty: all lanes of its orientation
+  std::optional<double> stop_s;     // of a light away from junctions: its stop line; from split_at_lights()
   SourceLocation where;
 };
 
@@ -175,6 +176,7 @@ struct SignalReference {
   double s = 0, t = 0;
   Orientation orientation = Orientation::either;
   std::vector<LaneRange> validity;  // empty: all lanes of its orientation
+  std::optional<double> stop_s;     // as of a signal
   SourceLocation where;
 };
 

@@ -7,6 +7,7 @@
 #include "pictura/common/error.h"
 #include "pictura/map/opendrive/build.h"
 #include "pictura/map/opendrive/deform.h"
+#include "pictura/map/opendrive/lights.h"
 #include "pictura/map/opendrive/reader.h"
 #include "pictura/map/opendrive/sections.h"
 
@@ -44,6 +45,7 @@ RoadMap import_network(std::string_view text, const std::string& source, const O
   opendrive::Network network;
   opendrive::read_network(text, source, &faults, &network);
   opendrive::split_at_speed_changes(&network);
+  opendrive::split_at_lights(&network);
 
   RoadMap map;
   map.name = std::filesystem::path(source).stem().string();

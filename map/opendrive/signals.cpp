@@ -5,14 +5,16 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <tuple>
 
 #include "pictura/map/opendrive/build.h"
+#include "pictura/map/opendrive/lights.h"
+#include "pictura/map/opendrive/sections.h"
 
 namespace pictura::opendrive {
 
 namespace {
 
-constexpr std::string_view kLightType = "1000001";
 // Height of a head above the foot of its post; the file does not give it. Posts beyond the junction carry a mast arm.
 constexpr double kNearHeadHeight_m = 3.5, kFarHeadHeight_m = 5.5;
 // A head further beyond the stop line than this is on the far side.
@@ -55,26 +57,40 @@ class SignalBuilder {
           continue;
         }
         is_referenced[signal->second] = true;
-        collect(signal->second, road, reference.s, reference.orientation, reference.validity);
+        collect(signal->second, road, reference);
       }
     }
     for (std::size_t signal_index = 0; signal_index < placed_signals_.size(); ++signal_index) {
       const FileSignal& signal = *placed_signals_[signal_index].signal;
-      if (!is_referenced[signal_index])
-        collect(signal_index, placed_signals_[signal_index].road, signal.s, signal.orientation, signal.validity);
+      if (!is_referenced[signal_index]) collect(signal_index, placed_signals_[signal_index].road, signal);
       sort_unique(&signal_lanes_[signal_index]);
       if (signal.type != kLightType) {
         add_sign(signal_index);
-      } else if (phases_.contains(signal.id)) {
-        for (const int32_t lane : signal_lanes_[signal_index]) add_approaches(signal_index, lane);
+        continue;
+      }
+      const bool is_controlled = phases_.contains(signal.id);
+      Approaches approaches = std::move(lone_approaches_[signal_index]);
+      for (const int32_t lane : signal_lanes_[signal_index]) find_approaches(lane, &approaches);
+      if (approaches.empty()) {
+        signal.where.mend(build_.faults, MendKind::laneless_light, "controls no lane with a stop line");
+      } else if (is_controlled) {
+        for (auto& [road, approach] : approaches) add_light(signal_index, phases_.at(signal.id), &approach);
+      } else {
+        add_uncontrolled(signal_index, approaches);
       }
     }
-    for (auto& [key, approach] : approaches_) add_light(key.first, &approach);
+    add_uncontrolled_lights();
   }
 
  private:
-  /// Index of the signal, index of the approach road. Signals are in the order of the file's roads.
-  using Key = std::pair<std::size_t, int32_t>;
+  /// By the index of the approach road.
+  using Approaches = std::map<int32_t, Approach>;
+
+  /// An approach that no controller controls: the heads there share one line.
+  struct UncontrolledLine {
+    std::size_t signal_index = 0;  // of its first head
+    Approach approach;
+  };
 
   void find_signals() {
     for (std::size_t road = 0; road < build_.network.roads.size(); ++road) {
@@ -139,26 +155,36 @@ class SignalBuilder {
     return map_.lane_points[static_cast<std::size_t>(lane(index).points.end) - 1];
   }
 
-  /// Adds the lanes at s of a road to which a signal applies: those of its validity, else all of its orientation.
-  void collect(std::size_t signal_index, std::size_t road, double s, Orientation orientation,
-               const std::vector<LaneRange>& validity) {
+  /// Adds the lanes at s of a road to which a signal applies: those of its validity, else all of its orientation. Those
+  /// that meet at the stop line of a light away from junctions are an approach.
+  template <typename Signal>
+  void collect(std::size_t signal_index, std::size_t road, const Signal& signal) {
     const FileRoad& file_road = build_.network.roads[road];
     // References are often placed mid-road; use the lane ids of the section there.
-    std::size_t section = file_road.sections.size() - 1;
-    while (section > 0 && file_road.sections[section].s > s) --section;
-    for (const std::vector<FileLane>* side : {&file_road.sections[section].left, &file_road.sections[section].right}) {
+    const FileSection& section = section_at(file_road, signal.stop_s.value_or(signal.s));
+    const SectionLanes& lanes = build_.lanes[road][static_cast<std::size_t>(&section - file_road.sections.data())];
+    for (const std::vector<FileLane>* side : {&section.left, &section.right}) {
       for (const FileLane& candidate : *side) {
-        const int32_t index = build_.lanes[road][section].of(candidate.id);
+        const int32_t index = lanes.of(candidate.id);
         if (index < 0 || candidate.type != LaneType::driving) continue;
-        const bool is_valid = validity.empty()
-                                  ? orientation == Orientation::either ||
-                                        (orientation == Orientation::along) == travels_forward(file_road, candidate)
-                                  : std::any_of(validity.begin(), validity.end(), [&](const LaneRange& range) {
-                                      return candidate.id >= std::min(range.from, range.to) &&
-                                             candidate.id <= std::max(range.from, range.to);
-                                    });
-        if (is_valid) signal_lanes_[signal_index].push_back(index);
+        if (!applies_to(candidate, file_road, signal.orientation, signal.validity)) continue;
+        if (!signal.stop_s) {
+          signal_lanes_[signal_index].push_back(index);
+        } else if ((*signal.stop_s - section.s < section.end - *signal.stop_s) ==
+                   travels_forward(file_road, candidate)) {
+          add_lone_approach(signal_index, map_.links(lane(index).predecessors), {index});
+        } else {
+          const Span<const int32_t> next = map_.links(lane(index).successors);
+          add_lone_approach(signal_index, Span<const int32_t>(&index, 1), {next.begin(), next.end()});
+        }
       }
+    }
+  }
+
+  void add_lone_approach(std::size_t signal_index, Span<const int32_t> incoming,
+                         const std::vector<int32_t>& connecting) {
+    for (const int32_t from : incoming) {
+      if (is_drivable(lane(from).type)) add_approach(from, connecting, &lone_approaches_[signal_index]);
     }
   }
 
@@ -180,11 +206,11 @@ class SignalBuilder {
 
   /// A lane of a junction is followed back to its start: its drivable predecessors are the incoming lanes. A lane that
   /// leads to a junction is followed to its end: its last piece is the incoming lane.
-  void add_approaches(std::size_t signal_index, int32_t start) {
+  void find_approaches(int32_t start, Approaches* approaches) const {
     if (lane(start).in_junction) {
       const std::vector<int32_t> connecting = along_road(start, &Lane::predecessors);
       for (const int32_t incoming : map_.links(lane(connecting.back()).predecessors)) {
-        if (is_drivable(lane(incoming).type)) add_approach(signal_index, incoming, connecting);
+        if (is_drivable(lane(incoming).type)) add_approach(incoming, connecting, approaches);
       }
       return;
     }
@@ -193,13 +219,71 @@ class SignalBuilder {
     for (const int32_t next : map_.links(lane(incoming).successors)) {
       if (lane(next).in_junction) connecting.push_back(next);
     }
-    if (!connecting.empty()) add_approach(signal_index, incoming, connecting);
+    if (!connecting.empty()) add_approach(incoming, connecting, approaches);
   }
 
-  void add_approach(std::size_t signal_index, int32_t incoming, const std::vector<int32_t>& connecting) {
-    Approach& approach = approaches_[{signal_index, lane(incoming).source_road}];
+  void add_approach(int32_t incoming, const std::vector<int32_t>& connecting, Approaches* approaches) const {
+    Approach& approach = (*approaches)[lane(incoming).source_road];
     approach.incoming.push_back(incoming);
     approach.connecting.insert(approach.connecting.end(), connecting.begin(), connecting.end());
+  }
+
+  /// The junction of an approach, or -1.
+  int32_t junction_of(const Approach& approach) const {
+    return approach.connecting.empty() ? -1 : lane(approach.connecting.front()).junction;
+  }
+
+  /// Adds a head to the lines of its approaches. Where controllers rule the junction it is none of theirs: left out.
+  void add_uncontrolled(std::size_t signal_index, const Approaches& approaches) {
+    const FileSignal& signal = *placed_signals_[signal_index].signal;
+    if (const char* const junction = ruled_junction(approaches)) {
+      signal.where.mend(build_.faults, MendKind::unlisted_light, "no controller of junction {} controls it", junction);
+      return;
+    }
+    signal.where.mend(build_.faults, MendKind::uncontrolled_light, "no controller of a junction controls it");
+    for (const auto& [road, approach] : approaches) {
+      const int32_t junction_index = junction_of(approach);
+      // On a road lines are told apart by their lanes.
+      const int32_t first = junction_index < 0 ? approach.incoming.front() : -1;
+      const auto [line, is_new] = uncontrolled_.try_emplace({junction_index, road, first});
+      if (is_new) line->second.signal_index = signal_index;
+      Approach& whole = line->second.approach;
+      whole.incoming.insert(whole.incoming.end(), approach.incoming.begin(), approach.incoming.end());
+      whole.connecting.insert(whole.connecting.end(), approach.connecting.begin(), approach.connecting.end());
+    }
+  }
+
+  /// The name of a junction of the approaches whose lights controllers control; null if there is none.
+  const char* ruled_junction(const Approaches& approaches) const {
+    for (const auto& [road, approach] : approaches) {
+      const int32_t junction = junction_of(approach);
+      if (junction < 0 || map_.junctions[static_cast<std::size_t>(junction)].num_phases == 0) continue;
+      return map_.junctions[static_cast<std::size_t>(junction)].name.c_str();
+    }
+    return nullptr;
+  }
+
+  /// Adds a light for each line that no controller controls. Those of a junction whose headings are alike, or opposite,
+  /// have one phase; a line away from junctions is alone.
+  void add_uncontrolled_lights() {
+    constexpr double kSameAxis_rad = 0.25 * std::numbers::pi;
+    std::map<int32_t, std::vector<double>> headings;  // [junction] of the first line of each phase
+    for (auto& [key, line] : uncontrolled_) {
+      Phase phase{std::get<0>(key), 0};
+      if (phase.junction >= 0) {
+        std::vector<double>& phases = headings[phase.junction];
+        const double heading = end_of(line.approach.incoming.front()).heading_rad;
+        const auto same = std::find_if(phases.begin(), phases.end(), [&](double other) {
+          return std::abs(std::remainder(heading - other, std::numbers::pi)) <= kSameAxis_rad;
+        });
+        phase.phase = static_cast<int32_t>(same - phases.begin());
+        if (same == phases.end()) phases.push_back(heading);
+      }
+      add_light(line.signal_index, phase, &line.approach);
+    }
+    for (const auto& [junction, phases] : headings) {
+      map_.junctions[static_cast<std::size_t>(junction)].num_phases = static_cast<int32_t>(phases.size());
+    }
   }
 
   Eigen::Vector3d position_of(std::size_t signal_index) const {
@@ -236,11 +320,10 @@ class SignalBuilder {
     lanes->erase(std::unique(lanes->begin(), lanes->end()), lanes->end());
   }
 
-  void add_light(std::size_t signal_index, Approach* approach) {
+  void add_light(std::size_t signal_index, const Phase& phase, Approach* approach) {
     sort_unique(&approach->incoming);
     sort_unique(&approach->connecting);
     const FileSignal& signal = *placed_signals_[signal_index].signal;
-    const Phase phase = phases_.at(signal.id);
     TrafficLight light;
     light.name = signal.id;
     light.junction = phase.junction;
@@ -293,7 +376,9 @@ class SignalBuilder {
   std::unordered_map<std::string, std::size_t> index_by_id_;
   std::vector<std::vector<int32_t>> signal_lanes_;  // [signals] lanes to which each applies
   std::unordered_map<std::string, Phase> phases_;
-  std::map<Key, Approach> approaches_;
+  std::map<std::size_t, Approaches> lone_approaches_;  // [signals] away from junctions
+  // By junction, approach road and, away from junctions, the first lane.
+  std::map<std::tuple<int32_t, int32_t, int32_t>, UncontrolledLine> uncontrolled_;
 };
 
 }  // namespace

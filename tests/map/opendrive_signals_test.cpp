@@ -1,5 +1,6 @@
 // Lights and signs: the lanes they control, stop lines, and positions of heads.
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -90,11 +91,98 @@ TEST(OpenDriveLights, WithoutValidityTheyControlTheLanesOfTheirOrientation) {
   EXPECT_EQ(lights_with("-").size(), 0u);
 }
 
-TEST(OpenDriveLights, WithoutAControllerOfAJunctionTheyAreSkipped) {
-  const std::string light = R"(<signals><signal id="50" type="1000001" s="1" t="-7"/></signals>)";
-  EXPECT_EQ(parse(three_roads(light)).lights.size(), 0u);
-  EXPECT_EQ(parse(three_roads(light) + kController).lights.size(), 0u);
-  EXPECT_EQ(parse(three_roads(light, kInJunction) + kController).lights.size(), 1u);
+/// What was said about the lights of a map.
+std::vector<MendKind> kinds_of(const RoadMap& map) {
+  std::vector<MendKind> kinds;
+  for (const Mend& mend : map.mends) kinds.push_back(mend.kind);
+  return kinds;
+}
+
+std::string light(const std::string& id, double s, double t, const std::string& orientation = "+") {
+  return fmt::format(R"(<signal id="{}" type="1000001" s="{}" t="{}" zOffset="4" dynamic="yes" orientation="{}"/>)", id,
+                     s, t, orientation);
+}
+
+TEST(OpenDriveLights, OneOnARoadStandsAloneAtItsStation) {
+  const auto ring_of = [](const std::string& lights) {
+    return parse(test::ring_with("", [&](RoadText* road) { road->rest = "<signals>" + lights + "</signals>"; }));
+  };
+  const RoadMap map = ring_of(light("7", 100, -5));
+  EXPECT_EQ(kinds_of(map), std::vector<MendKind>{MendKind::uncontrolled_light});
+  ASSERT_EQ(map.lights.size(), 1u);
+  const TrafficLight& alone = map.lights[0];
+  EXPECT_EQ(alone.junction, -1);
+  EXPECT_EQ(alone.phase, 0);
+  const double angle = 100.0 / 40;
+  expect_at(map, alone.stop_a_m, 40 * std::sin(angle), -40 * std::cos(angle));
+  expect_at(map, alone.stop_b_m, 43.5 * std::sin(angle), -43.5 * std::cos(angle));
+  EXPECT_NEAR(alone.stop_heading_rad, angle, 1e-5);
+  // The lane is cut at the line; it counts once.
+  EXPECT_EQ(map.facts.driving_lanes, 2);
+  ASSERT_EQ(lanes_of(map, alone).size(), 2u);
+  EXPECT_NEAR(map.lanes[static_cast<size_t>(lanes_of(map, alone)[0])].length_m, 41.75 * angle, 0.01);
+  for (const Lane& lane : map.lanes) EXPECT_TRUE(lane.is_endless);
+  // Heads on both sides, and beyond, have one line; the next line has its own light.
+  EXPECT_EQ(ring_of(light("7", 60, -5) + light("8", 60.2, 2) + light("9", 75, -5)).lights.size(), 1u);
+  EXPECT_EQ(ring_of(light("7", 60, -5) + light("8", 100, -5)).lights.size(), 2u);
+  // At an end of its road the line is there.
+  EXPECT_EQ(ring_of(light("7", 0.1, -5)).lights.size(), 1u);
+  EXPECT_EQ(ring_of(light("7", 40 * std::numbers::pi, -5)).lights.size(), 1u);
+  const RoadMap nothing = ring_of(light("7", 100, -5, "-"));
+  EXPECT_EQ(nothing.lights.size(), 0u);
+  EXPECT_EQ(kinds_of(nothing), std::vector<MendKind>{MendKind::laneless_light});
+}
+
+/// A junction at the origin which roads w, e and s lead to, each with a light and a way straight on.
+std::string crossing(const std::string& more_on_w, const std::string& junction_more = "") {
+  std::string roads, connections;
+  for (const auto& [name, heading] :
+       std::vector<std::pair<std::string, double>>{{"w", 0}, {"e", std::numbers::pi}, {"s", 0.5 * std::numbers::pi}}) {
+    const double x = std::cos(heading), y = std::sin(heading);
+    RoadText in, through, out;
+    for (RoadText* road : {&in, &through, &out}) road->right = lane_of(-1, "driving", 3);
+    in.id = name;
+    in.geometry = test::line_at(0, -110 * x, -110 * y, heading, 100);
+    in.link = R"(<successor elementType="junction" elementId="7"/>)";
+    in.rest = "<signals>" + light(name, 95, -5) + (name == "w" ? more_on_w : "") + "</signals>";
+    through.id = name + " through";
+    through.junction = "7";
+    through.length = 20;
+    through.geometry = test::line_at(0, -10 * x, -10 * y, heading, 20);
+    through.link = fmt::format(R"(<predecessor elementType="road" elementId="{}" contactPoint="end"/>)"
+                               R"(<successor elementType="road" elementId="{} out" contactPoint="start"/>)",
+                               name, name);
+    through.right = lane_of(-1, "driving", 3, R"(<link><predecessor id="-1"/><successor id="-1"/></link>)");
+    out.id = name + " out";
+    out.geometry = test::line_at(0, 10 * x, 10 * y, heading, 100);
+    out.link = R"(<predecessor elementType="junction" elementId="7"/>)";
+    roads += in.text() + through.text() + out.text();
+    connections += fmt::format(R"(<connection id="{}" incomingRoad="{}" connectingRoad="{} through" )"
+                               R"(contactPoint="start"><laneLink from="-1" to="-1"/></connection>)",
+                               name, name, name);
+  }
+  return roads + "<junction id=\"7\">" + connections + junction_more + "</junction>";
+}
+
+TEST(OpenDriveLights, WithoutControllersThoseOfAJunctionCycleByHeading) {
+  const RoadMap map = parse(crossing(light("second head", 99, 3)));
+  EXPECT_EQ(kinds_of(map), std::vector<MendKind>(4, MendKind::uncontrolled_light));
+  ASSERT_EQ(map.lights.size(), 3u);
+  EXPECT_EQ(map.junctions.at(0).num_phases, 2);
+  for (const TrafficLight& each : map.lights) {
+    EXPECT_EQ(each.junction, 0);
+    EXPECT_EQ(each.phase, each.name == "s" ? 1 : 0) << each.name;
+    EXPECT_EQ(lanes_of(map, each).size(), 2u);
+  }
+  expect_at(map, map.lights[0].stop_a_m, -10, 0);
+}
+
+TEST(OpenDriveLights, ThoseThatTheControllersOfAJunctionLeaveOutDoNotStand) {
+  const RoadMap map =
+      parse(crossing("", R"(<controller id="90"/>)") + R"(<controller id="90"><control signalId="w"/></controller>)");
+  ASSERT_EQ(map.lights.size(), 1u);
+  EXPECT_EQ(map.lights[0].name, "w");
+  EXPECT_EQ(kinds_of(map), std::vector<MendKind>(2, MendKind::unlisted_light));
 }
 
 TEST(OpenDriveSigns, ApplyToTheLanesThatTheyNameAndFaceTheirTraffic) {
