@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <map>
+#include <numbers>
 
 #include <nlohmann/json.hpp>
 
@@ -18,6 +20,29 @@ constexpr double kStep_s = 0.1;
 constexpr int32_t kHistorySteps = 10;
 constexpr int32_t kMaxId = 1'000'000'000;
 constexpr std::size_t kMaxLightStates = 8'000'000;
+
+/// The text with null in place of NaN and Infinity, which Python writes outside of JSON: where a number is needed, null
+/// is refused, and what is not valid is not looked at.
+std::string with_null_for_nan(std::string_view text) {
+  std::string out;
+  out.reserve(text.size());
+  bool is_quoted = false;
+  for (std::size_t i = 0; i < text.size();) {
+    std::size_t length = is_quoted && text[i] == '\\' ? 2 : 1;
+    if (text[i] == '"') is_quoted = !is_quoted;
+    std::string_view copied = text.substr(i, length);
+    if (!is_quoted && (text[i] == 'N' || text[i] == 'I' || text[i] == '-')) {
+      for (const std::string_view word : {"NaN", "-Infinity", "Infinity"}) {
+        if (!text.substr(i).starts_with(word)) continue;
+        length = word.size();
+        copied = "null";
+      }
+    }
+    out += copied;
+    i += length;
+  }
+  return out;
+}
 
 const Json& member(const Json& object, const char* field) {
   if (!object.is_object()) fail_field("", "expected an object, got {}", object.type_name());
@@ -70,10 +95,37 @@ Eigen::Vector3d point_of(const Json& object) {
   return {number_of(object, "x"), number_of(object, "y"), object.contains("z") ? number_of(object, "z") : 0.0};
 }
 
-void read_object(const Json& object, LoggedScene* scene) {
+/// A center has no z in flat geometry: it is half of the height above the ground.
+Eigen::Vector3d center_of(const Json& position, double height_m) {
+  Eigen::Vector3d center = point_of(position);
+  if (!position.contains("z")) center.z() = 0.5 * height_m;
+  return center;
+}
+
+bool flag_in(const Json& value) {
+  if (value.is_boolean()) return value.get<bool>();
+  if (value.is_number_integer() && (value == 0 || value == 1)) return value == 1;
+  fail_field("", "expected true or false, got {}", value.is_number() ? value.dump() : value.type_name());
+}
+
+/// Older files have no heights.
+double height_of(const Json& object, TrackType type, const std::string& place, LoggedScene* scene) {
+  constexpr double kVehicleHeight_m = 1.6, kPersonHeight_m = 1.7;
+  if (object.contains("height")) return number_of(object, "height");
+  scene->note("objects without a height: vehicles are 1.6 m high, others 1.7 m", place);
+  return type == TrackType::vehicle ? kVehicleHeight_m : kPersonHeight_m;
+}
+
+void read_object(const Json& object, std::size_t index, LoggedScene* scene) {
   constexpr std::array kTypes{"unset", "vehicle", "pedestrian", "cyclist", "other"};
   LoggedTrack& track = scene->tracks.emplace_back();
-  track.id = integer_of(object, "id");
+  const std::string place = fmt::format("objects[{}]", index);
+  if (object.is_object() && !object.contains("id")) {
+    scene->note("objects without an id: their places count", place);
+    track.id = static_cast<int64_t>(index);
+  } else {
+    track.id = integer_of(object, "id");
+  }
   const std::string type = text_of(object, "type");
   const auto known = std::find(kTypes.begin(), kTypes.end(), type);
   track.type = known == kTypes.end() ? TrackType::other : static_cast<TrackType>(known - kTypes.begin());
@@ -96,15 +148,15 @@ void read_object(const Json& object, LoggedScene* scene) {
     if (array->size() != steps) fail_field(field, "expected {} steps, got {}", steps, array->size());
   }
   const double length_m = number_of(object, "length"), width_m = number_of(object, "width"),
-               height_m = number_of(object, "height");
+               height_m = height_of(object, track.type, place, scene);
+  if (object.contains("is_sdc") && within("is_sdc", [&] { return flag_in(object["is_sdc"]); })) {
+    scene->sdc_track = static_cast<int32_t>(index);
+  }
   for (std::size_t i = 0; i < steps; ++i) {
     LoggedState& state = track.states.emplace_back();
-    within("valid", i, [&] {
-      if (!valid[i].is_boolean()) fail_field("", "expected true or false, got {}", valid[i].type_name());
-    });
-    if (!valid[i].get<bool>()) continue;
+    if (!within("valid", i, [&] { return flag_in(valid[i]); })) continue;
     state.valid = true;
-    state.center_m = within("position", i, [&] { return point_of(position[i]); });
+    state.center_m = within("position", i, [&] { return center_of(position[i], height_m); });
     state.heading_rad = within("heading", i, [&] { return number_in(heading[i], ""); });
     within("velocity", i, [&] {
       state.velocity_x_mps = number_of(velocity[i], "x");
@@ -116,11 +168,22 @@ void read_object(const Json& object, LoggedScene* scene) {
   }
 }
 
+// Lanes 0 to 3, lines 5 to 13, edges 14 to 16, and one number each for the rest.
+constexpr int64_t kSurfaceLane = 2, kLastLane = 3, kFirstLine = 5, kLastLine = 13, kLastEdge = 16, kStopSign = 17,
+                  kCrosswalk = 18, kSpeedBump = 19, kDriveway = 20;
+
+/// The number of a road's kind. Older files only name it.
+int64_t kind_of_road(const Json& road) {
+  if (!road.is_object() || road.contains("map_element_id")) return integer_of(road, "map_element_id");
+  static const std::map<std::string, int64_t> kKinds{
+      {"lane", kSurfaceLane},    {"road_line", kFirstLine},  {"road_edge", kLastEdge}, {"stop_sign", kStopSign},
+      {"crosswalk", kCrosswalk}, {"speed_bump", kSpeedBump}, {"driveway", kDriveway}};
+  const auto found = kKinds.find(text_of(road, "type"));
+  return found == kKinds.end() ? -1 : found->second;
+}
+
 void read_road(const Json& road, std::size_t index, LoggedScene* scene) {
-  // Lanes 0 to 3, lines 5 to 13, edges 14 to 16, and one number each for the rest.
-  constexpr int64_t kLastLane = 3, kFirstLine = 5, kLastLine = 13, kLastEdge = 16, kStopSign = 17, kCrosswalk = 18,
-                    kSpeedBump = 19, kDriveway = 20;
-  const int64_t type = integer_of(road, "map_element_id");
+  const int64_t type = kind_of_road(road);
   // Running numbers of some writers repeat; the place in the file does not.
   const auto id = static_cast<int64_t>(index);
   const Json& geometry = array_of(road, "geometry");
@@ -194,6 +257,68 @@ void read_light(const std::string& lane, const Json& light, const std::map<std::
   scene->lights.push_back(std::move(logged));
 }
 
+/// A list has an element a light, which names its lane.
+std::string lane_of_light(const Json& light) {
+  for (const char* field : {"lane", "lane_id", "id"}) {
+    if (!light.is_object() || !light.contains(field)) continue;
+    return light[field].is_string() ? text_of(light, field) : std::to_string(integer_of(light, field));
+  }
+  fail_field("lane", "expected it, got nothing");
+}
+
+void read_lights(const Json& lights, const Json& roads, LoggedScene* scene) {
+  if (lights.is_null()) return;
+  if (!lights.is_object() && !lights.is_array()) {
+    fail_field("tl_states", "expected an object or an array, got {}", lights.type_name());
+  }
+  const auto steps = static_cast<std::size_t>(scene->num_steps);
+  if (lights.size() * steps > kMaxLightStates) {
+    fail_field("tl_states", "expected at most {} lights at {} steps, got {}", kMaxLightStates / steps, steps,
+               lights.size());
+  }
+  std::map<std::string, int64_t> lane_ids;
+  for (std::size_t i = 0; i < roads.size(); ++i) {
+    if (!roads[i].contains("id") || !roads[i]["id"].is_number_integer()) continue;
+    lane_ids.emplace(std::to_string(roads[i]["id"].get<int64_t>()), static_cast<int64_t>(i));
+  }
+  if (lights.is_array()) {
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+      within("tl_states", i, [&] { read_light(lane_of_light(lights[i]), lights[i], lane_ids, scene); });
+    }
+    return;
+  }
+  for (const auto& light : lights.items()) {
+    within("tl_states", [&] { within(light.key(), [&] { read_light(light.key(), light.value(), lane_ids, scene); }); });
+  }
+}
+
+/// Turns headings in degrees, which older files have, into radians. They are degrees if those of moving objects then
+/// fit their motion better, or, unless they fit it worse, if any is larger than a whole turn in radians.
+void convert_degrees(LoggedScene* scene) {
+  constexpr double kMoving_mps = 0.5, kLargest_rad = 6.3, kRadians = std::numbers::pi / 180;
+  double fit = 0, fit_of_degrees = 0;  // sums of the cosines between heading and motion
+  bool is_large = false;
+  for (const LoggedTrack& track : scene->tracks) {
+    for (const LoggedState& state : track.states) {
+      if (!state.valid) continue;
+      is_large = is_large || std::abs(state.heading_rad) > kLargest_rad;
+      if (!(std::hypot(state.velocity_x_mps, state.velocity_y_mps) > kMoving_mps)) continue;
+      const double motion = std::atan2(state.velocity_y_mps, state.velocity_x_mps);
+      fit += std::cos(state.heading_rad - motion);
+      fit_of_degrees += std::cos(kRadians * state.heading_rad - motion);
+    }
+  }
+  if (!(fit_of_degrees > fit || (is_large && fit_of_degrees == fit))) return;
+  for (std::size_t i = 0; i < scene->tracks.size(); ++i) {
+    bool is_there = false;
+    for (LoggedState& state : scene->tracks[i].states) {
+      state.heading_rad *= kRadians;
+      is_there = is_there || state.valid;
+    }
+    if (is_there) scene->note("tracks whose headings are degrees", fmt::format("objects[{}]", i));
+  }
+}
+
 void read_metadata(const Json& metadata, LoggedScene* scene) {
   const auto tracks = static_cast<int64_t>(scene->tracks.size());
   // Indices are of the recording's tracks, of which the file may lack some.
@@ -204,7 +329,8 @@ void read_metadata(const Json& metadata, LoggedScene* scene) {
   };
   if (metadata.contains("sdc_track_index")) {
     const int64_t index = integer_of(metadata, "sdc_track_index");
-    if (is_track(index, "sdc_track_index")) scene->sdc_track = static_cast<int32_t>(index);
+    // An object that says so itself is it.
+    if (scene->sdc_track < 0 && is_track(index, "sdc_track_index")) scene->sdc_track = static_cast<int32_t>(index);
   }
   if (metadata.contains("objects_of_interest")) {
     for (const Json& id : array_of(metadata, "objects_of_interest")) {
@@ -237,41 +363,28 @@ LoggedScene parse_scene(std::string_view text, const std::string& source) {
   try {
     Json json;
     try {
-      json = Json::parse(text);
+      json = Json::parse(with_null_for_nan(text));
     } catch (const Json::exception& error) {
       // Of the library: "[json.exception.parse_error.101] parse error at line 1, column 2: ..."
       std::string reason = error.what();
       reason.erase(0, reason.find(']') == std::string::npos ? 0 : reason.find(']') + 2);
       fail_field("", "expected JSON, got a {}", reason);
     }
-    if (json.is_object() && json.contains("scenario_id")) scene.id = text_of(json, "scenario_id");
+    if (json.is_object() && json.contains("scenario_id")) {
+      const Json& id = json["scenario_id"];
+      scene.id = id.is_number_integer() ? id.dump() : text_of(json, "scenario_id");
+    }
     const Json& objects = array_of(json, "objects");
     if (objects.size() > static_cast<std::size_t>(kMaxScenarioTracks)) {
       fail_field("objects", "expected at most {}, got {}", kMaxScenarioTracks, objects.size());
     }
-    for (std::size_t i = 0; i < objects.size(); ++i) within("objects", i, [&] { read_object(objects[i], &scene); });
+    for (std::size_t i = 0; i < objects.size(); ++i) within("objects", i, [&] { read_object(objects[i], i, &scene); });
     if (objects.empty()) fail_field("objects", "expected at least one, got none");
+    convert_degrees(&scene);
     scene.current_step = std::min(kHistorySteps, scene.num_steps - 1);
     const Json& roads = array_of(json, "roads");
     for (std::size_t i = 0; i < roads.size(); ++i) within("roads", i, [&] { read_road(roads[i], i, &scene); });
-    if (json.contains("tl_states")) {
-      const Json& lights = json["tl_states"];
-      if (!lights.is_object()) fail_field("tl_states", "expected an object, got {}", lights.type_name());
-      const auto steps = static_cast<std::size_t>(scene.num_steps);
-      if (lights.size() * steps > kMaxLightStates) {
-        fail_field("tl_states", "expected at most {} lights at {} steps, got {}", kMaxLightStates / steps, steps,
-                   lights.size());
-      }
-      std::map<std::string, int64_t> lane_ids;
-      for (std::size_t i = 0; i < roads.size(); ++i) {
-        if (!roads[i].contains("id") || !roads[i]["id"].is_number_integer()) continue;
-        lane_ids.emplace(std::to_string(roads[i]["id"].get<int64_t>()), static_cast<int64_t>(i));
-      }
-      for (const auto& light : lights.items()) {
-        within("tl_states",
-               [&] { within(light.key(), [&] { read_light(light.key(), light.value(), lane_ids, &scene); }); });
-      }
-    }
+    if (json.contains("tl_states")) read_lights(json["tl_states"], roads, &scene);
     if (json.contains("metadata")) within("metadata", [&] { read_metadata(member(json, "metadata"), &scene); });
   } catch (const FieldError& error) {
     throw to_error(source, error);

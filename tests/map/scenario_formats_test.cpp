@@ -93,8 +93,8 @@ TEST(GpuDrive, FaultsAreNamed) {
     return message_of([&] { read_json(changed); });
   };
   EXPECT_EQ(reason("\"objects\"", "\"object\""), "scene.json: objects: expected it, got nothing");
-  EXPECT_EQ(reason("\"valid\":[true", "\"valid\":[1"),
-            "scene.json: objects[0].valid[0]: expected true or false, got number");
+  EXPECT_EQ(reason("\"valid\":[true", "\"valid\":[2"),
+            "scene.json: objects[0].valid[0]: expected true or false, got 2");
   EXPECT_EQ(reason("\"valid\":[true,", "\"valid\":["), "scene.json: objects[0].valid: expected 3 steps, got 2");
   EXPECT_EQ(reason("\"heading\":[", "\"heading\":[null,"), "scene.json: objects[0].heading: expected 3 steps, got 4");
   EXPECT_EQ(reason("\"map_element_id\":2", "\"map_element_id\":\"lane\""),
@@ -103,11 +103,133 @@ TEST(GpuDrive, FaultsAreNamed) {
             "scene.json: roads[0].map_element_id: expected a number of at most 1000000000 in magnitude, got "
             "18446744073709551615");
   EXPECT_THAT(reason("{\"name\"", "{name"), HasSubstr("scene.json: expected JSON, got a parse error at line 1"));
-  EXPECT_THAT(reason("\"x\":", "\"x\":NaN,\"y\":"), HasSubstr("scene.json: expected JSON"));
+  EXPECT_EQ(reason("\"x\":", "\"x\":NaN,\"u\":"), "scene.json: objects[0].position[0].x: expected a number, got null");
   EXPECT_THAT(reason("\"x\":", "\"x\":1e300,\"u\":"), HasSubstr("scene.json: objects[0].position[0].x: expected"));
   EXPECT_THAT(message_of([] { read_json(""); }), HasSubstr("scene.json: expected JSON"));
   EXPECT_THAT(message_of([] { read_json("[]"); }), HasSubstr("scene.json: expected an object, got array"));
   EXPECT_THAT(message_of([] { read_json(std::string(200'000, '[')); }), HasSubstr("scene.json: expected JSON"));
+}
+
+/// Scenes as earlier versions of GPUDrive and other writers made them: two vehicles on a road of two lanes, 91 steps.
+struct OldScene {
+  bool has_z = false, has_ids = false, has_degrees = false;
+  std::string height, more, lights = "{}";
+  std::string invalid = R"({"x":0.0001,"y":0.0001})";  // the position while the second vehicle is not there
+  int32_t first_step = 0;                              // of the second vehicle
+
+  std::string list(const std::function<std::string(int)>& of_step, int count = 91) const {
+    std::string text;
+    for (int step = 0; step < count; ++step) text += (step ? "," : "") + of_step(step);
+    return "[" + text + "]";
+  }
+  std::string point(double x, double y) const {
+    return fmt::format(R"({{"x":{},"y":{}{}}})", x, y, has_z ? R"(,"z":-122.8)" : "");
+  }
+  std::string vehicle(int id, double x, double y, double speed_mps, int32_t first, const std::string& own = "") const {
+    const bool turned = speed_mps < 0;
+    const std::string heading = has_degrees ? (turned ? "180" : "0") : (turned ? "3.14159265" : "0.0");
+    return fmt::format(
+        R"({{"type":"vehicle","width":2.0,"length":4.5{}{}{},"goalPosition":{},"position":{},"heading":{},"velocity":{},)"
+        R"("valid":{}}})",
+        height, own, has_ids ? fmt::format(R"(,"id":{})", id) : "", point(0, 0),
+        list([&](int step) { return step < first ? invalid : point(x + 0.1 * speed_mps * step, y); }),
+        list([&](int step) { return step < first ? "0.0001" : heading; }),
+        list([&](int) { return fmt::format(R"({{"x":{},"y":0.0}})", speed_mps); }),
+        list([&](int step) { return step < first ? "false" : "true"; }));
+  }
+  std::string road(int id, const std::string& type, int element, double from_x, double to_x, double y) const {
+    return fmt::format(R"({{"type":"{}"{},"geometry":{}}})", type,
+                       has_ids ? fmt::format(R"(,"id":{},"map_element_id":{})", id, element) : "",
+                       list([&](int i) { return point(from_x + (to_x - from_x) * i / 140, y); }, 141));
+  }
+  std::string text(const std::string& of_second = "") const {
+    return R"({"name":"old.json",)" + more + R"("objects":[)" + vehicle(7, 0, 0, 8, 0) + "," +
+           vehicle(8, 100, 3.6, -7, first_step, of_second) + R"(],"roads":[)" + road(10, "lane", 2, -20, 120, 0) + "," +
+           road(11, "lane", 2, 120, -20, 3.6) + "," + road(12, "road_edge", 15, -20, 120, -1.8) + "," +
+           road(13, "road_edge", 15, 120, -20, 5.4) + "," + road(14, "road_line", 11, -20, 120, 1.8) +
+           R"(],"tl_states":)" + lights + "}";
+  }
+};
+
+std::vector<std::string> notes_of(const Scenario& scene) {
+  std::vector<std::string> notes;
+  for (const ConversionNote& note : scene.notes) notes.push_back(fmt::format("{} {}", note.count, note.what));
+  return notes;
+}
+
+TEST(GpuDrive, FlatFilesWithoutIdsAndWithDegreesAreRead) {
+  const Scenario scene = read_json(OldScene{.has_degrees = true}.text());
+  ASSERT_EQ(scene.tracks.size(), 2u);
+  EXPECT_EQ(scene.tracks[1].id, 1);
+  EXPECT_FLOAT_EQ(scene.tracks[0].height_m, 1.6f);
+  const auto second = static_cast<std::size_t>(scene.num_steps);
+  EXPECT_FLOAT_EQ(scene.states[0].velocity_mps.x, 8);
+  EXPECT_FLOAT_EQ(scene.states[second].velocity_mps.x, -7);
+  EXPECT_EQ(scene.states[0].heading_rad, 0);
+  EXPECT_NEAR(std::abs(scene.states[second].heading_rad), M_PI, 1e-6);
+  EXPECT_NEAR(scene.states[0].position_m.z, 0, 1e-6) << "on the ground";
+  EXPECT_EQ(scene.map.lanes.size(), 2u);
+  EXPECT_EQ(scene.map.markings.size(), 1u);
+  EXPECT_FALSE(scene.map.road_edges.empty());
+  EXPECT_THAT(notes_of(scene),
+              ::testing::UnorderedElementsAre("2 objects without an id: their places count",
+                                              "2 objects without a height: vehicles are 1.6 m high, others 1.7 m",
+                                              "2 tracks whose headings are degrees"));
+}
+
+TEST(GpuDrive, HeadingsAreDegreesOnlyIfTheyFit) {
+  EXPECT_NEAR(std::abs(read_json(OldScene{}.text()).states[91].heading_rad), M_PI, 1e-6);
+  // A whole turn more is no degrees where the motion fits radians; without a motion it is.
+  std::string text = OldScene{}.text();
+  const auto replace_all = [&](const std::string& from, const std::string& to) {
+    for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size()) {
+      text.replace(at, from.size(), to);
+    }
+  };
+  replace_all("3.14159265", "9.42477796");
+  EXPECT_NEAR(std::abs(read_json(text).states[91].heading_rad), M_PI, 1e-6);
+  replace_all(R"({"x":-7,"y":0.0})", R"({"x":0,"y":0.0})");
+  replace_all(R"({"x":8,"y":0.0})", R"({"x":0,"y":0.0})");
+  EXPECT_NEAR(read_json(text).states[91].heading_rad, 9.42477796 * M_PI / 180, 1e-6);
+}
+
+TEST(GpuDrive, LightsAreReadFromObjectsAndLists) {
+  OldScene old{.has_z = true, .has_ids = true, .height = R"(,"height":1.6)", .more = R"("scenario_id":4711,)"};
+  old.first_step = 30;
+  const std::string states = R"("state":)" + old.list([](int step) { return step < 40 ? R"("stop")" : R"("go")"; }) +
+                             R"(,"time_index":)" + old.list([](int step) { return std::to_string(step); });
+  for (const std::string& lights :
+       {"{\"10\":{" + states + "}}", "[{\"lane\":10," + states + "}]", "[{\"lane_id\":\"10\"," + states + "}]"}) {
+    old.lights = lights;
+    for (const char* invalid :
+         {R"({"x":0.0001,"y":0.0001,"z":0.0001})", "null", "\"nothing\"", R"({"x":NaN,"y":-Infinity})"}) {
+      old.invalid = invalid;
+      const Scenario scene = read_json(old.text());
+      EXPECT_EQ(scene.id, "4711");
+      ASSERT_EQ(scene.lights.size(), 1u);
+      for (std::size_t step = 0; step < 91; ++step) {
+        EXPECT_EQ(scene.light_states[step], step < 40 ? RecordedLightState::stop : RecordedLightState::go);
+      }
+      ASSERT_EQ(scene.tracks.size(), 2u);
+      EXPECT_EQ(scene.tracks[1].first_valid, 30);
+      EXPECT_EQ(scene.tracks[1].id, 8);
+      EXPECT_THAT(scene.notes, ::testing::IsEmpty());
+    }
+  }
+  for (const char* lights : {"[]", "{}", "null"}) {
+    old.lights = lights;
+    EXPECT_EQ(read_json(old.text()).lights.size(), 0u);
+  }
+}
+
+TEST(GpuDrive, AnObjectSaysThatItIsTheSelfDrivingCar) {
+  const OldScene old{.more = R"("metadata":{"sdc_track_index":0},)"};
+  EXPECT_EQ(read_json(old.text()).sdc_track, 0);
+  EXPECT_EQ(read_json(old.text(R"(,"is_sdc":false)")).sdc_track, 0);
+  EXPECT_EQ(read_json(old.text(R"(,"is_sdc":true)")).sdc_track, 1);
+  EXPECT_EQ(read_json(OldScene{}.text(R"(,"is_sdc":1)")).sdc_track, 1);
+  EXPECT_EQ(message_of([&] { read_json(old.text(R"(,"is_sdc":"yes")")); }),
+            "scene.json: objects[1].is_sdc: expected true or false, got string");
 }
 
 TEST(GpuDrive, IndicesOfTracksThatWereDroppedAreLeftOut) {
