@@ -16,7 +16,8 @@ namespace {
 /// A sequence of actions: its last one, and the sequence before it in the beam of the step before.
 struct Sequence {
   Motion motion;
-  double cost = 0;
+  double cost = 0;           // of its steps
+  double foreseen_cost = 0;  // with those of coming back to the record
   float error_m = 0;
   int32_t action = 0;
   int32_t before = -1;
@@ -39,24 +40,67 @@ double cost_of(const Motion& motion, const RecordedState& wanted, float* error_m
          kAccelWeight * (squared(motion.accel_long_mps2) + squared(motion.accel_lat_mps2));
 }
 
+/// A recorded state, with the velocity and acceleration of the places around it.
+struct Target {
+  RecordedState state;
+  Vec2 velocity_mps, accel_mps2;
+};
+
+Target target_at(Span<const RecordedState> run, size_t i, float dt_s) {
+  constexpr size_t kVelocitySteps = 3, kAccelSteps = 6, kMinAccelSteps = 3;  // to both sides: records are rough
+  const auto place = [&](size_t step) { return run[step].position_m.xy(); };
+  const size_t room = std::min(i, run.size() - 1 - i);
+  Target target{.state = run[i]};
+  if (const size_t steps = std::min(room, kVelocitySteps); steps > 0) {
+    target.velocity_mps = (place(i + steps) - place(i - steps)) * (1 / (2 * static_cast<float>(steps) * dt_s));
+  } else {
+    const SinCos heading = sincos_of(run[i].heading_rad);
+    target.velocity_mps = Vec2{heading.cos, heading.sin} * run[i].speed_mps;
+  }
+  if (const size_t steps = std::min(room, kAccelSteps); steps >= kMinAccelSteps) {
+    const float time_s = static_cast<float>(steps) * dt_s;
+    target.accel_mps2 = (place(i + steps) + place(i - steps) - place(i) * 2.0f) * (1 / square(time_s));
+  }
+  return target;
+}
+
+/// The cost of coming back to the record from the errors of place, velocity and acceleration: the least integral of
+/// squared distances over time, in steps, of a point whose jerk is controlled and whose bandwidth is kBandwidth.
+/// Without it a beam of near-sighted sequences swings about the record, the more the longer the vehicle.
+double cost_of_return(const Motion& motion, const Target& target, float dt_s) {
+  constexpr double kBandwidth_radps = 2;
+  constexpr double s1 = 1 / kBandwidth_radps, s2 = s1 * s1, s3 = s2 * s1, s4 = s3 * s1, s5 = s4 * s1;
+  const SinCos heading = sincos_of(motion.heading_rad);
+  const Vec2 along{heading.cos, heading.sin}, left{-heading.sin, heading.cos};
+  const Vec2 apart = Vec2{motion.x_m, motion.y_m} - target.state.position_m.xy();
+  const Vec2 drift = along * motion.speed_mps - target.velocity_mps;
+  const Vec2 pull = along * motion.accel_long_mps2 + left * motion.accel_lat_mps2 - target.accel_mps2;
+  const auto product = [](Vec2 a, Vec2 b) { return static_cast<double>(dot(a, b)); };
+  return (2 * s1 * product(apart, apart) + 4 * s2 * product(apart, drift) + 2 * s3 * product(apart, pull) +
+          3 * s3 * product(drift, drift) + 4 * s4 * product(drift, pull) + 2 * s5 * product(pull, pull)) /
+         static_cast<double>(dt_s);
+}
+
 /// The beam of the step after, by all actions.
-std::vector<Sequence> next_beam(const std::vector<Sequence>& beam, const RecordedState& wanted,
+std::vector<Sequence> next_beam(const std::vector<Sequence>& beam, const Target& target,
                                 const DynamicsParameters& parameters, const ClassLimits& limits, float dt_s) {
   std::map<decltype(likeness(Motion{})), Sequence> best;
   for (size_t i = 0; i < beam.size(); ++i) {
     for (int32_t action = 0; action < kNumActions; ++action) {
       Sequence next;
       next.motion = move(beam[i].motion, controls_of_action(action), parameters, limits, dt_s);
-      next.cost = beam[i].cost + cost_of(next.motion, wanted, &next.error_m);
+      next.cost = beam[i].cost + cost_of(next.motion, target.state, &next.error_m);
+      next.foreseen_cost = next.cost + cost_of_return(next.motion, target, dt_s);
       next.action = action;
       next.before = static_cast<int32_t>(i);
       const auto [found, is_new] = best.emplace(likeness(next.motion), next);
-      if (!is_new && next.cost < found->second.cost) found->second = next;
+      if (!is_new && next.foreseen_cost < found->second.foreseen_cost) found->second = next;
     }
   }
   std::vector<Sequence> all;
   for (const auto& [key, sequence] : best) all.push_back(sequence);
-  std::stable_sort(all.begin(), all.end(), [](const Sequence& a, const Sequence& b) { return a.cost < b.cost; });
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Sequence& a, const Sequence& b) { return a.foreseen_cost < b.foreseen_cost; });
   all.resize(std::min<size_t>(all.size(), kBeamWidth));
   return all;
 }
@@ -75,7 +119,7 @@ void follow_run(Span<const RecordedState> run, const RecordedAgent& agent, const
   start.motion.speed_mps = run[0].speed_mps;
   std::vector<std::vector<Sequence>> beams{{start}};
   for (size_t i = 1; i < run.size(); ++i) {
-    beams.push_back(next_beam(beams.back(), run[i], parameters, limits, dt_s));
+    beams.push_back(next_beam(beams.back(), target_at(run, i, dt_s), parameters, limits, dt_s));
   }
   int32_t at = 0;
   for (size_t i = run.size(); i-- > 1;) {

@@ -23,9 +23,9 @@ struct InverseActions {
 
 /// Searches each unbroken run of valid states by itself, from the first one, with accelerations and steering angle 0,
 /// as a takeover starts. A beam search keeps the best kBeamWidth sequences of actions; it pays for squared distances
-/// from the recorded places, and a little for speeds and headings that are not the recorded ones, without which it
-/// would weave. Multipliers of the dynamics are 1, and `rules` are those of the worlds in which the actions are taken.
-/// Throws UsageError for a map without a record.
+/// from the recorded places, a little for speeds and headings that are not the recorded ones, without which it would
+/// weave, and for the way back to the record that its last motion leaves. Multipliers of the dynamics are 1, and
+/// `rules` are those of the worlds in which the actions are taken. Throws UsageError for a map without a record.
 InverseActions find_inverse_actions(const CompiledMap& scene, float dt_s, int num_threads = 0,
                                     const DynamicsRules& rules = {});
 constexpr int kBeamWidth = 48;

@@ -63,6 +63,14 @@ PICTURA_HD inline LongitudinalMotion move_along(LongitudinalMotion from, float j
   return to;
 }
 
+/// The largest steering angle. Vehicles longer than their class, which only recordings have, turn as tightly as its
+/// longest.
+PICTURA_HD inline float max_steer_rad(float wheelbase_m, const ClassLimits& limits) {
+  const float longest_m = kWheelbasePerLength * limits.max_length_m;
+  if (wheelbase_m <= longest_m) return limits.max_steer_rad;
+  return atan_of(tan_of(limits.max_steer_rad) * (wheelbase_m / longest_m));
+}
+
 /// One step of dt_s. Accelerations, speed and steering respect `limits`; the lateral acceleration is written back from
 /// the steering angle that was reached.
 PICTURA_HD inline Motion move(const Motion& from, Controls controls, const DynamicsParameters& parameters,
@@ -81,8 +89,9 @@ PICTURA_HD inline Motion move(const Motion& from, Controls controls, const Dynam
   const float turning_speed = max_of(fabsf(to.speed_mps), kMinTurningSpeed_mps);
   const float wanted_steer = atan_of(wanted_lat / square(turning_speed) * parameters.wheelbase_m);
   const float max_change = limits.max_steer_rate_radps * dt_s;
-  to.steer_rad = clamp(from.steer_rad + clamp(wanted_steer - from.steer_rad, -max_change, max_change),
-                       -limits.max_steer_rad, limits.max_steer_rad);
+  const float max_steer = max_steer_rad(parameters.wheelbase_m, limits);
+  to.steer_rad =
+      clamp(from.steer_rad + clamp(wanted_steer - from.steer_rad, -max_change, max_change), -max_steer, max_steer);
   const float curvature = tan_of(to.steer_rad) / parameters.wheelbase_m;
   to.accel_lat_mps2 = square(to.speed_mps) * curvature;
 

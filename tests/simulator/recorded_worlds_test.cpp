@@ -464,6 +464,46 @@ TEST(RecordedWorlds, InverseActionsFollowTheRecord) {
   expect_inverse_actions_to_follow_the_record({.reset_at_standstill = true, .forbid_reversing = true});
 }
 
+/// The largest distance to its record of a bus that turns left by a quarter on an arc of that radius.
+float largest_error_of_bus(float length_m, float radius_m, float first_speed_mps) {
+  Scenario scene = *crossing({.num_steps = 160});
+  const int32_t self = mover(scene, 40);
+  const float steps_m = 6;  // over which the curvature grows and ends
+  scene.tracks[static_cast<size_t>(self)].length_m = length_m;
+  float s = 0, x = 0, y = 0, heading = 0, speed = first_speed_mps;
+  for (int32_t step = 0; step < scene.num_steps; ++step) {
+    const size_t at = static_cast<size_t>(self) * static_cast<size_t>(scene.num_steps) + static_cast<size_t>(step);
+    const SinCos along = sincos_of(heading);
+    scene.valid[at] = 1;
+    scene.states[at] = {{x, y, 0}, heading, Vec2{along.cos, along.sin} * speed};
+    const float into_turn = s - 25, turn_m = radius_m * 0.5f * kPi;
+    const float share = std::clamp(std::min(into_turn, turn_m + steps_m - into_turn) / steps_m, 0.0f, 1.0f);
+    const float wanted = into_turn < -15 || into_turn > turn_m ? 8.0f : 5.0f;
+    speed += 0.1f * std::clamp(wanted - speed, -2.0f, 1.2f);
+    s += 0.1f * speed;
+    heading += 0.1f * speed * share / radius_m;
+    x += 0.1f * speed * along.cos;
+    y += 0.1f * speed * along.sin;
+  }
+  RecordedTrack& track = scene.tracks[static_cast<size_t>(self)];
+  track.first_valid = 0;
+  track.last_valid = scene.num_steps - 1;
+  track.num_valid = scene.num_steps;
+  const auto simulator = world_of(std::make_shared<const Scenario>(scene));
+  const InverseActions inverse = find_inverse_actions(*simulator->maps()[0], simulator->config().dt_s);
+  const auto first = inverse.error_m.begin() + self * inverse.num_steps;
+  return *std::max_element(first, first + inverse.num_steps);
+}
+
+TEST(RecordedWorlds, InverseActionsOfLongVehiclesComeBack) {
+  for (const float radius_m : {12.0f, 15.0f, 20.0f}) {
+    for (const float speed_mps : {0.0f, 3.0f, 7.0f}) {
+      EXPECT_LT(largest_error_of_bus(13.8f, radius_m, speed_mps), 0.5f) << radius_m << " m, " << speed_mps << " m/s";
+    }
+  }
+  EXPECT_LT(largest_error_of_bus(18, 15, 7), 0.5f);
+}
+
 TEST(RecordedWorlds, IdmFollowsThePathAndStopsBehindOthers) {
   const IdmParameters parameters;
   EXPECT_FLOAT_EQ(idm_acceleration(parameters, 0, INFINITY, 0), 2);
