@@ -42,7 +42,7 @@ std::optional<FileBox> shown_box(const MapArguments& arguments) {
 }
 
 Json facts_of(const RoadMap& map) {
-  Json object{{"map", map.name}};
+  Json object{{"map", map.name}, {"origin_m", map.origin_m}};
   visit_fields(map.facts, [&object](const std::string& name, const auto& value) { object[name] = value; });
   return object;
 }

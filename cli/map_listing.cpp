@@ -7,6 +7,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/json_text.h"
+#include "pictura/map/file_position.h"
 
 namespace pictura {
 
@@ -36,7 +37,8 @@ class Listing {
   }
 
   Json place(Vec3 p) const {
-    return {rounded(p.x + map_.origin_m[0]), rounded(p.y + map_.origin_m[1]), rounded(p.z + map_.origin_m[2])};
+    const std::array<double, 3> place_m = file_position_m(map_.origin_m, p);
+    return {rounded(place_m[0]), rounded(place_m[1]), rounded(place_m[2])};
   }
 
   void print() {

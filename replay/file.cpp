@@ -428,6 +428,7 @@ Json header_of(const Replay& replay, const std::vector<Section>& sections) {
           {"commit", origin.commit},
           {"map", origin.map},
           {"map_hash", origin.map_hash},
+          {"origin_m", origin.map_origin_m},
           {"policy", origin.policy},
           {"policy_hash", origin.policy_hash},
           {"light_cycles", origin.light_cycles},
@@ -492,6 +493,7 @@ void read_header_values(const Json& header, Replay* replay_out) {
   header.at("commit").get_to(origin.commit);
   header.at("map").get_to(origin.map);
   header.at("map_hash").get_to(origin.map_hash);
+  origin.map_origin_m = header.value("origin_m", std::array<double, 3>{});
   header.at("policy").get_to(origin.policy);
   header.at("policy_hash").get_to(origin.policy_hash);
   origin.light_cycles = header.value("light_cycles", "");

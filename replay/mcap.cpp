@@ -225,6 +225,14 @@ std::string png_of(const ReplayCamera& camera, const char* rgb) {
   return png;
 }
 
+/// Where an agent is, in the coordinates of the map's file.
+std::string place_text(const Replay& replay, int frame, int agent) {
+  const auto coordinate = [&](Track track, size_t axis) {
+    return 0.01 * replay.at(track, frame, agent) + replay.origin.map_origin_m[axis];
+  };
+  return fmt::format("({:.2f}, {:.2f})", coordinate(Track::x_m, 0), coordinate(Track::y_m, 1));
+}
+
 }  // namespace
 
 void write_mcap(const std::string& path, const Replay& replay) {
@@ -268,11 +276,12 @@ void write_mcap(const std::string& path, const Replay& replay) {
         if ((bits & bit) != 0) names += (names.empty() ? "" : ", ") + std::string(name);
       }
       if (names.empty()) continue;
-      writer.add_message(events, ns,
-                         json_text(Json{{"timestamp", time_json(ns)},
-                                        {"level", (bits & kInfractions) != 0 ? kWarning : kInfo},
-                                        {"message", fmt::format("agent {}: {}", agent, names)},
-                                        {"name", origin.map}}));
+      writer.add_message(
+          events, ns,
+          json_text(Json{{"timestamp", time_json(ns)},
+                         {"level", (bits & kInfractions) != 0 ? kWarning : kInfo},
+                         {"message", fmt::format("agent {} at {}: {}", agent, place_text(replay, frame, agent), names)},
+                         {"name", origin.map}}));
     }
     if (frame >= num_pictured) continue;
     const int per_group = replay.images.frames_per_group, in_group = frame % per_group;
@@ -296,6 +305,7 @@ void write_mcap(const std::string& path, const Replay& replay) {
                                   {"commit", origin.commit},
                                   {"map", origin.map},
                                   {"map_hash", origin.map_hash},
+                                  {"origin_m", fmt::format("{}", fmt::join(origin.map_origin_m, " "))},
                                   {"policy", origin.policy},
                                   {"policy_hash", origin.policy_hash},
                                   {"light_cycles", origin.light_cycles},

@@ -314,6 +314,7 @@ void Recorder::set_origin(ReplayOrigin origin) {
   Parts& parts = *parts_;
   const CompiledMap& map = parts.setup.map_of(parts.world);
   origin.map = map.road->name;
+  origin.map_origin_m = map.road->origin_m;
   origin.map_hash = fmt::format("{:016x}", map.fingerprint);
   origin.seed = parts.replay.origin.seed;
   origin.global_world = parts.setup.worlds[static_cast<size_t>(parts.world)].global_world;

@@ -176,6 +176,7 @@ struct ReplayImages {
 struct ReplayOrigin {
   std::string command, commit, version;
   std::string map, map_hash;
+  std::array<double, 3> map_origin_m{};  // file coordinates of the map's (0, 0, 0); zero in files of earlier versions
   std::string policy, policy_hash;
   std::string light_cycles;  // as light_cycles_text() says; empty in files of versions that do not name them
   uint64_t seed = 0;

@@ -27,7 +27,8 @@ async function main() {
 
 // Makes the views, and plays. Throws where they cannot be made of what the replay holds.
 function show(replay, live) {
-  const header = replay.header, last = () => replay.frames - 1;
+  // Files of earlier versions do not hold the map's origin.
+  const header = replay.header, last = () => replay.frames - 1, origin = header.origin_m ?? [0, 0, 0];
   byId("message").hidden = true;
   byId("app").hidden = false;
 
@@ -156,7 +157,7 @@ function show(replay, live) {
     byId("policy-name").title = header.policy;
     fillMetrics();
     const command = make("code", header.command), about = byId("about").querySelector("dl");
-    const facts = [["Command", command], ["Policy", header.policy], ["Policy's hash", header.policy_hash], ["Map", header.map], ["Map's hash", header.map_hash], ["Traffic lights", header.light_cycles], ["Seed", header.seed],
+    const facts = [["Command", command], ["Policy", header.policy], ["Policy's hash", header.policy_hash], ["Map", header.map], ["Map's hash", header.map_hash], ["Map's origin", origin.map(metres => metres.toFixed(2)).join(", ") + " m"], ["Traffic lights", header.light_cycles], ["Seed", header.seed],
       ["World", header.global_world], ["Agents", replay.agents], ["Steps", live ? `of ${header.dt_s.toFixed(2)} s` : `${last()} of ${header.dt_s.toFixed(2)} s`], ...(live ? [] : [["Episodes", replay.episodes.length]]),
       ["Commit", header.commit], ["Program", header.program], ["Quantised to", "1 cm, 0.1 degree, 1 cm/s"],
       ...(live ? [] : Object.entries(header.metrics).map(([name, value]) => [name.replace(/_/g, " "), Number(value.toFixed(3))]))];
@@ -407,7 +408,8 @@ function show(replay, live) {
     canvas.style.cursor = agent === null ? "" : "pointer";
     if (agent === null) return;
     const isHalted = replay.raw("status", agent, at) === HALTED, reasons = reasonsOf(replay.raw("halt_reason", agent, at)).map(reason => reason.name).join(", ");
-    tip.textContent = `agent ${agent}, ${CLASSES[replay.body(agent, at).agentClass]}, ` + (isHalted ? `halted: ${reasons}` : `${(3.6 * replay.get("speed_mps", agent, at)).toFixed(0)} km/h`);
+    tip.textContent = `agent ${agent}, ${CLASSES[replay.body(agent, at).agentClass]}, ` + (isHalted ? `halted: ${reasons}` : `${(3.6 * replay.get("speed_mps", agent, at)).toFixed(0)} km/h`) +
+      `, at (${["x_m", "y_m"].map((name, axis) => (replay.get(name, agent, at) + origin[axis]).toFixed(2)).join(", ")})`;
     tip.style.left = `${Math.min(px + 14, canvas.clientWidth - tip.offsetWidth - 4)}px`;
     tip.style.top = `${Math.max(4, py - 30)}px`;
   }

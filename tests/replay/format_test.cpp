@@ -43,6 +43,7 @@ Replay any_replay() {
                    .version = "1.2.3",
                    .map = "a & b",
                    .map_hash = "00ff00ff00ff00ff",
+                   .map_origin_m = {388096, 3948996.5, -0.25},
                    .policy = "lane",
                    .policy_hash = "lane",
                    .light_cycles = "independent",

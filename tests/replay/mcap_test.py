@@ -7,6 +7,7 @@ import base64
 import json
 import math
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -120,6 +121,12 @@ class Mcap(unittest.TestCase):
         times = sorted(time_ns // 100_000_000 for _, time_ns, _ in self.messages["/events"])
         self.assertEqual(times, sorted(wanted))
         self.assertGreater(len(times), 0)
+        origin = self.page.header["origin_m"]
+        for _, time_ns, message in self.messages["/events"]:
+            agent, x, y = re.match(r"agent (\d+) at \((\S+), (\S+)\): ", message["message"]).groups()
+            frame = time_ns // 100_000_000
+            self.assertAlmostEqual(float(x), self.page.tracks["x_m"][int(agent)][frame] + origin[0], 1)
+            self.assertAlmostEqual(float(y), self.page.tracks["y_m"][int(agent)][frame] + origin[1], 1)
 
     def test_the_summary_is_that_of_the_messages(self):
         with open(self.path, "rb") as file:

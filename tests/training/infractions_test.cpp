@@ -23,10 +23,15 @@ struct Start {
   float x_m = 0, y_m = 0, heading_rad = 0, speed_mps = 0;
 };
 
+// The map as a file in UTM coordinates would place it.
+constexpr std::array<double, 3> kOrigin_m{388096, 3948956, 12};
+
 // What becomes of the first of two vehicles that keep their speed, within two seconds.
 Infraction infraction_of_the_first(const Start& first, const Start& second, int steps = 20) {
-  const auto simulator = make_simulator("cpu", testing::cars({.reset_inactive_fraction = 2}),
-                                        {testing::stadium(200, 2)}, {{0, 2, kFirstEvaluationWorld + kScenario}});
+  const auto map = testing::stadium(200, 2);
+  map->origin_m = kOrigin_m;
+  const auto simulator = make_simulator("cpu", testing::cars({.reset_inactive_fraction = 2}), {map},
+                                        {{0, 2, kFirstEvaluationWorld + kScenario}});
   const std::vector<int32_t> slots{0, 1};
   std::vector<std::vector<float>> values;
   std::vector<NamedArray> fields;
@@ -70,7 +75,13 @@ TEST(Infractions, CollisionsSayWithWhomAndHow) {
   EXPECT_GT(behind.step, 3);
   EXPECT_LT(behind.step, 12);
   EXPECT_FALSE(behind.changed_lane);
-  EXPECT_GT(behind.position_m.x, 52);
+  EXPECT_GT(behind.position_m[0], kOrigin_m[0] + 52);
+  EXPECT_LT(behind.position_m[0], kOrigin_m[0] + 62);
+  EXPECT_NEAR(behind.position_m[1], kOrigin_m[1], 0.1);
+  EXPECT_NEAR(behind.position_m[2], kOrigin_m[2], 0.1);
+  test::ScratchFolder folder;
+  write_infractions_csv(folder / "one.csv", {behind});
+  EXPECT_THAT(read_file(folder / "one.csv"), HasSubstr(",3948956.00,12.00,"));
 
   const Infraction moving = infraction_of_the_first(driving, {.x_m = 62, .speed_mps = 3});
   EXPECT_EQ(moving.partner_motion, PartnerMotion::moving);

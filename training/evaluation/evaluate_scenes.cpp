@@ -12,6 +12,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/parallel_for.h"
+#include "pictura/map/file_position.h"
 #include "pictura/map/scenario/load_scenario.h"
 #include "pictura/simulator/recorded_scene.h"
 #include "pictura/simulator/rules/limits.h"
@@ -82,10 +83,8 @@ Array array_of(const DeviceCopy<T>& copy, const Dims& shape, Device device) {
 
 /// Where a box of the map's is, in the coordinates of the scene's file; its centre is rise_m above its foot.
 SimulatedState simulated_state(const RoadMap& map, const AgentBox& box, float rise_m) {
-  const auto in_file = [&map](int axis, float metres) {
-    return static_cast<float>(map.origin_m[static_cast<size_t>(axis)] + static_cast<double>(metres));
-  };
-  return {in_file(0, box.center_m.x), in_file(1, box.center_m.y), in_file(2, box.center_m.z + rise_m),
+  const std::array<double, 3> center_m = file_position_m(map.origin_m, box.center_m + Vec3{0, 0, rise_m});
+  return {static_cast<float>(center_m[0]), static_cast<float>(center_m[1]), static_cast<float>(center_m[2]),
           std::atan2(box.sin_heading, box.cos_heading)};
 }
 

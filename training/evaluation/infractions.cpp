@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "pictura/common/support/file.h"
+#include "pictura/map/file_position.h"
 #include "pictura/simulator/rules/collision.h"
 #include "pictura/training/evaluation/csv.h"
 #include "pictura/training/struct_copies.h"
@@ -171,11 +172,12 @@ struct InfractionObserver::WorldStep {
   }
 
   void describe_place(size_t agent, Infraction* out) const {
-    out->position_m = before.boxes[first_box + agent].center_m;
+    const Vec3 center_m = before.boxes[first_box + agent].center_m;
+    out->position_m = file_position_m(map.origin_m, center_m);
     const int32_t lane = before.lane[first_slot + agent];
     if (lane < 0) return;
     const Lane& on = map.lanes[static_cast<size_t>(lane)];
-    const LanePlace place = place_on(map, on, out->position_m.xy());
+    const LanePlace place = place_on(map, on, center_m.xy());
     out->shape = shape_of(map, on, place);
     out->before_merge = is_before_merge(map, on, place.s_m);
   }
@@ -332,7 +334,7 @@ void write_infractions_csv(const std::string& path, const std::vector<Infraction
         "{:.1f},{:.1f}\n",
         one.agents_per_world, one.scenario, csv_quoted(one.map), one.agent, to_string(one.agent_class), one.step,
         one.is(kEventAtFault), one.is(kEventCollision), one.is(kEventOffRoad), one.is(kEventRedLight),
-        one.is(kEventWall), one.position_m.x, one.position_m.y, one.position_m.z, one.speed_mps, one.lane_offset_m,
+        one.is(kEventWall), one.position_m[0], one.position_m[1], one.position_m[2], one.speed_mps, one.lane_offset_m,
         one.lane_angle_rad, csv_quoted(to_string(one.shape)), one.changed_lane, one.before_merge,
         to_string(one.partner), to_string(one.partner_motion), to_string(one.contact), one.partner_agent,
         one.partner_speed_mps, one.red_for_s, one.stop_line_to_head_m);

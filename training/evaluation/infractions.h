@@ -1,6 +1,7 @@
 // What goes wrong in an evaluation, case by case: who did what, where, and with whom. Without torch headers.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <string>
 #include <vector>
@@ -31,8 +32,8 @@ struct Infraction {
   std::string map;
   int agent = 0, step = 0;  // of the scenario; from 1
   AgentClass agent_class = AgentClass::vehicle;
-  int events = 0;  // of the step in which it halted: bits of Event
-  Vec3 position_m;
+  int events = 0;                      // of the step in which it halted: bits of Event
+  std::array<double, 3> position_m{};  // in the coordinates of the map's file
   float speed_mps = 0, lane_offset_m = 0, lane_angle_rad = 0;
   RoadShape shape = RoadShape::no_lane;
   bool changed_lane = false;  // to a neighbour within the last 3 s

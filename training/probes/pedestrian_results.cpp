@@ -6,6 +6,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/output_file.h"
 #include "pictura/common/support/suggestion.h"
+#include "pictura/map/file_position.h"
 #include "pictura/training/evaluation/csv.h"
 #include "pictura/training/probes/crossing_path.h"
 #include "pictura/training/probes/probe_json.h"
@@ -81,13 +82,14 @@ void write_pedestrian_cases(const std::string& path, const PedestrianResults& re
     const PedestrianPoint& point = results.points[i];
     const PedestrianPath& one = results.paths[static_cast<size_t>(point.path)];
     const auto at = static_cast<int32_t>(i);
-    const Vec3 position_m = point.pedestrian.center_m;
+    const std::array<double, 3> position_m =
+        file_position_m(results.maps[static_cast<size_t>(one.map)]->road->origin_m, point.pedestrian.center_m);
     file.write(fmt::format(
         "{},{},{},{},{},{},{},{:.3f},{},{:.3f},{},{},{:.3f},{:.3f},{:.3f},{:.3f},{},{}{}\n", i, point.path, one.scene,
         csv_quoted(results.setting.maps[static_cast<size_t>(one.map)]), csv_quoted(results.driver_name(one.driver)),
         one.step, one.ego, one.ego_speed_mps, one.hider, one.hider_distance_m, point.along_m,
-        static_cast<float>(at - one.first_point - one.first_seen) * kPathSpacing_m, position_m.x, position_m.y,
-        position_m.z, point.distance_m, kPathPhaseNames[static_cast<size_t>(one.phase_of(at))], point.visible_share,
+        static_cast<float>(at - one.first_point - one.first_seen) * kPathSpacing_m, position_m[0], position_m[1],
+        position_m[2], point.distance_m, kPathPhaseNames[static_cast<size_t>(one.phase_of(at))], point.visible_share,
         response_fields(results, i)));
   }
   file.commit();

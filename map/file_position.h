@@ -1,0 +1,17 @@
+// Places on a map in the coordinates of its file, in which all is written that says where something is.
+#pragma once
+
+#include <array>
+
+#include "pictura/common/error.h"
+#include "pictura/common/math.h"
+
+namespace pictura {
+
+/// File coordinates in metres of a point of a map with that origin (RoadMap::origin_m).
+inline std::array<double, 3> file_position_m(const std::array<double, 3>& origin_m, Vec3 point_m) {
+  return {static_cast<double>(point_m.x) + origin_m[0], static_cast<double>(point_m.y) + origin_m[1],
+          static_cast<double>(point_m.z) + origin_m[2]};
+}
+
+}  // namespace pictura
