@@ -16,6 +16,8 @@ constexpr double kSampleStep_m = 0.5;            // sampling step along borders
 constexpr double kBisectionTolerance_m = 0.002;  // bisection tolerance of the points where an outline begins and ends
 constexpr double kMaxJoinGap_m = 0.06;           // maximum distance of outline ends that are joined
 constexpr double kMinOutline_m = 0.3;
+constexpr double kSamePoint_m = 1e-3;
+constexpr double kOwnReach_m = 1.0;  // at bends neighbouring quads of a band overlap a little
 
 /// A point on an outline and the band whose border it lies on.
 struct OutlinePoint {
@@ -39,13 +41,9 @@ class Tracer {
       for (std::size_t i = 0; i <= last; ++i) {
         is_narrow_.push_back(plan_distance_m(sides.left[i], sides.right[i]) < kMaxGap_m);
       }
-      for (std::size_t i = 0; i < last; ++i) {
-        trace_side(sides.left[i], sides.left[i + 1], is_narrow_[i] && is_narrow_[i + 1]);
-      }
+      for (std::size_t i = 0; i < last; ++i) trace_border(sides.left, i, i + 1, sides);
       trace_side(sides.left[last], sides.right[last], is_narrow_[last]);
-      for (std::size_t i = last; i > 0; --i) {
-        trace_side(sides.right[i], sides.right[i - 1], is_narrow_[i] && is_narrow_[i - 1]);
-      }
+      for (std::size_t i = last; i > 0; --i) trace_border(sides.right, i, i - 1, sides);
       trace_side(sides.right[0], sides.left[0], is_narrow_[0]);
       finish_run();
     }
@@ -53,6 +51,24 @@ class Tracer {
   }
 
  private:
+  /// The segment of a border between two neighbouring points. In a turn tighter than the band is wide it may run back:
+  /// there the surface lies on its other side.
+  void trace_border(const std::vector<Eigen::Vector3d>& border, std::size_t from, std::size_t to,
+                    const SurfaceBand& sides) {
+    const std::size_t quad = std::min(from, to);
+    const auto across = [&](std::size_t i) -> Eigen::Vector2d { return (sides.left[i] - sides.right[i]).head<2>(); };
+    const Eigen::Vector2d left = across(quad) + across(quad + 1);
+    const Eigen::Vector2d step = (border[quad + 1] - border[quad]).head<2>();
+    const bool is_skipped = is_narrow_[from] && is_narrow_[to];
+    quad_ = quad;
+    if (left.y() * step.x() - left.x() * step.y() >= 0) return trace_side(border[from], border[to], is_skipped);
+    finish_run();
+    reach_m_ = 0;
+    trace_side(border[to], border[from], is_skipped);
+    reach_m_ = kOwnReach_m;
+    finish_run();
+  }
+
   /// One straight segment of a band's side.
   void trace_side(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool is_skipped) {
     const double length_m = plan_distance_m(a, b);
@@ -87,11 +103,16 @@ class Tracer {
     if (was_edge) append(b);
   }
 
-  /// Whether no other band covers the point just outside `p` on the border of `band`, and no band of a lower index
-  /// emits the same shared border. Bands that share a border within kSharedBorder_m may each extend slightly beyond the
-  /// other, so the test recurses to check that the lower band really emits it: one of them always does.
+  /// Whether no other band covers the point just outside `p` on the border of `band`, the band itself does not fold
+  /// over it, and no band of a lower index emits the same shared border. Bands that share a border within
+  /// kSharedBorder_m may each extend slightly beyond the other, so the test recurses to check that the lower band
+  /// really emits it: one of them always does.
   bool is_outline(const Eigen::Vector3d& p, const Eigen::Vector2d& outward, int32_t band) {
     surface_.find_near(p.head<2>(), p.z(), &near_);
+    for (const double distance_m : {kSharedBorder_m, kMaxGap_m}) {
+      if (surface_.is_folded_over(near_, p.head<2>() + distance_m * outward, p.z(), band, quad_, reach_m_))
+        return false;
+    }
     return is_outline_near(p, outward, band, 0);
   }
 
@@ -136,6 +157,8 @@ class Tracer {
   const std::vector<SurfaceBand>& bands_;
   const Surface& surface_;
   int32_t band_ = 0;
+  std::size_t quad_ = 0;             // of the band, beside the present segment
+  double reach_m_ = kOwnReach_m;     // of that quad's neighbours, which do not count as a fold
   std::vector<bool> is_narrow_;      // [points of a side]
   Surface::Candidates near_, none_;  // about the place in question; none, so that quads are looked up anew
   std::vector<OutlinePoint> run_;
@@ -235,7 +258,7 @@ std::vector<RoadEdge> outline_of(const std::vector<SurfaceBand>& bands, double c
     for (const OutlinePoint& p : outline) {
       if (!points.empty()) {
         const double step_m = plan_distance_m(points.back().position_m, p.position_m);
-        if (step_m < 1e-3) continue;
+        if (step_m < kSamePoint_m) continue;
         // The end of a wide road is one straight segment.
         const Eigen::Vector3d begin = points.back().position_m;
         const int pieces = std::max(1, static_cast<int>(std::ceil(step_m / kMaxPiece_m - kPieceRounding)));
@@ -252,7 +275,9 @@ std::vector<RoadEdge> outline_of(const std::vector<SurfaceBand>& bands, double c
     if (length_m < kMinOutline_m) continue;
     const std::vector<std::size_t> indices = thin_polyline(points, chord_error_m, kMaxPiece_m);
     for (std::size_t i = 1; i < indices.size(); ++i) {
-      edges.push_back({to_vec3(points[indices[i - 1]].position_m), to_vec3(points[indices[i]].position_m)});
+      const Eigen::Vector3d &a = points[indices[i - 1]].position_m, &b = points[indices[i]].position_m;
+      if (plan_distance_m(a, b) < kSamePoint_m) continue;  // out by less than the tolerance, and back
+      edges.push_back({to_vec3(a), to_vec3(b)});
       if (bands_out) bands_out->push_back(bands_of_points[indices[i - 1]]);
     }
   }

@@ -33,10 +33,15 @@ Surface::Surface(const std::vector<SurfaceBand>& bands, double level_m) : level_
   quads_.reserve(num_quads);
   for (std::size_t band = 0; band < bands.size(); ++band) {
     const auto& [left, right] = bands[band];
+    first_quads_.push_back(quads_.size());
+    double s_m = 0;
     for (std::size_t i = 0; i + 1 < left.size(); ++i) {
       const Eigen::Vector3d* corners[4] = {&left[i], &right[i], &right[i + 1], &left[i + 1]};
       Quad quad{.band = static_cast<int32_t>(band)};
       for (std::size_t k = 0; k < 4; ++k) quad.corners_m[k] = corners[k]->head<2>();
+      const double length_m = std::max(plan_distance_m(left[i], left[i + 1]), plan_distance_m(right[i], right[i + 1]));
+      quad.s_m = s_m + 0.5 * length_m;
+      s_m += length_m;
       quad.mean_z_m = 0.25 * (corners[0]->z() + corners[1]->z() + corners[2]->z() + corners[3]->z());
       Aabb2 box{{1e30f, 1e30f}, {-1e30f, -1e30f}};
       for (const Eigen::Vector2d& corner : quad.corners_m) {
@@ -105,6 +110,17 @@ void Surface::find_near(const Eigen::Vector2d& p, double z, Candidates* out) con
     out->quads.push_back(quad);
     return false;
   });
+}
+
+bool Surface::is_folded_over(const Candidates& near, const Eigen::Vector2d& p, double z, int32_t band, std::size_t from,
+                             double reach_m) const {
+  const double s_m = quads_[first_quads_[static_cast<std::size_t>(band)] + from].s_m;
+  const auto covers_far = [&](const Quad& quad) {
+    return quad.band == band && std::abs(quad.s_m - s_m) > reach_m && contains(quad, p, z);
+  };
+  if (!near.are_complete) return any_quad_at(p, z, covers_far);
+  return std::any_of(near.quads.begin(), near.quads.end(),
+                     [&](int32_t quad) { return covers_far(quads_[static_cast<std::size_t>(quad)]); });
 }
 
 /// Two triangles, so that non-convex quads are covered as drawn.

@@ -53,25 +53,23 @@ class Surface {
   }
   static constexpr double kNear_m = 0.1;
 
+  /// Whether a quad of the band that is more than `reach_m` along it from quad `from` covers `p`: in a turn tighter
+  /// than its width a band folds over itself.
+  bool is_folded_over(const Candidates& near, const Eigen::Vector2d& p, double z, int32_t band, std::size_t from,
+                      double reach_m) const;
+
   /// Calls visit(band) for every band that covers `p` at about height `z`, until it returns true; returns whether any
   /// call did.
   template <typename Visit>
   bool any_band_at(const Eigen::Vector2d& p, double z, Visit&& visit) const {
-    const GridView grid = grid_.view();
-    const Vec2 position{static_cast<float>(p.x()), static_cast<float>(p.y())};
-    if (!grid.contains(position)) return false;
-    const std::size_t cell = static_cast<std::size_t>(grid.cell_y(position.y)) * static_cast<std::size_t>(grid.num_x) +
-                             static_cast<std::size_t>(grid.cell_x(position.x));
-    return any_in_cell(cell, position, z, [&](int32_t index) {
-      const Quad& quad = quads_[static_cast<std::size_t>(index)];
-      return contains(quad, p, z) && visit(quad.band);
-    });
+    return any_quad_at(p, z, [&](const Quad& quad) { return contains(quad, p, z) && visit(quad.band); });
   }
 
  private:
   struct Quad {
     Eigen::Vector2d corners_m[4];  // counter-clockwise: left, right, next right, next left
     double mean_z_m = 0;
+    double s_m = 0;  // of its middle, along the longer border
     int32_t band = 0;
   };
 
@@ -115,6 +113,18 @@ class Surface {
     return false;
   }
 
+  /// Calls visit(quad) for the quads whose bounds contain a place, until it returns true; returns whether any call did.
+  template <typename Visit>
+  bool any_quad_at(const Eigen::Vector2d& p, double z, Visit&& visit) const {
+    const GridView grid = grid_.view();
+    const Vec2 position{static_cast<float>(p.x()), static_cast<float>(p.y())};
+    if (!grid.contains(position)) return false;
+    const std::size_t cell = static_cast<std::size_t>(grid.cell_y(position.y)) * static_cast<std::size_t>(grid.num_x) +
+                             static_cast<std::size_t>(grid.cell_x(position.x));
+    return any_in_cell(cell, position, z,
+                       [&](int32_t index) { return visit(quads_[static_cast<std::size_t>(index)]); });
+  }
+
   QuadBounds bounds_of(const Quad& quad) const;
   bool contains(const Quad& quad, const Eigen::Vector2d& p, double z) const {
     return !(std::abs(z - quad.mean_z_m) >= level_m_) && covers(quad, p);
@@ -127,6 +137,7 @@ class Surface {
 
   double level_m_ = 0;
   std::vector<Quad> quads_;
+  std::vector<std::size_t> first_quads_;  // [bands]
   Grid grid_;
   ItemBounds bounds_;
   mutable int64_t remaining_lookups_ = 0;

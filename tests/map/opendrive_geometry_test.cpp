@@ -21,6 +21,45 @@ using test::parse;
 using test::RoadText;
 using test::three_roads;
 
+/// A road of two lanes of 4 m along x to 100, and a way back at its end: a half circle of that radius on the outside of
+/// its lane, after straight pieces as long as the file says.
+std::string turnaround(double radius, double straight) {
+  RoadText street, way;
+  street.link = R"(<successor elementType="junction" elementId="9"/>)";
+  street.left = lane_of(1, "driving", 4);
+  street.right = lane_of(-1, "driving", 4);
+  way.id = "2";
+  way.junction = "9";
+  way.length = M_PI * radius + 2 * straight;
+  way.link = R"(<predecessor elementType="road" elementId="1" contactPoint="end"/>)"
+             R"(<successor elementType="road" elementId="1" contactPoint="end"/>)";
+  way.geometry = line_at(0, 100, -radius, 0, straight) +
+                 fmt::format(R"(<geometry s="{}" x="{}" y="{}" hdg="0" length="{}"><arc curvature="{}"/></geometry>)",
+                             straight, 100 + straight, -radius, M_PI * radius, 1 / radius) +
+                 line_at(straight + M_PI * radius, 100 + straight, radius, M_PI, straight);
+  way.lane_offset = R"(<laneOffset s="0" a="4" b="0" c="0" d="0"/>)";
+  way.right = lane_of(-1, "driving", 4, R"(<link><predecessor id="-1"/><successor id="1"/></link>)");
+  return street.text() + way.text() +
+         R"(<junction id="9"><connection id="0" incomingRoad="1" connectingRoad="2" contactPoint="start">)"
+         R"(<laneLink from="-1" to="-1"/></connection></junction>)";
+}
+
+TEST(OpenDriveGeometry, WhereALaneFoldsOverItselfThereIsNoRoadEdge) {
+  for (const double radius : {1.0, 2.0, 3.0, 3.9}) {
+    for (const double straight : {1.0, 6.0}) {
+      const RoadMap map = parse(turnaround(radius, straight));
+      for (const RoadEdge& edge : map.road_edges) {
+        const double x = 0.5 * (edge.a_m.x + edge.b_m.x) + map.origin_m[0];
+        const double y = 0.5 * (edge.a_m.y + edge.b_m.y) + map.origin_m[1];
+        // The ground of the way: within its reference line.
+        const double beyond = std::max(x - 100 - straight, 0.0);
+        EXPECT_FALSE(x > 100.1 && std::hypot(beyond, y) < radius - 0.1)
+            << "radius " << radius << ", straight " << straight << ": an edge at (" << x << ", " << y << ")";
+      }
+    }
+  }
+}
+
 TEST(OpenDriveGeometry, LanesOfALineRunInTheDirectionOfTravel) {
   RoadText road;
   road.geometry = line_at(0, 10, 20, M_PI / 6, 100);
