@@ -19,6 +19,7 @@ namespace {
 constexpr double kNearHeadHeight_m = 3.5, kFarHeadHeight_m = 5.5;
 // A head further beyond the stop line than this is on the far side.
 constexpr float kFarHead_m = 5.0f;
+constexpr float kMinStopLine_m = 0.1f;
 
 struct PlacedSignal {
   std::size_t road = 0;
@@ -74,7 +75,7 @@ class SignalBuilder {
       if (approaches.empty()) {
         signal.where.mend(build_.faults, MendKind::laneless_light, "controls no lane with a stop line");
       } else if (is_controlled) {
-        for (auto& [road, approach] : approaches) add_light(signal_index, phases_.at(signal.id), &approach);
+        for (auto& [way, approach] : approaches) add_light(signal_index, phases_.at(signal.id), &approach);
       } else {
         add_uncontrolled(signal_index, approaches);
       }
@@ -83,8 +84,8 @@ class SignalBuilder {
   }
 
  private:
-  /// By the index of the approach road.
-  using Approaches = std::map<int32_t, Approach>;
+  /// By the index of the approach road, and whether its traffic runs along s.
+  using Approaches = std::map<std::pair<int32_t, bool>, Approach>;
 
   /// An approach that no controller controls: the heads there share one line.
   struct UncontrolledLine {
@@ -223,7 +224,9 @@ class SignalBuilder {
   }
 
   void add_approach(int32_t incoming, const std::vector<int32_t>& connecting, Approaches* approaches) const {
-    Approach& approach = (*approaches)[lane(incoming).source_road];
+    const FileRoad& road = build_.network.roads[static_cast<std::size_t>(lane(incoming).source_road)];
+    const bool forward = travels_forward(road, *build_.file_lanes[static_cast<std::size_t>(incoming)].lane);
+    Approach& approach = (*approaches)[{lane(incoming).source_road, forward}];
     approach.incoming.push_back(incoming);
     approach.connecting.insert(approach.connecting.end(), connecting.begin(), connecting.end());
   }
@@ -241,11 +244,11 @@ class SignalBuilder {
       return;
     }
     signal.where.mend(build_.faults, MendKind::uncontrolled_light, "no controller of a junction controls it");
-    for (const auto& [road, approach] : approaches) {
+    for (const auto& [way, approach] : approaches) {
       const int32_t junction_index = junction_of(approach);
       // On a road lines are told apart by their lanes.
       const int32_t first = junction_index < 0 ? approach.incoming.front() : -1;
-      const auto [line, is_new] = uncontrolled_.try_emplace({junction_index, road, first});
+      const auto [line, is_new] = uncontrolled_.try_emplace({junction_index, way, first});
       if (is_new) line->second.signal_index = signal_index;
       Approach& whole = line->second.approach;
       whole.incoming.insert(whole.incoming.end(), approach.incoming.begin(), approach.incoming.end());
@@ -255,7 +258,7 @@ class SignalBuilder {
 
   /// The name of a junction of the approaches whose lights controllers control; null if there is none.
   const char* ruled_junction(const Approaches& approaches) const {
-    for (const auto& [road, approach] : approaches) {
+    for (const auto& [way, approach] : approaches) {
       const int32_t junction = junction_of(approach);
       if (junction < 0 || map_.junctions[static_cast<std::size_t>(junction)].num_phases == 0) continue;
       return map_.junctions[static_cast<std::size_t>(junction)].name.c_str();
@@ -353,6 +356,10 @@ class SignalBuilder {
         }
       }
     }
+    if (!(length((light.stop_b_m - light.stop_a_m).xy()) >= kMinStopLine_m)) {
+      return signal.where.mend(build_.faults, MendKind::laneless_light, "controls lanes that are less than {} m wide",
+                               kMinStopLine_m);
+    }
     light.stop_heading_rad = reference.heading_rad;
     light.head_facing = Vec2{-direction.cos, -direction.sin};
 
@@ -377,8 +384,8 @@ class SignalBuilder {
   std::vector<std::vector<int32_t>> signal_lanes_;  // [signals] lanes to which each applies
   std::unordered_map<std::string, Phase> phases_;
   std::map<std::size_t, Approaches> lone_approaches_;  // [signals] away from junctions
-  // By junction, approach road and, away from junctions, the first lane.
-  std::map<std::tuple<int32_t, int32_t, int32_t>, UncontrolledLine> uncontrolled_;
+  // By junction, approach and, away from junctions, the first lane.
+  std::map<std::tuple<int32_t, std::pair<int32_t, bool>, int32_t>, UncontrolledLine> uncontrolled_;
 };
 
 }  // namespace

@@ -133,6 +133,27 @@ TEST(OpenDriveLights, OneOnARoadStandsAloneAtItsStation) {
   EXPECT_EQ(kinds_of(nothing), std::vector<MendKind>{MendKind::laneless_light});
 }
 
+TEST(OpenDriveLights, OneForBothDirectionsHasALineForEach) {
+  RoadText road;
+  road.left = lane_of(1, "driving", 3);
+  road.right = lane_of(-1, "driving", 3);
+  road.rest = "<signals>" + light("7", 50, -5, "none") + "</signals>";
+  const RoadMap map = parse(road.text());
+  ASSERT_EQ(map.lights.size(), 2u);
+  expect_at(map, map.lights[0].stop_a_m, 50, 0);  // against s first
+  expect_at(map, map.lights[0].stop_b_m, 50, 3);
+  expect_at(map, map.lights[1].stop_a_m, 50, 0);
+  expect_at(map, map.lights[1].stop_b_m, 50, -3);
+}
+
+TEST(OpenDriveLights, OneOfLanesWithoutWidthDoesNotStand) {
+  RoadText road;
+  road.right = R"(<lane id="-1" type="driving"><width sOffset="0" a="3" b="-0.06" c="0" d="0"/></lane>)";
+  road.rest = "<signals>" + light("7", 50, -5) + "</signals>";
+  const RoadMap map = parse(road.text());
+  EXPECT_EQ(map.lights.size(), 0u);
+}
+
 /// A junction at the origin which roads w, e and s lead to, each with a light and a way straight on.
 std::string crossing(const std::string& more_on_w, const std::string& junction_more = "") {
   std::string roads, connections;
