@@ -112,9 +112,9 @@ PICTURA_HD inline float atan2_of(float y, float x) {
   return y < 0.0f ? angle - kPi : angle + kPi;
 }
 
-/// e^x within 2e-7 relative; 0 below -87, and x is clamped to 88 above.
+/// e^x within 2e-7 relative; 0 below -87, x is clamped to 88 above, and NaN is NaN.
 PICTURA_HD inline float exp_of(float x) {
-  if (x < -87.0f) return 0.0f;
+  if (!(x >= -87.0f)) return x < -87.0f ? 0.0f : x;
   x = min_of(x, 88.0f);
   const float n = floorf(x * 1.44269504088896341f + 0.5f);
   float r = x - n * 0.693359375f;

@@ -40,6 +40,9 @@ TEST(Math, ExponentialIsWithin2e7Relative) {
   }
   EXPECT_EQ(exp_of(-100.0f), 0.0f);
   EXPECT_TRUE(std::isfinite(exp_of(1000.0f)));
+  EXPECT_TRUE(std::isfinite(exp_of(std::numeric_limits<float>::infinity())));
+  EXPECT_EQ(exp_of(-std::numeric_limits<float>::infinity()), 0.0f);
+  EXPECT_TRUE(std::isnan(exp_of(std::numeric_limits<float>::quiet_NaN())));
 }
 
 TEST(Math, WrappedAnglesStayWithinPiAndKeepTheirDirection) {
