@@ -8,6 +8,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/numbers.h"
 
 namespace pictura {
 
@@ -25,12 +26,10 @@ ProgressTable::ProgressTable(const std::string& run_folder) : path_(run_folder +
   for (int number = 2; std::getline(lines, line); ++number) {
     size_t column = 0;
     for (std::istringstream cells(line); std::getline(cells, cell, ','); ++column) {
-      char* end = nullptr;
-      const double value = std::strtod(cell.c_str(), &end);
-      PICTURA_CHECK(column < names_.size() && end != cell.c_str() && *end == '\0',
-                    "{}:{}: expected {} numbers, got '{}' as number {}", path_, number, names_.size(), cell,
-                    column + 1);
-      columns_[names_[column]].push_back(value);
+      const std::optional<double> value = parse_written_number(cell);
+      PICTURA_CHECK(column < names_.size() && value, "{}:{}: expected {} numbers, got '{}' as number {}", path_, number,
+                    names_.size(), cell, column + 1);
+      columns_[names_[column]].push_back(*value);
     }
     PICTURA_CHECK(column == names_.size(), "{}:{}: expected {} numbers, got {}", path_, number, names_.size(), column);
     ++num_rows_;

@@ -7,6 +7,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/numbers.h"
 
 namespace pictura {
 
@@ -122,10 +123,8 @@ bool is_row(std::string_view line, size_t num_columns, int64_t updates_done) {
   std::istringstream cells{std::string(line)};
   size_t columns = 0;
   for (std::string cell; std::getline(cells, cell, ','); ++columns) {
-    char* end = nullptr;
-    const double value = std::strtod(cell.c_str(), &end);
-    if (end == cell.c_str() || end != cell.c_str() + cell.size()) return false;
-    if (columns == 0 && value > static_cast<double>(updates_done)) return false;
+    const std::optional<double> value = parse_written_number(cell);
+    if (!value || (columns == 0 && *value > static_cast<double>(updates_done))) return false;
   }
   return columns == num_columns;
 }

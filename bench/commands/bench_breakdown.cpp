@@ -17,6 +17,7 @@
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
+#include "pictura/common/support/numbers.h"
 #include "pictura/map/load_map.h"
 #include "pictura/training/config.h"
 
@@ -192,7 +193,7 @@ void draw_breakdown(const PlotArguments& plot) {
   for (const PlottedResult& result : read_results(plot.results)) {
     std::smatch match;
     if (!std::regex_match(result.name, match, measured)) continue;
-    const double width_px = std::stod(match[2]);
+    const double width_px = parse_number(match[2].str()).value();
     const std::string series = fmt::format("{}, {} agents a world", match[1].str(), match[3].str());
     if (match[4] == "total") add_point(&total, series, width_px, result.value);
     if (match[4] == "rendering") add_point(&rendering, series, width_px, result.value);

@@ -14,6 +14,7 @@
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
+#include "pictura/common/support/numbers.h"
 
 namespace pictura {
 
@@ -165,7 +166,8 @@ void draw_rates(const PlotArguments& plot) {
     if (!std::regex_match(result.name, match, swept)) continue;
     const int egos = std::stoi(match[5]);
     if (egos == kSweptEgos) {
-      add_point(match[3] == match[4] ? &by_square : &by_size, match[1], std::stod(match[3]), result.value);
+      add_point(match[3] == match[4] ? &by_square : &by_size, match[1], parse_number(match[3].str()).value(),
+                result.value);
     }
     if (match[2] == kSweptSize) add_point(&by_egos, match[1], egos, result.value);
   }

@@ -101,6 +101,13 @@ std::optional<int64_t> parse_integer(std::string_view text) {
   return static_cast<int64_t>(decimal->negative ? 0 - *magnitude : *magnitude);
 }
 
+std::optional<double> parse_written_number(std::string_view text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
 bool looks_like_number(std::string_view text) {
   take(&text, "+-");
   take(&text, ".");

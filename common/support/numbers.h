@@ -17,6 +17,9 @@ std::optional<double> parse_number(std::string_view text);
 std::optional<uint64_t> parse_unsigned(std::string_view text);
 std::optional<int64_t> parse_integer(std::string_view text);
 
+/// The number that the whole text is, as programs write them, whatever the locale: nan and inf too.
+std::optional<double> parse_written_number(std::string_view text);
+
 /// Whether the text is meant as a number, though it may be none: it begins with a digit, or with a sign or a point
 /// before one.
 bool looks_like_number(std::string_view text);

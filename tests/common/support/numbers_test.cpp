@@ -1,12 +1,23 @@
 // Numbers as people write them.
 #include "pictura/common/support/numbers.h"
 
+#include <cmath>
 #include <limits>
 
 #include <gtest/gtest.h>
 
 namespace pictura {
 namespace {
+
+TEST(Numbers, WrittenNumbersAreReadWhole) {
+  EXPECT_EQ(parse_written_number("1.5"), 1.5);
+  EXPECT_EQ(parse_written_number("-2.5e-310"), -2.5e-310);
+  EXPECT_EQ(parse_written_number("inf"), std::numeric_limits<double>::infinity());
+  EXPECT_TRUE(std::isnan(parse_written_number("nan").value()));
+  for (const char* text : {"", "1,5", "1.5 ", " 1.5", "1.5x", "0x1p3"}) {
+    EXPECT_EQ(parse_written_number(text), std::nullopt) << text;
+  }
+}
 
 TEST(Numbers, WholeNumbersAreDecimalInAnyNotationAndExact) {
   EXPECT_EQ(parse_unsigned("10"), 10u);
