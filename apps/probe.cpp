@@ -14,6 +14,7 @@
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/json.h"
 #include "pictura/training/probes/corner.h"
 #include "pictura/training/probes/pedestrian.h"
 #include "pictura/training/probes/removal.h"
@@ -176,7 +177,7 @@ void report(const ProbeArguments& arguments, const std::string& summary, const R
             const std::vector<Row>& rows) {
   write_file(arguments.out + "/summary.json", summary + "\n");
   if (arguments.json)
-    print_json(Json::parse(summary));
+    print_json(parse_json(summary));
   else
     print_table(results, rows);
 }

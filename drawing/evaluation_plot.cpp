@@ -74,7 +74,7 @@ std::vector<PlotPanel> plot_evaluations(const std::string& path, RunAxis axis) {
   }
   std::string where = "its lines";
   try {
-    const Json lines = Json::parse(read_file(path)).at("lines");
+    const Json lines = parse_json(read_file(path)).at("lines");
     PICTURA_CHECK(lines.is_array() && !lines.empty(), "{}: expected a line or more", path);
     for (const Json& line : lines) {
       where = fmt::format("line {}", &line - &lines[0] + 1);

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/json.h"
 #include "pictura/common/support/numbers.h"
 #include "pictura/replay/encoding.h"
 #include "pictura/replay/images.h"
@@ -463,7 +464,7 @@ std::string_view element(std::string_view page, std::string_view begin, const ch
 }
 
 Json header_from(std::string_view page) {
-  Json header = Json::parse(element(page, kHeaderBegin, "a replay's header"));
+  Json header = parse_json(element(page, kHeaderBegin, "a replay's header"));
   PICTURA_CHECK(header.value("format", "") == kFormat, "expected a replay's header");
   const int version = header.at("version").get<int>();
   PICTURA_CHECK(version == kReplayVersion, "expected a replay of version {}, got version {}", kReplayVersion, version);

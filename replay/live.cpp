@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "pictura/common/support/json.h"
 #include "pictura/replay/encoding.h"
 #include "pictura/replay/file.h"
 
@@ -122,7 +123,7 @@ LiveJson LiveWorld::look(const std::optional<ReplayDecision>& decision, int agen
 LiveRequest parse_live_request(std::string_view text, int num_agents) {
   LiveJson asked;
   try {
-    asked = LiveJson::parse(text);
+    asked = parse_json(text);
   } catch (const LiveJson::exception&) {  // also for a number beyond what a double holds
     fail("expected JSON");
   }

@@ -5,6 +5,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/hash.h"
+#include "pictura/common/support/json.h"
 #include "pictura/common/support/json_text.h"
 #include "pictura/training/policy_json.h"
 
@@ -116,7 +117,7 @@ Checkpoint parse_checkpoint(const std::string& file, const std::string& path) {
   Checkpoint result;
   result.path = path;
   try {
-    const ordered_json header = ordered_json::parse(content.substr(kPreamble, header_bytes));
+    const ordered_json header = parse_json(content.substr(kPreamble, header_bytes));
     result.config = parse_saved_config(header.at("config").get<std::string>(), path + ": config");
     check_schema(header.at("schema"), result.config, path);
     const std::string_view data = content.substr(kPreamble + header_bytes);

@@ -8,6 +8,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/hash.h"
+#include "pictura/common/support/json.h"
 #include "pictura/training/layers.h"
 #include "pictura/training/policy.h"
 
@@ -42,7 +43,7 @@ struct ImageBackbone::Parts {
 
   void read_description(const std::string& text) {
     try {
-      const nlohmann::json json = nlohmann::json::parse(text);
+      const nlohmann::json json = parse_json<nlohmann::json>(text);
       PICTURA_CHECK(json.value("format", "") == kBackboneFormat, "expected \"format\": \"{}\"", kBackboneFormat);
       json.at("patch_px").get_to(patch_px);
       json.at("channels").get_to(channels);

@@ -10,6 +10,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/hash.h"
+#include "pictura/common/support/json.h"
 #include "pictura/common/support/json_text.h"
 #include "pictura/training/checkpoint.h"
 #include "pictura/training/policy_json.h"
@@ -98,7 +99,7 @@ SavedPolicy parse_safetensors(const std::string& file, const std::string& path) 
   SavedPolicy result;
   result.path = path;
   try {
-    const ordered_json header = ordered_json::parse(file.substr(kLengthBytes, length));
+    const ordered_json header = parse_json(file.substr(kLengthBytes, length));
     const ordered_json metadata = header.value("__metadata__", ordered_json::object());
     PICTURA_CHECK(metadata.contains("config") && metadata.contains("schema"),
                   "{}: expected safetensors of a policy, as training or `pictura export` writes them: "
@@ -108,12 +109,12 @@ SavedPolicy parse_safetensors(const std::string& file, const std::string& path) 
     PICTURA_CHECK(hash_of_file(file, text("hash")) == text("hash"),
                   "{}: damaged or truncated: its bytes do not have the hash that its metadata name", path);
     result.config = parse_saved_config(text("config"), path + ": config");
-    check_schema(ordered_json::parse(text("schema")), result.config, path);
-    result.rig = rig_from_json(ordered_json::parse(text("rig")));
+    check_schema(parse_json(text("schema")), result.config, path);
+    result.rig = rig_from_json(parse_json(text("rig")));
     result.backbone_hash = text("backbone_hash");
     result.update = std::stoll(text("update"));
     result.agent_steps = std::stoll(text("agent_steps"));
-    if (metadata.contains("rate_factors")) ordered_json::parse(text("rate_factors")).get_to(result.rate_factors);
+    if (metadata.contains("rate_factors")) parse_json(text("rate_factors")).get_to(result.rate_factors);
     const std::string_view data = std::string_view(file).substr(kLengthBytes + length);
     for (const auto& [name, entry] : header.items()) {
       if (name != "__metadata__") {

@@ -10,6 +10,7 @@
 #include "pictura/cli/number_options.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/json.h"
 
 namespace pictura {
 
@@ -30,7 +31,7 @@ void draw_rates_of_ranks(const PlotArguments& plot) {
   PlotPanel efficiency_of_each{"Rate over GPUs times the rate of one", "GPUs", "efficiency", {}, AxisScale::binary},
       efficiency_in_all = efficiency_of_each;
   for (const std::string& path : plot.results) {
-    const Json file = Json::parse(read_file(path), nullptr, /*allow_exceptions=*/false);
+    const Json file = parse_json(read_file(path), /*allow_exceptions=*/false);
     PICTURA_CHECK(file.is_object() && file.contains("rate"), "{}: expected rates of scripts/gpu_ranks", path);
     std::string precision = "bf16";
     for (const Json& argument : file.value("arguments", Json::array())) {

@@ -7,6 +7,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/json.h"
 
 namespace pictura {
 
@@ -73,7 +74,7 @@ std::vector<Comparison> compare_results(const Json& before_rows, const Json& aft
 }
 
 EarlierReport::EarlierReport(const std::string& path) : path_(path) {
-  report_ = Json::parse(read_file(path), nullptr, /*allow_exceptions=*/false);
+  report_ = parse_json(read_file(path), /*allow_exceptions=*/false);
   const bool is_report = report_.is_object() && report_.value("results", Json()).is_array() &&
                          !report_["results"].empty() && std::ranges::all_of(report_["results"], is_row);
   const auto is_text = [this](const char* key) { return !report_.contains(key) || report_[key].is_string(); };

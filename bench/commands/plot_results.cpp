@@ -6,6 +6,7 @@
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/json.h"
 
 namespace pictura {
 
@@ -34,7 +35,7 @@ void add_rate_options(CLI::App* command, RateArguments* arguments) {
 std::vector<PlottedResult> read_results(const std::vector<std::string>& paths) {
   std::vector<PlottedResult> results;
   for (const std::string& path : paths) {
-    const Json object = Json::parse(read_file(path), nullptr, /*allow_exceptions=*/false);
+    const Json object = parse_json(read_file(path), /*allow_exceptions=*/false);
     const std::size_t before = results.size();
     auto add = [&](const Json& benchmark) {
       if (!benchmark.is_object() || !benchmark.contains("results")) return;

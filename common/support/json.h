@@ -1,7 +1,9 @@
-// What is written as JSON, which has neither infinity nor NaN.
+// What is written and read as JSON. It has neither infinity nor NaN; what comes from outside is nested as deep as it
+// likes.
 #pragma once
 
 #include <cmath>
+#include <string_view>
 
 #include <nlohmann/json.hpp>
 
@@ -12,5 +14,40 @@ using Json = nlohmann::ordered_json;
 
 /// The number, or null where it is infinite or NaN.
 inline Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+/// How deep text may be nested: far above what anything here writes or reads. The library writes, copies and compares
+/// by recursion, so that deeper values overflow the stack.
+constexpr int kMaxJsonDepth = 64;
+
+/// The first byte of JSON text that is nested deeper than kMaxJsonDepth; npos where none is.
+inline size_t first_too_deep(std::string_view text) {
+  int depth = 0;
+  bool in_string = false;
+  for (size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (in_string) {
+      if (c == '\\') ++i;
+      in_string = c != '"';
+    } else if (c == '"') {
+      in_string = true;
+    } else if (c == '[' || c == '{') {
+      if (++depth > kMaxJsonDepth) return i;
+    } else if (c == ']' || c == '}') {
+      --depth;
+    }
+  }
+  return std::string_view::npos;
+}
+
+/// The one reader of JSON from outside. Throws the library's parse_error where the text is no JSON or is nested deeper
+/// than kMaxJsonDepth; without exceptions the value is discarded then.
+template <typename Value = Json>
+Value parse_json(std::string_view text, bool allow_exceptions = true) {
+  const size_t too_deep = first_too_deep(text);
+  if (too_deep == std::string_view::npos) return Value::parse(text, nullptr, allow_exceptions);
+  if (!allow_exceptions) return Value(nlohmann::detail::value_t::discarded);
+  throw Value::parse_error::create(
+      101, too_deep, "expected values nested at most " + std::to_string(kMaxJsonDepth) + " deep", nullptr);
+}
 
 }  // namespace pictura

@@ -7,7 +7,7 @@
 #include <map>
 #include <numbers>
 
-#include <nlohmann/json.hpp>
+#include "pictura/common/support/json.h"
 
 namespace pictura::gpudrive {
 
@@ -363,7 +363,7 @@ LoggedScene parse_scene(std::string_view text, const std::string& source) {
   try {
     Json json;
     try {
-      json = Json::parse(with_null_for_nan(text));
+      json = parse_json<Json>(with_null_for_nan(text));
     } catch (const Json::exception& error) {
       // Of the library: "[json.exception.parse_error.101] parse error at line 1, column 2: ..."
       std::string reason = error.what();

@@ -97,6 +97,8 @@ TEST(LiveRequest, NamesWhatIsWrong) {
   EXPECT_THAT(complaint("{\"steps\": 1e30}"), HasSubstr("steps: expected a number"));
   EXPECT_THAT(complaint("{\"keys\": \"left\"}"), HasSubstr("keys: expected"));
   EXPECT_THAT(complaint("[]"), HasSubstr("expected an object"));
+  EXPECT_THAT(complaint("{\"paused\": " + std::string(100'000, '[') + std::string(100'000, ']') + "}"),
+              HasSubstr("expected JSON"));
 }
 
 // One vehicle under these keys for some steps; its state afterwards.

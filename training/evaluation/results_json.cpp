@@ -4,6 +4,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/json.h"
 #include "pictura/simulator/simulator.h"
 
 namespace pictura {
@@ -64,7 +65,7 @@ Json read_results_json(const std::string& path, const std::vector<std::string>& 
   const std::string text = read_file(path);
   Json json;
   try {
-    json = Json::parse(text);
+    json = parse_json(text);
   } catch (const Json::parse_error& error) {
     fail("{}: {}, got no JSON from byte {}", path, kExpected, error.byte);
   }

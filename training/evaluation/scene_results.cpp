@@ -6,6 +6,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/json.h"
 #include "pictura/common/support/json_text.h"
 #include "pictura/simulator/fields.h"
 #include "pictura/training/evaluation/csv.h"
@@ -202,7 +203,7 @@ SceneResults read_scene_results(const std::string& path) {
 }
 
 bool has_scene_results(const std::string& path) {
-  const Json json = Json::parse(read_file(path), nullptr, /*allow_exceptions=*/false);
+  const Json json = parse_json(read_file(path), /*allow_exceptions=*/false);
   return json.is_object() && json.value("format", Json()) == kSceneResultsFormat;
 }
 
