@@ -13,7 +13,6 @@
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
-#include "pictura/common/raster/camera.h"
 #include "pictura/common/scene_file.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/hash.h"
@@ -255,7 +254,7 @@ void add_render_command(CLI::App& app) {
   command
       ->add_option("--line-floor", arguments->line_floor_px,
                    "Least width of a line on screen in pixels; 0 turns it off")
-      ->transform(number(0, kGuardBand_px))
+      ->transform(number(0, kMaxLineFloor_px))
       ->capture_default_str();
   command->add_option("--planes", arguments->planes, "Also write these planes as pictures: depth, class, instance")
       ->delimiter(',')

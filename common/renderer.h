@@ -18,6 +18,9 @@ struct PixelSamples {
   bool operator==(const PixelSamples&) const = default;
 };
 
+/// Largest line floor: that of the guard band (common/raster/camera.h), within which strips are widened.
+constexpr float kMaxLineFloor_px = 8;
+
 struct RendererConfig {
   Rig rig = paper_rig();
   Device device;                // where the caller keeps scenes, views and images

@@ -217,7 +217,7 @@ SceneFile parse_scene(const std::string& text, const std::string& source, const 
   TomlFields root(table, source);
   SceneFile out;
   out.config.rig = read_rig(&root, source, folder);
-  out.config.line_floor_px = root.number("line_floor_px", {0, 8}, out.config.line_floor_px);
+  out.config.line_floor_px = root.number("line_floor_px", {0, kMaxLineFloor_px}, out.config.line_floor_px);
   out.config.debug_palette = root.flag("debug_palette", false);
   for (TomlFields& row : root.tables("agent")) {
     out.scene.agents.push_back(read_agent(&row));

@@ -10,7 +10,6 @@
 #include "pictura/backends/make_renderer.h"
 #include "pictura/backends/upload_maps.h"
 #include "pictura/common/math.h"
-#include "pictura/common/raster/camera.h"
 #include "pictura/drawing/drawing.h"
 #include "pictura/drawing/video.h"
 #include "pictura/drawing/world.h"
@@ -59,7 +58,7 @@ RendererConfig film_view(const RendererConfig& trained_view) {
     line_scale = std::min(line_scale, scale);
   }
   // One width for all cameras: that of the widest.
-  view.line_floor_px = std::min(view.line_floor_px * line_scale, static_cast<float>(kGuardBand_px));
+  view.line_floor_px = std::min(view.line_floor_px * line_scale, kMaxLineFloor_px);
   return view;
 }
 

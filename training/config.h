@@ -35,12 +35,8 @@ enum class ValueHead { linear, symlog, two_hot };
 /// |advantage|, or a quantile of them.
 enum class FilterThreshold { maximum, quantile };
 
-/// What becomes of the queries that a camera's images are asked: their average is its feature, or all of them are, one
-/// after another.
-
-/// Largest side of a policy's patches, and largest line floor, that a configuration may have.
+/// Largest side of a policy's patches that a configuration may have.
 constexpr int kMaxPatch_px = 16;
-constexpr double kMaxLineFloor_px = 16;
 
 struct Config {
   struct Run {

@@ -2,6 +2,7 @@
 #include "pictura/training/loop.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include <ATen/Parallel.h>
@@ -174,6 +175,9 @@ void set_up_torch(const Config& config, Device device) {
 
 TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
   const Stopwatch start;
+  if (!(options.minutes >= 0 && std::isfinite(options.minutes))) {
+    fail_usage("train: minutes: expected 0 (no limit) or more, got {}", options.minutes);
+  }
   const Config config = load_config(options.config_path, options.overrides);
   check_equal_settings(
       config, fmt::format("old_run {}, init_from '{}'", static_cast<int>(options.old_run), options.init_from), ranks);

@@ -10,7 +10,6 @@
 #include "pictura/cli/file_options.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
-#include "pictura/common/raster/camera.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/parallel_for.h"
 #include "pictura/map/load_map.h"
@@ -141,7 +140,7 @@ void add_quality_benchmark(CLI::App& bench) {
   add_threads_option(command, &arguments->world.num_threads);
   command->add_flag("!--no-walls", arguments->world.walls, "Leave out the walls along the building lines");
   command->add_option("--line-floor", arguments->line_floor_px, "Minimum width of a line on screen in pixels")
-      ->transform(number(0, kGuardBand_px))
+      ->transform(number(0, kMaxLineFloor_px))
       ->capture_default_str();
   command
       ->add_option("--random", arguments->random,

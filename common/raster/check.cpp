@@ -217,10 +217,12 @@ void check_geometry(std::string_view renderer, const StaticGeometry& geometry) {
   check_grid(renderer, "walls", geometry.walls.size(), geometry.wall_grid);
 }
 
+static_assert(kMaxLineFloor_px <= kGuardBand_px);
+
 const RendererConfig& check_config(std::string_view renderer, const RendererConfig& config) {
   validate(config.rig);
-  PICTURA_CHECK(config.line_floor_px >= 0 && config.line_floor_px <= kGuardBand_px,
-                "renderer {}: expected a line floor of 0 to {} pixels, got {}", renderer, kGuardBand_px,
+  PICTURA_CHECK(config.line_floor_px >= 0 && config.line_floor_px <= kMaxLineFloor_px,
+                "renderer {}: expected a line floor of 0 to {} pixels, got {}", renderer, kMaxLineFloor_px,
                 config.line_floor_px);
   return config;
 }

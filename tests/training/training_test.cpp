@@ -5,6 +5,7 @@
 #include <cstring>
 #include <filesystem>
 #include <functional>
+#include <limits>
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -627,6 +628,16 @@ TEST_F(Training, BeginsWithTheWeightsOfAnotherRunAtAnyImageSize) {
     reads_more.init_from = first;
     EXPECT_THAT(message_of([&] { train(reads_more); }),
                 AllOf(HasSubstr(first), HasSubstr(key + ": expected true, got false")));
+  }
+}
+
+TEST_F(Training, RefusesMinutesThatAreNone) {
+  for (const double minutes :
+       {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    TrainOptions o = options("run", {});
+    o.minutes = minutes;
+    EXPECT_THAT(message_of([&] { train(o); }), HasSubstr("minutes: expected 0 (no limit) or more"));
+    EXPECT_FALSE(std::filesystem::exists(o.out_folder));
   }
 }
 
