@@ -23,24 +23,33 @@ PICTURA_HD inline RoutePoint neighbor_of(const MapView& map, RoutePoint at, int 
   return {neighbor, at.s_m * (map.lanes[static_cast<size_t>(neighbor)].length_m / lane.length_m)};
 }
 
+/// The point beside `at` on the nearest lane that has a successor, by as many lane changes as that takes, of two
+/// equally near lanes on the left one; `at` itself where its own lane has a successor or none beside it has.
+PICTURA_HD inline RoutePoint through_lane(const MapView& map, RoutePoint at) {
+  const auto goes_on = [&map](RoutePoint p) { return map.lanes[static_cast<size_t>(p.lane)].num_successors > 0; };
+  RoutePoint left = at, right = at;
+  while (!goes_on(left) && !goes_on(right)) {
+    const RoutePoint next_left = neighbor_of(map, left, -1), next_right = neighbor_of(map, right, 1);
+    if (next_left.lane == left.lane && next_right.lane == right.lane) return at;
+    left = next_left;
+    right = next_right;
+  }
+  return goes_on(left) ? left : right;
+}
+
 /// Walks distance_m along lanes, choosing among successors with equal chance. Where a lane has no successor from which
-/// the route goes on, it changes to a neighbour that has one.
+/// the route goes on, it changes to the nearest lane that has one.
 PICTURA_HD inline RoutePoint walk(const MapView& map, RoutePoint at, float distance_m, RandomStream* random_inout) {
   constexpr int kMaxLanesWalked = 64;  // lanes shorter than a metre in a row: a bound, not a rule
   for (int i = 0; i < kMaxLanesWalked; ++i) {
-    const MapLane* lane = &map.lanes[static_cast<size_t>(at.lane)];
-    const float left_m = lane->length_m - at.s_m;
+    const float left_m = map.lanes[static_cast<size_t>(at.lane)].length_m - at.s_m;
     if (distance_m <= left_m) return {at.lane, at.s_m + distance_m};
-    for (int side = -1; side <= 1 && lane->num_successors == 0; side += 2) {
-      const RoutePoint changed = neighbor_of(map, at, side);
-      if (map.lanes[static_cast<size_t>(changed.lane)].num_successors == 0) continue;
-      at = changed;
-      lane = &map.lanes[static_cast<size_t>(at.lane)];
-    }
-    if (lane->num_successors == 0) break;
+    at = through_lane(map, at);
+    const MapLane& lane = map.lanes[static_cast<size_t>(at.lane)];
+    if (lane.num_successors == 0) break;
     distance_m -= left_m;
-    const int choice = random_inout->below(lane->num_successors);
-    at = {map.successors[static_cast<size_t>(lane->first_successor + choice)], 0.0f};
+    const int choice = random_inout->below(lane.num_successors);
+    at = {map.successors[static_cast<size_t>(lane.first_successor + choice)], 0.0f};
   }
   return {at.lane, map.lanes[static_cast<size_t>(at.lane)].length_m};
 }

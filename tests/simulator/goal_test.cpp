@@ -50,6 +50,22 @@ TEST(Goal, LanesChangeWithAQuarterOfTheWaypoints) {
   EXPECT_NEAR(changes / double{kWaypoints}, 0.125, 0.02);
 }
 
+TEST(Goal, RoutesLeaveALaneThatEndsForTheNearestThatGoesOn) {
+  // Of the three lanes of the southern straight only the innermost goes on.
+  auto map = testing::stadium(200, 3);
+  for (const size_t lane : {0u, 4u}) map->lanes[lane].successors = {};
+  const MapRules rules = make_map_rules(*map, {});
+  const MapView view = rules.view();
+  EXPECT_EQ(through_lane(view, {0, 50}).lane, 8);
+  EXPECT_EQ(through_lane(view, {4, 50}).lane, 8);
+  EXPECT_EQ(through_lane(view, {8, 50}).lane, 8);
+  EXPECT_FLOAT_EQ(through_lane(view, {0, 50}).s_m, 50);
+  RandomStream random({.seed = 3, .purpose = Purpose::goals});
+  const RoutePoint at = walk(view, {0, 190}, 30, &random);
+  EXPECT_EQ(at.lane, 9);
+  EXPECT_NEAR(at.s_m, 20, 1e-3);
+}
+
 TEST(Goal, RoutesAvoidDeadEnds) {
   // The right lane of the northern straight ends: the route must have changed to the left one.
   auto map = testing::stadium(200, 2);
