@@ -68,7 +68,7 @@ class WalkGraph {
 };
 
 bool road_leads(const WorldView& world, const LaneGraph& graph, RoutePoint from, RoutePoint to) {
-  const auto route = graph.route(lane_place(world.map, from), lane_place(world.map, to));
+  const auto route = graph.route(lane_place(world.map, graph, from), lane_place(world.map, graph, to));
   // The gap itself, but for what neighbours differ in length.
   return route && route->length_m <= 2 * kMaxWaypointGap_m;
 }
@@ -102,8 +102,9 @@ std::array<RoutePoint, kNumWaypoints> goal_places(const WorldView& world, int ag
   return places;
 }
 
-LanePosition lane_place(const MapView& map, RoutePoint at) {
-  return {at.lane, min_of(at.s_m, map.lanes[static_cast<size_t>(at.lane)].length_m)};
+LanePosition lane_place(const MapView& map, const LaneGraph& graph, RoutePoint at) {
+  const float length_m = min_of(map.lanes[static_cast<size_t>(at.lane)].length_m, graph.length_m(at.lane));
+  return {at.lane, min_of(at.s_m, length_m)};
 }
 
 std::array<GoalReach, 2> follow_goals(const WorldView& world, const LaneGraph& graph, uint32_t chains) {

@@ -16,8 +16,8 @@ RoutePoint spawn_place(const WorldView& world, int agent);
 /// The waypoints of chain `chain` of the agent's episode, which starts at `from`.
 std::array<RoutePoint, kNumWaypoints> goal_places(const WorldView& world, int agent, uint32_t chain, RoutePoint from);
 
-/// As the lane graph knows it.
-LanePosition lane_place(const MapView& map, RoutePoint at);
+/// The place on the graph's lanes, whose lengths differ by rounding from those of the map's rules.
+LanePosition lane_place(const MapView& map, const LaneGraph& graph, RoutePoint at);
 
 struct GoalReach {
   int64_t agents = 0, waypoints = 0, unreachable = 0;

@@ -46,17 +46,21 @@ void LanePath::cut(size_t last) {
 bool LanePath::go_to(RoutePoint to) {
   constexpr int kMaxDetours = 4;
   for (int detour = 0; detour <= kMaxDetours; ++detour) {
-    if (follow_route(route_to(to), to)) return true;
+    const std::optional<std::vector<int32_t>> route = route_to(to);
+    if (!route) return false;
+    if (follow_route(*route, to)) return true;
     follow(lane(at_.lane).length_m);
-    enter(best_successor(to));
+    const int32_t next = best_successor(to);
+    if (next < 0) return false;
+    enter(next);
   }
   return false;
 }
 
-/// The lanes there, with every change as early as lanes lie side by side.
-std::vector<int32_t> LanePath::route_to(RoutePoint to) const {
-  const auto route = graph_->route(lane_place(map_, at_), lane_place(map_, to));
-  if (!route) fail("lane path: no route from lane {} to lane {}", at_.lane, to.lane);
+/// The lanes there, if a route leads there, with every change as early as lanes lie side by side.
+std::optional<std::vector<int32_t>> LanePath::route_to(RoutePoint to) const {
+  const auto route = graph_->route(lane_place(map_, *graph_, at_), lane_place(map_, *graph_, to));
+  if (!route) return std::nullopt;
   std::vector<int32_t> lanes = route->lanes;
   for (bool is_done = false; !is_done;) {
     is_done = true;
@@ -95,7 +99,10 @@ bool LanePath::follow_route(const std::vector<int32_t>& lanes, RoutePoint to) {
 }
 
 void LanePath::go_on(float distance_m) {
-  while (distance_m > 0 && lane(at_.lane).num_successors > 0) {
+  while (distance_m > 0) {
+    const RoutePoint through = through_lane(map_, at_);
+    if (lane(through.lane).num_successors == 0) break;
+    if (through.lane != at_.lane) change_to(through.lane, lane(through.lane).length_m - through.s_m);
     distance_m -= lane(at_.lane).length_m - at_.s_m;
     follow(lane(at_.lane).length_m);
     const Span<const int32_t> next = successors_of(at_.lane);
@@ -116,17 +123,16 @@ float LanePath::turn_of(int32_t index) const {
                               pose_on_lane(map_, index, 0).heading_rad));
 }
 
-/// From which the way to `to` is shortest.
+/// The successor from which the way to `to` is shortest; -1 where none leads there.
 int32_t LanePath::best_successor(RoutePoint to) const {
   int32_t best = -1;
   double least = INFINITY;
   for (const int32_t next : successors_of(at_.lane)) {
-    const auto route = graph_->route({next, 0}, lane_place(map_, to));
+    const auto route = graph_->route({next, 0}, lane_place(map_, *graph_, to));
     if (!route || route->length_m >= least) continue;
     least = route->length_m;
     best = next;
   }
-  if (best < 0) fail("lane path: no successor of lane {} leads to lane {}", at_.lane, to.lane);
   return best;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "pictura/common/error.h"
@@ -44,10 +45,11 @@ class LanePath {
 
   /// Forgets what comes after point `last`.
   void cut(size_t last);
-  /// Goes on to a place from which a route goes on for ever; false where that is too short for lane changes,
-  /// also after detours: then it has gone on somewhere. Throws Error where no route leads there.
+  /// Goes on to a place; false where no route leads there, or where lane changes lack room, also after detours: then it
+  /// has gone on somewhere.
   bool go_to(RoutePoint to);
-  /// Goes on for so long as lanes do, at forks the straightest way.
+  /// Goes on for so long as lanes do, at forks the straightest way; from a lane that ends it changes to one that goes
+  /// on.
   void go_on(float distance_m);
   /// Whether the way parts within so far from the end.
   bool forks_within(float distance_m) const;
@@ -58,7 +60,7 @@ class LanePath {
  private:
   const MapLane& lane(int32_t index) const { return map_.lanes[static_cast<size_t>(index)]; }
   bool is_change(int32_t from, int32_t to) const { return to == lane(from).left || to == lane(from).right; }
-  std::vector<int32_t> route_to(RoutePoint to) const;
+  std::optional<std::vector<int32_t>> route_to(RoutePoint to) const;
   bool follow_route(const std::vector<int32_t>& lanes, RoutePoint to);
   Span<const int32_t> successors_of(int32_t index) const;
   float turn_of(int32_t index) const;
