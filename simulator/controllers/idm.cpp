@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "pictura/simulator/controllers/host_controllers.h"
 #include "pictura/simulator/rules/collision.h"
+#include "pictura/simulator/rules/goal.h"
 #include "pictura/simulator/rules/world_view.h"
 
 namespace pictura {
@@ -55,6 +57,31 @@ RoutePoint nearest_on_lane(const MapView& map, int32_t lane_index, Vec2 p, float
   return nearest;
 }
 
+/// The lane of the point, or, where that has no successors, the nearest lane beside it that has some.
+int32_t lane_to_follow(const MapView& map, RoutePoint at) {
+  return map.lanes[static_cast<size_t>(at.lane)].num_all_successors > 0 ? at.lane : through_lane(map, at).lane;
+}
+
+/// Moves a point to the place nearest to p on the lane to follow. Returns the way along that lane on which a path from
+/// p comes to its centre line: before the end of the point's own lane, if that is left. Without room for that the point
+/// moves along its own lane to where the front is before its end, and there is no way.
+std::optional<float> merge(const MapView& map, Vec2 p, float front_m, RoutePoint* at_inout) {
+  constexpr float kMinMerge_m = 6, kMergePerMetre = 4;  // for one metre beside the centre line
+  constexpr float kBeforeEnd_m = 0.5f;
+  float aside_m = 0;
+  RoutePoint& at = *at_inout;
+  at = nearest_on_lane(map, at.lane, p, &aside_m);
+  const int32_t followed = lane_to_follow(map, at);
+  if (followed == at.lane) return std::max(kMinMerge_m, kMergePerMetre * aside_m);
+  const float left_m = map.lanes[static_cast<size_t>(at.lane)].length_m - at.s_m - front_m - kBeforeEnd_m;
+  if (left_m < kMinMerge_m) {
+    at.s_m += std::max(left_m, 0.0f);
+    return std::nullopt;
+  }
+  at = nearest_on_lane(map, followed, p, &aside_m);
+  return std::max(kMinMerge_m, std::min(kMergePerMetre * aside_m, left_m));
+}
+
 }  // namespace
 
 float idm_acceleration(const IdmParameters& parameters, float speed_mps, float gap_m, float front_mps) {
@@ -102,30 +129,35 @@ FollowedPath::Pose FollowedPath::at(float wanted_s_m) const {
           wrap_angle(heading_rad[i] + t * wrap_angle(heading_rad[i + 1] - heading_rad[i]))};
 }
 
-FollowedPath path_along_lanes(const MapView& map, int32_t lane, Vec3 position_m, float heading_rad) {
+FollowedPath path_along_lanes(const MapView& map, int32_t lane, Vec3 position_m, float heading_rad, float front_m) {
   constexpr float kAhead_m = 200, kSpacing_m = 1;
-  constexpr float kMinMerge_m = 6, kMergePerMetre = 4;  // along the lane, for one metre beside its centre line
   FollowedPath path;
   path.add(position_m, heading_rad);
   if (lane < 0) return path;
-  float aside_m = 0;
-  RoutePoint at = nearest_on_lane(map, lane, position_m.xy(), &aside_m);
-  float step_m = std::max(kMinMerge_m, kMergePerMetre * aside_m);
+  RoutePoint at{lane, 0};
+  const auto end_at = [&path, &map](RoutePoint end) {
+    const LanePose pose = pose_on_lane(map, end.lane, end.s_m);
+    path.add(pose.position_m, pose.heading_rad);
+    return path;
+  };
+  std::optional<float> step_m = merge(map, position_m.xy(), front_m, &at);
+  if (!step_m) return end_at(at);
   for (float ahead_m = 0; ahead_m < kAhead_m; step_m = kSpacing_m) {
-    ahead_m += step_m;
-    for (float rest_m = step_m; rest_m > 0;) {
+    ahead_m += *step_m;
+    for (float rest_m = *step_m; rest_m > 0;) {
       const float length_m = map.lanes[static_cast<size_t>(at.lane)].length_m;
       const float taken_m = std::min(rest_m, std::max(length_m - at.s_m, 0.0f));
       at.s_m += taken_m;
       rest_m -= taken_m;
       if (rest_m <= 0) break;
       const int32_t next = straightest_after(map, at.lane);
-      if (next < 0) {
-        const LanePose end = pose_on_lane(map, at.lane, length_m);
-        path.add(end.position_m, end.heading_rad);
-        return path;
-      }
+      if (next < 0) return end_at({at.lane, length_m});
       at = {next, 0};
+      if (lane_to_follow(map, at) == next) continue;
+      step_m = merge(map, pose_on_lane(map, next, 0).position_m.xy(), front_m, &at);
+      if (!step_m) return end_at(at);
+      rest_m = *step_m;
+      ahead_m += rest_m;
     }
     const LanePose pose = pose_on_lane(map, at.lane, at.s_m);
     path.add(pose.position_m, pose.heading_rad);
@@ -176,7 +208,11 @@ float IdmController::place_on_path(const ControllerInput& input, size_t slot) {
   };
   if (on_lanes_[slot] && (begins || path.points_m.empty() || !serves())) {
     const bool walks = static_cast<AgentClass>(input.state.agent_class[slot]) == AgentClass::pedestrian;
-    path = path_along_lanes(views_[world], walks ? -1 : input.state.lane[slot], here, input.state.heading_rad[slot]);
+    const float length_m = input.state.length_m[slot];
+    const float front_m =
+        reference_to_center(static_cast<AgentClass>(input.state.agent_class[slot]), length_m) + 0.5f * length_m;
+    path = path_along_lanes(views_[world], walks ? -1 : input.state.lane[slot], here, input.state.heading_rad[slot],
+                            front_m);
     s_m = 0;
   }
   progress_m_[slot] = s_m;

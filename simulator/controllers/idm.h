@@ -50,9 +50,10 @@ struct FollowedPath {
 };
 
 /// From a pose onto the centre line of the lane, and along it and those that follow, at forks the straightest way, for
-/// kAhead_m or to where lanes end. Of lanes from which a route goes on for ever, others do not follow. From no lane
-/// (-1) the pose alone.
-FollowedPath path_along_lanes(const MapView& map, int32_t lane, Vec3 position_m, float heading_rad);
+/// kAhead_m or to where lanes end. Of lanes from which a route goes on for ever, others do not follow. A lane without
+/// successors is left for the nearest lane beside it that has some; without room for that, the path ends where the
+/// front bumper, front_m ahead of the reference point, is before the lane's end. From no lane (-1) the pose alone.
+FollowedPath path_along_lanes(const MapView& map, int32_t lane, Vec3 position_m, float heading_rad, float front_m);
 
 enum class IdmPaths {
   logged,  // recorded ones; where there is no record, as in towns, along lanes

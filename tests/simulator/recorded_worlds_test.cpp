@@ -623,14 +623,14 @@ TEST(RecordedWorlds, PathsAlongLanesEndWhereTheyDo) {
   const auto simulator = world_of(scene);
   const MapView map = simulator->maps()[0]->rules.view();
   const Vec3 here{3, 4, 0};
-  const FollowedPath nowhere = path_along_lanes(map, -1, here, 1);
+  const FollowedPath nowhere = path_along_lanes(map, -1, here, 1, 4);
   ASSERT_EQ(nowhere.points_m.size(), 1u);
   EXPECT_EQ(nowhere.at(10).position_m.x, here.x);
   for (int32_t lane = 0; lane < static_cast<int32_t>(map.lanes.size()); ++lane) {
     const MapLane& about = map.lanes[static_cast<size_t>(lane)];
     if (about.num_segments == 0) continue;
     const LanePose begin = pose_on_lane(map, lane, 0);
-    const FollowedPath path = path_along_lanes(map, lane, begin.position_m, begin.heading_rad);
+    const FollowedPath path = path_along_lanes(map, lane, begin.position_m, begin.heading_rad, 4);
     EXPECT_TRUE(path.ends);  // as all lanes of the recording do
     EXPECT_GE(path.length_m(), about.length_m - 1);
     const float middle_m = 0.5f * std::min(path.length_m(), about.length_m);
