@@ -38,6 +38,7 @@ LaneKeepingAgent::LaneKeepingAgent(const WorldView& world, int agent, const Lane
 }
 
 int32_t LaneKeepingAgent::act() {
+  search_nodes_ = std::min(search_nodes_ + kSearchNodesPerStep, kMaxSearchNodes);
   find_place();
   follow_goals();
   const Motion now = agent_.now();
@@ -60,7 +61,7 @@ void LaneKeepingAgent::renew_plan(const Motion& now) {
     return;
   }
   if (plan_.is_clear && next_planned_ < plan_.actions.size() / 2) return;
-  DrivingPlan plan = search_steering(agent_, points(), place_);
+  DrivingPlan plan = search_steering(agent_, points(), place_, &search_nodes_);
   if (!plan.is_clear) plan = plan_elsewhere(std::move(plan));
   if (!plan.is_clear && plan.actions.size() <= plan_.actions.size() - next_planned_) return;
   plan_ = std::move(plan);
@@ -104,7 +105,7 @@ DrivingPlan LaneKeepingAgent::plan_elsewhere(DrivingPlan plan) {
   other.cut(place_);
   other.go_on(kWayOn_m);
   other.limit_speeds(place_, INFINITY);
-  DrivingPlan straight = search_steering(agent_, other.points(), place_);
+  DrivingPlan straight = search_steering(agent_, other.points(), place_, &search_nodes_);
   if (!straight.is_clear) return plan;
   path_ = std::move(other);
   goals_.fill(ahead(place_, kPassed_m));

@@ -11,7 +11,6 @@ namespace pictura {
 namespace {
 
 constexpr int kStrides = 30;
-constexpr size_t kMaxNodes = 500'000;
 
 struct Node {
   Motion motion;
@@ -38,10 +37,10 @@ class Search {
  public:
   Search(const DrivenAgent& agent, const std::vector<PathPoint>& path) : agent_(agent), path_(path) {}
 
-  DrivingPlan from(const Node& start) {
+  DrivingPlan from(const Node& start, size_t max_nodes) {
     size_t farthest = 0;
     open(start);
-    while (!queue_.empty() && nodes_[farthest].stride < kStrides && nodes_.size() < kMaxNodes) {
+    while (!queue_.empty() && nodes_[farthest].stride < kStrides && nodes_.size() < max_nodes) {
       const size_t index = queue_.top().second;
       queue_.pop();
       if (!closed_.insert(key_of(nodes_[index])).second) continue;
@@ -50,6 +49,7 @@ class Search {
     }
     return plan_to(farthest);
   }
+  size_t num_nodes() const { return nodes_.size(); }
 
  private:
   using Entry = std::pair<float, size_t>;  // cost, node
@@ -115,11 +115,15 @@ class Search {
 
 }  // namespace
 
-DrivingPlan search_steering(const DrivenAgent& agent, const std::vector<PathPoint>& path, size_t place) {
+DrivingPlan search_steering(const DrivenAgent& agent, const std::vector<PathPoint>& path, size_t place,
+                            size_t* nodes_left_inout) {
   Node start;
   start.motion = agent.now();
   start.place = place;
-  return Search(agent, path).from(start);
+  Search search(agent, path);
+  DrivingPlan plan = search.from(start, *nodes_left_inout);
+  *nodes_left_inout -= std::min(search.num_nodes(), *nodes_left_inout);
+  return plan;
 }
 
 }  // namespace pictura

@@ -22,6 +22,8 @@ struct DrivingPlan {
 /// The cheapest way along the path, from the agent's motion now, at point `place`: it strays little from the path and
 /// seldom comes near the edge of the road. Hybrid A* without a heuristic (Dolgov et al., Path planning for autonomous
 /// vehicles in unknown semi-structured environments, 2010): motions are exact, and of those that are alike one is kept.
-DrivingPlan search_steering(const DrivenAgent& agent, const std::vector<PathPoint>& path, size_t place);
+/// Takes the nodes that it makes from *nodes_left_inout; without any left, the plan is the farthest way found.
+DrivingPlan search_steering(const DrivenAgent& agent, const std::vector<PathPoint>& path, size_t place,
+                            size_t* nodes_left_inout);
 
 }  // namespace pictura

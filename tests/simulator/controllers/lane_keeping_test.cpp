@@ -4,9 +4,13 @@
 
 #include <gtest/gtest.h>
 
+#include "pictura/backends/make_controller.h"
+#include "pictura/backends/make_simulator.h"
 #include "pictura/bench/lane_keeping_episodes.h"
 #include "pictura/map/load_map.h"
 #include "pictura/map/map_copy.h"
+#include "pictura/map/opendrive/opendrive.h"
+#include "pictura/tests/map/small_roads.h"
 #include "pictura/tests/simulator/stage.h"
 
 namespace pictura {
@@ -79,6 +83,95 @@ TEST(LaneKeeping, OfATownFullOfTrafficSeldomCollides) {
   const auto agents = static_cast<int>(towns.size()) * kAgents;
   EXPECT_LT(halted, 0.02 * agents);
   EXPECT_GT(goals, agents / 2);
+}
+
+using test::RoadText;
+
+std::string section_of(double s, const std::string& lanes) {
+  return fmt::format(
+      R"(<laneSection s="{}"><center><lane id="0" type="none"/></center><right>{}</right></laneSection>)", s, lanes);
+}
+
+/// Half of a ring that roads 1 and 2 make, of lanes to the right of a circle of that radius about the origin.
+RoadText half_ring(const std::string& id, double radius_m, const std::string& lanes) {
+  const bool is_first = id == "1";
+  RoadText road;
+  road.id = id;
+  road.length = kPi * radius_m;
+  road.link = fmt::format(R"(<predecessor elementType="road" elementId="{0}" contactPoint="end"/>)"
+                          R"(<successor elementType="road" elementId="{0}" contactPoint="start"/>)",
+                          is_first ? "2" : "1");
+  road.geometry = fmt::format(R"(<geometry s="0" x="0" y="{}" hdg="{}" length="{}"><arc curvature="{}"/></geometry>)",
+                              is_first ? -radius_m : radius_m, is_first ? 0.0 : kPi, road.length, 1 / radius_m);
+  road.sections = section_of(0, lanes);
+  return road;
+}
+
+constexpr const char* kOnward1 = R"(<link><predecessor id="-1"/><successor id="-1"/></link>)";
+constexpr const char* kOnward2 = R"(<link><predecessor id="-2"/><successor id="-2"/></link>)";
+constexpr const char* kOnward3 = R"(<link><predecessor id="-3"/><successor id="-3"/></link>)";
+
+/// A road of sections of 11 m, too short for a lane change, that leads into a ring of two lanes. A waypoint on it that
+/// was missed cannot be reached again.
+std::string short_sections_into_a_ring() {
+  const std::string both = test::lane_of(-1, "driving", 3.5, kOnward1) + test::lane_of(-2, "driving", 3.5, kOnward2);
+  RoadText entry;
+  entry.id = "3";
+  entry.length = 132;
+  entry.link = R"(<successor elementType="road" elementId="1" contactPoint="start"/>)";
+  entry.geometry = test::line_at(0, -132, -40, 0, 132);
+  for (int section = 0; section < 12; ++section) entry.sections += section_of(11 * section, both);
+  return test::file_of(half_ring("1", 40, both).text() + half_ring("2", 40, both).text() + entry.text());
+}
+
+/// A ring of which one half has three lanes, two of which end with it.
+std::string through_lane_two_changes_away() {
+  const std::string through = test::lane_of(-3, "driving", 3.5, kOnward3);
+  const auto with = [&](const char* type) {
+    return test::lane_of(-1, type, 3.5) + test::lane_of(-2, type, 3.5) + through;
+  };
+  return test::file_of(half_ring("1", 75, with("driving")).text() + half_ring("2", 75, with("none")).text());
+}
+
+TEST(LaneKeeping, GivesUpWaypointsThatItCannotReachAnyMore) {
+  const auto map = std::make_shared<RoadMap>(parse_opendrive(short_sections_into_a_ring(), "short_sections.xodr", {}));
+  for (uint64_t seed = 0; seed < 4; ++seed) {
+    double distance_m = 0;
+    for (const DrivenEpisode& driven :
+         drive_lane_keeping_episodes(map, {.seed = seed, .num_threads = 1, .cyclist_fraction = 0.1f}, 1, 16, 300)) {
+      distance_m += driven.distance_m;
+      EXPECT_EQ(driven.halt_reason & kEventOffRoad, 0) << seed << " at " << driven.end_m.x << ' ' << driven.end_m.y;
+    }
+    EXPECT_GT(distance_m, 500) << seed;
+  }
+}
+
+TEST(LaneKeeping, ReachesAThroughLaneTwoChangesAway) {
+  const auto map = std::make_shared<RoadMap>(parse_opendrive(through_lane_two_changes_away(), "two_changes.xodr", {}));
+  int goals = 0, off_road = 0;
+  for (uint64_t seed = 0; seed < 4; ++seed) {
+    for (const DrivenEpisode& driven :
+         drive_lane_keeping_episodes(map, {.seed = seed, .num_threads = 1, .cyclist_fraction = 0.1f}, 4, 1, 600)) {
+      goals += driven.goals;
+      off_road += (driven.halt_reason & kEventOffRoad) != 0;
+    }
+  }
+  EXPECT_GT(goals, 16);
+  EXPECT_LE(off_road, 1);  // that starts too near to the end of its lane to turn
+}
+
+TEST(Idm, StaysOnTheRoadWhereTheThroughLaneIsTwoChangesAway) {
+  const auto map = std::make_shared<RoadMap>(parse_opendrive(through_lane_two_changes_away(), "two_changes.xodr", {}));
+  const auto simulator =
+      make_simulator("cpu", testing::cars({.num_threads = 1}), {map}, {{0, 16, 0}, {0, 16, 1}, {0, 16, 2}});
+  const auto idm = make_controller("idm_lanes", *simulator, 0);
+  std::vector<Command> commands(static_cast<size_t>(simulator->num_slots()));
+  for (int step = 0; step < 600; ++step) {
+    idm->act(simulator->controller_input(), {}, commands);
+    simulator->step(commands);
+  }
+  EXPECT_EQ(simulator->totals().off_road, 0);
+  EXPECT_GT(simulator->totals().distance_m, 3 * 2000);
 }
 
 /// Paths advance evenly, and in the direction that they say.
@@ -175,7 +268,8 @@ TEST(SteeringSearch, FindsTheWayRoundThatTheMiddleOfTheLaneIsNot) {
   middle.x_m = 6.5f;
   EXPECT_TRUE(agent.leaves_road(middle, 0, 0));
 
-  const DrivingPlan plan = search_steering(agent, car.path->points(), 0);
+  size_t nodes_left = 500'000;
+  const DrivingPlan plan = search_steering(agent, car.path->points(), 0, &nodes_left);
   ASSERT_TRUE(plan.is_clear);
   for (const int32_t action : plan.actions) {
     car.stage.step(action);
@@ -184,11 +278,23 @@ TEST(SteeringSearch, FindsTheWayRoundThatTheMiddleOfTheLaneIsNot) {
   EXPECT_GT(car.stage.worlds.state.agents.distance_m[0], 20);
 }
 
+TEST(SteeringSearch, MakesNoMoreNodesThanItMay) {
+  LongCarOnARing car(6.5f, 6);
+  const DrivenAgent agent(car.stage.world(), 0);
+  size_t nodes_left = 1000;
+  const DrivingPlan plan = search_steering(agent, car.path->points(), 0, &nodes_left);
+  EXPECT_FALSE(plan.is_clear);
+  EXPECT_FALSE(plan.actions.empty());
+  EXPECT_LT(nodes_left, 10u);
+  EXPECT_TRUE(search_steering(agent, car.path->points(), 0, &nodes_left).actions.empty());
+}
+
 TEST(SteeringSearch, SaysHowFarItGetsWhereNoCarCan) {
   // From 3.4 to 7.4 m: the front corner of the tightest circle is 7.83 m from the centre.
   LongCarOnARing car(5.4f, 4.6f);
   const DrivenAgent agent(car.stage.world(), 0);
-  const DrivingPlan plan = search_steering(agent, car.path->points(), 0);
+  size_t nodes_left = 500'000;
+  const DrivingPlan plan = search_steering(agent, car.path->points(), 0, &nodes_left);
   EXPECT_FALSE(plan.is_clear);
   EXPECT_FALSE(plan.actions.empty());
   for (const int32_t action : plan.actions) {
