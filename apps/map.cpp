@@ -16,6 +16,7 @@
 #include "pictura/map/load_map.h"
 #include "pictura/map/map_fields.h"
 #include "pictura/map/map_geometry.h"
+#include "pictura/map/open_lanes.h"
 #include "pictura/map/opendrive/writer.h"
 #include "pictura/map/scenario/drivable_area.h"
 #include "pictura/map/scenario/load_scenario.h"
@@ -45,6 +46,13 @@ Json facts_of(const RoadMap& map) {
   Json object{{"map", map.name}, {"origin_m", map.origin_m}};
   visit_fields(map.facts, [&object](const std::string& name, const auto& value) { object[name] = value; });
   return object;
+}
+
+void add_lane_use(const RoadMap& map, Json* object_out) {
+  const LaneUse use = count_lane_use(map);
+  (*object_out)["endless_lanes"] = use.endless;
+  (*object_out)["open_lanes"] = use.open;
+  (*object_out)["unreachable_lanes"] = use.unreachable;
 }
 
 /// With the default walls of simulations.
@@ -173,6 +181,7 @@ void run_map(const CLI::App& command, const MapArguments& arguments) {
     write_file(arguments.xodr, export_opendrive(text.text, text.source));
   }
   Json object = facts_of(*map);
+  add_lane_use(*map, &object);
   add_blind_approaches(*map, &object);
   object["cached"] = report.cached;
   if (!report.cache_rejection.empty()) object["cache_refused"] = report.cache_rejection;

@@ -1,23 +1,27 @@
 #include "pictura/map/endless_lanes.h"
 
-#include <cstddef>
-#include <vector>
-
 namespace pictura {
 
-void find_endless_lanes(RoadMap* map_inout) {
-  RoadMap& map = *map_inout;
-  // Lanes connected by lane changes form a group, named by its leftmost lane. A group without successor groups is a
-  // dead end; dead ends are removed repeatedly, since this may leave their predecessors without successors.
-  std::vector<std::size_t> group(map.lanes.size());
-  std::vector<std::vector<std::size_t>> members(map.lanes.size());
+LaneGroups group_lanes(const RoadMap& map) {
+  LaneGroups groups{std::vector<std::size_t>(map.lanes.size()),
+                    std::vector<std::vector<std::size_t>>(map.lanes.size())};
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {
     std::size_t leftmost = i;
     while (map.lanes[leftmost].left_neighbor >= 0)
       leftmost = static_cast<std::size_t>(map.lanes[leftmost].left_neighbor);
-    group[i] = leftmost;
-    members[leftmost].push_back(i);
+    groups.of_lane[i] = leftmost;
+    groups.members[leftmost].push_back(i);
   }
+  return groups;
+}
+
+void find_endless_lanes(RoadMap* map_inout) {
+  RoadMap& map = *map_inout;
+  // A group without successor groups is a dead end; dead ends are removed repeatedly, since this may leave their
+  // predecessors without successors.
+  const LaneGroups groups = group_lanes(map);
+  const std::vector<std::size_t>& group = groups.of_lane;
+  const std::vector<std::vector<std::size_t>>& members = groups.members;
   auto is_route_lane = [&](int32_t lane) { return is_route(map.lanes[static_cast<std::size_t>(lane)].type); };
   std::vector<int> num_exits(map.lanes.size(), 0);
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {

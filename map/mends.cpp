@@ -79,6 +79,7 @@ Text text_of(MendKind kind) {
       return {"lights without a controller", "they cycle by heading at junctions, alone elsewhere"};
     case MendKind::unlisted_light: return {"lights that the controllers of their junction leave out", "left out"};
     case MendKind::laneless_light: return {"lights without a lane", "left out"};
+    case MendKind::missing_link: return {"lanes that end without a link where others begin", "routes end before them"};
   }
   return {"unknown", "unknown"};
 }
@@ -91,6 +92,7 @@ const char* action_of(MendKind kind) { return text_of(kind).action; }
 std::vector<MendKind> mend_kinds() {
   std::vector<MendKind> kinds;
   for (int i = 0; i <= static_cast<int>(MendKind::laneless_light); ++i) kinds.push_back(static_cast<MendKind>(i));
+  for (int i = 0; i <= static_cast<int>(MendKind::missing_link); ++i) kinds.push_back(static_cast<MendKind>(i));
   return kinds;
 }
 

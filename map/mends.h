@@ -72,6 +72,7 @@ enum class MendKind : uint8_t {
   uncontrolled_light,
   unlisted_light,
   laneless_light,
+  missing_link,
 };
 
 /// The fault, as "records out of order", and what is done about it, as "sorted".

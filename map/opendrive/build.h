@@ -71,6 +71,9 @@ void set_speed_limits(Build* build);
 /// The outline of the drivable surface.
 void build_road_edges(Build* build);
 
+/// Takes road edges away from where traffic leaves and enters a map without endless roads, and notes missing links.
+void open_road_ends(Build* build);
+
 /// Lane marks; then crosswalks, parking spaces and stop lines.
 void build_markings(Build* build);
 void build_objects(Build* build);

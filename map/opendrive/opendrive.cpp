@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "pictura/common/error.h"
+#include "pictura/map/open_lanes.h"
 #include "pictura/map/opendrive/build.h"
 #include "pictura/map/opendrive/deform.h"
 #include "pictura/map/opendrive/lights.h"
@@ -63,6 +64,7 @@ RoadMap import_network(std::string_view text, const std::string& source, const O
   find_endless_lanes(&map);
   begin("road edges", 0.2);
   opendrive::build_road_edges(&build);
+  if (!has_endless_roads(map)) opendrive::open_road_ends(&build);
   begin("markings", 0.8);
   opendrive::build_markings(&build);
   opendrive::build_objects(&build);

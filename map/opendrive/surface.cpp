@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "pictura/map/open_lanes.h"
 #include "pictura/map/opendrive/build.h"
 #include "pictura/map/road_edges.h"
 
@@ -110,6 +111,19 @@ void build_road_edges(Build* build) {
   for (const int32_t band : bands_of_edges) {
     build->map->provenance.road_edges.push_back({roads[static_cast<std::size_t>(band)], 0});
   }
+}
+
+void open_road_ends(Build* build) {
+  const RoadMap& map = *build->map;
+  const OpenLanes open = find_open_lanes(map);
+  for (const OpenLanes::MissingLink& link : open.missing_links) {
+    const Lane& to = map.lanes[static_cast<std::size_t>(link.to)];
+    build->file_lanes[static_cast<std::size_t>(link.from)].lane->where.mend(
+        build->faults, MendKind::missing_link,
+        "ends {:.2f} m from the start of lane {} of road {}, to which it has no link", link.gap_m, to.source_lane,
+        map.road_names[static_cast<std::size_t>(to.source_road)]);
+  }
+  open_mouths(open, build->map);
 }
 
 void build_building_lines(Build* build) {

@@ -1,0 +1,79 @@
+// OpenDRIVE files of roads that end.
+#pragma once
+
+#include <cmath>
+#include <string>
+
+#include "pictura/tests/map/small_roads.h"
+
+namespace pictura::test {
+
+/// A street along x with a lane of 3.5 m each way. Both ends are an exit and an entry.
+inline std::string open_street(double length_m = 300) {
+  RoadText road;
+  road.length = length_m;
+  road.left = lane_of(1, "driving", 3.5);
+  road.right = lane_of(-1, "driving", 3.5);
+  return file_of(road.text());
+}
+
+/// A crossing about the origin with four arms of two lanes, each an exit and an entry.
+inline std::string open_crossing(double arm_m = 60) {
+  constexpr double kArmBegin_m = 12, kQuarter = 1.5707963267948966;
+  std::string roads, connections;
+  for (int arm = 0; arm < 4; ++arm) {
+    const double x = kArmBegin_m * std::cos(kQuarter * arm), y = kArmBegin_m * std::sin(kQuarter * arm);
+    RoadText road;
+    road.id = std::to_string(arm);
+    road.length = arm_m;
+    road.geometry = line_at(0, x, y, kQuarter * arm, arm_m);
+    road.link = R"(<predecessor elementType="junction" elementId="9"/>)";
+    road.left = lane_of(1, "driving", 3.5);
+    road.right = lane_of(-1, "driving", 3.5);
+    roads += road.text();
+    for (int turn = 1; turn < 4; ++turn) {  // right, straight on, left
+      const int to = (arm + turn) % 4;
+      RoadText way;
+      way.id = std::to_string(10 + 4 * arm + turn);
+      way.junction = "9";
+      way.length = turn == 2 ? 2 * kArmBegin_m : kArmBegin_m * kQuarter;
+      way.link = fmt::format(R"(<predecessor elementType="road" elementId="{}" contactPoint="start"/>)"
+                             R"(<successor elementType="road" elementId="{}" contactPoint="start"/>)",
+                             arm, to);
+      way.geometry = fmt::format(
+          R"(<geometry s="0" x="{}" y="{}" hdg="{}" length="{}">{}</geometry>)", x, y, kQuarter * (arm + 2), way.length,
+          turn == 2 ? "<line/>" : fmt::format(R"(<arc curvature="{}"/>)", (turn - 2) / kArmBegin_m));
+      way.right = lane_of(-1, "driving", 3.5, R"(<link><predecessor id="1"/><successor id="-1"/></link>)");
+      roads += way.text();
+      connections += fmt::format(R"(<connection id="{0}" incomingRoad="{1}" connectingRoad="{0}" contactPoint="start">)"
+                                 R"(<laneLink from="1" to="-1"/></connection>)",
+                                 way.id, arm);
+    }
+  }
+  return file_of(roads + R"(<junction id="9" name="">)" + connections + "</junction>\n");
+}
+
+/// A one-way road along x of two lanes and an on-ramp beside them that ends after 100 m of 250.
+inline std::string open_ramp() {
+  const auto section = [](double s, const std::string& lanes) {
+    return fmt::format(
+        R"(<laneSection s="{}"><center><lane id="0" type="none"/></center><right>{}</right></laneSection>)", s, lanes);
+  };
+  const std::string both = lane_of(-1, "driving", 3.5, R"(<link><predecessor id="-1"/><successor id="-1"/></link>)") +
+                           lane_of(-2, "driving", 3.5, R"(<link><predecessor id="-2"/><successor id="-2"/></link>)");
+  RoadText road;
+  road.length = 250;
+  road.sections = section(0, both + lane_of(-3, "onRamp", 3.5)) + section(100, both);
+  return file_of(road.text());
+}
+
+/// Two straight roads of one lane along x whose ends touch, and which no link joins.
+inline std::string unlinked_roads() {
+  RoadText first, second;
+  first.right = second.right = lane_of(-1, "driving", 3.5);
+  second.id = "2";
+  second.geometry = line_at(0, 100.3, 0, 0, 100);
+  return file_of(first.text() + second.text());
+}
+
+}  // namespace pictura::test
