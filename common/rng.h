@@ -45,6 +45,7 @@ enum class Purpose : uint8_t {
   soak,
   first_episode,
   map_copies,
+  entry,
 };
 
 /// Whose draws they are, when, and what for. Ids are global across ranks. Fields that are not given are 0.

@@ -18,13 +18,13 @@ struct AgentState {
   void resize(size_t num_agents);
   void reserve(size_t num_agents);
   AgentStateView view();
-  /// Adds the bytes of every field, in the order of the list.
-  void add_to(Hash64* hash_inout) const;
-  size_t size_bytes() const;
+  /// Adds the bytes of every field, in the order of the list; those of lives if `with_lives`, here and below.
+  void add_to(Hash64* hash_inout, bool with_lives) const;
+  size_t size_bytes(bool with_lives) const;
   /// Writes the bytes of every field, in the order of the list: size_bytes() of them.
-  void copy_to(uint8_t* bytes_out) const;
+  void copy_to(uint8_t* bytes_out, bool with_lives) const;
   /// Reads back what copy_to wrote for as many agents; `bytes` holds at least size_bytes() bytes.
-  void assign_from(const uint8_t* bytes);
+  void assign_from(const uint8_t* bytes, bool with_lives);
 };
 
 }  // namespace pictura

@@ -33,7 +33,10 @@ constexpr bool is_derived(AgentField field) {
     case AgentField::lane_offset_m:
     case AgentField::lane_angle_rad:
     case AgentField::speed_limit_mps:
-    case AgentField::refusal: return true;
+    case AgentField::refusal:
+    case AgentField::life:
+    case AgentField::life_step:
+    case AgentField::left: return true;
     default: return false;
   }
 }

@@ -2,6 +2,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/parallel_for.h"
+#include "pictura/map/open_lanes.h"
 #include "pictura/simulator/hash_values.h"
 #include "pictura/simulator/simulator.h"
 
@@ -54,8 +55,8 @@ uint64_t fingerprint_of(const RoadMap& map, const MapRecord& record) {
 std::shared_ptr<const CompiledMap> compile_map(std::shared_ptr<const RoadMap> road, const MapOptions& options) {
   std::shared_ptr<CompiledMap> map = compile_map(std::move(road), options, MapRecord{});
   PICTURA_CHECK(!map->rules.spawn_lanes.empty(),
-                "map {}: expected a lane outside junctions from which a route goes on for ever, got none",
-                map->road->name);
+                "map {}: expected a driving or ramp lane with more than {} m of way ahead, got none", map->road->name,
+                kMinOpenWay_m);
   return map;
 }
 

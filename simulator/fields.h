@@ -9,8 +9,13 @@ namespace pictura {
 
 /// How a controlled agent stands in its episode. Halted agents stay where they are, in everybody's way. Recorded ones
 /// are where the record of their world's scene has them: they are met and seen, but nothing happens to them, until an
-/// action makes them active.
-enum class AgentStatus : uint8_t { active, halted, parked, absent, recorded };
+/// action makes them active. Waiting ones have left a road that ends, and are nowhere until they enter one again.
+enum class AgentStatus : uint8_t { active, halted, parked, absent, recorded, waiting };
+
+/// Whether an agent stands anywhere.
+PICTURA_HD constexpr bool has_body(AgentStatus status) {
+  return status != AgentStatus::absent && status != AgentStatus::waiting;
+}
 
 /// Whether an action would move an agent: it drives, or is where its record has it.
 PICTURA_HD constexpr bool takes_actions(AgentStatus status) {
@@ -45,7 +50,7 @@ constexpr int kInfractions = kEventCollision | kEventOffRoad | kEventRedLight | 
 constexpr int kNumWaypoints = 3;
 
 // X(name, type, per agent, first value, comment)
-#define PICTURA_AGENT_FIELDS(X)                                                                                  \
+#define PICTURA_EPISODE_FIELDS(X)                                                                                \
   X(x_m, float, 1, 0, "rear axle, or the centre of a pedestrian")                                                \
   X(y_m, float, 1, 0, "")                                                                                        \
   X(z_m, float, 1, 0, "height of the road under it")                                                             \
@@ -88,6 +93,15 @@ constexpr int kNumWaypoints = 3;
   X(first_motion_step, int32_t, 1, 0, "first step of this episode above kRest_mps, from 1; 0: none yet")         \
   X(episode_events, uint8_t, 1, 0, "union of the episode's event bits")                                          \
   X(episode_return, float, 1, 0, "sum of rewards in this episode")
+
+// Lives follow each other in a slot on roads that end. Elsewhere these keep their first values, and neither saved
+// states nor hashes have them.
+#define PICTURA_LIFE_FIELDS(X)                                                                     \
+  X(life, int32_t, 1, 0, "lives of this episode that ended before by leaving")                     \
+  X(life_step, int32_t, 1, 0, "steps of this episode before the life began; counts are of a life") \
+  X(left, uint8_t, 1, 0, "1: it left in the last step")
+
+#define PICTURA_AGENT_FIELDS(X) PICTURA_EPISODE_FIELDS(X) PICTURA_LIFE_FIELDS(X)
 
 /// What rules read and write: pointers alone, on either device.
 struct AgentStateView {

@@ -3,11 +3,15 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "pictura/common/error.h"
 #include "pictura/common/grid.h"
+#include "pictura/map/endless_lanes.h"
+#include "pictura/map/open_lanes.h"
 #include "pictura/simulator/rules/collision.h"
+#include "pictura/simulator/rules/exit.h"
 #include "pictura/simulator/rules/limits.h"
 #include "pictura/simulator/rules/observe.h"
 #include "pictura/simulator/rules/road.h"
@@ -21,6 +25,8 @@ constexpr float kObservedChordError_m = 0.25f;
 constexpr float kNearCell_m = 10.0f;
 constexpr float kCellRadius_m = 0.5f * 1.41421356f * kNearCell_m + 0.1f;  // half a diagonal, and room for rounding
 constexpr float kLookupCell_m = 5.0f;
+/// On open maps waypoints lie this far before the end of the way.
+constexpr float kRouteEndMargin_m = 5.0f;
 /// Agents stay this close to drivable lanes; cells farther out list nothing to observe.
 constexpr float kObserverReach_m = 15.0f;
 
@@ -75,7 +81,12 @@ void append_pieces(const std::vector<Vec3>& points, float extent, const PieceRul
   }
 }
 
-void add_lanes(const RoadMap& map, const PieceRule& rule, MapRules* out) {
+/// `open` is null on maps with endless roads and recorded scenes.
+void add_lanes(const RoadMap& map, const PieceRule& rule, const OpenLanes* open, MapRules* out) {
+  bool starts_in_junctions = open != nullptr;  // where agents can start nowhere else
+  for (size_t index = 0; index < map.lanes.size() && starts_in_junctions; ++index) {
+    starts_in_junctions = map.lanes[index].in_junction || !is_open(map, *open, index);
+  }
   out->lanes.resize(map.lanes.size());
   for (size_t index = 0; index < map.lanes.size(); ++index) {
     const Lane& lane = map.lanes[index];
@@ -115,7 +126,11 @@ void add_lanes(const RoadMap& map, const PieceRule& rule, MapRules* out) {
     flat.num_segments = static_cast<int32_t>(out->segments.size()) - flat.first_segment;
     if (is_driven) append_pieces(line, widest * (1.0f / kScaleLaneWidth_m), rule, &out->lane_pieces);
 
-    const auto goes_on = [&](int32_t other) { return other >= 0 && map.lanes[static_cast<size_t>(other)].is_endless; };
+    const auto goes_on = [&](int32_t other) {
+      if (other < 0) return false;
+      const Lane& to = map.lanes[static_cast<size_t>(other)];
+      return open ? is_route(to.type) : to.is_endless;
+    };
     for (const int32_t successor : map.links(lane.successors)) {
       if (goes_on(successor)) out->successors.push_back(successor);
     }
@@ -126,10 +141,35 @@ void add_lanes(const RoadMap& map, const PieceRule& rule, MapRules* out) {
     flat.num_all_successors = static_cast<int32_t>(out->successors.size()) - flat.first_successor;
     flat.left = goes_on(lane.left_neighbor) ? lane.left_neighbor : -1;
     flat.right = goes_on(lane.right_neighbor) ? lane.right_neighbor : -1;
-    if (lane.is_endless && !lane.in_junction && is_driven && s > 0) {
-      out->spawn_lanes.push_back(static_cast<int32_t>(index));
-      out->spawn_end_m.push_back((out->spawn_end_m.empty() ? 0.0f : out->spawn_end_m.back()) + s);
+    bool starts = lane.is_endless && !lane.in_junction;
+    float starts_until_m = s;
+    if (open && is_route(lane.type)) {
+      const float way_m = s + open->way_after_m[index];
+      if (way_m - kRouteEndMargin_m < s) flat.route_end_m = std::max(way_m - kRouteEndMargin_m, 0.0f);
+      starts = lane.in_junction == starts_in_junctions;
+      starts_until_m = std::min(s, way_m - kMinOpenWay_m);
     }
+    if (starts && is_driven && starts_until_m > 0) {
+      out->spawn_lanes.push_back(static_cast<int32_t>(index));
+      out->spawn_end_m.push_back((out->spawn_end_m.empty() ? 0.0f : out->spawn_end_m.back()) + starts_until_m);
+    }
+  }
+}
+
+/// Exits, and entries with their turns: entries within kSharedTurn_m of each other share one, also by way of others.
+void add_mouths(const OpenLanes& open, MapRules* out) {
+  constexpr float kSharedTurn_m = 5.0f;
+  for (const LaneMouth& exit : open.exits) out->exits.push_back({exit.middle_m, exit.direction, exit.half_width_m});
+  for (size_t i = 0; i < open.entries.size(); ++i) {
+    auto turn = static_cast<int32_t>(i);
+    for (size_t j = 0; j < i; ++j) {
+      const int32_t other = out->entries[j].turn;
+      if (other == turn || length(open.entries[i].middle_m - open.entries[j].middle_m) > kSharedTurn_m) continue;
+      const auto [kept, joined] = std::minmax(other, turn);
+      for (Entry& entry : out->entries) entry.turn = entry.turn == joined ? kept : entry.turn;
+      turn = kept;
+    }
+    out->entries.push_back({open.entries[i].lane, turn});
   }
 }
 
@@ -440,7 +480,11 @@ MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool obs
   MapRules out;
   if (!record.agents.empty()) out.sides = side_edges_of(map);
   add_record(std::move(record), &out);
-  add_lanes(map, rule, &out);
+  std::optional<OpenLanes> open;
+  if (out.record.agents.empty() && !has_endless_roads(map)) open = find_open_lanes(map);
+  out.is_open = open.has_value();
+  add_lanes(map, rule, open ? &*open : nullptr, &out);
+  if (open) add_mouths(*open, &out);
   PICTURA_CHECK(!out.segments.empty(), "map {}: expected at least one drivable lane, got none", map.name);
   add_barriers(map, walls, rule, &out);
   add_stop_lines(map, &out);
@@ -464,6 +508,10 @@ MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool obs
   };
   out.edge_cells = cells_of(out.edges, barrier_box);
   out.wall_cells = cells_of(out.walls, barrier_box);
+  out.exit_cells = cells_of(out.exits, [](const Exit& exit) {
+    const float reach_m = exit.half_width_m + kExitReach_m;
+    return box_of_segment(exit.middle_m.xy(), exit.middle_m.xy(), reach_m);
+  });
   out.stop_line_cells = cells_of(out.stop_lines, [](const StopLine& line) {
     return box_of_segment(line.middle_m.xy(), line.middle_m.xy(), kStopLineReach_m);
   });
@@ -511,6 +559,9 @@ MapView MapRules::view() const {
   view.stop_lines = stop_lines;
   view.spawn_lanes = spawn_lanes;
   view.spawn_end_m = spawn_end_m;
+  view.exits = exits;
+  view.entries = entries;
+  view.exit_cells = exit_cells.view();
   view.walk_pieces = walkways.pieces;
   view.walk_end_m = walkways.end_m;
   view.walk_leave_begin = walkways.leave_begin;
@@ -539,6 +590,7 @@ MapView MapRules::view() const {
   view.side_cells = sides.cells.view();
   view.max_box_radius_m = max_box_radius_m;
   view.max_speed_mps = max_speed_mps;
+  view.is_open = is_open;
   return view;
 }
 

@@ -42,16 +42,19 @@ struct MapRules {
   std::vector<StopLine> stop_lines;  // of RoadMap::lights, in its order
   std::vector<int32_t> spawn_lanes;
   std::vector<float> spawn_end_m;
+  std::vector<Exit> exits;
+  std::vector<Entry> entries;
   Walkways walkways;
   std::vector<ParkingSpot> parking_spots;
   std::vector<ObservedPiece> lane_pieces, boundary_pieces, wall_pieces;
   std::vector<Vec2> lane_middles, boundary_middles, wall_middles;
-  Grid segment_cells, edge_cells, wall_cells, stop_line_cells, walk_cells;
+  Grid segment_cells, edge_cells, wall_cells, stop_line_cells, walk_cells, exit_cells;
   CellLists near_lane_pieces, near_boundary_pieces, near_wall_pieces, near_stop_lines;
   Vec2 low_m, high_m;
   MapRecord record;
   SideEdges sides;  // where there is a record
   float max_box_radius_m = 0, max_speed_mps = 0;
+  bool is_open = false;
 
   MapView view() const;
   /// Of all arrays of the view in one piece of memory, each aligned to kMapAlignment_bytes.

@@ -116,7 +116,7 @@ class StateSnapshot {
 struct StepResult {
   Span<const float> reward;        // [slots]
   Span<const uint8_t> terminated;  // [slots] 1: an infraction ended the agent's episode in this step
-  Span<const uint8_t> truncated;   // [slots] 1: the episode ended for another reason; bootstrap
+  Span<const uint8_t> truncated;   // [slots] 1: it ended for another reason, or a life on a road that ends; bootstrap
   Span<const uint8_t> valid;       // [slots] 1: the agent was active when the step began: learn from it
   Span<const uint8_t> refusal;     // [slots] SpawnFailure: why the agent is absent from this episode, 0 where it is not
   Span<const StepSums> sums;       // [slots] of which the reward is made, and how far the agent drove; 0 if not valid
@@ -126,6 +126,7 @@ struct StepResult {
 struct SpawnReport {
   int64_t asked = 0, spawned = 0, refused = 0;      // asked == spawned + refused
   int64_t refused_no_place = 0, refused_taken = 0;  // the reasons: SpawnFailure of each absent agent
+  int64_t entered = 0, left = 0;                    // on roads that end: lives after the first of a slot, and ended
   int64_t parked_asked = 0, parked_placed = 0;
 };
 

@@ -213,6 +213,10 @@ SimulatorSetup SimulatorSetup::with(CompiledMaps other_maps, std::vector<Geometr
   return {other, std::move(other_maps), std::move(other_handles), std::move(other_worlds)};
 }
 
+bool SimulatorSetup::has_lives() const {
+  return std::any_of(maps.begin(), maps.end(), [](const auto& map) { return map->rules.is_open; });
+}
+
 void SimulatorSetup::reserve(const SimulatorCapacity& capacity) {
   for (auto* begins : {&slot_begin, &box_begin, &light_begin})
     begins->reserve(static_cast<size_t>(capacity.worlds) + 1);

@@ -30,6 +30,8 @@ struct SimulatorSetup {
   const CompiledMap& map_of(int world) const {
     return *maps[static_cast<size_t>(worlds[static_cast<size_t>(world)].map)];
   }
+  /// Whether any of the maps has roads that end, so that agents have lives.
+  bool has_lives() const;
   SimulatorCapacity needs() const { return capacity_of(maps, worlds); }
   /// Allocates for as many worlds, slots and so on, so that assigning another setup within it moves no array.
   void reserve(const SimulatorCapacity& capacity);

@@ -153,6 +153,9 @@ SpawnReport SimulatorState::spawn_report(const SimulatorSetup& setup) const {
   report.refused_no_place = refused_for(SpawnFailure::no_place);
   report.refused_taken = refused_for(SpawnFailure::taken);
   report.refused = report.refused_no_place + report.refused_taken;
+  report.entered = std::accumulate(agents.life.begin(), agents.life.end(), int64_t{0});
+  report.left = report.entered +
+                std::count(agents.status.begin(), agents.status.end(), static_cast<uint8_t>(AgentStatus::waiting));
   report.parked_asked = int64_t{setup.num_worlds()} * setup.config.parked_cars;
   for (size_t w = 0; w < setup.worlds.size(); ++w) {
     report.parked_placed +=
@@ -164,7 +167,7 @@ SpawnReport SimulatorState::spawn_report(const SimulatorSetup& setup) const {
 
 uint64_t SimulatorState::hash(const SimulatorSetup& setup) const {
   Hash64 hash;
-  agents.add_to(&hash);
+  agents.add_to(&hash, setup.has_lives());
   hash.add(Span<const LightState>(lights));
   for (size_t w = 0; w < setup.worlds.size(); ++w) {
     const int first_parked = setup.box_begin[w] + setup.worlds[w].num_agents;
@@ -199,15 +202,15 @@ void SimulatorState::copy_worlds(const SimulatorSetup& setup, int world, const S
       [&](auto& to, const auto& of) { std::copy_n(of.begin() + from_world, count, to.begin() + world); });
 }
 
-size_t SimulatorState::saved_bytes() const {
-  size_t sum = agents.size_bytes();
+size_t SimulatorState::saved_bytes(bool with_lives) const {
+  size_t sum = agents.size_bytes(with_lives);
   visit_arrays(*this, *this, [&sum](const auto& array, const auto&) { sum += array.size() * sizeof(*array.data()); });
   return sum;
 }
 
-void SimulatorState::assign_from(const uint8_t* bytes) {
-  agents.assign_from(bytes);
-  bytes += agents.size_bytes();
+void SimulatorState::assign_from(const uint8_t* bytes, bool with_lives) {
+  agents.assign_from(bytes, with_lives);
+  bytes += agents.size_bytes(with_lives);
   visit_arrays(*this, *this, [&bytes](auto& array, auto&) {
     const size_t size = array.size() * sizeof(*array.data());
     if (size > 0) std::memcpy(array.data(), bytes, size);
@@ -215,9 +218,9 @@ void SimulatorState::assign_from(const uint8_t* bytes) {
   });
 }
 
-void SimulatorState::copy_to(uint8_t* bytes_out) const {
-  agents.copy_to(bytes_out);
-  bytes_out += agents.size_bytes();
+void SimulatorState::copy_to(uint8_t* bytes_out, bool with_lives) const {
+  agents.copy_to(bytes_out, with_lives);
+  bytes_out += agents.size_bytes(with_lives);
   visit_arrays(*this, *this, [&bytes_out](const auto& array, const auto&) {
     const size_t size = array.size() * sizeof(*array.data());
     if (size > 0) std::memcpy(bytes_out, array.data(), size);
@@ -230,12 +233,12 @@ std::vector<uint8_t> SimulatorState::save(const SimulatorSetup& setup) const {
   SavedHeader header;
   header.num_fingerprints = prints.size();
   const size_t prints_bytes = prints.size() * sizeof(uint64_t);
-  std::vector<uint8_t> bytes(sizeof(header) + prints_bytes + saved_bytes());
+  std::vector<uint8_t> bytes(sizeof(header) + prints_bytes + saved_bytes(setup.has_lives()));
   std::memcpy(bytes.data(), &header, sizeof(header));
   for (size_t i = 0; i < prints.size(); ++i) {
     std::memcpy(bytes.data() + sizeof(header) + i * sizeof(uint64_t), &prints[i].value, sizeof(uint64_t));
   }
-  copy_to(bytes.data() + sizeof(header) + prints_bytes);
+  copy_to(bytes.data() + sizeof(header) + prints_bytes, setup.has_lives());
   return bytes;
 }
 
@@ -262,16 +265,17 @@ void SimulatorState::restore(const SimulatorSetup& setup, Span<const uint8_t> by
   PICTURA_CHECK(header.num_fingerprints == prints.size(), "simulator state: expected {} fingerprints, got {}",
                 prints.size(), header.num_fingerprints);
   const size_t begin = sizeof(header) + prints.size() * sizeof(uint64_t);
-  PICTURA_CHECK(bytes.size() == begin + saved_bytes(), "simulator state: expected {} bytes, got {}",
-                begin + saved_bytes(), bytes.size());
+  const bool with_lives = setup.has_lives();
+  PICTURA_CHECK(bytes.size() == begin + saved_bytes(with_lives), "simulator state: expected {} bytes, got {}",
+                begin + saved_bytes(with_lives), bytes.size());
 
-  std::vector<uint8_t> present(saved_bytes());
-  copy_to(present.data());
-  assign_from(bytes.data() + begin);
+  std::vector<uint8_t> present(saved_bytes(with_lives));
+  copy_to(present.data(), with_lives);
+  assign_from(bytes.data() + begin, with_lives);
   try {
     check_restored(setup, *this, agents.view());
   } catch (const Error&) {
-    assign_from(present.data());
+    assign_from(present.data(), with_lives);
     throw;
   }
 }

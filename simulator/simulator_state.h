@@ -65,10 +65,10 @@ struct SimulatorState {
   }
 
  private:
-  /// Bytes of the state without its header, and the state to and from so many.
-  size_t saved_bytes() const;
-  void copy_to(uint8_t* bytes_out) const;
-  void assign_from(const uint8_t* bytes);
+  /// Bytes of the state without its header, and the state to and from so many; with the lives of agents or without.
+  size_t saved_bytes(bool with_lives) const;
+  void copy_to(uint8_t* bytes_out, bool with_lives) const;
+  void assign_from(const uint8_t* bytes, bool with_lives);
 };
 
 /// What an Error says of a command that a step rejected, see rejected_command().

@@ -8,6 +8,7 @@
 #include "pictura/common/support/parallel_for.h"
 #include "pictura/simulator/host_worlds.h"
 #include "pictura/simulator/rules/edit_state.h"
+#include "pictura/simulator/rules/enter.h"
 #include "pictura/simulator/rules/episode.h"
 #include "pictura/simulator/rules/observe_query.h"
 #include "pictura/simulator/rules/spawn.h"
@@ -315,6 +316,9 @@ class SimulatorCpu final : public Simulator {
     const bool ends = episode_ends(world, steps, worlds_.state.spawned[index], active);
     worlds_.state.episode_over[index] = ends;
     for (int agent = 0; agent < world.num_agents; ++agent) finish_agent(world, agent, ends, results, bin_of(agent));
+    bool has_entered = false;
+    if (!ends) enter_waiting(world, steps, SingleThread{}, [&has_entered](int) { has_entered = true; });
+    if (has_entered) sort_into_cells(world, &worlds_.box_cells[index]);
     SimulatorTotals sum;
     for (const SimulatorTotals& bin : bins) sum.add(bin);
     worlds_.state.world_totals[index].add(sum);

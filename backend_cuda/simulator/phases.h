@@ -9,6 +9,7 @@
 
 #include "pictura/common/portable/intrinsics.h"
 #include "pictura/simulator/rules/edit_state.h"
+#include "pictura/simulator/rules/enter.h"
 #include "pictura/simulator/rules/episode.h"
 #include "pictura/simulator/rules/observe_query.h"
 #include "pictura/simulator/rules/spawn.h"
@@ -53,6 +54,7 @@ struct SimulatorArrays {
   View* views = nullptr;
   ObservationView observations;
   uint8_t entity_sets = 0;
+  uint8_t has_lives = 0;  // some map has roads that end
   // Between phases and steps.
   uint8_t* began = nullptr;          // [num_worlds] an episode began in the last step: the one after it is to be made
   uint8_t* prepares = nullptr;       // [num_worlds] it is made in the present step
@@ -402,6 +404,20 @@ struct FinishStep {
   }
 };
 
+/// Lets waiting agents into a world of roads that end, after a step that did not end its episode.
+struct EnterWaiting {
+  SimulatorArrays arrays;
+  template <typename ThreadGroup>
+  PICTURA_HD void operator()(const ThreadGroup& group, int w) const {
+    const int steps = arrays.episode_step[w];
+    if (arrays.has_rejected_command() || arrays.episode_over[w] || steps == 0) return;
+    const WorldView world = arrays.world(w);
+    enter_waiting(world, steps, group, [&group, &world](int agent) {
+      if (group.rank() == 0) world.cell_centers[agent] = center_of(world.boxes[agent]);
+    });
+  }
+};
+
 /// Writes what agents observe, a group of threads an observation.
 class ObservationWriter {
  public:
@@ -653,6 +669,7 @@ void launch_step(const Launch& launch, const SimulatorArrays& arrays, const Comm
                      launch.template groups<kThreadsPerAgent>(arrays.num_slots, Advance<CommandType>{arrays, commands});
                      launch.template groups<kThreadsPerAgent>(arrays.num_slots, ApplyRewardAndHalt{arrays});
                      launch.template groups<kWarp>(arrays.num_worlds, FinishStep<CommandType>{arrays, commands});
+                     if (arrays.has_lives) launch.template groups<kWarp>(arrays.num_worlds, EnterWaiting{arrays});
                      launch_write_observations(launch, arrays);
                    });
 }

@@ -115,6 +115,8 @@ class SimulatorCuda final : public Simulator {
     get(state_.boxes, &host_.boxes, handle_of(stream));
     get(state_.spawned, &host_.spawned, handle_of(stream));
     get(state_.agents.refusal, &host_.agents.refusal, handle_of(stream));
+    get(state_.agents.status, &host_.agents.status, handle_of(stream));
+    get(state_.agents.life, &host_.agents.life, handle_of(stream));
     PICTURA_CUDA(cudaStreamSynchronize(handle_of(stream)));
     return host_.spawn_report(setup_);
   }
@@ -348,6 +350,7 @@ class SimulatorCuda final : public Simulator {
     arrays.views = results_.views.data();
     arrays.observations = observations();
     arrays.entity_sets = config().vector_observations;
+    arrays.has_lives = setup_.has_lives();
     arrays.began = scratch_.began.data();
     arrays.prepares = scratch_.prepares.data();
     arrays.next_spawned = scratch_.next_spawned.data();

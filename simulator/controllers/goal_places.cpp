@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "pictura/common/error.h"
+#include "pictura/simulator/rules/enter.h"
 
 namespace pictura {
 
@@ -82,8 +83,12 @@ bool walk_leads(const WorldView& world, int agent, const WalkGraph& graph, Route
 
 }  // namespace
 
-RoutePoint spawn_place(const WorldView& world, int agent) {
+RoutePoint start_place(const WorldView& world, int agent) {
   const int slot = world.first_slot + agent;
+  if (world.agents.life[slot] > 0) {
+    return entry_place(world.map, drawn_entry(world, agent, world.agents.life_step[slot]), class_of(world.agents, slot),
+                       world.agents.length_m[slot]);
+  }
   for (int i = 0; i < kSpawnTries; ++i) {
     const RoutePoint at = spawn_point(world, agent, i);
     const Vec3 place = pose_of(world, agent, at).position_m;
@@ -93,7 +98,7 @@ RoutePoint spawn_place(const WorldView& world, int agent) {
 }
 
 std::array<RoutePoint, kNumWaypoints> goal_places(const WorldView& world, int agent, uint32_t chain, RoutePoint from) {
-  RandomStream random = agent_stream(world, agent, chain, Purpose::goals);
+  RandomStream random = goal_stream(world, agent, static_cast<int32_t>(chain));
   std::array<RoutePoint, kNumWaypoints> places;
   for (RoutePoint& place : places) {
     from = place =
@@ -115,7 +120,7 @@ std::array<GoalReach, 2> follow_goals(const WorldView& world, const LaneGraph& g
     const bool on_foot = walks(world, agent);
     GoalReach& count = reach[on_foot];
     ++count.agents;
-    RoutePoint at = spawn_place(world, agent);
+    RoutePoint at = start_place(world, agent);
     for (uint32_t chain = 0; chain < chains; ++chain) {
       for (const RoutePoint next : goal_places(world, agent, chain, at)) {
         ++count.waypoints;

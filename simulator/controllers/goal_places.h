@@ -10,10 +10,10 @@
 
 namespace pictura {
 
-/// Where a present agent was placed at the start of its episode; it must not have moved yet.
-RoutePoint spawn_place(const WorldView& world, int agent);
+/// Where a present agent was placed at the start of its life; it must not have moved yet.
+RoutePoint start_place(const WorldView& world, int agent);
 
-/// The waypoints of chain `chain` of the agent's episode, which starts at `from`.
+/// The waypoints of chain `chain` of the agent's life, which starts at `from`.
 std::array<RoutePoint, kNumWaypoints> goal_places(const WorldView& world, int agent, uint32_t chain, RoutePoint from);
 
 /// The place on the graph's lanes, whose lengths differ by rounding from those of the map's rules.

@@ -80,8 +80,8 @@ void check_worlds(std::string_view controller, const Simulator& simulator) {
                  controller, world.global_world, map.road->name);
     }
     if (controller == "lane" && map.scenario) {
-      fail_usage("controller lane: world {}: expected a map whose lanes go on for ever, got recorded scene {}",
-                 world.global_world, map.scenario->id);
+      fail_usage("controller lane: world {}: expected a map of roads, got recorded scene {}", world.global_world,
+                 map.scenario->id);
     }
   }
 }

@@ -182,6 +182,7 @@ IdmController::IdmController(const Simulator& simulator, IdmPaths paths, const I
     }
   }
   progress_m_.assign(paths_.size(), 0);
+  life_.assign(paths_.size(), 0);
 }
 
 void IdmController::act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream) {
@@ -199,7 +200,8 @@ float IdmController::place_on_path(const ControllerInput& input, size_t slot) {
   const auto world = static_cast<size_t>(input.slots.world_of_slot[slot]);
   FollowedPath& path = paths_[slot];
   const Vec3 here{input.state.x_m[slot], input.state.y_m[slot], input.state.z_m[slot]};
-  const bool begins = input.episode_step[world] == 0;
+  const bool begins = input.episode_step[world] == 0 || input.state.life[slot] != life_[slot];
+  life_[slot] = input.state.life[slot];
   // Nobody goes back on the path but who begins anew.
   float s_m = path.points_m.empty() ? 0.0f : path.nearest_m(here.xy(), begins ? 0.0f : progress_m_[slot]);
   const auto serves = [&] {

@@ -90,6 +90,7 @@ class IdmController final : public Controller {
   std::vector<FollowedPath> paths_;                       // [slots]
   std::vector<uint8_t> on_lanes_;                         // [slots] whether its path is along lanes
   std::vector<float> progress_m_;                         // [slots] at the last act(), where the next one looks for it
+  std::vector<int32_t> life_;                             // [slots] of the agent at the last act()
 };
 
 }  // namespace pictura

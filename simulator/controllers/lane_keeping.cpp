@@ -32,8 +32,9 @@ LaneKeepingAgent::LaneKeepingAgent(const WorldView& world, int agent, const Lane
     : world_(world),
       self_(agent),
       slot_(world.first_slot + agent),
+      life_(world.agents.life[slot_]),
       agent_(world, agent),
-      path_(world.map, graph, spawn_place(world, agent)) {
+      path_(world.map, graph, start_place(world, agent)) {
   waypoints_.back() = points().front().at;  // where the first chain starts
 }
 
@@ -279,6 +280,7 @@ LaneKeepingController::LaneKeepingController(const Simulator& simulator) {
       std::make_unique<SimulatorSetup>(simulator.config(), simulator.maps(), simulator.handles(), simulator.worlds());
   for (const auto& map : simulator.maps()) graphs_.push_back(std::make_unique<LaneGraph>(*map->road));
   episode_.assign(simulator.worlds().size(), -1);
+  views_.resize(simulator.worlds().size());
   agents_.resize(static_cast<size_t>(simulator.num_slots()));
 }
 
@@ -292,6 +294,7 @@ void LaneKeepingController::act(const ControllerInput& input, Span<const uint8_t
     PICTURA_CHECK(episode_[w] == input.episode_index[w],
                   "controller lane: world {}: expected to act from the first step of episode {} on, got step {}", w,
                   input.episode_index[w], input.episode_step[w]);
+    if (views_[w]->map.is_open) begin_lives(w);
   }
   // Agents look at the state and write nothing but their own commands.
   parallel_for(setup_->config.num_threads, static_cast<int64_t>(episode_.size()), [&](int64_t world) {
@@ -309,19 +312,30 @@ void LaneKeepingController::act(const ControllerInput& input, Span<const uint8_t
 void LaneKeepingController::begin_episode(const ControllerInput& input, size_t world) {
   // Over the simulator's agents, boxes and lights, which nothing here writes.
   const auto map = static_cast<size_t>(setup_->worlds[world].map);
-  WorldView view = setup_->view(static_cast<int>(world), setup_->map_views[map], setup_->options);
+  WorldView& view =
+      views_[world].emplace(setup_->view(static_cast<int>(world), setup_->map_views[map], setup_->options));
   view.seed = input.seed[world];
   view.episode = static_cast<uint32_t>(input.episode_index[world]);
   view.agents = input.state;
   view.boxes = view.boxes_before = const_cast<AgentBox*>(input.scene.agents.data()) + view.first_box;
   view.lights = const_cast<LightState*>(input.scene.light_states.data()) + input.scene.light_begin[world];
-  const LaneGraph& graph = *graphs_[map];
   for (int agent = 0; agent < view.num_agents; ++agent) {
-    const bool drives = is_active(view, agent) && !walks(view, agent);
-    agents_[static_cast<size_t>(view.first_slot + agent)] =
-        drives ? std::make_unique<LaneKeepingAgent>(view, agent, graph) : nullptr;
+    agents_[static_cast<size_t>(view.first_slot + agent)] = nullptr;
   }
+  begin_lives(world);
   episode_[world] = input.episode_index[world];
+}
+
+/// Takes charge of agents that have begun a life since the last look.
+void LaneKeepingController::begin_lives(size_t world) {
+  const WorldView& view = *views_[world];
+  const LaneGraph& graph = *graphs_[static_cast<size_t>(setup_->worlds[world].map)];
+  for (int agent = 0; agent < view.num_agents; ++agent) {
+    const auto slot = static_cast<size_t>(view.first_slot + agent);
+    const bool is_known = agents_[slot] && agents_[slot]->life() == view.agents.life[slot];
+    if (is_known || !is_active(view, agent) || walks(view, agent)) continue;
+    agents_[slot] = std::make_unique<LaneKeepingAgent>(view, agent, graph);
+  }
 }
 
 }  // namespace pictura

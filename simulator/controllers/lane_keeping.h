@@ -6,6 +6,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "pictura/common/error.h"
@@ -19,15 +20,16 @@ namespace pictura {
 
 struct SimulatorSetup;
 
-/// Drives one vehicle or cyclist of a world through one episode.
+/// Drives one vehicle or cyclist of a world through one life.
 class LaneKeepingAgent {
  public:
   /// `world` shows the simulator's agents and lights as they are at every act(), and has not been stepped in this
-  /// episode yet; the graph is its map's. Its arrays and the graph must outlive this.
+  /// life yet; the graph is its map's. Its arrays and the graph must outlive this.
   LaneKeepingAgent(const WorldView& world, int agent, const LaneGraph& graph);
 
   /// The action for what the agent and the lights are now.
   int32_t act();
+  int32_t life() const { return life_; }
   /// Steps in which it waited at a red light.
   int stops() const { return stops_; }
   /// Steps in which its rear axle was more than kAstray_m from its path.
@@ -57,6 +59,7 @@ class LaneKeepingAgent {
 
   const WorldView world_;
   const int self_, slot_;
+  const int32_t life_;
   const DrivenAgent agent_;
   std::array<RoutePoint, kNumWaypoints> waypoints_;
   int32_t chain_ = -1;  // whose waypoints these are
@@ -85,10 +88,12 @@ class LaneKeepingController final : public Controller {
 
  private:
   void begin_episode(const ControllerInput& input, size_t world);
+  void begin_lives(size_t world);
 
   std::unique_ptr<SimulatorSetup> setup_;                  // a copy, for its maps and rule options
   std::vector<std::unique_ptr<LaneGraph>> graphs_;         // [maps]
   std::vector<int32_t> episode_;                           // [worlds] the one that agents_ drive, or -1
+  std::vector<std::optional<WorldView>> views_;            // [worlds] of that episode
   std::vector<std::unique_ptr<LaneKeepingAgent>> agents_;  // [slots]
 };
 

@@ -180,7 +180,7 @@ bool LanePath::forks_within(float distance_m) const {
     distance_m -= lane(at.lane).length_m - at.s_m;
     at = {successors_of(at.lane)[0], 0};
   }
-  return distance_m > 0;
+  return distance_m > 0 && lane(at.lane).route_end_m == kRouteGoesOn_m;
 }
 
 void LanePath::limit_speeds(size_t slow, float slow_mps) {

@@ -51,7 +51,7 @@ class LanePath {
   /// Goes on for so long as lanes do, at forks the straightest way; from a lane that ends it changes to one that goes
   /// on.
   void go_on(float distance_m);
-  /// Whether the way parts within so far from the end.
+  /// Whether the way parts within so far from the end. Where a road ends it does not.
   bool forks_within(float distance_m) const;
   /// Gives every point the speed at which its curve, and by slowing down those ahead, can be driven. Point `slow` is
   /// passed at slow_mps at most.

@@ -18,7 +18,7 @@ PICTURA_HD inline AgentField invalid_field(const MapView& map, const RuleOptions
 #undef X
   const auto status = static_cast<AgentStatus>(agents.status[slot]);
   if (status != AgentStatus::active && status != AgentStatus::halted && status != AgentStatus::absent &&
-      !(status == AgentStatus::recorded && has_record(map))) {
+      !(status == AgentStatus::recorded && has_record(map)) && !(status == AgentStatus::waiting && map.is_open)) {
     return AgentField::status;
   }
   if (agents.agent_class[slot] >= kNumAgentClasses) return AgentField::agent_class;
@@ -34,6 +34,8 @@ PICTURA_HD inline AgentField invalid_field(const MapView& map, const RuleOptions
   if (!is_way && !(goal_lane == -1 && (status == AgentStatus::absent || has_record(map)))) return AgentField::goal_lane;
   if (agents.next_waypoint[slot] < 0 || agents.next_waypoint[slot] >= kNumWaypoints) return AgentField::next_waypoint;
   if (agents.goal_chains[slot] < 0) return AgentField::goal_chains;
+  if (agents.life[slot] < 0) return AgentField::life;
+  if (agents.life_step[slot] < 0 || agents.life_step[slot] > options.episode_steps) return AgentField::life_step;
   if (agents.first_motion_step[slot] < 0 || agents.first_motion_step[slot] > options.episode_steps) {
     return AgentField::first_motion_step;
   }
@@ -42,9 +44,9 @@ PICTURA_HD inline AgentField invalid_field(const MapView& map, const RuleOptions
   if (fabsf(agents.z_m[slot]) > kMaxCommanded_m) return AgentField::z_m;
   if (fabsf(agents.heading_rad[slot]) > kMaxCommanded_rad) return AgentField::heading_rad;
   // Who is absent has no body.
-  const bool has_body = status != AgentStatus::absent;
-  if (agents.length_m[slot] < 0 || (has_body && agents.length_m[slot] == 0)) return AgentField::length_m;
-  if (agents.width_m[slot] < 0 || (has_body && agents.width_m[slot] == 0)) return AgentField::width_m;
+  const bool is_there = has_body(status);
+  if (agents.length_m[slot] < 0 || (is_there && agents.length_m[slot] == 0)) return AgentField::length_m;
+  if (agents.width_m[slot] < 0 || (is_there && agents.width_m[slot] == 0)) return AgentField::width_m;
   if (agents.height_m[slot] < 0 || agents.height_m[slot] > kMaxCommanded_m) return AgentField::height_m;
   if (square(agents.length_m[slot]) + square(agents.width_m[slot]) > square(2.0f * map.max_box_radius_m)) {
     return AgentField::length_m;
@@ -110,11 +112,11 @@ PICTURA_HD inline int apply_edit(const WorldView& world, const StateEdit& edit, 
   record.heading_rad[0] = wrap_angle(record.heading_rad[0]);
   const auto status = static_cast<AgentStatus>(record.status[0]);
   if (status == AgentStatus::active) record.halt_reason[0] = 0;
-  const bool joins = status != AgentStatus::absent && record.refusal[0] != static_cast<uint8_t>(SpawnFailure::none);
+  const bool joins = has_body(status) && record.refusal[0] != static_cast<uint8_t>(SpawnFailure::none);
   if (joins) record.refusal[0] = static_cast<uint8_t>(SpawnFailure::none);
   copy_fields(record.view(), 0, agents, slot);
   store_motion(agents, slot, motion_of(agents, slot));
-  if (status != AgentStatus::absent) {
+  if (has_body(status)) {
     store_fit(agents, slot,
               fit_agent(world, agent, {agents.x_m[slot], agents.y_m[slot]}, agents.z_m[slot], agents.heading_rad[slot],
                         agents.lane[slot], SingleThread{}));

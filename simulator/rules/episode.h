@@ -36,10 +36,11 @@ PICTURA_HD bool takes_part(const WorldView& world, int agent, const CommandType&
 }
 
 /// Whether the agent counts among those that still drive when it is asked whether an episode ends: who follows a
-/// record does, also where that has nothing.
+/// record does, also where that has nothing, and who waits to enter.
 PICTURA_HD inline bool keeps_episode(const WorldView& world, int agent) {
   const auto status = static_cast<AgentStatus>(world.agents.status[world.first_slot + agent]);
-  return takes_actions(status) || (status == AgentStatus::absent && has_record(world.map));
+  return takes_actions(status) || status == AgentStatus::waiting ||
+         (status == AgentStatus::absent && has_record(world.map));
 }
 
 /// A command that a step refused, in one word that a host reads whole: slot, kind, and the action of an action.
@@ -83,7 +84,7 @@ PICTURA_HD inline void apply_reward_and_halt(const WorldView& world, int agent, 
   const StepSums sums{distance_m, apply_reward_and_halt(world, agent)};
   results.sums[slot] = sums;
   results.reward[slot] = sums.reward_terms.total();
-  results.terminated[slot] = results.valid[slot] && !is_active(world, agent);
+  results.terminated[slot] = results.valid[slot] && !is_active(world, agent) && !has_left(world, agent);
 }
 
 /// Counts the step of an agent after phase 3.
@@ -120,19 +121,21 @@ PICTURA_HD inline bool episode_ends(const WorldView& world, int steps, int spawn
   return inactive >= world.options.reset_inactive_fraction * static_cast<float>(spawned);
 }
 
-/// Once it is known whether the world's episode ends with this step: cuts off who still drives, and counts whose
-/// episode is over.
+/// Once it is known whether the world's episode ends with this step: cuts off who still drives and who has left, and
+/// counts whose episode, or life, is over.
 PICTURA_HD inline void finish_agent(const WorldView& world, int agent, bool ends, const StepArrays& results,
                                     SimulatorTotals* totals_inout) {
   const int slot = world.first_slot + agent;
-  results.truncated[slot] = ends && is_active(world, agent);
+  results.truncated[slot] = (ends && is_active(world, agent)) || has_left(world, agent);
   if (!results.terminated[slot] && !results.truncated[slot]) return;
   ++totals_inout->finished_agent_episodes;
   totals_inout->finished_return += static_cast<double>(world.agents.episode_return[slot]);
   totals_inout->finished_passed_waypoint += world.agents.waypoints_reached[slot] > 0;
   const int first_motion_step = world.agents.first_motion_step[slot];
   totals_inout->finished_moved += first_motion_step > 0;
-  totals_inout->finished_first_motion_s += first_motion_step * static_cast<double>(world.options.dt_s);
+  if (first_motion_step == 0) return;
+  const int to_motion_steps = first_motion_step - world.agents.life_step[slot];
+  totals_inout->finished_first_motion_s += to_motion_steps * static_cast<double>(world.options.dt_s);
 }
 
 }  // namespace pictura

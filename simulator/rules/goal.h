@@ -1,5 +1,5 @@
 // Goal chains: three waypoints along the lane network, 20 to 60 m apart along the route, lane changes included; and
-// when a waypoint is passed. The route goes only where it never ends.
+// when a waypoint is passed. The route goes only where it never ends; on open maps it ends before the lanes do.
 #pragma once
 
 #include "pictura/common/rng.h"
@@ -38,12 +38,15 @@ PICTURA_HD inline RoutePoint through_lane(const MapView& map, RoutePoint at) {
 }
 
 /// Walks distance_m along lanes, choosing among successors with equal chance. Where a lane has no successor from which
-/// the route goes on, it changes to the nearest lane that has one.
+/// the route goes on, it changes to the nearest lane that has one. Stops where routes end.
 PICTURA_HD inline RoutePoint walk(const MapView& map, RoutePoint at, float distance_m, RandomStream* random_inout) {
   constexpr int kMaxLanesWalked = 64;  // lanes shorter than a metre in a row: a bound, not a rule
   for (int i = 0; i < kMaxLanesWalked; ++i) {
     const float left_m = map.lanes[static_cast<size_t>(at.lane)].length_m - at.s_m;
-    if (distance_m <= left_m) return {at.lane, at.s_m + distance_m};
+    const float route_end_m = map.lanes[static_cast<size_t>(at.lane)].route_end_m;
+    if (distance_m <= left_m || route_end_m < kRouteGoesOn_m) {
+      return {at.lane, min_of(at.s_m + distance_m, route_end_m)};
+    }
     at = through_lane(map, at);
     const MapLane& lane = map.lanes[static_cast<size_t>(at.lane)];
     if (lane.num_successors == 0) break;

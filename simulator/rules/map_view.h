@@ -32,14 +32,31 @@ struct LaneSegment {
   int32_t is_driven = 0;  // agents associate with its lane; else it is only part of the drivable surface (parking)
 };
 
+/// MapLane::route_end_m where routes go on after the lane.
+constexpr float kRouteGoesOn_m = 1e30f;
+
 struct MapLane {
   int32_t first_segment = 0, num_segments = 0;
-  // Of MapView::successors: first those from which a route goes on for ever, num_successors of them, then the others.
+  // Of MapView::successors: first those from which a route goes on for ever, or on open maps along driving and ramp
+  // lanes, num_successors of them, then the others.
   int32_t first_successor = 0, num_successors = 0, num_all_successors = 0;
-  int32_t left = -1, right = -1;  // neighbours from which a route goes on for ever
+  int32_t left = -1, right = -1;  // neighbours from which routes go on in that way
   float length_m = 0;
   float speed_limit_mps = 0;
-  int32_t light = -1;  // the stop line that holds it
+  int32_t light = -1;                  // the stop line that holds it
+  float route_end_m = kRouteGoesOn_m;  // on open maps, how far along it waypoints lie where routes end
+};
+
+/// Where agents leave an open map: a line across the end of a lane.
+struct Exit {
+  Vec3 middle_m;
+  Vec2 direction;  // of traffic, unit vector
+  float half_width_m = 0;
+};
+
+/// A lane at whose start agents enter an open map. Of the entries of one turn one agent enters in a step.
+struct Entry {
+  int32_t lane = 0, turn = 0;
 };
 
 /// A piece of the drivable surface's outline, or the foot of a wall.
@@ -117,7 +134,10 @@ struct MapView {
   Span<const Barrier> edges, walls;
   Span<const StopLine> stop_lines;
   Span<const int32_t> spawn_lanes;
-  Span<const float> spawn_end_m;  // [spawn_lanes] running sum of their lengths
+  Span<const float> spawn_end_m;  // [spawn_lanes] running sum of their lengths; on open maps, with way enough ahead
+  Span<const Exit> exits;
+  Span<const Entry> entries;
+  GridView exit_cells;
   Span<const WalkPiece> walk_pieces;
   Span<const float> walk_end_m;          // [walk_pieces] running sum of their lengths
   Span<const int32_t> walk_leave_begin;  // [walk nodes + 1] of walk_leaving: the pieces that leave a node
@@ -136,6 +156,7 @@ struct MapView {
   Span<const LightState> recorded_lights;         // [stop_lines, recorded_steps]; or none, and lights run by plans
   int32_t recorded_steps = 0;                     // the first one is where episodes start
   float max_box_radius_m = 0, max_speed_mps = 0;  // no box has a longer half-diagonal, and nothing is faster
+  uint8_t is_open = 0;                            // roads end, and agents leave and enter
 };
 
 /// Whether the map comes from a recorded scene: all agents of its worlds are the scene's.
@@ -152,6 +173,8 @@ PICTURA_HD void visit_arrays(MapView* view, Visit&& visit) {
   visit(&view->stop_lines);
   visit(&view->spawn_lanes);
   visit(&view->spawn_end_m);
+  visit(&view->exits);
+  visit(&view->entries);
   visit(&view->walk_pieces);
   visit(&view->walk_end_m);
   visit(&view->walk_leave_begin);
@@ -167,10 +190,10 @@ PICTURA_HD void visit_arrays(MapView* view, Visit&& visit) {
   visit(&view->recorded_states);
   visit(&view->recorded_lights);
   visit(&view->side_edges);
-  GridView* const lists[] = {
-      &view->segment_cells,   &view->edge_cells,       &view->wall_cells,           &view->stop_line_cells,
-      &view->walk_cells,      &view->near_lane_pieces, &view->near_boundary_pieces, &view->near_wall_pieces,
-      &view->near_stop_lines, &view->side_cells};
+  GridView* const lists[] = {&view->segment_cells,        &view->edge_cells,       &view->wall_cells,
+                             &view->stop_line_cells,      &view->walk_cells,       &view->near_lane_pieces,
+                             &view->near_boundary_pieces, &view->near_wall_pieces, &view->near_stop_lines,
+                             &view->side_cells,           &view->exit_cells};
   for (GridView* cells : lists) {
     visit(&cells->begin);
     visit(&cells->items);

@@ -330,7 +330,8 @@ PICTURA_HD int observe_controls(const WorldView& world, int slot, const NearPlac
 
 /// Whether anybody learns from or acts on the agent's observation: it drives or may begin to, or this is its last one.
 PICTURA_HD inline bool observes(const WorldView& world, int agent) {
-  return takes_actions(world, agent) || (world.agents.events[world.first_slot + agent] & kInfractions) != 0;
+  return takes_actions(world, agent) || has_left(world, agent) ||
+         (world.agents.events[world.first_slot + agent] & kInfractions) != 0;
 }
 
 /// What is no set, to that row of `out`: all zeros for the absent and for those that halted in an earlier step.

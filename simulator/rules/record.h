@@ -38,12 +38,17 @@ PICTURA_HD LaneFit fit_agent(const WorldView& world, int agent, Vec2 p, float z_
                              : fit_lane(world.map, p, z_m, heading_rad, current_lane, group);
 }
 
-/// Takes an agent out of its world's episode.
-PICTURA_HD inline void leave(const WorldView& world, int agent) {
+/// Takes away the box of an agent that has no body any more.
+PICTURA_HD inline void clear_place(const WorldView& world, int agent) {
   const int slot = world.first_slot + agent;
-  world.agents.status[slot] = static_cast<uint8_t>(AgentStatus::absent);
   world.agents.events[slot] = kEventNone;
   world.boxes[agent] = world.boxes_before[agent] = box_of(world.agents, slot);
+}
+
+/// Takes an agent out of its world's episode.
+PICTURA_HD inline void leave(const WorldView& world, int agent) {
+  world.agents.status[world.first_slot + agent] = static_cast<uint8_t>(AgentStatus::absent);
+  clear_place(world, agent);
 }
 
 /// Puts an agent where its record has it so many steps after the episode's start, or nowhere. Who was not recorded

@@ -1,4 +1,4 @@
-// The start of an episode: what an agent is, how it is conditioned, where it stands, and where it goes first.
+// The start of an episode or a life: what an agent is, how it is conditioned, where it stands, and where it goes first.
 #pragma once
 
 #include "pictura/simulator/rules/collision.h"
@@ -29,6 +29,48 @@ PICTURA_HD inline RandomStream agent_stream(const WorldView& world, int agent, u
                        .purpose = purpose});
 }
 
+/// The stream of goal chain `chain` of the agent's life. Keys of all lives differ: a life of n steps draws fewer than n
+/// chains.
+PICTURA_HD inline RandomStream goal_stream(const WorldView& world, int agent, int32_t chain) {
+  const int32_t life_step = world.agents.life_step[world.first_slot + agent];
+  return agent_stream(world, agent, static_cast<uint32_t>(life_step) + static_cast<uint32_t>(chain), Purpose::goals);
+}
+
+/// The size that an agent of this class draws for the life that begins after `step` steps of the episode.
+PICTURA_HD inline BodySize draw_size(const WorldView& world, int agent, AgentClass agent_class, int step) {
+  const ClassLimits limits = class_limits(agent_class);
+  RandomStream random = agent_stream(world, agent, static_cast<uint32_t>(step), Purpose::agent_size);
+  BodySize size;
+  size.length_m = random.uniform(limits.min_length_m, limits.max_length_m);
+  size.width_m = random.uniform(limits.min_width_m, limits.max_width_m);
+  size.height_m = limits.height_m;
+  return size;
+}
+
+/// Draws size and conditioning of the agent, whose class and life_step are set, or takes its size from the record.
+PICTURA_HD inline void draw_body(const WorldView& world, int agent) {
+  const AgentStateView& agents = world.agents;
+  const int slot = world.first_slot + agent;
+  const AgentClass agent_class = class_of(agents, slot);
+  const int step = agents.life_step[slot];
+  const BodySize size = draw_size(world, agent, agent_class, step);
+  agents.length_m[slot] = size.length_m;
+  agents.width_m[slot] = size.width_m;
+  agents.height_m[slot] = size.height_m;
+  if (has_record(world.map)) store_recorded_size(world, agent);
+
+  RandomStream conditioning_random = agent_stream(world, agent, static_cast<uint32_t>(step), Purpose::conditioning);
+  float* conditioning = agents.conditioning + slot * kNumConditioning;
+  for (int i = 0; i < kNumConditioning; ++i) {
+    conditioning[i] = draw_conditioning(world.options.conditioning[i], &conditioning_random);
+  }
+  if (agent_class != AgentClass::pedestrian) return;
+  // Paper: for pedestrians only the goal and collision terms are active, and the goal radius is capped.
+  for (int i = static_cast<int>(Conditioning::off_road); i < kNumRewardConditioning; ++i) conditioning[i] = 0.0f;
+  float& goal_radius_m = conditioning[static_cast<int>(Conditioning::delta_goal_m)];
+  goal_radius_m = min_of(goal_radius_m, kPedestrianGoalRadius_m);
+}
+
 /// Clears the agent's fields and draws its class, size and conditioning, or takes class and size from the record. It
 /// is absent until place_agent finds a place.
 PICTURA_HD inline void draw_agent(const WorldView& world, int agent) {
@@ -44,24 +86,8 @@ PICTURA_HD inline void draw_agent(const WorldView& world, int agent) {
   if (has_record(world.map)) {
     agent_class = static_cast<AgentClass>(world.map.recorded_agents[static_cast<size_t>(agent)].agent_class);
   }
-  const ClassLimits limits = class_limits(agent_class);
-  RandomStream size_random = agent_stream(world, agent, 0, Purpose::agent_size);
   agents.agent_class[slot] = static_cast<uint8_t>(agent_class);
-  agents.length_m[slot] = size_random.uniform(limits.min_length_m, limits.max_length_m);
-  agents.width_m[slot] = size_random.uniform(limits.min_width_m, limits.max_width_m);
-  agents.height_m[slot] = limits.height_m;
-  if (has_record(world.map)) store_recorded_size(world, agent);
-
-  RandomStream conditioning_random = agent_stream(world, agent, 0, Purpose::conditioning);
-  float* conditioning = agents.conditioning + slot * kNumConditioning;
-  for (int i = 0; i < kNumConditioning; ++i) {
-    conditioning[i] = draw_conditioning(world.options.conditioning[i], &conditioning_random);
-  }
-  if (agent_class != AgentClass::pedestrian) return;
-  // Paper: for pedestrians only the goal and collision terms are active, and the goal radius is capped.
-  for (int i = static_cast<int>(Conditioning::off_road); i < kNumRewardConditioning; ++i) conditioning[i] = 0.0f;
-  float& goal_radius_m = conditioning[static_cast<int>(Conditioning::delta_goal_m)];
-  goal_radius_m = min_of(goal_radius_m, kPedestrianGoalRadius_m);
+  draw_body(world, agent);
 }
 
 /// Whether a box keeps kSpawnClearance_m from the boxes [begin, end).
@@ -117,7 +143,7 @@ PICTURA_HD void draw_goal_chain(const WorldView& world, int agent, const ThreadG
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
   const int32_t chain = agents.goal_chains[slot];
-  RandomStream random = agent_stream(world, agent, static_cast<uint32_t>(chain), Purpose::goals);
+  RandomStream random = goal_stream(world, agent, chain);
   RoutePoint at{agents.goal_lane[slot], agents.goal_lane_s_m[slot]};
   group.sync();
   if (has_record(world.map)) {
@@ -276,32 +302,23 @@ PICTURA_HD bool may_spawn(const MapView& map, const AgentBox& box, const ThreadG
 /// Whether the agent that chose try `i` takes part in the episode: with -1 it found no place.
 PICTURA_HD inline bool joins_episode(const WorldView& world, int i) { return i >= 0 || has_record(world.map); }
 
-/// Puts the agent at the place of its try `i`, standing still, and draws its first goals; with -1 it stays absent. Who
-/// is recorded is put where its record starts.
-template <typename ThreadGroup = SingleThread>
-PICTURA_HD void place_agent(const WorldView& world, int agent, int i, const ThreadGroup& group = {}) {
+/// Puts the agent on its route with this speed along it, and draws its first goals.
+template <typename ThreadGroup>
+PICTURA_HD void put_on_route(const WorldView& world, int agent, RoutePoint at, float speed_mps,
+                             const ThreadGroup& group) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
-  const bool is_writer = group.rank() == 0;
-  if (has_record(world.map)) return begin_record(world, agent, group);
-  if (i < 0) {
-    if (!is_writer) return;
-    world.boxes[agent] = world.boxes_before[agent] = box_of(agents, slot);
-    agents.refusal[slot] =
-        static_cast<uint8_t>(has_places(world, agent) ? SpawnFailure::taken : SpawnFailure::no_place);
-    return;
-  }
-  const RoutePoint at = spawn_point(world, agent, i);
   const LanePose pose = pose_of(world, agent, at);
   // A pedestrian's place is on a walkway: no lane is its own yet.
   const int32_t own_lane = walks(world, agent) ? -1 : at.lane;
   const LaneFit fit =
       fit_agent(world, agent, pose.position_m.xy(), pose.position_m.z, pose.heading_rad, own_lane, group);
-  if (is_writer) {
+  if (group.rank() == 0) {
     Motion motion;
     motion.x_m = pose.position_m.x;
     motion.y_m = pose.position_m.y;
     motion.heading_rad = pose.heading_rad;
+    motion.speed_mps = speed_mps;
     store_motion(agents, slot, motion);
     store_fit(agents, slot, fit);
     agents.status[slot] = static_cast<uint8_t>(AgentStatus::active);
@@ -311,6 +328,23 @@ PICTURA_HD void place_agent(const WorldView& world, int agent, int i, const Thre
   }
   group.sync();
   draw_goal_chain(world, agent, group);
+}
+
+/// Puts the agent at the place of its try `i`, standing still, and draws its first goals; with -1 it stays absent. Who
+/// is recorded is put where its record starts.
+template <typename ThreadGroup = SingleThread>
+PICTURA_HD void place_agent(const WorldView& world, int agent, int i, const ThreadGroup& group = {}) {
+  const AgentStateView& agents = world.agents;
+  const int slot = world.first_slot + agent;
+  if (has_record(world.map)) return begin_record(world, agent, group);
+  if (i < 0) {
+    if (group.rank() > 0) return;
+    world.boxes[agent] = world.boxes_before[agent] = box_of(agents, slot);
+    agents.refusal[slot] =
+        static_cast<uint8_t>(has_places(world, agent) ? SpawnFailure::taken : SpawnFailure::no_place);
+    return;
+  }
+  put_on_route(world, agent, spawn_point(world, agent, i), 0.0f, group);
 }
 
 }  // namespace pictura

@@ -5,6 +5,7 @@
 
 #include "pictura/simulator/command.h"
 #include "pictura/simulator/rules/collision.h"
+#include "pictura/simulator/rules/exit.h"
 #include "pictura/simulator/rules/reward.h"
 #include "pictura/simulator/rules/spawn.h"
 
@@ -16,6 +17,11 @@ PICTURA_HD inline bool is_active(const WorldView& world, int agent) {
 
 PICTURA_HD inline bool takes_actions(const WorldView& world, int agent) {
   return takes_actions(static_cast<AgentStatus>(world.agents.status[world.first_slot + agent]));
+}
+
+/// Whether the agent left a road that ends in the last step.
+PICTURA_HD inline bool has_left(const WorldView& world, int agent) {
+  return world.map.is_open && world.agents.left[world.first_slot + agent] != 0;
 }
 
 PICTURA_HD inline bool runs_red_light(const WorldView& world, const AgentBox& before, const AgentBox& after,
@@ -33,6 +39,16 @@ PICTURA_HD inline bool runs_red_light(const WorldView& world, const AgentBox& be
 PICTURA_HD inline Vec3 waypoint_of(const AgentStateView& agents, int slot, int index) {
   const int i = slot * kNumWaypoints + index;
   return {agents.waypoint_x_m[i], agents.waypoint_y_m[i], agents.waypoint_z_m[i]};
+}
+
+/// With a step's event bits: the agent leaves a road that ends. Kept in a field of its own.
+constexpr int kLeaves = 256;
+
+/// Whether the agent's last waypoint lies where routes end.
+PICTURA_HD inline bool ends_way(const WorldView& world, int agent) {
+  const int slot = world.first_slot + agent;
+  return world.map.is_open && !walks(world, agent) &&
+         is_at_route_end(world.map, {world.agents.goal_lane[slot], world.agents.goal_lane_s_m[slot]});
 }
 
 /// Passes waypoints along the way from `from` to `to`; returns event bits. The last waypoint becomes the
@@ -59,6 +75,7 @@ PICTURA_HD int pass_waypoints(const WorldView& world, int agent, Vec3 from, Vec3
   if (!passes_waypoint) return events;
   if (is_writer) ++agents.waypoints_reached[slot];
   if (index + 1 == kNumWaypoints) {
+    if (ends_way(world, agent)) return events | kEventGoal | kLeaves;
     draw_goal_chain(world, agent, group);
     return events | kEventGoal;
   }
@@ -144,9 +161,10 @@ PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& co
   }
   if (!takes_actions(world, agent)) {
     if (group.rank() > 0) return;
+    if (world.map.is_open) agents.left[slot] = 0;
     // Who left at the end of the last step was still there for all to see.
-    const bool has_left = agents.status[slot] == static_cast<uint8_t>(AgentStatus::absent) && before.drawn;
-    if (has_left) return leave(world, agent);
+    const bool is_gone = !has_body(static_cast<AgentStatus>(agents.status[slot])) && before.drawn;
+    if (is_gone) return clear_place(world, agent);
     world.boxes_before[agent] = before;
     agents.events[slot] = kEventNone;
     return;
@@ -177,6 +195,7 @@ PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& co
       events |= kEventOffRoad;
     }
     if (runs_red_light(world, before, box, lane_before, fit.lane)) events |= kEventRedLight;
+    if (crosses_exit(world.map, front_bumper(before), front_bumper(box), box.center_m.z)) events |= kLeaves;
   }
   events |= pass_waypoints(world, agent, from, {motion.x_m, motion.y_m, fit.z_m}, group);
   if (group.rank() > 0) return;
@@ -186,7 +205,8 @@ PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& co
   world.boxes[agent] = box;
   store_motion(agents, slot, motion, heading);
   store_fit(agents, slot, fit);
-  agents.events[slot] = static_cast<uint8_t>(events);
+  agents.events[slot] = static_cast<uint8_t>(events & ~kLeaves);
+  if (world.map.is_open) agents.left[slot] = (events & kLeaves) != 0;
 }
 
 /// Phase 2: finds the collisions of an active agent with every other box, halted and parked ones included.
@@ -232,9 +252,9 @@ PICTURA_HD inline StepFacts step_facts(const Motion& motion, const LaneFit& fit,
   return facts;
 }
 
-/// Phase 3: the reward of an active agent, and its end: the halt after an infraction, or its leaving after one or at
-/// its goal. Whoever leaves is absent, but its box stands there until the next step, in which nobody meets it. Returns
-/// the reward's terms. Nothing that it writes is read by another agent's phase 2.
+/// Phase 3: the reward of an active agent, and its end: the halt after an infraction, or its leaving after one, at its
+/// goal, or where its road ends. Whoever leaves is absent or waits, but its box stands there until the next step, in
+/// which nobody meets it. Returns the reward's terms. Nothing that it writes is read by another agent's phase 2.
 PICTURA_HD inline RewardTerms apply_reward_and_halt(const WorldView& world, int agent) {
   if (!is_active(world, agent)) return {};
   const AgentStateView& agents = world.agents;
@@ -251,11 +271,14 @@ PICTURA_HD inline RewardTerms apply_reward_and_halt(const WorldView& world, int 
     agents.halt_reason[slot] = static_cast<uint8_t>(infractions);
   }
   const bool arrives = world.options.leave_at_goal && (events & kEventMetricGoal) != 0;
-  if (arrives || (infractions != 0 && after == AfterInfraction::leave)) {
-    agents.status[slot] = static_cast<uint8_t>(AgentStatus::absent);
-    return terms;
+  const bool is_out = arrives || (infractions != 0 && after == AfterInfraction::leave);
+  const bool halts = infractions != 0 && after == AfterInfraction::halt;
+  if (has_left(world, agent)) {
+    agents.left[slot] = !is_out && !halts;
+    if (agents.left[slot]) agents.status[slot] = static_cast<uint8_t>(AgentStatus::waiting);
   }
-  if (infractions == 0 || after != AfterInfraction::halt) return terms;
+  if (is_out) agents.status[slot] = static_cast<uint8_t>(AgentStatus::absent);
+  if (is_out || !halts) return terms;
   agents.status[slot] = static_cast<uint8_t>(AgentStatus::halted);
   agents.speed_mps[slot] = agents.accel_long_mps2[slot] = agents.accel_lat_mps2[slot] = 0.0f;
   agents.steer_rad[slot] = agents.jerk_long_mps3[slot] = agents.jerk_lat_mps3[slot] = 0.0f;

@@ -96,29 +96,39 @@ PICTURA_HD inline void store_fit(const AgentStateView& agents, int slot, const L
   agents.speed_limit_mps[slot] = fit.speed_limit_mps;
 }
 
-/// A box of the agent's class and size whose reference point stands at `position_m`.
-PICTURA_HD inline AgentBox box_at(const AgentStateView& agents, int slot, Vec3 position_m, SinCos heading) {
-  const float ahead = reference_to_center(class_of(agents, slot), agents.length_m[slot]);
+struct BodySize {
+  float length_m = 0, width_m = 0, height_m = 0;
+};
+
+/// A box of this class and size whose reference point stands at `position_m`.
+PICTURA_HD inline AgentBox box_at(AgentClass agent_class, const BodySize& size, Vec3 position_m, SinCos heading) {
+  const float ahead = reference_to_center(agent_class, size.length_m);
   AgentBox box;
   box.center_m = {position_m.x + ahead * heading.cos, position_m.y + ahead * heading.sin, position_m.z};
   box.cos_heading = heading.cos;
   box.sin_heading = heading.sin;
-  box.length_m = agents.length_m[slot];
-  box.width_m = agents.width_m[slot];
-  box.height_m = agents.height_m[slot];
-  box.agent_class = class_of(agents, slot);
+  box.length_m = size.length_m;
+  box.width_m = size.width_m;
+  box.height_m = size.height_m;
+  box.agent_class = agent_class;
   return box;
+}
+
+/// The same of the agent's class and size.
+PICTURA_HD inline AgentBox box_at(const AgentStateView& agents, int slot, Vec3 position_m, SinCos heading) {
+  const BodySize size{agents.length_m[slot], agents.width_m[slot], agents.height_m[slot]};
+  return box_at(class_of(agents, slot), size, position_m, heading);
 }
 
 constexpr uint8_t kHaltedPalette = 1;
 
-/// The agent's box in the scene; nothing of an absent agent is drawn or met.
+/// The agent's box in the scene; nothing of an agent without a body is drawn or met.
 PICTURA_HD inline AgentBox box_of(const AgentStateView& agents, int slot) {
   const AgentStatus status = static_cast<AgentStatus>(agents.status[slot]);
   AgentBox box = box_at(agents, slot, {agents.x_m[slot], agents.y_m[slot], agents.z_m[slot]},
                         {agents.sin_heading[slot], agents.cos_heading[slot]});
   box.palette = status == AgentStatus::halted ? kHaltedPalette : 0;
-  box.drawn = status != AgentStatus::absent;
+  box.drawn = has_body(status);
   return box;
 }
 

@@ -118,7 +118,7 @@ with tempfile.TemporaryDirectory() as name:
     assert "in [0, 91), got 91" in refusal(scene, "--start", 91)
     assert "--follow: expected 0 to 11, got 12" in refusal(scene, "--replay", folder / "x.html", "--follow", 12)
     assert "expected a recorded scene, got map" in refusal("procedural:1", "--agents", 2, "--policy", "log")
-    assert "whose lanes go on for ever" in refusal(scene, "--policy", "lane")
+    assert "expected a map of roads" in refusal(scene, "--policy", "lane")
 
     refused = run(f"{folder}#5", status=2).stderr
     assert refused.startswith("error: ") and "expected #0 to #4 or the id of one of its scenes, got #5" in refused, refused

@@ -657,7 +657,7 @@ TEST(RecordedWorlds, RefuseWhatCannotBe) {
               HasSubstr("slot 0: expected a world on a recorded scene"));
   const auto simulator = world_of(scene);
   EXPECT_THAT(test::message_of<UsageError>([&] { make_controller("lane", *simulator, 0); }),
-              HasSubstr("expected a map whose lanes go on for ever"));
+              HasSubstr("expected a map of roads, got recorded scene"));
 }
 
 TEST(RecordedWorlds, WordsNameTracks) {

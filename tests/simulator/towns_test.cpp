@@ -113,7 +113,7 @@ TEST(Towns, EveryGoalCanBeReached) {
     // What is drawn again is what the agents were given.
     for (int agent = 0; agent < 150; ++agent) {
       if (!is_active(world, agent)) continue;
-      const auto places = goal_places(world, agent, 0, spawn_place(world, agent));
+      const auto places = goal_places(world, agent, 0, start_place(world, agent));
       for (int i = 0; i < kNumWaypoints; ++i) {
         const Vec3 given = waypoint_of(world.agents, agent, i);
         const Vec3 drawn = pose_of(world, agent, places[static_cast<size_t>(i)]).position_m;

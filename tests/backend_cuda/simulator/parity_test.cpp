@@ -12,9 +12,11 @@
 #include "pictura/common/error.h"
 #include "pictura/map/load_map.h"
 #include "pictura/map/map_copy.h"
+#include "pictura/map/opendrive/opendrive.h"
 #include "pictura/simulator/recorded_scene.h"
 #include "pictura/tests/backend_cuda/device_test.h"
 #include "pictura/tests/backend_cuda/on_host.h"
+#include "pictura/tests/map/open_roads.h"
 #include "pictura/tests/simulator/random_edit.h"
 #include "pictura/tests/simulator/random_queries.h"
 #include "pictura/tests/simulator/same_bits.h"
@@ -225,6 +227,32 @@ TEST_F(CudaSimulatorTest, StaggeredEpisodesAndRulesOfStandstill) {
   config.dynamics = {.reset_at_standstill = true, .forbid_reversing = true};
   config.reset_inactive_fraction = 2;
   expect_parity(config, {load_map("procedural:1")}, draw_worlds(5, 120, 1, 20, 1), 500);
+}
+
+TEST_F(CudaSimulatorTest, RoadsThatEndOver1000Steps) {
+  SimulatorConfig config = whole_world();
+  config.episode_steps = 700;
+  config.reset_inactive_fraction = 2;
+  config.parked_cars = 4;
+  const Maps maps{std::make_shared<RoadMap>(parse_opendrive(test::open_street(), "street.xodr")),
+                  std::make_shared<RoadMap>(parse_opendrive(test::open_crossing(), "crossing.xodr")),
+                  std::make_shared<RoadMap>(parse_opendrive(test::open_ramp(), "ramp.xodr"))};
+  const std::vector<WorldSpec> worlds{{0, 60, 0}, {1, 40, 1}, {2, 120, 2}, {0, 3, 3}};
+  const auto cpu = make_simulator("cpu", config, maps, worlds);
+  const auto cuda = make_simulator("cuda", config, maps, worlds);
+  for (int step = 0; step < 1000; ++step) {
+    const std::vector<int32_t> actions = testing::straight_actions(cpu->state(), cpu->num_slots());
+    const DeviceBuffer<int32_t> device_actions{Span<const int32_t>(actions)};
+    cpu->step(actions);
+    cuda->step(Array(device_actions.data(), {cpu->num_slots()}, cuda->device()));
+    if (step % 50 == 0) expect_same_view(cpu.get(), cuda.get(), step);
+    ASSERT_EQ(cpu->state_hash(), cuda->state_hash()) << "step " << step;
+  }
+  EXPECT_EQ(cpu->save(), cuda->save());
+  const SpawnReport a = cpu->spawn_report(), b = cuda->spawn_report();
+  EXPECT_GT(a.entered, 20);
+  EXPECT_EQ(a.entered, b.entered);
+  EXPECT_EQ(a.left, b.left);
 }
 
 TEST_F(CudaSimulatorTest, TenThousandSteps) {

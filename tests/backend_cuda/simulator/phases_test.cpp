@@ -6,9 +6,11 @@
 
 #include "pictura/backends/make_simulator.h"
 #include "pictura/map/load_map.h"
+#include "pictura/map/opendrive/opendrive.h"
 #include "pictura/simulator/agent_state_arrays.h"
 #include "pictura/simulator/recorded_scene.h"
 #include "pictura/tests/backend_cuda/simulator/shuffled_executor.h"
+#include "pictura/tests/map/open_roads.h"
 #include "pictura/tests/simulator/random_edit.h"
 #include "pictura/tests/simulator/random_queries.h"
 #include "pictura/tests/simulator/same_bits.h"
@@ -82,6 +84,35 @@ TEST(Phases, LetEachLightCycleAlone) {
     config.fixed_lights = fixed;
     expect_same(config, {load_map("procedural:1"), load_map("procedural:2")}, draw_worlds(5, 60, 1, 30, 2), 100, 12);
   }
+}
+
+TEST(Phases, LeaveAndEnterRoadsThatEnd) {
+  SimulatorConfig config;
+  config.episode_steps = 400;
+  config.reset_inactive_fraction = 2;
+  config.parked_cars = 2;
+  const std::vector<std::shared_ptr<const RoadMap>> maps{
+      std::make_shared<RoadMap>(parse_opendrive(test::open_street(80), "street.xodr")),
+      std::make_shared<RoadMap>(parse_opendrive(test::open_ramp(), "ramp.xodr"))};
+  const std::vector<WorldSpec> worlds{{0, 20, 0}, {1, 30, 1}, {0, 3, 2}};
+  const CompiledMaps compiled = compile_maps(maps, map_options(config));
+  const auto cpu = make_simulator("cpu", config, compiled, worlds);
+  testing::ShuffledExecutor other(config, compiled, worlds, 17);
+  int64_t left = 0;
+  for (uint32_t step = 0; step < 600; ++step) {
+    const std::vector<int32_t> actions = testing::straight_actions(cpu->state(), cpu->num_slots());
+    other.step(actions);
+    const StepResult result = cpu->step(actions);
+    ASSERT_EQ(cpu->state_hash(), other.hash()) << "step " << step;
+    ASSERT_EQ(testing::first_difference(cpu->observations(), other.results.observation_view()), "") << "step " << step;
+    ASSERT_TRUE(testing::same_bits(cpu->views(), Span<const View>(other.results.views))) << "step " << step;
+    ASSERT_TRUE(testing::same_bits(result.terminated, Span<const uint8_t>(other.results.terminated)));
+    ASSERT_TRUE(testing::same_bits(result.truncated, Span<const uint8_t>(other.results.truncated)));
+    ASSERT_TRUE(testing::same_bits(result.valid, Span<const uint8_t>(other.results.valid)));
+    for (int slot = 0; slot < cpu->num_slots(); ++slot) left += cpu->state().left[slot];
+  }
+  EXPECT_EQ(cpu->save(), other.save());
+  EXPECT_GT(left, 20);
 }
 
 TEST(Phases, StaggerEpisodesAndObeyTheRulesOfStandstill) {

@@ -185,6 +185,7 @@ class ShuffledExecutor {
     arrays.views = results.views.data();
     arrays.observations = results.observation_view();
     arrays.entity_sets = host.setup.config.vector_observations;
+    arrays.has_lives = host.setup.has_lives();
     arrays.began = began_.data();
     arrays.prepares = prepares_.data();
     arrays.next_spawned = next_spawned_.data();

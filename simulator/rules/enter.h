@@ -1,0 +1,147 @@
+// Entering a road that ends: agents that left one wait, and come in again where lanes begin and there is room for them.
+#pragma once
+
+#include "pictura/simulator/rules/spawn.h"
+
+namespace pictura {
+
+constexpr float kEntryInside_m = 0.1f;  // of the rear bumper
+constexpr float kMaxEntry_mps = 8.0f;
+constexpr float kEntryGap_m = 2.0f, kEntryHeadway_s = 2.0f;  // to the next box
+
+/// Whether an agent waits to enter; whoever leaves is still seen in that step.
+PICTURA_HD inline bool waits(const WorldView& world, int agent) {
+  return world.agents.status[world.first_slot + agent] == static_cast<uint8_t>(AgentStatus::waiting) &&
+         !world.boxes[agent].drawn;
+}
+
+/// The entry that an agent draws at the end of this step of the episode. There must be entries.
+PICTURA_HD inline const Entry& drawn_entry(const WorldView& world, int agent, int step) {
+  RandomStream random = agent_stream(world, agent, static_cast<uint32_t>(step), Purpose::entry);
+  return world.map.entries[static_cast<size_t>(random.below(static_cast<int>(world.map.entries.size())))];
+}
+
+/// The point so far ahead on the way along first successors, at most at its end.
+PICTURA_HD inline RoutePoint point_ahead(const MapView& map, RoutePoint at, float distance_m) {
+  constexpr int kMaxLanesAhead = 64;  // a bound, not a rule
+  at.s_m += distance_m;
+  for (int i = 0; i < kMaxLanesAhead; ++i) {
+    const MapLane& lane = map.lanes[static_cast<size_t>(at.lane)];
+    if (at.s_m <= lane.length_m || lane.num_successors == 0) break;
+    at = {map.successors[static_cast<size_t>(lane.first_successor)], at.s_m - lane.length_m};
+  }
+  return {at.lane, min_of(at.s_m, map.lanes[static_cast<size_t>(at.lane)].length_m)};
+}
+
+/// Where the reference point of an agent is that enters on a lane.
+PICTURA_HD inline RoutePoint entry_place(const MapView& map, const Entry& entry, AgentClass agent_class,
+                                         float length_m) {
+  const float to_rear_m = 0.5f * length_m - reference_to_center(agent_class, length_m);
+  return point_ahead(map, {entry.lane, 0.0f}, kEntryInside_m + to_rear_m);
+}
+
+/// The next box on a way.
+struct NextBox {
+  float gap_m = 1e9f;   // from the front bumper, to within half a metre below
+  float speed_mps = 0;  // along the way
+};
+
+/// What is next on the way of an agent whose box stands at `at`, no farther than the largest gap that it must keep.
+template <typename ThreadGroup>
+PICTURA_HD NextBox next_box(const WorldView& world, const AgentBox& own, RoutePoint at, const ThreadGroup& group) {
+  constexpr float kStride_m = 0.5f;
+  constexpr float kLook_m = kEntryGap_m + kEntryHeadway_s * kMaxEntry_mps;
+  const float ahead_m = reference_to_center(own.agent_class, own.length_m);
+  NextBox next;
+  int next_index = world.num_boxes;
+  for (int i = group.rank(); i < world.num_boxes; i += group.size()) {
+    const AgentBox& other = world.boxes[i];
+    const Vec2 apart = (other.center_m - own.center_m).xy();
+    const float reach_m = kLook_m + radius(own) + world.map.max_box_radius_m;
+    if (!other.drawn || dot(apart, apart) > square(reach_m)) continue;
+    for (float way_m = kStride_m; way_m - kStride_m < min_of(next.gap_m, kLook_m); way_m += kStride_m) {
+      const RoutePoint there = point_ahead(world.map, at, way_m);
+      const LanePose pose = pose_on_lane(world.map, there.lane, there.s_m);
+      const SinCos heading = sincos_of(pose.heading_rad);
+      AgentBox box = own;
+      box.center_m = pose.position_m + Vec3{ahead_m * heading.cos, ahead_m * heading.sin, 0.0f};
+      box.cos_heading = heading.cos;
+      box.sin_heading = heading.sin;
+      if (!same_level(box, other) || !overlap(footprint(box), footprint(other))) continue;
+      next.gap_m = way_m - kStride_m;
+      const float speed_mps = i < world.num_agents ? world.agents.speed_mps[world.first_slot + i] : 0.0f;
+      const float along = other.cos_heading * heading.cos + other.sin_heading * heading.sin;
+      next.speed_mps = max_of(speed_mps * along, 0.0f);
+      next_index = i;
+      break;
+    }
+  }
+  return group.of_lowest(next.gap_m, next_index, next);
+}
+
+/// Whether an agent with a lower number has entered in this step by an entry of the same turn.
+template <typename ThreadGroup>
+PICTURA_HD bool is_turn_taken(const WorldView& world, int agent, int step, int32_t turn, const ThreadGroup& group) {
+  bool is_taken = false;
+  for (int other = group.rank(); other < agent && !is_taken; other += group.size()) {
+    const bool entered = world.agents.life_step[world.first_slot + other] == step;
+    is_taken = entered && drawn_entry(world, other, step).turn == turn;
+  }
+  return group.any(is_taken);
+}
+
+/// Begins the next life of an agent.
+template <typename ThreadGroup>
+PICTURA_HD void begin_life(const WorldView& world, int agent, int step, RoutePoint at, float speed_mps,
+                           const ThreadGroup& group) {
+  const AgentStateView& agents = world.agents;
+  const int slot = world.first_slot + agent;
+  if (group.rank() == 0) {
+    const uint8_t agent_class = agents.agent_class[slot];
+    const int32_t life = agents.life[slot] + 1;
+    reset_fields(agents, slot);
+    agents.agent_class[slot] = agent_class;
+    agents.life[slot] = life;
+    agents.life_step[slot] = step;
+    draw_body(world, agent);
+  }
+  group.sync();
+  put_on_route(world, agent, at, speed_mps, group);
+}
+
+/// Brings a waiting agent in at the end of this step of the episode, if there is room where it draws.
+template <typename ThreadGroup>
+PICTURA_HD bool try_to_enter(const WorldView& world, int agent, int step, const ThreadGroup& group) {
+  const AgentStateView& agents = world.agents;
+  const int slot = world.first_slot + agent;
+  const Entry& entry = drawn_entry(world, agent, step);
+  if (is_turn_taken(world, agent, step, entry.turn, group)) return false;
+  const AgentClass agent_class = class_of(agents, slot);
+  const BodySize size = draw_size(world, agent, agent_class, step);
+  const RoutePoint at = entry_place(world.map, entry, agent_class, size.length_m);
+  const LanePose pose = pose_on_lane(world.map, at.lane, at.s_m);
+  const AgentBox box = box_at(agent_class, size, pose.position_m, sincos_of(pose.heading_rad));
+  if (!may_spawn(world.map, box, group) || !is_clear(world, box, 0, world.num_boxes, group)) return false;
+  const NextBox next = next_box(world, box, at, group);
+  float speed_mps = min_of(kMaxEntry_mps, world.map.lanes[static_cast<size_t>(at.lane)].speed_limit_mps);
+  speed_mps = min_of(speed_mps, class_limits(agent_class).max_speed_mps);
+  if (next.gap_m < 1e9f) speed_mps = min_of(speed_mps, next.speed_mps);
+  if (next.gap_m < kEntryGap_m + kEntryHeadway_s * speed_mps) return false;
+  group.sync();
+  begin_life(world, agent, step, at, speed_mps, group);
+  return true;
+}
+
+/// Lets waiting agents in at the end of this step of the episode, the lowest first, and calls entered(agent) for each
+/// that came in.
+template <typename ThreadGroup, typename Entered>
+PICTURA_HD void enter_waiting(const WorldView& world, int step, const ThreadGroup& group, const Entered& entered) {
+  if (world.map.entries.empty()) return;
+  for (int agent = 0; agent < world.num_agents; ++agent) {
+    if (!waits(world, agent) || !try_to_enter(world, agent, step, group)) continue;
+    group.sync();
+    entered(agent);
+  }
+}
+
+}  // namespace pictura
