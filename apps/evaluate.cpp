@@ -38,6 +38,11 @@ void print_table(const EvaluateReport& report) {
         interval_text(row.waypoints_per_vehicle), interval_text(row.km_per_infraction),
         interval_text(row.km_per_at_fault_infraction), row.km_driven);
   }
+  for (const EvaluateRow& row : report.rows) {
+    if (row.left == 0) continue;
+    fmt::print("{}: vehicles are lives on roads that end: {} of {} agents spawned, {} entered, {} left; {} goals/km\n",
+               row.density, row.spawned, row.asked, row.entered, row.left, interval_text(row.goals_per_km));
+  }
   fmt::print("traffic lights: {}\n", name_of(report.results.setting.light_cycles));
   fmt::print("+- is the half width of a 95 % confidence interval over scenarios\n");
   if (report.agent_steps > 0) {
@@ -50,12 +55,16 @@ void print_table(const EvaluateReport& report) {
 void print_report(const EvaluateOptions& options, const EvaluateReport& report, const Json& infractions) {
   Json table = Json::array();
   for (const EvaluateRow& row : report.rows) {
-    Json json = {{"density", row.density},
-                 {"scenarios", row.scenarios},
-                 {"steps", row.steps},
-                 {"vehicle_episodes", row.vehicle_episodes},
+    Json json = {{"density", row.density},    {"scenarios", row.scenarios},
+                 {"steps", row.steps},        {"asked", row.asked},
+                 {"spawned", row.spawned},    {"entered", row.entered},
+                 {"left", row.left},          {"vehicle_episodes", row.vehicle_episodes},
                  {"km_driven", row.km_driven}};
     for (const auto& [name, estimate] : metrics_of(row)) add_estimate(name, estimate, &json);
+    add_estimate("at_fault_collisions_per_km", row.at_fault_collisions_per_km, &json);
+    add_estimate("off_road_per_km", row.off_road_per_km, &json);
+    add_estimate("red_lights_per_km", row.red_lights_per_km, &json);
+    add_estimate("goals_per_km", row.goals_per_km, &json);
     table.push_back(std::move(json));
   }
   Json json = driver_json(options, report.results.setting);

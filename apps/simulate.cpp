@@ -42,7 +42,7 @@ std::array<int64_t, kNumAgentClasses> spawned_by_class(Simulator& simulator) {
   const AgentStateView state = simulator.state();
   std::array<int64_t, kNumAgentClasses> counts{};
   for (int slot = 0; slot < simulator.num_slots(); ++slot) {
-    counts[state.agent_class[slot]] += state.status[slot] != static_cast<uint8_t>(AgentStatus::absent);
+    counts[state.agent_class[slot]] += has_body(static_cast<AgentStatus>(state.status[slot]));
   }
   return counts;
 }
@@ -82,8 +82,29 @@ void refuse_idle_options(const CLI::App& command, const SimulateArguments& argum
   refuse_idle_backend_options(command, arguments.policy);
 }
 
+/// How many lives began after the first of a slot, and ended by leaving, on roads that end, over all episodes.
+class LifeCounter {
+ public:
+  void add(const Simulator& simulator) {
+    if (!simulator.maps()[0]->rules.is_open) return;
+    const SpawnReport now = simulator.spawn_report();
+    if (now.left < current_.left) {  // another episode
+      entered_ += current_.entered;
+      left_ += current_.left;
+    }
+    current_ = now;
+  }
+  int64_t entered() const { return entered_ + current_.entered; }
+  int64_t left() const { return left_ + current_.left; }
+
+ private:
+  SpawnReport current_;
+  int64_t entered_ = 0, left_ = 0;
+};
+
 struct SimulationRun {
   SpawnReport spawned;  // in the first episode, as those of each class
+  LifeCounter lives;
   std::array<int64_t, kNumAgentClasses> of_class{};
   int steps = 0;
   double drive_s = 0, simulate_s = 0;  // without filming, recording and serving; of the simulator alone
@@ -105,6 +126,8 @@ void print_simulation(const SimulationRun& run, const DrivenWorld& world, bool j
               {"refused", run.spawned.refused},
               {"refused_no_place", run.spawned.refused_no_place},
               {"refused_taken", run.spawned.refused_taken},
+              {"entered", run.lives.entered()},
+              {"left", run.lives.left()},
               {"vehicles", run.of_class[static_cast<size_t>(AgentClass::vehicle)]},
               {"cyclists", run.of_class[static_cast<size_t>(AgentClass::cyclist)]},
               {"pedestrians", run.of_class[static_cast<size_t>(AgentClass::pedestrian)]},
@@ -188,6 +211,7 @@ void run_simulate(SimulateArguments arguments) {
     const StepResult result = world.step();
     const auto end = std::chrono::steady_clock::now();
     if (scene) run.displacement.add(*simulator, *scene);
+    run.lives.add(*simulator);
     if (recording) recording->after_step(result);
     if (saved) saved->after_step();
     if (live) live->after_step(result);

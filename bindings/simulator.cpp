@@ -657,6 +657,8 @@ py::dict report_of(const SpawnReport& report) {
   d["refused"] = report.refused;
   d["refused_no_place"] = report.refused_no_place;
   d["refused_taken"] = report.refused_taken;
+  d["entered"] = report.entered;
+  d["left"] = report.left;
   d["parked_asked"] = report.parked_asked;
   d["parked_placed"] = report.parked_placed;
   return d;

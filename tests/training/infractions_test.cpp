@@ -7,6 +7,7 @@
 
 #include "pictura/backends/make_simulator.h"
 #include "pictura/common/support/file.h"
+#include "pictura/tests/map/open_roads.h"
 #include "pictura/tests/simulator/test_maps.h"
 #include "pictura/tests/support/scratch_folder.h"
 
@@ -113,6 +114,33 @@ TEST(Infractions, WrecksAndLaneChangesAreTold) {
   const Infraction across = infraction_of_the_first({.x_m = 50, .heading_rad = 0.5f, .speed_mps = 10}, {.x_m = 90});
   EXPECT_TRUE(across.is(kEventOffRoad));
   EXPECT_TRUE(across.changed_lane);
+}
+
+TEST(Evaluation, CountsLivesOnRoadsThatEnd) {
+  const test::ScratchFolder folder;
+  const std::string street = folder / "street.xodr";
+  write_file(street, test::open_street(120));
+  EvaluateOptions options;
+  options.controller = "idm_lanes";
+  options.maps = {street};
+  options.agents_per_world = 6;
+  options.scenarios = 2;
+  options.steps = 400;
+  options.num_threads = 1;
+  options.device = options.simulator = "cpu";
+  const EvaluateReport report = evaluate(options);
+  const EvaluateRow& row = report.rows.at(0);
+  EXPECT_EQ(row.asked, 12);
+  EXPECT_LE(row.spawned, 12);
+  EXPECT_GT(row.left, 12);
+  EXPECT_GT(row.entered, 8);
+  EXPECT_LE(row.entered, row.left);
+  // Of pedestrians and cyclists there are few; vehicles that wait at the end are counted as what they were.
+  EXPECT_GT(row.vehicle_episodes, 12);
+  EXPECT_LE(row.vehicle_episodes, row.spawned + row.entered);
+  EXPECT_NEAR(row.goals_per_km.value * row.km_driven, row.goals_per_vehicle.value * double(row.vehicle_episodes), 1e-6);
+  write_results(folder / "results.json", report.results);
+  EXPECT_EQ(rows_of(read_results(folder / "results.json")).at(0).left, row.left);
 }
 
 TEST(Infractions, OfAnEvaluationAreThoseThatItCounts) {

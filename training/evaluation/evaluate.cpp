@@ -48,12 +48,15 @@ AgentState counted_state(Simulator& simulator) {
   copy(state.waypoints_reached, &host.waypoints_reached);
   copy(state.distance_m, &host.distance_m);
   copy(state.episode_return, &host.episode_return);
+  copy(state.refusal, &host.refusal);
+  copy(state.life, &host.life);
+  copy(state.left, &host.left);
   return host;
 }
 
-void add(const AgentStateView& state, int64_t slot, ScenarioCounts* counts) {
+// Of a life that is over, or that the last step cuts off.
+void add_life(const AgentStateView& state, int64_t slot, ScenarioCounts* counts) {
   const auto status = static_cast<AgentStatus>(state.status[slot]);
-  if (status == AgentStatus::absent) return;
   if (static_cast<AgentClass>(state.agent_class[slot]) != AgentClass::vehicle) return;
   const uint8_t events = state.episode_events[slot];
   const auto has = [events](int any_of) { return (events & any_of) != 0; };
@@ -65,11 +68,35 @@ void add(const AgentStateView& state, int64_t slot, ScenarioCounts* counts) {
   counts->wall_contact += has(kEventWall);
   counts->any_infraction += has(kEventCollision | kEventOffRoad | kEventRedLight);
   counts->at_fault_infraction += has(kEventAtFault | kEventOffRoad | kEventRedLight);
-  counts->active_at_end += status == AgentStatus::active;
+  counts->active_at_end += status == AgentStatus::active || status == AgentStatus::waiting;
   counts->goals += state.goals_reached[slot];
   counts->waypoints += state.waypoints_reached[slot];
   counts->distance_m += static_cast<double>(state.distance_m[slot]);
   counts->returns += static_cast<double>(state.episode_return[slot]);
+}
+
+// Of a slot after the last step. Lives of those that left have been counted.
+void add_slot(const AgentStateView& state, int64_t slot, ScenarioCounts* counts) {
+  const auto status = static_cast<AgentStatus>(state.status[slot]);
+  const bool waits = status == AgentStatus::waiting;
+  ++counts->asked;
+  counts->spawned += state.refusal[slot] == static_cast<uint8_t>(SpawnFailure::none);
+  counts->entered += state.life[slot];
+  counts->left += state.life[slot] + waits;
+  if (has_body(status)) add_life(state, slot, counts);
+}
+
+bool has_lives(const Simulator& simulator) {
+  const CompiledMaps& maps = simulator.maps();
+  return std::any_of(maps.begin(), maps.end(), [](const auto& map) { return map->rules.is_open; });
+}
+
+// Whether an agent will yet enter, or may.
+bool is_awaited(Simulator& simulator) {
+  if (!has_lives(simulator)) return false;
+  const Span<const uint8_t> status(simulator.state().status, static_cast<size_t>(simulator.num_slots()));
+  const std::vector<uint8_t> all = host_copy(status, simulator.device());
+  return std::find(all.begin(), all.end(), static_cast<uint8_t>(AgentStatus::waiting)) != all.end();
 }
 
 void check(const EvaluateOptions& options) {
@@ -93,11 +120,12 @@ std::vector<WorldSpec> worlds_of(const EvaluateOptions& options, size_t num_maps
   return worlds;
 }
 
-// Drives the simulator's worlds from the start of their episodes to the last step, or until no agent is active, since
-// halted ones stay as they are. False: it was interrupted. Calls on_steps with the steps that are done, now and then.
-template <typename OnSteps>
+// Drives the simulator's worlds from the start of their episodes to the last step, or until no agent is active or waits
+// to enter, since halted ones stay as they are. False: it was interrupted. Calls on_steps with the steps that are done,
+// now and then, and on_left(state, slot) for each agent that left a road that ends.
+template <typename OnSteps, typename OnLeft>
 bool drive_to_the_end(const EvaluatedDriver& driver, const EvaluateOptions& options, Simulator* simulator,
-                      const OnSteps& on_steps, int64_t* agent_steps_inout) {
+                      const OnSteps& on_steps, const OnLeft& on_left, int64_t* agent_steps_inout) {
   const Driving driving = driver.drive(*simulator);
   EvaluationObserver* const observer = options.observer;
   if (observer) observer->begin(*simulator);
@@ -107,11 +135,17 @@ bool drive_to_the_end(const EvaluatedDriver& driver, const EvaluateOptions& opti
     if (interrupted()) return false;
     driving.controller->act(simulator->controller_input(), {}, commands);
     const int64_t num_driven = driving.num_driven();
-    if (num_driven == 0) break;
+    if (num_driven == 0 && !is_awaited(*simulator)) break;
     *agent_steps_inout += num_driven;
     if (observer) observer->before_step(commands);
     const StepResult taken = simulator->step(Span<const Command>(commands));
     if (observer) observer->after_step(taken);
+    if (has_lives(*simulator)) {
+      AgentState state = counted_state(*simulator);
+      for (size_t slot = 0; slot < state.left.size(); ++slot) {
+        if (state.left[slot] != 0) on_left(state.view(), static_cast<int64_t>(slot));
+      }
+    }
     if (step % 10 == 0 || step == 1) on_steps(step + 1);
   }
   if (observer) observer->end();
@@ -152,7 +186,11 @@ EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& op
         simulator = make_simulator(options.simulator, simulator_config, maps, worlds);
       const auto num_slots = double(simulator->num_slots());
       const auto on_steps = [&](int steps) { clock.update((done + num_slots * steps) / work); };
-      if (!drive_to_the_end(driver, options, simulator.get(), on_steps, &report.agent_steps)) {
+      const auto counts_of = [&](int64_t slot) {
+        return &result.scenarios[static_cast<size_t>(first + slot / density.agents)];
+      };
+      const auto on_left = [&](const AgentStateView& state, int64_t slot) { add_life(state, slot, counts_of(slot)); };
+      if (!drive_to_the_end(driver, options, simulator.get(), on_steps, on_left, &report.agent_steps)) {
         report.interrupted = true;
         result.scenarios.resize(static_cast<size_t>(first));  // those of the batches before are finished
         break;
@@ -160,7 +198,7 @@ EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& op
       done += num_slots * options.steps;
       AgentState state = counted_state(*simulator);
       for (int slot = 0; slot < simulator->num_slots(); ++slot) {
-        add(state.view(), slot, &result.scenarios[static_cast<size_t>(first + slot / density.agents)]);
+        add_slot(state.view(), slot, counts_of(slot));
       }
     }
     if (!result.scenarios.empty()) {

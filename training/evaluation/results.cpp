@@ -28,17 +28,24 @@ namespace {
   X(goals)                         \
   X(waypoints)                     \
   X(distance_m)                    \
-  X(returns)
+  X(returns)                       \
+  X(asked)                         \
+  X(spawned)                       \
+  X(entered)                       \
+  X(left)
 
 constexpr const char* kResultsFormat = "pictura evaluation 2";
 constexpr const char* kResultsFormatAtFaultAlone = "pictura evaluation 1";
 // Format 1 lacks these counts, and its "infractions" are at_fault_infraction.
 constexpr const char* kCountsOfFormat2[] = {"collision", "wall_contact", "any_infraction", "at_fault_infraction"};
+// Files of format 2 may lack these.
+constexpr const char* kAgentCounts[] = {"asked", "spawned", "entered", "left"};
 
 // Returns a scenario's counts as format 1 has them.
 Json as_format_1(Json json) {
   json["infractions"] = json.at("at_fault_infraction");
   for (const char* name : kCountsOfFormat2) json.erase(name);
+  for (const char* name : kAgentCounts) json.erase(name);
   return json;
 }
 
@@ -57,8 +64,9 @@ Json to_json(const ScenarioCounts& counts) {
   return json;
 }
 
-ScenarioCounts scenario_counts_from(const Json& json) {
+ScenarioCounts scenario_counts_from(Json json) {
   ScenarioCounts counts;
+  for (const char* name : kAgentCounts) json.emplace(name, 0);
 #define X(name) json.at(#name).get_to(counts.name);
   PICTURA_SCENARIO_COUNTS(X)
 #undef X
@@ -124,6 +132,10 @@ EvaluateRow row_of(const DensityResult& result, int steps) {
   for (const Counts& counts : all) {
     row.vehicle_episodes += counts.vehicles;
     row.km_driven += km_of(counts);
+    row.asked += counts.asked;
+    row.spawned += counts.spawned;
+    row.entered += counts.entered;
+    row.left += counts.left;
   }
   row.at_fault_collision_rate = per_vehicle([](const Counts& c) { return c.at_fault; });
   row.off_road_rate = per_vehicle([](const Counts& c) { return c.off_road; });
@@ -137,6 +149,11 @@ EvaluateRow row_of(const DensityResult& result, int steps) {
   row.collision_rate = per_vehicle([](const Counts& c) { return c.collision; });
   row.wall_contact_rate = per_vehicle([](const Counts& c) { return c.wall_contact; });
   row.km_per_at_fault_infraction = estimate_ratio(all, km_of, [](const Counts& c) { return c.at_fault_infraction; });
+  const auto per_km = [&](const auto& part_of) { return estimate_ratio(all, part_of, km_of); };
+  row.at_fault_collisions_per_km = per_km([](const Counts& c) { return c.at_fault; });
+  row.off_road_per_km = per_km([](const Counts& c) { return c.off_road; });
+  row.red_lights_per_km = per_km([](const Counts& c) { return c.red_light; });
+  row.goals_per_km = per_km([](const Counts& c) { return c.goals; });
   return row;
 }
 

@@ -13,7 +13,8 @@
 
 namespace pictura {
 
-/// Counts over the vehicles of one scenario. An event counts once a vehicle, however often it happens.
+/// Counts over the vehicles of one scenario; on roads that end, over their lives, each of which counts as a vehicle. An
+/// event counts once a vehicle, however often it happens.
 struct ScenarioCounts {
   int64_t vehicles = 0;
   int64_t collision = 0, at_fault = 0;  // any collision; collisions at fault alone
@@ -21,9 +22,11 @@ struct ScenarioCounts {
   int64_t wall_contact = 0;         // belongs to neither kind of infraction below
   int64_t any_infraction = 0;       // a collision, off-road or a red light: the paper's (appendix, metric definitions)
   int64_t at_fault_infraction = 0;  // a collision at fault, off-road or a red light
-  int64_t active_at_end = 0;        // vehicles that have not halted by the last step
+  int64_t active_at_end = 0;        // vehicles that have not halted by the last step, or before they left
   int64_t goals = 0, waypoints = 0;
   double distance_m = 0, returns = 0;
+  // Agents of all classes: as SpawnReport. 0 in files of earlier versions.
+  int64_t asked = 0, spawned = 0, entered = 0, left = 0;
 };
 
 /// The scenarios first, first + 1, ... of one density.
@@ -92,6 +95,9 @@ struct EvaluateRow {
   Estimate active_at_end_share;
   Estimate collision_rate, wall_contact_rate;
   Estimate km_per_at_fault_infraction;  // over vehicles with at_fault_infraction; infinite when there was none
+  // Per km, since lives on roads that end are short.
+  Estimate at_fault_collisions_per_km, off_road_per_km, red_lights_per_km, goals_per_km;
+  int64_t asked = 0, spawned = 0, entered = 0, left = 0;
 };
 
 /// Its metrics with the names that they have in files.
