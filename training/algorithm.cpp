@@ -79,7 +79,7 @@ at::Tensor Collector::record(int64_t step) {
   RolloutObservations& observations = run_.rollout.observations;
   const ControllerInput input = run_.simulator->controller_input();
   const at::Tensor slots =
-      clock_.deciding(input, active_slots(input, {}, run_.executor.get()), step, run_.simulator->episode_over());
+      clock_.deciding(input, active_slots(input, {}, true, run_.executor.get()), step, run_.simulator->episode_over());
   // Those whose images are kept are others every time.
   if (observations.keep_images())
     observations.record(step, seen_slots(run_, slots));

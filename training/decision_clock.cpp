@@ -23,7 +23,12 @@ at::Tensor DecisionClock::deciding(const ControllerInput& input, const at::Tenso
   const at::Tensor acted_before = acted_;
   acted_ = at::zeros({num_slots}, active.options().dtype(at::kByte)).index_fill_(0, active, 1);
   if (step % decision_steps_ == 0 || !acted_before.defined() || acted_before.size(0) != num_slots) return active;
-  at::Tensor decides = (acted_before == 0).logical_or_(of_slots(input, input.episode_step) == 0);
+  const at::Tensor life_step = tensor_over(Span<const int32_t>(input.state.life_step, static_cast<size_t>(num_slots)),
+                                           input.device, {num_slots});
+  const at::Tensor left =
+      tensor_over(Span<const uint8_t>(input.state.left, static_cast<size_t>(num_slots)), input.device, {num_slots});
+  at::Tensor decides = (acted_before == 0).logical_or_(of_slots(input, input.episode_step) == life_step);
+  decides.logical_or_(left);
   if (!episode_over.empty()) decides.logical_or_(of_slots(input, episode_over));
   return active.index_select(0, at::nonzero(decides.index_select(0, active)).squeeze(1));
 }

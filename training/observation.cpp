@@ -118,11 +118,12 @@ std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> vi
   return blocks;
 }
 
-at::Tensor active_slots(const ControllerInput& input, Span<const uint8_t> mask, LearnerExecutor* executor) {
+at::Tensor active_slots(const ControllerInput& input, Span<const uint8_t> mask, bool with_left,
+                        LearnerExecutor* executor) {
   const auto num_slots = static_cast<int64_t>(input.slots.world_of_slot.size());
   const at::Tensor slots = at::empty({num_slots}, at::TensorOptions(at::kLong).device(torch_device(input.device)));
-  return slots.narrow(0, 0,
-                      executor->select_active(input, mask, span_of<int64_t>(slots), current_stream(input.device)));
+  const AskedSlots asked{input.state.status, mask, with_left ? input.state.left : nullptr};
+  return slots.narrow(0, 0, executor->select_asked(asked, span_of<int64_t>(slots), current_stream(input.device)));
 }
 
 constexpr auto kViewBytes = static_cast<int64_t>(sizeof(View));

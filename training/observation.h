@@ -85,7 +85,9 @@ std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> vi
                                     int patch_px = 0);
 
 /// The slots whose agents are active and that the mask [slots] has (empty: all), i64 [n], in ascending order.
-at::Tensor active_slots(const ControllerInput& input, Span<const uint8_t> mask, LearnerExecutor* executor);
+/// with_left: also those of agents that left a road that ends in the last step, whose last observation has a value.
+at::Tensor active_slots(const ControllerInput& input, Span<const uint8_t> mask, bool with_left,
+                        LearnerExecutor* executor);
 
 /// Views in the memory of a device.
 class SelectedViews {

@@ -159,7 +159,7 @@ class SessionController final : public PolicyController {
     if (!actions_.defined() || actions_.size(0) != num_slots) {
       actions_ = at::zeros({num_slots}, at::TensorOptions(at::kInt).device(torch_device(parts_.device)));
     }
-    const at::Tensor active = active_slots(input, mask, parts_.executor.get());
+    const at::Tensor active = active_slots(input, mask, false, parts_.executor.get());
     num_driven_ = active.size(0);
     const at::Tensor slots = clock_.deciding(input, active, step_++);
     const Decision decision =

@@ -20,10 +20,8 @@ class LearnerExecutorCpu final : public LearnerExecutor {
   Device device() const override { return {}; }
   int64_t memory_bytes() const override { return int64_t{sysconf(_SC_PHYS_PAGES)} * sysconf(_SC_PAGESIZE); }
 
-  int64_t select_active(const ControllerInput& input, Span<const uint8_t> mask, Span<int64_t> slots_out,
-                        Stream) override {
-    return select(static_cast<int64_t>(slots_out.size()), slots_out,
-                  [&](int64_t slot) { return takes_actions(input.state.status, mask, slot); });
+  int64_t select_asked(const AskedSlots& asked, Span<int64_t> slots_out, Stream) override {
+    return select(static_cast<int64_t>(slots_out.size()), slots_out, asked);
   }
 
   void choose_actions(const ControllerInput& input, Span<const int64_t> slots, Span<const float> log_probs,

@@ -67,11 +67,6 @@ struct Permute {
   __device__ void operator()(int64_t i) const { items_out[i] = items[permutation(i)]; }
 };
 
-struct IsActive {
-  ActiveSlots rule;
-  __device__ bool operator()(int64_t slot) const { return takes_actions(rule.status, rule.mask, slot); }
-};
-
 struct IsKept {
   KeptTransitions rule;
   __device__ bool operator()(int64_t i) const {
@@ -115,9 +110,9 @@ void launch_permute(const Permutation& permutation, Span<const int64_t> items, i
   launch(static_cast<int64_t>(items.size()), Permute{permutation, items.data(), items_out}, stream);
 }
 
-cudaError_t select(const ActiveSlots& rule, int64_t count, int64_t* items_out, int64_t* num_items_out, void* scratch,
+cudaError_t select(const AskedSlots& rule, int64_t count, int64_t* items_out, int64_t* num_items_out, void* scratch,
                    size_t* scratch_bytes, cudaStream_t stream) {
-  return select_if(IsActive{rule}, count, items_out, num_items_out, scratch, scratch_bytes, stream);
+  return select_if(rule, count, items_out, num_items_out, scratch, scratch_bytes, stream);
 }
 
 cudaError_t select(const KeptTransitions& rule, int64_t count, int64_t* items_out, int64_t* num_items_out,

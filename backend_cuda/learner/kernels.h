@@ -20,18 +20,14 @@ void launch_count_advantages(Span<const float> advantages, Span<const uint8_t> v
                              cudaStream_t stream);
 void launch_permute(const Permutation& permutation, Span<const int64_t> items, int64_t* items_out, cudaStream_t stream);
 
-/// Those of [0, count) that are active, or kept, in ascending order, and how many. Where `scratch` is null they only
+/// Those of [0, count) that are asked, or kept, in ascending order, and how many. Where `scratch` is null they only
 /// say how many bytes of it they need.
-struct ActiveSlots {
-  const uint8_t* status;
-  Span<const uint8_t> mask;
-};
 struct KeptTransitions {
   Span<const float> advantages;
   Span<const uint8_t> valid;
   float threshold;
 };
-cudaError_t select(const ActiveSlots& rule, int64_t count, int64_t* items_out, int64_t* num_items_out, void* scratch,
+cudaError_t select(const AskedSlots& rule, int64_t count, int64_t* items_out, int64_t* num_items_out, void* scratch,
                    size_t* scratch_bytes_inout, cudaStream_t stream);
 cudaError_t select(const KeptTransitions& rule, int64_t count, int64_t* items_out, int64_t* num_items_out,
                    void* scratch, size_t* scratch_bytes_inout, cudaStream_t stream);

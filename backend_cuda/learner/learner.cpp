@@ -29,9 +29,8 @@ class LearnerExecutorCuda final : public LearnerExecutor {
     return static_cast<int64_t>(free_bytes);
   }
 
-  int64_t select_active(const ControllerInput& input, Span<const uint8_t> mask, Span<int64_t> slots_out,
-                        Stream stream) override {
-    return select(cuda::ActiveSlots{input.state.status, mask}, slots_out.size(), slots_out, handle_of(stream));
+  int64_t select_asked(const AskedSlots& asked, Span<int64_t> slots_out, Stream stream) override {
+    return select(asked, slots_out.size(), slots_out, handle_of(stream));
   }
 
   void choose_actions(const ControllerInput& input, Span<const int64_t> slots, Span<const float> log_probs,

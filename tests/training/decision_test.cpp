@@ -5,10 +5,13 @@
 
 #include <gmock/gmock.h>
 
+#include "pictura/backends/make_controller.h"
 #include "pictura/backends/make_learner.h"
 #include "pictura/backends/make_simulator.h"
 #include "pictura/common/error.h"
 #include "pictura/map/load_map.h"
+#include "pictura/map/opendrive/opendrive.h"
+#include "pictura/tests/map/open_roads.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/tests/training/small_runs.h"
@@ -75,7 +78,7 @@ TEST(HeldActions, AreDecidedAgainWhereTheClockOrANewEpisodeSaysSo) {
   std::string deciding;
   for (int64_t step = 0; step < 12; ++step) {
     const ControllerInput input = simulator->controller_input();
-    const at::Tensor active = active_slots(input, {}, executor.get());
+    const at::Tensor active = active_slots(input, {}, true, executor.get());
     const int64_t count = clock.deciding(input, active, step, simulator->episode_over()).size(0);
     EXPECT_TRUE(count == 0 || count == active.size(0)) << step;
     deciding += count > 0 ? 'd' : 'h';
@@ -83,6 +86,38 @@ TEST(HeldActions, AreDecidedAgainWhereTheClockOrANewEpisodeSaysSo) {
   }
   // Step 4 shows what the episode ends with, which is valued, and step 5 the start of the next one.
   EXPECT_EQ(deciding, "dhhddddhhddh");
+}
+
+TEST(HeldActions, AreDecidedWhereALifeBeginsAndAgentsHaveLeft) {
+  SimulatorConfig config;
+  config.num_threads = 1;
+  config.pedestrian_fraction = config.cyclist_fraction = 0;
+  config.parked_cars = 0;
+  const auto street = std::make_shared<RoadMap>(parse_opendrive(test::open_street(120), "street.xodr"));
+  const std::unique_ptr<Simulator> simulator = make_simulator("cpu", config, {street}, {WorldSpec{0, 6, 0}});
+  const std::unique_ptr<Controller> driver = make_controller("idm_lanes", *simulator, 0);
+  const std::unique_ptr<LearnerExecutor> executor = make_learner_executor(Device{});
+  std::vector<Command> commands(6);
+  DecisionClock clock(50);
+  int begun = 0, left = 0;
+  for (int64_t step = 0; step < 400; ++step) {
+    const ControllerInput input = simulator->controller_input();
+    const at::Tensor deciding = clock.deciding(input, active_slots(input, {}, true, executor.get()), step);
+    std::vector<bool> decides(6);
+    for (int64_t i = 0; i < deciding.size(0); ++i) decides[static_cast<size_t>(deciding[i].item<int64_t>())] = true;
+    for (size_t slot = 0; slot < decides.size(); ++slot) {
+      const bool begins = input.state.life[slot] > 0 && input.state.life_step[slot] == input.episode_step[0];
+      const bool leaves = input.state.left[slot] != 0;
+      begun += begins;
+      left += leaves;
+      if (step % 50 == 0) continue;
+      EXPECT_EQ(decides[slot], begins || leaves) << slot << " at " << step;
+    }
+    driver->act(input, {}, commands);
+    simulator->step(Span<const Command>(commands));
+  }
+  EXPECT_GT(begun, 4);
+  EXPECT_GT(left, 4);
 }
 
 std::vector<std::string> held(const char* modality) {

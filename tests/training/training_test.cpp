@@ -298,7 +298,7 @@ TEST_F(Training, WhatARolloutKeepsIsWhatTheActiveAgentsSaw) {
   std::vector<float> egos;
   for (int64_t step = 0; step < 4; ++step) {
     const ControllerInput input = simulator->controller_input();
-    const at::Tensor slots = active_slots(input, {}, executor.get());
+    const at::Tensor slots = active_slots(input, {}, false, executor.get());
     for (RolloutObservations& observations : all) observations.record(step, slots);
     rows.push_back(slots + step * 24);
     HostImages images(rig, 24);

@@ -77,9 +77,16 @@ PICTURA_HD inline void write_command(const int32_t* actions, Span<const uint8_t>
   commands_out[slot].action = actions[slot];
 }
 
-/// Whether a slot's agent is to be drawn, encoded and commanded.
-PICTURA_HD inline bool takes_actions(const uint8_t* status, Span<const uint8_t> mask, int64_t slot) {
-  return takes_actions(static_cast<AgentStatus>(status[slot])) && (mask.empty() || mask[static_cast<size_t>(slot)]);
-}
+/// The slots whose agents are drawn, encoded and commanded.
+struct AskedSlots {
+  const uint8_t* status;
+  Span<const uint8_t> mask;  // [slots] others are left out; empty: none are
+  const uint8_t* left;       // [slots] those that have just left a road that ends are asked too; null: they are not
+
+  PICTURA_HD bool operator()(int64_t slot) const {
+    const bool is_asked = takes_actions(static_cast<AgentStatus>(status[slot])) || (left != nullptr && left[slot] != 0);
+    return is_asked && (mask.empty() || mask[static_cast<size_t>(slot)]);
+  }
+};
 
 }  // namespace pictura

@@ -22,10 +22,8 @@ class LearnerExecutor {
   /// That can be had: of a device, what is free; of the host, all, since what caches files is as good as free.
   virtual int64_t memory_bytes() const = 0;
 
-  /// The slots whose agents are neither halted nor absent and that the mask [slots] has (empty: all), in ascending
-  /// order. slots_out [slots] has room for all. Returns their number.
-  virtual int64_t select_active(const ControllerInput& input, Span<const uint8_t> mask, Span<int64_t> slots_out,
-                                Stream stream = {}) = 0;
+  /// The asked slots in ascending order. slots_out [slots] has room for all. Returns their number.
+  virtual int64_t select_asked(const AskedSlots& asked, Span<int64_t> slots_out, Stream stream = {}) = 0;
   /// Chooses the actions of some slots. log_probs: [slots.size(), kNumActions]; actions_out: [slots of the simulator],
   /// of which those of all others stay as they are.
   virtual void choose_actions(const ControllerInput& input, Span<const int64_t> slots, Span<const float> log_probs,
