@@ -30,6 +30,68 @@ ReplayBody body_of(const AgentBox& box) {
   return {box.agent_class, centimetres(box.length_m), centimetres(box.width_m), centimetres(box.height_m)};
 }
 
+/// A life that began in the middle of an episode.
+struct LaterLife {
+  size_t episode = 0;  // among those of the replay
+  int32_t frame = 0, agent = 0;
+  ReplayBody body;
+  std::vector<float> conditioning;
+};
+
+/// Makes every later life an agent of its own, after those that are there. Lives are in the order of their frames.
+void split_lives(const std::vector<LaterLife>& lives, Replay* replay_inout) {
+  if (lives.empty()) return;
+  Replay& replay = *replay_inout;
+  const int32_t num_slots = replay.num_agents;
+  std::vector<int32_t> column(lives.size());  // the agent that each life becomes
+  std::vector<int32_t> next(replay.episodes.size(), num_slots);
+  for (size_t i = 0; i < lives.size(); ++i) column[i] = next[lives[i].episode]++;
+  const int32_t num_agents = *std::max_element(next.begin(), next.end());
+  check_replay_room(num_agents, int64_t{replay.num_frames});
+
+  // Of each frame and slot, the agent that its life has become.
+  std::vector<int32_t> agent_of(static_cast<size_t>(replay.num_frames) * static_cast<size_t>(num_slots));
+  const auto at = [num_slots](int32_t frame, int32_t slot) {
+    return static_cast<size_t>(frame) * static_cast<size_t>(num_slots) + static_cast<size_t>(slot);
+  };
+  for (int32_t frame = 0; frame < replay.num_frames; ++frame) {
+    for (int32_t slot = 0; slot < num_slots; ++slot) agent_of[at(frame, slot)] = slot;
+  }
+  for (size_t i = 0; i < lives.size(); ++i) {
+    const ReplayEpisode& episode = replay.episodes[lives[i].episode];
+    for (int32_t frame = lives[i].frame; frame < episode.first_frame + episode.num_frames; ++frame) {
+      agent_of[at(frame, lives[i].agent)] = column[i];
+    }
+  }
+
+  const auto frames = static_cast<size_t>(replay.num_frames), agents = static_cast<size_t>(num_agents);
+  for (size_t which = 0; which < kNumTracks; ++which) {
+    const bool is_status = static_cast<Track>(which) == Track::status;
+    std::vector<int32_t> track(frames * agents, is_status ? static_cast<int32_t>(AgentStatus::absent) : 0);
+    for (int32_t frame = 0; frame < replay.num_frames; ++frame) {
+      for (int32_t slot = 0; slot < num_slots; ++slot) {
+        const size_t from = at(frame, slot);
+        track[static_cast<size_t>(frame) * agents + static_cast<size_t>(agent_of[from])] = replay.tracks[which][from];
+      }
+    }
+    replay.tracks[which] = std::move(track);
+  }
+  for (ReplayEpisode& episode : replay.episodes) {
+    episode.agents.resize(agents);
+    episode.conditioning.resize(agents * kNumConditioning);
+    for (ReplayChain& chain : episode.chains) chain.agent = agent_of[at(chain.frame, chain.agent)];
+  }
+  for (size_t i = 0; i < lives.size(); ++i) {
+    ReplayEpisode& episode = replay.episodes[lives[i].episode];
+    episode.agents[static_cast<size_t>(column[i])] = lives[i].body;
+    std::copy(lives[i].conditioning.begin(), lives[i].conditioning.end(),
+              episode.conditioning.begin() + int64_t{column[i]} * kNumConditioning);
+  }
+  auto& first = replay.first_infraction;
+  if (first.frame >= 0) first.agent = agent_of[at(first.frame, first.agent)];
+  replay.num_agents = num_agents;
+}
+
 }  // namespace
 
 ReplayBox replay_box(const AgentBox& box) {
@@ -108,7 +170,7 @@ struct Recorder::Parts {
   std::vector<int32_t>& track(Track which) { return replay.tracks[static_cast<size_t>(which)]; }
   ReplayEpisode& episode() { return replay.episodes.back(); }
   bool is_absent(const AgentStateView& state, int32_t agent) const {
-    return state.status[slot(agent)] == static_cast<uint8_t>(AgentStatus::absent);
+    return !has_body(static_cast<AgentStatus>(state.status[slot(agent)]));
   }
 
   void begin_episode(const AgentStateView& state, Span<const AgentBox> boxes) {
@@ -127,6 +189,19 @@ struct Recorder::Parts {
     }
     replay.episodes.push_back(std::move(next));
     chains.assign(static_cast<size_t>(replay.num_agents), -1);
+    lives.assign(static_cast<size_t>(replay.num_agents), 0);
+  }
+
+  void begin_life(const AgentStateView& state, const AgentBox& box, int32_t agent) {
+    const size_t at = slot(agent);
+    lives[static_cast<size_t>(agent)] = state.life[at];
+    chains[static_cast<size_t>(agent)] = -1;
+    const float* conditioning = state.conditioning + at * kNumConditioning;
+    later_lives.push_back({replay.episodes.size() - 1,
+                           replay.num_frames,
+                           agent,
+                           body_of(box),
+                           {conditioning, conditioning + kNumConditioning}});
   }
 
   // Nothing has led to the next frame.
@@ -160,7 +235,8 @@ struct Recorder::Parts {
     const size_t at = slot(agent);
     const AgentBox& box = boxes[static_cast<size_t>(agent)];
     const bool absent = is_absent(state, agent);
-    track(Track::status).push_back(state.status[at]);
+    if (state.life[at] != lives[static_cast<size_t>(agent)]) begin_life(state, box, agent);
+    track(Track::status).push_back(absent ? static_cast<int32_t>(AgentStatus::absent) : state.status[at]);
     track(Track::halt_reason).push_back(state.halt_reason[at]);
     track(Track::next_waypoint).push_back(absent ? 0 : state.next_waypoint[at]);
     track(Track::events).push_back(begins ? 0 : state.events[at]);
@@ -250,6 +326,8 @@ struct Recorder::Parts {
   std::vector<Command> commands;
   int32_t first_slot = 0, first_box = 0, num_boxes = 0, first_light = 0;
   std::vector<int32_t> chains;  // [agents] the number of the chain that was written last
+  std::vector<int32_t> lives;   // [agents] the life that was written last
+  std::vector<LaterLife> later_lives;
   std::unique_ptr<AgentCameras> cameras;
   std::string group;  // images that wait to be compressed
   Replay replay;
@@ -345,6 +423,7 @@ void Recorder::forget() {
   episode.chains = std::move(kept);
   replay.first_infraction = {};
   replay.num_frames = 1;
+  parts_->later_lives.clear();
 }
 
 Replay Recorder::finish(ReplayOrigin origin) {
@@ -354,6 +433,7 @@ Replay Recorder::finish(ReplayOrigin origin) {
     parts.replay.decisions.resize(static_cast<size_t>(parts.replay.num_frames) * kDecisionValues);
   }
   if (parts.cameras) parts.end_group();
+  split_lives(parts.later_lives, &parts.replay);
   return std::move(parts.replay);
 }
 

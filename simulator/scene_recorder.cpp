@@ -69,7 +69,7 @@ SceneRecorder::SceneRecorder(Simulator& simulator, int world)
   episode_ = simulator.episode_index()[world_];
   first_step_ = simulator.episode_step()[world_];
   const Span<const AgentBox> now = boxes();
-  bodies_.assign(now.begin(), now.end());
+  for (const AgentBox& box : now) bodies_.push_back({box});
   add_step();
 }
 
@@ -85,21 +85,23 @@ void SceneRecorder::add_step() {
   const Span<const AgentBox> now = boxes();
   for (size_t i = 0; i < now.size(); ++i) {
     const AgentBox& box = now[i];
+    const bool is_agent = static_cast<int>(i) < spec_.num_agents;
+    const auto slot = static_cast<size_t>(first_slot_) + i;
     valid_.push_back(box.drawn ? 1 : 0);
+    life_.push_back(is_agent ? state.life[slot] : 0);
     states_.emplace_back();
     driven_.emplace_back();
     if (!box.drawn) continue;
-    bodies_[i] = box;
-    const bool moves = static_cast<int>(i) < spec_.num_agents;
-    const auto slot = static_cast<size_t>(first_slot_) + i;
-    const float speed_mps = moves ? state.speed_mps[slot] : 0.0f;
+    bodies_[i].resize(static_cast<size_t>(life_.back()) + 1, box);
+    bodies_[i].back() = box;
+    const float speed_mps = is_agent ? state.speed_mps[slot] : 0.0f;
     states_.back() = {box.center_m,
-                      moves ? state.heading_rad[slot] : std::atan2(box.sin_heading, box.cos_heading),
+                      is_agent ? state.heading_rad[slot] : std::atan2(box.sin_heading, box.cos_heading),
                       {speed_mps * box.cos_heading, speed_mps * box.sin_heading}};
     const float ahead_m = reference_to_center(box.agent_class, box.length_m);
     const Vec3 behind_m{box.center_m.x - ahead_m * box.cos_heading, box.center_m.y - ahead_m * box.sin_heading,
                         box.center_m.z};
-    driven_.back() = {moves ? Vec3{state.x_m[slot], state.y_m[slot], state.z_m[slot]} : behind_m, speed_mps};
+    driven_.back() = {is_agent ? Vec3{state.x_m[slot], state.y_m[slot], state.z_m[slot]} : behind_m, speed_mps};
   }
   for (int32_t i = scene.light_begin[world_]; i < scene.light_begin[world_ + 1]; ++i) {
     lights_.push_back(recorded_light(scene.light_states[static_cast<size_t>(i)]));
@@ -129,27 +131,38 @@ Scenario SceneRecorder::scenario(std::string id, int self_agent) const {
   scenario.map = recorded ? recorded->map : *map.road;  // recorded lights are no part of it
   if (recorded && self_agent < 0) self_agent = recorded->sdc_track;
   const auto steps = static_cast<size_t>(num_steps_);
+  std::vector<std::pair<size_t, size_t>> lives;  // of each box, the first ones before the others
+  for (size_t i = 0; i < bodies_.size(); ++i) lives.emplace_back(i, 0);
   for (size_t i = 0; i < bodies_.size(); ++i) {
-    const AgentBox& body = bodies_[i];
+    for (size_t life = 1; life < bodies_[i].size(); ++life) lives.emplace_back(i, life);
+  }
+  for (const auto& [i, life] : lives) {
+    const AgentBox& body = bodies_[i][life];
+    const auto is_valid = [this, i = i, life = life](size_t step) {
+      const size_t at = step * bodies_.size() + i;
+      return valid_[at] && life_[at] == static_cast<int32_t>(life);
+    };
     RecordedTrack track{
-        .id = recorded ? recorded->tracks[i].id : static_cast<int64_t>(i),
+        .id = recorded ? recorded->tracks[i].id : static_cast<int64_t>(i + life * bodies_.size()),
         .type = recorded ? recorded->tracks[i].type : type_of(body.agent_class),
         .control = static_cast<int>(i) < spec_.num_agents ? RecordedControl::unstated : RecordedControl::still,
         .length_m = body.length_m,
         .width_m = body.width_m,
         .height_m = body.height_m};
     for (size_t step = 0; step < steps; ++step) {
-      if (!valid_[step * bodies_.size() + i]) continue;
+      if (!is_valid(step)) continue;
       if (track.num_valid++ == 0) track.first_valid = static_cast<int32_t>(step);
       track.last_valid = static_cast<int32_t>(step);
     }
     if (track.num_valid == 0) continue;
-    if (static_cast<int>(i) == self_agent) scenario.sdc_track = static_cast<int32_t>(scenario.tracks.size());
+    if (static_cast<int>(i) == self_agent && scenario.sdc_track < 0)
+      scenario.sdc_track = static_cast<int32_t>(scenario.tracks.size());
     scenario.tracks.push_back(track);
     for (size_t step = 0; step < steps; ++step) {
-      scenario.states.push_back(states_[step * bodies_.size() + i]);
-      scenario.valid.push_back(valid_[step * bodies_.size() + i]);
-      scenario.driven.push_back(driven_[step * bodies_.size() + i]);
+      const bool is_there = is_valid(step);
+      scenario.states.push_back(is_there ? states_[step * bodies_.size() + i] : TrackState{});
+      scenario.valid.push_back(is_there ? 1 : 0);
+      scenario.driven.push_back(is_there ? driven_[step * bodies_.size() + i] : SavedMotion{});
     }
   }
   if (self_agent >= 0 && scenario.sdc_track < 0) {

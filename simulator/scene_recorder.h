@@ -25,7 +25,8 @@ class SceneRecorder {
   bool is_over() const { return is_over_; }
   int32_t num_steps() const { return num_steps_; }
 
-  /// The scene until now: agents that were there at any step, with the number of their box in the world as id.
+  /// The scene until now: agents that were there at any step, with the number of their box in the world as id. On roads
+  /// that end each life is a track; life k has the id of the first one and k times the number of boxes.
   /// self_agent: whose track is the self-driving car's; -1: nobody's. In a world of a recorded scene ids, types,
   /// recorded lights and the self-driving car are that one's. An empty id becomes one of the map's name, seed, world
   /// and episode. Throws UsageError for an agent that was never there.
@@ -42,11 +43,12 @@ class SceneRecorder {
   uint64_t seed_;
   int32_t first_slot_ = 0, episode_ = 0, first_step_ = 0, num_steps_ = 0;
   bool is_over_ = false;
-  std::vector<AgentBox> bodies_;            // [boxes] where they were last seen
-  std::vector<TrackState> states_;          // [steps, boxes]
-  std::vector<SavedMotion> driven_;         // [steps, boxes]
-  std::vector<uint8_t> valid_;              // [steps, boxes]
-  std::vector<RecordedLightState> lights_;  // [steps, lights]
+  std::vector<std::vector<AgentBox>> bodies_;  // [boxes][lives] where they were last seen
+  std::vector<TrackState> states_;             // [steps, boxes]
+  std::vector<SavedMotion> driven_;            // [steps, boxes]
+  std::vector<uint8_t> valid_;                 // [steps, boxes]
+  std::vector<int32_t> life_;                  // [steps, boxes]
+  std::vector<RecordedLightState> lights_;     // [steps, lights]
 };
 
 }  // namespace pictura

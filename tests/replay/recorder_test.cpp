@@ -1,6 +1,7 @@
 // What a recorder keeps of a simulator: places, rewards by term, actions, events, chains, lights and images.
 #include "pictura/replay/recorder.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gmock/gmock.h>
@@ -11,7 +12,9 @@
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
 #include "pictura/map/load_map.h"
+#include "pictura/map/opendrive/opendrive.h"
 #include "pictura/replay/images.h"
+#include "pictura/tests/map/open_roads.h"
 #include "pictura/tests/support/error_message.h"
 
 namespace pictura {
@@ -51,6 +54,38 @@ Replay record(Simulator& simulator, const std::string& policy, int steps, const 
     visit(step + 1, &result, commands);
   }
   return recorder.finish({.policy = policy});
+}
+
+TEST(Recorder, EachLifeIsAnAgent) {
+  SimulatorConfig config;
+  config.num_threads = 1;
+  config.parked_cars = 0;
+  config.pedestrian_fraction = config.cyclist_fraction = 0;
+  const auto street = std::make_shared<RoadMap>(parse_opendrive(test::open_street(120), "street.xodr"));
+  const auto simulator = make_simulator("cpu", config, {street}, {{0, 6, 0}});
+  const Replay replay = record(*simulator, "idm_lanes", 300, {}, [](auto&&...) {});
+  const SpawnReport report = simulator->spawn_report();
+  ASSERT_GT(report.entered, 4);
+  ASSERT_EQ(replay.num_agents, 6 + report.entered);
+  const ReplayEpisode& episode = replay.episodes.front();
+  ASSERT_EQ(episode.agents.size(), static_cast<size_t>(replay.num_agents));
+  for (int agent = 0; agent < replay.num_agents; ++agent) {
+    int first = -1, last = -1, there = 0;
+    for (int frame = 0; frame < replay.num_frames; ++frame) {
+      if (replay.at(Track::status, frame, agent) == static_cast<int32_t>(AgentStatus::absent)) continue;
+      if (first < 0) first = frame;
+      EXPECT_TRUE(last < 0 || last == frame - 1) << agent << ": without gaps";
+      last = frame;
+      ++there;
+    }
+    if (agent < 6 && there == 0) continue;  // found no place
+    EXPECT_GT(there, 0) << agent;
+    EXPECT_GE(episode.agents[static_cast<size_t>(agent)].length_cm, 350);
+    const bool has_chain = std::any_of(episode.chains.begin(), episode.chains.end(), [&](const ReplayChain& chain) {
+      return chain.agent == agent && chain.frame == first;
+    });
+    EXPECT_TRUE(has_chain) << agent;
+  }
 }
 
 TEST(Recorder, SceneryIsTheMapsGeometryToACentimetre) {

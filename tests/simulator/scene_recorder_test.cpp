@@ -8,9 +8,11 @@
 #include "pictura/backends/make_simulator.h"
 #include "pictura/common/support/file.h"
 #include "pictura/map/load_map.h"
+#include "pictura/map/opendrive/opendrive.h"
 #include "pictura/map/scenario/load_scenario.h"
 #include "pictura/map/scenario/scene_file.h"
 #include "pictura/simulator/recorded_scene.h"
+#include "pictura/tests/map/open_roads.h"
 #include "pictura/tests/simulator/same_bits.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/recorded_crossing.h"
@@ -50,6 +52,36 @@ Scenario drive(Simulator& simulator, std::vector<std::vector<AgentBox>>* boxes_o
   }
   EXPECT_EQ(recorder.num_steps(), kRecordedSteps + 1);
   return recorder.scenario();
+}
+
+TEST(SceneRecorder, EachLifeIsATrack) {
+  const SimulatorConfig config{.num_threads = 1, .pedestrian_fraction = 0, .cyclist_fraction = 0, .parked_cars = 0};
+  const auto street = std::make_shared<RoadMap>(parse_opendrive(test::open_street(120), "street.xodr"));
+  const auto simulator = make_simulator("cpu", config, {street}, {{0, 6, 0}});
+  const auto driver = make_controller("idm_lanes", *simulator, 0);
+  SceneRecorder recorder(*simulator);
+  std::vector<Command> commands(6);
+  for (int step = 0; step < 300; ++step) {
+    driver->act(simulator->controller_input(), {}, commands);
+    simulator->step(Span<const Command>(commands));
+    recorder.after_step();
+  }
+  const SpawnReport report = simulator->spawn_report();
+  ASSERT_GT(report.entered, 4);
+  const Scenario scene = recorder.scenario();
+  ASSERT_EQ(static_cast<int64_t>(scene.tracks.size()), report.spawned + report.entered);
+  const auto steps = static_cast<size_t>(scene.num_steps);
+  for (size_t i = 0; i < scene.tracks.size(); ++i) {
+    const RecordedTrack& track = scene.tracks[i];
+    EXPECT_EQ(track.num_valid, track.last_valid - track.first_valid + 1) << "without gaps";
+    for (auto step = static_cast<size_t>(track.first_valid) + 1; step <= static_cast<size_t>(track.last_valid);
+         ++step) {
+      const Vec3 way = scene.states[i * steps + step].position_m - scene.states[i * steps + step - 1].position_m;
+      EXPECT_LT(length(way), 2.1f) << "no jumps";
+    }
+  }
+  // Tracks of one slot differ in size.
+  EXPECT_NE(scene.tracks.front().length_m, scene.tracks.back().length_m);
 }
 
 TEST(SceneRecorder, WhatWasDrivenIsSavedLoadedAndReplayed) {
