@@ -240,6 +240,35 @@ def test_pettingzoo_passes_its_tests():
         env.step({})
 
 
+STREET = """<OpenDRIVE><header revMajor="1" revMinor="6"/><road id="1" junction="-1" length="60"><link/>
+<planView><geometry s="0" x="0" y="0" hdg="0" length="60"><line/></geometry></planView><lanes><laneSection s="0">
+<center><lane id="0" type="none"/></center><right><lane id="-1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>
+</right></laneSection></lanes></road></OpenDRIVE>"""
+
+
+def test_agents_that_enter_a_road_have_names_of_their_own():
+    pytest.importorskip("pettingzoo")
+    from pictura.envs.pettingzoo_env import DriveParallelEnv
+
+    street = pictura.Map.from_text(STREET)
+    env = DriveParallelEnv(street, 2, pedestrian_fraction=0, cyclist_fraction=0, parked_cars=0, episode_steps=400)
+    env.reset(seed=2)
+    known, left = set(env.agents), set()
+    for _ in range(300):
+        speed = env.batch.simulator.state["speed_mps"].numpy()
+        acting = list(env.agents)
+        actions = {agent: 10 if speed[env._slot(agent)] < 4 else 7 for agent in acting}
+        seen, _, terminations, truncations, infos = env.step(actions)
+        entered = set(env.agents) - set(acting)
+        assert not entered & known and set(seen) == set(infos) == set(truncations) == set(acting) | entered
+        assert all(env.observation_space(agent).contains(seen[agent]) for agent in entered)
+        known |= entered
+        left |= {agent for agent in acting if truncations[agent]}
+    assert "agent_0_1" in known and "agent_0" in left
+    report = env.batch.simulator.spawn_report()
+    assert report["left"] == len(left) and report["entered"] == len([agent for agent in known if agent.count("_") == 2])
+
+
 def test_torchrl_passes_its_check():
     pytest.importorskip("torchrl")
     import torch

@@ -14,8 +14,10 @@ from pictura.envs.gymnasium_spaces import action_space, observation_space
 
 class DriveParallelEnv(ParallelEnv):
     """agent_0, agent_1, ...: those that found a place and still drive are `agents`. An infraction terminates an agent, the
-    end of the world's episode truncates all that are left. infos have what pictura.envs.Batch.info() lists; "active" is
-    whether the agent goes on. Options are Batch's; it runs on the CPU.
+    end of the world's episode truncates all that are left, and so does leaving a road that ends. An agent that enters
+    such a road in the place of agent_3 is agent_3_1, the next one agent_3_2; possible_agents has the first ones alone.
+    infos have what pictura.envs.Batch.info() lists; "active" is whether the agent goes on. Options are Batch's; it runs
+    on the CPU.
     """
 
     metadata = {"name": "pictura_drive_v0", "render_modes": RENDER_MODES, "render_fps": 10, "is_parallelizable": True}
@@ -39,10 +41,10 @@ class DriveParallelEnv(ParallelEnv):
         self._random = np.random.default_rng(options.get("seed", 0))
 
     def observation_space(self, agent: str) -> Any:
-        return self.observation_spaces[agent]
+        return self.observation_spaces[self.possible_agents[self._slot(agent)]]
 
     def action_space(self, agent: str) -> Any:
-        return self.action_spaces[agent]
+        return self.action_spaces[self.possible_agents[self._slot(agent)]]
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[dict, dict]:
         if seed is not None:
@@ -64,14 +66,21 @@ class DriveParallelEnv(ParallelEnv):
             raise pictura.Error(f"step: expected an action of every live agent, got none of {', '.join(missing)}")
         width = 2 if self.batch.actions == "multi_discrete" else 1
         idle = divmod(pictura.IDLE_ACTION, 3) if width == 2 else pictura.IDLE_ACTION
-        told = np.array([actions[agent] if agent in acting else idle for agent in self.possible_agents])
-        results = self.batch.step(told)
         slots = {agent: self._slot(agent) for agent in acting}
+        told = np.array([idle] * len(self.possible_agents))
+        for agent, slot in slots.items():
+            told[slot] = actions[agent]
+        results = self.batch.step(told)
         rewards = {agent: float(results["reward"][slot]) for agent, slot in slots.items()}
         terminations = {agent: bool(results["terminated"][slot]) for agent, slot in slots.items()}
         truncations = {agent: bool(results["truncated"][slot]) for agent, slot in slots.items()}
-        self.agents = [agent for agent in acting if not terminations[agent] and not truncations[agent]]
-        return self._observations(acting), rewards, terminations, truncations, self._infos(acting)
+        entered = self._entered()
+        self.agents = [agent for agent in acting if not terminations[agent] and not truncations[agent]] + entered
+        shown = acting + entered
+        rewards |= dict.fromkeys(entered, 0.0)
+        terminations |= dict.fromkeys(entered, False)
+        truncations |= dict.fromkeys(entered, False)
+        return self._observations(shown), rewards, terminations, truncations, self._infos(shown)
 
     def render(self) -> np.ndarray | None:
         return self.batch.draw(0, 0) if self.render_mode == "rgb_array" else None
@@ -80,7 +89,14 @@ class DriveParallelEnv(ParallelEnv):
         self.batch.close()
 
     def _slot(self, agent: str) -> int:
-        return int(agent.removeprefix("agent_"))
+        return int(agent.split("_")[1])
+
+    def _entered(self) -> list[str]:
+        """Agents that entered a road in the last step, in the order of their slots."""
+        simulator, state = self.batch.simulator, self.batch._state
+        step = int(self.batch.view(simulator.episode_step)[0])
+        entered = np.flatnonzero(self.batch.active & (state["life"] > 0) & (state["life_step"] == step))
+        return [f"agent_{slot}_{state['life'][slot]}" for slot in entered]
 
     def _observations(self, agents: list[str]) -> dict[str, Any]:
         seen = self.batch.observe(copy=True)
