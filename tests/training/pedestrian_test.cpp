@@ -243,6 +243,7 @@ PedestrianResults made_up_pedestrians() {
   all.paths_asked = 3;
   const auto add = [&all](int scene, const std::vector<float>& shares, int first_seen, int hidden_again) {
     all.paths.push_back({.scene = scene,
+                         .map_origin_m = {388096, 3948956, 12},
                          .first_point = static_cast<int32_t>(all.points.size()),
                          .num_points = static_cast<int32_t>(shares.size()),
                          .first_seen = first_seen,
@@ -299,6 +300,9 @@ TEST(PedestrianResults, AreWrittenPlaceByPlace) {
   EXPECT_EQ(table[2][16], "seen");
   EXPECT_EQ(table[3][19], "-2") << table[0][19];
   EXPECT_EQ(table[9][16], "hidden again");
+  EXPECT_EQ(table[0][12], "x_m");
+  EXPECT_EQ(table[1][12], "388096.000");
+  EXPECT_EQ(table[1][13], "3948956.000");
 
   const auto json = nlohmann::json::parse(pedestrian_summary_json(all, summarize(all), "cases.csv"));
   EXPECT_EQ(json.at("kind"), "pedestrian");

@@ -207,6 +207,7 @@ class PedestrianProbe {
     PedestrianPath path{.scene = scene,
                         .map = spec.map,
                         .driver = frame.driver,
+                        .map_origin_m = run_.maps()[static_cast<size_t>(spec.map)]->road->origin_m,
                         .step = frame.step,
                         .ego = one.ego,
                         .hider = one.hider,

@@ -82,8 +82,7 @@ void write_pedestrian_cases(const std::string& path, const PedestrianResults& re
     const PedestrianPoint& point = results.points[i];
     const PedestrianPath& one = results.paths[static_cast<size_t>(point.path)];
     const auto at = static_cast<int32_t>(i);
-    const std::array<double, 3> position_m =
-        file_position_m(results.maps[static_cast<size_t>(one.map)]->road->origin_m, point.pedestrian.center_m);
+    const std::array<double, 3> position_m = file_position_m(one.map_origin_m, point.pedestrian.center_m);
     file.write(fmt::format(
         "{},{},{},{},{},{},{},{:.3f},{},{:.3f},{},{},{:.3f},{:.3f},{:.3f},{:.3f},{},{}{}\n", i, point.path, one.scene,
         csv_quoted(results.setting.maps[static_cast<size_t>(one.map)]), csv_quoted(results.driver_name(one.driver)),

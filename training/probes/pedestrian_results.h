@@ -30,6 +30,7 @@ constexpr std::array<const char*, 3> kPathPhaseNames{"hidden", "seen", "hidden a
 /// A path in a frozen state. Boxes are numbered in their world: agents, then parked cars.
 struct PedestrianPath {
   int32_t scene = 0, map = 0, driver = 0;  // the number of its scenario; indices of its map and of who drove
+  std::array<double, 3> map_origin_m{};    // file coordinates of the map's origin
   int32_t step = 0;                        // steps done in the scenario
   int32_t ego = 0, hider = 0;              // the hider is the box that the path begins behind
   float ego_speed_mps = 0, hider_distance_m = 0;
