@@ -415,6 +415,8 @@ std::unique_ptr<const Policy> make_policy(const Config& config, const Rig& rig, 
   return policy;
 }
 
+bool Decision::is_finite() const { return logits.isfinite().all().logical_and(value.isfinite().all()).item<bool>(); }
+
 Decision decide(const at::Tensor& rows, const ChunkSizes& chunks,
                 const std::function<Policy::Output(const at::Tensor& rows)>& act) {
   const at::NoGradGuard no_grad;

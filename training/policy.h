@@ -126,6 +126,9 @@ void scale_logits(const Policy& policy, double factor);
 /// Policy outputs for a whole batch without gradients: logits and log-probabilities [batch, actions], values [batch].
 struct Decision {
   at::Tensor logits, log_probs, value;
+
+  /// Waits for the device.
+  bool is_finite() const;
 };
 /// For the agents in some rows, i64 [batch], a chunk at a time: act(rows) gives what the policy makes of those of a
 /// chunk, which need not outlast the next call.

@@ -105,11 +105,16 @@ struct PolicySession::Parts {
     if (config.reads_images()) check_images(input, static_cast<size_t>(batch), renderer);
     const ChunkSizes chunks =
         input.full_chunk > 0 ? ChunkSizes{input.full_chunk, true} : ChunkSizes{config.train.forward_chunk};
-    return pictura::decide(indices, chunks, [&](const at::Tensor& some) {
+    Decision decision = pictura::decide(indices, chunks, [&](const at::Tensor& some) {
       Observation observation = select_arrays(config, input.observations, device, batch, some);
       if (config.reads_images()) observation.images = draw(input, some, renderer);
       return policy.forward(observation);
     });
+    PICTURA_CHECK(decision.is_finite(),
+                  "policy: expected finite logits and values, got infinities or NaN: its weights are "
+                  "too large for {}",
+                  device.is_host() ? "fp32" : name_of(config.train.precision));
+    return decision;
   }
 
   const Config config;

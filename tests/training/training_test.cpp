@@ -631,6 +631,23 @@ TEST_F(Training, BeginsWithTheWeightsOfAnotherRunAtAnyImageSize) {
   }
 }
 
+TEST_F(Training, EndsWhereLogitsAreFiniteNoLonger) {
+  // They grow beyond all floats after an update.
+  const TrainOptions o = options("run", {"train.updates=4", "train.sharpen_agent_steps=1"});
+  EXPECT_THAT(message_of([&] { train(o); }), HasSubstr("the loss or its gradient is not finite"));
+}
+
+TEST_F(Training, RefusesToDriveByLogitsThatAreNotFinite) {
+  SavedPolicy policy = read_policy(train(options("run", {"train.updates=1", "policy.modality=vector"})).checkpoint);
+  for (NamedTensor& parameter : policy.parameters) {
+    if (parameter.name == "actor.weight") parameter.value.fill_(3e38);  // finite, but no sum of them is
+  }
+  const std::string path = folder_ / "large.safetensors";
+  write_policy(path, policy, WeightType::f32, "");
+  EXPECT_THAT(message_of([&] { evaluate(test::one_scenario(path, 10)); }),
+              HasSubstr("expected finite logits and values"));
+}
+
 TEST_F(Training, RefusesMinutesThatAreNone) {
   for (const double minutes :
        {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
