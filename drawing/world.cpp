@@ -346,7 +346,7 @@ RgbImage WorldPainter::draw(const WorldFrame& frame, const TopCamera& camera) {
 
   for (size_t i = 0; i < frame.agents.size(); ++i) {
     const auto status = frame.status.empty() ? AgentStatus::active : static_cast<AgentStatus>(frame.status[i]);
-    if (!frame.agents[i].drawn || status == AgentStatus::absent) continue;
+    if (!frame.agents[i].drawn || !has_body(status)) continue;
     const Vector2d position = pixel_at(frame.agents[i].center_m);
     paint_agent(canvas, frame.agents[i], status, position, camera.px_per_m);
     const HaltReason* reason =

@@ -189,7 +189,7 @@ struct InfractionObserver::WorldStep {
     for (size_t other = 0; other < num_boxes; ++other) {
       const bool is_parked = other >= num_agents;
       if (other == agent) continue;
-      if (!is_parked && before.status_of(first_slot + other) == AgentStatus::absent) continue;
+      if (!is_parked && !has_body(before.status_of(first_slot + other))) continue;
       const AgentBox &its = before.boxes[first_box + other], &its_after = after.boxes[first_box + other];
       const float apart_m = length((its.center_m - own.center_m).xy());
       if (apart_m >= least_m || !collide(own, own_after, its, its_after)) continue;
