@@ -91,7 +91,6 @@ const char* action_of(MendKind kind) { return text_of(kind).action; }
 
 std::vector<MendKind> mend_kinds() {
   std::vector<MendKind> kinds;
-  for (int i = 0; i <= static_cast<int>(MendKind::laneless_light); ++i) kinds.push_back(static_cast<MendKind>(i));
   for (int i = 0; i <= static_cast<int>(MendKind::missing_link); ++i) kinds.push_back(static_cast<MendKind>(i));
   return kinds;
 }

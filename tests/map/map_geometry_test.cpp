@@ -28,7 +28,7 @@ TEST(MapGeometry, AStraightRoadHasItsMarksAndItsEdges) {
   const RoadMap map = parse_opendrive(test::file_of(road.text()), "small.xodr");
   const StaticGeometry geometry = make_static_geometry(map, {.walls = false});
   EXPECT_EQ(count_of(geometry, StripKind::lane_mark), 10);
-  EXPECT_EQ(count_of(geometry, StripKind::road_edge), 22);  // 100 m twice and 8 m twice
+  EXPECT_EQ(count_of(geometry, StripKind::road_edge), 20);  // 100 m twice: vehicles enter and leave by both ends
   EXPECT_EQ(count_of(geometry, StripKind::crosswalk), 4);
   EXPECT_EQ(count_of(geometry, StripKind::stop_line), 0);
   EXPECT_TRUE(geometry.walls.empty());

@@ -312,7 +312,8 @@ def test_pedestrian_is_the_commands(trained, tmp_path):
         **options)  # fmt: skip
     header, case = replay_of(tmp_path / "case.html")
     shown = row_of_case(cases, int(re.match(r"case (\d+):", case["what"]).group(1)))
-    assert (case["frame"], case["ego"]) == (int(shown["step"]), int(shown["ego"])) and case["inserted"]["x_cm"] / 100 == pytest.approx(float(shown["x_m"]), abs=0.006)
+    assert (case["frame"], case["ego"]) == (int(shown["step"]), int(shown["ego"]))
+    assert header["origin_m"][0] + case["inserted"]["x_cm"] / 100 == pytest.approx(float(shown["x_m"]), abs=0.006), "places in a page are relative to the map's origin"
     assert header["images"] is None
     assert report["kind"] == "pedestrian" and report["paths"] in (1, 2) and report["paths_asked"] == 2 and done[-1] == 1
     assert sum(row["cases"] for row in report["rows"] if row["phase"]) == report["cases"]
