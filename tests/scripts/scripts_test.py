@@ -243,6 +243,24 @@ class Lanes(OnADevice):
         self.assertIn("slow is not done: out of time", said)
         self.assertFalse({name for name in self.packed() if name.endswith(".done")} - {"runs/lanes/trained.done"})
 
+    def test_training_ends_after_the_minutes_of_its_line(self):
+        for arguments, is_done in (("", False), (" --minutes 1", True), (" --minutes 1000", False)):
+            with self.subTest(arguments):
+                status, said, _ = self.work(f"0 run{len(arguments)} 1 pictura train late{arguments}")
+                self.assertEqual((status, "is not done: out of time" in said), (0, not is_done), said)
+
+    def test_a_run_is_packed_with_its_checkpoint(self):
+        self.write("runs/kept/checkpoint.ckpt", "state")
+        self.write("runs/kept/untrained.ckpt", "first weights")
+        list_of_work = self.write("list", "0 good 1 true\n")
+        result = self.run_script("gpu_lanes", "--out", self.root / "out", "--pack", "kept", "100", list_of_work)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with tarfile.open(self.root / "out/kept.tar.gz.00") as tar:
+            self.assertEqual([member.name for member in tar if member.isfile()], ["kept/checkpoint.ckpt"])
+        result = self.run_script("gpu_lanes", "--out", self.root / "out", "--pack", "lost", "100", list_of_work)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("runs/lost is not packed: it has no checkpoint", result.stdout)
+
     def test_weights_that_cannot_be_exported_leave_the_others_packed(self):
         for name in ("broken", "whole"):
             self.write(f"runs/{name}/checkpoint.ckpt", "")
