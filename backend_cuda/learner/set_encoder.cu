@@ -15,7 +15,7 @@ constexpr int kWarps = 4, kThreads = kWarps * kWarp;
 constexpr int kTile = 16;  // members that a warp takes at once
 constexpr int kChannels = SetSize::kChannels, kInputs = SetSize::kMostWidth;
 constexpr int kColumnTiles = kChannels / 8;
-// Of rows in shared memory, such that the rows that a warp reads at once lie in different banks.
+// Strides of rows in shared memory, such that the rows that a warp reads at once lie in different banks.
 constexpr int kInputStride = kInputs + 8, kChannelStride = kChannels + 8;
 
 __device__ int lane() { return static_cast<int>(threadIdx.x) % kWarp; }
@@ -455,7 +455,7 @@ __global__ void __launch_bounds__(kThreads)
       }
     }
   }
-  // Of each warp's rows, [warp, channel]: the tiles are read.
+  // Sums of each warp, [warp, channel], in the place of the tiles, which are read.
   float* const shared = reinterpret_cast<float*>(tiles);
   float *const hidden_bias = shared, *const bias = shared + kWarps * kChannels;
 #pragma unroll
