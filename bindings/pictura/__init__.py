@@ -4,6 +4,7 @@ The library's objects are here; environments are in pictura.envs, policies as to
 the probes and PolicySession need a package that was built beside torch, and load it on first use.
 """
 
+import os
 from typing import TYPE_CHECKING
 
 from pictura._pictura import (  # noqa: F401
@@ -78,6 +79,24 @@ def make_vec(maps="procedural:3", num_agents: int = 16, **options):
     from pictura.envs.gymnasium_vector import DriveVectorEnv
 
     return DriveVectorEnv(maps, num_agents, **options)
+
+
+def make_vec_for(policy, maps="procedural:3", num_agents: int = 16, **options):
+    """As make_vec, with the world, cameras and observation that a policy was trained with: its file, or what
+    pictura.torch.load_policy() read. options that are given count instead. A policy of decision_steps n expects its actions to be
+    held for n steps. Needs a package that was built beside torch. Raises pictura.UsageError for a policy of no file."""
+    from pictura.envs.gymnasium_vector import DriveVectorEnv
+
+    path = policy if isinstance(policy, (str, os.PathLike)) else getattr(policy, "metadata", {}).get("path")
+    if path is None:
+        raise UsageError("policy: expected the name of a file, or a policy that pictura.torch.load_policy() read")
+    session = __getattr__("PolicySession")(os.fspath(path), device="cpu")
+    world = session.training_world()
+    for of_the_session in ("device", "num_threads", "seed", "stagger_episodes"):
+        del world[of_the_session]
+    if session.reads_images:
+        world |= {"observation": "images", "rig": session.rig}
+    return DriveVectorEnv(maps, num_agents, **(world | options))
 
 
 def _register() -> None:

@@ -82,6 +82,11 @@ def _values(head: str, outputs: Tensor) -> Tensor:
     return _symexp(values) if head == "symlog" else values
 
 
+def _as_tensors(array: Any, device: torch.device) -> Any:
+    """A tensor of a tensor or of NumPy's array, or a list of such."""
+    return [_as_tensors(each, device) for each in array] if isinstance(array, list) else torch.as_tensor(array, device=device)
+
+
 class _Encoder(nn.Module):
     def __init__(self, features: int, width: int, layer_norm: bool) -> None:
         super().__init__()
@@ -138,7 +143,10 @@ class Policy(nn.Module):
     observation: float32 tensors by the names of pictura.Simulator.observations, [batch, ...] on the module's device: `ego`,
     `conditioning` and `waypoints`; for the vector policy the entity sets and `set_counts`; for the perspective one `rgb` uint8
     [batch, cameras, 3, height, width], or a list of such for cameras of several sizes in the order of the rig.
-    config: the `policy` table of a configuration (docs/configuration.md). walls: of the vector policy, whether it reads them.
+    Arrays that are NumPy's become tensors first. config: the `policy` table of a configuration (docs/configuration.md). walls: of
+    the vector policy, whether it reads them. metadata: of a policy that load_policy() read, what its file says beside the weights:
+    `path`, `config` (the whole configuration of its training), `schema`, `rig`, `update` and `agent_steps` among others; else empty.
+    Raises pictura.UsageError where an observation is not what the policy was trained to read.
     """
 
     def __init__(self, config: Mapping[str, Any], num_cameras: int = 4, walls: bool = False) -> None:
@@ -146,6 +154,7 @@ class Policy(nn.Module):
         if config.get("backbone", "conv") != "conv":
             raise pictura.UsageError(f"policy.backbone: expected 'conv', got '{config['backbone']}', which is a program of its own")
         self.config = dict(config)
+        self.metadata: dict[str, Any] = {}
         self.modality = config["modality"]
         self.points, self.segments, self.goals = (
             bool(config.get(f"{of}_features", False)) for of in ("point", "segment", "goal")
@@ -187,7 +196,8 @@ class Policy(nn.Module):
             raise pictura.UsageError(f"policy.value_head: expected one of {', '.join(_VALUE_OUTPUTS)}, got '{self.value_head}'")
         self.actor, self.critic = nn.Linear(inside, _NUM_ACTIONS), nn.Linear(inside, _VALUE_OUTPUTS[self.value_head])
 
-    def forward(self, observation: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
+    def forward(self, observation: Mapping[str, Any]) -> tuple[Tensor, Tensor]:
+        observation = self._read(observation)
         waypoints = observation["waypoints"].flatten(1)
         own = [observation["conditioning"].flatten(1), waypoints]
         if self.points:
@@ -199,12 +209,26 @@ class Policy(nn.Module):
         for_critic = self._trunk(self.critic_backbone, x) if len(self.critic_backbone) > 0 else for_actor
         return self.actor(for_actor), _values(self.value_head, self.critic(for_critic))
 
-    def act(self, observation: Mapping[str, Tensor], argmax: bool = True) -> Tensor:
+    def act(self, observation: Mapping[str, Any], argmax: bool = True) -> Tensor:
         """Actions int32 [batch], which pictura.Simulator.step takes; without gradients."""
         with torch.no_grad():
             logits = self(observation)[0]
             chosen = logits.argmax(1) if argmax else torch.distributions.Categorical(logits=logits).sample()
         return chosen.to(torch.int32)
+
+    def _read(self, observation: Mapping[str, Any]) -> dict[str, Any]:
+        """The arrays that this policy reads, as tensors on its device."""
+        names = ["ego", "conditioning", "waypoints"]
+        names += ["rgb"] if self.modality == "perspective" else ["set_counts", *self.sets]
+        if not isinstance(observation, Mapping):
+            raise pictura.UsageError(f"observation: expected a dict with {', '.join(names)}, got {type(observation).__name__}")
+        missing = [name for name in names if name not in observation]
+        if missing:
+            raise pictura.UsageError(
+                f"observation: a {self.modality} policy reads {', '.join(names)}: expected '{missing[0]}', got {', '.join(observation)};"
+                " pictura.make_vec_for(policy) makes environments that show what it reads"
+            )
+        return {name: _as_tensors(observation[name], self.actor.weight.device) for name in names}
 
     def _trunk(self, layers: nn.ModuleList, x: Tensor) -> Tensor:
         for i, layer in enumerate(layers):
@@ -237,6 +261,14 @@ class Policy(nn.Module):
         num_cameras = sum(block.shape[1] for block in blocks)
         if num_cameras != self.num_cameras:
             raise pictura.Error(f"rgb: expected images of {self.num_cameras} cameras, got {num_cameras}")
+        learnt = [tuple(camera["size_px"]) for camera in self.metadata.get("rig", [])]
+        shown = [(block.shape[4], block.shape[3]) for block in blocks for _ in range(block.shape[1])]
+        for number, (expected, got) in enumerate(zip(learnt, shown)):
+            if got != expected:
+                raise pictura.UsageError(
+                    f"rgb: camera {number}: expected images of {expected[0]}x{expected[1]}, which the policy was trained with, got"
+                    f" {got[0]}x{got[1]}; pictura.make_vec_for(policy) shows those, `pictura export --size` grows a policy"
+                )
         embedded, first = [], 0
         for block in blocks:
             embedded.extend(self.attention(self._maps(block), first))
@@ -309,9 +341,10 @@ def _read_checkpoint(path: str) -> tuple[dict[str, Any], bytearray, int]:
     return json.loads(data[size : size + length]), data, size + length
 
 
-def _policy_of(config_toml: str, tensors: dict[str, Tensor], path: str) -> Policy:
+def _policy_of(config_toml: str, tensors: dict[str, Tensor], metadata: Mapping[str, Any], path: str) -> Policy:
     try:
-        config = tomllib.loads(config_toml)["policy"]
+        whole_config = tomllib.loads(config_toml)
+        config = whole_config["policy"]
     except (tomllib.TOMLDecodeError, KeyError) as error:
         raise pictura.Error(f"{path}: expected the configuration of its training, with a table 'policy': {error}") from error
     queries = tensors.get("attention.queries")
@@ -322,6 +355,7 @@ def _policy_of(config_toml: str, tensors: dict[str, Tensor], path: str) -> Polic
     missing, unexpected = policy.load_state_dict(weights, strict=False, assign=True)
     if missing or unexpected:
         raise pictura.Error(f"{path}: of another architecture: expected {sorted(missing)}, got {sorted(unexpected)}")
+    policy.metadata = {**metadata, "path": path, "config": whole_config}
     return policy
 
 
@@ -353,7 +387,9 @@ def _load(path: str, average: bool) -> Policy:
         if average:
             raise pictura.Error(f"{path}: holds one set of weights: expected a checkpoint to choose the average of")
         metadata, tensors = _read_safetensors(path)
-        return _policy_of(metadata.get("config", ""), tensors, path)
+        texts = {name: json.loads(metadata[name]) for name in ("schema", "rig", "rate_factors") if metadata.get(name)}
+        numbers = {name: int(metadata[name]) for name in ("update", "agent_steps") if name in metadata}
+        return _policy_of(metadata.get("config", ""), tensors, metadata | texts | numbers, path)
     header, data, begin = _read_checkpoint(path)
     tensors = {}
     if average and "average" not in header:
@@ -362,7 +398,9 @@ def _load(path: str, average: bool) -> Policy:
         count = math.prod(entry["shape"])
         values = torch.frombuffer(data, dtype=torch.float32, count=count, offset=begin + entry["offset"])
         tensors[entry["name"]] = values.reshape(entry["shape"]).clone()
-    return _policy_of(header["config"], tensors, path)
+    counters = {name: header.get("counters", {}).get(name) for name in ("update", "agent_steps")}
+    kept = {name: value for name, value in header.items() if name not in ("parameters", "average", "moments", "recent", "counters")}
+    return _policy_of(header["config"], tensors, kept | counters, path)
 
 
 def save_policy(policy: Policy, path: str | os.PathLike[str], like: str | os.PathLike[str]) -> None:

@@ -184,12 +184,25 @@ def test_wrong_options_are_named():
     ):
         with pytest.raises(pictura.UsageError, match=name):
             pictura.make_vec(**({"maps": "procedural:3"} | options))
+    for options, said in (
+        ({"num_agent": 3}, "num_agent: no such option: did you mean num_agents?"),
+        ({"wals": True}, "wals: no such option: did you mean walls?"),
+        ({"autorest": "same_step"}, "autorest: no such option: did you mean autoreset?"),
+        ({"colour": 3}, "colour: no such option$"),
+    ):
+        with pytest.raises(pictura.UsageError, match=said.replace("?", "[?]")):
+            pictura.make_vec("procedural:3", **options)
     env = vector()
+    with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
+        env.step(np.full(24, 7))
+    env.reset(seed=1)
     for wrong in (np.zeros(24), np.zeros(23, int), np.full(24, 12)):
         with pytest.raises(pictura.Error):
             env.step(wrong)
+    pairs = vector(actions="multi_discrete")
+    pairs.reset(seed=1)
     with pytest.raises(pictura.Error, match="longitudinal"):
-        vector(actions="multi_discrete").step(np.full((24, 2), 3))
+        pairs.step(np.full((24, 2), 3))
 
 
 @pytest.mark.parametrize("array", ["numpy", "torch"])
@@ -197,6 +210,7 @@ def test_wrong_actions_never_become_right_ones(array):
     if array == "torch":
         pytest.importorskip("torch")
     env = vector(array=array)
+    env.reset(seed=1)
     wrong = [np.full(24, 2**40), np.full(24, 2**32 + 3), np.full(24, -(2**32)), np.full(24, -1), np.full(24, 12), np.full(24, np.nan)]
     for actions in [*wrong, np.full(24, 2**64 - 1, np.uint64), np.ones(24, bool), np.ones(23, int), [7], None, "go"]:
         with pytest.raises((pictura.Error, TypeError)):
@@ -204,6 +218,7 @@ def test_wrong_actions_never_become_right_ones(array):
     env.step([7] * 24)
     env.step(np.full(24, 7, np.uint8))
     env = vector(array=array, actions="multi_discrete")
+    env.reset(seed=1)
     for pair in ([-1, 0], [0, 3], [1, -1], [4, 0], [2**33, 0], [0, 2**62]):
         with pytest.raises(pictura.Error):
             env.step(np.tile(pair, (24, 1)))

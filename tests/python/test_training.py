@@ -90,6 +90,43 @@ def test_a_trained_policys_numbers_are_those_of_the_library(trained, session, to
         torch.testing.assert_close(values.torch(), expected_values, rtol=0, atol=1e-5)
 
 
+def test_environments_are_made_for_a_policy(trained):
+    modality, folder, _, _ = trained
+    path = folder / "policy.safetensors"
+    policy = load_policy(path)
+    assert policy.metadata["path"] == str(path) and policy.metadata["config"]["policy"]["modality"] == modality
+    assert len(policy.metadata["rig"]) == 4 and policy.metadata["update"] > 0
+    for of in (policy, path, str(folder / "checkpoint.ckpt")):
+        envs = pictura.make_vec_for(of, "procedural:3", 4, num_worlds=2, num_threads=1)
+        seen, _ = envs.reset(seed=1)
+        assert ("rgb" in seen) == (modality == "perspective") and ("lanes" in seen) == (modality == "vector")
+        actions = policy.act(seen)
+        assert torch.equal(actions, policy.act({name: torch.from_numpy(array) for name, array in seen.items()}))
+        envs.step(actions.numpy())
+    # The same world as the session's, and another one than where nothing is said of it.
+    world = pictura.PolicySession(str(path), device="cpu").training_world() | {"num_threads": 1, "seed": 0, "stagger_episodes": False}
+    ours, its = pictura.Simulator([pictura.Map.load("procedural:3")], [(0, 4, 0), (0, 4, 1)], **world), envs.batch.simulator
+    ours.reset(None, 5)
+    its.reset(None, 5)
+    assert ours.state_hash() == its.state_hash() != pictura.make_vec("procedural:3", 4, num_worlds=2).batch.simulator.state_hash()
+    other = {"images": "vector", "vector": "images"}["images" if modality == "perspective" else "vector"]
+    shown, _ = pictura.make_vec("procedural:3", 4, observation=other).reset(seed=1)
+    missing = "rgb" if modality == "perspective" else "set_counts"
+    with pytest.raises(pictura.UsageError, match=f"a {modality} policy reads .*: expected '{missing}', got .*make_vec_for"):
+        policy.act(shown)
+    with pytest.raises(pictura.UsageError, match="expected a dict with ego, .*, got ndarray"):
+        policy.act(shown["ego"])
+    if modality == "perspective":
+        width, height = policy.metadata["rig"][0]["size_px"]
+        rig = pictura.Rig.paper(2 * width, 2 * height)
+        shown, _ = pictura.make_vec("procedural:3", 4, observation="images", rig=rig).reset(seed=1)
+        with pytest.raises(pictura.UsageError, match=f"expected images of {width}x{height}, .*, got {2 * width}x{2 * height}"):
+            policy.act(shown)
+    del policy.metadata["path"]
+    with pytest.raises(pictura.UsageError, match="policy: expected the name of a file"):
+        pictura.make_vec_for(policy)
+
+
 @pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
 def test_released_policies_have_the_librarys_numbers(path, town):
     session = pictura.PolicySession(str(path), device="cpu", num_threads=1)

@@ -181,8 +181,9 @@ class NetworkPasses {
   virtual void patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, Stream stream) = 0;
 
   /// The largest value of each channel over the members of each set, bf16 [sets, kChannels], 0 for an empty set, and
-  /// which member has it, [sets, kChannels], the first of equal ones, kNoMember in an empty set; null where nobody
-  /// asks. members: f32; goals: as row_features() has them; counts: as size.counts_stride says. Products are in bf16.
+  /// which member has it, [sets, kChannels], the first of equal ones, kNoMember in an empty set; null where it is not
+  /// asked for. members: f32; goals: as row_features() has them; counts: as size.counts_stride says. Products are in
+  /// bf16.
   virtual void largest_embedding(const SetSize& size, const float* members, const float* goals, const int32_t* counts,
                                  const SetParameters<const float>& parameters, void* out, uint8_t* which_out,
                                  Stream stream) = 0;

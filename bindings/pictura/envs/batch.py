@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
+import inspect
+import re
 import sys
 import webbrowser
 from collections.abc import Callable, Mapping, Sequence
@@ -30,6 +33,18 @@ def load_maps(maps: str | pictura.Map | Sequence[str | pictura.Map]) -> list[pic
     return [pictura.Map.load(each) if isinstance(each, str) else each for each in maps]
 
 
+def refuse_unknown(options: Mapping[str, Any]) -> None:
+    """Raises pictura.UsageError for an option that neither environments nor simulators have."""
+    signature = (pictura.Simulator.__init__.__doc__ or "").split("->")[0]
+    of_simulators = set(re.findall(r"(\w+): ", signature)) - {"self", "maps", "worlds"}
+    for name in options:
+        if name not in of_simulators:
+            own = set(inspect.signature(Batch.__init__).parameters) - {"self", "options"}
+            close = difflib.get_close_matches(name, own | of_simulators | {"num_envs", "autoreset", "render_mode", "copy"}, 1)
+            hint = f": did you mean {close[0]}?" if close else ""
+            raise pictura.UsageError(f"{name}: no such option{hint}")
+
+
 class Batch:
     """A simulator whose slots are agents to be trained, with images where they are observed.
 
@@ -56,6 +71,7 @@ class Batch:
         num_threads: int = 0,
         **options: Any,
     ) -> None:
+        refuse_unknown(options)
         if observation not in OBSERVATIONS:
             raise pictura.UsageError(f"observation: expected one of {', '.join(OBSERVATIONS)}; got '{observation}'")
         if actions not in ACTIONS:

@@ -60,13 +60,17 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
         self._over = self.batch.view(self.batch.simulator.episode_over)
         self._everybody = self.batch.active
         self._everybody[:] = True
+        self._has_begun = False
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         super().reset(seed=seed)
+        self._has_begun = True
         self.batch.reset(self._next_seed())
         return self.batch.observe(self._copy), self._info(self._copy)
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+        if not self._has_begun:
+            raise gymnasium.error.ResetNeeded("step: expected reset() before the first step")
         batch = self.batch
         results = batch.step(actions)
         # The reset of the same step writes them again.
