@@ -1,4 +1,4 @@
-// Places on a map in the coordinates of its file, in which all is written that says where something is.
+// Coordinates of a map's file, in which reports, events and tables write places.
 #pragma once
 
 #include <array>

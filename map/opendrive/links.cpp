@@ -94,8 +94,8 @@ class Linker {
     }
   }
 
-  /// Links two lanes that meet, in the order in which traffic passes them. Links that traffic cannot follow are mended:
-  /// they are left out. Those of sidewalks and the like go without a word.
+  /// Links two lanes that meet, in the order in which traffic passes them. Links that traffic cannot follow are left
+  /// out and counted, those between sidewalks and the like left out alone.
   void add(const LaneEnd& a, const LaneEnd& b, const SourceLocation& where) {
     const int32_t lane_a = lane_at(a), lane_b = lane_at(b);
     if (lane_a < 0 || lane_b < 0) return;

@@ -27,7 +27,7 @@ RoadLink* link_at(FileRoad* road, ContactPoint end) {
   return end == ContactPoint::start ? &road->predecessor : &road->successor;
 }
 
-/// Its location remains, by which lanes know that their road's link was there.
+/// Removes a road's link but for its location, by which lanes know that there was one.
 void leave_out(RoadLink* link) {
   link->kind = RoadLink::Kind::none;
   link->id.clear();

@@ -33,14 +33,14 @@ def load_maps(maps: str | pictura.Map | Sequence[str | pictura.Map]) -> list[pic
     return [pictura.Map.load(each) if isinstance(each, str) else each for each in maps]
 
 
-def refuse_unknown(options: Mapping[str, Any]) -> None:
-    """Raises pictura.UsageError for an option that neither environments nor simulators have."""
+def refuse_unknown(options: Mapping[str, Any], *makers: Callable[..., Any]) -> None:
+    """Raises pictura.UsageError for an option that neither these functions nor simulators have."""
     signature = (pictura.Simulator.__init__.__doc__ or "").split("->")[0]
-    of_simulators = set(re.findall(r"(\w+): ", signature)) - {"self", "maps", "worlds"}
+    known = set(re.findall(r"(\w+): ", signature)) - {"worlds"}
+    known = known.union(*(inspect.signature(maker).parameters for maker in makers)) - {"self", "options"}
     for name in options:
-        if name not in of_simulators:
-            own = set(inspect.signature(Batch.__init__).parameters) - {"self", "options"}
-            close = difflib.get_close_matches(name, own | of_simulators | {"num_envs", "autoreset", "render_mode", "copy"}, 1)
+        if name not in known:
+            close = difflib.get_close_matches(name, known, 1)
             hint = f": did you mean {close[0]}?" if close else ""
             raise pictura.UsageError(f"{name}: no such option{hint}")
 
@@ -71,7 +71,7 @@ class Batch:
         num_threads: int = 0,
         **options: Any,
     ) -> None:
-        refuse_unknown(options)
+        refuse_unknown(options, Batch.__init__)
         if observation not in OBSERVATIONS:
             raise pictura.UsageError(f"observation: expected one of {', '.join(OBSERVATIONS)}; got '{observation}'")
         if actions not in ACTIONS:

@@ -10,7 +10,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 import pictura
-from pictura.envs.batch import Batch
+from pictura.envs.batch import Batch, refuse_unknown
 from pictura.envs.gymnasium_spaces import action_space, observation_space
 
 
@@ -39,6 +39,7 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
         copy: bool = True,
         **options: Any,
     ) -> None:
+        refuse_unknown(options, DriveVectorEnv.__init__, Batch.__init__)
         modes = {"next_step": AutoresetMode.NEXT_STEP, "same_step": AutoresetMode.SAME_STEP}
         if autoreset not in modes:
             raise pictura.UsageError(f"autoreset: expected one of {', '.join(modes)}; got '{autoreset}'")
