@@ -39,9 +39,10 @@ class DeviceLayers : public test::DeviceTest, public testing::WithParamInterface
     return all;
   }
 
-  /// The first `num_activations` inputs are activations, all others parameters. `plain` is the layer in ATen's words.
+  /// The first `num_activations` inputs are activations, all others parameters. `plain` is the layer in ATen's words,
+  /// of whose errors `of_atens` times as much is allowed.
   void expect_as_on_the_host(const Layer& layer, const Layer& plain, const std::vector<at::Tensor>& inputs,
-                             size_t num_activations) {
+                             size_t num_activations, double of_atens = 2) {
     set_float32_products(GetParam());
     const auto copies = [&](at::Device device, at::ScalarType of_activations, at::ScalarType of_parameters) {
       std::vector<at::Tensor> result;
@@ -64,7 +65,7 @@ class DeviceLayers : public test::DeviceTest, public testing::WithParamInterface
       ASSERT_EQ(got[i].sizes(), expected[i].sizes());
       const auto error = [&](const at::Tensor& t) { return (t - expected[i]).abs().max().item<double>(); };
       const double largest = expected[i].abs().max().item<double>();
-      EXPECT_LE(error(got[i]), 2 * error(atens[i]) + precision * (0.1 + largest))
+      EXPECT_LE(error(got[i]), of_atens * error(atens[i]) + precision * (0.1 + largest))
           << (i == 0 ? "value" : "gradient " + std::to_string(i - 1)) << ", up to " << largest;
     }
   }
@@ -161,12 +162,18 @@ TEST_P(DeviceLayers, LargestEmbedding) {
         const at::Tensor members = numbers({sets, most, 7}, 1).to(at::kFloat),
                          goals = features.of_goal ? numbers({sets, goal_columns}, 2).to(at::kFloat) : at::Tensor(),
                          // Empty sets and full ones; what lies beyond a column of counts is not read.
-            counts = at::arange(2 * sets, at::kInt).view({sets, 2}).remainder(most + 1).select(1, 0);
+            counts = at::arange(sets, at::kInt).remainder(most + 1).unsqueeze(1).repeat({1, 2}).select(1, 0);
         const int64_t width = 7 + features.count();
         const std::vector<at::Tensor> parameters{numbers({64, width}, 1), numbers({64}, 2), 0.3 * numbers({64, 64}, 3),
                                                  numbers({64}, 4)};
         const auto on = [](const at::Tensor& t, const at::Tensor& where) {
           return t.defined() ? t.to(where.device()) : at::Tensor();
+        };
+        // Doubles rounded as the device holds them, with the gradient of what they were: of members that are nearly
+        // equal, rounding decides which one the gradient reaches.
+        const auto as_held = [&](const at::Tensor& x) {
+          if (x.scalar_type() != at::kDouble) return x;
+          return x + (x.detach().to(activations()).to(at::kDouble) - x.detach());
         };
         const Layer plain = [&](const auto& in) {
           const bool is_double = in[0].scalar_type() == at::kDouble;
@@ -177,9 +184,9 @@ TEST_P(DeviceLayers, LargestEmbedding) {
                   ? with_row_features(its_members.to(is_double ? at::kDouble : at::kFloat), features, type,
                                       its_goals.defined() && is_double ? its_goals.to(at::kDouble) : its_goals)
                   : its_members.to(type);
-          const at::Tensor before = at::linear(rows, in[0], in[1]);
+          const at::Tensor before = at::linear(as_held(rows), in[0], in[1]);
           const at::Tensor hidden = gelu(has_norm ? at::layer_norm(before, {64}).to(before.scalar_type()) : before);
-          return masked_max(at::linear(hidden, in[2], in[3]), on(counts, in[0]));
+          return masked_max(at::linear(as_held(hidden), as_held(in[2]), in[3]), on(counts, in[0]));
         };
         const Layer layer = [&](const auto& in) {
           if (!in[0].is_cuda()) return plain(in);
@@ -189,7 +196,8 @@ TEST_P(DeviceLayers, LargestEmbedding) {
           return largest_embedding(its_members, on(goals, in[0]), its_counts, features, has_norm, in[0], in[1], in[2],
                                    in[3]);
         };
-        expect_as_on_the_host(layer, plain, parameters, 0);
+        // ATen rounds the embeddings as well, and so prefers other members.
+        expect_as_on_the_host(layer, plain, parameters, 0, GetParam() == Precision::bf16 ? 0 : 2);
         if (GetParam() != Precision::bf16) continue;
         // Without a way back: the same bits.
         const LayerPrecision precision(Precision::bf16, at::kCUDA);
