@@ -87,7 +87,7 @@ void ChunkRunner::set_targets(const Targets& targets) {
 void ChunkRunner::begin_minibatch() { stats_.zero_(); }
 
 void ChunkRunner::learn(const at::Tensor& rows, const at::Tensor& advantages, const at::Tensor& shares, double weight,
-                        const Config::Train& config, const std::function<void(const Losses&)>& diagnose) {
+                        const Config::Train& config) {
   Work& work = observe(rows);
   set(&work.advantages, advantages);
   // A product with 1 changes no bit, so one graph serves full chunks and those that are filled up.
@@ -96,7 +96,7 @@ void ChunkRunner::learn(const at::Tensor& rows, const at::Tensor& advantages, co
   work.weight.fill_(weight);
 
   // Both halves are done one way: graphs keep nothing from which calls could go on backwards.
-  const Mode mode = work.learn.next_mode(*graphs_, work.observe.is_captured() && !diagnose);
+  const Mode mode = work.learn.next_mode(*graphs_, work.observe.is_captured());
   if (mode == Mode::capture) graphs_->make_room();
   {
     const PhaseTimer::Scope timed(timer_, Phase::learn);
@@ -105,7 +105,6 @@ void ChunkRunner::learn(const at::Tensor& rows, const at::Tensor& advantages, co
                               config.clip_coef);
     });
   }
-  if (diagnose) diagnose(work.losses);
   const PhaseTimer::Scope timed(timer_, Phase::backward);
   work.backward.run(mode, graphs_, [&] {
     const Losses& losses = work.losses;
@@ -115,6 +114,13 @@ void ChunkRunner::learn(const at::Tensor& rows, const at::Tensor& advantages, co
     stats_.narrow(0, 0, kNumStats - 1) += work.weight * losses.stats;
   });
   work.losses = {};
+}
+
+Losses ChunkRunner::losses(const at::Tensor& rows, const at::Tensor& advantages, const at::Tensor& shares,
+                           const Config::Train& config) {
+  const Work& work = observe(rows);
+  const PhaseTimer::Scope timed(timer_, Phase::diagnose);
+  return losses_of(policy_.forward(work.observation), targets_, rows, advantages, shares, config.clip_coef);
 }
 
 }  // namespace pictura

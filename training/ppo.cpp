@@ -186,47 +186,23 @@ at::Tensor shares_in(const Chunk& chunk, const at::Tensor& shares, const at::Ten
   return padded * (static_cast<double>(chunk.size()) / static_cast<double>(chunk.count));
 }
 
-// How many of this rank's transitions of an update's first minibatch are a chunk of their own, by whose gradients the
-// single losses are compared: on the host those of the first of all ranks', one of 64 of those that the update passes
-// over in all its epochs, so that three more ways back are at most 3 % of its work. Nothing on a device, where the
-// first chunk is a small part anyway, and chunks have few sizes.
-std::optional<int64_t> diagnosed_rows(const Minibatches& minibatches, const Config::Train& config, bool on_host) {
-  if (!on_host) return std::nullopt;
-  constexpr int64_t kPassesPerDiagnosed = 64;
+// The first of an update's transitions, those of all ranks that are this one's, by whose gradients the single losses
+// are compared: so few that a way there and three back are at most 3 % of an update's work.
+at::Tensor diagnosed_rows(const Minibatches& minibatches, const Config::Train& config) {
+  constexpr int64_t kPassesPerDiagnosed = 100, kMostDiagnosed = 1024;
   const int64_t of_all = minibatches.size() * config.update_epochs / kPassesPerDiagnosed,
-                most = std::min(config.forward_chunk, minibatches.size(0));
-  return minibatches.own_of_first(std::clamp<int64_t>(of_all, 1, most));
+                most = std::min({kMostDiagnosed, config.forward_chunk, minibatches.size(0)});
+  return minibatches.rows(0).narrow(0, 0, minibatches.own_of_first(std::clamp<int64_t>(of_all, 1, most)));
 }
 
-// Calls f(const Chunk&) for all chunks of at most `most` of a minibatch, whose first `head` rows are one where there
-// are more.
-template <typename F>
-void for_each_chunk_after(int64_t head, const at::Tensor& minibatch, int64_t most, const F& f) {
-  const int64_t rest = minibatch.size(0) - head;
-  if (head == 0 || rest <= 0) return for_each_chunk(minibatch, {most}, f);
-  f(Chunk{minibatch.narrow(0, 0, head), 0, head});
-  for_each_chunk(minibatch.narrow(0, head, rest), {most}, [&](Chunk chunk) {
-    chunk.begin += head;
-    f(chunk);
-  });
-}
+// A minibatch's advantages as they are learned from, and what each of its rows counts (see losses_of).
+struct Weighted {
+  at::Tensor advantages, shares;
+};
 
-// The norms of the gradient of the first chunk, or of those of all ranks, by each loss alone: f64 [3].
-at::Tensor norms_over_ranks(std::vector<at::Tensor> gradients, int64_t num_rows, const Optimizer& optimizer,
-                            Communicator* communicator) {
-  constexpr int64_t kNumLosses = 3;
-  if (gradients.empty()) gradients.resize(kNumLosses, at::zeros_like(optimizer.gradients()));
-  const at::Tensor sums = at::constant_pad_nd(at::stack(gradients), {0, 1}, 1) * num_rows;
-  communicator->sum(sums);
-  return (sums.slice(1, 0, -1).norm(2, {1}) / sums.select(1, -1)).to(at::kDouble);
-}
-
-// Adds this rank's part of a minibatch's gradients, which has `size_of_all` transitions over all ranks, to those of the
-// parameters, `forward_chunk` transitions at a time after the first `diagnosed`. Returns the minibatch's LossStats
-// without the norm, f64 [kNumStats], until the next minibatch. With `norms`, sets them as norms_over_ranks does.
-at::Tensor add_gradients(ChunkRunner* runner, const Batch& batch, const at::Tensor& minibatch, int64_t size_of_all,
-                         std::optional<int64_t> diagnosed, const Config::Train& config, Optimizer* optimizer,
-                         PhaseTimer* timer, Communicator* communicator, at::Tensor* norms) {
+// Of this rank's rows of a minibatch, which has `size_of_all` transitions over all ranks.
+Weighted weighted(const Batch& batch, const at::Tensor& minibatch, int64_t size_of_all, const Config::Train& config,
+                  Communicator* communicator) {
   at::Tensor advantages = batch.advantages.index_select(0, minibatch), shares;
   const at::Tensor valid = takes_all(config) ? batch.valid.index_select(0, minibatch).to(at::kDouble)
                                              : at::ones_like(advantages, at::kDouble);
@@ -238,24 +214,41 @@ at::Tensor add_gradients(ChunkRunner* runner, const Batch& batch, const at::Tens
     advantages = (advantages - mean) / (variance.sqrt() + 1e-8);
   }
   if (takes_all(config)) shares = (valid * (static_cast<double>(size_of_all) / count)).to(at::kFloat);
-  runner->begin_minibatch();
-  std::vector<at::Tensor> by_loss;
-  int64_t num_rows_by_loss = 0;
-  const auto diagnose = [&](const Losses& losses) {
+  return {advantages, shares};
+}
+
+// The norms of the gradient of some rows, the first ones of a minibatch that is `of_minibatch`, by each loss alone, of
+// all ranks: policy, value and entropy, f64 [3].
+at::Tensor norms_by_loss(ChunkRunner* runner, const at::Tensor& rows, const Weighted& of_minibatch,
+                         const Config::Train& config, Optimizer* optimizer, PhaseTimer* timer,
+                         Communicator* communicator) {
+  at::Tensor gradients = at::zeros({3, optimizer->gradients().numel()}, optimizer->gradients().options());
+  for_each_chunk(rows, {config.forward_chunk}, [&](const Chunk& chunk) {
+    const Losses losses =
+        runner->losses(chunk.rows, chunk.take(of_minibatch.advantages),
+                       shares_in(chunk, of_minibatch.shares, of_minibatch.advantages.options()), config);
     const PhaseTimer::Scope timed(timer, Phase::diagnose);
-    for (const at::Tensor& loss : {losses.policy, config.vf_coef * losses.value, config.ent_coef * losses.entropy}) {
-      by_loss.push_back(gradient_of(loss, optimizer));
-    }
-  };
-  for_each_chunk_after(diagnosed.value_or(0), minibatch, config.forward_chunk, [&](const Chunk& chunk) {
+    gradients = at::stack({gradient_of(losses.policy, optimizer), gradient_of(config.vf_coef * losses.value, optimizer),
+                           gradient_of(config.ent_coef * losses.entropy, optimizer)});
+  });
+  const PhaseTimer::Scope timed(timer, Phase::diagnose);
+  const at::Tensor sums = at::constant_pad_nd(gradients, {0, 1}, 1) * rows.size(0);
+  communicator->sum(sums);
+  return (sums.slice(1, 0, -1).norm(2, {1}) / sums.select(1, -1)).to(at::kDouble);
+}
+
+// Adds this rank's part of a minibatch's gradients, which has `size_of_all` transitions over all ranks, to those of the
+// parameters, `forward_chunk` transitions at a time. Returns the minibatch's LossStats without the norm, f64
+// [kNumStats], until the next minibatch.
+at::Tensor add_gradients(ChunkRunner* runner, const at::Tensor& minibatch, const Weighted& its, int64_t size_of_all,
+                         const Config::Train& config, Communicator* communicator) {
+  runner->begin_minibatch();
+  for_each_chunk(minibatch, {config.forward_chunk}, [&](const Chunk& chunk) {
     const double weight = static_cast<double>(chunk.count) / static_cast<double>(size_of_all);
-    const bool is_diagnosed = norms && chunk.begin == 0 && diagnosed != 0;
-    if (is_diagnosed) num_rows_by_loss = chunk.count;
-    runner->learn(chunk.rows, chunk.take(advantages), shares_in(chunk, shares, advantages.options()), weight, config,
-                  is_diagnosed ? diagnose : std::function<void(const Losses&)>());
+    runner->learn(chunk.rows, chunk.take(its.advantages), shares_in(chunk, its.shares, its.advantages.options()),
+                  weight, config);
   });
   communicator->sum(runner->stats());
-  if (norms) *norms = norms_over_ranks(std::move(by_loss), num_rows_by_loss, *optimizer, communicator);
   return runner->stats();
 }
 
@@ -269,11 +262,11 @@ bool must_be_recomputed(const LossStats& first) {
 // The log-probabilities of all chosen actions [steps * slots], for kept transitions by the learner's forward pass: in
 // the minibatches and chunks in which they are learned from next, so that not even the batch's size differs.
 at::Tensor recomputed_log_probs(ChunkRunner* runner, const Targets& targets, const Minibatches& minibatches,
-                                int64_t first_head, int64_t forward_chunk) {
+                                int64_t forward_chunk) {
   const at::NoGradGuard no_grad;
   at::Tensor log_probs = targets.old_log_probs.clone();
   for (int64_t m = 0; m < minibatches.count(); ++m) {
-    for_each_chunk_after(m == 0 ? first_head : 0, minibatches.rows(m), forward_chunk, [&](const Chunk& chunk) {
+    for_each_chunk(minibatches.rows(m), {forward_chunk}, [&](const Chunk& chunk) {
       const at::Tensor all = at::log_softmax(runner->look(chunk.rows).logits, 1).narrow(0, 0, chunk.count);
       const at::Tensor rows = chunk.rows.narrow(0, 0, chunk.count);
       log_probs.index_copy_(0, rows, log_probs_of(all, targets, rows));
@@ -349,22 +342,22 @@ UpdateStats ppo_update(ChunkRunner* runner, const Rollout& rollout, const Config
     minibatches.shuffle(epoch);
     for (int64_t m = 0; m < minibatches.count(); ++m) {
       const bool is_first = stats.minibatches == 0;
-      const std::optional<int64_t> diagnosed =
-          is_first ? diagnosed_rows(minibatches, config, batch.valid.is_cpu()) : std::nullopt;
-      const auto add_its_gradients = [&] {
-        return add_gradients(runner, batch, minibatches.rows(m), minibatches.size(m), diagnosed, config, optimizer,
-                             timer, communicator, is_first ? &first_norms : nullptr);
-      };
-      at::Tensor minibatch_stats = add_its_gradients();
+      const at::Tensor rows = minibatches.rows(m);
+      const int64_t size_of_all = minibatches.size(m);
+      const Weighted its = weighted(batch, rows, size_of_all, config, communicator);
+      if (is_first) {
+        first_norms =
+            norms_by_loss(runner, diagnosed_rows(minibatches, config), its, config, optimizer, timer, communicator);
+      }
+      at::Tensor minibatch_stats = add_gradients(runner, rows, its, size_of_all, config, communicator);
       if (is_first) {
         const LossStats first = loss_stats(minibatch_stats.cpu());
         if (must_be_recomputed(first)) {
           stats.rejected = first;
-          batch.targets.old_log_probs =
-              recomputed_log_probs(runner, batch.targets, minibatches, diagnosed.value_or(0), config.forward_chunk);
+          batch.targets.old_log_probs = recomputed_log_probs(runner, batch.targets, minibatches, config.forward_chunk);
           runner->set_targets(batch.targets);
           optimizer->clear_gradients();
-          minibatch_stats = add_its_gradients();
+          minibatch_stats = add_gradients(runner, rows, its, size_of_all, config, communicator);
         }
       }
       const PhaseTimer::Scope timed(timer, Phase::optimize);

@@ -76,8 +76,7 @@ void expect_same_first_update(const std::string& run, const std::string& other, 
 class EachModality : public DeviceTraining, public testing::WithParamInterface<const char*> {
  protected:
   static std::string modality() { return std::string("policy.modality=") + GetParam(); }
-  // An update in fp32. Chunks are so small that the one whose single losses are diagnosed is the same on a host, where
-  // it is at most one of 64 transitions, as on a device.
+  // An update in fp32.
   static std::vector<std::string> one_update() {
     return {modality(), "train.precision=fp32", "train.updates=1", "train.num_steps=30", "train.forward_chunk=3"};
   }
