@@ -1,0 +1,53 @@
+// Small files of the kinds that other tools write, and the table of them in docs/map_cases.md.
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "pictura/common/support/file.h"
+#include "pictura/map/mends.h"
+#include "pictura/map/open_lanes.h"
+#include "pictura/map/opendrive/opendrive.h"
+
+namespace pictura {
+namespace {
+
+struct MapCase {
+  std::string name;  // of the file, without .xodr
+  std::string kind;  // what it has
+};
+
+const std::vector<MapCase> kCases{
+    {"center_lane_without_type", "center lanes that say no type"},
+    {"road_mark_width_minus_one", "road marks of width -1, some tool's word for none"},
+    {"tiny_road_elevation", "a road of 0.2 nm with a slope, which any other length would carry to 234,375 km"},
+    {"geometry_of_no_length", "a road and a geometry of no length"},
+    {"tiny_section_lane_offset", "a lane section of 20 micrometres, between two others whose lane offset jumps there"},
+    {"jump_in_reference_line", "a reference line that goes on 0.63 m beside itself"},
+    {"light_without_controller", "a traffic light that no controller names, away from junctions"},
+    {"street_with_ends", "a street whose ends lead nowhere: agents enter at one end and leave at the other"},
+    {"turnaround", "a turnaround so tight that its inner lane folds over itself"},
+    {"lane_change_in_short_sections", "lanes that must be changed within sections of a few metres"},
+    {"through_lane_two_changes_away", "a way on that begins two lanes away"},
+    {"utm_loop", "coordinates of a UTM zone, 5,800 km from its origin"},
+};
+
+TEST(OpenDriveCases, ThePageSaysWhatIsMadeOfEachFile) {
+  std::string table = "| file | what it has | lanes | endless, open | what is done |\n|---|---|---|---|---|\n";
+  for (const MapCase& its : kCases) {
+    const std::string file = its.name + ".xodr";
+    const RoadMap map = parse_opendrive(read_file(PICTURA_MAP_CASES "/" + file), file);
+    const LaneUse use = count_lane_use(map);
+    std::string done;
+    for (const MendGroup& group : group_mends(map.mends)) {
+      done += fmt::format("{}{}: {}", done.empty() ? "" : "; ", to_string(group.kind), action_of(group.kind));
+    }
+    table += fmt::format("| `{0}` | {1} | {2}, {3:.3f} km | {4}, {5} | {6} |\n", its.name, its.kind, map.facts.lanes,
+                         map.facts.driving_lane_km, use.endless, use.open, done.empty() ? "read without a word" : done);
+  }
+  const std::string docs = read_file(PICTURA_MAP_CASES_DOCS);
+  EXPECT_TRUE(docs.find(table) != std::string::npos) << "expected in docs/map_cases.md:\n" << table;
+}
+
+}  // namespace
+}  // namespace pictura
