@@ -284,6 +284,45 @@ def test_agents_that_enter_a_road_have_names_of_their_own():
     assert report["left"] == len(left) and report["entered"] == len([agent for agent in known if agent.count("_") == 2])
 
 
+def drive_on(speed):
+    return np.where(speed < 4, 10, 7)
+
+
+def test_same_step_has_the_last_observation_of_agents_that_leave():
+    env = pictura.make_vec(
+        pictura.Map.from_text(STREET), 2, pedestrian_fraction=0, cyclist_fraction=0, parked_cars=0, autoreset="same_step"
+    )
+    env.reset(seed=2)
+    for _ in range(300):
+        seen, _, terminated, truncated, info = env.step(drive_on(env.batch.simulator.state["speed_mps"].numpy()))
+        ended = terminated | truncated
+        assert ("final_obs" in info) == ended.any()
+        if truncated.any():
+            assert (info["_final_obs"] == ended).all() and not info["active"][truncated].any()
+            assert (info["final_obs"]["ego"][truncated] == seen["ego"][truncated]).all()
+            return
+    pytest.fail("nobody left the street")
+
+
+def test_torchrl_knows_agents_that_leave():
+    pytest.importorskip("torchrl")
+    import torch
+
+    from pictura.envs.torchrl_env import DriveTorchRLEnv
+
+    street = pictura.Map.from_text(STREET)
+    env = DriveTorchRLEnv(street, num_agents=2, num_worlds=1, pedestrian_fraction=0, cyclist_fraction=0, parked_cars=0)
+    state = env.reset()
+    for _ in range(300):
+        action = drive_on(env.batch.simulator.state["speed_mps"].numpy())
+        state["agents", "action"] = torch.from_numpy(action).reshape(1, 2)
+        state = env.step(state)["next"]
+        if state["agents", "truncated"].any():
+            assert not state["done"].any() and not state["agents", "terminated"].any()
+            return
+    pytest.fail("nobody left the street")
+
+
 def test_torchrl_passes_its_check():
     pytest.importorskip("torchrl")
     import torch

@@ -18,7 +18,8 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
     """All agents of all worlds.
 
     A slot whose agent has halted reports `terminated` once, then reward 0 and info["active"] false until its world resets:
-    agents of a world begin together. autoreset "next_step": the step after a world's end begins its next episode; its
+    agents of a world begin together. On roads that end a slot whose agent leaves reports `truncated` with that agent's last
+    observation, and waits, not active, until another one enters. autoreset "next_step": the step after a world's end begins its next episode; its
     rewards are 0. "same_step": the step that ends it begins it, and info["final_obs"] and info["final_info"] have, for the
     slots that ended in that step, what was last seen.
 
@@ -79,14 +80,13 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
         returned = (results[key] for key in ("reward", "terminated", "truncated"))
         reward, terminated, truncated = map(batch.copied, returned) if copy else returned
         info = self._info(copy)
-        if self._same_step and bool(self._over.any()):
-            ended = terminated | truncated
+        ended = terminated | truncated
+        if self._same_step and bool(ended.any()):
+            final_info = info.copy()
             info["final_obs"], info["_final_obs"] = batch.observe(copy=True), ended
-            info["final_info"], info["_final_info"] = info.copy(), batch.copied(ended)
-            for key in ("final_obs", "_final_obs"):
-                info["final_info"].pop(key)
-            over = batch.copied(self._over)
-            batch.reset(self._next_seed(), over)
+            info["final_info"], info["_final_info"] = final_info, batch.copied(ended)
+        if self._same_step and bool(self._over.any()):
+            batch.reset(self._next_seed(), batch.copied(self._over))
             info["active"] = batch.active
         return batch.observe(self._copy), reward, terminated, truncated, info
 

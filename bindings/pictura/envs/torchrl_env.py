@@ -15,7 +15,8 @@ from pictura.envs.batch import Batch
 class DriveTorchRLEnv(EnvBase):
     """batch_size [worlds]. ("agents", "observation", ...), ("agents", "action"), ("agents", "reward") and ("agents", "mask"),
     which is false for the halted and the absent, are [worlds, agents, ...]; done, terminated and truncated are the worlds',
-    [worlds, 1]; ("agents", "terminated") says whose infraction ended its part. reset() takes "_reset" [worlds]. Options are
+    [worlds, 1]. ("agents", "terminated") is true for the agents that an infraction has just ended, ("agents", "truncated") for
+    those whose world ends or who leave by a road's end: their observation is still their own. reset() takes "_reset" [worlds]. Options are
     pictura.envs.Batch's; on CUDA nothing is copied to the host.
     """
 
@@ -45,7 +46,9 @@ class DriveTorchRLEnv(EnvBase):
             observation = spec(*shapes)
         flag = lambda shape: Categorical(2, shape=shape, dtype=torch.bool, device=self.device)  # noqa: E731
         agents = Composite(
-            {"observation": observation, "mask": flag(self._shape), "terminated": flag((*self._shape, 1))}, shape=self._shape
+            {"observation": observation, "mask": flag(self._shape)}
+            | {end: flag((*self._shape, 1)) for end in self._agent_ends},
+            shape=self._shape,
         )
         self.observation_spec = Composite({"agents": agents}, shape=self.batch_size)
         if self.batch.actions == "discrete":
@@ -60,19 +63,16 @@ class DriveTorchRLEnv(EnvBase):
             {"done": flag(ends), "terminated": flag(ends), "truncated": flag(ends)}, shape=self.batch_size
         )
 
-    def _agents(self, terminated: torch.Tensor | None = None) -> TensorDict:
+    def _agents(self, results: dict[str, Any] | None = None) -> TensorDict:
         split = lambda value: value.reshape(*self._shape, *value.shape[1:])  # noqa: E731
         seen = self.batch.observe(copy=True)
         if isinstance(seen, dict):
             seen = TensorDict({key: split(value) for key, value in seen.items()}, self._shape, device=self.device)
         else:
             seen = split(seen)
-        ended = torch.zeros(*self._shape, 1, dtype=torch.bool, device=self.device)
-        if terminated is not None:
-            ended = split(terminated).unsqueeze(-1).clone()
-        return TensorDict(
-            {"observation": seen, "mask": split(self.batch.active), "terminated": ended}, self._shape, device=self.device
-        )
+        nobody = torch.zeros(*self._shape, 1, dtype=torch.bool, device=self.device)
+        ends = {end: split(results[end]).unsqueeze(-1).clone() if results else nobody.clone() for end in self._agent_ends}
+        return TensorDict({"observation": seen, "mask": split(self.batch.active)} | ends, self._shape, device=self.device)
 
     def _reset(self, tensordict: TensorDictBase | None = None, **_: Any) -> TensorDictBase:
         mask = None if tensordict is None else tensordict.get("_reset", None)
@@ -84,11 +84,12 @@ class DriveTorchRLEnv(EnvBase):
         return TensorDict({"agents": self._agents(), **ends}, self.batch_size, device=self.device)
 
     _ends = ("done", "terminated", "truncated")
+    _agent_ends = ("terminated", "truncated")
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         actions = tensordict["agents", "action"].flatten(0, 1)
         results = self.batch.step(actions)
-        agents = self._agents(results["terminated"])
+        agents = self._agents(results)
         agents["reward"] = results["reward"].reshape(*self._shape, 1).clone()
         over = self._over.reshape(*self.batch_size, 1).clone()
         # A world ends in time, or because too many have halted: for those that still drive both are a truncation.
