@@ -44,6 +44,9 @@ Aabb2 bounds_of(const RoadMap& map) {
     grow(&box, edge.b_m.xy(), 0);
   }
   for (const Vec3& point : map.marking_points) grow(&box, point.xy(), 0);
+  for (const ParkingSpace& space : map.parking_spaces) {
+    grow(&box, space.center_m.xy(), 0.5f * std::hypot(space.length_m, space.width_m));
+  }
   PICTURA_CHECK(box.low.x <= box.high.x, "{}: the map has nothing to draw", map.name);
   return box;
 }

@@ -16,8 +16,8 @@ constexpr Rgb kRoadEdgeInk = hex(0xC8312F);
 constexpr Rgb kStopLineInk = hex(0xFFFFFF);
 constexpr Rgb kParkingSpaceInk = hex(0xC9D2DE);
 
-/// Bounding box of a map's lanes, edges and markings, beyond which little else of it lies. Throws Error when there is
-/// nothing.
+/// Bounding box of a map's lanes, edges, markings and parking spaces, beyond which little else of it lies. Throws Error
+/// when there is nothing.
 Aabb2 bounds_of(const RoadMap& map);
 
 /// Colour of a lane's surface from above.

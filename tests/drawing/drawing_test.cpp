@@ -508,6 +508,17 @@ TEST(DrawMap, ShowsSignsPaintAndBuildingLines) {
   EXPECT_NEAR(full.at_m(60, -1).b, violet.b, 15);
 }
 
+TEST(DrawMap, ParkingSpacesBesideTheRoadAreInThePicture) {
+  test::RoadText road;
+  road.right = test::lane_of(-1, "driving", 3);
+  const auto height_px = [&] { return draw_map(test::parse(road.text()), {.size_px = 800}).height_px; };
+  const int of_the_road_px = height_px();
+  road.rest =
+      R"(<objects><object id="1" type="parkingSpace" s="50" t="-20" zOffset="0" hdg="0" length="5" width="2.5"/></objects>)";
+  const double px_per_m = 8;  // at least: 100 m on 800 px, but for margins
+  EXPECT_GT(height_px(), of_the_road_px + 0.8 * 17 * px_per_m);
+}
+
 TEST(DrawMap, TheSvgHasTheSameSizeAndIsComplete) {
   const ScratchFolder folder;
   draw_map_svg(town(), folder / "map.svg", {.size_px = 700});
