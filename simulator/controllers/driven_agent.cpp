@@ -62,6 +62,12 @@ bool DrivenAgent::leaves_road(const Motion& at, float z_m, float margin_m) const
   return !fits_map(world_.map, box({at.x_m, at.y_m, z_m}, at.heading_rad, margin_m));
 }
 
+bool DrivenAgent::crosses_exit(const Motion& before, const Motion& after, float z_m) const {
+  if (world_.map.exits.empty()) return false;
+  const auto box_of = [&](const Motion& at) { return box({at.x_m, at.y_m, z_m}, at.heading_rad, 0); };
+  return pictura::crosses_exit(world_.map, front_bumper(box_of(before)), front_bumper(box_of(after)), z_m);
+}
+
 float DrivenAgent::to_bumper_m() const {
   const float length_m = world_.agents.length_m[slot_];
   return reference_to_center(class_of(world_.agents, slot_), length_m) + 0.5f * length_m;

@@ -23,6 +23,8 @@ class DrivenAgent {
   AgentBox box(Vec3 axle_m, float heading_rad, float margin_m) const;
   /// Whether its box, at that motion and height, and so much larger on every side, is not all on the road.
   bool leaves_road(const Motion& at, float z_m, float margin_m) const;
+  /// Whether its front bumper crosses an exit in a step at that height: the agent is out then.
+  bool crosses_exit(const Motion& before, const Motion& after, float z_m) const;
   /// From the rear axle to the front bumper.
   float to_bumper_m() const;
   float wheelbase_m() const { return parameters_.wheelbase_m; }

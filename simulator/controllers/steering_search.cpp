@@ -18,6 +18,7 @@ struct Node {
   float aside_m = 0;  // to the left of the path
   float cost = 0;
   int stride = 0;
+  bool is_out = false;  // by an exit
   size_t parent = 0;
   std::array<int32_t, kStrideSteps> actions{};
 };
@@ -40,11 +41,11 @@ class Search {
   DrivingPlan from(const Node& start, size_t max_nodes) {
     size_t farthest = 0;
     open(start);
-    while (!queue_.empty() && nodes_[farthest].stride < kStrides && nodes_.size() < max_nodes) {
+    while (!queue_.empty() && !is_clear(nodes_[farthest]) && nodes_.size() < max_nodes) {
       const size_t index = queue_.top().second;
       queue_.pop();
       if (!closed_.insert(key_of(nodes_[index])).second) continue;
-      if (nodes_[index].stride > nodes_[farthest].stride) farthest = index;
+      if (nodes_[index].stride > nodes_[farthest].stride || nodes_[index].is_out) farthest = index;
       expand(index);
     }
     return plan_to(farthest);
@@ -53,6 +54,8 @@ class Search {
 
  private:
   using Entry = std::pair<float, size_t>;  // cost, node
+
+  static bool is_clear(const Node& node) { return node.stride == kStrides || node.is_out; }
 
   void open(const Node& node) {
     if (closed_.count(key_of(node)) != 0) return;
@@ -68,7 +71,7 @@ class Search {
       next.parent = index;
       ++next.stride;
       bool stays = true;
-      for (size_t step = 0; step < kStrideSteps && stays; ++step) {
+      for (size_t step = 0; step < kStrideSteps && stays && !next.is_out; ++step) {
         const float wanted_mps = std::min(kPlannedSpeed_mps, path_[next.place].speed_mps);
         next.actions[step] = agent_.speed_action(next.motion, wanted_mps) + (step < steps ? side : 0);
         stays = drive(next.actions[step], &next);
@@ -82,12 +85,14 @@ class Search {
     constexpr float kFarthestAside_m = 3, kMaxAskew_rad = 1.6f;
     constexpr float kMinMargin_m = 0.02f, kMargin_m = 0.2f, kTight = 3;
     Node& node = *node_inout;
-    node.motion = agent_.after(node.motion, action);
+    const Motion before = node.motion;
+    node.motion = agent_.after(before, action);
     const Vec2 axle{node.motion.x_m, node.motion.y_m};
     node.place = nearest_point(path_, node.place, axle);
     const PathPoint& point = path_[node.place];
     const bool is_tight = agent_.leaves_road(node.motion, point.position_m.z, kMargin_m);
     if (is_tight && agent_.leaves_road(node.motion, point.position_m.z, kMinMargin_m)) return false;
+    node.is_out = agent_.crosses_exit(before, node.motion, point.position_m.z);
     const SinCos way = sincos_of(point.heading_rad);
     node.aside_m = cross({way.cos, way.sin}, axle - point.position_m.xy());
     const float askew_rad = wrap_angle(node.motion.heading_rad - point.heading_rad);
@@ -98,7 +103,7 @@ class Search {
 
   DrivingPlan plan_to(size_t index) const {
     DrivingPlan plan;
-    plan.is_clear = nodes_[index].stride == kStrides;
+    plan.is_clear = is_clear(nodes_[index]);
     plan.actions.resize(kStrideSteps * static_cast<size_t>(nodes_[index].stride));
     for (auto end = plan.actions.end(); end != plan.actions.begin(); index = nodes_[index].parent) {
       end = std::copy_backward(nodes_[index].actions.begin(), nodes_[index].actions.end(), end);

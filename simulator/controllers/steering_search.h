@@ -16,7 +16,7 @@ constexpr size_t kStrideSteps = 4;
 
 struct DrivingPlan {
   std::vector<int32_t> actions;  // of the coming steps
-  bool is_clear = false;         // as far as plans go; else only until it leaves the road
+  bool is_clear = false;         // as far as plans go, or out by an exit; else only until it leaves the road
 };
 
 /// The cheapest way along the path, from the agent's motion now, at point `place`: it strays little from the path and

@@ -10,7 +10,7 @@
 #include "pictura/map/load_map.h"
 #include "pictura/map/map_copy.h"
 #include "pictura/map/opendrive/opendrive.h"
-#include "pictura/tests/map/small_roads.h"
+#include "pictura/tests/map/open_roads.h"
 #include "pictura/tests/simulator/stage.h"
 
 namespace pictura {
@@ -287,6 +287,25 @@ TEST(SteeringSearch, MakesNoMoreNodesThanItMay) {
   EXPECT_FALSE(plan.actions.empty());
   EXPECT_LT(nodes_left, 10u);
   EXPECT_TRUE(search_steering(agent, car.path->points(), 0, &nodes_left).actions.empty());
+}
+
+TEST(SteeringSearch, EndsAtAnExit) {
+  const auto map = std::make_shared<RoadMap>(parse_opendrive(test::open_street(60), "street.xodr", {}));
+  testing::Stage stage(map, 1);
+  const LaneGraph graph(*map);
+  stage.put(0, {45 - static_cast<float>(map->origin_m[0]), -1.75f}, 0, kPlannedSpeed_mps);
+  LanePath path(stage.world().map, graph, RoutePoint{stage.worlds.state.agents.lane[0], 45});
+  path.go_on(60);
+  path.limit_speeds(0, INFINITY);
+  size_t nodes_left = 10'000;
+  const DrivingPlan plan = search_steering(DrivenAgent(stage.world(), 0), path.points(), 0, &nodes_left);
+  EXPECT_TRUE(plan.is_clear);
+  for (const int32_t action : plan.actions) {
+    if (stage.worlds.state.agents.left[0]) break;
+    stage.step(action);
+    ASSERT_EQ(stage.events(0) & kInfractions, 0);
+  }
+  EXPECT_TRUE(stage.worlds.state.agents.left[0]);
 }
 
 TEST(SteeringSearch, SaysHowFarItGetsWhereNoCarCan) {
