@@ -15,6 +15,7 @@ namespace {
 
 constexpr float kWayOn_m = 80;   // beyond the last waypoint
 constexpr float kMissed_m = 10;  // a waypoint so far behind has been missed
+constexpr float kStanding_mps = 0.1f;
 
 /// The first of `boxes` that touches `other`, or how many there are.
 size_t first_touching(const std::vector<AgentBox>& boxes, const AgentBox& other) {
@@ -44,28 +45,58 @@ int32_t LaneKeepingAgent::act() {
   follow_goals();
   const Motion now = agent_.now();
   const float max_mps = std::min(speed_before_light(now), speed_behind_others());
+  bool is_safe = false;
   if (max_mps < kPlannedSpeed_mps) {
-    plan_ = {};
-    next_planned_ = 0;
+    drop_plan();
   } else if (next_planned_ % kStrideSteps == 0 || next_planned_ >= plan_.actions.size()) {
-    renew_plan(now);
+    is_safe = renew_plan(now);
+  } else {
+    is_safe = is_plan_safe();
   }
-  if (next_planned_ < plan_.actions.size()) return plan_.actions[next_planned_++];
-  return pursuing_action(now, place_, std::min(points()[place_].speed_mps, max_mps));
+  const bool is_planned = next_planned_ < plan_.actions.size();
+  const int32_t action = is_planned ? plan_.actions[next_planned_]
+                                    : pursuing_action(now, place_, std::min(points()[place_].speed_mps, max_mps));
+  if (is_safe) {
+    halts_ = false;
+    min_search_nodes_ = 0;
+  } else if (halts_ || !can_stop_after(now, action)) {
+    halts_ = true;
+    drop_plan();
+    return braking_action(now);
+  }
+  next_planned_ += is_planned;
+  return action;
 }
 
-/// Nothing is planned while pursuing the path will do. A plan is followed for half of it at least.
-void LaneKeepingAgent::renew_plan(const Motion& now) {
-  if (stays_on_road(now)) {
-    plan_ = {};
-    next_planned_ = 0;
-    return;
+/// Returns whether what it then does keeps it on the road. Nothing is planned while pursuing the path will do. A plan
+/// is followed for half of it at least. An agent that halts searches where it then stands, each time with twice as many
+/// nodes; a search that has tried everything there was the last.
+bool LaneKeepingAgent::renew_plan(const Motion& now) {
+  if (stays_on_road(now, action_of(Driving::pursues, now, place_), Driving::pursues)) {
+    drop_plan();
+    return true;
   }
-  if (plan_.is_clear && next_planned_ < plan_.actions.size() / 2) return;
+  if (next_planned_ < plan_.actions.size() / 2) return plan_.is_clear;
+  const bool brakes = halts_ && std::fabs(now.speed_mps) > kStanding_mps;
+  const size_t had_nodes = search_nodes_;
+  if (brakes || had_nodes < min_search_nodes_) return false;
   DrivingPlan plan = search_steering(agent_, points(), place_, &search_nodes_);
   if (!plan.is_clear) plan = plan_elsewhere(std::move(plan));
-  if (!plan.is_clear && plan.actions.size() <= plan_.actions.size() - next_planned_) return;
-  plan_ = std::move(plan);
+  const bool is_cut_off = search_nodes_ == 0;
+  if (halts_) {
+    min_search_nodes_ = is_cut_off ? 2 * had_nodes : SIZE_MAX;
+  } else {
+    min_search_nodes_ = is_cut_off ? kMinSearchNodes : 0;
+  }
+  if (plan.is_clear || plan.actions.size() > plan_.actions.size() - next_planned_) {
+    plan_ = std::move(plan);
+    next_planned_ = 0;
+  }
+  return is_plan_safe();
+}
+
+void LaneKeepingAgent::drop_plan() {
+  plan_ = {};
   next_planned_ = 0;
 }
 
@@ -157,23 +188,48 @@ int32_t LaneKeepingAgent::pursuing_action(const Motion& now, size_t place, float
   return best;
 }
 
-/// Whether pursuing the path keeps it on the road so far ahead, by a margin.
-bool LaneKeepingAgent::stays_on_road(Motion now) const {
-  constexpr float kHorizon_m = 20, kMargin_m = 0.1f;
+int32_t LaneKeepingAgent::action_of(Driving how, const Motion& now, size_t place) const {
+  if (how == Driving::brakes_straight) return agent_.speed_action(now, 0);
+  return pursuing_action(now, place, how == Driving::pursues ? points()[place].speed_mps : 0);
+}
+
+/// Whether that action, and then driving so, keeps it on the road by a margin until it has come so far, stands after
+/// braking, or is out by an exit.
+bool LaneKeepingAgent::stays_on_road(Motion now, int32_t action, Driving how) const {
+  constexpr float kHorizon_m = 20;
+  const float margin_m = how == Driving::pursues ? 0.1f : 0.02f;
   size_t place = place_;
   for (float ahead_m = 0; ahead_m < kHorizon_m; ahead_m += driven_m(now.speed_mps, agent_.dt_s())) {
-    now = agent_.after(now, pursuing_action(now, place, points()[place].speed_mps));
+    const Motion before = now;
+    now = agent_.after(now, action);
     place = nearest_point(points(), place, {now.x_m, now.y_m});
-    if (agent_.leaves_road(now, points()[place].position_m.z, kMargin_m)) return false;
+    const float z_m = points()[place].position_m.z;
+    if (agent_.leaves_road(now, z_m, margin_m)) return false;
+    if (agent_.crosses_exit(before, now, z_m)) return true;
+    if (how != Driving::pursues && now.speed_mps < kStanding_mps) return true;
+    action = action_of(how, now, place);
   }
   return true;
+}
+
+/// Whether it can still stop on the road after that action.
+bool LaneKeepingAgent::can_stop_after(const Motion& now, int32_t action) const {
+  return stays_on_road(now, action, Driving::brakes) || stays_on_road(now, action, Driving::brakes_straight);
+}
+
+/// Stops it on the road, if it can.
+int32_t LaneKeepingAgent::braking_action(const Motion& now) const {
+  const int32_t action = action_of(Driving::brakes, now, place_);
+  if (stays_on_road(now, action, Driving::brakes)) return action;
+  const int32_t straight = action_of(Driving::brakes_straight, now, place_);
+  return stays_on_road(now, straight, Driving::brakes_straight) ? straight : action;
 }
 
 /// The speed from which it can stop before the next closed line.
 float LaneKeepingAgent::speed_before_light(const Motion& now) {
   constexpr float kMargin_m = 2.0f;
   const float gap_m = to_closed_line(now) - kMargin_m;
-  stops_ += gap_m < 1 && now.speed_mps < 0.1f;
+  stops_ += gap_m < 1 && now.speed_mps < kStanding_mps;
   return std::sqrt(2 * 1.5f * std::max(gap_m, 0.0f));
 }
 

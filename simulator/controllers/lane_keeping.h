@@ -1,7 +1,7 @@
 // The lane keeper: a controller for vehicles and cyclists among others. It goes where its waypoints lead, stops at red
 // lights and behind others, even if those halt at once, and gives way where it changes lanes. It pursues the path of
-// its lanes, and where that would leave the road, since long cars cut corners, it follows a plan that does not. On the
-// host only.
+// its lanes, and where that would leave the road, since long cars cut corners, it follows a plan that does not. Where
+// there is none it stops. On the host only.
 #pragma once
 
 #include <array>
@@ -37,18 +37,25 @@ class LaneKeepingAgent {
   static constexpr float kAstray_m = 1;
 
  private:
-  // A node takes 1 to 2 us: searches take at most 4 ms a step in the mean of a long run, and .6 s in a single step.
-  static constexpr size_t kMaxSearchNodes = 300'000, kSearchNodesPerStep = 2'000;
+  // A node takes 1 to 2 us: searches take at most 1 ms a step in the mean of a long run, and .6 s in a single step.
+  static constexpr size_t kMaxSearchNodes = 300'000, kSearchNodesPerStep = 500, kMinSearchNodes = 20'000;
+
+  enum class Driving { pursues, brakes, brakes_straight };  // the path; on the path; without steering
 
   void follow_goals();
   void plan();
   void find_place();
   size_t ahead(size_t from, float distance_m) const;
-  void renew_plan(const Motion& now);
+  bool renew_plan(const Motion& now);
+  void drop_plan();
+  bool is_plan_safe() const { return plan_.is_clear && next_planned_ < plan_.actions.size() / 2; }
   DrivingPlan plan_elsewhere(DrivingPlan plan);
   float steer_to(const Motion& now, size_t place) const;
   int32_t pursuing_action(const Motion& now, size_t place, float wanted_mps) const;
-  bool stays_on_road(Motion now) const;
+  int32_t action_of(Driving how, const Motion& now, size_t place) const;
+  bool stays_on_road(Motion now, int32_t action, Driving how) const;
+  bool can_stop_after(const Motion& now, int32_t action) const;
+  int32_t braking_action(const Motion& now) const;
   float speed_before_light(const Motion& now);
   float to_closed_line(const Motion& now) const;
   float speed_behind_others() const;
@@ -69,6 +76,8 @@ class LaneKeepingAgent {
   DrivingPlan plan_;
   size_t next_planned_ = 0;                // of its actions
   size_t search_nodes_ = kMaxSearchNodes;  // that its searches may still make
+  size_t min_search_nodes_ = 0;            // of these, to begin the next search
+  bool halts_ = false;                     // before it would leave the road, until it knows a way on
   int stops_ = 0, steps_astray_ = 0;
 };
 
