@@ -96,26 +96,25 @@ class GroupWays {
   std::vector<float> way_after_m_;  // [lanes] of the groups that they name
 };
 
-/// The parts of an edge beside a mouth, of which each at least kMinEdge_m long is appended.
+/// The parts of an edge beside a mouth, of which each at least kMinEdge_m long is appended. The edge across a mouth
+/// goes through its middle, but not always at right angles to the lane: where lanes get wider, their middle lines are
+/// askew.
 void append_parts_beside(const RoadEdge& edge, const LaneMouth& mouth, std::vector<RoadEdge>* parts_out) {
-  constexpr float kAcross_m = 0.1f, kBeyond_m = 0.05f, kMinEdge_m = 0.01f;
-  const Vec2 a = edge.a_m.xy() - mouth.middle_m.xy(), b = edge.b_m.xy() - mouth.middle_m.xy();
-  const Vec2 left = left_normal(mouth.direction);
-  const bool is_across =
-      std::fabs(dot(a, mouth.direction)) < kAcross_m && std::fabs(dot(b, mouth.direction)) < kAcross_m;
+  constexpr float kOff_m = 0.1f, kBeyond_m = 0.05f, kMinEdge_m = 0.01f, kMaxAlong = 0.7f;
+  const Vec2 a = edge.a_m.xy() - mouth.middle_m.xy(), edge_m = (edge.b_m - edge.a_m).xy();
+  const float length_m = length(edge_m);
+  const Vec2 way = edge_m * (1 / length_m);
+  const bool is_across = std::fabs(dot(way, mouth.direction)) < kMaxAlong && std::fabs(cross(way, a)) < kOff_m;
   const bool is_level = std::fabs(edge.a_m.z - mouth.middle_m.z) < kSameRoadLevel_m;
-  const float reach_m = mouth.half_width_m + kBeyond_m, from_m = dot(a, left), to_m = dot(b, left);
-  if (!is_across || !is_level || std::max(from_m, to_m) < -reach_m || std::min(from_m, to_m) > reach_m) {
+  // Along the edge: the mouth is between begin_m and end_m.
+  const float reach_m = mouth.half_width_m + kBeyond_m, begin_m = -dot(a, way) - reach_m, end_m = begin_m + 2 * reach_m;
+  if (!is_across || !is_level || end_m < 0 || begin_m > length_m) {
     parts_out->push_back(edge);
     return;
   }
-  const auto point_at = [&](float across_m) {
-    return edge.a_m + (edge.b_m - edge.a_m) * ((across_m - from_m) / (to_m - from_m));
-  };
-  const float near_m = from_m < to_m ? -reach_m : reach_m;  // the mouth's end that the edge comes to first
-  const float toward = from_m < to_m ? 1.0f : -1.0f;
-  if ((near_m - from_m) * toward > kMinEdge_m) parts_out->push_back({edge.a_m, point_at(near_m)});
-  if ((to_m + near_m) * toward > kMinEdge_m) parts_out->push_back({point_at(-near_m), edge.b_m});
+  const auto point_at = [&](float along_m) { return edge.a_m + (edge.b_m - edge.a_m) * (along_m / length_m); };
+  if (begin_m > kMinEdge_m) parts_out->push_back({edge.a_m, point_at(begin_m)});
+  if (length_m - end_m > kMinEdge_m) parts_out->push_back({point_at(end_m), edge.b_m});
 }
 
 }  // namespace

@@ -56,6 +56,23 @@ TEST(OpenLanes, AStreetIsAnExitAndAnEntryAtEitherEnd) {
   EXPECT_EQ(use.unreachable, 0);
 }
 
+/// The middle lines of its lanes are up to .2 rad askew to the ends of the road.
+TEST(OpenLanes, NoEdgeCrossesTheEndsOfLanesThatGetWider) {
+  for (const double slope : {-0.05, 0.1, 0.2}) {
+    const std::string width =
+        fmt::format(R"(<width sOffset="0" a="{}" b="{}" c="0" d="0"/></lane>)", slope < 0 ? 6 : 3.5, slope);
+    test::RoadText road;
+    road.length = 50;
+    road.left = R"(<lane id="2" type="driving">)" + width + R"(<lane id="1" type="driving">)" + width;
+    road.right = R"(<lane id="-1" type="driving">)" + width + R"(<lane id="-2" type="driving">)" + width;
+    const RoadMap map = map_of(test::file_of(road.text()));
+    const OpenLanes open = find_open_lanes(map);
+    EXPECT_EQ(open.exits.size(), 4u);
+    SCOPED_TRACE(slope);
+    expect_no_edges_across(map, open);
+  }
+}
+
 TEST(OpenLanes, ACrossingHasOneExitAndOneEntryAnArm) {
   const RoadMap map = map_of(test::open_crossing());
   const OpenLanes open = find_open_lanes(map);
