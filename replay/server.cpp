@@ -1,37 +1,36 @@
 #include "pictura/replay/server.h"
 
-#ifdef PICTURA_HAS_HTTPLIB
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cerrno>
 #include <condition_variable>
 #include <deque>
 #include <mutex>
 #include <system_error>
-#include <thread>
 
-#include <httplib.h>
 #include <sys/random.h>
-#include <sys/socket.h>
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/json_text.h"
+#include "pictura/replay/http_server.h"
 #include "pictura/replay/page_sources.h"
 #include "pictura/replay/template.h"
-#endif
 
 namespace pictura {
-
-#ifdef PICTURA_HAS_HTTPLIB
 
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
 constexpr int kTokenBytes = 16;
-constexpr size_t kMaxRequestBytes = 4096;
-constexpr std::chrono::seconds kMaxWriteTime{20}, kMaxReadTime{5}, kKeepAlive{2};
+constexpr int kThreads = kMaxLivePages + 8;  // for pages that listen, and for all else
+constexpr const char* kHeaderFields =
+    "Cache-Control: no-store\r\n"
+    "Content-Security-Policy: default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src "
+    "'self'; worker-src blob:; img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'\r\n"
+    "Cross-Origin-Resource-Policy: same-origin\r\n"
+    "Referrer-Policy: no-referrer\r\n"
+    "X-Content-Type-Options: nosniff\r\n";
 constexpr std::chrono::seconds kHeartbeat{10};  // shows the server that a page has gone
 
 std::string random_token() {
@@ -84,56 +83,23 @@ struct Listener {
 struct LiveServer::Parts {
   explicit Parts(const LiveServerOptions& its_options)
       : options(its_options), host_name(host_name_of(its_options.host_name)), token(random_token()) {
-    server.new_task_queue = [] { return new httplib::ThreadPool(kMaxLivePages + 8); };
-    server.set_payload_max_length(kMaxRequestBytes);
-    server.set_read_timeout(kMaxReadTime);
-    server.set_write_timeout(kMaxWriteTime);
-    server.set_keep_alive_timeout(kKeepAlive.count());
-    server.set_tcp_nodelay(true);
-    // The library's own also lets several servers share a port.
-    server.set_socket_options([](socket_t socket) {
-      const int yes = 1;
-      setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-    });
-    server.set_default_headers(
-        {{"Cache-Control", "no-store"},
-         {"Content-Security-Policy",
-          "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src "
-          "'self'; worker-src blob:; img-src data: blob:; base-uri 'none'; form-action 'none'; "
-          "frame-ancestors 'none'"},
-         {"Cross-Origin-Resource-Policy", "same-origin"},
-         {"Referrer-Policy", "no-referrer"},
-         {"X-Content-Type-Options", "nosniff"}});
-    server.set_pre_routing_handler(
-        [this](const httplib::Request& request, httplib::Response& response) { return admit(request, response); });
-    const std::string root = "/" + token;
-    server.Get(root + "/", [](const httplib::Request&, httplib::Response& response) {
-      const std::string page = filled(page::replay_html(), {{"title", "live"}, {"elements", kLiveElement}});
-      response.set_content(page, "text/html; charset=utf-8");
-    });
-    server.Get(root + "/events",
-               [this](const httplib::Request&, httplib::Response& response) { give_events(response); });
-    server.Post(root + "/control", [this](const httplib::Request& request, httplib::Response& response) {
-      take_request(request, response);
-    });
     const bool everywhere = !host_name.empty();
-    const std::string listened = everywhere ? "0.0.0.0" : "127.0.0.1";
-    port = options.port;
-    if (port == 0) {
-      port = server.bind_to_any_port(listened);
-    } else if (!server.bind_to_port(listened, port)) {
-      port = -1;
+    try {
+      server = std::make_unique<HttpServer>(
+          everywhere, options.port, kThreads, kHeaderFields,
+          [this](const HttpRequest& request, HttpAnswer& answer) { answer_request(request, answer); });
+    } catch (const std::system_error& error) {
+      fail("serve: cannot listen on {}:{}: {}", everywhere ? "0.0.0.0" : "127.0.0.1", options.port,
+           error.code() == std::errc::address_in_use ? "is the port taken?" : error.code().message());
     }
-    PICTURA_CHECK(port > 0, "serve: cannot listen on {}:{}: is the port taken?", listened, options.port);
+    const int port = server->port();
     address = fmt::format("http://{}:{}/{}/", everywhere ? host_name : "127.0.0.1", port, token);
+    const std::lock_guard lock(mutex);
     for (const std::string& name : {std::string("127.0.0.1"), std::string("localhost"), host_name}) {
       if (name.empty()) continue;
       hosts.push_back(fmt::format("{}:{}", name, port));
       if (port == 80) hosts.push_back(name);  // as browsers say it
     }
-    thread = std::thread([this] { server.listen_after_bind(); });
-    // stop() does nothing before this.
-    while (!server.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
 
   ~Parts() {
@@ -142,70 +108,81 @@ struct LiveServer::Parts {
       is_closing = true;
     }
     changed.notify_all();
-    server.stop();
-    thread.join();
+    server.reset();
+  }
+
+  void answer_request(const HttpRequest& request, HttpAnswer& answer) {
+    check_asker(request);
+    const std::string_view name = std::string_view(request.path).substr(token.size() + 2);
+    const auto expect = [&request](std::string_view method) {
+      if (request.method != method) throw HttpRefusal{405, fmt::format("expected {}", method)};
+    };
+    if (name.empty()) {
+      expect("GET");
+      answer.send(200, "text/html; charset=utf-8",
+                  filled(page::replay_html(), {{"title", "live"}, {"elements", kLiveElement}}));
+    } else if (name == "events") {
+      expect("GET");
+      write_events(answer);
+    } else if (name == "control") {
+      expect("POST");
+      take_request(request);
+      answer.send(204, "", "");
+    } else {
+      throw HttpRefusal{404, "nothing here"};
+    }
   }
 
   // Pages of other sites reach the loopback too: by names that they point at it, which Host shows, and by requests of
   // their own, which Origin shows.
-  httplib::Server::HandlerResponse admit(const httplib::Request& request, httplib::Response& response) const {
-    const auto refuse = [&response](int status, const char* why) {
-      response.status = status;
-      response.set_content(std::string(why) + "\n", "text/plain");
-      return httplib::Server::HandlerResponse::Handled;
+  void check_asker(const HttpRequest& request) const {
+    const std::string host(request.value("host"));
+    const auto is_served = [&] {
+      const std::lock_guard lock(mutex);
+      return std::find(hosts.begin(), hosts.end(), host) != hosts.end();
     };
-    const std::string host = request.get_header_value("Host");
-    if (request.get_header_value_count("Host") != 1 || std::find(hosts.begin(), hosts.end(), host) == hosts.end()) {
-      return refuse(403, "this host name is not served");
+    if (request.count("host") != 1 || !is_served()) throw HttpRefusal{403, "this host name is not served"};
+    if (request.count("origin") > 0 && request.value("origin") != "http://" + host) {
+      throw HttpRefusal{403, "other origins are not served"};
     }
-    if (request.has_header("Origin") && request.get_header_value("Origin") != "http://" + host) {
-      return refuse(403, "other origins are not served");
-    }
-    const std::string site = request.get_header_value("Sec-Fetch-Site");
-    if (!site.empty() && site != "same-origin" && site != "none") return refuse(403, "other sites are not served");
+    const std::string_view site = request.value("sec-fetch-site");
+    if (!site.empty() && site != "same-origin" && site != "none") throw HttpRefusal{403, "other sites are not served"};
     const std::string_view path = request.path;
-    if (path.size() < token.size() + 2 || !is_equal(path.substr(1, token.size()), token)) {
-      return refuse(404, "nothing here");
+    if (path.size() < token.size() + 2 || !is_equal(path.substr(1, token.size()), token) ||
+        path[token.size() + 1] != '/') {
+      throw HttpRefusal{404, "nothing here"};
     }
-    return httplib::Server::HandlerResponse::Unhandled;
   }
 
-  void give_events(httplib::Response& response) {
+  void write_events(HttpAnswer& answer) {
     auto listener = std::make_shared<Listener>();
     {
       const std::lock_guard lock(mutex);
       if (listeners.size() >= kMaxLivePages) {
-        response.status = 503;
-        response.set_content(fmt::format("{} pages listen already\n", kMaxLivePages), "text/plain");
-        return;
+        throw HttpRefusal{503, fmt::format("{} pages listen already", kMaxLivePages)};
       }
       listeners.push_back(listener);
     }
     changed.notify_all();
-    response.set_chunked_content_provider(
-        "text/event-stream",
-        [this, listener](size_t /*offset*/, httplib::DataSink& sink) { return write_next(*listener, sink); },
-        [this, listener](bool /*success*/) {
-          {
-            const std::lock_guard lock(mutex);
-            listeners.erase(std::remove(listeners.begin(), listeners.end(), listener), listeners.end());
-          }
-          changed.notify_all();
-        });
+    if (answer.begin_stream("text/event-stream")) {
+      while (write_next(*listener, answer)) continue;
+    }
+    {
+      const std::lock_guard lock(mutex);
+      listeners.erase(std::remove(listeners.begin(), listeners.end(), listener), listeners.end());
+    }
+    changed.notify_all();
   }
 
   // Whether the connection goes on.
-  bool write_next(Listener& listener, httplib::DataSink& sink) {
+  bool write_next(Listener& listener, HttpAnswer& answer) {
     Text text;
     {
       std::unique_lock lock(mutex);
       listener.is_writing = false;
       changed.notify_all();
       const bool has_news = changed.wait_for(lock, kHeartbeat, [&] { return is_closing || !listener.waiting.empty(); });
-      if (is_closing) {
-        sink.done();
-        return true;
-      }
+      if (is_closing) return false;
       if (has_news) {
         text = listener.waiting.front();
         listener.waiting.pop_front();
@@ -213,34 +190,21 @@ struct LiveServer::Parts {
         listener.is_writing = true;
       }
     }
-    static const std::string heartbeat = ":\n\n";
-    const std::string& bytes = text ? *text : heartbeat;
-    return sink.write(bytes.data(), bytes.size());
+    return answer.write(text ? *text : ":\n\n");
   }
 
-  void take_request(const httplib::Request& request, httplib::Response& response) {
-    const auto refuse = [&response](int status, const std::string& why) {
-      response.status = status;
-      response.set_content(why + "\n", "text/plain");
-    };
+  void take_request(const HttpRequest& request) {
     // Forms of other sites cannot send this type without asking first.
-    std::string type = request.get_header_value("Content-Type");
-    type.resize(std::min(type.size(), type.find_first_of("; ")));  // without its character set
-    if (type != "application/json") {
-      refuse(415, "expected Content-Type: application/json");
-      return;
-    }
+    std::string_view type = request.value("content-type");
+    type = type.substr(0, type.find_first_of("; "));  // without its character set
+    if (type != "application/json") throw HttpRefusal{415, "expected Content-Type: application/json"};
     try {
       const LiveRequest asked = parse_live_request(request.body, options.num_agents);
       const std::lock_guard lock(mutex);
-      if (requests.size() >= kMaxWaitingMessages) {
-        refuse(503, "too many requests wait");
-        return;
-      }
+      if (requests.size() >= kMaxWaitingMessages) throw HttpRefusal{503, "too many requests wait"};
       requests.push_back(asked);
-      response.status = 204;
     } catch (const Error& error) {
-      refuse(400, error.what());
+      throw HttpRefusal{400, error.what()};
     }
     changed.notify_all();
   }
@@ -263,20 +227,17 @@ struct LiveServer::Parts {
   const LiveServerOptions options;
   const std::string host_name;  // in lower case
   const std::string token;
-  httplib::Server server;
-  std::thread thread;
-  int port = 0;
   std::string address;
-  std::vector<std::string> hosts;
 
   mutable std::mutex mutex;  // of all that follows
   std::condition_variable changed;
+  std::vector<std::string> hosts;
   std::vector<std::shared_ptr<Listener>> listeners;
   std::vector<LiveRequest> requests;
   bool is_closing = false;
-};
 
-bool can_serve() { return true; }
+  std::unique_ptr<HttpServer> server;  // ends before what its answers read
+};
 
 LiveServer::LiveServer(const LiveServerOptions& options) : parts_(std::make_unique<Parts>(options)) {}
 
@@ -344,28 +305,5 @@ void LiveServer::flush(std::chrono::milliseconds patience) {
                        [](const auto& listener) { return listener->waiting.empty() && !listener->is_writing; });
   });
 }
-
-#else
-
-struct LiveServer::Parts {
-  std::string address;
-};
-
-bool can_serve() { return false; }
-
-LiveServer::LiveServer(const LiveServerOptions& /*options*/) {
-  fail_usage("--serve: this build cannot serve pages: install libcpp-httplib-dev and build again");
-}
-LiveServer::~LiveServer() = default;
-const std::string& LiveServer::address() const { return parts_->address; }
-void LiveServer::send(std::string_view /*event*/, const std::function<LiveJson()>& /*message*/) {}
-bool LiveServer::has_newcomers() const { return false; }
-void LiveServer::greet(const std::vector<Message>& /*messages*/) {}
-std::vector<LiveRequest> LiveServer::take_requests() { return {}; }
-void LiveServer::wait_until(std::chrono::steady_clock::time_point /*end*/) {}
-int LiveServer::num_pages() const { return 0; }
-void LiveServer::flush(std::chrono::milliseconds /*patience*/) {}
-
-#endif
 
 }  // namespace pictura

@@ -26,13 +26,10 @@ constexpr int kMaxLivePages = 8;
 /// Messages and bytes that may wait for a page.
 constexpr size_t kMaxWaitingMessages = 256, kMaxWaitingBytes = size_t{32} << 20;
 
-/// Whether this build can serve: it needs cpp-httplib.
-bool can_serve();
-
 class LiveServer {
  public:
-  /// Listens from now on, in threads of its own. Throws UsageError where this build cannot, and Error where the port
-  /// is taken.
+  /// Listens from now on, in threads of its own. Throws UsageError for a host name that no browser sends, and Error
+  /// where the port is taken.
   explicit LiveServer(const LiveServerOptions& options);
   /// Ends all connections.
   ~LiveServer();

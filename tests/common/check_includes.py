@@ -43,7 +43,6 @@ STAYS_IN = [
     (re.compile(r"^(Eigen|unsupported)/"), re.compile(r"^((tests/)?map|drawing|bench/truth)/|^common/.*\.cpp$")),
     (re.compile(r"^pugixml"), re.compile(r"^(tests/)?map/")),
     (re.compile(r"^cairo"), re.compile(r"^(tests/)?drawing/")),
-    (re.compile(r"^httplib"), re.compile(r"^(tests/)?replay/")),
     (re.compile(r"^CLI/"), re.compile(r"^(apps|cli|bench/commands)/")),
 ]
 INCLUDE = re.compile(r'^\s*#\s*include\s+([<"])([^>"]+)[>"]')

@@ -16,14 +16,6 @@ from replay_pages import Events, header_of
 import pictura
 
 
-@pytest.fixture
-def can_serve(make):
-    try:
-        pictura.LiveView(make(2))
-    except pictura.UsageError as error:
-        pytest.skip(str(error))
-
-
 def test_a_recording_holds_what_the_simulator_did(make, tmp_path):
     simulator = make(6, 2, seed=4)
     recorder = pictura.Recorder(simulator, world=1, follow=2, rig=pictura.Rig.paper(16, 9))
@@ -119,7 +111,7 @@ def test_what_cannot_be_recorded_is_refused_by_name(make, tmp_path):
     assert recorder.num_steps == 0
 
 
-def test_a_live_view_shows_steps_and_lets_a_page_drive(make, can_serve):
+def test_a_live_view_shows_steps_and_lets_a_page_drive(make):
     simulator = make(5, seed=2)
     recorder = pictura.Recorder(simulator)  # before whom the view gives other commands
     view = pictura.LiveView(simulator, follow=1, wait_for_page=False)
@@ -152,7 +144,7 @@ def test_a_live_view_shows_steps_and_lets_a_page_drive(make, can_serve):
     simulator.step(idle)
 
 
-def test_a_step_waits_for_a_page_unless_told_not_to(make, can_serve):
+def test_a_step_waits_for_a_page_unless_told_not_to(make):
     simulator = make(2)
     view = pictura.LiveView(simulator)
     stepped = threading.Event()
@@ -170,7 +162,7 @@ def test_a_step_waits_for_a_page_unless_told_not_to(make, can_serve):
     events.close()
 
 
-def test_environments_open_a_page(monkeypatch, capfd, can_serve):
+def test_environments_open_a_page(monkeypatch, capfd):
     gymnasium = pytest.importorskip("gymnasium")
     opened = []
     monkeypatch.setattr(webbrowser, "open", opened.append)

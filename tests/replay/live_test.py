@@ -4,6 +4,8 @@ Chromium that drives an agent.
 Run by ctest, one entry per class: python3 live_test.py PICTURA [unittest arguments].
 """
 
+import contextlib
+import gzip
 import http.client
 import json
 import pathlib
@@ -209,6 +211,79 @@ class Http(Served):
         self.assertEqual(events.next("end")["step"], 20)
         out, _ = self.process.communicate(timeout=60)
         self.assertEqual((self.process.returncode, json.loads(out)["steps"]), (0, 20))
+
+
+class Limits(Served):
+    """What a connection may cost, whoever has opened it."""
+
+    def raw(self, text):
+        """A connection that has sent text."""
+        connection = socket.create_connection(("127.0.0.1", self.port), timeout=30)
+        self.addCleanup(connection.close)
+        connection.sendall(text if isinstance(text, bytes) else text.encode())
+        return connection
+
+    def status(self, text):
+        answer = self.raw(text).recv(4096)
+        return int(answer.split()[1]) if answer else None
+
+    def head(self, method, name, *fields):
+        return "\r\n".join([f"{method} {self.path}{name} HTTP/1.1", f"Host: 127.0.0.1:{self.port}", *fields, "", ""])
+
+    def test_requests_that_cost_more_than_they_may_are_refused(self):
+        self.serve()
+        json_type = "Content-Type: application/json"
+        nested = gzip.compress(b"[" * 1000000)
+        for status, request in [
+            # Of 1 MB once it is decompressed, which overflowed the stack.
+            (415, self.head("POST", "control", json_type, "Content-Encoding: gzip", f"Content-Length: {len(nested)}").encode() + nested),
+            (501, self.head("POST", "control", json_type, "Transfer-Encoding: chunked") + "ffffffff\r\n"),
+            (413, self.head("POST", "control", json_type, "Content-Length: 18446744073709551615")),
+            (400, self.head("POST", "control", json_type, "Content-Length: -1")),
+            (400, self.head("POST", "control", json_type, "Content-Length: 2", "Content-Length: 3") + "{}"),
+            (400, self.head("POST", "control", json_type, "Content-Length: 40") + "[" * 40),
+            (400, self.head("GET", "", "a line without a name")),
+            (400, "GET / HTTP/2\r\n\r\n"),
+            (400, "\0\xff" * 100 + "\r\n\r\n"),
+            (405, self.head("DELETE", "")),
+            (431, self.head("GET", "", *["X: y"] * 20000)),
+            (431, self.head("GET", "", "X: " + "y" * 20000)),
+            # No part of an answer is sent alone.
+            (200, self.head("GET", "", "Range: bytes=" + ",".join(["0-"] * 1000))),
+        ]:
+            with self.subTest(request[:200]):
+                self.assertEqual(self.status(request), status)
+        self.assertIsNone(self.process.poll())
+
+    def test_a_request_has_five_seconds_to_come(self):
+        self.serve()
+        slow = self.raw(self.head("GET", "")[:-2])
+        begin = time.monotonic()
+        with contextlib.suppress(ConnectionError):
+            while time.monotonic() - begin < 20:
+                slow.sendall(b"X: y\r\n")
+                slow.settimeout(0.2)
+                with contextlib.suppress(TimeoutError):
+                    if slow.recv(1) == b"":
+                        break
+        self.assertGreater(time.monotonic() - begin, 3)
+        self.assertLess(time.monotonic() - begin, 10)
+
+    def test_connections_do_not_hold_up_the_end(self):
+        self.serve("--cameras")
+        idle = [self.raw("") for _ in range(4)]
+        halfway = [self.raw(self.head("POST", "control", "Content-Length: 100")) for _ in range(4)]
+        deaf = self.raw(self.head("GET", "events"))
+        events = Events(self.address)
+        events.next("frame")
+        time.sleep(0.5)
+        begin = time.monotonic()
+        self.process.send_signal(signal.SIGINT)
+        self.process.wait(timeout=60)
+        self.assertLess(time.monotonic() - begin, 1 + 2)  # what the command does besides
+        for connection in [*idle, *halfway, deaf]:
+            connection.close()
+        events.close()
 
 
 class Usage(unittest.TestCase):
