@@ -182,21 +182,15 @@ function(pictura_add_test name)
   gtest_discover_tests(${name}_test ${filter} DISCOVERY_TIMEOUT 120 PROPERTIES ${properties})
 endfunction()
 
-# The environment of tests. Maps are not cached, so that the importer just built is tested. Idle threads sleep: spinning
-# threads of parallel tests would take the processor from each other.
+# The environment of tests. Maps are not cached, so that the importer just built is tested. Torch's idle threads sleep:
+# spinning threads of parallel tests would take the processor from each other.
 set(PICTURA_TEST_ENVIRONMENT PICTURA_CACHE=off OMP_WAIT_POLICY=passive)
 if(NOT DEFINED ENV{PICTURA_DATA} AND EXISTS ${PROJECT_SOURCE_DIR}/../shared/data)
   get_filename_component(data_folder ${PROJECT_SOURCE_DIR}/../shared/data REALPATH)
   list(APPEND PICTURA_TEST_ENVIRONMENT PICTURA_DATA=${data_folder})
 endif()
 if(PICTURA_SANITIZE MATCHES thread)
-  # Archer tells the sanitizer about OpenMP's synchronisation; without it every parallel loop looks like a race.
-  file(GLOB llvm_folders /usr/lib/llvm-*/lib)
-  find_file(ARCHER libarcher.so HINTS ${llvm_folders} NO_CACHE)
-  if(NOT ARCHER)
-    message(FATAL_ERROR "the thread sanitizer needs clang and libomp's Archer, libarcher.so: install libomp-dev")
-  endif()
-  list(APPEND PICTURA_TEST_ENVIRONMENT OMP_TOOL_LIBRARIES=${ARCHER} TSAN_OPTIONS=ignore_noninstrumented_modules=1)
+  list(APPEND PICTURA_TEST_ENVIRONMENT TSAN_OPTIONS=ignore_noninstrumented_modules=1)
 elseif(PICTURA_SANITIZE MATCHES address)
   # The sanitizer guesses where thread-local variables of libraries loaded at run time lie from the words before them;
   # with Mesa's it may guess wrong and abort.

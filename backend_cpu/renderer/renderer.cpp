@@ -1,5 +1,5 @@
 // The CPU renderer, which is the reference of all others (the oracle): checks its input, places the cameras, and
-// distributes images over OpenMP threads.
+// distributes images over threads.
 #include <cstddef>
 #include <memory>
 
@@ -43,10 +43,10 @@ class CpuRenderer final : public Renderer {
     check_scene(name(), scene, geometries_);
     check_views(name(), scene, views);
     const std::size_t num_cameras = cameras_.size();
-    parallel_for(num_threads(), static_cast<int64_t>(views.size() * num_cameras), [&](int64_t image) {
+    parallel_for(num_threads(), static_cast<int64_t>(views.size() * num_cameras), [&](int64_t image, int thread) {
       const std::size_t view = static_cast<std::size_t>(image) / num_cameras;
       const std::size_t camera = static_cast<std::size_t>(image) % num_cameras;
-      ImageDrawer& drawer = drawers_[static_cast<std::size_t>(omp_get_thread_num())];
+      ImageDrawer& drawer = drawers_[static_cast<std::size_t>(thread)];
       drawer.prepare(request(scene, views[view], camera));
       drawer.draw(target(images_out, view, camera));
     });
@@ -58,9 +58,9 @@ class CpuRenderer final : public Renderer {
     check_scene(name(), scene, geometries_);
     check_views(name(), scene, views);
     check_queries(name(), scene, views, batch.size(), queries, visibility_out.size());
-    parallel_for(num_threads(), static_cast<int64_t>(queries.size()), [&](int64_t i) {
+    parallel_for(num_threads(), static_cast<int64_t>(queries.size()), [&](int64_t i, int thread) {
       const VisibilityQuery& query = queries[static_cast<std::size_t>(i)];
-      ImageDrawer& drawer = drawers_[static_cast<std::size_t>(omp_get_thread_num())];
+      ImageDrawer& drawer = drawers_[static_cast<std::size_t>(thread)];
       VisibilitySum seen;
       const bool is_drawn = static_cast<std::size_t>(query.view) < views.size();
       for (std::size_t camera = 0; is_drawn && camera < cameras_.size(); ++camera) {

@@ -1,48 +1,67 @@
-// Parallel loops of host code: OpenMP with an explicit number of threads. An exception in a body is rethrown in the
-// caller; if several bodies throw, that of the lowest item.
+// Parallel loops of host code over an explicit number of threads. The threads of a loop are the caller's own: they stay
+// with it for its next loop and sleep between loops. An exception in a body is rethrown in the caller; if several
+// bodies throw, that of the lowest item.
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cstdint>
 #include <exception>
 #include <limits>
-
-#include <omp.h>
-
-#include "pictura/common/error.h"
+#include <memory>
+#include <mutex>
+#include <type_traits>
 
 namespace pictura {
 
-/// Far above what a host has, and below where OpenMP ends the process because the system has no more threads.
+/// Far above what a host has, and below where a system has no more threads.
 constexpr int kMaxThreads = 1024;
 
 /// The number of threads to use; 0 means OpenMP's default, cut off at kMaxThreads. Throws Error for numbers out of 0 to
 /// kMaxThreads.
-inline int resolve_num_threads(int num_threads) {
-  PICTURA_CHECK(num_threads >= 0 && num_threads <= kMaxThreads, "threads: expected 0 (all) to {}, got {}", kMaxThreads,
-                num_threads);
-  return num_threads > 0 ? num_threads : std::min(omp_get_max_threads(), kMaxThreads);
-}
+int resolve_num_threads(int num_threads);
 
-/// Calls body(i) for i in [0, count), over num_threads threads (0: all). Bodies must not touch each other's outputs.
+/// Calls call(body, number) in this thread, with number 0, and at the same time in up to num_threads - 1 others, with
+/// numbers of their own below num_threads. A thread that has not begun when this one's call ends is not waited for, so
+/// that processes which keep it from a processor do not hold up the loop. Inside a call: in this thread alone.
+void run_on_threads(int num_threads, void (*call)(void* body, int number), void* body);
+
+/// Calls body(i), or body(i, thread) with the number of the thread below num_threads, for i in [0, count), over at most
+/// num_threads threads (0: all). Bodies must not touch each other's outputs.
 template <typename Body>
 void parallel_for(int num_threads, std::int64_t count, Body&& body) {
-  const int resolved = resolve_num_threads(num_threads);
-  std::exception_ptr error;
-  std::int64_t error_item = std::numeric_limits<std::int64_t>::max();
-#pragma omp parallel for schedule(dynamic, 1) num_threads(resolved) if (resolved != 1)
-  for (std::int64_t i = 0; i < count; ++i) {
-    try {
-      body(i);
-    } catch (...) {
-#pragma omp critical(pictura_parallel_for_error)
-      if (i < error_item) {
-        error = std::current_exception();
-        error_item = i;
+  struct Loop {
+    // Takes items until none is left.
+    void work(int thread) {
+      for (std::int64_t i; (i = next.fetch_add(1, std::memory_order_relaxed)) < count;) {
+        try {
+          if constexpr (std::is_invocable_v<Body&, std::int64_t, int>) {
+            body(i, thread);
+          } else {
+            body(i);
+          }
+        } catch (...) {
+          const std::lock_guard lock(mutex);
+          if (i < error_item) {
+            error = std::current_exception();
+            error_item = i;
+          }
+        }
       }
     }
-  }
-  if (error) std::rethrow_exception(error);
+
+    Body& body;
+    std::int64_t count;
+    std::atomic<std::int64_t> next = 0;
+    std::mutex mutex{};  // of what follows
+    std::exception_ptr error{};
+    std::int64_t error_item = std::numeric_limits<std::int64_t>::max();
+  };
+  const auto threads = std::min<std::int64_t>(resolve_num_threads(num_threads), count);
+  Loop loop{body, count};
+  run_on_threads(
+      static_cast<int>(threads), [](void* its, int thread) { static_cast<Loop*>(its)->work(thread); }, &loop);
+  if (loop.error) std::rethrow_exception(loop.error);
 }
 
 }  // namespace pictura
