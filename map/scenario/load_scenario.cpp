@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <filesystem>
 
-#include <sys/stat.h>
-
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/hash.h"
 #include "pictura/common/support/numbers.h"
@@ -21,28 +19,16 @@ namespace pictura {
 
 namespace fs = std::filesystem;
 
-/// A record of a TFRecord file as its cached index has it.
-struct IndexedRecord {
-  uint64_t offset = 0, bytes = 0;
-  std::string id;
-};
-struct ShardIndex {
-  std::vector<IndexedRecord> records;
-  std::string fault;
+/// What is slow to find of a TFRecord file's records.
+struct ShardIds {
+  std::vector<std::string> of_records;
 };
 
-PICTURA_FIELDS(IndexedRecord, offset, bytes, id)
-PICTURA_FIELDS(ShardIndex, records, fault)
+PICTURA_FIELDS(ShardIds, of_records)
 
 namespace {
 
 enum class SceneFormat { none, womd, gpudrive, pufferdrive, own };
-
-/// What says whether a file is still the same.
-struct FileVersion {
-  uint64_t bytes = 0;
-  int64_t changed_ns = 0;
-};
 
 constexpr std::size_t kMaxJson_bytes = std::size_t{1} << 26, kMaxBinary_bytes = std::size_t{1} << 28;
 constexpr std::string_view kShard = ".tfrecord";
@@ -69,61 +55,49 @@ SceneName split(std::string_view name) {
   return {std::string(name.substr(0, mark)), std::string(name.substr(mark + 1))};
 }
 
-FileVersion version_of(const std::string& path) {
-  struct stat status{};
-  PICTURA_CHECK(::stat(path.c_str(), &status) == 0, "{}: no such file", path);
-  return {static_cast<uint64_t>(status.st_size),
-          int64_t{status.st_mtim.tv_sec} * 1'000'000'000 + int64_t{status.st_mtim.tv_nsec}};
-}
-
 uint64_t hash_of_path(const std::string& path) {
   std::error_code error;
   return hash_of(fs::weakly_canonical(path, error).string());
 }
 
-/// Of a cached index or scene: of which file in which version.
-uint64_t hash_of_version(const FileVersion& version) {
-  Hash64 hash;
-  hash.add_bytes(&version.bytes, sizeof version.bytes);
-  hash.add_bytes(&version.changed_ns, sizeof version.changed_ns);
-  return hash.value();
-}
-
-ShardIndex scan_shard(const std::string& path) {
-  const womd::FileBytes file(path);
-  womd::RecordList list = womd::list_records(file, path);
-  ShardIndex index{{}, std::move(list.fault)};
-  for (std::size_t k = 0; k < list.records.size(); ++k) {
-    const womd::RecordPlace place = list.records[k];
-    std::string id;
+ShardIds scan_ids(const womd::ByteSource& file, const std::vector<womd::RecordPlace>& records) {
+  ShardIds ids;
+  for (const womd::RecordPlace& place : records) {
+    std::string& id = ids.of_records.emplace_back();
     try {
       id = womd::scan_scenario_id(file, place);
     } catch (const FieldError&) {
       // Reading the record says what is wrong with it.
     }
-    index.records.push_back({place.offset, place.bytes, std::move(id)});
   }
-  return index;
+  return ids;
 }
 
-ShardIndex index_shard(const std::string& path) {
+/// The ids of a shard's records, cached for as long as these have the same lengths and checksums.
+ShardIds find_ids(const std::string& path, const womd::ByteSource& file,
+                  const std::vector<womd::RecordPlace>& records) {
   const std::string folder = cache_folder("scenes");
-  if (folder.empty()) return scan_shard(path);
+  if (folder.empty()) return scan_ids(file, records);
   const std::string cached = fmt::format("{}/{:016x}.index", folder, hash_of_path(path));
-  const SceneCacheKey key{.file = hash_of_version(version_of(path)), .record = SceneCacheKey::kIndex};
+  Hash64 content;
+  for (const womd::RecordPlace& place : records) {
+    content.add_bytes(&place.bytes, sizeof place.bytes);
+    content.add_bytes(&place.sum, sizeof place.sum);
+  }
+  const SceneCacheKey key{.content = content.value(), .record = SceneCacheKey::kIndex};
   std::error_code error;
   if (fs::exists(cached, error)) {
     try {
-      ShardIndex index;
-      decode_cached(read_file(cached), key, cached, [&](FieldReader* reader) { reader->get(&index); });
-      return index;
+      ShardIds ids;
+      decode_cached(read_file(cached), key, cached, [&](FieldReader* reader) { reader->get(&ids); });
+      if (ids.of_records.size() == records.size()) return ids;
     } catch (const Error&) {
       // Stale or damaged: made again.
     }
   }
-  ShardIndex index = scan_shard(path);
-  try_to_cache(cached, encode_cached(key, [&](FieldWriter* writer) { writer->put(index); }));
-  return index;
+  ShardIds ids = scan_ids(file, records);
+  try_to_cache(cached, encode_cached(key, [&](FieldWriter* writer) { writer->put(ids); }));
+  return ids;
 }
 
 void append_scenes(const std::string& path, SceneIndex* index_out) {
@@ -131,12 +105,15 @@ void append_scenes(const std::string& path, SceneIndex* index_out) {
     index_out->scenes.push_back({.file = path});
     return;
   }
-  ShardIndex shard = index_shard(path);
-  for (std::size_t k = 0; k < shard.records.size(); ++k) {
-    IndexedRecord& record = shard.records[k];
-    index_out->scenes.push_back({path, static_cast<int32_t>(k), record.offset, record.bytes, std::move(record.id)});
+  const womd::FileBytes file(path);
+  womd::RecordList list = womd::list_records(file, path);
+  ShardIds ids = find_ids(path, file, list.records);
+  for (std::size_t k = 0; k < list.records.size(); ++k) {
+    const womd::RecordPlace& place = list.records[k];
+    index_out->scenes.push_back(
+        {path, static_cast<int32_t>(k), place.offset, place.bytes, std::move(ids.of_records[k])});
   }
-  if (!shard.fault.empty()) index_out->faults.push_back(std::move(shard.fault));
+  if (!list.fault.empty()) index_out->faults.push_back(std::move(list.fault));
 }
 
 LoggedScene parse(std::string_view bytes, const std::string& name) {
@@ -149,16 +126,18 @@ LoggedScene parse(std::string_view bytes, const std::string& name) {
              kShard);
 }
 
-Scenario import_scene(const SceneRef& scene) {
+/// The bytes of the scene's record or file.
+std::string read_scene(const SceneRef& scene) {
   if (scene.record >= 0) {
     const womd::FileBytes file(scene.file);
-    const auto record = static_cast<std::size_t>(scene.record);
-    const std::string payload = womd::read_record(file, scene.file, record, {scene.offset, scene.bytes});
-    return make_scenario(womd::parse_scenario(payload, fmt::format("{}: record {}", scene.file, record)));
+    return womd::read_record(file, scene.file, static_cast<std::size_t>(scene.record), {scene.offset, scene.bytes});
   }
-  if (format_of(scene.file) == SceneFormat::own) return parse_scene_file(read_file(scene.file), scene.file);
-  const bool is_json = format_of(scene.file) == SceneFormat::gpudrive;
-  return make_scenario(parse(read_file(scene.file, is_json ? kMaxJson_bytes : kMaxBinary_bytes), scene.file));
+  return read_file(scene.file, format_of(scene.file) == SceneFormat::gpudrive ? kMaxJson_bytes : kMaxBinary_bytes);
+}
+
+Scenario import_scene(const SceneRef& scene, std::string_view bytes) {
+  if (scene.record < 0) return make_scenario(parse(bytes, scene.file));
+  return make_scenario(womd::parse_scenario(bytes, fmt::format("{}: record {}", scene.file, scene.record)));
 }
 
 }  // namespace
@@ -224,12 +203,13 @@ Scenario load_scenario(const SceneRef& scene, SceneReport* report_out) {
   SceneReport unused;
   SceneReport& report = report_out ? *report_out : unused;
   report = {};
-  const std::string folder = cache_folder("scenes");
   // What we wrote ourselves is as quickly read as the cache.
-  if (folder.empty() || format_of(scene.file) == SceneFormat::own) return import_scene(scene);
+  if (format_of(scene.file) == SceneFormat::own) return parse_scene_file(read_file(scene.file), scene.file);
+  const std::string bytes = read_scene(scene), folder = cache_folder("scenes");
+  if (folder.empty()) return import_scene(scene, bytes);
   const std::string cached =
       fmt::format("{}/{:016x}/{}.scene", folder, hash_of_path(scene.file), std::max(scene.record, 0));
-  const SceneCacheKey key{.file = hash_of_version(version_of(scene.file)), .record = scene.record};
+  const SceneCacheKey key{.content = hash_of(bytes), .record = scene.record};
   std::error_code error;
   if (fs::exists(cached, error)) {
     try {
@@ -240,7 +220,7 @@ Scenario load_scenario(const SceneRef& scene, SceneReport* report_out) {
       report.cache_rejection = rejection.what();
     }
   }
-  Scenario scenario = import_scene(scene);
+  Scenario scenario = import_scene(scene, bytes);
   try_to_cache(cached, encode_scenario(scenario, key));
   return scenario;
 }

@@ -35,8 +35,8 @@ struct SceneReport {
 /// name, or a folder; each with or without #K or #SCENARIO_ID.
 bool is_scene_name(std::string_view name);
 
-/// The scenes of a file or a folder. Records are found from their lengths and ids; the index of a TFRecord file is kept
-/// in the cache (cache_folder("scenes")) for as long as the file's size and time of change stay. Throws Error when
+/// The scenes of a file or a folder. Records are found from their lengths and ids; the ids of a TFRecord file are kept
+/// in the cache (cache_folder("scenes")) for as long as the records' lengths and checksums stay. Throws Error when
 /// there is no such file or folder, and when a folder holds no scene.
 SceneIndex index_scenes(const std::string& path);
 

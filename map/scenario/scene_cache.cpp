@@ -20,7 +20,7 @@ struct FieldFileHeader {
   std::array<char, 8> magic{};
   uint32_t version = 0, byte_order = kByteOrder;
   uint64_t layout = 0;
-  uint64_t file = 0;
+  uint64_t content = 0;
   int64_t record = 0;
   uint64_t payload_bytes = 0, payload_crc = 0;
 };
@@ -38,7 +38,7 @@ std::string encode_fields(const FieldFileKind& kind, const SceneCacheKey& key,
   const FieldFileHeader header{.magic = kind.magic,
                                .version = kind.version,
                                .layout = kind.layout,
-                               .file = key.file,
+                               .content = key.content,
                                .record = key.record,
                                .payload_bytes = payload.size(),
                                .payload_crc = crc32c(payload)};
@@ -58,7 +58,7 @@ void decode_fields(std::string_view bytes, const FieldFileKind& kind, const Scen
     PICTURA_CHECK(header.byte_order == kByteOrder, "written on a machine of another byte order");
     PICTURA_CHECK(header.version == kind.version, "expected version {}, got {}", kind.version, header.version);
     PICTURA_CHECK(header.layout == kind.layout, "{}", kind.other);
-    PICTURA_CHECK(header.file == key.file && header.record == key.record,
+    PICTURA_CHECK(header.content == key.content && header.record == key.record,
                   "stale: the scene's file has changed, or this is another one's");
     const std::string_view payload = bytes.substr(sizeof header);
     PICTURA_CHECK(header.payload_bytes == payload.size(), "{}: expected {} bytes after the header, got {}",

@@ -14,12 +14,11 @@
 
 namespace pictura {
 
-/// What determines a scene, besides this build of the importers. Equal keys mean equal scenes, for as long as files
-/// that change have another size or time of change.
+/// What determines a scene, besides this build of the importers. Equal keys mean equal scenes.
 struct SceneCacheKey {
   static constexpr int64_t kIndex = -2;
-  uint64_t file = 0;   // hash of the file's size and time of change
-  int64_t record = 0;  // in the file; -1: the file is the scene; kIndex: the list of its records
+  uint64_t content = 0;  // hash of the scene's bytes; of an index, of the records' lengths and checksums
+  int64_t record = 0;    // in the file; -1: the file is the scene; kIndex: the list of its records
 };
 
 /// Which kind of file it is: what its header begins with.

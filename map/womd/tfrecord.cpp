@@ -78,7 +78,8 @@ RecordList list_records(const ByteSource& source, const std::string& name) {
                                length + kSum_bytes, payload, size - payload);
       break;
     }
-    list.records.push_back({payload, length});
+    const auto payload_sum = number_at<uint32_t>(source.read(payload + length, kSum_bytes), 0);
+    list.records.push_back({payload, length, payload_sum});
     at = payload + length + kSum_bytes;
   }
   return list;

@@ -45,9 +45,10 @@ class MemoryBytes : public ByteSource {
   std::string_view bytes_;
 };
 
-/// Where a record's payload is.
+/// Where a record's payload is, and the checksum beside it.
 struct RecordPlace {
   uint64_t offset = 0, bytes = 0;
+  uint32_t sum = 0;
 };
 
 /// Scenes have about 1 MB; what is longer than this is no scene.

@@ -19,7 +19,7 @@ namespace pictura::test {
 
 namespace {
 
-constexpr SceneCacheKey kKey{.file = 1, .record = 2};
+constexpr SceneCacheKey kKey{.content = 1, .record = 2};
 
 void exercise(const Scenario& scenario) {
   make_static_geometry(scenario.map);

@@ -1,5 +1,6 @@
 // The rules by which a scenario is made of a recording, each where it decides: docs/scenario.md lists them.
 #include <cmath>
+#include <filesystem>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -307,7 +308,7 @@ TEST(DrivableArea, TheFixturesTrafficStaysOnItsRoad) {
 // The cache
 // ------------------------------------------------------------------------------------------------------------
 
-constexpr SceneCacheKey kKey{.file = 0x1234, .record = 5};
+constexpr SceneCacheKey kKey{.content = 0x1234, .record = 5};
 
 TEST(SceneCache, EveryFieldIsRestored) {
   const Scenario scenario = make_scenario(test::make_fixture());
@@ -330,7 +331,7 @@ TEST(SceneCache, OtherFilesAreRejectedWithTheirReason) {
     damaged[at] = static_cast<char>(damaged[at] ^ 0x10);
     ASSERT_NE(reason(damaged), test::kNoError) << at;
   }
-  EXPECT_THAT(reason(bytes, {.file = 0x1235, .record = 5}), HasSubstr("stale: the scene's file has changed"));
+  EXPECT_THAT(reason(bytes, {.content = 0x1235, .record = 5}), HasSubstr("stale: the scene's file has changed"));
   EXPECT_THAT(reason("PICTRMAP" + bytes.substr(8)), HasSubstr("foreign: expected it to begin with PICTRSCN"));
 }
 
@@ -355,6 +356,24 @@ TEST(SceneCache, ScenesAndIndicesAreKeptUntilTheirFileChanges) {
   EXPECT_FALSE(report.cached);
   EXPECT_THAT(report.cache_rejection, HasSubstr("stale"));
   EXPECT_EQ(load_scenario(shard + "#2").id, "fixture00000004");
+}
+
+TEST(SceneCache, OtherBytesOfTheSameSizeAndTimeAreAnotherScene) {
+  const test::ScratchFolder folder, cache;
+  const test::EnvironmentVariable on("PICTURA_CACHE", std::nullopt), home("XDG_CACHE_HOME", cache.path());
+  const std::string shard = folder / "some.tfrecord";
+  const auto write = [&](uint64_t seed) {
+    write_file(shard, test::write_tfrecord({test::write_womd(test::make_fixture({.seed = seed, .num_steps = 3}))}));
+  };
+  write(1);
+  const auto time = std::filesystem::last_write_time(shard);
+  const auto bytes = std::filesystem::file_size(shard);
+  EXPECT_EQ(load_scenario(shard).id, "fixture00000001");
+  write(2);
+  std::filesystem::last_write_time(shard, time);
+  ASSERT_EQ(std::filesystem::file_size(shard), bytes);
+  EXPECT_EQ(find_scene(shard).id, "fixture00000002");
+  EXPECT_EQ(load_scenario(shard + "#fixture00000002").id, "fixture00000002");
 }
 
 }  // namespace
