@@ -8,6 +8,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/parallel_for.h"
 #include "pictura/common/support/suggestion.h"
 #include "pictura/map/map_cache.h"
@@ -138,8 +139,10 @@ std::shared_ptr<const RoadMap> load_map(const std::string& name, const OpenDrive
 }
 
 std::vector<std::shared_ptr<const RoadMap>> load_maps(const std::vector<std::string>& names, int num_threads) {
+  const InterruptibleWork work("interrupted while maps were loaded");
   std::vector<std::shared_ptr<const RoadMap>> maps(names.size());
   parallel_for(num_threads, static_cast<int64_t>(names.size()), [&](int64_t index) {
+    work.check();
     const auto i = static_cast<std::size_t>(index);
     maps[i] = load_map(names[i]);
   });

@@ -14,6 +14,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/math.h"
+#include "pictura/common/support/interrupt.h"
 
 namespace pictura {
 
@@ -62,13 +63,16 @@ inline double chord_error(const CurvePoint& a, const CurvePoint& b, const CurveP
 /// are.
 std::vector<std::size_t> thin_polyline(const std::vector<CurvePoint>& points, double tolerance_m, double max_piece_m);
 
-/// Limits the number of samples, so that no input can exhaust memory.
+/// Limits the number of samples, so that no input can exhaust memory, and ends sampling where `work` is interrupted.
 class SampleBudget {
  public:
   /// `source` names the map in messages.
-  SampleBudget(std::int64_t max_samples, std::string source)
-      : max_samples_(max_samples), remaining_(max_samples), source_(std::move(source)) {}
+  SampleBudget(std::int64_t max_samples, std::string source, InterruptibleWork work)
+      : max_samples_(max_samples), remaining_(max_samples), source_(std::move(source)), work_(std::move(work)) {}
+  const InterruptibleWork& work() const { return work_; }
   void count_sample() {
+    constexpr std::int64_t kSamplesPerCheck = 1024;
+    if (remaining_ % kSamplesPerCheck == 0) work_.check();
     if (--remaining_ < 0) {
       fail("{}: its curves need more than the {} samples that a file of its size may take", source_, max_samples_);
     }
@@ -77,6 +81,7 @@ class SampleBudget {
  private:
   std::int64_t max_samples_, remaining_;
   std::string source_;
+  InterruptibleWork work_;
 };
 
 /// Where a curve is cut for sampling: it is smooth between breaks. Values at the breaks themselves may belong to other

@@ -1,6 +1,7 @@
 #include "pictura/simulator/compiled_map.h"
 
 #include "pictura/common/error.h"
+#include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/parallel_for.h"
 #include "pictura/map/open_lanes.h"
 #include "pictura/simulator/hash_values.h"
@@ -63,12 +64,15 @@ std::shared_ptr<const CompiledMap> compile_map(std::shared_ptr<const RoadMap> ro
 std::shared_ptr<CompiledMap> compile_map(std::shared_ptr<const RoadMap> road, const MapOptions& options,
                                          MapRecord record) {
   if (!road) fail_usage("simulator: expected maps, got a null pointer");
+  const InterruptibleWork work(fmt::format("map {}: interrupted while it was compiled", road->name));
   auto map = std::make_shared<CompiledMap>();
   const MapGeometryOptions geometry_options{
       .walls = options.walls, .wall_seed = options.wall_seed, .light_heads = options.light_heads};
   const std::vector<WallFace> walls = options.walls ? make_walls(*road, geometry_options) : std::vector<WallFace>{};
+  work.check();
   map->fingerprint = record.agents.empty() ? fingerprint_of(*road) : fingerprint_of(*road, record);
   map->rules = make_map_rules(*road, walls, options.observe_walls, std::move(record), options.observed_span_m);
+  work.check();
   map->geometry = make_static_geometry(*road, geometry_options);
   map->options = options;
   map->road = std::move(road);
@@ -77,9 +81,11 @@ std::shared_ptr<CompiledMap> compile_map(std::shared_ptr<const RoadMap> road, co
 
 std::vector<std::shared_ptr<const CompiledMap>> compile_maps(const std::vector<std::shared_ptr<const RoadMap>>& roads,
                                                              const MapOptions& options, int num_threads) {
+  const InterruptibleWork work("interrupted while maps were compiled");
   std::vector<std::shared_ptr<const CompiledMap>> maps(roads.size());
   parallel_for(num_threads, static_cast<int64_t>(roads.size()), [&](int64_t index) {
     const auto i = static_cast<size_t>(index);
+    work.check();
     maps[i] = compile_map(roads[i], options);
   });
   return maps;

@@ -8,6 +8,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/grid.h"
+#include "pictura/common/support/interrupt.h"
 #include "pictura/map/endless_lanes.h"
 #include "pictura/map/open_lanes.h"
 #include "pictura/simulator/rules/collision.h"
@@ -216,18 +217,28 @@ void add_stop_lines(const RoadMap& map, MapRules* out) {
   }
 }
 
+template <typename Item, typename ToBox>
+Grid cells_of(const std::vector<Item>& items, ToBox&& to_box) {
+  std::vector<Aabb2> boxes;
+  boxes.reserve(items.size());
+  for (const Item& item : items) boxes.push_back(to_box(item));
+  return Grid(boxes, kLookupCell_m);
+}
+
 /// The spot outside the kerb nearest to p, if that is within reach_m. Right-hand traffic: the kerb is to the right of
 /// the cars next to it, and a road edge has the road on its own right, so the cars point against it.
 void add_kerb_spot(Vec3 p, float reach_m, MapRules* out) {
-  const Barrier* nearest = nullptr;
+  const Barrier* nearest = nullptr;  // the first of equally near ones
   float best_m = reach_m;
-  for (const Barrier& edge : out->edges) {
-    if (std::fabs(edge.z_m - p.z) >= kLevel_m) continue;
+  visit_items(out->edge_cells.view(), box_of_segment(p.xy(), p.xy(), reach_m), [&](size_t item) {
+    const Barrier& edge = out->edges[item];
+    if (std::fabs(edge.z_m - p.z) >= kLevel_m) return;
     const float distance = distance_to_segment(p.xy(), edge.a_m, edge.b_m);
-    if (distance >= best_m) continue;
+    const bool is_first = nearest && distance == best_m && &edge < nearest;
+    if (!(distance < best_m || is_first)) return;
     best_m = distance;
     nearest = &edge;
-  }
+  });
   if (!nearest) return;
   const Vec2 way = nearest->b_m - nearest->a_m;
   const float way_m = length(way);
@@ -279,14 +290,6 @@ void add_record(MapRecord record, MapRules* out) {
     out->max_speed_mps = std::max(out->max_speed_mps, length((now.position_m - before.position_m).xy()) / record.dt_s);
   }
   out->record = std::move(record);
-}
-
-template <typename Item, typename ToBox>
-Grid cells_of(const std::vector<Item>& items, ToBox&& to_box) {
-  std::vector<Aabb2> boxes;
-  boxes.reserve(items.size());
-  for (const Item& item : items) boxes.push_back(to_box(item));
-  return Grid(boxes, kLookupCell_m);
 }
 
 /// What lies within range of a cell's centre, nearest first.
@@ -350,10 +353,12 @@ CellLists lists_by_distance(const MapRules& map, const std::string& map_name, co
   for (const Vec2& point : points) boxes.push_back({point, point});
   const Grid grid(boxes, 20.0f);
   const GridView point_cells = grid.view();
+  const InterruptibleWork work(fmt::format("map {}: interrupted while it was compiled", map_name));
   std::vector<uint64_t> keys;
   Neighbors found;
   lists.begin.assign(1, 0);
   for (size_t cell = 0; cell < num_cells; ++cell) {
+    work.check();
     if (is_occupied[cell] && !points.empty()) {
       const Vec2 center = lists.origin_m + Vec2{static_cast<float>(cell % static_cast<size_t>(lists.num_x)) + 0.5f,
                                                 static_cast<float>(cell / static_cast<size_t>(lists.num_x)) + 0.5f} *
@@ -487,6 +492,10 @@ MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool obs
   if (open) add_mouths(*open, &out);
   PICTURA_CHECK(!out.segments.empty(), "map {}: expected at least one drivable lane, got none", map.name);
   add_barriers(map, walls, rule, &out);
+  const auto barrier_box = [&out](const Barrier& barrier) {
+    return box_of_segment(barrier.a_m, barrier.b_m, out.max_box_radius_m);
+  };
+  out.edge_cells = cells_of(out.edges, barrier_box);
   add_stop_lines(map, &out);
   add_parking_spots(map, &out);
 
@@ -503,10 +512,6 @@ MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool obs
     return box_of_segment(a, a + segment.direction * segment.length_m,
                           std::max(kLaneReach_m, segment.half_width_m + kSeamTolerance_m));
   });
-  const auto barrier_box = [&out](const Barrier& barrier) {
-    return box_of_segment(barrier.a_m, barrier.b_m, out.max_box_radius_m);
-  };
-  out.edge_cells = cells_of(out.edges, barrier_box);
   out.wall_cells = cells_of(out.walls, barrier_box);
   out.exit_cells = cells_of(out.exits, [](const Exit& exit) {
     const float reach_m = exit.half_width_m + kExitReach_m;

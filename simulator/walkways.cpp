@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <unordered_map>
 
+#include "pictura/common/support/interrupt.h"
 #include "pictura/simulator/rules/road.h"
 
 namespace pictura {
@@ -15,7 +17,6 @@ constexpr float kCrossingReach_m = 8.0f;  // from the end of a crosswalk to the 
 
 struct Edge {
   int32_t a = 0, b = 0;  // nodes
-  bool on_crosswalk = false;
 };
 
 struct Network {
@@ -106,14 +107,61 @@ void add_middle_line(Span<const Vec3> outline, Vec3* a_out, Vec3* b_out) {
   }
 }
 
+/// Edges next to the road by the square cells that they touch, which crosswalks cut and add to.
+class EdgeCells {
+ public:
+  explicit EdgeCells(const Network& network) {
+    for (size_t i = 0; i < network.edges.size(); ++i) add(network, i);
+  }
+
+  /// Adds an edge piece by piece, so that long ones are in few cells.
+  void add(const Network& network, size_t edge) {
+    const Vec2 a = network.at(network.edges[edge].a).xy(), way = network.at(network.edges[edge].b).xy() - a;
+    const int pieces = 1 + static_cast<int>(length(way) / kCell_m);
+    for (int i = 0; i < pieces; ++i) {
+      const Vec2 from = a + way * (static_cast<float>(i) / static_cast<float>(pieces));
+      const Vec2 to = a + way * (static_cast<float>(i + 1) / static_cast<float>(pieces));
+      visit(min_of(from.x, to.x), max_of(from.x, to.x), min_of(from.y, to.y), max_of(from.y, to.y),
+            [&](uint64_t cell) { edges_of_[cell].push_back(edge); });
+    }
+  }
+
+  /// All edges within reach of p, and others, in ascending order.
+  const std::vector<size_t>& near(Vec2 p) {
+    found_.clear();
+    visit(p.x - kReach_m, p.x + kReach_m, p.y - kReach_m, p.y + kReach_m, [&](uint64_t cell) {
+      const auto edges = edges_of_.find(cell);
+      if (edges != edges_of_.end()) found_.insert(found_.end(), edges->second.begin(), edges->second.end());
+    });
+    std::sort(found_.begin(), found_.end());
+    found_.erase(std::unique(found_.begin(), found_.end()), found_.end());
+    return found_;
+  }
+
+ private:
+  static constexpr float kReach_m = kCrossingReach_m + 1, kCell_m = 2 * kReach_m;  // with room for rounding
+
+  template <typename Visit>
+  static void visit(float low_x, float high_x, float low_y, float high_y, Visit&& visit_cell) {
+    const auto cell = [](float x_m) { return static_cast<int32_t>(std::floor(x_m / kCell_m)); };
+    for (int32_t x = cell(low_x); x <= cell(high_x); ++x) {
+      for (int32_t y = cell(low_y); y <= cell(high_y); ++y) {
+        visit_cell(uint64_t{static_cast<uint32_t>(x)} << 32 | static_cast<uint32_t>(y));
+      }
+    }
+  }
+
+  std::unordered_map<uint64_t, std::vector<size_t>> edges_of_;
+  std::vector<size_t> found_;
+};
+
 /// The node nearest to p next to the road, made by cutting an edge where it lies between nodes; -1 where none is within
 /// reach.
-int32_t node_near(Vec3 p, Network* network_inout) {
+int32_t node_near(Vec3 p, Network* network_inout, EdgeCells* cells_inout) {
   const size_t num_edges = network_inout->edges.size();
   size_t nearest = num_edges;
   float best_m = kCrossingReach_m, best_t = 0;
-  for (size_t i = 0; i < num_edges; ++i) {
-    if (network_inout->edges[i].on_crosswalk) continue;
+  for (const size_t i : cells_inout->near(p.xy())) {
     const Vec3 a = network_inout->at(network_inout->edges[i].a), b = network_inout->at(network_inout->edges[i].b);
     const Vec2 way = (b - a).xy();
     const float way2 = dot(way, way);
@@ -132,22 +180,26 @@ int32_t node_near(Vec3 p, Network* network_inout) {
   const int32_t node = network_inout->add_node(a + way * best_t);
   network_inout->edges[nearest].b = node;
   network_inout->edges.push_back({node, edge.b});
+  cells_inout->add(*network_inout, num_edges);
   return node;
 }
 
 void add_crosswalks(const RoadMap& map, Network* out) {
+  const InterruptibleWork work(fmt::format("map {}: interrupted while it was compiled", map.name));
+  EdgeCells cells(*out);
   for (const Crosswalk& crosswalk : map.crosswalks) {
+    work.check();
     Vec3 end_m[2];
     const auto corners = static_cast<size_t>(crosswalk.outline.size());
     add_middle_line({map.outline_points.data() + crosswalk.outline.begin, corners}, &end_m[0], &end_m[1]);
     if (length((end_m[1] - end_m[0]).xy()) < kMinPiece_m) continue;
     int32_t before = -1;
     for (const Vec3& at : end_m) {
-      const int32_t walk = node_near(at, out);
+      const int32_t walk = node_near(at, out, &cells);
       const bool is_there = walk >= 0 && length((at - out->at(walk)).xy()) < kMinPiece_m;
       const int32_t end = is_there ? walk : out->add_node(at);
-      if (walk >= 0 && !is_there) out->edges.push_back({walk, end, true});
-      if (before >= 0) out->edges.push_back({before, end, true});
+      if (walk >= 0 && !is_there) out->edges.push_back({walk, end});
+      if (before >= 0) out->edges.push_back({before, end});
       before = end;
     }
   }

@@ -18,9 +18,9 @@ namespace {
 
 /// Bounds the import time of small files and the memory of large ones: CARLA's towns need 0.2 samples per byte,
 /// procedural ones 0.7, of which the largest has 35 MB, and a straight road of 100 km half a million.
-SampleBudget budget_for(std::size_t text_bytes, const std::string& source) {
+SampleBudget budget_for(std::size_t text_bytes, const std::string& source, const InterruptibleWork& work) {
   constexpr std::int64_t kBaseSamples = 500'000, kSamplesPerByte = 10, kMaxSamples = 60'000'000;
-  return {std::min(kMaxSamples, kBaseSamples + kSamplesPerByte * static_cast<std::int64_t>(text_bytes)), source};
+  return {std::min(kMaxSamples, kBaseSamples + kSamplesPerByte * static_cast<std::int64_t>(text_bytes)), source, work};
 }
 
 /// Throws Error unless the singular values of the plan are in [0.5, 1.5] and it does not mirror.
@@ -37,8 +37,10 @@ void check_plan(const PlanMap& plan) {
 /// Faults of the network as a whole do not name the file.
 RoadMap import_network(std::string_view text, const std::string& source, const OpenDriveOptions& options,
                        const ImportProgress& progress) {
+  const InterruptibleWork work(fmt::format("{}: interrupted while it was imported", source));
   // Shares as large networks have them.
   const auto begin = [&](const char* stage, double done) {
+    work.check();
     if (progress) progress(stage, done);
   };
   begin("reading", 0);
@@ -55,7 +57,7 @@ RoadMap import_network(std::string_view text, const std::string& source, const O
   } else {
     opendrive::deform(options.plan, &network);  // a copy lies nowhere on Earth
   }
-  opendrive::Build build{network, options, &faults, &map, budget_for(text.size(), source), {}, {}, {}};
+  opendrive::Build build{network, options, &faults, &map, budget_for(text.size(), source, work), {}, {}, {}};
   begin("lanes", 0.1);
   opendrive::choose_origin(&build);
   opendrive::build_lanes(&build);

@@ -321,6 +321,7 @@ void build_markings(Build* build) {
 void build_objects(Build* build) {
   for (std::size_t road = 0; road < build->network.roads.size(); ++road) {
     for (const FileObject& object : build->network.roads[road].objects) {
+      build->budget.work().check();
       add_object(build, road, object);
     }
   }

@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 
+#include "pictura/common/support/interrupt.h"
 #include "pictura/map/opendrive/document.h"
 #include "pictura/map/opendrive/extent.h"
 #include "pictura/map/opendrive/mend_links.h"
@@ -114,6 +115,7 @@ std::optional<double> read_speed_mps(const Element& element) {
 }
 
 void read_network(std::string_view text, const std::string& source_name, Faults* faults, Network* network_out) {
+  const InterruptibleWork work(fmt::format("{}: interrupted while it was read", source_name));
   Network& network = *network_out;
   network = Network();
   network.source = Source(source_name, text);
@@ -127,6 +129,7 @@ void read_network(std::string_view text, const std::string& source_name, Faults*
   }
   const Offset offset = read_header(root.child("header"), &network.geo_reference);
   root.each("road", [&](const Element& element) {
+    work.check();
     const std::string name = name_of(element);
     const Element road = element.with_owner(&name);
     append(read_road(road, offset, faults), road, &network.roads, &network.road_index);

@@ -62,6 +62,7 @@ class SignalBuilder {
       }
     }
     for (std::size_t signal_index = 0; signal_index < placed_signals_.size(); ++signal_index) {
+      build_.budget.work().check();
       const FileSignal& signal = *placed_signals_[signal_index].signal;
       if (!is_referenced[signal_index]) collect(signal_index, placed_signals_[signal_index].road, signal);
       sort_unique(&signal_lanes_[signal_index]);

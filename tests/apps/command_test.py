@@ -304,6 +304,24 @@ class Maps(CommandCase):
             with unittest.mock.patch.dict(os.environ, {"PICTURA_CACHE": "off"}):
                 self.assertFalse(self.json_of("map", town)["cached"])
 
+    def test_imports_end_soon_after_an_interrupt(self):
+        town = self.folder / "large.xodr"
+        self.assertEqual(run("town", "--blocks", "12x12", "--out", town).returncode, 0)
+        command = [PICTURA, "simulate", town, "--agents", "4", "--steps", "1", "--policy", "idle"]
+        with unittest.mock.patch.dict(os.environ, {"PICTURA_CACHE": "off"}):
+            begin = time.monotonic()
+            self.assertEqual(subprocess.run(command, capture_output=True).returncode, 0)
+            whole_s = time.monotonic() - begin
+            for share in (0.3, 0.5, 0.7, 0.9):
+                process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+                time.sleep(share * whole_s)
+                begin = time.monotonic()
+                process.send_signal(signal.SIGINT)
+                _, message = process.communicate(timeout=60)
+                with self.subTest(share=share, message=message):
+                    self.assertIn(process.returncode, (0, 130, -signal.SIGINT))
+                    self.assertLess(time.monotonic() - begin, max(1, 0.35 * whole_s))
+
     def test_exports_are_the_same_map(self):
         first, second = self.folder / "first.xodr", self.folder / "second.xodr"
         facts = self.json_of("map", "procedural:4", "--xodr", first)

@@ -1,4 +1,5 @@
 // Pedestrians: the walkways that a map gives them, where they stand and go, and what counts for them.
+#include <chrono>
 #include <cmath>
 #include <set>
 
@@ -69,6 +70,23 @@ TEST(Walkways, FollowSidewalksInBothDirectionsAndJoinWhereTheyMeet) {
     EXPECT_NEAR(dot(piece.direction, back.direction), -1, 1e-5);
     EXPECT_FLOAT_EQ(std::fabs(piece.a_m.y), 5);
   }
+}
+
+TEST(Walkways, ManyCrosswalksTakeTimeAsTheirNumber) {
+  constexpr float kLength_m = 20'000;
+  constexpr int kCrosswalks = 40'000;
+  auto map = testing::stadium(kLength_m, 1);
+  for (const float y : {5.0f, -5.0f}) {
+    testing::add_side_lane(map.get(), LaneType::sidewalk, straight({0, y}, {kLength_m, y}, 2000));
+  }
+  for (int i = 0; i < kCrosswalks; ++i) {
+    const float x = (static_cast<float>(i) + 0.5f) * (kLength_m / kCrosswalks);
+    testing::add_crosswalk(map.get(), {{x - 0.1f, -4, 0}, {x + 0.1f, -4, 0}, {x + 0.1f, 4, 0}, {x - 0.1f, 4, 0}});
+  }
+  const auto begin = std::chrono::steady_clock::now();
+  const Walkways walkways = world_map(*map).walkways;
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(4));
+  EXPECT_EQ(networks(walkways), 1);
 }
 
 TEST(Walkways, CrosswalksLeadOverTheRoad) {
