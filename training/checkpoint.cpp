@@ -92,7 +92,18 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
 
 bool is_checkpoint(std::string_view file) { return file.starts_with(std::string_view(kMagic, sizeof kMagic)); }
 
-std::string read_checkpoint_file(const std::string& path) { return read_file(path, size_t{1} << 36); }
+std::string read_checkpoint_file(const std::string& path) {
+  return read_file(path, size_t{1} << 36, [&path](std::string_view first) {
+    // Safetensors begin with the length of their header, which is JSON.
+    uint64_t length = 0;
+    const bool is_long = first.size() > sizeof length;
+    if (is_long) std::memcpy(&length, first.data(), sizeof length);
+    PICTURA_CHECK(is_checkpoint(first) || (is_long && length > 0 && first[sizeof length] == '{'),
+                  "{}: expected a checkpoint, which begins with PICTCKPT, or safetensors; got neither, "
+                  "or a truncated file",
+                  path);
+  });
+}
 
 Checkpoint read_checkpoint(const std::string& path) { return parse_checkpoint(read_checkpoint_file(path), path); }
 

@@ -71,7 +71,8 @@ bool is_same_version(const struct stat& a, const struct stat& b) {
 
 }  // namespace
 
-std::string read_file(const std::string& path, std::size_t max_bytes) {
+std::string read_file(const std::string& path, std::size_t max_bytes,
+                      const std::function<void(std::string_view first)>& check) {
   const InputFile file(path);
   const struct stat before = file.status();
   PICTURA_CHECK(!S_ISDIR(before.st_mode), "{}: expected a file, got a folder", path);
@@ -84,6 +85,8 @@ std::string read_file(const std::string& path, std::size_t max_bytes) {
   constexpr std::size_t kChunk_bytes = std::size_t{1} << 16;
   std::string bytes;
   if (is_regular) bytes.reserve(static_cast<std::size_t>(before.st_size) + kChunk_bytes);
+  while (bytes.size() < kFirst_bytes && file.append_to(&bytes, kChunk_bytes) > 0) check_size(bytes.size());
+  if (check) check(std::string_view(bytes).substr(0, kFirst_bytes));
   while (file.append_to(&bytes, kChunk_bytes) > 0) check_size(bytes.size());
   if (is_regular) {
     // Files of the kernel's own have no size, and bytes all the same.

@@ -1,6 +1,7 @@
 // Files that are read and written whole.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -10,7 +11,10 @@ namespace pictura {
 
 /// The bytes of a file. Throws Error naming the path and the reason; refuses folders, files above max_bytes, and files
 /// whose size or time of change differ before and after reading. Throws Interrupted while it waits for a FIFO's writer.
-std::string read_file(const std::string& path, std::size_t max_bytes = std::size_t{1} << 30);
+/// `check`, which may throw, gets the first kFirst_bytes, or what there is, before more is read.
+constexpr std::size_t kFirst_bytes = 64;
+std::string read_file(const std::string& path, std::size_t max_bytes = std::size_t{1} << 30,
+                      const std::function<void(std::string_view first)>& check = {});
 
 /// Writes the bytes as OutputFile does (output_file.h): whole, or not at all.
 void write_file(const std::string& path, std::string_view bytes);

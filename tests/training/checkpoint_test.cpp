@@ -169,6 +169,11 @@ TEST(Rigs, DifferencesAreNamed) {
   EXPECT_EQ(first_difference(saved, now), "4 cameras became 3");
 }
 
+TEST_F(CheckpointFile, FilesWithoutAnEndAreRefusedByHowTheyBegin) {
+  EXPECT_THAT(message_of([] { read_policy("/dev/zero"); }), HasSubstr("/dev/zero: expected a checkpoint"));
+  EXPECT_THAT(message_of([] { read_checkpoint("/dev/urandom"); }), HasSubstr("/dev/urandom: expected a checkpoint"));
+}
+
 TEST_F(CheckpointFile, BrokenFilesAreRefused) {
   const Config config = small_config();
   const PolicyNetwork policy(config.policy, 4, 1);
@@ -184,7 +189,7 @@ TEST_F(CheckpointFile, BrokenFilesAreRefused) {
     EXPECT_THAT(refuse(whole.substr(0, size)), HasSubstr("b.ckpt")) << size;
   }
   EXPECT_THAT(refuse(whole.substr(0, whole.size() - 1)), HasSubstr("truncated"));
-  EXPECT_THAT(refuse("hello, this is no checkpoint at all"), HasSubstr("not a checkpoint"));
+  EXPECT_THAT(refuse("hello, this is no checkpoint at all"), HasSubstr("expected a checkpoint"));
   std::string changed = whole;
   changed[whole.size() - 20] = static_cast<char>(changed[whole.size() - 20] ^ 1);
   EXPECT_THAT(refuse(changed), HasSubstr("damaged"));
