@@ -57,7 +57,10 @@ void settle_evaluation_options(EvaluationArguments* arguments) {
 
 std::string interval_text(const Estimate& estimate, int decimals) {
   if (!std::isfinite(estimate.value)) return "-";
-  return fmt::format("{:.{}f} +- {:.{}f}", estimate.value, decimals, estimate.half_width_95, decimals);
+  const std::string value = fmt::format("{:.{}f} +- ", estimate.value, decimals);
+  // One scenario gives no interval.
+  if (!std::isfinite(estimate.half_width_95)) return value + "-";
+  return value + fmt::format("{:.{}f}", estimate.half_width_95, decimals);
 }
 
 void EvaluationProgress::update(double done, double eta_s) {

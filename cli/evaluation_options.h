@@ -32,7 +32,7 @@ void set_backends(const BackendOptions& backends, DriverOptions* options_out);
 /// Puts into arguments->evaluate what has been parsed beside it.
 void settle_evaluation_options(EvaluationArguments* arguments);
 
-/// "0.123 +- 0.045": the estimate and the half width of its interval; "-" where there was nothing to divide by.
+/// "0.123 +- 0.045": the estimate and the half width of its interval; "-" for what there is not.
 std::string interval_text(const Estimate& estimate, int decimals = 3);
 
 /// Says how far an evaluation is, and once, where it takes long, for how long and what can be done about it.
