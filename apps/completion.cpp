@@ -15,7 +15,7 @@ void add_completion_command(CLI::App& app) {
       "Examples:\n  source <(pictura completion bash)\n"
       "  pictura completion zsh > ~/.zfunc/_pictura\n"
       "  pictura completion fish > ~/.config/fish/completions/pictura.fish");
-  command->callback([shell, &app] { fmt::print("{}", completion_script(app, *shell)); });
+  command->callback([shell, &app] { print_result("{}", completion_script(app, *shell)); });
 }
 
 }  // namespace pictura

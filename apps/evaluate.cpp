@@ -26,11 +26,11 @@ namespace {
 constexpr int kShownGroups = 6;  // of each kind of infraction
 
 void print_table(const EvaluateReport& report) {
-  fmt::print("{:10} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>17} {:>19} {:>9}\n",
-             "density", "scenarios", "steps", "vehicles", "return", "collision", "at-fault", "off-road", "red light",
-             "wall", "goals", "waypoints", "km/infraction", "km/at-fault infr.", "km");
+  print_result("{:10} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>17} {:>19} {:>9}\n",
+               "density", "scenarios", "steps", "vehicles", "return", "collision", "at-fault", "off-road", "red light",
+               "wall", "goals", "waypoints", "km/infraction", "km/at-fault infr.", "km");
   for (const EvaluateRow& row : report.rows) {
-    fmt::print(
+    print_result(
         "{:10} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>17} {:>19} {:>9.2f}\n",
         row.density, row.scenarios, row.steps, row.vehicle_episodes, interval_text(row.return_per_vehicle),
         interval_text(row.collision_rate), interval_text(row.at_fault_collision_rate), interval_text(row.off_road_rate),
@@ -40,15 +40,16 @@ void print_table(const EvaluateReport& report) {
   }
   for (const EvaluateRow& row : report.rows) {
     if (row.left == 0) continue;
-    fmt::print("{}: vehicles are lives on roads that end: {} of {} agents spawned, {} entered, {} left; {} goals/km\n",
-               row.density, row.spawned, row.asked, row.entered, row.left, interval_text(row.goals_per_km));
+    print_result(
+        "{}: vehicles are lives on roads that end: {} of {} agents spawned, {} entered, {} left; {} goals/km\n",
+        row.density, row.spawned, row.asked, row.entered, row.left, interval_text(row.goals_per_km));
   }
-  fmt::print("traffic lights: {}\n", name_of(report.results.setting.light_cycles));
-  fmt::print("+- is the half width of a 95 % confidence interval over scenarios\n");
+  print_result("traffic lights: {}\n", name_of(report.results.setting.light_cycles));
+  print_result("+- is the half width of a 95 % confidence interval over scenarios\n");
   if (report.agent_steps > 0) {
     const auto steps = static_cast<double>(report.agent_steps);
-    fmt::print("{} agent-steps in {}: {}/s\n", format_count(steps), format_duration(report.seconds),
-               format_count(steps / report.seconds));
+    print_result("{} agent-steps in {}: {}/s\n", format_count(steps), format_duration(report.seconds),
+                 format_count(steps / report.seconds));
   }
 }
 
@@ -78,7 +79,7 @@ void print_report(const EvaluateOptions& options, const EvaluateReport& report, 
 }
 
 void print_groups(const std::vector<InfractionGroup>& groups) {
-  fmt::print("{:10} {:>7} {:>7}  {}\n", "infraction", "count", "share", "of vehicles, the commonest");
+  print_result("{:10} {:>7} {:>7}  {}\n", "infraction", "count", "share", "of vehicles, the commonest");
   std::map<std::string, int64_t> totals;
   for (const InfractionGroup& group : groups) totals[group.kind] += group.count;
   for (const auto& [kind, total] : totals) {
@@ -86,8 +87,8 @@ void print_groups(const std::vector<InfractionGroup>& groups) {
     for (const InfractionGroup& group : groups) {
       if (group.kind != kind || shown == kShownGroups) continue;
       ++shown;
-      fmt::print("{:10} {:>7} {:>5.1f} %  {}\n", kind, group.count,
-                 100 * static_cast<double>(group.count) / static_cast<double>(total), group.how);
+      print_result("{:10} {:>7} {:>5.1f} %  {}\n", kind, group.count,
+                   100 * static_cast<double>(group.count) / static_cast<double>(total), group.how);
     }
   }
 }
@@ -141,9 +142,9 @@ EvaluateReport merged(const std::vector<std::string>& paths) {
   report.results = merge(parts, paths);
   report.rows = rows_of(report.results);
   if (!report.results.counts_all_collisions) {
-    fmt::print(stderr,
-               "notice: --merge: files of an earlier version count collisions at fault alone: collisions, walls and km "
-               "per infraction are unknown, km per at-fault infraction is what they called km per infraction\n");
+    print_message(
+        "notice: --merge: files of an earlier version count collisions at fault alone: collisions, walls and km "
+        "per infraction are unknown, km per at-fault infraction is what they called km per infraction\n");
   }
   return report;
 }

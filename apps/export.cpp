@@ -55,9 +55,9 @@ void add_export_command(CLI::App& app) {
                   {"agent_steps", exported.agent_steps},
                   {"policy_hash", exported.policy_hash}});
     } else {
-      fmt::print("{}: {} parameters in {}, {} bytes; {} updates, {} agent-steps; policy hash {}\n", arguments->out,
-                 exported.parameters, arguments->weights, exported.file_bytes, exported.updates, exported.agent_steps,
-                 exported.policy_hash);
+      print_result("{}: {} parameters in {}, {} bytes; {} updates, {} agent-steps; policy hash {}\n", arguments->out,
+                   exported.parameters, arguments->weights, exported.file_bytes, exported.updates, exported.agent_steps,
+                   exported.policy_hash);
     }
   });
 }

@@ -2,8 +2,7 @@
 // SIGTERM, 129 after a hang-up) and one-line error messages.
 #include <algorithm>
 #include <csignal>
-#include <cstdio>
-#include <system_error>
+#include <string>
 
 #include "pictura/apps/commands.h"
 #include "pictura/apps/usage_error.h"
@@ -14,8 +13,64 @@
 #include "pictura/common/support/interrupt.h"
 #include "pictura/version.h"
 
+namespace pictura {
+
+namespace {
+
+void complain(const std::string& message) { print_message("error: {}\n", printable(message)); }
+
+/// Does what the words ask for. Returns the exit status.
+int run(CLI::App& app, int argc, char** argv) {
+  try {
+    app.parse(argc, argv);
+    return 0;
+  } catch (const CLI::Success& success) {  // --help, --version
+    return app.exit(success);
+  } catch (const CLI::ParseError& error) {
+    complain(usage_error(app, error));
+    return 2;
+  } catch (const UsageError& error) {
+    complain(error.what());
+    return 2;
+  } catch (const Interrupted& error) {
+    complain(error.what());
+    return 128 + interrupting_signal();
+  } catch (const Error& error) {
+    complain(error.what());
+  } catch (const std::bad_alloc&) {
+    complain("out of memory");
+  } catch (const std::exception& error) {
+    // Of a library: what follows the first line is where in its own code.
+    std::string message = error.what();
+    message.erase(std::min(message.find('\n'), message.size()));
+    const bool lacks_memory =
+        message.find("out of memory") != std::string::npos || message.find("allocate memory") != std::string::npos;
+    complain(lacks_memory ? "out of memory: " + message : message);
+  }
+  return 1;
+}
+
+/// Ends stdout after a command that ended with `status`. Returns the status of the process.
+int end_output(int status) {
+  try {
+    close_stdout();
+  } catch (const Error& error) {
+    complain(error.what());
+    return status == 0 ? 1 : status;
+  }
+  return status;
+}
+
+}  // namespace
+
+}  // namespace pictura
+
 int main(int argc, char** argv) {
   using namespace pictura;
+  open_standard_streams();
+  catch_interrupts();
+  // A file that would pass the limit on its size (ulimit -f) is an error of writing instead of a sudden death.
+  std::signal(SIGXFSZ, SIG_IGN);
   CLI::App app{
       "Self-play driving from rendered views: maps, simulation, images, training and evaluation.\n"
       "MAP is a .xodr file, a CARLA town's name (looked up in $PICTURA_DATA), or procedural[:SEED]."};
@@ -48,52 +103,5 @@ int main(int argc, char** argv) {
   add_bench_command(app);
   refuse_empty_values(&app);
 
-  catch_interrupts();
-  // A file that would pass the limit on its size (ulimit -f) is an error of writing instead of a sudden death.
-  std::signal(SIGXFSZ, SIG_IGN);
-  const auto complain = [](const std::string& message) {
-    std::fprintf(stderr, "error: %s\n", printable(message).c_str());
-  };
-  try {
-    app.parse(argc, argv);
-    close_stdout();
-    return 0;
-  } catch (const CLI::Success& success) {  // --help, --version
-    app.exit(success);
-  } catch (const CLI::ParseError& error) {
-    complain(usage_error(app, error));
-    return 2;
-  } catch (const UsageError& error) {
-    complain(error.what());
-    return 2;
-  } catch (const Interrupted& error) {
-    complain(error.what());
-    return 128 + interrupting_signal();
-  } catch (const Error& error) {
-    complain(error.what());
-    return 1;
-  } catch (const std::system_error& error) {
-    // A terminal that has hung up takes no report of what was saved.
-    if (interrupting_signal() == SIGHUP) return 128 + SIGHUP;
-    complain(error.what());
-    return 1;
-  } catch (const std::bad_alloc&) {
-    complain("out of memory");
-    return 1;
-  } catch (const std::exception& error) {
-    // Of a library: what follows the first line is where in its own code.
-    std::string message = error.what();
-    message.erase(std::min(message.find('\n'), message.size()));
-    const bool lacks_memory =
-        message.find("out of memory") != std::string::npos || message.find("allocate memory") != std::string::npos;
-    complain(lacks_memory ? "out of memory: " + message : message);
-    return 1;
-  }
-  try {
-    close_stdout();  // of the help
-  } catch (const Error& error) {
-    complain(error.what());
-    return 1;
-  }
-  return 0;
+  return end_output(run(app, argc, argv));
 }

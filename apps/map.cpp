@@ -97,10 +97,10 @@ void add_scene_facts(const Scenario& scenario, Json* object_out) {
 
 void print_table(const Json& object) {
   for (const auto& [key, value] : object.items()) {
-    fmt::print("{:28} {}\n", key,
-               value.is_string()         ? value.get<std::string>()
-               : value.is_number_float() ? fmt::format("{:.2f}", value.get<double>())
-                                         : value.dump());
+    print_result("{:28} {}\n", key,
+                 value.is_string()         ? value.get<std::string>()
+                 : value.is_number_float() ? fmt::format("{:.2f}", value.get<double>())
+                                           : value.dump());
   }
 }
 
@@ -138,12 +138,12 @@ void run_scene(const MapArguments& arguments) {
   if (arguments.full) return print_listing(object, scenario.map);
   if (arguments.json) return print_json(object);
   for (const ConversionNote& note : scenario.notes) {
-    fmt::print(stderr, "note: {} {} (first: {})\n", note.count, note.what, note.first);
+    print_message("note: {} {} (first: {})\n", note.count, note.what, note.first);
   }
   object.erase("notes");
   print_table(object);
   for (const std::string& path : {arguments.png, arguments.svg}) {
-    if (!path.empty()) fmt::print("drawn into {}\n", path);
+    if (!path.empty()) print_result("drawn into {}\n", path);
   }
 }
 
@@ -192,9 +192,9 @@ void run_map(const CLI::App& command, const MapArguments& arguments) {
   object.erase("mends");  // said on stderr
   print_table(object);
   for (const std::string& path : {arguments.png, arguments.svg}) {
-    if (!path.empty()) fmt::print("drawn into {}\n", path);
+    if (!path.empty()) print_result("drawn into {}\n", path);
   }
-  if (!arguments.xodr.empty()) fmt::print("written to {}\n", arguments.xodr);
+  if (!arguments.xodr.empty()) print_result("written to {}\n", arguments.xodr);
 }
 
 }  // namespace

@@ -108,7 +108,7 @@ void add_plot_command(CLI::App& app) {
       if (arguments->json) {
         print_json(facts_of(panels, arguments->out, arguments->x));
       } else {
-        fmt::print("{}: lines {}, panels {}\n", arguments->out, panels[0].series.size(), panels.size());
+        print_result("{}: lines {}, panels {}\n", arguments->out, panels[0].series.size(), panels.size());
       }
       return;
     }
@@ -119,8 +119,8 @@ void add_plot_command(CLI::App& app) {
     if (arguments->json) {
       print_json(facts_of(plot, arguments->out, arguments->x));
     } else {
-      fmt::print("{}: runs {}, lines {}, panels {}\n", arguments->out, arguments->runs.size(), plot.lines.size(),
-                 plot.panels.size());
+      print_result("{}: runs {}, lines {}, panels {}\n", arguments->out, arguments->runs.size(), plot.lines.size(),
+                   plot.panels.size());
     }
   });
 }

@@ -125,46 +125,46 @@ constexpr const char* kEstimateNote =
 
 void print_table(const RemovalResults& results, const std::vector<RemovalRow>& rows) {
   const size_t width = name_width(results);
-  fmt::print("{:{}} {:>10} {:>8} {:>7} {:>20} {:>20} {:>8}\n", "policy", width, "occlusion", "cases", "scenes", "|dV|",
-             "|dP(brake)|", "changed");
+  print_result("{:{}} {:>10} {:>8} {:>7} {:>20} {:>20} {:>8}\n", "policy", width, "occlusion", "cases", "scenes",
+               "|dV|", "|dP(brake)|", "changed");
   for (const RemovalRow& row : rows) {
     if (row.group.distance_band || row.cases == 0) continue;
-    fmt::print("{:{}} {:>10} {:>8} {:>7} {:>20} {:>20} {:>6.1f} %\n",
-               results.policies[static_cast<size_t>(row.policy)].answers_as(), width, row.group.occlusion_name(),
-               row.cases, row.scenes, interval_of(row.abs_value_change), interval_of(row.abs_brake_change),
-               100 * row.changed_share.value);
+    print_result("{:{}} {:>10} {:>8} {:>7} {:>20} {:>20} {:>6.1f} %\n",
+                 results.policies[static_cast<size_t>(row.policy)].answers_as(), width, row.group.occlusion_name(),
+                 row.cases, row.scenes, interval_of(row.abs_value_change), interval_of(row.abs_brake_change),
+                 100 * row.changed_share.value);
   }
-  fmt::print("{}\n{} removals in {}\n", kEstimateNote, results.cases.size(), format_duration(results.seconds));
+  print_result("{}\n{} removals in {}\n", kEstimateNote, results.cases.size(), format_duration(results.seconds));
 }
 
 void print_table(const PedestrianResults& results, const std::vector<PedestrianRow>& rows) {
   const size_t width = name_width(results);
-  fmt::print("{:{}} {:>12} {:>8} {:>7} {:>20} {:>20} {:>8}\n", "policy", width, "pedestrian", "cases", "scenes", "dV",
-             "dP(brake)", "changed");
+  print_result("{:{}} {:>12} {:>8} {:>7} {:>20} {:>20} {:>8}\n", "policy", width, "pedestrian", "cases", "scenes", "dV",
+               "dP(brake)", "changed");
   for (const PedestrianRow& row : rows) {
     if (!row.phase || row.cases == 0) continue;
-    fmt::print("{:{}} {:>12} {:>8} {:>7} {:>20} {:>20} {:>6.1f} %\n",
-               results.policies[static_cast<size_t>(row.policy)].answers_as(), width,
-               kPathPhaseNames[static_cast<size_t>(*row.phase)], row.cases, row.scenes, interval_of(row.value_change),
-               interval_of(row.brake_change), 100 * row.changed_share.value);
+    print_result("{:{}} {:>12} {:>8} {:>7} {:>20} {:>20} {:>6.1f} %\n",
+                 results.policies[static_cast<size_t>(row.policy)].answers_as(), width,
+                 kPathPhaseNames[static_cast<size_t>(*row.phase)], row.cases, row.scenes, interval_of(row.value_change),
+                 interval_of(row.brake_change), 100 * row.changed_share.value);
   }
-  fmt::print("{}\n{} of {} paths found, {} cases in {}\n", kEstimateNote, results.paths.size(), results.paths_asked,
-             results.points.size(), format_duration(results.seconds));
+  print_result("{}\n{} of {} paths found, {} cases in {}\n", kEstimateNote, results.paths.size(), results.paths_asked,
+               results.points.size(), format_duration(results.seconds));
 }
 
 void print_table(const CornerResults& results, const std::vector<CornerRow>& rows) {
   const size_t width = name_width(results);
-  fmt::print("{:{}} {:>8} {:>6} {:>9} {:>11} {:>20} {:>20} {:>20}\n", "policy", width, "case", "walls", "revealed",
-             "after (s)", "distance (m)", "speed (m/s)", "deceleration");
+  print_result("{:{}} {:>8} {:>6} {:>9} {:>11} {:>20} {:>20} {:>20}\n", "policy", width, "case", "walls", "revealed",
+               "after (s)", "distance (m)", "speed (m/s)", "deceleration");
   for (const CornerRow& row : rows) {
     if (row.less_policy || row.less_case || row.revealed == 0) continue;
-    fmt::print("{:{}} {:>8} {:>6} {:>9} {:>5.1f}-{:>5.1f} {:>20} {:>20} {:>20}\n",
-               results.policies[row.policy].answers_as(), width, kCornerCaseNames[static_cast<size_t>(row.its_case)],
-               kWallNames[row.walls ? 0 : 1], row.revealed, row.reveal_s.front(), row.reveal_s.back(),
-               interval_of(row.at_reveal.distance_m), interval_of(row.at_reveal.speed_mps),
-               interval_of(row.at_reveal.deceleration_mps2));
+    print_result("{:{}} {:>8} {:>6} {:>9} {:>5.1f}-{:>5.1f} {:>20} {:>20} {:>20}\n",
+                 results.policies[row.policy].answers_as(), width, kCornerCaseNames[static_cast<size_t>(row.its_case)],
+                 kWallNames[row.walls ? 0 : 1], row.revealed, row.reveal_s.front(), row.reveal_s.back(),
+                 interval_of(row.at_reveal.distance_m), interval_of(row.at_reveal.speed_mps),
+                 interval_of(row.at_reveal.deceleration_mps2));
   }
-  fmt::print(
+  print_result(
       "at the reveal, where line of sight past the walls opens; deceleration over the next 2 s, m/s2\n{}\n"
       "{} of {} pairs, of {} states with somebody hidden and {} empty ones, in {}\n",
       kEstimateNote, results.pairs.size(), results.pairs_asked, results.hidden_found, results.empty_found,

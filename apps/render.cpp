@@ -59,7 +59,7 @@ std::unique_ptr<Renderer> open_renderer(const RenderArguments& arguments, Render
   auto renderer = make_renderer(name, config, &choice);
   PICTURA_CHECK(renderer->device().is_host(), "--renderer {}: pictures are written from host memory; choose cpu",
                 renderer->name());
-  if (name == "auto") fmt::print(stderr, "backend {}\n", choice);
+  if (name == "auto") print_message("backend {}\n", choice);
   make_output_folder(arguments.out);
   return renderer;
 }
@@ -133,9 +133,9 @@ void draw_and_report(const RenderArguments& arguments, const Subject& subject, R
                 {"contact_sheet", sheets[0]},
                 {"contact_sheets", sheets}});
   } else {
-    fmt::print("{} images in {}, contact sheet {}; {} agent-steps/s drawn by {}; image hash {}\n",
-               num_views * num_cameras, arguments.out, fmt::join(sheets, ", "), format_count(rate), renderer->name(),
-               hash.hex());
+    print_result("{} images in {}, contact sheet {}; {} agent-steps/s drawn by {}; image hash {}\n",
+                 num_views * num_cameras, arguments.out, fmt::join(sheets, ", "), format_count(rate), renderer->name(),
+                 hash.hex());
   }
 }
 

@@ -73,7 +73,7 @@ void run_replay(const ReplayArguments& arguments) {
   Json replays = Json::array();
   const auto write_index = [&] {
     const int count = write_gallery(arguments.gallery);
-    fmt::print(stderr, "{}: {} replays\n", (std::filesystem::path(arguments.gallery) / "index.html").string(), count);
+    print_message("{}: {} replays\n", (std::filesystem::path(arguments.gallery) / "index.html").string(), count);
   };
   try {
     for (int episode = 0; episode < arguments.episodes; ++episode) {

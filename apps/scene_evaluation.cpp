@@ -29,42 +29,42 @@ double parse_density(const std::string& text) {
 }
 
 void print_settings(const SceneProtocol& protocol) {
-  fmt::print("protocol {}: control {}, start {}, {} steps\n", protocol.name, protocol.control, protocol.start_step,
-             protocol.steps);
+  print_result("protocol {}: control {}, start {}, {} steps\n", protocol.name, protocol.control, protocol.start_step,
+               protocol.steps);
   std::string rules;
   for (const auto& [name, value] : rules_of(protocol)) rules += fmt::format(" {}={}", name, value);
-  fmt::print("rules:{}\n", rules);
+  print_result("rules:{}\n", rules);
 }
 
 void print_table(const SceneEvaluation& evaluation) {
   const SceneProtocol& protocol = evaluation.results.protocol;
   print_settings(protocol);
   const SceneResults& results = evaluation.results;
-  fmt::print("{} scenes: {} scored, {} with nobody to drive, {} faults\n\n", evaluation.found, results.scored(),
-             results.without_drivers, evaluation.faults().size());
+  print_result("{} scenes: {} scored, {} with nobody to drive, {} faults\n\n", evaluation.found, results.scored(),
+               results.without_drivers, evaluation.faults().size());
   constexpr const char* kLine = "{:8} {:34} {:>8} {:>9} {:>17} {:>17} {:>17} {:>17} {:>17} {:>9}\n";
-  fmt::print(fmt::runtime(kLine), "density", "agent", "scenes", "vehicles", "at-fault", "off-road", "goals",
-             "collisions", "displacement m", "km");
+  print_result(fmt::runtime(kLine), "density", "agent", "scenes", "vehicles", "at-fault", "off-road", "goals",
+               "collisions", "displacement m", "km");
   for (const SceneRow& row : evaluation.rows) {
     const std::string density = fmt::format("{:g} %", 100 * row.density);
-    fmt::print(fmt::runtime(kLine), density, "this", row.scenes, row.vehicle_episodes,
-               interval_text(row.at_fault_collision_rate), interval_text(row.off_road_rate),
-               interval_text(row.goal_rate), interval_text(row.collision_rate), interval_text(row.mean_displacement_m),
-               fmt::format("{:.2f}", row.km_driven));
+    print_result(fmt::runtime(kLine), density, "this", row.scenes, row.vehicle_episodes,
+                 interval_text(row.at_fault_collision_rate), interval_text(row.off_road_rate),
+                 interval_text(row.goal_rate), interval_text(row.collision_rate),
+                 interval_text(row.mean_displacement_m), fmt::format("{:.2f}", row.km_driven));
     if (protocol.name != scene_protocols().front().name) continue;
     for (const PaperSceneRow& paper : paper_scene_rows()) {
       if (paper.density != row.density) continue;
       const auto rate = [](double value) { return fmt::format("{:.3f}", value); };
-      fmt::print(fmt::runtime(kLine), density, fmt::format("paper: {}", paper.agent), "44073", "", rate(paper.at_fault),
-                 rate(paper.off_road), rate(paper.goals), "", "", "");
+      print_result(fmt::runtime(kLine), density, fmt::format("paper: {}", paper.agent), "44073", "",
+                   rate(paper.at_fault), rate(paper.off_road), rate(paper.goals), "", "", "");
     }
   }
-  fmt::print("+- is the half width of a 95 % confidence interval over scenes\n");
+  print_result("+- is the half width of a 95 % confidence interval over scenes\n");
   if (evaluation.seconds <= 0) return;
   const auto steps = static_cast<double>(results.agent_steps());
-  fmt::print("{} agent-steps in {}: {}/s, {:.1f} scenes a minute\n", format_count(steps),
-             format_duration(evaluation.seconds), format_count(steps / evaluation.seconds),
-             60 * results.scored() / evaluation.seconds);
+  print_result("{} agent-steps in {}: {}/s, {:.1f} scenes a minute\n", format_count(steps),
+               format_duration(evaluation.seconds), format_count(steps / evaluation.seconds),
+               60 * results.scored() / evaluation.seconds);
 }
 
 // Of parts, the time is not known.
@@ -110,10 +110,10 @@ void print_report(const DriverOptions& options, const SceneEvaluation& evaluatio
 
 void print_faults(const std::vector<std::string>& faults) {
   for (size_t i = 0; i < std::min(faults.size(), kShownFaults); ++i) {
-    fmt::print(stderr, "warning: left out: {}\n", printable(faults[i]));
+    print_message("warning: left out: {}\n", printable(faults[i]));
   }
   if (faults.size() > kShownFaults) {
-    fmt::print(stderr, "warning: {} more are left out; --json lists all\n", faults.size() - kShownFaults);
+    print_message("warning: {} more are left out; --json lists all\n", faults.size() - kShownFaults);
   }
 }
 
@@ -197,9 +197,9 @@ void run_scene_evaluation(const CLI::App& command, const SceneArguments& argumen
   if (!arguments.rollouts.empty()) {
     check_rollouts(protocol);
     if (options.controller.empty() && options.argmax) {
-      fmt::print(stderr,
-                 "notice: the rollouts of a scene are equal, since the most likely actions are taken; --sampled "
-                 "draws them\n");
+      print_message(
+          "notice: the rollouts of a scene are equal, since the most likely actions are taken; --sampled "
+          "draws them\n");
     }
     rollouts = std::make_unique<RolloutsFile>(arguments.rollouts);
     options.on_rollouts = [&rollouts](const SceneRollouts& scene) { rollouts->write(scene); };

@@ -160,7 +160,7 @@ void print_simulation(const SimulationRun& run, const DrivenWorld& world, bool j
     print_json(object);
   } else {
     for (const auto& [key, value] : object.items()) {
-      fmt::print("{:20} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+      print_result("{:20} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
     }
   }
 }
@@ -232,7 +232,7 @@ void run_simulate(SimulateArguments arguments) {
   }
   if (saved) {
     write_scene_file(arguments.scene, saved->scenario());
-    fmt::print(stderr, "{}: {} steps of the first episode\n", arguments.scene, saved->num_steps() - 1);
+    print_message("{}: {} steps of the first episode\n", arguments.scene, saved->num_steps() - 1);
   }
 
   print_simulation(run, world, arguments.json);

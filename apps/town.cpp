@@ -48,8 +48,8 @@ void add_town_command(CLI::App& app) {
       for (const TownFeature& feature : town_features()) object[feature.name] = arguments->town.*feature.value;
       print_json(object);
     } else {
-      fmt::print("{}: {} bytes; to view it: pictura map {} --png town.png\n", arguments->out, text.size(),
-                 arguments->out);
+      print_result("{}: {} bytes; to view it: pictura map {} --png town.png\n", arguments->out, text.size(),
+                   arguments->out);
     }
   });
 }

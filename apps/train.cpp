@@ -52,7 +52,7 @@ void add_train_command(CLI::App& app) {
   command->callback([arguments] {
     ProgressLine line;
     arguments->train.on_progress = [&line](const TrainProgress& progress) { line.update(progress_text(progress)); };
-    arguments->train.on_notice = [](const std::string& notice) { fmt::print(stderr, "notice: {}\n", notice); };
+    arguments->train.on_notice = [](const std::string& notice) { print_message("notice: {}\n", notice); };
     if (arguments->resume) arguments->train.old_run = OldRun::resume;
     if (arguments->overwrite) arguments->train.old_run = OldRun::overwrite;
     for (const std::string& text : overrides_of(arguments->backends)) arguments->train.overrides.push_back(text);
@@ -83,10 +83,10 @@ void add_train_command(CLI::App& app) {
                   {"out_of_time", report.out_of_time},
                   {"learning_curve", curve.empty() ? Json(nullptr) : Json(curve)}});
     } else {
-      fmt::print("{} agent-steps in {} updates, {:.1f} km driven; checkpoint {}, policy hash {}{}\n",
-                 format_count(static_cast<double>(report.agent_steps)), report.updates, report.km_driven,
-                 report.checkpoint, report.policy_hash, curve.empty() ? "" : ", curve " + curve);
-      if (report.out_of_time) fmt::print("out of time: go on with --resume --out {}\n", arguments->train.out_folder);
+      print_result("{} agent-steps in {} updates, {:.1f} km driven; checkpoint {}, policy hash {}{}\n",
+                   format_count(static_cast<double>(report.agent_steps)), report.updates, report.km_driven,
+                   report.checkpoint, report.policy_hash, curve.empty() ? "" : ", curve " + curve);
+      if (report.out_of_time) print_result("out of time: go on with --resume --out {}\n", arguments->train.out_folder);
     }
     end_as_asked();
   });

@@ -5,6 +5,7 @@
 #include "pictura/cli/drive.h"
 #include "pictura/cli/map_options.h"
 #include "pictura/cli/number_options.h"
+#include "pictura/cli/report.h"
 #include "pictura/training/config.h"
 
 namespace pictura {
@@ -71,8 +72,8 @@ void EvaluationProgress::update(double done, double eta_s) {
     has_estimate_ = true;
     if (elapsed_s + eta_s > kLong_s) {
       line_.finish();
-      fmt::print(stderr, "notice: this takes {} at most; ^C reports {}, and --scenarios A:B evaluates a part\n",
-                 format_duration(elapsed_s + eta_s), finished_);
+      print_message("notice: this takes {} at most; ^C reports {}, and --scenarios A:B evaluates a part\n",
+                    format_duration(elapsed_s + eta_s), finished_);
     }
   }
   line_.update(fmt::format("evaluating: {:.0f} %  ETA {}", 100 * done, format_duration(eta_s)));

@@ -1,10 +1,10 @@
 #include "pictura/cli/map_listing.h"
 
 #include <cmath>
-#include <cstdio>
 #include <functional>
 #include <string>
 
+#include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/json_text.h"
 #include "pictura/map/file_position.h"
@@ -43,7 +43,7 @@ class Listing {
 
   void print() {
     text_ += "\n  }\n}\n";
-    std::fwrite(text_.data(), 1, text_.size(), stdout);
+    print_result_text(text_);
   }
 
  private:

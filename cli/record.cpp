@@ -5,6 +5,7 @@
 
 #include "pictura/cli/drive.h"
 #include "pictura/cli/number_options.h"
+#include "pictura/cli/report.h"
 #include "pictura/commit.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
@@ -44,8 +45,8 @@ std::string quoted(const std::string& word) {
 void say_what_was_written(const std::string& path, const Replay& replay) {
   std::error_code none;  // of a device
   const auto bytes = std::filesystem::file_size(path, none);
-  fmt::print(stderr, "{}: {} agents, {} steps{}\n", path, replay.num_agents, replay.num_frames - 1,
-             none ? "" : fmt::format(", {:.2f} MB", static_cast<double>(bytes) / 1e6));
+  print_message("{}: {} agents, {} steps{}\n", path, replay.num_agents, replay.num_frames - 1,
+                none ? "" : fmt::format(", {:.2f} MB", static_cast<double>(bytes) / 1e6));
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include "pictura/cli/file_options.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/replay_scenarios.h"
+#include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/training/evaluation/infractions.h"
 
@@ -87,8 +88,8 @@ RecordedScenario scenario_of(const ProbeOptions& probe, const ProbeResults& resu
 void compare_speed(const std::string& path, const Replay& replay, int frame, int ego, float probed_mps) {
   const double speed_mps = 0.01 * replay.at(Track::speed_mps, frame, ego);
   if (std::abs(speed_mps - double{probed_mps}) < 0.0051) return;
-  fmt::print(stderr, "notice: {}: the ego drives at {:.2f} m/s, in the probe at {:.2f} m/s: {}\n", path, speed_mps,
-             probed_mps, kWhyOtherwise);
+  print_message("notice: {}: the ego drives at {:.2f} m/s, in the probe at {:.2f} m/s: {}\n", path, speed_mps,
+                probed_mps, kWhyOtherwise);
 }
 
 // Writes the replay of a case, which is at `frame` of it; `probed` says what the case is about.
@@ -107,7 +108,7 @@ void write(const CaseReplayOptions& options, const ProbeResults& results, size_t
   }
   replay.probed = std::move(probed);
   write_replay_and_say_so(options.path, replay);
-  fmt::print(stderr, "{}\n", replay.probed->what);
+  print_message("{}\n", replay.probed->what);
   compare_speed(options.path, replay, frame, place.ego, place.ego_speed_mps);
 }
 
@@ -183,8 +184,8 @@ void write_case_replay(const CaseReplayOptions& options, const CornerOptions& pr
   write(options, results, pair, place, 0, {.what = what, .removed = state.user}, replay);
   const Takeover& probed = results.takeover(pair, true, CornerCase::hidden, 0);
   if (const int steps = replay.num_frames - 1; steps != probed.steps) {
-    fmt::print(stderr, "notice: {}: the ego drives for {} steps, in the probe for {}: {}\n", options.path, steps,
-               probed.steps, kWhyOtherwise);
+    print_message("notice: {}: the ego drives for {} steps, in the probe for {}: {}\n", options.path, steps,
+                  probed.steps, kWhyOtherwise);
   } else if (probed.ended_by == 0) {
     compare_speed(options.path, replay, steps, state.ego, probed.speed_mps[static_cast<size_t>(steps)]);
   }

@@ -6,6 +6,7 @@
 
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
+#include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/interrupt.h"
@@ -124,10 +125,10 @@ void write(const EvaluateOptions& options, const EvaluationResults& results, con
   write_replay_and_say_so(path, record_scenario(options, scenario, recording, &counts));
   const ScenarioCounts& evaluated = counts_of(results, place);
   if (counts.any_infraction == evaluated.any_infraction && counts.goals == evaluated.goals) return;
-  fmt::print(stderr,
-             "notice: {}: {} infractions and {} goals, in the evaluation {} and {}: the policy's numbers differ in "
-             "their last bits where batches or devices differ\n",
-             path, counts.any_infraction, counts.goals, evaluated.any_infraction, evaluated.goals);
+  print_message(
+      "notice: {}: {} infractions and {} goals, in the evaluation {} and {}: the policy's numbers differ in "
+      "their last bits where batches or devices differ\n",
+      path, counts.any_infraction, counts.goals, evaluated.any_infraction, evaluated.goals);
 }
 
 }  // namespace
@@ -204,7 +205,7 @@ void write_scenario_replays(const EvaluateOptions& options, const EvaluationResu
           (root / fmt::format("{}_{}.html", results.densities[place.density].density, place.scenario)).string());
   }
   const int replays = write_gallery(folder);
-  fmt::print(stderr, "{}: {} replays\n", (root / "index.html").string(), replays);
+  print_message("{}: {} replays\n", (root / "index.html").string(), replays);
 }
 
 void write_scenario_replay(const EvaluateOptions& options, const EvaluationResults& results,

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 
+#include <fcntl.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -16,10 +18,17 @@
 
 namespace pictura {
 
-void print_json(const Json& object) {
-  const std::string text = json_text(object, 2) + "\n";
-  std::fwrite(text.data(), 1, text.size(), stdout);
+void open_standard_streams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    // The lowest free number is this one. Read-only: writing fails as it does on a closed one.
+    if (::fcntl(stream, F_GETFD) < 0) ::open("/dev/null", O_RDONLY);
+  }
+  std::signal(SIGPIPE, SIG_IGN);
 }
+
+void print_result_text(const std::string& text) { std::fwrite(text.data(), 1, text.size(), stdout); }
+void print_message_text(const std::string& text) { std::fwrite(text.data(), 1, text.size(), stderr); }
+void print_json(const Json& object) { print_result_text(json_text(object, 2) + "\n"); }
 
 void close_stdout() {
   // A flush says nothing of bytes that an earlier call lost.
@@ -82,7 +91,7 @@ void ProgressLine::update(const std::string& text) {
   const bool terminal = isatty(STDERR_FILENO) != 0;
   if (now - last_print_ < std::chrono::milliseconds(terminal ? 200 : 10000)) return;
   last_print_ = now;
-  std::fprintf(stderr, terminal ? "\r\033[K%s" : "%s\n", shown(text_).c_str());
+  print_message_text(terminal ? "\r\033[K" + shown(text_) : text_ + "\n");
   dirty_ = terminal;
 }
 
@@ -93,7 +102,7 @@ void ProgressLine::update(const std::string& text, double done) {
 
 void ProgressLine::finish() {
   if (!dirty_) return;
-  std::fprintf(stderr, isatty(STDERR_FILENO) ? "\r\033[K%s\n" : "%s\n", text_.c_str());
+  print_message_text((isatty(STDERR_FILENO) ? "\r\033[K" : "") + text_ + "\n");
   dirty_ = false;
 }
 

@@ -1,7 +1,5 @@
 #include "pictura/cli/reported_map.h"
 
-#include <cstdio>
-
 #include "pictura/cli/report.h"
 
 namespace pictura {
@@ -10,8 +8,8 @@ std::shared_ptr<const RoadMap> load_reported_map(const std::string& name) {
   LoadReport report;
   std::shared_ptr<const RoadMap> map = load_map(name, {}, &report);
   if (const std::size_t count = map->mends.size()) {
-    fmt::print(stderr, "{}: {} fault{} mended; `pictura map` lists them\n", printable(report.source), count,
-               count == 1 ? "" : "s");
+    print_message("{}: {} fault{} mended; `pictura map` lists them\n", printable(report.source), count,
+                  count == 1 ? "" : "s");
   }
   return map;
 }
@@ -19,10 +17,10 @@ std::shared_ptr<const RoadMap> load_reported_map(const std::string& name) {
 void print_mends(const RoadMap& map, const std::string& source) {
   if (map.mends.empty()) return;
   for (const std::string& line : describe_mends(map.mends, source)) {
-    fmt::print(stderr, "mended: {}\n", printable(line));
+    print_message("mended: {}\n", printable(line));
   }
-  fmt::print(stderr, "{} fault{} mended; --json lists all, --strict refuses them\n", map.mends.size(),
-             map.mends.size() == 1 ? "" : "s");
+  print_message("{} fault{} mended; --json lists all, --strict refuses them\n", map.mends.size(),
+                map.mends.size() == 1 ? "" : "s");
 }
 
 }  // namespace pictura

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <optional>
 
+#include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/numbers.h"
@@ -49,7 +50,7 @@ std::unique_ptr<LiveView> serve(const ServeOptions& options, Simulator& simulato
   });
   // A page opens with the agent that its address names.
   const std::string opens_with = recording.followed ? fmt::format("#agent={}", *recording.followed) : "";
-  fmt::print(stderr, "serving {}{} (^C ends it)\n", serving->address(), opens_with);
+  print_message("serving {}{} (^C ends it)\n", serving->address(), opens_with);
   return serving;
 }
 

@@ -83,8 +83,8 @@ Json summary_of(BenchResult result) {
 }
 
 void print_heading(const BenchContext& context) {
-  fmt::print("{}\nbackend {} on {}{}, commit {}\n", context.workload, context.backend, context.device,
-             context.driver.empty() ? "" : ", driver " + context.driver, PICTURA_COMMIT);
+  print_result("{}\nbackend {} on {}{}, commit {}\n", context.workload, context.backend, context.device,
+               context.driver.empty() ? "" : ", driver " + context.driver, PICTURA_COMMIT);
 }
 
 void report_benchmark(bool json, const BenchContext& context, const std::vector<BenchResult>& results,
@@ -99,10 +99,10 @@ void report_benchmark(bool json, const BenchContext& context, const std::vector<
   }
   print_heading(context);
   for (const Json& row : rows) {
-    fmt::print("{:50} {:>14.6g} {:18} (mean {:.6g}, min {:.6g}, max {:.6g}, {} repeats)\n",
-               row["name"].get<std::string>(), row["value"].get<double>(), row["unit"].get<std::string>(),
-               row["mean"].get<double>(), row["min"].get<double>(), row["max"].get<double>(),
-               row["repeats"].get<int>());
+    print_result("{:50} {:>14.6g} {:18} (mean {:.6g}, min {:.6g}, max {:.6g}, {} repeats)\n",
+                 row["name"].get<std::string>(), row["value"].get<double>(), row["unit"].get<std::string>(),
+                 row["mean"].get<double>(), row["min"].get<double>(), row["max"].get<double>(),
+                 row["repeats"].get<int>());
   }
   if (earlier) earlier->print_comparison(object);
 }

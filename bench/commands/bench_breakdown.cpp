@@ -167,21 +167,21 @@ BenchResult measure_host_steps(const BreakdownArguments& arguments, const Breakd
 }
 
 void print_table_head() {
-  fmt::print("Seconds, medians; the paper's, on an H100 NVL, after |.\n{:36}", "");
-  for (const Column& column : kColumns) fmt::print(" {:>12}", column.name);
-  fmt::print("  {:^20} {:>7} | {:>9} {:>7}\n", "(min to max)", "chunk", "rendering", "total");
+  print_result("Seconds, medians; the paper's, on an H100 NVL, after |.\n{:36}", "");
+  for (const Column& column : kColumns) print_result(" {:>12}", column.name);
+  print_result("  {:^20} {:>7} | {:>9} {:>7}\n", "(min to max)", "chunk", "rendering", "total");
 }
 
 void print_table_row(const BreakdownCase& c, const std::vector<BenchResult>& columns, int64_t chunk) {
-  fmt::print("{:36}", c.name());
-  for (const BenchResult& column : columns) fmt::print(" {:>12.4g}", summary_of(column)["value"].get<double>());
+  print_result("{:36}", c.name());
+  for (const BenchResult& column : columns) print_result(" {:>12.4g}", summary_of(column)["value"].get<double>());
   const Json total = summary_of(columns.back());
-  fmt::print("  {:^20} {:>7}",
-             fmt::format("({:.4g} to {:.4g})", total["min"].get<double>(), total["max"].get<double>()), chunk);
+  print_result("  {:^20} {:>7}",
+               fmt::format("({:.4g} to {:.4g})", total["min"].get<double>(), total["max"].get<double>()), chunk);
   for (const PaperRow& row : kPaperRows) {
-    if (c.size == row.size) fmt::print(" | {:>9} {:>7}", row.rendering, row.total);
+    if (c.size == row.size) print_result(" | {:>9} {:>7}", row.rendering, row.total);
   }
-  fmt::print("\n");
+  print_result("\n");
 }
 
 /// Plots seconds by size from earlier results, beside the paper's.
@@ -276,8 +276,8 @@ void run_breakdown(const BreakdownArguments& arguments) {
       results.push_back(measure_host_steps(arguments, c));
       const Json row = summary_of(results.back());
       if (!arguments.json) {
-        fmt::print("{:36} {:>12.4g}  ({:.4g} to {:.4g})\n", results.back().name, row["value"].get<double>(),
-                   row["min"].get<double>(), row["max"].get<double>());
+        print_result("{:36} {:>12.4g}  ({:.4g} to {:.4g})\n", results.back().name, row["value"].get<double>(),
+                     row["min"].get<double>(), row["max"].get<double>());
       }
     }
   }

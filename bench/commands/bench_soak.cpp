@@ -23,7 +23,7 @@ struct SoakArguments {
   bool json = false;
 };
 
-void print_result(const SoakArguments& arguments, const SoakResult& result) {
+void print_soak(const SoakArguments& arguments, const SoakResult& result) {
   if (arguments.json) {
     Json faults = Json::array();
     for (const SoakFault& fault : result.faults) {
@@ -63,7 +63,7 @@ void print_result(const SoakArguments& arguments, const SoakResult& result) {
                    {"visibility_faults", visibility_faults}});
     return print_json(object);
   }
-  fmt::print(
+  print_result(
       "{}: {} images of {} scenes in {:.0f} s, {} of {} values differ from the oracle's, worst {:.2f}/255; planes "
       "differ "
       "at {} of {} pixels; {} of {} visibilities differ\n{}\n",
@@ -71,15 +71,15 @@ void print_result(const SoakArguments& arguments, const SoakResult& result) {
       255 * result.error.worst, result.error.differing_plane_pixels, result.error.plane_pixels,
       result.differing_answers, result.queries, result.choice);
   for (const SoakFault& fault : result.faults) {
-    fmt::print(
+    print_result(
         "scene {} view {} camera {}: {} of {} values off by more than 1/255, worst {:.2f}/255; planes differ at {} of "
         "{} pixels\n",
         fault.scene, fault.view, fault.camera, fault.error.beyond, fault.error.values, 255 * fault.error.worst,
         fault.error.differing_plane_pixels, fault.error.plane_pixels);
   }
   for (const VisibilityFault& fault : result.visibility_faults) {
-    fmt::print("scene {} view {} agent {}: visibility {}, expected {}\n", fault.scene, fault.query.view,
-               fault.query.agent, fault.answer, fault.expected);
+    print_result("scene {} view {} agent {}: visibility {}, expected {}\n", fault.scene, fault.query.view,
+                 fault.query.agent, fault.answer, fault.expected);
   }
 }
 
@@ -101,7 +101,7 @@ void run_soak(SoakArguments arguments) {
                     std::min(1.0, std::max(of_time, of_scenes)));
   });
   progress.finish();
-  print_result(arguments, result);
+  print_soak(arguments, result);
   PICTURA_CHECK(
       result.first_faulty_scene < 0,
       "bench soak: {} of {} images are out of tolerance and {} of {} visibilities differ; to repeat the first: "

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/json.h"
@@ -104,18 +105,18 @@ void EarlierReport::add_comparison(Json* report_inout) const {
 }
 
 void EarlierReport::print_comparison(const Json& report) const {
-  fmt::print("\nagainst {}, commit {}:\n", path_, report_.value("commit", "unknown"));
+  print_result("\nagainst {}, commit {}:\n", path_, report_.value("commit", "unknown"));
   for (const char* key : {"workload", "device"}) {
     if (report_.value(key, "") != report.value(key, ""))
-      fmt::print("  the {} differs: {}\n", key, report_.value(key, "unknown"));
+      print_result("  the {} differs: {}\n", key, report_.value(key, "unknown"));
   }
   const std::vector<Comparison> comparisons = compare_results(report_["results"], report["results"]);
-  if (comparisons.empty()) fmt::print("  it has no result of these names\n");
+  if (comparisons.empty()) print_result("  it has no result of these names\n");
   for (const Comparison& each : comparisons) {
-    fmt::print("{:50} {:>14.6g} -> {:<14.6g} {:18} x{:.3f} ({:.3f} to {:.3f}) {}\n", each.name, each.before, each.after,
-               each.unit, each.ratio, each.low, each.high, name_of(each.change));
+    print_result("{:50} {:>14.6g} -> {:<14.6g} {:18} x{:.3f} ({:.3f} to {:.3f}) {}\n", each.name, each.before,
+                 each.after, each.unit, each.ratio, each.low, each.high, name_of(each.change));
   }
-  fmt::print("{}\n", totals_of(comparisons));
+  print_result("{}\n", totals_of(comparisons));
 }
 
 }  // namespace pictura

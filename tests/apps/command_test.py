@@ -232,6 +232,39 @@ class Files(CommandCase):
                 result = subprocess.run([PICTURA, *arguments], stdout=full, stderr=subprocess.PIPE, text=True)
                 self.assertEqual((result.returncode, "No space left on device" in result.stderr), (1, True), result.stderr)
 
+    def test_closed_descriptors_are_no_outputs(self):
+        for closed in ([2], [0, 1, 2]):
+            with self.subTest(closed=closed):
+                video = self.folder / "film.mp4"
+                arguments = ["simulate", "procedural:1", "--agents", 4, "--steps", 10, "--video", video, "--film-width", 60]
+                result = subprocess.run([PICTURA, *map(str, arguments)], stdout=subprocess.DEVNULL,
+                                        preexec_fn=lambda closed=closed: [os.close(descriptor) for descriptor in closed])  # fmt: skip
+                self.assertEqual(result.returncode, 1 if 1 in closed else 0)
+                self.assertEqual(video.read_bytes()[4:8], b"ftyp")
+
+    def test_what_stderr_does_not_take_is_lost_and_nothing_else(self):
+        reader, closed_pipe = os.pipe()
+        os.close(reader)
+        self.addCleanup(os.close, closed_pipe)
+        with open("/dev/full", "wb") as full:
+            for stderr in (full.fileno(), closed_pipe):
+                page = self.folder / "page.html"
+                result = subprocess.run([PICTURA, "replay", "procedural:1", "--agents", "4", "--steps", "20", "--out", str(page), "--json"],
+                                        stdout=subprocess.PIPE, stderr=stderr)  # fmt: skip
+                self.assertEqual((result.returncode, json.loads(result.stdout)["steps"]), (0, 20))
+                self.assertTrue(page.exists())
+
+    def test_a_closed_stdout_is_an_error_after_the_work_is_saved(self):
+        reader, closed_pipe = os.pipe()
+        os.close(reader)
+        self.addCleanup(os.close, closed_pipe)
+        for number, arguments in enumerate((["--seed", "3"], ["--seed", "3", "--json"])):
+            town = self.folder / f"town{number}.xodr"
+            result = subprocess.run([PICTURA, "town", "--blocks", "1x1", *arguments, "--out", str(town)],
+                                    stdout=closed_pipe, stderr=subprocess.PIPE, text=True)  # fmt: skip
+            self.assertEqual((result.returncode, town.exists()), (1, True), result.stderr)
+            self.assertIn("error: stdout: cannot be written: Broken pipe", result.stderr)
+
     def test_the_contact_sheet_of_many_views_has_pages(self):
         out = self.folder / "images"
         facts = self.json_of("render", self.town(), "--agents", 80, "--steps", 0, "--views", 80, "--backend", "null",
@@ -1461,6 +1494,23 @@ class Training(CommandCase):
         process.send_signal(signal.SIGTERM)
         process.communicate(timeout=120)
         self.assertEqual((process.returncode, (out / "checkpoint.ckpt").exists()), (143, True))
+
+    def test_a_run_loses_nothing_by_a_stderr_that_takes_nothing(self):
+        train = [PICTURA, "train", *TINY, "--set", "train.updates=2", "--out"]
+        reader, closed_pipe = os.pipe()
+        os.close(reader)
+        self.addCleanup(os.close, closed_pipe)
+        with open("/dev/full", "wb") as full:
+            for name, options in {"closed": {"preexec_fn": lambda: os.close(2)}, "full": {"stderr": full},
+                                  "pipe": {"stderr": closed_pipe}}.items():  # fmt: skip
+                with self.subTest(name):
+                    out = self.folder / name
+                    result = subprocess.run([*train, str(out)], stdout=subprocess.DEVNULL, **options)
+                    self.assertEqual(result.returncode, 0)
+                    self.assertTrue((out / "policy.safetensors").exists())
+                    self.assertTrue((out / "lock").read_text().isdigit())
+                    rows = list(csv.DictReader((out / "progress.csv").read_text().splitlines()))
+                    self.assertEqual([row["update"] for row in rows], ["1", "2"])
 
     def test_a_terminal_that_hangs_up_takes_nothing_with_it(self):
         out = self.folder / "run"
