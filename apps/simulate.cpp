@@ -224,7 +224,7 @@ void run_simulate(SimulateArguments arguments) {
   run.drive_s = seconds_since(begin_of_all) - film_s;
   line.finish();
   if (live) live->finish();
-  if (film) film->close();
+  if (film && step > 0) film->close();  // ^C may come before the first frame
   if (recording) {
     const Replay replay = recording->finish();
     if (!arguments.replay.empty()) write_replay_and_say_so(arguments.replay, replay);

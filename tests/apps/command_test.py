@@ -513,6 +513,16 @@ class Simulation(CommandCase):
         self.assert_refused(2, "--parked", "simulate", town, "--parked", -1)
 
     @unittest.skipUnless(shutil.which("ffmpeg"), "no ffmpeg on this machine")
+    def test_a_film_that_is_interrupted_before_its_first_frame_has_the_status_of_the_signal(self):
+        video = self.folder / "film.mp4"
+        # Served worlds wait for a page.
+        arguments = ["simulate", "procedural:1", "--agents", "4", "--serve", "--video", str(video)]
+        with subprocess.Popen([PICTURA, *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+            self.assertIn("serving http", process.stderr.readline())
+            process.send_signal(signal.SIGINT)
+            self.assertIn("error: interrupted at step 0", process.stderr.read())
+        self.assertEqual((process.returncode, video.exists()), (130, False))
+
     def test_a_video_is_written(self):
         video = self.folder / "drive.mp4"
         film = ["simulate", self.town(), "--agents", 5, "--steps", 12, "--policy", "random", "--video", video]
