@@ -7,20 +7,25 @@
 
 #include <fmt/format.h>
 
+#include "pictura/common/error.h"
+#include "pictura/common/support/output_file.h"
+
 namespace pictura {
 
 namespace fs = std::filesystem;
 
 std::vector<std::string> run_files(const std::string& folder) {
-  // The last are what a killed process leaves of common/support/output_file.h.
   static const std::regex kNames(
       R"(config\.toml|(untrained|checkpoint(\.(\d+|next))?|milestone_\d+[kM]?)\.ckpt|(policy|policy_average|failed_minibatch)\.safetensors|)"
       R"((progress|evaluation)\.csv(\.\d+)?|)"
-      R"(events\.out\.tfevents\.\d+\.\d+|learning_curve\.png|\.[\w.]+\.\d+\.\d+\.tmp)");
+      R"(events\.out\.tfevents\.\d+\.\d+|learning_curve\.png)");
   std::vector<std::string> names;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
     std::string name = entry.path().filename().string();
-    if (entry.is_regular_file() && std::regex_match(name, kNames)) names.push_back(std::move(name));
+    // A killed process leaves temporary ones.
+    if (!std::regex_match(name, kNames) && !is_temporary_name(name)) continue;
+    PICTURA_CHECK(!entry.is_symlink(), "{}/{}: expected a run's own file, got a link", folder, name);
+    if (entry.is_regular_file()) names.push_back(std::move(name));
   }
   std::sort(names.begin(), names.end());
   return names;

@@ -9,7 +9,8 @@
 namespace pictura {
 
 /// Names of the files of a run that lie in a folder, in order; its lock (common/support/folder_lock.h), which says
-/// nothing of a run, is not among them. Files of these names are all that a training run writes, or removes.
+/// nothing of a run, is not among them. Files of these names are all that a training run writes, or removes. Throws
+/// Error for one that is a link: a folder that came from elsewhere would have a run write into files anywhere.
 std::vector<std::string> run_files(const std::string& folder);
 
 /// Calls save(path) for what becomes checkpoint.ckpt, and keeps num_kept - 1 before it as checkpoint.1.ckpt, which is

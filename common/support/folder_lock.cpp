@@ -23,7 +23,9 @@ std::string holder_of(int fd) {
 }  // namespace
 
 FolderLock::FolderLock(const std::string& folder)
-    : fd_(::open((folder + "/lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {
+    // A link, in a folder that came from elsewhere, would have this write into a file anywhere.
+    : fd_(::open((folder + "/lock").c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0666)) {
+  PICTURA_CHECK(fd_ >= 0 || errno != ELOOP, "{}/lock: expected a file, got a link", folder);
   PICTURA_CHECK(fd_ >= 0, "{}/lock: cannot be opened: {}", folder, std::strerror(errno));
   try {
     if (::flock(fd_, LOCK_EX | LOCK_NB) != 0) {

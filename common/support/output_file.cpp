@@ -1,18 +1,23 @@
 #include "pictura/common/support/output_file.h"
 
 #include <cerrno>
+#include <climits>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <random>
 
 #include <fcntl.h>
+#include <linux/magic.h>
 #include <poll.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/vfs.h>
 #include <unistd.h>
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
+#include "pictura/common/support/numbers.h"
 
 namespace pictura {
 
@@ -31,12 +36,18 @@ std::string folder_of(const std::string& path) {
   return folder.empty() ? "." : folder;
 }
 
-// The name that a chain of links ends with, whether or not there is a file.
+// Whether links of the folder are of the kernel's making: they name an open file, which need not have that name.
+bool is_in_proc(const std::string& folder) {
+  struct statfs status{};
+  return ::statfs(folder.c_str(), &status) == 0 && status.f_type == PROC_SUPER_MAGIC;
+}
+
+// The name that a chain of links ends with, whether or not there is a file, or the first that lies in /proc.
 std::string without_links(const std::string& path) {
   constexpr int kMaxLinks = 40;
   fs::path target(path);
   std::error_code error;
-  for (int i = 0; fs::is_symlink(target, error); ++i) {
+  for (int i = 0; !is_in_proc(folder_of(target)) && fs::is_symlink(target, error); ++i) {
     PICTURA_CHECK(i < kMaxLinks, "{}: cannot be written: {}", path, std::strerror(ELOOP));
     const fs::path next = fs::read_symlink(target, error);
     PICTURA_CHECK(!error, "{}: cannot be written: {}", path, error.message());
@@ -45,22 +56,30 @@ std::string without_links(const std::string& path) {
   return target.string();
 }
 
-// "/folder/.NAME.": how the hidden files of a target begin.
-std::string hidden_prefix(const std::string& target) {
-  return folder_of(target) + "/." + fs::path(target).filename().string() + '.';
-}
-constexpr std::string_view kHiddenEnding = ".tmp";
-
-// Hidden files of the target that nobody writes any more: a writer holds a lock, which ends with its process.
-void remove_abandoned(const std::string& target) {
-  const std::string prefix = hidden_prefix(target);
+// The descriptor of this process that a name without links stands for: 3 for /proc/self/fd/3.
+std::optional<int> descriptor_named(const std::string& target) {
+  const std::optional<uint64_t> number = parse_unsigned(fs::path(target).filename().string());
   std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder_of(target), error)) {
+  if (!number || *number > uint64_t{INT_MAX} || !fs::equivalent(folder_of(target), "/proc/self/fd", error)) return {};
+  return static_cast<int>(*number);
+}
+
+constexpr std::string_view kHiddenBeginning = ".pictura-", kHiddenEnding = ".tmp";
+constexpr size_t kHiddenDigits = 16;
+
+// A name for a hidden file of the folder, which must be taken as one that is new (O_EXCL, linkat).
+std::string new_hidden_name(const std::string& folder) {
+  std::random_device random;
+  return fmt::format("{}/{}{:08x}{:08x}{}", folder, kHiddenBeginning, random(), random(), kHiddenEnding);
+}
+
+// Hidden files of the folder that nobody writes any more: a writer holds a lock, which ends with its process.
+void remove_abandoned(const std::string& folder) {
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    if (!is_temporary_name(entry.path().filename().string())) continue;
     const std::string name = entry.path().string();
-    const bool is_hidden = name.size() > prefix.size() + kHiddenEnding.size() && name.starts_with(prefix) &&
-                           name.ends_with(kHiddenEnding) && entry.is_regular_file(error);
-    if (!is_hidden) continue;
-    const Descriptor file(::open(name.c_str(), O_RDONLY | O_CLOEXEC));
+    const Descriptor file(::open(name.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
     if (file.get() >= 0 && ::flock(file.get(), LOCK_EX | LOCK_NB) == 0) ::unlink(name.c_str());
   }
 }
@@ -80,10 +99,16 @@ void write_all(int fd, std::string_view bytes, const std::string& path) {
   }
 }
 
-// Opens what is no regular file. A FIFO has no writers before it has a reader, which a person may start later.
+// Opens what is written through. A descriptor of this process goes on where it is. A FIFO has no writers before it has
+// a reader, which a person may start later.
 int open_through(const std::string& target, const std::string& path) {
+  if (const std::optional<int> own = descriptor_named(target)) {
+    const int fd = ::fcntl(*own, F_DUPFD_CLOEXEC, 0);
+    if (fd < 0) fail_to_write(path);
+    return fd;
+  }
   for (;;) {
-    const int fd = ::open(target.c_str(), O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+    const int fd = ::open(target.c_str(), O_WRONLY | O_APPEND | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
     if (fd >= 0) return fd;
     if (errno != ENXIO && errno != EINTR) fail_to_write(path);
     if (interrupted()) throw Interrupted(fmt::format("{}: interrupted while it waited for a reader", path));
@@ -92,6 +117,13 @@ int open_through(const std::string& target, const std::string& path) {
 }
 
 }  // namespace
+
+bool is_temporary_name(std::string_view name) {
+  if (name.size() != kHiddenBeginning.size() + kHiddenDigits + kHiddenEnding.size()) return false;
+  const std::string_view digits = name.substr(kHiddenBeginning.size(), kHiddenDigits);
+  return name.starts_with(kHiddenBeginning) && name.ends_with(kHiddenEnding) &&
+         digits.find_first_not_of("0123456789abcdef") == std::string_view::npos;
+}
 
 void Descriptor::reset(int fd) {
   if (fd_ >= 0) ::close(fd_);
@@ -106,10 +138,16 @@ OutputFile::OutputFile(const std::string& path, Staging staging) : path_(path) {
   struct stat status{};
   const bool exists = ::stat(path.c_str(), &status) == 0;
   PICTURA_CHECK(!exists || !S_ISDIR(status.st_mode), "{}: cannot be written: expected a file, got a folder", path);
-  is_through_ = exists && !S_ISREG(status.st_mode);
-  // What a device will take waits with the temporary files, for want of a folder of its own.
-  target_ = is_through_ ? path : without_links(path);
-  if (!is_through_) remove_abandoned(target_);
+  target_ = without_links(path);
+  is_through_ = exists && (!S_ISREG(status.st_mode) || is_in_proc(folder_of(target_)));
+  if (exists && !is_through_) {
+    // A superuser passes faccessat().
+    const bool is_read_only = (status.st_mode & (S_IWUSR | S_IWGRP | S_IWOTH)) == 0 ||
+                              ::faccessat(AT_FDCWD, target_.c_str(), W_OK, AT_EACCESS) != 0;
+    PICTURA_CHECK(!is_read_only, "{}: cannot be written: it is read-only", path);
+    replaced_ = status;
+  }
+  remove_abandoned(staging_folder());
   if (staging == Staging::unnamed) stage_unnamed();
   if (staged_.get() < 0) stage_named();
 }
@@ -118,20 +156,23 @@ OutputFile::~OutputFile() {
   if (!temporary_.empty()) ::unlink(temporary_.c_str());
 }
 
+// What a device will take waits with the temporary files, for want of a folder of its own.
+std::string OutputFile::staging_folder() const {
+  return is_through_ ? fs::temp_directory_path().string() : folder_of(target_);
+}
+
 void OutputFile::stage_unnamed() {
 #ifdef O_TMPFILE
   constexpr const char* kNames = "/proc/self/fd";  // by which replace() finds it again
   if (::access(kNames, X_OK) != 0) return;
-  const std::string folder = is_through_ ? fs::temp_directory_path().string() : folder_of(target_);
-  staged_.reset(::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0666));
+  staged_.reset(::open(staging_folder().c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0666));
   if (staged_.get() >= 0) ::flock(staged_.get(), LOCK_EX | LOCK_NB);
 #endif
 }
 
 void OutputFile::stage_named() {
-  const std::string near = is_through_ ? (fs::temp_directory_path() / fs::path(target_).filename()).string() : target_;
-  for (int number = 0; staged_.get() < 0; ++number) {
-    const std::string name = fmt::format("{}{}.{}{}", hidden_prefix(near), ::getpid(), number, kHiddenEnding);
+  while (staged_.get() < 0) {
+    const std::string name = new_hidden_name(staging_folder());
     const Descriptor file(::open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
     if (file.get() < 0 && errno == EEXIST) continue;
     if (file.get() < 0) fail_to_write(path_);
@@ -162,14 +203,20 @@ void OutputFile::pour() {
 }
 
 void OutputFile::replace() {
+  if (replaced_) {
+    // Owners can be passed on by a superuser alone, and groups by their members.
+    [[maybe_unused]] const int ignored = ::fchown(staged_.get(), replaced_->st_uid, replaced_->st_gid);
+    constexpr mode_t kPermissions = S_IRWXU | S_IRWXG | S_IRWXO;
+    if (::fchmod(staged_.get(), replaced_->st_mode & kPermissions) != 0) fail_to_write(path_);
+  }
   // On disk before the rename, so that a crash never leaves an empty file under the final name.
   if (::fsync(staged_.get()) != 0) fail_to_write(path_);
   if (temporary_.empty()) {
     // A link takes no name that there is already, a rename takes no file without a name: so from none to a hidden one
     // to the final one.
     const std::string unnamed = fmt::format("/proc/self/fd/{}", staged_.get());
-    for (int number = 0; temporary_.empty(); ++number) {
-      const std::string name = fmt::format("{}{}.{}{}", hidden_prefix(target_), ::getpid(), number, kHiddenEnding);
+    while (temporary_.empty()) {
+      const std::string name = new_hidden_name(folder_of(target_));
       if (::linkat(AT_FDCWD, unnamed.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0) {
         temporary_ = name;
       } else if (errno != EEXIST) {

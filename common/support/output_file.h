@@ -2,8 +2,11 @@
 // sees half a file, a full disk leaves the old one, and a process that is killed leaves nothing behind.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
+
+#include <sys/stat.h>
 
 #include "pictura/common/error.h"
 
@@ -25,13 +28,18 @@ class Descriptor {
 };
 
 /// Where bytes wait for commit(). Without a name wherever the file system can; else, and for tests, in a hidden file
-/// beside the target, which the next writer of the same target removes if its own writer was killed.
+/// beside the target, which the next writer into that folder removes if its own writer was killed.
 enum class Staging { unnamed, named };
+
+/// Whether a file of this name is such a hidden one: .pictura-*.tmp with 16 random hexadecimal digits, as no file of a
+/// user's is called.
+bool is_temporary_name(std::string_view name);
 
 class OutputFile {
  public:
-  /// Links are followed. What is no regular file (a device, a FIFO) is written through and never replaced. Throws Error
-  /// naming the path for folders, and where nothing can be written.
+  /// Links are followed. What is no regular file (a device, a FIFO), and what a link of /proc leads to, as /dev/stdout,
+  /// is written through and never replaced. A file that is replaced passes on its mode and, where possible, its owner.
+  /// Throws Error naming the path for folders and read-only files, and where nothing can be written.
   explicit OutputFile(const std::string& path, Staging staging = Staging::unnamed);
   /// Without commit(), the target is as it was before.
   ~OutputFile();
@@ -48,15 +56,17 @@ class OutputFile {
   void commit();
 
  private:
+  std::string staging_folder() const;
   void stage_unnamed();
   void stage_named();
   void pour();
   void replace();
 
-  std::string path_;       // as the caller says it, for messages
-  std::string target_;     // with links followed
-  bool is_through_;        // the target is no regular file
-  std::string temporary_;  // the name of staged_, empty while it has none
+  std::string path_;                     // as the caller says it, for messages
+  std::string target_;                   // with links followed, except those of /proc
+  bool is_through_;                      // the target is written through
+  std::optional<struct stat> replaced_;  // the file that commit() replaces
+  std::string temporary_;                // the name of staged_, empty while it has none
   Descriptor staged_;
 };
 

@@ -218,6 +218,27 @@ class Files(CommandCase):
         self.assertTrue(fifo.is_fifo())
         self.assert_refused(1, "expected a file, got a folder", "map", town, "--png", self.folder)
 
+    def test_names_of_descriptors_are_written_where_they_are(self):
+        expected = self.town(blocks="1x1").read_text()
+        town = [PICTURA, "town", "--seed", "3", "--blocks", "1x1", "--out"]
+        for name in ("/dev/stdout", "/proc/self/fd/1", "/dev/fd/1"):
+            for mode in ("w", "a"):
+                path = self.folder / "redirected"
+                path.write_text("of before\n")
+                with open(path, mode) as out:
+                    out.write("head\n")
+                    out.flush()
+                    subprocess.run([*town, name], stdout=out, check=True)
+                    out.write("tail\n")
+                before = "of before\n" if mode == "a" else ""
+                got = path.read_text()
+                self.assertTrue(got.startswith(before + "head\n" + expected) and got.endswith("tail\n"), (name, mode))
+        reading, writing = socket.socketpair()  # which can be opened by no name
+        with reading, reading.makefile() as text:
+            with writing:
+                subprocess.run([*town, "/dev/stdout"], stdout=writing, check=True, timeout=60)
+            self.assertTrue(text.read().startswith(expected))
+
     def test_every_byte_of_stdout_counts(self):
         town = self.town()
         listing = [PICTURA, "map", str(town), "--full", "--json"]

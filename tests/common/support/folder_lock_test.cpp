@@ -2,6 +2,7 @@
 #include "pictura/common/support/folder_lock.h"
 
 #include <csignal>
+#include <filesystem>
 #include <optional>
 
 #include <gmock/gmock.h>
@@ -55,6 +56,13 @@ TEST_F(FolderLockTest, TheDeathOfItsProcessReleasesIt) {
 TEST_F(FolderLockTest, AFolderThatIsNotThereIsNamed) {
   EXPECT_THAT(test::message_of([this] { FolderLock lock(folder_ / "none"); }),
               testing::HasSubstr("none/lock: cannot be opened"));
+}
+
+TEST_F(FolderLockTest, ALinkIsRefusedAndNothingIsWrittenWhereItLeads) {
+  write_file(folder_ / "mine", "text");
+  std::filesystem::create_symlink("mine", folder_ / "lock");
+  EXPECT_EQ(refusal(), folder_.path() + "/lock: expected a file, got a link");
+  EXPECT_EQ(read_file(folder_ / "mine"), "text");
 }
 
 }  // namespace

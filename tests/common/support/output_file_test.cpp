@@ -7,6 +7,8 @@
 #include <fstream>
 #include <thread>
 
+#include <fcntl.h>
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -85,6 +87,48 @@ TEST_P(OutputFileTest, WritesThroughDevicesAndFifosWhichStayWhatTheyAre) {
   EXPECT_EQ(got, sent);
   EXPECT_TRUE(fs::is_fifo(path));
   EXPECT_EQ(folder_.num_entries(), 2u);
+}
+
+TEST_P(OutputFileTest, WritesThroughDescriptorsWhereverTheyAre) {
+  const std::string path = folder_ / "redirected";
+  put(path, "0123456789");
+  const Descriptor file(::open(path.c_str(), O_RDWR));
+  ASSERT_EQ(::write(file.get(), "ab", 2), 2);
+  fs::create_symlink(fmt::format("/dev/fd/{}", file.get()), folder_ / "link");
+  put(fmt::format("/proc/self/fd/{}", file.get()), "cd");
+  put(fmt::format("/dev/fd/{}", file.get()), "ef");
+  put(folder_ / "link", "gh");
+  EXPECT_EQ(read_file(path), "abcdefgh89");
+  struct stat named{}, open{};
+  ::stat(path.c_str(), &named);
+  ::fstat(file.get(), &open);
+  EXPECT_EQ(named.st_ino, open.st_ino) << "the file was replaced";
+  const Descriptor reading(::open(path.c_str(), O_RDONLY));
+  const std::string name = fmt::format("/proc/self/fd/{}", reading.get());
+  EXPECT_EQ(test::message_of([&] { put(name, "x"); }), name + ": cannot be written: Bad file descriptor");
+  EXPECT_EQ(folder_.num_entries(), 2u);
+}
+
+TEST_P(OutputFileTest, KeepsTheModeOfWhatItReplacesAndRefusesWhatIsReadOnly) {
+  const std::string path = folder_ / "a.txt";
+  put(path, "old");
+  for (const fs::perms mode : {fs::perms(0640), fs::perms(0777), fs::perms(0600)}) {
+    fs::permissions(path, mode);
+    put(path, "new");
+    EXPECT_EQ(fs::status(path).permissions(), mode);
+  }
+  fs::permissions(path, fs::perms(0444));
+  EXPECT_EQ(test::message_of([&] { put(path, "x"); }), path + ": cannot be written: it is read-only");
+  EXPECT_EQ(read_file(path), "new");
+}
+
+TEST_P(OutputFileTest, RemovesNoFileOfAUsers) {
+  const std::vector<std::string> names{".a.txt.backup.tmp", ".a.txt.1.0.tmp", ".pictura-notes.tmp",
+                                       ".pictura-0123456789abcdeg.tmp"};
+  for (const std::string& name : names) std::ofstream(folder_ / name) << "mine";
+  fs::create_symlink(names[0], folder_ / ".pictura-0123456789abcdef.tmp");
+  put(folder_ / "a.txt", "new");
+  EXPECT_EQ(folder_.num_entries(), names.size() + 2);
 }
 
 TEST_P(OutputFileTest, RefusesFoldersAndNamesWhatCannotBeWritten) {
