@@ -194,7 +194,7 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
 
   Run run(config, device, communicator.get());
   const std::vector<RecentUpdate> recent = keeper.begin(&run);
-  RunLog log(communicator->is_first() ? options.out_folder : "", config, run.update, run.agent_steps, recent,
+  RunLog log(communicator->is_first() ? keeper.folder() : "", config, run.update, run.agent_steps, recent,
              options.on_notice);
   RunTime time(options.minutes, start, &run);
   TrainingLoop loop(options, ranks, &keeper, &time, &log, &run);

@@ -12,8 +12,10 @@
 
 namespace pictura {
 
+namespace fs = std::filesystem;
+
 RunKeeper::RunKeeper(const TrainOptions& options, Ranks* ranks, Communicator* communicator)
-    : options_(options), ranks_(ranks), communicator_(communicator) {
+    : options_(options), ranks_(ranks), communicator_(communicator), folder_(options.out_folder) {
   if (!communicator->is_first()) return;
   make_output_folder(options.out_folder);
   lock_.emplace(options.out_folder);
@@ -43,7 +45,11 @@ std::vector<RecentUpdate> RunKeeper::begin(Run* run) {
     if (!options_.init_from.empty()) {
       run->begin_with(parse_policy(file_of_first(options_.init_from, communicator_), options_.init_from));
     }
-    for (const std::string& name : old_files_) std::filesystem::remove(path(name));
+    if (!old_files_.empty()) {
+      folder_ = path(".pictura-new-run");
+      fs::remove_all(folder_);  // of a run that ended before its first checkpoint
+      make_output_folder(folder_);
+    }
     run->simulator->reset();
     save_as("untrained.ckpt", *run, recent);
   }
@@ -62,12 +68,21 @@ void RunKeeper::save(const Run& run, const std::vector<RecentUpdate>& recent) {
   // A second time it would be the same, in the place of an older one.
   if (run.update == saved_update_) return;
   const auto write = [&](const Checkpoint& checkpoint) {
-    save_checkpoint(options_.out_folder, run.config.train.keep_checkpoints,
+    save_checkpoint(folder_, run.config.train.keep_checkpoints,
                     [&](const std::string& path) { write_checkpoint(path, checkpoint); });
+    if (folder_ != options_.out_folder) overwrite_old_run();
   };
   write_with(write, run, recent);
   saved_update_ = run.update;
   since_saved_.restart();
+}
+
+// Files that are open for writing stay so.
+void RunKeeper::overwrite_old_run() {
+  for (const std::string& name : old_files_) fs::remove(fs::path(options_.out_folder) / name);
+  for (const std::string& name : run_files(folder_)) fs::rename(path(name), fs::path(options_.out_folder) / name);
+  fs::remove_all(folder_);
+  folder_ = options_.out_folder;
 }
 
 void RunKeeper::save_as(const std::string& name, const Run& run, const std::vector<RecentUpdate>& recent) const {

@@ -16,12 +16,13 @@ namespace pictura {
 /// Rank 0 alone reads and writes; all ranks must call what names no rank, since a checkpoint has something of each.
 class RunKeeper {
  public:
-  /// Takes the folder for this process. Throws Error naming it where another run is at work in it, and where one lies
-  /// that options.old_run does not speak of. What is given must outlive this.
+  /// Takes the folder for this process. Throws Error naming it where another run is at work in it, where one lies that
+  /// options.old_run does not speak of, and where a file of a run is a link. What is given must outlive this.
   RunKeeper(const TrainOptions& options, Ranks* ranks, Communicator* communicator);
 
   /// Begins the run as the options say: from its last checkpoint, from the weights of another run, or anew, when the
-  /// untrained policy is kept too. Returns what the mean return of its last updates is made of.
+  /// untrained policy is kept too. A run that is overwritten stays until the first save(). Returns what the mean return
+  /// of its last updates is made of.
   std::vector<RecentUpdate> begin(Run* run);
 
   /// Whether the configuration asks for a checkpoint after the update that the run has just made.
@@ -33,10 +34,14 @@ class RunKeeper {
   /// Writes the weights as policy.safetensors, and their average, where there is one, as policy_average.safetensors.
   void write_weights(const Run& run) const;
 
-  std::string path(const std::string& name) const { return options_.out_folder + "/" + name; }
+  /// Where the run's files are: options.out_folder, or, until the first checkpoint of a run that overwrites another, a
+  /// folder in it.
+  const std::string& folder() const { return folder_; }
+  std::string path(const std::string& name) const { return folder_ + "/" + name; }
   std::string checkpoint_path() const { return path("checkpoint.ckpt"); }
 
  private:
+  void overwrite_old_run();
   void write_with(const std::function<void(const Checkpoint&)>& write, const Run& run,
                   const std::vector<RecentUpdate>& recent) const;
 
@@ -45,6 +50,7 @@ class RunKeeper {
   Communicator* const communicator_;
   std::optional<FolderLock> lock_;
   std::vector<std::string> old_files_;  // of an earlier run
+  std::string folder_;
   int64_t saved_update_ = -1;
   Stopwatch since_saved_;
 };

@@ -453,7 +453,7 @@ TEST_F(Training, ARunInTheFolderIsNeitherOverwrittenNorMixedWithUnlessAskedFor) 
       *std::find_if(files.begin(), files.end(), [](const auto& name) { return name.starts_with("events."); });
   // Of an earlier process, and another program's; and what is no run's.
   write_file(folder_ / "run/events.out.tfevents.17.5", "old");
-  write_file(folder_ / "run/.checkpoint.next.ckpt.1717.0.tmp", "left by a killed process");
+  write_file(folder_ / "run/.pictura-0123456789abcdef.tmp", "left by a killed process");
   write_file(folder_ / "run/notes.txt", "mine");
   write_file(folder_ / "run/events.out.tfevents.17.host", "another program's");
 
@@ -468,13 +468,33 @@ TEST_F(Training, ARunInTheFolderIsNeitherOverwrittenNorMixedWithUnlessAskedFor) 
   EXPECT_THAT(message_of([&] { train(over); }), HasSubstr("train.speed"));
   EXPECT_EQ(read_file(folder_ / "run/checkpoint.ckpt"), checkpoint) << "what cannot begin removes nothing";
   over.overrides.pop_back();
+  over.on_progress = [](const TrainProgress&) { throw Error("disk full"); };
+  EXPECT_EQ(message_of([&] { train(over); }), "disk full");
+  EXPECT_EQ(read_file(folder_ / "run/checkpoint.ckpt"), checkpoint) << "what ends before its first checkpoint neither";
+  EXPECT_EQ(read_table(folder_ / "run/progress.csv").size(), 3u);
+  over.on_progress = {};
   EXPECT_EQ(train(over).updates, 1);
+  EXPECT_NE(read_file(folder_ / "run/checkpoint.ckpt"), checkpoint);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "run/.pictura-new-run"));
   EXPECT_EQ(read_table(folder_ / "run/progress.csv").size(), 2u);
   EXPECT_EQ(count_events(), 2);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "run/events.out.tfevents.17.5"));
-  EXPECT_FALSE(std::filesystem::exists(folder_ / "run/.checkpoint.next.ckpt.1717.0.tmp"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "run/.pictura-0123456789abcdef.tmp"));
   EXPECT_EQ(read_file(folder_ / "run/notes.txt"), "mine");
   EXPECT_EQ(read_file(folder_ / "run/events.out.tfevents.17.host"), "another program's");
+}
+
+TEST_F(Training, NothingIsWrittenWhereLinksInItsFolderLead) {
+  for (const char* name : {"lock", "config.toml", "checkpoint.next.ckpt", "progress.csv", "learning_curve.png"}) {
+    const std::string run = folder_ / (std::string("run_with_") + name);
+    std::filesystem::create_directory(run);
+    write_file(folder_ / "mine", "text");
+    std::filesystem::create_symlink("../mine", run + "/" + name);
+    TrainOptions linked = options(std::filesystem::path(run).filename().string(), {"train.updates=1"});
+    linked.old_run = OldRun::overwrite;
+    EXPECT_THAT(message_of([&] { train(linked); }), AllOf(HasSubstr(run + "/" + name), HasSubstr("got a link")));
+    EXPECT_EQ(read_file(folder_ / "mine"), "text");
+  }
 }
 
 TEST_F(Training, TheLastCheckpointsAreKept) {
