@@ -150,9 +150,9 @@ void draw_example(const CornerResults& results, const std::string& path) {
 
 }  // namespace
 
-void draw_corner_figures(const CornerResults& results, const std::vector<CornerRow>& rows, const std::string& folder) {
-  draw_means(results, rows, folder + "/corner.png");
-  draw_example(results, folder + "/example.png");
+void draw_corner_figures(const CornerResults& results, const std::vector<CornerRow>& rows, FilledFolder* folder) {
+  draw_means(results, rows, folder->file("corner.png"));
+  draw_example(results, folder->file("example.png"));
 }
 
 }  // namespace pictura

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "pictura/common/support/filled_folder.h"
 #include "pictura/training/probes/corner_results.h"
 
 namespace pictura {
@@ -13,6 +14,6 @@ namespace pictura {
 /// 90th percentile of the times at which line of sight opens. And example.png: the pair at whose reveal policies'
 /// speeds differ most, with walls and without, from above and over time. There must be a pair. Throws Error naming the
 /// path.
-void draw_corner_figures(const CornerResults& results, const std::vector<CornerRow>& rows, const std::string& folder);
+void draw_corner_figures(const CornerResults& results, const std::vector<CornerRow>& rows, FilledFolder* folder);
 
 }  // namespace pictura

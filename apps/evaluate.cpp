@@ -13,7 +13,9 @@
 #include "pictura/cli/replay_scenarios.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
+#include "pictura/common/support/file.h"
 #include "pictura/common/support/numbers.h"
+#include "pictura/replay/gallery.h"
 #include "pictura/simulator/controllers/host_controllers.h"
 #include "pictura/simulator/simulator.h"
 #include "pictura/training/evaluation/estimate_json.h"
@@ -197,6 +199,10 @@ void evaluate_in_towns(const CLI::App& command, EvaluateArguments* arguments) {
   if (!records) refuse_recording_options(command, "--replay or --gallery");
   if (records && merges) fail_usage("--replay, --gallery: have no effect with --merge");
   if (lists_infractions && merges) fail_usage("--infractions: has no effect with --merge");
+  if (!arguments->gallery.empty()) {
+    make_output_folder(arguments->gallery);
+    check_gallery(arguments->gallery);
+  }
   EvaluationProgress progress("the scenarios that are finished");
   evaluation.on_progress = [&progress](double done, double eta_s) { progress.update(done, eta_s); };
   InfractionObserver infractions;
@@ -293,8 +299,9 @@ void add_evaluate_command(CLI::App& app) {
   CLI::Option* const replays =
       command->add_option("--replays", arguments->replays, "Record the N worst scenarios again, into --gallery")
           ->transform(whole_number(1));
-  CLI::Option* const gallery =
-      command->add_option("--gallery", arguments->gallery, "A folder for the pages of --replays, and an index of them");
+  CLI::Option* const gallery = command->add_option(
+      "--gallery", arguments->gallery,
+      "A folder for the pages of --replays, in place of an earlier gallery's, and an index of them");
   replays->needs(gallery);
   gallery->needs(replays);
   add_recording_options(command, &arguments->recording);

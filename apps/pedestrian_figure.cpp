@@ -207,14 +207,14 @@ void draw_means(const PedestrianResults& results, const std::vector<PedestrianRo
 }  // namespace
 
 void draw_pedestrian_figures(const PedestrianResults& results, const std::vector<PedestrianRow>& rows,
-                             const std::string& folder, const std::function<void(size_t)>& on_path) {
+                             FilledFolder* folder, const std::function<void(size_t)>& on_path) {
   PathFigures figures(results);
   for (size_t i = 0; i < results.paths.size(); ++i) {
     const RgbImage page = figures.draw(i);
-    write_png(fmt::format("{}/path_{:03}.png", folder, i), page.width_px, page.height_px, page.rgb);
+    write_png(folder->file(fmt::format("path_{:03}.png", i)), page.width_px, page.height_px, page.rgb);
     on_path(i + 1);
   }
-  draw_means(results, rows, folder + "/pedestrian.png");
+  draw_means(results, rows, folder->file("pedestrian.png"));
 }
 
 }  // namespace pictura

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "pictura/common/support/filled_folder.h"
 #include "pictura/training/probes/pedestrian_results.h"
 
 namespace pictura {
@@ -14,6 +15,6 @@ namespace pictura {
 /// places; and pedestrian.png, the means over all paths from where the pedestrian is first seen, with their 95 %
 /// intervals over scenes. `on_path` is called with the number of paths that are drawn. Throws Error naming the path.
 void draw_pedestrian_figures(const PedestrianResults& results, const std::vector<PedestrianRow>& rows,
-                             const std::string& folder, const std::function<void(size_t)>& on_path);
+                             FilledFolder* folder, const std::function<void(size_t)>& on_path);
 
 }  // namespace pictura

@@ -14,6 +14,7 @@
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/filled_folder.h"
 #include "pictura/common/support/json.h"
 #include "pictura/training/probes/corner.h"
 #include "pictura/training/probes/pedestrian.h"
@@ -174,8 +175,9 @@ void print_table(const CornerResults& results, const std::vector<CornerRow>& row
 // Writes summary.json and prints it, or a table.
 template <typename Results, typename Row>
 void report(const ProbeArguments& arguments, const std::string& summary, const Results& results,
-            const std::vector<Row>& rows) {
-  write_file(arguments.out + "/summary.json", summary + "\n");
+            const std::vector<Row>& rows, FilledFolder* out) {
+  write_file(out->file("summary.json"), summary + "\n");
+  out->remove_others();
   if (arguments.json)
     print_json(parse_json(summary));
   else
@@ -214,10 +216,11 @@ void add_removal_command(CLI::App& probe) {
     check_case_number(arguments->replay, removal.removals);
     const RemovalResults results = run_probe(&probe_removal, arguments.get(), &removal);
     const std::vector<RemovalRow> rows = summarize(results);
-    const std::string cases_file = arguments->out + "/cases.csv";
+    FilledFolder out(arguments->out, "probe");
+    const std::string cases_file = out.file("cases.csv");
     write_removal_cases(cases_file, results);
-    draw_removal_figure(results, rows, arguments->out + "/removal.png");
-    report(*arguments, removal_summary_json(results, rows, cases_file), results, rows);
+    draw_removal_figure(results, rows, out.file("removal.png"));
+    report(*arguments, removal_summary_json(results, rows, cases_file), results, rows, &out);
     if (results.interrupted) {
       throw Interrupted(fmt::format("interrupted; {} of {} removals are done, and written to {}", results.cases.size(),
                                     results.removals_asked, arguments->out));
@@ -265,18 +268,19 @@ void add_pedestrian_command(CLI::App& probe) {
     pedestrian.control = pedestrian_control_named(arguments->control);
     const PedestrianResults results = run_probe(&probe_pedestrian, arguments.get(), &pedestrian);
     const std::vector<PedestrianRow> rows = summarize(results);
-    const std::string cases_file = arguments->out + "/cases.csv";
+    FilledFolder out(arguments->out, "probe");
+    const std::string cases_file = out.file("cases.csv");
     write_pedestrian_cases(cases_file, results);
     if (!results.interrupted) {
       ProgressLine line;
       const size_t all = results.paths.size();
-      draw_pedestrian_figures(results, rows, arguments->out, [&](size_t done) {
+      draw_pedestrian_figures(results, rows, &out, [&](size_t done) {
         line.update(fmt::format("drawing: path {} of {}", done, all),
                     static_cast<double>(done) / static_cast<double>(all));
       });
       line.finish();
     }
-    report(*arguments, pedestrian_summary_json(results, rows, cases_file), results, rows);
+    report(*arguments, pedestrian_summary_json(results, rows, cases_file), results, rows, &out);
     if (results.interrupted) {
       throw Interrupted(fmt::format("interrupted; {} of {} paths are done, and written to {} without figures",
                                     results.paths.size(), results.paths_asked, arguments->out));
@@ -335,10 +339,11 @@ void add_corner_command(CLI::App& probe) {
     check_case_number(arguments->replay, corner.pairs);
     const CornerResults results = run_probe(&probe_corner, arguments.get(), &corner);
     const std::vector<CornerRow> rows = summarize(results);
-    const std::string cases_file = arguments->out + "/cases.csv";
+    FilledFolder out(arguments->out, "probe");
+    const std::string cases_file = out.file("cases.csv");
     write_corner_cases(cases_file, results);
-    if (!results.pairs.empty()) draw_corner_figures(results, rows, arguments->out);
-    report(*arguments, corner_summary_json(results, rows, cases_file), results, rows);
+    if (!results.pairs.empty()) draw_corner_figures(results, rows, &out);
+    report(*arguments, corner_summary_json(results, rows, cases_file), results, rows, &out);
     if (results.interrupted) {
       throw Interrupted(fmt::format("interrupted; {} of {} pairs are done, and written to {}", results.pairs.size(),
                                     results.pairs_asked, arguments->out));

@@ -15,6 +15,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/scene_file.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/filled_folder.h"
 #include "pictura/common/support/hash.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/drawing/drawing.h"
@@ -82,35 +83,33 @@ double draw(const Subject& subject, Renderer* renderer, HostImages* images_out) 
 
 /// Returns the paths of the contact sheets.
 std::vector<std::string> write_pictures(const RenderArguments& arguments, const Subject& subject, const Rig& rig,
-                                        const HostImages& images) {
+                                        const HostImages& images, FilledFolder* out) {
   const InterruptibleWork work("interrupted while pictures were written");
   const int num_views = static_cast<int>(subject.views.size());
   for (int view = 0; view < num_views; ++view) {
     work.check();
     for (int camera = 0; camera < static_cast<int>(rig.cameras.size()); ++camera) {
       const CameraImages& image = images.camera(camera);
-      const std::string stem = fmt::format("{}/{}_{}", arguments.out, subject.names[static_cast<size_t>(view)],
-                                           rig.cameras[static_cast<size_t>(camera)].name);
-      write_png(stem + ".png", image.width_px, image.height_px, images.interleaved(view, camera));
+      const std::string stem =
+          fmt::format("{}_{}", subject.names[static_cast<size_t>(view)], rig.cameras[static_cast<size_t>(camera)].name);
+      write_png(out->file(stem + ".png"), image.width_px, image.height_px, images.interleaved(view, camera));
       for (const std::string& plane : arguments.planes) {
         const RgbImage picture = plane_picture(images, view, camera, plane_by_name(plane));
-        write_png(fmt::format("{}_{}.png", stem, plane), picture.width_px, picture.height_px, picture.rgb);
+        write_png(out->file(fmt::format("{}_{}.png", stem, plane)), picture.width_px, picture.height_px, picture.rgb);
       }
     }
   }
-  const std::vector<std::string> sheets =
-      draw_contact_sheets(images, rig, subject.names, arguments.out + "/contact_sheet");
+  const std::vector<std::string> sheets = draw_contact_sheets(images, rig, subject.names, out);
   if (!arguments.figure) return sheets;
   std::vector<RgbImage> panels;
   for (int view = 0; view < num_views; ++view) {
     work.check();
     panels.push_back(captioned(images, view, 0, subject.captions[static_cast<size_t>(view)]));
     const RgbImage& panel = panels.back();
-    write_png(fmt::format("{}/{}.png", arguments.out, subject.names[static_cast<size_t>(view)]), panel.width_px,
-              panel.height_px, panel.rgb);
+    write_png(out->file(subject.names[static_cast<size_t>(view)] + ".png"), panel.width_px, panel.height_px, panel.rgb);
   }
   const RgbImage all = assembled(panels);
-  write_png(arguments.out + "/figure.png", all.width_px, all.height_px, all.rgb);
+  write_png(out->file("figure.png"), all.width_px, all.height_px, all.rgb);
   return sheets;
 }
 
@@ -119,7 +118,9 @@ void draw_and_report(const RenderArguments& arguments, const Subject& subject, R
   const int num_views = static_cast<int>(subject.views.size()), num_cameras = static_cast<int>(rig.cameras.size());
   HostImages images(rig, num_views, PixelFormat::u8, arguments.planes.empty() ? Planes::none : Planes::all);
   const double rate = draw(subject, renderer, &images);
-  const std::vector<std::string> sheets = write_pictures(arguments, subject, rig, images);
+  FilledFolder out(arguments.out, "render");
+  const std::vector<std::string> sheets = write_pictures(arguments, subject, rig, images, &out);
+  out.remove_others();
 
   Hash64 hash;
   hash.add(Span<const uint8_t>(images.bytes()));
@@ -262,7 +263,10 @@ void add_render_command(CLI::App& app) {
       ->check(one_of({"depth", "class", "instance"}));
   command->add_flag("--figure", arguments->figure,
                     "Also write VIEW.png, its first camera enlarged with a caption, and figure.png with all of them");
-  command->add_option("--out", arguments->out, "Folder for the pictures")->required();
+  command
+      ->add_option("--out", arguments->out,
+                   "Folder for the pictures; those that an earlier call wrote there are removed")
+      ->required();
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "Examples:\n  pictura render Town01 --agents 80 --steps 100 --views 6 --size 192x108 --out images\n"

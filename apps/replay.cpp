@@ -1,6 +1,4 @@
 // `pictura replay`: records episodes as pages that a browser plays, one as a file, or many with an index.
-#include <filesystem>
-
 #include "pictura/apps/commands.h"
 #include "pictura/cli/drive.h"
 #include "pictura/cli/file_options.h"
@@ -8,7 +6,7 @@
 #include "pictura/cli/record.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
-#include "pictura/common/support/file.h"
+#include "pictura/common/support/filled_folder.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/replay/gallery.h"
 
@@ -68,27 +66,23 @@ void run_replay(const ReplayArguments& arguments) {
     if (arguments.json) print_json(facts_of(arguments.out.empty() ? arguments.mcap : arguments.out, replay));
     return;
   }
-  make_output_folder(arguments.gallery);
+  FilledFolder pages(arguments.gallery, "gallery");
   check_gallery(arguments.gallery);
   Json replays = Json::array();
-  const auto write_index = [&] {
-    const int count = write_gallery(arguments.gallery);
-    print_message("{}: {} replays\n", (std::filesystem::path(arguments.gallery) / "index.html").string(), count);
-  };
   try {
     for (int episode = 0; episode < arguments.episodes; ++episode) {
       const uint64_t seed = arguments.world.seed + static_cast<uint64_t>(episode);
       const Replay replay = record(arguments, seed, &line);
       line.finish();
-      const std::string path = (std::filesystem::path(arguments.gallery) / fmt::format("seed_{}.html", seed)).string();
+      const std::string path = pages.file(fmt::format("seed_{}.html", seed));
       write_replay_and_say_so(path, replay);
       replays.push_back(facts_of(path, replay));
     }
   } catch (const Interrupted&) {
-    if (!replays.empty()) write_index();  // of those that are finished
+    if (!replays.empty()) write_index(&pages);  // of those that are finished
     throw;
   }
-  write_index();
+  write_index(&pages);
   if (arguments.json) print_json({{"gallery", arguments.gallery}, {"replays", replays}});
 }
 
@@ -103,8 +97,8 @@ void add_replay_command(CLI::App& app) {
       command->add_option("--out", arguments->out, "The page to write")->check(file_ending(".html"));
   CLI::Option* const gallery =
       command->add_option("--gallery", arguments->gallery,
-                          "Instead of one page: a folder for pages of several seeds, and an index of all replays in "
-                          "it, worst first");
+                          "Instead of one page: a folder for pages of several seeds, in place of an earlier "
+                          "gallery's, and an index of all replays in it, worst first");
   gallery->excludes(out);
   command->add_option("--mcap", arguments->mcap, "The same as an MCAP file, for Foxglove; with or without a page")
       ->check(file_ending(".mcap"))

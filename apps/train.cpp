@@ -29,7 +29,9 @@ void add_train_command(CLI::App& app) {
   add_policy_backend_options(command, "as the configuration says", &arguments->backends);
   command->add_option("--out", arguments->train.out_folder, "Folder for checkpoints, curves and logs")->required();
   CLI::Option* const resume = command->add_flag("--resume", arguments->resume, "Go on from the checkpoint in --out");
-  command->add_flag("--overwrite", arguments->overwrite, "Begin anew; the run that lies in --out is removed once the new one has a checkpoint")
+  command
+      ->add_flag("--overwrite", arguments->overwrite,
+                 "Begin anew; the run that lies in --out is removed once the new one has a checkpoint")
       ->excludes(resume);
   command
       ->add_option("--init-from", arguments->train.init_from,

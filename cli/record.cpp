@@ -10,6 +10,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/replay/file.h"
+#include "pictura/replay/gallery.h"
 #include "pictura/replay/mcap.h"
 #include "pictura/replay/recorder.h"
 #include "pictura/version.h"
@@ -158,6 +159,12 @@ void write_replay_and_say_so(const std::string& path, const Replay& replay) {
 void write_mcap_and_say_so(const std::string& path, const Replay& replay) {
   write_mcap(path, replay);
   say_what_was_written(path, replay);
+}
+
+void write_index(FilledFolder* pages) {
+  const std::string index = pages->file("index.html");
+  pages->remove_others();
+  print_message("{}: {} replays\n", index, write_gallery(pages->path()));
 }
 
 }  // namespace pictura

@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include "pictura/common/renderer.h"
+#include "pictura/common/support/filled_folder.h"
 #include "pictura/replay/recorder.h"
 #include "pictura/simulator/simulator.h"
 
@@ -67,6 +68,9 @@ class Recording {
 /// Writes a replay under this name, and what was written on stderr.
 void write_replay_and_say_so(const std::string& path, const Replay& replay);
 void write_mcap_and_say_so(const std::string& path, const Replay& replay);
+
+/// Removes the pages of a gallery that earlier calls wrote, lists the others, and says so on stderr.
+void write_index(FilledFolder* pages);
 
 /// This process's command, as a shell would read it; the program without its folder.
 std::string command_line();

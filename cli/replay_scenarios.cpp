@@ -1,16 +1,14 @@
 #include "pictura/cli/replay_scenarios.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <optional>
 
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
-#include "pictura/common/support/file.h"
+#include "pictura/common/support/filled_folder.h"
 #include "pictura/common/support/interrupt.h"
-#include "pictura/replay/gallery.h"
 #include "pictura/simulator/saved_worlds.h"
 #include "pictura/training/probes/driven_scenes.h"
 #include "pictura/training/session.h"
@@ -198,14 +196,12 @@ Replay record_takeover(const EvaluateOptions& options, const RecordedScenario& s
 
 void write_scenario_replays(const EvaluateOptions& options, const EvaluationResults& results,
                             const RecordingOptions& recording, int count, const std::string& folder) {
-  make_output_folder(folder);
-  const std::filesystem::path root(folder);
+  FilledFolder pages(folder, "gallery");
   for (const ScenarioPlace& place : worst_scenarios(results, count)) {
     write(options, results, recording, place,
-          (root / fmt::format("{}_{}.html", results.densities[place.density].density, place.scenario)).string());
+          pages.file(fmt::format("{}_{}.html", results.densities[place.density].density, place.scenario)));
   }
-  const int replays = write_gallery(folder);
-  print_message("{}: {} replays\n", (root / "index.html").string(), replays);
+  write_index(&pages);
 }
 
 void write_scenario_replay(const EvaluateOptions& options, const EvaluationResults& results,

@@ -141,11 +141,12 @@ std::vector<RgbImage> contact_sheets(const HostImages& images, const Rig& rig,
 }
 
 std::vector<std::string> draw_contact_sheets(const HostImages& images, const Rig& rig,
-                                             const std::vector<std::string>& view_names, const std::string& stem) {
+                                             const std::vector<std::string>& view_names, FilledFolder* folder) {
   const SheetLayout layout = layout_of(rig, view_names, 0);
   std::vector<std::string> paths;
   for (const Span<const SheetRow> rows : layout.pages()) {
-    paths.push_back(paths.empty() ? stem + ".png" : fmt::format("{}_{}.png", stem, paths.size() + 1));
+    const std::string page_number = paths.empty() ? "" : fmt::format("_{}", paths.size() + 1);
+    paths.push_back(folder->file(fmt::format("contact_sheet{}.png", page_number)));
     const RgbImage page = page_of(images, rig, view_names, layout, rows);
     write_png(paths.back(), page.width_px, page.height_px, page.rgb);
   }

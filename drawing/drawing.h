@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pictura/common/image.h"
+#include "pictura/common/support/filled_folder.h"
 #include "pictura/map/road_map.h"
 #include "pictura/map/scenario/scenario.h"
 
@@ -42,9 +43,10 @@ void draw_map_svg(const RoadMap& map, const std::string& path, const MapPictureO
 std::vector<RgbImage> contact_sheets(const HostImages& images, const Rig& rig,
                                      const std::vector<std::string>& view_names, int enlargement = 0);
 
-/// The same as PNG files STEM.png, STEM_2.png, ..., whose paths it returns. Throws Error naming the path.
+/// The same as contact_sheet.png, contact_sheet_2.png, ... of a folder, whose paths it returns. Throws Error naming the
+/// path.
 std::vector<std::string> draw_contact_sheets(const HostImages& images, const Rig& rig,
-                                             const std::vector<std::string>& view_names, const std::string& stem);
+                                             const std::vector<std::string>& view_names, FilledFolder* folder);
 
 /// One image, enlarged by an integer factor without smoothing to about 480 px, above its caption.
 RgbImage captioned(const HostImages& images, int view, int camera, const std::string& caption);

@@ -450,6 +450,16 @@ class Images(CommandCase):
         self.assertEqual(len(hashes), 1)
         self.assertRegex(hashes.pop(), "^[0-9a-f]{16}$")
 
+    def test_a_used_folder_keeps_no_pictures_of_before(self):
+        out = self.folder / "images"
+        render = ["render", "procedural:1", "--agents", 6, "--steps", 0, "--backend", "null", "--size", "16x9", "--out", out]
+        self.json_of(*render, "--views", 4, "--figure")
+        (out / "agent009_mine.png").write_text("mine")
+        self.json_of("render", SCENES / "crossing.toml", "--backend", "null", "--out", out)
+        self.json_of(*render, "--views", 2)
+        pictures = {path.name for path in out.glob("[!.]*")}
+        self.assertEqual({name.split("_")[0] for name in pictures}, {"agent000", "agent001", "agent009", "contact"}, pictures)
+
     def test_a_scene_file_is_drawn_with_its_planes_and_a_figure(self):
         out = self.folder / "scene"
         result = self.json_of("render", SCENES / "left_out.toml", "--backend", "cpu", "--planes", "depth,class,instance",
@@ -460,7 +470,7 @@ class Images(CommandCase):
         planes = ["", "_depth", "_class", "_instance"]
         names = [f"{view}_front{plane}.png" for view in views for plane in planes]
         names += [f"{view}.png" for view in views] + ["figure.png", "contact_sheet.png"]
-        self.assertEqual(sorted(path.name for path in out.iterdir()), sorted(names))
+        self.assertEqual(sorted(path.name for path in out.glob("[!.]*")), sorted(names))
 
     def test_bad_scene_files_are_refused_with_their_line(self):
         text = (SCENES / "vehicles.toml").read_text().replace('rig = "rigs/front.toml"', "size_px = [8, 8]")
@@ -1067,6 +1077,14 @@ class Replays(CommandCase):
         self.assert_refused(2, "--cameras: has no effect without --replay", "simulate", *self.WORLD, "--cameras")
         self.assertEqual(list(self.folder.iterdir()), [])
 
+    def test_a_gallery_takes_the_place_of_an_earlier_one(self):
+        folder = self.folder / "gallery"
+        replay = ["replay", "procedural:1:blocks=2x2", "--agents", 4, "--steps", 10]
+        self.json_of(*replay, "--gallery", folder, "--episodes", 3)
+        self.json_of(*replay, "--out", folder / "mine.html")
+        self.json_of(*replay, "--gallery", folder, "--episodes", 2, "--seed", 7)
+        self.assertEqual(sorted(path.name for path in folder.glob("[!.]*")), ["index.html", "mine.html", "seed_7.html", "seed_8.html"])
+
     def test_the_worst_scenarios_of_an_evaluation_are_driven_again(self):
         if not has_torch():
             self.skipTest("this build has no torch")
@@ -1079,7 +1097,7 @@ class Replays(CommandCase):
         scenarios = json.loads(out.read_text())["densities"][0]["scenarios"]
         rates = [s["at_fault_infraction"] / s["vehicles"] for s in scenarios]
         worst = sorted(range(4), key=lambda i: -rates[i])[:2]
-        self.assertEqual(sorted(p.name for p in folder.iterdir()), sorted(["index.html", *(f"custom_{i}.html" for i in worst)]))
+        self.assertEqual(sorted(p.name for p in folder.glob("[!.]*")), sorted(["index.html", *(f"custom_{i}.html" for i in worst)]))
         self.assertEqual(header_of(self.folder / "worst.html")["map"], f"procedural:{1 + worst[0] % 2}:blocks=2x2")
         self.assert_refused(2, "--gallery", *evaluate, "--replays", 2)
         self.assert_refused(2, "--follow: has no effect without --replay", *evaluate, "--follow", 1)

@@ -84,7 +84,7 @@ with tempfile.TemporaryDirectory() as name:
         out = folder / "images"
         shutil.rmtree(out, ignore_errors=True)
         drawn = json.loads(run(scene, *words, "--backend", "cpu", "--out", out, "--json", command="render").stdout)
-        return drawn, {path.name for path in out.iterdir()}
+        return drawn, {path.name for path in out.glob("[!.]*")}
 
     drawn, files = render("--figure", "--size", "32x18")
     assert drawn["images"] == 4 and drawn["cameras"] == 4

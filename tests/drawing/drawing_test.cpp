@@ -597,9 +597,11 @@ TEST(ContactSheet, GoesOnOnFurtherPagesAndRowsWhereThereIsNoRoom) {
   EXPECT_EQ(count(pages[2], {255, 0, 0}), 4 * 4);
   for (const RgbImage& page : pages) EXPECT_LE(page.height_px, 8192);
   const ScratchFolder folder;
-  EXPECT_EQ(draw_contact_sheets(images, rig, names, folder / "sheet"),
-            (std::vector<std::string>{folder / "sheet.png", folder / "sheet_2.png", folder / "sheet_3.png"}));
-  EXPECT_EQ(read_png(folder / "sheet_3.png").rgb, pages[2].rgb);
+  FilledFolder filled(folder.path(), "render");
+  EXPECT_EQ(draw_contact_sheets(images, rig, names, &filled),
+            (std::vector<std::string>{folder / "contact_sheet.png", folder / "contact_sheet_2.png",
+                                      folder / "contact_sheet_3.png"}));
+  EXPECT_EQ(read_png(folder / "contact_sheet_3.png").rgb, pages[2].rgb);
   // Five cameras of 8,000 px: two a row.
   Rig wide{.cameras = std::vector<Camera>(5, paper_rig(8000, 2).cameras[0])};
   const std::vector<RgbImage> sheet = contact_sheets(HostImages(wide, 1), wide, {"0"});

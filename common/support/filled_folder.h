@@ -1,0 +1,31 @@
+// Folders that a command fills with files under names of its own.
+#pragma once
+
+#include <set>
+#include <string>
+
+#include "pictura/common/support/output_file.h"
+
+namespace pictura {
+
+/// A folder in which what earlier calls of a kind of command wrote, and this call does not, is removed. Which files
+/// that are, a hidden list in the folder says, .pictura-KIND; all others stay.
+class FilledFolder {
+ public:
+  /// Makes the folder. Throws Error as make_output_folder() does, and for a list that is a link.
+  FilledFolder(std::string folder, const std::string& kind);
+
+  const std::string& path() const { return folder_; }
+  /// "FOLDER/NAME" for a file that is written next. Throws Error for a link of that name, which would lead out of the
+  /// folder.
+  std::string file(const std::string& name);
+  /// Removes what earlier calls wrote under names that file() was not given.
+  void remove_others();
+
+ private:
+  const std::string folder_, list_;
+  Descriptor list_file_;  // names are appended to it
+  std::set<std::string> written_, listed_;
+};
+
+}  // namespace pictura
