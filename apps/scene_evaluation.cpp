@@ -177,6 +177,7 @@ void run_scene_evaluation(const CLI::App& command, const SceneArguments& argumen
                           const std::vector<std::string>& densities, SceneEvaluateOptions options,
                           const std::string& out, bool json) {
   options.scenes = arguments.scenes;
+  options.hashes_scenes = !out.empty();
   SceneProtocol& protocol = options.protocol;
   protocol = scene_protocol(arguments.protocol);
   if (command.count("--control") > 0) protocol.control = arguments.control;

@@ -915,6 +915,22 @@ std::vector<std::string> differences_to_report(const Config& saved, const Config
   return differences(saved, now, is_reported);
 }
 
+std::map<std::string, std::string> keys_of_evaluation(const Config& config, bool has_policy) {
+  static const std::set<std::string> kReplaced{
+      "simulator.backend",      "simulator.maps",        "simulator.map_copies",    "simulator.num_slots",
+      "simulator.min_agents",   "simulator.max_agents",  "simulator.episode_steps", "simulator.reset_inactive_fraction",
+      "simulator.light_cycles", "simulator.light_heads", "policy.backbone",         "policy.backbone_frozen"};
+  Writer writer;
+  visit(config, writer);
+  std::map<std::string, std::string> keys;
+  for (const auto& [key, value] : writer.lines) {
+    const bool is_of_world = key.starts_with("simulator.") && !key.starts_with("simulator.conditioning.");
+    const bool is_of_policy = key.starts_with("policy.") || key == "render.line_floor_px";
+    if ((is_of_world || (has_policy && is_of_policy)) && !kReplaced.contains(key)) keys[key] = value;
+  }
+  return keys;
+}
+
 bool Config::reads(ObservationPart part) const {
   return part == ObservationPart::own ||
          (policy.modality == Modality::vector && (part != ObservationPart::walls || simulator.wall_observations));

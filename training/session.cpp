@@ -8,6 +8,8 @@
 #include "pictura/common/pixel_samples.h"
 #include "pictura/common/support/parallel_for.h"
 #include "pictura/simulator/controllers/host_controllers.h"
+#include "pictura/simulator/hash_values.h"
+#include "pictura/training/config_keys.h"
 #include "pictura/training/decision_clock.h"
 #include "pictura/training/observation.h"
 #include "pictura/training/precision.h"
@@ -225,6 +227,7 @@ EvaluationSetting PolicySession::evaluation_setting() const {
   const Config& config = parts_->config;
   EvaluationSetting setting;
   setting.policy_hash = parts_->policy.hash();
+  setting.config = keys_of_evaluation(config, /*has_policy=*/true);
   setting.conditioning = config.evaluate.conditioning;
   setting.light_cycles = config.simulator.light_cycles;
   setting.device = parts_->device.is_host() ? "cpu" : "cuda";
@@ -232,9 +235,14 @@ EvaluationSetting PolicySession::evaluation_setting() const {
   if (!reads_images()) return setting;
   setting.renderer = config.render.backend;
   setting.samples = text_of(config.render.samples);
+  Hash64 cameras;
   for (const Camera& camera : rig().cameras) {
     setting.image_sizes.push_back(fmt::format("{}x{}", camera.width_px, camera.height_px));
+    add_values(&cameras, camera.focal_x_px, camera.focal_y_px, camera.center_x_px, camera.center_y_px,
+               camera.position_m.x, camera.position_m.y, camera.position_m.z, camera.yaw_rad, camera.pitch_rad,
+               camera.roll_rad);
   }
+  setting.cameras_hash = cameras.hex();
   return setting;
 }
 

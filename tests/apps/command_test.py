@@ -1349,6 +1349,11 @@ class Training(CommandCase):
         self.assertEqual(paths["merged"].read_bytes(), paths["whole"].read_bytes())
         self.assertIn("goals_per_vehicle_half_width_95", whole[0])
         self.assert_refused(1, "expected 3", "evaluate", "--merge", paths["whole"], paths["b"])
+        for x_m, path, scenarios in ((1.5, paths["a"], "0:1"), (2, paths["b"], "1:2")):
+            rig = self.folder / "rig.toml"
+            rig.write_text("".join(f"[[camera]]\nname = 'c{i}'\nwidth_px = 16\nheight_px = 9\nfocal_px = 9\nx_m = {x_m}\nz_m = 1.5\n" for i in range(4)))
+            self.json_of(*evaluate, path, "--scenarios", scenarios, "--rig", rig)
+        self.assert_refused(1, "b.json: cameras_hash is", "evaluate", "--merge", paths["a"], paths["b"])
         self.assert_refused(2, "--scenarios", *evaluate, paths["a"], "--scenarios", "3:3")
 
     def test_controllers_are_evaluated_like_policies(self):
@@ -1372,6 +1377,14 @@ class Training(CommandCase):
                          "--scenarios", scenarios, "--out", path)  # fmt: skip
         merged = self.json_of("evaluate", "--merge", *parts)
         self.assertEqual(merged["rows"][0]["vehicle_episodes"], 24)
+        # In another world, and on a map that has changed.
+        self.json_of(*evaluate[:-4], "--steps", 300, "--policy", "lane", "--scenarios", "1:2", "--out", parts[1])
+        self.assert_refused(1, "b.json: config.simulator.cyclist_fraction is", "evaluate", "--merge", *parts)
+        town = self.town()
+        for seed, path, scenarios in zip((3, 4), parts, ("0:1", "1:2")):
+            town.write_bytes(self.town(seed=seed).read_bytes())
+            self.json_of("evaluate", "--map", town, "--agents", 4, "--steps", 5, "--policy", "idle", "--scenarios", scenarios, "--out", path)
+        self.assert_refused(1, "b.json: maps_hash is", "evaluate", "--merge", *parts)
         self.assert_refused(2, "random, idle, lane, idm_lanes, log, inverse, idm; got 'pilot'", *evaluate, "--policy", "pilot")
         self.assert_refused(2, "random, idle, lane, idm_lanes; got 'log'", *evaluate, "--policy", "log")
         self.assert_refused(2, "excludes", *evaluate, "--policy", "lane", "--sampled")

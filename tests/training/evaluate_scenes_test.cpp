@@ -229,6 +229,7 @@ TEST_F(SceneEvaluations, PartsMergeIntoTheWhole) {
   options_.protocol.densities = {1.0, 0.5};
   set_scene_rule("rollouts=2", &options_.protocol);
   const test::ScratchFolder files;
+  options_.hashes_scenes = true;
   write_results(files / "whole", evaluate_scenes(options_).results);
   std::vector<SceneResults> parts;
   std::vector<std::string> names;
@@ -257,10 +258,17 @@ TEST_F(SceneEvaluations, PartsMergeIntoTheWhole) {
   EXPECT_THAT(refusal(), HasSubstr("begins with scene 1: expected 2"));
   parts[2].first_scene = 2;
   parts[2].protocol.box_scale = 1;
-  EXPECT_THAT(refusal(), ::testing::AllOf(HasSubstr("rules is"), HasSubstr("2.json")));
+  EXPECT_THAT(refusal(), ::testing::AllOf(HasSubstr("rules.box_scale is"), HasSubstr("2.json")));
   parts[2].protocol.box_scale = 0.7f;
   parts[2].setting.seed = 2;
   EXPECT_THAT(refusal(), HasSubstr("seed is 2, in "));
+  parts[2].setting.seed = parts[0].setting.seed;
+  EXPECT_EQ(refusal(), test::kNoError);
+  write(1, {.num_vehicles = 5});
+  parts.pop_back();
+  names.pop_back();
+  add_part(2, 2);
+  EXPECT_THAT(refusal(), HasSubstr("2.json: maps_hash is \""));
   write_file(files / "bad.json", R"({"format": "pictura evaluation 1"})");
   EXPECT_FALSE(has_scene_results(files / "bad.json"));
   EXPECT_FALSE(has_scene_results(folder_ / "1.scenario"));

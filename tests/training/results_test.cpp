@@ -146,13 +146,21 @@ TEST(Results, PartsThatDoNotFitAreRefusedByName) {
   EXPECT_THAT(merged_message(first, other), HasSubstr("b.json: steps is 99, in a.json 100"));
   EvaluationResults bold = part(2, {counts(4, 1, 10)});
   bold.setting.conditioning[static_cast<size_t>(Conditioning::collision)] = 0.5;
-  EXPECT_THAT(merged_message(first, bold), AllOf(HasSubstr("b.json: conditioning is"), HasSubstr("\"collision\":0.5")));
+  EXPECT_THAT(merged_message(first, bold), HasSubstr("b.json: conditioning.collision is 0.5, in a.json 0.0"));
   EvaluationResults lit = part(2, {counts(4, 1, 10)});
   lit.setting.light_cycles = LightCycles::independent;
   EXPECT_THAT(merged_message(first, lit), HasSubstr("b.json: light_cycles is \"independent\", in a.json \"phases\""));
   EvaluationResults moved = part(2, {counts(4, 1, 10)});
   moved.setting.light_heads = "visible";
   EXPECT_THAT(merged_message(first, moved), HasSubstr("b.json: light_heads is \"visible\", in a.json \"as_mapped\""));
+  EvaluationResults rebuilt = part(2, {counts(4, 1, 10)});
+  rebuilt.setting.maps_hash = "fedcba9876543210";
+  EXPECT_THAT(merged_message(first, rebuilt), HasSubstr("b.json: maps_hash is \"fedcba9876543210\", in a.json \"\""));
+  EvaluationResults populated = part(2, {counts(4, 1, 10)});
+  populated.setting.config["simulator.cyclist_fraction"] = "0.2";
+  EXPECT_THAT(merged_message(first, populated),
+              HasSubstr("b.json: config.simulator.cyclist_fraction is \"0.2\", in a.json null"));
+  EXPECT_THAT(merged_message(populated, first), HasSubstr("config.simulator.cyclist_fraction is null"));
   EvaluationResults crowd = part(2, {counts(4, 1, 10)});
   crowd.densities[0].agents_per_world = 9;
   EXPECT_THAT(merged_message(first, crowd), HasSubstr("has 9 agents a world, a.json has 8"));

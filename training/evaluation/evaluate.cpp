@@ -5,9 +5,11 @@
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
+#include "pictura/common/support/hash.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/suggestion.h"
 #include "pictura/map/load_map.h"
+#include "pictura/map/map_cache.h"
 #include "pictura/simulator/agent_state.h"
 #include "pictura/training/evaluation/progress.h"
 #include "pictura/training/session.h"
@@ -99,6 +101,15 @@ bool is_awaited(Simulator& simulator) {
   return std::find(all.begin(), all.end(), static_cast<uint8_t>(AgentStatus::waiting)) != all.end();
 }
 
+std::string hash_of(const CompiledMaps& maps) {
+  Hash64 hash;
+  for (const auto& map : maps) {
+    const std::string roads = encode_map(*map->road, {});
+    hash.add_bytes(roads.data(), roads.size());
+  }
+  return hash.hex();
+}
+
 void check(const EvaluateOptions& options) {
   if (options.first_scenario < 0) fail_usage("evaluate: expected a scenario from 0, got {}", options.first_scenario);
   if (options.scenarios < 1) fail_usage("evaluate: expected one scenario or more, got {}", options.scenarios);
@@ -169,6 +180,8 @@ EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& op
   report.results.setting = driver.setting;
   EvaluationSetting& setting = report.results.setting;
   setting.maps = options.maps;
+  if (shared->maps_hash.empty()) shared->maps_hash = hash_of(maps);
+  setting.maps_hash = shared->maps_hash;
   setting.steps = options.steps;
   setting.argmax = options.argmax;
   setting.seed = options.seed;

@@ -59,6 +59,7 @@ struct EvaluationWorlds {
   CompiledMaps maps;                     // of EvaluateOptions::maps, compiled with those options of the session's world
   Renderer* renderer = nullptr;          // of the session's images, with the maps as 0, 1, ...; null without images
   std::unique_ptr<Simulator> simulator;  // made by the first of them
+  std::string maps_hash;                 // as EvaluationSetting's; computed by the first of them
 };
 
 /// The options' maps as a world of that configuration needs them.

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <optional>
 
 #include <fmt/ranges.h>
@@ -10,6 +12,7 @@
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
+#include "pictura/common/support/hash.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/parallel_for.h"
 #include "pictura/map/file_position.h"
@@ -371,8 +374,36 @@ std::vector<WorldSpec> worlds_of(const LoadedScenes& batch, int first_scene, int
   return worlds;
 }
 
-/// The scenes that the options name, and what of them is no scene.
-SceneIndex find_all(const SceneEvaluateOptions& options) {
+std::string hash_of_file(const std::string& path) {
+  Hash64 hash;
+  std::ifstream file(path, std::ios::binary);
+  std::vector<char> bytes(std::size_t{1} << 20);
+  while (file.read(bytes.data(), static_cast<std::streamsize>(bytes.size())), file.gcount() > 0) {
+    throw_if_interrupted();
+    hash.add_bytes(bytes.data(), static_cast<std::size_t>(file.gcount()));
+  }
+  return hash.hex();
+}
+
+/// Of the names and bytes of their files, wherever these lie.
+std::string hash_of(const std::vector<SceneRef>& scenes, int num_threads) {
+  std::vector<std::string> files;
+  for (const SceneRef& scene : scenes) {
+    if (files.empty() || files.back() != scene.file) files.push_back(scene.file);
+  }
+  std::vector<std::string> hashes(files.size());
+  parallel_for(num_threads, static_cast<int64_t>(files.size()), [&](int64_t item) {
+    const auto i = static_cast<size_t>(item);
+    hashes[i] = std::filesystem::path(files[i]).filename().string() + ' ' + hash_of_file(files[i]) + '\n';
+  });
+  Hash64 hash;
+  for (const std::string& line : hashes) hash.add_bytes(line.data(), line.size());
+  return hash.hex();
+}
+
+/// The scenes that the options name, and what of them is no scene. `hash_out` receives the hash of all, where it is
+/// asked for.
+SceneIndex find_all(const SceneEvaluateOptions& options, std::string* hash_out) {
   if (options.scenes.empty()) fail_usage("evaluate: expected scenes, got none");
   SceneIndex all;
   for (const std::string& name : options.scenes) {
@@ -384,6 +415,7 @@ SceneIndex find_all(const SceneEvaluateOptions& options) {
   if (found > 0 && (options.first_scene < 0 || options.first_scene >= found)) {
     fail_usage("evaluate: expected a first scene in [0, {}), got {}", found, options.first_scene);
   }
+  if (options.hashes_scenes) *hash_out = hash_of(all.scenes, options.num_threads);
   const int end = options.num_scenes > 0 ? std::min(found, options.first_scene + options.num_scenes) : found;
   all.scenes = {all.scenes.begin() + std::min(found, options.first_scene), all.scenes.begin() + end};
   return all;
@@ -408,10 +440,10 @@ void count_agents(const std::vector<std::vector<std::vector<SceneAgent>>>& agent
 SceneEvaluation evaluate_scenes(const EvaluatedDriver& driver, Renderer* renderer,
                                 const SceneEvaluateOptions& options) {
   const SceneProtocol& protocol = options.protocol;
-  SceneIndex index = find_all(options);
   SceneEvaluation evaluation;
   SceneResults& results = evaluation.results;
   results.setting = driver.setting;
+  SceneIndex index = find_all(options, &results.setting.maps_hash);
   results.setting.maps = options.scenes;
   results.setting.steps = protocol.steps;
   results.setting.argmax = options.argmax;

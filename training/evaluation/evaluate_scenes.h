@@ -16,6 +16,7 @@ struct SceneEvaluateOptions : DriverOptions {
   std::vector<std::string> scenes;  // as find_scenes() takes them; one after the other
   SceneProtocol protocol;
   int first_scene = 0, num_scenes = 0;  // of all that are found; 0: all from the first on
+  bool hashes_scenes = false;           // the setting has maps_hash, for which the files of all scenes are read
   int scenes_at_once = 0;               // that are simulated together, which changes no figure; 0: as the device needs
   // For every driven road user: scene by scene, density by density, rollout by rollout, in the order of the tracks.
   std::function<void(const SceneAgent&)> on_agent;

@@ -6,6 +6,7 @@
 #include "pictura/common/error.h"
 #include "pictura/simulator/controllers/host_controllers.h"
 #include "pictura/training/config.h"
+#include "pictura/training/config_keys.h"
 #include "pictura/training/saved_policy.h"
 #include "pictura/training/session.h"
 #include "pictura/training/torch_device.h"
@@ -68,6 +69,7 @@ EvaluatedDriver controller_driver(const DriverOptions& options, int steps) {
   driver.world = evaluation_simulator_config(config, steps, driver.device);
   driver.setting.policy_hash = name;
   driver.setting.conditioning = config.evaluate.conditioning;
+  driver.setting.config = keys_of_evaluation(config, /*has_policy=*/false);
   driver.setting.light_cycles = config.simulator.light_cycles;
   driver.setting.device = driver.device.is_host() ? "cpu" : is_on_host ? "cuda, driven from the host" : "cuda";
   driver.drive = [&options](Simulator& simulator) {

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -39,8 +40,12 @@ struct DensityResult {
 
 /// What decides an evaluation's numbers. Parts are merged where all of it is the same.
 struct EvaluationSetting {
-  std::string policy_hash;
+  std::string policy_hash;  // of the weights; a controller's name
   std::vector<std::string> maps;
+  // Of the maps' roads, of the bytes of recorded scenes' files, and of the poses and lenses of all cameras. Empty in
+  // files of earlier versions, and where nobody asked for it.
+  std::string maps_hash, cameras_hash;
+  std::map<std::string, std::string> config;  // see keys_of_evaluation(); empty in files of earlier versions
   int steps = 0;
   bool argmax = true;
   uint64_t seed = 0;

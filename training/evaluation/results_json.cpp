@@ -20,6 +20,9 @@ Json to_json(const EvaluationSetting& s) {
   for (size_t i = 0; i < kNumConditioning; ++i) conditioning[kConditioningNames[i]] = s.conditioning[i];
   return {{"policy_hash", s.policy_hash},
           {"maps", s.maps},
+          {"maps_hash", s.maps_hash},
+          {"cameras_hash", s.cameras_hash},
+          {"config", s.config},
           {"steps", s.steps},
           {"argmax", s.argmax},
           {"seed", s.seed},
@@ -37,6 +40,9 @@ EvaluationSetting setting_from(const Json& json) {
   EvaluationSetting s;
   json.at("policy_hash").get_to(s.policy_hash);
   json.at("maps").get_to(s.maps);
+  s.maps_hash = json.value("maps_hash", "");
+  s.cameras_hash = json.value("cameras_hash", "");
+  s.config = json.value("config", s.config);
   json.at("steps").get_to(s.steps);
   json.at("argmax").get_to(s.argmax);
   json.at("seed").get_to(s.seed);
@@ -54,10 +60,18 @@ EvaluationSetting setting_from(const Json& json) {
   return s;
 }
 
-void check_same(const Json& first, const std::string& first_name, const Json& other, const std::string& other_name) {
-  for (const auto& [key, value] : first.items()) {
-    PICTURA_CHECK(other.at(key) == value, "{}: {} is {}, in {} {}", other_name, key, other.at(key).dump(), first_name,
-                  value.dump());
+void check_same(const Json& first, const std::string& first_name, const Json& other, const std::string& other_name,
+                const std::string& within) {
+  Json of_both = first;
+  of_both.update(other);
+  for (const auto& [key, either] : of_both.items()) {
+    const Json value = first.value(key, Json()), other_value = other.value(key, Json());
+    if (value.is_object() && other_value.is_object()) {
+      check_same(value, first_name, other_value, other_name, within + key + ".");
+    } else {
+      PICTURA_CHECK(value == other_value, "{}: {}{} is {}, in {} {}", other_name, within, key, other_value.dump(),
+                    first_name, value.dump());
+    }
   }
 }
 

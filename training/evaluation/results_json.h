@@ -13,8 +13,10 @@ namespace pictura {
 Json to_json(const EvaluationSetting& setting);
 EvaluationSetting setting_from(const Json& json);
 
-/// Throws Error naming the first key whose values differ in two parts' objects, and the parts.
-void check_same(const Json& first, const std::string& first_name, const Json& other, const std::string& other_name);
+/// Throws Error naming the first key whose values differ in two parts' objects, and the parts. Keys of objects in them
+/// are named as "rules.box_scale"; `within` is what stands before all keys.
+void check_same(const Json& first, const std::string& first_name, const Json& other, const std::string& other_name,
+                const std::string& within = "");
 
 /// A file's JSON. Throws Error naming the file unless it is that of one of these formats, the first being the present
 /// one.
