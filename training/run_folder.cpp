@@ -49,6 +49,7 @@ void save_checkpoint(const std::string& folder, int64_t num_kept,
     fs::create_hard_link(path(0), path(1), no_links);
     if (no_links) fs::copy_file(path(0), path(1));
   }
+  if (fs::exists(path(0))) fs::permissions(next, fs::status(path(0)).permissions());
   fs::rename(next, path(0));
 }
 

@@ -14,7 +14,7 @@ namespace pictura {
 std::vector<std::string> run_files(const std::string& folder);
 
 /// Calls save(path) for what becomes checkpoint.ckpt, and keeps num_kept - 1 before it as checkpoint.1.ckpt, which is
-/// the newest of them, checkpoint.2.ckpt, ... Wherever it ends, checkpoint.ckpt is whole.
+/// the newest of them, checkpoint.2.ckpt, ... Wherever it ends, checkpoint.ckpt is whole; it keeps its mode.
 void save_checkpoint(const std::string& folder, int64_t num_kept,
                      const std::function<void(const std::string& path)>& save);
 

@@ -518,7 +518,10 @@ TEST_F(Training, TheLastCheckpointsAreKept) {
   EXPECT_EQ(updates(), (Updates{4, 3, 2, -1}));
   // With fewer kept, those that are too many go.
   const std::string newest = read_file(folder_ / "run/checkpoint.ckpt");
+  constexpr auto kPrivate = std::filesystem::perms::owner_read | std::filesystem::perms::owner_write;
+  std::filesystem::permissions(folder_ / "run/checkpoint.ckpt", kPrivate);
   save_checkpoint(folder_ / "run", 2, [&](const std::string& path) { write_file(path, "next"); });
+  EXPECT_EQ(std::filesystem::status(folder_ / "run/checkpoint.ckpt").permissions(), kPrivate);
   EXPECT_EQ(read_file(folder_ / "run/checkpoint.ckpt"), "next");
   EXPECT_EQ(read_file(folder_ / "run/checkpoint.1.ckpt"), newest);
   EXPECT_EQ(update_of("checkpoint.2.ckpt"), -1);
