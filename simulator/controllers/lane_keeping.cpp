@@ -29,13 +29,14 @@ size_t first_touching(const std::vector<AgentBox>& boxes, const AgentBox& other)
 
 }  // namespace
 
-LaneKeepingAgent::LaneKeepingAgent(const WorldView& world, int agent, const LaneGraph& graph)
+LaneKeepingAgent::LaneKeepingAgent(const WorldView& world, int agent, const LaneGraph& graph, size_t search_nodes)
     : world_(world),
       self_(agent),
       slot_(world.first_slot + agent),
       life_(world.agents.life[slot_]),
       agent_(world, agent),
-      path_(world.map, graph, start_place(world, agent)) {
+      path_(world.map, graph, start_place(world, agent)),
+      search_nodes_(search_nodes) {
   waypoints_.back() = points().front().at;  // where the first chain starts
 }
 
@@ -390,7 +391,9 @@ void LaneKeepingController::begin_lives(size_t world) {
     const auto slot = static_cast<size_t>(view.first_slot + agent);
     const bool is_known = agents_[slot] && agents_[slot]->life() == view.agents.life[slot];
     if (is_known || !is_active(view, agent) || walks(view, agent)) continue;
-    agents_[slot] = std::make_unique<LaneKeepingAgent>(view, agent, graph);
+    agents_[slot] = agents_[slot]
+                        ? std::make_unique<LaneKeepingAgent>(view, agent, graph, agents_[slot]->search_nodes())
+                        : std::make_unique<LaneKeepingAgent>(view, agent, graph);
   }
 }
 

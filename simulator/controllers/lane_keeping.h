@@ -24,12 +24,15 @@ struct SimulatorSetup;
 class LaneKeepingAgent {
  public:
   /// `world` shows the simulator's agents and lights as they are at every act(), and has not been stepped in this
-  /// life yet; the graph is its map's. Its arrays and the graph must outlive this.
-  LaneKeepingAgent(const WorldView& world, int agent, const LaneGraph& graph);
+  /// life yet; the graph is its map's. Its arrays and the graph must outlive this. `search_nodes` are what the slot's
+  /// life before left.
+  LaneKeepingAgent(const WorldView& world, int agent, const LaneGraph& graph, size_t search_nodes = kMaxSearchNodes);
 
   /// The action for what the agent and the lights are now.
   int32_t act();
   int32_t life() const { return life_; }
+  /// How many nodes its searches may still make.
+  size_t search_nodes() const { return search_nodes_; }
   /// Steps in which it waited at a red light.
   int stops() const { return stops_; }
   /// Steps in which its rear axle was more than kAstray_m from its path.
@@ -37,7 +40,8 @@ class LaneKeepingAgent {
   static constexpr float kAstray_m = 1;
 
  private:
-  // A node takes 1 to 2 us: searches take at most 1 ms a step in the mean of a long run, and .6 s in a single step.
+  // A node takes 1 to 2 us: a slot's searches take at most 1 ms a step in the mean of a long run, and .6 s in a single
+  // step.
   static constexpr size_t kMaxSearchNodes = 300'000, kSearchNodesPerStep = 500, kMinSearchNodes = 20'000;
 
   enum class Driving { pursues, brakes, brakes_straight };  // the path; on the path; without steering
@@ -74,10 +78,10 @@ class LaneKeepingAgent {
   size_t place_ = 0;                           // the point of the path nearest to it
   std::array<size_t, kNumWaypoints> goals_{};  // the points where the waypoints are
   DrivingPlan plan_;
-  size_t next_planned_ = 0;                // of its actions
-  size_t search_nodes_ = kMaxSearchNodes;  // that its searches may still make
-  size_t min_search_nodes_ = 0;            // of these, to begin the next search
-  bool halts_ = false;                     // before it would leave the road, until it knows a way on
+  size_t next_planned_ = 0;  // of its actions
+  size_t search_nodes_;
+  size_t min_search_nodes_ = 0;  // of these, to begin the next search
+  bool halts_ = false;           // before it would leave the road, until it knows a way on
   int stops_ = 0, steps_astray_ = 0;
 };
 
