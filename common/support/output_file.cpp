@@ -207,7 +207,11 @@ void OutputFile::replace() {
     // Owners can be passed on by a superuser alone, and groups by their members.
     [[maybe_unused]] const int ignored = ::fchown(staged_.get(), replaced_->st_uid, replaced_->st_gid);
     constexpr mode_t kPermissions = S_IRWXU | S_IRWXG | S_IRWXO;
-    if (::fchmod(staged_.get(), replaced_->st_mode & kPermissions) != 0) fail_to_write(path_);
+    struct stat staged{};
+    if (::fstat(staged_.get(), &staged) != 0) fail_to_write(path_);
+    // File systems without modes, on which all are the same, refuse the call.
+    const bool differs = ((staged.st_mode ^ replaced_->st_mode) & kPermissions) != 0;
+    if (differs && ::fchmod(staged_.get(), replaced_->st_mode & kPermissions) != 0) fail_to_write(path_);
   }
   // On disk before the rename, so that a crash never leaves an empty file under the final name.
   if (::fsync(staged_.get()) != 0) fail_to_write(path_);
