@@ -7,7 +7,12 @@ the probes and PolicySession need a package that was built beside torch, and loa
 import os
 from typing import TYPE_CHECKING
 
-from pictura._pictura import (  # noqa: F401
+# Threads of torch's loops spin while they wait, for milliseconds unless this limits it (apps/limit_spinning.cpp says why).
+# It is read once, when the first of pictura and torch is imported.
+if "OMP_WAIT_POLICY" not in os.environ:
+    os.environ.setdefault("GOMP_SPINCOUNT", "2000")
+
+from pictura._pictura import (  # noqa: E402, F401
     AGENT_FIELDS,
     BOX_DTYPE,
     COMMAND_DTYPE,
