@@ -7,7 +7,7 @@ namespace pictura::testing {
 namespace {
 
 constexpr double kSpeed_mps = 20, kAcceleration_mps2 = 5, kLateralAcceleration_mps2 = 4, kSteering_rad = 0.55;
-constexpr double kLength_m = 6, kWidth_m = 3, kLaneOffset_m = 4, kNoLane_m = 4;
+constexpr double kLength_m = 6, kWidth_m = 3, kLaneOffset_m = 4, kNoLane_m = 4, kNoLaneLimit_mps = 15;
 constexpr double kDistance_m = 120, kHeight_m = 10, kHalfLength_m = 5;
 constexpr double kRange_m = 100, kBehind_m = 20, kAhead_m = 120, kAside_m = 30;
 constexpr float kCell_m = 10, kLaneReach_m = 15;
@@ -134,7 +134,7 @@ ReferenceObservation reference_observation(Simulator& simulator, int slot) {
                      state.steer_rad[slot] / kSteering_rad,
                      state.accel_long_mps2[slot] / kAcceleration_mps2,
                      state.accel_lat_mps2[slot] / kLateralAcceleration_mps2,
-                     state.speed_limit_mps[slot] / kSpeed_mps,
+                     (has_lane ? state.speed_limit_mps[slot] : kNoLaneLimit_mps) / kSpeed_mps,
                      !has_auxiliary ? 0 : (has_lane ? state.lane_offset_m[slot] : kNoLane_m) / kLaneOffset_m,
                      has_auxiliary && has_lane ? std::cos(double{state.lane_angle_rad[slot]}) : 0};
   for (int i = 0; i < kNumConditioning; ++i) {
@@ -164,14 +164,14 @@ ReferenceObservation reference_observation(Simulator& simulator, int slot) {
   observation.is_near_lane = cell.is_near_lane;
   observation.is_within_cells = cell.holds_ego;
   if (!cell.is_near_lane) return observation;
-  for (size_t i = 0; i < map.road->lights.size(); ++i) {
-    const TrafficLight& light = map.road->lights[i];
-    const auto begin = map.road->light_lanes.begin();
-    const bool controls_ego =
-        std::find(begin + light.lanes.begin, begin + light.lanes.end, state.lane[slot]) != begin + light.lanes.end;
-    rows(EntitySet::controls)
-        .push_back(
-            control(ego, light, scene.light_states[static_cast<size_t>(scene.light_begin[world]) + i], controls_ego));
+  const std::vector<TrafficLight>& lights = map.road->lights;
+  const auto first_of_lane = std::find_if(lights.begin(), lights.end(), [&](const TrafficLight& light) {
+    const auto begin = map.road->light_lanes.begin() + light.lanes.begin, end = begin + light.lanes.size();
+    return std::find(begin, end, state.lane[slot]) != end;
+  });
+  for (auto light = lights.begin(); light != lights.end(); ++light) {
+    const auto index = static_cast<size_t>(scene.light_begin[world] + (light - lights.begin()));
+    rows(EntitySet::controls).push_back(control(ego, *light, scene.light_states[index], light == first_of_lane));
   }
   rows(EntitySet::lanes) = rows_of(map.rules.lane_pieces, ego, cell);
   rows(EntitySet::boundaries) = rows_of(map.rules.boundary_pieces, ego, cell);

@@ -206,6 +206,15 @@ TEST(ObservationReference, HoldsWhateverIsConfigured) {
   EXPECT_GT(driven_on.observations, left.observations);
 }
 
+TEST(ObservationReference, HoldsInCrowds) {
+  SimulatorConfig config = mixed_traffic();
+  config.parked_cars = 60;
+  const auto simulator = make(config, load_map("procedural:2:blocks=2x2"), {{0, 120, 0}});
+  Compared compared;
+  drive_and_compare(*simulator, 1, &compared);
+  EXPECT_EQ(compared.full[static_cast<size_t>(EntitySet::partners)], compared.observations);
+}
+
 TEST(ObservationReference, AnAgentThatLeavesAtItsGoalObservesNothing) {
   SimulatorConfig config = mixed_traffic();
   config.leave_at_goal = true;
