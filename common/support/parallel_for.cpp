@@ -8,8 +8,6 @@
 #include <omp.h>
 #include <pthread.h>
 
-#include "pictura/common/error.h"
-
 namespace pictura {
 
 namespace {

@@ -12,6 +12,8 @@
 #include <mutex>
 #include <type_traits>
 
+#include "pictura/common/error.h"
+
 namespace pictura {
 
 /// Far above what a host has, and below where a system has no more threads.
