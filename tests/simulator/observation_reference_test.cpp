@@ -262,11 +262,24 @@ struct Lines {
   std::vector<double> extents;
 };
 
-/// How far pieces may be from their line, and how long they may be.
+/// How far pieces may be from their line, how long they may be, and whether they end at points of it alone.
 struct PieceLimits {
   double chord_error_m, longest_m;
+  bool ends_at_points;
 };
-constexpr PieceLimits kTrainingPieces{0.25, 10}, kEvenPieces{0.02, 5};
+constexpr PieceLimits kTrainingPieces{0.25, 10, true}, kEvenPieces{0.02, 5, false};
+
+/// The maximum distance of points [begin, end] of a line from the chord between the first and the last of them.
+double furthest_aside_m(const std::vector<Vec3>& points, size_t begin, size_t end) {
+  const Vec2 first = points[begin].xy(), way = points[end].xy() - first;
+  double furthest_m = 0;
+  for (size_t i = begin; i <= end; ++i) {
+    const Vec2 at = points[i].xy() - first;
+    const float share = std::clamp(dot(at, way) / std::max(dot(way, way), 1e-12f), 0.0f, 1.0f);
+    furthest_m = std::max(furthest_m, double{length(at - way * share)});
+  }
+  return furthest_m;
+}
 
 /// The first fault of pieces that should follow these lines, each from its start to its end; empty if there is none.
 std::string fault_of_pieces(const std::vector<ObservedPiece>& pieces, const Lines& lines, const PieceLimits& limits) {
@@ -291,9 +304,13 @@ std::string fault_of_pieces(const std::vector<ObservedPiece>& pieces, const Line
         }
       }
       const Vec3 way = points[end] - points[begin];
-      for (size_t i = begin; i <= end; ++i) {
-        const double aside_m = cross(pieces[first].direction, points[i].xy() - points[begin].xy());
-        if (std::abs(aside_m) > limits.chord_error_m + kRounding_m) return fmt::format("piece {} cuts a corner", first);
+      if (furthest_aside_m(points, begin, end) > limits.chord_error_m + kRounding_m) {
+        return fmt::format("piece {} cuts a corner", first);
+      }
+      if (end + 1 < points.size() && limits.ends_at_points &&
+          length(points[end + 1].xy() - points[begin].xy()) < limits.longest_m - kRounding_m &&
+          furthest_aside_m(points, begin, end + 1) < limits.chord_error_m - kRounding_m) {
+        return fmt::format("piece {} could be longer", first);
       }
       for (size_t i = first; i < next; ++i) {
         const auto share =
