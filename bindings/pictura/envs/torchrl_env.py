@@ -70,8 +70,8 @@ class DriveTorchRLEnv(EnvBase):
             seen = TensorDict({key: split(value) for key, value in seen.items()}, self._shape, device=self.device)
         else:
             seen = split(seen)
-        nobody = torch.zeros(*self._shape, 1, dtype=torch.bool, device=self.device)
-        ends = {end: split(results[end]).unsqueeze(-1).clone() if results else nobody.clone() for end in self._agent_ends}
+        none_ended = torch.zeros(*self._shape, 1, dtype=torch.bool, device=self.device)
+        ends = {end: split(results[end]).unsqueeze(-1).clone() if results else none_ended.clone() for end in self._agent_ends}
         return TensorDict({"observation": seen, "mask": split(self.batch.active)} | ends, self._shape, device=self.device)
 
     def _reset(self, tensordict: TensorDictBase | None = None, **_: Any) -> TensorDictBase:
