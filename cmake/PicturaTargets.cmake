@@ -190,7 +190,7 @@ if(NOT DEFINED ENV{PICTURA_DATA} AND EXISTS ${PROJECT_SOURCE_DIR}/../shared/data
   list(APPEND PICTURA_TEST_ENVIRONMENT PICTURA_DATA=${data_folder})
 endif()
 if(PICTURA_SANITIZE MATCHES thread)
-  list(APPEND PICTURA_TEST_ENVIRONMENT TSAN_OPTIONS=ignore_noninstrumented_modules=1)
+  list(APPEND PICTURA_TEST_ENVIRONMENT TSAN_OPTIONS=ignore_noninstrumented_modules=1:die_after_fork=0)
 elseif(PICTURA_SANITIZE MATCHES address)
   # The sanitizer guesses where thread-local variables of libraries loaded at run time lie from the words before them;
   # with Mesa's it may guess wrong and abort.
