@@ -40,7 +40,7 @@ int run(CLI::App& app, int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     complain("out of memory");
   } catch (const std::exception& error) {
-    // Of a library: what follows the first line is where in its own code.
+    // A library's message: the lines after the first say where in its code the error arose.
     std::string message = error.what();
     message.erase(std::min(message.find('\n'), message.size()));
     const bool lacks_memory =

@@ -9,10 +9,12 @@
 
 namespace pictura {
 
+/// How much of a file read_file() shows to its check.
+constexpr std::size_t kFirst_bytes = 64;
+
 /// The bytes of a file. Throws Error naming the path and the reason; refuses folders, files above max_bytes, and files
 /// whose size or time of change differ before and after reading. Throws Interrupted while it waits for a FIFO's writer.
 /// `check`, which may throw, gets the first kFirst_bytes, or what there is, before more is read.
-constexpr std::size_t kFirst_bytes = 64;
 std::string read_file(const std::string& path, std::size_t max_bytes = std::size_t{1} << 30,
                       const std::function<void(std::string_view first)>& check = {});
 

@@ -9,8 +9,8 @@
 
 namespace pictura {
 
-/// A folder in which what earlier calls of a kind of command wrote, and this call does not, is removed. Which files
-/// that are, a hidden list in the folder says, .pictura-KIND; all others stay.
+/// A folder that a command fills again: files that earlier calls of the same kind wrote, and this call does not, are
+/// removed. A hidden list in the folder, .pictura-KIND, names the files that were written; all others stay.
 class FilledFolder {
  public:
   /// Makes the folder. Throws Error as make_output_folder() does, and for a list that is a link.

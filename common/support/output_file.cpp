@@ -73,7 +73,7 @@ std::string new_hidden_name(const std::string& folder) {
   return fmt::format("{}/{}{:08x}{:08x}{}", folder, kHiddenBeginning, random(), random(), kHiddenEnding);
 }
 
-// Hidden files of the folder that nobody writes any more: a writer holds a lock, which ends with its process.
+// Removes hidden files of the folder whose writers have ended: a writer holds a lock until its process ends.
 void remove_abandoned(const std::string& folder) {
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {

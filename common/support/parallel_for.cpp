@@ -95,7 +95,7 @@ class Team {
   std::atomic<bool> is_ending_ = false;
   std::atomic<std::uint32_t> num_loops_ = 0;  // so far; threads without work sleep on it
   std::atomic<std::uint32_t> state_ = 0;      // kPlace for every free place in the loop, 1 for every thread at work
-  // Of the loop, set while no thread is at work.
+  // The call of the present loop and its argument, which are set while no thread is at work.
   void (*call_)(void*, int) = nullptr;
   void* body_ = nullptr;
 };
