@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kSpeed_mps = 20, kAcceleration_mps2 = 5, kLateralAcceleration_mps2 = 4, kSteering_rad = 0.55;
 constexpr double kLength_m = 6, kWidth_m = 3, kLaneOffset_m = 4, kNoLane_m = 4, kNoLaneLimit_mps = 15;
-constexpr double kDistance_m = 120, kHeight_m = 10, kHalfLength_m = 5;
+constexpr double kDistance_m = 120, kMapHeight_m = 10, kHalfLength_m = 5;
 constexpr double kRange_m = 100, kBehind_m = 20, kAhead_m = 120, kAside_m = 30;
 constexpr float kCell_m = 10, kLaneReach_m = 15;
 
@@ -21,7 +21,7 @@ struct Frame {
   /// Scaled coordinates of a point.
   std::vector<double> point(const Vec3& at) const {
     const double x = at.x - x_m, y = at.y - y_m;
-    return {forward(x, y) / kDistance_m, left(x, y) / kDistance_m, (at.z - z_m) / kHeight_m};
+    return {forward(x, y) / kDistance_m, left(x, y) / kDistance_m, (at.z - z_m) / kMapHeight_m};
   }
 };
 
