@@ -1,6 +1,5 @@
 // `pictura map`: a map's properties, its elements, and its picture from above.
 #include <algorithm>
-#include <chrono>
 
 #include "pictura/apps/commands.h"
 #include "pictura/cli/file_options.h"
@@ -11,6 +10,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/interrupt.h"
+#include "pictura/common/support/stopwatch.h"
 #include "pictura/drawing/drawing.h"
 #include "pictura/map/blind_approaches.h"
 #include "pictura/map/load_map.h"
@@ -123,9 +123,9 @@ void run_scene(const MapArguments& arguments) {
   if (!arguments.xodr.empty()) fail_usage("--xodr: {} is a recorded scene, which has no OpenDRIVE", arguments.map);
   const InterruptibleWork work("interrupted");
   SceneReport report;
-  const auto begin = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const Scenario scenario = load_scenario(arguments.map, &report);
-  const double load_ms = 1e3 * seconds_since(begin);
+  const double load_ms = 1e3 * watch.seconds();
   work.check();
   const MapPictureOptions picture{.size_px = arguments.size_px, .box = shown_box(arguments), .scenario = &scenario};
   if (!arguments.png.empty()) draw_map_png(scenario.map, arguments.png, picture);
@@ -162,14 +162,14 @@ void run_map(const CLI::App& command, const MapArguments& arguments) {
   const InterruptibleWork work("interrupted");
   LoadReport report;
   ProgressLine progress;
-  const auto begin = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const std::shared_ptr<const RoadMap> map =
       load_map(arguments.map, {.strict = arguments.strict}, &report, [&](const char* stage, double done) {
         work.check();
-        if (seconds_since(begin) > kQuiet_s) progress.update(fmt::format("{}: {}", arguments.map, stage), done);
+        if (watch.seconds() > kQuiet_s) progress.update(fmt::format("{}: {}", arguments.map, stage), done);
       });
   progress.finish();
-  const double load_ms = 1e3 * seconds_since(begin);
+  const double load_ms = 1e3 * watch.seconds();
   work.check();
   print_mends(*map, report.source);
   const MapPictureOptions picture{.size_px = arguments.size_px, .box = shown_box(arguments)};

@@ -1,7 +1,6 @@
 // `pictura render`: writes what cameras see, of a scene file, of a world that was driven with random actions, or of a
 // recorded scene.
 #include <cctype>
-#include <chrono>
 #include <filesystem>
 
 #include <fmt/ranges.h>
@@ -18,6 +17,7 @@
 #include "pictura/common/support/filled_folder.h"
 #include "pictura/common/support/hash.h"
 #include "pictura/common/support/interrupt.h"
+#include "pictura/common/support/stopwatch.h"
 #include "pictura/drawing/drawing.h"
 #include "pictura/drawing/planes.h"
 #include "pictura/map/scenario/load_scenario.h"
@@ -73,9 +73,9 @@ double draw(const Subject& subject, Renderer* renderer, HostImages* images_out) 
   std::vector<double> seconds;
   for (int repeat = 0; repeat < 5; ++repeat) {
     work.check();
-    const auto begin = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     renderer->render(subject.scene, subject.views, images_out->batch());
-    seconds.push_back(seconds_since(begin));
+    seconds.push_back(watch.seconds());
   }
   std::nth_element(seconds.begin(), seconds.begin() + 2, seconds.end());
   return static_cast<double>(subject.views.size()) / seconds[2];

@@ -2,7 +2,6 @@
 // cameras.
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <optional>
 
 #include "pictura/apps/commands.h"
@@ -14,6 +13,7 @@
 #include "pictura/cli/serve.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
+#include "pictura/common/support/stopwatch.h"
 #include "pictura/drawing/drawing.h"
 #include "pictura/drawing/film.h"
 #include "pictura/map/scenario/scenario.h"
@@ -196,32 +196,33 @@ void run_simulate(SimulateArguments arguments) {
 
   ProgressLine line;
   double film_s = 0;  // filming, recording and serving
-  const auto begin_of_all = std::chrono::steady_clock::now();
+  const Stopwatch since_start;
   int& step = run.steps;
   for (; (arguments.endless || step < arguments.steps) && !interrupted(); ++step) {
-    const auto begin_of_frame = std::chrono::steady_clock::now();
+    Stopwatch beside;  // what is neither driven nor simulated
     if (live && !await_step(*live)) break;
     if (film) film->add_frame(*simulator);
-    film_s += seconds_since(begin_of_frame);
+    film_s += beside.seconds();
     world.act();
-    const auto begin_of_recording = std::chrono::steady_clock::now();
+    beside.restart();
     if (live) live->before_step(world.commands);
     if (recording) recording->before_step(world.commands);
-    const auto begin = std::chrono::steady_clock::now();
+    film_s += beside.seconds();
+    const Stopwatch stepping;
     const StepResult result = world.step();
-    const auto end = std::chrono::steady_clock::now();
+    run.simulate_s += stepping.seconds();
+    beside.restart();
     if (scene) run.displacement.add(*simulator, *scene);
     run.lives.add(*simulator);
     if (recording) recording->after_step(result);
     if (saved) saved->after_step();
     if (live) live->after_step(result);
-    run.simulate_s += std::chrono::duration<double>(end - begin).count();
-    film_s += std::chrono::duration<double>(begin - begin_of_recording).count() + seconds_since(end);
+    film_s += beside.seconds();
     if (!live)
       line.update(fmt::format("step {}/{}", step + 1, arguments.steps),
                   static_cast<double>(step + 1) / arguments.steps);
   }
-  run.drive_s = seconds_since(begin_of_all) - film_s;
+  run.drive_s = since_start.seconds() - film_s;
   line.finish();
   if (live) live->finish();
   if (film && step > 0) film->close();  // ^C may come before the first frame

@@ -1,5 +1,6 @@
 #include "pictura/backends/make_learner.h"
 
+#include "pictura/backends/make_policy_executor.h"
 #include "pictura/common/error.h"
 
 namespace pictura {
@@ -44,6 +45,8 @@ std::unique_ptr<LearnerExecutor> make_learner_executor(Device device) {
 #endif
   return make_cpu_learner_executor();
 }
+
+std::unique_ptr<PolicyExecutor> make_policy_executor(Device device) { return make_learner_executor(device); }
 
 std::unique_ptr<SceneHistory> make_scene_history(Device device, const SceneHistorySize& size) {
   check_device(device);

@@ -12,6 +12,7 @@
 #include "pictura/cli/reported_map.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/suggestion.h"
+#include "pictura/configuration/apply_config.h"
 #include "pictura/map/scenario/load_scenario.h"
 #include "pictura/simulator/controllers/host_controllers.h"
 #include "pictura/simulator/controllers/shared_control.h"

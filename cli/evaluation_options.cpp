@@ -6,7 +6,7 @@
 #include "pictura/cli/map_options.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
-#include "pictura/training/config.h"
+#include "pictura/configuration/config.h"
 
 namespace pictura {
 
@@ -67,7 +67,7 @@ std::string interval_text(const Estimate& estimate, int decimals) {
 void EvaluationProgress::update(double done, double eta_s) {
   // The notice comes when the time is long, as soon as a few seconds tell.
   constexpr double kEstimateAfter_s = 5, kLong_s = 600;
-  const double elapsed_s = seconds_since(begin_);
+  const double elapsed_s = since_start_.seconds();
   if (!has_estimate_ && elapsed_s >= kEstimateAfter_s) {
     has_estimate_ = true;
     if (elapsed_s + eta_s > kLong_s) {

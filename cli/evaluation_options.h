@@ -7,6 +7,7 @@
 #include "pictura/cli/backend_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/support/json.h"
+#include "pictura/common/support/stopwatch.h"
 #include "pictura/training/evaluation/evaluate.h"
 
 namespace pictura {
@@ -46,7 +47,7 @@ class EvaluationProgress {
  private:
   std::string finished_;
   ProgressLine line_;
-  const std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  const Stopwatch since_start_;
   bool has_estimate_ = false;
 };
 

@@ -9,6 +9,7 @@
 #include "pictura/commit.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/configuration/apply_config.h"
 #include "pictura/replay/file.h"
 #include "pictura/replay/gallery.h"
 #include "pictura/replay/mcap.h"
@@ -120,7 +121,7 @@ ReplayOrigin origin_of(const RecordedDriver& driver) {
   ReplayOrigin origin{.command = command_line(), .commit = PICTURA_COMMIT, .version = PICTURA_VERSION};
   origin.policy = origin.policy_hash = driver.policy;
 #ifdef PICTURA_HAS_TORCH
-  if (driver.session) origin.policy_hash = driver.session->evaluation_setting().policy_hash;
+  if (driver.session) origin.policy_hash = driver.session->policy_hash();
 #endif
   return origin;
 }

@@ -53,10 +53,6 @@ std::string printable(std::string_view message) {
   return text;
 }
 
-double seconds_since(std::chrono::steady_clock::time_point begin) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-}
-
 std::string format_duration(double seconds) {
   if (!std::isfinite(seconds)) return "?";
   const auto total = static_cast<long>(std::lround(seconds));
@@ -87,16 +83,15 @@ ProgressLine::~ProgressLine() { finish(); }
 void ProgressLine::update(const std::string& text) {
   text_ = text;
   dirty_ = true;
-  const auto now = std::chrono::steady_clock::now();
   const bool terminal = isatty(STDERR_FILENO) != 0;
-  if (now - last_print_ < std::chrono::milliseconds(terminal ? 200 : 10000)) return;
-  last_print_ = now;
+  if (since_print_ && since_print_->seconds() < (terminal ? 0.2 : 10)) return;
+  since_print_.emplace();
   print_message_text(terminal ? "\r\033[K" + shown(text_) : text_ + "\n");
   dirty_ = terminal;
 }
 
 void ProgressLine::update(const std::string& text, double done) {
-  const double elapsed_s = seconds_since(begin_);
+  const double elapsed_s = since_start_.seconds();
   update(fmt::format("{}  ETA {}", text, format_duration(elapsed_s * (1 - done) / done)));
 }
 

@@ -3,7 +3,7 @@
 // (close_stdout()), a stderr that takes nothing loses messages.
 #pragma once
 
-#include <chrono>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -11,6 +11,7 @@
 
 #include "pictura/common/renderer.h"
 #include "pictura/common/support/json.h"
+#include "pictura/common/support/stopwatch.h"
 
 namespace pictura {
 
@@ -39,9 +40,6 @@ void close_stdout();
 /// A message in one line, in which control characters of names are escaped: "a\nb".
 std::string printable(std::string_view message);
 
-/// Until now.
-double seconds_since(std::chrono::steady_clock::time_point begin);
-
 /// "1 h 02 min", "3 min 05 s" or "12 s".
 std::string format_duration(double seconds);
 
@@ -61,7 +59,8 @@ class ProgressLine {
  private:
   std::string text_;
   bool dirty_ = false;
-  std::chrono::steady_clock::time_point last_print_{}, begin_ = std::chrono::steady_clock::now();
+  std::optional<Stopwatch> since_print_;
+  const Stopwatch since_start_;
 };
 
 /// Parses "AxB" with both numbers in [1, max]. Throws UsageError naming the option.

@@ -15,7 +15,7 @@ at::Tensor seen_slots(const Run& run, const at::Tensor& active) {
 
 // What the policy makes of some active slots at a step that has been recorded.
 Decision decide(Run* run, int64_t step, const at::Tensor& active) {
-  const Config::Train& config = run->config.train;
+  const TrainSection& config = run->config.train;
   const at::Tensor rows = run->rollout.rows_of(step, seen_slots(*run, active));
   // In chunks of another size products may be rounded otherwise. Full ones have one, over however many ranks the agents
   // are divided.
@@ -112,7 +112,7 @@ void Collector::simulate(int64_t step) {
 }
 
 UpdateStats improve(Run* run) {
-  const Config::Train& config = run->config.train;
+  const TrainSection& config = run->config.train;
   const UpdateKey key{run->config.run.seed, run->update, learning_rate_at(config, run->agent_steps),
                       teacher_weight(*run)};
   UpdateStats stats;

@@ -1,10 +1,9 @@
-// What a run saves: one file from which training goes on exactly and a policy can be loaded. Layout: the eight bytes
-// PICTCKPT, u32 version, u32 byte order mark, u64 length of a JSON header, the header, the data that it describes, u64
-// hash (FNV-1a) of all bytes before. Version 1 has no such hash: its header names one of the data.
+// What a run saves: one file (training/checkpoint_file.h) from which training goes on exactly and a policy can be
+// loaded.
 #pragma once
 
 #include <map>
-#include <string_view>
+#include <string>
 
 #include "pictura/training/saved_policy.h"
 
@@ -34,11 +33,8 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint);
 /// Throws Error naming the file when it is no checkpoint, truncated, damaged, of another version or byte order, or of
 /// another observation schema (naming the entry that differs).
 Checkpoint read_checkpoint(const std::string& path);
-/// Whether the bytes of a file begin as those of a checkpoint do.
-bool is_checkpoint(std::string_view file);
-/// The bytes of such a file, and what they say.
-std::string read_checkpoint_file(const std::string& path);
-Checkpoint parse_checkpoint(const std::string& file, const std::string& path);
+/// What the bytes of such a file say.
+Checkpoint parse_checkpoint(const std::string& bytes, const std::string& path);
 
 /// Camera and property in which the two rigs first differ, with both values, or empty.
 std::string first_difference(const Rig& saved, const Rig& now);

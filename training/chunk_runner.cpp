@@ -87,7 +87,7 @@ void ChunkRunner::set_targets(const Targets& targets) {
 void ChunkRunner::begin_minibatch() { stats_.zero_(); }
 
 void ChunkRunner::learn(const at::Tensor& rows, const at::Tensor& advantages, const at::Tensor& shares, double weight,
-                        const Config::Train& config) {
+                        const TrainSection& config) {
   Work& work = observe(rows);
   set(&work.advantages, advantages);
   // A product with 1 changes no bit, so one graph serves full chunks and those that are filled up.
@@ -117,7 +117,7 @@ void ChunkRunner::learn(const at::Tensor& rows, const at::Tensor& advantages, co
 }
 
 Losses ChunkRunner::losses(const at::Tensor& rows, const at::Tensor& advantages, const at::Tensor& shares,
-                           const Config::Train& config) {
+                           const TrainSection& config) {
   const Work& work = observe(rows);
   const PhaseTimer::Scope timed(timer_, Phase::diagnose);
   return losses_of(policy_.forward(work.observation), targets_, rows, advantages, shares, config.clip_coef);

@@ -30,10 +30,10 @@ class ChunkRunner {
   /// Adds the gradient of a chunk's loss times `weight` to those of the parameters, which must be defined, and its
   /// stats times `weight` to stats(). shares: see losses_of. Phase::learn and Phase::backward.
   void learn(const at::Tensor& rows, const at::Tensor& advantages, const at::Tensor& shares, double weight,
-             const Config::Train& config);
+             const TrainSection& config);
   /// The losses of a chunk with their ways back, call by call: Phase::diagnose.
   Losses losses(const at::Tensor& rows, const at::Tensor& advantages, const at::Tensor& shares,
-                const Config::Train& config);
+                const TrainSection& config);
   /// f64 [kNumStats], where those of all chunks since begin_minibatch() are added up; the last, the norm, is 0.
   const at::Tensor& stats() const { return stats_; }
   static constexpr int64_t kNumStats = 8;  // of LossStats

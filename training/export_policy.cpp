@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "pictura/common/error.h"
+#include "pictura/configuration/apply_config.h"
 #include "pictura/training/patch_spread.h"
 #include "pictura/training/saved_policy.h"
 

@@ -11,7 +11,7 @@
 #include <ATen/core/grad_mode.h>
 #include <torch/csrc/autograd/custom_function.h>
 
-#include "pictura/backends/make_learner.h"
+#include "pictura/backends/make_policy_executor.h"
 #include "pictura/training/host_passes.h"
 #include "pictura/training/torch_device.h"
 

@@ -10,8 +10,9 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/parallel_for.h"
+#include "pictura/common/support/stopwatch.h"
+#include "pictura/configuration/config_keys.h"
 #include "pictura/training/algorithm.h"
-#include "pictura/training/config_keys.h"
 #include "pictura/training/diagnosis.h"
 #include "pictura/training/host_memory.h"
 #include "pictura/training/memory.h"
@@ -70,7 +71,7 @@ class TrainingLoop {
 
  private:
   bool goes_on() {
-    const Config::Train& train = run_.config.train;
+    const TrainSection& train = run_.config.train;
     if (is_interrupted_ || is_out_of_time_) return false;
     if (run_.update >= train.updates || schedule_has_ended(train, run_.agent_steps)) return false;
     is_out_of_time_ = time_.is_too_short_for(RunWork::update);

@@ -6,6 +6,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/image.h"
 #include "pictura/common/scene_history.h"
+#include "pictura/configuration/apply_config.h"
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/observation_arrays.h"
 #include "pictura/training/network_shape.h"
@@ -60,7 +61,7 @@ bool keeps_images(const Config& config, int num_agents, Device device, int64_t m
 }
 
 double estimated_bytes(const Config& config, bool keeps_images) {
-  const Config::SimulatorSection& section = config.simulator;
+  const SimulatorSection& section = config.simulator;
   const double agents = section.num_slots, steps = config.train.num_steps;
   const double worlds = 2 * agents / (section.min_agents + section.max_agents),
                boxes = agents + worlds * section.parked_cars;
@@ -127,7 +128,7 @@ void add_entity_sets(const Config& config, Device device, LayerSum* sum) {
 
 // Images of the size that the rig of these agent-steps has.
 void add_images(const Config& config, const Rig& rig, LayerSum* sum) {
-  const Config::PolicySection& policy = config.policy;
+  const PolicySection& policy = config.policy;
   const double cameras = static_cast<double>(rig.cameras.size()), queries = policy.num_queries;
   const bool is_program = policy.backbone != "conv";
   double channels = 3.0 * policy.patch_px * policy.patch_px, pixels = 0;
@@ -158,7 +159,7 @@ void add_images(const Config& config, const Rig& rig, LayerSum* sum) {
 }
 
 LayerSum layers_of(const Config& config, const Rig& rig, Device device) {
-  const Config::PolicySection& policy = config.policy;
+  const PolicySection& policy = config.policy;
   LayerSum sum;
   double sets = 4;
   if (config.reads_images()) {

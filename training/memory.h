@@ -1,7 +1,7 @@
 // Whether a configuration's agents and network fit into memory, before anything is made.
 #pragma once
 
-#include "pictura/training/config.h"
+#include "pictura/configuration/config.h"
 
 namespace pictura {
 

@@ -3,9 +3,9 @@
 
 #include <string_view>
 
+#include "pictura/configuration/config.h"
 #include "pictura/simulator/observation.h"
 #include "pictura/simulator/rules/observe.h"
-#include "pictura/training/config.h"
 #include "pictura/training/rules/network_passes.h"
 
 namespace pictura {
@@ -14,7 +14,7 @@ namespace pictura {
 constexpr int num_ego_features(bool sees_images) { return sees_images ? kEgoFeatures - 2 : kEgoFeatures; }
 
 /// Features that are read of each row of an array of the observation, by its name: of a set, or of the waypoints.
-inline RowFeatures row_features_of(const Config::PolicySection& policy, std::string_view array) {
+inline RowFeatures row_features_of(const PolicySection& policy, std::string_view array) {
   const int points = array == "controls" ? 2 : 1;  // a stop line has two ends
   const bool is_segment = array == "lanes" || array == "boundaries" || array == "walls";
   return {.points = policy.point_features ? points : 0,

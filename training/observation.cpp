@@ -119,7 +119,7 @@ std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> vi
 }
 
 at::Tensor active_slots(const ControllerInput& input, Span<const uint8_t> mask, bool with_left,
-                        LearnerExecutor* executor) {
+                        PolicyExecutor* executor) {
   const auto num_slots = static_cast<int64_t>(input.slots.world_of_slot.size());
   const at::Tensor slots = at::empty({num_slots}, at::TensorOptions(at::kLong).device(torch_device(input.device)));
   const AskedSlots asked{input.state.status, mask, with_left ? input.state.left : nullptr};

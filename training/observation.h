@@ -7,10 +7,10 @@
 #include <ATen/ATen.h>
 
 #include "pictura/common/renderer.h"
+#include "pictura/configuration/config.h"
 #include "pictura/simulator/observation_arrays.h"
 #include "pictura/simulator/simulator.h"
-#include "pictura/training/config.h"
-#include "pictura/training/rules/learner_executor.h"
+#include "pictura/training/rules/policy_executor.h"
 
 namespace pictura {
 
@@ -87,7 +87,7 @@ std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> vi
 /// The slots whose agents are active and that the mask [slots] has (empty: all), i64 [n], in ascending order.
 /// with_left: also those of agents that left a road that ends in the last step, whose last observation has a value.
 at::Tensor active_slots(const ControllerInput& input, Span<const uint8_t> mask, bool with_left,
-                        LearnerExecutor* executor);
+                        PolicyExecutor* executor);
 
 /// Views in the memory of a device.
 class SelectedViews {

@@ -6,7 +6,7 @@
 
 namespace pictura {
 
-Optimizer::Optimizer(const Policy& policy, const Config::Train& config, Device device, bool uses_graphs)
+Optimizer::Optimizer(const Policy& policy, const TrainSection& config, Device device, bool uses_graphs)
     : rate_factors(policy.parameters().size(), 1), parameters_(policy.parameters()), config_(config) {
   allocate_gradients();
   std::vector<at::Tensor> of_muon;

@@ -13,7 +13,7 @@ namespace pictura {
 class Optimizer {
  public:
   /// Gives the parameters, which lie on `device`, gradients as allocate_gradients() does. uses_graphs: see Muon.
-  Optimizer(const Policy& policy, const Config::Train& config, Device device = {}, bool uses_graphs = false);
+  Optimizer(const Policy& policy, const TrainSection& config, Device device = {}, bool uses_graphs = false);
   /// Scalars on the parameters' device, which nothing has waited for.
   struct Step {
     at::Tensor norm;    // of the gradients before they were scaled, see rate_factors
@@ -46,7 +46,7 @@ class Optimizer {
   void step_adamw(double learning_rate, const at::Tensor& failed);
 
   const std::vector<NamedTensor>& parameters_;
-  Config::Train config_;
+  TrainSection config_;
   at::Tensor gradients_;
   std::optional<Muon> muon_;
 };

@@ -6,10 +6,6 @@
 
 namespace pictura {
 
-class Optimizer;
-class Policy;
-class WeightAverage;
-
 /// Name of the weight [out, 3 patch_px^2, kernel, kernel] of the first convolution, as policies and files have it.
 inline constexpr const char* kFirstConvolution = "conv.0.weight";
 
@@ -21,21 +17,16 @@ int patch_side_px(int64_t channels);
 /// `weight` gives of one pixel a block.
 at::Tensor spread_over_patches(const at::Tensor& weight, int factor);
 
-/// Adam's moments of the weights that spread_over_patches() gives: those of the weight that each comes from. A feature
-/// is a sum of w x over pixels. Where a block is constant, each of its k^2 weights has the gradient dL/dw that the one
-/// weight had, so its moments, and its direction m / sqrt(v), are those of the one weight. Together they move the
-/// feature k^2 times as far: see rate_factor_of_spread().
-at::Tensor repeat_over_patches(const at::Tensor& moments, int factor);
+/// The weight, or what Adam keeps of it, at each place of spread_over_patches(), undivided. Adam's moments of weights
+/// that are spread are those of the weight that each comes from: a feature is a sum of w x over pixels; where a block
+/// is constant, each of its k^2 weights has the gradient dL/dw that the one weight had, so its moments, and its
+/// direction m / sqrt(v), are those of the one weight. Together they move the feature k^2 times as far: see
+/// rate_factor_of_spread().
+at::Tensor repeat_over_patches(const at::Tensor& weight, int factor);
 
 /// Factor of the learning rate of weights that are spread: 1 / k^2, by which a step moves the features as far as it
 /// moved them before. Weight decay keeps the whole rate, since it scales the sum as it scales each weight. In the
 /// gradient's norm k^2 equal gradients count as one, so that it is clipped as before.
 constexpr double rate_factor_of_spread(int factor) { return 1.0 / (double(factor) * factor); }
-
-/// Spreads the first convolution of a policy, in place, what its optimizer keeps of it (moments, rate factor and memory
-/// for gradients), and its average, if there is one. No graph of autograd or CUDA may hold the weight. Throws Error
-/// where the policy has no such convolution.
-void spread_first_convolution(const Policy& policy, int factor, Optimizer* optimizer_inout,
-                              WeightAverage* average_inout = nullptr);
 
 }  // namespace pictura

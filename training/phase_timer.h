@@ -1,27 +1,16 @@
 // Where the time of an update goes, by named phase: a clock on the host, events on a device, which wait for nothing.
 #pragma once
 
-#include <chrono>
 #include <memory>
 #include <vector>
 
 #include <c10/core/Event.h>
 
 #include "pictura/common/device.h"
+#include "pictura/common/support/stopwatch.h"
 #include "pictura/training/phases.h"
 
 namespace pictura {
-
-/// Time since it was made or last restarted.
-class Stopwatch {
- public:
-  void restart() { start_ = Clock::now(); }
-  double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  Clock::time_point start_ = Clock::now();
-};
 
 class PhaseTimer {
  public:

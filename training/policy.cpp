@@ -65,7 +65,7 @@ class ParameterMaker {
     return {normal(name + ".weight", {out, in}, gain), constant(name + ".bias", {out}, 0)};
   }
   /// The paper's per-group encoder, a 2-layer MLP.
-  PolicyNetwork::GroupEncoder group(const std::string& name, int64_t in, const Config::PolicySection& config) {
+  PolicyNetwork::GroupEncoder group(const std::string& name, int64_t in, const PolicySection& config) {
     const int64_t width = config.embedding_width;
     return {linear(name + ".hidden", in, width, std::numbers::sqrt2), linear(name + ".out", width, width, 1.0),
             config.layer_norm};
@@ -115,7 +115,7 @@ at::Tensor masked_max(const at::Tensor& members, const at::Tensor& counts) {
 class VectorEncoder final : public SceneEncoder {
  public:
   /// Members with features are converted to `input_type`.
-  VectorEncoder(const Config::PolicySection& config, bool reads_walls, at::ScalarType input_type, ParameterMaker* make)
+  VectorEncoder(const PolicySection& config, bool reads_walls, at::ScalarType input_type, ParameterMaker* make)
       : embedding_width_(config.embedding_width), input_type_(input_type) {
     for (size_t i = 0; i < std::size(kObservationArrays); ++i) {
       const ObservationArray& array = kObservationArrays[i];
@@ -164,8 +164,7 @@ class VectorEncoder final : public SceneEncoder {
 class PerspectiveEncoder final : public SceneEncoder {
  public:
   /// Images are converted to `image_type`.
-  PerspectiveEncoder(const Config::PolicySection& config, int num_cameras, at::ScalarType image_type,
-                     ParameterMaker* make)
+  PerspectiveEncoder(const PolicySection& config, int num_cameras, at::ScalarType image_type, ParameterMaker* make)
       : config_(config),
         num_cameras_(num_cameras),
         image_type_(image_type),
@@ -235,8 +234,7 @@ class PerspectiveEncoder final : public SceneEncoder {
                      1);
   }
 
-  static std::unique_ptr<ImageBackbone> load_backbone(const Config::PolicySection& config,
-                                                      const at::TensorOptions& options) {
+  static std::unique_ptr<ImageBackbone> load_backbone(const PolicySection& config, const at::TensorOptions& options) {
     if (config.backbone == "conv") return nullptr;
     auto backbone = std::make_unique<ImageBackbone>(config.backbone, options, config.backbone_frozen);
     PICTURA_CHECK(backbone->channels() % config.attention_heads == 0,
@@ -299,7 +297,7 @@ class PerspectiveEncoder final : public SceneEncoder {
     return at::linear(sums, at::matmul(out, value).transpose(0, 1).flatten(1), apply(out_, value_.bias));
   }
 
-  const Config::PolicySection config_;
+  const PolicySection config_;
   const int num_cameras_;
   const at::ScalarType image_type_;
   const std::unique_ptr<ImageBackbone> backbone_;  // null: the convolutions
@@ -310,7 +308,7 @@ class PerspectiveEncoder final : public SceneEncoder {
   PolicyNetwork::Linear position_, query_, value_, out_, mlp_hidden_, mlp_out_, project_;
 };
 
-PolicyNetwork::PolicyNetwork(const Config::PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type,
+PolicyNetwork::PolicyNetwork(const PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type,
                              bool reads_walls, Device device, Precision precision)
     : type_(type),
       precision_(precision),

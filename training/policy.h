@@ -10,8 +10,8 @@
 
 #include <ATen/ATen.h>
 
+#include "pictura/configuration/config.h"
 #include "pictura/training/chunks.h"
-#include "pictura/training/config.h"
 #include "pictura/training/observation.h"
 #include "pictura/training/rules/network_passes.h"
 
@@ -81,7 +81,7 @@ class PolicyNetwork final : public Policy {
   /// Parameters are drawn from (seed, index of the parameter, index of the element) alone, but for those of a program
   /// (policy.backbone), which begin as they are in its file. With `reads_walls` the
   /// vector policy has a fifth set. The host has bf16 too, slowly, but no tf32: there it is fp32.
-  PolicyNetwork(const Config::PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type = at::kFloat,
+  PolicyNetwork(const PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type = at::kFloat,
                 bool reads_walls = false, Device device = {}, Precision precision = Precision::fp32);
 
   Output forward(const Observation& observation) const override;

@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "pictura/training/config.h"
+#include "pictura/configuration/config.h"
 
 namespace pictura {
 

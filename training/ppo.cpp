@@ -57,7 +57,7 @@ LossStats loss_stats(const at::Tensor& row) {
   return {values[0], values[1], values[2], values[3], values[4], values[5], values[6], values[7]};
 }
 
-bool takes_all(const Config::Train& config) { return config.halted_slots == HaltedSlots::draw; }
+bool takes_all(const TrainSection& config) { return config.halted_slots == HaltedSlots::draw; }
 
 // The largest |advantage| of all ranks; not finite where one of them is not. Waits for the device.
 float largest_advantage(const Batch& batch, Communicator* communicator) {
@@ -80,7 +80,7 @@ float quantile_of_advantages(const Batch& batch, double share, LearnerExecutor* 
 
 // The rows of this rank's transitions that are learned from, i64 [n]: those that the filter keeps, or all, of which
 // those that are not valid have no share. Says in the stats what the filter did on all ranks.
-at::Tensor taken_rows(const Batch& batch, const Config::Train& config, int64_t update, LearnerExecutor* executor,
+at::Tensor taken_rows(const Batch& batch, const TrainSection& config, int64_t update, LearnerExecutor* executor,
                       AdvantageFilter* filter, Communicator* communicator, UpdateStats* stats) {
   const bool by_quantile = config.adv_filter == FilterThreshold::quantile;
   const float newest = by_quantile ? quantile_of_advantages(batch, config.adv_filter_quantile, executor, communicator)
@@ -188,7 +188,7 @@ at::Tensor shares_in(const Chunk& chunk, const at::Tensor& shares, const at::Ten
 
 // The first of an update's transitions, those of all ranks that are this one's, by whose gradients the single losses
 // are compared: so few that a way there and three back are at most 3 % of an update's work.
-at::Tensor diagnosed_rows(const Minibatches& minibatches, const Config::Train& config) {
+at::Tensor diagnosed_rows(const Minibatches& minibatches, const TrainSection& config) {
   constexpr int64_t kPassesPerDiagnosed = 100, kMostDiagnosed = 1024;
   const int64_t of_all = minibatches.size() * config.update_epochs / kPassesPerDiagnosed,
                 most = std::min({kMostDiagnosed, config.forward_chunk, minibatches.size(0)});
@@ -201,7 +201,7 @@ struct Weighted {
 };
 
 // Of this rank's rows of a minibatch, which has `size_of_all` transitions over all ranks.
-Weighted weighted(const Batch& batch, const at::Tensor& minibatch, int64_t size_of_all, const Config::Train& config,
+Weighted weighted(const Batch& batch, const at::Tensor& minibatch, int64_t size_of_all, const TrainSection& config,
                   Communicator* communicator) {
   at::Tensor advantages = batch.advantages.index_select(0, minibatch), shares;
   const at::Tensor valid = takes_all(config) ? batch.valid.index_select(0, minibatch).to(at::kDouble)
@@ -220,7 +220,7 @@ Weighted weighted(const Batch& batch, const at::Tensor& minibatch, int64_t size_
 // The norms of the gradient of some rows, the first ones of a minibatch that is `of_minibatch`, by each loss alone, of
 // all ranks: policy, value and entropy, f64 [3].
 at::Tensor norms_by_loss(ChunkRunner* runner, const at::Tensor& rows, const Weighted& of_minibatch,
-                         const Config::Train& config, Optimizer* optimizer, PhaseTimer* timer,
+                         const TrainSection& config, Optimizer* optimizer, PhaseTimer* timer,
                          Communicator* communicator) {
   at::Tensor gradients = at::zeros({3, optimizer->gradients().numel()}, optimizer->gradients().options());
   for_each_chunk(rows, {config.forward_chunk}, [&](const Chunk& chunk) {
@@ -241,7 +241,7 @@ at::Tensor norms_by_loss(ChunkRunner* runner, const at::Tensor& rows, const Weig
 // parameters, `forward_chunk` transitions at a time. Returns the minibatch's LossStats without the norm, f64
 // [kNumStats], until the next minibatch.
 at::Tensor add_gradients(ChunkRunner* runner, const at::Tensor& minibatch, const Weighted& its, int64_t size_of_all,
-                         const Config::Train& config, Communicator* communicator) {
+                         const TrainSection& config, Communicator* communicator) {
   runner->begin_minibatch();
   for_each_chunk(minibatch, {config.forward_chunk}, [&](const Chunk& chunk) {
     const double weight = static_cast<double>(chunk.count) / static_cast<double>(size_of_all);
@@ -310,7 +310,7 @@ void store_means(const at::Tensor& sums, const at::Tensor& first_norms, UpdateSt
 
 }  // namespace
 
-UpdateStats ppo_update(ChunkRunner* runner, const Rollout& rollout, const Config::Train& config, const UpdateKey& key,
+UpdateStats ppo_update(ChunkRunner* runner, const Rollout& rollout, const TrainSection& config, const UpdateKey& key,
                        LearnerExecutor* executor, Optimizer* optimizer, AdvantageFilter* filter, PhaseTimer* timer,
                        Communicator* communicator) {
   UpdateStats stats;

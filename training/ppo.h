@@ -70,7 +70,7 @@ class NotFinite : public Error {
 /// steps; all improve one policy on all of it, and get the same parameters to the bit and the same stats. Throws
 /// NotFinite, with the policy as it was before that minibatch: in it on the host, at the end on a device. `runner` is
 /// of the policy and of the rollout's observations.
-UpdateStats ppo_update(ChunkRunner* runner, const Rollout& rollout, const Config::Train& config, const UpdateKey& key,
+UpdateStats ppo_update(ChunkRunner* runner, const Rollout& rollout, const TrainSection& config, const UpdateKey& key,
                        LearnerExecutor* executor, Optimizer* optimizer_inout, AdvantageFilter* filter_inout,
                        PhaseTimer* timer = nullptr, Communicator* communicator = alone());
 

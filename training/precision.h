@@ -4,7 +4,7 @@
 
 #include <ATen/autocast_mode.h>
 
-#include "pictura/training/config.h"
+#include "pictura/configuration/config.h"
 
 namespace pictura {
 

@@ -7,9 +7,11 @@
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
+#include "pictura/configuration/apply_config.h"
+#include "pictura/configuration/compare_configs.h"
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/saved_worlds.h"
-#include "pictura/training/patch_spread.h"
+#include "pictura/training/patch_growth.h"
 #include "pictura/training/ranks/agree.h"
 #include "pictura/training/training_maps.h"
 

@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "pictura/configuration/apply_config.h"
 #include "pictura/training/checkpoint.h"
 #include "pictura/training/ppo.h"
 #include "pictura/training/ranks/communicator.h"

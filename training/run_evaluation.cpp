@@ -1,5 +1,6 @@
 #include "pictura/training/run_evaluation.h"
 
+#include "pictura/common/support/stopwatch.h"
 #include "pictura/training/session.h"
 
 namespace pictura {

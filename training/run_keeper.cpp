@@ -6,7 +6,8 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
-#include "pictura/training/config_keys.h"
+#include "pictura/configuration/compare_configs.h"
+#include "pictura/configuration/config_keys.h"
 #include "pictura/training/ranks/agree.h"
 #include "pictura/training/run_folder.h"
 
@@ -59,7 +60,7 @@ std::vector<RecentUpdate> RunKeeper::begin(Run* run) {
 }
 
 bool RunKeeper::is_due(const Run& run) const {
-  const Config::Train& train = run.config.train;
+  const TrainSection& train = run.config.train;
   return run.update % train.checkpoint_every == 0 ||
          any_rank(since_saved_.seconds() > 60 * train.checkpoint_minutes, communicator_);
 }

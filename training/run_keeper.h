@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pictura/common/support/folder_lock.h"
+#include "pictura/common/support/stopwatch.h"
 #include "pictura/training/loop.h"
 #include "pictura/training/ranks/ranks.h"
 #include "pictura/training/run.h"

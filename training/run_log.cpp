@@ -8,6 +8,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/numbers.h"
+#include "pictura/configuration/apply_config.h"
 
 namespace pictura {
 

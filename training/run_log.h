@@ -5,6 +5,7 @@
 #include <deque>
 #include <optional>
 
+#include "pictura/common/support/stopwatch.h"
 #include "pictura/training/checkpoint.h"
 #include "pictura/training/diagnosis.h"
 #include "pictura/training/evaluation/results.h"

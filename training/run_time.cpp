@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "pictura/backends/make_learner.h"
+#include "pictura/backends/make_policy_executor.h"
 #include "pictura/training/ranks/agree.h"
 
 namespace pictura {

@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "pictura/common/support/stopwatch.h"
 #include "pictura/training/loop.h"
 #include "pictura/training/run.h"
 

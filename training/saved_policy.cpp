@@ -12,7 +12,7 @@
 #include "pictura/common/support/hash.h"
 #include "pictura/common/support/json.h"
 #include "pictura/common/support/json_text.h"
-#include "pictura/training/checkpoint.h"
+#include "pictura/training/checkpoint_file.h"
 #include "pictura/training/policy_json.h"
 
 namespace pictura {
@@ -131,21 +131,35 @@ SavedPolicy parse_safetensors(const std::string& file, const std::string& path) 
 
 }  // namespace
 
+std::string read_policy_file(const std::string& path) {
+  return read_file(path, size_t{1} << 36, [&path](std::string_view first) {
+    // Safetensors begin with the length of their header, which is JSON.
+    uint64_t length = 0;
+    const bool is_long = first.size() > sizeof length;
+    if (is_long) std::memcpy(&length, first.data(), sizeof length);
+    PICTURA_CHECK(is_checkpoint(first) || (is_long && length > 0 && first[sizeof length] == '{'),
+                  "{}: expected a checkpoint, which begins with PICTCKPT, or safetensors; got neither, "
+                  "or a truncated file",
+                  path);
+  });
+}
+
 SavedPolicy parse_policy(const std::string& file, const std::string& path, bool average) {
   PICTURA_CHECK(!average || is_checkpoint(file),
                 "{}: holds one set of weights: expected a checkpoint to choose the average of", path);
   if (!is_checkpoint(file)) return parse_safetensors(file, path);
-  Checkpoint checkpoint = parse_checkpoint(file, path);
+  const CheckpointFile checkpoint(file, path);
+  SavedPolicy policy = checkpoint.policy();
   if (average) {
-    PICTURA_CHECK(!checkpoint.average.empty(),
+    PICTURA_CHECK(checkpoint.header.contains("average"),
                   "{}: holds no average of weights: expected a checkpoint of a run with train.weight_average", path);
-    checkpoint.parameters = std::move(checkpoint.average);
+    policy.parameters = checkpoint.tensors("average");
   }
-  return checkpoint;
+  return policy;
 }
 
 SavedPolicy read_policy(const std::string& path, bool average) {
-  return parse_policy(read_checkpoint_file(path), path, average);
+  return parse_policy(read_policy_file(path), path, average);
 }
 
 void write_policy(const std::string& path, const SavedPolicy& policy, WeightType type, const std::string& commit) {

@@ -26,7 +26,9 @@ struct SavedPolicy {
 /// neither, truncated, damaged, or of another observation schema (naming the entry that differs), and with `average`,
 /// which asks for the average of weights that a checkpoint holds, where it holds none.
 SavedPolicy read_policy(const std::string& path, bool average = false);
-/// What the bytes of such a file say.
+/// The bytes of such a file.
+std::string read_policy_file(const std::string& path);
+/// What they say.
 SavedPolicy parse_policy(const std::string& file, const std::string& path, bool average = false);
 
 /// Writes safetensors under another name and renames them to path. Their metadata are text: config (TOML), schema and

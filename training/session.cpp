@@ -2,14 +2,13 @@
 
 #include <ATen/Parallel.h>
 
-#include "pictura/backends/make_learner.h"
+#include "pictura/backends/make_policy_executor.h"
 #include "pictura/backends/make_renderer.h"
 #include "pictura/common/error.h"
 #include "pictura/common/pixel_samples.h"
 #include "pictura/common/support/parallel_for.h"
+#include "pictura/configuration/apply_config.h"
 #include "pictura/simulator/controllers/host_controllers.h"
-#include "pictura/simulator/hash_values.h"
-#include "pictura/training/config_keys.h"
 #include "pictura/training/decision_clock.h"
 #include "pictura/training/observation.h"
 #include "pictura/training/precision.h"
@@ -80,7 +79,7 @@ struct PolicySession::Parts {
       : config(adapted(saved.config, options)),
         device(open_learning_device(config)),
         rig(chosen_rig(saved, options)),
-        executor(make_learner_executor(device)),
+        executor(make_policy_executor(device)),
         own_policy(make_policy(config, rig, device)),
         policy(*own_policy) {
     restore_policy(saved, policy);
@@ -89,14 +88,14 @@ struct PolicySession::Parts {
       : config(with_seed(trained.config, seed)),
         device(trained.device),
         rig(trained.rig),
-        executor(make_learner_executor(device)),
+        executor(make_policy_executor(device)),
         own_policy(make_policy(config, rig, device)),
         policy(*own_policy) {}
   Parts(const Config& its_config, const Rig& its_rig, Device its_device, const Policy& its_policy)
       : config(its_config),
         device(its_device),
         rig(its_rig),
-        executor(make_learner_executor(device)),
+        executor(make_policy_executor(device)),
         policy(its_policy) {}
 
   /// For the agents of a batch that `indices`, i64 [n], name.
@@ -122,7 +121,7 @@ struct PolicySession::Parts {
   const Config config;
   const Device device;
   const Rig rig;
-  const std::unique_ptr<LearnerExecutor> executor;
+  const std::unique_ptr<PolicyExecutor> executor;
   const std::unique_ptr<const Policy> own_policy;  // null where it is another's
   const Policy& policy;
 
@@ -223,28 +222,9 @@ SimulatorConfig PolicySession::evaluation_world(int steps) const {
   return evaluation_simulator_config(parts_->config, steps, parts_->device);
 }
 
-EvaluationSetting PolicySession::evaluation_setting() const {
-  const Config& config = parts_->config;
-  EvaluationSetting setting;
-  setting.policy_hash = parts_->policy.hash();
-  setting.config = keys_of_evaluation(config, /*has_policy=*/true);
-  setting.conditioning = config.evaluate.conditioning;
-  setting.light_cycles = config.simulator.light_cycles;
-  setting.device = parts_->device.is_host() ? "cpu" : "cuda";
-  setting.precision = parts_->device.is_host() ? "fp32" : name_of(config.train.precision);
-  if (!reads_images()) return setting;
-  setting.renderer = config.render.backend;
-  setting.samples = text_of(config.render.samples);
-  Hash64 cameras;
-  for (const Camera& camera : rig().cameras) {
-    setting.image_sizes.push_back(fmt::format("{}x{}", camera.width_px, camera.height_px));
-    add_values(&cameras, camera.focal_x_px, camera.focal_y_px, camera.center_x_px, camera.center_y_px,
-               camera.position_m.x, camera.position_m.y, camera.position_m.z, camera.yaw_rad, camera.pitch_rad,
-               camera.roll_rad);
-  }
-  setting.cameras_hash = cameras.hex();
-  return setting;
-}
+const Config& PolicySession::config() const { return parts_->config; }
+
+std::string PolicySession::policy_hash() const { return parts_->policy.hash(); }
 
 void PolicySession::evaluate(const PolicyInput& input, Renderer* renderer, Span<float> logits_out,
                              Span<float> values_out) {

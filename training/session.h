@@ -7,9 +7,9 @@
 #include <string>
 
 #include "pictura/common/renderer.h"
+#include "pictura/configuration/apply_config.h"
 #include "pictura/simulator/controllers/controller.h"
 #include "pictura/simulator/simulator.h"
-#include "pictura/training/evaluation/results.h"
 
 namespace pictura {
 
@@ -84,8 +84,10 @@ class PolicySession {
   SimulatorConfig training_world() const;
   /// The same for the paper's evaluation: episodes of `steps` that nothing ends early, fixed conditioning and lights.
   SimulatorConfig evaluation_world(int steps) const;
-  /// What of an evaluation's setting is the policy's and the session's: policy, precision, device and images.
-  EvaluationSetting evaluation_setting() const;
+  /// That it was trained with, with what the options changed.
+  const Config& config() const;
+  /// Of its weights.
+  std::string policy_hash() const;
 
   /// Writes logits [batch, kNumActions] and values [batch]. `renderer` holds the scene's maps under the handles that
   /// the scene names, and has renderer_config(); policies without images need none. Throws Error naming the array where

@@ -1,6 +1,7 @@
 #include "pictura/training/teacher.h"
 
 #include "pictura/common/error.h"
+#include "pictura/configuration/apply_config.h"
 
 namespace pictura {
 

@@ -5,7 +5,7 @@
 #include <c10/core/impl/VirtualGuardImpl.h>
 #include <dlfcn.h>
 
-#include "pictura/backends/make_learner.h"
+#include "pictura/backends/make_policy_executor.h"
 #include "pictura/common/error.h"
 
 namespace pictura {
@@ -96,7 +96,7 @@ DeviceMemory memory_of(Device device) {
 
 int64_t available_bytes(Device device) {
   release_unused_memory(device);
-  return make_learner_executor(device)->memory_bytes();
+  return make_policy_executor(device)->memory_bytes();
 }
 
 at::Device torch_device(Device device) {

@@ -7,7 +7,7 @@
 #include <ATen/ATen.h>
 
 #include "pictura/common/array.h"
-#include "pictura/training/config.h"
+#include "pictura/configuration/config.h"
 
 namespace pictura {
 

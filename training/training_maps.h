@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "pictura/configuration/config.h"
 #include "pictura/simulator/simulator.h"
-#include "pictura/training/config.h"
 
 namespace pictura {
 

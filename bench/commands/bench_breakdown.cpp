@@ -18,8 +18,9 @@
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/numbers.h"
+#include "pictura/configuration/apply_config.h"
+#include "pictura/configuration/config.h"
 #include "pictura/map/load_map.h"
-#include "pictura/training/config.h"
 
 namespace pictura {
 

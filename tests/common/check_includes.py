@@ -23,15 +23,16 @@ MAY_INCLUDE = {
     "backend_cuda/learner": SIMULATION | {"training/rules"},
     "backend_gl": {"common"},
     "backends": SIMULATION | {"training/rules"},
-    "training": SIMULATION | {"backends", "training/rules"},
+    "configuration": SIMULATION | {"backends"},
+    "training": SIMULATION | {"backends", "configuration", "training/rules"},
     "training/rules": SIMULATION,
     "drawing": SIMULATION | {"backends"},
     "replay": SIMULATION | {"backends", "drawing"},
-    "cli": SIMULATION | {"backends", "replay", "training"},
-    "bindings": SIMULATION | {"backends", "cli", "drawing", "replay", "training"},
+    "cli": SIMULATION | {"backends", "configuration", "replay", "training"},
+    "bindings": SIMULATION | {"backends", "cli", "configuration", "drawing", "replay", "training"},
     "bench": SIMULATION | {"backends", "backend_cpu/renderer"},
-    "bench/commands": SIMULATION | {"backends", "bench", "cli", "drawing", "training"},
-    "apps": SIMULATION | {"backends", "bench/commands", "cli", "drawing", "replay", "training"},
+    "bench/commands": SIMULATION | {"backends", "bench", "cli", "configuration", "drawing", "training"},
+    "apps": SIMULATION | {"backends", "bench/commands", "cli", "configuration", "drawing", "replay", "training"},
     "tests": None,  # anything
 }
 # Libraries restricted to folders: pattern of the include -> files that may include it.

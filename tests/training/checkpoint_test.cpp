@@ -342,7 +342,7 @@ TEST_F(CheckpointFile, APolicyDrivesFromSafetensorsAsFromItsCheckpoint) {
   EXPECT_EQ(back.agent_steps, 3456);
   EXPECT_EQ(hash_of_parameters(back.parameters), policy.hash());
   EXPECT_EQ(hash_of_parameters(from_checkpoint.parameters), policy.hash());
-  EXPECT_EQ(PolicySession(path).evaluation_setting().policy_hash, policy.hash());
+  EXPECT_EQ(PolicySession(path).policy_hash(), policy.hash());
 
   const ExportedPolicy half = export_policy(path, folder_ / "half.safetensors", {.commit = "abc123"});
   EXPECT_EQ(half.parameters, policy.num_parameters());

@@ -1,16 +1,18 @@
 // The configuration: reading, refusing, writing back.
-#include "pictura/training/config.h"
+#include "pictura/configuration/config.h"
 
 #include <filesystem>
 
 #include <gmock/gmock.h>
 
-#include "pictura/backends/make_learner.h"
+#include "pictura/backends/make_policy_executor.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/configuration/apply_config.h"
+#include "pictura/configuration/compare_configs.h"
+#include "pictura/configuration/config_keys.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
-#include "pictura/training/config_keys.h"
 #include "pictura/training/torch_device.h"
 #include "pictura/training/training_maps.h"
 

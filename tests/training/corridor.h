@@ -27,7 +27,7 @@ struct Corridor {
   void compute_advantages(double gamma, double gae_lambda) {
     rollout.compute_advantages(gamma, gae_lambda, executor.get());
   }
-  UpdateStats update(const Policy& policy, const Config::Train& train, int64_t number, Optimizer* optimizer,
+  UpdateStats update(const Policy& policy, const TrainSection& train, int64_t number, Optimizer* optimizer,
                      AdvantageFilter* filter) {
     const UpdateKey key{seed, number, learning_rate_at(train, 0)};
     ChunkRunner runner(policy, rollout.observations);

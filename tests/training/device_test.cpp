@@ -12,6 +12,7 @@
 #include "pictura/backends/make_renderer.h"
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
+#include "pictura/configuration/apply_config.h"
 #include "pictura/map/load_map.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"

@@ -20,7 +20,7 @@ using Curve = std::array<double, kUpdates / kWindow>;
 
 Curve learn(Precision precision, uint64_t seed) {
   const PolicyNetwork policy(test::learning_section(), 1, seed, at::kFloat, /*reads_walls=*/false, Device{}, precision);
-  Config::Train train;
+  TrainSection train;
   train.minibatch_size = 512;
   train.update_epochs = 1;
   train.learning_rate = 3e-3;

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <malloc.h>
 
+#include "pictura/configuration/apply_config.h"
 #include "pictura/map/load_map.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/training/run.h"

@@ -50,15 +50,15 @@ at::Tensor leaf(const at::Tensor& value) {
   return result;
 }
 
-Config::Train muon_config() {
-  Config::Train train;
+TrainSection muon_config() {
+  TrainSection train;
   train.optimizer = OptimizerKind::muon;
   return train;
 }
 
 TEST(AdamW, StepsAsLoshchilovAndHutterDefineIt) {
   const PolicyNetwork policy(test::tiny_section(Modality::vector), 1, 3);
-  Config::Train train;
+  TrainSection train;
   train.weight_decay = 0.1;
   train.max_grad_norm = 1e9;
   Optimizer optimizer(policy, train);
@@ -82,7 +82,7 @@ TEST(AdamW, StepsAsLoshchilovAndHutterDefineIt) {
 TEST(AdamW, TakesNoStepWhereTheLossOrAGradientIsNotFinite) {
   const PolicyNetwork policy(test::tiny_section(Modality::vector), 1, 3);
   const std::string before = policy.hash();
-  Optimizer optimizer(policy, Config::Train{});
+  Optimizer optimizer(policy, TrainSection{});
   at::Tensor weight = policy.parameters()[0].value;
   for (const auto& [gradient, loss] : {std::pair{1.0, std::nan("")}, std::pair{HUGE_VAL, 1.0}}) {
     weight.mutable_grad().fill_(gradient);
@@ -153,7 +153,7 @@ TEST(Muon, ChangesNothingWhereAGradientIsNotFinite) {
 
 // The names of the parameters that AdamW steps beside Muon, where the critic has a trunk of its own.
 std::vector<std::string> stepped_by_adamw(Modality modality) {
-  Config::PolicySection section = test::tiny_section(modality);
+  PolicySection section = test::tiny_section(modality);
   section.critic_layers = 2;
   const PolicyNetwork policy(section, 1, 3);
   std::vector<std::string> names;
@@ -185,7 +185,7 @@ TEST(WeightRms, IsOfHiddenLayersAlone) {
 TEST(Muon, LearnsATaskWithDelayedReward) {
   at::set_num_threads(1);
   const PolicyNetwork policy(test::learning_section(), 1, 7);
-  Config::Train train = muon_config();
+  TrainSection train = muon_config();
   train.minibatch_size = 256;
   train.learning_rate = 3e-3;
   train.schedule = Schedule::constant;

@@ -10,6 +10,7 @@
 #include "pictura/tests/training/numbers.h"
 #include "pictura/training/checkpoint.h"
 #include "pictura/training/optimizer.h"
+#include "pictura/training/patch_growth.h"
 #include "pictura/training/saved_policy.h"
 #include "pictura/training/session.h"
 
@@ -20,8 +21,8 @@ using test::message_of;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-Config::PolicySection small_section(int patch_px) {
-  Config::PolicySection c;
+PolicySection small_section(int patch_px) {
+  PolicySection c;
   c.patch_px = patch_px;
   c.conv_channels = {8, 8};
   c.conv_kernels = {1, 3};
@@ -71,8 +72,8 @@ Observation blocks_of(int64_t pixels) {
 
 struct Learner {
   explicit Learner(double max_grad_norm) : policy(small_section(2), 3, 1), optimizer(policy, setting(max_grad_norm)) {}
-  static Config::Train setting(double max_grad_norm) {
-    Config::Train train;
+  static TrainSection setting(double max_grad_norm) {
+    TrainSection train;
     train.max_grad_norm = max_grad_norm;
     train.weight_decay = 0.1;
     return train;

@@ -54,7 +54,7 @@ double scalar_of(const Policy& policy, const Observation& o, bool with_gradient)
 
 // Images as u8, and as the patches that renderers draw.
 TEST(PolicyPatches, GiveTheBitsThatImagesGive) {
-  Config::PolicySection config = tiny_section(Modality::perspective);
+  PolicySection config = tiny_section(Modality::perspective);
   config.conv_kernels = {1, 3};
   const Observation images = observation(Modality::perspective, 3).map([](const at::Tensor& t) {
     return t.scalar_type() == at::kByte ? t : t.to(at::kFloat);
@@ -115,7 +115,7 @@ TEST_P(BothModalities, GradientsEqualDifferenceQuotients) {
 }
 
 TEST(Policy, GradientsOfValuesOfOtherHeadsEqualDifferenceQuotients) {
-  Config::PolicySection section = tiny_section(Modality::vector);
+  PolicySection section = tiny_section(Modality::vector);
   for (const ValueHead head : {ValueHead::symlog, ValueHead::two_hot}) {
     section.value_head = head;
     expect_gradients(PolicyNetwork(section, 3, 5, at::kDouble), observation(Modality::vector, 2));
@@ -123,13 +123,13 @@ TEST(Policy, GradientsOfValuesOfOtherHeadsEqualDifferenceQuotients) {
 }
 
 TEST(Policy, GradientsOfFeaturesOfSegmentsEqualDifferenceQuotients) {
-  Config::PolicySection section = tiny_section(Modality::vector);
+  PolicySection section = tiny_section(Modality::vector);
   section.segment_features = section.goal_features = true;
   expect_gradients(PolicyNetwork(section, 3, 5, at::kDouble, /*reads_walls=*/true), observation(Modality::vector, 2));
 }
 
 TEST(Policy, GradientsOfPatchesEqualDifferenceQuotients) {
-  Config::PolicySection section = tiny_section(Modality::perspective);
+  PolicySection section = tiny_section(Modality::perspective);
   section.patch_px = 2;
   section.conv_kernels = {1, 3};
   section.conv_strides = {1, 2};
@@ -137,7 +137,7 @@ TEST(Policy, GradientsOfPatchesEqualDifferenceQuotients) {
 }
 
 TEST_P(BothModalities, GradientsOfNormalizedLayersEqualDifferenceQuotients) {
-  Config::PolicySection section = tiny_section(GetParam());
+  PolicySection section = tiny_section(GetParam());
   section.layer_norm = section.residual = true;
   section.backbone_layers = 3;
   const PolicyNetwork policy(section, 3, 5, at::kDouble);
@@ -149,7 +149,7 @@ TEST_P(BothModalities, GradientsOfNormalizedLayersEqualDifferenceQuotients) {
 
 // Whatever the scale of the layers before it, what the heads read has a mean of 0 and a variance of 1.
 TEST(Policy, HeadsReadNormalizedActivations) {
-  Config::PolicySection section = tiny_section(Modality::vector);
+  PolicySection section = tiny_section(Modality::vector);
   section.layer_norm = true;
   const PolicyNetwork policy(section, 3, 5, at::kDouble);
   const at::NoGradGuard no_grad;
@@ -162,13 +162,13 @@ TEST(Policy, HeadsReadNormalizedActivations) {
 }
 
 TEST_P(BothModalities, GradientsOfACriticWithATrunkOfItsOwnEqualDifferenceQuotients) {
-  Config::PolicySection section = tiny_section(GetParam());
+  PolicySection section = tiny_section(GetParam());
   section.critic_layers = 2;
   expect_gradients(PolicyNetwork(section, 3, 5, at::kDouble), observation(GetParam(), 2));
 }
 
 TEST_P(BothModalities, ACriticWithATrunkOfItsOwnLeavesTheActorAsItIs) {
-  Config::PolicySection section = tiny_section(GetParam());
+  PolicySection section = tiny_section(GetParam());
   const PolicyNetwork shared(section, 3, 5, at::kDouble);
   section.critic_layers = 1;
   const PolicyNetwork apart(section, 3, 5, at::kDouble);
@@ -185,7 +185,7 @@ TEST_P(BothModalities, ACriticWithATrunkOfItsOwnLeavesTheActorAsItIs) {
 
 // A layer of zeros gives gelu(0) = 0, so that only its input is left.
 TEST(Policy, ResidualsPassOverLayersOfTheTrunk) {
-  Config::PolicySection section = tiny_section(Modality::vector);
+  PolicySection section = tiny_section(Modality::vector);
   section.residual = true;
   section.backbone_layers = 1;
   const PolicyNetwork shallow(section, 3, 5, at::kDouble);
@@ -209,7 +209,7 @@ TEST(Policy, ResidualsPassOverLayersOfTheTrunk) {
 }
 
 TEST_P(BothModalities, HasThePapersShapes) {
-  Config::PolicySection config;
+  PolicySection config;
   config.modality = GetParam();
   config.point_features = false;
   const PolicyNetwork policy(config, 4, 1);
@@ -242,7 +242,7 @@ int64_t inputs_of(const Policy& policy, const std::string& group) {
 }
 
 TEST_P(BothModalities, ReadsFeaturesOfPointsBesideTheirCoordinates) {
-  Config::PolicySection config;
+  PolicySection config;
   config.modality = GetParam();
   const PolicyNetwork policy(config, 4, 1);
   constexpr int kOfPoint = RowFeatures::kOfPoint;
@@ -255,7 +255,7 @@ TEST_P(BothModalities, ReadsFeaturesOfPointsBesideTheirCoordinates) {
 }
 
 TEST(Policy, ReadsTheDistanceOfLanesToTheActiveWaypointAlone) {
-  Config::PolicySection config = tiny_section(Modality::vector);
+  PolicySection config = tiny_section(Modality::vector);
   const Observation seen = observation(Modality::vector, 4);
   const auto moved = [&seen](int64_t number) {
     Observation result = seen.map([](const at::Tensor& t) { return t.clone(); });
@@ -281,7 +281,7 @@ TEST(Policy, ReadsTheDistanceOfLanesToTheActiveWaypointAlone) {
 }
 
 TEST(Policy, ReadsItsPlaceBesideLanesBoundariesAndWalls) {
-  Config::PolicySection config;
+  PolicySection config;
   config.modality = Modality::vector;
   config.segment_features = true;
   for (const int of_point : {0, RowFeatures::kOfPoint}) {
@@ -298,7 +298,7 @@ TEST(Policy, ReadsItsPlaceBesideLanesBoundariesAndWalls) {
 
 // The host's own passes in fp32 against ATen's layers in fp64.
 TEST(Policy, FeaturesOfRowsAreTheSameInSingleAndDoublePrecision) {
-  Config::PolicySection config = tiny_section(Modality::vector);
+  PolicySection config = tiny_section(Modality::vector);
   config.segment_features = config.goal_features = true;
   const PolicyNetwork doubles(config, 3, 5, at::kDouble, /*reads_walls=*/true), floats(config, 3, 5, at::kFloat, true);
   const Observation seen = observation(Modality::vector, 6);
@@ -313,7 +313,7 @@ TEST(Policy, FeaturesOfRowsAreTheSameInSingleAndDoublePrecision) {
 }
 
 TEST(Policy, WallsAreAFifthGroupOfTheVectorPolicy) {
-  Config::PolicySection config;
+  PolicySection config;
   config.point_features = false;
   config.modality = Modality::vector;
   const PolicyNetwork without(config, 4, 1), with(config, 4, 1, at::kFloat, /*reads_walls=*/true);
@@ -348,7 +348,7 @@ TEST(Policy, WallsAreAFifthGroupOfTheVectorPolicy) {
 }
 
 TEST_P(BothModalities, FirstPolicyIsNearlyUniformAndDoesNotDependOnThreads) {
-  Config::PolicySection config = tiny_section(GetParam());
+  PolicySection config = tiny_section(GetParam());
   at::set_num_threads(1);
   const PolicyNetwork one(config, 3, 42);
   at::set_num_threads(2);

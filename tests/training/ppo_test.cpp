@@ -149,7 +149,7 @@ TEST(AdvantageFilter, QuantileIsThatOfTheSortedAdvantages) {
 TEST(AdvantageFilter, DropsTheShareOfItsQuantile) {
   at::set_num_threads(1);
   const PolicyNetwork policy(test::learning_section(), 1, 7);
-  Config::Train train;
+  TrainSection train;
   train.adv_filter = FilterThreshold::quantile;
   Corridor corridor;
   corridor.play(policy, 0);
@@ -175,7 +175,7 @@ TEST(AdvantageFilter, DropsTheShareOfItsQuantile) {
 }
 
 TEST(Schedule, FallsToZeroOverItsLastPart) {
-  Config::Train train;
+  TrainSection train;
   train.learning_rate = 2;
   train.schedule_agent_steps = 100;
   EXPECT_DOUBLE_EQ(learning_rate_at(train, 0), 2);
@@ -194,7 +194,7 @@ TEST(Schedule, FallsToZeroOverItsLastPart) {
 }
 
 TEST(Schedule, DoublesLogitsInSoManyAgentSteps) {
-  Config::Train train;
+  TrainSection train;
   EXPECT_EQ(logit_growth(train, 1000), 1);
   train.sharpen_agent_steps = 100;
   EXPECT_DOUBLE_EQ(logit_growth(train, 100), 2);
@@ -202,7 +202,7 @@ TEST(Schedule, DoublesLogitsInSoManyAgentSteps) {
 }
 
 TEST(Schedule, RisesFromATenth) {
-  Config::Train train;
+  TrainSection train;
   train.learning_rate = 2;
   train.schedule = Schedule::constant;
   train.warm_up_agent_steps = 10;
@@ -264,7 +264,7 @@ TEST(Ppo, LearnsATaskWithDelayedReward) {
   at::set_num_threads(1);
   const at::AutoGradMode mode(true);
   const PolicyNetwork policy(test::learning_section(), 1, 7);
-  Config::Train train;
+  TrainSection train;
   train.minibatch_size = 256;
   train.forward_chunk = 100;
   train.learning_rate = 3e-3;
@@ -290,9 +290,9 @@ TEST(Ppo, LearnsATaskWithDelayedReward) {
 
 TEST(Ppo, ChunksChangeNothingButRounding) {
   at::set_num_threads(1);
-  const Config::PolicySection section = test::learning_section();
+  const PolicySection section = test::learning_section();
   const PolicyNetwork whole(section, 1, 7), chunked(section, 1, 7);
-  Config::Train train;
+  TrainSection train;
   train.minibatch_size = 512;
   for (const Policy* policy : {&whole, &chunked}) {
     train.forward_chunk = policy == &whole ? 100000 : 60;
@@ -329,7 +329,7 @@ TEST(Ppo, OneOf100TransitionsTellsTheLossesGradientsApart) {
   at::set_num_threads(1);
   const PolicyNetwork network(test::learning_section(), 1, 7);
   const CountedPolicy policy(&network);
-  Config::Train train;
+  TrainSection train;
   train.minibatch_size = 512;
   train.forward_chunk = 128;  // no chunk is filled up
   train.update_epochs = 4;
@@ -356,9 +356,9 @@ TEST(Ppo, OneOf100TransitionsTellsTheLossesGradientsApart) {
 
 TEST(Ppo, InvalidTransitionsTeachNothing) {
   at::set_num_threads(1);
-  const Config::PolicySection section = test::learning_section();
+  const PolicySection section = test::learning_section();
   const PolicyNetwork a(section, 1, 7), b(section, 1, 7);
-  Config::Train train;
+  TrainSection train;
   for (const Policy* policy : {&a, &b}) {
     Corridor corridor;
     corridor.play(*policy, 0);
@@ -386,7 +386,7 @@ TEST(Ppo, StopsBeforeTheStepOfAMinibatchThatIsNotFinite) {
   corridor.rollout.log_probs[3][5] = std::nan("");
   const int64_t bad_row = 3 * Corridor::kSlots + 5;
   for (const int64_t minibatch_size : {100000, 100}) {
-    Config::Train train;
+    TrainSection train;
     train.minibatch_size = minibatch_size;
     Optimizer optimizer(policy, train);
     AdvantageFilter filter;
@@ -418,7 +418,7 @@ TEST(Ppo, StopsBeforeTheStepOfAMinibatchThatIsNotFinite) {
 // Both rollouts kept log-probabilities that are not the policy's: the update takes the policy's own.
 TEST(Ppo, LogProbabilitiesThatAreNotTheLearnersAreComputedAgain) {
   at::set_num_threads(1);
-  Config::Train train;
+  TrainSection train;
   train.minibatch_size = 200;
   train.forward_chunk = 60;
   std::vector<std::string> policies;
@@ -454,7 +454,7 @@ TEST(Ppo, LogProbabilitiesThatAreNotTheLearnersAreComputedAgain) {
 
 TEST(Ppo, NanIsAnError) {
   const PolicyNetwork policy(test::learning_section(), 1, 7);
-  Config::Train train;
+  TrainSection train;
   Corridor corridor;
   corridor.play(policy, 0);
   corridor.rollout.rewards.fill_(1);

@@ -242,8 +242,8 @@ TEST(Communicators, GiveEveryRankTheSameBits) {
   EXPECT_TRUE(sums[2].equal(sums[0]));
 }
 
-Config::PolicySection tiny_policy() {
-  Config::PolicySection policy;
+PolicySection tiny_policy() {
+  PolicySection policy;
   policy.modality = Modality::vector;
   policy.embedding_width = 8;
   policy.backbone_layers = 1;
@@ -269,7 +269,7 @@ struct Learnt {
 };
 
 // Three updates on the corridor by ranks that have its slots up to each of these ends, in which each plays all of it.
-std::vector<Learnt> learn(const std::vector<int64_t>& ends, const Config::Train& train) {
+std::vector<Learnt> learn(const std::vector<int64_t>& ends, const TrainSection& train) {
   std::vector<Learnt> of_ranks(ends.size());
   const std::vector<std::string> errors = run_ranks(static_cast<int>(ends.size()), [&](Ranks& ranks) {
     at::set_num_threads(1);
@@ -306,8 +306,8 @@ std::vector<Learnt> learn(const std::vector<int64_t>& ends, const Config::Train&
 }
 
 // Parameters step along the gradient itself, whose size nothing hides.
-Config::Train plain_steps() {
-  Config::Train train;
+TrainSection plain_steps() {
+  TrainSection train;
   train.schedule = Schedule::constant;
   train.learning_rate = 0.01;
   train.adam_eps = 1;
@@ -321,7 +321,7 @@ Config::Train plain_steps() {
 }
 
 TEST(RanksLearn, WithMuonTheSameToTheBit) {
-  Config::Train train = plain_steps();
+  TrainSection train = plain_steps();
   train.optimizer = OptimizerKind::muon;
   const std::vector<Learnt> ranks = learn({10, 100, test::Corridor::kSlots}, train);
   for (const Learnt& rank : ranks) EXPECT_EQ(rank.hashes, ranks[0].hashes);
@@ -329,7 +329,7 @@ TEST(RanksLearn, WithMuonTheSameToTheBit) {
 }
 
 TEST(RanksLearn, ByAQuantileOfAllAdvantages) {
-  Config::Train train = plain_steps();
+  TrainSection train = plain_steps();
   train.adv_filter = FilterThreshold::quantile;
   const Learnt one = learn({test::Corridor::kSlots}, train).front();
   for (const std::vector<int64_t>& ends : {std::vector<int64_t>{48, 128}, std::vector<int64_t>{10, 100, 128}}) {
@@ -344,7 +344,7 @@ TEST(RanksLearn, ByAQuantileOfAllAdvantages) {
 }
 
 TEST(RanksLearn, WhatOneWouldHaveLearntAndTheSameToTheBit) {
-  const Config::Train train = plain_steps();
+  const TrainSection train = plain_steps();
   const Learnt one = learn({test::Corridor::kSlots}, train).front();
   ASSERT_GT(one.last.minibatches, 6);
   ASSERT_LT(one.last.kept_fraction, 0.95);
@@ -369,7 +369,7 @@ TEST(RanksLearn, WhatOneWouldHaveLearntAndTheSameToTheBit) {
 }
 
 TEST(RanksLearn, FromSlotsThatCountNothingToo) {
-  Config::Train train = plain_steps();
+  TrainSection train = plain_steps();
   train.adv_filter_threshold = 0;
   train.halted_slots = HaltedSlots::draw;
   const Learnt one = learn({test::Corridor::kSlots}, train).front();
@@ -401,7 +401,7 @@ TEST(RanksLearn, AndNoticeWhenTheirPoliciesDifferByABit) {
 TEST(RanksLearn, AndStopTogetherWhenOneMeetsNaN) {
   const std::vector<std::string> errors = run_ranks(2, [&](Ranks& ranks) {
     const std::unique_ptr<Communicator> communicator = make_communicator(&ranks, Device{});
-    const Config::Train train = plain_steps();
+    const TrainSection train = plain_steps();
     const PolicyNetwork policy(tiny_policy(), 4, 3);
     const std::string before = policy.hash();
     test::Corridor corridor;

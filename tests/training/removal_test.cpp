@@ -184,7 +184,7 @@ TEST_F(Removal, UntrainedPoliciesAnswerInTheSameStates) {
 
 TEST_F(Removal, WeightsOfUntrainedPoliciesAreOfTheSeed) {
   const PolicySession trained(policies_[kAgent], {.num_threads = 1, .device = "cpu"});
-  const auto hash_of = [&](uint64_t seed) { return trained.untrained(seed)->evaluation_setting().policy_hash; };
+  const auto hash_of = [&](uint64_t seed) { return trained.untrained(seed)->policy_hash(); };
   EXPECT_EQ(hash_of(1), hash_of(1));
   EXPECT_NE(hash_of(1), hash_of(2));
   EXPECT_EQ(trained.untrained(1)->training_world().walls, trained.training_world().walls);

@@ -1,13 +1,13 @@
 // Policies that are small enough for hundreds of passes.
 #pragma once
 
-#include "pictura/training/config.h"
+#include "pictura/configuration/config.h"
 
 namespace pictura::test {
 
 /// A policy of either modality, with layers of uneven widths. Its images are small, with patches of a pixel.
-inline Config::PolicySection tiny_section(Modality modality) {
-  Config::PolicySection c;
+inline PolicySection tiny_section(Modality modality) {
+  PolicySection c;
   c.modality = modality;
   c.patch_px = 1;
   c.conv_channels = {3, 4};
@@ -23,8 +23,8 @@ inline Config::PolicySection tiny_section(Modality modality) {
 }
 
 /// A vector policy that learns the task of corridor.h.
-inline Config::PolicySection learning_section() {
-  Config::PolicySection c = tiny_section(Modality::vector);
+inline PolicySection learning_section() {
+  PolicySection c = tiny_section(Modality::vector);
   c.embedding_width = 8;
   c.backbone_width = 32;
   return c;

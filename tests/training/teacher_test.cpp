@@ -37,7 +37,7 @@ TEST(Teacher, LossIsTheWeightedDivergenceFromItsActions) {
 }
 
 TEST(Teacher, WeightFallsAlongALine) {
-  Config::Train train;
+  TrainSection train;
   EXPECT_EQ(teacher_weight_at(train, 0), 0);
   train.teacher = "teacher.safetensors";
   train.teacher_coef = 2;

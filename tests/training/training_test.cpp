@@ -18,6 +18,8 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/interrupt.h"
+#include "pictura/configuration/apply_config.h"
+#include "pictura/configuration/compare_configs.h"
 #include "pictura/map/load_map.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/missing_renderer.h"
@@ -839,10 +841,10 @@ TEST_F(Training, PoliciesDriveInTheWorldAndSeeTheImagesThatTheyWereTrainedOn) {
   EXPECT_EQ(session.evaluation_world(9).wall_seed, 77u);
   EXPECT_EQ(session.evaluation_world(9).episode_steps, 9);
   EXPECT_EQ(session.evaluation_world(9).light_cycles, LightCycles::independent);
-  EXPECT_EQ(session.evaluation_setting().light_cycles, LightCycles::independent);
+  EXPECT_EQ(session.config().simulator.light_cycles, LightCycles::independent);
   const PolicySession in_turns(checkpoint, {.num_threads = 1, .light_cycles = LightCycles::phases});
   EXPECT_EQ(in_turns.evaluation_world(9).light_cycles, LightCycles::phases);
-  EXPECT_EQ(in_turns.evaluation_setting().light_cycles, LightCycles::phases);
+  EXPECT_EQ(in_turns.config().simulator.light_cycles, LightCycles::phases);
   EXPECT_EQ(session.training_world().conditioning[0].high,
             simulator_config(load_config(o.config_path)).conditioning[0].high);
   EXPECT_EQ(session.make_renderer()->config().rig.cameras.size(), 1u);

@@ -109,10 +109,10 @@ INSTANTIATE_TEST_SUITE_P(ValueHead, EachValueHead,
 TEST_P(EachValueHead, LearnsReturns) {
   at::set_num_threads(1);
   const at::AutoGradMode mode(true);
-  Config::PolicySection section = test::learning_section();
+  PolicySection section = test::learning_section();
   section.value_head = GetParam();
   const PolicyNetwork policy(section, 1, 7);
-  Config::Train train;
+  TrainSection train;
   train.minibatch_size = 256;
   train.learning_rate = 3e-3;
   train.schedule = Schedule::constant;

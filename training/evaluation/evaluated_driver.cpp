@@ -4,9 +4,12 @@
 
 #include "pictura/backends/make_controller.h"
 #include "pictura/common/error.h"
+#include "pictura/common/pixel_samples.h"
+#include "pictura/configuration/apply_config.h"
+#include "pictura/configuration/compare_configs.h"
+#include "pictura/configuration/config.h"
 #include "pictura/simulator/controllers/host_controllers.h"
-#include "pictura/training/config.h"
-#include "pictura/training/config_keys.h"
+#include "pictura/simulator/hash_values.h"
 #include "pictura/training/saved_policy.h"
 #include "pictura/training/session.h"
 #include "pictura/training/torch_device.h"
@@ -40,8 +43,32 @@ SessionOptions session_options(const DriverOptions& options) {
           .light_heads = options.light_heads};
 }
 
+EvaluationSetting setting_of(const PolicySession& session) {
+  const Config& config = session.config();
+  const bool is_on_host = session.device().is_host();
+  EvaluationSetting setting;
+  setting.policy_hash = session.policy_hash();
+  setting.config = keys_of_evaluation(config, /*has_policy=*/true);
+  setting.conditioning = config.evaluate.conditioning;
+  setting.light_cycles = config.simulator.light_cycles;
+  setting.device = is_on_host ? "cpu" : "cuda";
+  setting.precision = is_on_host ? "fp32" : name_of(config.train.precision);
+  if (!session.reads_images()) return setting;
+  setting.renderer = config.render.backend;
+  setting.samples = text_of(config.render.samples);
+  Hash64 cameras;
+  for (const Camera& camera : session.rig().cameras) {
+    setting.image_sizes.push_back(fmt::format("{}x{}", camera.width_px, camera.height_px));
+    add_values(&cameras, camera.focal_x_px, camera.focal_y_px, camera.center_x_px, camera.center_y_px,
+               camera.position_m.x, camera.position_m.y, camera.position_m.z, camera.yaw_rad, camera.pitch_rad,
+               camera.roll_rad);
+  }
+  setting.cameras_hash = cameras.hex();
+  return setting;
+}
+
 EvaluatedDriver policy_driver(PolicySession* session, Renderer* renderer, const DriverOptions& options, int steps) {
-  return {session->evaluation_world(steps), session->evaluation_setting(), session->device(),
+  return {session->evaluation_world(steps), setting_of(*session), session->device(),
           [session, renderer, &options](Simulator&) {
             std::unique_ptr<PolicyController> controller =
                 session->make_controller(renderer, options.argmax, options.seed);

@@ -56,6 +56,9 @@ struct EvaluatedDriver {
   std::function<Driving(Simulator&)> drive;
 };
 
+/// What of an evaluation's setting is the session's: policy, precision, device and images.
+EvaluationSetting setting_of(const PolicySession& session);
+
 /// A session's policy, in episodes of so many steps.
 EvaluatedDriver policy_driver(PolicySession* session, Renderer* renderer, const DriverOptions& options, int steps);
 /// options.controller, which needs no policy.

@@ -3,7 +3,7 @@
 
 #include <functional>
 
-#include "pictura/training/phase_timer.h"
+#include "pictura/common/support/stopwatch.h"
 
 namespace pictura {
 

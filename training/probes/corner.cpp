@@ -6,6 +6,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
+#include "pictura/common/support/stopwatch.h"
 #include "pictura/training/probes/probe_run.h"
 #include "pictura/training/probes/takeover.h"
 

@@ -10,6 +10,7 @@
 #include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
 #include "pictura/common/raster/check.h"
+#include "pictura/configuration/apply_config.h"
 #include "pictura/simulator/rules/dynamics.h"
 #include "pictura/training/observation.h"
 #include "pictura/training/probes/observation_rows.h"
@@ -233,9 +234,8 @@ ProbeRun::ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptio
   const std::vector<std::string> names = names_of(options.policies);
   for (size_t i = 0; i < sessions.size(); ++i) {
     const PolicySession* const untrained = participants_[i].untrained.get();
-    results_.policies.push_back({names[i], options.policies[i], sessions[i]->evaluation_setting().policy_hash,
-                                 sessions[i]->reads_images(),
-                                 untrained ? untrained->evaluation_setting().policy_hash : ""});
+    results_.policies.push_back({names[i], options.policies[i], sessions[i]->policy_hash(), sessions[i]->reads_images(),
+                                 untrained ? untrained->policy_hash() : ""});
   }
 }
 
@@ -338,7 +338,7 @@ void ProbeRun::drive_by_controller() {
   driven_ = nullptr;
   results_.interrupted = report.interrupted;
   const EvaluationSetting& driven = report.results.setting;
-  results_.setting = participants_[0].session->evaluation_setting();
+  results_.setting = setting_of(*participants_[0].session);
   results_.setting.maps = driven.maps;
   results_.setting.steps = driven.steps;
   results_.setting.argmax = driven.argmax;

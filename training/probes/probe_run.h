@@ -11,8 +11,8 @@
 
 #include "pictura/common/raster/camera.h"
 #include "pictura/common/renderer.h"
+#include "pictura/common/support/stopwatch.h"
 #include "pictura/simulator/simulator.h"
-#include "pictura/training/phase_timer.h"
 #include "pictura/training/probes/probe_options.h"
 #include "pictura/training/probes/probe_results.h"
 #include "pictura/training/session.h"

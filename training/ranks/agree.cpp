@@ -1,8 +1,9 @@
 #include "pictura/training/ranks/agree.h"
 
 #include "pictura/common/support/interrupt.h"
-#include "pictura/training/checkpoint.h"
+#include "pictura/configuration/compare_configs.h"
 #include "pictura/training/ranks/ranks.h"
+#include "pictura/training/saved_policy.h"
 
 namespace pictura {
 
@@ -26,7 +27,7 @@ bool any_rank_interrupted(Communicator* communicator) {
 }
 
 std::string file_of_first(const std::string& path, Communicator* communicator) {
-  return communicator->from_first(communicator->is_first() ? read_checkpoint_file(path) : "");
+  return communicator->from_first(communicator->is_first() ? read_policy_file(path) : "");
 }
 
 }  // namespace pictura

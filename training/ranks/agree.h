@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "pictura/training/config.h"
+#include "pictura/configuration/config.h"
 #include "pictura/training/ranks/communicator.h"
 
 namespace pictura {

@@ -2,11 +2,10 @@
 // folders.
 #pragma once
 
-#include <map>
 #include <string>
 #include <vector>
 
-#include "pictura/training/config.h"
+#include "pictura/configuration/config.h"
 
 namespace pictura {
 
@@ -17,10 +16,6 @@ struct ConfigKey {
 
 /// Every key, in the order of the file that to_toml() writes.
 std::vector<ConfigKey> config_keys();
-
-/// The keys that decide what an evaluation counts and that no option of it replaces, with their values as to_toml()
-/// writes them: of the worlds, and of the policy where there is one.
-std::map<std::string, std::string> keys_of_evaluation(const Config& config, bool has_policy);
 
 /// What of a configuration has no effect though it is no contradiction, a sentence each.
 std::vector<std::string> idle_settings(const Config& config);

@@ -1,0 +1,19 @@
+// Wall time that passes.
+#pragma once
+
+#include <chrono>
+
+namespace pictura {
+
+/// Time since it was made or last restarted.
+class Stopwatch {
+ public:
+  void restart() { start_ = Clock::now(); }
+  double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point start_ = Clock::now();
+};
+
+}  // namespace pictura

@@ -1,0 +1,59 @@
+#include "pictura/configuration/config.h"
+
+#include <algorithm>
+
+#include "pictura/configuration/config_writer.h"
+#include "pictura/configuration/visit_keys.h"
+
+namespace pictura {
+
+std::array<double, kNumConditioning> EvaluateSection::default_conditioning() {
+  // Safe and eager: full penalties, no bias in the lane, goals within 2 m at any speed, unscaled dynamics.
+  std::array<double, kNumConditioning> values{};
+  auto set = [&](Conditioning which, double value) { values[static_cast<size_t>(which)] = value; };
+  set(Conditioning::delta_goal_m, 2);
+  set(Conditioning::v_goal_mps, 20);
+  set(Conditioning::collision, 3);
+  set(Conditioning::off_road, 3);
+  set(Conditioning::stop_line, 1);
+  set(Conditioning::comfort, 0.05);
+  set(Conditioning::lane_align, 2.5e-2);
+  set(Conditioning::vel_align, 1);
+  set(Conditioning::lane_center, 7.5e-3);
+  set(Conditioning::center_bias_m, 0);
+  set(Conditioning::velocity, 2.5e-3);
+  set(Conditioning::reverse, 7.5e-3);
+  set(Conditioning::overspeed, 0.05);
+  set(Conditioning::timestep, 2.5e-5);
+  set(Conditioning::throttle, 1);
+  set(Conditioning::steer, 1);
+  set(Conditioning::acceleration, 1);
+  return values;
+}
+
+bool Config::reads(ObservationPart part) const {
+  return part == ObservationPart::own ||
+         (policy.modality == Modality::vector && (part != ObservationPart::walls || simulator.wall_observations));
+}
+
+std::string to_toml(const Config& config) {
+  ConfigWriter writer;
+  visit(config, writer);
+  return writer.toml;
+}
+
+namespace {
+
+template <typename Enum>
+std::string name_among(const Choices<Enum>& choices, Enum value) {
+  return std::find_if(choices.begin(), choices.end(), [&](const auto& choice) { return choice.second == value; })
+      ->first;
+}
+
+}  // namespace
+
+std::string name_of(Precision precision) { return name_among(kPrecisions, precision); }
+std::string name_of(OptimizerKind kind) { return name_among(kOptimizers, kind); }
+std::string name_of(ValueHead head) { return name_among(kValueHeads, head); }
+
+}  // namespace pictura

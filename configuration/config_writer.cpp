@@ -1,0 +1,30 @@
+#include "pictura/configuration/config_writer.h"
+
+#include <sstream>
+
+#include <toml++/toml.h>
+
+namespace pictura {
+
+std::string shortest(float value) { return fmt::format("{}", value); }
+std::string shortest(double value) {
+  const std::string text = fmt::format("{}", value);
+  return text.find_first_of(".en") == std::string::npos ? text + ".0" : text;
+}
+
+std::string ConfigWriter::quoted(const std::string& value) {
+  std::ostringstream out;
+  out << toml::value<std::string>(value);
+  return out.str();
+}
+
+void ConfigWriter::line(const std::string& key, const std::string& value) {
+  const size_t dot = key.rfind('.');
+  if (const std::string section = key.substr(0, dot); section != section_) {
+    toml += fmt::format("{}[{}]\n", section_.empty() ? "" : "\n", section);
+    section_ = section;
+  }
+  toml += fmt::format("{} = {}\n", key.substr(dot + 1), value);
+  lines.emplace_back(key, value);
+}
+}  // namespace pictura

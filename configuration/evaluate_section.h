@@ -1,0 +1,16 @@
+// [evaluate] of a configuration.
+#pragma once
+
+#include <array>
+
+#include "pictura/simulator/conditioning.h"
+
+namespace pictura {
+
+struct EvaluateSection {
+  /// What every agent is conditioned on: [evaluate.conditioning] NAME = value.
+  std::array<double, kNumConditioning> conditioning = default_conditioning();
+  static std::array<double, kNumConditioning> default_conditioning();
+};
+
+}  // namespace pictura

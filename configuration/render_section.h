@@ -1,0 +1,31 @@
+// [render] of a configuration: the images of a policy.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "pictura/common/renderer.h"
+
+namespace pictura {
+
+struct RenderSection {
+  std::string backend = "auto";       // as make_renderer takes it
+  PixelSamples samples;               // of gl; the others compute exact coverage
+  std::string rig;                    // a rig file (docs/image.md)
+  int width_px = 96, height_px = 54;  // without one: of each camera of the paper's rig
+  /// Other sizes, each from so many agent-steps of the run on, in ascending order; not with a rig file. Where
+  /// patch_px is not 0, policy.patch_px and line_floor_px are these from then on, and the first convolution is spread
+  /// over the larger patches (training/patch_spread.h).
+  struct SizeChange {
+    int64_t agent_steps = 0;
+    int width_px = 0, height_px = 0;
+    int patch_px = 0;  // 0: patches and line floor stay
+    double line_floor_px = 0;
+    bool has_patches() const { return patch_px > 0; }
+  };
+  std::vector<SizeChange> schedule;
+  double line_floor_px = 0.35;  // least width of a line on screen
+};
+
+}  // namespace pictura

@@ -1,0 +1,15 @@
+// [run] of a configuration.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace pictura {
+
+struct RunSection {
+  uint64_t seed = 1;            // names the whole run
+  int num_threads = 0;          // of simulator, renderer and torch; 0: all
+  std::string device = "auto";  // what learns: cpu, cuda, cuda:N or auto
+};
+
+}  // namespace pictura
