@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "pictura/common/support/filled_folder.h"
-#include "pictura/training/probes/corner_results.h"
+#include "pictura/evaluation/probes/corner_results.h"
 
 namespace pictura {
 

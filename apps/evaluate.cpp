@@ -1,5 +1,5 @@
 // `pictura evaluate`: the paper's driving metrics of a checkpoint or a controller, by traffic density.
-#include "pictura/training/evaluation/evaluate.h"
+#include "pictura/evaluation/evaluate.h"
 
 #include <algorithm>
 #include <map>
@@ -15,11 +15,11 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/numbers.h"
+#include "pictura/evaluation/estimate_json.h"
+#include "pictura/evaluation/infractions.h"
 #include "pictura/replay/gallery.h"
 #include "pictura/simulator/controllers/host_controllers.h"
 #include "pictura/simulator/simulator.h"
-#include "pictura/training/evaluation/estimate_json.h"
-#include "pictura/training/evaluation/infractions.h"
 
 namespace pictura {
 

@@ -6,7 +6,7 @@
 #include "pictura/cli/file_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/commit.h"
-#include "pictura/training/export_policy.h"
+#include "pictura/policy/export_policy.h"
 
 namespace pictura {
 

@@ -15,7 +15,7 @@
 #include "pictura/drawing/film.h"
 #include "pictura/drawing/plot.h"
 #include "pictura/drawing/world.h"
-#include "pictura/training/probes/crossing_path.h"
+#include "pictura/evaluation/probes/crossing_path.h"
 
 namespace pictura {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "pictura/common/support/filled_folder.h"
-#include "pictura/training/probes/pedestrian_results.h"
+#include "pictura/evaluation/probes/pedestrian_results.h"
 
 namespace pictura {
 

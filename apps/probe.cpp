@@ -16,9 +16,9 @@
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/filled_folder.h"
 #include "pictura/common/support/json.h"
-#include "pictura/training/probes/corner.h"
-#include "pictura/training/probes/pedestrian.h"
-#include "pictura/training/probes/removal.h"
+#include "pictura/evaluation/probes/corner.h"
+#include "pictura/evaluation/probes/pedestrian.h"
+#include "pictura/evaluation/probes/removal.h"
 
 namespace pictura {
 

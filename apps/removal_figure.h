@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "pictura/training/probes/removal_results.h"
+#include "pictura/evaluation/probes/removal_results.h"
 
 namespace pictura {
 

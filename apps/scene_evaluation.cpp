@@ -11,8 +11,8 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/numbers.h"
 #include "pictura/common/support/output_file.h"
+#include "pictura/evaluation/estimate_json.h"
 #include "pictura/map/scenario/scenario.h"
-#include "pictura/training/evaluation/estimate_json.h"
 
 namespace pictura {
 

@@ -6,7 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "pictura/training/evaluation/evaluate_scenes.h"
+#include "pictura/evaluation/evaluate_scenes.h"
 
 namespace pictura {
 

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "pictura/common/error.h"
-#include "pictura/training/rules/network_passes.h"
-#include "pictura/training/rules/policy_executor.h"
+#include "pictura/policy/rules/network_passes.h"
+#include "pictura/policy/rules/policy_executor.h"
 
 namespace pictura {
 

@@ -18,7 +18,7 @@
 #include "pictura/simulator/controllers/shared_control.h"
 #include "pictura/simulator/recorded_scene.h"
 #ifdef PICTURA_HAS_TORCH
-#include "pictura/training/session.h"
+#include "pictura/policy/session.h"
 #endif
 
 namespace pictura {

@@ -8,7 +8,7 @@
 #include "pictura/cli/report.h"
 #include "pictura/common/support/json.h"
 #include "pictura/common/support/stopwatch.h"
-#include "pictura/training/evaluation/evaluate.h"
+#include "pictura/evaluation/evaluate.h"
 
 namespace pictura {
 

@@ -16,7 +16,7 @@
 #include "pictura/replay/recorder.h"
 #include "pictura/version.h"
 #ifdef PICTURA_HAS_TORCH
-#include "pictura/training/session.h"
+#include "pictura/policy/session.h"
 #endif
 
 namespace pictura {

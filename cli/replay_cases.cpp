@@ -7,7 +7,7 @@
 #include "pictura/cli/replay_scenarios.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
-#include "pictura/training/evaluation/infractions.h"
+#include "pictura/evaluation/infractions.h"
 
 namespace pictura {
 

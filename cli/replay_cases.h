@@ -7,9 +7,9 @@
 #include <CLI/CLI.hpp>
 
 #include "pictura/cli/record.h"
-#include "pictura/training/probes/corner.h"
-#include "pictura/training/probes/pedestrian.h"
-#include "pictura/training/probes/removal.h"
+#include "pictura/evaluation/probes/corner.h"
+#include "pictura/evaluation/probes/pedestrian.h"
+#include "pictura/evaluation/probes/removal.h"
 
 namespace pictura {
 

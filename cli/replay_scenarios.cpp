@@ -9,9 +9,9 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/filled_folder.h"
 #include "pictura/common/support/interrupt.h"
+#include "pictura/evaluation/probes/driven_scenes.h"
+#include "pictura/policy/session.h"
 #include "pictura/simulator/saved_worlds.h"
-#include "pictura/training/probes/driven_scenes.h"
-#include "pictura/training/session.h"
 
 namespace pictura {
 

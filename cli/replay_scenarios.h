@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "pictura/cli/record.h"
-#include "pictura/training/evaluation/evaluate.h"
+#include "pictura/evaluation/evaluate.h"
 
 namespace pictura {
 

@@ -8,7 +8,7 @@ namespace pictura {
 
 enum class Modality { perspective, vector };
 
-/// What the critic's head predicts, see training/value_head.h: values; their symlog; or how probable each of a row of
+/// What the critic's head predicts, see policy/value_head.h: values; their symlog; or how probable each of a row of
 /// values is.
 enum class ValueHead { linear, symlog, two_hot };
 
@@ -26,7 +26,7 @@ struct PolicySection {
   int attention_heads = 4;
   int attention_mlp = 256;        // hidden width of the block's MLP; 0: none
   int embedding_width = 64;       // of every group
-  bool point_features = true;     // encoders read points near the agent apart, see training/row_features.h
+  bool point_features = true;     // encoders read points near the agent apart, see policy/row_features.h
   bool segment_features = false;  // vector: encoders read the agent's place beside lanes, boundaries and walls
   bool goal_features = false;     // vector: encoders read the distance of lanes to the goal
   /// "conv": the convolutions; or the path of a program of scripts/export_backbone, relative to the configuration's
@@ -38,7 +38,7 @@ struct PolicySection {
   ValueHead value_head = ValueHead::linear;
   bool layer_norm = false;  // layers of groups and trunk are normalized, see docs/network.md
   bool residual = false;    // every layer of the trunk but the first adds its input
-  int decision_steps = 1;   // steps for which an action is held, see training/decision_clock.h
+  int decision_steps = 1;   // steps for which an action is held, see policy/decision_clock.h
 };
 
 }  // namespace pictura

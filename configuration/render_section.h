@@ -16,7 +16,7 @@ struct RenderSection {
   int width_px = 96, height_px = 54;  // without one: of each camera of the paper's rig
   /// Other sizes, each from so many agent-steps of the run on, in ascending order; not with a rig file. Where
   /// patch_px is not 0, policy.patch_px and line_floor_px are these from then on, and the first convolution is spread
-  /// over the larger patches (training/patch_spread.h).
+  /// over the larger patches (policy/patch_spread.h).
   struct SizeChange {
     int64_t agent_steps = 0;
     int width_px = 0, height_px = 0;

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "pictura/training/decision_clock.h"
+#include "pictura/policy/decision_clock.h"
 #include "pictura/training/run.h"
 
 namespace pictura {

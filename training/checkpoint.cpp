@@ -1,8 +1,8 @@
 #include "pictura/training/checkpoint.h"
 
 #include "pictura/common/support/file.h"
-#include "pictura/training/checkpoint_file.h"
-#include "pictura/training/policy_json.h"
+#include "pictura/policy/checkpoint_file.h"
+#include "pictura/policy/policy_json.h"
 
 namespace pictura {
 

@@ -1,11 +1,11 @@
-// What a run saves: one file (training/checkpoint_file.h) from which training goes on exactly and a policy can be
+// What a run saves: one file (policy/checkpoint_file.h) from which training goes on exactly and a policy can be
 // loaded.
 #pragma once
 
 #include <map>
 #include <string>
 
-#include "pictura/training/saved_policy.h"
+#include "pictura/policy/saved_policy.h"
 
 namespace pictura {
 

@@ -12,11 +12,12 @@
 #include "pictura/common/support/parallel_for.h"
 #include "pictura/common/support/stopwatch.h"
 #include "pictura/configuration/config_keys.h"
+#include "pictura/policy/precision.h"
+#include "pictura/policy/torch_device.h"
 #include "pictura/training/algorithm.h"
 #include "pictura/training/diagnosis.h"
 #include "pictura/training/host_memory.h"
 #include "pictura/training/memory.h"
-#include "pictura/training/precision.h"
 #include "pictura/training/ranks/agree.h"
 #include "pictura/training/ranks/ranks.h"
 #include "pictura/training/run.h"
@@ -26,7 +27,6 @@
 #include "pictura/training/run_log.h"
 #include "pictura/training/run_time.h"
 #include "pictura/training/schedule.h"
-#include "pictura/training/torch_device.h"
 
 namespace pictura {
 

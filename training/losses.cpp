@@ -3,7 +3,7 @@
 #include <ATen/core/grad_mode.h>
 
 #include "pictura/common/error.h"
-#include "pictura/training/value_head.h"
+#include "pictura/policy/value_head.h"
 
 namespace pictura {
 

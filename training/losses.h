@@ -1,7 +1,7 @@
 // PPO's losses of some transitions.
 #pragma once
 
-#include "pictura/training/policy.h"
+#include "pictura/policy/policy.h"
 
 namespace pictura {
 

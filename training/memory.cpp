@@ -8,10 +8,10 @@
 #include "pictura/common/scene_history.h"
 #include "pictura/configuration/apply_config.h"
 #include "pictura/map/load_map.h"
+#include "pictura/policy/network_shape.h"
+#include "pictura/policy/observation.h"
+#include "pictura/policy/rules/network_passes.h"
 #include "pictura/simulator/observation_arrays.h"
-#include "pictura/training/network_shape.h"
-#include "pictura/training/observation.h"
-#include "pictura/training/rules/network_passes.h"
 #include "pictura/training/training_maps.h"
 
 namespace pictura {

@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "pictura/training/policy.h"
+#include "pictura/policy/policy.h"
 #include "pictura/training/repeated_work.h"
 
 namespace pictura {

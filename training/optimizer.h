@@ -36,7 +36,7 @@ class Optimizer {
   /// Second moments of the parameters that AdamW steps, in their order.
   std::vector<NamedTensor> second_moments;
   /// Factors of AdamW's learning rate, in the order of the policy's parameters: 1 but for weights that move together
-  /// (training/patch_spread.h), whose squares the gradient's norm counts by the same factor. Weight decay keeps the
+  /// (policy/patch_spread.h), whose squares the gradient's norm counts by the same factor. Weight decay keeps the
   /// whole rate.
   std::vector<double> rate_factors;
   int64_t steps = 0;

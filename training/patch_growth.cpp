@@ -5,8 +5,8 @@
 #include <ATen/core/grad_mode.h>
 
 #include "pictura/common/error.h"
+#include "pictura/policy/patch_spread.h"
 #include "pictura/training/optimizer.h"
-#include "pictura/training/patch_spread.h"
 #include "pictura/training/weight_average.h"
 
 namespace pictura {

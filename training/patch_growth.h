@@ -1,4 +1,4 @@
-// The first convolution of a policy that is being trained, where its images become larger: see training/patch_spread.h.
+// The first convolution of a policy that is being trained, where its images become larger: see policy/patch_spread.h.
 #pragma once
 
 namespace pictura {

@@ -5,7 +5,7 @@
 #include <nvtx3/nvToolsExt.h>
 #endif
 
-#include "pictura/training/torch_device.h"
+#include "pictura/policy/torch_device.h"
 
 namespace pictura {
 

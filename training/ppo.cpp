@@ -7,10 +7,10 @@
 #include <ATen/core/grad_mode.h>
 
 #include "pictura/common/error.h"
-#include "pictura/training/chunks.h"
-#include "pictura/training/precision.h"
+#include "pictura/policy/chunks.h"
+#include "pictura/policy/precision.h"
+#include "pictura/policy/torch_device.h"
 #include "pictura/training/rules/advantage_filter.h"
-#include "pictura/training/torch_device.h"
 
 namespace pictura {
 

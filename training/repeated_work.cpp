@@ -6,7 +6,7 @@
 
 #include "pictura/backends/make_learner.h"
 #include "pictura/common/error.h"
-#include "pictura/training/torch_device.h"
+#include "pictura/policy/torch_device.h"
 
 namespace pictura {
 

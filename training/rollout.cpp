@@ -2,8 +2,8 @@
 
 #include "pictura/backends/make_learner.h"
 #include "pictura/common/error.h"
+#include "pictura/policy/torch_device.h"
 #include "pictura/training/memory.h"
-#include "pictura/training/torch_device.h"
 
 namespace pictura {
 

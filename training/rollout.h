@@ -2,7 +2,7 @@
 #pragma once
 
 #include "pictura/common/scene_history.h"
-#include "pictura/training/observation.h"
+#include "pictura/policy/observation.h"
 #include "pictura/training/phase_timer.h"
 #include "pictura/training/rules/learner_executor.h"
 

@@ -5,11 +5,11 @@
 #include <optional>
 
 #include "pictura/configuration/apply_config.h"
+#include "pictura/policy/torch_device.h"
 #include "pictura/training/checkpoint.h"
 #include "pictura/training/ppo.h"
 #include "pictura/training/ranks/communicator.h"
 #include "pictura/training/teacher.h"
-#include "pictura/training/torch_device.h"
 #include "pictura/training/weight_average.h"
 
 namespace pictura {

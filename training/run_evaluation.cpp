@@ -1,7 +1,7 @@
 #include "pictura/training/run_evaluation.h"
 
 #include "pictura/common/support/stopwatch.h"
-#include "pictura/training/session.h"
+#include "pictura/policy/session.h"
 
 namespace pictura {
 

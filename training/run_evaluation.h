@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "pictura/training/evaluation/evaluate.h"
+#include "pictura/evaluation/evaluate.h"
 #include "pictura/training/run.h"
 #include "pictura/training/run_log.h"
 

@@ -6,9 +6,9 @@
 #include <optional>
 
 #include "pictura/common/support/stopwatch.h"
+#include "pictura/evaluation/results.h"
 #include "pictura/training/checkpoint.h"
 #include "pictura/training/diagnosis.h"
-#include "pictura/training/evaluation/results.h"
 #include "pictura/training/event_file.h"
 #include "pictura/training/loop.h"
 #include "pictura/training/phase_timer.h"

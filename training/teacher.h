@@ -4,8 +4,8 @@
 
 #include <memory>
 
-#include "pictura/training/policy.h"
-#include "pictura/training/saved_policy.h"
+#include "pictura/policy/policy.h"
+#include "pictura/policy/saved_policy.h"
 
 namespace pictura {
 

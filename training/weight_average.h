@@ -2,7 +2,7 @@
 // updates.
 #pragma once
 
-#include "pictura/training/policy.h"
+#include "pictura/policy/policy.h"
 
 namespace pictura {
 

@@ -5,8 +5,8 @@
 
 #include <unistd.h>
 
+#include "pictura/policy/rules/choose_action.h"
 #include "pictura/training/rules/advantage_filter.h"
-#include "pictura/training/rules/choose_action.h"
 #include "pictura/training/rules/learner_executor.h"
 
 namespace pictura {

@@ -4,7 +4,7 @@
 
 #include <cuda_runtime_api.h>
 
-#include "pictura/training/rules/choose_action.h"
+#include "pictura/policy/rules/choose_action.h"
 #include "pictura/training/rules/gae.h"
 #include "pictura/training/rules/permutation.h"
 

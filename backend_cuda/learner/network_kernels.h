@@ -4,7 +4,7 @@
 
 #include <cuda_runtime_api.h>
 
-#include "pictura/training/rules/network_passes.h"
+#include "pictura/policy/rules/network_passes.h"
 
 namespace pictura::cuda {
 

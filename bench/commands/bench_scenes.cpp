@@ -10,7 +10,7 @@
 #include "pictura/cli/number_options.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
-#include "pictura/training/evaluation/evaluate_scenes.h"
+#include "pictura/evaluation/evaluate_scenes.h"
 
 namespace pictura {
 

@@ -10,6 +10,9 @@ import sys
 import tempfile
 
 SIMULATION = {"common", "map", "simulator"}
+POLICY = SIMULATION | {"backends", "configuration", "policy", "policy/rules"}
+EVALUATION = POLICY | {"evaluation"}
+TRAINING = EVALUATION | {"training", "training/rules"}
 # Folder -> pictura folders that its files may include, besides itself.
 MAY_INCLUDE = {
     "common": set(),
@@ -17,27 +20,30 @@ MAY_INCLUDE = {
     "simulator": {"common", "map"},
     "backend_cpu/renderer": {"common"},
     "backend_cpu/simulator": SIMULATION,
-    "backend_cpu/learner": SIMULATION | {"training/rules"},
+    "backend_cpu/learner": SIMULATION | {"policy/rules", "training/rules"},
     "backend_cuda/renderer": {"common"},
     "backend_cuda/simulator": SIMULATION,
-    "backend_cuda/learner": SIMULATION | {"training/rules"},
+    "backend_cuda/learner": SIMULATION | {"policy/rules", "training/rules"},
     "backend_gl": {"common"},
-    "backends": SIMULATION | {"training/rules"},
+    "backends": SIMULATION | {"policy/rules", "training/rules"},
     "configuration": SIMULATION | {"backends"},
-    "training": SIMULATION | {"backends", "configuration", "training/rules"},
-    "training/rules": SIMULATION,
+    "policy": POLICY,
+    "policy/rules": SIMULATION,
+    "evaluation": EVALUATION,
+    "training": TRAINING,
+    "training/rules": SIMULATION | {"policy/rules"},
     "drawing": SIMULATION | {"backends"},
     "replay": SIMULATION | {"backends", "drawing"},
-    "cli": SIMULATION | {"backends", "configuration", "replay", "training"},
-    "bindings": SIMULATION | {"backends", "cli", "configuration", "drawing", "replay", "training"},
+    "cli": TRAINING | {"replay"},
+    "bindings": TRAINING | {"cli", "drawing", "replay"},
     "bench": SIMULATION | {"backends", "backend_cpu/renderer"},
-    "bench/commands": SIMULATION | {"backends", "bench", "cli", "configuration", "drawing", "training"},
-    "apps": SIMULATION | {"backends", "bench/commands", "cli", "configuration", "drawing", "replay", "training"},
+    "bench/commands": TRAINING | {"bench", "cli", "drawing"},
+    "apps": TRAINING | {"bench/commands", "cli", "drawing", "replay"},
     "tests": None,  # anything
 }
 # Libraries restricted to folders: pattern of the include -> files that may include it.
 STAYS_IN = [
-    (re.compile(r"^(torch|ATen|c10)/"), re.compile(r"^(training|tests/training)/")),
+    (re.compile(r"^(torch|ATen|c10)/"), re.compile(r"^(tests/)?(policy|evaluation|training)/|^tests/configuration/")),
     (re.compile(r"^(GL|EGL|GLES\d?)/"), re.compile(r"^(backend_gl|tests/backend_gl)/")),
     (re.compile(r"^(cuda|nvrtc|cub/|nccl)"), re.compile(r"^((tests/)?backend_cuda|common/cuda|backend_gl/cuda|bench)/")),
     (re.compile(r"^pybind11/"), re.compile(r"^bindings/")),

@@ -14,10 +14,10 @@
 #include "pictura/common/support/crc32c.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/hash.h"
+#include "pictura/policy/session.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/training/event_file.h"
-#include "pictura/training/session.h"
 
 namespace pictura {
 namespace {

@@ -3,8 +3,8 @@
 
 #include "pictura/backends/make_learner.h"
 #include "pictura/common/rng.h"
+#include "pictura/policy/rules/choose_action.h"
 #include "pictura/training/ppo.h"
-#include "pictura/training/rules/choose_action.h"
 #include "pictura/training/schedule.h"
 
 namespace pictura::test {

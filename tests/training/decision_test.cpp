@@ -11,13 +11,13 @@
 #include "pictura/common/error.h"
 #include "pictura/map/load_map.h"
 #include "pictura/map/opendrive/opendrive.h"
+#include "pictura/policy/decision_clock.h"
+#include "pictura/policy/session.h"
 #include "pictura/tests/map/open_roads.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/tests/training/small_runs.h"
 #include "pictura/training/algorithm.h"
-#include "pictura/training/decision_clock.h"
-#include "pictura/training/session.h"
 
 namespace pictura {
 namespace {

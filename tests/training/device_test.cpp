@@ -13,15 +13,15 @@
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
 #include "pictura/configuration/apply_config.h"
+#include "pictura/evaluation/probes/corner.h"
+#include "pictura/evaluation/probes/removal.h"
 #include "pictura/map/load_map.h"
+#include "pictura/policy/torch_device.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/tests/training/averaged_runs.h"
-#include "pictura/training/probes/corner.h"
-#include "pictura/training/probes/removal.h"
 #include "pictura/training/ranks/ranks.h"
 #include "pictura/training/run.h"
-#include "pictura/training/torch_device.h"
 
 namespace pictura {
 namespace {

@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 
 #include "pictura/common/support/parallel_for.h"
+#include "pictura/policy/precision.h"
 #include "pictura/training/algorithm.h"
-#include "pictura/training/precision.h"
 
 namespace pictura::test {
 

@@ -6,8 +6,8 @@
 #include <ATen/Parallel.h>
 #include <gmock/gmock.h>
 
+#include "pictura/tests/policy/small_policy.h"
 #include "pictura/tests/training/corridor.h"
-#include "pictura/tests/training/small_policy.h"
 
 namespace pictura {
 namespace {

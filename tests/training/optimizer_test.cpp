@@ -6,9 +6,9 @@
 #include <ATen/core/grad_mode.h>
 #include <gmock/gmock.h>
 
+#include "pictura/tests/policy/small_policy.h"
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/tests/training/corridor.h"
-#include "pictura/tests/training/small_policy.h"
 #include "pictura/tests/training/small_runs.h"
 
 namespace pictura {

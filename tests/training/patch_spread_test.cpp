@@ -1,18 +1,18 @@
 // The first convolution at larger images: weights by hand, the function before and after a step, and exported files.
-#include "pictura/training/patch_spread.h"
+#include "pictura/policy/patch_spread.h"
 
 #include <ATen/core/grad_mode.h>
 #include <gmock/gmock.h>
 
 #include "pictura/common/error.h"
+#include "pictura/policy/saved_policy.h"
+#include "pictura/policy/session.h"
+#include "pictura/tests/policy/numbers.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
-#include "pictura/tests/training/numbers.h"
 #include "pictura/training/checkpoint.h"
 #include "pictura/training/optimizer.h"
 #include "pictura/training/patch_growth.h"
-#include "pictura/training/saved_policy.h"
-#include "pictura/training/session.h"
 
 namespace pictura {
 namespace {

@@ -14,10 +14,10 @@
 #include "pictura/backends/make_learner.h"
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
+#include "pictura/policy/rules/choose_action.h"
+#include "pictura/tests/policy/small_policy.h"
 #include "pictura/tests/training/corridor.h"
-#include "pictura/tests/training/small_policy.h"
 #include "pictura/training/rules/advantage_filter.h"
-#include "pictura/training/rules/choose_action.h"
 #include "pictura/training/schedule.h"
 
 namespace pictura {

@@ -4,10 +4,10 @@
 #include <ATen/Context.h>
 #include <gmock/gmock.h>
 
+#include "pictura/policy/precision.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/tests/training/small_runs.h"
-#include "pictura/training/precision.h"
 
 namespace pictura {
 namespace {

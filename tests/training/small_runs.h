@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "pictura/common/support/file.h"
-#include "pictura/training/evaluation/evaluate.h"
+#include "pictura/evaluation/evaluate.h"
 #include "pictura/training/loop.h"
 
 namespace pictura::test {

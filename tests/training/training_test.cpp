@@ -20,17 +20,17 @@
 #include "pictura/common/support/interrupt.h"
 #include "pictura/configuration/apply_config.h"
 #include "pictura/configuration/compare_configs.h"
+#include "pictura/evaluation/evaluate.h"
 #include "pictura/map/load_map.h"
+#include "pictura/policy/layers.h"
+#include "pictura/policy/observation.h"
+#include "pictura/policy/session.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/missing_renderer.h"
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/tests/training/small_runs.h"
-#include "pictura/training/evaluation/evaluate.h"
-#include "pictura/training/layers.h"
-#include "pictura/training/observation.h"
 #include "pictura/training/run.h"
 #include "pictura/training/run_folder.h"
-#include "pictura/training/session.h"
 
 namespace pictura {
 namespace {

@@ -1,5 +1,5 @@
 // Heads of the critic: what their outputs mean, their losses, and that each of them learns.
-#include "pictura/training/value_head.h"
+#include "pictura/policy/value_head.h"
 
 #include <cmath>
 
@@ -7,10 +7,10 @@
 #include <ATen/core/grad_mode.h>
 #include <gmock/gmock.h>
 
+#include "pictura/tests/policy/numbers.h"
+#include "pictura/tests/policy/small_policy.h"
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/tests/training/corridor.h"
-#include "pictura/tests/training/numbers.h"
-#include "pictura/tests/training/small_policy.h"
 #include "pictura/tests/training/small_runs.h"
 #include "pictura/training/losses.h"
 

@@ -2,8 +2,8 @@
 
 #include "pictura/common/support/interrupt.h"
 #include "pictura/configuration/compare_configs.h"
+#include "pictura/policy/saved_policy.h"
 #include "pictura/training/ranks/ranks.h"
-#include "pictura/training/saved_policy.h"
 
 namespace pictura {
 

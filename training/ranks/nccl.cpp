@@ -6,9 +6,9 @@
 #include <dlfcn.h>
 
 #include "pictura/common/error.h"
+#include "pictura/policy/torch_device.h"
 #include "pictura/training/ranks/communicator.h"
 #include "pictura/training/ranks/ranks.h"
-#include "pictura/training/torch_device.h"
 
 namespace pictura {
 

@@ -2,9 +2,9 @@
 // CUDA devices give the same bits.
 #pragma once
 
+#include "pictura/policy/rules/policy_executor.h"
 #include "pictura/training/rules/gae.h"
 #include "pictura/training/rules/permutation.h"
-#include "pictura/training/rules/policy_executor.h"
 
 namespace pictura {
 

@@ -1,0 +1,269 @@
+#include "pictura/evaluation/evaluate.h"
+
+#include <algorithm>
+
+#include "pictura/backends/make_simulator.h"
+#include "pictura/backends/upload_maps.h"
+#include "pictura/common/error.h"
+#include "pictura/common/support/hash.h"
+#include "pictura/common/support/interrupt.h"
+#include "pictura/common/support/suggestion.h"
+#include "pictura/evaluation/progress.h"
+#include "pictura/map/load_map.h"
+#include "pictura/map/map_cache.h"
+#include "pictura/policy/session.h"
+#include "pictura/policy/struct_copies.h"
+#include "pictura/policy/torch_device.h"
+#include "pictura/simulator/agent_state.h"
+
+namespace pictura {
+
+namespace {
+
+struct DensityOf {
+  const char* name;
+  int agents;
+};
+DensityOf density_of(Density density) {
+  const auto index = static_cast<size_t>(density);
+  return {kDensityNames[index], kDensityAgents[index]};
+}
+
+// Worlds that are simulated together: on a device all 200 of the paper's densities, which keep it busy. Images take no
+// part in it: they are drawn for train.forward_chunk agents at a time.
+int worlds_per_batch(Device device, int agents_per_world) {
+  const int max_agents = device.is_host() ? 4096 : 32768;
+  return std::max(1, max_agents / agents_per_world);
+}
+
+// The agents' fields that are counted, on the host; all others are empty.
+AgentState counted_state(Simulator& simulator) {
+  const AgentStateView state = simulator.state();
+  AgentState host(0);
+  const auto copy = [&simulator](const auto* field, auto* out) {
+    *out = host_copy(Span(field, static_cast<size_t>(simulator.num_slots())), simulator.device());
+  };
+  copy(state.status, &host.status);
+  copy(state.agent_class, &host.agent_class);
+  copy(state.episode_events, &host.episode_events);
+  copy(state.goals_reached, &host.goals_reached);
+  copy(state.waypoints_reached, &host.waypoints_reached);
+  copy(state.distance_m, &host.distance_m);
+  copy(state.episode_return, &host.episode_return);
+  copy(state.refusal, &host.refusal);
+  copy(state.life, &host.life);
+  copy(state.left, &host.left);
+  return host;
+}
+
+// Of a life that is over, or that the last step cuts off.
+void add_life(const AgentStateView& state, int64_t slot, ScenarioCounts* counts) {
+  const auto status = static_cast<AgentStatus>(state.status[slot]);
+  if (static_cast<AgentClass>(state.agent_class[slot]) != AgentClass::vehicle) return;
+  const uint8_t events = state.episode_events[slot];
+  const auto has = [events](int any_of) { return (events & any_of) != 0; };
+  ++counts->vehicles;
+  counts->collision += has(kEventCollision);
+  counts->at_fault += has(kEventAtFault);
+  counts->off_road += has(kEventOffRoad);
+  counts->red_light += has(kEventRedLight);
+  counts->wall_contact += has(kEventWall);
+  counts->any_infraction += has(kEventCollision | kEventOffRoad | kEventRedLight);
+  counts->at_fault_infraction += has(kEventAtFault | kEventOffRoad | kEventRedLight);
+  counts->active_at_end += status == AgentStatus::active || status == AgentStatus::waiting;
+  counts->goals += state.goals_reached[slot];
+  counts->waypoints += state.waypoints_reached[slot];
+  counts->distance_m += static_cast<double>(state.distance_m[slot]);
+  counts->returns += static_cast<double>(state.episode_return[slot]);
+}
+
+// Of a slot after the last step. Lives of those that left have been counted.
+void add_slot(const AgentStateView& state, int64_t slot, ScenarioCounts* counts) {
+  const auto status = static_cast<AgentStatus>(state.status[slot]);
+  const bool waits = status == AgentStatus::waiting;
+  ++counts->asked;
+  counts->spawned += state.refusal[slot] == static_cast<uint8_t>(SpawnFailure::none);
+  counts->entered += state.life[slot];
+  counts->left += state.life[slot] + waits;
+  if (has_body(status)) add_life(state, slot, counts);
+}
+
+bool has_lives(const Simulator& simulator) {
+  const CompiledMaps& maps = simulator.maps();
+  return std::any_of(maps.begin(), maps.end(), [](const auto& map) { return map->rules.is_open; });
+}
+
+// Whether an agent will yet enter, or may.
+bool is_awaited(Simulator& simulator) {
+  if (!has_lives(simulator)) return false;
+  const Span<const uint8_t> status(simulator.state().status, static_cast<size_t>(simulator.num_slots()));
+  const std::vector<uint8_t> all = host_copy(status, simulator.device());
+  return std::find(all.begin(), all.end(), static_cast<uint8_t>(AgentStatus::waiting)) != all.end();
+}
+
+std::string hash_of(const CompiledMaps& maps) {
+  Hash64 hash;
+  for (const auto& map : maps) {
+    const std::string roads = encode_map(*map->road, {});
+    hash.add_bytes(roads.data(), roads.size());
+  }
+  return hash.hex();
+}
+
+void check(const EvaluateOptions& options) {
+  if (options.first_scenario < 0) fail_usage("evaluate: expected a scenario from 0, got {}", options.first_scenario);
+  if (options.scenarios < 1) fail_usage("evaluate: expected one scenario or more, got {}", options.scenarios);
+  if (options.steps < 1) fail_usage("evaluate: expected one step or more, got {}", options.steps);
+  if (options.maps.empty()) fail_usage("evaluate: expected one map or more");
+  if (options.agents_per_world < 0 || options.agents_per_world > kMaxAgentsPerWorld) {
+    fail_usage("evaluate: expected 1 to {} agents per world, got {}", kMaxAgentsPerWorld, options.agents_per_world);
+  }
+}
+
+// Of so many scenarios from `first` of the options' ones on, which take the maps in turn.
+std::vector<WorldSpec> worlds_of(const EvaluateOptions& options, size_t num_maps, int agents, int first, int count) {
+  std::vector<WorldSpec> worlds;
+  for (int i = first; i < std::min(first + count, options.scenarios); ++i) {
+    const int scenario = options.first_scenario + i;
+    worlds.push_back(
+        {scenario % static_cast<int>(num_maps), agents, kFirstEvaluationWorld + static_cast<uint32_t>(scenario)});
+  }
+  return worlds;
+}
+
+// Drives the simulator's worlds from the start of their episodes to the last step, or until no agent is active or waits
+// to enter, since halted ones stay as they are. False: it was interrupted. Calls on_steps with the steps that are done,
+// now and then, and on_left(state, slot) for each agent that left a road that ends.
+template <typename OnSteps, typename OnLeft>
+bool drive_to_the_end(const EvaluatedDriver& driver, const EvaluateOptions& options, Simulator* simulator,
+                      const OnSteps& on_steps, const OnLeft& on_left, int64_t* agent_steps_inout) {
+  const Driving driving = driver.drive(*simulator);
+  EvaluationObserver* const observer = options.observer;
+  if (observer) observer->begin(*simulator);
+  DeviceCopy<Command> command_memory(std::vector<Command>(static_cast<size_t>(simulator->num_slots())), driver.device);
+  const Span<Command> commands = command_memory.span();
+  for (int step = 0; step < options.steps; ++step) {
+    if (interrupted()) return false;
+    driving.controller->act(simulator->controller_input(), {}, commands);
+    const int64_t num_driven = driving.num_driven();
+    if (num_driven == 0 && !is_awaited(*simulator)) break;
+    *agent_steps_inout += num_driven;
+    if (observer) observer->before_step(commands);
+    const StepResult taken = simulator->step(Span<const Command>(commands));
+    if (observer) observer->after_step(taken);
+    if (has_lives(*simulator)) {
+      AgentState state = counted_state(*simulator);
+      for (size_t slot = 0; slot < state.left.size(); ++slot) {
+        if (state.left[slot] != 0) on_left(state.view(), static_cast<int64_t>(slot));
+      }
+    }
+    if (step % 10 == 0 || step == 1) on_steps(step + 1);
+  }
+  if (observer) observer->end();
+  return true;
+}
+
+EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& options, EvaluationWorlds* shared) {
+  const CompiledMaps& maps = shared->maps;
+  SimulatorConfig simulator_config = driver.world;
+  simulator_config.seed = options.seed;
+  std::vector<DensityOf> densities;
+  if (options.agents_per_world > 0)
+    densities.push_back({"custom", options.agents_per_world});
+  else
+    for (const Density density : options.densities) densities.push_back(density_of(density));
+  double work = 0, done = 0;  // in agents times steps
+  for (const DensityOf& density : densities) work += double(density.agents) * options.scenarios * options.steps;
+
+  EvaluationClock clock(options.on_progress);
+  EvaluateReport report;
+  report.results.setting = driver.setting;
+  EvaluationSetting& setting = report.results.setting;
+  setting.maps = options.maps;
+  if (shared->maps_hash.empty()) shared->maps_hash = hash_of(maps);
+  setting.maps_hash = shared->maps_hash;
+  setting.steps = options.steps;
+  setting.argmax = options.argmax;
+  setting.seed = options.seed;
+  setting.light_heads = name_of(maps.front()->options.light_heads);
+  for (const DensityOf& density : densities) {
+    DensityResult result{density.name, density.agents, options.first_scenario, {}};
+    result.scenarios.resize(static_cast<size_t>(options.scenarios));
+    const int per_batch = worlds_per_batch(driver.device, density.agents);
+    for (int first = 0; first < options.scenarios && !report.interrupted; first += per_batch) {
+      const std::vector<WorldSpec> worlds = worlds_of(options, maps.size(), density.agents, first, per_batch);
+      std::unique_ptr<Simulator>& simulator = shared->simulator;
+      if (simulator)
+        simulator->set_worlds(maps, {}, worlds, options.seed);
+      else
+        simulator = make_simulator(options.simulator, simulator_config, maps, worlds);
+      const auto num_slots = double(simulator->num_slots());
+      const auto on_steps = [&](int steps) { clock.update((done + num_slots * steps) / work); };
+      const auto counts_of = [&](int64_t slot) {
+        return &result.scenarios[static_cast<size_t>(first + slot / density.agents)];
+      };
+      const auto on_left = [&](const AgentStateView& state, int64_t slot) { add_life(state, slot, counts_of(slot)); };
+      if (!drive_to_the_end(driver, options, simulator.get(), on_steps, on_left, &report.agent_steps)) {
+        report.interrupted = true;
+        result.scenarios.resize(static_cast<size_t>(first));  // those of the batches before are finished
+        break;
+      }
+      done += num_slots * options.steps;
+      AgentState state = counted_state(*simulator);
+      for (int slot = 0; slot < simulator->num_slots(); ++slot) {
+        add_slot(state.view(), slot, counts_of(slot));
+      }
+    }
+    if (!result.scenarios.empty()) {
+      report.rows.push_back(row_of(result, options.steps));
+      report.results.densities.push_back(std::move(result));
+    }
+    if (report.interrupted) break;
+  }
+  report.seconds = clock.seconds();
+  if (!report.interrupted) clock.finish();
+  return report;
+}
+
+}  // namespace
+
+Density density_named(const std::string& name) {
+  return static_cast<Density>(index_of_word("densities", name, kDensityNames));
+}
+
+CompiledMaps compile_maps_of(const EvaluateOptions& options, const SimulatorConfig& world) {
+  return compile_maps(load_maps(options.maps, options.num_threads), map_options(world), options.num_threads);
+}
+
+EvaluateReport evaluate(const EvaluateOptions& options) {
+  if (options.controller.empty()) {
+    PolicySession session(options.checkpoint, session_options(options));
+    return evaluate(&session, options);
+  }
+  EvaluationWorlds worlds;
+  return evaluate(options, &worlds);
+}
+
+EvaluateReport evaluate(const EvaluateOptions& options, EvaluationWorlds* shared) {
+  check(options);
+  const EvaluatedDriver driver = controller_driver(options, options.steps);
+  if (shared->maps.empty()) shared->maps = compile_maps_of(options, driver.world);
+  return evaluate(driver, options, shared);
+}
+
+EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options) {
+  check(options);
+  EvaluationWorlds worlds;
+  worlds.maps = compile_maps_of(options, session->evaluation_world(options.steps));
+  const std::unique_ptr<Renderer> renderer = session->make_renderer();
+  worlds.renderer = renderer.get();
+  if (renderer) upload_maps(worlds.maps, {}, renderer.get());
+  return evaluate(session, options, &worlds);
+}
+
+EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options, EvaluationWorlds* shared) {
+  check(options);
+  return evaluate(policy_driver(session, shared->renderer, options, options.steps), options, shared);
+}
+
+}  // namespace pictura

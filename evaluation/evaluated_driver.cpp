@@ -1,0 +1,109 @@
+#include "pictura/evaluation/evaluated_driver.h"
+
+#include <algorithm>
+
+#include "pictura/backends/make_controller.h"
+#include "pictura/common/error.h"
+#include "pictura/common/pixel_samples.h"
+#include "pictura/configuration/apply_config.h"
+#include "pictura/configuration/compare_configs.h"
+#include "pictura/configuration/config.h"
+#include "pictura/policy/saved_policy.h"
+#include "pictura/policy/session.h"
+#include "pictura/policy/torch_device.h"
+#include "pictura/simulator/controllers/host_controllers.h"
+#include "pictura/simulator/hash_values.h"
+
+namespace pictura {
+
+namespace {
+
+int64_t count_active(Simulator& simulator) {
+  const Span<const uint8_t> status(simulator.state().status, static_cast<size_t>(simulator.num_slots()));
+  const std::vector<uint8_t> all = host_copy(status, simulator.device());
+  return std::count(all.begin(), all.end(), static_cast<uint8_t>(AgentStatus::active));
+}
+
+}  // namespace
+
+SessionOptions session_options(const DriverOptions& options) {
+  return {.num_threads = options.num_threads,
+          .device = options.device,
+          .simulator = options.simulator,
+          .renderer = options.renderer,
+          .samples = options.samples,
+          .rig = options.rig,
+          .width_px = options.width_px,
+          .height_px = options.height_px,
+          .backbone = options.backbone,
+          .conditioning = options.conditioning,
+          .adds_walls = options.adds_walls,
+          .average = options.average,
+          .light_cycles = options.light_cycles,
+          .light_heads = options.light_heads};
+}
+
+EvaluationSetting setting_of(const PolicySession& session) {
+  const Config& config = session.config();
+  const bool is_on_host = session.device().is_host();
+  EvaluationSetting setting;
+  setting.policy_hash = session.policy_hash();
+  setting.config = keys_of_evaluation(config, /*has_policy=*/true);
+  setting.conditioning = config.evaluate.conditioning;
+  setting.light_cycles = config.simulator.light_cycles;
+  setting.device = is_on_host ? "cpu" : "cuda";
+  setting.precision = is_on_host ? "fp32" : name_of(config.train.precision);
+  if (!session.reads_images()) return setting;
+  setting.renderer = config.render.backend;
+  setting.samples = text_of(config.render.samples);
+  Hash64 cameras;
+  for (const Camera& camera : session.rig().cameras) {
+    setting.image_sizes.push_back(fmt::format("{}x{}", camera.width_px, camera.height_px));
+    add_values(&cameras, camera.focal_x_px, camera.focal_y_px, camera.center_x_px, camera.center_y_px,
+               camera.position_m.x, camera.position_m.y, camera.position_m.z, camera.yaw_rad, camera.pitch_rad,
+               camera.roll_rad);
+  }
+  setting.cameras_hash = cameras.hex();
+  return setting;
+}
+
+EvaluatedDriver policy_driver(PolicySession* session, Renderer* renderer, const DriverOptions& options, int steps) {
+  return {session->evaluation_world(steps), setting_of(*session), session->device(),
+          [session, renderer, &options](Simulator&) {
+            std::unique_ptr<PolicyController> controller =
+                session->make_controller(renderer, options.argmax, options.seed);
+            const PolicyController* const policy = controller.get();
+            return Driving{std::move(controller), [policy] { return policy->num_driven(); }};
+          }};
+}
+
+EvaluatedDriver controller_driver(const DriverOptions& options, int steps) {
+  Config config = options.checkpoint.empty() ? Config() : read_policy(options.checkpoint).config;
+  config = with_evaluate_conditioning(config, options.conditioning);
+  config.policy.modality = Modality::perspective;  // nobody reads vectors,
+  config.render.backend = "auto";                  // and nothing is drawn
+  config.run.num_threads = options.num_threads;
+  config.run.device = options.device;
+  config.simulator.backend = options.simulator;
+  config.simulator.walls |= options.adds_walls;
+  config.simulator.light_cycles = options.light_cycles.value_or(config.simulator.light_cycles);
+  config.simulator.light_heads = options.light_heads.value_or(config.simulator.light_heads);
+  const std::string& name = options.controller;
+  const bool is_on_host = drives_on_host(name);
+  if (is_on_host && options.device == "auto" && options.simulator == "auto") config.run.device = "cpu";
+  EvaluatedDriver driver;
+  driver.device = open_learning_device(config);
+  driver.world = evaluation_simulator_config(config, steps, driver.device);
+  driver.setting.policy_hash = name;
+  driver.setting.conditioning = config.evaluate.conditioning;
+  driver.setting.config = keys_of_evaluation(config, /*has_policy=*/false);
+  driver.setting.light_cycles = config.simulator.light_cycles;
+  driver.setting.device = driver.device.is_host() ? "cpu" : is_on_host ? "cuda, driven from the host" : "cuda";
+  driver.drive = [&options](Simulator& simulator) {
+    return Driving{make_controller(options.controller, simulator, options.seed),
+                   [&simulator] { return count_active(simulator); }};
+  };
+  return driver;
+}
+
+}  // namespace pictura

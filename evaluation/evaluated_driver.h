@@ -1,0 +1,67 @@
+// Who is evaluated, in whatever worlds: a saved policy or a controller, and where it computes. Without torch headers.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pictura/evaluation/results.h"
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+class PolicySession;
+class Renderer;
+struct SessionOptions;
+
+struct DriverOptions {
+  std::string checkpoint;
+  // A controller of make_controller, "lane" for one, that drives instead of the checkpoint's policy, in its world, or
+  // in the paper's if there is no checkpoint.
+  std::string controller;
+  bool argmax = true;
+  uint64_t seed = 1;
+  int num_threads = 0;
+  std::string device = "auto", simulator = "auto";  // as run.device and simulator.backend of a configuration
+  // As render.backend and render.samples; empty: as the policy was trained.
+  std::string renderer, samples;
+  // Cameras other than those of training, see SessionOptions.
+  std::string rig;
+  int width_px = 0, height_px = 0;
+  // As in SessionOptions.
+  std::string backbone;
+  std::vector<std::string> conditioning;
+  bool adds_walls = false;
+  bool average = false;
+  std::optional<LightCycles> light_cycles;
+  std::optional<LightHeads> light_heads;
+};
+
+/// With which the checkpoint's policy is opened.
+SessionOptions session_options(const DriverOptions& options);
+
+/// What drives the agents of a batch of worlds, and how many it drove when it last acted.
+struct Driving {
+  std::unique_ptr<Controller> controller;
+  std::function<int64_t()> num_driven;
+};
+
+/// What it drives with lives as long as session, renderer and options do.
+struct EvaluatedDriver {
+  SimulatorConfig world;      // the paper's evaluation: fixed conditioning and lights, no early end
+  EvaluationSetting setting;  // what of it is the driver's
+  Device device;
+  std::function<Driving(Simulator&)> drive;
+};
+
+/// What of an evaluation's setting is the session's: policy, precision, device and images.
+EvaluationSetting setting_of(const PolicySession& session);
+
+/// A session's policy, in episodes of so many steps.
+EvaluatedDriver policy_driver(PolicySession* session, Renderer* renderer, const DriverOptions& options, int steps);
+/// options.controller, which needs no policy.
+EvaluatedDriver controller_driver(const DriverOptions& options, int steps);
+
+}  // namespace pictura

@@ -1,0 +1,90 @@
+// What policies made of a pedestrian who walks from behind a vehicle through a frozen state: every place, means along
+// the path, and the files that hold them. Without torch headers.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pictura/common/renderer.h"
+#include "pictura/evaluation/probes/probe_results.h"
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+/// Whether the pedestrian is there.
+enum class PedestrianControl : uint8_t {
+  none,
+  nobody,     // a control: nobody is inserted, so that nothing may change
+  untrained,  // a control: it is, and policies with fresh weights answer in the same states
+};
+constexpr std::array<const char*, 3> kPedestrianControlNames{"none", "nobody", "untrained"};
+/// Throws UsageError listing the names.
+PedestrianControl pedestrian_control_named(const std::string& name);
+
+/// A part of a path.
+enum class PathPhase : uint8_t { hidden, seen, hidden_again };
+constexpr std::array<const char*, 3> kPathPhaseNames{"hidden", "seen", "hidden again"};
+
+/// A path in a frozen state. Boxes are numbered in their world: agents, then parked cars.
+struct PedestrianPath {
+  int32_t scene = 0, map = 0, driver = 0;  // the number of its scenario; indices of its map and of who drove
+  std::array<double, 3> map_origin_m{};    // file coordinates of the map's origin
+  int32_t step = 0;                        // steps done in the scenario
+  int32_t ego = 0, hider = 0;              // the hider is the box that the path begins behind
+  float ego_speed_mps = 0, hider_distance_m = 0;
+  int32_t first_point = 0, num_points = 0;   // of PedestrianResults::points
+  int32_t first_seen = 0, hidden_again = 0;  // of these, from the path's first
+  // The state, for pictures.
+  std::vector<AgentBox> boxes;
+  std::vector<uint8_t> status;  // [boxes] AgentStatus
+  std::vector<LightState> lights;
+  View view;  // of the ego; its indices are those of a scene of this world alone
+
+  PathPhase phase_of(int32_t point) const {
+    const int32_t at = point - first_point;
+    return at < first_seen ? PathPhase::hidden : at < hidden_again ? PathPhase::seen : PathPhase::hidden_again;
+  }
+};
+
+/// The pedestrian at one place of a path: a case.
+struct PedestrianPoint {
+  int32_t path = 0;   // index
+  float along_m = 0;  // from the path's first point
+  AgentBox pedestrian;
+  float distance_m = 0;     // on the ground, from the ego's rear axle
+  float visible_share = 0;  // in the ego's cameras: Renderer::visibility
+};
+
+struct PedestrianResults : ProbeResults {
+  int64_t paths_asked = 0;
+  float hider_range_m = 0, min_speed_mps = 0, height_m = 0;
+  PedestrianControl control = PedestrianControl::none;
+  std::vector<PedestrianPath> paths;    // by scene, step, ego and hider
+  std::vector<PedestrianPoint> points;  // by path, along it
+  CompiledMaps maps;                    // for pictures, like the cameras of the first policy that reads images
+  RendererConfig cameras;
+};
+
+/// One policy's responses over all points of a phase, or over those at one offset from where the pedestrian is first
+/// seen.
+struct PedestrianRow : ResponseMeans {
+  int policy = 0;
+  std::optional<PathPhase> phase;
+  std::optional<int> offset;      // in points
+  double mean_visible_share = 0;  // of the cases
+};
+
+/// For each policy the phases, then the offsets in ascending order.
+std::vector<PedestrianRow> summarize(const PedestrianResults& results);
+
+/// A row a point, with a header: the path and its state, where on it the pedestrian is, and for each policy value,
+/// d_value, p_brake and d_p_brake. Throws Error naming the path.
+void write_pedestrian_cases(const std::string& path, const PedestrianResults& results);
+
+/// Results and rows as one JSON object's text; `cases_file` names where the cases are, and may be empty.
+std::string pedestrian_summary_json(const PedestrianResults& results, const std::vector<PedestrianRow>& rows,
+                                    const std::string& cases_file);
+
+}  // namespace pictura

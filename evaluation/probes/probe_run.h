@@ -1,0 +1,194 @@
+// How all probes are run: scenes driven by policies in equal shares, states of them kept as one scene, and batches of
+// cases put to all policies.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pictura/common/raster/camera.h"
+#include "pictura/common/renderer.h"
+#include "pictura/common/support/stopwatch.h"
+#include "pictura/evaluation/probes/probe_options.h"
+#include "pictura/evaluation/probes/probe_results.h"
+#include "pictura/policy/session.h"
+#include "pictura/policy/struct_copies.h"
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+/// What is read of the driven worlds, on the host.
+struct ProbeFrame {
+  std::vector<WorldSpec> worlds;
+  int step = 0;    // done in them
+  int driver = 0;  // index of the policy that drives; a controller comes after all of them
+  std::vector<uint8_t> status, agent_class;
+  std::vector<int32_t> lane;
+  std::vector<float> speed_mps;
+  std::vector<AgentBox> boxes;
+  std::vector<LightState> lights;
+  std::vector<GeometryHandle> geometry;
+  std::vector<View> views;
+  std::vector<int32_t> box_begin, light_begin, slot_begin;
+
+  ProbeFrame(Simulator& simulator, int step, int driver);
+
+  /// The number of a world's scenario.
+  int32_t scene_of(size_t world) const {
+    return static_cast<int32_t>(worlds[world].global_world - kFirstEvaluationWorld);
+  }
+  bool is_present(size_t slot) const {
+    const auto its_status = static_cast<AgentStatus>(status[slot]);
+    return its_status == AgentStatus::active || its_status == AgentStatus::halted;
+  }
+  bool is_ego(size_t slot) const {
+    return static_cast<AgentStatus>(status[slot]) == AgentStatus::active &&
+           static_cast<AgentClass>(agent_class[slot]) == AgentClass::vehicle;
+  }
+};
+
+/// Worlds of frames of any steps as one scene, on the host.
+struct KeptScene {
+  std::vector<int32_t> world_begin{0}, light_begin{0}, hidden;
+  std::vector<AgentBox> boxes;
+  std::vector<GeometryHandle> geometry;
+  std::vector<LightState> lights;
+
+  /// Adds a world, with further boxes after its own.
+  void add_world(const ProbeFrame& frame, size_t world, Span<const InsertedBox> inserted = {});
+  /// Where boxes of the world that was added last are: those of its frame, and the first that was inserted.
+  int32_t box_of(const ProbeFrame& frame, size_t world, int32_t box_of_frame) const {
+    return box_of_frame - frame.box_begin[world] + world_begin[geometry.size() - 1];
+  }
+  int32_t first_inserted(const ProbeFrame& frame, size_t world) const {
+    return box_of(frame, world, frame.box_begin[world + 1]);
+  }
+  /// What a slot of that world sees without some of this scene's boxes.
+  View view_of(const ProbeFrame& frame, size_t world, int32_t slot, const std::vector<int32_t>& without);
+};
+
+/// An agent of a frame in a state with and without somebody: a box that is hidden in the second, or inserted in the
+/// first, or nobody.
+struct ProbePair {
+  size_t world = 0;
+  int32_t slot = 0;
+  int32_t hidden_box = -1;
+  std::optional<InsertedBox> inserted;
+  int32_t asked_box = -1;  // whose visibility is wanted; -1: nobody's, which is NaN
+};
+
+/// How many cases of each scene are still to be drawn: as many in each, spread evenly over its samples for as long as
+/// it has so many.
+class CaseQuota {
+ public:
+  CaseQuota(int64_t cases, const ProbeOptions& options) : cases_(cases), options_(options) {}
+  int64_t due(int32_t scene, int step) const;
+  void take(int32_t scene, int64_t count) { taken_[scene] += count; }
+
+ private:
+  int64_t cases_;
+  const ProbeOptions& options_;
+  std::map<int32_t, int64_t> taken_;
+};
+
+/// What differs between probes.
+struct ProbeKind {
+  // A control: policies with fresh weights, drawn from the seed, answer. The others still drive.
+  bool untrained = false;
+};
+
+class ProbeRun final : public EvaluationObserver {
+ public:
+  /// Opens nothing: the sessions are of one device, `options` names them. Fills in what results say of the setting.
+  ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptions& options, ProbeResults* results_out,
+           const ProbeKind& kind);
+  ~ProbeRun() override;
+
+  /// Sees worlds before every step, and who drives.
+  using Watch = std::function<void(Simulator& simulator, int driver)>;
+
+  /// Drives all scenes, each policy its share, or options.worlds.controller all, and hands out their states of every
+  /// sample_steps steps, from the first such on. Then asks what is left, and returns the visibility of whom all pairs
+  /// asked for, in the order of ask(). With `watch` states are looked at alone: nothing is to be asked of them.
+  std::vector<float> run(const std::function<void(const ProbeFrame&)>& sample, const Watch& watch = {});
+
+  /// Of the present frame. Responses are appended to the results in this order.
+  void ask(const ProbeFrame& frame, Span<const ProbePair> pairs);
+
+  /// In the cameras of the first policy that reads images, or in the paper's.
+  std::vector<float> visibility(const KeptScene& scene, const std::vector<View>& views,
+                                const std::vector<VisibilityQuery>& queries);
+  /// The same of a scene in the memory of device().
+  std::vector<float> visibility(const SceneBatch& scene, const std::vector<View>& views,
+                                const std::vector<VisibilityQuery>& queries);
+  /// What that policy's images are drawn with.
+  const RendererConfig& cameras() const { return cameras_; }
+  /// The first of them, in the ego's frame.
+  const PinholeCamera& front_camera() const { return front_camera_; }
+  const CompiledMaps& maps() const { return maps_; }
+  Renderer& measuring() { return *measuring_; }
+  Device device() const { return device_; }
+  /// Of a policy: the session that answers, the renderer of its images, if it reads any, and worlds as it observes
+  /// them.
+  PolicySession& session(size_t policy) const;
+  Renderer* renderer(size_t policy) const;
+  SimulatorConfig world_of(size_t policy) const;
+
+  void begin(Simulator& simulator) override;
+  void before_step(Span<const Command> commands) override;
+  void after_step(const StepResult& /*result*/) override {}
+
+ private:
+  struct ObservedWorlds;
+  struct Participant;
+  struct Pending;
+
+  template <typename F>
+  void for_each_other(const F& f);
+  EvaluateOptions share_of_driver(int shares);
+  void drive();
+  void drive_by_controller();
+  void add(const ProbeFrame& frame, Span<const ProbePair> pairs);
+  void respond();
+
+  const ProbeOptions& options_;
+  const Device device_;
+  const int pass_;
+  int64_t batch_ = 0;
+  const Stopwatch since_start_;
+  CompiledMaps maps_;
+  std::map<bool, std::unique_ptr<ObservedWorlds>> observed_;  // by whether auxiliary slots are filled
+  std::vector<Participant> participants_;
+  RendererConfig cameras_;
+  PinholeCamera front_camera_;
+  std::unique_ptr<Renderer> measuring_;
+  std::function<void(const ProbeFrame&)> sample_;
+  Watch watch_;
+  Simulator* driven_ = nullptr;
+  int driver_ = 0, step_ = 0;
+  std::unique_ptr<Pending> pending_;
+  std::vector<float> visible_shares_;
+  ProbeResults& results_;
+};
+
+/// Throws UsageError where scenes cannot be shared equally, or there is nothing to sample.
+void check_probe(const ProbeOptions& options, size_t num_policies);
+
+/// Opens options.policies, and calls `probe` with them.
+template <typename Results, typename Options>
+Results with_opened(const Options& options,
+                    Results (*probe)(const std::vector<PolicySession*>& sessions, const Options& options)) {
+  check_probe(options, options.policies.size());
+  std::vector<std::unique_ptr<PolicySession>> opened;
+  std::vector<PolicySession*> sessions;
+  for (const std::string& path : options.policies) {
+    opened.push_back(std::make_unique<PolicySession>(path, session_options(options.worlds)));
+    sessions.push_back(opened.back().get());
+  }
+  return probe(sessions, options);
+}
+
+}  // namespace pictura

@@ -1,0 +1,146 @@
+#include "pictura/evaluation/scene_plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "pictura/common/rng.h"
+#include "pictura/common/support/hash.h"
+#include "pictura/map/scenario/scenario.h"
+#include "pictura/simulator/recorded_scene.h"
+#include "pictura/simulator/rules/limits.h"
+#include "pictura/simulator/rules/spawn.h"
+
+namespace pictura {
+
+namespace {
+
+const RecordedState& state_of(const CompiledMap& map, size_t track, int32_t step) {
+  const MapRecord& record = map.rules.record;
+  return record.states[track * static_cast<size_t>(record.num_steps) + static_cast<size_t>(step)];
+}
+
+/// The first step of the episode at which the track is there; -1: none.
+int32_t first_step(const CompiledMap& map, size_t track) {
+  for (int32_t step = 0; step < map.rules.record.num_steps; ++step) {
+    if (state_of(map, track, step).is_there) return step;
+  }
+  return -1;
+}
+
+/// Whether the box cannot start a drive: it touches an edge, is off the road, or touches another's that stays.
+bool overlaps(const MapView& map, Span<const AgentBox> boxes, const std::vector<SceneRole>& roles, size_t track) {
+  const AgentBox& box = boxes[track];
+  if (!fits_map(map, box)) return true;
+  for (size_t other = 0; other < boxes.size(); ++other) {
+    if (other == track || roles[other] == SceneRole::removed || !boxes[other].drawn) continue;
+    if (same_level(box, boxes[other]) && overlap(footprint(box), footprint(boxes[other]))) return true;
+  }
+  return false;
+}
+
+/// [tracks] the step at which each would be taken over, were it not for overlaps and thinning; -1: never.
+std::vector<int32_t> takeovers(const CompiledMap& map, const SceneProtocol& protocol) {
+  const Scenario& scene = *map.scenario;
+  const std::vector<uint8_t> named = tracks_named(scene, protocol.control);
+  std::vector<int32_t> steps(named.size(), -1);
+  for (size_t track = 0; track < named.size(); ++track) {
+    if (!named[track]) continue;
+    if (protocol.replay_experts && scene.tracks[track].control == RecordedControl::expert) continue;
+    const int32_t step = first_step(map, track);
+    if (step < 0 || (step > 0 && protocol.late != Late::drive)) continue;
+    const Vec3 from = state_of(map, track, step).position_m, goal = map.rules.record.agents[track].goal_m;
+    if (protocol.least_way_m > 0 && passes(from, from, goal, protocol.least_way_m)) continue;
+    steps[track] = step;
+  }
+  return steps;
+}
+
+}  // namespace
+
+std::shared_ptr<const Scenario> protocol_scene(Scenario scenario, const SceneProtocol& protocol) {
+  constexpr float kStep_s = kMaxStep_s, kTolerance = 0.01f;  // WOMD's steps are of 0.1000 to 0.1002 s
+  PICTURA_CHECK(std::abs(scenario.dt_s - kStep_s) <= kTolerance * kStep_s,
+                "scene {}: expected time steps of {} s, got {} s", scenario.id, kStep_s, scenario.dt_s);
+  for (RecordedTrack& track : scenario.tracks) {
+    track.length_m *= protocol.box_scale;
+    track.width_m *= protocol.box_scale;
+  }
+  return std::make_shared<const Scenario>(std::move(scenario));
+}
+
+std::vector<uint8_t> thinned_out(const Scenario& scenario, double density, uint64_t seed) {
+  const auto scene = static_cast<uint32_t>(hash_of(scenario.id));
+  std::vector<std::pair<uint32_t, size_t>> draws;
+  for (size_t track = 0; track < scenario.tracks.size(); ++track) {
+    if (static_cast<int32_t>(track) == scenario.sdc_track) continue;
+    RandomStream random(
+        {.seed = seed, .world = scene, .agent = static_cast<uint32_t>(track), .purpose = Purpose::spawn});
+    draws.emplace_back(random.bits(), track);
+  }
+  std::sort(draws.begin(), draws.end());
+  const auto count = static_cast<size_t>(std::lround((1 - density) * static_cast<double>(draws.size())));
+  std::vector<uint8_t> out(scenario.tracks.size());
+  for (size_t i = 0; i < count; ++i) out[draws[i].second] = 1;
+  return out;
+}
+
+bool has_drivers(const CompiledMap& map, const SceneProtocol& protocol) {
+  const std::vector<int32_t> steps = takeovers(map, protocol);
+  return std::any_of(steps.begin(), steps.end(), [](int32_t step) { return step >= 0; });
+}
+
+ScenePlan plan_scene(const CompiledMap& map, Span<const AgentBox> boxes, const SceneProtocol& protocol, double density,
+                     uint64_t seed) {
+  const Scenario& scene = *map.scenario;
+  const size_t num_tracks = scene.tracks.size();
+  PICTURA_CHECK(boxes.size() == num_tracks, "scene {}: expected {} boxes, got {}", scene.id, num_tracks, boxes.size());
+  ScenePlan plan{std::vector<SceneRole>(num_tracks, SceneRole::replayed), takeovers(map, protocol)};
+  const std::vector<uint8_t> thinned = thinned_out(scene, density, seed);
+  for (size_t track = 0; track < num_tracks; ++track) {
+    const bool is_named = plan.takeover_steps[track] >= 0;
+    const bool is_other = static_cast<AgentClass>(map.rules.record.agents[track].agent_class) != AgentClass::vehicle;
+    const bool is_left_out = (is_other && !is_named && protocol.others == Others::absent) ||
+                             (protocol.late == Late::absent && !boxes[track].drawn);
+    if (thinned[track] || is_left_out) plan.roles[track] = SceneRole::removed;
+  }
+  // The self-driving car first, so that a bound on their number never leaves it out.
+  std::vector<size_t> order(num_tracks);
+  std::iota(order.begin(), order.end(), size_t{0});
+  if (scene.sdc_track >= 0) {
+    const auto self = order.begin() + scene.sdc_track;
+    std::rotate(order.begin(), self, self + 1);
+  }
+  const MapView view = map.rules.view();
+  int num_driven = 0;
+  for (const size_t track : order) {
+    if (plan.roles[track] == SceneRole::removed || plan.takeover_steps[track] < 0) continue;
+    if (protocol.max_driven > 0 && num_driven >= protocol.max_driven) break;
+    const bool starts = plan.takeover_steps[track] == 0;
+    if (protocol.overlapping == Overlapping::replay && starts && overlaps(view, boxes, plan.roles, track)) continue;
+    plan.roles[track] = SceneRole::driven;
+    ++num_driven;
+  }
+  return plan;
+}
+
+std::vector<Vec3> path_waypoints(const CompiledMap& map, int32_t track, int32_t takeover_step) {
+  const auto index = static_cast<size_t>(track);
+  std::vector<Vec3> path;
+  std::vector<float> way_m;
+  for (int32_t step = takeover_step; step < map.rules.record.num_steps; ++step) {
+    const RecordedState& state = state_of(map, index, step);
+    if (!state.is_there) continue;
+    way_m.push_back(path.empty() ? 0.0f : way_m.back() + length((state.position_m - path.back()).xy()));
+    path.push_back(state.position_m);
+  }
+  std::vector<Vec3> waypoints;
+  for (int i = 1; i < kNumWaypoints && !path.empty(); ++i) {
+    const float at_m = way_m.back() * static_cast<float>(i) / static_cast<float>(kNumWaypoints);
+    waypoints.push_back(path[static_cast<size_t>(std::lower_bound(way_m.begin(), way_m.end(), at_m) - way_m.begin())]);
+  }
+  waypoints.push_back(map.rules.record.agents[index].goal_m);
+  return waypoints;
+}
+
+}  // namespace pictura

@@ -1,0 +1,71 @@
+#include "pictura/policy/export_policy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "pictura/common/error.h"
+#include "pictura/configuration/apply_config.h"
+#include "pictura/policy/patch_spread.h"
+#include "pictura/policy/saved_policy.h"
+
+namespace pictura {
+
+namespace {
+
+// The policy for images of another size: patches and line floor grow as the images do, and the first convolution is
+// spread.
+SavedPolicy resized_policy(const SavedPolicy& policy, ImageSize size) {
+  const Config& config = policy.config;
+  if (!config.reads_images()) fail_usage("{}: size: its policy reads no images", policy.path);
+  if (!config.render.rig.empty()) {
+    fail_usage("{}: size: its policy sees through the cameras of {}, whose sizes are theirs", policy.path,
+               config.render.rig);
+  }
+  if (config.policy.backbone != "conv") {
+    fail_usage("{}: size: its policy has the program {} in place of convolutions", policy.path, config.policy.backbone);
+  }
+  const Camera& camera = policy.rig.cameras.at(0);
+  const int factor = whole_factor({camera.width_px, camera.height_px}, size);
+  if (factor == 0) {
+    fail_usage("{}: size: expected one whole number of times {}x{}, got {}x{}", policy.path, camera.width_px,
+               camera.height_px, size.width_px, size.height_px);
+  }
+  SavedPolicy result = policy;
+  result.config.policy.patch_px *= factor;
+  // Rounded to what would be written by hand: .35 times 3 is 1.05, not 1.0499999999999998.
+  result.config.render.line_floor_px = std::round(1e6 * factor * config.render.line_floor_px) / 1e6;
+  if (result.config.policy.patch_px > kMaxPatch_px || result.config.render.line_floor_px > kMaxLineFloor_px) {
+    fail_usage("{}: size: expected patches of at most {} px and lines of at most {} px, got {} and {} for {}x{}",
+               policy.path, kMaxPatch_px, kMaxLineFloor_px, result.config.policy.patch_px,
+               result.config.render.line_floor_px, size.width_px, size.height_px);
+  }
+  result.config.render.width_px = size.width_px;
+  result.config.render.height_px = size.height_px;
+  result.config.render.schedule.clear();  // of the run at the old size
+  result.rig = paper_rig(size.width_px, size.height_px);
+  const auto first = std::find_if(result.parameters.begin(), result.parameters.end(),
+                                  [](const NamedTensor& parameter) { return parameter.name == kFirstConvolution; });
+  PICTURA_CHECK(first != result.parameters.end(), "{}: of another architecture: it has no parameter '{}'", policy.path,
+                kFirstConvolution);
+  first->value = spread_over_patches(first->value, factor);
+  if (factor > 1) result.rate_factors.try_emplace(kFirstConvolution, 1).first->second *= rate_factor_of_spread(factor);
+  return result;
+}
+
+}  // namespace
+
+ExportedPolicy export_policy(const std::string& policy_path, const std::string& out, const ExportOptions& options) {
+  const SavedPolicy policy = read_policy(policy_path, options.average);
+  write_policy(out, options.size ? resized_policy(policy, *options.size) : policy, options.weights, options.commit);
+  const SavedPolicy written = read_policy(out);
+  ExportedPolicy result;
+  for (const NamedTensor& parameter : written.parameters) result.parameters += parameter.value.numel();
+  result.file_bytes = static_cast<int64_t>(std::filesystem::file_size(out));
+  result.updates = written.update;
+  result.agent_steps = written.agent_steps;
+  result.policy_hash = hash_of_parameters(written.parameters);
+  return result;
+}
+
+}  // namespace pictura

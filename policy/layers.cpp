@@ -1,0 +1,696 @@
+#include "pictura/policy/layers.h"
+
+#include <cstring>
+#include <map>
+#include <mutex>
+#include <optional>
+
+#include <ATen/Parallel.h>
+#include <ATen/autocast_mode.h>
+#include <ATen/core/LegacyTypeDispatch.h>
+#include <ATen/core/grad_mode.h>
+#include <torch/csrc/autograd/custom_function.h>
+
+#include "pictura/backends/make_policy_executor.h"
+#include "pictura/policy/host_passes.h"
+#include "pictura/policy/torch_device.h"
+
+namespace pictura {
+
+namespace {
+
+using torch::autograd::AutogradContext;
+using torch::autograd::Function;
+using torch::autograd::variable_list;
+
+bool is_supported(const at::Tensor& x) {
+  return x.is_cuda() && (x.scalar_type() == at::kBFloat16 || x.scalar_type() == at::kFloat);
+}
+
+ActivationType activation_type_of(at::ScalarType type) {
+  return type == at::kBFloat16 ? ActivationType::bf16 : ActivationType::f32;
+}
+
+// Of a tensor whose last dimension are the channels.
+ActivationSize size_of(const at::Tensor& x) {
+  return {activation_type_of(x.scalar_type()), x.numel() / x.size(-1), x.size(-1)};
+}
+
+NetworkPasses& passes_on(at::Device device) {
+  static std::mutex mutex;
+  static std::map<c10::DeviceIndex, std::unique_ptr<NetworkPasses>> of_devices;
+  const std::lock_guard lock(mutex);
+  std::unique_ptr<NetworkPasses>& passes = of_devices[device.index()];
+  if (!passes) passes = make_network_passes({MemorySpace::cuda, device.index()});
+  return *passes;
+}
+
+Stream stream_on(at::Device device) { return current_stream({MemorySpace::cuda, device.index()}); }
+
+const float* floats_of(const at::Tensor& parameter) { return parameter.const_data_ptr<float>(); }
+
+/// The gradient that arrives, laid out as x is.
+at::Tensor arranged(const at::Tensor& grad, const at::Tensor& x) { return grad.to(x.scalar_type()).contiguous(); }
+
+// x: [..., channels] without gaps. With kHasNorm x + bias is normalized before the GELU.
+template <bool kHasNorm>
+struct BiasGelu : Function<BiasGelu<kHasNorm>> {
+  static at::Tensor forward(AutogradContext* context, const at::Tensor& x, const at::Tensor& bias) {
+    context->save_for_backward({x, bias});
+    at::Tensor out = at::empty_like(x);
+    constexpr auto kPass = kHasNorm ? &NetworkPasses::bias_norm_gelu : &NetworkPasses::bias_gelu;
+    (passes_on(x.device()).*kPass)(size_of(x), x.const_data_ptr(), floats_of(bias), out.mutable_data_ptr(),
+                                   stream_on(x.device()));
+    return out;
+  }
+
+  static variable_list backward(AutogradContext* context, const variable_list& grads) {
+    const variable_list saved = context->get_saved_variables();
+    const at::Tensor &x = saved[0], &bias = saved[1], grad = arranged(grads[0], x);
+    const ActivationSize size = size_of(x);
+    const int64_t num_sums = kHasNorm ? NetworkPasses::num_norm_sums(size.rows, 1) : NetworkPasses::kBiasSums;
+    const at::Tensor grad_x = at::empty_like(x),
+                     sums = at::empty({num_sums, size.channels}, bias.options().requires_grad(false));
+    constexpr auto kPass = kHasNorm ? &NetworkPasses::bias_norm_gelu_backward : &NetworkPasses::bias_gelu_backward;
+    (passes_on(x.device()).*kPass)(size, x.const_data_ptr(), floats_of(bias), grad.const_data_ptr(),
+                                   grad_x.mutable_data_ptr(), sums.mutable_data_ptr<float>(), stream_on(x.device()));
+    return {grad_x, sums.sum(0)};
+  }
+};
+
+// x: [..., channels] without gaps; position: [period, channels] of x's type, or undefined.
+struct Norm : Function<Norm> {
+  static at::Tensor forward(AutogradContext* context, const at::Tensor& x, const std::optional<at::Tensor>& added,
+                            const at::Tensor& weight, const at::Tensor& bias) {
+    const at::Tensor position = added.value_or(at::Tensor());
+    context->save_for_backward({x, position, weight});
+    at::Tensor out = at::empty_like(x);
+    passes_on(x.device())
+        .norm(size_of(x), x.const_data_ptr(), data_of(position), period_of(position), floats_of(weight),
+              floats_of(bias), out.mutable_data_ptr(), stream_on(x.device()));
+    return out;
+  }
+
+  static variable_list backward(AutogradContext* context, const variable_list& grads) {
+    const variable_list saved = context->get_saved_variables();
+    const at::Tensor &x = saved[0], &position = saved[1], &weight = saved[2], grad = arranged(grads[0], x);
+    const ActivationSize size = size_of(x);
+    const int64_t period = period_of(position);
+    const at::Tensor grad_x = at::empty_like(x),
+                     sums = at::empty({NetworkPasses::num_norm_sums(size.rows, period), period, 3, size.channels},
+                                      weight.options().requires_grad(false));
+    passes_on(x.device())
+        .norm_backward(size, x.const_data_ptr(), data_of(position), period, floats_of(weight), grad.const_data_ptr(),
+                       grad_x.mutable_data_ptr(), sums.mutable_data_ptr<float>(), stream_on(x.device()));
+    const at::Tensor by_position = sums.sum(0), all = by_position.sum(0);
+    return {grad_x, position.defined() ? by_position.select(1, 0).to(position.scalar_type()) : at::Tensor(), all[1],
+            all[2]};
+  }
+
+ private:
+  static const void* data_of(const at::Tensor& position) {
+    return position.defined() ? position.const_data_ptr() : nullptr;
+  }
+  static int64_t period_of(const at::Tensor& position) { return position.defined() ? position.size(0) : 1; }
+};
+
+// scores: [matrices, tokens, columns] without gaps.
+struct TokenSoftmax : Function<TokenSoftmax> {
+  static at::Tensor forward(AutogradContext* context, const at::Tensor& scores) {
+    at::Tensor out = at::empty_like(scores);
+    passes_on(scores.device())
+        .token_softmax(tokens_of(scores), scores.const_data_ptr(), out.mutable_data_ptr(), stream_on(scores.device()));
+    context->save_for_backward({out});
+    return out;
+  }
+
+  static variable_list backward(AutogradContext* context, const variable_list& grads) {
+    const at::Tensor out = context->get_saved_variables()[0], grad = arranged(grads[0], out);
+    at::Tensor grad_scores = at::empty_like(out);
+    passes_on(out.device())
+        .token_softmax_backward(tokens_of(out), out.const_data_ptr(), grad.const_data_ptr(),
+                                grad_scores.mutable_data_ptr(), stream_on(out.device()));
+    return {grad_scores};
+  }
+
+ private:
+  static TokenSize tokens_of(const at::Tensor& scores) {
+    return {activation_type_of(scores.scalar_type()), scores.size(0), scores.size(1), scores.size(2)};
+  }
+};
+
+RowSize row_size(const at::Tensor& rows, const at::Tensor& goals, const RowFeatures& features, bool keeps_rows) {
+  const int64_t columns = rows.size(-1);
+  RowSize size{rows.numel() / columns, columns, features, keeps_rows};
+  if (features.of_goal) {
+    size.rows_per_goal = rows.size(-2);
+    size.goal_columns = goals.size(-1);
+  }
+  return size;
+}
+
+// Whether the host's own passes (host_passes.h) take it: those are fp32, which layers in bf16 are not.
+bool is_on_host(const at::Tensor& x) {
+  return x.is_cpu() && x.scalar_type() == at::kFloat && !at::autocast::is_autocast_enabled(at::kCPU);
+}
+
+// Whether a gradient will be asked of what these make.
+bool keeps_gradients(std::initializer_list<at::Tensor> inputs) {
+  return at::GradMode::is_enabled() &&
+         std::any_of(inputs.begin(), inputs.end(), [](const at::Tensor& t) { return t.requires_grad(); });
+}
+
+// Work on [0, count) in blocks of at most `block`, in as many parts as torch has threads. What parts add up is summed
+// in their order, so sums depend on the number of threads alone.
+class Blocks {
+ public:
+  Blocks(int64_t count, int64_t block)
+      : count_(count),
+        block_(std::max<int64_t>(1, block)),
+        blocks_((count + block_ - 1) / block_),
+        parts_(std::min<int64_t>(blocks_, at::get_num_threads())) {}
+
+  int64_t parts() const { return parts_; }
+  /// The largest block.
+  int64_t most() const { return std::min(block_, count_); }
+
+  /// Calls make(part), once a part, for a function that is called with (begin, end) of each of its blocks.
+  template <typename Make>
+  void run(const Make& make) const {
+    at::parallel_for(0, parts_, 1, [&](int64_t first, int64_t last) {
+      const at::AutoDispatchBelowAutograd no_autograd;
+      for (int64_t part = first; part < last; ++part) {
+        auto work = make(part);
+        for (int64_t i = part * blocks_ / parts_; i < (part + 1) * blocks_ / parts_; ++i) {
+          work(i * block_, std::min(count_, (i + 1) * block_));
+        }
+      }
+    });
+  }
+
+ private:
+  int64_t count_, block_, blocks_, parts_;
+};
+
+const float* read(const at::Tensor& t, int64_t row = 0) { return t.const_data_ptr<float>() + row * t.stride(0); }
+float* write(const at::Tensor& t, int64_t row = 0) { return t.mutable_data_ptr<float>() + row * t.stride(0); }
+
+// Sets out, and slope where it is defined, see host::bias_gelu. All [..., channels] without gaps.
+void add_bias_gelu(const at::Tensor& x, const at::Tensor& bias, const at::Tensor& out, const at::Tensor& slope) {
+  const int64_t channels = bias.size(0), rows = x.numel() / channels;
+  const float* const from = read(x);
+  float *const to = write(out), *const its_slope = slope.defined() ? write(slope) : nullptr;
+  Blocks(rows, host::kBlockNumbers / channels).run([&](int64_t) {
+    return [&](int64_t begin, int64_t end) {
+      const int64_t first = begin * channels;
+      host::bias_gelu(from + first, read(bias), end - begin, channels, to + first,
+                      its_slope ? its_slope + first : nullptr);
+    };
+  });
+}
+
+// GELU of x + bias, [..., channels] without gaps, where nothing else reads x, in whose memory the derivative is kept.
+struct HostBiasGelu : Function<HostBiasGelu> {
+  static at::Tensor forward(AutogradContext* context, const at::Tensor& x, const at::Tensor& bias) {
+    at::Tensor out = at::empty_like(x), slope = x.detach();
+    add_bias_gelu(x, bias, out, slope);
+    context->save_for_backward({slope});
+    return out;
+  }
+
+  static variable_list backward(AutogradContext* context, const variable_list& grads) {
+    const at::Tensor slope = context->get_saved_variables()[0], grad = grads[0].contiguous();
+    const int64_t channels = slope.size(-1);
+    at::Tensor grad_x = at::empty_like(slope);
+    const Blocks blocks(slope.numel() / channels, host::kBlockNumbers / channels);
+    const at::Tensor sums = at::zeros({blocks.parts(), channels}, slope.options());
+    blocks.run([&](int64_t part) {
+      return [&, part](int64_t begin, int64_t end) {
+        const int64_t first = begin * channels;
+        host::bias_gelu_backward(read(slope) + first, read(grad) + first, end - begin, channels, write(grad_x) + first,
+                                 write(sums, part));
+      };
+    });
+    return {grad_x, sums.sum(0)};
+  }
+};
+
+at::Tensor host_bias_gelu(const at::Tensor& x, const at::Tensor& bias) {
+  if (keeps_gradients({x, bias})) return HostBiasGelu::apply(x, bias);
+  add_bias_gelu(x, bias, x, {});
+  return x;
+}
+
+// A convolution as products of what its outputs read with the weights, a block of images at a time: for few channels
+// two to four times as fast as oneDNN's on the way back.
+struct HostConvolution : Function<HostConvolution> {
+  /// Fewer outputs make products of which a vector unit is mostly idle.
+  static constexpr int64_t kLeastOutputs = 16;
+
+  HostConvolution(const at::Tensor& x, const at::Tensor& w, int64_t stride)
+      : size{x.size(1), x.size(2), x.size(3), w.size(2), stride},
+        outputs(w.size(0)),
+        blocks(x.size(0), host::kBlockNumbers / (size.pixels() * (size.taps() + outputs))),
+        weight(w.detach().permute({0, 2, 3, 1}).reshape({outputs, size.taps()})) {}
+
+  const host::ConvolutionSize size;
+  const int64_t outputs;
+  const Blocks blocks;
+  const at::Tensor weight;  // [outputs, taps]
+
+  bool reads_pixels() const { return size.kernel == 1 && size.stride == 1; }
+  at::Tensor scratch(int64_t columns) const {
+    return at::empty({blocks.most() * size.pixels(), columns}, weight.options());
+  }
+  at::Tensor of_images(const at::Tensor& rows, int64_t begin, int64_t end) const {
+    return rows.narrow(0, begin * size.pixels(), (end - begin) * size.pixels());
+  }
+  /// What the outputs of images [begin, end) read, in `memory` where it is not the images themselves.
+  at::Tensor taps(const at::Tensor& x, const at::Tensor& memory, int64_t begin, int64_t end) const {
+    if (reads_pixels()) return of_images(x.view({-1, size.channels}), begin, end);
+    host::unfold(size, read(x, begin), end - begin, write(memory));
+    return memory.narrow(0, 0, (end - begin) * size.pixels());
+  }
+
+  /// x: [n, height, width, channels]. Returns [n, rows, columns, outputs]; sets the derivatives of the GELUs, of the
+  /// same shape, where `slope_out` is not null.
+  static at::Tensor compute(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias, int64_t stride,
+                            at::Tensor* slope_out) {
+    const HostConvolution c(x, weight, stride);
+    const at::Tensor out = at::empty({x.size(0), c.size.rows(), c.size.columns(), c.outputs}, c.weight.options()),
+                     products = slope_out ? at::empty_like(out) : out;
+    const at::Tensor rows = out.view({-1, c.outputs}), product_rows = products.view({-1, c.outputs}),
+                     transposed = c.weight.t();
+    c.blocks.run([&](int64_t) {
+      return [&, memory = c.reads_pixels() ? at::Tensor() : c.scratch(c.size.taps())](int64_t begin, int64_t end) {
+        at::Tensor some = c.of_images(product_rows, begin, end);
+        at::mm_out(some, c.taps(x, memory, begin, end), transposed);
+        host::bias_gelu(read(some), read(bias), some.size(0), c.outputs, write(c.of_images(rows, begin, end)),
+                        slope_out ? write(some) : nullptr);
+      };
+    });
+    if (slope_out) *slope_out = products;
+    return out;
+  }
+
+  static at::Tensor forward(AutogradContext* context, const at::Tensor& x, const at::Tensor& weight,
+                            const at::Tensor& bias, int64_t stride) {
+    at::Tensor slope;
+    const at::Tensor out = compute(x, weight, bias, stride, &slope);
+    context->save_for_backward({x, weight, slope});
+    context->saved_data["stride"] = stride;
+    return out;
+  }
+
+  static variable_list backward(AutogradContext* context, const variable_list& grads) {
+    const variable_list saved = context->get_saved_variables();
+    const at::Tensor x = saved[0].detach(), &slope = saved[2], grad = grads[0].contiguous();
+    const HostConvolution c(x, saved[1], context->saved_data["stride"].toInt());
+    const at::Tensor slope_rows = slope.view({-1, c.outputs}), grad_rows = grad.view({-1, c.outputs});
+    const at::Tensor weight_sums = at::zeros({c.blocks.parts(), c.outputs, c.size.taps()}, c.weight.options()),
+                     bias_sums = at::zeros({c.blocks.parts(), c.outputs}, c.weight.options());
+    const at::Tensor grad_x = context->needs_input_grad(0) ? at::empty_like(x) : at::Tensor();
+    c.blocks.run([&](int64_t part) {
+      return [&, part, memory = c.scratch(c.size.taps()), product_grads = c.scratch(c.outputs),
+              weight_sum = weight_sums[part]](int64_t begin, int64_t end) {
+        const at::Tensor some = c.of_images(slope_rows, begin, end),
+                         grad_some = product_grads.narrow(0, 0, some.size(0));
+        host::bias_gelu_backward(read(some), read(c.of_images(grad_rows, begin, end)), some.size(0), c.outputs,
+                                 write(grad_some), write(bias_sums, part));
+        at::Tensor sum = weight_sum;
+        at::addmm_out(sum, sum, grad_some.t(), c.taps(x, memory, begin, end));
+        if (!grad_x.defined()) return;
+        at::Tensor taps_grad = c.reads_pixels() ? c.of_images(grad_x.view({-1, c.size.channels}), begin, end)
+                                                : memory.narrow(0, 0, some.size(0));
+        at::mm_out(taps_grad, grad_some, c.weight);
+        if (!c.reads_pixels()) host::fold(c.size, read(taps_grad), end - begin, write(grad_x, begin));
+      };
+    });
+    const at::Tensor weight_grad =
+        weight_sums.sum(0).view({c.outputs, c.size.kernel, c.size.kernel, c.size.channels}).permute({0, 3, 1, 2});
+    return {grad_x, weight_grad, bias_sums.sum(0), at::Tensor()};
+  }
+};
+
+// Sets of members in blocks, each member through a layer with GELU, normalized before it or not, and one without; of
+// each set the largest in each channel. That channel's gradient goes to that member alone, so the way back knows these
+// alone: a few of a set.
+struct HostSets : Function<HostSets> {
+  /// Returns {the largest, [sets, channels]; the members that there are with their features, [all, width];
+  /// which member of its set is the largest, i32 [sets, channels]}.
+  static variable_list compute(const at::Tensor& members, const at::Tensor& goals, const at::Tensor& counts,
+                               const RowFeatures& features, bool has_norm, const at::Tensor& hidden_weight,
+                               const at::Tensor& hidden_bias, const at::Tensor& weight, const at::Tensor& bias) {
+    const int64_t sets = members.size(0), most = members.size(1), hidden = hidden_weight.size(0),
+                  channels = weight.size(0);
+    const RowSize size = row_size(members, goals, features, /*keeps_rows=*/true);
+    const std::vector<int64_t> begins = begins_of(counts);
+    const auto options = members.options().requires_grad(false);
+    const at::Tensor rows = at::empty({begins.back(), size.width()}, options),
+                     largest = at::empty({sets, channels}, options),
+                     which = at::empty({sets, channels}, counts.options());
+    const Blocks blocks(sets, host::kBlockNumbers / (most * (hidden + channels)));
+    const at::Tensor hidden_transposed = hidden_weight.detach().t(), transposed = weight.detach().t(),
+                     gelu_bias = gelu_bias_of(hidden_bias.detach(), has_norm);
+    blocks.run([&](int64_t) {
+      return [&, hidden_memory = at::empty({blocks.most() * most, hidden}, options),
+              memory = at::empty({blocks.most() * most, channels}, options)](int64_t begin, int64_t end) {
+        const auto first = begins[static_cast<size_t>(begin)], count = begins[static_cast<size_t>(end)] - first;
+        const int32_t* const its_counts = counts.const_data_ptr<int32_t>() + begin;
+        const at::Tensor some = rows.narrow(0, first, count);
+        host::member_rows(read(members, begin), features.of_goal ? read(goals, begin) : nullptr, its_counts,
+                          end - begin, most, size, write(some));
+        at::Tensor activations = hidden_memory.narrow(0, 0, count), embeddings = memory.narrow(0, 0, count);
+        at::mm_out(activations, some, hidden_transposed);
+        if (has_norm) host::bias_norm(read(activations), read(hidden_bias), count, hidden, write(activations), nullptr);
+        host::bias_gelu(read(activations), read(gelu_bias), count, hidden, write(activations), nullptr);
+        at::mm_out(embeddings, activations, transposed);
+        host::largest_members(read(embeddings), its_counts, end - begin, channels, write(largest, begin),
+                              which.mutable_data_ptr<int32_t>() + begin * channels);
+      };
+    });
+    // Adding it to all members would change no order.
+    return {largest + bias.detach() * counts.gt(0).unsqueeze(1), rows, which};
+  }
+
+  static at::Tensor forward(AutogradContext* context, const at::Tensor& members, const std::optional<at::Tensor>& goals,
+                            const at::Tensor& counts, const RowFeatures& features, bool has_norm,
+                            const at::Tensor& hidden_weight, const at::Tensor& hidden_bias, const at::Tensor& weight,
+                            const at::Tensor& bias) {
+    const variable_list made = compute(members, goals.value_or(at::Tensor()), counts, features, has_norm, hidden_weight,
+                                       hidden_bias, weight, bias);
+    context->save_for_backward({made[1], made[2], counts, hidden_weight, hidden_bias, weight});
+    context->saved_data["has_norm"] = has_norm;
+    return made[0];
+  }
+
+  static variable_list backward(AutogradContext* context, const variable_list& grads) {
+    const variable_list saved = context->get_saved_variables();
+    const at::Tensor &rows = saved[0], &which = saved[1], &counts = saved[2], hidden_weight = saved[3].detach(),
+                     hidden_bias = saved[4].detach(), weight = saved[5].detach().contiguous(),
+                     grad = grads[0].contiguous();
+    const int64_t sets = which.size(0), channels = which.size(1), hidden = hidden_weight.size(0);
+    const bool has_norm = context->saved_data["has_norm"].toBool();
+    const std::vector<int64_t> begins = begins_of(counts);
+    // Of a set most members are the largest nowhere: there are a few rows of slopes, activations and their gradients.
+    const Blocks blocks(sets, host::kBlockNumbers / (16 * hidden));
+    const auto options = weight.options();
+    const at::Tensor hidden_weight_sums = at::zeros({blocks.parts(), hidden, rows.size(1)}, options),
+                     hidden_bias_sums = at::zeros({blocks.parts(), hidden}, options),
+                     gelu_bias_sums = at::zeros({blocks.parts(), hidden}, options),  // of zeros: not asked for
+        weight_sums = at::zeros({blocks.parts(), channels, hidden}, options);
+    const at::Tensor hidden_transposed = hidden_weight.t(), gelu_bias = gelu_bias_of(hidden_bias, has_norm);
+    blocks.run([&](int64_t part) {
+      return [&, part, numbers = std::vector<int32_t>(), places = std::vector<int32_t>(),
+              chosen = std::vector<int64_t>(),
+              hidden_weight_sum = hidden_weight_sums[part]](int64_t begin, int64_t end) mutable {
+        // The members that are the largest somewhere, and where each channel's is among them.
+        chosen.clear();
+        places.clear();
+        const int32_t* its_which = which.const_data_ptr<int32_t>() + begin * channels;
+        for (int64_t set = begin; set < end; ++set, its_which += channels) {
+          const int64_t first = begins[static_cast<size_t>(set)], count = begins[static_cast<size_t>(set) + 1] - first;
+          numbers.assign(static_cast<size_t>(count), -1);
+          for (int64_t c = 0; c < channels; ++c) {
+            if (count == 0) {
+              places.push_back(-1);
+              continue;
+            }
+            int32_t& number = numbers[static_cast<size_t>(its_which[c])];
+            if (number < 0) {
+              number = static_cast<int32_t>(chosen.size());
+              chosen.push_back(first + its_which[c]);
+            }
+            places.push_back(number);
+          }
+        }
+        const auto count = static_cast<int64_t>(chosen.size());
+        if (count == 0) return;
+        const at::Tensor some = rows.index_select(0, at::from_blob(chosen.data(), {count}, at::kLong)),
+                         slope = at::mm(some, hidden_transposed), activations = at::empty_like(slope),
+                         activation_grads = at::zeros_like(slope);
+        at::Tensor normalized, inverse_deviations;
+        if (has_norm) {
+          inverse_deviations = at::empty({count}, options);
+          host::bias_norm(read(slope), read(hidden_bias), count, hidden, write(slope), write(inverse_deviations));
+          normalized = slope.clone();
+        }
+        host::bias_gelu(read(slope), read(gelu_bias), count, hidden, write(activations), write(slope));
+        host::largest_members_backward(read(grad, begin), places.data(), end - begin, channels, hidden, read(weight),
+                                       read(activations), write(activation_grads), write(weight_sums, part));
+        host::bias_gelu_backward(read(slope), read(activation_grads), count, hidden, write(activation_grads),
+                                 write(has_norm ? gelu_bias_sums : hidden_bias_sums, part));
+        if (has_norm) {
+          host::bias_norm_backward(read(normalized), read(inverse_deviations), read(activation_grads), count, hidden,
+                                   write(activation_grads), write(hidden_bias_sums, part));
+        }
+        at::Tensor hidden_sum = hidden_weight_sum;
+        at::addmm_out(hidden_sum, hidden_sum, activation_grads.t(), some);
+      };
+    });
+    const at::Tensor none;
+    return {none,
+            none,
+            none,
+            none,
+            none,
+            hidden_weight_sums.sum(0),
+            hidden_bias_sums.sum(0),
+            weight_sums.sum(0),
+            at::mm(counts.gt(0).to(grad.scalar_type()).unsqueeze(0), grad).squeeze(0)};
+  }
+
+ private:
+  // What the GELU adds: the norm before it has added the bias already.
+  static at::Tensor gelu_bias_of(const at::Tensor& hidden_bias, bool has_norm) {
+    return has_norm ? at::zeros_like(hidden_bias) : hidden_bias;
+  }
+  // Where the members of each set begin among those of all, and how many there are.
+  static std::vector<int64_t> begins_of(const at::Tensor& counts) {
+    std::vector<int64_t> begins{0};
+    const int32_t* const its_counts = counts.const_data_ptr<int32_t>();
+    for (int64_t i = 0; i < counts.size(0); ++i) begins.push_back(begins.back() + its_counts[i]);
+    return begins;
+  }
+};
+
+// Whether layers on a device compute in bf16.
+bool is_bf16_on_device(const at::Tensor& x) {
+  return x.is_cuda() && at::autocast::is_autocast_enabled(at::kCUDA) &&
+         at::autocast::get_autocast_dtype(at::kCUDA) == at::kBFloat16;
+}
+
+// As HostSets, in one pass each way on a device. The way back computes anew what it needs of the members that are the
+// largest somewhere.
+struct DeviceSets : Function<DeviceSets> {
+  /// Sets which member is the largest, u8 [sets, channels], where `which_out` is not null.
+  static at::Tensor compute(const at::Tensor& members, const at::Tensor& goals, const at::Tensor& counts,
+                            const SetSize& size, const at::Tensor& hidden_weight, const at::Tensor& hidden_bias,
+                            const at::Tensor& weight, const at::Tensor& bias, at::Tensor* which_out) {
+    const at::TensorOptions options = members.options().requires_grad(false);
+    at::Tensor out = at::empty({size.sets(), SetSize::kChannels}, options.dtype(at::kBFloat16));
+    if (which_out) *which_out = at::empty(out.sizes(), options.dtype(at::kByte));
+    passes_on(members.device())
+        .largest_embedding(size, floats_of(members), goals.defined() ? floats_of(goals) : nullptr,
+                           counts.const_data_ptr<int32_t>(),
+                           {floats_of(hidden_weight), floats_of(hidden_bias), floats_of(weight), floats_of(bias)},
+                           out.mutable_data_ptr(), which_out ? which_out->mutable_data_ptr<uint8_t>() : nullptr,
+                           stream_on(members.device()));
+    return out;
+  }
+
+  static at::Tensor forward(AutogradContext* context, const at::Tensor& members, const std::optional<at::Tensor>& goals,
+                            const at::Tensor& counts, const SetSize& size, const at::Tensor& hidden_weight,
+                            const at::Tensor& hidden_bias, const at::Tensor& weight, const at::Tensor& bias) {
+    at::Tensor which;
+    const at::Tensor out =
+        compute(members, goals.value_or(at::Tensor()), counts, size, hidden_weight, hidden_bias, weight, bias, &which);
+    // A context keeps tensors: the size is kept as its bytes.
+    const at::Tensor size_bytes = at::empty({sizeof(SetSize)}, at::kByte);
+    std::memcpy(size_bytes.mutable_data_ptr(), &size, sizeof(SetSize));
+    context->save_for_backward(
+        {members, goals.value_or(at::Tensor()), which, hidden_weight, hidden_bias, weight, bias, size_bytes});
+    return out;
+  }
+
+  static variable_list backward(AutogradContext* context, const variable_list& grads) {
+    const variable_list saved = context->get_saved_variables();
+    const at::Tensor &members = saved[0], &goals = saved[1], &which = saved[2],
+                     grad = grads[0].to(at::kBFloat16).contiguous();
+    SetSize size;
+    std::memcpy(&size, saved[7].const_data_ptr(), sizeof(SetSize));
+    const auto sums_of = [&](const at::Tensor& parameter) {
+      std::vector<int64_t> shape{SetSize::kSums};
+      shape.insert(shape.end(), parameter.sizes().begin(), parameter.sizes().end());
+      return at::empty(shape, parameter.options().requires_grad(false));
+    };
+    const at::Tensor &hidden_weight = saved[3], &hidden_bias = saved[4], &weight = saved[5], &bias = saved[6];
+    const at::Tensor hidden_weight_sums = sums_of(hidden_weight), hidden_bias_sums = sums_of(hidden_bias),
+                     weight_sums = sums_of(weight), bias_sums = sums_of(bias);
+    passes_on(members.device())
+        .largest_embedding_backward(
+            size, floats_of(members), goals.defined() ? floats_of(goals) : nullptr,
+            {floats_of(hidden_weight), floats_of(hidden_bias), floats_of(weight), floats_of(bias)},
+            which.const_data_ptr<uint8_t>(), grad.const_data_ptr(),
+            {hidden_weight_sums.mutable_data_ptr<float>(), hidden_bias_sums.mutable_data_ptr<float>(),
+             weight_sums.mutable_data_ptr<float>(), bias_sums.mutable_data_ptr<float>()},
+            stream_on(members.device()));
+    const at::Tensor none;
+    return {none,
+            none,
+            none,
+            none,
+            hidden_weight_sums.sum(0),
+            hidden_bias_sums.sum(0),
+            weight_sums.sum(0),
+            bias_sums.sum(0)};
+  }
+};
+
+// [views, cameras, 3, ...] -> [cameras * views, 3, ...]
+at::Tensor by_camera(const at::Tensor& images) { return images.transpose(0, 1).flatten(0, 1); }
+
+at::Tensor host_patches(const at::Tensor& images, int64_t patch_px) {
+  const at::Tensor from = images.contiguous();
+  const PatchSize size{from.size(0), from.size(1), from.size(3), from.size(4), patch_px};
+  const at::Tensor out =
+      at::empty({size.cameras * size.views, size.rows(), size.columns(), 3 * patch_px * patch_px}, at::kFloat);
+  const int64_t image_bytes = from.stride(0);
+  for (int64_t camera = 0; camera < size.cameras; ++camera) {
+    Blocks(size.views, host::kBlockNumbers / (size.rows() * size.columns())).run([&](int64_t) {
+      return [&](int64_t begin, int64_t end) {
+        host::patches(from.const_data_ptr<uint8_t>() + begin * image_bytes, end - begin, size.cameras, camera,
+                      size.height_px, size.width_px, patch_px, write(out, camera * size.views + begin));
+      };
+    });
+  }
+  return out.permute({0, 3, 1, 2});
+}
+
+at::Tensor space_to_depth(const at::Tensor& images, int64_t patch_px) {
+  if (patch_px == 1) return images;
+  const int64_t channels = images.size(1), height = images.size(2), width = images.size(3);
+  const int64_t rows = (height + patch_px - 1) / patch_px, columns = (width + patch_px - 1) / patch_px;
+  // [n, c, rows, patch, columns, patch] -> [n, rows, columns, c, patch, patch]: in memory, channels last.
+  return at::constant_pad_nd(images, {0, columns * patch_px - width, 0, rows * patch_px - height})
+      .view({-1, channels, rows, patch_px, columns, patch_px})
+      .permute({0, 2, 4, 1, 3, 5})
+      .reshape({-1, rows, columns, channels * patch_px * patch_px})
+      .permute({0, 3, 1, 2});
+}
+
+}  // namespace
+
+at::Tensor linear_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias) {
+  if (is_on_host(x)) return host_bias_gelu(at::linear(x, weight), bias);
+  if (!x.is_cuda() || !NetworkPasses::gelu_takes(bias.size(0))) return gelu(at::linear(x, weight, bias));
+  return BiasGelu<false>::apply(at::linear(x, weight), bias);
+}
+
+at::Tensor normalize(const at::Tensor& x) {
+  // Autocast would convert to fp32 and back, two passes more each way. Sums are fp32 without it, too.
+  const c10::impl::ExcludeDispatchKeyGuard no_autocast(c10::autocast_dispatch_keyset);
+  return at::layer_norm(x, {x.size(-1)});
+}
+
+at::Tensor linear_norm_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias) {
+  if (!x.is_cuda() || !NetworkPasses::norm_takes(bias.size(0))) return gelu(normalize(at::linear(x, weight, bias)));
+  return BiasGelu<true>::apply(at::linear(x, weight), bias);
+}
+
+at::Tensor convolve_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias, int64_t stride) {
+  const int64_t padding = weight.size(2) / 2, missing = x.size(1) - weight.size(1);
+  const at::Tensor padded = missing > 0 ? at::constant_pad_nd(weight, {0, 0, 0, 0, 0, missing}) : weight;
+  if (is_on_host(x)) {
+    const auto channels_last = [](const at::Tensor& t) { return t.permute({0, 2, 3, 1}).contiguous(); };
+    at::Tensor out;
+    if (bias.size(0) < HostConvolution::kLeastOutputs)
+      out = host_bias_gelu(channels_last(at::conv2d(x, padded, {}, {stride}, {padding})), bias);
+    else if (keeps_gradients({x, weight, bias}))
+      out = HostConvolution::apply(channels_last(x), padded, bias, stride);
+    else
+      out = HostConvolution::compute(channels_last(x), padded, bias, stride, /*slope_out=*/nullptr);
+    return out.permute({0, 3, 1, 2});
+  }
+  if (!x.is_cuda() || !NetworkPasses::gelu_takes(bias.size(0))) {
+    return gelu(at::conv2d(x, padded, bias, {stride}, {padding}));
+  }
+  const at::Tensor rows = at::conv2d(x, padded, {}, {stride}, {padding}).permute({0, 2, 3, 1}).contiguous();
+  return BiasGelu<false>::apply(rows, bias).permute({0, 3, 1, 2});
+}
+
+at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tensor& weight, const at::Tensor& bias) {
+  if (!is_supported(x) || !NetworkPasses::norm_takes(x.size(-1))) {
+    return at::layer_norm(position.defined() ? x + position : x, {x.size(-1)}, weight, bias);
+  }
+  std::optional<at::Tensor> added;
+  if (position.defined()) added = position.to(x.scalar_type()).contiguous();
+  return Norm::apply(x.contiguous(), added, weight, bias);
+}
+
+bool takes_sets(const at::Tensor& members, const RowFeatures& features, const at::Tensor& hidden_weight,
+                const at::Tensor& weight) {
+  if (is_on_host(members)) return true;
+  return is_bf16_on_device(members) && members.scalar_type() == at::kFloat &&
+         SetSize::takes(weight.size(0), hidden_weight.size(0), members.size(2) + features.count(), members.size(1));
+}
+
+at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& goals, const at::Tensor& counts,
+                             const RowFeatures& features, bool has_norm, const at::Tensor& hidden_weight,
+                             const at::Tensor& hidden_bias, const at::Tensor& weight, const at::Tensor& bias) {
+  const at::Tensor all = members.contiguous(), its_goals = features.of_goal ? goals.contiguous() : at::Tensor();
+  const bool has_way_back = keeps_gradients({hidden_weight, hidden_bias, weight, bias});
+  if (members.is_cuda()) {
+    const SetSize size{row_size(members, goals, features, /*keeps_rows=*/true), members.size(1), counts.stride(0),
+                       has_norm};
+    if (has_way_back)
+      return DeviceSets::apply(all, std::optional(its_goals), counts, size, hidden_weight, hidden_bias, weight, bias);
+    return DeviceSets::compute(all, its_goals, counts, size, hidden_weight, hidden_bias, weight, bias, nullptr);
+  }
+  const at::Tensor its_counts = counts.contiguous();
+  if (has_way_back)
+    return HostSets::apply(all, std::optional(its_goals), its_counts, features, has_norm, hidden_weight, hidden_bias,
+                           weight, bias);
+  return HostSets::compute(all, its_goals, its_counts, features, has_norm, hidden_weight, hidden_bias, weight, bias)[0];
+}
+
+at::Tensor token_softmax(const at::Tensor& scores) {
+  if (!is_supported(scores) || scores.size(2) % 2 != 0) return at::_softmax(scores, 1, /*half_to_float=*/false);
+  return TokenSoftmax::apply(scores.contiguous());
+}
+
+bool takes_feature_rows(const at::Tensor& rows, const RowFeatures& features) {
+  return rows.is_cuda() && rows.scalar_type() == at::kFloat && rows.size(-1) + features.count() <= RowSize::kMostWidth;
+}
+
+at::Tensor feature_rows(const at::Tensor& rows, const at::Tensor& goals, const RowFeatures& features, bool keeps_rows,
+                        at::ScalarType type) {
+  const RowSize size = row_size(rows, goals, features, keeps_rows);
+  const at::Tensor its_goals = features.of_goal ? goals.contiguous() : at::Tensor();
+  std::vector<int64_t> shape = rows.sizes().vec();
+  shape.back() = size.width();
+  at::Tensor out = at::empty(shape, rows.options().dtype(type));
+  passes_on(rows.device())
+      .row_features(size, rows.contiguous().const_data_ptr<float>(),
+                    features.of_goal ? its_goals.const_data_ptr<float>() : nullptr, activation_type_of(type),
+                    out.mutable_data_ptr(), stream_on(rows.device()));
+  return out;
+}
+
+at::Tensor image_patches(const at::Tensor& images, int64_t patch_px, at::ScalarType type) {
+  if (images.is_cpu() && type == at::kFloat && PatchSize::takes(patch_px)) return host_patches(images, patch_px);
+  if (!images.is_cuda() || !PatchSize::takes(patch_px)) {
+    return space_to_depth(by_camera(images), patch_px)
+        .to(type, /*non_blocking=*/false, /*copy=*/false, at::MemoryFormat::ChannelsLast);
+  }
+  const PatchSize size{images.size(0), images.size(1), images.size(3), images.size(4), patch_px};
+  const at::Tensor out =
+      at::empty({size.cameras * size.views, size.rows(), size.columns(), PatchSize::channels_of(patch_px)},
+                images.options().dtype(type));
+  passes_on(images.device())
+      .patches(size, images.contiguous().const_data_ptr<uint8_t>(), activation_type_of(type), out.mutable_data_ptr(),
+               stream_on(images.device()));
+  return out.permute({0, 3, 1, 2});
+}
+
+}  // namespace pictura

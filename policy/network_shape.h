@@ -1,0 +1,35 @@
+// Sizes of the policy that its layers and the estimate of their memory share.
+#pragma once
+
+#include <string_view>
+
+#include "pictura/configuration/config.h"
+#include "pictura/policy/rules/network_passes.h"
+#include "pictura/simulator/observation.h"
+#include "pictura/simulator/rules/observe.h"
+
+namespace pictura {
+
+/// Of its own state: beside images without the two auxiliary slots, which come last.
+constexpr int num_ego_features(bool sees_images) { return sees_images ? kEgoFeatures - 2 : kEgoFeatures; }
+
+/// Features that are read of each row of an array of the observation, by its name: of a set, or of the waypoints.
+inline RowFeatures row_features_of(const PolicySection& policy, std::string_view array) {
+  const int points = array == "controls" ? 2 : 1;  // a stop line has two ends
+  const bool is_segment = array == "lanes" || array == "boundaries" || array == "walls";
+  return {.points = policy.point_features ? points : 0,
+          .of_segment = policy.segment_features && is_segment,
+          .of_goal = policy.goal_features && array == "lanes",
+          .position_unit_m = kScalePosition_m,
+          .half_length_unit_m = kScaleHalfPiece_m};
+}
+
+/// Sines and cosines of a pixel's position in the image, so that attention knows where a token is whatever the image's
+/// size.
+constexpr int kPositionFeatures = 8;
+
+/// Outputs of the critic's head: one, or those of as many bins (policy/value_head.h).
+constexpr int kValueBins = 101;
+constexpr int num_value_outputs(ValueHead head) { return head == ValueHead::two_hot ? kValueBins : 1; }
+
+}  // namespace pictura

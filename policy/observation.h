@@ -1,0 +1,104 @@
+// What a policy sees, as tensors: the simulator's arrays, and images.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include <ATen/ATen.h>
+
+#include "pictura/common/renderer.h"
+#include "pictura/configuration/config.h"
+#include "pictura/policy/rules/policy_executor.h"
+#include "pictura/simulator/observation_arrays.h"
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+/// The images of the cameras that share one size: u8 [batch, cameras of this size, 3, height, width]; or bf16 [batch,
+/// cameras, rows, columns, values of a patch], the patches of common/patches.h, in memory [cameras, batch, ...].
+struct ImageBlock {
+  at::Tensor pixels;
+  std::vector<int64_t> cameras;  // their indices in the rig
+};
+
+/// What a batch of agents sees: the arrays of simulator/observation.h by name, and images. Tensors that the policy does
+/// not read are undefined; sets are [batch, rows, features], all others [batch, rows * features].
+struct Observation {
+#define X(name, type, rows, features, part, comment) at::Tensor name;
+  PICTURA_OBSERVATION_ARRAYS(X)
+#undef X
+  std::vector<ImageBlock> images;
+
+  /// Applies f to every defined tensor.
+  template <typename F>
+  Observation map(F&& f) const {
+    Observation result;
+#define X(name, type, rows, features, part, comment) \
+  if (name.defined()) result.name = f(name);
+    PICTURA_OBSERVATION_ARRAYS(X)
+#undef X
+    for (const ImageBlock& block : images) result.images.push_back({f(block.pixels), block.cameras});
+    return result;
+  }
+};
+
+/// Its tensors in the order of kObservationArrays.
+inline constexpr at::Tensor Observation::* kObservationTensors[] = {
+#define X(name, type, rows, features, part, comment) &Observation::name,
+    PICTURA_OBSERVATION_ARRAYS(X)
+#undef X
+};
+
+/// Whether an array holds the members of an entity set, which set_counts counts.
+constexpr bool is_set(const ObservationArray& array) {
+  return array.part != ObservationPart::own && array.type == ElementType::f32;
+}
+/// The number in EntitySet of kObservationArrays[array_index], for arrays that are sets.
+constexpr int entity_set_of(size_t array_index) {
+  int set = 0;
+  for (size_t i = 0; i < array_index; ++i) set += is_set(kObservationArrays[i]);
+  return set;
+}
+static_assert(entity_set_of(std::size(kObservationArrays)) == kNumEntitySets, "the list and EntitySet have equal sets");
+
+/// Uninitialised storage for the arrays that this configuration's policy reads, [rows, slots, ...].
+Observation allocate_observations(const Config& config, int64_t rows, int64_t slots, Device device);
+
+/// One row of storage whose tensors are [rows, ...].
+Observation row_of(const Observation& rows, int64_t row);
+
+/// Copies arrays that lie on `device` to the defined tensors, [slots, ...], which lie there too. Throws Error naming an
+/// array of another size.
+void copy_arrays(const ObservationView& view, Device device, const Observation& out);
+
+/// Some agents' part of arrays that lie on `device`: those that this configuration's policy reads. indices: i64 [n], in
+/// [0, batch). Throws Error naming an array that is not one of `batch` agents.
+Observation select_arrays(const Config& config, const ObservationView& view, Device device, int64_t batch,
+                          const at::Tensor& indices);
+
+/// Uninitialised memory for images of a rig, [batch..., cameras of one size, 3, height, width].
+std::vector<ImageBlock> allocate_images(const Rig& rig, std::vector<int64_t> batch, Device device);
+
+/// The images of these views, [views, ...], in the renderer's memory: as patches of `patch_px` where that is not 0 and
+/// the renderer draws them, else planar.
+std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> views, Renderer* renderer,
+                                    int patch_px = 0);
+
+/// The slots whose agents are active and that the mask [slots] has (empty: all), i64 [n], in ascending order.
+/// with_left: also those of agents that left a road that ends in the last step, whose last observation has a value.
+at::Tensor active_slots(const ControllerInput& input, Span<const uint8_t> mask, bool with_left,
+                        PolicyExecutor* executor);
+
+/// Views in the memory of a device.
+class SelectedViews {
+ public:
+  SelectedViews(int64_t size, Device device);
+  /// Those of `views` that `indices`, i64 [n], name.
+  SelectedViews(Span<const View> views, Device device, const at::Tensor& indices);
+  Span<View> views() const;
+
+ private:
+  at::Tensor bytes_;  // u8 [n, sizeof(View)]
+};
+
+}  // namespace pictura

@@ -1,0 +1,43 @@
+#include "pictura/policy/precision.h"
+
+#include <ATen/Context.h>
+#include <c10/util/env.h>
+
+#include "pictura/common/error.h"
+
+namespace pictura {
+
+void set_float32_products(Precision precision) {
+  // One by one: what is set for all does not change convolutions, which have TF32 by default.
+  for (const at::Float32Op operation : {at::Float32Op::CONV, at::Float32Op::MATMUL}) {
+    at::globalContext().setFloat32Precision(
+        at::Float32Backend::CUDA, operation,
+        precision == Precision::tf32 ? at::Float32Precision::TF32 : at::Float32Precision::IEEE);
+  }
+}
+
+void set_reproducible(bool reproducible) {
+  if (reproducible) {
+    constexpr const char* kName = "CUBLAS_WORKSPACE_CONFIG";
+    c10::utils::set_env(kName, ":4096:8", /*overwrite=*/false);
+    const std::string value = c10::utils::get_env(kName).value_or("");
+    PICTURA_CHECK(value == ":4096:8" || value == ":16:8",
+                  "train.reproducible: expected {} to be absent, \":4096:8\" or \":16:8\", with which cuBLAS is "
+                  "reproducible, got \"{}\"",
+                  kName, value);
+  }
+  at::Context& context = at::globalContext();
+  context.setDeterministicAlgorithms(reproducible, /*warn_only=*/false);
+  // Else torch fills all new memory, so that whoever reads what was never written reads the same. Nothing here does.
+  context.setDeterministicFillUninitializedMemory(false);
+  context.setDeterministicCuDNN(reproducible);
+}
+
+Autotuner::Autotuner() {
+  at::Context& context = at::globalContext();
+  context.setBenchmarkCuDNN(!context.deterministicCuDNN());
+}
+
+Autotuner::~Autotuner() { at::globalContext().setBenchmarkCuDNN(false); }
+
+}  // namespace pictura

@@ -1,0 +1,202 @@
+// What a network does to its activations between matrix products, each in one pass over memory where ATen takes
+// several. For CUDA devices: the host's are in policy/host_passes.h.
+#pragma once
+
+#include <algorithm>
+
+#include "pictura/common/device.h"
+#include "pictura/common/math.h"
+#include "pictura/common/portable/hd.h"
+
+namespace pictura {
+
+enum class ActivationType : uint8_t { f32, bf16 };
+
+/// Activations of `rows` positions without gaps; `type` is that of all arrays of a call but parameters and their
+/// gradients, which are f32. The memory begins at a multiple of 16 bytes.
+struct ActivationSize {
+  ActivationType type = ActivationType::f32;
+  int64_t rows = 0, channels = 0;
+};
+
+/// How images become what the first convolution reads: a patch of patch_px^2 pixels, rounded up with black, becomes one
+/// position whose channel (c * patch_px + y) * patch_px + x is color c of pixel (x, y) of the patch; channels beyond
+/// those of the image are 0. From u8 [views, cameras, 3, height_px, width_px] to
+/// [cameras, views, rows, columns, channels], the colors from 0 to 255.
+struct PatchSize {
+  int64_t views = 0, cameras = 0, height_px = 0, width_px = 0, patch_px = 1;
+  static constexpr bool takes(int64_t patch_px) { return patch_px >= 1 && patch_px <= 4; }
+  /// Of a position: whole vectors of 8, which matrix units want.
+  PICTURA_HD static constexpr int64_t channels_of(int64_t patch_px) { return (3 * patch_px * patch_px + 7) / 8 * 8; }
+  PICTURA_HD int64_t rows() const { return (height_px + patch_px - 1) / patch_px; }
+  PICTURA_HD int64_t columns() const { return (width_px + patch_px - 1) / patch_px; }
+};
+
+/// Where a segment's row (docs/observation.md) holds what features are made of, after the x and y of its middle.
+struct SegmentColumn {
+  static constexpr int kHalfLength = 3, kCos = 4, kSin = 5;  // the latter of its direction
+};
+
+/// Features that are read of a row beside its numbers (see policy/row_features.h): those of each of the `points`
+/// pairs (x, y) that the row begins with; where the row is a segment, those of the agent's place beside it, and those
+/// of its distance to a goal.
+struct RowFeatures {
+  int points = 0;
+  bool of_segment = false, of_goal = false;
+  float position_unit_m = 1, half_length_unit_m = 1;  // of x and y, goals' too, and of half lengths
+  static constexpr int kOfPoint = 6, kOfSegment = 4, kOfGoal = 2;
+  PICTURA_HD constexpr int count() const {
+    return points * kOfPoint + (of_segment ? kOfSegment : 0) + (of_goal ? kOfGoal : 0);
+  }
+};
+
+/// Rows of f32 without gaps that become their features, each behind the row itself where keeps_rows says so. With
+/// features.of_goal every rows_per_goal of them share a goal, of goal_columns numbers, x and y first.
+struct RowSize {
+  int64_t rows = 0, columns = 0;
+  RowFeatures features;
+  bool keeps_rows = false;
+  int64_t rows_per_goal = 1, goal_columns = 0;
+  PICTURA_HD int64_t kept() const { return keeps_rows ? columns : 0; }
+  PICTURA_HD int64_t width() const { return kept() + features.count(); }
+  static constexpr int64_t kMostWidth = 256;
+};
+
+/// What is added to what lengths are divided by (see policy/row_features.h).
+constexpr float kNearPoint_m = 4.0f, kFarPoint_m = 20.0f, kPointDirection_m = 1.0f;
+
+/// A length, or a coordinate, between -1 and 1.
+PICTURA_HD inline float bounded_length(float length_m, float added_m) { return length_m / (fabsf(length_m) + added_m); }
+
+/// A feature of a point in metres. The first four are of x and y alone.
+PICTURA_HD inline float point_feature(Vec2 point_m, int feature) {
+  const float its_m = feature % 2 == 0 ? point_m.x : point_m.y;
+  if (feature >= 4) return its_m / (length(point_m) + kPointDirection_m);
+  return bounded_length(its_m, feature < 2 ? kNearPoint_m : kFarPoint_m);
+}
+
+/// A place relative to the segment of a row, in metres: x along the segment from its middle, y to the left of its line.
+PICTURA_HD inline Vec2 beside_segment(const RowFeatures& features, const float* row, Vec2 place_m) {
+  const Vec2 from_middle_m = place_m - Vec2{row[0], row[1]} * features.position_unit_m,
+             direction{row[SegmentColumn::kCos], row[SegmentColumn::kSin]};
+  return {dot(from_middle_m, direction), cross(direction, from_middle_m)};
+}
+
+/// The distance of a place from the segment of a row, between its ends.
+PICTURA_HD inline float segment_distance_m(const RowFeatures& features, const float* row, Vec2 place_m) {
+  const Vec2 beside_m = beside_segment(features, row, place_m);
+  const float half_length_m = row[SegmentColumn::kHalfLength] * features.half_length_unit_m;
+  return length(Vec2{max_of(fabsf(beside_m.x) - half_length_m, 0.0f), beside_m.y});
+}
+
+/// One of the features of a row. `goal` is read with features.of_goal alone.
+PICTURA_HD inline float row_feature(const RowFeatures& features, const float* row, const float* goal, int feature) {
+  const auto place_m = [&features](const float* xy) { return Vec2{xy[0], xy[1]} * features.position_unit_m; };
+  const int end_of_points = features.points * RowFeatures::kOfPoint;
+  if (feature < end_of_points) {
+    return point_feature(place_m(row + 2 * (feature / RowFeatures::kOfPoint)), feature % RowFeatures::kOfPoint);
+  }
+  const int end_of_segment = end_of_points + (features.of_segment ? RowFeatures::kOfSegment : 0);
+  if (feature < end_of_segment) return point_feature(beside_segment(features, row, Vec2{}), feature - end_of_points);
+  return bounded_length(segment_distance_m(features, row, place_m(goal)),
+                        feature == end_of_segment ? kNearPoint_m : kFarPoint_m);
+}
+
+/// Sets of members, each read by a linear layer, GELU, and a second linear layer, both of kChannels outputs. With
+/// has_norm the first layer's outputs are normalized before the GELU.
+struct SetSize {
+  RowSize members;  // of all sets, `most` of each, whether there are as many or not; keeps_rows is set
+  int64_t most = 0;
+  int64_t counts_stride = 1;  // from the number of members of a set to that of the next
+  bool has_norm = false;
+  static constexpr int kChannels = 64, kMostWidth = 32, kMostMembers = 254, kNoMember = 255;
+  PICTURA_HD int64_t sets() const { return members.rows / most; }
+  static constexpr bool takes(int64_t channels, int64_t hidden_channels, int64_t width, int64_t most) {
+    return channels == kChannels && hidden_channels == kChannels && width <= kMostWidth && most >= 1 &&
+           most <= kMostMembers;
+  }
+  /// How many partial sums there are of a gradient.
+  static constexpr int64_t kSums = 264;
+};
+
+/// What belongs to each parameter of a set's layers: hidden_weight [kChannels, members.width()], weight [kChannels,
+/// kChannels], biases [kChannels].
+template <typename Number>
+struct SetParameters {
+  Number *hidden_weight, *hidden_bias, *weight, *bias;
+};
+
+/// Matrices [matrices, tokens, columns] of scores; `columns` is even.
+struct TokenSize {
+  ActivationType type = ActivationType::f32;
+  int64_t matrices = 0, tokens = 0, columns = 0;
+};
+
+/// Holds no state. Work is put on the stream, all memory is the device's. Sums over rows are in a fixed order.
+class NetworkPasses {
+ public:
+  NetworkPasses() = default;
+  virtual ~NetworkPasses() = default;
+  NetworkPasses(const NetworkPasses&) = delete;
+  NetworkPasses& operator=(const NetworkPasses&) = delete;
+
+  /// Whether bias_gelu() takes rows of so many channels, and norm() and bias_norm_gelu().
+  static constexpr bool gelu_takes(int64_t channels) { return channels % 8 == 0 && channels <= 1024; }
+  static constexpr bool norm_takes(int64_t channels) {
+    return channels % 64 == 0 && channels <= 512 && channels != 320 && channels != 448;
+  }
+
+  /// out = GELU(x + bias), by the error function. bias: [channels].
+  virtual void bias_gelu(const ActivationSize& size, const void* x, const float* bias, void* out, Stream stream) = 0;
+  /// The gradients of x and, as partial sums [kBiasSums, channels], of the bias.
+  virtual void bias_gelu_backward(const ActivationSize& size, const void* x, const float* bias, const void* grad_out,
+                                  void* grad_x_out, float* grad_bias_sums_out, Stream stream) = 0;
+  static constexpr int64_t kBiasSums = 528;
+
+  /// out = GELU(layer norm of x + bias), whose norm is over channels and has no parameters and an epsilon of 1e-5.
+  virtual void bias_norm_gelu(const ActivationSize& size, const void* x, const float* bias, void* out,
+                              Stream stream) = 0;
+  /// The gradients of x and, as partial sums [num_norm_sums(rows, 1), channels], of the bias.
+  virtual void bias_norm_gelu_backward(const ActivationSize& size, const void* x, const float* bias,
+                                       const void* grad_out, void* grad_x_out, float* grad_bias_sums_out,
+                                       Stream stream) = 0;
+
+  /// out = layer norm of x + position, over channels, with an epsilon of 1e-5. weight, bias: [channels]; position
+  /// [period, channels] is that of row r in r % period, null for none (then period is 1).
+  virtual void norm(const ActivationSize& size, const void* x, const void* position, int64_t period,
+                    const float* weight, const float* bias, void* out, Stream stream) = 0;
+  /// The gradients of x and, as partial sums [num_norm_sums(rows, period), period, 3, channels], of position, weight
+  /// and bias.
+  virtual void norm_backward(const ActivationSize& size, const void* x, const void* position, int64_t period,
+                             const float* weight, const void* grad_out, void* grad_x_out, float* sums_out,
+                             Stream stream) = 0;
+  static constexpr int64_t num_norm_sums(int64_t rows, int64_t period) {
+    return std::clamp<int64_t>((8448 + period - 1) / period, 1, std::max<int64_t>(1, rows / period));
+  }
+
+  /// out: [rows, width()], at most kMostWidth wide. goals: [rows / rows_per_goal, goal_columns], null for none.
+  virtual void row_features(const RowSize& size, const float* rows, const float* goals, ActivationType type, void* out,
+                            Stream stream) = 0;
+
+  virtual void patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, Stream stream) = 0;
+
+  /// The largest value of each channel over the members of each set, bf16 [sets, kChannels], 0 for an empty set, and
+  /// which member has it, [sets, kChannels], the first of equal ones, kNoMember in an empty set; null where it is not
+  /// asked for. members: f32; goals: as row_features() has them; counts: as size.counts_stride says. Products are in
+  /// bf16.
+  virtual void largest_embedding(const SetSize& size, const float* members, const float* goals, const int32_t* counts,
+                                 const SetParameters<const float>& parameters, void* out, uint8_t* which_out,
+                                 Stream stream) = 0;
+  /// The gradients of the parameters as partial sums [kSums, ...], from that of `out`, bf16.
+  virtual void largest_embedding_backward(const SetSize& size, const float* members, const float* goals,
+                                          const SetParameters<const float>& parameters, const uint8_t* which,
+                                          const void* grad_out, const SetParameters<float>& sums_out,
+                                          Stream stream) = 0;
+
+  /// out = softmax over tokens; and the gradient of scores by way of `out`.
+  virtual void token_softmax(const TokenSize& size, const void* scores, void* out, Stream stream) = 0;
+  virtual void token_softmax_backward(const TokenSize& size, const void* out, const void* grad_out,
+                                      void* grad_scores_out, Stream stream) = 0;
+};
+
+}  // namespace pictura

@@ -1,0 +1,134 @@
+#include "pictura/policy/torch_device.h"
+
+#include <c10/core/CachingDeviceAllocator.h>
+#include <c10/core/StreamGuard.h>
+#include <c10/core/impl/VirtualGuardImpl.h>
+#include <dlfcn.h>
+
+#include "pictura/backends/make_policy_executor.h"
+#include "pictura/common/error.h"
+
+namespace pictura {
+
+namespace {
+
+// Empty where torch can compute on CUDA devices, else why not. Its CUDA library is opened here rather than linked, so
+// that programs start on machines without it.
+std::string why_torch_has_no_cuda() {
+  static const void* const library = dlopen("libtorch_cuda.so", RTLD_NOW | RTLD_GLOBAL | RTLD_NODELETE);
+  if (!library) return "this torch has no CUDA (libtorch_cuda.so cannot be opened): install a torch with CUDA";
+  if (!at::globalContext().hasCUDA()) return "torch finds no CUDA device: its CUDA may be newer than the driver";
+  return "";
+}
+
+std::string why_not_on_cuda() {
+  const std::string no_device = why_no_cuda_device();
+  return no_device.empty() ? why_torch_has_no_cuda() : no_device;
+}
+
+}  // namespace
+
+Device open_learning_device(const Config& config, int local_rank) {
+  const std::string &wanted = config.run.device, &simulator = config.simulator.backend,
+                    &renderer = config.render.backend;
+  // Before anything is computed, wherever that will be: torch looks for its CUDA library once, and a process that
+  // learns on the host may do so on a device later.
+  const std::string why_not = why_not_on_cuda();
+  const bool draws_on_host =
+      config.reads_images() && (renderer == "cpu" || renderer == "null" || renderer == "gl:osmesa");
+  const auto refuse_on_device = [&wanted](const char* key, const std::string& value, const char* instead) {
+    fail("{}: \"{}\" works in host memory, but run.device is \"{}\": set it to {}", key, value, wanted, instead);
+  };
+  if (wanted.starts_with("cuda")) {
+    if (simulator == "cpu") refuse_on_device("simulator.backend", simulator, "\"cuda\" or \"auto\"");
+    if (draws_on_host) refuse_on_device("render.backend", renderer, "\"cuda\", \"gl:egl\" or \"auto\"");
+  }
+  if (wanted == "cpu" || simulator == "cpu" || draws_on_host) {
+    PICTURA_CHECK(
+        simulator != "cuda",
+        "simulator.backend: \"cuda\" works in the device's memory, but run.device is \"{}\" and render.backend "
+        "\"{}\": set it to \"cpu\" or \"auto\"",
+        wanted, renderer);
+    return {};
+  }
+  if (wanted == "auto" && simulator == "auto" && !why_not.empty()) return {};
+  PICTURA_CHECK(why_not.empty(), "{}: {}", wanted == "auto" ? "simulator.backend: \"cuda\"" : "run.device: " + wanted,
+                why_not);
+  const int count = at::detail::getCUDAHooks().deviceCount();
+  // A launcher may have left each process only its own.
+  Device device{MemorySpace::cuda, count == 1 ? 0 : local_rank};
+  if (const size_t colon = wanted.find(':'); colon != std::string::npos) {
+    device.index = std::stoi(wanted.substr(colon + 1));
+    PICTURA_CHECK(device.index < count, "run.device: expected cuda:0 to cuda:{}, got \"{}\"", count - 1, wanted);
+  }
+  PICTURA_CHECK(device.index < count, "run.device: \"{}\" is cuda:{} for LOCAL_RANK {}, but this host has {} devices",
+                wanted, device.index, local_rank, count);
+  return device;
+}
+
+namespace {
+
+// Torch's allocator of a device, or null where it has not been used.
+at::DeviceAllocator* allocator_of(Device device) {
+  if (device.is_host()) return nullptr;
+  at::DeviceAllocator* const allocator = at::getDeviceAllocator(torch_device(device).type());
+  return allocator->initialized() ? allocator : nullptr;
+}
+
+}  // namespace
+
+void release_unused_memory(Device device) {
+  at::DeviceAllocator* const allocator = allocator_of(device);
+  if (!allocator) return;
+  allocator->emptyCache();
+  allocator->resetPeakStats(torch_device(device).index());
+}
+
+DeviceMemory memory_of(Device device) {
+  at::DeviceAllocator* const allocator = allocator_of(device);
+  if (!allocator) return {};
+  const c10::DeviceIndex index = torch_device(device).index();
+  const auto [free, total] = allocator->getMemoryInfo(index);
+  constexpr auto kAll = static_cast<size_t>(c10::CachingAllocator::StatType::AGGREGATE);
+  return {static_cast<int64_t>(total) - static_cast<int64_t>(free),
+          allocator->getDeviceStats(index).allocated_bytes[kAll].peak};
+}
+
+int64_t available_bytes(Device device) {
+  release_unused_memory(device);
+  return make_policy_executor(device)->memory_bytes();
+}
+
+at::Device torch_device(Device device) {
+  return device.is_host() ? at::Device(at::kCPU) : at::Device(at::kCUDA, static_cast<c10::DeviceIndex>(device.index));
+}
+
+namespace {
+
+c10::Stream torch_stream(Device device) {
+  const at::Device where = torch_device(device);
+  return c10::impl::VirtualGuardImpl(where.type()).getStream(where);
+}
+
+}  // namespace
+
+Stream current_stream(Device device) {
+  return device.is_host() ? Stream{} : Stream{torch_stream(device).native_handle()};
+}
+
+OwnStream::OwnStream(Device device)
+    : stream_(c10::impl::VirtualGuardImpl(torch_device(device).type()).getStreamFromGlobalPool(torch_device(device))) {}
+
+void OwnStream::run(const std::function<void()>& work) const {
+  c10::impl::VirtualGuardImpl(stream_.device_type()).getStream(stream_.device()).synchronize();
+  const c10::StreamGuard guard(stream_);
+  try {
+    work();
+  } catch (...) {
+    stream_.synchronize();  // tensors that whoever catches it reads are complete
+    throw;
+  }
+  stream_.synchronize();
+}
+
+}  // namespace pictura

@@ -1,0 +1,67 @@
+// Small policies that probes are asked about.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "pictura/evaluation/probes/probe_options.h"
+#include "pictura/evaluation/probes/probe_results.h"
+#include "pictura/tests/support/scratch_folder.h"
+#include "pictura/tests/training/small_runs.h"
+
+namespace pictura::test {
+
+constexpr size_t kAgent = 0, kVectorized = 1, kLikeForLike = 2;  // the order of policies_
+
+/// A policy that reads images, and both that read vectors, as good as untrained: of one update each on the town with
+/// walls.
+class ProbedPolicies : public ::testing::Test {
+ protected:
+  // For the first test, whose name the folder has.
+  void SetUp() override {
+    if (folder_) return;
+    folder_ = new ScratchFolder;
+    const auto trained = [](const std::string& name, std::vector<std::string> more) {
+      more.insert(more.end(), {"train.updates=1", "simulator.walls=true", "simulator.pedestrian_fraction=0.2"});
+      return train(small_run(*folder_ / name, "cpu", more)).checkpoint;
+    };
+    policies_ = {trained("agent", {}), trained("vectorized", {"policy.modality=vector", "policy.auxiliary=true"}),
+                 trained("like_for_like", {"policy.modality=vector"})};
+  }
+  static void TearDownTestSuite() {
+    delete folder_;
+    folder_ = nullptr;
+  }
+
+  /// All three, in six scenes of two towns.
+  static void ask(ProbeOptions* options) {
+    options->policies = policies_;
+    options->worlds.maps = {"procedural:1", "procedural:2"};
+    options->worlds.agents_per_world = 40;
+    options->worlds.first_scenario = 3;
+    options->worlds.scenarios = 6;
+    options->worlds.steps = 60;
+    options->worlds.num_threads = 1;
+    options->worlds.device = options->worlds.simulator = "cpu";
+    options->sample_steps = 4;  // untrained policies soon halt
+  }
+
+  static inline ScratchFolder* folder_ = nullptr;
+  static inline std::vector<std::string> policies_;
+};
+
+inline bool same_bits(const ProbeResults& a, const ProbeResults& b) {
+  if (a.responses.size() != b.responses.size()) return false;
+  for (size_t i = 0; i < a.responses.size(); ++i) {
+    const PairedResponse &x = a.responses[i], &y = b.responses[i];
+    if (x.value != y.value || x.value_without != y.value_without || x.brake != y.brake ||
+        x.brake_without != y.brake_without) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace pictura::test

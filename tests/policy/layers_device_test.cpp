@@ -1,0 +1,283 @@
+// Layers on a CUDA device against the same layers in double precision on the host: values and every gradient are about
+// as near as those of ATen's own layers on the device.
+#include <gtest/gtest.h>
+
+#include "pictura/policy/layers.h"
+#include "pictura/policy/policy.h"
+#include "pictura/policy/precision.h"
+#include "pictura/policy/row_features.h"
+#include "pictura/policy/torch_device.h"
+#include "pictura/simulator/rules/observe.h"
+#include "pictura/tests/backend_cuda/device_test.h"
+#include "pictura/tests/policy/numbers.h"
+
+namespace pictura {
+namespace {
+
+using Layer = std::function<at::Tensor(const std::vector<at::Tensor>& inputs)>;
+
+class DeviceLayers : public test::DeviceTest, public testing::WithParamInterface<Precision> {
+ protected:
+  static void SetUpTestSuite() {
+    Config config;
+    config.policy.modality = Modality::vector;
+    config.run.device = "cuda";
+    open_learning_device(config);
+  }
+
+  // So that rounding inputs is no difference.
+  static at::Tensor numbers(at::IntArrayRef shape, double phase) { return test::numbers(shape, phase, at::kBFloat16); }
+  at::ScalarType activations() const { return GetParam() == Precision::bf16 ? at::kBFloat16 : at::kFloat; }
+
+  /// The value and the gradients of all inputs, on the host.
+  static std::vector<at::Tensor> results(const Layer& layer, const std::vector<at::Tensor>& inputs) {
+    const at::Tensor value = layer(inputs);
+    std::vector<at::Tensor> all{value};
+    value.backward(numbers(value.sizes(), 0.3).to(value.device(), value.scalar_type()));
+    for (const at::Tensor& input : inputs) all.push_back(input.grad());
+    for (at::Tensor& result : all) result = result.detach().to(at::kCPU, at::kDouble);
+    return all;
+  }
+
+  /// The first `num_activations` inputs are activations, all others parameters. `plain` is the layer in ATen's words,
+  /// of whose errors `of_atens` times as much is allowed.
+  void expect_as_on_the_host(const Layer& layer, const Layer& plain, const std::vector<at::Tensor>& inputs,
+                             size_t num_activations, double of_atens = 2) {
+    set_float32_products(GetParam());
+    const auto copies = [&](at::Device device, at::ScalarType of_activations, at::ScalarType of_parameters) {
+      std::vector<at::Tensor> result;
+      for (size_t i = 0; i < inputs.size(); ++i) {
+        const at::ScalarType type = i < num_activations ? of_activations : of_parameters;
+        result.push_back(inputs[i].detach().to(device, type, /*non_blocking=*/false, /*copy=*/true).requires_grad_());
+      }
+      return result;
+    };
+    const auto on_device = [&](const Layer& some) {
+      const LayerPrecision precision(GetParam(), at::kCUDA);
+      return results(some, copies(at::kCUDA, activations(), at::kFloat));
+    };
+    const std::vector<at::Tensor> expected = results(layer, copies(at::kCPU, at::kDouble, at::kDouble)),
+                                  got = on_device(layer), atens = on_device(plain);
+    const double precision = GetParam() == Precision::bf16   ? 1.0 / 128
+                             : GetParam() == Precision::tf32 ? 1.0 / 512
+                                                             : 1e-6;
+    for (size_t i = 0; i < expected.size(); ++i) {
+      ASSERT_EQ(got[i].sizes(), expected[i].sizes());
+      const auto error = [&](const at::Tensor& t) { return (t - expected[i]).abs().max().item<double>(); };
+      const double largest = expected[i].abs().max().item<double>();
+      EXPECT_LE(error(got[i]), of_atens * error(atens[i]) + precision * (0.1 + largest))
+          << (i == 0 ? "value" : "gradient " + std::to_string(i - 1)) << ", up to " << largest;
+    }
+  }
+};
+INSTANTIATE_TEST_SUITE_P(All, DeviceLayers, ::testing::Values(Precision::fp32, Precision::tf32, Precision::bf16),
+                         [](const auto& precision) {
+                           return std::string(precision.param == Precision::fp32   ? "fp32"
+                                              : precision.param == Precision::tf32 ? "tf32"
+                                                                                   : "bf16");
+                         });
+
+TEST_P(DeviceLayers, LinearGelu) {
+  // 24 and 40: not a power of two of vectors; 6: no vectors at all.
+  for (const int64_t out : {512, 64, 40, 24, 6}) {
+    for (const int64_t rows : {1, 7, 3000}) {
+      expect_as_on_the_host([](const auto& in) { return linear_gelu(in[0], in[1], in[2]); },
+                            [](const auto& in) { return gelu(at::linear(in[0], in[1], in[2])); },
+                            {numbers({rows, 16}, 1), 0.3 * numbers({out, 16}, 2), numbers({out}, 3)}, 1);
+    }
+  }
+}
+
+TEST_P(DeviceLayers, LinearNormGelu) {
+  // 36: ATen's own. 9,000 rows are more than there are partial sums.
+  for (const int64_t out : {64, 128, 192, 256, 384, 512, 36}) {
+    for (const int64_t rows : {1, 7, 9000}) {
+      expect_as_on_the_host([](const auto& in) { return linear_norm_gelu(in[0], in[1], in[2]); },
+                            [](const auto& in) {
+                              const at::Tensor x = at::linear(in[0], in[1], in[2]);
+                              return gelu(at::layer_norm(x, {x.size(-1)})).to(x.scalar_type());
+                            },
+                            {numbers({rows, 16}, 1), 0.3 * numbers({out, 16}, 2), numbers({out}, 3)}, 1);
+    }
+  }
+}
+
+TEST_P(DeviceLayers, NormalizeKeepsTheTypeOfActivations) {
+  for (const int64_t channels : {6, 512, 1024}) {
+    expect_as_on_the_host(
+        [](const auto& in) {
+          const at::Tensor out = normalize(in[0]);
+          EXPECT_EQ(out.scalar_type(), in[0].scalar_type());
+          return out;
+        },
+        [](const auto& in) { return at::layer_norm(in[0], {in[0].size(-1)}).to(in[0].scalar_type()); },
+        {numbers({300, channels}, 1)}, 1);
+  }
+}
+
+TEST_P(DeviceLayers, ConvolveGelu) {
+  for (const int64_t stride : {1, 2}) {
+    const auto layer = [stride](const auto& in) {
+      return convolve_gelu(in[0].contiguous(at::MemoryFormat::ChannelsLast), in[1], in[2], stride);
+    };
+    const auto plain = [stride](const auto& in) {
+      return gelu(at::conv2d(in[0].narrow(1, 0, 12), in[1], in[2], {stride}, {1}));
+    };
+    expect_as_on_the_host(layer, plain,
+                          {numbers({5, 16, 9, 12}, 1), 0.1 * numbers({32, 12, 3, 3}, 2), numbers({32}, 3)}, 1);
+  }
+}
+
+TEST_P(DeviceLayers, Norm) {
+  const Layer with_position = [](const auto& in) { return norm(in[0], in[1], in[2], in[3]).to(in[0].scalar_type()); };
+  const Layer plain_with_position = [](const auto& in) {
+    return at::layer_norm(in[0] + in[1], {in[0].size(-1)}, in[2], in[3]).to(in[0].scalar_type());
+  };
+  const Layer without = [](const auto& in) { return norm(in[0], {}, in[1], in[2]).to(in[0].scalar_type()); };
+  const Layer plain_without = [](const auto& in) {
+    return at::layer_norm(in[0], {in[0].size(-1)}, in[1], in[2]).to(in[0].scalar_type());
+  };
+  // 36: ATen's own.
+  for (const int64_t channels : {64, 128, 192, 256, 384, 512, 36}) {
+    const at::Tensor weight = numbers({channels}, 2), bias = numbers({channels}, 3);
+    for (const int64_t repetitions : {1, 300}) {
+      expect_as_on_the_host(with_position, plain_with_position,
+                            {numbers({repetitions, 7, channels}, 1), numbers({7, channels}, 4), weight, bias}, 2);
+    }
+    expect_as_on_the_host(without, plain_without, {numbers({2, 50, channels}, 1), weight, bias}, 1);
+  }
+}
+
+TEST_P(DeviceLayers, LargestEmbedding) {
+  const int64_t sets = 300, goal_columns = 9;
+  const RowFeatures all{.points = 1,
+                        .of_segment = true,
+                        .of_goal = true,
+                        .position_unit_m = kScalePosition_m,
+                        .half_length_unit_m = kScaleHalfPiece_m};
+  for (const RowFeatures& features :
+       {RowFeatures{}, RowFeatures{.points = 1, .position_unit_m = kScalePosition_m}, all}) {
+    for (const int64_t most : {1, 10, 80}) {
+      for (const bool has_norm : {false, true}) {
+        const at::Tensor members = numbers({sets, most, 7}, 1).to(at::kFloat),
+                         goals = features.of_goal ? numbers({sets, goal_columns}, 2).to(at::kFloat) : at::Tensor(),
+                         // Empty sets and full ones; what lies beyond a column of counts is not read.
+            counts = at::arange(sets, at::kInt).remainder(most + 1).unsqueeze(1).repeat({1, 2}).select(1, 0);
+        const int64_t width = 7 + features.count();
+        const std::vector<at::Tensor> parameters{numbers({64, width}, 1), numbers({64}, 2), 0.3 * numbers({64, 64}, 3),
+                                                 numbers({64}, 4)};
+        const auto on = [](const at::Tensor& t, const at::Tensor& where) {
+          return t.defined() ? t.to(where.device()) : at::Tensor();
+        };
+        // Doubles rounded as the device holds them, with the gradient of what they were: of members that are nearly
+        // equal, rounding decides which one the gradient reaches.
+        const auto as_held = [&](const at::Tensor& x) {
+          if (x.scalar_type() != at::kDouble) return x;
+          return x + (x.detach().to(activations()).to(at::kDouble) - x.detach());
+        };
+        const Layer plain = [&](const auto& in) {
+          const bool is_double = in[0].scalar_type() == at::kDouble;
+          const at::ScalarType type = is_double ? at::kDouble : activations();
+          const at::Tensor its_members = on(members, in[0]), its_goals = on(goals, in[0]);
+          const at::Tensor rows =
+              features.count() > 0
+                  ? with_row_features(its_members.to(is_double ? at::kDouble : at::kFloat), features, type,
+                                      its_goals.defined() && is_double ? its_goals.to(at::kDouble) : its_goals)
+                  : its_members.to(type);
+          const at::Tensor before = at::linear(as_held(rows), in[0], in[1]);
+          const at::Tensor hidden = gelu(has_norm ? at::layer_norm(before, {64}).to(before.scalar_type()) : before);
+          return masked_max(at::linear(as_held(hidden), as_held(in[2]), in[3]), on(counts, in[0]));
+        };
+        const Layer layer = [&](const auto& in) {
+          if (!in[0].is_cuda()) return plain(in);
+          const at::Tensor its_members = on(members, in[0]), its_counts = on(counts, in[0]);
+          EXPECT_EQ(takes_sets(its_members, features, in[0], in[2]), GetParam() == Precision::bf16);
+          if (GetParam() != Precision::bf16) return plain(in);
+          return largest_embedding(its_members, on(goals, in[0]), its_counts, features, has_norm, in[0], in[1], in[2],
+                                   in[3]);
+        };
+        // ATen rounds the embeddings as well, and so prefers other members.
+        expect_as_on_the_host(layer, plain, parameters, 0, GetParam() == Precision::bf16 ? 0 : 2);
+        if (GetParam() != Precision::bf16) continue;
+        // Without a way back: the same bits.
+        const LayerPrecision precision(Precision::bf16, at::kCUDA);
+        std::vector<at::Tensor> on_device;
+        for (const at::Tensor& p : parameters) on_device.push_back(p.to(at::kCUDA, at::kFloat));
+        const at::Tensor value = layer(on_device);
+        for (at::Tensor& p : on_device) p.requires_grad_();
+        EXPECT_TRUE(layer(on_device).equal(value));
+      }
+    }
+  }
+}
+
+TEST_P(DeviceLayers, LargestEmbeddingGivesWayToNoNumberThatIsNone) {
+  if (GetParam() != Precision::bf16) GTEST_SKIP() << "one pass in bf16 alone";
+  const LayerPrecision precision(Precision::bf16, at::kCUDA);
+  const auto options = at::TensorOptions(at::kCUDA).dtype(at::kFloat);
+  at::Tensor members = at::zeros({1, 40, 2}, options);
+  members[0][20][0] = std::numeric_limits<float>::quiet_NaN();
+  const auto largest = [&](int count) {
+    return largest_embedding(members, {}, at::full({1}, count, options.dtype(at::kInt)), {}, /*has_norm=*/false,
+                             at::ones({64, 2}, options), at::zeros({64}, options), at::ones({64, 64}, options),
+                             at::zeros({64}, options))
+        .to(at::kCPU, at::kFloat);
+  };
+  EXPECT_TRUE(largest(40).isnan().all().item<bool>());
+  EXPECT_TRUE(largest(20).eq(0).all().item<bool>());
+}
+
+TEST_P(DeviceLayers, TokenSoftmax) {
+  // 5: ATen's own.
+  for (const int64_t columns : {2, 64, 5}) {
+    expect_as_on_the_host([](const auto& in) { return token_softmax(in[0]); },
+                          [](const auto& in) { return at::_softmax(in[0], 1, /*half_to_float=*/false); },
+                          {8 * numbers({30, 84, columns}, 1)}, 1);
+  }
+}
+
+TEST_P(DeviceLayers, RowFeatures) {
+  struct Case {
+    int64_t columns;
+    int points;
+    bool of_segment, of_goal;
+  };
+  for (const Case& c :
+       {Case{7, 1, false, false}, Case{4, 2, false, false}, Case{2, 1, false, false}, Case{40, 20, false, false},
+        Case{7, 0, true, false}, Case{7, 0, false, true}, Case{7, 1, true, true}}) {
+    const RowFeatures features{.points = c.points,
+                               .of_segment = c.of_segment,
+                               .of_goal = c.of_goal,
+                               .position_unit_m = kScalePosition_m,
+                               .half_length_unit_m = kScaleHalfPiece_m};
+    const at::Tensor rows = numbers({31, 17, c.columns}, 1).to(at::kFloat), on_device = rows.to(at::kCUDA);
+    const at::Tensor goals = numbers({31, 9}, 2).to(at::kFloat),
+                     device_goals = c.of_goal ? goals.to(at::kCUDA) : at::Tensor();
+    const at::Tensor expected = with_row_features(rows.to(at::kDouble), features, at::kDouble, goals.to(at::kDouble));
+    ASSERT_TRUE(takes_feature_rows(on_device, features));
+    const at::Tensor got = with_row_features(on_device, features, activations(), device_goals);
+    ASSERT_EQ(got.sizes(), expected.sizes());
+    EXPECT_EQ(got.scalar_type(), activations());
+    EXPECT_TRUE(got.narrow(-1, 0, c.columns).to(at::kCPU, at::kFloat).equal(rows)) << "bf16 holds these";
+    const double error = (got.to(at::kCPU, at::kDouble) - expected).abs().max().item<double>();
+    EXPECT_LE(error, activations() == at::kBFloat16 ? 1.0 / 500 : 1e-5) << c.columns << " " << c.points;
+    EXPECT_TRUE(got.narrow(-1, c.columns, features.count())
+                    .equal(row_features(on_device, features, activations(), device_goals)));
+  }
+}
+
+TEST_P(DeviceLayers, ImagePatchesAreTheHostsWithChannelsOfZeros) {
+  const at::Tensor images =
+      at::arange(3 * 2 * 3 * 10 * 13, at::kInt).remainder(251).to(at::kByte).reshape({3, 2, 3, 10, 13});
+  for (const int64_t patch_px : {1, 2, 3, 4, 8, 12}) {
+    const at::Tensor expected = image_patches(images, patch_px, activations());
+    const at::Tensor got = image_patches(images.to(at::kCUDA), patch_px, activations()).to(at::kCPU);
+    EXPECT_TRUE(got.narrow(1, 0, expected.size(1)).equal(expected)) << patch_px;
+    EXPECT_EQ(got.size(1) % 8, 0);
+    EXPECT_EQ(got.slice(1, expected.size(1)).abs().sum().item<float>(), 0);
+    EXPECT_TRUE(got.is_contiguous(at::MemoryFormat::ChannelsLast));
+  }
+}
+
+}  // namespace
+}  // namespace pictura
