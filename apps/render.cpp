@@ -7,10 +7,11 @@
 
 #include "pictura/apps/commands.h"
 #include "pictura/backends/make_renderer.h"
-#include "pictura/cli/drive.h"
+#include "pictura/cli/backend_options.h"
 #include "pictura/cli/file_options.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
+#include "pictura/cli/world_options.h"
 #include "pictura/common/error.h"
 #include "pictura/common/scene_file.h"
 #include "pictura/common/support/file.h"
@@ -20,6 +21,7 @@
 #include "pictura/common/support/stopwatch.h"
 #include "pictura/drawing/drawing.h"
 #include "pictura/drawing/planes.h"
+#include "pictura/driving/world.h"
 #include "pictura/map/scenario/load_scenario.h"
 #include "pictura/simulator/recorded_scene.h"
 

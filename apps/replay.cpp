@@ -1,13 +1,15 @@
 // `pictura replay`: records episodes as pages that a browser plays, one as a file, or many with an index.
 #include "pictura/apps/commands.h"
-#include "pictura/cli/drive.h"
 #include "pictura/cli/file_options.h"
 #include "pictura/cli/number_options.h"
-#include "pictura/cli/record.h"
+#include "pictura/cli/recording_options.h"
 #include "pictura/cli/report.h"
+#include "pictura/cli/world_options.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/filled_folder.h"
 #include "pictura/common/support/interrupt.h"
+#include "pictura/driving/recording.h"
+#include "pictura/driving/world.h"
 #include "pictura/replay/gallery.h"
 
 namespace pictura {
@@ -49,8 +51,7 @@ Replay record(ReplayArguments arguments, uint64_t seed, ProgressLine* line_out) 
   for (int step = 0; step < arguments.steps; ++step) {
     if (interrupted()) throw Interrupted(fmt::format("interrupted at step {} of {}", step, arguments.steps));
     world.act();
-    recording.before_step(world.commands);
-    recording.after_step(world.step());
+    world.step({&recording});
     line_out->update(fmt::format("seed {}: step {}/{}", seed, step + 1, arguments.steps));
   }
   return recording.finish();

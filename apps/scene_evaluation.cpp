@@ -3,11 +3,11 @@
 #include <memory>
 
 #include "pictura/cli/backend_options.h"
-#include "pictura/cli/drive.h"
 #include "pictura/cli/evaluation_options.h"
 #include "pictura/cli/file_options.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
+#include "pictura/cli/world_options.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/numbers.h"
 #include "pictura/common/support/output_file.h"

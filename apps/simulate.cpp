@@ -5,17 +5,20 @@
 #include <optional>
 
 #include "pictura/apps/commands.h"
-#include "pictura/cli/drive.h"
 #include "pictura/cli/file_options.h"
 #include "pictura/cli/number_options.h"
-#include "pictura/cli/record.h"
+#include "pictura/cli/recording_options.h"
 #include "pictura/cli/report.h"
-#include "pictura/cli/serve.h"
+#include "pictura/cli/serve_options.h"
+#include "pictura/cli/world_options.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/stopwatch.h"
 #include "pictura/drawing/drawing.h"
 #include "pictura/drawing/film.h"
+#include "pictura/driving/recording.h"
+#include "pictura/driving/serve.h"
+#include "pictura/driving/world.h"
 #include "pictura/map/scenario/scenario.h"
 #include "pictura/map/scenario/scene_file.h"
 #include "pictura/simulator/recorded_scene.h"
@@ -102,16 +105,43 @@ class LifeCounter {
   int64_t entered_ = 0, left_ = 0;
 };
 
+/// Time that steps take, of the simulator alone where it is the last observer.
+class StepClock final : public StepObserver {
+ public:
+  void before_step(Span<const Command>) override { watch_.restart(); }
+  void after_step(const StepResult&) override { seconds_ += watch_.seconds(); }
+  double seconds() const { return seconds_; }
+
+ private:
+  Stopwatch watch_;
+  double seconds_ = 0;
+};
+
+/// What is counted over steps for the report.
+class StepCounter final : public StepObserver {
+ public:
+  StepCounter(Simulator& simulator, const Scenario* scene) : simulator_(simulator), scene_(scene) {}
+  void after_step(const StepResult&) override {
+    if (scene_) displacement.add(simulator_, *scene_);
+    lives.add(simulator_);
+  }
+
+  Displacement displacement;  // in a recorded scene
+  LifeCounter lives;
+
+ private:
+  Simulator& simulator_;
+  const Scenario* const scene_;
+};
+
 struct SimulationRun {
   SpawnReport spawned;  // in the first episode, as those of each class
-  LifeCounter lives;
   std::array<int64_t, kNumAgentClasses> of_class{};
   int steps = 0;
   double drive_s = 0, simulate_s = 0;  // without filming, recording and serving; of the simulator alone
-  Displacement displacement;           // in a recorded scene
 };
 
-void print_simulation(const SimulationRun& run, const DrivenWorld& world, bool json) {
+void print_simulation(const SimulationRun& run, const StepCounter& counted, const DrivenWorld& world, bool json) {
   Simulator& simulator = *world.simulator;
   const Scenario* const scene = simulator.maps()[0]->scenario.get();
   const SimulatorTotals& totals = simulator.totals();
@@ -126,8 +156,8 @@ void print_simulation(const SimulationRun& run, const DrivenWorld& world, bool j
               {"refused", run.spawned.refused},
               {"refused_no_place", run.spawned.refused_no_place},
               {"refused_taken", run.spawned.refused_taken},
-              {"entered", run.lives.entered()},
-              {"left", run.lives.left()},
+              {"entered", counted.lives.entered()},
+              {"left", counted.lives.left()},
               {"vehicles", run.of_class[static_cast<size_t>(AgentClass::vehicle)]},
               {"cyclists", run.of_class[static_cast<size_t>(AgentClass::cyclist)]},
               {"pedestrians", run.of_class[static_cast<size_t>(AgentClass::pedestrian)]},
@@ -151,10 +181,10 @@ void print_simulation(const SimulationRun& run, const DrivenWorld& world, bool j
   if (scene) {
     object["scenario_id"] = scene->id;
     object["start_step"] = simulator.maps()[0]->start_step;
-    object["displacement_steps"] = run.displacement.steps;
+    object["displacement_steps"] = counted.displacement.steps;
     object["displacement_mean_m"] =
-        finite_or_null(run.displacement.sum_m / static_cast<double>(run.displacement.steps));
-    object["displacement_max_m"] = run.displacement.max_m;
+        finite_or_null(counted.displacement.sum_m / static_cast<double>(counted.displacement.steps));
+    object["displacement_max_m"] = counted.displacement.max_m;
   }
   if (json) {
     print_json(object);
@@ -194,35 +224,25 @@ void run_simulate(SimulateArguments arguments) {
   std::unique_ptr<LiveView> live;
   if (arguments.serve.is_asked) live = serve(arguments.serve, *simulator, driver, arguments.recording);
 
+  StepCounter counter(*simulator, scene);
+  StepClock clock;
+  std::vector<StepObserver*> observers{live.get(), recording.get(), saved ? &*saved : nullptr, &counter, &clock};
+  std::erase(observers, nullptr);
   ProgressLine line;
-  double film_s = 0;  // filming, recording and serving
-  const Stopwatch since_start;
   int& step = run.steps;
   for (; (arguments.endless || step < arguments.steps) && !interrupted(); ++step) {
-    Stopwatch beside;  // what is neither driven nor simulated
     if (live && !await_step(*live)) break;
     if (film) film->add_frame(*simulator);
-    film_s += beside.seconds();
+    const Stopwatch acting;
     world.act();
-    beside.restart();
-    if (live) live->before_step(world.commands);
-    if (recording) recording->before_step(world.commands);
-    film_s += beside.seconds();
-    const Stopwatch stepping;
-    const StepResult result = world.step();
-    run.simulate_s += stepping.seconds();
-    beside.restart();
-    if (scene) run.displacement.add(*simulator, *scene);
-    run.lives.add(*simulator);
-    if (recording) recording->after_step(result);
-    if (saved) saved->after_step();
-    if (live) live->after_step(result);
-    film_s += beside.seconds();
+    run.drive_s += acting.seconds();
+    world.step(observers);
     if (!live)
       line.update(fmt::format("step {}/{}", step + 1, arguments.steps),
                   static_cast<double>(step + 1) / arguments.steps);
   }
-  run.drive_s = since_start.seconds() - film_s;
+  run.simulate_s = clock.seconds();
+  run.drive_s += run.simulate_s;
   line.finish();
   if (live) live->finish();
   if (film && step > 0) film->close();  // ^C may come before the first frame
@@ -236,7 +256,7 @@ void run_simulate(SimulateArguments arguments) {
     print_message("{}: {} steps of the first episode\n", arguments.scene, saved->num_steps() - 1);
   }
 
-  print_simulation(run, world, arguments.json);
+  print_simulation(run, counter, world, arguments.json);
   if (arguments.endless) throw Interrupted(fmt::format("interrupted at step {}", step));
   if (step < arguments.steps) throw Interrupted(fmt::format("interrupted at step {} of {}", step, arguments.steps));
 }

@@ -16,6 +16,7 @@
 #include "pictura/simulator/compiled_map.h"
 #include "pictura/simulator/controllers/controller.h"
 #include "pictura/simulator/simulator.h"
+#include "pictura/simulator/step_observer.h"
 
 namespace pictura::python {
 
@@ -70,27 +71,13 @@ struct Scene {
   Stream stream;
 };
 
-/// Who sees every step of a simulator in host memory, and may change what agents do in it.
-class Watcher {
- public:
-  virtual ~Watcher() = default;
-  /// Whether the next step may be taken; waits for it a little.
-  virtual bool is_due() { return true; }
-  /// Before any watcher sees the commands: gives agents that it drives other ones.
-  virtual void drive(Span<Command> /*commands_inout*/) {}
-  virtual void before_step(Span<const Command> /*commands*/) {}
-  virtual void after_step(const StepResult& result) = 0;
-  /// After new episodes that no step began, of the worlds of the mask [worlds]; empty: of all.
-  virtual void after_reset(Span<const uint8_t> world_mask) = 0;
-};
-
 /// What is inside a pictura.Simulator.
 struct SimulatorInside {
   std::shared_ptr<Simulator> simulator;
   /// Runs work without the GIL while no other thread is in a call of the simulator.
   std::function<void(std::string_view what, const std::function<void()>& work)> run;
   /// Lets a watcher see steps for as long as it lives.
-  std::function<void(const std::shared_ptr<Watcher>&)> watch;
+  std::function<void(const std::shared_ptr<StepObserver>&)> watch;
 };
 
 /// What is inside a pictura.Renderer.

@@ -19,8 +19,6 @@ namespace pictura::python {
 
 namespace {
 
-constexpr std::chrono::milliseconds kGlance{50};  // between two looks at whether ^C was pressed
-
 RendererConfig cameras_of(const std::optional<Rig>& rig) {
   RendererConfig config;
   if (rig) config.rig = *rig;
@@ -45,7 +43,7 @@ ReplayDecision decision_of_python(const py::array_t<float, py::array::c_style | 
   return decision_of(Span<const float>(logits.data(), static_cast<size_t>(logits.size())), value);
 }
 
-class PyRecorder final : public Watcher {
+class PyRecorder final : public StepObserver {
  public:
   PyRecorder(SimulatorInside inside, const RecorderOptions& options)
       : inside_(std::move(inside)), followed_(options.followed) {
@@ -53,20 +51,18 @@ class PyRecorder final : public Watcher {
   }
 
   void before_step(Span<const Command> commands) override {
-    if (recorder_) recorder_->before_step(commands, decision_);
+    if (recorder_) recorder_->before_step(commands);
   }
   void after_step(const StepResult& result) override {
     if (recorder_) recorder_->after_step(result);
-    decision_.reset();
   }
   void after_reset(Span<const uint8_t> world_mask) override {
     if (recorder_) recorder_->after_reset(world_mask);
-    decision_.reset();
   }
 
   void decide(const ReplayDecision& decision) {
     if (followed_ < 0) fail_usage("decide: the recorder follows no agent");
-    decision_ = decision;
+    if (recorder_) recorder_->decide(decision);
   }
   int num_steps() const { return recorded().num_frames - 1; }
   const ReplayMetrics& metrics() const { return recorded().metrics; }
@@ -90,10 +86,9 @@ class PyRecorder final : public Watcher {
   const int followed_;
   std::optional<Recorder> recorder_;
   std::optional<Replay> finished_;
-  std::optional<ReplayDecision> decision_;
 };
 
-class PyLiveView final : public Watcher {
+class PyLiveView final : public StepObserver {
  public:
   PyLiveView(SimulatorInside inside, const LiveViewOptions& options) : inside_(std::move(inside)) {
     const ReplayOrigin origin = origin_of("");
@@ -103,9 +98,12 @@ class PyLiveView final : public Watcher {
     });
   }
 
-  bool is_due() override { return !view_ || view_->is_due(kGlance); }
+  bool is_due() override { return !view_ || view_->is_due(); }
   void drive(Span<Command> commands_inout) override {
-    if (view_) view_->before_step(commands_inout);
+    if (view_) view_->drive(commands_inout);
+  }
+  void before_step(Span<const Command> commands) override {
+    if (view_) view_->before_step(commands);
   }
   void after_step(const StepResult& result) override {
     if (view_) view_->after_step(result);

@@ -137,16 +137,14 @@ py::dict inverse_actions_of(RecordedScene& scene, int num_threads) {
   return d;
 }
 
-class PySceneRecorder final : public Watcher {
+class PySceneRecorder final : public StepObserver {
  public:
-  PySceneRecorder(SimulatorInside inside, int world) : inside_(std::move(inside)), world_(world) {
+  PySceneRecorder(SimulatorInside inside, int world) : inside_(std::move(inside)) {
     inside_.run("SceneRecorder", [&] { recorder_.emplace(*inside_.simulator, world); });
   }
 
-  void after_step(const StepResult& /*result*/) override { recorder_->after_step(); }
-  void after_reset(Span<const uint8_t> world_mask) override {
-    if (world_mask.empty() || world_mask[static_cast<size_t>(world_)]) recorder_->after_step();
-  }
+  void after_step(const StepResult& result) override { recorder_->after_step(result); }
+  void after_reset(Span<const uint8_t> world_mask) override { recorder_->after_reset(world_mask); }
 
   int num_steps() const { return recorder_->num_steps() - 1; }
   std::shared_ptr<RecordedScene> scenario(const std::string& id, int self_agent) {
@@ -158,7 +156,6 @@ class PySceneRecorder final : public Watcher {
 
  private:
   SimulatorInside inside_;
-  int world_;
   std::optional<SceneRecorder> recorder_;
 };
 

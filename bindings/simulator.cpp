@@ -189,7 +189,7 @@ class PySimulator {
 
   SimulatorInside inside() {
     return {simulator_, [this](std::string_view what, const std::function<void()>& work) { calls_->run(what, work); },
-            [this](const std::shared_ptr<Watcher>& watcher) { watchers_.push_back(watcher); }};
+            [this](const std::shared_ptr<StepObserver>& watcher) { watchers_.push_back(watcher); }};
   }
 
   void set_state(const py::object& slots, const py::dict& fields) {
@@ -400,9 +400,9 @@ class PySimulator {
   }
 
   // Those that are gone see nothing more.
-  std::vector<std::shared_ptr<Watcher>> watchers() {
+  std::vector<std::shared_ptr<StepObserver>> watchers() {
     std::erase_if(watchers_, [](const auto& watcher) { return watcher.expired(); });
-    std::vector<std::shared_ptr<Watcher>> watching;
+    std::vector<std::shared_ptr<StepObserver>> watching;
     for (const auto& watcher : watchers_) {
       if (auto one = watcher.lock()) watching.push_back(std::move(one));
     }
@@ -418,19 +418,13 @@ class PySimulator {
   }
   /// ^C ends the wait.
   StepResult watched_step(std::vector<Command> commands) {
-    const std::vector<std::shared_ptr<Watcher>> watching = watchers();
+    const std::vector<std::shared_ptr<StepObserver>> watching = watchers();
     for (const auto& watcher : watching) {
       while (!calls_->run("step", [&] { return watcher->is_due(); })) {
         if (PyErr_CheckSignals() != 0) throw py::error_already_set();
       }
     }
-    return calls_->run("step", [&] {
-      for (const auto& watcher : watching) watcher->drive(commands);
-      for (const auto& watcher : watching) watcher->before_step(commands);
-      const StepResult result = simulator_->step(Span<const Command>(commands), stream_);
-      for (const auto& watcher : watching) watcher->after_step(result);
-      return result;
-    });
+    return calls_->run("step", [&] { return step_observed(*simulator_, Span<Command>(commands), watching, stream_); });
   }
 
   CompiledMaps compiled(const std::vector<std::shared_ptr<Map>>& maps) {
@@ -528,7 +522,7 @@ class PySimulator {
   py::object result_;
   const float* of_result_ = nullptr;
   std::vector<BorrowedArray> kept_;  // what the last call was given
-  std::vector<std::weak_ptr<Watcher>> watchers_;
+  std::vector<std::weak_ptr<StepObserver>> watchers_;
   std::vector<uint8_t> all_on_host_;
 #ifdef PICTURA_HAS_CUDA
   DeviceBuffer<uint8_t> all_on_device_;

@@ -6,15 +6,12 @@
 
 #include <CLI/CLI.hpp>
 
+#include "pictura/driving/world.h"
+
 namespace pictura {
 
 /// Takes these names alone; the complaint lists them.
 CLI::Validator one_of(const std::vector<std::string>& names);
-
-/// Empty where an option was not given.
-struct BackendOptions {
-  std::string device, simulator, renderer, samples;
-};
 
 /// Adds --simulator, --renderer (or --backend) and --samples, whose help names `otherwise` as what counts without them.
 void add_backend_options(CLI::App* command, const std::string& otherwise, BackendOptions* options_out);

@@ -2,11 +2,13 @@
 
 #include <cmath>
 
-#include "pictura/cli/drive.h"
+#include "pictura/cli/backend_options.h"
 #include "pictura/cli/map_options.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
+#include "pictura/cli/world_options.h"
 #include "pictura/configuration/config.h"
+#include "pictura/driving/world.h"
 
 namespace pictura {
 

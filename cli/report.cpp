@@ -1,13 +1,8 @@
 #include "pictura/cli/report.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <csignal>
-#include <cstdio>
-#include <cstring>
 
-#include <fcntl.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -18,40 +13,7 @@
 
 namespace pictura {
 
-void open_standard_streams() {
-  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-    // The lowest free number is this one. Read-only: writing fails as it does on a closed one.
-    if (::fcntl(stream, F_GETFD) < 0) ::open("/dev/null", O_RDONLY);
-  }
-  std::signal(SIGPIPE, SIG_IGN);
-}
-
-void print_result_text(const std::string& text) { std::fwrite(text.data(), 1, text.size(), stdout); }
-void print_message_text(const std::string& text) { std::fwrite(text.data(), 1, text.size(), stderr); }
 void print_json(const Json& object) { print_result_text(json_text(object, 2) + "\n"); }
-
-void close_stdout() {
-  // A flush says nothing of bytes that an earlier call lost.
-  errno = 0;
-  const bool lost = std::ferror(stdout) != 0;
-  const bool closed = std::fclose(stdout) == 0;
-  PICTURA_CHECK(!lost && closed, "stdout: cannot be written{}{}", errno ? ": " : "", errno ? std::strerror(errno) : "");
-}
-
-std::string printable(std::string_view message) {
-  std::string text;
-  for (const char c : message) {
-    constexpr unsigned char kFirstPrintable = 0x20, kDelete = 0x7F;
-    const auto code = static_cast<unsigned char>(c);
-    if (c == '\n')
-      text += "\\n";
-    else if (code < kFirstPrintable || code == kDelete)
-      text += fmt::format("\\x{:02x}", code);
-    else
-      text += c;
-  }
-  return text;
-}
 
 std::string format_duration(double seconds) {
   if (!std::isfinite(seconds)) return "?";

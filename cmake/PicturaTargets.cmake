@@ -16,7 +16,7 @@ find_package(fmt REQUIRED)
 # <build>/include/pictura/FOLDER -> FOLDER: sources include headers by their installed names.
 set(PICTURA_INCLUDE_DIR ${PROJECT_BINARY_DIR}/include)
 file(MAKE_DIRECTORY ${PICTURA_INCLUDE_DIR}/pictura)
-foreach(folder bindings common map simulator backend_cpu backend_cuda backend_gl backends configuration policy evaluation training drawing replay cli apps bench tests)
+foreach(folder bindings common map simulator backend_cpu backend_cuda backend_gl backends configuration policy evaluation training drawing replay driving cli apps bench tests)
   file(CREATE_LINK ${PROJECT_SOURCE_DIR}/${folder} ${PICTURA_INCLUDE_DIR}/pictura/${folder} SYMBOLIC)
 endforeach()
 configure_file(${PROJECT_SOURCE_DIR}/common/version.h.in ${PICTURA_INCLUDE_DIR}/pictura/version.h @ONLY)

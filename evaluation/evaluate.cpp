@@ -139,7 +139,11 @@ bool drive_to_the_end(const EvaluatedDriver& driver, const EvaluateOptions& opti
                       const OnSteps& on_steps, const OnLeft& on_left, int64_t* agent_steps_inout) {
   const Driving driving = driver.drive(*simulator);
   EvaluationObserver* const observer = options.observer;
-  if (observer) observer->begin(*simulator);
+  std::vector<StepObserver*> observers;
+  if (observer) {
+    observer->begin(*simulator);
+    observers.push_back(observer);
+  }
   DeviceCopy<Command> command_memory(std::vector<Command>(static_cast<size_t>(simulator->num_slots())), driver.device);
   const Span<Command> commands = command_memory.span();
   for (int step = 0; step < options.steps; ++step) {
@@ -148,9 +152,7 @@ bool drive_to_the_end(const EvaluatedDriver& driver, const EvaluateOptions& opti
     const int64_t num_driven = driving.num_driven();
     if (num_driven == 0 && !is_awaited(*simulator)) break;
     *agent_steps_inout += num_driven;
-    if (observer) observer->before_step(commands);
-    const StepResult taken = simulator->step(Span<const Command>(commands));
-    if (observer) observer->after_step(taken);
+    step_observed(*simulator, commands, observers);
     if (has_lives(*simulator)) {
       AgentState state = counted_state(*simulator);
       for (size_t slot = 0; slot < state.left.size(); ++slot) {

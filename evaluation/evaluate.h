@@ -10,6 +10,7 @@
 #include "pictura/evaluation/evaluated_driver.h"
 #include "pictura/evaluation/results.h"
 #include "pictura/simulator/simulator.h"
+#include "pictura/simulator/step_observer.h"
 
 namespace pictura {
 
@@ -24,13 +25,10 @@ Density density_named(const std::string& name);
 constexpr uint32_t kFirstEvaluationWorld = 0x80000000u;
 
 /// Watches the worlds of an evaluation as they are driven; the simulator is the same object for each batch of worlds.
-class EvaluationObserver {
+class EvaluationObserver : public StepObserver {
  public:
-  virtual ~EvaluationObserver() = default;
   /// Worlds at the start of their episode.
   virtual void begin(Simulator& simulator) = 0;
-  virtual void before_step(Span<const Command> commands) = 0;
-  virtual void after_step(const StepResult& result) = 0;
   /// All of these worlds are counted. Not called where an interrupt ends them.
   virtual void end() {}
 };

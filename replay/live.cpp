@@ -69,11 +69,10 @@ void LiveWorld::after_step(const StepResult& result) {
   keep_newest(num_episodes);
 }
 
-bool LiveWorld::after_reset(Span<const uint8_t> world_mask) {
+void LiveWorld::after_reset(Span<const uint8_t> world_mask) {
   const size_t num_episodes = recorder_.recorded().episodes.size();
-  if (!recorder_.after_reset(world_mask)) return false;
-  keep_newest(num_episodes);
-  return true;
+  recorder_.after_reset(world_mask);
+  if (world_mask.empty() || world_mask[0]) keep_newest(num_episodes);
 }
 
 void LiveWorld::keep_newest(size_t num_episodes) {

@@ -17,16 +17,14 @@ namespace pictura {
 using LiveJson = nlohmann::ordered_json;
 
 /// Follows the only world of a simulator in host memory, and keeps no more than its newest frame.
-class LiveWorld {
+class LiveWorld final : public StepObserver {
  public:
   /// The simulator must outlive it.
   LiveWorld(Simulator& simulator, ReplayOrigin origin, const RendererConfig& cameras, bool sends_images);
 
-  /// Around each step.
-  void before_step(Span<const Command> commands) { recorder_.before_step(commands); }
-  void after_step(const StepResult& result);
-  /// After a reset by the caller: as Recorder::after_reset().
-  bool after_reset(Span<const uint8_t> world_mask);
+  void before_step(Span<const Command> commands) override { recorder_.before_step(commands); }
+  void after_step(const StepResult& result) override;
+  void after_reset(Span<const uint8_t> world_mask) override;
 
   /// All that a page needs to begin at this frame.
   LiveJson begin() const;

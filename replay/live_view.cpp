@@ -14,6 +14,7 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kMaxBehind{500};       // later steps are not made up for
 constexpr std::chrono::seconds kKeysHold{1}, kHandsOn{5};  // without word from the page that drives
 constexpr std::chrono::milliseconds kGoodbye{1000};
+constexpr std::chrono::milliseconds kGlance{50};  // the longest wait of one is_due()
 
 }  // namespace
 
@@ -70,7 +71,7 @@ struct LiveView::Parts {
     server.greet({{"begin", world.begin()}, {"status", status()}, {"look", look()}});
   }
 
-  bool is_due(std::chrono::milliseconds patience) {
+  bool is_due() {
     attend();
     const auto now = Clock::now();
     if (has_begun && paused && steps_asked > 0) {
@@ -83,17 +84,16 @@ struct LiveView::Parts {
       due = std::max(due, now - kMaxBehind) + std::chrono::duration_cast<Clock::duration>(pause);
       return true;
     }
-    server.wait_until(runs ? std::min(due, now + patience) : now + patience);
+    server.wait_until(runs ? std::min(due, now + kGlance) : now + kGlance);
     return false;
   }
 
-  void before_step(Span<Command> commands_inout) {
+  void drive(Span<Command> commands_inout) {
     if (driven >= 0) {
       const DrivingKeys held = Clock::now() - heard > kKeysHold ? DrivingKeys{} : keys;
       commands_inout[static_cast<size_t>(driven)] = {
           .action = action_of_keys(held, simulator.state(), driven, simulator.config().dt_s)};
     }
-    world.before_step(commands_inout);
   }
 
   void tell_of_frame() {
@@ -119,8 +119,9 @@ LiveView::~LiveView() = default;
 
 const std::string& LiveView::address() const { return parts_->server.address(); }
 int LiveView::num_pages() const { return parts_->server.num_pages(); }
-bool LiveView::is_due(std::chrono::milliseconds patience) { return parts_->is_due(patience); }
-void LiveView::before_step(Span<Command> commands_inout) { parts_->before_step(commands_inout); }
+bool LiveView::is_due() { return parts_->is_due(); }
+void LiveView::drive(Span<Command> commands_inout) { parts_->drive(commands_inout); }
+void LiveView::before_step(Span<const Command> commands) { parts_->world.before_step(commands); }
 
 void LiveView::after_step(const StepResult& result) {
   parts_->world.after_step(result);
@@ -128,7 +129,9 @@ void LiveView::after_step(const StepResult& result) {
 }
 
 void LiveView::after_reset(Span<const uint8_t> world_mask) {
-  if (parts_->world.after_reset(world_mask)) parts_->tell_of_frame();
+  const int64_t step = parts_->world.step();
+  parts_->world.after_reset(world_mask);
+  if (parts_->world.step() != step) parts_->tell_of_frame();
 }
 
 void LiveView::finish() {

@@ -12,6 +12,7 @@
 #include "pictura/common/renderer.h"
 #include "pictura/replay/recorder.h"
 #include "pictura/simulator/simulator.h"
+#include "pictura/simulator/step_observer.h"
 
 namespace pictura {
 
@@ -24,7 +25,7 @@ struct LiveViewOptions {
   bool waits_for_page = true;  // no step is due before a page has come
 };
 
-class LiveView {
+class LiveView final : public StepObserver {
  public:
   /// What drives the agent would do now, where it is a policy.
   using Decide = std::function<std::optional<ReplayDecision>(int agent)>;
@@ -32,20 +33,19 @@ class LiveView {
   /// Serves the only world of a simulator in host memory, which must outlive it. Throws UsageError where this build
   /// cannot or there is no such agent, Error where the port is taken.
   LiveView(Simulator& simulator, const LiveViewOptions& options, const ReplayOrigin& origin, Decide decide);
-  ~LiveView();
+  ~LiveView() override;
 
   /// Of the page, with its secret.
   const std::string& address() const;
   int num_pages() const;
 
-  /// Does what pages ask and waits, at most so long, until the next step is due: whether it is.
-  bool is_due(std::chrono::milliseconds patience);
-  /// Before each step: puts what a person's keys ask for among the commands [slots].
-  void before_step(Span<Command> commands_inout);
-  /// After it.
-  void after_step(const StepResult& result);
-  /// After a reset by the caller, of the worlds of the mask [worlds]; empty: of all.
-  void after_reset(Span<const uint8_t> world_mask);
+  /// Does what pages ask and waits, 50 ms at most, until the next step is due.
+  bool is_due() override;
+  /// Puts what a person's keys ask for among the commands [slots].
+  void drive(Span<Command> commands_inout) override;
+  void before_step(Span<const Command> commands) override;
+  void after_step(const StepResult& result) override;
+  void after_reset(Span<const uint8_t> world_mask) override;
   /// Tells pages that it is over; they keep what they have seen.
   void finish();
 

@@ -272,7 +272,7 @@ struct Recorder::Parts {
     group.clear();
   }
 
-  void add_decision(const std::optional<ReplayDecision>& decision) {
+  void add_decision() {
     if (replay.decisions.empty() && !decision) return;
     replay.decisions.resize(static_cast<size_t>(replay.num_frames) * kDecisionValues);
     if (!decision) return;
@@ -281,6 +281,7 @@ struct Recorder::Parts {
       *values++ = in_units(static_cast<double>(probability), kDecisionUnit);
     }
     *values = in_units(static_cast<double>(decision->value), kDecisionUnit);
+    decision.reset();
   }
 
   /// Action and reward of every agent, in the step that has led to the frame that is next.
@@ -323,6 +324,7 @@ struct Recorder::Parts {
   Simulator& simulator;
   const int world;
   const SimulatorSetup setup;
+  std::optional<ReplayDecision> decision;  // for the next step
   std::vector<Command> commands;
   int32_t first_slot = 0, first_box = 0, num_boxes = 0, first_light = 0;
   std::vector<int32_t> chains;  // [agents] the number of the chain that was written last
@@ -359,14 +361,16 @@ Recorder::Recorder(Simulator& simulator, const RecorderOptions& options) {
 
 Recorder::~Recorder() = default;
 
-void Recorder::before_step(Span<const Command> commands, const std::optional<ReplayDecision>& decision) {
+void Recorder::decide(const ReplayDecision& decision) { parts_->decision = decision; }
+
+void Recorder::before_step(Span<const Command> commands) {
   Parts& parts = *parts_;
   PICTURA_CHECK(commands.size() == static_cast<size_t>(parts.simulator.num_slots()),
                 "replay: expected {} commands, got {}", parts.simulator.num_slots(), commands.size());
   const auto agents = static_cast<size_t>(parts.replay.num_agents);
   const Span<const Command> of_world = commands.subspan(parts.slot(0), agents);
   parts.commands.assign(of_world.begin(), of_world.end());
-  parts.add_decision(decision);
+  parts.add_decision();
 }
 
 void Recorder::after_step(const StepResult& result) {
@@ -376,14 +380,14 @@ void Recorder::after_step(const StepResult& result) {
   parts.add_frame();
 }
 
-bool Recorder::after_reset(Span<const uint8_t> world_mask) {
+void Recorder::after_reset(Span<const uint8_t> world_mask) {
   Parts& parts = *parts_;
-  if (!world_mask.empty() && !world_mask[static_cast<size_t>(parts.world)]) return false;
+  if (!world_mask.empty() && !world_mask[static_cast<size_t>(parts.world)]) return;
+  parts.decision.reset();
   parts.check_room();
   parts.take_seed();
   parts.add_no_step();
   parts.add_frame(/*begins_anew=*/true);
-  return true;
 }
 
 const Replay& Recorder::recorded() const { return parts_->replay; }

@@ -10,6 +10,7 @@
 #include "pictura/common/renderer.h"
 #include "pictura/replay/replay.h"
 #include "pictura/simulator/simulator.h"
+#include "pictura/simulator/step_observer.h"
 
 namespace pictura {
 
@@ -55,19 +56,19 @@ ReplayBox replay_box(const AgentBox& box);
 void check_replay_room(int num_agents, int64_t num_steps);
 
 /// Throws UsageError where the simulator does not work in host memory, or has no such world or agent.
-class Recorder {
+class Recorder final : public StepObserver {
  public:
   /// The state of the simulator, which must outlive the recorder, is the first frame.
   Recorder(Simulator& simulator, const RecorderOptions& options);
-  ~Recorder();
+  ~Recorder() override;
 
-  /// Before each step: its commands [slots], and, where the followed agent's policy was asked, its decision.
-  void before_step(Span<const Command> commands, const std::optional<ReplayDecision>& decision = {});
-  /// After it. Throws Error where the replay would take more memory than it may.
-  void after_step(const StepResult& result);
-  /// After a reset by the caller, not by a step, of the worlds of the mask [worlds] (empty: of all): a new episode
-  /// begins if this recorder's world is among them. Whether it is.
-  bool after_reset(Span<const uint8_t> world_mask = {});
+  /// What the followed agent's policy makes of its state, for the next step.
+  void decide(const ReplayDecision& decision);
+  void before_step(Span<const Command> commands) override;
+  /// Throws Error where the replay would take more memory than it may.
+  void after_step(const StepResult& result) override;
+  /// A new episode begins if this recorder's world is among them.
+  void after_reset(Span<const uint8_t> world_mask = {}) override;
 
   /// What was recorded until now, without images that wait to be compressed; its last frame is the simulator's state.
   const Replay& recorded() const;

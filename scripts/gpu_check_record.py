@@ -21,7 +21,7 @@ import subprocess
 import sys
 import time
 
-SOURCES = ("common map simulator backend_cpu backend_cuda backend_gl backends configuration policy evaluation training drawing replay cli apps bindings "
+SOURCES = ("common map simulator backend_cpu backend_cuda backend_gl backends configuration policy evaluation training drawing replay driving cli apps bindings "
            "examples bench tests cmake").split()
 RESULTS = pathlib.Path("bench/results")
 LAST_LINES = 40

@@ -109,7 +109,13 @@ void SceneRecorder::add_step() {
   ++num_steps_;
 }
 
-void SceneRecorder::after_step() {
+void SceneRecorder::after_step(const StepResult& /*result*/) { follow(); }
+
+void SceneRecorder::after_reset(Span<const uint8_t> world_mask) {
+  if (world_mask.empty() || world_mask[world_]) follow();
+}
+
+void SceneRecorder::follow() {
   is_over_ = is_over_ || simulator_.episode_index()[world_] != episode_ ||
              simulator_.episode_step()[world_] != first_step_ + num_steps_;
   if (is_over_) return;

@@ -8,19 +8,21 @@
 #include "pictura/common/error.h"
 #include "pictura/map/scenario/scenario.h"
 #include "pictura/simulator/simulator.h"
+#include "pictura/simulator/step_observer.h"
 
 namespace pictura {
 
 /// Records one episode of a world in host memory: controlled agents, then parked cars, as tracks, and the states of its
 /// lights, which become recorded ones.
-class SceneRecorder {
+class SceneRecorder final : public StepObserver {
  public:
   /// The state of the simulator, which must outlive the recorder, is the first step. Throws UsageError where the
   /// simulator does not work in host memory or has no such world.
   explicit SceneRecorder(Simulator& simulator, int world = 0);
 
-  /// After each step or reset. What follows the episode is left out. Throws Error where a scene may not be so long.
-  void after_step();
+  /// What follows the episode is left out. Throws Error where a scene may not be so long.
+  void after_step(const StepResult& result) override;
+  void after_reset(Span<const uint8_t> world_mask) override;
   /// Whether the episode that it records is over.
   bool is_over() const { return is_over_; }
   int32_t num_steps() const { return num_steps_; }
@@ -34,6 +36,8 @@ class SceneRecorder {
 
  private:
   Span<const AgentBox> boxes() const;
+  /// After whatever may have been a step of the episode.
+  void follow();
   void add_step();
 
   Simulator& simulator_;

@@ -8,12 +8,12 @@
 
 #include <fmt/ranges.h>
 
-#include "pictura/cli/drive.h"
 #include "pictura/cli/map_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/commit.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/suggestion.h"
+#include "pictura/driving/world.h"
 #include "pictura/map/load_map.h"
 
 namespace pictura {

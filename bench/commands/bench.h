@@ -8,8 +8,8 @@
 #include <CLI/CLI.hpp>
 
 #include "pictura/bench/commands/compare_results.h"
-#include "pictura/cli/drive.h"
 #include "pictura/cli/report.h"
+#include "pictura/driving/world.h"
 
 namespace pictura {
 

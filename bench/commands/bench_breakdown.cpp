@@ -13,6 +13,7 @@
 #include "pictura/bench/commands/plot_results.h"
 #include "pictura/bench/render.h"
 #include "pictura/bench/step_rate.h"
+#include "pictura/cli/backend_options.h"
 #include "pictura/cli/file_options.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"

@@ -7,10 +7,11 @@
 #include "pictura/bench/commands/plot_results.h"
 #include "pictura/bench/history.h"
 #include "pictura/bench/render.h"
-#include "pictura/cli/drive.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
+#include "pictura/cli/world_options.h"
 #include "pictura/common/error.h"
+#include "pictura/driving/world.h"
 #include "pictura/map/load_map.h"
 
 namespace pictura {

@@ -10,11 +10,13 @@
 #include "pictura/bench/commands/bench.h"
 #include "pictura/bench/commands/plot_results.h"
 #include "pictura/bench/render.h"
-#include "pictura/cli/drive.h"
+#include "pictura/cli/backend_options.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
+#include "pictura/cli/world_options.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/numbers.h"
+#include "pictura/driving/world.h"
 
 namespace pictura {
 

@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 
 #include "pictura/bench/commands/bench.h"
+#include "pictura/cli/backend_options.h"
 #ifdef PICTURA_HAS_BENCH
 #include "pictura/bench/render.h"
 #endif

@@ -11,6 +11,7 @@
 #include "pictura/bench/commands/plot_results.h"
 #include "pictura/bench/render.h"
 #include "pictura/bench/step_rate.h"
+#include "pictura/cli/backend_options.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"

@@ -139,7 +139,6 @@ class ProbeRun final : public EvaluationObserver {
 
   void begin(Simulator& simulator) override;
   void before_step(Span<const Command> commands) override;
-  void after_step(const StepResult& /*result*/) override {}
 
  private:
   struct ObservedWorlds;

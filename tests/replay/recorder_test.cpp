@@ -48,7 +48,8 @@ Replay record(Simulator& simulator, const std::string& policy, int steps, const 
     ReplayDecision decision;
     decision.probabilities[3] = 0.25f;
     decision.value = -0.5f * static_cast<float>(step);
-    recorder.before_step(commands, decision);
+    recorder.decide(decision);
+    recorder.before_step(commands);
     const StepResult result = simulator.step(Span<const Command>(commands));
     recorder.after_step(result);
     visit(step + 1, &result, commands);

@@ -46,8 +46,7 @@ Scenario drive(Simulator& simulator, std::vector<std::vector<AgentBox>>* boxes_o
   };
   keep();
   for (uint32_t step = 0; step < kRecordedSteps; ++step) {
-    simulator.step(testing::mixed_actions(simulator.num_slots(), step));
-    recorder.after_step();
+    recorder.after_step(simulator.step(testing::mixed_actions(simulator.num_slots(), step)));
     keep();
   }
   EXPECT_EQ(recorder.num_steps(), kRecordedSteps + 1);
@@ -63,8 +62,7 @@ TEST(SceneRecorder, EachLifeIsATrack) {
   std::vector<Command> commands(6);
   for (int step = 0; step < 300; ++step) {
     driver->act(simulator->controller_input(), {}, commands);
-    simulator->step(Span<const Command>(commands));
-    recorder.after_step();
+    recorder.after_step(simulator->step(Span<const Command>(commands)));
   }
   const SpawnReport report = simulator->spawn_report();
   ASSERT_GT(report.entered, 4);
@@ -166,8 +164,7 @@ TEST(SceneRecorder, AReplayedRecordingIsTheRecording) {
   SceneRecorder recorder(*simulator);
   for (int step = 0; step < 40; ++step) {
     log->act(simulator->controller_input(), {}, commands, {});
-    simulator->step(Span<const Command>(commands));
-    recorder.after_step();
+    recorder.after_step(simulator->step(Span<const Command>(commands)));
   }
   const Scenario again = recorder.scenario("again");
   EXPECT_EQ(again.id, "again");
@@ -198,14 +195,13 @@ TEST(SceneRecorder, EndsWithTheEpisodeAndRefusesWhatItCannotRecord) {
   SceneRecorder recorder(*simulator);
   const std::vector<int32_t> actions(4, kIdleAction);
   for (int step = 0; step < 8; ++step) {
-    simulator->step(actions);
-    recorder.after_step();
+    recorder.after_step(simulator->step(actions));
     EXPECT_EQ(recorder.is_over(), step >= 5);
   }
   EXPECT_EQ(recorder.scenario().num_steps, 6);
   SceneRecorder cut(*simulator);
   simulator->reset();
-  cut.after_step();
+  cut.after_reset({});
   EXPECT_TRUE(cut.is_over());
   EXPECT_THAT(message_of<UsageError>([&] { SceneRecorder(*simulator, 1); }), HasSubstr("in [0, 1), got 1"));
   EXPECT_THAT(message_of<UsageError>([&] { cut.scenario("", 400); }), HasSubstr("got 400"));

@@ -1,12 +1,10 @@
-#include "pictura/cli/replay_cases.h"
+#include "pictura/driving/replay_cases.h"
 
 #include <cmath>
 
-#include "pictura/cli/file_options.h"
-#include "pictura/cli/number_options.h"
-#include "pictura/cli/replay_scenarios.h"
-#include "pictura/cli/report.h"
 #include "pictura/common/error.h"
+#include "pictura/common/support/messages.h"
+#include "pictura/driving/replay_scenarios.h"
 #include "pictura/evaluation/infractions.h"
 
 namespace pictura {
@@ -127,16 +125,6 @@ void write_scene(const CaseReplayOptions& options, const ProbeOptions& probe, co
 }
 
 }  // namespace
-
-void add_case_replay_options(CLI::App* command, CaseReplayOptions* options_out, const std::string& case_help) {
-  CLI::Option* const replay =
-      command
-          ->add_option("--replay", options_out->path,
-                       "A page that plays the scene of one case, follows its ego, and marks the road user")
-          ->check(file_ending(".html"));
-  command->add_option("--case", options_out->number, case_help)->transform(whole_number(0))->needs(replay);
-  add_cameras_option(command, &options_out->recording)->needs(replay);
-}
 
 void check_case_number(const CaseReplayOptions& options, int64_t count) {
   if (options.number && *options.number >= count)

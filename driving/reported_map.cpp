@@ -1,6 +1,6 @@
-#include "pictura/cli/reported_map.h"
+#include "pictura/driving/reported_map.h"
 
-#include "pictura/cli/report.h"
+#include "pictura/common/support/messages.h"
 
 namespace pictura {
 

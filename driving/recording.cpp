@@ -1,15 +1,13 @@
-#include "pictura/cli/record.h"
+#include "pictura/driving/recording.h"
 
 #include <algorithm>
 #include <filesystem>
 
-#include "pictura/cli/drive.h"
-#include "pictura/cli/number_options.h"
-#include "pictura/cli/report.h"
 #include "pictura/commit.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
-#include "pictura/configuration/apply_config.h"
+#include "pictura/common/support/messages.h"
+#include "pictura/driving/world.h"
 #include "pictura/replay/file.h"
 #include "pictura/replay/gallery.h"
 #include "pictura/replay/mcap.h"
@@ -40,8 +38,14 @@ std::string quoted(const std::string& word) {
   constexpr std::string_view kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-+=.,:/@%";
   if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
   std::string text = "'";
-  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return text + "'";
+  for (const char c : word) {
+    if (c == '\'')
+      text += "'\\''";
+    else
+      text += c;
+  }
+  text += '\'';
+  return text;
 }
 
 void say_what_was_written(const std::string& path, const Replay& replay) {
@@ -53,32 +57,10 @@ void say_what_was_written(const std::string& path, const Replay& replay) {
 
 }  // namespace
 
-void add_recording_options(CLI::App* command, RecordingOptions* options_out) {
-  command
-      ->add_option("--follow", options_out->followed,
-                   "The agent whose decisions and images the replay holds, and that it opens with; default: 0, in "
-                   "recorded scenes the self-driving car")
-      ->transform(whole_number(0, kMaxAgentsPerWorld - 1));
-  add_cameras_option(command, options_out);
-}
-
-CLI::Option* add_cameras_option(CLI::App* command, RecordingOptions* options_out) {
-  return command->add_flag(
-      "--cameras", options_out->cameras,
-      "Keep the followed agent's images as well, without loss: as its policy was trained, else the "
-      "paper's. A page holds 10 MB of them, and draws what it does not hold");
-}
-
 void settle_followed(const DrivenWorld& world, RecordingOptions* options_inout) {
   const int num_agents = world.simulator->num_slots(), followed = options_inout->followed.value_or(world.first_agent);
   if (followed >= num_agents) fail_usage("--follow: expected 0 to {}, got {}", num_agents - 1, followed);
   options_inout->followed = followed;
-}
-
-void refuse_recording_options(const CLI::App& command, const std::string& needed) {
-  for (const char* option : {"--follow", "--cameras"}) {
-    if (command.count(option) > 0) fail_usage("{}: has no effect without {}", option, needed);
-  }
 }
 
 std::string command_line() {
@@ -87,7 +69,12 @@ std::string command_line() {
   for (size_t begin = 0; begin < words.size();) {
     const size_t end = std::min(words.find('\0', begin), words.size());
     const std::string word = words.substr(begin, end - begin);
-    line += begin == 0 ? std::filesystem::path(word).filename().string() : " " + quoted(word);
+    if (begin == 0) {
+      line = std::filesystem::path(word).filename().string();
+    } else {
+      line += ' ';
+      line += quoted(word);
+    }
     begin = end + 1;
   }
   return line;
@@ -145,7 +132,9 @@ Recording::Recording(Simulator& simulator, const RecordedDriver& driver, const R
 Recording::~Recording() = default;
 
 void Recording::before_step(Span<const Command> commands) {
-  parts_->recorder.before_step(commands, decision_of_agent(parts_->simulator, parts_->driver, parts_->followed));
+  const auto decision = decision_of_agent(parts_->simulator, parts_->driver, parts_->followed);
+  if (decision) parts_->recorder.decide(*decision);
+  parts_->recorder.before_step(commands);
 }
 
 void Recording::after_step(const StepResult& result) { parts_->recorder.after_step(result); }

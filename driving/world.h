@@ -1,22 +1,20 @@
-// One world of one map for `render` and `simulate`, and the controller that drives in it, by name or from a checkpoint.
+// One world of one map, and the controller that drives in it, by name or from a checkpoint.
 #pragma once
 
-#include <initializer_list>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
-#include "pictura/cli/backend_options.h"
+#include "pictura/common/error.h"
 #include "pictura/common/renderer.h"
 #include "pictura/simulator/controllers/controller.h"
 #include "pictura/simulator/simulator.h"
+#include "pictura/simulator/step_observer.h"
 
 namespace pictura {
 
-/// Options that every command with a world shares.
+/// What all worlds that are driven here share.
 struct WorldOptions {
   std::string map;
   int agents = 32;
@@ -37,33 +35,10 @@ struct WorldOptions {
   int min_episode_steps = 1;
 };
 
-/// Adds --agents, --pedestrians, --cyclists, --parked, --seed, --threads and --no-walls, which fill *options_out.
-void add_world_options(CLI::App* command, WorldOptions* options_out);
-
-/// Adds --light-cycles. `otherwise` says what holds where it is not given.
-void add_light_cycles_option(CLI::App* command, std::optional<LightCycles>* cycles_out, const std::string& otherwise);
-
-/// Adds --light-heads, for commands whose worlds are seen by cameras.
-void add_light_heads_option(CLI::App* command, std::optional<LightHeads>* heads_out);
-
-/// Adds what chooses of a recorded scene: --start and --recorded-lights.
-void add_scene_options(CLI::App* command, WorldOptions* options_out);
-/// Throws UsageError where one of these, or of `more` options of recorded scenes, was given for another map.
-void refuse_scene_options(const CLI::App& command, const std::string& map, std::initializer_list<const char*> more);
-
-/// Throws UsageError where one of these options was given; `why` says where it would have no effect.
-void refuse_options(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why);
-
-/// Adds MAP, which may be a recorded scene, those options, --light-cycles, --light-heads, --control, --start, --steps,
-/// --policy and where the policy runs.
-void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_out, std::string* policy_out,
-                         BackendOptions* backends_out);
-
-/// What these options mean for a recorded scene, where MAP is one: everybody is driven as recorded unless a policy was
-/// asked for, for as many steps as are recorded unless --steps was given (else *steps_inout becomes 0). Throws
-/// UsageError for options that have no effect on what MAP is.
-void settle_driving_options(const CLI::App& command, WorldOptions* world_inout, int* steps_inout,
-                            std::string* policy_inout);
+/// What computes; empty where nothing was asked for.
+struct BackendOptions {
+  std::string device, simulator, renderer, samples;
+};
 
 /// Sets the shares of pedestrians and cyclists that were given; a share that was not gives way to one that was. Throws
 /// UsageError where both were given and are more than 1.
@@ -71,9 +46,6 @@ void set_population(const WorldOptions& options, SimulatorConfig* config_inout);
 
 /// Whether a policy is the name of a controller that needs no checkpoint.
 bool is_host_controller(const std::string& policy);
-
-/// Throws UsageError where a policy that computes and draws nothing was given options that say by what.
-void refuse_idle_backend_options(const CLI::App& command, const std::string& policy);
 
 class PolicySession;
 
@@ -90,7 +62,10 @@ struct DrivenWorld {
 
   /// Lets the controller choose the commands of the next step.
   void act() { controller->act(simulator->controller_input(), {}, commands); }
-  StepResult step() { return simulator->step(commands); }
+  /// Steps by them, as step_observed().
+  StepResult step(const std::vector<StepObserver*>& observers = {}) {
+    return step_observed(*simulator, Span<Command>(commands), observers);
+  }
 };
 
 /// A world of options.agents agents on the map, at the start of its first episode, with evaluation's light timing.

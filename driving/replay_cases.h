@@ -4,9 +4,7 @@
 #include <optional>
 #include <string>
 
-#include <CLI/CLI.hpp>
-
-#include "pictura/cli/record.h"
+#include "pictura/driving/recording.h"
 #include "pictura/evaluation/probes/corner.h"
 #include "pictura/evaluation/probes/pedestrian.h"
 #include "pictura/evaluation/probes/removal.h"
@@ -18,9 +16,6 @@ struct CaseReplayOptions {
   std::optional<int64_t> number;  // of the case, as in cases.csv; nothing: see write_case_replay()
   RecordingOptions recording;     // whom it follows is the case's ego
 };
-
-/// Adds --replay, --case with its help, and --cameras.
-void add_case_replay_options(CLI::App* command, CaseReplayOptions* options_out, const std::string& case_help);
 
 /// Throws UsageError where there is no case of the number that was asked for among `count`. A probe's number of cases
 /// may be known only in the end: before, `count` is the most that there can be.

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "pictura/cli/record.h"
+#include "pictura/driving/recording.h"
 #include "pictura/evaluation/evaluate.h"
 
 namespace pictura {

@@ -1,11 +1,8 @@
-#include "pictura/cli/serve.h"
+#include "pictura/cli/serve_options.h"
 
-#include <chrono>
 #include <optional>
 
-#include "pictura/cli/report.h"
 #include "pictura/common/error.h"
-#include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/numbers.h"
 
 namespace pictura {
@@ -36,30 +33,6 @@ void add_serve_options(CLI::App* command, ServeOptions* options_out) {
   command->add_option("--serve-host", options_out->host_name,
                       "With --serve: listen on all of this machine's addresses, for pages that name it so. Whoever "
                       "has the address can then drive; nothing is encrypted");
-}
-
-std::unique_ptr<LiveView> serve(const ServeOptions& options, Simulator& simulator, const RecordedDriver& driver,
-                                const RecordingOptions& recording) {
-  const LiveViewOptions view{.port = options.port,
-                             .host_name = options.host_name,
-                             .watched = recording.followed.value_or(0),
-                             .cameras = cameras_of(driver),
-                             .sends_images = recording.cameras};
-  auto serving = std::make_unique<LiveView>(simulator, view, origin_of(driver), [&simulator, driver](int agent) {
-    return decision_of_agent(simulator, driver, agent);
-  });
-  // A page opens with the agent that its address names.
-  const std::string opens_with = recording.followed ? fmt::format("#agent={}", *recording.followed) : "";
-  print_message("serving {}{} (^C ends it)\n", serving->address(), opens_with);
-  return serving;
-}
-
-bool await_step(LiveView& view) {
-  constexpr std::chrono::milliseconds kGlance{50};  // between two looks at whether to end
-  while (!interrupted()) {
-    if (view.is_due(kGlance)) return true;
-  }
-  return false;
 }
 
 }  // namespace pictura

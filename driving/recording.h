@@ -1,11 +1,9 @@
-// Recording what drives in a world as replays: the options, and what a policy makes of the followed agent.
+// Recording what drives in a world as replays, and what a policy makes of the followed agent.
 #pragma once
 
 #include <memory>
 #include <optional>
 #include <string>
-
-#include <CLI/CLI.hpp>
 
 #include "pictura/common/renderer.h"
 #include "pictura/common/support/filled_folder.h"
@@ -22,16 +20,9 @@ struct RecordingOptions {
   bool cameras = false;
 };
 
-/// Adds --follow and --cameras.
-void add_recording_options(CLI::App* command, RecordingOptions* options_out);
-/// Adds --cameras alone, for replays that choose whom they follow.
-CLI::Option* add_cameras_option(CLI::App* command, RecordingOptions* options_out);
 /// Follows the world's first agent where nothing was asked for. Throws UsageError unless the world has the followed
 /// one.
 void settle_followed(const DrivenWorld& world, RecordingOptions* options_inout);
-/// Throws UsageError where the command was given one of them, which has no effect without `needed`.
-void refuse_recording_options(const CLI::App& command, const std::string& needed);
-
 /// Who drives, and what draws. A controller has no session; without it, cameras are the paper's.
 struct RecordedDriver {
   std::string policy;  // as it was asked for
@@ -47,15 +38,14 @@ std::optional<ReplayDecision> decision_of_agent(Simulator& simulator, const Reco
 ReplayOrigin origin_of(const RecordedDriver& driver);
 
 /// Records the only world of a simulator in host memory.
-class Recording {
+class Recording final : public StepObserver {
  public:
   /// The simulator and what the driver names must outlive it. Throws UsageError where there is no such agent.
   Recording(Simulator& simulator, const RecordedDriver& driver, const RecordingOptions& options);
-  ~Recording();
+  ~Recording() override;
 
-  /// Around each step.
-  void before_step(Span<const Command> commands);
-  void after_step(const StepResult& result);
+  void before_step(Span<const Command> commands) override;
+  void after_step(const StepResult& result) override;
 
   /// The replay until now, of which nothing more can be recorded.
   Replay finish();

@@ -1,4 +1,4 @@
-// Loads maps for commands that use them: says on stderr what was mended in their files.
+// Loads maps for programs that use them: says on stderr what was mended in their files.
 #pragma once
 
 #include <memory>

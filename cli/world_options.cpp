@@ -1,25 +1,12 @@
-#include "pictura/cli/drive.h"
+#include "pictura/cli/world_options.h"
 
-#include <algorithm>
-#include <filesystem>
 #include <iterator>
 
-#include "pictura/backends/make_controller.h"
-#include "pictura/backends/make_simulator.h"
-#include "pictura/backends/upload_maps.h"
+#include "pictura/cli/backend_options.h"
 #include "pictura/cli/file_options.h"
 #include "pictura/cli/number_options.h"
-#include "pictura/cli/reported_map.h"
 #include "pictura/common/error.h"
-#include "pictura/common/support/suggestion.h"
-#include "pictura/configuration/apply_config.h"
 #include "pictura/map/scenario/load_scenario.h"
-#include "pictura/simulator/controllers/host_controllers.h"
-#include "pictura/simulator/controllers/shared_control.h"
-#include "pictura/simulator/recorded_scene.h"
-#ifdef PICTURA_HAS_TORCH
-#include "pictura/policy/session.h"
-#endif
 
 namespace pictura {
 
@@ -137,112 +124,10 @@ void settle_driving_options(const CLI::App& command, WorldOptions* world_inout, 
   }
 }
 
-bool is_host_controller(const std::string& policy) {
-  const std::vector<std::string> names = host_controller_names();
-  return std::find(names.begin(), names.end(), policy) != names.end();
-}
-
 void refuse_idle_backend_options(const CLI::App& command, const std::string& policy) {
   if (!is_host_controller(policy)) return;
   refuse_options(command, {"--device", "--renderer", "--samples"},
                  fmt::format("with the policy '{}', which computes and draws nothing", policy));
-}
-
-void set_population(const WorldOptions& options, SimulatorConfig* config_inout) {
-  float& pedestrians = config_inout->pedestrian_fraction;
-  float& cyclists = config_inout->cyclist_fraction;
-  pedestrians = options.pedestrian_fraction.value_or(pedestrians);
-  cyclists = options.cyclist_fraction.value_or(cyclists);
-  if (pedestrians + cyclists <= 1) return;
-  if (options.pedestrian_fraction && options.cyclist_fraction) {
-    fail_usage("--pedestrians and --cyclists: expected at most 1 together, got {} + {}", pedestrians, cyclists);
-  }
-  (options.pedestrian_fraction ? cyclists : pedestrians) = 1 - (options.pedestrian_fraction ? pedestrians : cyclists);
-}
-
-namespace {
-
-/// [tracks] those that the policy drives: the controlled ones that are there at the start.
-std::vector<uint8_t> controlled_tracks(const WorldOptions& options, const CompiledMap& map) {
-  try {
-    return tracks_of(*map.scenario, options.controlled, map.start_step);
-  } catch (const UsageError& error) {
-    fail_usage("--control: {}", error.what());
-  }
-}
-
-}  // namespace
-
-DrivenWorld make_world(const WorldOptions& options, const std::string& policy, const BackendOptions& backends) {
-  if (backends.simulator == "cuda") {
-    fail_usage(
-        "--simulator cuda: its states and scenes lie on the device, and reading them back for pictures and reports "
-        "is missing from this version: choose cpu");
-  }
-  SimulatorConfig config;
-  DrivenWorld world;
-  const bool is_trained = !is_host_controller(policy);
-  config.vector_observations = options.vector_observations;
-  if (is_trained) {
-#ifdef PICTURA_HAS_TORCH
-    const std::vector<std::string> names = host_controller_names();
-    if (const std::string near = suggestion(policy, names); !near.empty() && !std::filesystem::exists(policy)) {
-      fail_usage("--policy: expected {}, or a checkpoint's file, got '{}'{}", fmt::join(names, ", "), policy, near);
-    }
-    world.session = std::make_shared<PolicySession>(
-        policy, SessionOptions{.num_threads = options.num_threads,
-                               .device = backends.device.empty() ? "auto" : backends.device,
-                               .simulator = "cpu",
-                               .renderer = backends.renderer,
-                               .samples = backends.samples});
-    world.renderer = world.session->make_renderer();
-    if (world.renderer) world.trained_view = world.session->renderer_config();
-    const SimulatorConfig defaults;
-    config = world.session->evaluation_world(defaults.episode_steps);
-    config.reset_inactive_fraction = defaults.reset_inactive_fraction;
-#else
-    const std::vector<std::string> names = host_controller_names();
-    fail_usage("--policy: expected {} (this build has no torch for checkpoints), got '{}'{}", fmt::join(names, ", "),
-               policy, suggestion(policy, names));
-#endif
-  }
-  config.seed = options.seed;
-  config.num_threads = options.num_threads;
-  config.walls = config.walls && options.walls;
-  config.light_heads = options.light_heads.value_or(config.light_heads);
-  config.light_cycles = options.light_cycles.value_or(config.light_cycles);
-  config.fixed_lights = true;
-  set_population(options, &config);
-  config.parked_cars = options.parked_cars.value_or(config.parked_cars);
-  const std::string simulator = backends.simulator.empty() ? "cpu" : backends.simulator;
-  std::vector<uint8_t> controlled;  // of a recorded scene, by other than the record
-  if (is_scene_name(options.map)) {
-    const auto scene = std::make_shared<const Scenario>(load_scenario(options.map));
-    config = scene_config(*scene, options.start_step, config);
-    config.episode_steps = std::max(config.episode_steps, options.min_episode_steps);
-    MapOptions compiled = map_options(config);
-    compiled.recorded_lights = options.recorded_lights;
-    const auto map = compile_scenario(scene, compiled, options.start_step);
-    if (policy != "log") controlled = controlled_tracks(options, *map);
-    world.simulator = make_simulator(simulator, config, CompiledMaps{map}, {scene_world(*map)});
-    world.first_agent = std::max(scene->sdc_track, 0);
-  } else {
-    world.simulator = make_simulator(simulator, config, {load_reported_map(options.map)}, {{0, options.agents, 0}});
-  }
-  world.commands.resize(static_cast<size_t>(world.simulator->num_slots()));
-#ifdef PICTURA_HAS_TORCH
-  if (is_trained) {
-    if (world.renderer) upload_maps(*world.simulator, world.renderer.get());
-    world.controller = world.session->make_controller(world.renderer.get(), /*argmax=*/true, options.seed);
-  }
-#endif
-  if (!world.controller) world.controller = make_controller(policy, *world.simulator, options.seed);
-  if (controlled.empty()) return world;
-  std::vector<Driver> drivers;
-  drivers.push_back({.controller = make_controller("log", *world.simulator, options.seed)});
-  drivers.push_back(driver_of(std::move(world.controller), std::move(controlled)));
-  world.controller = std::make_unique<SharedControl>(std::move(drivers));
-  return world;
 }
 
 }  // namespace pictura

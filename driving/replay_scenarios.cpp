@@ -1,14 +1,15 @@
-#include "pictura/cli/replay_scenarios.h"
+#include "pictura/driving/replay_scenarios.h"
 
 #include <algorithm>
+#include <array>
 #include <optional>
 
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
-#include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/filled_folder.h"
 #include "pictura/common/support/interrupt.h"
+#include "pictura/common/support/messages.h"
 #include "pictura/evaluation/probes/driven_scenes.h"
 #include "pictura/policy/session.h"
 #include "pictura/simulator/saved_worlds.h"
@@ -47,7 +48,6 @@ class ScenarioKeeper final : public EvaluationObserver {
     scenes_.add(*simulator_, 0);
     if (steps_++ == step_) kept_ = keep_worlds(*simulator_, simulator_->save(), {0})[0];
   }
-  void after_step(const StepResult&) override {}
 
   const DrivenScene& scene(int number) const { return scenes_.of(number); }
   const KeptWorld* kept() const { return kept_.get(); }
@@ -180,6 +180,7 @@ Replay record_takeover(const EvaluateOptions& options, const RecordedScenario& s
   RecordingOptions followed = recording;
   followed.followed = takeover.agent;
   Recording recorded(*simulator, {takeover.policy, session.get(), renderer.get()}, followed);
+  const std::array<StepObserver*, 1> observers{&recorded};
   const std::unique_ptr<PolicyController> controller = session->make_controller(renderer.get(), one.argmax, one.seed);
   std::vector<uint8_t> mask(static_cast<size_t>(simulator->num_slots()));
   mask[static_cast<size_t>(takeover.agent)] = 1;
@@ -188,8 +189,7 @@ Replay record_takeover(const EvaluateOptions& options, const RecordedScenario& s
     scene.command_places(takeover.step + step + 1, commands.data());
     controller->act(simulator->controller_input(), mask, commands);
     if (controller->num_driven() == 0) break;
-    recorded.before_step(commands);
-    recorded.after_step(simulator->step(Span<const Command>(commands)));
+    step_observed(*simulator, Span<Command>(commands), observers);
   }
   return recorded.finish();
 }

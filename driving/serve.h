@@ -1,12 +1,10 @@
-// `--serve`: the options, and a live view of what a command simulates.
+// A live view of what a program simulates.
 #pragma once
 
 #include <memory>
 #include <string>
 
-#include <CLI/CLI.hpp>
-
-#include "pictura/cli/record.h"
+#include "pictura/driving/recording.h"
 #include "pictura/replay/live_view.h"
 
 namespace pictura {
@@ -16,9 +14,6 @@ struct ServeOptions {
   int port = 0;
   std::string host_name;
 };
-
-/// Adds --serve and --serve-host.
-void add_serve_options(CLI::App* command, ServeOptions* options_out);
 
 /// Serves the only world of a simulator in host memory, and says where on stderr. The simulator and what the driver
 /// names must outlive it. Throws UsageError where this build cannot, Error where the port is taken.

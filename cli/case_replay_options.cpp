@@ -1,0 +1,19 @@
+#include "pictura/cli/case_replay_options.h"
+
+#include "pictura/cli/file_options.h"
+#include "pictura/cli/number_options.h"
+#include "pictura/cli/recording_options.h"
+
+namespace pictura {
+
+void add_case_replay_options(CLI::App* command, CaseReplayOptions* options_out, const std::string& case_help) {
+  CLI::Option* const replay =
+      command
+          ->add_option("--replay", options_out->path,
+                       "A page that plays the scene of one case, follows its ego, and marks the road user")
+          ->check(file_ending(".html"));
+  command->add_option("--case", options_out->number, case_help)->transform(whole_number(0))->needs(replay);
+  add_cameras_option(command, &options_out->recording)->needs(replay);
+}
+
+}  // namespace pictura

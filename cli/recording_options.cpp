@@ -1,0 +1,30 @@
+#include "pictura/cli/recording_options.h"
+
+#include "pictura/cli/number_options.h"
+#include "pictura/common/error.h"
+
+namespace pictura {
+
+void add_recording_options(CLI::App* command, RecordingOptions* options_out) {
+  command
+      ->add_option("--follow", options_out->followed,
+                   "The agent whose decisions and images the replay holds, and that it opens with; default: 0, in "
+                   "recorded scenes the self-driving car")
+      ->transform(whole_number(0, kMaxAgentsPerWorld - 1));
+  add_cameras_option(command, options_out);
+}
+
+CLI::Option* add_cameras_option(CLI::App* command, RecordingOptions* options_out) {
+  return command->add_flag(
+      "--cameras", options_out->cameras,
+      "Keep the followed agent's images as well, without loss: as its policy was trained, else the "
+      "paper's. A page holds 10 MB of them, and draws what it does not hold");
+}
+
+void refuse_recording_options(const CLI::App& command, const std::string& needed) {
+  for (const char* option : {"--follow", "--cameras"}) {
+    if (command.count(option) > 0) fail_usage("{}: has no effect without {}", option, needed);
+  }
+}
+
+}  // namespace pictura

@@ -1,0 +1,19 @@
+// Options of commands that record replays.
+#pragma once
+
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "pictura/driving/recording.h"
+
+namespace pictura {
+
+/// Adds --follow and --cameras.
+void add_recording_options(CLI::App* command, RecordingOptions* options_out);
+/// Adds --cameras alone, for replays that choose whom they follow.
+CLI::Option* add_cameras_option(CLI::App* command, RecordingOptions* options_out);
+/// Throws UsageError where the command was given one of them, which has no effect without `needed`.
+void refuse_recording_options(const CLI::App& command, const std::string& needed);
+
+}  // namespace pictura
