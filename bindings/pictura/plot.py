@@ -1,0 +1,964 @@
+"""Charts of trainings, evaluations, probes and benchmarks, from the CSV and JSON files that these write.
+
+    from pictura import plot
+    plot.save(plot.run_curves(["runs/a", "runs/b"], x="hours"), "curves.png")
+    plot.figure(plot.probe_means("probe_removal/summary.json"))  # a Matplotlib figure, for notebooks
+
+A function that ends in _curves, _rates, _costs, _parts or _means reads files and returns a Chart: the data that is drawn.
+figure() and save() draw it. Only these need Matplotlib; the rest needs Python 3.11 alone, neither NumPy nor pictura's
+extensions. `pictura plot`, `pictura probe` and `pictura bench --plot` carry this file and run it as a program:
+
+    python -m pictura.plot '{"chart": "run_curves", "runs": ["runs/a"], "out": "curves.png"}'
+
+takes a function's name and arguments as one JSON object, with the picture's name as "out". It exits with 0, with 1 after an
+error, or with 3 without Matplotlib, after writing the chart's data as JSON to the picture's name and ".json".
+"""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import errno
+import io
+import itertools
+import json
+import math
+import os
+import pathlib
+import re
+import secrets
+import shutil
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Okabe and Ito's colours, which colour-blind people tell apart, but for their yellow, which is faint on white.
+SERIES_COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#5A5A5A")
+# Of a share from 0 to 1: hidden, half seen, seen whole.
+SHARE_COLORS = ("#D73027", "#FEE090", "#4575B4")
+_REVEALING = ("#E3E5E8", "#5A6068")  # line of sight opens seldom, often
+
+METRICS = (
+    "charts/episode_return",
+    "driving/goals_per_1000_steps",
+    "driving/mean_speed_mps",
+    "driving/at_fault_collisions_per_1000_steps",
+    "driving/off_road_per_1000_steps",
+    "driving/red_light_per_1000_steps",
+)
+# Means of consecutive updates beyond this many.
+MAX_RUN_POINTS = 200
+_NAN = math.nan
+
+
+class PlotError(Exception):
+    """A file or an argument that cannot be drawn; names it."""
+
+
+class MissingMatplotlib(PlotError):
+    """No picture without Matplotlib."""
+
+
+@dataclass
+class Series:
+    """One line. Points that are not finite, or not above 0 on a logarithmic axis, leave a gap."""
+
+    name: str
+    x: list[float] = field(default_factory=list)
+    y: list[float] = field(default_factory=list)
+    low: list[float] = field(default_factory=list)  # of a band behind the line: as long, or empty where there is none
+    high: list[float] = field(default_factory=list)
+    dashed: bool = False
+
+    def add(self, x: float, y: float | None, low: float | None = None, high: float | None = None) -> None:
+        """Adds a point; None is no number. Points of a series all have a band, where any has."""
+        for values, value in ((self.x, x), (self.y, y), (self.low, low), (self.high, high)):
+            values.append(_NAN if value is None else float(value))
+
+    def add_estimate(self, x: float, value: float | None, half_width: float | None, least: float = -math.inf) -> None:
+        """Adds a value in its confidence interval, which ends at `least`."""
+        has_band = value is not None and half_width is not None
+        self.add(x, value, *((max(least, value - half_width), value + half_width) if has_band else ()))
+
+
+@dataclass
+class Panel:
+    title: str
+    x_label: str
+    y_label: str
+    series: list[Series] = field(default_factory=list)
+    x_scale: str = "linear"  # or "log", with ticks where points are
+    y_scale: str = "linear"  # or "log"
+    starts_at_zero: bool = False  # the y axis
+    marks: list[tuple[float, str]] = field(default_factory=list)  # dashed lines across the panel, labelled above it
+    strip: list[tuple[float, str]] = field(default_factory=list)  # colours under the x axis, which reach half way to their neighbours
+
+
+@dataclass
+class Chart:
+    panels: list[Panel]
+    columns: int = 3
+    panel_size_in: tuple[float, float] = (3.5, 2.7)
+    facts: dict[str, Any] = field(default_factory=dict)  # what a report says of it beside the picture's name
+
+
+def _finite_or_null(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _need(condition: Any, message: str) -> None:
+    if not condition:
+        raise PlotError(message)
+
+
+def _read_json(path: str) -> Any:
+    try:
+        return json.loads(pathlib.Path(path).read_text(encoding="utf-8"))
+    except ValueError as error:  # of JSON and of UTF-8
+        raise PlotError(f"{path}: expected JSON: {error}") from None
+
+
+# ---- runs
+
+
+@dataclass
+class _Run:
+    folder: str
+    path: str
+    columns: dict[str, list[float]]
+    settings: Any  # config.toml but for run.seed; the folder where runs are not grouped
+    seed: int = 0
+
+    def column(self, name: str) -> list[float]:
+        _need(name in self.columns, f"{self.path}: expected a column '{name}'; it has {', '.join(self.columns)}")
+        return self.columns[name]
+
+
+def _number(text: str) -> float | None:
+    # float() takes more than what is written: spaces and underscores.
+    try:
+        return None if "_" in text or text != text.strip() else float(text)
+    except ValueError:
+        return None
+
+
+def _read_progress(folder: str) -> tuple[str, dict[str, list[float]]]:
+    path = f"{folder}/progress.csv"
+    _need(os.path.isdir(folder), f"{folder}: expected the folder of a training run")
+    _need(os.path.exists(path), f"{folder}: expected the folder of a training run: it has no progress.csv")
+    lines = pathlib.Path(path).read_text(encoding="utf-8").splitlines()
+    names = lines[0].split(",") if lines else []
+    for i, name in enumerate(names):
+        _need(name not in names[:i], f"{path}:1: column '{name}' stands twice")
+    columns: dict[str, list[float]] = {name: [] for name in names}
+    for number, line in enumerate(lines[1:], 2):
+        cells = line.split(",")
+        for i, cell in enumerate(cells):
+            value = _number(cell)
+            _need(i < len(names) and value is not None, f"{path}:{number}: expected {len(names)} numbers, got '{cell}' as number {i + 1}")
+            columns[names[i]].append(value)  # type: ignore[arg-type]
+        _need(len(cells) == len(names), f"{path}:{number}: expected {len(names)} numbers, got {len(cells)}")
+    _need(columns and len(columns[names[0]]) > 0, f"{path}: has no update yet")
+    return path, columns
+
+
+def _read_run(folder: str, groups_seeds: bool) -> _Run:
+    path, columns = _read_progress(folder)
+    if not groups_seeds:
+        return _Run(folder, path, columns, folder)
+    import tomllib
+
+    config_path = f"{folder}/config.toml"
+    _need(
+        os.path.exists(config_path),
+        f"{config_path}: expected beside progress.csv, to find runs that differ in their seed alone; --group none needs none",
+    )
+    try:
+        config = tomllib.loads(pathlib.Path(config_path).read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise PlotError(f"{config_path}: expected TOML: {error}") from None
+    section = config.get("run")
+    seed = section.pop("seed", None) if isinstance(section, dict) else None
+    _need(isinstance(seed, int), f"{config_path}: expected a number run.seed")
+    return _Run(folder, path, columns, config, seed)  # type: ignore[arg-type]
+
+
+def _column_of(metric: str, run: _Run) -> str:
+    """The column that a metric names in full, or by what follows its slash."""
+    if metric in run.columns:
+        return metric
+    found = [name for name in run.columns if name.endswith(f"/{metric}")]
+    _need(len(found) < 2, f"{run.path}: '{metric}' may be {' or '.join(found)}")
+    return found[0] if found else metric  # column() refuses one that is not there
+
+
+def _mean_of_finite(values: Iterable[float]) -> float:
+    finite = [value for value in values if math.isfinite(value)]
+    return sum(finite) / len(finite) if finite else _NAN
+
+
+def _curve_of(run: _Run, x: str, column: str) -> Series:
+    """A run's curve, in at most MAX_RUN_POINTS points."""
+    if x == "hours":
+        seconds = zip(run.column("time/rollout_s"), run.column("time/update_s"), strict=True)
+        along = [total_s / 3600 for total_s in itertools.accumulate(map(sum, seconds))]
+    else:
+        along = run.column("charts/agent_steps")
+    heights = run.column(column)
+    stride = -(-len(along) // MAX_RUN_POINTS)
+    begins = range(0, len(along), stride)
+    return Series(
+        column,
+        [_mean_of_finite(along[begin : begin + stride]) for begin in begins],
+        [_mean_of_finite(heights[begin : begin + stride]) for begin in begins],
+    )
+
+
+def _height_at(curve: Series, x: float) -> float:
+    """A curve's height between its points; NaN beside one that is not finite."""
+    after = next((i for i, at in enumerate(curve.x) if at >= x), len(curve.x) - 1)
+    if after == 0 or curve.x[after] == x:
+        return curve.y[after]
+    share = (x - curve.x[after - 1]) / (curve.x[after] - curve.x[after - 1])
+    return curve.y[after - 1] + share * (curve.y[after] - curve.y[after - 1])
+
+
+def _mean_of_curves(curves: list[Series], name: str) -> Series:
+    """The mean of curves where all of them are, and a band from the lowest to the highest."""
+    low, high = max(curve.x[0] for curve in curves), min(curve.x[-1] for curve in curves)
+    _need(low <= high, f"{name}: these runs have no stretch in common; --group none draws them apart")
+    last = max(len(curve.x) for curve in curves) - 1
+    mean = Series(name)
+    for i in range(last + 1):
+        x = high if i == last else low + i / last * (high - low)  # not beyond the end by rounding
+        heights = [_height_at(curve, x) for curve in curves]
+        mean.add(x, *((sum(heights) / len(heights), min(heights), max(heights)) if all(map(math.isfinite, heights)) else (None,)))
+    return mean
+
+
+def _name_of_group(names: list[str]) -> str:
+    """ "town_*, 3 seeds" of town_a, town_b and town_c."""
+    if len(names) == 1:
+        return names[0]
+    begin = os.path.commonprefix(names)
+    # Beginning and end do not overlap in the shortest name.
+    end = os.path.commonprefix([name[len(begin) :][::-1] for name in names])[::-1]
+    return f"{begin}*{end}, {len(names)} seeds"
+
+
+_UNITS = {
+    "_per_1000_steps": "per 1,000 agent-steps",
+    "_per_km": "per km",
+    "_mps": "m/s",
+    "_per_step": "per agent-step",
+    "_per_s": "per second",
+    "_share": "share",
+    "_fraction": "share",
+    "_rate": "",
+    "_s": "s",
+}
+_UNITS_OF_WHOLE_NAMES = {"episode_return": "sum of rewards", "entropy": "nats", "approx_kl": "nats"}
+
+
+def _labels_of(column: str) -> tuple[str, str]:
+    """Title and unit of a column: "driving/goals_per_1000_steps" is Goals per 1,000 agent-steps."""
+    title = column.split("/")[-1]
+    suffix = next((suffix for suffix in _UNITS if title.endswith(suffix)), "")
+    unit = _UNITS.get(suffix, "")
+    whole_unit = _UNITS_OF_WHOLE_NAMES.get(title, "")
+    title = title.removesuffix(suffix if unit else "").replace("_", " ")
+    title = title[:1].upper() + title[1:]
+    return (f"Reward: {title}" if column.startswith("rewards/") else title), unit or whole_unit
+
+
+def run_curves(runs: Sequence[str], metrics: Sequence[str] = METRICS, x: str = "agent_steps", group: str = "seeds") -> Chart:
+    """Curves of training runs, a panel a metric, a line a run.
+
+    runs: folders that `pictura train` wrote. metrics: columns of progress.csv, or what follows their slash where only one
+    column has it. x: "agent_steps", or "hours" of collecting and improving. group: "seeds" makes one line of runs whose
+    config.toml differ in run.seed alone, their mean over the stretch that all of them cover with a band from the lowest to the
+    highest; "none" draws a line each. A line has MAX_RUN_POINTS points at most, means of as many consecutive updates each.
+    Raises PlotError naming the folder, file or column that is missing, or runs that have no stretch in common.
+    """
+    _need(runs and metrics, "run_curves: expected a run and a metric or more")
+    read: list[_Run] = []
+    for folder in map(str, runs):
+        read.append(_read_run(folder, group == "seeds"))
+        for other in read[:-1]:
+            _need(not os.path.samefile(other.folder, folder), f"{folder}: is the same folder as {other.folder}")
+    names = [os.path.basename(os.path.realpath(run.folder)) for run in read]
+    if len(set(names)) < len(names):
+        names = [run.folder for run in read]
+
+    members: list[list[int]] = []  # of each line, by run
+    for i, run in enumerate(read):
+        same = next((lines for lines in members if read[lines[0]].settings == run.settings), None)
+        if same is None:
+            members.append([i])
+        else:
+            same.append(i)
+    line_names = [_name_of_group([names[i] for i in line]) for line in members]
+
+    columns = [_column_of(metric, read[0]) for metric in metrics]
+    panels = []
+    for column in columns:
+        title, unit = _labels_of(column)
+        panel = Panel(title, "time of collecting and improving (h)" if x == "hours" else "agent-steps", unit)
+        for name, line in zip(line_names, members, strict=True):
+            curves = [_curve_of(read[i], x, column) for i in line]
+            panel.series.append(curves[0] if len(curves) == 1 else _mean_of_curves(curves, name))
+            panel.series[-1].name = name
+        panels.append(panel)
+
+    lines = [
+        {
+            "name": name,
+            "runs": [read[i].folder for i in line],
+            "seeds": [read[i].seed for i in line] if group == "seeds" else [],
+            **_extent_of(panels[0].series[index]),
+            "last": {column: _finite_or_null(panel.series[index].y[-1]) for column, panel in zip(columns, panels, strict=True)},
+        }
+        for index, (name, line) in enumerate(zip(line_names, members, strict=True))
+    ]
+    facts = {"x": x, "metrics": columns, "band": "lowest to highest seed", "lines": lines}
+    return Chart(panels, columns=_columns_for(len(panels)), facts=facts)
+
+
+def _extent_of(series: Series) -> dict[str, float]:
+    return {"points": len(series.x), "x_first": series.x[0], "x_last": series.x[-1]}
+
+
+def _columns_for(num_panels: int) -> int:
+    return 2 if num_panels in (2, 4) else 3
+
+
+# ---- evaluations
+
+
+# Key, title and label; as the columns of the paper's tables.
+_PROTOCOL = (
+    ("at_fault_collision_rate", "At-fault collision", "share of vehicles"),
+    ("off_road_rate", "Off-road", "share of vehicles"),
+    ("red_light_rate", "Red light", "share of vehicles"),
+    ("goals_per_vehicle", "Goals", "per vehicle"),
+    ("km_per_infraction", "Distance per infraction", "distance (km)"),
+    ("km_per_at_fault_infraction", "Distance per at-fault infraction", "distance (km)"),
+)
+# Without a panel where no row has it.
+_OPTIONAL = ("km_per_infraction", "km_per_at_fault_infraction")
+
+
+def _evaluation_series(line: dict[str, Any], metric: str, x: str) -> Series:
+    """A metric at medium density, in a band from the lowest to the highest of all densities."""
+    series = Series(line["name"], dashed=bool(line.get("dashed", False)))
+    for point in line["points"]:
+        # None where there is nothing to divide by.
+        given = {row["density"]: row.get(metric) if metric in _OPTIONAL else row[metric] for row in point["rows"]}
+        known = [value for value in given.values() if value is not None] or [None]
+        series.add(point["gpu_hours" if x == "hours" else "agent_steps"], given["medium"], min(known), max(known))
+    return series
+
+
+def evaluation_curves(path: str, x: str = "agent_steps") -> Chart:
+    """Metrics of the evaluation protocol along trainings: medium traffic in a band of all densities.
+
+    path: what `scripts/reproduce_table --curves` writes. x: "agent_steps", or "hours" of one GPU. Raises PlotError naming the
+    file, the line and what is missing.
+    """
+    x_label = "time on one GPU (h)" if x == "hours" else "agent-steps"
+    panels = {metric: Panel(title, x_label, y_label, starts_at_zero=True) for metric, title, y_label in _PROTOCOL}
+    content = _read_json(path)
+    where = "its lines"
+    try:
+        lines = content["lines"]
+        _need(isinstance(lines, list) and lines, f"{path}: expected a line or more")
+        for number, line in enumerate(lines, 1):
+            where = f"line {number}"
+            where = f"line '{line['name']}'"
+            points = line["points"]
+            _need(isinstance(points, list) and points, f"{path}: {where}: expected a point or more")
+            for point in points:
+                has_medium = any(row["density"] == "medium" for row in point["rows"])
+                _need(has_medium, f"{path}: {where}: expected a row of medium density in every point")
+            for metric, panel in panels.items():
+                series = _evaluation_series(line, metric, x)
+                _need(series.x == sorted(series.x), f"{path}: {where}: expected points in ascending order")
+                panel.series.append(series)
+        rows = [row for line in lines for point in line["points"] for row in point["rows"]]
+    except KeyError as error:
+        raise PlotError(f"{path}: {where}: expected a key {error}") from None
+    except (AttributeError, TypeError, ValueError) as error:
+        raise PlotError(f"{path}: {where}: {error}") from None
+    shown = [panel for metric, panel in panels.items() if metric not in _OPTIONAL or any(metric in row for row in rows)]
+    lines = [{"name": series.name, **_extent_of(series)} for series in shown[0].series]
+    return Chart(shown, columns=_columns_for(len(shown)), facts={"x": x, "band": "lowest to highest density", "lines": lines})
+
+
+# ---- benchmarks
+
+_RATE, _SIZE = "agent-steps/s", "width of a 16:9 image (px)"
+
+
+def _read_results(paths: Sequence[str]) -> list[tuple[str, float]]:
+    """Names and values of results: of what `pictura bench --json` printed, and of files of scripts/gpu_check, which hold several."""
+    results: list[tuple[str, float]] = []
+    for path in paths:
+        content, before = _read_json(path), len(results)
+        benchmarks = [content, *(content.get("bench", []) if isinstance(content, dict) else [])]
+        for benchmark in benchmarks:
+            rows = benchmark.get("results", []) if isinstance(benchmark, dict) else []
+            results += [(row.get("name", ""), row.get("value", 0.0)) for row in rows]
+        _need(len(results) > before, f"{path}: expected results of a benchmark")
+    return results
+
+
+def _sweep(title: str, x_label: str, y_label: str) -> Panel:
+    return Panel(title, x_label, y_label, x_scale="log", y_scale="log")
+
+
+def _add_point(panel: Panel, name: str, x: float, y: float) -> None:
+    """Adds a point to the series of that name; points ascend in x, and of several with one x the first is kept."""
+    series = next((series for series in panel.series if series.name == name), None)
+    if series is None:
+        series = Series(name)
+        panel.series.append(series)
+    if x in series.x:
+        return
+    at = sum(other < x for other in series.x)
+    series.x.insert(at, float(x))
+    series.y.insert(at, float(y))
+
+
+def render_rates(results: Sequence[str]) -> Chart:
+    """Rates of rendering by size and number of egos, of the sweeps of `pictura bench render`."""
+    egos_fixed, size_fixed = 2048, "96x54"
+    by_size = _sweep(f"{egos_fixed:,} egos", _SIZE, _RATE)
+    by_egos = _sweep(f"{size_fixed.replace('x', '×')} px", "egos in one call", _RATE)
+    by_square = _sweep(f"{egos_fixed:,} egos, walls off", "width of a square image (px)", _RATE)
+    for name, value in _read_results(results):
+        match = re.fullmatch(r"(.+) ((\d+)x(\d+)) (\d+) egos", name)
+        if not match:
+            continue
+        renderer, size, width, height, egos = match.groups()
+        if int(egos) == egos_fixed:
+            _add_point(by_square if width == height else by_size, renderer, float(width), value)
+        if size == size_fixed:
+            _add_point(by_egos, renderer, float(egos), value)
+    return Chart([by_size, by_egos, by_square])
+
+
+def step_costs(results: Sequence[str]) -> Chart:
+    """What an agent-step costs by agents and worlds, of the sweeps of `pictura bench simulate`."""
+    worlds_fixed, agents_fixed, cost = 64, 60, "time for an agent-step (ns)"
+    by_agents = _sweep(f"{worlds_fixed} worlds", "agents in each world", cost)
+    by_worlds = _sweep(f"{agents_fixed} agents in each world", "worlds", cost)
+    for name, value in _read_results(results):
+        match = re.fullmatch(r"(\w+), (\d+) worlds of (\d+) agents", name)
+        if not match:
+            continue
+        backend, worlds, agents = match[1], int(match[2]), int(match[3])
+        if agents == agents_fixed:
+            _add_point(by_worlds, backend, worlds, 1e9 / value)
+        elif worlds == worlds_fixed:
+            _add_point(by_agents, backend, agents, 1e9 / value)
+    return Chart([by_agents, by_worlds], columns=2, panel_size_in=(4.2, 3))
+
+
+def rank_rates(results: Sequence[str]) -> Chart:
+    """Rates and efficiencies over GPUs, of files of scripts/gpu_ranks: with the agents of each GPU fixed, and those of all."""
+    cases = {"each": "The same number of agents on each GPU", "in_all": "The same number of agents in all"}
+    rates = {case: _sweep(title, "GPUs", _RATE) for case, title in cases.items()}
+    efficiencies = {
+        case: Panel("Rate over GPUs times the rate of one", "GPUs", "efficiency", x_scale="log", starts_at_zero=True) for case in cases
+    }
+    for path in results:
+        content = _read_json(path)
+        _need(isinstance(content, dict) and "rate" in content, f"{path}: expected rates of scripts/gpu_ranks")
+        key = "train.precision="
+        precisions = [text.removeprefix(key) for text in content.get("arguments", []) if text.startswith(key)]
+        for size, rows in content["rate"].items():
+            name = f"{size} {precisions[-1] if precisions else 'bf16'}"
+            for case in cases:
+                rate, efficiency = Series(name), Series(name)
+                for row in rows:
+                    if row["case"] not in ("one", case):
+                        continue
+                    measured = row["agent_steps_per_s"]
+                    rate.add(row["gpus"], measured["median"], measured["min"], measured["max"])
+                    efficiency.add(row["gpus"], row["efficiency"])
+                rates[case].series.append(rate)
+                efficiencies[case].series.append(efficiency)
+    return Chart([*rates.values(), *efficiencies.values()], columns=2, panel_size_in=(4.2, 3))
+
+
+def breakdown_parts(results: Sequence[str], parts: Sequence[str], paper: dict[str, dict[str, float]]) -> Chart:
+    """Seconds of an update by size, of `pictura bench breakdown`, beside the paper's.
+
+    parts: the columns of the table, of which the third panel shows those of the first case. paper: the paper's seconds by size,
+    of "total" and of "rendering".
+    """
+    seconds = "time of an update (s)"
+    shown = {"total": _sweep("Whole update", _SIZE, seconds), "rendering": _sweep("Rendering", _SIZE, seconds)}
+    of_first = _sweep("", _SIZE, seconds)
+    for name, value in _read_results(results):
+        match = re.fullmatch(r"(.+) (\d+)x\d+ (\d+) agents a world, (\w+)", name)
+        if not match:
+            continue
+        series, width, part = f"{match[1]}, {match[3]} agents a world", float(match[2]), match[4]
+        if part in shown:
+            _add_point(shown[part], series, width, value)
+        of_first.title = of_first.title or series
+        if of_first.title == series and part in parts:
+            _add_point(of_first, part, width, value)
+    for size, row in paper.items():
+        for part, panel in shown.items():
+            _add_point(panel, "the paper, H100 NVL", float(size.split("x")[0]), row[part])
+    _need(of_first.title, "--plot: expected results of bench breakdown")
+    return Chart([*shown.values(), of_first], panel_size_in=(3.8, 4))
+
+
+# ---- probes
+
+TAKEOVER_STEP_S = 0.1
+_CASES = {"hidden": "hidden vehicle", "removed": "the same without it", "empty": "empty corner"}
+_CHANGES = {"d_value": ("Value", "dV"), "d_p_brake": ("Braking probability", "dP(brake)")}
+_SEEN = "strip: share that is seen, none (red) to all (blue)"
+
+
+def _share_color(share: float) -> str:
+    """Between SHARE_COLORS, linearly."""
+    place = min(max(share, 0.0), 1.0) * (len(SHARE_COLORS) - 1)
+    below = min(int(place), len(SHARE_COLORS) - 2)
+    channels = [[int(color[i : i + 2], 16) for i in (1, 3, 5)] for color in SHARE_COLORS[below : below + 2]]
+    return "#" + "".join(f"{round(a + (b - a) * (place - below)):02X}" for a, b in zip(*channels, strict=True))
+
+
+def _names_of(summary: dict[str, Any]) -> dict[str, str]:
+    """How charts call the policies, by their names in rows: fresh weights answer in the place of some."""
+    return {one["name"]: ("untrained " if one.get("untrained_hash") else "") + one["name"] for one in summary["policy"]}
+
+
+def _removal_means(summary: dict[str, Any]) -> Chart:
+    panels = []
+    for by_distance in (False, True):
+        for change, (title, label) in _CHANGES.items():
+            lines = {name: Series(shown) for name, shown in _names_of(summary).items()}
+            for row in summary["rows"]:
+                is_of_band = row["distance_from_m"] is not None
+                if by_distance and is_of_band and row["group"] == "hidden":
+                    x = 0.5 * (row["distance_from_m"] + row["distance_to_m"])
+                elif not by_distance and not is_of_band and row["in_frame"] and row["cases"] > 0:
+                    x = 100 * row["occlusion_mean"]
+                else:
+                    continue
+                # No mean of magnitudes is below 0.
+                lines[row["policy"]].add_estimate(x, row[f"abs_{change}"], row[f"abs_{change}_half_width_95"], least=0.0)
+            panels.append(
+                Panel(
+                    f"{title}, wholly hidden users" if by_distance else title,
+                    "distance of the user (m)" if by_distance else "occlusion of the user (%)",
+                    f"mean |{label}|",
+                    list(lines.values()),
+                )
+            )
+    return Chart(panels, columns=2, panel_size_in=(4.2, 3))
+
+
+def _pedestrian_means(summary: dict[str, Any]) -> Chart:
+    panels = []
+    for change, (title, label) in _CHANGES.items():
+        lines = {name: Series(shown) for name, shown in _names_of(summary).items()}
+        panel = Panel(title, f"distance from where it is first seen (m)\n{_SEEN}", f"mean {label}", list(lines.values()))
+        for row in summary["rows"]:
+            # Where most paths have a point: the ends are of few.
+            if row["from_first_sight_m"] is None or 2 * row["cases"] < summary["paths"]:
+                continue
+            lines[row["policy"]].add_estimate(row["from_first_sight_m"], row[change], row[f"{change}_half_width_95"])
+            if row["policy"] == summary["policy"][0]["name"]:
+                panel.strip.append((row["from_first_sight_m"], _share_color(row["visible_share_mean"])))
+        panels.append(panel)
+    return Chart(panels, columns=2, panel_size_in=(4.2, 3))
+
+
+def _with_walls(title: str, walls: bool) -> str:
+    return f"{title}, {'walls' if walls else 'no walls'}"
+
+
+def _reveal_strip(rows: list[dict[str, Any]], num_steps: int) -> list[tuple[float, str]]:
+    """Dark from the first policy's 10th percentile of reveals to the last one's 90th."""
+    quantiles_s = [(row["reveal_s_p10"], row["reveal_s_p90"]) for row in rows if row["reveal_s_p10"] is not None]
+    if not quantiles_s:
+        return []
+    first, last = (round(pick(column) / TAKEOVER_STEP_S) for pick, column in zip((min, max), zip(*quantiles_s, strict=True), strict=True))
+    return [(TAKEOVER_STEP_S * k, _REVEALING[first <= k <= last]) for k in range(num_steps + 1)]
+
+
+def _corner_means(summary: dict[str, Any]) -> Chart:
+    panels = []
+    runs = [row for row in summary["rows"] if row["less_policy"] is None and row["less_case"] is None]
+    names = _names_of(summary)
+    for walls in (True, False):
+        hidden = [row for row in runs if row["walls"] is walls and row["case"] == "hidden"]
+        strip = _reveal_strip(hidden, summary["takeover_steps"])
+        for case, title in _CASES.items():
+            panel = Panel(_with_walls(title, walls), "time since the takeover (s)\nstrip: line of sight opens", "mean speed (m/s)", strip=strip)
+            for row in runs:
+                if row["walls"] is not walls or row["case"] != case:
+                    continue
+                series = Series(names[row["policy"]])
+                curve = zip(row["speed_curve_mps"], row["speed_curve_mps_half_width_95"], row["driving"], strict=True)
+                for k, (speed, half_width, driving) in enumerate(curve):
+                    series.add_estimate(TAKEOVER_STEP_S * k, speed if driving > 0 else None, half_width)
+                panel.series.append(series)
+            panels.append(panel)
+    return Chart(panels)
+
+
+_PROBES = {"removal": _removal_means, "pedestrian": _pedestrian_means, "corner": _corner_means}
+
+
+def probe_means(summary: str) -> Chart:
+    """The means of a probe with their 95 % intervals, as the paper's figures: summary.json of `pictura probe`.
+
+    Of removal: absolute changes over how occluded the user was, and of wholly hidden users over distance. Of pedestrian: changes
+    from where the pedestrian is first seen, with how much of it is seen as a strip. Of corner: mean speeds since the takeover.
+    """
+    content = _read_json(summary)
+    kind = content.get("kind") if isinstance(content, dict) else None
+    _need(kind in _PROBES, f"{summary}: expected the summary of a probe of {', '.join(_PROBES)}")
+    try:
+        return _PROBES[kind](content)
+    except KeyError as error:
+        raise PlotError(f"{summary}: expected a key {error}") from None
+
+
+def _read_cases(file_name: str, /, **wanted: str) -> list[dict[str, str]]:
+    """The rows of cases.csv that have these values."""
+    with open(file_name, encoding="utf-8", newline="") as file:
+        return [row for row in csv.DictReader(file) if all(row[name] == value for name, value in wanted.items())]
+
+
+def path_curves(folder: str, path: int, marks: Sequence[tuple[float, str]] = ()) -> Chart:
+    """The changes of value and braking along one path of `pictura probe pedestrian`, with how much is seen as a strip.
+
+    marks: places along the path in m, and their letters.
+    """
+    names = _names_of(_read_json(f"{folder}/summary.json"))
+    rows = _read_cases(f"{folder}/cases.csv", path=str(path))
+    along_m = [float(row["along_m"]) for row in rows]
+    strip = [(at_m, _share_color(float(row["visible_share"]))) for at_m, row in zip(along_m, rows, strict=True)]
+    panels = []
+    for change, (title, label) in _CHANGES.items():
+        series = [Series(shown, along_m, [float(row[f"{name}/{change}"]) for row in rows]) for name, shown in names.items()]
+        panels.append(Panel(title, f"distance along the path (m)\n{_SEEN}", label, series, marks=list(marks), strip=strip))
+    return Chart(panels, columns=2, panel_size_in=(5.5, 3.2))
+
+
+def takeover_curves(folder: str, pair: int) -> Chart:
+    """The speeds of one pair of `pictura probe corner` towards the hidden vehicle, with walls and without."""
+    names = _names_of(_read_json(f"{folder}/summary.json"))
+    panels = []
+    for walls in ("on", "off"):
+        panel = Panel(
+            _with_walls("Speed towards the hidden vehicle", walls == "on"),
+            "time since the takeover (s)\nx: it enters the input, o: line of sight opens",
+            "speed (m/s)",
+        )
+        marks: dict[float, str] = {}
+        for row in _read_cases(f"{folder}/cases.csv", pair=str(pair), case="hidden", walls=walls):
+            speeds = {name: text for name, text in row.items() if re.fullmatch(r"speed_mps_[\d.]+", name)}
+            times_s = [float(name.removeprefix("speed_mps_")) for name in speeds]
+            panel.series.append(Series(names[row["policy"]], times_s, [float(text) if text else _NAN for text in speeds.values()]))
+            for text, letter in ((row["input_s"], "x"), (row["sight_s"] if walls == "on" else "", "o")):
+                if text and letter not in marks.get(float(text), ""):
+                    marks[float(text)] = marks.get(float(text), "") + letter
+        panel.marks = sorted(marks.items())
+        panels.append(panel)
+    return Chart(panels, columns=2, panel_size_in=(5.5, 3.2))
+
+
+# ---- drawing
+
+_DPI = 150
+_PAGE_DPI = 100  # text as large as in the pictures above
+_STYLE = {
+    "font.family": "DejaVu Sans",  # which comes with Matplotlib
+    "font.size": 9.5,
+    "text.color": "#22262B",
+    "axes.titlesize": 10.5,
+    "axes.titleweight": "bold",
+    "axes.labelcolor": "#3A3F46",
+    "axes.edgecolor": "#3A3F46",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#E3E5E8",
+    "xtick.color": "#5A6068",
+    "ytick.color": "#5A6068",
+    "xtick.labelsize": 9,
+    "ytick.labelsize": 9,
+    "xtick.minor.bottom": False,
+    "ytick.minor.left": False,
+    "lines.linewidth": 1.8,
+    "lines.markersize": 4,
+    "lines.solid_capstyle": "round",
+    "svg.hashsalt": "pictura",
+}
+
+
+def _matplotlib(what: str) -> Any:
+    try:
+        import matplotlib.figure
+        import matplotlib.style
+    except ImportError as error:
+        raise MissingMatplotlib(
+            f"{what}: not drawn, since {sys.executable} has no Matplotlib ({error}): pip install 'pictura[plot]', or matplotlib alone"
+        ) from None
+    return matplotlib
+
+
+def _tick_text(value: float, _position: int = 0) -> str:
+    """ "1.5G", "20k", "0.02"."""
+    for unit, suffix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
+        # 8192 and 1024 are clearer in full.
+        if abs(value) >= unit * (10 if suffix == "k" else 1) * (1 - 1e-9) and (suffix != "k" or value % 1000 == 0):
+            return f"{value / unit:g}{suffix}".replace("-", "\N{MINUS SIGN}")
+    return f"{value:g}".replace("-", "\N{MINUS SIGN}")
+
+
+def _apart(values: Iterable[float]) -> list[float]:
+    """As many of these values, in ascending order, as have room for their numbers on a logarithmic axis."""
+    ascending, kept = sorted(values), []
+    for value in ascending:
+        if not kept or math.log(value / kept[-1]) > math.log(ascending[-1] / ascending[0]) / 8:
+            kept.append(value)
+    return kept
+
+
+def _set_scale(axes: Axes, panel: Panel) -> None:
+    from matplotlib import ticker
+
+    if panel.x_scale == "log":
+        axes.set_xscale("log", base=2)
+        axes.xaxis.set_major_locator(ticker.FixedLocator(_apart({x for series in panel.series for x in series.x})))
+        axes.xaxis.set_minor_locator(ticker.NullLocator())
+        axes.xaxis.set_major_formatter(ticker.FuncFormatter(_tick_text))
+    else:
+        axes.xaxis.set_major_locator(ticker.MaxNLocator(6, steps=[1, 2, 5, 10]))
+    if panel.y_scale == "log":
+        axes.set_yscale("log")
+        low, high = axes.get_ylim()
+        axes.yaxis.set_major_locator(ticker.LogLocator(10, (1.0, 2.0, 5.0) if high < 1000 * low else (1.0,)))
+        axes.yaxis.set_minor_locator(ticker.NullLocator())
+        axes.yaxis.set_major_formatter(ticker.FuncFormatter(_tick_text))
+    else:
+        axes.yaxis.set_major_locator(ticker.MaxNLocator(6, steps=[1, 2, 5, 10]))
+    for axis, is_log in ((axes.xaxis, panel.x_scale == "log"), (axes.yaxis, panel.y_scale == "log")):
+        if not is_log and not 1e-3 <= max(map(abs, axis.get_view_interval())) < 1e4:
+            axis.set_major_formatter(ticker.FuncFormatter(_tick_text))
+
+
+def _lone_points(series: Series) -> list[int]:
+    """Points between gaps, which no line shows."""
+    shown = [False, *(math.isfinite(x) and math.isfinite(y) for x, y in zip(series.x, series.y, strict=True)), False]
+    return [i for i in range(len(series.x)) if shown[i + 1] and not shown[i] and not shown[i + 2]]
+
+
+def _draw_panel(axes: Axes, panel: Panel, colors: dict[str, str]) -> None:
+    axes.set_title(panel.title)
+    axes.set_xlabel(panel.x_label)
+    axes.set_ylabel(panel.y_label)
+    shows_points = max((len(series.x) for series in panel.series), default=0) <= 12
+    for series in panel.series:
+        if any(map(math.isfinite, series.low)):
+            axes.fill_between(series.x, series.low, series.high, color=colors[series.name], alpha=0.18, linewidth=0)
+    for series in panel.series:
+        points = {} if shows_points else {"markevery": _lone_points(series)}
+        is_marked = shows_points or points["markevery"]
+        axes.plot(
+            series.x, series.y, color=colors[series.name], label=series.name, linestyle="--" if series.dashed else "-",
+            marker="o" if is_marked else "", **points,
+        )
+    axes.margins(x=0.02 if shows_points and not panel.strip else 0)
+    _set_scale(axes, panel)
+    if panel.starts_at_zero:
+        axes.set_ylim(bottom=0)
+    for x, label in panel.marks:
+        axes.axvline(x, color="#5A6068", linestyle=(0, (3, 3)), linewidth=0.9, zorder=1)
+        axes.annotate(label, (x, 1), xycoords=("data", "axes fraction"), xytext=(0, 2), textcoords="offset points", ha="center", fontsize=9)
+    if panel.marks:
+        axes.set_title(panel.title, pad=15)
+    if panel.strip:
+        from matplotlib.collections import PolyCollection
+
+        places = [x for x, _ in panel.strip]
+        edges = [places[0], *(0.5 * (a + b) for a, b in itertools.pairwise(places)), places[-1]]
+        cells = [[(a, -0.035), (b, -0.035), (b, 0), (a, 0)] for a, b in itertools.pairwise(edges)]
+        axes.add_collection(
+            PolyCollection(cells, facecolors=[c for _, c in panel.strip], transform=axes.get_xaxis_transform(), clip_on=False, linewidth=0),
+            autolim=False,
+        )
+        axes.tick_params(axis="x", pad=8, length=0)
+
+
+def _colors_of(names: Iterable[str]) -> dict[str, str]:
+    return dict(zip(dict.fromkeys(names), itertools.cycle(SERIES_COLORS)))
+
+
+def figure(chart: Chart, width_in: float | None = None) -> Figure:
+    """Draws a chart. Lines have the series' names as labels. width_in: in inches; default: by the chart's panels.
+
+    Raises MissingMatplotlib.
+    """
+    matplotlib = _matplotlib("the chart")
+    columns = min(chart.columns, len(chart.panels))
+    rows = -(-len(chart.panels) // columns)
+    width_in, height_in = width_in or columns * chart.panel_size_in[0], rows * chart.panel_size_in[1]
+    if len(chart.panels) == 1:
+        width_in, height_in = 1.6 * width_in, 1.3 * height_in
+    with matplotlib.style.context(["default", _STYLE]):
+        drawn = matplotlib.figure.Figure((width_in, height_in), dpi=_DPI, layout="constrained")
+        shared = _colors_of(series.name for series in chart.panels[0].series)
+        for i, panel in enumerate(chart.panels):
+            axes = drawn.add_subplot(rows, columns, i + 1)
+            names = [series.name for series in panel.series]
+            is_shared = set(names) <= set(shared)
+            _draw_panel(axes, panel, shared if is_shared else _colors_of(names))
+            if not is_shared:
+                axes.legend(loc="upper left", bbox_to_anchor=(1, 1), frameon=False, fontsize=9)
+        if shared:
+            fitting = int(width_in / (0.08 * max(map(len, shared)) + 0.6))
+            drawn.legend(*drawn.axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=max(1, fitting), frameon=False, borderaxespad=0.2)
+    return drawn
+
+
+def _write(path: str, content: bytes) -> None:
+    """Writes a file beside its target and renames it: no reader sees half of it. What is no regular file is written through."""
+    if path.startswith(("/dev/", "/proc/")) or (os.path.exists(path) and not os.path.isfile(path)):
+        pathlib.Path(path).write_bytes(content)
+        return
+    target = os.path.realpath(path)
+    if os.path.exists(target) and not os.access(target, os.W_OK):
+        raise PermissionError(errno.EACCES, "is read-only", path)
+    # Named as temporary files of the command are, which its next call removes where this one was killed.
+    temporary = os.path.join(os.path.dirname(target), f".pictura-{secrets.token_hex(8)}.tmp")
+    try:
+        with open(temporary, "xb") as file:
+            file.write(content)
+        if os.path.exists(target):
+            shutil.copymode(target, temporary)
+        os.replace(temporary, target)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, path) from None
+    finally:
+        with contextlib.suppress(OSError):
+            os.unlink(temporary)
+
+
+def save(chart: Chart, path: str) -> None:
+    """Draws a chart into a file: vector graphics where its name ends in .svg, else a PNG.
+
+    Without Matplotlib it writes the chart's panels to `path` and ".json", and raises MissingMatplotlib. Raises OSError.
+    """
+    try:
+        matplotlib = _matplotlib(path)
+    except MissingMatplotlib as missing:
+        # NaN is no JSON.
+        panels = json.loads(json.dumps([asdict(panel) for panel in chart.panels]), parse_constant=lambda _: None)
+        _write(f"{path}.json", (json.dumps({"panels": panels}, indent=1) + "\n").encode())
+        raise MissingMatplotlib(f"{missing}; its data is in {path}.json") from None
+    content = io.BytesIO()
+    is_svg = path.endswith(".svg")
+    with matplotlib.style.context(["default", _STYLE]):
+        figure(chart).savefig(content, format="svg" if is_svg else "png", metadata={"Date": None} if is_svg else None)
+    _write(path, content.getvalue())
+
+
+def append_to(picture: str, chart: Chart) -> None:
+    """Draws a chart below a PNG picture, as wide as this. Raises MissingMatplotlib."""
+    _matplotlib(picture)
+    import numpy as np
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from PIL import Image
+
+    with Image.open(picture) as opened:
+        above = np.asarray(opened.convert("RGB"))
+    drawn = figure(chart, above.shape[1] / _PAGE_DPI)
+    drawn.set_dpi(_PAGE_DPI)
+    canvas = FigureCanvasAgg(drawn)
+    canvas.draw()
+    below = np.asarray(canvas.buffer_rgba())[..., :3]
+    page = np.full((len(above) + len(below), max(above.shape[1], below.shape[1]), 3), 255, np.uint8)
+    page[: len(above), : above.shape[1]] = above
+    page[len(above) :, : below.shape[1]] = below
+    content = io.BytesIO()
+    Image.fromarray(page).save(content, format="png")
+    _write(picture, content.getvalue())
+
+
+def probe_charts(folder: str, pages: Sequence[dict[str, Any]] = ()) -> None:
+    """Draws what belongs to a folder of `pictura probe`: KIND.png of its means, and curves below its pictures.
+
+    pages: of each picture its file ("picture"), and the arguments of path_curves() or takeover_curves().
+    """
+    summary = f"{folder}/summary.json"
+    kind = _read_json(summary)["kind"]
+    _matplotlib(f"{folder}/{kind}.png")
+    save(probe_means(summary), f"{folder}/{kind}.png")
+    for page in pages:
+        picture, arguments = page["picture"], {key: value for key, value in page.items() if key != "picture"}
+        append_to(f"{folder}/{picture}", (path_curves if kind == "pedestrian" else takeover_curves)(folder, **arguments))
+
+
+CHARTS = {chart.__name__: chart for chart in (run_curves, evaluation_curves, render_rates, step_costs, rank_rates, breakdown_parts, probe_means)}
+
+
+def _answer(request: dict[str, Any]) -> None:
+    """Draws what a request asks for. Its "report" is "json" or "text", for what is printed, or is not there."""
+    name, report = request.pop("chart", None), request.pop("report", None)
+    if name == "probe_charts":
+        return probe_charts(**request)
+    _need(name in CHARTS, f"plot: expected a chart of {', '.join(CHARTS)}; got {name!r}")
+    out = request.pop("out")
+    chart = CHARTS[name](**request)
+    save(chart, out)
+    if report == "json":
+        print(json.dumps({"out": out, **chart.facts}, indent=2))
+    elif report == "text":
+        runs = f"runs {len(request['runs'])}, " if "runs" in request else ""
+        print(f"{out}: {runs}lines {len(chart.panels[0].series)}, panels {len(chart.panels)}")
+    sys.stdout.flush()
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Answers a request, the only argument. Returns the exit status."""
+    if sys.version_info < (3, 11):
+        print(f"error: charts: {sys.executable} is Python {sys.version.split()[0]}: expected 3.11 or later", file=sys.stderr)
+        return 3
+    if len(arguments) != 1 or not arguments[0].startswith("{"):
+        print(__doc__, file=sys.stderr)
+        return 2
+    try:
+        _answer(json.loads(arguments[0]))
+        return 0
+    except MissingMatplotlib as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 3
+    except PlotError as error:
+        print(f"error: {error}", file=sys.stderr)
+    except OSError as error:
+        print(f"error: {error.filename or 'stdout'}: {error.strerror}", file=sys.stderr)
+    except KeyboardInterrupt:
+        print("error: interrupted", file=sys.stderr)
+        return 130
+    return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
