@@ -1,20 +1,18 @@
-// The figures of `pictura probe pedestrian`.
+// The pictures of `pictura probe pedestrian`.
 #pragma once
 
 #include <functional>
-#include <string>
-#include <vector>
 
 #include "pictura/common/support/filled_folder.h"
+#include "pictura/common/support/json.h"
 #include "pictura/evaluation/probes/pedestrian_results.h"
 
 namespace pictura {
 
-/// Draws, as the paper's figure, path_000.png and so on in a folder: a path from above, coloured by how much of the
-/// pedestrian is seen, the signed changes of value and braking probability along it, and the ego's cameras at five
-/// places; and pedestrian.png, the means over all paths from where the pedestrian is first seen, with their 95 %
-/// intervals over scenes. `on_path` is called with the number of paths that are drawn. Throws Error naming the path.
-void draw_pedestrian_figures(const PedestrianResults& results, const std::vector<PedestrianRow>& rows,
-                             FilledFolder* folder, const std::function<void(size_t)>& on_path);
+/// Draws path_000.png and so on in a folder: a path from above, coloured by how much of the pedestrian is seen, and the
+/// ego's cameras at five places. `on_path` is called with the number of paths that are drawn. Returns the pages for
+/// pictura.plot, which draws the changes along the path below. Throws Error naming the path.
+Json draw_pedestrian_paths(const PedestrianResults& results, FilledFolder* folder,
+                           const std::function<void(size_t)>& on_path);
 
 }  // namespace pictura

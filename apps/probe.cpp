@@ -1,15 +1,16 @@
 // `pictura probe`: what policies make of what their cameras see, and of what they do not.
 #include <algorithm>
 #include <array>
+#include <filesystem>
 
 #include <fmt/ranges.h>
 
 #include "pictura/apps/commands.h"
 #include "pictura/apps/corner_figure.h"
 #include "pictura/apps/pedestrian_figure.h"
-#include "pictura/apps/removal_figure.h"
 #include "pictura/cli/backend_options.h"
 #include "pictura/cli/case_replay_options.h"
+#include "pictura/cli/draw_chart.h"
 #include "pictura/cli/evaluation_options.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
@@ -174,14 +175,27 @@ void print_table(const CornerResults& results, const std::vector<CornerRow>& row
       format_duration(results.seconds));
 }
 
-// Writes summary.json and prints it, or a table.
+/// Draws the chart of a probe's means as `name`, and those below the pages, or gives notice why not.
+void draw_charts(const std::string& name, const Json& pages, FilledFolder* out) {
+  const std::string chart = out->file(name);
+  try {
+    draw_chart({{"chart", "probe_charts"}, {"folder", out->path()}, {"pages", pages}});
+  } catch (const NoMatplotlib& error) {
+    std::filesystem::remove(chart);  // an earlier call's
+    print_message("notice: {}\n", error.what());
+  }
+}
+
+/// Writes summary.json, draws the charts, unless it has no pages (null), and prints the summary or a table.
 template <typename Results, typename Row>
 void report(const ProbeArguments& arguments, const std::string& summary, const Results& results,
-            const std::vector<Row>& rows, FilledFolder* out) {
+            const std::vector<Row>& rows, const Json& pages, FilledFolder* out) {
   write_file(out->file("summary.json"), summary + "\n");
+  const Json object = parse_json(summary);
+  if (!pages.is_null()) draw_charts(object.at("kind").get<std::string>() + ".png", pages, out);
   out->remove_others();
   if (arguments.json)
-    print_json(parse_json(summary));
+    print_json(object);
   else
     print_table(results, rows);
 }
@@ -221,8 +235,7 @@ void add_removal_command(CLI::App& probe) {
     FilledFolder out(arguments->out, "probe");
     const std::string cases_file = out.file("cases.csv");
     write_removal_cases(cases_file, results);
-    draw_removal_figure(results, rows, out.file("removal.png"));
-    report(*arguments, removal_summary_json(results, rows, cases_file), results, rows, &out);
+    report(*arguments, removal_summary_json(results, rows, cases_file), results, rows, Json::array(), &out);
     if (results.interrupted) {
       throw Interrupted(fmt::format("interrupted; {} of {} removals are done, and written to {}", results.cases.size(),
                                     results.removals_asked, arguments->out));
@@ -273,16 +286,17 @@ void add_pedestrian_command(CLI::App& probe) {
     FilledFolder out(arguments->out, "probe");
     const std::string cases_file = out.file("cases.csv");
     write_pedestrian_cases(cases_file, results);
+    Json pages;
     if (!results.interrupted) {
       ProgressLine line;
       const size_t all = results.paths.size();
-      draw_pedestrian_figures(results, rows, &out, [&](size_t done) {
+      pages = draw_pedestrian_paths(results, &out, [&](size_t done) {
         line.update(fmt::format("drawing: path {} of {}", done, all),
                     static_cast<double>(done) / static_cast<double>(all));
       });
       line.finish();
     }
-    report(*arguments, pedestrian_summary_json(results, rows, cases_file), results, rows, &out);
+    report(*arguments, pedestrian_summary_json(results, rows, cases_file), results, rows, pages, &out);
     if (results.interrupted) {
       throw Interrupted(fmt::format("interrupted; {} of {} paths are done, and written to {} without figures",
                                     results.paths.size(), results.paths_asked, arguments->out));
@@ -344,8 +358,12 @@ void add_corner_command(CLI::App& probe) {
     FilledFolder out(arguments->out, "probe");
     const std::string cases_file = out.file("cases.csv");
     write_corner_cases(cases_file, results);
-    if (!results.pairs.empty()) draw_corner_figures(results, rows, &out);
-    report(*arguments, corner_summary_json(results, rows, cases_file), results, rows, &out);
+    Json pages;
+    if (!results.pairs.empty()) {
+      draw_corner_example(results, out.file("example.png"));
+      pages = {{{"picture", "example.png"}, {"pair", example_of(results)}}};
+    }
+    report(*arguments, corner_summary_json(results, rows, cases_file), results, rows, pages, &out);
     if (results.interrupted) {
       throw Interrupted(fmt::format("interrupted; {} of {} pairs are done, and written to {}", results.pairs.size(),
                                     results.pairs_asked, arguments->out));

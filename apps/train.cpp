@@ -1,4 +1,4 @@
-// `pictura train`: self-play PPO from a configuration file, with a progress line, and the learning curve as a picture.
+// `pictura train`: self-play PPO from a configuration file, with a progress line.
 #include "pictura/apps/commands.h"
 #include "pictura/cli/backend_options.h"
 #include "pictura/cli/number_options.h"
@@ -6,7 +6,6 @@
 #include "pictura/cli/train_progress.h"
 #include "pictura/commit.h"
 #include "pictura/common/error.h"
-#include "pictura/drawing/learning_curve.h"
 #include "pictura/training/loop.h"
 
 namespace pictura {
@@ -68,7 +67,6 @@ void add_train_command(CLI::App& app) {
       }
     };
     if (arguments->train.launch.rank > 0) return end_as_asked();
-    const std::string curve = draw_learning_curve(arguments->train.out_folder);
     if (arguments->json) {
       print_json({{"agent_steps", report.agent_steps},
                   {"agent_steps_per_s", report.agent_steps_per_s},
@@ -82,12 +80,11 @@ void add_train_command(CLI::App& app) {
                   {"device", report.device},
                   {"simulator", report.simulator},
                   {"renderer", report.renderer.empty() ? Json(nullptr) : Json(report.renderer)},
-                  {"out_of_time", report.out_of_time},
-                  {"learning_curve", curve.empty() ? Json(nullptr) : Json(curve)}});
+                  {"out_of_time", report.out_of_time}});
     } else {
-      print_result("{} agent-steps in {} updates, {:.1f} km driven; checkpoint {}, policy hash {}{}\n",
+      print_result("{} agent-steps in {} updates, {:.1f} km driven; checkpoint {}, policy hash {}\n",
                    format_count(static_cast<double>(report.agent_steps)), report.updates, report.km_driven,
-                   report.checkpoint, report.policy_hash, curve.empty() ? "" : ", curve " + curve);
+                   report.checkpoint, report.policy_hash);
       if (report.out_of_time) print_result("out of time: go on with --resume --out {}\n", arguments->train.out_folder);
     }
     end_as_asked();

@@ -17,11 +17,12 @@ void add_map_or_scene(CLI::App* command, std::string* map_out, const std::string
       ->required();
 }
 
-CLI::Validator file_ending(const std::string& ending) {
-  auto complaint = [ending](const std::string& text) -> std::string {
+CLI::Validator file_ending(const std::string& ending, const std::string& other) {
+  auto complaint = [ending, other](const std::string& text) -> std::string {
     const std::string own = std::filesystem::path(text).extension().string();
-    if (own.empty() || own == ending) return "";
-    return fmt::format("expected a name that ends in {}, got '{}'", ending, text);
+    if (own.empty() || own == ending || own == other) return "";
+    return fmt::format("expected a name that ends in {}{}{}, got '{}'", ending, other.empty() ? "" : " or ", other,
+                       text);
   };
   return {complaint, ""};
 }

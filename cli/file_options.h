@@ -7,9 +7,9 @@
 
 namespace pictura {
 
-/// Takes names that end in `ending`, as .png, or in none at all, as devices do: no other format is written under a name
-/// that promises it.
-CLI::Validator file_ending(const std::string& ending);
+/// Takes names that end in `ending`, as .png, or in `other`, if there is one, or in none at all, as devices do: no
+/// other format is written under a name that promises it.
+CLI::Validator file_ending(const std::string& ending, const std::string& other = "");
 
 /// Adds MAP, which may be a recorded scene; `more` names what else it may be.
 void add_map_or_scene(CLI::App* command, std::string* map_out, const std::string& more = "");

@@ -1,10 +1,11 @@
 # Runs at every build in which a source changed: writes OUTPUT, a C++ file of the functions that HEADER declares in
-# namespace NAMESPACE, one for each of PAGES: the text of a file NAME.html in SOURCE_DIR as NAME_html(), in which each
+# namespace NAMESPACE, one for each of TEXTS: the text of a file NAME.ENDING in SOURCE_DIR as NAME_ENDING(), in which each
 # {{file FILE}} is replaced by the text of a file beside it.
 cmake_minimum_required(VERSION 3.25)
 set(functions "")
-foreach(page ${PAGES})
-  file(READ ${SOURCE_DIR}/${page}.html text)
+foreach(file ${TEXTS})
+  file(READ ${SOURCE_DIR}/${file} text)
+  string(REPLACE . _ function ${file})
   string(REGEX MATCHALL "{{file [^}]+}}" marks "${text}")
   foreach(mark ${marks})
     string(REGEX REPLACE "{{file (.+)}}" "\\1" name ${mark})
@@ -24,7 +25,7 @@ foreach(page ${PAGES})
     endif()
   endwhile()
   string(APPEND functions "
-std::string_view ${page}_html() {
+std::string_view ${function}() {
   static const std::string text = joined({${literals}});
   return text;
 }

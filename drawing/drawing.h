@@ -1,5 +1,5 @@
 // Pictures for people: a map from above, and contact sheets of camera images. See drawing/world.h for a simulated world
-// from above, drawing/plot.h for curves and drawing/video.h for videos.
+// from above and drawing/video.h for videos.
 #pragma once
 
 #include <optional>

@@ -11,7 +11,7 @@
 #include "pictura/common/support/interrupt.h"
 #include "pictura/drawing/drawing.h"
 #include "pictura/drawing/map_details.h"
-#include "pictura/drawing/plot.h"
+#include "pictura/drawing/ticks.h"
 #include "pictura/drawing/tracks.h"
 
 namespace pictura {

@@ -2,7 +2,6 @@
 // (section 4, figure and appendix "Training-Step Time Breakdown"), and its figure.
 #include <algorithm>
 #include <optional>
-#include <regex>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -18,7 +17,6 @@
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
-#include "pictura/common/support/numbers.h"
 #include "pictura/configuration/apply_config.h"
 #include "pictura/configuration/config.h"
 #include "pictura/map/load_map.h"
@@ -186,37 +184,16 @@ void print_table_row(const BreakdownCase& c, const std::vector<BenchResult>& col
   print_result("\n");
 }
 
-/// Plots seconds by size from earlier results, beside the paper's.
-void draw_breakdown(const PlotArguments& plot) {
-  const std::regex measured(R"((.+) (\d+)x\d+ (\d+) agents a world, (\w+))");
-  const char *width = "width in pixels, 16:9", *seconds = "seconds of an update";
-  PlotPanel total = sweep_panel("Whole update", width, seconds), rendering = sweep_panel("Rendering", width, seconds),
-            parts = sweep_panel("", width, seconds);
-  for (const PlottedResult& result : read_results(plot.results)) {
-    std::smatch match;
-    if (!std::regex_match(result.name, match, measured)) continue;
-    const double width_px = parse_number(match[2].str()).value();
-    const std::string series = fmt::format("{}, {} agents a world", match[1].str(), match[3].str());
-    if (match[4] == "total") add_point(&total, series, width_px, result.value);
-    if (match[4] == "rendering") add_point(&rendering, series, width_px, result.value);
-    // The parts of the first case.
-    if (parts.title.empty()) parts.title = series;
-    const bool is_column = std::any_of(std::begin(kColumns), std::end(kColumns),
-                                       [&](const Column& column) { return match[4] == column.name; });
-    if (parts.title == series && is_column) add_point(&parts, match[4], width_px, result.value);
-  }
-  for (const PaperRow& row : kPaperRows) {
-    const double width_px = parse_pair("size", row.size, 8192).first;
-    add_point(&total, "the paper, H100 NVL", width_px, row.total);
-    add_point(&rendering, "the paper, H100 NVL", width_px, row.rendering);
-  }
-  PICTURA_CHECK(!parts.title.empty(), "--plot: expected results of bench breakdown");
-  draw_plots_png({total, rendering, parts}, plot.figure,
-                 {.panel_height_px = 640, .columns = 3, .title = "Where the time of an update goes"});
+/// The table's columns, and the paper's seconds beside them.
+Json breakdown_request() {
+  Json parts = Json::array(), paper = Json::object();
+  for (const Column& column : kColumns) parts.push_back(column.name);
+  for (const PaperRow& row : kPaperRows) paper[row.size] = {{"total", row.total}, {"rendering", row.rendering}};
+  return {{"parts", parts}, {"paper", paper}};
 }
 
 void run_breakdown(const BreakdownArguments& arguments) {
-  if (wants_plot(arguments.plot)) return draw_breakdown(arguments.plot);
+  if (wants_plot(arguments.plot)) return draw_results("breakdown_parts", arguments.plot, breakdown_request());
   const std::vector<BreakdownCase> cases = breakdown_cases_of(arguments);
   const Config first =
       load_config(arguments.measured.config_path, overrides_of(arguments, cases.front(), arguments.chunk));
@@ -327,8 +304,7 @@ void add_breakdown_benchmark(CLI::App& bench) {
                    "Number of egos whose images are compared with the oracle's before each case")
       ->transform(whole_number(0))
       ->capture_default_str();
-  command->add_option("--plot", arguments->plot.results, "Plot these results instead of measuring")->delimiter(',');
-  command->add_option("--figure", arguments->plot.figure, "PNG file for --plot")->check(file_ending(".png"));
+  add_plot_options(command, "Plot these results instead of measuring", &arguments->plot);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "Examples:\n  pictura bench breakdown --host-steps --json\n"

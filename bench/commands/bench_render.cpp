@@ -1,7 +1,6 @@
 // `pictura bench render`: rates of drawing the images of agents of many worlds, by backend, size and number of egos,
 // and the device memory used.
 #include <algorithm>
-#include <regex>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -15,7 +14,6 @@
 #include "pictura/cli/report.h"
 #include "pictura/cli/world_options.h"
 #include "pictura/common/error.h"
-#include "pictura/common/support/numbers.h"
 #include "pictura/driving/world.h"
 
 namespace pictura {
@@ -156,28 +154,8 @@ void append_results(const std::string& name, const RenderCase& measured, const R
   }
 }
 
-/// Plots the rates of the sweeps in earlier results.
-void draw_rates(const PlotArguments& plot) {
-  const std::regex swept(R"((.+) ((\d+)x(\d+)) (\d+) egos)");
-  const char* rate = "agent-steps/s";
-  PlotPanel by_size = sweep_panel(fmt::format("{} egos", kSweptEgos), "width in pixels, 16:9", rate);
-  PlotPanel by_egos = sweep_panel(fmt::format("{} pixels", kSweptSize), "egos in one call", rate);
-  PlotPanel by_square = sweep_panel(fmt::format("{} egos, walls off", kSweptEgos), "width in pixels, square", rate);
-  for (const PlottedResult& result : read_results(plot.results)) {
-    std::smatch match;
-    if (!std::regex_match(result.name, match, swept)) continue;
-    const int egos = std::stoi(match[5]);
-    if (egos == kSweptEgos) {
-      add_point(match[3] == match[4] ? &by_square : &by_size, match[1], parse_number(match[3].str()).value(),
-                result.value);
-    }
-    if (match[2] == kSweptSize) add_point(&by_egos, match[1], egos, result.value);
-  }
-  draw_plots_png({by_size, by_egos, by_square}, plot.figure, {.columns = 3, .title = "Rates of rendering"});
-}
-
 void run_render(RenderArguments arguments) {
-  if (wants_plot(arguments.rate.plot)) return draw_rates(arguments.rate.plot);
+  if (wants_plot(arguments.rate.plot)) return draw_results("render_rates", arguments.rate.plot);
   apply_defaults(&arguments);
   std::vector<NamedCase> cases = render_cases_of(arguments);
   ProgressLine progress;

@@ -1,7 +1,6 @@
 // `pictura bench simulate`: how fast executors step worlds, by backend, number of worlds and agents in each, with and
 // without entity sets; and what an agent-step costs, as a figure.
 #include <algorithm>
-#include <regex>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -116,28 +115,8 @@ void measure(const SimulateArguments& arguments, const std::string& backend, con
   results_out->insert(results_out->end(), {live, slots, step});
 }
 
-/// Draws what the sweeps in earlier results say an agent-step costs.
-void draw_cost(const PlotArguments& plot) {
-  const std::regex swept(R"((\w+), (\d+) worlds of (\d+) agents)");
-  const char* cost_label = "ns for an agent-step";
-  PlotPanel by_agents = sweep_panel(fmt::format("{} worlds", kSweptWorlds), "agents in each world", cost_label);
-  PlotPanel by_worlds = sweep_panel(fmt::format("{} agents in each world", kSweptAgents), "worlds", cost_label);
-  for (const PlottedResult& result : read_results(plot.results)) {
-    std::smatch match;
-    if (!std::regex_match(result.name, match, swept)) continue;
-    const int worlds = std::stoi(match[2]), agents = std::stoi(match[3]);
-    const double cost = 1e9 / result.value;
-    if (agents == kSweptAgents) {
-      add_point(&by_worlds, match[1], worlds, cost);
-    } else if (worlds == kSweptWorlds) {
-      add_point(&by_agents, match[1], agents, cost);
-    }
-  }
-  draw_plots_png({by_agents, by_worlds}, plot.figure, {.title = "What an agent-step costs"});
-}
-
 void run_simulate(SimulateArguments arguments) {
-  if (wants_plot(arguments.rate.plot)) return draw_cost(arguments.rate.plot);
+  if (wants_plot(arguments.rate.plot)) return draw_results("step_costs", arguments.rate.plot);
   check_backends(arguments.backends, simulator_names());
   arguments.maps = named_maps(arguments.maps);
   std::vector<std::shared_ptr<const RoadMap>> maps;

@@ -6,11 +6,7 @@
 #include "pictura/bench/commands/measure_training.h"
 #include "pictura/bench/commands/plot_results.h"
 #include "pictura/cli/backend_options.h"
-#include "pictura/cli/file_options.h"
 #include "pictura/cli/number_options.h"
-#include "pictura/common/error.h"
-#include "pictura/common/support/file.h"
-#include "pictura/common/support/json.h"
 
 namespace pictura {
 
@@ -23,42 +19,6 @@ struct TrainArguments {
   std::optional<EarlierReport> earlier;
   PlotArguments plot;
 };
-
-// Rates and efficiencies over GPUs, of files of scripts/gpu_ranks: agents on each GPU fixed, and in all.
-void draw_rates_of_ranks(const PlotArguments& plot) {
-  PlotPanel rate_of_each = sweep_panel("The same number of agents on each GPU", "GPUs", "agent-steps/s"),
-            rate_in_all = sweep_panel("The same number of agents in all", "GPUs", "agent-steps/s");
-  PlotPanel efficiency_of_each{"Rate over GPUs times the rate of one", "GPUs", "efficiency", {}, AxisScale::binary},
-      efficiency_in_all = efficiency_of_each;
-  for (const std::string& path : plot.results) {
-    const Json file = parse_json(read_file(path), /*allow_exceptions=*/false);
-    PICTURA_CHECK(file.is_object() && file.contains("rate"), "{}: expected rates of scripts/gpu_ranks", path);
-    std::string precision = "bf16";
-    for (const Json& argument : file.value("arguments", Json::array())) {
-      const std::string text = argument.get<std::string>(), key = "train.precision=";
-      if (text.starts_with(key)) precision = text.substr(key.size());
-    }
-    for (const auto& [size, rows] : file["rate"].items()) {
-      for (const bool of_each : {true, false}) {
-        const char* const its_case = of_each ? "each" : "in_all";
-        PlotSeries rate{.name = size + " " + precision}, efficiency = rate;
-        for (const Json& row : rows) {
-          if (row.at("case") != "one" && row.at("case") != its_case) continue;
-          const Json& agent_steps_per_s = row.at("agent_steps_per_s");
-          rate.x.push_back(row.at("gpus"));
-          rate.y.push_back(agent_steps_per_s.at("median"));
-          rate.low.push_back(agent_steps_per_s.at("min"));
-          rate.high.push_back(agent_steps_per_s.at("max"));
-          efficiency.x.push_back(row.at("gpus"));
-          efficiency.y.push_back(row.at("efficiency"));
-        }
-        (of_each ? rate_of_each : rate_in_all).series.push_back(std::move(rate));
-        (of_each ? efficiency_of_each : efficiency_in_all).series.push_back(std::move(efficiency));
-      }
-    }
-  }
-  draw_plots_png({rate_of_each, rate_in_all, efficiency_of_each, efficiency_in_all}, plot.figure, {.one_legend = true});
-}
 
 // Of the profiled update: the time of all kernels and copies, what of the wall time none of them ran in, and the
 // longest kernels. They run one after the other, on one stream.
@@ -82,7 +42,7 @@ void add_kernels(const TrainingMeasurement& measurement, std::vector<BenchResult
 }
 
 void run_train(TrainArguments arguments) {
-  if (wants_plot(arguments.plot)) return draw_rates_of_ranks(arguments.plot);
+  if (wants_plot(arguments.plot)) return draw_results("rank_rates", arguments.plot);
   TrainingCase& measured = arguments.measured;
   for (const std::string& text : overrides_of(arguments.backends)) measured.overrides.push_back(text);
   const TrainingMeasurement measurement = measure_training(measured);
@@ -145,11 +105,7 @@ void add_train_benchmark(CLI::App& bench) {
                     "Time each kernel in one update more: the longest, and the share of the wall time without any");
   command->add_flag("--json", arguments->json, "Print one JSON object");
   add_compare_option(command, &arguments->earlier);
-  command
-      ->add_option("--plot", arguments->plot.results,
-                   "Plot rates of scripts/gpu_ranks from its files instead of measuring")
-      ->delimiter(',');
-  command->add_option("--figure", arguments->plot.figure, "PNG file for --plot")->check(file_ending(".png"));
+  add_plot_options(command, "Plot rates of scripts/gpu_ranks from its files instead of measuring", &arguments->plot);
   command->footer(
       "Examples:\n  pictura bench train --updates 5\n"
       "  pictura bench train --config configs/smoke.toml --json\n"

@@ -1,18 +1,28 @@
 #include "pictura/bench/commands/plot_results.h"
 
-#include <algorithm>
-
+#include "pictura/cli/draw_chart.h"
+#include "pictura/cli/file_options.h"
 #include "pictura/cli/number_options.h"
-#include "pictura/cli/report.h"
 #include "pictura/common/error.h"
-#include "pictura/common/support/file.h"
-#include "pictura/common/support/json.h"
 
 namespace pictura {
+
+void add_plot_options(CLI::App* command, const std::string& description, PlotArguments* arguments) {
+  command->add_option("--plot", arguments->results, description)->delimiter(',');
+  command->add_option("--figure", arguments->figure, "The picture of --plot, a PNG or .svg")
+      ->check(file_ending(".png", ".svg"));
+}
 
 bool wants_plot(const PlotArguments& arguments) {
   if (arguments.results.empty() != arguments.figure.empty()) fail_usage("--plot and --figure: expected both");
   return !arguments.results.empty();
+}
+
+void draw_results(const std::string& chart, const PlotArguments& arguments, Json request) {
+  request["chart"] = chart;
+  request["results"] = arguments.results;
+  request["out"] = arguments.figure;
+  draw_chart(request);
 }
 
 void add_repeat_options(CLI::App* command, RateArguments* arguments) {
@@ -27,41 +37,7 @@ void add_repeat_options(CLI::App* command, RateArguments* arguments) {
 
 void add_rate_options(CLI::App* command, RateArguments* arguments) {
   add_repeat_options(command, arguments);
-  command->add_option("--plot", arguments->plot.results, "Plot the sweeps of these results instead of measuring")
-      ->delimiter(',');
-  command->add_option("--figure", arguments->plot.figure, "PNG file for --plot");
-}
-
-std::vector<PlottedResult> read_results(const std::vector<std::string>& paths) {
-  std::vector<PlottedResult> results;
-  for (const std::string& path : paths) {
-    const Json object = parse_json(read_file(path), /*allow_exceptions=*/false);
-    const std::size_t before = results.size();
-    auto add = [&](const Json& benchmark) {
-      if (!benchmark.is_object() || !benchmark.contains("results")) return;
-      for (const Json& row : benchmark["results"]) results.push_back({row.value("name", ""), row.value("value", 0.0)});
-    };
-    add(object);
-    if (object.is_object() && object.contains("bench")) {
-      for (const Json& benchmark : object["bench"]) add(benchmark);
-    }
-    PICTURA_CHECK(results.size() > before, "{}: expected results of a benchmark", path);
-  }
-  return results;
-}
-
-PlotPanel sweep_panel(const std::string& title, const std::string& x_label, const std::string& y_label) {
-  return {title, x_label, y_label, {}, AxisScale::binary, AxisScale::decimal};
-}
-
-void add_point(PlotPanel* panel, const std::string& series, double x, double y) {
-  auto& all = panel->series;
-  auto found = std::find_if(all.begin(), all.end(), [&](const PlotSeries& s) { return s.name == series; });
-  if (found == all.end()) found = all.insert(found, PlotSeries{series, {}, {}});
-  const auto at = std::lower_bound(found->x.begin(), found->x.end(), x);
-  if (at != found->x.end() && *at == x) return;
-  found->y.insert(found->y.begin() + (at - found->x.begin()), y);
-  found->x.insert(at, x);
+  add_plot_options(command, "Plot the sweeps of these results instead of measuring", &arguments->plot);
 }
 
 }  // namespace pictura

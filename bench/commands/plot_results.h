@@ -1,5 +1,5 @@
-// Shared by benchmarks of rates: options of measurement and report, and figures from earlier results: from their JSON
-// output, and from files of scripts/gpu_check, which contain several of those.
+// Shared by benchmarks of rates: options of measurement and report, and charts of earlier results: of their JSON
+// output, and of files of scripts/gpu_check, which contain several of those.
 #pragma once
 
 #include <string>
@@ -7,17 +7,21 @@
 
 #include <CLI/CLI.hpp>
 
-#include "pictura/drawing/plot.h"
+#include "pictura/common/support/json.h"
 
 namespace pictura {
 
-/// Files of results, and the PNG file to draw.
+/// Files of results, and the picture to draw.
 struct PlotArguments {
   std::vector<std::string> results;
   std::string figure;
 };
+/// Adds the options --plot, which `description` documents, and --figure.
+void add_plot_options(CLI::App* command, const std::string& description, PlotArguments* arguments);
 /// Whether both were given; throws UsageError if only one was.
 bool wants_plot(const PlotArguments& arguments);
+/// Draws a chart of pictura.plot from the results, with further arguments of its function.
+void draw_results(const std::string& chart, const PlotArguments& arguments, Json request = Json::object());
 
 struct RateArguments {
   int repeats = 7;
@@ -29,19 +33,5 @@ struct RateArguments {
 void add_repeat_options(CLI::App* command, RateArguments* arguments);
 /// Adds these and --plot and --figure.
 void add_rate_options(CLI::App* command, RateArguments* arguments);
-
-struct PlottedResult {
-  std::string name;
-  double value = 0;
-};
-/// The results in the files, in order. Throws Error naming a file that cannot be read or contains none.
-std::vector<PlottedResult> read_results(const std::vector<std::string>& paths);
-
-/// A panel of a sweep, with ticks at powers of 2 in x and at decades in y.
-PlotPanel sweep_panel(const std::string& title, const std::string& x_label, const std::string& y_label);
-
-/// Adds a point to the series of that name, which is created if missing; points of a series ascend in x, and of several
-/// with one x the first is kept.
-void add_point(PlotPanel* panel, const std::string& series, double x, double y);
 
 }  // namespace pictura

@@ -14,6 +14,7 @@ def main() -> None:
     program = pathlib.Path(__file__).parent / "bin" / "pictura"
     if not program.exists():
         sys.exit(f"error: this package was built without the command: expected {program}")
+    os.environ.setdefault("PICTURA_PYTHON", sys.executable)  # draws charts
     os.execv(program, [str(program), *sys.argv[1:]])
 
 

@@ -47,8 +47,9 @@ TINY = [
 TOWNS = sorted(path.stem for path in pathlib.Path(os.environ.get("PICTURA_DATA", "/nowhere")).glob("carla/*.xodr"))
 
 
-def run(*arguments, timeout=300):
-    return subprocess.run([PICTURA, *map(str, arguments)], capture_output=True, text=True, timeout=timeout)
+def run(*arguments, timeout=300, **variables):
+    environment = {**os.environ, **{name: str(value) for name, value in variables.items()}}
+    return subprocess.run([PICTURA, *map(str, arguments)], capture_output=True, text=True, timeout=timeout, env=environment)
 
 
 def has_torch():
@@ -88,6 +89,16 @@ class CommandCase(unittest.TestCase):
             for number in ("nan", "inf", "-1", "2000000000"):
                 with self.subTest(" ".join(map(str, arguments)), number=number):
                     self.assert_refused(2, arguments[-1], *arguments, number)
+
+    def python_as(self, command):
+        """A Python for charts that is a shell's command instead."""
+        path = self.folder / "python"
+        path.write_text(f"#!/bin/sh\n{command}\n")
+        path.chmod(0o755)
+        return path
+
+    def python_without_matplotlib(self):
+        return self.python_as(f'unset PYTHONPATH; exec {sys.executable} -S "$@"')
 
     def town(self, seed=3, blocks="2x2"):
         path = self.folder / f"town{seed}.xodr"
@@ -843,7 +854,51 @@ class Plots(CommandCase):
         self.assert_refused(1, "/proc/nowhere", "plot", a, "--metrics", "update", "--out", "/proc/nowhere/curves.png")
         self.assert_refused(2, "--x", "plot", a, "--x", "days", *out)
         self.assert_refused(2, "RUN", "plot", *out)
+        self.assert_refused(2, "expected a name that ends in .png or .svg", "plot", a, "--out", self.folder / "curves.pdf")
         self.assertFalse((self.folder / "curves.png").exists())
+
+    def test_a_picture_is_vector_graphics_where_its_name_says_so(self):
+        curves = self.folder / "curves.svg"
+        result = run("plot", self.run_folder("a", 1, [1, 2]), "--metrics", "update", "--out", curves)
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        self.assertIn("<svg", curves.read_text())
+
+    def test_modules_in_the_working_folder_are_not_imported(self):
+        (self.folder / "json.py").write_text("raise SystemExit(7)")
+        command = [PICTURA, "plot", self.run_folder("a", 1, [1, 2]), "--metrics", "update", "--out", "curves.png"]
+        result = subprocess.run(list(map(str, command)), capture_output=True, text=True, cwd=self.folder)
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+
+    def test_without_matplotlib_or_python_plots_say_what_to_install(self):
+        curves = self.folder / "curves.png"
+        arguments = ["plot", self.run_folder("a", 1, [1, 2]), "--metrics", "goals_per_1000_steps", "--out", curves]
+        result = run(*arguments, PICTURA_PYTHON=self.python_without_matplotlib())
+        self.assertEqual((result.returncode, result.stdout), (1, ""))
+        self.assertIn("pip install 'pictura[plot]'", result.stderr)
+        self.assertIn(f"its data is in {curves}.json", result.stderr)
+        (panel,) = json.loads(pathlib.Path(f"{curves}.json").read_text())["panels"]
+        self.assertEqual(panel["series"][0]["y"], [1, 2])
+        result = run(*arguments, PICTURA_PYTHON=self.folder / "nowhere")
+        self.assertEqual((result.returncode, "PICTURA_PYTHON names one" in result.stderr), (1, True), result.stderr)
+        result = run(*arguments, PICTURA_PYTHON=self.python_as("echo broken >&2; exit 5"))
+        self.assertEqual((result.returncode, result.stderr), (1, "error: broken\n"))
+        result = run(*arguments, PICTURA_PYTHON=self.python_as("kill -9 $$"))
+        self.assertEqual((result.returncode, "was ended by signal 9" in result.stderr), (1, True), result.stderr)
+        self.assertFalse(curves.exists())
+
+    def test_an_interrupt_ends_the_python_too(self):
+        running = self.folder / "running"
+        python = self.python_as(f"echo $$ > {running}; exec sleep 60")
+        command = [PICTURA, "plot", self.run_folder("a", 1, [1]), "--out", self.folder / "curves.png"]
+        process = subprocess.Popen(list(map(str, command)), stderr=subprocess.PIPE, text=True, env={**os.environ, "PICTURA_PYTHON": str(python)})
+        deadline = time.monotonic() + 60
+        while not (running.exists() and running.read_text()) and time.monotonic() < deadline:
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        _, message = process.communicate(timeout=30)
+        self.assertEqual((process.returncode, message), (130, "error: interrupted while a chart was drawn\n"))
+        with self.assertRaises(ProcessLookupError):
+            os.kill(int(running.read_text()), 0)
 
 
 def free_port():
@@ -1144,6 +1199,14 @@ class Replays(CommandCase):
                     self.assertAlmostEqual(shown["inserted"]["x_cm"] / 100, float(case["x_m"]), delta=0.006)
                     self.assertIn([shown["inserted"]["x_cm"], shown["inserted"]["y_cm"]], shown["inserted"]["path_cm"])
             self.assertEqual([c["width_px"] for c in header["cameras"]], [96] * 4)  # the vectors' driver has the paper's
+            charts = {"removal": {"removal.png"}, "pedestrian": {"pedestrian.png", *(f"path_{i:03}.png" for i in range(4))}}[kind]
+            self.assertEqual({file.name for file in (self.folder / kind).glob("*.png")}, charts)
+        removal = self.folder / "removal"
+        result = run("probe", "removal", *world, "--removals", 80, "--out", removal, "--json", PICTURA_PYTHON=self.python_without_matplotlib())
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn(f"notice: {removal}/removal.png: not drawn", result.stderr)
+        self.assertEqual({file.name for file in removal.glob("[!.]*")}, {"cases.csv", "summary.json"})
+        self.assertEqual(json.loads(result.stdout), json.loads((removal / "summary.json").read_text()))
         result = run(*probe, "--replay", path, "--case", len(cases))  # how many there are is known in the end
         self.assertEqual((result.returncode, f"--case: expected 0 to {len(cases) - 1}, got {len(cases)}" in result.stderr), (2, True), result.stderr)
         self.assert_refused(2, "--replay", *probe, "--case", 1)
@@ -1153,6 +1216,7 @@ class Replays(CommandCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         with open(self.folder / "corner" / "cases.csv") as file:
             case = next(csv.DictReader(file))
+        self.assertTrue({"corner.png", "example.png"} <= {file.name for file in (self.folder / "corner").iterdir()})
         header = header_of(path)
         shown = header["case"]
         self.assertEqual((shown["frame"], shown["ego"], shown["removed"]), (0, int(case["ego"]), int(case["user"])))
@@ -1248,7 +1312,7 @@ class Training(CommandCase):
         parts = self.json_of("train", *TINY, "--set", "train.updates=4", "--out", self.folder / "parts", "--resume")
         for key in ("policy_hash", "updates", "agent_steps"):
             self.assertEqual(whole[key], parts[key], key)
-        for name in ("checkpoint.ckpt", "untrained.ckpt", "policy.safetensors", "progress.csv", "learning_curve.png"):
+        for name in ("checkpoint.ckpt", "untrained.ckpt", "policy.safetensors", "progress.csv"):
             self.assertTrue((self.folder / "whole" / name).exists(), name)
 
     def test_exported_weights_drive_as_the_checkpoint_does(self):
@@ -1406,7 +1470,6 @@ class Training(CommandCase):
         self.assert_refused(2, "--minutes", *train, "--minutes", 0)
         stopped = self.json_of(*train, "--minutes", 1e-9)
         self.assertEqual((stopped["out_of_time"], stopped["updates"], stopped["episode_return"]), (True, 0, None))
-        self.assertIsNone(stopped["learning_curve"])
         resumed = self.json_of(*train, "--resume", "--minutes", 60)
         self.assertEqual((resumed["out_of_time"], resumed["updates"]), (False, 1))
 

@@ -38,7 +38,7 @@ MAY_INCLUDE = {
     "cli": TRAINING | {"driving", "replay"},
     "bindings": TRAINING | {"drawing", "driving", "replay"},
     "bench": SIMULATION | {"backends", "backend_cpu/renderer"},
-    "bench/commands": TRAINING | {"bench", "cli", "drawing", "driving"},
+    "bench/commands": TRAINING | {"bench", "cli", "driving"},
     "apps": TRAINING | {"bench/commands", "cli", "drawing", "driving", "replay"},
     "tests": None,  # anything
 }

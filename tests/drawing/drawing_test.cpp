@@ -23,7 +23,7 @@
 #include "pictura/common/support/interrupt.h"
 #include "pictura/drawing/film.h"
 #include "pictura/drawing/planes.h"
-#include "pictura/drawing/plot.h"
+#include "pictura/drawing/ticks.h"
 #include "pictura/drawing/video.h"
 #include "pictura/drawing/world.h"
 #include "pictura/map/opendrive/opendrive.h"
@@ -674,7 +674,7 @@ TEST(Planes, HaveTheirColors) {
   EXPECT_THROW(plane_picture(HostImages(rig, 1), 0, 0, Plane::depth), Error);
 }
 
-TEST(Plots, TicksAreRound) {
+TEST(Ticks, AreRound) {
   EXPECT_THAT(round_ticks(0, 10, 5), testing::ElementsAre(0, 2, 4, 6, 8, 10));
   EXPECT_THAT(round_ticks(-1, 1, 4), testing::ElementsAre(-1, -0.5, 0, 0.5, 1));
   EXPECT_THAT(round_ticks(1.3e6, 2.9e6, 3), testing::ElementsAre(1.5e6, 2e6, 2.5e6));
@@ -682,91 +682,6 @@ TEST(Plots, TicksAreRound) {
   EXPECT_LT(round_ticks(1 - 1e-16, 1, 5).size(), 21u) << "a range that a double hardly tells from its ends";
   EXPECT_LT(round_ticks(1e17, std::nextafter(1e17, 2e17), 5).size(), 21u);
   EXPECT_TRUE(round_ticks(0, std::numeric_limits<double>::infinity(), 4).empty());
-  EXPECT_THAT(binary_ticks(32, 768, 6), testing::ElementsAre(32, 64, 128, 256, 512));
-  EXPECT_THAT(binary_ticks(1, 1024, 6), testing::ElementsAre(1, 4, 16, 64, 256, 1024));
-  EXPECT_THAT(decimal_ticks(400, 3e6, 5), testing::ElementsAre(1e3, 1e4, 1e5, 1e6));
-  EXPECT_THAT(decimal_ticks(4e5, 3e6, 5), testing::ElementsAre(5e5, 1e6, 2e6));
-  EXPECT_THAT(decimal_ticks(1, 1e9, 4), testing::ElementsAre(1, 1e3, 1e6, 1e9));
-  EXPECT_THAT(decimal_ticks(1, std::exp2(std::log2(10.0)), 5), testing::ElementsAre(1, 2, 5, 10));
-  EXPECT_THAT(decimal_ticks(2.1e6, 4.9e6, 3), testing::ElementsAre(3e6, 4e6)) << "within 2 and 5 million";
-  EXPECT_THAT(binary_ticks(33, 63, 3), testing::ElementsAre(40, 50, 60)) << "between two powers";
-  EXPECT_TRUE(binary_ticks(0, 4, 4).empty());
-  EXPECT_TRUE(decimal_ticks(-1, 4, 4).empty());
-}
-
-TEST(Plots, DrawSeriesWithGapsInPanels) {
-  const double nan = std::nan("");
-  PlotPanel panel{"return", "agent-steps", "return", {{"a", {0, 1, 2, 3}, {0, 1, 1, 0}}}};
-  const Pixel blue{31, 111, 235};
-  const RgbImage whole = draw_plots({panel});
-  EXPECT_EQ(whole.width_px, 560 + 12);
-  const int drawn = count(whole, blue);
-  EXPECT_GT(drawn, 300);
-  // The flat middle third is a gap.
-  panel.series[0].y = {0, 1, nan, 0};
-  const int with_gap = count(draw_plots({panel}), blue);
-  EXPECT_LT(with_gap, 0.7 * drawn);
-  EXPECT_GT(with_gap, 0);
-  panel.series[0].y = {nan, nan, nan, nan};
-  EXPECT_EQ(count(draw_plots({panel}), blue), 0);
-  panel.series[0] = {"constant", {5}, {7}};
-  EXPECT_GT(count(draw_plots({panel}), blue), 0) << "a single point is a dot";
-  PlotPanel decades{"rate", "egos", "rate", {{"a", {1, 2, 4, 8}, {1, 1e3, 1e3, 1}}}};
-  decades.x_scale = AxisScale::binary;
-  decades.y_scale = AxisScale::decimal;
-  const int on_decades = count(draw_plots({decades}), blue);
-  EXPECT_GT(on_decades, 300);
-  decades.series[0].y[1] = 0;
-  EXPECT_LT(count(draw_plots({decades}), blue), 0.7 * on_decades) << "a logarithm has no 0";
-  const RgbImage three = draw_plots({panel, panel, panel}, {.columns = 2, .title = "run"});
-  EXPECT_EQ(three.width_px, 2 * 560 + 12);
-  EXPECT_GT(three.height_px, 2 * 360);
-  panel.series[0].y.push_back(1);
-  EXPECT_THAT(test::message_of([&] { draw_plots({panel}); }), HasSubstr("series 'constant'"));
-  EXPECT_THROW(draw_plots({}), Error);
-  EXPECT_THROW(draw_plots({PlotPanel{}}, {.panel_width_px = 10}), Error);
-  EXPECT_THROW(draw_plots_png({PlotPanel{}}, "/nonexistent/a/plot.png"), Error);
-}
-
-TEST(Plots, BandsLieBehindTheirLinesAndCountForTheAxis) {
-  PlotPanel panel{"return", "agent-steps", "return", {{"a", {0, 1, 2, 3}, {5, 5, 5, 5}}}};
-  const RgbImage without = draw_plots({panel});
-  panel.series[0].low = {4, 4, 4, 4};
-  panel.series[0].high = {6, 6, 6, 6};
-  const Pixel band = at(draw_plots({panel}), 300, 100);  // between two lines of the grid
-  EXPECT_LE(distance(band, {215, 229, 251}), 2) << "the first colour, thin on white";
-  EXPECT_EQ(count(without, band), 0);
-  const int whole = count(draw_plots({panel}), band);
-  EXPECT_GT(whole, 50'000) << "most of the panel, since the axis is as long as the band is wide";
-  EXPECT_GT(count(draw_plots({panel}), Pixel{31, 111, 235}), 300);
-  panel.series[0].high[1] = std::nan("");
-  EXPECT_NEAR(count(draw_plots({panel}), band), whole / 3, whole / 30) << "a gap up to both neighbours";
-  panel.series[0].low.pop_back();
-  EXPECT_THAT(test::message_of([&] { draw_plots({panel}); }), HasSubstr("expected a band of 4 points or none, got 3"));
-}
-
-TEST(Plots, StripsAndMarksStandAtTheirPlaces) {
-  PlotPanel panel{"return", "agent-steps", "return", {{"a", {0, 1, 2, 4}, {5, 5, 5, 5}}}};
-  const Pixel green{0, 128, 0}, red{255, 0, 0}, grey{90, 96, 104};
-  const int labels = count(draw_plots({panel}), grey);
-  panel.strip = {{0, rgb8(0, 128, 0)}, {2, rgb8(255, 0, 0)}, {4, rgb8(0, 128, 0)}};
-  const RgbImage with_strip = draw_plots({panel});
-  EXPECT_NEAR(count(with_strip, red), count(with_strip, green), 30) << "each cell reaches half way to its neighbours";
-  EXPECT_GT(count(with_strip, red), 1000);
-  panel.marks = {{2, "b"}};
-  EXPECT_GT(count(draw_plots({panel}), grey), labels) << "a dashed line";
-}
-
-TEST(Plots, OneLegendStandsAboveAllPanels) {
-  const PlotPanel panel{"a", "x", "y", {{"first", {0, 1}, {0, 1}}, {"second", {0, 1}, {1, 0}}}};
-  const RgbImage in_panels = draw_plots({panel, panel}), above = draw_plots({panel, panel}, {.one_legend = true});
-  EXPECT_GT(above.height_px, in_panels.height_px);
-  const Pixel blue{31, 111, 235};
-  EXPECT_EQ(at(above, 90, 6 + 11), blue) << "the first name's line";
-  // Names that need more than a row get one.
-  PlotPanel wide = panel;
-  wide.series[1].name = std::string(200, 'x');
-  EXPECT_GT(draw_plots({wide}, {.one_legend = true}).height_px, draw_plots({panel}, {.one_legend = true}).height_px);
 }
 
 // ---- video
