@@ -3,12 +3,8 @@
 
 set(PICTURA_HAS_PYTHON OFF)
 if(NOT PICTURA_WITH_PYTHON STREQUAL OFF)
-  if(NOT Python_EXECUTABLE)
-    foreach(venv ${PICTURA_VENV} $ENV{PICTURA_VENV} ${PROJECT_SOURCE_DIR}/.venv)
-      if(EXISTS ${venv}/bin/python AND NOT Python_EXECUTABLE)
-        set(Python_EXECUTABLE ${venv}/bin/python)
-      endif()
-    endforeach()
+  if(NOT Python_EXECUTABLE AND PICTURA_VENV_PYTHONS)
+    list(GET PICTURA_VENV_PYTHONS 0 Python_EXECUTABLE)
   endif()
   if(NOT Python_EXECUTABLE)
     execute_process(COMMAND python3 -c "import pybind11, sys; print(sys.executable)"

@@ -5,13 +5,7 @@
 set(PICTURA_HAS_TORCH OFF)
 set(PICTURA_HAS_GLOO OFF)
 if(NOT PICTURA_WITH_TORCH STREQUAL OFF)
-  set(pictura_pythons ${Python_EXECUTABLE})
-  foreach(venv ${PICTURA_VENV} $ENV{PICTURA_VENV} ${PROJECT_SOURCE_DIR}/.venv)
-    if(EXISTS ${venv}/bin/python)
-      list(APPEND pictura_pythons ${venv}/bin/python)
-    endif()
-  endforeach()
-  foreach(python ${pictura_pythons} python3)
+  foreach(python ${Python_EXECUTABLE} ${PICTURA_VENV_PYTHONS} python3)
     execute_process(COMMAND ${python} -c
       "import importlib.util as u, importlib.metadata as m; print(u.find_spec('torch').submodule_search_locations[0], m.version('torch'))"
       OUTPUT_VARIABLE pictura_torch_found ERROR_QUIET OUTPUT_STRIP_TRAILING_WHITESPACE RESULT_VARIABLE failed)
