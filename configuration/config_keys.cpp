@@ -65,7 +65,7 @@ class Describer {
  private:
   void add(const std::string& key, const std::string& values) {
     const auto line = std::find_if(writer_.lines.begin(), writer_.lines.end(),
-                                   [&key](const auto& each) { return each.first == key; });
+                                   [&key](const auto& each) { return each.first.name == key; });
     keys.push_back({key, line->second, values});
   }
   ConfigWriter writer_;

@@ -20,29 +20,28 @@ std::string shortest(double value);
 class ConfigWriter {
  public:
   template <typename Int>
-  void integer(const std::string& key, const Int& value, int64_t, int64_t) {
+  void integer(const NamedKey& key, const Int& value, int64_t, int64_t) {
     line(key, fmt::format("{}", value));
   }
   template <typename Int>
-  void integer_unless(const std::string&, bool is_set, const std::string& key, const Int& value, int64_t low,
-                      int64_t high) {
+  void integer_unless(const NamedKey&, bool is_set, const NamedKey& key, const Int& value, int64_t low, int64_t high) {
     if (!is_set) integer(key, value, low, high);
   }
-  void number(const std::string& key, const double& value, double, double) { line(key, shortest(value)); }
-  void flag(const std::string& key, const bool& value) { line(key, value ? "true" : "false"); }
-  void text(const std::string& key, const std::string& value) { line(key, quoted(value)); }
-  void name(const std::string& key, const std::string& value, const std::vector<std::string>&) { text(key, value); }
-  void device(const std::string& key, const std::string& value) { text(key, value); }
-  void samples(const std::string& key, const PixelSamples& value) { text(key, text_of(value)); }
-  void texts(const std::string& key, const std::vector<std::string>& values) {
+  void number(const NamedKey& key, const double& value, double, double) { line(key, shortest(value)); }
+  void flag(const NamedKey& key, const bool& value) { line(key, value ? "true" : "false"); }
+  void text(const NamedKey& key, const std::string& value) { line(key, quoted(value)); }
+  void name(const NamedKey& key, const std::string& value, const std::vector<std::string>&) { text(key, value); }
+  void device(const NamedKey& key, const std::string& value) { text(key, value); }
+  void samples(const NamedKey& key, const PixelSamples& value) { text(key, text_of(value)); }
+  void texts(const NamedKey& key, const std::vector<std::string>& values) {
     std::vector<std::string> all;
     for (const std::string& value : values) all.push_back(quoted(value));
     line(key, fmt::format("[{}]", fmt::join(all, ", ")));
   }
-  void integers(const std::string& key, const std::vector<int>& values, int64_t, int64_t) {
+  void integers(const NamedKey& key, const std::vector<int>& values, int64_t, int64_t) {
     line(key, fmt::format("[{}]", fmt::join(values, ", ")));
   }
-  void size_changes(const std::string& key, const std::vector<RenderSection::SizeChange>& values) {
+  void size_changes(const NamedKey& key, const std::vector<RenderSection::SizeChange>& values) {
     std::vector<std::string> all;
     for (const auto& change : values) {
       all.push_back(fmt::format(
@@ -52,21 +51,21 @@ class ConfigWriter {
     line(key, fmt::format("[{}]", fmt::join(all, ", ")));
   }
   template <typename Enum>
-  void choice(const std::string& key, const Enum& value, const Choices<Enum>& choices) {
+  void choice(const NamedKey& key, const Enum& value, const Choices<Enum>& choices) {
     for (const auto& [name, chosen] : choices) {
       if (chosen == value) text(key, name);
     }
   }
-  void range(const std::string& key, const ConditioningRange& value) {
+  void range(const NamedKey& key, const ConditioningRange& value) {
     line(key, fmt::format("[{}, {}]", shortest(value.low), shortest(value.high)));
   }
 
-  std::string toml;                                        // the whole file
-  std::vector<std::pair<std::string, std::string>> lines;  // key, value as written
+  std::string toml;                                     // the whole file
+  std::vector<std::pair<NamedKey, std::string>> lines;  // key, value as written
 
  private:
   static std::string quoted(const std::string& value);
-  void line(const std::string& key, const std::string& value);
+  void line(const NamedKey& key, const std::string& value);
 
   std::string section_;
 };
