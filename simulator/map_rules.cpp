@@ -160,7 +160,11 @@ void add_lanes(const RoadMap& map, const PieceRule& rule, const OpenLanes* open,
 /// Exits, and entries with their turns: entries within kSharedTurn_m of each other share one, also by way of others.
 void add_mouths(const OpenLanes& open, MapRules* out) {
   constexpr float kSharedTurn_m = 5.0f;
-  for (const LaneMouth& exit : open.exits) out->exits.push_back({exit.middle_m, exit.direction, exit.half_width_m});
+  for (const LaneMouth& exit : open.exits) {
+    const MapLane& lane = out->lanes[static_cast<size_t>(exit.lane)];
+    const LaneSegment& last = out->segments[static_cast<size_t>(lane.first_segment + lane.num_segments - 1)];
+    out->exits.push_back({exit.middle_m, exit.direction, exit.half_width_m, last.slope});
+  }
   for (size_t i = 0; i < open.entries.size(); ++i) {
     auto turn = static_cast<int32_t>(i);
     for (size_t j = 0; j < i; ++j) {

@@ -65,7 +65,7 @@ bool DrivenAgent::leaves_road(const Motion& at, float z_m, float margin_m) const
 bool DrivenAgent::crosses_exit(const Motion& before, const Motion& after, float z_m) const {
   if (world_.map.exits.empty()) return false;
   const auto box_of = [&](const Motion& at) { return box({at.x_m, at.y_m, z_m}, at.heading_rad, 0); };
-  return pictura::crosses_exit(world_.map, front_bumper(box_of(before)), front_bumper(box_of(after)), z_m);
+  return pictura::crosses_exit(world_.map, box_of(before), box_of(after));
 }
 
 float DrivenAgent::to_bumper_m() const {

@@ -1,7 +1,9 @@
 // Leaving a road that ends: where routes end, and when an agent is out.
 #pragma once
 
+#include "pictura/simulator/rules/collision.h"
 #include "pictura/simulator/rules/goal.h"
+#include "pictura/simulator/rules/limits.h"
 
 namespace pictura {
 
@@ -13,19 +15,21 @@ PICTURA_HD inline bool is_at_route_end(const MapView& map, RoutePoint at) {
   return at.s_m >= map.lanes[static_cast<size_t>(at.lane)].route_end_m;
 }
 
-/// Whether the way of a front bumper's middle, at height z_m, crosses the exit in the direction of its traffic.
-PICTURA_HD inline bool crosses(const Exit& exit, Vec2 before, Vec2 after, float z_m) {
-  const Vec2 to = after - exit.middle_m.xy();
-  const float along_before = dot(before - exit.middle_m.xy(), exit.direction), along_after = dot(to, exit.direction);
-  return along_before < 0.0f && along_after >= 0.0f && fabsf(cross(exit.direction, to)) <= exit.half_width_m &&
-         fabsf(exit.middle_m.z - z_m) < kLevel_m;
+/// Whether the middle of a box's front bumper crosses the exit in the direction of its traffic. A box is as high as the
+/// road under its reference point: on a slope, the road under the bumper is not.
+PICTURA_HD inline bool crosses(const Exit& exit, const AgentBox& before, const AgentBox& after) {
+  const Vec2 from = front_bumper(before) - exit.middle_m.xy(), to = front_bumper(after) - exit.middle_m.xy();
+  const float to_bumper_m = reference_to_center(after.agent_class, after.length_m) + 0.5f * after.length_m;
+  const float bumper_z_m = after.center_m.z + exit.slope * to_bumper_m;
+  return dot(from, exit.direction) < 0.0f && dot(to, exit.direction) >= 0.0f &&
+         fabsf(cross(exit.direction, to)) <= exit.half_width_m && fabsf(exit.middle_m.z - bumper_z_m) < kLevel_m;
 }
 
-PICTURA_HD inline bool crosses_exit(const MapView& map, Vec2 before, Vec2 after, float z_m) {
+PICTURA_HD inline bool crosses_exit(const MapView& map, const AgentBox& before, const AgentBox& after) {
   if (map.exits.empty()) return false;
-  const Span<const int32_t> exits = items_at(map.exit_cells, after);
+  const Span<const int32_t> exits = items_at(map.exit_cells, front_bumper(after));
   for (size_t i = 0; i < exits.size(); ++i) {
-    if (crosses(map.exits[static_cast<size_t>(exits[i])], before, after, z_m)) return true;
+    if (crosses(map.exits[static_cast<size_t>(exits[i])], before, after)) return true;
   }
   return false;
 }

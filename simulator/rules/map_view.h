@@ -52,6 +52,7 @@ struct Exit {
   Vec3 middle_m;
   Vec2 direction;  // of traffic, unit vector
   float half_width_m = 0;
+  float slope = 0;  // of the lane there, rise per metre
 };
 
 /// A lane at whose start agents enter an open map. Of the entries of one turn one agent enters in a step.

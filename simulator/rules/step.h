@@ -195,7 +195,7 @@ PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& co
       events |= kEventOffRoad;
     }
     if (runs_red_light(world, before, box, lane_before, fit.lane)) events |= kEventRedLight;
-    if (crosses_exit(world.map, front_bumper(before), front_bumper(box), box.center_m.z)) events |= kLeaves;
+    if (crosses_exit(world.map, before, box)) events |= kLeaves;
   }
   events |= pass_waypoints(world, agent, from, {motion.x_m, motion.y_m, fit.z_m}, group);
   if (group.rank() > 0) return;

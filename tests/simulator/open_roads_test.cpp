@@ -176,6 +176,38 @@ TEST(OpenRoads, WaypointsEndFiveMetresBeforeTheExit) {
   }
 }
 
+/// The road under a bumper is several metres higher or lower there than under the rear axle.
+TEST(OpenRoads, AgentsLeaveSteepRoads) {
+  for (const double slope : {-1.0, -0.7, 0.7, 1.0}) {
+    test::RoadText road;
+    road.elevation = fmt::format(R"(<elevation s="0" a="{}" b="{}" c="0" d="0"/>)", -96 * slope, slope);
+    road.right = test::lane_of(-1, "driving", 3.5);
+    testing::Stage stage(map_of(test::file_of(road.text())), 1);
+    stage.put(0, {96, -1.75f}, 0, 5);
+    bool left = false;
+    for (int step = 0; step < 3; ++step) {
+      stage.step();
+      left |= stage.world().agents.left[0] != 0;
+    }
+    EXPECT_TRUE(left) << slope;
+  }
+}
+
+TEST(OpenRoads, ExitsOfOtherLevelsHoldNobody) {
+  test::RoadText below, above;
+  below.right = above.right = test::lane_of(-1, "driving", 3.5);
+  above.id = "2";
+  above.length = 50;
+  above.elevation = R"(<elevation s="0" a="3" b="0" c="0" d="0"/>)";
+  testing::Stage stage(map_of(test::file_of(below.text() + above.text())), 1);
+  stage.put(0, {40, -1.75f}, 0, 10);
+  for (int step = 0; step < 20; ++step) {
+    stage.step();
+    EXPECT_FALSE(stage.world().agents.left[0]);
+  }
+  EXPECT_GT(stage.world().agents.x_m[0], 55);
+}
+
 TEST(OpenRoads, AgentsStartWithWayAhead) {
   const auto simulator = make(testing::cars(), map_of(test::open_street(30)), {{0, 20, 0}});
   const SpawnReport report = simulator->spawn_report();
