@@ -223,7 +223,11 @@ int32_t LaneKeepingAgent::braking_action(const Motion& now) const {
   const int32_t action = action_of(Driving::brakes, now, place_);
   if (stays_on_road(now, action, Driving::brakes)) return action;
   const int32_t straight = action_of(Driving::brakes_straight, now, place_);
-  return stays_on_road(now, straight, Driving::brakes_straight) ? straight : action;
+  if (stays_on_road(now, straight, Driving::brakes_straight)) return straight;
+  // Jerks are too coarse to stop at zero: what stands creeps by millimetres a second, until it must turn back.
+  constexpr float kBack_mps = 0.5f;
+  return std::fabs(now.speed_mps) < kStanding_mps ? agent_.speed_action(now, std::copysign(kBack_mps, -now.speed_mps))
+                                                  : action;
 }
 
 /// The speed from which it can stop before the next closed line.

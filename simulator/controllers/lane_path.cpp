@@ -101,7 +101,10 @@ bool LanePath::follow_route(const std::vector<int32_t>& lanes, RoutePoint to) {
 void LanePath::go_on(float distance_m) {
   while (distance_m > 0) {
     const RoutePoint through = through_lane(map_, at_);
-    if (lane(through.lane).num_successors == 0) break;
+    if (lane(through.lane).num_successors == 0) {
+      if (lane(at_.lane).route_end_m < kRouteGoesOn_m) follow(lane(at_.lane).length_m);  // to the exit
+      break;
+    }
     if (through.lane != at_.lane) change_to(through.lane, lane(through.lane).length_m - through.s_m);
     distance_m -= lane(at_.lane).length_m - at_.s_m;
     follow(lane(at_.lane).length_m);

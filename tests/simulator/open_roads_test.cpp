@@ -68,6 +68,23 @@ TEST(OpenRoads, TheLaneKeeperDrivesOffAndOthersEnter) {
   }
 }
 
+/// No car gets round the end of this road, which turns by 2.5 rad within 5 cm. Those that stopped there crept over the
+/// edge, by millimetres a second.
+TEST(OpenRoads, WhatCannotGoOnStands) {
+  test::RoadText road;
+  road.length = 24.1;
+  road.geometry =
+      test::line_at(0, 0, 0, 0, 24) +
+      R"(<geometry s="24" x="24" y="0" hdg="0" length="0.1"><spiral curvStart="100" curvEnd="-100"/></geometry>)";
+  road.right = test::lane_of(-1, "driving", 3.5);
+  for (const uint64_t seed : {0, 7}) {
+    const auto simulator = make({.seed = seed, .num_threads = 1}, map_of(test::file_of(road.text())), {{0, 3, 0}});
+    drive(simulator.get(), "lane", 900, [](const StepResult&) {});
+    EXPECT_GT(simulator->totals().agent_steps, 900);
+    EXPECT_EQ(simulator->totals().off_road, 0) << seed;
+  }
+}
+
 TEST(OpenRoads, EveryControllerDrives) {
   for (const char* name : {"random", "idle", "lane", "idm_lanes"}) {
     const auto simulator = make({.num_threads = 1, .parked_cars = 2}, map_of(test::open_crossing()), {{0, 10, 0}});
