@@ -36,6 +36,7 @@ Text text_of(MendKind kind) {
     case MendKind::geometry_jump:
       return {"jumps of the reference line", "spread over ten metres, or ten times their size"};
     case MendKind::geometry_gap: return {"gaps between geometries", "bridged by a straight line"};
+    case MendKind::height_jump: return {"jumps of the elevation", "spread over ten metres, or ten times their size"};
     case MendKind::strip_surface: return {"cross-sections of strips", "flattened"};
     case MendKind::missing_lane_type:
       return {"lanes without a type", "counted as none in the center, as special lanes elsewhere"};

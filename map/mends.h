@@ -32,6 +32,7 @@ enum class MendKind : uint8_t {
   moved_geometry,
   geometry_jump,
   geometry_gap,
+  height_jump,
   strip_surface,
   missing_lane_type,
   unknown_lane_type,

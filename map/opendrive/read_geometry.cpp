@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <optional>
 
 #include "pictura/map/opendrive/curves.h"
@@ -17,7 +18,10 @@ constexpr double kMaxTurn_rad = 100.0;    // of one geometry: 16 turns, enough f
 constexpr double kMaxGap_m = 0.1;         // between two geometries of a reference line, and of its length
 constexpr double kMaxLengthError = 0.01;  // relative error of a <paramPoly3>'s length, in addition to kMaxGap_m
 constexpr double kMaxJump_m = 5.0;        // larger gaps have no one meaning
+constexpr double kMaxStep_m = 0.5;        // of the elevation: more is a wall to cars
 constexpr std::size_t kMaxJumps = 1000;   // of a road: bounds the time to spread them
+// The heading of a geometry shorter than kStationTolerance_m means nothing where the line turns by more.
+constexpr double kMaxKink_rad = 0.2;
 // A length that is off by at most this much, or by this share, is cut or extended to fit.
 constexpr double kMaxCut_m = 0.5, kMaxCutShare = 0.01;
 
@@ -153,6 +157,33 @@ std::optional<Jump> jump_between(const Geometry& geometry, std::size_t index, co
   return Jump{.piece = index, .shift_m = Eigen::Vector2d{road.geometry[index].x, road.geometry[index].y} - end};
 }
 
+/// By how much the line turns from the end of a geometry to the start of the next one.
+double turn_between(const GeometryPiece& piece, const GeometryPiece& next) {
+  return std::abs(std::remainder(next.heading - pose_on(piece, piece.length).heading, 2 * std::numbers::pi));
+}
+
+/// Leaves out geometries of next to no length that head elsewhere than the next one, or the one before the last.
+void drop_kinks(std::vector<Geometry>* geometries) {
+  std::vector<Geometry> kept;
+  for (std::size_t i = 0; i < geometries->size(); ++i) {
+    const Geometry& geometry = (*geometries)[i];
+    double turn_rad = 0;
+    if (i + 1 < geometries->size()) {
+      turn_rad = turn_between(geometry.piece, (*geometries)[i + 1].piece);
+    } else if (!kept.empty()) {
+      turn_rad = turn_between(kept.back().piece, geometry.piece);
+    }
+    if (geometry.piece.length >= kStationTolerance_m || turn_rad <= kMaxKink_rad) {
+      kept.push_back(geometry);
+      continue;
+    }
+    geometry.element.mend(MendKind::empty_geometry,
+                          "attribute length: expected at least {} where the line turns by {:.3f} rad, got {}",
+                          kStationTolerance_m, turn_rad, geometry.piece.length);
+  }
+  *geometries = std::move(kept);
+}
+
 /// Joins the geometries: together they are the road, whatever length it states.
 void join_geometry(const std::vector<Geometry>& geometries, FileRoad* road) {
   double moved = 0;  // stations by the geometries before
@@ -184,6 +215,23 @@ void join_geometry(const std::vector<Geometry>& geometries, FileRoad* road) {
     if (jumps.size() > kMaxJumps) geometries[i].element.fail("expected at most {} gaps in a road", kMaxJumps);
   }
   if (!jumps.empty()) spread_jumps(jumps, road);
+}
+
+/// Elevation: cubics of s that join, as far as the file describes the road.
+void read_elevation(const Element& profile, double described, FileRoad* road) {
+  road->elevation = read_profile(profile, "elevation", "s", road->length);
+  const std::vector<Cubic>& cubics = road->elevation.cubics;
+  std::vector<HeightJump> jumps;
+  for (std::size_t i = 1; i < cubics.size(); ++i) {
+    const double s = cubics[i].s, before_m = Profile{{cubics[i - 1]}}.value(s), rise_m = cubics[i].a - before_m;
+    if (std::abs(rise_m) <= kMaxStep_m || s >= std::min(described, road->length)) continue;
+    profile.mend(MendKind::height_jump,
+                 "at s {} it goes on {:.3f} m above {:.3f} m, where it was; expected at most {} m", s, rise_m, before_m,
+                 kMaxStep_m);
+    jumps.push_back({s, rise_m});
+    if (jumps.size() > kMaxJumps) profile.fail("expected at most {} jumps in a road", kMaxJumps);
+  }
+  if (!jumps.empty()) spread_height_jumps(jumps, road);
 }
 
 /// A straight road from where the first geometry begins.
@@ -284,11 +332,13 @@ double read_reference_line(const Element& road_element, FileRoad* road) {
       append_record(element, "s", &Geometry::s, {s, element, std::move(piece)}, &geometries);
     });
     sort_records(&Geometry::s, &geometries);
+    drop_kinks(&geometries);
     join_geometry(geometries, road);
   }
-  road->elevation = read_profile(road_element.child("elevationProfile"), "elevation", "s", road->length);
+  const double described = is_short ? 0 : stated;
+  read_elevation(road_element.child("elevationProfile"), described, road);
   read_banking(road_element.child("lateralProfile"), road);
-  return is_short ? 0 : stated;
+  return described;
 }
 
 }  // namespace pictura::opendrive

@@ -14,17 +14,20 @@ constexpr double kMinSpan_m = 10, kSpanPerJump = 10;
 constexpr double kMinSpanPerJump = 7.5;
 constexpr double kMaxCubic_m = 1;  // length of the cubics that replace a moved line: within 0.1 mm of it
 
-/// A jump with the stretch of s over which it is spread.
-struct Spread {
-  Jump jump;
+/// The stretch of s over which a jump is spread.
+struct Stretch {
   double begin = 0, end = 0;
 };
 
-Spread spread_of(const Jump& jump, const FileRoad& road) {
-  const double span = std::min(road.length, std::max(kMinSpan_m, kSpanPerJump * jump.shift_m.norm()));
-  const double begin = std::clamp(road.geometry[jump.piece].s - 0.5 * span, 0.0, road.length - span);
-  return {jump, begin, begin + span};
+Stretch stretch_of(double s, double jump_m, double road_length) {
+  const double span = std::min(road_length, std::max(kMinSpan_m, kSpanPerJump * std::abs(jump_m)));
+  const double begin = std::clamp(s - 0.5 * span, 0.0, road_length - span);
+  return {begin, begin + span};
 }
+
+struct Spread : Stretch {
+  Jump jump;
+};
 
 /// A point of the moved line and its derivative by s.
 struct Knot {
@@ -53,7 +56,9 @@ GeometryPiece cubic_between(const Knot& a, const Knot& b, double s, double lengt
 class JumpSpreader {
  public:
   JumpSpreader(const std::vector<Jump>& jumps, FileRoad* road) : road_(*road) {
-    for (const Jump& jump : jumps) spreads_.push_back(spread_of(jump, road_));
+    for (const Jump& jump : jumps) {
+      spreads_.push_back({stretch_of(road_.geometry[jump.piece].s, jump.shift_m.norm(), road_.length), jump});
+    }
   }
 
   void run() {
@@ -111,10 +116,55 @@ class JumpSpreader {
   std::vector<GeometryPiece> moved_;
 };
 
+/// The cubic that goes on as `cubic` does, from station s.
+Cubic continued(const Cubic& cubic, double s) {
+  const double ds = s - cubic.s;
+  return {.s = s,
+          .a = cubic.a + ds * (cubic.b + ds * (cubic.c + ds * cubic.d)),
+          .b = cubic.b + ds * (2 * cubic.c + 3 * ds * cubic.d),
+          .c = cubic.c + 3 * ds * cubic.d,
+          .d = cubic.d};
+}
+
+/// A smoothstep from 0 to `rise` over the stretch.
+Cubic smoothstep(const Stretch& stretch, double rise) {
+  const double span = stretch.end - stretch.begin;
+  return {.s = stretch.begin, .c = 3 * rise / (span * span), .d = -2 * rise / (span * span * span)};
+}
+
 }  // namespace
 
 bool can_spread_jump(double jump_m, double road_length_m) { return road_length_m >= kMinSpanPerJump * jump_m; }
 
 void spread_jumps(const std::vector<Jump>& jumps, FileRoad* road) { JumpSpreader(jumps, road).run(); }
+
+void spread_height_jumps(const std::vector<HeightJump>& jumps, FileRoad* road) {
+  std::vector<Stretch> stretches;
+  std::vector<double> stations;
+  for (const Cubic& cubic : road->elevation.cubics) stations.push_back(cubic.s);
+  for (const HeightJump& jump : jumps) {
+    stretches.push_back(stretch_of(jump.s, jump.rise_m, road->length));
+    stations.insert(stations.end(), {stretches.back().begin, stretches.back().end});
+  }
+  std::sort(stations.begin(), stations.end());
+  stations.erase(std::unique(stations.begin(), stations.end()), stations.end());
+  Profile spread;
+  auto next = road->elevation.cubics.cbegin();
+  Cubic base;
+  for (const double s : stations) {
+    while (next != road->elevation.cubics.cend() && next->s <= s) base = *next++;
+    Cubic cubic = continued(base, s);
+    for (std::size_t i = 0; i < jumps.size(); ++i) {
+      if (s < stretches[i].begin || s >= stretches[i].end) continue;
+      const Cubic step = continued(smoothstep(stretches[i], jumps[i].rise_m), s);
+      cubic.a += step.a - (s >= jumps[i].s ? jumps[i].rise_m : 0);
+      cubic.b += step.b;
+      cubic.c += step.c;
+      cubic.d += step.d;
+    }
+    spread.cubics.push_back(cubic);
+  }
+  road->elevation = std::move(spread);
+}
 
 }  // namespace pictura::opendrive

@@ -1,4 +1,4 @@
-// Jumps of a reference line, spread over the road around them.
+// Jumps of a reference line, in plan and in height, spread over the road around them.
 #pragma once
 
 #include <cstddef>
@@ -23,5 +23,13 @@ bool can_spread_jump(double jump_m, double road_length_m);
 /// before, as a smoothstep of s over ten metres, or ten times the jump if that is more, or the whole of a shorter road.
 /// Stations and both ends of the road stay. Jumps are in the order of their pieces.
 void spread_jumps(const std::vector<Jump>& jumps, FileRoad* road);
+
+/// A step of a road's elevation at s.
+struct HeightJump {
+  double s = 0, rise_m = 0;
+};
+
+/// Changes the elevation around each jump as spread_jumps() does the line.
+void spread_height_jumps(const std::vector<HeightJump>& jumps, FileRoad* road);
 
 }  // namespace pictura::opendrive

@@ -24,6 +24,8 @@ const std::vector<MapCase> kCases{
     {"geometry_of_no_length", "a road and a geometry of no length"},
     {"tiny_section_lane_offset", "a lane section of 20 micrometres, between two others whose lane offset jumps there"},
     {"jump_in_reference_line", "a reference line that goes on 0.63 m beside itself"},
+    {"elevation_steps", "a street whose elevation jumps up by 2 m, and down by 0.8 m"},
+    {"steep_street", "a street of 70 %, on which a bumper is metres above its rear axle"},
     {"light_without_controller", "a traffic light that no controller names, away from junctions"},
     {"street_with_ends", "a street whose ends lead nowhere: agents enter at one end and leave at the other"},
     {"cul_de_sac", "a street that ends in a turning circle: its only exit is its entry"},

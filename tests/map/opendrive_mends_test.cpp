@@ -412,6 +412,41 @@ TEST(OpenDriveMends, JumpsNearAnEndLeaveTheEnd) {
   test::expect_at(map, last_point(map, map.lanes[0]).position_m, 100, -1.5);
 }
 
+TEST(OpenDriveMends, JumpsOfTheElevationAreSpreadOverTheRoad) {
+  for (const double rise : {2.0, -0.6, 12.0}) {
+    RoadText road = straight();
+    road.elevation = fmt::format(
+        R"(<elevation s="0" a="1" b="0" c="0" d="0"/><elevation s="50" a="{}" b="0.1" c="0" d="0"/>)", 1 + rise);
+    const RoadMap map = mended(road.text(), MendKind::height_jump);
+    const double half_m = std::min(50.0, std::max(5.0, 5 * std::abs(rise)));
+    const Span<const LanePoint> points = map.points_of(map.lanes[0]);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const double x = points[i].position_m.x + map.origin_m[0], z = points[i].position_m.z + map.origin_m[2];
+      if (std::abs(x - 50) >= half_m) {
+        EXPECT_NEAR(z, x < 50 ? 1 : 1 + rise + 0.1 * (x - 50), 1e-4) << x;
+      }
+      if (i == 0) continue;
+      const Vec3 step = points[i].position_m - points[i - 1].position_m;
+      EXPECT_LE(std::abs(step.z / step.x), 0.75 * std::abs(rise) / half_m + 0.1 + 1e-3) << x;
+    }
+  }
+  RoadText road = straight();
+  road.elevation = R"(<elevation s="0" a="0" b="0" c="0" d="0"/><elevation s="50" a="0.4" b="0" c="0" d="0"/>)";
+  EXPECT_TRUE(parse_opendrive(file_of(road.text()), "low.xodr").mends.empty());
+}
+
+/// Some writers begin a road with a geometry of no length that heads elsewhere.
+TEST(OpenDriveMends, GeometriesOfNextToNoLengthTurnNothing) {
+  constexpr double kNorth = 1.5707963267948966;
+  for (const std::string& geometry : {line_at(0, 0, 0, 0, 1e-9) + line_at(1e-9, 1e-9, 0, kNorth, 100),
+                                      line_at(0, 0, 0, kNorth, 100) + line_at(100, 0, 100, 0, 1e-9)}) {
+    RoadText road = straight();
+    road.geometry = geometry;
+    const RoadMap map = mended(road.text(), MendKind::empty_geometry);
+    for (const LanePoint& point : map.points_of(map.lanes[0])) EXPECT_NEAR(point.heading_rad, kNorth, 1e-6);
+  }
+}
+
 TEST(OpenDriveMends, LargeJumpsAreRefused) {
   RoadText road = straight();
   road.geometry = line_at(0, 0, 0, 0, 50) + line_at(50, 50, 5.1, 0, 50);
