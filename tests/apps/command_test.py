@@ -33,6 +33,7 @@ from replay_pages import header_of
 
 PICTURA = ""
 CONFIGS = pathlib.Path(__file__).resolve().parents[2] / "configs"
+MAP_CASES = sorted((pathlib.Path(__file__).resolve().parents[1] / "map" / "cases").glob("*.xodr"))
 SCENES = pathlib.Path(__file__).resolve().parents[1] / "golden"
 # A policy and a world so small that an update takes well under a second. On the host, whose runs are exact.
 TINY = [
@@ -1149,7 +1150,7 @@ class Replays(CommandCase):
         result = run(*evaluate, "--out", out, "--replays", 2, "--gallery", folder, "--replay", self.folder / "worst.html")
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertNotIn("notice", result.stderr)  # they count what the evaluation did
-        scenarios = json.loads(out.read_text())["densities"][0]["scenarios"]
+        scenarios = json.loads(out.read_text())["rows"][0]["scenarios"]
         rates = [s["at_fault_infraction"] / s["vehicles"] for s in scenarios]
         worst = sorted(range(4), key=lambda i: -rates[i])[:2]
         self.assertEqual(sorted(p.name for p in folder.glob("[!.]*")), sorted(["index.html", *(f"custom_{i}.html" for i in worst)]))
@@ -1270,6 +1271,34 @@ class Replays(CommandCase):
                 found.append((bits >> 1) ^ -(bits & 1))
                 bits = shift = 0
         return found
+
+
+class MapCases(CommandCase):
+    """Every command on every file of tests/map/cases."""
+
+    def test_maps_are_shown_driven_drawn_and_replayed(self):
+        for path in MAP_CASES:
+            with self.subTest(path.stem):
+                facts = self.json_of("map", path, "--png", self.folder / "map.png")
+                self.assertGreater(facts["endless_lanes"] + facts["open_lanes"], 0)
+                for policy in ("random", "idle", "idm_lanes", "lane"):
+                    driven = self.json_of("simulate", path, "--agents", 8, "--steps", 100, "--parked", 2, "--policy", policy)
+                    self.assertGreater(driven["agent_steps"], 0, policy)
+                self.assertEqual(driven["off_road"], 0, "by the lane keeper")
+                self.json_of("render", path, "--agents", 4, "--steps", 5, "--views", 1, "--out", self.folder / "images")
+                self.json_of("replay", path, "--agents", 4, "--steps", 20, "--policy", "lane", "--out", self.folder / "drive.html")
+
+    def test_policies_are_trained_and_evaluated_on_all_at_once(self):
+        if not has_torch():
+            self.skipTest("built without torch")
+        names = ",".join(map(str, MAP_CASES))
+        few = ["--map", names, "--agents", 4, "--steps", 30, "--density", "light", "--scenarios", len(MAP_CASES)]
+        self.assertEqual(self.json_of("evaluate", "--policy", "lane", *few)["rows"][0]["scenarios"], len(MAP_CASES))
+        maps = json.dumps([str(path) for path in MAP_CASES])
+        self.json_of("train", *TINY, "--set", f"simulator.maps={maps}", "--set", f"simulator.num_slots={3 * len(MAP_CASES)}",
+                     "--set", "train.updates=2", "--out", self.folder / "run")
+        evaluated = self.json_of("evaluate", self.folder / "run" / "checkpoint.ckpt", *few)
+        self.assertEqual(evaluated["rows"][0]["scenarios"], len(MAP_CASES))
 
 
 class Training(CommandCase):

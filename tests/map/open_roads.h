@@ -1,8 +1,11 @@
 // OpenDRIVE files of roads that end.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <string>
+#include <vector>
 
 #include "pictura/tests/map/small_roads.h"
 
@@ -75,5 +78,15 @@ inline std::string unlinked_roads() {
   second.geometry = line_at(0, 100.3, 0, 0, 100);
   return file_of(first.text() + second.text());
 }
+
+/// The files of tests/map/cases, in the order of their names. Programs that call this define PICTURA_MAP_CASES.
+#ifdef PICTURA_MAP_CASES
+inline std::vector<std::string> map_cases() {
+  std::vector<std::string> files;
+  for (const auto& entry : std::filesystem::directory_iterator(PICTURA_MAP_CASES)) files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+#endif
 
 }  // namespace pictura::test

@@ -234,10 +234,14 @@ TEST_F(CudaSimulatorTest, RoadsThatEndOver1000Steps) {
   config.episode_steps = 700;
   config.reset_inactive_fraction = 2;
   config.parked_cars = 4;
-  const Maps maps{std::make_shared<RoadMap>(parse_opendrive(test::open_street(), "street.xodr")),
-                  std::make_shared<RoadMap>(parse_opendrive(test::open_crossing(), "crossing.xodr")),
-                  std::make_shared<RoadMap>(parse_opendrive(test::open_ramp(), "ramp.xodr"))};
-  const std::vector<WorldSpec> worlds{{0, 60, 0}, {1, 40, 1}, {2, 120, 2}, {0, 3, 3}};
+  Maps maps{std::make_shared<RoadMap>(parse_opendrive(test::open_street(), "street.xodr")),
+            std::make_shared<RoadMap>(parse_opendrive(test::open_crossing(), "crossing.xodr")),
+            std::make_shared<RoadMap>(parse_opendrive(test::open_ramp(), "ramp.xodr"))};
+  std::vector<WorldSpec> worlds{{0, 60, 0}, {1, 40, 1}, {2, 120, 2}, {0, 3, 3}};
+  for (const std::string& map_case : test::map_cases()) {
+    worlds.push_back({static_cast<int>(maps.size()), 16, static_cast<uint32_t>(worlds.size())});
+    maps.push_back(load_map(map_case));
+  }
   const auto cpu = make_simulator("cpu", config, maps, worlds);
   const auto cuda = make_simulator("cuda", config, maps, worlds);
   for (int step = 0; step < 1000; ++step) {
