@@ -787,7 +787,13 @@ light_heads: 'as_mapped', or 'visible': heads beside or before their stop line s
 conditioning: a number or (low, high) by name, see CONDITIONING_NAMES; the paper's ranges otherwise. stream: a cudaStream_t
 as int; None: the legacy default stream. The other defaults are the paper's training world.
 Raises pictura.UsageError naming what cannot be simulated, pictura.Error where there is no device.)")
-      .def("_inside", &PySimulator::inside, py::keep_alive<0, 1>())
+      .def("_inside",
+           [](PySimulator& self) {
+             py::object inside = py::cast(self.inside());
+             // Not by py::keep_alive<0, 1>: pybind11 3.1 crashes in it where the arguments are of other types.
+             py::detail::keep_alive_impl(inside, py::cast(&self, py::return_value_policy::reference));
+             return inside;
+           })
       .def_property_readonly("name", [](PySimulator& self) { return std::string(self.simulator().name()); })
       .def_property_readonly("choice", &PySimulator::choice, py::doc("What was chosen for 'auto', and why."))
       .def_property_readonly("device", [](PySimulator& self) { return name_of(self.simulator().device()); })
@@ -1002,7 +1008,7 @@ void define_controller(py::class_<PyController>* controller) {
           [](const std::vector<std::pair<PyController*, py::object>>& drivers, const PySimulator& simulator) {
             return std::make_unique<PyController>(shared_controller(drivers, simulator));
           },
-          py::arg("drivers"), py::arg("simulator"), py::keep_alive<0, 2>(),
+          py::arg("drivers"), py::arg("simulator"),
           R"(Controllers that share a simulator's slots, of (controller, mask): of two that command a slot, the later one drives.
 
 mask: uint8 or bool [slots] in the simulator's memory, which is read at every step; None: all. Raises pictura.Error for another

@@ -688,7 +688,7 @@ class Simulator:
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
-    def _inside(self) -> _SimulatorInside:
+    def _inside(self) -> typing.Any:
         ...
     def check(self) -> None:
         """

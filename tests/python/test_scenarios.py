@@ -132,6 +132,11 @@ def test_some_drive_among_the_recorded(scene):
         pictura.Controller.shared([(pictura.Controller("idle", simulator), np.ones(3, np.uint8))], simulator)
     with pytest.raises(pictura.UsageError):
         pictura.Controller.shared([], simulator)
+    for no_simulator in ("x", 3, None, mask):
+        with pytest.raises(TypeError):
+            pictura.Controller.shared([], no_simulator)
+        with pytest.raises(TypeError):
+            pictura.Simulator._inside(no_simulator)
     other = world_of(scene)
     with pytest.raises(pictura.Error, match="of this simulator"):
         pictura.Controller.shared([(pictura.Controller("idle", other), None)], simulator)
