@@ -121,12 +121,11 @@ Json mends_of(const RoadMap& map, const std::string& source) {
 /// A recorded scene: the facts of its map, its tracks and lights, and how its traffic and its edges agree.
 void run_scene(const MapArguments& arguments) {
   if (!arguments.xodr.empty()) fail_usage("--xodr: {} is a recorded scene, which has no OpenDRIVE", arguments.map);
-  const InterruptibleWork work("interrupted");
   SceneReport report;
   const Stopwatch watch;
   const Scenario scenario = load_scenario(arguments.map, &report);
   const double load_ms = 1e3 * watch.seconds();
-  work.check();
+  throw_if_interrupted();
   const MapPictureOptions picture{.size_px = arguments.size_px, .box = shown_box(arguments), .scenario = &scenario};
   if (!arguments.png.empty()) draw_map_png(scenario.map, arguments.png, picture);
   if (!arguments.svg.empty()) draw_map_svg(scenario.map, arguments.svg, picture);
@@ -159,22 +158,21 @@ void run_map(const CLI::App& command, const MapArguments& arguments) {
   }
   if (arguments.full && !arguments.json) fail_usage("--full: lists elements as JSON; expected --json with it");
   if (is_scene_name(arguments.map)) return run_scene(arguments);
-  const InterruptibleWork work("interrupted");
   LoadReport report;
   ProgressLine progress;
   const Stopwatch watch;
   const std::shared_ptr<const RoadMap> map =
       load_map(arguments.map, {.strict = arguments.strict}, &report, [&](const char* stage, double done) {
-        work.check();
+        throw_if_interrupted();
         if (watch.seconds() > kQuiet_s) progress.update(fmt::format("{}: {}", arguments.map, stage), done);
       });
   progress.finish();
   const double load_ms = 1e3 * watch.seconds();
-  work.check();
+  throw_if_interrupted();
   print_mends(*map, report.source);
   const MapPictureOptions picture{.size_px = arguments.size_px, .box = shown_box(arguments)};
   if (!arguments.png.empty()) draw_map_png(*map, arguments.png, picture);
-  work.check();
+  throw_if_interrupted();
   if (!arguments.svg.empty()) draw_map_svg(*map, arguments.svg, picture);
   if (!arguments.xodr.empty()) {
     const MapText text = map_text(arguments.map);

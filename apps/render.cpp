@@ -69,12 +69,11 @@ std::unique_ptr<Renderer> open_renderer(const RenderArguments& arguments, Render
 
 /// Draws the subject. Returns views per second: the median of five calls after one that warms up.
 double draw(const Subject& subject, Renderer* renderer, HostImages* images_out) {
-  const InterruptibleWork work("interrupted while images were drawn");
   upload_geometries(subject.geometries, renderer);
   renderer->render(subject.scene, subject.views, images_out->batch());
   std::vector<double> seconds;
   for (int repeat = 0; repeat < 5; ++repeat) {
-    work.check();
+    if (interrupted()) throw Interrupted("interrupted while images were drawn");
     const Stopwatch watch;
     renderer->render(subject.scene, subject.views, images_out->batch());
     seconds.push_back(watch.seconds());
@@ -86,10 +85,12 @@ double draw(const Subject& subject, Renderer* renderer, HostImages* images_out) 
 /// Returns the paths of the contact sheets.
 std::vector<std::string> write_pictures(const RenderArguments& arguments, const Subject& subject, const Rig& rig,
                                         const HostImages& images, FilledFolder* out) {
-  const InterruptibleWork work("interrupted while pictures were written");
+  const auto check = [] {
+    if (interrupted()) throw Interrupted("interrupted while pictures were written");
+  };
   const int num_views = static_cast<int>(subject.views.size());
   for (int view = 0; view < num_views; ++view) {
-    work.check();
+    check();
     for (int camera = 0; camera < static_cast<int>(rig.cameras.size()); ++camera) {
       const CameraImages& image = images.camera(camera);
       const std::string stem =
@@ -105,7 +106,7 @@ std::vector<std::string> write_pictures(const RenderArguments& arguments, const 
   if (!arguments.figure) return sheets;
   std::vector<RgbImage> panels;
   for (int view = 0; view < num_views; ++view) {
-    work.check();
+    check();
     panels.push_back(captioned(images, view, 0, subject.captions[static_cast<size_t>(view)]));
     const RgbImage& panel = panels.back();
     write_png(out->file(subject.names[static_cast<size_t>(view)] + ".png"), panel.width_px, panel.height_px, panel.rgb);

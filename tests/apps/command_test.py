@@ -462,6 +462,15 @@ class Images(CommandCase):
         self.assertEqual(len(hashes), 1)
         self.assertRegex(hashes.pop(), "^[0-9a-f]{16}$")
 
+    def test_drawing_ends_soon_after_an_interrupt_that_came_before_it(self):
+        out = self.folder / "images"
+        arguments = ["render", str(self.town()), "--agents", "30", "--steps", "0", "--views", "30", "--size", "384x216", "--out", str(out)]
+        with subprocess.Popen([PICTURA, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            self.assertIn("backend", process.stderr.readline())  # before there is a world
+            process.send_signal(signal.SIGINT)
+            self.assertIn("error: ", process.communicate()[1])
+        self.assertEqual((process.returncode, list(out.iterdir())), (130, []))
+
     def test_a_used_folder_keeps_no_pictures_of_before(self):
         out = self.folder / "images"
         render = ["render", "procedural:1", "--agents", 6, "--steps", 0, "--backend", "null", "--size", "16x9", "--out", out]
