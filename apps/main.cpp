@@ -102,6 +102,7 @@ int main(int argc, char** argv) {
   add_completion_command(app);
   add_bench_command(app);
   refuse_empty_values(&app);
+  app.parse_complete_callback([&app] { refuse_shared_files(app); });
 
   return end_output(run(app, argc, argv));
 }

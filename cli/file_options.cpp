@@ -1,10 +1,17 @@
 #include "pictura/cli/file_options.h"
 
+#include <algorithm>
+#include <array>
 #include <filesystem>
+#include <map>
 
 #include <fmt/format.h>
 
+#include "pictura/common/error.h"
+
 namespace pictura {
+
+namespace fs = std::filesystem;
 
 void add_map_or_scene(CLI::App* command, std::string* map_out, const std::string& more) {
   command
@@ -19,12 +26,51 @@ void add_map_or_scene(CLI::App* command, std::string* map_out, const std::string
 
 CLI::Validator file_ending(const std::string& ending, const std::string& other) {
   auto complaint = [ending, other](const std::string& text) -> std::string {
-    const std::string own = std::filesystem::path(text).extension().string();
+    const std::string own = fs::path(text).extension().string();
     if (own.empty() || own == ending || own == other) return "";
     return fmt::format("expected a name that ends in {}{}{}, got '{}'", ending, other.empty() ? "" : " or ", other,
                        text);
   };
   return {complaint, ""};
+}
+
+namespace {
+
+constexpr std::array kOutputs{"--out",      "--csv",   "--infractions", "--mcap",  "--png", "--replay",
+                              "--rollouts", "--scene", "--svg",         "--video", "--xodr"};
+constexpr std::array kInputs{"CHECKPOINT", "POLICY", "--policy", "--rig"};
+
+template <typename Names>
+bool is_among(const Names& names, const CLI::Option* option) {
+  return std::find(names.begin(), names.end(), option->get_name()) != names.end();
+}
+
+/// The regular file that a text names, whether or not there is one yet; empty where it names anything else.
+std::string file_named(const std::string& text) {
+  std::error_code error;
+  const fs::file_status status = fs::status(text, error);
+  if (fs::exists(status) && !fs::is_regular_file(status)) return "";
+  return fs::weakly_canonical(fs::absolute(text, error), error).string();
+}
+
+}  // namespace
+
+void refuse_shared_files(const CLI::App& app) {
+  std::map<std::string, std::string> name_of_file;  // of the option
+  for (const bool writes : {false, true}) {
+    for (const CLI::Option* option : app.get_options()) {
+      if (writes ? !is_among(kOutputs, option) : !is_among(kInputs, option)) continue;
+      for (const std::string& text : option->results()) {
+        const std::string file = file_named(text);
+        if (file.empty()) continue;
+        const auto [other, is_new] = name_of_file.emplace(file, option->get_name());
+        if (!is_new && writes) {
+          fail_usage("{}: expected another file than that of {}, got '{}'", option->get_name(), other->second, text);
+        }
+      }
+    }
+  }
+  for (const CLI::App* each : app.get_subcommands()) refuse_shared_files(*each);
 }
 
 void refuse_empty_values(CLI::App* command) {

@@ -298,6 +298,19 @@ class Files(CommandCase):
             self.assertEqual((result.returncode, town.exists()), (1, True), result.stderr)
             self.assertIn("error: stdout: cannot be written: Broken pipe", result.stderr)
 
+    def test_no_two_options_write_one_file(self):
+        town, page = self.town(blocks="1x1"), self.folder / "page"
+        for first, second in [("--replay", "--mcap"), ("--mcap", "--scene"), ("--policy", "--replay")]:
+            with self.subTest(first=first, second=second):
+                self.assert_refused(2, "expected another file than that of --", "simulate", town, first, page, second, page)
+        relative = [os.path.abspath(PICTURA), "simulate", town, "--replay", "page", "--mcap", "./page"]
+        self.assertEqual(subprocess.run(relative, cwd=self.folder, stderr=subprocess.DEVNULL).returncode, 2)
+        self.assertFalse(page.exists())
+        self.json_of("simulate", town, "--agents", 2, "--steps", 2, "--replay", "/dev/null", "--mcap", "/dev/null")
+        before = town.stat().st_ino
+        self.json_of("map", town, "--xodr", town)  # a map may be replaced
+        self.assertNotEqual(town.stat().st_ino, before)
+
     def test_the_contact_sheet_of_many_views_has_pages(self):
         out = self.folder / "images"
         facts = self.json_of("render", self.town(), "--agents", 80, "--steps", 0, "--views", 80, "--backend", "null",
