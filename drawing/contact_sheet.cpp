@@ -76,7 +76,9 @@ SheetLayout layout_of(const Rig& rig, const std::vector<std::string>& view_names
     images_width_px += camera.width_px;
     image_height_px = std::max(image_height_px, camera.height_px);
   }
-  layout.enlargement = enlargement > 0 ? enlargement : std::max(1, kWantedWidth_px / images_width_px);
+  layout.enlargement =
+      enlargement > 0 ? enlargement
+                      : std::max(1, std::min(kWantedWidth_px / images_width_px, kMaxPageHeight_px / image_height_px));
   layout.row_px = image_height_px * layout.enlargement + kImageGap_px;
   const Canvas ruler(1, 1, kSheetColor);
   for (const std::string& name : view_names) {

@@ -317,6 +317,10 @@ class Files(CommandCase):
                              "--size", "96x54", "--out", out)  # fmt: skip
         self.assertEqual([pathlib.Path(path).name for path in facts["contact_sheets"]],
                          ["contact_sheet.png", "contact_sheet_2.png", "contact_sheet_3.png"])  # fmt: skip
+        # One row is as high as a page, not the more the narrower its images are.
+        facts = self.json_of("render", self.town(), "--agents", 2, "--steps", 0, "--views", 1, "--backend", "null",
+                             "--size", "8x1000", "--out", out)  # fmt: skip
+        self.assertEqual(len(facts["contact_sheets"]), 1)
 
 
 class Maps(CommandCase):
