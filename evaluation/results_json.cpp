@@ -82,6 +82,8 @@ Json read_results_json(const std::string& path, const std::vector<std::string>& 
     json = parse_json(text);
   } catch (const Json::parse_error& error) {
     fail("{}: {}, got no JSON from byte {}", path, kExpected, error.byte);
+  } catch (const Json::out_of_range&) {
+    fail("{}: {}, got a number beyond what a double holds", path, kExpected);
   }
   parse_results(path, [&] {
     PICTURA_CHECK(std::find(formats.begin(), formats.end(), json.value("format", "")) != formats.end(),

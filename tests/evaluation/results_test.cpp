@@ -202,7 +202,8 @@ TEST(Results, OtherFilesAreRefusedByName) {
   test::ScratchFolder folder;
   const std::string path = folder / "x.json";
   for (const char* text :
-       {"", "[1]", "{}", R"({"format": "pictura evaluation 1"})", R"({"format": "pictura evaluation 3"})"}) {
+       {"", "[1]", "{}", R"({"format": "pictura evaluation 1"})", R"({"format": "pictura evaluation 3"})",
+        R"({"format": "pictura evaluation 2", "densities": 1e999})"}) {
     write_file(path, text);
     EXPECT_THAT(message_of([&] { read_results(path); }), AllOf(HasSubstr("x.json"), HasSubstr("evaluate --out")))
         << text;
