@@ -57,6 +57,7 @@ SavedPolicy resized_policy(const SavedPolicy& policy, ImageSize size) {
 
 ExportedPolicy export_policy(const std::string& policy_path, const std::string& out, const ExportOptions& options) {
   const SavedPolicy policy = read_policy(policy_path, options.average);
+  check_finite(policy.path, policy.parameters);
   write_policy(out, options.size ? resized_policy(policy, *options.size) : policy, options.weights, options.commit);
   const SavedPolicy written = read_policy(out);
   ExportedPolicy result;

@@ -179,8 +179,16 @@ void write_policy(const std::string& path, const SavedPolicy& policy, WeightType
   write_file(path, file);
 }
 
+void check_finite(const std::string& path, const std::vector<NamedTensor>& saved) {
+  for (const NamedTensor& parameter : saved) {
+    PICTURA_CHECK(at::isfinite(parameter.value).all().item<bool>(),
+                  "{}: parameter '{}': expected finite numbers, got infinities or NaN", path, parameter.name);
+  }
+}
+
 void restore_tensors(const std::string& path, const std::vector<NamedTensor>& saved,
                      const std::vector<NamedTensor>& parameters) {
+  check_finite(path, saved);
   const at::NoGradGuard no_grad;
   for (const NamedTensor& parameter : parameters) {
     const auto found = std::find_if(saved.begin(), saved.end(),
@@ -189,8 +197,6 @@ void restore_tensors(const std::string& path, const std::vector<NamedTensor>& sa
     PICTURA_CHECK(found->value.sizes() == parameter.value.sizes(),
                   "{}: of another architecture: parameter '{}': expected [{}], got [{}]", path, parameter.name,
                   fmt::join(parameter.value.sizes(), ", "), fmt::join(found->value.sizes(), ", "));
-    PICTURA_CHECK(at::isfinite(found->value).all().item<bool>(),
-                  "{}: parameter '{}': expected finite numbers, got infinities or NaN", path, parameter.name);
     at::Tensor target = parameter.value;
     target.copy_(found->value);
   }

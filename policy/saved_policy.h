@@ -36,8 +36,12 @@ SavedPolicy parse_policy(const std::string& file, const std::string& path, bool 
 /// writes), and hash: FNV-1a of the whole file with the 16 digits of this hash as zeros. Throws Error naming the path.
 void write_policy(const std::string& path, const SavedPolicy& policy, WeightType type, const std::string& commit);
 
+/// Throws Error naming the file `path` and the first tensor that holds a number that is not finite: such a policy would
+/// still choose actions.
+void check_finite(const std::string& path, const std::vector<NamedTensor>& saved);
+
 /// Copies `saved`, of the file `path`, into `parameters` in place. Throws Error naming the file and the first tensor
-/// that is missing, of another shape, or holds a number that is not finite: such a policy would still choose actions.
+/// that is missing or of another shape, and as check_finite() does.
 void restore_tensors(const std::string& path, const std::vector<NamedTensor>& saved,
                      const std::vector<NamedTensor>& parameters);
 
