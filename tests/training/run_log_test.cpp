@@ -3,7 +3,9 @@
 #include "pictura/training/run_log.h"
 
 #include <algorithm>
+#include <clocale>
 #include <csignal>
+#include <cstdlib>
 #include <filesystem>
 
 #include <gmock/gmock.h>
@@ -52,6 +54,17 @@ TEST_F(ProgressCsvFile, KeepsWholeRowsOfUpdatesThatAreDone) {
   EXPECT_EQ(after("update,a", 2), "update,a,b\n9,0.5,7\n");
   EXPECT_TRUE(notices_.empty());
   EXPECT_EQ(folder_.num_entries(), 1u);
+}
+
+TEST_F(ProgressCsvFile, KeepsItsRowsUnderALocaleOfDecimalCommas) {
+  const test::ScratchFolder locales;  // few machines have such a locale installed
+  const std::string make = "localedef -i de_DE -f UTF-8 " + locales.path() + "/de_DE.UTF-8 2>/dev/null";
+  if (std::system(make.c_str()) != 0) GTEST_SKIP() << "localedef makes no locale here";
+  const test::EnvironmentVariable place("LOCPATH", locales.path());
+  ASSERT_TRUE(std::setlocale(LC_ALL, "de_DE.UTF-8"));
+  const std::string rows = "update,a,b\n1,2.5,3e-2\n2,0.25,-5e-3\n", written = after(rows, 2);
+  std::setlocale(LC_ALL, "C");
+  EXPECT_EQ(written, rows + "9,0.5,7\n");
 }
 
 TEST_F(ProgressCsvFile, OtherColumnsGoOnInANewFile) {
