@@ -158,7 +158,12 @@ OutputFile::~OutputFile() {
 
 // What a device will take waits with the temporary files, for want of a folder of its own.
 std::string OutputFile::staging_folder() const {
-  return is_through_ ? fs::temp_directory_path().string() : folder_of(target_);
+  if (!is_through_) return folder_of(target_);
+  std::error_code error;
+  const std::string folder = fs::temp_directory_path(error).string();
+  PICTURA_CHECK(!error, "{}: cannot be written: expected $TMPDIR to name a folder for temporary files: {}", path_,
+                error.message());
+  return folder;
 }
 
 void OutputFile::stage_unnamed() {

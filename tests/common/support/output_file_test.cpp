@@ -122,6 +122,14 @@ TEST_P(OutputFileTest, KeepsTheModeOfWhatItReplacesAndRefusesWhatIsReadOnly) {
   EXPECT_EQ(read_file(path), "new");
 }
 
+TEST_P(OutputFileTest, NamesTheVariableThatNamesNoFolderForTemporaryFiles) {
+  const test::EnvironmentVariable folder("TMPDIR", folder_ / "missing");
+  EXPECT_EQ(test::message_of([&] { put("/dev/null", "x"); }),
+            "/dev/null: cannot be written: expected $TMPDIR to name a folder for temporary files: No such file or "
+            "directory");
+  put(folder_ / "a.txt", "x");
+}
+
 TEST_P(OutputFileTest, RemovesNoFileOfAUsers) {
   const std::vector<std::string> names{".a.txt.backup.tmp", ".a.txt.1.0.tmp", ".pictura-notes.tmp",
                                        ".pictura-0123456789abcdeg.tmp"};
