@@ -12,6 +12,7 @@
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
+#include "pictura/common/support/file.h"
 #include "pictura/common/support/hash.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/parallel_for.h"
@@ -372,17 +373,6 @@ std::vector<WorldSpec> worlds_of(const LoadedScenes& batch, int first_scene, int
     worlds.push_back(scene_world(*batch.maps[i], static_cast<int>(i), kFirstEvaluationWorld + number));
   }
   return worlds;
-}
-
-std::string hash_of_file(const std::string& path) {
-  Hash64 hash;
-  std::ifstream file(path, std::ios::binary);
-  std::vector<char> bytes(std::size_t{1} << 20);
-  while (file.read(bytes.data(), static_cast<std::streamsize>(bytes.size())), file.gcount() > 0) {
-    throw_if_interrupted();
-    hash.add_bytes(bytes.data(), static_cast<std::size_t>(file.gcount()));
-  }
-  return hash.hex();
 }
 
 /// Of the names and bytes of their files, wherever these lie.

@@ -66,16 +66,15 @@ RoadMap load_file(const std::string& path, const OpenDriveOptions& options, cons
   const std::string cache_path = map_cache_path(path, options);
   if (cache_path.empty()) return parse_opendrive(text, path, options, progress);
   const MapCacheKey key = map_cache_key(text, options);
-  std::error_code error;
-  if (fs::exists(cache_path, error)) {
-    try {
-      RoadMap map = decode_map(read_file(cache_path), key, cache_path);
+  try {
+    if (const std::optional<std::string> cached = read_cached(cache_path)) {
+      RoadMap map = decode_map(*cached, key, cache_path);
       map.name = fs::path(path).stem().string();  // another link may have named the file that was cached
       report->cached = true;
       return map;
-    } catch (const Error& rejection) {
-      report->cache_rejection = rejection.what();
     }
+  } catch (const Error& rejection) {
+    report->cache_rejection = rejection.what();
   }
   RoadMap map = parse_opendrive(text, path, options, progress);
   try_to_cache(cache_path, encode_map(map, key));

@@ -11,14 +11,22 @@
 #include <unistd.h>
 
 #include "pictura/common/error.h"
+#include "pictura/common/support/hash.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/output_file.h"
+#include "pictura/common/support/regular_file.h"
 
 namespace pictura {
 
 namespace fs = std::filesystem;
 
 namespace {
+
+bool is_same_version(const struct stat& a, const struct stat& b) {
+  return a.st_size == b.st_size && a.st_mtim.tv_sec == b.st_mtim.tv_sec && a.st_mtim.tv_nsec == b.st_mtim.tv_nsec;
+}
+
+constexpr std::size_t kChunk_bytes = std::size_t{1} << 16;
 
 /// A file open for reading. Opening a FIFO does not wait for its writer: reading does, and can be interrupted.
 class InputFile {
@@ -28,13 +36,20 @@ class InputFile {
     PICTURA_CHECK(!path.empty(), "expected the name of a file to read, got an empty one");
     PICTURA_CHECK(file_.get() >= 0 || errno != ENOENT, "{}: no such file", path_);
     PICTURA_CHECK(file_.get() >= 0, "{}: cannot be opened: {}", path_, std::strerror(errno));
+    opened_ = status();
+    PICTURA_CHECK(!S_ISDIR(opened_.st_mode), "{}: expected a file, got a folder", path_);
   }
 
-  struct stat status() const {
-    struct stat result{};
-    PICTURA_CHECK(::fstat(file_.get(), &result) == 0, "{}: cannot be asked for its size: {}", path_,
-                  std::strerror(errno));
-    return result;
+  /// Whether its size is known beforehand: pipes and the like have none.
+  bool is_regular() const { return S_ISREG(opened_.st_mode); }
+  std::size_t size_bytes() const { return static_cast<std::size_t>(opened_.st_size); }
+
+  /// Throws Error unless the bytes read are the whole file, unchanged since it was opened.
+  void check_unchanged(std::size_t bytes_read) const {
+    if (!is_regular()) return;
+    // Files of the kernel's own have no size, and bytes all the same.
+    const bool is_whole = opened_.st_size == 0 || bytes_read == size_bytes();
+    PICTURA_CHECK(is_whole && is_same_version(opened_, status()), "{}: changed while it was read", path_);
   }
 
   /// Appends the next bytes, at most `count`; returns how many there were, 0 at the end.
@@ -52,6 +67,13 @@ class InputFile {
   }
 
  private:
+  struct stat status() const {
+    struct stat result{};
+    PICTURA_CHECK(::fstat(file_.get(), &result) == 0, "{}: cannot be asked for its size: {}", path_,
+                  std::strerror(errno));
+    return result;
+  }
+
   // Until there are bytes or nobody is left to write them; at once for regular files.
   void wait_for_bytes() const {
     constexpr int kPoll_ms = 100;
@@ -63,37 +85,40 @@ class InputFile {
 
   const std::string& path_;
   Descriptor file_;
+  struct stat opened_{};
 };
-
-bool is_same_version(const struct stat& a, const struct stat& b) {
-  return a.st_size == b.st_size && a.st_mtim.tv_sec == b.st_mtim.tv_sec && a.st_mtim.tv_nsec == b.st_mtim.tv_nsec;
-}
 
 }  // namespace
 
 std::string read_file(const std::string& path, std::size_t max_bytes,
                       const std::function<void(std::string_view first)>& check) {
   const InputFile file(path);
-  const struct stat before = file.status();
-  PICTURA_CHECK(!S_ISDIR(before.st_mode), "{}: expected a file, got a folder", path);
-  // Pipes and the like have no size to be asked for beforehand.
-  const bool is_regular = S_ISREG(before.st_mode);
   const auto check_size = [&](std::size_t bytes) {
     PICTURA_CHECK(bytes <= max_bytes, "{}: larger than {} bytes", path, max_bytes);
   };
-  if (is_regular) check_size(static_cast<std::size_t>(before.st_size));
-  constexpr std::size_t kChunk_bytes = std::size_t{1} << 16;
   std::string bytes;
-  if (is_regular) bytes.reserve(static_cast<std::size_t>(before.st_size) + kChunk_bytes);
+  if (file.is_regular()) {
+    check_size(file.size_bytes());
+    bytes.reserve(file.size_bytes() + kChunk_bytes);
+  }
   while (bytes.size() < kFirst_bytes && file.append_to(&bytes, kChunk_bytes) > 0) check_size(bytes.size());
   if (check) check(std::string_view(bytes).substr(0, kFirst_bytes));
   while (file.append_to(&bytes, kChunk_bytes) > 0) check_size(bytes.size());
-  if (is_regular) {
-    // Files of the kernel's own have no size, and bytes all the same.
-    const bool is_whole = before.st_size == 0 || bytes.size() == static_cast<std::size_t>(before.st_size);
-    PICTURA_CHECK(is_whole && is_same_version(before, file.status()), "{}: changed while it was read", path);
-  }
+  file.check_unchanged(bytes.size());
   return bytes;
+}
+
+std::string hash_of_file(const std::string& path) {
+  const InputFile file(path);
+  Hash64 hash;
+  std::size_t bytes_read = 0;
+  for (std::string chunk; file.append_to(&chunk, kChunk_bytes) > 0; chunk.clear()) {
+    throw_if_interrupted();
+    hash.add_bytes(chunk.data(), chunk.size());
+    bytes_read += chunk.size();
+  }
+  file.check_unchanged(bytes_read);
+  return hash.hex();
 }
 
 void write_file(const std::string& path, std::string_view bytes) {
@@ -117,7 +142,16 @@ std::string cache_folder(const std::string& name) {
   return folder + "/pictura/" + name;
 }
 
+std::optional<std::string> read_cached(const std::string& path) {
+  std::error_code error;
+  if (!fs::exists(path, error)) return std::nullopt;
+  require_regular_file(path);
+  return read_file(path);
+}
+
 void try_to_cache(const std::string& path, std::string_view bytes) {
+  std::error_code error;
+  if (fs::exists(path, error) && !fs::is_regular_file(path, error)) return;
   try {
     make_output_folder(fs::path(path).parent_path().string());
     write_file(path, bytes);

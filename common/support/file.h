@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -18,12 +19,20 @@ constexpr std::size_t kFirst_bytes = 64;
 std::string read_file(const std::string& path, std::size_t max_bytes = std::size_t{1} << 30,
                       const std::function<void(std::string_view first)>& check = {});
 
+/// The 16 digits of Hash64 over a file's bytes, of which only a piece is in memory at a time. Throws as read_file()
+/// does.
+std::string hash_of_file(const std::string& path);
+
 /// Writes the bytes as OutputFile does (output_file.h): whole, or not at all.
 void write_file(const std::string& path, std::string_view bytes);
 
 /// The folder for what can be made again: $XDG_CACHE_HOME/pictura/NAME, or ~/.cache/pictura/NAME. Empty when there is
 /// neither, or when $PICTURA_CACHE is `off`.
 std::string cache_folder(const std::string& name);
+
+/// The bytes of a file of a cache folder, or nothing where there is none. Throws as read_file() does, and where it is a
+/// FIFO or a device, which might never end.
+std::optional<std::string> read_cached(const std::string& path);
 
 /// Writes a file of a cache folder, which is made where it is missing. Says nothing when it cannot: such a folder is
 /// the user's choice, or not his to change.

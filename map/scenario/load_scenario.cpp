@@ -85,15 +85,14 @@ ShardIds find_ids(const std::string& path, const womd::ByteSource& file,
     content.add_bytes(&place.sum, sizeof place.sum);
   }
   const SceneCacheKey key{.content = content.value(), .record = SceneCacheKey::kIndex};
-  std::error_code error;
-  if (fs::exists(cached, error)) {
-    try {
+  try {
+    if (const std::optional<std::string> bytes = read_cached(cached)) {
       ShardIds ids;
-      decode_cached(read_file(cached), key, cached, [&](FieldReader* reader) { reader->get(&ids); });
+      decode_cached(*bytes, key, cached, [&](FieldReader* reader) { reader->get(&ids); });
       if (ids.of_records.size() == records.size()) return ids;
-    } catch (const Error&) {
-      // Stale or damaged: made again.
     }
+  } catch (const Error&) {
+    // Stale or damaged: made again.
   }
   ShardIds ids = scan_ids(file, records);
   try_to_cache(cached, encode_cached(key, [&](FieldWriter* writer) { writer->put(ids); }));
@@ -210,15 +209,14 @@ Scenario load_scenario(const SceneRef& scene, SceneReport* report_out) {
   const std::string cached =
       fmt::format("{}/{:016x}/{}.scene", folder, hash_of_path(scene.file), std::max(scene.record, 0));
   const SceneCacheKey key{.content = hash_of(bytes), .record = scene.record};
-  std::error_code error;
-  if (fs::exists(cached, error)) {
-    try {
-      Scenario scenario = decode_scenario(read_file(cached), key, cached);
+  try {
+    if (const std::optional<std::string> encoded = read_cached(cached)) {
+      Scenario scenario = decode_scenario(*encoded, key, cached);
       report.cached = true;
       return scenario;
-    } catch (const Error& rejection) {
-      report.cache_rejection = rejection.what();
     }
+  } catch (const Error& rejection) {
+    report.cache_rejection = rejection.what();
   }
   Scenario scenario = import_scene(scene, bytes);
   try_to_cache(cached, encode_scenario(scenario, key));

@@ -109,6 +109,30 @@ TEST_F(FileTest, AFifoIsReadToItsEndAndWaitingForItsWriterCanBeInterrupted) {
       testing::ExitedWithCode(0), "fifo: interrupted while it was read");
 }
 
+TEST_F(FileTest, WhatIsNoRegularFileIsNoCache) {
+  const std::string fifo = folder_ / "fifo", device = folder_ / "device", file = folder_ / "file";
+  ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
+  std::filesystem::create_symlink("/dev/zero", device);
+  for (const std::string& path : {fifo, device}) {
+    EXPECT_THAT(test::message_of([&] { read_cached(path); }), testing::HasSubstr("expected a regular file")) << path;
+  }
+  EXPECT_EQ(read_cached(folder_ / "none"), std::nullopt);
+  try_to_cache(fifo, "x");
+  try_to_cache(file, "x");
+  EXPECT_EQ(read_cached(file), "x");
+  EXPECT_TRUE(std::filesystem::is_fifo(fifo));
+}
+
+TEST_F(FileTest, TheHashOfAFileIsThatOfItsBytesAndNeedsAllOfThem) {
+  const std::string path = folder_ / "scene.bin", bytes(200'000, 'x');
+  std::ofstream(path) << bytes;
+  EXPECT_EQ(hash_of_file(path), fmt::format("{:016x}", hash_of(bytes)));
+  EXPECT_THAT(test::message_of<Error>([&] { hash_of_file(folder_ / "none"); }),
+              testing::HasSubstr("none: no such file"));
+  EXPECT_THAT(test::message_of<Error>([&] { hash_of_file(folder_.path()); }),
+              testing::HasSubstr("expected a file, got a folder"));
+}
+
 TEST(Hash, IsFnv1a) {
   Hash64 hash;
   hash.add_bytes("a", 1);
