@@ -46,9 +46,8 @@ RgbImage from_above(const CornerResults& results, size_t pair, bool walls) {
   frame.status = scene.status;
   frame.highlighted = state.ego;
   frame.marks = marks;
-  frame.caption =
-      fmt::format("pair {}: {}, scene {}, step {}, {}", pair, results.setting.maps[static_cast<size_t>(state.map)],
-                  state.scene, state.step, walls ? "walls" : "no walls");
+  frame.caption = fmt::format("pair {}: {}, scene {}, step {}, {}", pair, results.setting.maps[state.map], state.scene,
+                              state.step, walls ? "walls" : "no walls");
   const Vec2 size_m = shown.high - shown.low;
   WorldPainter painter(*map.road, kTopSize_px, kTopSize_px, walls ? map.geometry.walls : std::vector<WallFace>{});
   return painter.draw(

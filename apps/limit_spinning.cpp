@@ -27,7 +27,7 @@ void limit_spinning(int /*argc*/, char** argv, char** environment) {
   std::array<char, 4096> path;
   const ssize_t length = readlink("/proc/self/exe", path.data(), path.size() - 1);
   if (length <= 0) return;
-  path[static_cast<size_t>(length)] = '\0';
+  path[length] = '\0';
   auto** const with_count = static_cast<char**>(alloca((count + 2) * sizeof(char*)));
   for (size_t i = 0; i < count; ++i) with_count[i] = environment[i];
   with_count[count] = spin_count;

@@ -48,8 +48,7 @@ class PathFigures {
     config.device = {};
     config.samples = {};
     Rig rig;
-    for (const int camera : film_order(config.rig))
-      rig.cameras.push_back(config.rig.cameras[static_cast<size_t>(camera)]);
+    for (const int camera : film_order(config.rig)) rig.cameras.push_back(config.rig.cameras[camera]);
     config.rig = rig;
     renderer_ = make_renderer("cpu", config);
     upload_maps(results.maps, {}, renderer_.get());
@@ -79,7 +78,7 @@ class PathFigures {
 
  private:
   const PedestrianPoint& point(const PedestrianPath& path, int32_t at) const {
-    return results_.points[static_cast<size_t>(path.first_point + at)];
+    return results_.points[path.first_point + at];
   }
 
   /// Between the chart's colours: of a pedestrian that is hidden, half seen and seen whole.
@@ -90,7 +89,7 @@ class PathFigures {
 
   RgbImage from_above(size_t index, const std::array<int32_t, 5>& places, int width_px) {
     const PedestrianPath& path = results_.paths[index];
-    const CompiledMap& map = *results_.maps[static_cast<size_t>(path.map)];
+    const CompiledMap& map = *results_.maps[path.map];
     std::unique_ptr<WorldPainter>& painter = painters_[path.map];
     if (!painter) {
       painter = std::make_unique<WorldPainter>(*map.road, width_px, kTopHeight_px, map.geometry.walls);
@@ -114,8 +113,7 @@ class PathFigures {
     frame.highlighted = path.ego;
     frame.marks = marks;
     frame.caption = fmt::format("path {}: {}, scene {}, step {}, agent {} at {:.1f} m/s", index,
-                                results_.setting.maps[static_cast<size_t>(path.map)], path.scene, path.step, path.ego,
-                                path.ego_speed_mps);
+                                results_.setting.maps[path.map], path.scene, path.step, path.ego, path.ego_speed_mps);
     const Vec2 size_m = shown.high - shown.low;
     const float height_m = max_of(size_m.x, size_m.y) + 2 * kPedestrianMargin_m;
     const float width_m = height_m * static_cast<float>(width_px) / kTopHeight_px;

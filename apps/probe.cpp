@@ -133,10 +133,9 @@ void print_table(const RemovalResults& results, const std::vector<RemovalRow>& r
                "|dV|", "|dP(brake)|", "changed");
   for (const RemovalRow& row : rows) {
     if (row.group.distance_band || row.cases == 0) continue;
-    print_result("{:{}} {:>10} {:>8} {:>7} {:>20} {:>20} {:>6.1f} %\n",
-                 results.policies[static_cast<size_t>(row.policy)].answers_as(), width, row.group.occlusion_name(),
-                 row.cases, row.scenes, interval_of(row.abs_value_change), interval_of(row.abs_brake_change),
-                 100 * row.changed_share.value);
+    print_result("{:{}} {:>10} {:>8} {:>7} {:>20} {:>20} {:>6.1f} %\n", results.policies[row.policy].answers_as(),
+                 width, row.group.occlusion_name(), row.cases, row.scenes, interval_of(row.abs_value_change),
+                 interval_of(row.abs_brake_change), 100 * row.changed_share.value);
   }
   print_result("{}\n{} removals in {}\n", kEstimateNote, results.cases.size(), format_duration(results.seconds));
 }
@@ -147,10 +146,9 @@ void print_table(const PedestrianResults& results, const std::vector<PedestrianR
                "dP(brake)", "changed");
   for (const PedestrianRow& row : rows) {
     if (!row.phase || row.cases == 0) continue;
-    print_result("{:{}} {:>12} {:>8} {:>7} {:>20} {:>20} {:>6.1f} %\n",
-                 results.policies[static_cast<size_t>(row.policy)].answers_as(), width,
-                 kPathPhaseNames[static_cast<size_t>(*row.phase)], row.cases, row.scenes, interval_of(row.value_change),
-                 interval_of(row.brake_change), 100 * row.changed_share.value);
+    print_result("{:{}} {:>12} {:>8} {:>7} {:>20} {:>20} {:>6.1f} %\n", results.policies[row.policy].answers_as(),
+                 width, kPathPhaseNames[static_cast<size_t>(*row.phase)], row.cases, row.scenes,
+                 interval_of(row.value_change), interval_of(row.brake_change), 100 * row.changed_share.value);
   }
   print_result("{}\n{} of {} paths found, {} cases in {}\n", kEstimateNote, results.paths.size(), results.paths_asked,
                results.points.size(), format_duration(results.seconds));

@@ -93,8 +93,7 @@ std::vector<std::string> write_pictures(const RenderArguments& arguments, const 
     check();
     for (int camera = 0; camera < static_cast<int>(rig.cameras.size()); ++camera) {
       const CameraImages& image = images.camera(camera);
-      const std::string stem =
-          fmt::format("{}_{}", subject.names[static_cast<size_t>(view)], rig.cameras[static_cast<size_t>(camera)].name);
+      const std::string stem = fmt::format("{}_{}", subject.names[view], rig.cameras[camera].name);
       write_png(out->file(stem + ".png"), image.width_px, image.height_px, images.interleaved(view, camera));
       for (const std::string& plane : arguments.planes) {
         const RgbImage picture = plane_picture(images, view, camera, plane_by_name(plane));
@@ -109,7 +108,7 @@ std::vector<std::string> write_pictures(const RenderArguments& arguments, const 
     check();
     panels.push_back(captioned(images, view, 0, subject.captions[static_cast<size_t>(view)]));
     const RgbImage& panel = panels.back();
-    write_png(out->file(subject.names[static_cast<size_t>(view)] + ".png"), panel.width_px, panel.height_px, panel.rgb);
+    write_png(out->file(subject.names[view] + ".png"), panel.width_px, panel.height_px, panel.rgb);
   }
   const RgbImage all = assembled(panels);
   write_png(out->file("figure.png"), all.width_px, all.height_px, all.rgb);
@@ -175,11 +174,8 @@ void render_world(const RenderArguments& arguments) {
     world.step();
   }
 
-  Subject subject{{simulator->maps()[0]->geometry},
-                  simulator->scene(),
-                  simulator->views().subspan(0, static_cast<size_t>(arguments.views)),
-                  {},
-                  {}};
+  Subject subject{
+      {simulator->maps()[0]->geometry}, simulator->scene(), simulator->views().subspan(0, arguments.views), {}, {}};
   for (int view = 0; view < arguments.views; ++view) subject.names.push_back(fmt::format("agent{:03}", view));
   subject.captions = subject.names;
   draw_and_report(arguments, subject, renderer.get());

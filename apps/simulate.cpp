@@ -59,8 +59,7 @@ struct Displacement {
     const int32_t step = simulator.maps()[0]->start_step + simulator.episode_step()[0];
     for (int32_t track = 0; track < simulator.num_slots() && step < scene.num_steps; ++track) {
       if (simulator.state().status[track] != static_cast<uint8_t>(AgentStatus::active)) continue;
-      const std::optional<float> apart_m =
-          displacement_m(scene, track, step, simulator.scene().agents[static_cast<size_t>(track)].center_m);
+      const std::optional<float> apart_m = displacement_m(scene, track, step, simulator.scene().agents[track].center_m);
       if (!apart_m) continue;
       ++steps;
       sum_m += double{*apart_m};

@@ -61,7 +61,7 @@ std::vector<EGLDeviceEXT> devices_of(const Egl& egl) {
   if (!egl.query_devices || !egl.query_device_string || !egl.query_devices(0, nullptr, &count)) return {};
   std::vector<EGLDeviceEXT> devices(static_cast<std::size_t>(count));
   if (!egl.query_devices(count, devices.data(), &count)) return {};
-  devices.resize(static_cast<std::size_t>(count));
+  devices.resize(count);
   return devices;
 }
 

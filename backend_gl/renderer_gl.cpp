@@ -181,8 +181,8 @@ class GlRenderer final : public Renderer {
     const auto count = static_cast<std::size_t>(end - begin);
     if (faces_.size() < count) faces_.resize(count);
     parallel_for(config_.num_threads, end - begin, [&](int64_t i) {
-      const PinholeCamera& camera = cameras_[group.cameras[static_cast<std::size_t>((begin + i) / num_views)]];
-      build_faces(camera, scene, views[static_cast<std::size_t>((begin + i) % num_views)], static_cast<int32_t>(i));
+      const PinholeCamera& camera = cameras_[group.cameras[(begin + i) / num_views]];
+      build_faces(camera, scene, views[(begin + i) % num_views], static_cast<int32_t>(i));
     });
     upload_faces(count);
 
@@ -191,7 +191,7 @@ class GlRenderer final : public Renderer {
     gl_->BindVertexArray(vertex_array_);
     copies_planned_.clear();
     for (int64_t image = begin; image < end;) {
-      const std::size_t index = group.cameras[static_cast<std::size_t>(image / num_views)];
+      const std::size_t index = group.cameras[image / num_views];
       const int64_t view = image % num_views, last = std::min(end, image + num_views - view);
       const auto layer = static_cast<std::size_t>(image - begin), end_layer = static_cast<std::size_t>(last - begin);
       project_by(cameras_[index]);
@@ -211,10 +211,9 @@ class GlRenderer final : public Renderer {
 
   void build_faces(const PinholeCamera& in_ego, const SceneBatch& scene, const View& view, int32_t layer) {
     const PinholeCamera camera = place_camera(in_ego, view);
-    const GeometryHandle handle = scene.geometry[static_cast<std::size_t>(view.world)];
-    faces_[static_cast<std::size_t>(layer)].build(
-        {camera, make_frustum(camera), config_.line_floor_px, config_.debug_palette}, *geometries_.find(handle), scene,
-        view, layer);
+    const GeometryHandle handle = scene.geometry[view.world];
+    faces_[layer].build({camera, make_frustum(camera), config_.line_floor_px, config_.debug_palette},
+                        *geometries_.find(handle), scene, view, layer);
   }
 
   // Uploads the faces of the first `count` images, one after the other, to the instance buffer.

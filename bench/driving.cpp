@@ -54,7 +54,7 @@ DrivenWorlds drive_worlds(const DrivenOptions& options) {
   PICTURA_CHECK(static_cast<int>(worlds.views.size()) >= expected,
                 "bench: expected {} agents, but only {} of {} found a place", expected, worlds.views.size(),
                 views.size());
-  if (options.num_views > 0) worlds.views.resize(static_cast<std::size_t>(options.num_views));
+  if (options.num_views > 0) worlds.views.resize(options.num_views);
   return worlds;
 }
 

@@ -173,7 +173,7 @@ void write_quality_figure(const std::string& path, Span<const Snapshot> snapshot
   // White between the crops, because the images' background is black.
   std::vector<uint8_t> sheet(static_cast<std::size_t>(3 * width) * static_cast<std::size_t>(height), 255);
   for (int row = 0; row < rows; ++row) {
-    const Snapshot& snapshot = snapshots[static_cast<std::size_t>(row)];
+    const Snapshot& snapshot = snapshots[row];
     const MethodImages drawn =
         draw_all_methods(snapshot.geometry, snapshot.scene.batch(), snapshot.views.at(0), camera, config.line_floor_px);
     const auto [x0, y0] = worst_crop(drawn, camera.width_px, camera.height_px);
@@ -186,8 +186,7 @@ void write_quality_figure(const std::string& path, Span<const Snapshot> snapshot
             const int from = (channel * camera.height_px + y0 + y / kZoom) * camera.width_px + x0 + x / kZoom;
             const int to_x = column * (crop_width * kZoom + kGap_px) + x;
             const int to_y = row * (crop_height * kZoom + kGap_px) + y;
-            sheet[static_cast<std::size_t>(3 * (to_y * width + to_x) + channel)] =
-                to_byte((*images[column])[static_cast<std::size_t>(from)]);
+            sheet[3 * (to_y * width + to_x) + channel] = to_byte((*images[column])[from]);
           }
         }
       }

@@ -41,7 +41,7 @@ std::vector<Rig> draw_rigs(const SoakOptions& options) {
   RandomStream random = random_of(options, 0, Draw::rigs);
   while (rigs.size() < 4) {
     Rig rig = paper_rig();
-    rig.cameras.resize(static_cast<std::size_t>(1 + random.below(4)));
+    rig.cameras.resize(1 + random.below(4));
     for (std::size_t k = 0; k < rig.cameras.size(); ++k) {
       const int width_px = 1 + random.below(220), height_px = 1 + random.below(130);
       rig.cameras[k] = paper_rig(width_px, height_px).cameras[k];
@@ -108,7 +108,7 @@ class Scenes {
     const Span<const View> of_agents = simulator_->views();
     ViewsOfScene result;
     for (int i = 0; i < options_.views; ++i) {
-      View view = of_agents[static_cast<std::size_t>(random.below(static_cast<int>(of_agents.size())))];
+      View view = of_agents[random.below(static_cast<int>(of_agents.size()))];
       if (random.below(2) == 0) {
         const View moved = make_view(view.origin_m + Vec3{random.uniform(-20.0f, 20.0f), random.uniform(-20.0f, 20.0f),
                                                           random.uniform(-2.0f, 20.0f)},

@@ -76,7 +76,7 @@ py::dict tracks_of_scene(const Scenario& scenario) {
   d["id"] = copied<int64_t>({tracks}, scenario.tracks, &RecordedTrack::id, 1);
   py::array_t<uint8_t> type(tracks), valid({tracks, steps});
   for (py::ssize_t i = 0; i < tracks; ++i) {
-    type.mutable_at(i) = static_cast<uint8_t>(scenario.tracks[static_cast<size_t>(i)].type);
+    type.mutable_at(i) = static_cast<uint8_t>(scenario.tracks[i].type);
   }
   std::copy(scenario.valid.begin(), scenario.valid.end(), valid.mutable_data());
   d["type"] = type;

@@ -291,10 +291,10 @@ class PySimulator {
                   name_of(simulator_->device()));
     PICTURA_CHECK(world >= 0 && world < static_cast<int>(simulator_->worlds().size()),
                   "draw: expected a world in [0, {}), got {}", simulator_->worlds().size(), world);
-    const WorldSpec& spec = simulator_->worlds()[static_cast<size_t>(world)];
+    const WorldSpec& spec = simulator_->worlds()[world];
     PICTURA_CHECK(agent >= -1 && agent < spec.num_agents, "draw: expected an agent in [0, {}), or -1, got {}",
                   spec.num_agents, agent);
-    const CompiledMap& map = *simulator_->maps()[static_cast<size_t>(spec.map)];
+    const CompiledMap& map = *simulator_->maps()[spec.map];
     const RgbImage image = calls_->run("draw", [&] {
       if (!painter_ || painted_map_ != map.road || painter_->width_px() != width_px ||
           painter_->height_px() != height_px) {
@@ -472,7 +472,7 @@ class PySimulator {
   Array all_worlds() {
     const auto count = static_cast<int64_t>(simulator_->worlds().size());
     if (simulator_->device().is_host()) {
-      all_on_host_.assign(static_cast<size_t>(count), 1);
+      all_on_host_.assign(count, 1);
       return {all_on_host_.data(), {count}, Device{}};
     }
 #ifdef PICTURA_HAS_CUDA

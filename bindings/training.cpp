@@ -141,7 +141,7 @@ py::dict dict_of(const SceneEvaluation& evaluation, const std::vector<SceneAgent
 py::dict dict_of(const SimulatorConfig& config) {
   py::dict conditioning;
   for (int i = 0; i < kNumConditioning; ++i) {
-    const ConditioningRange& range = config.conditioning[static_cast<size_t>(i)];
+    const ConditioningRange& range = config.conditioning[i];
     const py::str name(std::string(kConditioningNames[i]));
     if (range.low == range.high) {
       conditioning[name] = range.low;

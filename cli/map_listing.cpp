@@ -48,7 +48,7 @@ class Listing {
 
  private:
   void add_source(const SourceElement& source, Json* json) const {
-    if (source.road >= 0) (*json)["road"] = map_.road_names[static_cast<size_t>(source.road)];
+    if (source.road >= 0) (*json)["road"] = map_.road_names[source.road];
     if (source.line > 0) (*json)["line"] = source.line;
   }
 
@@ -61,7 +61,7 @@ Json lanes_in(const std::vector<int32_t>& all, IndexRange range) {
 }
 
 Json junction_name(const RoadMap& map, int32_t junction) {
-  return junction < 0 ? Json(nullptr) : Json(map.junctions[static_cast<size_t>(junction)].name);
+  return junction < 0 ? Json(nullptr) : Json(map.junctions[junction].name);
 }
 
 Json lane_of(const Listing& listing, const RoadMap& map, size_t i) {
@@ -79,9 +79,8 @@ Json lane_of(const Listing& listing, const RoadMap& map, size_t i) {
             {"points", points.size()},
             {"begin_m", listing.place(points[0].position_m)},
             {"end_m", listing.place(points[points.size() - 1].position_m)}};
-  json["source"] = {{"road", map.road_names[static_cast<size_t>(lane.source_road)]},
-                    {"section", lane.source_section},
-                    {"lane", lane.source_lane}};
+  json["source"] = {
+      {"road", map.road_names[lane.source_road]}, {"section", lane.source_section}, {"lane", lane.source_lane}};
   return json;
 }
 
@@ -89,7 +88,7 @@ void add_paint(Listing& listing, const RoadMap& map) {
   const Provenance& sources = map.provenance;
   listing.add("markings", map.markings.size(), sources.markings, [&](size_t i) {
     const Marking& marking = map.markings[i];
-    const auto point = [&](int32_t index) { return listing.place(map.marking_points[static_cast<size_t>(index)]); };
+    const auto point = [&](int32_t index) { return listing.place(map.marking_points[index]); };
     return Json{{"color", to_string(marking.color)},      {"broken", marking.broken},
                 {"width_m", rounded(marking.width_m)},    {"points", marking.points.size()},
                 {"begin_m", point(marking.points.begin)}, {"end_m", point(marking.points.end - 1)}};
@@ -101,7 +100,7 @@ void add_paint(Listing& listing, const RoadMap& map) {
     Json corners = Json::array();
     const IndexRange outline = map.crosswalks[i].outline;
     for (int32_t k = outline.begin; k < outline.end; ++k) {
-      corners.push_back(listing.place(map.outline_points[static_cast<size_t>(k)]));
+      corners.push_back(listing.place(map.outline_points[k]));
     }
     return Json{{"corners_m", corners}};
   });

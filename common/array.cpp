@@ -23,7 +23,7 @@ std::size_t bytes_of(ElementType type) {
 
 std::string_view name_of(ElementType type) {
   constexpr std::string_view kNames[] = {"u8", "u16", "u32", "i32", "i64", "f16", "bf16", "f32", "f64"};
-  return kNames[static_cast<std::size_t>(type)];
+  return kNames[static_cast<size_t>(type)];
 }
 
 std::string name_of(Device device) { return device.is_host() ? "cpu" : fmt::format("cuda:{}", device.index); }

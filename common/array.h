@@ -47,8 +47,8 @@ class Dims {
   /// Throws Error for more than kMaxRank.
   Dims(std::initializer_list<int64_t> values);
   int rank() const { return rank_; }
-  int64_t operator[](int dimension) const { return values_[static_cast<std::size_t>(dimension)]; }
-  int64_t& operator[](int dimension) { return values_[static_cast<std::size_t>(dimension)]; }
+  int64_t operator[](int dimension) const { return values_[dimension]; }
+  int64_t& operator[](int dimension) { return values_[dimension]; }
   /// The product of all lengths.
   int64_t count() const;
   /// Strides, in elements, of an array of these lengths without gaps, the last dimension fastest.

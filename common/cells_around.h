@@ -8,12 +8,8 @@ namespace pictura {
 /// Cells in rows; the items of those of a row follow one another.
 struct CellRows {
   int x0 = 0, x1 = 0, y0 = 0, y1 = 0;
-  PICTURA_HD int32_t begin(const GridView& cells, int y) const {
-    return cells.begin[static_cast<size_t>(y * cells.num_x + x0)];
-  }
-  PICTURA_HD int32_t end(const GridView& cells, int y) const {
-    return cells.begin[static_cast<size_t>(y * cells.num_x + x1 + 1)];
-  }
+  PICTURA_HD int32_t begin(const GridView& cells, int y) const { return cells.begin[y * cells.num_x + x0]; }
+  PICTURA_HD int32_t end(const GridView& cells, int y) const { return cells.begin[y * cells.num_x + x1 + 1]; }
 };
 
 /// The cells that a square of half-width reach_m about p touches.

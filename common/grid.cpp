@@ -37,11 +37,10 @@ Grid::Grid(Span<const Aabb2> boxes, float cell_m) : cell_m_(cell_m), num_boxes_(
   begin_.assign(static_cast<std::size_t>(num_x_) * static_cast<std::size_t>(num_y_) + 1, 0);
   for (const Aabb2& box : boxes) visit_cells(grid, box, [&](std::size_t cell) { ++begin_[cell + 1]; });
   for (std::size_t cell = 1; cell < begin_.size(); ++cell) begin_[cell] += begin_[cell - 1];
-  items_.resize(static_cast<std::size_t>(begin_.back()));
+  items_.resize(begin_.back());
   std::vector<int32_t> next(begin_.begin(), begin_.end() - 1);
   for (std::size_t i = 0; i < boxes.size(); ++i) {
-    visit_cells(grid, boxes[i],
-                [&](std::size_t cell) { items_[static_cast<std::size_t>(next[cell]++)] = static_cast<int32_t>(i); });
+    visit_cells(grid, boxes[i], [&](std::size_t cell) { items_[next[cell]++] = static_cast<int32_t>(i); });
   }
 }
 

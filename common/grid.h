@@ -46,7 +46,7 @@ template <typename Visit>
 void visit_items(const GridView& grid, const Aabb2& box, Visit&& visit) {
   visit_cells(grid, box, [&](std::size_t cell) {
     for (int32_t i = grid.begin[cell]; i < grid.begin[cell + 1]; ++i) {
-      visit(static_cast<std::size_t>(grid.items[static_cast<std::size_t>(i)]));
+      visit(static_cast<std::size_t>(grid.items[i]));
     }
   });
 }

@@ -59,14 +59,14 @@ ImageLayout image_layout(Span<const ImageSize> sizes, int64_t num_views, PixelFo
     CameraLayout camera{.size = sizes[i], .block = static_cast<int>(block - layout.blocks.begin())};
     layout.cameras.push_back(camera);
     if (block == layout.blocks.end()) layout.blocks.push_back({.size = sizes[i]});
-    layout.blocks[static_cast<std::size_t>(camera.block)].cameras.push_back(static_cast<int>(i));
+    layout.blocks[camera.block].cameras.push_back(static_cast<int>(i));
   }
   const bool is_planar = order == ChannelOrder::planar;
   for (BlockLayout& block : layout.blocks) {
     block.offset = layout.num_values;
     const int64_t values = image_values(block.size, order, patch_px);
     for (std::size_t i = 0; i < block.cameras.size(); ++i) {
-      CameraLayout& camera = layout.cameras[static_cast<std::size_t>(block.cameras[i])];
+      CameraLayout& camera = layout.cameras[block.cameras[i]];
       camera.offset = block.offset + static_cast<int64_t>(i) * values;
       camera.view_stride = static_cast<int64_t>(block.cameras.size()) * values;
       camera.camera_stride = values;
@@ -88,7 +88,7 @@ ImageLayout image_layout(const Rig& rig, int64_t num_views, PixelFormat format, 
 }
 
 CameraImages camera_images(const ImageLayout& layout, int camera, void* first) {
-  const CameraLayout& its = layout.cameras[static_cast<std::size_t>(camera)];
+  const CameraLayout& its = layout.cameras[camera];
   CameraImages images;
   images.width_px = its.size.width_px;
   images.height_px = its.size.height_px;
@@ -131,7 +131,7 @@ ImageBatch HostImages::batch() {
 std::vector<uint8_t> HostImages::interleaved(int view, int camera_index) const {
   PICTURA_CHECK(layout_.format == PixelFormat::u8 && layout_.order == ChannelOrder::planar,
                 "images: expected planar ones of the format u8");
-  const CameraLayout& from = layout_.cameras[static_cast<std::size_t>(camera_index)];
+  const CameraLayout& from = layout_.cameras[camera_index];
   const ImageLayout one =
       image_layout(Span<const ImageSize>(&from.size, 1), 1, PixelFormat::u8, ChannelOrder::interleaved);
   const CameraLayout& to = one.cameras[0];
@@ -140,7 +140,7 @@ std::vector<uint8_t> HostImages::interleaved(int view, int camera_index) const {
   for (int y = 0; y < from.size.height_px; ++y) {
     for (int x = 0; x < from.size.width_px; ++x) {
       for (int channel = 0; channel < 3; ++channel) {
-        rgb[static_cast<std::size_t>(y * to.row_stride + x * to.pixel_stride + channel * to.channel_stride)] =
+        rgb[y * to.row_stride + x * to.pixel_stride + channel * to.channel_stride] =
             image[y * from.row_stride + x * from.pixel_stride + channel * from.channel_stride];
       }
     }

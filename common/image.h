@@ -107,7 +107,7 @@ class HostImages {
   /// The bytes of all blocks of colour in order: what image_hash is computed from.
   Span<const uint8_t> bytes() const { return bytes_; }
   Span<uint8_t> bytes() { return bytes_; }
-  const CameraImages& camera(int index) const { return cameras_[static_cast<size_t>(index)]; }
+  const CameraImages& camera(int index) const { return cameras_[index]; }
   /// u8 colour of one image as [height, width, 3]. Throws unless the format is u8 and the order planar.
   std::vector<uint8_t> interleaved(int view, int camera) const;
 

@@ -157,7 +157,7 @@ View read_view(TomlFields* row, SceneOwner* scene_inout) {
   if (row->has("ego")) {
     if (scene_inout->agents.empty()) row->refuse("ego", "the scene has no agents");
     view.ego_agent = row->integer("ego", agent_index);
-    view.body_length_m = scene_inout->agents[static_cast<std::size_t>(view.ego_agent)].length_m;
+    view.body_length_m = scene_inout->agents[view.ego_agent].length_m;
   }
   view.body_length_m = row->number("body_length_m", kSize_m, view.body_length_m);
   view.hidden_begin = static_cast<int32_t>(scene_inout->hidden_agents.size());

@@ -1,5 +1,5 @@
 // A pointer and a length that both devices can hold; it never owns. Converts from std::vector and from Span<T> to
-// Span<const T>.
+// Span<const T>. Lengths and indices may be any integers: counts are int in most of the code, and need no casts.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -10,7 +10,8 @@ template <typename T>
 class Span {
  public:
   constexpr Span() = default;
-  PICTURA_HD constexpr Span(T* data, size_t size) : data_(data), size_(size) {}
+  template <typename Integer>
+  PICTURA_HD constexpr Span(T* data, Integer size) : data_(data), size_(static_cast<size_t>(size)) {}
   template <typename Container>
     requires requires(Container& c, T*& p) {
       p = c.data();
@@ -24,7 +25,10 @@ class Span {
     }
   PICTURA_HD constexpr Span(const Container& container) : data_(container.data()), size_(container.size()) {}
 
-  PICTURA_HD constexpr T& operator[](size_t i) const { return data_[i]; }
+  template <typename Integer>
+  PICTURA_HD constexpr T& operator[](Integer i) const {
+    return data_[i];
+  }
   PICTURA_HD constexpr T* data() const { return data_; }
   PICTURA_HD constexpr size_t size() const { return size_; }
   PICTURA_HD constexpr bool empty() const { return size_ == 0; }

@@ -90,7 +90,7 @@ SheetLayout layout_of(const Rig& rig, const std::vector<std::string>& view_names
     for (int first = 0; first < num_cameras;) {
       int end = first, row_width_px = 0;
       for (; end < num_cameras; ++end) {
-        const int width_px = rig.cameras[static_cast<std::size_t>(end)].width_px * layout.enlargement + kImageGap_px;
+        const int width_px = rig.cameras[end].width_px * layout.enlargement + kImageGap_px;
         if (end > first && row_width_px + width_px > kMaxPageWidth_px) break;
         row_width_px += width_px;
       }
@@ -113,11 +113,10 @@ RgbImage page_of(const HostImages& images, const Rig& rig, const std::vector<std
   for (const SheetRow& row : rows) {
     const bool has_names = layout.has_names(&row, rows.data());
     if (has_names) y += kCameraNames_px;
-    canvas.text(layout.left_px - 10, y + 0.5 * (layout.row_px - kImageGap_px) + 5,
-                view_names[static_cast<std::size_t>(row.view)], kViewStyle);
+    canvas.text(layout.left_px - 10, y + 0.5 * (layout.row_px - kImageGap_px) + 5, view_names[row.view], kViewStyle);
     int x = layout.left_px;
     for (int camera = row.first_camera; camera < row.end_camera; ++camera) {
-      const Camera& each = rig.cameras[static_cast<std::size_t>(camera)];
+      const Camera& each = rig.cameras[camera];
       const int width_px = each.width_px * layout.enlargement;
       paste(canvas, images, row.view, camera, x, y, layout.enlargement);
       if (has_names) {

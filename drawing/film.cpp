@@ -65,7 +65,7 @@ RendererConfig film_view(const RendererConfig& trained_view) {
 std::vector<int> film_order(const Rig& rig) {
   std::vector<int> order(rig.cameras.size());
   std::iota(order.begin(), order.end(), 0);
-  const auto yaw = [&rig](int camera) { return wrap_angle(rig.cameras[static_cast<size_t>(camera)].yaw_rad); };
+  const auto yaw = [&rig](int camera) { return wrap_angle(rig.cameras[camera].yaw_rad); };
   const auto looks_back = [&yaw](int camera) { return std::abs(yaw(camera)) > 0.75f * kPi; };
   std::stable_sort(order.begin(), order.end(),
                    [&](int a, int b) { return looks_back(a) != looks_back(b) ? looks_back(b) : yaw(a) > yaw(b); });
@@ -111,11 +111,10 @@ void Film::add_frame(Simulator& simulator) {
                   simulator.config().dt_s * static_cast<float>(simulator.episode_step()[0]), parts.agent);
   const RgbImage top = draw_world(parts.painter, simulator, 0, parts.agent, parts.width_m, caption);
   paste(top, 0, 0, &parts.frame);
-  parts.renderer->render(simulator.scene(), simulator.views().subspan(static_cast<size_t>(parts.agent), 1),
-                         parts.images.batch());
+  parts.renderer->render(simulator.scene(), simulator.views().subspan(parts.agent, 1), parts.images.batch());
   for (size_t i = 0; i < parts.order.size(); ++i) {
     const int camera = parts.order[i], column = static_cast<int>(i) % kColumns, row = static_cast<int>(i) / kColumns;
-    const std::string& name = parts.renderer->config().rig.cameras[static_cast<size_t>(camera)].name;
+    const std::string& name = parts.renderer->config().rig.cameras[camera].name;
     paste(captioned(parts.images, 0, camera, name), column * (kCameraWidth_px + kCameraGap_px),
           kTopHeight_px + kCameraGap_px + row * parts.row_px, &parts.frame);
   }

@@ -38,12 +38,12 @@ std::vector<int32_t> lanes_in_drawing_order(const RoadMap& map) {
   std::vector<int32_t> order(map.lanes.size());
   std::iota(order.begin(), order.end(), 0);
   const auto storey = [&](int32_t lane) {
-    return std::floor((map.points_of(map.lanes[static_cast<size_t>(lane)])[0].position_m.z + 2.0f) / 4.0f);
+    return std::floor((map.points_of(map.lanes[lane])[0].position_m.z + 2.0f) / 4.0f);
   };
   std::stable_sort(order.begin(), order.end(), [&](int32_t a, int32_t b) {
     const float storey_a = storey(a), storey_b = storey(b);
     if (storey_a != storey_b) return storey_a < storey_b;
-    return layer_of(map.lanes[static_cast<size_t>(a)].type) < layer_of(map.lanes[static_cast<size_t>(b)].type);
+    return layer_of(map.lanes[a].type) < layer_of(map.lanes[b].type);
   });
   return order;
 }

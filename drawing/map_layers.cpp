@@ -146,7 +146,7 @@ MapLayers::MapLayers(const RoadMap& map) : map_(map), lanes_in_order_(lanes_in_d
   for (const Marking& marking : map.markings) {
     Aabb2 box = empty_box();
     for (int32_t i = marking.points.begin; i < marking.points.end; ++i) {
-      grow(&box, map.marking_points[static_cast<size_t>(i)].xy(), 0.5f);
+      grow(&box, map.marking_points[i].xy(), 0.5f);
     }
     marking_boxes_.push_back(box);
   }
@@ -164,8 +164,8 @@ void MapLayers::paint(Canvas& canvas, const Vector2d& left_top_m, double px_per_
 void MapLayers::paint_lanes(GroundPen& pen) const {
   cairo_t* context = pen.context();
   for (const int32_t index : lanes_in_order_) {
-    if (!pen.is_visible(lane_boxes_[static_cast<size_t>(index)])) continue;
-    const Lane& lane = map_.lanes[static_cast<size_t>(index)];
+    if (!pen.is_visible(lane_boxes_[index])) continue;
+    const Lane& lane = map_.lanes[index];
     cairo_new_path(context);
     for (const Vec2 corner : outline_of(map_, lane)) pen.line_to(in_plan(corner));
     cairo_close_path(context);
@@ -198,7 +198,7 @@ void MapLayers::paint_crosswalk(GroundPen& pen, const Crosswalk& crosswalk) cons
   cairo_t* context = pen.context();
   const int32_t count = crosswalk.outline.size();
   const auto corner = [&](int32_t i) {
-    return in_plan(map_.outline_points[static_cast<size_t>(crosswalk.outline.begin + (i + count) % count)]);
+    return in_plan(map_.outline_points[crosswalk.outline.begin + (i + count) % count]);
   };
   Vector2d along{1, 0}, center{0, 0};
   double longest = 0;
@@ -244,8 +244,7 @@ void MapLayers::paint_markings(GroundPen& pen) const {
     if (!pen.is_visible(marking_boxes_[i])) continue;
     const Marking& marking = map_.markings[i];
     cairo_new_path(context);
-    for (int32_t p = marking.points.begin; p < marking.points.end; ++p)
-      pen.line_to(in_plan(map_.marking_points[static_cast<size_t>(p)]));
+    for (int32_t p = marking.points.begin; p < marking.points.end; ++p) pen.line_to(in_plan(map_.marking_points[p]));
     pen.canvas().set_color(paint_color(marking.color), 0.95);
     cairo_set_line_width(context, pen.at_least(marking.width_m, 0.6));
     cairo_stroke(context);

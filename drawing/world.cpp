@@ -332,13 +332,13 @@ RgbImage WorldPainter::draw(const WorldFrame& frame, const TopCamera& camera) {
     paint_boxes(*impl_->scenario, frame.recorded_step, canvas, left_top, camera.px_per_m);
   }
   for (const AgentGoal& goal : frame.goals) {
-    const AgentBox& agent = frame.agents[static_cast<size_t>(goal.agent)];
+    const AgentBox& agent = frame.agents[goal.agent];
     paint_goal(canvas, pixel_at(agent.center_m), pixel_at(goal.position_m), agent.agent_class);
   }
 
   const bool has_highlight = frame.highlighted >= 0 && static_cast<size_t>(frame.highlighted) < frame.agents.size();
   if (has_highlight) {
-    const AgentBox& agent = frame.agents[static_cast<size_t>(frame.highlighted)];
+    const AgentBox& agent = frame.agents[frame.highlighted];
     std::vector<Vector2d> waypoints;
     for (const Vec2 waypoint : frame.waypoints_m) waypoints.push_back(pixel_at(waypoint));
     paint_highlight(canvas, pixel_at(agent.center_m), double{agent.length_m} * camera.px_per_m, waypoints);
@@ -368,22 +368,21 @@ RgbImage draw_world(WorldPainter& painter, Simulator& simulator, int world, int 
   PICTURA_CHECK(simulator.device().is_host(), "picture of a world: expected a simulator in host memory, got {}",
                 simulator.name());
   size_t first_slot = 0;
-  for (int w = 0; w < world; ++w)
-    first_slot += static_cast<size_t>(simulator.worlds()[static_cast<size_t>(w)].num_agents);
-  const auto num_slots = static_cast<size_t>(simulator.worlds()[static_cast<size_t>(world)].num_agents);
+  for (int w = 0; w < world; ++w) first_slot += static_cast<size_t>(simulator.worlds()[w].num_agents);
+  const auto num_slots = static_cast<size_t>(simulator.worlds()[world].num_agents);
   PICTURA_CHECK(followed < static_cast<int>(num_slots), "picture of a world: expected an agent below {}, got {}",
                 num_slots, followed);
   const SceneBatch& scene = simulator.scene();
   const AgentStateView state = simulator.state();
   const auto range = [world](auto begin, auto all) {
-    const auto first = static_cast<size_t>(begin[static_cast<size_t>(world)]);
+    const auto first = static_cast<size_t>(begin[world]);
     return all.subspan(first, static_cast<size_t>(begin[static_cast<size_t>(world) + 1]) - first);
   };
   WorldFrame frame;
   frame.agents = range(scene.world_begin, scene.agents);
   frame.lights = range(scene.light_begin, scene.light_states);
-  const int map = simulator.worlds()[static_cast<size_t>(world)].map;
-  frame.heads = simulator.maps()[static_cast<size_t>(map)]->geometry.heads;
+  const int map = simulator.worlds()[world].map;
+  frame.heads = simulator.maps()[map]->geometry.heads;
   std::vector<uint8_t> status(frame.agents.size(), static_cast<uint8_t>(AgentStatus::parked));
   std::copy_n(state.status + first_slot, std::min(num_slots, status.size()), status.begin());
   frame.status = status;
@@ -408,8 +407,7 @@ RgbImage draw_world(WorldPainter& painter, Simulator& simulator, int world, int 
       const size_t at = slot * kNumWaypoints + static_cast<size_t>(i);
       waypoints.push_back({state.waypoint_x_m[at], state.waypoint_y_m[at]});
     }
-    if (follow_width_m > 0)
-      camera = painter.around(frame.agents[static_cast<size_t>(followed)].center_m.xy(), follow_width_m);
+    if (follow_width_m > 0) camera = painter.around(frame.agents[followed].center_m.xy(), follow_width_m);
   }
   frame.waypoints_m = waypoints;
   return painter.draw(frame, camera);

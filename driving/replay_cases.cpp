@@ -75,7 +75,7 @@ std::string about(const CornerState& one, int32_t removed, CornerControl control
 EvaluateOptions driven_by(const ProbeOptions& probe, const CasePlace& place) {
   EvaluateOptions driven = probe.worlds;
   // A controller comes after all policies.
-  if (driven.controller.empty()) driven.checkpoint = probe.policies[static_cast<size_t>(place.driver)];
+  if (driven.controller.empty()) driven.checkpoint = probe.policies[place.driver];
   return driven;
 }
 RecordedScenario scenario_of(const ProbeOptions& probe, const ProbeResults& results, const CasePlace& place) {
@@ -142,7 +142,7 @@ void write_case_replay(const CaseReplayOptions& options, const PedestrianOptions
                        const PedestrianResults& results) {
   const size_t number = chosen_case(options, results);
   const PedestrianPoint& point = results.points[number];
-  const PedestrianPath& path = results.paths[static_cast<size_t>(point.path)];
+  const PedestrianPath& path = results.paths[point.path];
   ReplayCase probed{.what = about(point, path, results.control)};
   if (results.control != PedestrianControl::nobody) {
     probed.inserted = replay_box(point.pedestrian);
@@ -175,7 +175,7 @@ void write_case_replay(const CaseReplayOptions& options, const CornerOptions& pr
     print_message("notice: {}: the ego drives for {} steps, in the probe for {}: {}\n", options.path, steps,
                   probed.steps, kWhyOtherwise);
   } else if (probed.ended_by == 0) {
-    compare_speed(options.path, replay, steps, state.ego, probed.speed_mps[static_cast<size_t>(steps)]);
+    compare_speed(options.path, replay, steps, state.ego, probed.speed_mps[steps]);
   }
 }
 

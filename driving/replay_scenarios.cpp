@@ -111,7 +111,7 @@ double at_fault_infractions_per_vehicle(const ScenarioCounts& counts) {
 
 const ScenarioCounts& counts_of(const EvaluationResults& results, const ScenarioPlace& place) {
   const DensityResult& density = results.densities[place.density];
-  return density.scenarios[static_cast<size_t>(place.scenario - density.first_scenario)];
+  return density.scenarios[place.scenario - density.first_scenario];
 }
 
 void write(const EvaluateOptions& options, const EvaluationResults& results, const RecordingOptions& recording,
@@ -183,7 +183,7 @@ Replay record_takeover(const EvaluateOptions& options, const RecordedScenario& s
   const std::array<StepObserver*, 1> observers{&recorded};
   const std::unique_ptr<PolicyController> controller = session->make_controller(renderer.get(), one.argmax, one.seed);
   std::vector<uint8_t> mask(static_cast<size_t>(simulator->num_slots()));
-  mask[static_cast<size_t>(takeover.agent)] = 1;
+  mask[takeover.agent] = 1;
   std::vector<Command> commands(mask.size());
   for (int step = 0; step < takeover.steps; ++step) {
     scene.command_places(takeover.step + step + 1, commands.data());

@@ -190,7 +190,7 @@ EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& op
   setting.light_heads = name_of(maps.front()->options.light_heads);
   for (const DensityOf& density : densities) {
     DensityResult result{density.name, density.agents, options.first_scenario, {}};
-    result.scenarios.resize(static_cast<size_t>(options.scenarios));
+    result.scenarios.resize(options.scenarios);
     const int per_batch = worlds_per_batch(driver.device, density.agents);
     for (int first = 0; first < options.scenarios && !report.interrupted; first += per_batch) {
       const std::vector<WorldSpec> worlds = worlds_of(options, maps.size(), density.agents, first, per_batch);
@@ -201,13 +201,11 @@ EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& op
         simulator = make_simulator(options.simulator, simulator_config, maps, worlds);
       const auto num_slots = double(simulator->num_slots());
       const auto on_steps = [&](int steps) { clock.update((done + num_slots * steps) / work); };
-      const auto counts_of = [&](int64_t slot) {
-        return &result.scenarios[static_cast<size_t>(first + slot / density.agents)];
-      };
+      const auto counts_of = [&](int64_t slot) { return &result.scenarios[first + slot / density.agents]; };
       const auto on_left = [&](const AgentStateView& state, int64_t slot) { add_life(state, slot, counts_of(slot)); };
       if (!drive_to_the_end(driver, options, simulator.get(), on_steps, on_left, &report.agent_steps)) {
         report.interrupted = true;
-        result.scenarios.resize(static_cast<size_t>(first));  // those of the batches before are finished
+        result.scenarios.resize(first);  // those of the batches before are finished
         break;
       }
       done += num_slots * options.steps;

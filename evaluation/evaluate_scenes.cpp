@@ -126,7 +126,7 @@ class BatchDrive {
   void keep_places() {
     kept_slots_ = slots_where([&](size_t slot) {
       const CompiledMap& map = map_of(slot);
-      return map.scenario->valid_of(track_of_slot_[slot])[static_cast<size_t>(map.start_step)] != 0;
+      return map.scenario->valid_of(track_of_slot_[slot])[map.start_step] != 0;
     });
     places_.resize(kept_slots_.size() * static_cast<size_t>(protocol_.steps));
     // Boxes stand on the road of the map, recorded ones near it: none rises or falls at the start.
@@ -134,8 +134,7 @@ class BatchDrive {
     for (const int32_t kept : kept_slots_) {
       const auto slot = static_cast<size_t>(kept);
       const CompiledMap& map = map_of(slot);
-      const float foot_m =
-          map.scenario->states_of(track_of_slot_[slot])[static_cast<size_t>(map.start_step)].position_m.z;
+      const float foot_m = map.scenario->states_of(track_of_slot_[slot])[map.start_step].position_m.z;
       rises_m_.push_back(foot_m + boxes[slot].height_m / 2 - boxes[slot].center_m.z);
     }
     note_places(0);
@@ -153,9 +152,9 @@ class BatchDrive {
     const auto steps = static_cast<size_t>(protocol_.steps);
     for (size_t i = 0; i < kept_slots_.size(); ++i) {
       const auto slot = static_cast<size_t>(kept_slots_[i]);
-      SceneRollouts& scene = (*scenes_inout)[static_cast<size_t>(world_of_slot_[slot])];
+      SceneRollouts& scene = (*scenes_inout)[world_of_slot_[slot]];
       if (scene.rollouts.size() == 1) {
-        scene.track_ids.push_back(map_of(slot).scenario->tracks[static_cast<size_t>(track_of_slot_[slot])].id);
+        scene.track_ids.push_back(map_of(slot).scenario->tracks[track_of_slot_[slot]].id);
       }
       const auto first = places_.begin() + static_cast<ptrdiff_t>(i * steps);
       std::vector<SimulatedState>& places = scene.rollouts.back();
@@ -211,7 +210,7 @@ class BatchDrive {
       // Who was to be taken over later, and for whom the episode ended before, has not driven.
       if (roles_[slot] != SceneRole::driven || driven_steps_[slot] == 0) continue;
       const Scenario& scene = *map_of(slot).scenario;
-      const RecordedTrack& track = scene.tracks[static_cast<size_t>(track_of_slot_[slot])];
+      const RecordedTrack& track = scene.tracks[track_of_slot_[slot]];
       const Displacement& displacement = displacements_[slot];
       SceneAgent agent{.scenario_id = scene.id,
                        .density = density_,
@@ -227,7 +226,7 @@ class BatchDrive {
         agent.mean_displacement_m = static_cast<float>(displacement.sum_m / displacement.steps);
         agent.final_displacement_m = displacement.last_m;
       }
-      scenes[static_cast<size_t>(world_of_slot_[slot])].push_back(std::move(agent));
+      scenes[world_of_slot_[slot]].push_back(std::move(agent));
     }
     return scenes;
   }
@@ -240,7 +239,7 @@ class BatchDrive {
   };
 
   Device device() const { return simulator_.device(); }
-  const CompiledMap& map_of(size_t slot) const { return *batch_.maps[static_cast<size_t>(world_of_slot_[slot])]; }
+  const CompiledMap& map_of(size_t slot) const { return *batch_.maps[world_of_slot_[slot]]; }
   bool is_driven(size_t slot, int step) const {
     return roles_[slot] == SceneRole::driven && takeover_steps_[slot] <= step;
   }
@@ -466,7 +465,7 @@ SceneEvaluation evaluate_scenes(const EvaluatedDriver& driver, Renderer* rendere
         simulator->set_worlds(batch.maps, {}, worlds, options.seed);
       else
         simulator = make_simulator(options.simulator, config, batch.maps, worlds);
-      const double density = protocol.densities[static_cast<size_t>(i / protocol.rollouts)];
+      const double density = protocol.densities[i / protocol.rollouts];
       BatchDrive drive(batch, protocol, density, rollout, options.seed, simulator.get());
       if (options.on_rollouts) drive.keep_places();
       const Driving driving = driver.drive(*simulator);

@@ -59,7 +59,7 @@ bool is_before_merge(const RoadMap& map, const Lane& lane, float s_m) {
   if (lane.in_junction || lane.length_m - s_m > kMergeAhead_m) return false;
   const Span<const int32_t> next = map.links(lane.successors);
   return std::any_of(next.begin(), next.end(), [&](int32_t index) {
-    const Lane& successor = map.lanes[static_cast<size_t>(index)];
+    const Lane& successor = map.lanes[index];
     return !successor.in_junction && successor.predecessors.size() > 1;
   });
 }
@@ -152,9 +152,9 @@ struct InfractionObserver::WorldStep {
 
   WorldStep(Simulator& simulator, size_t world, const Frame& before_step, const Frame& after_step)
       : spec(simulator.worlds()[world]),
-        map(*simulator.maps()[static_cast<size_t>(spec.map)]->road),
-        stop_lines(simulator.maps()[static_cast<size_t>(spec.map)]->rules.stop_lines),
-        heads(simulator.maps()[static_cast<size_t>(spec.map)]->geometry.heads),
+        map(*simulator.maps()[spec.map]->road),
+        stop_lines(simulator.maps()[spec.map]->rules.stop_lines),
+        heads(simulator.maps()[spec.map]->geometry.heads),
         before(before_step),
         after(after_step),
         first_slot(static_cast<size_t>(after.slot_begin[world])),
@@ -167,7 +167,7 @@ struct InfractionObserver::WorldStep {
   bool has_changed_lane(size_t slot) const {
     const int32_t from = before.lane[slot], to = after.lane[slot];
     if (from < 0 || to < 0 || from == to) return false;
-    const Lane& lane = map.lanes[static_cast<size_t>(from)];
+    const Lane& lane = map.lanes[from];
     return to == lane.left_neighbor || to == lane.right_neighbor;
   }
 
@@ -176,7 +176,7 @@ struct InfractionObserver::WorldStep {
     out->position_m = file_position_m(map.origin_m, center_m);
     const int32_t lane = before.lane[first_slot + agent];
     if (lane < 0) return;
-    const Lane& on = map.lanes[static_cast<size_t>(lane)];
+    const Lane& on = map.lanes[lane];
     const LanePlace place = place_on(map, on, center_m.xy());
     out->shape = shape_of(map, on, place);
     out->before_merge = is_before_merge(map, on, place.s_m);
@@ -283,8 +283,8 @@ Infraction InfractionObserver::describe(const WorldStep& step, size_t agent) con
   const int since = red_since_step_[step.first_light + static_cast<size_t>(light)];
   one.red_for_s = since > 0 ? static_cast<float>(step_ - since) * dt_s
                             : (since < 0 ? 0.0f : std::numeric_limits<float>::infinity());
-  const Vec3 head_m = step.heads[static_cast<size_t>(light)].position_m;
-  one.stop_line_to_head_m = length((head_m - step.stop_lines[static_cast<size_t>(light)].middle_m).xy());
+  const Vec3 head_m = step.heads[light].position_m;
+  one.stop_line_to_head_m = length((head_m - step.stop_lines[light].middle_m).xy());
   return one;
 }
 

@@ -137,7 +137,7 @@ std::vector<Vec3> path_waypoints(const CompiledMap& map, int32_t track, int32_t 
   std::vector<Vec3> waypoints;
   for (int i = 1; i < kNumWaypoints && !path.empty(); ++i) {
     const float at_m = way_m.back() * static_cast<float>(i) / static_cast<float>(kNumWaypoints);
-    waypoints.push_back(path[static_cast<size_t>(std::lower_bound(way_m.begin(), way_m.end(), at_m) - way_m.begin())]);
+    waypoints.push_back(path[std::lower_bound(way_m.begin(), way_m.end(), at_m) - way_m.begin()]);
   }
   waypoints.push_back(map.rules.record.agents[index].goal_m);
   return waypoints;

@@ -43,25 +43,25 @@ void prepend(const RoadMap& map, const Lane& lane, std::vector<Vec3>* points_ino
 /// The path that begins with this junction lane, if its predecessor is outside the junction.
 std::optional<Path> path_through(const RoadMap& map, const Lane& first, float lead_m) {
   const int32_t approach = predecessor_of(map, first);
-  if (approach < 0 || map.lanes[static_cast<size_t>(approach)].junction == first.junction) return std::nullopt;
+  if (approach < 0 || map.lanes[approach].junction == first.junction) return std::nullopt;
   Path path;
   path.approach = approach;
-  path.road = map.lanes[static_cast<size_t>(approach)].source_road;
+  path.road = map.lanes[approach].source_road;
   for (const LanePoint& point : map.points_of(first)) path.points.push_back(point.position_m);
   // Later sections of the connecting road.
   constexpr int kMaxLanes = 16;
   const Lane* lane = &first;
   for (int i = 0; i < kMaxLanes; ++i) {
     const Span<const int32_t> next = map.links(lane->successors);
-    if (next.empty() || map.lanes[static_cast<size_t>(next[0])].junction != first.junction) break;
-    lane = &map.lanes[static_cast<size_t>(next[0])];
+    if (next.empty() || map.lanes[next[0]].junction != first.junction) break;
+    lane = &map.lanes[next[0]];
     const Span<const LanePoint> points = map.points_of(*lane);
     for (size_t k = 1; k < points.size(); ++k) path.points.push_back(points[k].position_m);
   }
   const size_t inside = path.points.size();
   float before_m = 0;
   for (int32_t at = approach, i = 0; at >= 0 && before_m < lead_m && i < kMaxLanes; ++i) {
-    lane = &map.lanes[static_cast<size_t>(at)];
+    lane = &map.lanes[at];
     prepend(map, *lane, &path.points);
     before_m += lane->length_m;
     at = predecessor_of(map, *lane);
@@ -120,7 +120,7 @@ void visit_crossings(const RoadMap& map, Span<const WallFace> walls, float dista
   for (const Lane& lane : map.lanes) {
     if (!lane.in_junction || lane.junction < 0 || !is_driven(lane)) continue;
     if (auto path = path_through(map, lane, distance_m)) {
-      of_junction[static_cast<size_t>(lane.junction)].push_back(std::move(*path));
+      of_junction[lane.junction].push_back(std::move(*path));
     }
   }
   const LineOfSight line_of_sight(walls);

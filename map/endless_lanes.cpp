@@ -22,7 +22,7 @@ void find_endless_lanes(RoadMap* map_inout) {
   const LaneGroups groups = group_lanes(map);
   const std::vector<std::size_t>& group = groups.of_lane;
   const std::vector<std::vector<std::size_t>>& members = groups.members;
-  auto is_route_lane = [&](int32_t lane) { return is_route(map.lanes[static_cast<std::size_t>(lane)].type); };
+  auto is_route_lane = [&](int32_t lane) { return is_route(map.lanes[lane].type); };
   std::vector<int> num_exits(map.lanes.size(), 0);
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {
     if (!is_route(map.lanes[i].type)) continue;
@@ -39,7 +39,7 @@ void find_endless_lanes(RoadMap* map_inout) {
       if (!is_route(map.lanes[lane].type)) continue;
       for (const int32_t before : map.links(map.lanes[lane].predecessors)) {
         if (!is_route_lane(before)) continue;
-        const std::size_t other = group[static_cast<std::size_t>(before)];
+        const std::size_t other = group[before];
         if (--num_exits[other] == 0) dead_ends.push_back(other);
       }
     }

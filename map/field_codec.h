@@ -127,7 +127,7 @@ class FieldReader {
       PICTURA_CHECK(count <= rest_.size() / min_bytes<Item>(),
                     "damaged: a size of {} elements of at least {} bytes, where {} bytes are left", count,
                     min_bytes<Item>(), rest_.size());
-      value_out->resize(static_cast<std::size_t>(count));
+      value_out->resize(count);
       get_items(value_out->data(), value_out->size());
     } else if constexpr (std::is_same_v<T, bool>) {
       uint8_t byte = 0;

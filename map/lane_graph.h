@@ -39,7 +39,7 @@ class LaneGraph {
   explicit LaneGraph(const RoadMap& map, double lane_change_cost_m = 0);
 
   int32_t num_lanes() const { return static_cast<int32_t>(length_m_.size()); }
-  float length_m(int32_t lane) const { return length_m_[static_cast<std::size_t>(lane)]; }
+  float length_m(int32_t lane) const { return length_m_[lane]; }
 
   /// The cheapest route, or nothing if there is none. A position behind `from` on the same lane is reached by a loop.
   /// Throws Error for a lane that is not in the map, or an s_m beyond its ends.

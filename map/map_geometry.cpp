@@ -66,7 +66,7 @@ float road_height_m(const RoadMap& map, const TrafficLight& light, Vec2 at_m) {
   Vec3 nearest = (light.stop_a_m + light.stop_b_m) * 0.5f;
   const auto apart_m = [at_m](Vec3 p) { return length(p.xy() - at_m); };
   for (int32_t i = light.lanes.begin; i < light.lanes.end; ++i) {
-    const Lane& lane = map.lanes[static_cast<size_t>(map.light_lanes[static_cast<size_t>(i)])];
+    const Lane& lane = map.lanes[map.light_lanes[i]];
     const Span<const LanePoint> points = map.points_of(lane);
     for (size_t k = 1; k < points.size(); ++k) {
       const Vec3 a = points[k - 1].position_m, piece = points[k].position_m - a;

@@ -103,7 +103,7 @@ std::string message_of(const Mend& mend, const std::string& source) {
 std::vector<MendGroup> group_mends(Span<const Mend> mends) {
   std::vector<MendGroup> groups;
   for (const MendKind kind : mend_kinds()) groups.push_back({kind, {}});
-  for (const Mend& mend : mends) groups[static_cast<std::size_t>(mend.kind)].mends.push_back(&mend);
+  for (const Mend& mend : mends) groups[static_cast<size_t>(mend.kind)].mends.push_back(&mend);
   std::erase_if(groups, [](const MendGroup& group) { return group.mends.empty(); });
   for (MendGroup& group : groups) {
     std::stable_sort(group.mends.begin(), group.mends.end(),

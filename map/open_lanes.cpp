@@ -12,7 +12,7 @@ namespace {
 
 constexpr float kMissingLink_m = 1.0f;
 
-const Lane& lane_at(const RoadMap& map, int32_t lane) { return map.lanes[static_cast<std::size_t>(lane)]; }
+const Lane& lane_at(const RoadMap& map, int32_t lane) { return map.lanes[lane]; }
 bool is_route_lane(const RoadMap& map, int32_t lane) { return is_route(lane_at(map, lane).type); }
 
 LaneMouth mouth_of(const RoadMap& map, int32_t lane, bool at_start) {
@@ -80,7 +80,7 @@ class GroupWays {
       for (const std::size_t lane : groups.members[group]) {
         for (const int32_t before : map.links(map.lanes[lane].predecessors)) {
           if (!is_route_lane(map, before)) continue;
-          const std::size_t other = groups.of_lane[static_cast<std::size_t>(before)];
+          const std::size_t other = groups.of_lane[before];
           longest_m[other] = std::max(longest_m[other], way_after_m_[group] + own_m);
           if (--successors_left[other] > 0) continue;
           way_after_m_[other] = longest_m[other];
@@ -145,7 +145,7 @@ OpenLanes find_open_lanes(const RoadMap& map) {
       if (open.way_after_m[i] > 0) continue;
       exits.push_back(mouth_of(map, lane, false));
       starts.visit_near(exits.back().middle_m, [&](int32_t other, float gap_m) {
-        if (groups.of_lane[static_cast<std::size_t>(other)] == group) return;
+        if (groups.of_lane[other] == group) return;
         open.missing_links.push_back({lane, other, gap_m});
       });
     }

@@ -38,7 +38,7 @@ std::vector<PaintedLine> lines_of_markings(const RoadMap& map) {
   for (const Marking& marking : map.markings) {
     PaintedLine line{.width_m = marking.width_m, .color = marking.color};
     for (int32_t i = marking.points.begin; i < marking.points.end; ++i) {
-      const Vec3 point = map.marking_points[static_cast<std::size_t>(i)];
+      const Vec3 point = map.marking_points[i];
       if (line.points_m.empty() || length((point - line.points_m.back()).xy()) >= kRepeatedPoint_m) {
         line.points_m.push_back(point);
       }

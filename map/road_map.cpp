@@ -47,7 +47,7 @@ void check_mutual(const RoadMap& map, IndexRange Lane::* range, IndexRange Lane:
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {
     for (const int32_t other : map.links(map.lanes[i].*range)) {
       check_index("lane", i, field, other, map.lanes.size(), 0);
-      const Span<const int32_t> back = map.links(map.lanes[static_cast<std::size_t>(other)].*mirror);
+      const Span<const int32_t> back = map.links(map.lanes[other].*mirror);
       PICTURA_CHECK(std::find(back.begin(), back.end(), static_cast<int32_t>(i)) != back.end(),
                     "lane {}: {}: lane {} does not name it in return", i, field, other);
     }
@@ -67,11 +67,11 @@ void validate_lanes(const RoadMap& map) {
     check_number("lane", i, "speed_limit_mps", lane.speed_limit_mps, 0.1f, 1000.0f);
     check_number("lane", i, "length_m", lane.length_m, 1e-4f, 1e6f);
     if (lane.left_neighbor >= 0) {
-      PICTURA_CHECK(map.lanes[static_cast<std::size_t>(lane.left_neighbor)].right_neighbor == static_cast<int32_t>(i),
+      PICTURA_CHECK(map.lanes[lane.left_neighbor].right_neighbor == static_cast<int32_t>(i),
                     "lane {}: left_neighbor: lane {} does not name it in return", i, lane.left_neighbor);
     }
     if (lane.right_neighbor >= 0) {
-      PICTURA_CHECK(map.lanes[static_cast<std::size_t>(lane.right_neighbor)].left_neighbor == static_cast<int32_t>(i),
+      PICTURA_CHECK(map.lanes[lane.right_neighbor].left_neighbor == static_cast<int32_t>(i),
                     "lane {}: right_neighbor: lane {} does not name it in return", i, lane.right_neighbor);
     }
     const Span<const LanePoint> points = map.points_of(lane);
@@ -150,7 +150,7 @@ void validate_lights(const RoadMap& map) {
     check_number("light", i, "length of its facing", length(light.head_facing), 0.999f, 1.001f);
     check_number("light", i, "length of its stop line", length(light.stop_b_m.xy() - light.stop_a_m.xy()), 0.1f, 1e3f);
     check_index("light", i, "junction", light.junction, map.junctions.size(), -1);
-    const int32_t phases = light.junction < 0 ? 1 : map.junctions[static_cast<std::size_t>(light.junction)].num_phases;
+    const int32_t phases = light.junction < 0 ? 1 : map.junctions[light.junction].num_phases;
     check_index("light", i, "phase", light.phase, static_cast<std::size_t>(phases), 0);
     check_range("light", i, "lanes", light.lanes, map.light_lanes.size(), 1);
   }

@@ -56,7 +56,7 @@ Surface::Surface(const std::vector<SurfaceBand>& bands, double level_m) : level_
   grid_ = Grid(boxes, kQuadCell_m);
   const GridView grid = grid_.view();
   bounds_.reserve(grid.items.size() + ItemBounds::kPadding);
-  for (const int32_t quad : grid.items) bounds_.push_back(bounds_of(quads_[static_cast<std::size_t>(quad)]));
+  for (const int32_t quad : grid.items) bounds_.push_back(bounds_of(quads_[quad]));
   for (std::size_t i = 0; i < ItemBounds::kPadding; ++i) bounds_.push_back({});
   remaining_lookups_ = kBaseLookups + kLookupsPerQuad * static_cast<int64_t>(quads_.size());
 }
@@ -114,13 +114,12 @@ void Surface::find_near(const Eigen::Vector2d& p, double z, Candidates* out) con
 
 bool Surface::is_folded_over(const Candidates& near, const Eigen::Vector2d& p, double z, int32_t band, std::size_t from,
                              double reach_m) const {
-  const double s_m = quads_[first_quads_[static_cast<std::size_t>(band)] + from].s_m;
+  const double s_m = quads_[first_quads_[band] + from].s_m;
   const auto covers_far = [&](const Quad& quad) {
     return quad.band == band && std::abs(quad.s_m - s_m) > reach_m && contains(quad, p, z);
   };
   if (!near.are_complete) return any_quad_at(p, z, covers_far);
-  return std::any_of(near.quads.begin(), near.quads.end(),
-                     [&](int32_t quad) { return covers_far(quads_[static_cast<std::size_t>(quad)]); });
+  return std::any_of(near.quads.begin(), near.quads.end(), [&](int32_t quad) { return covers_far(quads_[quad]); });
 }
 
 /// Two triangles, so that non-convex quads are covered as drawn.

@@ -46,7 +46,7 @@ class Surface {
   bool any_near(const Candidates& near, const Eigen::Vector2d& p, double z, IsWanted&& is_wanted, Visit&& visit) const {
     if (!near.are_complete) return any_band_at(p, z, [&](int32_t band) { return is_wanted(band) && visit(band); });
     for (const int32_t index : near.quads) {
-      const Quad& quad = quads_[static_cast<std::size_t>(index)];
+      const Quad& quad = quads_[index];
       if (is_wanted(quad.band) && contains(quad, p, z) && visit(quad.band)) return true;
     }
     return false;
@@ -121,8 +121,7 @@ class Surface {
     if (!grid.contains(position)) return false;
     const std::size_t cell = static_cast<std::size_t>(grid.cell_y(position.y)) * static_cast<std::size_t>(grid.num_x) +
                              static_cast<std::size_t>(grid.cell_x(position.x));
-    return any_in_cell(cell, position, z,
-                       [&](int32_t index) { return visit(quads_[static_cast<std::size_t>(index)]); });
+    return any_in_cell(cell, position, z, [&](int32_t index) { return visit(quads_[index]); });
   }
 
   QuadBounds bounds_of(const Quad& quad) const;

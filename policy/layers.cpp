@@ -355,7 +355,7 @@ struct HostSets : Function<HostSets> {
     blocks.run([&](int64_t) {
       return [&, hidden_memory = at::empty({blocks.most() * most, hidden}, options),
               memory = at::empty({blocks.most() * most, channels}, options)](int64_t begin, int64_t end) {
-        const auto first = begins[static_cast<size_t>(begin)], count = begins[static_cast<size_t>(end)] - first;
+        const auto first = begins[begin], count = begins[end] - first;
         const int32_t* const its_counts = counts.const_data_ptr<int32_t>() + begin;
         const at::Tensor some = rows.narrow(0, first, count);
         host::member_rows(read(members, begin), features.of_goal ? read(goals, begin) : nullptr, its_counts,
@@ -409,14 +409,14 @@ struct HostSets : Function<HostSets> {
         places.clear();
         const int32_t* its_which = which.const_data_ptr<int32_t>() + begin * channels;
         for (int64_t set = begin; set < end; ++set, its_which += channels) {
-          const int64_t first = begins[static_cast<size_t>(set)], count = begins[static_cast<size_t>(set) + 1] - first;
-          numbers.assign(static_cast<size_t>(count), -1);
+          const int64_t first = begins[set], count = begins[static_cast<size_t>(set) + 1] - first;
+          numbers.assign(count, -1);
           for (int64_t c = 0; c < channels; ++c) {
             if (count == 0) {
               places.push_back(-1);
               continue;
             }
-            int32_t& number = numbers[static_cast<size_t>(its_which[c])];
+            int32_t& number = numbers[its_which[c]];
             if (number < 0) {
               number = static_cast<int32_t>(chosen.size());
               chosen.push_back(first + its_which[c]);

@@ -209,7 +209,7 @@ class PerspectiveEncoder final : public SceneEncoder {
     for (const ImageBlock& block : o.images) {
       const at::Tensor pooled = pool(block);
       for (size_t i = 0; i < block.cameras.size(); ++i) {
-        per_camera[static_cast<size_t>(block.cameras[i])] = pooled.select(0, static_cast<int64_t>(i));
+        per_camera[block.cameras[i]] = pooled.select(0, static_cast<int64_t>(i));
       }
     }
     return apply(project_, at::cat(per_camera, 1));

@@ -566,8 +566,7 @@ Replay replay_from(std::string_view page) {
       const auto* track =
           std::find_if(kTracks.begin(), kTracks.end(), [&](const TrackInfo& t) { return t.name == name; });
       PICTURA_CHECK(track != kTracks.end(), "header: sections: unknown section '{}'", name);
-      replay.tracks[static_cast<size_t>(track - kTracks.begin())] =
-          columns_from(reader, frames, size(replay.num_agents), track->order);
+      replay.tracks[track - kTracks.begin()] = columns_from(reader, frames, size(replay.num_agents), track->order);
     }
   }
   for (size_t i = 0; i < kNumTracks; ++i) {

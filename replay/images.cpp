@@ -158,7 +158,7 @@ class PixelCoder {
     const int hue = code_number(&coder_, hue_[left.hue][above.hue], kHueBits, hue_of(pixel));
     if (hue >= static_cast<int>(hues_.size())) return {code_free(pixel), kNew, kFree};
     const int brightness = code_number(&coder_, brightness_[hue][p.highest() >> 5], 8, pixel.highest());
-    const Pixel guess = shade(hues_[static_cast<size_t>(hue)], brightness);
+    const Pixel guess = shade(hues_[hue], brightness);
     const auto near = [&](int channel, uint8_t guessed, uint8_t value) {
       Chance* chances = rounding_[hue][channel];
       if (coder_.bit(chances, value != guessed) == 0) return guessed;

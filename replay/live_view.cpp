@@ -91,8 +91,7 @@ struct LiveView::Parts {
   void drive(Span<Command> commands_inout) {
     if (driven >= 0) {
       const DrivingKeys held = Clock::now() - heard > kKeysHold ? DrivingKeys{} : keys;
-      commands_inout[static_cast<size_t>(driven)] = {
-          .action = action_of_keys(held, simulator.state(), driven, simulator.config().dt_s)};
+      commands_inout[driven] = {.action = action_of_keys(held, simulator.state(), driven, simulator.config().dt_s)};
     }
   }
 

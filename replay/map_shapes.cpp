@@ -46,7 +46,7 @@ std::vector<ReplayShape> map_shapes(const CompiledMap& map) {
   const RoadMap& road = *map.road;
   std::vector<ReplayShape> shapes;
   for (const int32_t index : lanes_in_drawing_order(road)) {
-    const Lane& lane = road.lanes[static_cast<size_t>(index)];
+    const Lane& lane = road.lanes[index];
     ReplayShape shape{ShapeKind::lane, static_cast<int32_t>(lane.type), 0, {}};
     for (const Vec2 corner : outline_of(road, lane)) shape.points_cm.push_back(point_of(corner));
     shapes.push_back(std::move(shape));
@@ -57,14 +57,14 @@ std::vector<ReplayShape> map_shapes(const CompiledMap& map) {
   for (const Crosswalk& crosswalk : road.crosswalks) {
     ReplayShape shape{ShapeKind::crosswalk, 0, 0, {}};
     for (int32_t i = crosswalk.outline.begin; i < crosswalk.outline.end; ++i) {
-      shape.points_cm.push_back(point_of(road.outline_points[static_cast<size_t>(i)].xy()));
+      shape.points_cm.push_back(point_of(road.outline_points[i].xy()));
     }
     shapes.push_back(std::move(shape));
   }
   for (const Marking& marking : road.markings) {
     ReplayShape shape{ShapeKind::marking, static_cast<int32_t>(marking.color), centimetres(marking.width_m), {}};
     for (int32_t i = marking.points.begin; i < marking.points.end; ++i) {
-      shape.points_cm.push_back(point_of(road.marking_points[static_cast<size_t>(i)].xy()));
+      shape.points_cm.push_back(point_of(road.marking_points[i].xy()));
     }
     shapes.push_back(std::move(shape));
   }
@@ -74,7 +74,7 @@ std::vector<ReplayShape> map_shapes(const CompiledMap& map) {
   append_lines(ShapeKind::road_edge, road.road_edges, &shapes);
   append_lines(ShapeKind::wall, map.geometry.walls, &shapes);
   for (const LightHead& head : map.geometry.heads) {
-    const TrafficLight& light = road.lights[static_cast<size_t>(head.signal)];
+    const TrafficLight& light = road.lights[head.signal];
     ReplayShape shape = line(ShapeKind::light, light.stop_a_m, light.stop_b_m);
     shape.points_cm.push_back(point_of(head.position_m.xy()));
     shape.points_cm.push_back(point_of(head.position_m.xy() + head.facing));

@@ -143,7 +143,7 @@ Json agents_json(const Replay& replay, const ReplayEpisode& episode, int frame, 
   for (int agent = 0; agent < replay.num_agents; ++agent) {
     const int32_t status = replay.at(Track::status, frame, agent);
     if (status == static_cast<int32_t>(AgentStatus::absent)) continue;
-    const ReplayBody& body = episode.agents[static_cast<size_t>(agent)];
+    const ReplayBody& body = episode.agents[agent];
     const double x_m = replay.at(Track::x_m, frame, agent) / 100.0, y_m = replay.at(Track::y_m, frame, agent) / 100.0;
     const double z_m = replay.at(Track::z_m, frame, agent) / 100.0;
     const bool is_halted = status == static_cast<int32_t>(AgentStatus::halted);

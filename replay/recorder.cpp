@@ -83,7 +83,7 @@ void split_lives(const std::vector<LaterLife>& lives, Replay* replay_inout) {
   }
   for (size_t i = 0; i < lives.size(); ++i) {
     ReplayEpisode& episode = replay.episodes[lives[i].episode];
-    episode.agents[static_cast<size_t>(column[i])] = lives[i].body;
+    episode.agents[column[i]] = lives[i].body;
     std::copy(lives[i].conditioning.begin(), lives[i].conditioning.end(),
               episode.conditioning.begin() + int64_t{column[i]} * kNumConditioning);
   }
@@ -133,7 +133,7 @@ AgentCameras::AgentCameras(Simulator& simulator, RendererConfig config) : simula
 AgentCameras::~AgentCameras() = default;
 
 std::string AgentCameras::draw(int slot) {
-  renderer_->render(simulator_.scene(), simulator_.views().subspan(static_cast<size_t>(slot), 1), images_->batch());
+  renderer_->render(simulator_.scene(), simulator_.views().subspan(slot, 1), images_->batch());
   std::string bytes;
   for (size_t camera = 0; camera < renderer_->config().rig.cameras.size(); ++camera) {
     const std::vector<uint8_t> rgb = images_->interleaved(0, static_cast<int>(camera));
@@ -148,10 +148,10 @@ struct Recorder::Parts {
         world(options.world),
         setup(simulator.config(), simulator.maps(), simulator.handles(), simulator.worlds()) {
     take_seed();
-    first_slot = setup.slot_begin[static_cast<size_t>(world)];
-    first_box = setup.box_begin[static_cast<size_t>(world)];
+    first_slot = setup.slot_begin[world];
+    first_box = setup.box_begin[world];
     num_boxes = setup.box_begin[static_cast<size_t>(world) + 1] - first_box;
-    first_light = setup.light_begin[static_cast<size_t>(world)];
+    first_light = setup.light_begin[world];
     replay.num_agents = setup.slot_begin[static_cast<size_t>(world) + 1] - first_slot;
     replay.num_lights = setup.light_begin[static_cast<size_t>(world) + 1] - first_light;
     replay.followed = options.followed;
@@ -165,7 +165,7 @@ struct Recorder::Parts {
   }
 
   // Of the world's random numbers: resets change it.
-  void take_seed() { replay.origin.seed = simulator.controller_input().seed[static_cast<size_t>(world)]; }
+  void take_seed() { replay.origin.seed = simulator.controller_input().seed[world]; }
   size_t slot(int32_t agent) const { return static_cast<size_t>(first_slot + agent); }
   std::vector<int32_t>& track(Track which) { return replay.tracks[static_cast<size_t>(which)]; }
   ReplayEpisode& episode() { return replay.episodes.back(); }
@@ -175,10 +175,10 @@ struct Recorder::Parts {
 
   void begin_episode(const AgentStateView& state, Span<const AgentBox> boxes) {
     ReplayEpisode next;
-    next.index = simulator.episode_index()[static_cast<size_t>(world)];
+    next.index = simulator.episode_index()[world];
     next.first_frame = replay.num_frames;
     for (int32_t agent = 0; agent < replay.num_agents; ++agent) {
-      next.agents.push_back(body_of(boxes[static_cast<size_t>(agent)]));
+      next.agents.push_back(body_of(boxes[agent]));
       const float* conditioning = state.conditioning + slot(agent) * kNumConditioning;
       next.conditioning.insert(next.conditioning.end(), conditioning, conditioning + kNumConditioning);
       replay.metrics.spawned += !is_absent(state, agent);
@@ -188,14 +188,14 @@ struct Recorder::Parts {
       next.parked.push_back(replay_box(boxes[i]));
     }
     replay.episodes.push_back(std::move(next));
-    chains.assign(static_cast<size_t>(replay.num_agents), -1);
-    lives.assign(static_cast<size_t>(replay.num_agents), 0);
+    chains.assign(replay.num_agents, -1);
+    lives.assign(replay.num_agents, 0);
   }
 
   void begin_life(const AgentStateView& state, const AgentBox& box, int32_t agent) {
     const size_t at = slot(agent);
-    lives[static_cast<size_t>(agent)] = state.life[at];
-    chains[static_cast<size_t>(agent)] = -1;
+    lives[agent] = state.life[at];
+    chains[agent] = -1;
     const float* conditioning = state.conditioning + at * kNumConditioning;
     later_lives.push_back({replay.episodes.size() - 1,
                            replay.num_frames,
@@ -217,14 +217,11 @@ struct Recorder::Parts {
   void add_frame(bool begins_anew = false) {
     const AgentStateView state = simulator.state();
     const SceneBatch& scene = simulator.scene();
-    const Span<const AgentBox> boxes =
-        scene.agents.subspan(static_cast<size_t>(first_box), static_cast<size_t>(num_boxes));
-    const bool begins = begins_anew || replay.episodes.empty() ||
-                        episode().index != simulator.episode_index()[static_cast<size_t>(world)];
+    const Span<const AgentBox> boxes = scene.agents.subspan(first_box, num_boxes);
+    const bool begins = begins_anew || replay.episodes.empty() || episode().index != simulator.episode_index()[world];
     if (begins) begin_episode(state, boxes);
     for (int32_t agent = 0; agent < replay.num_agents; ++agent) add_agent(state, boxes, agent, begins);
-    const Span<const LightState> lights =
-        scene.light_states.subspan(static_cast<size_t>(first_light), static_cast<size_t>(replay.num_lights));
+    const Span<const LightState> lights = scene.light_states.subspan(first_light, replay.num_lights);
     for (const LightState light : lights) replay.lights.push_back(static_cast<uint8_t>(light));
     ++episode().num_frames;
     ++replay.num_frames;
@@ -233,9 +230,9 @@ struct Recorder::Parts {
 
   void add_agent(const AgentStateView& state, Span<const AgentBox> boxes, int32_t agent, bool begins) {
     const size_t at = slot(agent);
-    const AgentBox& box = boxes[static_cast<size_t>(agent)];
+    const AgentBox& box = boxes[agent];
     const bool absent = is_absent(state, agent);
-    if (state.life[at] != lives[static_cast<size_t>(agent)]) begin_life(state, box, agent);
+    if (state.life[at] != lives[agent]) begin_life(state, box, agent);
     track(Track::status).push_back(absent ? static_cast<int32_t>(AgentStatus::absent) : state.status[at]);
     track(Track::halt_reason).push_back(state.halt_reason[at]);
     track(Track::next_waypoint).push_back(absent ? 0 : state.next_waypoint[at]);
@@ -250,8 +247,8 @@ struct Recorder::Parts {
                                 : near_heading(heading_of(box), headings[headings.size() - agents]));
     track(Track::speed_mps).push_back(absent ? 0 : centimetres(state.speed_mps[at]));
     track(Track::steer_deg).push_back(absent ? 0 : tenths_of_degree(state.steer_rad[at]));
-    if (absent || chains[static_cast<size_t>(agent)] == state.goal_chains[at]) return;
-    chains[static_cast<size_t>(agent)] = state.goal_chains[at];
+    if (absent || chains[agent] == state.goal_chains[at]) return;
+    chains[agent] = state.goal_chains[at];
     ReplayChain chain{.frame = replay.num_frames, .agent = agent};
     for (size_t i = 0; i < kNumWaypoints; ++i) {
       chain.x_cm[i] = centimetres(state.waypoint_x_m[at * kNumWaypoints + i]);
@@ -295,7 +292,7 @@ struct Recorder::Parts {
           replay.first_infraction = {replay.num_frames, agent};
         }
       }
-      const Command& command = commands[static_cast<size_t>(agent)];
+      const Command& command = commands[agent];
       const bool acts = result.valid[at] && command.kind == CommandKind::action;
       track(Track::action).push_back(acts ? 1 + command.action : 0);
       const RewardTerms& terms = result.sums[at].reward_terms;
@@ -350,7 +347,7 @@ Recorder::Recorder(Simulator& simulator, const RecorderOptions& options) {
   if (options.world < 0 || options.world >= num_worlds) {
     fail_usage("replay: expected a world of 0 to {}, got {}", num_worlds - 1, options.world);
   }
-  const int num_agents = simulator.worlds()[static_cast<size_t>(options.world)].num_agents;
+  const int num_agents = simulator.worlds()[options.world].num_agents;
   if (options.followed < -1 || options.followed >= num_agents) {
     fail_usage("replay: expected an agent of 0 to {} to follow, got {}", num_agents - 1, options.followed);
   }
@@ -399,7 +396,7 @@ void Recorder::set_origin(ReplayOrigin origin) {
   origin.map_origin_m = map.road->origin_m;
   origin.map_hash = fmt::format("{:016x}", map.fingerprint);
   origin.seed = parts.replay.origin.seed;
-  origin.global_world = parts.setup.worlds[static_cast<size_t>(parts.world)].global_world;
+  origin.global_world = parts.setup.worlds[parts.world].global_world;
   origin.dt_s = parts.setup.config.dt_s;
   origin.light_cycles = light_cycles_text(parts.setup.config, map);
   parts.replay.origin = std::move(origin);
@@ -417,7 +414,7 @@ void Recorder::forget() {
   episode.num_frames = 1;
   // Of each agent its chain of now.
   std::vector<const ReplayChain*> last(static_cast<size_t>(replay.num_agents), nullptr);
-  for (const ReplayChain& chain : episode.chains) last[static_cast<size_t>(chain.agent)] = &chain;
+  for (const ReplayChain& chain : episode.chains) last[chain.agent] = &chain;
   std::vector<ReplayChain> kept;
   for (const ReplayChain* chain : last) {
     if (chain == nullptr) continue;

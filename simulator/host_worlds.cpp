@@ -30,7 +30,7 @@ void HostWorlds::assign(const SimulatorSetup& other) {
 void HostWorlds::reserve(const SimulatorCapacity& capacity) {
   setup.reserve(capacity);
   state.reserve(capacity, setup.config);
-  cell_centers.reserve(static_cast<size_t>(capacity.boxes(setup.config)));
+  cell_centers.reserve(capacity.boxes(setup.config));
   make_cells_and_scene();
 }
 
@@ -52,7 +52,7 @@ void HostWorlds::make_cells_and_scene() {
 WorldView HostWorlds::world(int index) {
   const auto w = static_cast<size_t>(index);
   const int32_t first_box = setup.box_begin[w], first_light = setup.light_begin[w];
-  WorldView view = setup.view(index, setup.map_views[static_cast<size_t>(setup.worlds[w].map)], setup.options);
+  WorldView view = setup.view(index, setup.map_views[setup.worlds[w].map], setup.options);
   view.seed = state.seed[w];
   view.episode = static_cast<uint32_t>(state.episode_index[w]);
   view.agents = state.agents.view();

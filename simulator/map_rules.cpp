@@ -129,7 +129,7 @@ void add_lanes(const RoadMap& map, const PieceRule& rule, const OpenLanes* open,
 
     const auto goes_on = [&](int32_t other) {
       if (other < 0) return false;
-      const Lane& to = map.lanes[static_cast<size_t>(other)];
+      const Lane& to = map.lanes[other];
       return open ? is_route(to.type) : to.is_endless;
     };
     for (const int32_t successor : map.links(lane.successors)) {
@@ -211,11 +211,10 @@ void add_stop_lines(const RoadMap& map, MapRules* out) {
     line.half_length_m = 0.5f * length((light.stop_b_m - light.stop_a_m).xy());
     line.junction = light.junction;
     line.phase = light.phase;
-    line.num_phases =
-        light.junction < 0 ? 1 : std::max(1, map.junctions[static_cast<size_t>(light.junction)].num_phases);
+    line.num_phases = light.junction < 0 ? 1 : std::max(1, map.junctions[light.junction].num_phases);
     out->stop_lines.push_back(line);
     for (int32_t i = light.lanes.begin; i < light.lanes.end; ++i) {
-      int32_t& held_by = out->lanes[static_cast<size_t>(map.light_lanes[static_cast<size_t>(i)])].light;
+      int32_t& held_by = out->lanes[map.light_lanes[i]].light;
       if (held_by < 0) held_by = static_cast<int32_t>(index);
     }
   }
@@ -450,7 +449,7 @@ float oncoming_beyond_m(const MapView& map, const StopLine& line, Vec2 outward) 
   for (float at_m = kStep_m; line.half_length_m + at_m <= kStopLineReach_m; at_m += kStep_m) {
     const Vec2 p = line.middle_m.xy() + outward * (line.half_length_m + at_m);
     for (const int32_t item : items_at(map.segment_cells, p)) {
-      const LaneSegment& segment = map.segments[static_cast<size_t>(item)];
+      const LaneSegment& segment = map.segments[item];
       const Foot foot = foot_on(segment, p);
       const float height_m = height_on(segment, foot.along_m);
       if (!segment.is_driven || foot.distance_m > segment.half_width_m ||

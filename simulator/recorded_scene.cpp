@@ -74,8 +74,8 @@ LightState light_state(RecordedLightState state) {
 std::vector<LightState> light_states_of(const Scenario& scenario, int32_t start_step) {
   std::vector<LightState> states;
   for (int32_t light = 0; light < static_cast<int32_t>(scenario.lights.size()); ++light) {
-    for (const RecordedLightState state : scenario.states_of_light(light).subspan(
-             static_cast<size_t>(start_step), static_cast<size_t>(scenario.num_steps - start_step))) {
+    for (const RecordedLightState state :
+         scenario.states_of_light(light).subspan(start_step, scenario.num_steps - start_step)) {
       states.push_back(light_state(state));
     }
   }
@@ -121,9 +121,9 @@ std::vector<uint8_t> tracks_of_word(const Scenario& scenario, const std::string&
   } else if (word == "all") {
     choose([](int32_t, const RecordedTrack&) { return true; });
   } else if (word == "tracks_to_predict") {
-    for (const PredictedTrack& predicted : scenario.tracks_to_predict) mask[static_cast<size_t>(predicted.track)] = 1;
+    for (const PredictedTrack& predicted : scenario.tracks_to_predict) mask[predicted.track] = 1;
   } else if (word == "objects_of_interest") {
-    for (const int32_t track : scenario.objects_of_interest) mask[static_cast<size_t>(track)] = 1;
+    for (const int32_t track : scenario.objects_of_interest) mask[track] = 1;
   } else {
     int64_t id = 0;
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), id);
@@ -209,7 +209,7 @@ std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& word
 std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words, int32_t step) {
   std::vector<uint8_t> mask = tracks_of(scenario, words);
   for (size_t i = 0; i < mask.size(); ++i) {
-    mask[i] &= scenario.valid_of(static_cast<int32_t>(i))[static_cast<size_t>(step)];
+    mask[i] &= scenario.valid_of(static_cast<int32_t>(i))[step];
   }
   if (names_nobody(mask)) {
     fail_usage("'{}': expected a track that is there at step {}, got none", words, step);
@@ -218,8 +218,8 @@ std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& word
 }
 
 std::optional<float> displacement_m(const Scenario& scenario, int32_t track, int32_t step, Vec3 center_m) {
-  if (step >= scenario.num_steps || !scenario.valid_of(track)[static_cast<size_t>(step)]) return std::nullopt;
-  return length((center_m - scenario.states_of(track)[static_cast<size_t>(step)].position_m).xy());
+  if (step >= scenario.num_steps || !scenario.valid_of(track)[step]) return std::nullopt;
+  return length((center_m - scenario.states_of(track)[step].position_m).xy());
 }
 
 }  // namespace pictura

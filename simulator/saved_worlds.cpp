@@ -45,7 +45,7 @@ SimulatorSetup setup_of(const Simulator& simulator, std::vector<WorldSpec> world
 
 std::vector<WorldSpec> worlds_of_part(const std::vector<WorldSpec>& all, int part, int num_parts) {
   const std::vector<size_t> begins = part_begins(all, num_parts);
-  const auto at = [&](int of) { return all.begin() + static_cast<int64_t>(begins[static_cast<size_t>(of)]); };
+  const auto at = [&](int of) { return all.begin() + static_cast<int64_t>(begins[of]); };
   return {at(part), at(part + 1)};
 }
 
@@ -58,7 +58,7 @@ std::vector<uint8_t> join_saved_states(const Simulator& simulator, const std::ve
   for (int part = 0; part < num_parts; ++part) {
     const SimulatorSetup its_setup = setup_of(simulator, worlds_of_part(all, part, num_parts));
     SimulatorState its(its_setup);
-    its.restore(its_setup, parts[static_cast<size_t>(part)]);
+    its.restore(its_setup, parts[part]);
     joined.copy_worlds(setup, first_world, its, its_setup, 0, its_setup.num_worlds());
     first_world += its_setup.num_worlds();
   }
@@ -71,7 +71,7 @@ std::vector<uint8_t> part_of_saved_state(const Simulator& simulator, const std::
                        its_setup = setup_of(simulator, worlds_of_part(all, part, num_parts));
   SimulatorState whole(setup), its(its_setup);
   whole.restore(setup, saved);
-  its.copy_worlds(its_setup, 0, whole, setup, static_cast<int>(part_begins(all, num_parts)[static_cast<size_t>(part)]),
+  its.copy_worlds(its_setup, 0, whole, setup, static_cast<int>(part_begins(all, num_parts)[part]),
                   its_setup.num_worlds());
   return its.save(its_setup);
 }

@@ -46,8 +46,7 @@ void copy_lights(const Scenario& from, int32_t start_step, Scenario* to) {
   to->light_lanes = from.light_lanes;
   for (int32_t light = 0; light < static_cast<int32_t>(from.lights.size()); ++light) {
     for (int32_t step = start_step; step < start_step + to->num_steps; ++step) {
-      to->light_states.push_back(step < from.num_steps ? from.states_of_light(light)[static_cast<size_t>(step)]
-                                                       : RecordedLightState::none);
+      to->light_states.push_back(step < from.num_steps ? from.states_of_light(light)[step] : RecordedLightState::none);
     }
   }
 }
@@ -63,7 +62,7 @@ SceneRecorder::SceneRecorder(Simulator& simulator, int world)
     fail_usage("expected a world to record in [0, {}), got {}", simulator.worlds().size(), world);
   }
   spec_ = simulator.worlds()[world_];
-  map_ = simulator.maps()[static_cast<size_t>(spec_.map)];
+  map_ = simulator.maps()[spec_.map];
   seed_ = simulator.controller_input().seed[world_];
   first_slot_ = simulator.slots().slot_begin[world_];
   episode_ = simulator.episode_index()[world_];
@@ -104,7 +103,7 @@ void SceneRecorder::add_step() {
     driven_.back() = {is_agent ? Vec3{state.x_m[slot], state.y_m[slot], state.z_m[slot]} : behind_m, speed_mps};
   }
   for (int32_t i = scene.light_begin[world_]; i < scene.light_begin[world_ + 1]; ++i) {
-    lights_.push_back(recorded_light(scene.light_states[static_cast<size_t>(i)]));
+    lights_.push_back(recorded_light(scene.light_states[i]));
   }
   ++num_steps_;
 }

@@ -33,7 +33,7 @@ void check(const SimulatorConfig& config) {
     fail_usage("simulator: parked_cars: expected 0 to {}, got {}", kMaxAgentsPerWorld, config.parked_cars);
   }
   for (int i = 0; i < kNumConditioning; ++i) {
-    const ConditioningRange& range = config.conditioning[static_cast<size_t>(i)];
+    const ConditioningRange& range = config.conditioning[i];
     const bool is_positive = i == static_cast<int>(Conditioning::delta_goal_m) || i >= kNumRewardConditioning;
     if (!std::isfinite(range.low) || !std::isfinite(range.high) || range.low > range.high ||
         (is_positive && range.low <= 0) ||
@@ -80,7 +80,7 @@ void check(const SimulatorConfig& config, const CompiledMaps& maps, const std::v
       fail_usage("simulator: world {}: expected 1 to {} agents, got {}", world.global_world, kMaxAgentsPerWorld,
                  world.num_agents);
     }
-    const CompiledMap& map = *maps[static_cast<size_t>(world.map)];
+    const CompiledMap& map = *maps[world.map];
     if (!map.scenario) continue;
     if (static_cast<size_t>(world.num_agents) != map.scenario->tracks.size()) {
       fail_usage("simulator: world {}: expected as many agents as scene {} has tracks, {}, got {}", world.global_world,
@@ -138,7 +138,7 @@ void check_box_cells(const CompiledMaps& maps, const std::vector<WorldSpec>& wor
     cells_of_map.push_back(cells.num_x * cells.num_y + 1);
   }
   int64_t cells = 0;
-  for (const WorldSpec& world : worlds) cells += cells_of_map[static_cast<size_t>(world.map)];
+  for (const WorldSpec& world : worlds) cells += cells_of_map[world.map];
   if (cells > kMaxCells) {
     fail_usage("simulator: expected worlds of at most {} cells of {} m in all, got {} ({} bytes) in {} worlds",
                kMaxCells, kBoxCell_m, cells, cells * static_cast<int64_t>(sizeof(int32_t)), worlds.size());
@@ -173,7 +173,7 @@ SimulatorCapacity capacity_of(const CompiledMaps& maps, const std::vector<WorldS
   needs.maps = static_cast<int64_t>(maps.size());
   for (const WorldSpec& world : worlds) {
     needs.slots += world.num_agents;
-    needs.lights += static_cast<int64_t>(maps[static_cast<size_t>(world.map)]->rules.stop_lines.size());
+    needs.lights += static_cast<int64_t>(maps[world.map]->rules.stop_lines.size());
   }
   for (const auto& map : maps) needs.map_bytes += map->rules.size_bytes();
   return needs;
@@ -220,9 +220,9 @@ bool SimulatorSetup::has_lives() const {
 void SimulatorSetup::reserve(const SimulatorCapacity& capacity) {
   for (auto* begins : {&slot_begin, &box_begin, &light_begin})
     begins->reserve(static_cast<size_t>(capacity.worlds) + 1);
-  for (auto* of_slot : {&world_of_slot, &agent_of_slot}) of_slot->reserve(static_cast<size_t>(capacity.slots));
-  global_world.reserve(static_cast<size_t>(capacity.worlds));
-  geometry.reserve(static_cast<size_t>(capacity.worlds));
+  for (auto* of_slot : {&world_of_slot, &agent_of_slot}) of_slot->reserve(capacity.slots);
+  global_world.reserve(capacity.worlds);
+  geometry.reserve(capacity.worlds);
 }
 
 WorldView SimulatorSetup::view(int world, const MapView& map, const RuleOptions& its_options) const {

@@ -27,9 +27,7 @@ struct SimulatorSetup {
   size_t num_boxes() const { return static_cast<size_t>(box_begin.back()); }
   size_t num_lights() const { return static_cast<size_t>(light_begin.back()); }
   SlotTable slot_table() const { return {world_of_slot, agent_of_slot, slot_begin, global_world}; }
-  const CompiledMap& map_of(int world) const {
-    return *maps[static_cast<size_t>(worlds[static_cast<size_t>(world)].map)];
-  }
+  const CompiledMap& map_of(int world) const { return *maps[worlds[world].map]; }
   /// Whether any of the maps has roads that end, so that agents have lives.
   bool has_lives() const;
   SimulatorCapacity needs() const { return capacity_of(maps, worlds); }

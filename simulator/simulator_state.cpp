@@ -76,7 +76,7 @@ std::vector<Fingerprint> fingerprints(const SimulatorSetup& setup) {
 void check_restored(const SimulatorSetup& setup, const SimulatorState& state, const AgentStateView& agents) {
   constexpr float kMaxCoordinate_m = kMaxCommanded_m;
   for (size_t w = 0; w < setup.worlds.size(); ++w) {
-    const MapView& map = setup.map_views[static_cast<size_t>(setup.worlds[w].map)];
+    const MapView& map = setup.map_views[setup.worlds[w].map];
     for (int slot = setup.slot_begin[w]; slot < setup.slot_begin[w + 1]; ++slot) {
       const AgentField field = invalid_field(map, setup.options, agents, slot);
       PICTURA_CHECK(field == AgentField::none, "simulator state: agent {}: {}: {} is out of range", slot,
@@ -117,7 +117,7 @@ void check_restored(const SimulatorSetup& setup, const SimulatorState& state, co
 }  // namespace
 
 void SimulatorState::resize(const SimulatorSetup& setup) {
-  agents.resize(static_cast<size_t>(setup.num_slots()));
+  agents.resize(setup.num_slots());
   boxes.assign(setup.num_boxes(), {});
   boxes_before.assign(setup.num_boxes(), {});
   light_plans.assign(setup.num_lights(), {});
@@ -133,8 +133,8 @@ void SimulatorState::resize(const SimulatorSetup& setup) {
 
 void SimulatorState::reserve(const SimulatorCapacity& capacity, const SimulatorConfig& config) {
   const auto num_worlds = static_cast<size_t>(capacity.worlds), num_lights = static_cast<size_t>(capacity.lights);
-  agents.reserve(static_cast<size_t>(capacity.slots));
-  for (auto* its : {&boxes, &boxes_before}) its->reserve(static_cast<size_t>(capacity.boxes(config)));
+  agents.reserve(capacity.slots);
+  for (auto* its : {&boxes, &boxes_before}) its->reserve(capacity.boxes(config));
   light_plans.reserve(num_lights);
   lights.reserve(num_lights);
   for (auto* of_world : {&episode_step, &episode_index, &spawned}) of_world->reserve(num_worlds);
@@ -188,9 +188,9 @@ void SimulatorState::copy_worlds(const SimulatorSetup& setup, int world, const S
   // Arrays have `per` elements for each of what begins[world] counts.
   const auto copy = [&](auto& to_array, const auto& from_array, const std::vector<int32_t>& begins,
                         const std::vector<int32_t>& from_begins, int per) {
-    const auto first = from_array.begin() + int64_t{from_begins[static_cast<size_t>(from_world)]} * per,
-               last = from_array.begin() + int64_t{from_begins[static_cast<size_t>(from_world + count)]} * per;
-    std::copy(first, last, to_array.begin() + int64_t{begins[static_cast<size_t>(world)]} * per);
+    const auto first = from_array.begin() + int64_t{from_begins[from_world]} * per,
+               last = from_array.begin() + int64_t{from_begins[from_world + count]} * per;
+    std::copy(first, last, to_array.begin() + int64_t{begins[world]} * per);
   };
 #define X(name, type, per_agent, first, comment) \
   copy(agents.name, from.agents.name, setup.slot_begin, from_setup.slot_begin, per_agent);
@@ -306,7 +306,7 @@ std::string edit_fault_text(int64_t fault, int num_slots) {
   }
   if (what == kSlotAgain) return fmt::format("slots: element {}: expected each slot once, got {} again", element, slot);
   const auto field = static_cast<AgentField>(what);
-  const std::string_view name = kAgentFields[static_cast<size_t>(what)].name;
+  const std::string_view name = kAgentFields[what].name;
   if (field == AgentField::goal_lane) {
     return fmt::format(
         "slot {}: goal_lane: expected a lane of the map, or for pedestrians a piece of a walkway, unless "

@@ -27,7 +27,7 @@ struct Network {
     nodes.push_back(at);
     return static_cast<int32_t>(nodes.size()) - 1;
   }
-  Vec3 at(int32_t node) const { return nodes[static_cast<size_t>(node)]; }
+  Vec3 at(int32_t node) const { return nodes[node]; }
 };
 
 bool same_place(Vec3 a, Vec3 b) { return length((a - b).xy()) < kSamePlace_m && std::fabs(a.z - b.z) < kLevel_m; }
@@ -59,13 +59,13 @@ void add_lanes(const RoadMap& map, Network* out) {
   for (size_t i = 0; i < ends.size(); ++i) {
     for (size_t j = i + 1; j < ends.size() && out->at(ends[j]).x - out->at(ends[i]).x < kSamePlace_m; ++j) {
       if (!same_place(out->at(ends[i]), out->at(ends[j]))) continue;
-      int32_t& later = place[static_cast<size_t>(ends[j])];
-      if (later == ends[j]) later = place[static_cast<size_t>(ends[i])];
+      int32_t& later = place[ends[j]];
+      if (later == ends[j]) later = place[ends[i]];
     }
   }
   for (Edge& edge : out->edges) {
-    edge.a = place[static_cast<size_t>(edge.a)];
-    edge.b = place[static_cast<size_t>(edge.b)];
+    edge.a = place[edge.a];
+    edge.b = place[edge.b];
   }
 }
 
@@ -210,8 +210,8 @@ void drop_short_networks(Network* out) {
   std::vector<int32_t> root(out->nodes.size());
   std::iota(root.begin(), root.end(), 0);
   const auto root_of = [&root](int32_t node) {
-    while (root[static_cast<size_t>(node)] != node) {
-      node = root[static_cast<size_t>(node)] = root[static_cast<size_t>(root[static_cast<size_t>(node)])];
+    while (root[node] != node) {
+      node = root[node] = root[root[node]];
     }
     return static_cast<size_t>(node);
   };
@@ -260,14 +260,13 @@ Walkways make_walkways(const RoadMap& map, const MapView& roads) {
   out.leaving.resize(out.pieces.size());
   std::vector<int32_t> next(out.leave_begin.begin(), out.leave_begin.end() - 1);
   for (size_t i = 0; i < from_node.size(); ++i) {
-    out.leaving[static_cast<size_t>(next[static_cast<size_t>(from_node[i])]++)] = static_cast<int32_t>(i);
+    out.leaving[next[from_node[i]]++] = static_cast<int32_t>(i);
   }
   for (size_t i = 0; i < out.pieces.size(); ++i) {
     WalkPiece& piece = out.pieces[i];
     const int32_t back = static_cast<int32_t>(i) ^ 1;
-    const int32_t* const leaving = out.leaving.data() + out.leave_begin[static_cast<size_t>(piece.to_node)];
-    const int32_t ways =
-        out.leave_begin[static_cast<size_t>(piece.to_node) + 1] - out.leave_begin[static_cast<size_t>(piece.to_node)];
+    const int32_t* const leaving = out.leaving.data() + out.leave_begin[piece.to_node];
+    const int32_t ways = out.leave_begin[static_cast<size_t>(piece.to_node) + 1] - out.leave_begin[piece.to_node];
     piece.next = ways == 1 ? back : ways > 2 ? -1 : leaving[0] == back ? leaving[1] : leaving[0];
   }
   return out;

@@ -84,7 +84,7 @@ at::Tensor Collector::record(int64_t step) {
   if (observations.keep_images())
     observations.record(step, seen_slots(run_, slots));
   else
-    records_[static_cast<size_t>(step)].run(&graphs_, [&] { observations.record(step, slots); });
+    records_[step].run(&graphs_, [&] { observations.record(step, slots); });
   return slots;
 }
 
@@ -105,7 +105,7 @@ void Collector::ask_teacher(int64_t step, const at::Tensor& slots) {
 void Collector::simulate(int64_t step) {
   const PhaseTimer::Scope timed(&run_.timer, Phase::simulate);
   Rollout& rollout = run_.rollout;
-  simulations_[static_cast<size_t>(step)].run(&graphs_, [&] {
+  simulations_[step].run(&graphs_, [&] {
     const Array actions(rollout.actions_at(step).data(), {rollout.num_slots()}, run_.device);
     rollout.set_result(step, run_.simulator->step(actions, current_stream(run_.device)), run_.device);
   });

@@ -241,7 +241,7 @@ void Run::check_ranks_agree() const {
   communicator->max(extremes);
   const at::Tensor differs = at::nonzero(extremes[0] + extremes[1]).cpu();
   PICTURA_CHECK(differs.size(0) == 0, "update {}: the ranks' policies differ: parameter '{}'", update,
-                policy->parameters()[static_cast<size_t>(differs[0].item<int64_t>())].name);
+                policy->parameters()[differs[0].item<int64_t>()].name);
 }
 
 }  // namespace pictura

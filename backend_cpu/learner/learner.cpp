@@ -28,7 +28,7 @@ class LearnerExecutorCpu final : public LearnerExecutor {
                       const ActionChoice& choice, Span<int32_t> actions_out, Stream) override {
     const ActionRule rule(input, choice);
     for (size_t i = 0; i < slots.size(); ++i) {
-      actions_out[static_cast<size_t>(slots[i])] = rule(slots[i], log_probs.data() + i * kNumActions);
+      actions_out[slots[i]] = rule(slots[i], log_probs.data() + i * kNumActions);
     }
   }
 
@@ -47,7 +47,7 @@ class LearnerExecutorCpu final : public LearnerExecutor {
     for (int64_t step = transitions.num_steps - 1; step >= 0; --step) {
       float* const of_step = advantages_out.data() + step * transitions.num_slots;
       for (int64_t slot = 0; slot < transitions.num_slots; ++slot) {
-        of_step[slot] = gae_advantage(transitions.at(step, slot), gamma, gae_lambda, &tails[static_cast<size_t>(slot)]);
+        of_step[slot] = gae_advantage(transitions.at(step, slot), gamma, gae_lambda, &tails[slot]);
       }
     }
   }
@@ -55,7 +55,7 @@ class LearnerExecutorCpu final : public LearnerExecutor {
   void count_advantages(Span<const float> advantages, Span<const uint8_t> valid, Span<int64_t> counts_inout,
                         Stream) override {
     for (size_t i = 0; i < advantages.size(); ++i) {
-      if (valid[i] != 0) ++counts_inout[static_cast<size_t>(filter_bin(advantages[i]))];
+      if (valid[i] != 0) ++counts_inout[filter_bin(advantages[i])];
     }
   }
 
@@ -69,7 +69,7 @@ class LearnerExecutorCpu final : public LearnerExecutor {
 
   void permute(const Permutation& permutation, Span<const int64_t> items, Span<int64_t> items_out, Stream) override {
     for (size_t i = 0; i < items.size(); ++i) {
-      items_out[i] = items[static_cast<size_t>(permutation(static_cast<int64_t>(i)))];
+      items_out[i] = items[permutation(static_cast<int64_t>(i))];
     }
   }
 

@@ -95,9 +95,9 @@ void ImageDrawer::visit_spans(const ScreenFace& face, RowRange rows, Visit&& vis
 
 // Finds, for each pixel of the rows, the largest occluder_bound() of the faces that cover it fully.
 void ImageDrawer::find_occluder_bounds(FaceRange faces, RowRange rows) {
-  occluder_bounds_.assign(static_cast<std::size_t>((rows.y_end - rows.y_begin) * setting_.camera.width_px), 0.0f);
+  occluder_bounds_.assign((rows.y_end - rows.y_begin) * setting_.camera.width_px, 0.0f);
   for (int32_t f = faces.begin; f < faces.end; ++f) {
-    const ScreenFace& face = faces_[static_cast<std::size_t>(f)];
+    const ScreenFace& face = faces_[f];
     if (is_strip(face)) continue;  // has no bound
     visit_spans(face, rows, [&](int y, std::size_t row, const RowSpan& span) {
       for (int x = span.full_begin; x < span.full_end; ++x) {
@@ -114,7 +114,7 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
   first_fragment_.assign(occluder_bounds_.size(), -1);
   fragments_.clear();
   for (int32_t f = faces.begin; f < faces.end; ++f) {
-    const ScreenFace& face = faces_[static_cast<std::size_t>(f)];
+    const ScreenFace& face = faces_[f];
     const PolygonEdge* edges = edges_.at(face.edge_begin);
     visit_spans(face, rows, [&](int y, std::size_t row, const RowSpan& span) {
       for (int x = span.begin; x < span.end; ++x) {
@@ -134,8 +134,8 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
 // Copies the fragments of a pixel from its list and sorts them, nearest first.
 void ImageDrawer::collect_fragments(int32_t first) {
   pixel_.clear();
-  for (int32_t i = first; i >= 0; i = fragments_[static_cast<std::size_t>(i)].next) {
-    pixel_.push_back(fragments_[static_cast<std::size_t>(i)].fragment);
+  for (int32_t i = first; i >= 0; i = fragments_[i].next) {
+    pixel_.push_back(fragments_[i].fragment);
   }
   std::sort(pixel_.begin(), pixel_.end(),
             [this](const Fragment& a, const Fragment& b) { return is_nearer(a, b, faces_.data()); });
@@ -151,9 +151,9 @@ void ImageDrawer::resolve_occlusion(int x, int y) {
     for (std::size_t j = i + 1; j < pixel_.size(); ++j) {
       const PixelCoverage& b = pixel_[j].coverage;
       if (!may_occlude_more(visible_[i], a.samples, visible_[j], b.samples)) continue;
-      const OccludedSamples occluded = occlude_pair(
-          a, b, faces_[static_cast<std::size_t>(pixel_[i].face)], faces_[static_cast<std::size_t>(pixel_[j].face)],
-          corner, [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
+      const OccludedSamples occluded =
+          occlude_pair(a, b, faces_[pixel_[i].face], faces_[pixel_[j].face], corner,
+                       [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
       visible_[i] &= ~occluded.of_a;
       visible_[j] &= ~occluded.of_b;
     }
@@ -169,16 +169,16 @@ void ImageDrawer::composite_rows(RowRange rows, Visit&& visit, Finish&& finish) 
   int pixel = 0;
   for (int y = rows.y_begin; y < rows.y_end; ++y) {
     for (int x = 0; x < width; ++x, ++pixel) {
-      const int32_t first = first_fragment_[static_cast<std::size_t>(pixel)];
+      const int32_t first = first_fragment_[pixel];
       if (first < 0) {
         finish(pixel, Rgb{});
         continue;
       }
-      const LinkedFragment& alone = fragments_[static_cast<std::size_t>(first)];
+      const LinkedFragment& alone = fragments_[first];
       if (alone.next < 0) {
         const float weight = alone.fragment.coverage.area;
         visit(pixel, alone.fragment, weight);
-        finish(pixel, faces_[static_cast<std::size_t>(alone.fragment.face)].color * weight);
+        finish(pixel, faces_[alone.fragment.face].color * weight);
         continue;
       }
       collect_fragments(first);
@@ -187,7 +187,7 @@ void ImageDrawer::composite_rows(RowRange rows, Visit&& visit, Finish&& finish) 
       weights_.resize(pixel_.size());
       for (std::size_t i = 0; i < pixel_.size(); ++i) {
         weights_[i] = PixelAccumulator::weight_of(pixel_[i].coverage, visible_[i]);
-        sum.add(weights_[i], faces_[static_cast<std::size_t>(pixel_[i].face)].color);
+        sum.add(weights_[i], faces_[pixel_[i].face].color);
       }
       const PixelAccumulator::Shares shares = sum.shares();
       for (std::size_t i = 0; i < pixel_.size(); ++i) visit(pixel, pixel_[i], shares.of(weights_[i]));
@@ -240,8 +240,8 @@ void ImageDrawer::order_pixel(int x, int y) {
   auto stands_here = [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); };
   auto occludes = [&](const Fragment& other, const Fragment& fragment) {
     const uint64_t shared = shared_samples(other.coverage, fragment.coverage);
-    const ScreenFace& face = faces_[static_cast<std::size_t>(fragment.face)];
-    const ScreenFace& other_face = faces_[static_cast<std::size_t>(other.face)];
+    const ScreenFace& face = faces_[fragment.face];
+    const ScreenFace& other_face = faces_[other.face];
     return shared != 0 && face.object_id != other_face.object_id &&
            is_in_front(other_face, face, corner + centroid_of(shared), stands_here);
   };
@@ -258,10 +258,10 @@ void ImageDrawer::visit_fragments(const std::function<void(int, const PixelCover
   const int width = setting_.camera.width_px, height = setting_.camera.height_px;
   make_fragments({0, static_cast<int32_t>(faces_.size())}, {0, height});
   for (int pixel = 0; pixel < width * height; ++pixel) {
-    collect_fragments(first_fragment_[static_cast<std::size_t>(pixel)]);
+    collect_fragments(first_fragment_[pixel]);
     order_pixel(pixel % width, pixel / width);
     for (const Fragment& fragment : pixel_) {
-      visit(pixel, fragment.coverage, faces_[static_cast<std::size_t>(fragment.face)].color);
+      visit(pixel, fragment.coverage, faces_[fragment.face].color);
     }
   }
 }
@@ -274,7 +274,7 @@ void ImageDrawer::draw_planes(const ImageTarget& target) const {
       if (y < face.box.y_begin || y >= face.box.y_end) continue;
       for (int x = face.box.x_begin; x < face.box.x_end; ++x) {
         const Vec2 center = pixel_center(x, y);
-        FrontFace& front = fronts[static_cast<std::size_t>(x)];
+        FrontFace& front = fronts[x];
         if (is_again && !front.wants_again()) continue;
         if (!covers_point(edges_.at(face.edge_begin), face.edge_count, center.x, center.y)) continue;
         is_again ? front.offer_again(face, center) : front.offer(face, center);
@@ -287,8 +287,8 @@ void ImageDrawer::draw_planes(const ImageTarget& target) const {
     offer(y, /*is_again=*/true);
     for (int x = 0; x < width; ++x) {
       const Vec2 center = pixel_center(x, y);
-      const ScreenFace* face = fronts[static_cast<std::size_t>(x)].front(
-          center, [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
+      const ScreenFace* face =
+          fronts[x].front(center, [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
       const std::size_t pixel =
           static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
       if (target.depth_m) {

@@ -56,7 +56,7 @@ class ImageDrawer {
       edges_.resize(edges_.size() + static_cast<std::size_t>(count));
       return static_cast<int32_t>(edges_.size()) - count;
     }
-    void put(int32_t index, const PolygonEdge& edge) { edges_[static_cast<std::size_t>(index)] = edge; }
+    void put(int32_t index, const PolygonEdge& edge) { edges_[index] = edge; }
     const PolygonEdge* at(int32_t index) const { return edges_.data() + index; }
 
    private:
@@ -110,7 +110,7 @@ class ImageDrawer {
   void composite_rows(RowRange rows, Visit&& visit, Finish&& finish);
   void draw_planes(const ImageTarget& target) const;
   bool stands(uint32_t solid, uint32_t strip) const;
-  int32_t world_begin() const { return request_.scene->world_begin[static_cast<std::size_t>(request_.view->world)]; }
+  int32_t world_begin() const { return request_.scene->world_begin[request_.view->world]; }
 
   ImageRequest request_;
   ImageSetting setting_;

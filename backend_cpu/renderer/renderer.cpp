@@ -46,7 +46,7 @@ class CpuRenderer final : public Renderer {
     parallel_for(num_threads(), static_cast<int64_t>(views.size() * num_cameras), [&](int64_t image, int thread) {
       const std::size_t view = static_cast<std::size_t>(image) / num_cameras;
       const std::size_t camera = static_cast<std::size_t>(image) % num_cameras;
-      ImageDrawer& drawer = drawers_[static_cast<std::size_t>(thread)];
+      ImageDrawer& drawer = drawers_[thread];
       drawer.prepare(request(scene, views[view], camera));
       drawer.draw(target(images_out, view, camera));
     });
@@ -59,17 +59,17 @@ class CpuRenderer final : public Renderer {
     check_views(name(), scene, views);
     check_queries(name(), scene, views, batch.size(), queries, visibility_out.size());
     parallel_for(num_threads(), static_cast<int64_t>(queries.size()), [&](int64_t i, int thread) {
-      const VisibilityQuery& query = queries[static_cast<std::size_t>(i)];
-      ImageDrawer& drawer = drawers_[static_cast<std::size_t>(thread)];
+      const VisibilityQuery& query = queries[i];
+      ImageDrawer& drawer = drawers_[thread];
       VisibilitySum seen;
       const bool is_drawn = static_cast<std::size_t>(query.view) < views.size();
       for (std::size_t camera = 0; is_drawn && camera < cameras_.size(); ++camera) {
-        ImageRequest image = request(scene, views[static_cast<std::size_t>(query.view)], camera);
+        ImageRequest image = request(scene, views[query.view], camera);
         image.culls_occluded = false;  // occluded faces count when the agent is drawn alone
         drawer.prepare(image);
         drawer.accumulate_visibility(query.agent, &seen);
       }
-      visibility_out[static_cast<std::size_t>(i)] = seen.share();
+      visibility_out[i] = seen.share();
     });
   }
 
@@ -77,7 +77,7 @@ class CpuRenderer final : public Renderer {
   int num_threads() const { return static_cast<int>(drawers_.size()); }
 
   ImageRequest request(const SceneBatch& scene, const View& view, std::size_t camera) const {
-    const GeometryHandle handle = scene.geometry[static_cast<std::size_t>(view.world)];
+    const GeometryHandle handle = scene.geometry[view.world];
     return {geometries_.find(handle), &scene, &view, place_camera(cameras_[camera], view), config_.line_floor_px,
             config_.debug_palette};
   }

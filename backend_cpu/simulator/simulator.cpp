@@ -32,7 +32,7 @@ void sort_into_cells(const WorldView& world, CellLists* cells_inout) {
   for (int i = world.num_boxes - 1; i >= 0; --i) {
     if (!world.boxes[i].drawn) continue;
     const int32_t at = --begin[cell_of(world.boxes[i])];
-    cells_inout->items[static_cast<size_t>(at)] = i;
+    cells_inout->items[at] = i;
     world.cell_centers[at] = world.boxes[i].center_m.xy();
   }
 }
@@ -65,9 +65,9 @@ class SimulatorCpu final : public Simulator {
     if (capacity_.holds(capacity)) return;
     capacity_ = capacity_.joined(capacity);
     worlds_.reserve(capacity_);
-    results_.reserve(static_cast<size_t>(capacity_.slots), config());
+    results_.reserve(capacity_.slots, config());
     ++generation_;
-    for_each_world([this](int w) { sort_into_cells(worlds_.world(w), &worlds_.box_cells[static_cast<size_t>(w)]); });
+    for_each_world([this](int w) { sort_into_cells(worlds_.world(w), &worlds_.box_cells[w]); });
   }
   uint64_t generation() const override { return generation_; }
 
@@ -126,16 +126,16 @@ class SimulatorCpu final : public Simulator {
 
   void reset_worlds(Span<const uint8_t> world_mask, uint64_t seed, Stream) override {
     for_each_world([this, world_mask, seed](int w) {
-      if (world_mask[static_cast<size_t>(w)]) begin_first_episode(w, seed);
+      if (world_mask[w]) begin_first_episode(w, seed);
     });
   }
 
   void apply_edit(const StateEdit& edit, Stream) override {
     std::vector<int32_t> first_element(static_cast<size_t>(num_slots()), edit.count);
     for (int i = edit.count - 1; i >= 0; --i) {
-      if (has_slot(edit, i, num_slots())) first_element[static_cast<size_t>(edit.slots[i])] = i;
+      if (has_slot(edit, i, num_slots())) first_element[edit.slots[i]] = i;
     }
-    const auto world_index = [this](int slot) { return worlds_.setup.world_of_slot[static_cast<size_t>(slot)]; };
+    const auto world_index = [this](int slot) { return worlds_.setup.world_of_slot[slot]; };
     for (int i = 0; i < edit.count; ++i) {
       const int64_t fault = find_edit_fault(edit, i, num_slots(), first_element.data(),
                                             [&](int slot) { return worlds_.world(world_index(slot)); });
@@ -144,20 +144,18 @@ class SimulatorCpu final : public Simulator {
     std::vector<uint8_t> is_edited(static_cast<size_t>(worlds_.setup.num_worlds()));
     for (int i = 0; i < edit.count; ++i) {
       const int w = world_index(edit.slots[i]);
-      worlds_.state.spawned[static_cast<size_t>(w)] += pictura::apply_edit(worlds_.world(w), edit, i);
-      is_edited[static_cast<size_t>(w)] = 1;
+      worlds_.state.spawned[w] += pictura::apply_edit(worlds_.world(w), edit, i);
+      is_edited[w] = 1;
     }
     for_each_world([this, &is_edited](int w) {
-      if (!is_edited[static_cast<size_t>(w)]) return;
-      sort_into_cells(worlds_.world(w), &worlds_.box_cells[static_cast<size_t>(w)]);
+      if (!is_edited[w]) return;
+      sort_into_cells(worlds_.world(w), &worlds_.box_cells[w]);
       show(w);
     });
   }
 
   void answer_queries(const ObservationQueries& asked, Stream) override {
-    const auto world_of = [this](int slot) {
-      return worlds_.world(worlds_.setup.world_of_slot[static_cast<size_t>(slot)]);
-    };
+    const auto world_of = [this](int slot) { return worlds_.world(worlds_.setup.world_of_slot[slot]); };
     const auto count = static_cast<int>(asked.queries.size());
     for (int i = 0; i < count; ++i) {
       const int64_t fault = find_query_fault(asked, i, num_slots(), world_of);
@@ -165,13 +163,13 @@ class SimulatorCpu final : public Simulator {
     }
     parallel_for(config().num_threads, count, [&](int64_t item) {
       const int i = static_cast<int>(item);
-      answer_query(world_of(asked.queries[static_cast<size_t>(i)].slot), asked, i, config().vector_observations);
+      answer_query(world_of(asked.queries[i].slot), asked, i, config().vector_observations);
     });
   }
 
   void begin_first_episode(int w, uint64_t seed) {
-    worlds_.state.seed[static_cast<size_t>(w)] = seed;
-    worlds_.state.episode_index[static_cast<size_t>(w)] = 0;
+    worlds_.state.seed[w] = seed;
+    worlds_.state.episode_index[w] = 0;
     clear_results(w);
     begin_episode(w);
     show(w);
@@ -179,8 +177,8 @@ class SimulatorCpu final : public Simulator {
 
   void begin() {
     worlds_token_ = new_worlds_token();
-    results_.resize(static_cast<size_t>(num_slots()), config());
-    chosen_try_.assign(static_cast<size_t>(num_slots()), -1);
+    results_.resize(num_slots(), config());
+    chosen_try_.assign(num_slots(), -1);
     totals_ = {};
     reset({});
   }
@@ -189,7 +187,7 @@ class SimulatorCpu final : public Simulator {
     totals_ = worlds_.state.totals();
     for_each_world([this](int w) {
       clear_results(w);
-      sort_into_cells(worlds_.world(w), &worlds_.box_cells[static_cast<size_t>(w)]);
+      sort_into_cells(worlds_.world(w), &worlds_.box_cells[w]);
       show(w);
     });
   }
@@ -224,11 +222,11 @@ class SimulatorCpu final : public Simulator {
   template <typename CommandType>
   void check_commands(Span<const CommandType> commands) {
     for (int w = 0; w < worlds_.setup.num_worlds(); ++w) {
-      if (worlds_.state.episode_over[static_cast<size_t>(w)]) continue;
+      if (worlds_.state.episode_over[w]) continue;
       const WorldView world = worlds_.world(w);
       for (int agent = 0; agent < world.num_agents; ++agent) {
         const int slot = world.first_slot + agent;
-        const CommandType& command = commands[static_cast<size_t>(slot)];
+        const CommandType& command = commands[slot];
         if (!accepts(world, agent, command)) fail("step: {}", rejection_text(rejected_command(slot, command)));
       }
     }
@@ -266,11 +264,11 @@ class SimulatorCpu final : public Simulator {
       });
       if (chosen >= 0) world.boxes[agent] = spawn_box(world, agent, chosen);
       world.boxes[agent].drawn = chosen >= 0;
-      chosen_try_[static_cast<size_t>(world.first_slot + agent)] = chosen;
+      chosen_try_[world.first_slot + agent] = chosen;
     }
     int spawned = 0;
     for (int agent = 0; agent < world.num_agents; ++agent) {
-      const int chosen = chosen_try_[static_cast<size_t>(world.first_slot + agent)];
+      const int chosen = chosen_try_[world.first_slot + agent];
       place_agent(world, agent, chosen);
       spawned += joins_episode(world, chosen);
     }
@@ -303,7 +301,7 @@ class SimulatorCpu final : public Simulator {
     for (int agent = 0; agent < world.num_agents; ++agent) find_collisions(world, agent);
 
     std::array<SimulatorTotals, kTotalsBins> bins{};
-    const auto bin_of = [&bins](int agent) { return &bins[static_cast<size_t>(agent % kTotalsBins)]; };
+    const auto bin_of = [&bins](int agent) { return &bins[agent % kTotalsBins]; };
     int active = 0;
     for (int agent = 0; agent < world.num_agents; ++agent) {
       apply_reward_and_halt(world, agent, steps, results);
@@ -329,7 +327,7 @@ class SimulatorCpu final : public Simulator {
     const WorldView world = worlds_.world(w);
     const ObservationView observations = results_.observation_view();
     for (int agent = 0; agent < world.num_agents; ++agent) {
-      results_.views[static_cast<size_t>(world.first_slot + agent)] = view_of(world, agent);
+      results_.views[world.first_slot + agent] = view_of(world, agent);
     }
     pictura::observe(world, 0, world.num_agents, worlds_.setup.config.vector_observations, observations);
   }

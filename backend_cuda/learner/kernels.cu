@@ -70,8 +70,7 @@ struct Permute {
 struct IsKept {
   KeptTransitions rule;
   __device__ bool operator()(int64_t i) const {
-    return filter_keeps(rule.advantages[static_cast<size_t>(i)], rule.valid[static_cast<size_t>(i)] != 0,
-                        rule.threshold);
+    return filter_keeps(rule.advantages[i], rule.valid[i] != 0, rule.threshold);
   }
 };
 

@@ -104,7 +104,7 @@ __device__ inline bool set_view(ViewState* state, const DrawTask& task, int32_t 
   if (view.world < 0 || static_cast<size_t>(view.world) + 1 >= task.scene.world_begin.size()) {
     return fault(FaultKind::bad_world);
   }
-  const GeometryHandle handle = task.scene.geometry[static_cast<size_t>(view.world)];
+  const GeometryHandle handle = task.scene.geometry[view.world];
   if (handle < 0 || handle >= task.num_geometries) return fault(FaultKind::bad_geometry);
   if (!has_finite_pose(view) || !hides_within(view, task.scene.hidden_agents.size())) return fault(FaultKind::bad_pose);
   const size_t world = static_cast<size_t>(view.world);

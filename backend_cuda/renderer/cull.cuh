@@ -206,7 +206,7 @@ __device__ inline void cull_agents(const BlockState& state, const DrawTask& task
     const int32_t agent = first + lane_index();
     uint32_t faces = 0;
     if (agent < view.world_end) {
-      const AgentBox box = task.scene.agents[static_cast<size_t>(agent)];
+      const AgentBox box = task.scene.agents[agent];
       if (may_be_visible(box, setting.camera, setting.frustum) &&
           !is_excluded(view.view, task.scene.hidden_agents, agent)) {
         faces = front_facing_mask(box, setting.camera.position_m);
@@ -226,7 +226,7 @@ __device__ inline void cull_lights(const BlockState& state, EntryList* list) {
     const int index = first + lane_index();
     bool is_visible = false;
     if (index < num_heads) {
-      const LightHead head = heads[static_cast<size_t>(index)];
+      const LightHead head = heads[index];
       is_visible = may_be_visible(head, setting.camera, setting.frustum) &&
                    light_is_visible(head, state.context.lights[head.signal], setting.camera.position_m);
     }

@@ -31,7 +31,7 @@ void SortedPieces::sort(std::vector<Ball> balls) {
   }
   largest_radius_m_ += kLeeway_m;
   grid_ = Grid(middles, kCell_m);
-  for (const int32_t item : grid_.view().items) balls_.push_back(balls[static_cast<std::size_t>(item)]);
+  for (const int32_t item : grid_.view().items) balls_.push_back(balls[item]);
 }
 
 DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeCamera>& cameras,

@@ -474,7 +474,7 @@ class ObservationWriter {
       ObservedPiece pieces[kAtOnce];
       for (int k = 0; k < kAtOnce; ++k) {
         const int i = min_of(first + k * group.size(), num_items - 1);
-        pieces[k] = group.read(near.pieces[static_cast<size_t>(near.items[static_cast<size_t>(i)])]);
+        pieces[k] = group.read(near.pieces[near.items[i]]);
       }
       for (int k = 0; k < kAtOnce; ++k) {
         float row[8];
@@ -603,7 +603,7 @@ struct AnswerQueries {
   template <typename ThreadGroup>
   PICTURA_HD void operator()(const ThreadGroup& group, int i) const {
     if (*arrays.wrong_element != kNoSlot) return;
-    const ObservationQuery& query = asked.queries[static_cast<size_t>(i)];
+    const ObservationQuery& query = asked.queries[i];
     const WorldView world = arrays.world(arrays.world_of_slot[query.slot]);
     const int agent = query.slot - world.first_slot;
     observe_own(world, agent, i, asked.out, group);

@@ -305,7 +305,7 @@ class SimulatorCuda final : public Simulator {
     for (int w = 0; w < setup_.num_worlds(); ++w) {
       const auto index = static_cast<size_t>(w);
       const int32_t first_box = setup_.box_begin[index], first_light = setup_.light_begin[index];
-      const auto& map = setup_.maps[static_cast<size_t>(setup_.worlds[index].map)];
+      const auto& map = setup_.maps[setup_.worlds[index].map];
       WorldView view = setup_.view(w, maps_.view(map), *scratch_.options.data());
       view.agents = state_.agents.view();
       view.boxes = state_.boxes.data() + first_box;

@@ -52,8 +52,7 @@ void run_random(const QualityArguments& arguments) {
       const auto seed = arguments.world.seed + static_cast<uint64_t>(i);
       // Infinite where nothing is in the image.
       constexpr double kMost_db = 99;
-      psnr_db[static_cast<std::size_t>(i)] =
-          std::min(measure_random_scene(static_cast<RandomKind>(kind), seed).psnr_db(), kMost_db);
+      psnr_db[i] = std::min(measure_random_scene(static_cast<RandomKind>(kind), seed).psnr_db(), kMost_db);
     });
     progress.update(name);
     const auto worst = std::min_element(psnr_db.begin(), psnr_db.end()) - psnr_db.begin();

@@ -33,7 +33,7 @@ TrainingMeasurement measure_training(const TrainingCase& training_case);
 /// Wall time of an update, and what of it is in no phase.
 double wall_s(const UpdateCost& cost);
 double other_s(const UpdateCost& cost);
-inline double phase_s(const UpdateCost& cost, Phase phase) { return cost.phases_s[static_cast<std::size_t>(phase)]; }
+inline double phase_s(const UpdateCost& cost, Phase phase) { return cost.phases_s[static_cast<size_t>(phase)]; }
 
 /// One value of each update.
 template <typename Value>

@@ -131,7 +131,7 @@ Snapshot make_crowd() {
     town.scene.agents.push_back(
         make_box(AgentClass::pedestrian, {x, y, 0}, 0.1f * static_cast<float>(i), {0.6f, 0.6f, 1.2f}));
   }
-  town.scene.light_states.assign(static_cast<std::size_t>(town.geometry.num_signals), LightState::red);
+  town.scene.light_states.assign(town.geometry.num_signals, LightState::red);
   town.scene.end_world(0);
   town.views = {make_view({0, 0, 6}, 0.05f), make_view({80, 3, 0}, kPi)};
   return town;
@@ -280,7 +280,7 @@ Rig eight_camera_rig() {
   Rig eight;
   const int widths[] = {96, 64, 33, 128, 17, 50, 80, 7}, heights[] = {54, 36, 71, 20, 90, 50, 31, 5};
   for (int i = 0; i < 8; ++i) {
-    Camera camera = paper_rig(widths[i], heights[i]).cameras[static_cast<std::size_t>(i % 4)];
+    Camera camera = paper_rig(widths[i], heights[i]).cameras[i % 4];
     camera.name = std::to_string(i);
     camera.pitch_rad = 0.05f * static_cast<float>(i - 4);
     camera.roll_rad = 0.04f * static_cast<float>(4 - i);

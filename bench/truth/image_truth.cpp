@@ -431,9 +431,8 @@ class ImageSampler {
     const Eye eye(camera, view);
     const auto world = static_cast<std::size_t>(view.world);
     for (int32_t i = scene.world_begin[world]; i < scene.world_begin[world + 1]; ++i) {
-      const AgentBox& box = scene.agents[static_cast<std::size_t>(i)];
-      const auto hidden = scene.hidden_agents.subspan(static_cast<std::size_t>(view.hidden_begin),
-                                                      static_cast<std::size_t>(view.hidden_end - view.hidden_begin));
+      const AgentBox& box = scene.agents[i];
+      const auto hidden = scene.hidden_agents.subspan(view.hidden_begin, view.hidden_end - view.hidden_begin);
       if (!box.drawn || i == view.ego_agent || std::count(hidden.begin(), hidden.end(), i)) continue;
       add_agent(&tracer_, eye, box, static_cast<uint16_t>(1 + i - scene.world_begin[world]));
     }
@@ -518,7 +517,7 @@ TruthImage trace_image(const StaticGeometry& geometry, const SceneBatch& scene, 
     image.depth_m[pixel] = static_cast<float>(at_center.depth);
     if (at_center.strip) image.class_id[pixel] = at_center.strip->class_id;
     if (at_center.facet) {
-      const Solid& solid = sampler.tracer().solids[static_cast<std::size_t>(at_center.facet->solid)];
+      const Solid& solid = sampler.tracer().solids[at_center.facet->solid];
       image.class_id[pixel] = solid.class_id;
       image.instance_id[pixel] = solid.instance_id;
     }
@@ -529,12 +528,12 @@ TruthImage trace_image(const StaticGeometry& geometry, const SceneBatch& scene, 
 TruthVisibility trace_visibility(const StaticGeometry& geometry, const SceneBatch& scene, const View& view,
                                  const Rig& rig, float line_floor_px, int32_t agent) {
   const auto offsets = sample_offsets(TruthSamples::low_discrepancy_1024);
-  const int instance_id = 1 + agent - scene.world_begin[static_cast<std::size_t>(view.world)];
+  const int instance_id = 1 + agent - scene.world_begin[view.world];
   double visible = 0, alone = 0;
   for (const Camera& camera : rig.cameras) {
     const ImageSampler sampler(geometry, scene, view, camera, line_floor_px);
     auto is_wanted = [&](const Facet* facet) {
-      return sampler.tracer().solids[static_cast<std::size_t>(facet->solid)].instance_id == instance_id;
+      return sampler.tracer().solids[facet->solid].instance_id == instance_id;
     };
     sampler.for_each_pixel([&](int x, int y, const Candidates& in_pixel) {
       Candidates wanted;

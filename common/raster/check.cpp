@@ -148,7 +148,7 @@ Span<const View> counted_views(std::string_view renderer, const ViewBatch& views
   const int32_t count = *views.num_views;
   PICTURA_CHECK(count >= 0 && static_cast<std::size_t>(count) <= views.size(),
                 "renderer {}: number of views: expected 0 to {}, got {}", renderer, views.size(), count);
-  return views.views.subspan(0, static_cast<std::size_t>(count));
+  return views.views.subspan(0, count);
 }
 
 void check_answers(std::string_view renderer, std::size_t num_queries, std::size_t num_answers) {
@@ -165,7 +165,7 @@ void check_queries(std::string_view renderer, const SceneBatch& scene, Span<cons
                   "renderer {}: visibility query {}: expected a view below {}, got {}", renderer, i, max_views,
                   query.view);
     if (static_cast<std::size_t>(query.view) >= views.size()) continue;
-    const auto world = static_cast<std::size_t>(views[static_cast<std::size_t>(query.view)].world);
+    const auto world = static_cast<std::size_t>(views[query.view].world);
     const int32_t begin = scene.world_begin[world], end = scene.world_begin[world + 1];
     PICTURA_CHECK(query.agent >= begin && query.agent < end,
                   "renderer {}: visibility query {}: expected an agent of the view's world, {} to {}, got {}", renderer,

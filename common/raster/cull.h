@@ -50,7 +50,7 @@ PICTURA_HD inline bool may_be_visible(const AgentBox& box, const PinholeCamera& 
 PICTURA_HD inline bool is_excluded(const View& view, Span<const int32_t> hidden_agents, int32_t agent) {
   if (agent == view.ego_agent) return true;
   for (int32_t i = view.hidden_begin; i < view.hidden_end; ++i) {
-    if (hidden_agents[static_cast<size_t>(i)] == agent) return true;
+    if (hidden_agents[i] == agent) return true;
   }
   return false;
 }
@@ -66,7 +66,7 @@ PICTURA_HD inline void for_each_item(const GridView& grid, const Aabb2& query_bo
     const int x = cells.x_begin + cell % columns, y = cells.y_begin + cell / columns;
     const size_t at = static_cast<size_t>(y) * static_cast<size_t>(grid.num_x) + static_cast<size_t>(x);
     for (int32_t i = grid.begin[at]; i < grid.begin[at + 1]; ++i) {
-      const int32_t item = grid.items[static_cast<size_t>(i)];
+      const int32_t item = grid.items[i];
       if (is_first_visit(grid, cells, box_of(item), x, y)) visit(item);
     }
   }

@@ -19,12 +19,12 @@ class HostGeometries {
   }
   /// Frees what the handle holds, if anything.
   void release(GeometryHandle handle) {
-    if (static_cast<std::size_t>(handle) < kept_.size()) kept_[static_cast<std::size_t>(handle)].reset();
+    if (static_cast<std::size_t>(handle) < kept_.size()) kept_[handle].reset();
   }
   /// What any handle holds; null where it holds nothing.
   const StaticGeometryView* find(GeometryHandle handle) const {
     if (handle < 0 || static_cast<std::size_t>(handle) >= kept_.size()) return nullptr;
-    const auto& kept = kept_[static_cast<std::size_t>(handle)];
+    const auto& kept = kept_[handle];
     return kept ? &kept->view : nullptr;
   }
 

@@ -61,9 +61,9 @@ PICTURA_HD inline Extent extent_of(uint32_t object_id, const StaticGeometryView&
   const int32_t index = index_of(object_id);
   switch (kind_of(object_id)) {
     case kAgentKind: return extent_of(agents[index]);
-    case kWallKind: return extent_of(pieces.walls[static_cast<size_t>(index)]);
-    case kLightKind: return extent_of(pieces.heads[static_cast<size_t>(index)]);
-    default: return extent_of(pieces.strips[static_cast<size_t>(index)]);
+    case kWallKind: return extent_of(pieces.walls[index]);
+    case kLightKind: return extent_of(pieces.heads[index]);
+    default: return extent_of(pieces.strips[index]);
   }
 }
 

@@ -12,7 +12,7 @@ PICTURA_HD inline void visit_agents(const ImageSetting& setting, const SceneBatc
                                     Visit&& visit) {
   const auto world = static_cast<size_t>(view.world);
   for (int32_t agent = scene.world_begin[world]; agent < scene.world_begin[world + 1]; ++agent) {
-    const AgentBox& box = scene.agents[static_cast<size_t>(agent)];
+    const AgentBox& box = scene.agents[agent];
     if (!may_be_visible(box, setting.camera, setting.frustum)) continue;
     if (!is_excluded(view, scene.hidden_agents, agent)) visit(box, agent);
   }
@@ -24,9 +24,9 @@ PICTURA_HD inline void visit_walls(const ImageSetting& setting, const StaticGeom
   const Span<const WallFace> walls = geometry.walls;
   for_each_item(
       geometry.wall_grid, frustum_ground_box(setting.camera, setting.frustum),
-      [&](int32_t i) { return ground_box(walls[static_cast<size_t>(i)]); },
+      [&](int32_t i) { return ground_box(walls[i]); },
       [&](int32_t i) {
-        const WallFace& wall = walls[static_cast<size_t>(i)];
+        const WallFace& wall = walls[i];
         if (may_be_visible(wall, setting.camera, setting.frustum)) visit(wall, i);
       });
 }
@@ -35,13 +35,13 @@ PICTURA_HD inline void visit_walls(const ImageSetting& setting, const StaticGeom
 template <typename Visit>
 PICTURA_HD inline void visit_lights(const ImageSetting& setting, const StaticGeometryView& geometry,
                                     const SceneBatch& scene, const View& view, Visit&& visit) {
-  const int32_t begin = scene.light_begin[static_cast<size_t>(view.world)];
+  const int32_t begin = scene.light_begin[view.world];
   if (begin == scene.light_begin[static_cast<size_t>(view.world) + 1]) return;
   const Span<const LightHead> heads = geometry.heads;
   for (int32_t i = 0; i < static_cast<int32_t>(heads.size()); ++i) {
-    const LightHead& head = heads[static_cast<size_t>(i)];
+    const LightHead& head = heads[i];
     if (!may_be_visible(head, setting.camera, setting.frustum)) continue;
-    visit(head, scene.light_states[static_cast<size_t>(begin + head.signal)], i);
+    visit(head, scene.light_states[begin + head.signal], i);
   }
 }
 
@@ -51,9 +51,9 @@ PICTURA_HD inline void visit_strips(const ImageSetting& setting, const StaticGeo
   const Span<const Strip> strips = geometry.strips;
   for_each_item(
       geometry.strip_grid, frustum_ground_box(setting.camera, setting.frustum),
-      [&](int32_t i) { return ground_box(strips[static_cast<size_t>(i)]); },
+      [&](int32_t i) { return ground_box(strips[i]); },
       [&](int32_t i) {
-        const Strip& strip = strips[static_cast<size_t>(i)];
+        const Strip& strip = strips[i];
         if (may_be_visible(strip, setting.camera, setting.frustum)) visit(strip, i);
       });
 }

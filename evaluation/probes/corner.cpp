@@ -115,7 +115,7 @@ class CornerProbe {
     const DrivenScene& scene = scenes_.of(state.scene);
     for (int step = state.step; step <= state.step + kTakeoverSteps; ++step) {
       const int32_t lane = scene.at(step, state.user).lane;
-      if (lane >= 0 && run_.maps()[map]->road->lanes[static_cast<size_t>(lane)].junction == junction) return true;
+      if (lane >= 0 && run_.maps()[map]->road->lanes[lane].junction == junction) return true;
     }
     return false;
   }
@@ -150,9 +150,9 @@ class CornerProbe {
   int32_t another_of(const CornerScene& scene, const CornerState& state) const {
     std::vector<int32_t> others;
     const auto num_agents = static_cast<int32_t>(scenes_.of(state.scene).bodies.size());
-    const Vec2 ego_m = scene.boxes[static_cast<size_t>(state.ego)].center_m.xy();
+    const Vec2 ego_m = scene.boxes[state.ego].center_m.xy();
     for (int32_t agent = 0; agent < num_agents; ++agent) {
-      const AgentBox& box = scene.boxes[static_cast<size_t>(agent)];
+      const AgentBox& box = scene.boxes[agent];
       if (agent == state.ego || agent == state.user || !box.drawn || box.agent_class != AgentClass::vehicle) continue;
       if (length(box.center_m.xy() - ego_m) < options_.search.user_range_m) others.push_back(agent);
     }
@@ -162,7 +162,7 @@ class CornerProbe {
                          .agent = static_cast<uint32_t>(state.ego),
                          .step = static_cast<uint32_t>(state.step),
                          .purpose = Purpose::minibatch});
-    return others[static_cast<size_t>(random.below(static_cast<int>(others.size())))];
+    return others[random.below(static_cast<int>(others.size()))];
   }
 
   void take_over() {

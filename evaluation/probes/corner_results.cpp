@@ -137,7 +137,7 @@ std::optional<Reveal> reveal_of(const CornerResults& results, size_t pair, bool 
   const Takeover& run = results.takeover(pair, walls, its_case, policy);
   const bool is_empty = its_case == CornerCase::empty;
   const int32_t step = is_empty ? results.takeover(pair, walls, CornerCase::hidden, policy).sight_step : run.sight_step;
-  if (step < 0 || !std::isfinite(run.speed_mps[static_cast<size_t>(step)])) return std::nullopt;
+  if (step < 0 || !std::isfinite(run.speed_mps[step])) return std::nullopt;
   const auto at = static_cast<size_t>(step);
   const CornerPair& its_pair = results.pairs[pair];
   Reveal reveal{.step = step,
@@ -219,14 +219,13 @@ void write_corner_cases(const std::string& path, const CornerResults& results) {
         for (size_t policy = 0; policy < results.policies.size(); ++policy) {
           const Takeover& one = results.takeover(pair, walls, its_case, policy);
           const std::optional<Reveal> reveal = reveal_of(results, pair, walls, its_case, policy);
-          std::string row =
-              fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{:.3f},{:.3f},{:.1f},{},{},{}", run++, pair,
-                          kWallNames[walls ? 0 : 1], name_of(its_case), csv_quoted(results.policies[policy].name),
-                          state.scene, csv_quoted(results.setting.maps[static_cast<size_t>(state.map)]),
-                          csv_quoted(results.driver_name(state.driver)), state.step, state.ego, state.user,
-                          its_case == CornerCase::removed ? results.scenes_of_pairs[pair].removed : -1,
-                          state.distance_m, state.speed_mps, kTakeoverStep_s * one.steps, one.ended_by,
-                          seconds_of(one.input_step), seconds_of(one.sight_step));
+          std::string row = fmt::format(
+              "{},{},{},{},{},{},{},{},{},{},{},{},{:.3f},{:.3f},{:.1f},{},{},{}", run++, pair,
+              kWallNames[walls ? 0 : 1], name_of(its_case), csv_quoted(results.policies[policy].name), state.scene,
+              csv_quoted(results.setting.maps[state.map]), csv_quoted(results.driver_name(state.driver)), state.step,
+              state.ego, state.user, its_case == CornerCase::removed ? results.scenes_of_pairs[pair].removed : -1,
+              state.distance_m, state.speed_mps, kTakeoverStep_s * one.steps, one.ended_by, seconds_of(one.input_step),
+              seconds_of(one.sight_step));
           if (reveal) {
             fmt::format_to(std::back_inserter(row), ",{},{},{:.3f},{:.3f},{:.3f},{}", seconds_of(reveal->step),
                            text_of(reveal->distance_m), reveal->corner_m, reveal->speed_mps, reveal->approach_mps,

@@ -13,19 +13,19 @@ namespace pictura {
 namespace {
 
 Vec3 end_of(const RoadMap& map, int32_t lane) {
-  const Span<const LanePoint> points = map.points_of(map.lanes[static_cast<size_t>(lane)]);
+  const Span<const LanePoint> points = map.points_of(map.lanes[lane]);
   return points[points.size() - 1].position_m;
 }
 
 // A lane into a junction and those that lead to it, the nearest first.
 std::vector<int32_t> lanes_to(const RoadMap& map, int32_t approach) {
   std::vector<int32_t> lanes{approach};
-  float length_m = map.lanes[static_cast<size_t>(approach)].length_m;
+  float length_m = map.lanes[approach].length_m;
   while (length_m < kCornerLead_m) {
-    const Span<const int32_t> before = map.links(map.lanes[static_cast<size_t>(lanes.back())].predecessors);
-    if (before.empty() || map.lanes[static_cast<size_t>(before[0])].in_junction) break;
+    const Span<const int32_t> before = map.links(map.lanes[lanes.back()].predecessors);
+    if (before.empty() || map.lanes[before[0]].in_junction) break;
     lanes.push_back(before[0]);
-    length_m += map.lanes[static_cast<size_t>(before[0])].length_m;
+    length_m += map.lanes[before[0]].length_m;
   }
   return lanes;
 }
@@ -39,10 +39,10 @@ BlindCorners find_blind_corners(const RoadMap& map, Span<const WallFace> walls) 
   BlindCorners corners;
   for (const BlindCrossing& crossing : find_blind_crossings(map, walls)) {
     if (lit.contains(crossing.approach) || lit.contains(crossing.other_approach)) continue;
-    const Span<const int32_t> next = map.links(map.lanes[static_cast<size_t>(crossing.approach)].successors);
+    const Span<const int32_t> next = map.links(map.lanes[crossing.approach].successors);
     for (const int32_t lane : lanes_to(map, crossing.approach)) {
       BlindCorner& corner = corners[lane];
-      corner.junction = map.lanes[static_cast<size_t>(next[0])].junction;
+      corner.junction = map.lanes[next[0]].junction;
       corner.entry_m = end_of(map, crossing.approach);
       for (const int32_t other : lanes_to(map, crossing.other_approach))
         corner.lanes[other] = end_of(map, crossing.other_approach);
@@ -56,9 +56,7 @@ std::vector<CornerState> find_corner_states(const ProbeFrame& frame, size_t worl
                                             const PinholeCamera& front, const CornerSearch& search) {
   const WorldSpec& spec = frame.worlds[world];
   const int32_t first = frame.slot_begin[world];
-  const auto box_of = [&](int32_t agent) -> const AgentBox& {
-    return frame.boxes[static_cast<size_t>(frame.box_begin[world] + agent)];
-  };
+  const auto box_of = [&](int32_t agent) -> const AgentBox& { return frame.boxes[frame.box_begin[world] + agent]; };
   std::vector<CornerState> states;
   for (int32_t ego = 0; ego < spec.num_agents; ++ego) {
     const auto slot = static_cast<size_t>(first + ego);
@@ -87,7 +85,7 @@ std::vector<CornerState> find_corner_states(const ProbeFrame& frame, size_t worl
       const int32_t lane = frame.lane[its_slot];
       const bool drives = static_cast<AgentClass>(frame.agent_class[its_slot]) != AgentClass::pedestrian;
       if (other == ego || lane < 0 || !drives || !frame.is_present(its_slot)) continue;
-      is_empty &= map.lanes[static_cast<size_t>(lane)].junction != corner.junction;
+      is_empty &= map.lanes[lane].junction != corner.junction;
       const auto crossing = corner.lanes.find(lane);
       if (crossing == corner.lanes.end()) continue;
       const float its_distance_m = length((crossing->second - box_of(other).center_m).xy());

@@ -64,7 +64,7 @@ std::vector<bool> free_points(const CrossingPath& path, Span<const AgentBox> box
   const auto stands_near = [&](float z_m) { return std::abs(z_m - path.z_m) < kSameGround_m; };
   const auto rule_out = [&](const auto& is_taken) {
     for (int i = 0; i < kPathPoints; ++i) {
-      if (is_taken(path.point_m(i))) is_free[static_cast<size_t>(i)] = false;
+      if (is_taken(path.point_m(i))) is_free[i] = false;
     }
   };
   for (const AgentBox& box : boxes) {
@@ -80,10 +80,8 @@ std::vector<bool> free_points(const CrossingPath& path, Span<const AgentBox> box
 }
 
 std::optional<PathPart> used_part(Span<const float> visible_shares) {
-  const auto is_hidden = [&](int i) {
-    return i >= 0 && i < kPathPoints && visible_shares[static_cast<size_t>(i)] == 0;
-  };
-  const auto is_seen = [&](int i) { return i < kPathPoints && visible_shares[static_cast<size_t>(i)] > 0; };
+  const auto is_hidden = [&](int i) { return i >= 0 && i < kPathPoints && visible_shares[i] == 0; };
+  const auto is_seen = [&](int i) { return i < kPathPoints && visible_shares[i] > 0; };
   if (!is_hidden(kPathOrigin)) return {};
   constexpr int kHidden = static_cast<int>(kPathHidden_m / kPathSpacing_m),
                 kSeen = static_cast<int>(kPathSeen_m / kPathSpacing_m),
@@ -93,7 +91,7 @@ std::optional<PathPart> used_part(Span<const float> visible_shares) {
   while (is_hidden(part.begin - 1)) --part.begin;
   float most = 0;
   for (part.hidden_again = part.first_seen; is_seen(part.hidden_again); ++part.hidden_again)
-    most = max_of(most, visible_shares[static_cast<size_t>(part.hidden_again)]);
+    most = max_of(most, visible_shares[part.hidden_again]);
   for (part.end = part.hidden_again; is_hidden(part.end);) ++part.end;
   if (part.first_seen - part.begin < kHidden || part.end - part.hidden_again < kHidden) return {};
   if (part.hidden_again - part.first_seen < kSeen || most < kPathWhole) return {};

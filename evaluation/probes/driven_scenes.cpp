@@ -17,10 +17,10 @@ const DrivenState& DrivenScene::at(int step, int32_t agent) const {
 
 AgentBox DrivenScene::box_at(int step, int32_t agent) const {
   const DrivenState& state = at(step, agent);
-  AgentBox box = bodies[static_cast<size_t>(agent)];
+  AgentBox box = bodies[agent];
   box.cos_heading = std::cos(state.heading_rad);
   box.sin_heading = std::sin(state.heading_rad);
-  const float ahead = ahead_m[static_cast<size_t>(agent)];
+  const float ahead = ahead_m[agent];
   box.center_m = state.position_m + Vec3{box.cos_heading * ahead, box.sin_heading * ahead, 0};
   return box;
 }

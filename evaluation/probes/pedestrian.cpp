@@ -49,7 +49,7 @@ struct Trial {
   bool may_do() const {
     if (shares[kPathOrigin] != 0 || !(share_without_hider > 0)) return false;
     int i = kPathOrigin;
-    const auto share = [&] { return i < kPathPoints ? shares[static_cast<size_t>(i)] : -1; };
+    const auto share = [&] { return i < kPathPoints ? shares[i] : -1; };
     while (share() == 0) i += kCoarse;
     if (!(share() > 0)) return false;
     while (share() > 0) i += kCoarse;
@@ -96,7 +96,7 @@ class PedestrianProbe {
       const View& view = frame.views[slot];
       const Vec2 heading{view.cos_heading, view.sin_heading};
       for (int32_t box = first_box; box < frame.box_begin[world + 1]; ++box) {
-        const AgentBox& hider = frame.boxes[static_cast<size_t>(box)];
+        const AgentBox& hider = frame.boxes[box];
         if (box == first_box + ego || !hider.drawn || hider.agent_class != AgentClass::vehicle) continue;
         const Vec2 apart = hider.center_m.xy() - view.origin_m.xy();
         const float distance_m = length(apart);
@@ -141,13 +141,13 @@ class PedestrianProbe {
 
   std::vector<bool> free_points(const ProbeFrame& frame, const Trial& trial) const {
     const size_t world = trial.search->world;
-    const std::vector<WallFace>& walls = run_.maps()[static_cast<size_t>(frame.worlds[world].map)]->geometry.walls;
+    const std::vector<WallFace>& walls = run_.maps()[frame.worlds[world].map]->geometry.walls;
     return pictura::free_points(trial.one->path, boxes_of(frame, world), walls);
   }
 
   static Span<const AgentBox> boxes_of(const ProbeFrame& frame, size_t world) {
     const int32_t first = frame.box_begin[world], end = frame.box_begin[world + 1];
-    return Span<const AgentBox>(frame.boxes).subspan(static_cast<size_t>(first), static_cast<size_t>(end - first));
+    return Span<const AgentBox>(frame.boxes).subspan(first, end - first);
   }
 
   // The pedestrian on every stride-th free point, alone; and on the origin, without the hider.
@@ -161,9 +161,9 @@ class PedestrianProbe {
       std::vector<InsertedBox> pedestrians;
       std::vector<float*> of_point;
       for (int i = 0; i < kPathPoints; i += stride) {
-        if (!trial.is_free[static_cast<size_t>(i)]) continue;
+        if (!trial.is_free[i]) continue;
         pedestrians.push_back(trial.one->path.pedestrian(i, options_.height_m));
-        of_point.push_back(&trial.shares[static_cast<size_t>(i)]);
+        of_point.push_back(&trial.shares[i]);
       }
       scene.add_world(frame, world, pedestrians);
       const int32_t first = scene.first_inserted(frame, world), slot = frame.slot_begin[world] + trial.one->ego;
@@ -178,7 +178,7 @@ class PedestrianProbe {
           views.push_back(scene.view_of(frame, world, slot, others));
           shares_out.push_back(share_out);
         };
-        float* const share = of_point[static_cast<size_t>(i)];
+        float* const share = of_point[i];
         add(share);
         if (share != &trial.shares[kPathOrigin]) continue;
         others.push_back(scene.box_of(frame, world, frame.box_begin[world] + trial.one->hider));
@@ -207,7 +207,7 @@ class PedestrianProbe {
     PedestrianPath path{.scene = scene,
                         .map = spec.map,
                         .driver = frame.driver,
-                        .map_origin_m = run_.maps()[static_cast<size_t>(spec.map)]->road->origin_m,
+                        .map_origin_m = run_.maps()[spec.map]->road->origin_m,
                         .step = frame.step,
                         .ego = one.ego,
                         .hider = one.hider,
@@ -219,7 +219,7 @@ class PedestrianProbe {
                         .boxes = {boxes.begin(), boxes.end()},
                         .view = frame.views[ego]};
     const Vec2 eye_m = path.view.origin_m.xy();
-    path.hider_distance_m = length(path.boxes[static_cast<size_t>(one.hider)].center_m.xy() - eye_m);
+    path.hider_distance_m = length(path.boxes[one.hider].center_m.xy() - eye_m);
     path.view.world = 0;
     path.view.ego_agent = one.ego;
     const auto first_slot = frame.status.begin() + frame.slot_begin[world];
@@ -235,7 +235,7 @@ class PedestrianProbe {
                                  .along_m = kPathSpacing_m * static_cast<float>(i - part->begin),
                                  .pedestrian = pedestrian.box,
                                  .distance_m = length(one.path.point_m(i) - eye_m),
-                                 .visible_share = trial.shares[static_cast<size_t>(i)]});
+                                 .visible_share = trial.shares[i]});
       pairs.push_back({.world = world, .slot = slot});
       if (options_.control != PedestrianControl::nobody) pairs.back().inserted = pedestrian;
     }

@@ -33,7 +33,7 @@ struct PointSums {
 
 Json to_json(const PedestrianRow& row, const PedestrianResults& results) {
   Json json = {
-      {"policy", results.policies[static_cast<size_t>(row.policy)].name},
+      {"policy", results.policies[row.policy].name},
       {"phase", row.phase ? Json(kPathPhaseNames[static_cast<size_t>(*row.phase)]) : Json(nullptr)},
       {"from_first_sight_m", row.offset ? Json(*row.offset * static_cast<double>(kPathSpacing_m)) : Json(nullptr)},
       {"visible_share_mean", finite_or_null(row.mean_visible_share)}};
@@ -54,7 +54,7 @@ std::vector<PedestrianRow> summarize(const PedestrianResults& results) {
     std::map<int, PointSums> offsets;
     for (size_t i = 0; i < results.points.size(); ++i) {
       const PedestrianPoint& point = results.points[i];
-      const PedestrianPath& path = results.paths[static_cast<size_t>(point.path)];
+      const PedestrianPath& path = results.paths[point.path];
       const auto at = static_cast<int32_t>(i);
       const PairedResponse& response = results.response(i, policy);
       phases[static_cast<size_t>(path.phase_of(at))].add(path.scene, point, response);
@@ -80,13 +80,13 @@ void write_pedestrian_cases(const std::string& path, const PedestrianResults& re
       response_header(results) + '\n');
   for (size_t i = 0; i < results.points.size(); ++i) {
     const PedestrianPoint& point = results.points[i];
-    const PedestrianPath& one = results.paths[static_cast<size_t>(point.path)];
+    const PedestrianPath& one = results.paths[point.path];
     const auto at = static_cast<int32_t>(i);
     const std::array<double, 3> position_m = file_position_m(one.map_origin_m, point.pedestrian.center_m);
     file.write(fmt::format(
         "{},{},{},{},{},{},{},{:.3f},{},{:.3f},{},{},{:.3f},{:.3f},{:.3f},{:.3f},{},{}{}\n", i, point.path, one.scene,
-        csv_quoted(results.setting.maps[static_cast<size_t>(one.map)]), csv_quoted(results.driver_name(one.driver)),
-        one.step, one.ego, one.ego_speed_mps, one.hider, one.hider_distance_m, point.along_m,
+        csv_quoted(results.setting.maps[one.map]), csv_quoted(results.driver_name(one.driver)), one.step, one.ego,
+        one.ego_speed_mps, one.hider, one.hider_distance_m, point.along_m,
         static_cast<float>(at - one.first_point - one.first_seen) * kPathSpacing_m, position_m[0], position_m[1],
         position_m[2], point.distance_m, kPathPhaseNames[static_cast<size_t>(one.phase_of(at))], point.visible_share,
         response_fields(results, i)));
@@ -97,8 +97,7 @@ void write_pedestrian_cases(const std::string& path, const PedestrianResults& re
 std::string pedestrian_summary_json(const PedestrianResults& results, const std::vector<PedestrianRow>& rows,
                                     const std::string& cases_file) {
   std::vector<int32_t> drivers;
-  for (const PedestrianPoint& point : results.points)
-    drivers.push_back(results.paths[static_cast<size_t>(point.path)].driver);
+  for (const PedestrianPoint& point : results.points) drivers.push_back(results.paths[point.path].driver);
   Json json = {{"kind", "pedestrian"},
                {"policy", policies_json(results, drivers)},
                {"control", kPedestrianControlNames[static_cast<size_t>(results.control)]},

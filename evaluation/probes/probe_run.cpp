@@ -134,7 +134,7 @@ void KeptScene::add_world(const ProbeFrame& frame, size_t world, Span<const Inse
 }
 
 View KeptScene::view_of(const ProbeFrame& frame, size_t world, int32_t slot, const std::vector<int32_t>& without) {
-  View view = frame.views[static_cast<size_t>(slot)];
+  View view = frame.views[slot];
   view.world = static_cast<int32_t>(geometry.size()) - 1;
   view.ego_agent = box_of(frame, world, view.ego_agent);
   view.hidden_begin = static_cast<int32_t>(hidden.size());
@@ -307,7 +307,7 @@ EvaluateOptions ProbeRun::share_of_driver(int shares) {
 
 // The driver's share of the scenes.
 void ProbeRun::drive() {
-  const Participant& driver = participants_[static_cast<size_t>(driver_)];
+  const Participant& driver = participants_[driver_];
   EvaluationWorlds shared{maps_, driver.renderer.get(), std::move(driver.worlds->simulator)};
   const EvaluateReport report =
       evaluate(driver.session, share_of_driver(static_cast<int>(participants_.size())), &shared);

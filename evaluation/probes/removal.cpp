@@ -65,8 +65,7 @@ class RemovalProbe {
       for (int32_t user = 0; user < spec.num_agents; ++user) {
         const auto user_slot = static_cast<size_t>(first_slot + user);
         if (user == ego || !frame.is_present(user_slot)) continue;
-        const Vec2 apart =
-            frame.boxes[static_cast<size_t>(first_box + user)].center_m.xy() - frame.views[slot].origin_m.xy();
+        const Vec2 apart = frame.boxes[first_box + user].center_m.xy() - frame.views[slot].origin_m.xy();
         const float distance_m = length(apart);
         if (distance_m > options_.range_m) continue;
         RemovalCase facts;
@@ -101,8 +100,8 @@ class RemovalProbe {
                            .step = static_cast<uint32_t>(frame.step),
                            .purpose = Purpose::minibatch});
       const auto chosen = static_cast<size_t>(i + random.below(static_cast<int>(order.size()) - i));
-      std::swap(order[static_cast<size_t>(i)], order[chosen]);
-      DrawnCase one = pairs[static_cast<size_t>(order[static_cast<size_t>(i)])];
+      std::swap(order[i], order[chosen]);
+      DrawnCase one = pairs[order[i]];
       const int32_t first_box = frame.box_begin[one.world];
       one.facts.hidden = hidden_of(pairs, one, &random);
       if (one.facts.hidden >= 0) one.hidden_box = first_box + one.facts.hidden;
@@ -120,7 +119,7 @@ class RemovalProbe {
     for (const DrawnCase& pair : pairs) {
       if (pair.slot == one.slot && pair.facts.user != one.facts.user) others.push_back(pair.facts.user);
     }
-    return others.empty() ? -1 : others[static_cast<size_t>(random->below(static_cast<int>(others.size())))];
+    return others.empty() ? -1 : others[random->below(static_cast<int>(others.size()))];
   }
 
   // By scene, step, ego and user, in whatever order they came.

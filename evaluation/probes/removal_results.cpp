@@ -51,7 +51,7 @@ Json to_json(const RemovalRow& row, const RemovalResults& results) {
   const auto distance = [&](int band) {
     return group.distance_band ? Json(static_cast<double>(kDistanceBand_m) * band) : Json(nullptr);
   };
-  Json json = {{"policy", results.policies[static_cast<size_t>(row.policy)].name},
+  Json json = {{"policy", results.policies[row.policy].name},
                {"group", group.occlusion_name()},
                {"in_frame", is_in_frame},
                {"occlusion_from", bound(group.occlusion_bin)},
@@ -85,14 +85,13 @@ std::vector<RemovalRow> summarize(const RemovalResults& results) {
       const RemovalCase& one = results.cases[i];
       const PairedResponse& response = results.response(i, policy);
       const int bin = occlusion_bin(one) + 1, band = std::min(distance_band(one), num_bands - 1);
-      all[static_cast<size_t>(bin)].add(one, response);
-      by_band[static_cast<size_t>(band * kBins + bin)].add(one, response);
+      all[bin].add(one, response);
+      by_band[band * kBins + bin].add(one, response);
     }
     for (int band = -1; band < num_bands; ++band) {
       for (int i = 1; i <= kBins; ++i) {
         const int bin = i % kBins;  // those in no frame come last
-        const GroupSums& sums =
-            band < 0 ? all[static_cast<size_t>(bin)] : by_band[static_cast<size_t>(band * kBins + bin)];
+        const GroupSums& sums = band < 0 ? all[bin] : by_band[band * kBins + bin];
         RemovalGroup group{.occlusion_bin = bin - 1};
         if (band >= 0) group.distance_band = band;
         rows.push_back(sums.row(static_cast<int>(policy), group));
@@ -112,10 +111,9 @@ void write_removal_cases(const std::string& path, const RemovalResults& results)
   for (size_t i = 0; i < results.cases.size(); ++i) {
     const RemovalCase& one = results.cases[i];
     fmt::format_to(std::back_inserter(text), "{},{},{},{},{},{},{},{},{},{:d},{:.3f},{:.3f},{:d},", i, one.scene,
-                   csv_quoted(results.setting.maps[static_cast<size_t>(one.map)]),
-                   csv_quoted(results.driver_name(one.driver)), one.step, one.ego, one.user,
-                   one.hidden < 0 ? "" : std::to_string(one.hidden), to_string(one.user_class), one.user_halted,
-                   one.distance_m, one.ego_speed_mps, one.is_in_frame());
+                   csv_quoted(results.setting.maps[one.map]), csv_quoted(results.driver_name(one.driver)), one.step,
+                   one.ego, one.user, one.hidden < 0 ? "" : std::to_string(one.hidden), to_string(one.user_class),
+                   one.user_halted, one.distance_m, one.ego_speed_mps, one.is_in_frame());
     if (one.is_in_frame()) fmt::format_to(std::back_inserter(text), "{}", one.occlusion());
     text += response_fields(results, i);
     text += '\n';

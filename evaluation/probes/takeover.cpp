@@ -21,7 +21,7 @@ namespace {
 // Whether a box is among those that vectors hold of an ego's world.
 bool is_partner(Span<const AgentBox> boxes, int32_t box, int32_t ego, Vec2 origin_m) {
   const auto nearest = nearest_boxes(
-      static_cast<int>(boxes.size()), [&](int i) -> const AgentBox& { return boxes[static_cast<size_t>(i)]; },
+      static_cast<int>(boxes.size()), [&](int i) -> const AgentBox& { return boxes[i]; },
       [ego](int i) { return i != ego; }, origin_m, SingleThread{});
   for (int i = 0; i < nearest.count(); ++i) {
     if (nearest.item(i) == box) return true;
@@ -81,7 +81,7 @@ bool TakeoverWorlds::run(const std::vector<TakeoverStart>& starts, bool walls,
       std::vector<Command> commands(static_cast<size_t>(worlds->simulator->num_slots()));
       for (size_t i = 0; i < starts.size(); ++i) {
         const TakeoverStart& start = starts[i];
-        Command* const its_commands = &commands[static_cast<size_t>(worlds->first_slots[i])];
+        Command* const its_commands = &commands[worlds->first_slots[i]];
         start.scene->command_places(start.step + step + 1, its_commands);
         its_commands[start.ego] = {.action = actions[i]};
       }
@@ -190,12 +190,12 @@ bool TakeoverWorlds::look(Worlds* worlds, size_t policy, const std::vector<Takeo
     if (start.user < 0) continue;
 
     const AgentBox user = start.scene->box_at(start.step + step, start.user);
-    const LineOfSight& sight = sights_[static_cast<size_t>(start.scene->world.map)];
-    const Span<const AgentBox> its_boxes = Span<const AgentBox>(boxes).subspan(
-        static_cast<size_t>(box_begin[i]), static_cast<size_t>(box_begin[i + 1] - box_begin[i]));
+    const LineOfSight& sight = sights_[start.scene->world.map];
+    const Span<const AgentBox> its_boxes =
+        Span<const AgentBox>(boxes).subspan(box_begin[i], box_begin[i + 1] - box_begin[i]);
     if (one.sight_step < 0 && !sight.is_hidden(place_camera(run_.front_camera(), view).position_m, user)) {
       one.sight_step = step;
-      one.sight_distance_m = length((user.center_m - its_boxes[static_cast<size_t>(start.ego)].center_m).xy());
+      one.sight_distance_m = length((user.center_m - its_boxes[start.ego].center_m).xy());
     }
     if (one.input_step >= 0 || start.removed == start.user) continue;
     if (reads_images)
@@ -205,7 +205,7 @@ bool TakeoverWorlds::look(Worlds* worlds, size_t policy, const std::vector<Takeo
   }
   const std::vector<float> shares = run_.visibility(simulator.scene(), worlds->views, queries);
   for (size_t i = 0; i < shares.size(); ++i) {
-    if (shares[i] > 0) runs[static_cast<size_t>(queries[i].view)]->input_step = step;
+    if (shares[i] > 0) runs[queries[i].view]->input_step = step;
   }
   return is_any_active;
 }

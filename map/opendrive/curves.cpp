@@ -155,7 +155,7 @@ Pose pose_on(const GeometryPiece& piece, double ds, LastDirection* last) {
   }
   const auto last_panel = static_cast<double>(piece.panels.size() - 1);
   const double panel = std::min(last_panel, std::floor(ds / piece.length * (last_panel + 1)));
-  const auto& [begin_x, begin_y] = piece.panels[static_cast<std::size_t>(panel)];
+  const auto& [begin_x, begin_y] = piece.panels[panel];
   const Eigen::Vector2d in_frame =
       Eigen::Vector2d{begin_x, begin_y} + spiral_step(piece, panel * piece.length / (last_panel + 1), ds);
   return {in_file(piece, in_frame), piece.heading + spiral_turn(piece, ds), k0 + rate * ds};

@@ -24,8 +24,7 @@ void count_facts(Build* build) {
     if (lane.type != LaneType::driving) continue;
     if (!file_lane->is_continued) ++facts.driving_lanes;
     // Measured along the reference line, like s in the file.
-    const double length_m =
-        length_between(network.roads[static_cast<std::size_t>(lane.source_road)], section->s, section->end);
+    const double length_m = length_between(network.roads[lane.source_road], section->s, section->end);
     facts.driving_lane_km += 1e-3 * length_m;
     if (lane.in_junction) facts.driving_lane_km_in_junctions += 1e-3 * length_m;
     for (const LanePoint& point : map.points_of(lane)) {

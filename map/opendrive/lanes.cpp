@@ -49,8 +49,7 @@ void join_neighbors(Build* build, const FileRoad& road, const FileSection& secti
     if (!is_route(left.type) || !is_route(right.type)) return;
     const bool forward = travels_forward(road, left);
     if (forward != travels_forward(road, right)) return;
-    Lane &left_lane = lanes[static_cast<std::size_t>(left_index)],
-         &right_lane = lanes[static_cast<std::size_t>(right_index)];
+    Lane &left_lane = lanes[left_index], &right_lane = lanes[right_index];
     (forward ? left_lane.right_neighbor : left_lane.left_neighbor) = right_index;
     (forward ? right_lane.left_neighbor : right_lane.right_neighbor) = left_index;
   };
@@ -75,8 +74,7 @@ void choose_origin(Build* build) {
       }
     }
   }
-  for (int axis = 0; axis < 2; ++axis)
-    build->map->origin_m[static_cast<std::size_t>(axis)] = std::round(0.5 * (low[axis] + high[axis]));
+  for (int axis = 0; axis < 2; ++axis) build->map->origin_m[axis] = std::round(0.5 * (low[axis] + high[axis]));
   for (const FileRoad& road : build->network.roads) {
     for (const GeometryPiece& piece : road.geometry) {
       const Eigen::Vector2d xy = start_of(road, piece);

@@ -31,7 +31,7 @@ class Linker {
   }
 
  private:
-  const FileRoad& road_of(int index) const { return build_.network.roads[static_cast<std::size_t>(index)]; }
+  const FileRoad& road_of(int index) const { return build_.network.roads[index]; }
 
   int road_named(const std::string& id) const { return build_.network.road_index.at(id); }
 
@@ -41,9 +41,7 @@ class Linker {
     return {road, section, id, contact};
   }
 
-  const FileLane* file_lane(const LaneEnd& end) const {
-    return road_of(end.road).sections[static_cast<std::size_t>(end.section)].lane(end.id);
-  }
+  const FileLane* file_lane(const LaneEnd& end) const { return road_of(end.road).sections[end.section].lane(end.id); }
 
   /// Whether the lane is there; if not, the link to it is mended: left out.
   bool exists(const LaneEnd& end, const SourceLocation& where) const {
@@ -56,7 +54,7 @@ class Linker {
   void link_road(int road) {
     const FileRoad& file_road = road_of(road);
     for (int section = 0; section < static_cast<int>(file_road.sections.size()); ++section) {
-      const FileSection& file_section = file_road.sections[static_cast<std::size_t>(section)];
+      const FileSection& file_section = file_road.sections[section];
       for (const std::vector<FileLane>* side : {&file_section.left, &file_section.right}) {
         for (const FileLane& lane : *side) {
           for (const int id : lane.successors) link_lane(road, section, lane, ContactPoint::end, id);
@@ -99,8 +97,8 @@ class Linker {
   void add(const LaneEnd& a, const LaneEnd& b, const SourceLocation& where) {
     const int32_t lane_a = lane_at(a), lane_b = lane_at(b);
     if (lane_a < 0 || lane_b < 0) return;
-    const LaneType type_a = build_.map->lanes[static_cast<std::size_t>(lane_a)].type;
-    const LaneType type_b = build_.map->lanes[static_cast<std::size_t>(lane_b)].type;
+    const LaneType type_a = build_.map->lanes[lane_a].type;
+    const LaneType type_b = build_.map->lanes[lane_b].type;
     const auto leave_out = [&](MendKind kind, const std::string& reason) {
       if (!is_drivable(type_a) && !is_drivable(type_b)) return;
       if (!left_out_.emplace(std::minmax(lane_a, lane_b)).second) return;
@@ -121,18 +119,15 @@ class Linker {
 
   Vec3 begin_of(int32_t lane) const {
     const RoadMap& map = *build_.map;
-    return map.points_of(map.lanes[static_cast<std::size_t>(lane)])[0].position_m;
+    return map.points_of(map.lanes[lane])[0].position_m;
   }
 
   Vec3 end_of(int32_t lane) const {
     const RoadMap& map = *build_.map;
-    return map.lane_points[static_cast<std::size_t>(map.lanes[static_cast<std::size_t>(lane)].points.end) - 1]
-        .position_m;
+    return map.lane_points[static_cast<std::size_t>(map.lanes[lane].points.end) - 1].position_m;
   }
 
-  int32_t lane_at(const LaneEnd& end) const {
-    return build_.lanes[static_cast<std::size_t>(end.road)][static_cast<std::size_t>(end.section)].of(end.id);
-  }
+  int32_t lane_at(const LaneEnd& end) const { return build_.lanes[end.road][end.section].of(end.id); }
 
   bool is_exit(const LaneEnd& end) const {
     return travels_forward(road_of(end.road), *file_lane(end)) == (end.end == ContactPoint::end);

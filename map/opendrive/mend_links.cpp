@@ -74,7 +74,7 @@ class LinkMender {
  private:
   FileRoad* road_named(const std::string& id) {
     const auto found = network_.road_index.find(id);
-    return found == network_.road_index.end() ? nullptr : &network_.roads[static_cast<std::size_t>(found->second)];
+    return found == network_.road_index.end() ? nullptr : &network_.roads[found->second];
   }
 
   /// What a road's link names exists, and its contact point is the end that lies there.

@@ -9,8 +9,8 @@ namespace pictura::opendrive {
 void set_speed_limits(Build* build) {
   RoadMap& map = *build->map;
   for (Lane& lane : map.lanes) {
-    const FileRoad& road = build->network.roads[static_cast<std::size_t>(lane.source_road)];
-    const auto [section, file_lane] = build->file_lanes[static_cast<std::size_t>(&lane - map.lanes.data())];
+    const FileRoad& road = build->network.roads[lane.source_road];
+    const auto [section, file_lane] = build->file_lanes[&lane - map.lanes.data()];
     // Sections are cut where a limit changes, so the limit at the middle applies throughout. The lane's own limit has
     // precedence.
     const double middle = 0.5 * (section->s + section->end);
@@ -27,16 +27,16 @@ void set_speed_limits(Build* build) {
     while (!frontier.empty()) {
       std::map<int32_t, float> inherited;
       for (const int32_t from : frontier) {
-        const Lane& lane = map.lanes[static_cast<std::size_t>(from)];
+        const Lane& lane = map.lanes[from];
         for (const int32_t to : map.links(lane.*onward)) {
-          if (map.lanes[static_cast<std::size_t>(to)].speed_limit_mps > 0) continue;
+          if (map.lanes[to].speed_limit_mps > 0) continue;
           float& limit = inherited[to];
           limit = max_of(limit, lane.speed_limit_mps);
         }
       }
       frontier.clear();
       for (const auto& [lane, limit] : inherited) {
-        map.lanes[static_cast<std::size_t>(lane)].speed_limit_mps = limit;
+        map.lanes[lane].speed_limit_mps = limit;
         frontier.push_back(lane);
       }
     }

@@ -146,7 +146,7 @@ const FileSection& section_at(const FileRoad& road, double s) {
 
 bool split_section(double s, FileRoad* road) {
   const std::ptrdiff_t index = &section_at(*road, s) - road->sections.data();
-  FileSection& section = road->sections[static_cast<std::size_t>(index)];
+  FileSection& section = road->sections[index];
   if (s < section.s + kMinSplitSection_m || s > section.end - kMinSplitSection_m) return false;
   const double ds = s - section.s;
   FileSection rest;

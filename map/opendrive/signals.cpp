@@ -151,7 +151,7 @@ class SignalBuilder {
     }
   }
 
-  const Lane& lane(int32_t index) const { return map_.lanes[static_cast<std::size_t>(index)]; }
+  const Lane& lane(int32_t index) const { return map_.lanes[index]; }
 
   const LanePoint& end_of(int32_t index) const {
     return map_.lane_points[static_cast<std::size_t>(lane(index).points.end) - 1];
@@ -164,7 +164,7 @@ class SignalBuilder {
     const FileRoad& file_road = build_.network.roads[road];
     // References are often placed mid-road; use the lane ids of the section there.
     const FileSection& section = section_at(file_road, signal.stop_s.value_or(signal.s));
-    const SectionLanes& lanes = build_.lanes[road][static_cast<std::size_t>(&section - file_road.sections.data())];
+    const SectionLanes& lanes = build_.lanes[road][&section - file_road.sections.data()];
     for (const std::vector<FileLane>* side : {&section.left, &section.right}) {
       for (const FileLane& candidate : *side) {
         const int32_t index = lanes.of(candidate.id);
@@ -225,8 +225,8 @@ class SignalBuilder {
   }
 
   void add_approach(int32_t incoming, const std::vector<int32_t>& connecting, Approaches* approaches) const {
-    const FileRoad& road = build_.network.roads[static_cast<std::size_t>(lane(incoming).source_road)];
-    const bool forward = travels_forward(road, *build_.file_lanes[static_cast<std::size_t>(incoming)].lane);
+    const FileRoad& road = build_.network.roads[lane(incoming).source_road];
+    const bool forward = travels_forward(road, *build_.file_lanes[incoming].lane);
     Approach& approach = (*approaches)[{lane(incoming).source_road, forward}];
     approach.incoming.push_back(incoming);
     approach.connecting.insert(approach.connecting.end(), connecting.begin(), connecting.end());
@@ -261,8 +261,8 @@ class SignalBuilder {
   const char* ruled_junction(const Approaches& approaches) const {
     for (const auto& [way, approach] : approaches) {
       const int32_t junction = junction_of(approach);
-      if (junction < 0 || map_.junctions[static_cast<std::size_t>(junction)].num_phases == 0) continue;
-      return map_.junctions[static_cast<std::size_t>(junction)].name.c_str();
+      if (junction < 0 || map_.junctions[junction].num_phases == 0) continue;
+      return map_.junctions[junction].name.c_str();
     }
     return nullptr;
   }
@@ -286,7 +286,7 @@ class SignalBuilder {
       add_light(line.signal_index, phase, &line.approach);
     }
     for (const auto& [junction, phases] : headings) {
-      map_.junctions[static_cast<std::size_t>(junction)].num_phases = static_cast<int32_t>(phases.size());
+      map_.junctions[junction].num_phases = static_cast<int32_t>(phases.size());
     }
   }
 

@@ -68,8 +68,7 @@ std::vector<SurfaceBand> lane_bands(Build* build, double chord_error_m, std::vec
     const int32_t road = build->map->lanes[i].source_road;
     const auto [section, lane] = build->file_lanes[i];
     if (!is_selected(*lane)) continue;
-    SurfaceBand band =
-        lane_band(build, build->network.roads[static_cast<std::size_t>(road)], *section, *lane, chord_error_m);
+    SurfaceBand band = lane_band(build, build->network.roads[road], *section, *lane, chord_error_m);
     if (band.left.size() < 2) continue;
     bands.push_back(std::move(band));
     if (roads_out) roads_out->push_back(road);
@@ -109,7 +108,7 @@ void build_road_edges(Build* build) {
       lane_bands(build, kEdgeBandChordError_m, &roads, [](const FileLane& lane) { return is_drivable(lane.type); });
   build->map->road_edges = outline_of(bands, build->options.chord_error_m, &bands_of_edges);
   for (const int32_t band : bands_of_edges) {
-    build->map->provenance.road_edges.push_back({roads[static_cast<std::size_t>(band)], 0});
+    build->map->provenance.road_edges.push_back({roads[band], 0});
   }
 }
 
@@ -117,11 +116,11 @@ void open_road_ends(Build* build) {
   const RoadMap& map = *build->map;
   const OpenLanes open = find_open_lanes(map);
   for (const OpenLanes::MissingLink& link : open.missing_links) {
-    const Lane& to = map.lanes[static_cast<std::size_t>(link.to)];
-    build->file_lanes[static_cast<std::size_t>(link.from)].lane->where.mend(
+    const Lane& to = map.lanes[link.to];
+    build->file_lanes[link.from].lane->where.mend(
         build->faults, MendKind::missing_link,
         "ends {:.2f} m from the start of lane {} of road {}, to which it has no link", link.gap_m, to.source_lane,
-        map.road_names[static_cast<std::size_t>(to.source_road)]);
+        map.road_names[to.source_road]);
   }
   open_mouths(open, build->map);
 }

@@ -44,7 +44,7 @@ std::vector<int> Layout::shuffled(std::vector<int> candidates, uint32_t purpose)
 std::vector<int> Layout::pick(double fraction, std::vector<int> candidates, uint32_t purpose) const {
   const double count = std::ceil(fraction * static_cast<double>(candidates.size()) - 1e-9);
   candidates = shuffled(std::move(candidates), purpose);
-  candidates.resize(static_cast<std::size_t>(count));
+  candidates.resize(count);
   return candidates;
 }
 

@@ -315,7 +315,7 @@ void read_control(Cursor* cursor, int32_t index, LoggedScene* scene) {
     LoggedLight light{.lanes = lanes, .has_stop_line = true, .stop_a_m = a, .stop_b_m = b};
     for (const int32_t state : states) {
       if (state < 0 || state > 4) fail_field("states", "expected 0 to 4, got {}", state);
-      light.states.push_back(kStates[static_cast<std::size_t>(state)]);
+      light.states.push_back(kStates[state]);
     }
     if (static_cast<int32_t>(states.size()) != scene->num_steps) {
       fail_field("n_states", "expected the {} steps of the agents, got {}", scene->num_steps, states.size());

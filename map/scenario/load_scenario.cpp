@@ -191,7 +191,7 @@ SceneRef find_scene(const std::string& name) {
     if (scene.id == wanted.selector) return scene;
   }
   if (const std::optional<uint64_t> number = parse_unsigned(wanted.selector)) {
-    if (*number < index.scenes.size()) return index.scenes[static_cast<std::size_t>(*number)];
+    if (*number < index.scenes.size()) return index.scenes[*number];
   }
   // What follows the last whole record may have been the one that was asked for.
   fail_usage("{}: expected #0 to #{} or the id of one of its scenes, got #{}{}", wanted.path, index.scenes.size() - 1,

@@ -74,7 +74,7 @@ class WidthRuler {
       for (int32_t i = std::max(border.begin, 0); i <= last;
            i = i < last ? std::min(i + kWidthStride, last) : last + 1) {
         conversion_->count_work(feature->second->size());
-        const double half_m = distance_to(lane.points[static_cast<std::size_t>(i)].head<2>(), *feature->second);
+        const double half_m = distance_to(lane.points[i].head<2>(), *feature->second);
         if (half_m < kMinHalfWidth_m || half_m > kMaxHalfWidth_m) continue;
         const auto [at, is_new] = halves_out->emplace(static_cast<std::size_t>(i), half_m);
         if (!is_new) at->second = std::min(at->second, half_m);
@@ -191,11 +191,9 @@ void append_points(const std::vector<CurvePoint>& points, RoadMap* map, Lane* la
   lane->length_m = static_cast<float>(s_m);
 }
 
-const LanePoint& start_of(const RoadMap& map, int32_t lane) {
-  return map.points_of(map.lanes[static_cast<std::size_t>(lane)])[0];
-}
+const LanePoint& start_of(const RoadMap& map, int32_t lane) { return map.points_of(map.lanes[lane])[0]; }
 const LanePoint& end_of(const RoadMap& map, int32_t lane) {
-  const Span<const LanePoint> points = map.points_of(map.lanes[static_cast<std::size_t>(lane)]);
+  const Span<const LanePoint> points = map.points_of(map.lanes[lane]);
   return points[points.size() - 1];
 }
 
@@ -267,8 +265,8 @@ Links meeting_links(Conversion* conversion) {
 void set_links(const Links& links, RoadMap* map) {
   std::vector<std::vector<int32_t>> after(map->lanes.size()), before(map->lanes.size());
   for (const auto& [from, to] : links) {
-    after[static_cast<std::size_t>(from)].push_back(to);
-    before[static_cast<std::size_t>(to)].push_back(from);
+    after[from].push_back(to);
+    before[to].push_back(from);
   }
   const auto append = [&](const std::vector<int32_t>& lanes) {
     IndexRange range{static_cast<int32_t>(map->lane_links.size()), 0};
@@ -309,17 +307,17 @@ void set_neighbors(Conversion* conversion) {
   }
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {
     const int32_t other = left[i];
-    if (other < 0 || right[static_cast<std::size_t>(other)] != static_cast<int32_t>(i)) continue;
-    if (map.lanes[i].type != map.lanes[static_cast<std::size_t>(other)].type) continue;
+    if (other < 0 || right[other] != static_cast<int32_t>(i)) continue;
+    if (map.lanes[i].type != map.lanes[other].type) continue;
     // A ring of neighbours has no leftmost lane.
     int32_t leftmost = other;
     while (leftmost >= 0 && leftmost != static_cast<int32_t>(i)) {
-      leftmost = map.lanes[static_cast<std::size_t>(leftmost)].left_neighbor;
+      leftmost = map.lanes[leftmost].left_neighbor;
       conversion->count_work(1);
     }
     if (leftmost >= 0) continue;
     map.lanes[i].left_neighbor = other;
-    map.lanes[static_cast<std::size_t>(other)].right_neighbor = static_cast<int32_t>(i);
+    map.lanes[other].right_neighbor = static_cast<int32_t>(i);
   }
 }
 
@@ -330,7 +328,7 @@ void infer_types(RoadMap* map) {
     std::set<LaneType> linked;
     if (lane.type == LaneType::other) {
       for (const IndexRange range : {lane.successors, lane.predecessors}) {
-        for (const int32_t other : map->links(range)) linked.insert(map->lanes[static_cast<std::size_t>(other)].type);
+        for (const int32_t other : map->links(range)) linked.insert(map->lanes[other].type);
       }
     }
     linked.erase(LaneType::other);
@@ -404,15 +402,15 @@ void find_junctions(Conversion* conversion) {
     });
   }
   for (const auto& [a, b] : crossings) {
-    for (const int32_t lane : {a, b}) map.lanes[static_cast<std::size_t>(lane)].in_junction = true;
+    for (const int32_t lane : {a, b}) map.lanes[lane].in_junction = true;
   }
   // Lanes that cross are of one junction.
   std::vector<int32_t> group(map.lanes.size());
   std::iota(group.begin(), group.end(), 0);
   const auto first_of = [&](int32_t lane) {
-    while (group[static_cast<std::size_t>(lane)] != lane) {
-      int32_t& parent = group[static_cast<std::size_t>(lane)];
-      parent = group[static_cast<std::size_t>(parent)];
+    while (group[lane] != lane) {
+      int32_t& parent = group[lane];
+      parent = group[parent];
       lane = parent;
     }
     return lane;
@@ -420,7 +418,7 @@ void find_junctions(Conversion* conversion) {
   const auto join = [&](int32_t a, int32_t b) {
     a = first_of(a);
     b = first_of(b);
-    group[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
+    group[std::max(a, b)] = std::min(a, b);
   };
   for (const auto& [a, b] : crossings) join(a, b);
   // So are those that fork or merge.
@@ -428,7 +426,7 @@ void find_junctions(Conversion* conversion) {
     for (const IndexRange range : {lane.successors, lane.predecessors}) {
       int32_t before = -1;
       for (const int32_t other : map.links(range)) {
-        if (!map.lanes[static_cast<std::size_t>(other)].in_junction) continue;
+        if (!map.lanes[other].in_junction) continue;
         if (before >= 0) join(before, other);
         before = other;
       }
@@ -440,7 +438,7 @@ void find_junctions(Conversion* conversion) {
     if (!lane.in_junction) continue;
     const int32_t first = first_of(static_cast<int32_t>(i));
     const auto [junction, is_new] = junctions.emplace(first, static_cast<int32_t>(map.junctions.size()));
-    if (is_new) map.junctions.push_back({.name = map.road_names[static_cast<std::size_t>(first)]});
+    if (is_new) map.junctions.push_back({.name = map.road_names[first]});
     lane.junction = junction->second;
   }
 }

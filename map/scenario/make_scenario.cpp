@@ -168,7 +168,7 @@ void make_tracks(Conversion* conversion) {
   const auto kept_track = [&](const char* what, int32_t index) {
     PICTURA_CHECK(index >= 0 && index < static_cast<int32_t>(kept.size()),
                   "{}: {}: expected an index in [0, {}), got {}", scene.source, what, kept.size(), index);
-    const int32_t track = kept[static_cast<std::size_t>(index)];
+    const int32_t track = kept[index];
     if (track < 0) scene.note("references to tracks that were left out", what);
     return track;
   };
@@ -204,7 +204,7 @@ std::vector<int32_t> held_lanes(const LoggedLight& light, Conversion* conversion
     const auto lane = conversion->lane_of_id.find(id);
     if (lane == conversion->lane_of_id.end()) {
       scene.note("lanes of lights that the map does not have", fmt::format("lane {}", id));
-    } else if (conversion->out->map.lanes[static_cast<std::size_t>(lane->second)].type == LaneType::biking) {
+    } else if (conversion->out->map.lanes[lane->second].type == LaneType::biking) {
       scene.note("lights of bike lanes left out", fmt::format("lane {}", id));
     } else {
       lanes.push_back(lane->second);
@@ -221,12 +221,12 @@ FoundLight find_light(const RoadMap& map, const LoggedLight& light, std::vector<
   };
   LanePoint widest{};
   for (const int32_t index : lanes) {
-    const Lane& lane = map.lanes[static_cast<std::size_t>(index)];
+    const Lane& lane = map.lanes[index];
     const LanePoint start = map.points_of(lane)[0];
     if (start.width_m > widest.width_m) widest = start;
     const Span<const int32_t> before = map.links(lane.predecessors);
     for (const int32_t other : before) {
-      const Span<const LanePoint> points = map.points_of(map.lanes[static_cast<std::size_t>(other)]);
+      const Span<const LanePoint> points = map.points_of(map.lanes[other]);
       add_heading(points[points.size() - 1].heading_rad);
     }
     if (before.empty()) add_heading(start.heading_rad);

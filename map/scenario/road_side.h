@@ -44,7 +44,7 @@ PICTURA_HD RoadSide road_side(Span<const SideEdge> edges, const GridView& cells,
   if (edges.empty()) return {};
   const Vec2 p = position_m.xy();
   const auto look_at = [&](int32_t index) {
-    const SideEdge& edge = edges[static_cast<size_t>(index)];
+    const SideEdge& edge = edges[index];
     const Vec2 a = edge.a_m.xy(), way = (edge.b_m - edge.a_m).xy();
     const float t = clamp(dot(p - a, way) / max_of(dot(way, way), 1e-12f), 0.0f, 1.0f);
     const Vec2 away = p - (a + way * t);
@@ -55,7 +55,7 @@ PICTURA_HD RoadSide road_side(Span<const SideEdge> edges, const GridView& cells,
     }
     Vec2 normal = edge.left;
     const int32_t neighbor = t <= 0.0f ? edge.before : t >= 1.0f ? edge.next : -1;
-    if (neighbor >= 0) normal = normal + edges[static_cast<size_t>(neighbor)].left;
+    if (neighbor >= 0) normal = normal + edges[neighbor].left;
     best = {index, distance_m, dot(away, normal) <= 0.0f};
   };
   // Most edges are near: wider rings are looked at only where nearer ones hold none.
@@ -65,7 +65,7 @@ PICTURA_HD RoadSide road_side(Span<const SideEdge> edges, const GridView& cells,
     for (int y = range.y0; y <= range.y1; ++y) {
       const int32_t end = range.end(cells, y);
       for (int32_t i = range.begin(cells, y) + group.rank(); i < end; i += group.size()) {
-        look_at(cells.items[static_cast<size_t>(i)]);
+        look_at(cells.items[i]);
       }
     }
     best = group.of_lowest(best.distance_m, best.edge < 0 ? static_cast<int>(edges.size()) : best.edge, best);

@@ -10,7 +10,7 @@ namespace pictura {
 namespace {
 
 void check_track(const Scenario& scenario, int32_t index) {
-  const RecordedTrack& track = scenario.tracks[static_cast<std::size_t>(index)];
+  const RecordedTrack& track = scenario.tracks[index];
   for (const auto& [field, size_m] : {std::pair{"length_m", track.length_m}, std::pair{"width_m", track.width_m},
                                       std::pair{"height_m", track.height_m}}) {
     PICTURA_CHECK(size_m > 0 && size_m <= kMaxTrackSize_m, "track {}: {}: expected a number in (0, {}], got {}", index,
@@ -20,9 +20,8 @@ void check_track(const Scenario& scenario, int32_t index) {
   const Span<const TrackState> states = scenario.states_of(index);
   int32_t first = -1, last = -1, count = 0;
   for (int32_t step = 0; step < scenario.num_steps; ++step) {
-    const TrackState& state = states[static_cast<std::size_t>(step)];
-    PICTURA_CHECK(valid[static_cast<std::size_t>(step)] <= 1, "track {}: step {}: valid: expected 0 or 1, got {}",
-                  index, step, valid[static_cast<std::size_t>(step)]);
+    const TrackState& state = states[step];
+    PICTURA_CHECK(valid[step] <= 1, "track {}: step {}: valid: expected 0 or 1, got {}", index, step, valid[step]);
     for (const float value : {state.position_m.x, state.position_m.y, state.position_m.z, state.heading_rad,
                               state.velocity_mps.x, state.velocity_mps.y}) {
       PICTURA_CHECK(std::isfinite(value) && std::abs(value) <= kMaxScenarioRadius_m,
@@ -38,7 +37,7 @@ void check_track(const Scenario& scenario, int32_t index) {
                       kMaxScenarioRadius_m, value);
       }
     }
-    if (!valid[static_cast<std::size_t>(step)]) continue;
+    if (!valid[step]) continue;
     PICTURA_CHECK(std::abs(state.heading_rad) <= kPi + 1e-4f,
                   "track {}: step {}: heading_rad: expected a number in [-pi, pi], got {}", index, step,
                   state.heading_rad);
@@ -156,10 +155,9 @@ void validate(const Scenario& scenario) {
 std::string first_difference(const Scenario& a, const Scenario& b) { return difference_of(a, b); }
 
 bool is_moving(const Scenario& scenario, int32_t track) {
-  const RecordedTrack& summary = scenario.tracks[static_cast<std::size_t>(track)];
+  const RecordedTrack& summary = scenario.tracks[track];
   const Span<const TrackState> states = scenario.states_of(track);
-  return length(states[static_cast<std::size_t>(summary.last_valid)].position_m -
-                states[static_cast<std::size_t>(summary.first_valid)].position_m) >= kMovingTrack_m;
+  return length(states[summary.last_valid].position_m - states[summary.first_valid].position_m) >= kMovingTrack_m;
 }
 
 ScenarioFacts facts_of(const Scenario& scenario) {

@@ -88,7 +88,7 @@ RecordList list_records(const ByteSource& source, const std::string& name) {
 std::string read_record(const ByteSource& source, const std::string& name, std::size_t k, RecordPlace place) {
   std::string bytes = source.read(place.offset, static_cast<std::size_t>(place.bytes) + kSum_bytes);
   const auto sum = number_at<uint32_t>(bytes, static_cast<std::size_t>(place.bytes));
-  bytes.resize(static_cast<std::size_t>(place.bytes));
+  bytes.resize(place.bytes);
   const uint32_t expected = masked_crc32c(bytes);
   PICTURA_CHECK(sum == expected, "{}: record {}: expected the checksum {:08x} of its {} bytes, got {:08x}", name, k,
                 expected, place.bytes, sum);

@@ -383,7 +383,7 @@ class Decoder {
       LoggedLight& light = scene_.lights.emplace_back();
       light.lanes = {lane};
       light.states.assign(steps, RecordedLightState::none);
-      for (const auto& [step, state] : states) light.states[static_cast<std::size_t>(step)] = state;
+      for (const auto& [step, state] : states) light.states[step] = state;
     }
   }
 

@@ -61,9 +61,8 @@ struct ActionRule {
   /// log_probs: [kNumActions].
   PICTURA_HD int32_t operator()(int64_t slot, const float* log_probs) const {
     if (choice.argmax) return most_likely_action(log_probs, kNumActions);
-    const auto world = static_cast<size_t>(slots.world_of_slot[static_cast<size_t>(slot)]);
-    const ActionKey key{choice.seed, slots.global_world[world],
-                        static_cast<uint32_t>(slots.agent_of_slot[static_cast<size_t>(slot)]),
+    const auto world = static_cast<size_t>(slots.world_of_slot[slot]);
+    const ActionKey key{choice.seed, slots.global_world[world], static_cast<uint32_t>(slots.agent_of_slot[slot]),
                         static_cast<uint32_t>(episode_index[world]), static_cast<uint32_t>(episode_step[world])};
     return draw_action(log_probs, kNumActions, key);
   }
@@ -72,7 +71,7 @@ struct ActionRule {
 /// The command of an action, for the slots that a mask has.
 PICTURA_HD inline void write_command(const int32_t* actions, Span<const uint8_t> mask, int64_t slot,
                                      Command* commands_out) {
-  if (!mask.empty() && !mask[static_cast<size_t>(slot)]) return;
+  if (!mask.empty() && !mask[slot]) return;
   commands_out[slot] = {};
   commands_out[slot].action = actions[slot];
 }
@@ -85,7 +84,7 @@ struct AskedSlots {
 
   PICTURA_HD bool operator()(int64_t slot) const {
     const bool is_asked = takes_actions(static_cast<AgentStatus>(status[slot])) || (left != nullptr && left[slot] != 0);
-    return is_asked && (mask.empty() || mask[static_cast<size_t>(slot)]);
+    return is_asked && (mask.empty() || mask[slot]);
   }
 };
 

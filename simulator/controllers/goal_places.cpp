@@ -42,22 +42,21 @@ class WalkGraph {
   bool leads(RoutePoint from, RoutePoint to) const {
     const auto a = static_cast<size_t>(from.lane), b = static_cast<size_t>(to.lane);
     return passable_[a] && passable_[b] &&
-           network_[static_cast<size_t>(map_.walk_pieces[a].to_node)] ==
-               network_[static_cast<size_t>(map_.walk_pieces[b].to_node)];
+           network_[map_.walk_pieces[a].to_node] == network_[map_.walk_pieces[b].to_node];
   }
 
  private:
   void spread(int32_t first) {
     std::vector<int32_t> open{first};
-    network_[static_cast<size_t>(first)] = first;
+    network_[first] = first;
     while (!open.empty()) {
       const auto node = static_cast<size_t>(open.back());
       open.pop_back();
       for (int32_t i = map_.walk_leave_begin[node]; i < map_.walk_leave_begin[node + 1]; ++i) {
-        const auto piece = static_cast<size_t>(map_.walk_leaving[static_cast<size_t>(i)]);
+        const auto piece = static_cast<size_t>(map_.walk_leaving[i]);
         const int32_t next = map_.walk_pieces[piece].to_node;
-        if (!passable_[piece] || network_[static_cast<size_t>(next)] >= 0) continue;
-        network_[static_cast<size_t>(next)] = first;
+        if (!passable_[piece] || network_[next] >= 0) continue;
+        network_[next] = first;
         open.push_back(next);
       }
     }
@@ -108,7 +107,7 @@ std::array<RoutePoint, kNumWaypoints> goal_places(const WorldView& world, int ag
 }
 
 LanePosition lane_place(const MapView& map, const LaneGraph& graph, RoutePoint at) {
-  const float length_m = min_of(map.lanes[static_cast<size_t>(at.lane)].length_m, graph.length_m(at.lane));
+  const float length_m = min_of(map.lanes[at.lane].length_m, graph.length_m(at.lane));
   return {at.lane, min_of(at.s_m, length_m)};
 }
 

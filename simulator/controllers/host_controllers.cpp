@@ -74,7 +74,7 @@ std::vector<std::string> host_controller_names() {
 void check_worlds(std::string_view controller, const Simulator& simulator) {
   const bool needs_record = controller == "log" || controller == "inverse";
   for (const WorldSpec& world : simulator.worlds()) {
-    const CompiledMap& map = *simulator.maps()[static_cast<size_t>(world.map)];
+    const CompiledMap& map = *simulator.maps()[world.map];
     if (needs_record && !map.scenario) {
       fail_usage("controller {}: world {}: expected a recorded scene, got map {}, of which there is no record",
                  controller, world.global_world, map.road->name);

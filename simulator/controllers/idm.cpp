@@ -25,14 +25,14 @@ FollowedPath path_of(const MapRecord& record, size_t agent) {
 
 /// Of the drivable lanes that follow one, that which turns least; -1 where there is none.
 int32_t straightest_after(const MapView& map, int32_t lane_index) {
-  const MapLane& lane = map.lanes[static_cast<size_t>(lane_index)];
+  const MapLane& lane = map.lanes[lane_index];
   const int32_t count = lane.num_successors > 0 ? lane.num_successors : lane.num_all_successors;
   int32_t best = -1;
   float least_rad = INFINITY;
   for (int32_t i = 0; i < count; ++i) {
-    const int32_t next = map.successors[static_cast<size_t>(lane.first_successor + i)];
-    if (map.lanes[static_cast<size_t>(next)].num_segments == 0) continue;
-    const float end_m = map.lanes[static_cast<size_t>(next)].length_m;
+    const int32_t next = map.successors[lane.first_successor + i];
+    if (map.lanes[next].num_segments == 0) continue;
+    const float end_m = map.lanes[next].length_m;
     const float turn_rad =
         std::abs(wrap_angle(pose_on_lane(map, next, end_m).heading_rad - pose_on_lane(map, next, 0).heading_rad));
     if (turn_rad >= least_rad) continue;
@@ -44,11 +44,11 @@ int32_t straightest_after(const MapView& map, int32_t lane_index) {
 
 /// The place on the lane's centre line that is nearest to p, and how far that is.
 RoutePoint nearest_on_lane(const MapView& map, int32_t lane_index, Vec2 p, float* apart_m_out) {
-  const MapLane& lane = map.lanes[static_cast<size_t>(lane_index)];
+  const MapLane& lane = map.lanes[lane_index];
   RoutePoint nearest{lane_index, 0};
   *apart_m_out = INFINITY;
   for (int32_t i = 0; i < lane.num_segments; ++i) {
-    const LaneSegment& segment = map.segments[static_cast<size_t>(lane.first_segment + i)];
+    const LaneSegment& segment = map.segments[lane.first_segment + i];
     const Foot foot = foot_on(segment, p);
     if (foot.distance_m >= *apart_m_out) continue;
     *apart_m_out = foot.distance_m;
@@ -59,7 +59,7 @@ RoutePoint nearest_on_lane(const MapView& map, int32_t lane_index, Vec2 p, float
 
 /// The lane of the point, or, where that has no successors, the nearest lane beside it that has some.
 int32_t lane_to_follow(const MapView& map, RoutePoint at) {
-  return map.lanes[static_cast<size_t>(at.lane)].num_all_successors > 0 ? at.lane : through_lane(map, at).lane;
+  return map.lanes[at.lane].num_all_successors > 0 ? at.lane : through_lane(map, at).lane;
 }
 
 /// Moves a point to the place nearest to p on the lane to follow. Returns the way along that lane on which a path from
@@ -73,7 +73,7 @@ std::optional<float> merge(const MapView& map, Vec2 p, float front_m, RoutePoint
   at = nearest_on_lane(map, at.lane, p, &aside_m);
   const int32_t followed = lane_to_follow(map, at);
   if (followed == at.lane) return std::max(kMinMerge_m, kMergePerMetre * aside_m);
-  const float left_m = map.lanes[static_cast<size_t>(at.lane)].length_m - at.s_m - front_m - kBeforeEnd_m;
+  const float left_m = map.lanes[at.lane].length_m - at.s_m - front_m - kBeforeEnd_m;
   if (left_m < kMinMerge_m) {
     at.s_m += std::max(left_m, 0.0f);
     return std::nullopt;
@@ -145,7 +145,7 @@ FollowedPath path_along_lanes(const MapView& map, int32_t lane, Vec3 position_m,
   for (float ahead_m = 0; ahead_m < kAhead_m; step_m = kSpacing_m) {
     ahead_m += *step_m;
     for (float rest_m = *step_m; rest_m > 0;) {
-      const float length_m = map.lanes[static_cast<size_t>(at.lane)].length_m;
+      const float length_m = map.lanes[at.lane].length_m;
       const float taken_m = std::min(rest_m, std::max(length_m - at.s_m, 0.0f));
       at.s_m += taken_m;
       rest_m -= taken_m;
@@ -169,7 +169,7 @@ FollowedPath path_along_lanes(const MapView& map, int32_t lane, Vec3 position_m,
 IdmController::IdmController(const Simulator& simulator, IdmPaths paths, const IdmParameters& parameters)
     : wanted_paths_(paths), parameters_(parameters), dt_s_(simulator.config().dt_s), maps_(simulator.maps()) {
   for (const WorldSpec& world : simulator.worlds()) {
-    const MapRules& rules = maps_[static_cast<size_t>(world.map)]->rules;
+    const MapRules& rules = maps_[world.map]->rules;
     views_.push_back(rules.view());
     for (size_t agent = 0; agent < static_cast<size_t>(world.num_agents); ++agent) {
       FollowedPath path;
@@ -233,7 +233,7 @@ IdmController::Front IdmController::box_ahead(const ControllerInput& input, size
     const SinCos heading = sincos_of(pose.heading_rad);
     const AgentBox swept = box_at(input.state, agent, pose.position_m, heading);
     for (int i = first_box; i < end_box; ++i) {
-      const AgentBox& other = input.scene.agents[static_cast<size_t>(i)];
+      const AgentBox& other = input.scene.agents[i];
       const Vec2 apart = (other.center_m - swept.center_m).xy();
       if (i == own_box || !other.drawn || dot(apart, apart) > square(radius(swept) + radius(other))) continue;
       if (!same_level(swept, other) || !overlap(footprint(swept), footprint(other))) continue;
@@ -293,8 +293,7 @@ Command IdmController::command_of(const ControllerInput& input, size_t slot) {
     const int32_t lane = input.state.lane[slot];
     const bool walks = static_cast<AgentClass>(input.state.agent_class[slot]) == AgentClass::pedestrian;
     if (!walks && lane >= 0) {
-      parameters.wanted_mps =
-          std::min(parameters.wanted_mps, views_[world].lanes[static_cast<size_t>(lane)].speed_limit_mps);
+      parameters.wanted_mps = std::min(parameters.wanted_mps, views_[world].lanes[lane].speed_limit_mps);
     }
     const float line_m = closed_line_ahead_m(input, slot, s_m);
     if (line_m < front.gap_m) front = {line_m, 0};

@@ -123,7 +123,7 @@ void follow_run(Span<const RecordedState> run, const RecordedAgent& agent, const
   }
   int32_t at = 0;
   for (size_t i = run.size(); i-- > 1;) {
-    const Sequence& sequence = beams[i][static_cast<size_t>(at)];
+    const Sequence& sequence = beams[i][at];
     out->actions[first + i - 1] = sequence.action;
     out->is_followed[first + i - 1] = 1;
     out->error_m[first + i - 1] = sequence.error_m;
@@ -148,8 +148,7 @@ InverseActions find_inverse_actions(const CompiledMap& scene, float dt_s, int nu
       size_t end = begin;
       while (end < num_steps && states[end].is_there) ++end;
       if (end > begin + 1) {
-        follow_run(states.subspan(begin, end - begin), record.agents[static_cast<size_t>(agent)], rules, dt_s,
-                   first + begin, &out);
+        follow_run(states.subspan(begin, end - begin), record.agents[agent], rules, dt_s, first + begin, &out);
       }
       begin = end + 1;
     }
@@ -172,7 +171,7 @@ InverseTable::InverseTable(const Simulator& simulator) {
     of_map.push_back({static_cast<int64_t>(actions.size()), found.num_steps});
     actions.insert(actions.end(), found.actions.begin(), found.actions.end());
   }
-  for (const WorldSpec& world : simulator.worlds()) worlds.push_back(of_map[static_cast<size_t>(world.map)]);
+  for (const WorldSpec& world : simulator.worlds()) worlds.push_back(of_map[world.map]);
 }
 
 void InverseController::act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out,

@@ -110,8 +110,7 @@ void LaneKeepingAgent::follow_goals() {
     chain_ = chain;
     path_.cut(std::max(goals_.back(), place_));
     plan();
-  } else if (place_ + 1 >= points().size() ||
-             place_ > ahead(goals_[static_cast<size_t>(world_.agents.next_waypoint[slot_])], kMissed_m)) {
+  } else if (place_ + 1 >= points().size() || place_ > ahead(goals_[world_.agents.next_waypoint[slot_]], kMissed_m)) {
     path_.cut(place_);
     plan();
   }
@@ -342,7 +341,7 @@ LaneKeepingController::LaneKeepingController(const Simulator& simulator) {
   for (const auto& map : simulator.maps()) graphs_.push_back(std::make_unique<LaneGraph>(*map->road));
   episode_.assign(simulator.worlds().size(), -1);
   views_.resize(simulator.worlds().size());
-  agents_.resize(static_cast<size_t>(simulator.num_slots()));
+  agents_.resize(simulator.num_slots());
 }
 
 LaneKeepingController::~LaneKeepingController() = default;
@@ -381,7 +380,7 @@ void LaneKeepingController::begin_episode(const ControllerInput& input, size_t w
   view.boxes = view.boxes_before = const_cast<AgentBox*>(input.scene.agents.data()) + view.first_box;
   view.lights = const_cast<LightState*>(input.scene.light_states.data()) + input.scene.light_begin[world];
   for (int agent = 0; agent < view.num_agents; ++agent) {
-    agents_[static_cast<size_t>(view.first_slot + agent)] = nullptr;
+    agents_[view.first_slot + agent] = nullptr;
   }
   begin_lives(world);
   episode_[world] = input.episode_index[world];
@@ -390,7 +389,7 @@ void LaneKeepingController::begin_episode(const ControllerInput& input, size_t w
 /// Takes charge of agents that have begun a life since the last look.
 void LaneKeepingController::begin_lives(size_t world) {
   const WorldView& view = *views_[world];
-  const LaneGraph& graph = *graphs_[static_cast<size_t>(setup_->worlds[world].map)];
+  const LaneGraph& graph = *graphs_[setup_->worlds[world].map];
   for (int agent = 0; agent < view.num_agents; ++agent) {
     const auto slot = static_cast<size_t>(view.first_slot + agent);
     const bool is_known = agents_[slot] && agents_[slot]->life() == view.agents.life[slot];

@@ -116,8 +116,7 @@ void LanePath::go_on(float distance_m) {
 
 /// Those from which a route goes on for ever.
 Span<const int32_t> LanePath::successors_of(int32_t index) const {
-  return map_.successors.subspan(static_cast<size_t>(lane(index).first_successor),
-                                 static_cast<size_t>(lane(index).num_successors));
+  return map_.successors.subspan(lane(index).first_successor, lane(index).num_successors);
 }
 
 /// Between the ends of a lane.
@@ -146,7 +145,7 @@ void LanePath::change_to(int32_t to, float length_m) {
   Foot best;
   best.distance_m = INFINITY;
   for (int32_t i = 0; i < lane(to).num_segments; ++i) {
-    const LaneSegment& segment = map_.segments[static_cast<size_t>(lane(to).first_segment + i)];
+    const LaneSegment& segment = map_.segments[lane(to).first_segment + i];
     const Foot foot = foot_on(segment, here);
     if (foot.distance_m >= best.distance_m) continue;
     best = foot;

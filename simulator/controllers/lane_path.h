@@ -58,7 +58,7 @@ class LanePath {
   void limit_speeds(size_t slow, float slow_mps);
 
  private:
-  const MapLane& lane(int32_t index) const { return map_.lanes[static_cast<size_t>(index)]; }
+  const MapLane& lane(int32_t index) const { return map_.lanes[index]; }
   bool is_change(int32_t from, int32_t to) const { return to == lane(from).left || to == lane(from).right; }
   std::optional<std::vector<int32_t>> route_to(RoutePoint to) const;
   bool follow_route(const std::vector<int32_t>& lanes, RoutePoint to);

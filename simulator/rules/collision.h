@@ -124,7 +124,7 @@ PICTURA_HD bool touches_any(const OrientedBox& box, float z_m, Span<const Barrie
   bool found = false;
   for (size_t i = static_cast<size_t>(group.rank()); i < items.size() && !found;
        i += static_cast<size_t>(group.size())) {
-    const Barrier& barrier = barriers[static_cast<size_t>(items[i])];
+    const Barrier& barrier = barriers[items[i]];
     const Vec2 to_middle = (barrier.a_m + barrier.b_m) * 0.5f - box.center_m;
     const Vec2 half = (barrier.b_m - barrier.a_m) * 0.5f;
     if (fabsf(to_middle.x) > fabsf(half.x) + reach || fabsf(to_middle.y) > fabsf(half.y) + reach) continue;

@@ -73,8 +73,7 @@ struct TabledCommands {
     const int32_t step = episode_step[world];
     Command command;
     if (step >= table.num_steps) return command;
-    command.action =
-        actions[static_cast<size_t>(table.first + int64_t{slots.agent_of_slot[slot]} * table.num_steps + step)];
+    command.action = actions[table.first + int64_t{slots.agent_of_slot[slot]} * table.num_steps + step];
     return command;
   }
 };

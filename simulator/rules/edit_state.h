@@ -23,8 +23,7 @@ PICTURA_HD inline AgentField invalid_field(const MapView& map, const RuleOptions
   }
   if (agents.agent_class[slot] >= kNumAgentClasses) return AgentField::agent_class;
   const auto is_lane = [&map](int32_t lane) {
-    return lane >= 0 && static_cast<size_t>(lane) < map.lanes.size() &&
-           map.lanes[static_cast<size_t>(lane)].num_segments > 0;
+    return lane >= 0 && static_cast<size_t>(lane) < map.lanes.size() && map.lanes[lane].num_segments > 0;
   };
   if (agents.lane[slot] != -1 && !is_lane(agents.lane[slot])) return AgentField::lane;
   const int32_t goal_lane = agents.goal_lane[slot];

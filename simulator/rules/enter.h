@@ -18,7 +18,7 @@ PICTURA_HD inline bool waits(const WorldView& world, int agent) {
 /// The entry that an agent draws at the end of this step of the episode. There must be entries.
 PICTURA_HD inline const Entry& drawn_entry(const WorldView& world, int agent, int step) {
   RandomStream random = agent_stream(world, agent, static_cast<uint32_t>(step), Purpose::entry);
-  return world.map.entries[static_cast<size_t>(random.below(static_cast<int>(world.map.entries.size())))];
+  return world.map.entries[random.below(static_cast<int>(world.map.entries.size()))];
 }
 
 /// The point so far ahead on the way along first successors, at most at its end.
@@ -26,11 +26,11 @@ PICTURA_HD inline RoutePoint point_ahead(const MapView& map, RoutePoint at, floa
   constexpr int kMaxLanesAhead = 64;  // a bound, not a rule
   at.s_m += distance_m;
   for (int i = 0; i < kMaxLanesAhead; ++i) {
-    const MapLane& lane = map.lanes[static_cast<size_t>(at.lane)];
+    const MapLane& lane = map.lanes[at.lane];
     if (at.s_m <= lane.length_m || lane.num_successors == 0) break;
-    at = {map.successors[static_cast<size_t>(lane.first_successor)], at.s_m - lane.length_m};
+    at = {map.successors[lane.first_successor], at.s_m - lane.length_m};
   }
-  return {at.lane, min_of(at.s_m, map.lanes[static_cast<size_t>(at.lane)].length_m)};
+  return {at.lane, min_of(at.s_m, map.lanes[at.lane].length_m)};
 }
 
 /// Where the reference point of an agent is that enters on a lane.
@@ -123,7 +123,7 @@ PICTURA_HD bool try_to_enter(const WorldView& world, int agent, int step, const 
   const AgentBox box = box_at(agent_class, size, pose.position_m, sincos_of(pose.heading_rad));
   if (!may_spawn(world.map, box, group) || !is_clear(world, box, 0, world.num_boxes, group)) return false;
   const NextBox next = next_box(world, box, at, group);
-  float speed_mps = min_of(kMaxEntry_mps, world.map.lanes[static_cast<size_t>(at.lane)].speed_limit_mps);
+  float speed_mps = min_of(kMaxEntry_mps, world.map.lanes[at.lane].speed_limit_mps);
   speed_mps = min_of(speed_mps, class_limits(agent_class).max_speed_mps);
   if (next.gap_m < 1e9f) speed_mps = min_of(speed_mps, next.speed_mps);
   if (next.gap_m < kEntryGap_m + kEntryHeadway_s * speed_mps) return false;

@@ -59,8 +59,8 @@ PICTURA_HD constexpr int64_t rejected_command(int32_t slot, const Command& comma
 /// Draws the episode's cycle of one stop line and shows its first state.
 PICTURA_HD inline void begin_light(const WorldView& world, int light) {
   world.light_plans[light] =
-      draw_light_plan(world.map.stop_lines[static_cast<size_t>(light)], light, world.options.light_cycles,
-                      world.options.fixed_lights, world.options.dt_s, world.seed, world.global_world, world.episode);
+      draw_light_plan(world.map.stop_lines[light], light, world.options.light_cycles, world.options.fixed_lights,
+                      world.options.dt_s, world.seed, world.global_world, world.episode);
   world.lights[light] = light_state(world.map, light, world.light_plans[light], 0);
 }
 

@@ -12,7 +12,7 @@ constexpr float kExitReach_m = 5.0f;
 
 /// Whether a waypoint lies where routes end.
 PICTURA_HD inline bool is_at_route_end(const MapView& map, RoutePoint at) {
-  return at.s_m >= map.lanes[static_cast<size_t>(at.lane)].route_end_m;
+  return at.s_m >= map.lanes[at.lane].route_end_m;
 }
 
 /// Whether the middle of a box's front bumper crosses the exit in the direction of its traffic. A box is as high as the

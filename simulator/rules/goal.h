@@ -17,16 +17,16 @@ constexpr float kMetricGoalRadius_m = 2.0f;
 /// The neighbour of a point, `side` < 0 left, else right, at the same fraction of its lane; the point itself where
 /// there is none.
 PICTURA_HD inline RoutePoint neighbor_of(const MapView& map, RoutePoint at, int side) {
-  const MapLane& lane = map.lanes[static_cast<size_t>(at.lane)];
+  const MapLane& lane = map.lanes[at.lane];
   const int32_t neighbor = side < 0 ? lane.left : lane.right;
   if (neighbor < 0) return at;
-  return {neighbor, at.s_m * (map.lanes[static_cast<size_t>(neighbor)].length_m / lane.length_m)};
+  return {neighbor, at.s_m * (map.lanes[neighbor].length_m / lane.length_m)};
 }
 
 /// The point beside `at` on the nearest lane that has a successor, by as many lane changes as that takes, of two
 /// equally near lanes on the left one; `at` itself where its own lane has a successor or none beside it has.
 PICTURA_HD inline RoutePoint through_lane(const MapView& map, RoutePoint at) {
-  const auto goes_on = [&map](RoutePoint p) { return map.lanes[static_cast<size_t>(p.lane)].num_successors > 0; };
+  const auto goes_on = [&map](RoutePoint p) { return map.lanes[p.lane].num_successors > 0; };
   RoutePoint left = at, right = at;
   while (!goes_on(left) && !goes_on(right)) {
     const RoutePoint next_left = neighbor_of(map, left, -1), next_right = neighbor_of(map, right, 1);
@@ -42,19 +42,19 @@ PICTURA_HD inline RoutePoint through_lane(const MapView& map, RoutePoint at) {
 PICTURA_HD inline RoutePoint walk(const MapView& map, RoutePoint at, float distance_m, RandomStream* random_inout) {
   constexpr int kMaxLanesWalked = 64;  // lanes shorter than a metre in a row: a bound, not a rule
   for (int i = 0; i < kMaxLanesWalked; ++i) {
-    const float left_m = map.lanes[static_cast<size_t>(at.lane)].length_m - at.s_m;
-    const float route_end_m = map.lanes[static_cast<size_t>(at.lane)].route_end_m;
+    const float left_m = map.lanes[at.lane].length_m - at.s_m;
+    const float route_end_m = map.lanes[at.lane].route_end_m;
     if (distance_m <= left_m || route_end_m < kRouteGoesOn_m) {
       return {at.lane, min_of(at.s_m + distance_m, route_end_m)};
     }
     at = through_lane(map, at);
-    const MapLane& lane = map.lanes[static_cast<size_t>(at.lane)];
+    const MapLane& lane = map.lanes[at.lane];
     if (lane.num_successors == 0) break;
     distance_m -= left_m;
     const int choice = random_inout->below(lane.num_successors);
-    at = {map.successors[static_cast<size_t>(lane.first_successor + choice)], 0.0f};
+    at = {map.successors[lane.first_successor + choice], 0.0f};
   }
-  return {at.lane, map.lanes[static_cast<size_t>(at.lane)].length_m};
+  return {at.lane, map.lanes[at.lane].length_m};
 }
 
 /// The next waypoint of a route: perhaps a lane change, then the gap.

@@ -203,7 +203,7 @@ PICTURA_HD void visit_arrays(MapView* view, Visit&& visit) {
 
 PICTURA_HD inline Span<const int32_t> list_of(const GridView& lists, size_t index) {
   const int32_t begin = lists.begin[index];
-  return lists.items.subspan(static_cast<size_t>(begin), static_cast<size_t>(lists.begin[index + 1] - begin));
+  return lists.items.subspan(begin, lists.begin[index + 1] - begin);
 }
 
 /// The list of the cell that holds p; points outside belong to the nearest cell.

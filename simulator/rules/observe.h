@@ -147,7 +147,7 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
           Vec2 centers[kAtOnce];
           for (int k = 0; k < kAtOnce; ++k) {
             const int32_t i = min_of(first + k * group.size(), end - 1);
-            others[k] = cells.items[static_cast<size_t>(i)];
+            others[k] = cells.items[i];
             centers[k] = world.cell_centers[i];
           }
           for (int k = 0; k < kAtOnce; ++k) {
@@ -257,7 +257,7 @@ PICTURA_HD inline int find_pieces_in_sight(Span<const Vec2> middles, Span<const 
       look_at(items.data() + num_items - 8, last_of_eight(left));
     } else {
       int32_t few[8];
-      for (int k = 0; k < 8; ++k) few[k] = items[static_cast<size_t>(min_of(k, left - 1))];
+      for (int k = 0; k < 8; ++k) few[k] = items[min_of(k, left - 1)];
       look_at(few, first_of_eight(left));
     }
   }
@@ -271,7 +271,7 @@ PICTURA_HD inline int observe_pieces(const PieceList& near, const EgoFrame& fram
   int32_t found[kMaxPieces + 8];
   const int count = min_of(capacity, find_pieces_in_sight(near.middles, near.items, frame, capacity, found));
   const RowFrame row_frame(frame);
-  const auto row_of = [&](int i) { return observe_piece(near.pieces[static_cast<size_t>(found[i])], row_frame); };
+  const auto row_of = [&](int i) { return observe_piece(near.pieces[found[i]], row_frame); };
   // The zero behind a row lies where the next one begins; only the set's last row has none behind it.
   const int num_followed = min_of(count, capacity - 1);
   for (int i = 0; i < num_followed; ++i, out += kLaneFeatures) store8(row_of(i), out);
@@ -300,20 +300,20 @@ PICTURA_HD int observe_controls(const WorldView& world, int slot, const NearPlac
   typename ThreadGroup::template Nearest<kMaxControls> nearest;
   for (int first = 0; first < num_items; first += group.size()) {
     const int i = first + group.rank();
-    const int32_t light = items[static_cast<size_t>(min_of(i, num_items - 1))];
-    const Vec2 apart = world.map.stop_lines[static_cast<size_t>(light)].middle_m.xy() - frame.origin_m.xy();
+    const int32_t light = items[min_of(i, num_items - 1)];
+    const Vec2 apart = world.map.stop_lines[light].middle_m.xy() - frame.origin_m.xy();
     const float d2 = length2(apart.x, apart.y);
     nearest.offer(i < num_items && d2 < square(kControlRange_m), d2, light);
   }
   nearest.settle();
   const int32_t lane = world.agents.lane[slot];
-  const int32_t own_light = lane < 0 ? -1 : world.map.lanes[static_cast<size_t>(lane)].light;
+  const int32_t own_light = lane < 0 ? -1 : world.map.lanes[lane].light;
   const int count = nearest.count();
   const RowFrame ends_frame = RowFrame::of_two_places(frame);
   for (int i = group.rank(); i < count; i += group.size()) {
     float* out = rows + i * kControlFeatures;
     const int32_t light = nearest.item(i);
-    const StopLine& line = world.map.stop_lines[static_cast<size_t>(light)];
+    const StopLine& line = world.map.stop_lines[light];
     const Float8 ends = permute<0, 1, 2, 6, 3, 4, 5, 7>(load8(&line.left_m.x));  // left, right
     float local[8];
     store8(ends_frame.to_local(ends), local);

@@ -26,7 +26,7 @@ class QueriedObservation {
       float* out = rows + i * kPartnerFeatures;
       const int item = nearest.item(i);
       if (item >= world.num_boxes) {
-        const InsertedBox& one = inserted_[static_cast<size_t>(item - world.num_boxes)];
+        const InsertedBox& one = inserted_[item - world.num_boxes];
         observe_partner(one.box, world.options.auxiliary_observations ? one.speed_mps : 0.0f, row_frame, out);
       } else if (leaves_gaps_ && hides(world, item)) {
         for (int f = 0; f < kPartnerFeatures; ++f) out[f] = 0.0f;
@@ -40,7 +40,7 @@ class QueriedObservation {
  private:
   template <typename T>
   PICTURA_HD static Span<T> part(Span<T> list, int32_t begin, int32_t end) {
-    return list.subspan(static_cast<size_t>(begin), static_cast<size_t>(end - begin));
+    return list.subspan(begin, end - begin);
   }
   PICTURA_HD bool hides(const WorldView& world, int box) const {
     for (const int32_t hidden : hidden_) {
@@ -54,7 +54,7 @@ class QueriedObservation {
   template <typename ThreadGroup>
   PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin, const ThreadGroup& group) const {
     const auto box_at = [&](int item) -> const AgentBox& {
-      return item < world.num_boxes ? world.boxes[item] : inserted_[static_cast<size_t>(item - world.num_boxes)].box;
+      return item < world.num_boxes ? world.boxes[item] : inserted_[item - world.num_boxes].box;
     };
     const auto is_there = [&](int item) {
       return item >= world.num_boxes || (item != agent && (leaves_gaps_ || !hides(world, item)));
@@ -76,7 +76,7 @@ PICTURA_HD inline void clear_other_counts(const ObservationView& out, int row) {
 /// Writes the whole observation that a query, in which there is no fault, asks of its slot's world; sets if
 /// `entity_sets`.
 PICTURA_HD inline void answer_query(const WorldView& world, const ObservationQueries& asked, int i, bool entity_sets) {
-  const ObservationQuery& query = asked.queries[static_cast<size_t>(i)];
+  const ObservationQuery& query = asked.queries[i];
   const int agent = query.slot - world.first_slot;
   const QueriedObservation observation(asked, query);
   observe_own(world, agent, i, asked.out);
@@ -117,7 +117,7 @@ PICTURA_HD inline bool is_sound(const InsertedBox& one) {
 /// world_of(slot) is its WorldView.
 template <typename WorldOf>
 PICTURA_HD int64_t find_query_fault(const ObservationQueries& asked, int i, int num_slots, const WorldOf& world_of) {
-  const ObservationQuery& query = asked.queries[static_cast<size_t>(i)];
+  const ObservationQuery& query = asked.queries[i];
   const auto fault = [i](QueryFault what, int32_t value) { return query_fault(what, i, value); };
   if (query.slot < 0 || query.slot >= num_slots) return fault(QueryFault::slot, query.slot);
   const auto is_between = [](int32_t value, int32_t low, size_t high) {
@@ -133,11 +133,11 @@ PICTURA_HD int64_t find_query_fault(const ObservationQueries& asked, int i, int 
   }
   const WorldView world = world_of(query.slot);
   for (int32_t k = hidden_begin; k < query.hidden_end; ++k) {
-    const int32_t box = asked.hidden[static_cast<size_t>(k)];
+    const int32_t box = asked.hidden[k];
     if (box < world.first_box || box - world.first_box >= world.num_boxes) return fault(QueryFault::hidden_box, box);
   }
   for (int32_t k = inserted_begin; k < query.inserted_end; ++k) {
-    if (!is_sound(asked.inserted[static_cast<size_t>(k)])) return fault(QueryFault::inserted_box, k);
+    if (!is_sound(asked.inserted[k])) return fault(QueryFault::inserted_box, k);
   }
   return kNoQueryFault;
 }

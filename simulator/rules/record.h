@@ -19,7 +19,7 @@ PICTURA_HD inline RecordedState recorded_state(const MapView& map, int agent, in
 }
 
 PICTURA_HD inline void store_recorded_size(const WorldView& world, int agent) {
-  const RecordedAgent& recorded = world.map.recorded_agents[static_cast<size_t>(agent)];
+  const RecordedAgent& recorded = world.map.recorded_agents[agent];
   const int slot = world.first_slot + agent;
   world.agents.length_m[slot] = recorded.length_m;
   world.agents.width_m[slot] = recorded.width_m;
@@ -89,7 +89,7 @@ PICTURA_HD void begin_record(const WorldView& world, int agent, const ThreadGrou
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
   if (group.rank() == 0) {
-    const Vec3 goal = world.map.recorded_agents[static_cast<size_t>(agent)].goal_m;
+    const Vec3 goal = world.map.recorded_agents[agent].goal_m;
     for (int i = 0; i < kNumWaypoints; ++i) {
       agents.waypoint_x_m[slot * kNumWaypoints + i] = goal.x;
       agents.waypoint_y_m[slot * kNumWaypoints + i] = goal.y;

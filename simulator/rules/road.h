@@ -52,7 +52,7 @@ PICTURA_HD LaneFit fit_lane(const MapView& map, Vec2 p, float z_m, float heading
   const int num_items = static_cast<int>(items.size());
   int best_item = num_items;
   for (int i = group.rank(); i < num_items; i += group.size()) {
-    const LaneSegment& segment = map.segments[static_cast<size_t>(items[static_cast<size_t>(i)])];
+    const LaneSegment& segment = map.segments[items[i]];
     if (!segment.is_driven) continue;
     const Foot foot = foot_on(segment, p);
     const float height = height_on(segment, foot.along_m);
@@ -67,7 +67,7 @@ PICTURA_HD LaneFit fit_lane(const MapView& map, Vec2 p, float z_m, float heading
     best_score = score;
     best_item = i;
     best = {segment.lane, foot.side < 0.0f ? -foot.distance_m : foot.distance_m, angle, height,
-            map.lanes[static_cast<size_t>(segment.lane)].speed_limit_mps};
+            map.lanes[segment.lane].speed_limit_mps};
   }
   return group.of_lowest(best_score, best_item, best);
 }
@@ -81,7 +81,7 @@ PICTURA_HD bool is_on_road(const MapView& map, Vec2 p, float z_m, const ThreadGr
   bool is_on = false;
   for (size_t i = static_cast<size_t>(group.rank()); i < items.size() && !is_on;
        i += static_cast<size_t>(group.size())) {
-    const LaneSegment& segment = map.segments[static_cast<size_t>(items[i])];
+    const LaneSegment& segment = map.segments[items[i]];
     const Foot foot = foot_on(segment, p);
     const float height = height_on(segment, foot.along_m);
     is_on = foot.distance_m <= segment.half_width_m + kSeamTolerance_m && fabsf(height - z_m) < kLevel_m;
@@ -103,17 +103,17 @@ struct LanePose {
 
 /// At arc length s_m, clamped to the lane.
 PICTURA_HD inline LanePose pose_on_lane(const MapView& map, int32_t lane_index, float s_m) {
-  const MapLane& lane = map.lanes[static_cast<size_t>(lane_index)];
+  const MapLane& lane = map.lanes[lane_index];
   int low = lane.first_segment, high = lane.first_segment + lane.num_segments - 1;
   while (low < high) {
     const int middle = (low + high + 1) / 2;
-    if (map.segments[static_cast<size_t>(middle)].s_m <= s_m) {
+    if (map.segments[middle].s_m <= s_m) {
       low = middle;
     } else {
       high = middle - 1;
     }
   }
-  const LaneSegment& segment = map.segments[static_cast<size_t>(low)];
+  const LaneSegment& segment = map.segments[low];
   const float along = clamp(s_m - segment.s_m, 0.0f, segment.length_m);
   const Vec2 xy = segment.a_m.xy() + segment.direction * along;
   return {{xy.x, xy.y, height_on(segment, along)},

@@ -107,9 +107,8 @@ struct Crossing {
 };
 
 PICTURA_HD inline Span<const int32_t> successors_of(const MapView& map, int32_t lane) {
-  const MapLane& from = map.lanes[static_cast<size_t>(lane)];
-  return map.successors.subspan(static_cast<size_t>(from.first_successor),
-                                static_cast<size_t>(from.num_all_successors));
+  const MapLane& from = map.lanes[lane];
+  return map.successors.subspan(from.first_successor, from.num_all_successors);
 }
 
 /// Whether `to` follows `from`, directly or past one lane that is shorter than a step's way.
@@ -137,7 +136,7 @@ PICTURA_HD inline bool is_lane_change(const MapView& map, int32_t before, int32_
 /// junction behind it, or entering the next lane of the route is none.
 PICTURA_HD inline bool violates(const MapView& map, int32_t light, const Crossing& crossing, LightState state) {
   if (state != LightState::red) return false;
-  const StopLine& line = map.stop_lines[static_cast<size_t>(light)];
+  const StopLine& line = map.stop_lines[light];
   const Vec2 past = crossing.bumper_after - line.middle_m.xy();
   if (dot(past, past) > square(kStopLineReach_m) || !holds(line, crossing.forward, crossing.z_m)) return false;
   const float along_before = dot(crossing.bumper_before - line.middle_m.xy(), line.direction);
@@ -150,9 +149,8 @@ PICTURA_HD inline bool violates(const MapView& map, int32_t light, const Crossin
     const float beyond_m = side_m > 0.0f ? line.beyond_left_m : line.beyond_right_m;
     if (fabsf(side_m) <= line.half_length_m + max_of(kStopLineSideTolerance_m, beyond_m)) return true;
   }
-  return is_lane_change(map, crossing.lane_before, crossing.lane_after) &&
-         map.lanes[static_cast<size_t>(crossing.lane_before)].light < 0 &&
-         map.lanes[static_cast<size_t>(crossing.lane_after)].light == light;
+  return is_lane_change(map, crossing.lane_before, crossing.lane_after) && map.lanes[crossing.lane_before].light < 0 &&
+         map.lanes[crossing.lane_after].light == light;
 }
 
 }  // namespace pictura

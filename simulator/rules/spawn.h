@@ -84,7 +84,7 @@ PICTURA_HD inline void draw_agent(const WorldView& world, int agent) {
                                ? AgentClass::cyclist
                                : AgentClass::vehicle;
   if (has_record(world.map)) {
-    agent_class = static_cast<AgentClass>(world.map.recorded_agents[static_cast<size_t>(agent)].agent_class);
+    agent_class = static_cast<AgentClass>(world.map.recorded_agents[agent].agent_class);
   }
   agents.agent_class[slot] = static_cast<uint8_t>(agent_class);
   draw_body(world, agent);
@@ -172,7 +172,7 @@ PICTURA_HD inline const ParkingSpot& parking_spot(const WorldView& world, int ca
   RandomStream random = agent_stream(world, car, 0, Purpose::parked_cars);
   random.skip(kDrawsBefore + i);
   const Span<const ParkingSpot> spots = world.map.parking_spots;
-  return spots[static_cast<size_t>(random.below(static_cast<int>(spots.size())))];
+  return spots[random.below(static_cast<int>(spots.size()))];
 }
 
 /// Parked car `car` on `spot`, or outside the kerb there.
@@ -201,7 +201,7 @@ PICTURA_HD bool covers_driven_lane(const MapView& map, const AgentBox& box, cons
   bool covers = false;
   for (size_t i = static_cast<size_t>(group.rank()); i < items.size() && !covers;
        i += static_cast<size_t>(group.size())) {
-    const LaneSegment& segment = map.segments[static_cast<size_t>(items[i])];
+    const LaneSegment& segment = map.segments[items[i]];
     const float half_m = 0.5f * segment.length_m;
     const OrientedBox surface{segment.a_m.xy() + segment.direction * half_m, segment.direction, half_m,
                               segment.half_width_m - kSeamTolerance_m};
@@ -257,7 +257,7 @@ PICTURA_HD inline RoutePoint spawn_point(const WorldView& world, int agent, int 
   random.skip(i);
   if (walks(world, agent)) return draw_place(world.map.walk_end_m, &random);
   RoutePoint at = draw_place(world.map.spawn_end_m, &random);
-  at.lane = world.map.spawn_lanes[static_cast<size_t>(at.lane)];
+  at.lane = world.map.spawn_lanes[at.lane];
   return at;
 }
 
@@ -282,7 +282,7 @@ PICTURA_HD inline bool straddles_stop_line(const MapView& map, const AgentBox& b
   const Vec2 reference = box.center_m.xy() - forward * reference_to_center(box.agent_class, box.length_m);
   const Span<const int32_t> lights = items_at(map.stop_line_cells, bumper);
   for (size_t i = 0; i < lights.size(); ++i) {
-    const StopLine& line = map.stop_lines[static_cast<size_t>(lights[i])];
+    const StopLine& line = map.stop_lines[lights[i]];
     if (!holds(line, forward, box.center_m.z)) continue;
     const Vec2 past = bumper - line.middle_m.xy();
     const bool is_across =

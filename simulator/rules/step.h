@@ -226,7 +226,7 @@ PICTURA_HD void find_collisions(const WorldView& world, int agent, const ThreadG
     for (int32_t i = range.begin(cells, y) + group.rank(); i < end; i += group.size()) {
       const Vec2 apart = world.cell_centers[i] - own.center_m.xy();
       if (dot(apart, apart) > square(own_reach)) continue;
-      const int32_t other = cells.items[static_cast<size_t>(i)];
+      const int32_t other = cells.items[i];
       if (other == agent || !collide(own_before, own, world.boxes_before[other], world.boxes[other])) continue;
       collides = true;
       is_at_fault = is_at_fault || at_fault(own_before, world.agents.speed_mps[slot], world.boxes_before[other]);

@@ -8,7 +8,7 @@ namespace pictura {
 
 /// At distance s_m from the start of a piece, heading along it.
 PICTURA_HD inline LanePose pose_on_walk(const MapView& map, int32_t piece_index, float s_m) {
-  const WalkPiece& piece = map.walk_pieces[static_cast<size_t>(piece_index)];
+  const WalkPiece& piece = map.walk_pieces[piece_index];
   const float along = clamp(s_m, 0.0f, piece.length_m);
   const Vec2 xy = piece.a_m.xy() + piece.direction * along;
   return {{xy.x, xy.y, height_on(piece, along)}, piece.heading_rad};
@@ -16,14 +16,14 @@ PICTURA_HD inline LanePose pose_on_walk(const MapView& map, int32_t piece_index,
 
 /// The piece to go on to where a piece ends: each way but the one back is as likely.
 PICTURA_HD inline int32_t choose_way(const MapView& map, int32_t piece_index, RandomStream* random_inout) {
-  const WalkPiece& piece = map.walk_pieces[static_cast<size_t>(piece_index)];
+  const WalkPiece& piece = map.walk_pieces[piece_index];
   if (piece.next >= 0) return piece.next;
-  const int32_t begin = map.walk_leave_begin[static_cast<size_t>(piece.to_node)];
+  const int32_t begin = map.walk_leave_begin[piece.to_node];
   const int32_t end = map.walk_leave_begin[static_cast<size_t>(piece.to_node) + 1];
   const int32_t back = piece_index ^ 1;
   int32_t choice = random_inout->below(end - begin - 1);
   for (int32_t i = begin; i < end; ++i) {
-    const int32_t way = map.walk_leaving[static_cast<size_t>(i)];
+    const int32_t way = map.walk_leaving[i];
     if (way != back && choice-- == 0) return way;
   }
   return back;
@@ -33,7 +33,7 @@ PICTURA_HD inline int32_t choose_way(const MapView& map, int32_t piece_index, Ra
 PICTURA_HD inline RoutePoint stroll(const MapView& map, RoutePoint at, float distance_m, RandomStream* random_inout) {
   constexpr int kMaxPiecesWalked = 1024;  // pieces of a few centimetres in a row: a bound, not a rule
   for (int i = 0; i < kMaxPiecesWalked; ++i) {
-    const WalkPiece& piece = map.walk_pieces[static_cast<size_t>(at.lane)];
+    const WalkPiece& piece = map.walk_pieces[at.lane];
     const float left_m = piece.length_m - at.s_m;
     if (distance_m <= left_m) return {at.lane, at.s_m + distance_m};
     distance_m -= left_m;
@@ -53,7 +53,7 @@ PICTURA_HD LaneFit fit_walk(const MapView& map, Vec2 p, float z_m, float heading
   const int num_items = static_cast<int>(items.size());
   int nearest_item = num_items;
   for (int i = group.rank(); i < num_items; i += group.size()) {
-    const WalkPiece& piece = map.walk_pieces[2 * static_cast<size_t>(items[static_cast<size_t>(i)])];
+    const WalkPiece& piece = map.walk_pieces[2 * static_cast<size_t>(items[i])];
     const Vec2 from_a = p - piece.a_m.xy();
     const float along = clamp(dot(from_a, piece.direction), 0.0f, piece.length_m);
     const float distance_m = length(from_a - piece.direction * along);

@@ -150,7 +150,7 @@ std::vector<std::string> Ranks::texts(const std::string& key, const std::string&
   if (size() == 1) return {own};
   const std::vector<std::string> keys = keys_of_ranks(key, size());
   try {
-    store_->set(keys[static_cast<size_t>(rank())], own);
+    store_->set(keys[rank()], own);
     while (!store_->check(keys)) {
       check();
       std::this_thread::sleep_for(milliseconds(20));
@@ -273,9 +273,8 @@ void Ranks::watch() {
   std::vector<std::string> keys = keys_of_ranks("beat", size());
   keys.push_back(kFault);
   const auto exchange = std::make_shared<Exchange>();
-  std::thread exchanges([exchange, keys, own_key = keys[static_cast<size_t>(rank())], store = watch_store_] {
-    exchange->run(store.get(), own_key, keys);
-  });
+  std::thread exchanges(
+      [exchange, keys, own_key = keys[rank()], store = watch_store_] { exchange->run(store.get(), own_key, keys); });
   // Why a rank is lost, as far as is known.
   const auto look = [&]() -> std::string {
     std::vector<std::vector<uint8_t>> values;

@@ -43,11 +43,11 @@ inline float filter_bin_begin(int bin) { return __builtin_bit_cast(float, static
 /// spread evenly over it; 0 where there are none.
 inline float filter_quantile(Span<const int64_t> counts, double share) {
   int64_t all = 0;
-  for (int bin = 0; bin < kNotFiniteBin; ++bin) all += counts[static_cast<size_t>(bin)];
+  for (int bin = 0; bin < kNotFiniteBin; ++bin) all += counts[bin];
   const double wanted = share * static_cast<double>(all);
   double below = 0;
   for (int bin = 0; bin < kNotFiniteBin; ++bin) {
-    const auto count = static_cast<double>(counts[static_cast<size_t>(bin)]);
+    const auto count = static_cast<double>(counts[bin]);
     if (below + count > wanted) {
       const double begin = static_cast<double>(filter_bin_begin(bin)),
                    width = static_cast<double>(filter_bin_begin(bin + 1)) - begin;

@@ -59,9 +59,7 @@ struct TransitionArrays {
             truncated[i] != 0, valid[i] != 0, decides.empty() || decides[i] != 0};
   }
   /// What comes after the last step.
-  PICTURA_HD GaeTail tail(int64_t slot) const {
-    return {values[static_cast<size_t>(num_steps * num_slots + slot)], 0.0f};
-  }
+  PICTURA_HD GaeTail tail(int64_t slot) const { return {values[num_steps * num_slots + slot], 0.0f}; }
 };
 
 }  // namespace pictura
