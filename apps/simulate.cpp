@@ -45,7 +45,7 @@ std::array<int64_t, kNumAgentClasses> spawned_by_class(Simulator& simulator) {
   const AgentStateView state = simulator.state();
   std::array<int64_t, kNumAgentClasses> counts{};
   for (int slot = 0; slot < simulator.num_slots(); ++slot) {
-    counts[state.agent_class[slot]] += has_body(static_cast<AgentStatus>(state.status[slot]));
+    counts[static_cast<int>(state.agent_class[slot])] += has_body(state.status[slot]);
   }
   return counts;
 }
@@ -58,7 +58,7 @@ struct Displacement {
   void add(Simulator& simulator, const Scenario& scene) {
     const int32_t step = simulator.maps()[0]->start_step + simulator.episode_step()[0];
     for (int32_t track = 0; track < simulator.num_slots() && step < scene.num_steps; ++track) {
-      if (simulator.state().status[track] != static_cast<uint8_t>(AgentStatus::active)) continue;
+      if (simulator.state().status[track] != AgentStatus::active) continue;
       const std::optional<float> apart_m = displacement_m(scene, track, step, simulator.scene().agents[track].center_m);
       if (!apart_m) continue;
       ++steps;

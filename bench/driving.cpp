@@ -42,12 +42,12 @@ DrivenWorlds drive_worlds(const DrivenOptions& options) {
   DrivenWorlds worlds;
   worlds.simulator = make_simulator("cpu", config, maps, specs);
   step_randomly(worlds.simulator.get(), options.seed, options.steps);
-  const uint8_t* refusal = worlds.simulator->state().refusal;
+  const SpawnFailure* refusal = worlds.simulator->state().refusal;
   const Span<const View> views = worlds.simulator->views();
   for (int agent = 0; agent < options.agents; ++agent) {
     for (int world = 0; world < num_worlds; ++world) {
       const auto slot = static_cast<std::size_t>(world * options.agents + agent);
-      if (refusal[slot] == 0) worlds.views.push_back(views[slot]);
+      if (refusal[slot] == SpawnFailure::none) worlds.views.push_back(views[slot]);
     }
   }
   const int expected = std::max(1, options.num_views);

@@ -48,8 +48,8 @@ void count_population(HostWorlds& worlds, const LaneGraph& graph, Counts* counts
     count("refused, no place", "agents", 0);
     for (int agent = 0; agent < world.num_agents; ++agent) {
       const int slot = world.first_slot + agent;
-      switch (static_cast<SpawnFailure>(world.agents.refusal[slot])) {
-        case SpawnFailure::none: count(kClasses[world.agents.agent_class[slot]], "agents", 1); break;
+      switch (world.agents.refusal[slot]) {
+        case SpawnFailure::none: count(kClasses[static_cast<int>(world.agents.agent_class[slot])], "agents", 1); break;
         case SpawnFailure::taken: count("refused, places taken", "agents", 1); break;
         case SpawnFailure::no_place: count("refused, no place", "agents", 1); break;
       }

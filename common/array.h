@@ -22,10 +22,23 @@ std::string_view name_of(ElementType type);
 /// "cpu" or "cuda:0".
 std::string name_of(Device device);
 
+/// What elements of a C++ type are stored as: an enumeration as its integers.
+template <typename T>
+struct Stored {
+  using Type = std::remove_const_t<T>;
+};
+template <typename T>
+  requires std::is_enum_v<T>
+struct Stored<T> {
+  using Type = std::underlying_type_t<T>;
+};
+template <typename T>
+using StoredAs = typename Stored<T>::Type;
+
 /// The element type of a C++ type; f16 and bf16 have none of their own.
 template <typename T>
 consteval ElementType element_type() {
-  using U = std::remove_const_t<T>;
+  using U = StoredAs<T>;
   if constexpr (std::same_as<U, uint8_t>) return ElementType::u8;
   if constexpr (std::same_as<U, uint16_t>) return ElementType::u16;
   if constexpr (std::same_as<U, uint32_t>) return ElementType::u32;
@@ -36,8 +49,9 @@ consteval ElementType element_type() {
 }
 template <typename T>
 concept ArrayElement =
-    std::same_as<T, uint8_t> || std::same_as<T, uint16_t> || std::same_as<T, uint32_t> || std::same_as<T, int32_t> ||
-    std::same_as<T, int64_t> || std::same_as<T, float> || std::same_as<T, double>;
+    std::same_as<StoredAs<T>, uint8_t> || std::same_as<StoredAs<T>, uint16_t> || std::same_as<StoredAs<T>, uint32_t> ||
+    std::same_as<StoredAs<T>, int32_t> || std::same_as<StoredAs<T>, int64_t> || std::same_as<StoredAs<T>, float> ||
+    std::same_as<StoredAs<T>, double>;
 
 /// Lengths or strides of up to five dimensions.
 class Dims {

@@ -149,16 +149,16 @@ void paint_legend(Canvas& canvas, const WorldFrame& frame) {
     return sum;
   };
   const auto with = [&count](AgentStatus which) {
-    return count([which](int status, int) { return status == static_cast<int>(which); });
+    return count([which](AgentStatus status, int) { return status == which; });
   };
-  const int halted = static_cast<int>(AgentStatus::halted);
   std::vector<Row> rows{
       {fmt::format("{} active", with(AgentStatus::active)), agent_color(AgentClass::vehicle, BoxFace::back)}};
   if (const int recorded = with(AgentStatus::recorded)) {
     rows.push_back({fmt::format("{} as recorded", recorded), agent_color(AgentClass::vehicle, BoxFace::front)});
   }
   for (const HaltReason& reason : kHaltReasons) {
-    const int sum = count([&](int status, int events) { return status == halted && reason_of(events) == &reason; });
+    const int sum = count(
+        [&](AgentStatus status, int events) { return status == AgentStatus::halted && reason_of(events) == &reason; });
     rows.push_back({fmt::format("{} {}", sum, reason.name), reason.color});
   }
   constexpr double kRow_px = 19, kMargin_px = 10, kWidth_px = 132;
@@ -345,7 +345,7 @@ RgbImage WorldPainter::draw(const WorldFrame& frame, const TopCamera& camera) {
   }
 
   for (size_t i = 0; i < frame.agents.size(); ++i) {
-    const auto status = frame.status.empty() ? AgentStatus::active : static_cast<AgentStatus>(frame.status[i]);
+    const auto status = frame.status.empty() ? AgentStatus::active : frame.status[i];
     if (!frame.agents[i].drawn || !has_body(status)) continue;
     const Vector2d position = pixel_at(frame.agents[i].center_m);
     paint_agent(canvas, frame.agents[i], status, position, camera.px_per_m);
@@ -383,7 +383,7 @@ RgbImage draw_world(WorldPainter& painter, Simulator& simulator, int world, int 
   frame.lights = range(scene.light_begin, scene.light_states);
   const int map = simulator.worlds()[world].map;
   frame.heads = simulator.maps()[map]->geometry.heads;
-  std::vector<uint8_t> status(frame.agents.size(), static_cast<uint8_t>(AgentStatus::parked));
+  std::vector<AgentStatus> status(frame.agents.size(), AgentStatus::parked);
   std::copy_n(state.status + first_slot, std::min(num_slots, status.size()), status.begin());
   frame.status = status;
   std::vector<uint8_t> halt_reason(frame.agents.size(), 0);
@@ -391,7 +391,7 @@ RgbImage draw_world(WorldPainter& painter, Simulator& simulator, int world, int 
   frame.halt_reason = halt_reason;
   std::vector<AgentGoal> goals;
   for (size_t agent = 0; agent < num_slots; ++agent) {
-    if (status[agent] != static_cast<uint8_t>(AgentStatus::active)) continue;
+    if (status[agent] != AgentStatus::active) continue;
     const size_t at =
         (first_slot + agent) * kNumWaypoints + static_cast<size_t>(state.next_waypoint[first_slot + agent]);
     goals.push_back({static_cast<int>(agent), {state.waypoint_x_m[at], state.waypoint_y_m[at]}});

@@ -38,7 +38,7 @@ struct WorldFrame {
   Span<const AgentBox> agents;      // of this world
   Span<const LightState> lights;    // [map.lights]
   Span<const LightHead> heads;      // [map.lights] where heads stand, or empty: as mapped
-  Span<const uint8_t> status;       // [agents] AgentStatus, or empty: all active
+  Span<const AgentStatus> status;   // [agents] or empty: all active
   Span<const uint8_t> halt_reason;  // [agents] Event bits: a ring in the colour of the reason, and a legend that counts
   Span<const AgentGoal> goals;      // a thin line leads to each
   int highlighted = -1;             // index of the agent with a halo and the waypoints below, or -1

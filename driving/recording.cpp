@@ -92,7 +92,7 @@ std::optional<ReplayDecision> decision_of_agent([[maybe_unused]] Simulator& simu
                                                 [[maybe_unused]] int agent) {
 #ifdef PICTURA_HAS_TORCH
   const auto slot = static_cast<size_t>(agent);
-  if (!driver.session || simulator.state().status[slot] != static_cast<uint8_t>(AgentStatus::active)) return {};
+  if (!driver.session || simulator.state().status[slot] != AgentStatus::active) return {};
   std::array<float, kNumActions> logits{};
   std::array<float, 1> value{};
   driver.session->evaluate(

@@ -58,8 +58,8 @@ AgentState counted_state(Simulator& simulator) {
 
 // Of a life that is over, or that the last step cuts off.
 void add_life(const AgentStateView& state, int64_t slot, ScenarioCounts* counts) {
-  const auto status = static_cast<AgentStatus>(state.status[slot]);
-  if (static_cast<AgentClass>(state.agent_class[slot]) != AgentClass::vehicle) return;
+  const AgentStatus status = state.status[slot];
+  if (state.agent_class[slot] != AgentClass::vehicle) return;
   const uint8_t events = state.episode_events[slot];
   const auto has = [events](int any_of) { return (events & any_of) != 0; };
   ++counts->vehicles;
@@ -79,10 +79,10 @@ void add_life(const AgentStateView& state, int64_t slot, ScenarioCounts* counts)
 
 // Of a slot after the last step. Lives of those that left have been counted.
 void add_slot(const AgentStateView& state, int64_t slot, ScenarioCounts* counts) {
-  const auto status = static_cast<AgentStatus>(state.status[slot]);
+  const AgentStatus status = state.status[slot];
   const bool waits = status == AgentStatus::waiting;
   ++counts->asked;
-  counts->spawned += state.refusal[slot] == static_cast<uint8_t>(SpawnFailure::none);
+  counts->spawned += state.refusal[slot] == SpawnFailure::none;
   counts->entered += state.life[slot];
   counts->left += state.life[slot] + waits;
   if (has_body(status)) add_life(state, slot, counts);
@@ -96,9 +96,9 @@ bool has_lives(const Simulator& simulator) {
 // Whether an agent will yet enter, or may.
 bool is_awaited(Simulator& simulator) {
   if (!has_lives(simulator)) return false;
-  const Span<const uint8_t> status(simulator.state().status, static_cast<size_t>(simulator.num_slots()));
-  const std::vector<uint8_t> all = host_copy(status, simulator.device());
-  return std::find(all.begin(), all.end(), static_cast<uint8_t>(AgentStatus::waiting)) != all.end();
+  const Span<const AgentStatus> status(simulator.state().status, static_cast<size_t>(simulator.num_slots()));
+  const std::vector<AgentStatus> all = host_copy(status, simulator.device());
+  return std::find(all.begin(), all.end(), AgentStatus::waiting) != all.end();
 }
 
 std::string hash_of(const CompiledMaps& maps) {

@@ -176,7 +176,7 @@ class BatchDrive {
       if (protocol_.record_end == RecordEnd::vanish) {
         take_out(slots_where([&](size_t slot) {
           return last_steps_[slot] == step && !is_driven(slot, step) &&
-                 status_[slot] == static_cast<uint8_t>(AgentStatus::recorded);
+                 status_[slot] == AgentStatus::recorded;
         }));
       }
       // Who drives changes where somebody appears, or vanishes.
@@ -251,7 +251,7 @@ class BatchDrive {
   bool has_open(int step) const {
     for (size_t slot = 0; slot < roles_.size(); ++slot) {
       if (roles_[slot] != SceneRole::driven) continue;
-      if (takeover_steps_[slot] > step || takes_actions(static_cast<AgentStatus>(status_[slot]))) return true;
+      if (takeover_steps_[slot] > step || takes_actions(status_[slot])) return true;
     }
     return false;
   }
@@ -271,15 +271,15 @@ class BatchDrive {
     return slots;
   }
 
-  std::vector<uint8_t> status() const {
-    return host_copy(Span<const uint8_t>(simulator_.state().status, roles_.size()), device());
+  std::vector<AgentStatus> status() const {
+    return host_copy(Span<const AgentStatus>(simulator_.state().status, roles_.size()), device());
   }
 
   /// These are absent from now on, unless they are told to follow the recording.
   void take_out(const std::vector<int32_t>& slots) {
     if (slots.empty()) return;
     const DeviceCopy<int32_t> chosen(slots, device());
-    const DeviceCopy<uint8_t> absent(std::vector<uint8_t>(slots.size(), static_cast<uint8_t>(AgentStatus::absent)),
+    const DeviceCopy<AgentStatus> absent(std::vector<AgentStatus>(slots.size(), AgentStatus::absent),
                                      device());
     const Dims shape{static_cast<int64_t>(slots.size())};
     const NamedArray field{"status", array_of(absent, shape, device())};
@@ -311,11 +311,11 @@ class BatchDrive {
 
   /// Of the step that led to this one of the episode.
   void measure(int step) {
-    const std::vector<uint8_t> before = std::exchange(status_, status());
+    const std::vector<AgentStatus> before = std::exchange(status_, status());
     std::vector<AgentBox> boxes;
     for (size_t slot = 0; slot < roles_.size(); ++slot) {
       if (!is_driven(slot, step - 1)) continue;
-      if (!takes_actions(static_cast<AgentStatus>(before[slot]))) continue;
+      if (!takes_actions(before[slot])) continue;
       ++driven_steps_[slot];
       if (step > last_steps_[slot]) continue;
       // Only as long as anybody is measured is anything copied.
@@ -354,7 +354,7 @@ class BatchDrive {
   std::vector<int32_t> takeover_steps_;  // of the episode
   std::vector<int32_t> world_of_slot_, track_of_slot_;
   std::vector<int32_t> last_steps_;  // of the episode, that the recording has
-  std::vector<uint8_t> status_;      // after the last step
+  std::vector<AgentStatus> status_;      // after the last step
   std::vector<Displacement> displacements_;
   std::vector<int32_t> driven_steps_;
   std::vector<int32_t> kept_slots_;     // whose places are kept

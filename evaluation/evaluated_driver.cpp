@@ -19,9 +19,9 @@ namespace pictura {
 namespace {
 
 int64_t count_active(Simulator& simulator) {
-  const Span<const uint8_t> status(simulator.state().status, static_cast<size_t>(simulator.num_slots()));
-  const std::vector<uint8_t> all = host_copy(status, simulator.device());
-  return std::count(all.begin(), all.end(), static_cast<uint8_t>(AgentStatus::active));
+  const Span<const AgentStatus> status(simulator.state().status, static_cast<size_t>(simulator.num_slots()));
+  const std::vector<AgentStatus> all = host_copy(status, simulator.device());
+  return std::count(all.begin(), all.end(), AgentStatus::active);
 }
 
 }  // namespace

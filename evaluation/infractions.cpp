@@ -110,7 +110,9 @@ const char* to_string(RoadShape shape) {
 
 // What is read of all worlds, on the host.
 struct InfractionObserver::Frame {
-  std::vector<uint8_t> status, events, agent_class;
+  std::vector<AgentStatus> status;
+  std::vector<AgentClass> agent_class;
+  std::vector<uint8_t> events;
   std::vector<float> speed_mps, lane_offset_m, lane_angle_rad;
   std::vector<int32_t> lane;
   std::vector<AgentBox> boxes;
@@ -121,9 +123,9 @@ struct InfractionObserver::Frame {
     const Device device = simulator.device();
     const AgentStateView state = simulator.state();
     const auto slots = static_cast<size_t>(simulator.num_slots());
-    status = copy_of<uint8_t>(state.status, slots, device);
+    status = copy_of<AgentStatus>(state.status, slots, device);
     events = copy_of<uint8_t>(state.events, slots, device);
-    agent_class = copy_of<uint8_t>(state.agent_class, slots, device);
+    agent_class = copy_of<AgentClass>(state.agent_class, slots, device);
     speed_mps = copy_of<float>(state.speed_mps, slots, device);
     lane_offset_m = copy_of<float>(state.lane_offset_m, slots, device);
     lane_angle_rad = copy_of<float>(state.lane_angle_rad, slots, device);
@@ -137,7 +139,7 @@ struct InfractionObserver::Frame {
     slot_begin = host_copy(simulator.slots().slot_begin, device);
   }
 
-  AgentStatus status_of(size_t slot) const { return static_cast<AgentStatus>(status[slot]); }
+  AgentStatus status_of(size_t slot) const { return status[slot]; }
   bool is_red(size_t light) const { return lights[light] == static_cast<uint8_t>(LightState::red); }
 };
 
@@ -268,7 +270,7 @@ Infraction InfractionObserver::describe(const WorldStep& step, size_t agent) con
   one.map = step.map.name;
   one.agent = static_cast<int>(agent);
   one.step = step_;
-  one.agent_class = static_cast<AgentClass>(before_->agent_class[slot]);
+  one.agent_class = before_->agent_class[slot];
   one.events = after_->events[slot] & (kInfractions | kEventAtFault);
   one.speed_mps = before_->speed_mps[slot];
   one.lane_offset_m = before_->lane_offset_m[slot];

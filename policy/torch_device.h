@@ -59,7 +59,7 @@ at::Tensor tensor_over(Span<T> array, Device device, at::IntArrayRef shape) {
   const at::Device where = torch_device(device);
   // for_blob takes no pointer to const. Told where the memory is, it does not ask the driver.
   return at::for_blob(const_cast<Element*>(array.data()), shape)
-      .options(at::TensorOptions(c10::CppTypeToScalarType<Element>::value).device(where))
+      .options(at::TensorOptions(c10::CppTypeToScalarType<StoredAs<Element>>::value).device(where))
       .target_device(where)
       .make_tensor();
 }

@@ -170,7 +170,7 @@ struct Recorder::Parts {
   std::vector<int32_t>& track(Track which) { return replay.tracks[static_cast<size_t>(which)]; }
   ReplayEpisode& episode() { return replay.episodes.back(); }
   bool is_absent(const AgentStateView& state, int32_t agent) const {
-    return !has_body(static_cast<AgentStatus>(state.status[slot(agent)]));
+    return !has_body(state.status[slot(agent)]);
   }
 
   void begin_episode(const AgentStateView& state, Span<const AgentBox> boxes) {
@@ -233,7 +233,7 @@ struct Recorder::Parts {
     const AgentBox& box = boxes[agent];
     const bool absent = is_absent(state, agent);
     if (state.life[at] != lives[agent]) begin_life(state, box, agent);
-    track(Track::status).push_back(absent ? static_cast<int32_t>(AgentStatus::absent) : state.status[at]);
+    track(Track::status).push_back(static_cast<int32_t>(absent ? AgentStatus::absent : state.status[at]));
     track(Track::halt_reason).push_back(state.halt_reason[at]);
     track(Track::next_waypoint).push_back(absent ? 0 : state.next_waypoint[at]);
     track(Track::events).push_back(begins ? 0 : state.events[at]);

@@ -56,8 +56,8 @@ StateEdit state_edit(const Array& slots, Span<const NamedArray> fields, int num_
 }
 
 std::string field_text(const AgentStateView& agents, int slot, AgentField field) {
-  const auto text = [slot](const auto* values, int per_agent) {
-    const auto* const own = values + int64_t{slot} * per_agent;
+  const auto text = [slot]<typename T>(const T* values, int per_agent) {
+    const auto* const own = reinterpret_cast<const StoredAs<T>*>(values) + int64_t{slot} * per_agent;
     return per_agent == 1 ? fmt::format("{}", *own) : fmt::format("[{}]", fmt::join(own, own + per_agent, ", "));
   };
   switch (field) {

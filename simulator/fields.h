@@ -3,6 +3,7 @@
 // owns them on the host.
 #pragma once
 
+#include "pictura/common/color.h"
 #include "pictura/common/portable/hd.h"
 
 namespace pictura {
@@ -82,9 +83,9 @@ constexpr int kNumWaypoints = 3;
   X(goal_z_m, float, 1, 0, "")                                                                                   \
   X(goal_open, uint8_t, 1, 0, "1 while the metric waits for it")                                                 \
   X(conditioning, float, 17, 0, "reward coefficients and dynamics multipliers; see simulator/conditioning.h")    \
-  X(agent_class, uint8_t, 1, 0, "AgentClass")                                                                    \
-  X(status, uint8_t, 1, 3, "AgentStatus")                                                                        \
-  X(refusal, uint8_t, 1, 0, "SpawnFailure, of an absent agent")                                                  \
+  X(agent_class, AgentClass, 1, AgentClass::vehicle, "AgentClass")                                               \
+  X(status, AgentStatus, 1, AgentStatus::absent, "AgentStatus")                                                  \
+  X(refusal, SpawnFailure, 1, SpawnFailure::none, "SpawnFailure, of an absent agent")                            \
   X(halt_reason, uint8_t, 1, 0, "Event bits that halted it")                                                     \
   X(events, uint8_t, 1, 0, "Event bits of the last step")                                                        \
   X(goals_reached, int32_t, 1, 0, "last waypoints passed within 2 m in this episode")                            \

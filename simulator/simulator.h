@@ -118,7 +118,7 @@ struct StepResult {
   Span<const uint8_t> terminated;  // [slots] 1: an infraction ended the agent's episode in this step
   Span<const uint8_t> truncated;   // [slots] 1: it ended for another reason, or a life on a road that ends; bootstrap
   Span<const uint8_t> valid;       // [slots] 1: the agent was active when the step began: learn from it
-  Span<const uint8_t> refusal;     // [slots] SpawnFailure: why the agent is absent from this episode, 0 where it is not
+  Span<const SpawnFailure> refusal;  // [slots] why the agent is absent from this episode, or none
   Span<const StepSums> sums;       // [slots] of which the reward is made, and how far the agent drove; 0 if not valid
 };
 

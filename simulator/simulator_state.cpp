@@ -148,14 +148,14 @@ SpawnReport SimulatorState::spawn_report(const SimulatorSetup& setup) const {
   report.asked = setup.num_slots();
   report.spawned = std::accumulate(spawned.begin(), spawned.end(), int64_t{0});
   const auto refused_for = [this](SpawnFailure reason) {
-    return std::count(agents.refusal.begin(), agents.refusal.end(), static_cast<uint8_t>(reason));
+    return std::count(agents.refusal.begin(), agents.refusal.end(), reason);
   };
   report.refused_no_place = refused_for(SpawnFailure::no_place);
   report.refused_taken = refused_for(SpawnFailure::taken);
   report.refused = report.refused_no_place + report.refused_taken;
   report.entered = std::accumulate(agents.life.begin(), agents.life.end(), int64_t{0});
   report.left = report.entered +
-                std::count(agents.status.begin(), agents.status.end(), static_cast<uint8_t>(AgentStatus::waiting));
+                std::count(agents.status.begin(), agents.status.end(), AgentStatus::waiting);
   report.parked_asked = int64_t{setup.num_worlds()} * setup.config.parked_cars;
   for (size_t w = 0; w < setup.worlds.size(); ++w) {
     report.parked_placed +=

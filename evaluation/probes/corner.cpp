@@ -102,7 +102,7 @@ class CornerProbe {
   static CornerScene scene_of(const ProbeFrame& frame, size_t world) {
     CornerScene scene;
     scene.boxes.assign(frame.boxes.begin() + frame.box_begin[world], frame.boxes.begin() + frame.box_begin[world + 1]);
-    scene.status.assign(scene.boxes.size(), static_cast<uint8_t>(AgentStatus::parked));
+    scene.status.assign(scene.boxes.size(), AgentStatus::parked);
     std::copy(frame.status.begin() + frame.slot_begin[world], frame.status.begin() + frame.slot_begin[world + 1],
               scene.status.begin());
     return scene;

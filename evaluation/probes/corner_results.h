@@ -37,7 +37,7 @@ CornerControl corner_control_named(const std::string& name);
 /// A world at a takeover, for pictures: agents, then parked cars.
 struct CornerScene {
   std::vector<AgentBox> boxes;
-  std::vector<uint8_t> status;  // [boxes] AgentStatus
+  std::vector<AgentStatus> status;  // [boxes]
   std::vector<Vec2> user_m;     // [kTakeoverSteps + 1] where the hidden vehicle's box is
   int32_t removed = -1;         // who is not there in CornerCase::removed; -1: nobody
 };

@@ -83,7 +83,7 @@ std::vector<CornerState> find_corner_states(const ProbeFrame& frame, size_t worl
     for (int32_t other = 0; other < spec.num_agents; ++other) {
       const auto its_slot = static_cast<size_t>(first + other);
       const int32_t lane = frame.lane[its_slot];
-      const bool drives = static_cast<AgentClass>(frame.agent_class[its_slot]) != AgentClass::pedestrian;
+      const bool drives = frame.agent_class[its_slot] != AgentClass::pedestrian;
       if (other == ego || lane < 0 || !drives || !frame.is_present(its_slot)) continue;
       is_empty &= map.lanes[lane].junction != corner.junction;
       const auto crossing = corner.lanes.find(lane);

@@ -45,7 +45,7 @@ void DrivenScenes::add(Simulator& simulator, int driver) {
   const std::vector<float> x_m = copy(state.x_m), y_m = copy(state.y_m), z_m = copy(state.z_m),
                            heading_rad = copy(state.heading_rad), speed_mps = copy(state.speed_mps);
   const std::vector<int32_t> lane = copy(state.lane);
-  const std::vector<uint8_t> status = copy(state.status);
+  const std::vector<AgentStatus> status = copy(state.status);
   const std::vector<int32_t> slot_begin = host_copy(simulator.slots().slot_begin, device);
   for (size_t world = 0; world < simulator.worlds().size(); ++world) {
     const WorldSpec& spec = simulator.worlds()[world];
@@ -66,7 +66,7 @@ void DrivenScenes::add(Simulator& simulator, int driver) {
                               heading_rad[slot],
                               speed_mps[slot],
                               lane[slot],
-                              static_cast<AgentStatus>(status[slot])});
+                              status[slot]});
     }
   }
 }

@@ -223,7 +223,7 @@ class PedestrianProbe {
     path.view.world = 0;
     path.view.ego_agent = one.ego;
     const auto first_slot = frame.status.begin() + frame.slot_begin[world];
-    path.status.assign(path.boxes.size(), static_cast<uint8_t>(AgentStatus::parked));
+    path.status.assign(path.boxes.size(), AgentStatus::parked);
     std::copy(first_slot, first_slot + spec.num_agents, path.status.begin());
     path.lights.assign(frame.lights.begin() + frame.light_begin[world],
                        frame.lights.begin() + frame.light_begin[world + 1]);

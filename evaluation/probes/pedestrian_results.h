@@ -38,7 +38,7 @@ struct PedestrianPath {
   int32_t first_seen = 0, hidden_again = 0;  // of these, from the path's first
   // The state, for pictures.
   std::vector<AgentBox> boxes;
-  std::vector<uint8_t> status;  // [boxes] AgentStatus
+  std::vector<AgentStatus> status;  // [boxes]
   std::vector<LightState> lights;
   View view;  // of the ego; its indices are those of a scene of this world alone
 

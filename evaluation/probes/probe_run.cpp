@@ -107,8 +107,8 @@ ProbeFrame::ProbeFrame(Simulator& simulator, int steps_done, int drives)
   const Device device = simulator.device();
   const AgentStateView state = simulator.state();
   const auto slots = static_cast<size_t>(simulator.num_slots());
-  status = host_copy(Span<const uint8_t>(state.status, slots), device);
-  agent_class = host_copy(Span<const uint8_t>(state.agent_class, slots), device);
+  status = host_copy(Span<const AgentStatus>(state.status, slots), device);
+  agent_class = host_copy(Span<const AgentClass>(state.agent_class, slots), device);
   lane = host_copy(Span<const int32_t>(state.lane, slots), device);
   speed_mps = host_copy(Span<const float>(state.speed_mps, slots), device);
   const SceneBatch& scene = simulator.scene();

@@ -25,7 +25,8 @@ struct ProbeFrame {
   std::vector<WorldSpec> worlds;
   int step = 0;    // done in them
   int driver = 0;  // index of the policy that drives; a controller comes after all of them
-  std::vector<uint8_t> status, agent_class;
+  std::vector<AgentStatus> status;
+  std::vector<AgentClass> agent_class;
   std::vector<int32_t> lane;
   std::vector<float> speed_mps;
   std::vector<AgentBox> boxes;
@@ -41,12 +42,12 @@ struct ProbeFrame {
     return static_cast<int32_t>(worlds[world].global_world - kFirstEvaluationWorld);
   }
   bool is_present(size_t slot) const {
-    const auto its_status = static_cast<AgentStatus>(status[slot]);
+    const AgentStatus its_status = status[slot];
     return its_status == AgentStatus::active || its_status == AgentStatus::halted;
   }
   bool is_ego(size_t slot) const {
-    return static_cast<AgentStatus>(status[slot]) == AgentStatus::active &&
-           static_cast<AgentClass>(agent_class[slot]) == AgentClass::vehicle;
+    return status[slot] == AgentStatus::active &&
+           agent_class[slot] == AgentClass::vehicle;
   }
 };
 

@@ -75,8 +75,8 @@ class RemovalProbe {
         facts.step = frame.step;
         facts.ego = ego;
         facts.user = user;
-        facts.user_class = static_cast<AgentClass>(frame.agent_class[user_slot]);
-        facts.user_halted = static_cast<AgentStatus>(frame.status[user_slot]) == AgentStatus::halted;
+        facts.user_class = frame.agent_class[user_slot];
+        facts.user_halted = frame.status[user_slot] == AgentStatus::halted;
         facts.distance_m = distance_m;
         facts.ego_speed_mps = frame.speed_mps[slot];
         pairs.push_back({facts, world, first_slot + ego, first_box + user});

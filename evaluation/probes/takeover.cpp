@@ -137,7 +137,7 @@ void TakeoverWorlds::remove(Worlds* worlds, const std::vector<TakeoverStart>& st
   const Device device = run_.device();
   const auto count = static_cast<int64_t>(slots.size());
   const DeviceCopy<int32_t> which(slots, device);
-  const DeviceCopy<uint8_t> absent(std::vector<uint8_t>(slots.size(), static_cast<uint8_t>(AgentStatus::absent)),
+  const DeviceCopy<AgentStatus> absent(std::vector<AgentStatus>(slots.size(), AgentStatus::absent),
                                    device);
   worlds->simulator->set_state(Array(which.span().data(), {count}, device),
                                std::vector<NamedArray>{{"status", Array(absent.span().data(), {count}, device)}},
@@ -154,7 +154,8 @@ bool TakeoverWorlds::look(Worlds* worlds, size_t policy, const std::vector<Takeo
     return host_copy(Span(field, static_cast<size_t>(simulator.num_slots())), device);
   };
   const std::vector<float> x_m = copy(state.x_m), y_m = copy(state.y_m), speed_mps = copy(state.speed_mps);
-  const std::vector<uint8_t> status = copy(state.status), halt_reason = copy(state.halt_reason);
+  const std::vector<AgentStatus> status = copy(state.status);
+  const std::vector<uint8_t> halt_reason = copy(state.halt_reason);
   const std::vector<View> views = host_copy_of_structs(simulator.views(), device);
   const std::vector<AgentBox> boxes = host_copy_of_structs(simulator.scene().agents, device);
   const std::vector<int32_t> box_begin = host_copy(simulator.scene().world_begin, device);
@@ -173,12 +174,12 @@ bool TakeoverWorlds::look(Worlds* worlds, size_t policy, const std::vector<Takeo
     if (step == 0) {
       const DrivenState& driven = start.scene->at(start.step, start.ego);
       PICTURA_CHECK(x_m[slot] == driven.position_m.x && y_m[slot] == driven.position_m.y &&
-                        speed_mps[slot] == driven.speed_mps && status[slot] == static_cast<uint8_t>(driven.status),
+                        speed_mps[slot] == driven.speed_mps && status[slot] == driven.status,
                     "probe: scene {}, step {}: agent {} is not in the state that it was driven to",
                     start.scene->world.global_world - kFirstEvaluationWorld, start.step, start.ego);
     }
     if (one.steps < step) continue;
-    if (status[slot] != static_cast<uint8_t>(AgentStatus::active)) {
+    if (status[slot] != AgentStatus::active) {
       one.ended_by = halt_reason[slot];
       continue;
     }

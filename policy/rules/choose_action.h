@@ -78,12 +78,12 @@ PICTURA_HD inline void write_command(const int32_t* actions, Span<const uint8_t>
 
 /// The slots whose agents are drawn, encoded and commanded.
 struct AskedSlots {
-  const uint8_t* status;
+  const AgentStatus* status;
   Span<const uint8_t> mask;  // [slots] others are left out; empty: none are
   const uint8_t* left;       // [slots] those that have just left a road that ends are asked too; null: they are not
 
   PICTURA_HD bool operator()(int64_t slot) const {
-    const bool is_asked = takes_actions(static_cast<AgentStatus>(status[slot])) || (left != nullptr && left[slot] != 0);
+    const bool is_asked = takes_actions(status[slot]) || (left != nullptr && left[slot] != 0);
     return is_asked && (mask.empty() || mask[slot]);
   }
 };

@@ -9,7 +9,7 @@ DrivenAgent::DrivenAgent(const WorldView& world, int agent)
     : world_(world),
       slot_(world.first_slot + agent),
       parameters_(dynamics_of(world, slot_)),
-      limits_(class_limits(class_of(world.agents, slot_))) {}
+      limits_(class_limits(world.agents.agent_class[slot_])) {}
 
 Motion DrivenAgent::after(const Motion& from, int32_t action) const {
   return move(from, controls_of_action(action), parameters_, limits_, world_.options.dt_s);
@@ -70,7 +70,7 @@ bool DrivenAgent::crosses_exit(const Motion& before, const Motion& after, float 
 
 float DrivenAgent::to_bumper_m() const {
   const float length_m = world_.agents.length_m[slot_];
-  return reference_to_center(class_of(world_.agents, slot_), length_m) + 0.5f * length_m;
+  return reference_to_center(world_.agents.agent_class[slot_], length_m) + 0.5f * length_m;
 }
 
 }  // namespace pictura

@@ -190,7 +190,7 @@ void IdmController::act(const ControllerInput& input, Span<const uint8_t> mask, 
   for (size_t slot = 0; slot < commands_out.size(); ++slot) {
     if (!mask.empty() && !mask[slot]) continue;
     commands_out[slot] = {};
-    if (takes_actions(static_cast<AgentStatus>(input.state.status[slot]))) commands_out[slot] = command_of(input, slot);
+    if (takes_actions(input.state.status[slot])) commands_out[slot] = command_of(input, slot);
   }
 }
 
@@ -209,10 +209,10 @@ float IdmController::place_on_path(const ControllerInput& input, size_t slot) {
            (path.ends || path.length_m() - s_m >= kLeast_m);
   };
   if (on_lanes_[slot] && (begins || path.points_m.empty() || !serves())) {
-    const bool walks = static_cast<AgentClass>(input.state.agent_class[slot]) == AgentClass::pedestrian;
+    const bool walks = input.state.agent_class[slot] == AgentClass::pedestrian;
     const float length_m = input.state.length_m[slot];
     const float front_m =
-        reference_to_center(static_cast<AgentClass>(input.state.agent_class[slot]), length_m) + 0.5f * length_m;
+        reference_to_center(input.state.agent_class[slot], length_m) + 0.5f * length_m;
     path = path_along_lanes(views_[world], walks ? -1 : input.state.lane[slot], here, input.state.heading_rad[slot],
                             front_m);
     s_m = 0;
@@ -291,7 +291,7 @@ Command IdmController::command_of(const ControllerInput& input, size_t slot) {
   if (on_lanes_[slot]) {
     const auto world = static_cast<size_t>(input.slots.world_of_slot[slot]);
     const int32_t lane = input.state.lane[slot];
-    const bool walks = static_cast<AgentClass>(input.state.agent_class[slot]) == AgentClass::pedestrian;
+    const bool walks = input.state.agent_class[slot] == AgentClass::pedestrian;
     if (!walks && lane >= 0) {
       parameters.wanted_mps = std::min(parameters.wanted_mps, views_[world].lanes[lane].speed_limit_mps);
     }

@@ -363,7 +363,7 @@ void LaneKeepingController::act(const ControllerInput& input, Span<const uint8_t
     for (auto slot = static_cast<size_t>(setup_->slot_begin[w]); slot < end; ++slot) {
       if (!mask.empty() && !mask[slot]) continue;
       commands_out[slot] = {};
-      const bool is_active = input.state.status[slot] == static_cast<uint8_t>(AgentStatus::active);
+      const bool is_active = input.state.status[slot] == AgentStatus::active;
       if (agents_[slot] && is_active) commands_out[slot].action = agents_[slot]->act();
     }
   });

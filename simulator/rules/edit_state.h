@@ -10,24 +10,24 @@ namespace pictura {
 /// The first field of an agent that holds what no simulator writes and cannot be stepped on, or `none`.
 PICTURA_HD inline AgentField invalid_field(const MapView& map, const RuleOptions& options, const AgentStateView& agents,
                                            int slot) {
-#define X(name, type, per_agent, first, comment)                                  \
-  for (int i = 0; i < (per_agent); ++i) {                                         \
-    if (!is_finite(agents.name[slot * (per_agent) + i])) return AgentField::name; \
+#define X(name, type, per_agent, first, comment)                                                      \
+  for (int i = 0; i < (per_agent); ++i) {                                                             \
+    if (!is_finite(static_cast<float>(agents.name[slot * (per_agent) + i]))) return AgentField::name; \
   }
   PICTURA_AGENT_FIELDS(X)
 #undef X
-  const auto status = static_cast<AgentStatus>(agents.status[slot]);
+  const auto status = agents.status[slot];
   if (status != AgentStatus::active && status != AgentStatus::halted && status != AgentStatus::absent &&
       !(status == AgentStatus::recorded && has_record(map)) && !(status == AgentStatus::waiting && map.is_open)) {
     return AgentField::status;
   }
-  if (agents.agent_class[slot] >= kNumAgentClasses) return AgentField::agent_class;
+  if (static_cast<int>(agents.agent_class[slot]) >= kNumAgentClasses) return AgentField::agent_class;
   const auto is_lane = [&map](int32_t lane) {
     return lane >= 0 && static_cast<size_t>(lane) < map.lanes.size() && map.lanes[lane].num_segments > 0;
   };
   if (agents.lane[slot] != -1 && !is_lane(agents.lane[slot])) return AgentField::lane;
   const int32_t goal_lane = agents.goal_lane[slot];
-  const bool is_way = class_of(agents, slot) == AgentClass::pedestrian
+  const bool is_way = agents.agent_class[slot] == AgentClass::pedestrian
                           ? goal_lane >= 0 && static_cast<size_t>(goal_lane) < map.walk_pieces.size()
                           : is_lane(goal_lane);
   if (!is_way && !(goal_lane == -1 && (status == AgentStatus::absent || has_record(map)))) return AgentField::goal_lane;
@@ -109,10 +109,10 @@ PICTURA_HD inline int apply_edit(const WorldView& world, const StateEdit& edit, 
   const int slot = edit.slots[i], agent = slot - world.first_slot;
   AgentRecord record = edited_agent(agents, edit, i);
   record.heading_rad[0] = wrap_angle(record.heading_rad[0]);
-  const auto status = static_cast<AgentStatus>(record.status[0]);
+  const auto status = record.status[0];
   if (status == AgentStatus::active) record.halt_reason[0] = 0;
-  const bool joins = has_body(status) && record.refusal[0] != static_cast<uint8_t>(SpawnFailure::none);
-  if (joins) record.refusal[0] = static_cast<uint8_t>(SpawnFailure::none);
+  const bool joins = has_body(status) && record.refusal[0] != SpawnFailure::none;
+  if (joins) record.refusal[0] = SpawnFailure::none;
   copy_fields(record.view(), 0, agents, slot);
   store_motion(agents, slot, motion_of(agents, slot));
   if (has_body(status)) {

@@ -11,7 +11,7 @@ constexpr float kEntryGap_m = 2.0f, kEntryHeadway_s = 2.0f;  // to the next box
 
 /// Whether an agent waits to enter; whoever leaves is still seen in that step.
 PICTURA_HD inline bool waits(const WorldView& world, int agent) {
-  return world.agents.status[world.first_slot + agent] == static_cast<uint8_t>(AgentStatus::waiting) &&
+  return world.agents.status[world.first_slot + agent] == AgentStatus::waiting &&
          !world.boxes[agent].drawn;
 }
 
@@ -97,7 +97,7 @@ PICTURA_HD void begin_life(const WorldView& world, int agent, int step, RoutePoi
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
   if (group.rank() == 0) {
-    const uint8_t agent_class = agents.agent_class[slot];
+    const AgentClass agent_class = agents.agent_class[slot];
     const int32_t life = agents.life[slot] + 1;
     reset_fields(agents, slot);
     agents.agent_class[slot] = agent_class;
@@ -116,7 +116,7 @@ PICTURA_HD bool try_to_enter(const WorldView& world, int agent, int step, const 
   const int slot = world.first_slot + agent;
   const Entry& entry = drawn_entry(world, agent, step);
   if (is_turn_taken(world, agent, step, entry.turn, group)) return false;
-  const AgentClass agent_class = class_of(agents, slot);
+  const AgentClass agent_class = agents.agent_class[slot];
   const BodySize size = draw_size(world, agent, agent_class, step);
   const RoutePoint at = entry_place(world.map, entry, agent_class, size.length_m);
   const LanePose pose = pose_on_lane(world.map, at.lane, at.s_m);

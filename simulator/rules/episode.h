@@ -38,7 +38,7 @@ PICTURA_HD bool takes_part(const WorldView& world, int agent, const CommandType&
 /// Whether the agent counts among those that still drive when it is asked whether an episode ends: who follows a
 /// record does, also where that has nothing, and who waits to enter.
 PICTURA_HD inline bool keeps_episode(const WorldView& world, int agent) {
-  const auto status = static_cast<AgentStatus>(world.agents.status[world.first_slot + agent]);
+  const auto status = world.agents.status[world.first_slot + agent];
   return takes_actions(status) || status == AgentStatus::waiting ||
          (status == AgentStatus::absent && has_record(world.map));
 }

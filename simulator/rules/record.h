@@ -28,7 +28,7 @@ PICTURA_HD inline void store_recorded_size(const WorldView& world, int agent) {
 
 /// Where pedestrians walk, and everybody else drives.
 PICTURA_HD inline bool walks(const WorldView& world, int agent) {
-  return class_of(world.agents, world.first_slot + agent) == AgentClass::pedestrian;
+  return world.agents.agent_class[world.first_slot + agent] == AgentClass::pedestrian;
 }
 
 template <typename ThreadGroup>
@@ -47,7 +47,7 @@ PICTURA_HD inline void clear_place(const WorldView& world, int agent) {
 
 /// Takes an agent out of its world's episode.
 PICTURA_HD inline void leave(const WorldView& world, int agent) {
-  world.agents.status[world.first_slot + agent] = static_cast<uint8_t>(AgentStatus::absent);
+  world.agents.status[world.first_slot + agent] = AgentStatus::absent;
   clear_place(world, agent);
 }
 
@@ -58,7 +58,7 @@ PICTURA_HD void follow_record(const WorldView& world, int agent, int step, const
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
   const RecordedState at = recorded_state(world.map, agent, step);
-  const bool goes_on = agents.status[slot] == static_cast<uint8_t>(AgentStatus::recorded);
+  const bool goes_on = agents.status[slot] == AgentStatus::recorded;
   const int32_t lane_before = goes_on ? agents.lane[slot] : -1;
   const AgentBox before = world.boxes[agent];
   if (!at.is_there) {
@@ -76,7 +76,7 @@ PICTURA_HD void follow_record(const WorldView& world, int agent, int step, const
   motion.speed_mps = at.speed_mps;
   store_motion(agents, slot, motion);
   store_fit(agents, slot, fit);
-  agents.status[slot] = static_cast<uint8_t>(AgentStatus::recorded);
+  agents.status[slot] = AgentStatus::recorded;
   agents.events[slot] = kEventNone;
   world.boxes[agent] = box_of(agents, slot);
   world.boxes_before[agent] = goes_on ? before : world.boxes[agent];

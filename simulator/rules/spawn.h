@@ -51,7 +51,7 @@ PICTURA_HD inline BodySize draw_size(const WorldView& world, int agent, AgentCla
 PICTURA_HD inline void draw_body(const WorldView& world, int agent) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
-  const AgentClass agent_class = class_of(agents, slot);
+  const AgentClass agent_class = agents.agent_class[slot];
   const int step = agents.life_step[slot];
   const BodySize size = draw_size(world, agent, agent_class, step);
   agents.length_m[slot] = size.length_m;
@@ -86,7 +86,7 @@ PICTURA_HD inline void draw_agent(const WorldView& world, int agent) {
   if (has_record(world.map)) {
     agent_class = static_cast<AgentClass>(world.map.recorded_agents[agent].agent_class);
   }
-  agents.agent_class[slot] = static_cast<uint8_t>(agent_class);
+  agents.agent_class[slot] = agent_class;
   draw_body(world, agent);
 }
 
@@ -321,7 +321,7 @@ PICTURA_HD void put_on_route(const WorldView& world, int agent, RoutePoint at, f
     motion.speed_mps = speed_mps;
     store_motion(agents, slot, motion);
     store_fit(agents, slot, fit);
-    agents.status[slot] = static_cast<uint8_t>(AgentStatus::active);
+    agents.status[slot] = AgentStatus::active;
     agents.goal_lane[slot] = at.lane;
     agents.goal_lane_s_m[slot] = at.s_m;
     world.boxes[agent] = world.boxes_before[agent] = box_of(agents, slot);
@@ -340,8 +340,7 @@ PICTURA_HD void place_agent(const WorldView& world, int agent, int i, const Thre
   if (i < 0) {
     if (group.rank() > 0) return;
     world.boxes[agent] = world.boxes_before[agent] = box_of(agents, slot);
-    agents.refusal[slot] =
-        static_cast<uint8_t>(has_places(world, agent) ? SpawnFailure::taken : SpawnFailure::no_place);
+    agents.refusal[slot] = has_places(world, agent) ? SpawnFailure::taken : SpawnFailure::no_place;
     return;
   }
   put_on_route(world, agent, spawn_point(world, agent, i), 0.0f, group);

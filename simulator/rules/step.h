@@ -12,11 +12,11 @@
 namespace pictura {
 
 PICTURA_HD inline bool is_active(const WorldView& world, int agent) {
-  return world.agents.status[world.first_slot + agent] == static_cast<uint8_t>(AgentStatus::active);
+  return world.agents.status[world.first_slot + agent] == AgentStatus::active;
 }
 
 PICTURA_HD inline bool takes_actions(const WorldView& world, int agent) {
-  return takes_actions(static_cast<AgentStatus>(world.agents.status[world.first_slot + agent]));
+  return takes_actions(world.agents.status[world.first_slot + agent]);
 }
 
 /// Whether the agent left a road that ends in the last step.
@@ -127,14 +127,14 @@ PICTURA_HD inline bool tells_to_follow_record(const Command& command) { return c
 /// Whether a command to follow the record has an effect: whoever has not halted follows, the absent too.
 PICTURA_HD inline bool may_follow_record(const WorldView& world, int agent) {
   return has_record(world.map) &&
-         world.agents.status[world.first_slot + agent] != static_cast<uint8_t>(AgentStatus::halted);
+         world.agents.status[world.first_slot + agent] != AgentStatus::halted;
 }
 
 /// Where an agent is told to be after the step. Which level it is then on is looked for around *z_m_inout.
 PICTURA_HD inline Motion commanded_motion(const WorldView& world, int agent, int32_t action, float*) {
   const int slot = world.first_slot + agent;
   return move(motion_of(world.agents, slot), controls_of_action(action), dynamics_of(world, slot),
-              class_limits(class_of(world.agents, slot)), world.options.dt_s);
+              class_limits(world.agents.agent_class[slot]), world.options.dt_s);
 }
 PICTURA_HD inline Motion commanded_motion(const WorldView& world, int agent, const Command& command, float* z_m_inout) {
   if (command.kind == CommandKind::action) return commanded_motion(world, agent, command.action, z_m_inout);
@@ -155,7 +155,7 @@ PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& co
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
   const AgentBox before = world.boxes[agent];
-  const bool is_recorded = agents.status[slot] == static_cast<uint8_t>(AgentStatus::recorded);
+  const bool is_recorded = agents.status[slot] == AgentStatus::recorded;
   if (tells_to_follow_record(command) && may_follow_record(world, agent)) {
     return follow_record(world, agent, step, group);
   }
@@ -163,7 +163,7 @@ PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& co
     if (group.rank() > 0) return;
     if (world.map.is_open) agents.left[slot] = 0;
     // Who left at the end of the last step was still there for all to see.
-    const bool is_gone = !has_body(static_cast<AgentStatus>(agents.status[slot])) && before.drawn;
+    const bool is_gone = !has_body(agents.status[slot]) && before.drawn;
     if (is_gone) return clear_place(world, agent);
     world.boxes_before[agent] = before;
     agents.events[slot] = kEventNone;
@@ -176,7 +176,7 @@ PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& co
     return;
   }
 
-  const AgentClass agent_class = class_of(agents, slot);
+  const AgentClass agent_class = agents.agent_class[slot];
   const Vec3 from{agents.x_m[slot], agents.y_m[slot], agents.z_m[slot]};
   float level_m = from.z;
   const Motion motion = commanded_motion(world, agent, command, &level_m);
@@ -199,7 +199,7 @@ PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& co
   }
   events |= pass_waypoints(world, agent, from, {motion.x_m, motion.y_m, fit.z_m}, group);
   if (group.rank() > 0) return;
-  if (is_recorded) agents.status[slot] = static_cast<uint8_t>(AgentStatus::active);
+  if (is_recorded) agents.status[slot] = AgentStatus::active;
   agents.distance_m[slot] += driven_m(motion.speed_mps, world.options.dt_s);
   world.boxes_before[agent] = before;
   world.boxes[agent] = box;
@@ -275,11 +275,11 @@ PICTURA_HD inline RewardTerms apply_reward_and_halt(const WorldView& world, int 
   const bool halts = infractions != 0 && after == AfterInfraction::halt;
   if (has_left(world, agent)) {
     agents.left[slot] = !is_out && !halts;
-    if (agents.left[slot]) agents.status[slot] = static_cast<uint8_t>(AgentStatus::waiting);
+    if (agents.left[slot]) agents.status[slot] = AgentStatus::waiting;
   }
-  if (is_out) agents.status[slot] = static_cast<uint8_t>(AgentStatus::absent);
+  if (is_out) agents.status[slot] = AgentStatus::absent;
   if (is_out || !halts) return terms;
-  agents.status[slot] = static_cast<uint8_t>(AgentStatus::halted);
+  agents.status[slot] = AgentStatus::halted;
   agents.speed_mps[slot] = agents.accel_long_mps2[slot] = agents.accel_lat_mps2[slot] = 0.0f;
   agents.steer_rad[slot] = agents.jerk_long_mps3[slot] = agents.jerk_lat_mps3[slot] = 0.0f;
   world.boxes[agent].palette = kHaltedPalette;

@@ -48,10 +48,6 @@ struct WorldView {
   LightState* lights = nullptr;      // [stop lines] as observed before the step, and during it
 };
 
-PICTURA_HD inline AgentClass class_of(const AgentStateView& agents, int slot) {
-  return static_cast<AgentClass>(agents.agent_class[slot]);
-}
-
 PICTURA_HD inline Motion motion_of(const AgentStateView& agents, int slot) {
   return {agents.x_m[slot],
           agents.y_m[slot],
@@ -117,14 +113,14 @@ PICTURA_HD inline AgentBox box_at(AgentClass agent_class, const BodySize& size, 
 /// The same of the agent's class and size.
 PICTURA_HD inline AgentBox box_at(const AgentStateView& agents, int slot, Vec3 position_m, SinCos heading) {
   const BodySize size{agents.length_m[slot], agents.width_m[slot], agents.height_m[slot]};
-  return box_at(class_of(agents, slot), size, position_m, heading);
+  return box_at(agents.agent_class[slot], size, position_m, heading);
 }
 
 constexpr uint8_t kHaltedPalette = 1;
 
 /// The agent's box in the scene; nothing of an agent without a body is drawn or met.
 PICTURA_HD inline AgentBox box_of(const AgentStateView& agents, int slot) {
-  const AgentStatus status = static_cast<AgentStatus>(agents.status[slot]);
+  const AgentStatus status = agents.status[slot];
   AgentBox box = box_at(agents, slot, {agents.x_m[slot], agents.y_m[slot], agents.z_m[slot]},
                         {agents.sin_heading[slot], agents.cos_heading[slot]});
   box.palette = status == AgentStatus::halted ? kHaltedPalette : 0;

@@ -23,6 +23,25 @@ TEST(Array, OfAContainerIsOneDimensionOnTheHost) {
   EXPECT_EQ(span.size(), 3u);
 }
 
+TEST(Array, StoresEnumerationsAsTheirIntegers) {
+  enum class Light : uint8_t { red, green };
+  std::vector<Light> lights{Light::green, Light::red};
+  const Array array = lights;
+  EXPECT_EQ(array.text(), "u8 [2] on cpu");
+  EXPECT_EQ(array.checked<const Light>("lights", {2}, {})[0], Light::green);
+  EXPECT_EQ(array.checked<const uint8_t>("lights", {2}, {})[0], 1);
+}
+
+TEST(Span, IsIndexedByAnyInteger) {
+  const std::vector<float> values{1, 2, 3};
+  const int count = 2;
+  const Span<const float> span{values.data(), count};
+  EXPECT_EQ(span.size(), 2u);
+  EXPECT_EQ(span[int64_t{1}], 2);
+  EXPECT_EQ(span[uint8_t{1}], 2);
+  EXPECT_EQ(span.subspan(count - 1, 1)[0], 2);
+}
+
 TEST(Array, StridesFollowTheShape) {
   float data[24] = {};
   const Array array(data, {2, 3, 4}, Device{});

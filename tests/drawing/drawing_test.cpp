@@ -145,9 +145,9 @@ TEST(WorldPainter, SkipsAbsentAgentsAndDimsHaltedOnes) {
   WorldPainter painter(town(), 400, 300);
   std::vector<AgentBox> agents{box(500, 400, 0), box(500, 405, 0), box(500, 395, 0), box(510, 400, 0)};
   agents[3].drawn = 0;
-  const std::vector<uint8_t> status{
-      static_cast<uint8_t>(AgentStatus::halted), static_cast<uint8_t>(AgentStatus::absent),
-      static_cast<uint8_t>(AgentStatus::active), static_cast<uint8_t>(AgentStatus::active)};
+  const std::vector<AgentStatus> status{
+      AgentStatus::halted, AgentStatus::absent,
+      AgentStatus::active, AgentStatus::active};
   WorldFrame frame;
   frame.agents = agents;
   frame.status = status;
@@ -159,15 +159,15 @@ TEST(WorldPainter, SkipsAbsentAgentsAndDimsHaltedOnes) {
   EXPECT_EQ(at(image, 185, 200), kVehicleBody);
   EXPECT_EQ(at(image, 285, 150), kGround);
 
-  frame.status = Span<const uint8_t>(status).subspan(0, 3);
+  frame.status = Span<const AgentStatus>(status).subspan(0, 3);
   EXPECT_THAT(test::message_of([&] { painter.draw(frame, painter.whole_map()); }), HasSubstr("4 agents, got 3"));
 }
 
 TEST(WorldPainter, RingsShowHaltReasonsAndTheLegendCountsThem) {
   WorldPainter painter(town(), 800, 600);
   const std::vector<AgentBox> agents{box(500, 400, 0), box(510, 400, 0), box(500, 410, 0), box(510, 410, 0)};
-  const auto active = static_cast<uint8_t>(AgentStatus::active), halted = static_cast<uint8_t>(AgentStatus::halted);
-  const std::vector<uint8_t> status{halted, halted, active, halted};
+  const auto active = AgentStatus::active, halted = AgentStatus::halted;
+  const std::vector<AgentStatus> status{halted, halted, active, halted};
   std::vector<uint8_t> reasons{kEventCollision | kEventAtFault, kEventRedLight, 0, kEventOffRoad};
   WorldFrame frame;
   frame.agents = agents;
@@ -379,7 +379,7 @@ class StillSimulator final : public Simulator {
   std::vector<int32_t> world_begin_, light_begin_;
   std::vector<LightState> lights_;
   // Only slot 2 has waypoints, and has passed the first.
-  std::vector<uint8_t> status_{0, 0, 0, 1};
+  std::vector<AgentStatus> status_{AgentStatus::active, AgentStatus::active, AgentStatus::active, AgentStatus::halted};
   std::vector<uint8_t> halt_reason_{0, 0, 0, kEventWall};
   std::vector<int32_t> next_waypoint_{0, 0, 1, 0};
   std::vector<float> waypoint_x_m_ = std::vector<float>(12, 505.0f);

@@ -211,8 +211,8 @@ TEST(Collision, BothHaltAndOnlyTheRammerIsAtFault) {
   EXPECT_EQ(stage.events(0), kEventCollision | kEventAtFault);
   EXPECT_EQ(stage.events(1), kEventCollision);
   EXPECT_EQ(stage.events(2), kEventNone);
-  EXPECT_EQ(stage.worlds.state.agents.status[0], static_cast<uint8_t>(AgentStatus::halted));
-  EXPECT_EQ(stage.worlds.state.agents.status[1], static_cast<uint8_t>(AgentStatus::halted));
+  EXPECT_EQ(stage.worlds.state.agents.status[0], AgentStatus::halted);
+  EXPECT_EQ(stage.worlds.state.agents.status[1], AgentStatus::halted);
   EXPECT_EQ(stage.worlds.state.agents.speed_mps[0], 0);
   EXPECT_NEAR(rewards[0], -3, 0.01);
   EXPECT_NEAR(rewards[1], -0.5, 0.01);

@@ -57,7 +57,7 @@ std::unique_ptr<Simulator> queue_of(int num_cars, float gap_m, SimulatorConfig c
 
 void set_absent(Simulator* simulator, int32_t slot) {
   const std::vector<int32_t> slots{slot};
-  const std::vector<uint8_t> absent{static_cast<uint8_t>(AgentStatus::absent)};
+  const std::vector<AgentStatus> absent{AgentStatus::absent};
   simulator->set_state(slots, std::vector<NamedArray>{{"status", Array(absent)}});
 }
 
@@ -228,7 +228,7 @@ TEST(ObservationQueries, ShowTheNearestOfAnyHiddenAndInserted) {
     }
     ASSERT_EQ(testing::first_difference(others, ordinary_others), "");
     const View& view = simulator->views()[static_cast<size_t>(query.slot)];
-    if (state.status[query.slot] != static_cast<uint8_t>(AgentStatus::active) && ordinary.ego[1] == 0) {
+    if (state.status[query.slot] != AgentStatus::active && ordinary.ego[1] == 0) {
       ASSERT_EQ(answer.set_counts[0], 0);
       for (const float value : answer.partners) ASSERT_EQ(value, 0);
       continue;

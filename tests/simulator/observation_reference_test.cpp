@@ -94,7 +94,7 @@ void compare(Simulator& simulator, Span<const uint8_t> ended, Compared* compared
       const size_t size = array.size() / static_cast<size_t>(simulator.num_slots());
       return array.subspan(static_cast<size_t>(slot) * size, size);
     };
-    const bool goes_on = takes_actions(static_cast<AgentStatus>(state.status[slot]));
+    const bool goes_on = takes_actions(state.status[slot]);
     if (!goes_on && ended[static_cast<size_t>(slot)] == 0 && state.left[slot] == 0) {
       ++compared->zeros;
 #define X(name, type, rows, features, part, comment) \
@@ -127,7 +127,7 @@ void compare(Simulator& simulator, Span<const uint8_t> ended, Compared* compared
     compared->without_lane += state.lane[slot] < 0;
     compared->far_from_lanes += !expected.is_near_lane;
     compared->beyond_cells += !expected.is_within_cells;
-    ++compared->of_class[state.agent_class[slot]];
+    ++compared->of_class[static_cast<int>(state.agent_class[slot])];
   }
 }
 

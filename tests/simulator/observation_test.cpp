@@ -357,7 +357,7 @@ TEST_F(Observation, WallsAreThereOnlyWhereTheyAreAskedFor) {
 
 TEST_F(Observation, HaltedAndAbsentAgentsObserveNothingButTheyAreSeen) {
   AgentState& agents = stage.worlds.state.agents;
-  agents.status[1] = static_cast<uint8_t>(AgentStatus::halted);
+  agents.status[1] = AgentStatus::halted;
   agents.events[1] = kEventNone;
   look();
   const ObservationView out = stage.results.observation_view();

@@ -27,7 +27,7 @@ std::shared_ptr<const RoadMap> map_of(const std::string& text) {
 }
 
 bool is(AgentStatus status, const AgentStateView& state, int slot) {
-  return state.status[slot] == static_cast<uint8_t>(status);
+  return state.status[slot] == status;
 }
 
 /// Steps a simulator with a controller and calls look(result) after each step.

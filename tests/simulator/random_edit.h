@@ -16,7 +16,7 @@ class RandomEdit {
       RandomStream random(
           {.seed = 7, .world = number, .agent = static_cast<uint32_t>(slot), .purpose = Purpose::action});
       if (random.uniform() < 0.66f) continue;
-      const auto is_placed = [&state](int of) { return state.status[of] != static_cast<uint8_t>(AgentStatus::absent); };
+      const auto is_placed = [&state](int of) { return state.status[of] != AgentStatus::absent; };
       const int other = random.below(num_slots);
       const int of = random.uniform() < 0.1f && is_placed(other) ? other : slot;
       slots_.push_back(slot);
@@ -26,10 +26,10 @@ class RandomEdit {
       heading_rad_.push_back(state.heading_rad[of] + random.uniform(-7, 7));
       speed_mps_.push_back(random.uniform(-1, 15));
       const bool has_goal = state.goal_lane[slot] >= 0;
-      status_.push_back(static_cast<uint8_t>(!has_goal                 ? AgentStatus::absent
+      status_.push_back(!has_goal                 ? AgentStatus::absent
                                              : random.uniform() < 0.1f ? AgentStatus::absent
                                              : random.uniform() < 0.1f ? AgentStatus::halted
-                                                                       : AgentStatus::active));
+                                                                       : AgentStatus::active);
       for (int i = 0; i < kNumWaypoints; ++i) waypoint_x_m_.push_back(x_m_.back() + random.uniform(-30, 30));
     }
   }
@@ -50,7 +50,7 @@ class RandomEdit {
 
   std::vector<int32_t> slots_;
   std::vector<float> x_m_, y_m_, z_m_, heading_rad_, speed_mps_, waypoint_x_m_;
-  std::vector<uint8_t> status_;
+  std::vector<AgentStatus> status_;
 };
 
 }  // namespace pictura::testing

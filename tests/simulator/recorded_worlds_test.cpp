@@ -38,7 +38,7 @@ const std::vector<Command>& recorded(const Simulator& simulator) {
 }
 
 AgentStatus status_of(Simulator& simulator, int slot) {
-  return static_cast<AgentStatus>(simulator.state().status[slot]);
+  return simulator.state().status[slot];
 }
 
 /// Expects every agent to be where the recording has it at this step, or nowhere.
@@ -601,7 +601,7 @@ TEST(RecordedWorlds, IdmFollowsLanesWhereThereIsNoRecord) {
       town->step(commands);
       for (int slot = 0; slot < town->num_slots(); ++slot) {
         if (status_of(*town, slot) != AgentStatus::active) continue;
-        if (state.agent_class[slot] == static_cast<uint8_t>(AgentClass::pedestrian)) {
+        if (state.agent_class[slot] == AgentClass::pedestrian) {
           EXPECT_EQ(state.speed_mps[slot], 0);
           continue;
         }

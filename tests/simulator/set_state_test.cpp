@@ -160,7 +160,7 @@ TEST(SetState, OfAnAgentThatFoundNoPlaceCountsItAsSpawned) {
   const SpawnReport before = simulator->spawn_report();
   ASSERT_GT(before.refused, 0);
   int32_t absent = 0;
-  while (simulator->state().refusal[absent] == 0) ++absent;
+  while (simulator->state().refusal[absent] == SpawnFailure::none) ++absent;
   const std::vector<int32_t> slots{absent}, goal_lane{0};
   const std::vector<uint8_t> active{0};
   EXPECT_EQ(test::message_of([&] { simulator->set_state(slots, std::vector<NamedArray>{named("status", active)}); }),

@@ -194,7 +194,7 @@ TEST_F(RedLight, CrossingOnRedIsAnEvent) {
   stage.worlds.state.lights[0] = LightState::red;
   EXPECT_NEAR(stage.step()[0], -0.75, 0.01);
   EXPECT_EQ(stage.events(0), kEventRedLight);
-  EXPECT_EQ(stage.worlds.state.agents.status[0], static_cast<uint8_t>(AgentStatus::halted));
+  EXPECT_EQ(stage.worlds.state.agents.status[0], AgentStatus::halted);
 }
 
 TEST_F(RedLight, OtherColoursAreNone) {

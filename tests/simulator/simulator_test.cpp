@@ -149,7 +149,7 @@ TEST(Simulator, SpawnsWithoutOverlapAndCountsRefusals) {
     const AgentBox& a = scene.agents[i];
     drawn += a.drawn;
     if (!a.drawn) {
-      EXPECT_EQ(simulator->state().status[i], static_cast<uint8_t>(AgentStatus::absent));
+      EXPECT_EQ(simulator->state().status[i], AgentStatus::absent);
       EXPECT_EQ(simulator->views()[i].ego_agent, -1);
       continue;
     }
@@ -467,7 +467,7 @@ std::array<std::vector<int32_t>, 2> episode_lengths(Simulator* simulator, int ep
     for (size_t w = 0; w < num_worlds; ++w) {
       if (!simulator->episode_over()[w]) continue;
       lengths[static_cast<size_t>(simulator->episode_index()[w])][w] = simulator->episode_step()[w];
-      const bool drives = simulator->state().status[w] == static_cast<uint8_t>(AgentStatus::active);
+      const bool drives = simulator->state().status[w] == AgentStatus::active;
       EXPECT_EQ(result.truncated[w], drives) << w;  // agents that still drive at the end bootstrap
       truncated += drives;
     }
@@ -590,9 +590,9 @@ TEST(Simulator, RestoreRefusesFieldsOutOfRangeAndStaysAsItWas) {
   EXPECT_THAT(refusal([](AgentStateView state) { state.goal_lane[1] = -1; }), HasSubstr("agent 1: goal_lane: -1"));
   EXPECT_THAT(refusal([](AgentStateView state) { state.next_waypoint[0] = 3; }), HasSubstr("next_waypoint: 3"));
   EXPECT_THAT(refusal([](AgentStateView state) { state.first_motion_step[0] = -1; }), HasSubstr("first_motion_step"));
-  EXPECT_THAT(refusal([](AgentStateView state) { state.agent_class[2] = 3; }), HasSubstr("agent_class: 3"));
-  EXPECT_THAT(refusal([](AgentStateView state) { state.status[2] = 4; }), HasSubstr("status: 4"));
-  EXPECT_THAT(refusal([](AgentStateView state) { state.status[2] = 2; }), HasSubstr("status: 2"));
+  EXPECT_THAT(refusal([](AgentStateView state) { state.agent_class[2] = AgentClass{3}; }), HasSubstr("agent_class: 3"));
+  EXPECT_THAT(refusal([](AgentStateView state) { state.status[2] = AgentStatus{4}; }), HasSubstr("status: 4"));
+  EXPECT_THAT(refusal([](AgentStateView state) { state.status[2] = AgentStatus::parked; }), HasSubstr("status: 2"));
   EXPECT_THAT(refusal([](AgentStateView state) { state.x_m[2] = NAN; }), HasSubstr("x_m"));
   EXPECT_THAT(refusal([](AgentStateView state) { state.y_m[2] = 1e9f; }), HasSubstr("agent 2: y_m"));
   EXPECT_THAT(refusal([](AgentStateView state) { state.conditioning[20] = INFINITY; }), HasSubstr("conditioning"));
@@ -758,8 +758,8 @@ TEST(Simulator, ClassesComeInThePapersSharesEachWithItsSizes) {
   const AgentStateView state = simulator->state();
   int counts[kNumAgentClasses] = {};
   for (int i = 0; i < kAgents; ++i) {
-    ++counts[state.agent_class[i]];
-    const ClassLimits limits = class_limits(static_cast<AgentClass>(state.agent_class[i]));
+    ++counts[static_cast<int>(state.agent_class[i])];
+    const ClassLimits limits = class_limits(state.agent_class[i]);
     ASSERT_GE(state.length_m[i], limits.min_length_m);
     ASSERT_LE(state.length_m[i], limits.max_length_m);
     ASSERT_GE(state.width_m[i], limits.min_width_m);

@@ -34,7 +34,7 @@ void Stage::put(int agent, Vec2 position_m, float heading_rad, float speed_mps) 
   motion.speed_mps = speed_mps;
   store_motion(view.agents, agent, motion);
   store_fit(view.agents, agent, fit_lane(view.map, position_m, 0, heading_rad, -1));
-  view.agents.status[agent] = static_cast<uint8_t>(AgentStatus::active);
+  view.agents.status[agent] = AgentStatus::active;
   view.boxes[agent] = view.boxes_before[agent] = box_of(view.agents, agent);
   sort_boxes();
 }

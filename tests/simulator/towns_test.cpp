@@ -46,9 +46,9 @@ TEST(Towns, AccountForEveryAgentThatIsAskedFor) {
     const AgentStateView state = simulator->state();
     int64_t counts[3] = {};
     for (int i = 0; i < 1024; ++i) {
-      ASSERT_LE(state.refusal[i], 2);
-      EXPECT_EQ(state.refusal[i] != 0, state.status[i] == static_cast<uint8_t>(AgentStatus::absent));
-      ++counts[state.refusal[i]];
+      ASSERT_LE(state.refusal[i], SpawnFailure::taken);
+      EXPECT_EQ(state.refusal[i] != SpawnFailure::none, state.status[i] == AgentStatus::absent);
+      ++counts[static_cast<int>(state.refusal[i])];
     }
     EXPECT_EQ(report.asked, 1024);
     const StepResult result = simulator->step(std::vector<int32_t>(1024, 0));

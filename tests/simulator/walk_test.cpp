@@ -151,7 +151,7 @@ TEST(Pedestrians, StandAndAimOnWalkwaysAndAreToldOfGoalsAndCollisionsAlone) {
     draw_agent(world, agent);
     place_agent(world, agent, 0);
     const auto i = static_cast<size_t>(agent);
-    EXPECT_EQ(stage.worlds.state.agents.agent_class[i], static_cast<uint8_t>(AgentClass::pedestrian));
+    EXPECT_EQ(stage.worlds.state.agents.agent_class[i], AgentClass::pedestrian);
     const auto on_walk = [&](float x, float y) {
       return std::fabs(std::fabs(y) - 5) < 1e-3f || std::fabs(x - 50) < 1e-3f;
     };
@@ -179,7 +179,7 @@ TEST(Pedestrians, MayStandOnTheRoadAndPassRedLights) {
   auto map = street();
   testing::add_light(map.get(), 100, 4, 2, {0});
   testing::Stage stage(map, 1);
-  stage.worlds.state.agents.agent_class[0] = static_cast<uint8_t>(AgentClass::pedestrian);
+  stage.worlds.state.agents.agent_class[0] = AgentClass::pedestrian;
   stage.worlds.state.agents.length_m[0] = stage.worlds.state.agents.width_m[0] = 0.5f;
   stage.worlds.state.lights[0] = LightState::red;
   // Along the road over the line, then off the road: a car would halt at either.
@@ -189,7 +189,7 @@ TEST(Pedestrians, MayStandOnTheRoadAndPassRedLights) {
   stage.put(0, {80, 2.05f}, kHalfPi, 2);
   stage.step();
   EXPECT_EQ(stage.events(0), kEventNone);
-  stage.worlds.state.agents.agent_class[0] = static_cast<uint8_t>(AgentClass::vehicle);
+  stage.worlds.state.agents.agent_class[0] = AgentClass::vehicle;
   stage.put(0, {80, 2.05f}, kHalfPi, 2);
   stage.step();
   EXPECT_EQ(stage.events(0), kEventOffRoad);
@@ -216,7 +216,7 @@ TEST(Pedestrians, SpawnAtTheHeightOfTheirWalkwayWithTheirBoxes) {
   const AgentStateView state = simulator->state();
   int present = 0;
   for (size_t i = 0; i < 30; ++i) {
-    if (state.status[i] != static_cast<uint8_t>(AgentStatus::active)) continue;
+    if (state.status[i] != AgentStatus::active) continue;
     ++present;
     EXPECT_NEAR(state.z_m[i], 0.5f, 1e-4f);
     EXPECT_EQ(simulator->scene().agents[i].center_m.z, state.z_m[i]);
@@ -237,7 +237,7 @@ TEST(Pedestrians, DoNotAimAtPlacesUnderParkedCars) {
   ASSERT_GT(simulator->spawn_report().parked_placed, 10);
   const AgentStateView state = simulator->state();
   for (int i = 0; i < 100 * kNumWaypoints; ++i) {
-    if (state.status[i / kNumWaypoints] != static_cast<uint8_t>(AgentStatus::active)) continue;
+    if (state.status[i / kNumWaypoints] != AgentStatus::active) continue;
     for (size_t car = 100; car < 130; ++car) {
       const AgentBox& box = simulator->scene().agents[car];
       if (!box.drawn) continue;
@@ -258,10 +258,10 @@ TEST(Pedestrians, AreRefusedWhereThereIsNowhereToWalk) {
   const AgentStateView state = simulator->state();
   int walkers = 0;
   for (int i = 0; i < 40; ++i) {
-    const bool walks = state.agent_class[i] == static_cast<uint8_t>(AgentClass::pedestrian);
+    const bool walks = state.agent_class[i] == AgentClass::pedestrian;
     walkers += walks;
     if (walks) {
-      EXPECT_EQ(state.status[i], static_cast<uint8_t>(AgentStatus::absent));
+      EXPECT_EQ(state.status[i], AgentStatus::absent);
     }
   }
   EXPECT_GT(walkers, 8);

@@ -191,7 +191,7 @@ TEST(Commands, TheAbsentLeaveTheirEpisode) {
   std::vector<Command> commands(3);
   commands[1] = absence();
   StepResult result = simulator->step(commands);
-  EXPECT_EQ(simulator->state().status[1], static_cast<uint8_t>(AgentStatus::absent));
+  EXPECT_EQ(simulator->state().status[1], AgentStatus::absent);
   EXPECT_EQ(simulator->scene().agents[1].drawn, 0);
   EXPECT_EQ(simulator->views()[1].ego_agent, -1);
   EXPECT_EQ(result.valid[1], 0);
@@ -207,7 +207,7 @@ TEST(Commands, TheAbsentLeaveTheirEpisode) {
   const auto other = make(testing::cars({.reset_inactive_fraction = 2}), testing::stadium(200, 2), {{0, 3, 0}});
   EXPECT_NO_THROW(other->restore(simulator->save()));
   simulator->reset();
-  EXPECT_EQ(simulator->state().status[1], static_cast<uint8_t>(AgentStatus::active));
+  EXPECT_EQ(simulator->state().status[1], AgentStatus::active);
 }
 
 TEST(Commands, OutOfRangeAreRefusedByNameAndChangeNothing) {
