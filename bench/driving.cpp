@@ -15,7 +15,7 @@ void step_randomly(Simulator* simulator, uint64_t seed, int steps) {
   std::vector<Command> commands(static_cast<std::size_t>(simulator->num_slots()));
   for (int step = 0; step < steps; ++step) {
     throw_if_interrupted();
-    controller->act(simulator->controller_input(), {}, commands);
+    controller->act(simulator->arrays(), {}, commands);
     simulator->step(commands);
   }
 }

@@ -23,7 +23,7 @@ std::vector<DrivenEpisode> drive_lane_keeping_episodes(const std::shared_ptr<con
   std::vector<Command> commands(static_cast<size_t>(simulator->num_slots()));
   for (int step = 0; step < steps; ++step) {
     throw_if_interrupted();
-    controller.act(simulator->controller_input(), {}, commands);
+    controller.act(simulator->arrays(), {}, commands);
     simulator->step(commands);
   }
   const AgentStateView state = simulator->state();

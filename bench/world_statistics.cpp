@@ -77,7 +77,7 @@ void count_random_policy(Simulator& simulator, const WorldStatisticsOptions& opt
     const Span<const int32_t> before = simulator.episode_index();
     const std::vector<int32_t> episode(before.begin(), before.end());
     if (std::none_of(episode.begin(), episode.end(), in_first_episode)) break;
-    controller->act(simulator.controller_input(), {}, commands);
+    controller->act(simulator.arrays(), {}, commands);
     const StepResult result = simulator.step(commands);
     size_t slot = 0;
     for (size_t w = 0; w < worlds.size(); ++w) {

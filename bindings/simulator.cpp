@@ -559,7 +559,7 @@ class PyController {
     const bool has_same_worlds = std::ranges::equal(of().maps(), maps_) && std::ranges::equal(of().worlds(), worlds_);
     PICTURA_CHECK(simulator.shared() == inside_.of && has_same_worlds,
                   "Controller: expected the simulator, and the worlds, that it was made for");
-    inside_.controller->act(of().controller_input(), {}, commands_->span, simulator.stream());
+    inside_.controller->act(of().arrays(), {}, commands_->span, simulator.stream());
   }
   Span<const Command> commands() const { return commands_->span; }
   /// A NumPy array of COMMAND_DTYPE, or u8 [slots, bytes of a command] on a device.
@@ -609,7 +609,7 @@ class HeldController final : public Controller {
  public:
   explicit HeldController(std::shared_ptr<Controller> held) : held_(std::move(held)) {}
   std::string_view name() const override { return held_->name(); }
-  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
+  void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
     held_->act(input, mask, commands_out, stream);
   }
 

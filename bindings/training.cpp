@@ -306,7 +306,7 @@ class SessionController final : public Controller {
         controller_(std::move(controller)) {}
 
   std::string_view name() const override { return controller_->name(); }
-  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
+  void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
     const Turnstile::Pass in_session(of_session_.get(), "the controller's session");
     std::optional<Turnstile::Pass> in_renderer;
     if (renderer_.turnstile) in_renderer.emplace(renderer_.turnstile.get(), "the controller's renderer");

@@ -187,7 +187,7 @@ Replay record_takeover(const EvaluateOptions& options, const RecordedScenario& s
   std::vector<Command> commands(mask.size());
   for (int step = 0; step < takeover.steps; ++step) {
     scene.command_places(takeover.step + step + 1, commands.data());
-    controller->act(simulator->controller_input(), mask, commands);
+    controller->act(simulator->arrays(), mask, commands);
     if (controller->num_driven() == 0) break;
     step_observed(*simulator, Span<Command>(commands), observers);
   }

@@ -61,7 +61,7 @@ struct DrivenWorld {
   int first_agent = 0;  // that films and replays follow unless they are told: in recorded scenes the self-driving car
 
   /// Lets the controller choose the commands of the next step.
-  void act() { controller->act(simulator->controller_input(), {}, commands); }
+  void act() { controller->act(simulator->arrays(), {}, commands); }
   /// Steps by them, as step_observed().
   StepResult step(const std::vector<StepObserver*>& observers = {}) {
     return step_observed(*simulator, Span<Command>(commands), observers);

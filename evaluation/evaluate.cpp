@@ -148,7 +148,7 @@ bool drive_to_the_end(const EvaluatedDriver& driver, const EvaluateOptions& opti
   const Span<Command> commands = command_memory.span();
   for (int step = 0; step < options.steps; ++step) {
     if (interrupted()) return false;
-    driving.controller->act(simulator->controller_input(), {}, commands);
+    driving.controller->act(simulator->arrays(), {}, commands);
     const int64_t num_driven = driving.num_driven();
     if (num_driven == 0 && !is_awaited(*simulator)) break;
     *agent_steps_inout += num_driven;

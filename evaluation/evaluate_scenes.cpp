@@ -175,8 +175,7 @@ class BatchDrive {
       if (interrupted()) return false;
       if (protocol_.record_end == RecordEnd::vanish) {
         take_out(slots_where([&](size_t slot) {
-          return last_steps_[slot] == step && !is_driven(slot, step) &&
-                 status_[slot] == AgentStatus::recorded;
+          return last_steps_[slot] == step && !is_driven(slot, step) && status_[slot] == AgentStatus::recorded;
         }));
       }
       // Who drives changes where somebody appears, or vanishes.
@@ -188,8 +187,8 @@ class BatchDrive {
         driven_mask.emplace(driven, device());
         replayed_mask.emplace(replayed, device());
       }
-      driver->act(simulator_.controller_input(), driven_mask->span(), commands);
-      log->act(simulator_.controller_input(), replayed_mask->span(), commands);
+      driver->act(simulator_.arrays(), driven_mask->span(), commands);
+      log->act(simulator_.arrays(), replayed_mask->span(), commands);
       simulator_.step(Span<const Command>(commands));
       measure(step + 1);
       if (!kept_slots_.empty()) note_places(step);
@@ -279,8 +278,7 @@ class BatchDrive {
   void take_out(const std::vector<int32_t>& slots) {
     if (slots.empty()) return;
     const DeviceCopy<int32_t> chosen(slots, device());
-    const DeviceCopy<AgentStatus> absent(std::vector<AgentStatus>(slots.size(), AgentStatus::absent),
-                                     device());
+    const DeviceCopy<AgentStatus> absent(std::vector<AgentStatus>(slots.size(), AgentStatus::absent), device());
     const Dims shape{static_cast<int64_t>(slots.size())};
     const NamedArray field{"status", array_of(absent, shape, device())};
     simulator_.set_state(array_of(chosen, shape, device()), Span(&field, 1));
@@ -354,7 +352,7 @@ class BatchDrive {
   std::vector<int32_t> takeover_steps_;  // of the episode
   std::vector<int32_t> world_of_slot_, track_of_slot_;
   std::vector<int32_t> last_steps_;  // of the episode, that the recording has
-  std::vector<AgentStatus> status_;      // after the last step
+  std::vector<AgentStatus> status_;  // after the last step
   std::vector<Displacement> displacements_;
   std::vector<int32_t> driven_steps_;
   std::vector<int32_t> kept_slots_;     // whose places are kept

@@ -8,7 +8,7 @@ namespace {
 
 // What each slot's world has: [slots].
 template <typename T>
-at::Tensor of_slots(const ControllerInput& input, Span<const T> of_worlds) {
+at::Tensor of_slots(const SimulatorArrays& input, Span<const T> of_worlds) {
   const auto num_slots = static_cast<int64_t>(input.slots.world_of_slot.size());
   return tensor_over(of_worlds, input.device, {static_cast<int64_t>(of_worlds.size())})
       .index_select(0, tensor_over(input.slots.world_of_slot, input.device, {num_slots}));
@@ -16,7 +16,7 @@ at::Tensor of_slots(const ControllerInput& input, Span<const T> of_worlds) {
 
 }  // namespace
 
-at::Tensor DecisionClock::deciding(const ControllerInput& input, const at::Tensor& active, int64_t step,
+at::Tensor DecisionClock::deciding(const SimulatorArrays& input, const at::Tensor& active, int64_t step,
                                    Span<const uint8_t> episode_over) {
   if (decision_steps_ == 1) return active;
   const auto num_slots = static_cast<int64_t>(input.slots.world_of_slot.size());

@@ -18,7 +18,7 @@ class DecisionClock {
   /// Steps are numbered by the caller. episode_over: u8 [worlds], or empty: in worlds that it marks, all decide, so
   /// that the value of what they see last is known; likewise agents that have just left a road that ends. On a device
   /// waits for a count, unless all decide.
-  at::Tensor deciding(const ControllerInput& input, const at::Tensor& active, int64_t step,
+  at::Tensor deciding(const SimulatorArrays& input, const at::Tensor& active, int64_t step,
                       Span<const uint8_t> episode_over = {});
 
  private:

@@ -118,7 +118,7 @@ std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> vi
   return blocks;
 }
 
-at::Tensor active_slots(const ControllerInput& input, Span<const uint8_t> mask, bool with_left,
+at::Tensor active_slots(const SimulatorArrays& input, Span<const uint8_t> mask, bool with_left,
                         PolicyExecutor* executor) {
   const auto num_slots = static_cast<int64_t>(input.slots.world_of_slot.size());
   const at::Tensor slots = at::empty({num_slots}, at::TensorOptions(at::kLong).device(torch_device(input.device)));

@@ -86,7 +86,7 @@ std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> vi
 
 /// The slots whose agents are active and that the mask [slots] has (empty: all), i64 [n], in ascending order.
 /// with_left: also those of agents that left a road that ends in the last step, whose last observation has a value.
-at::Tensor active_slots(const ControllerInput& input, Span<const uint8_t> mask, bool with_left,
+at::Tensor active_slots(const SimulatorArrays& input, Span<const uint8_t> mask, bool with_left,
                         PolicyExecutor* executor);
 
 /// Views in the memory of a device.

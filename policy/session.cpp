@@ -159,7 +159,7 @@ class SessionController final : public PolicyController {
 
   std::string_view name() const override { return "policy"; }
 
-  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream) override {
+  void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream) override {
     check_controller_arrays(name(), input, parts_.device, mask, commands_out);
     const auto num_slots = static_cast<int64_t>(commands_out.size());
     if (!actions_.defined() || actions_.size(0) != num_slots) {

@@ -165,13 +165,11 @@ struct Recorder::Parts {
   }
 
   // Of the world's random numbers: resets change it.
-  void take_seed() { replay.origin.seed = simulator.controller_input().seed[world]; }
+  void take_seed() { replay.origin.seed = simulator.arrays().seed[world]; }
   size_t slot(int32_t agent) const { return static_cast<size_t>(first_slot + agent); }
   std::vector<int32_t>& track(Track which) { return replay.tracks[static_cast<size_t>(which)]; }
   ReplayEpisode& episode() { return replay.episodes.back(); }
-  bool is_absent(const AgentStateView& state, int32_t agent) const {
-    return !has_body(state.status[slot(agent)]);
-  }
+  bool is_absent(const AgentStateView& state, int32_t agent) const { return !has_body(state.status[slot(agent)]); }
 
   void begin_episode(const AgentStateView& state, Span<const AgentBox> boxes) {
     ReplayEpisode next;

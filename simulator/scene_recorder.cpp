@@ -63,7 +63,7 @@ SceneRecorder::SceneRecorder(Simulator& simulator, int world)
   }
   spec_ = simulator.worlds()[world_];
   map_ = simulator.maps()[spec_.map];
-  seed_ = simulator.controller_input().seed[world_];
+  seed_ = simulator.arrays().seed[world_];
   first_slot_ = simulator.slots().slot_begin[world_];
   episode_ = simulator.episode_index()[world_];
   first_step_ = simulator.episode_step()[world_];

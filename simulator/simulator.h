@@ -17,12 +17,10 @@
 #include "pictura/simulator/compiled_map.h"
 #include "pictura/simulator/conditioning.h"
 #include "pictura/simulator/controllers/controller.h"
-#include "pictura/simulator/fields.h"
-#include "pictura/simulator/observation.h"
 #include "pictura/simulator/observation_query.h"
 #include "pictura/simulator/rule_choices.h"
+#include "pictura/simulator/simulator_arrays.h"
 #include "pictura/simulator/state_edit.h"
-#include "pictura/simulator/totals.h"
 
 namespace pictura {
 
@@ -106,20 +104,18 @@ using CompiledMaps = std::vector<std::shared_ptr<const CompiledMap>>;
 /// What these worlds on these maps take; the capacities of several batches of worlds can be joined.
 SimulatorCapacity capacity_of(const CompiledMaps& maps, const std::vector<WorldSpec>& worlds);
 
+/// What a simulator is made of: its configuration, its maps and its worlds on them.
+struct SimulatorParts {
+  SimulatorConfig config;
+  CompiledMaps maps;
+  std::vector<GeometryHandle> handles;  // [maps] by which the scene's worlds name them
+  std::vector<WorldSpec> worlds;
+};
+
 /// A simulator's state, kept in its memory; made by Simulator::snapshot.
 class StateSnapshot {
  public:
   virtual ~StateSnapshot() = default;
-};
-
-/// What step() returns besides observations. Spans lie on device() and last as the simulator's addresses do.
-struct StepResult {
-  Span<const float> reward;        // [slots]
-  Span<const uint8_t> terminated;  // [slots] 1: an infraction ended the agent's episode in this step
-  Span<const uint8_t> truncated;   // [slots] 1: it ended for another reason, or a life on a road that ends; bootstrap
-  Span<const uint8_t> valid;       // [slots] 1: the agent was active when the step began: learn from it
-  Span<const SpawnFailure> refusal;  // [slots] why the agent is absent from this episode, or none
-  Span<const StepSums> sums;       // [slots] of which the reward is made, and how far the agent drove; 0 if not valid
 };
 
 /// What became of the agents that were requested, over all worlds, in their current episodes.
@@ -141,19 +137,34 @@ struct SpawnReport {
 class Simulator {
  public:
   virtual ~Simulator() = default;
-  Simulator() = default;
   Simulator(const Simulator&) = delete;
   Simulator& operator=(const Simulator&) = delete;
 
-  virtual std::string_view name() const = 0;
-  /// Where commands are read from, and where results, observations, scenes and state lie.
-  virtual Device device() const = 0;
-  virtual const SimulatorConfig& config() const = 0;
-  virtual const CompiledMaps& maps() const = 0;
+  std::string_view name() const { return name_; }
+  const SimulatorConfig& config() const { return parts_->config; }
+  const CompiledMaps& maps() const { return parts_->maps; }
   /// [maps] by which the scene's worlds name them: what maps()[i]->geometry is uploaded to in renderers.
-  virtual const std::vector<GeometryHandle>& handles() const = 0;
-  virtual const std::vector<WorldSpec>& worlds() const = 0;
-  virtual int num_slots() const = 0;
+  const std::vector<GeometryHandle>& handles() const { return parts_->handles; }
+  const std::vector<WorldSpec>& worlds() const { return parts_->worlds; }
+
+  /// All that the simulator shows; what controllers read.
+  const SimulatorArrays& arrays() const { return arrays_; }
+  /// Where commands are read from, and where results, observations, scenes and state lie.
+  Device device() const { return arrays_.device; }
+  int num_slots() const { return static_cast<int>(arrays_.slots.world_of_slot.size()); }
+  /// Which agent of which world each slot is.
+  const SlotTable& slots() const { return arrays_.slots; }
+  const ObservationView& observations() const { return arrays_.observations; }
+  const SceneBatch& scene() const { return arrays_.scene; }
+  /// One view per slot. That of an absent agent (one that found no place to spawn) is at its map's origin and leaves
+  /// nobody out: it can be drawn like any other, its images mean nothing, and its slot is never valid.
+  Span<const View> views() const { return arrays_.views; }
+  const AgentStateView& state() const { return arrays_.state; }
+  Span<const int32_t> episode_step() const { return arrays_.episode_step; }
+  Span<const int32_t> episode_index() const { return arrays_.episode_index; }
+  Span<const uint8_t> episode_over() const { return arrays_.episode_over; }
+  /// How often memory that callers hold addresses of has moved.
+  uint64_t generation() const { return generation_; }
 
   /// Other worlds on other maps, at the start of their first episodes of `seed`: bit for bit what a new simulator of
   /// this configuration, seed, maps and worlds is. handles [maps], or empty for 0, 1, ... Memory is reused; on a device
@@ -165,11 +176,9 @@ class Simulator {
   /// Allocates for set_worlds() calls up to this capacity. The present state goes on, as after a
   /// restore(). May wait for the device.
   virtual void reserve(const SimulatorCapacity& capacity) = 0;
-  /// How often memory that callers hold addresses of has moved.
-  virtual uint64_t generation() const = 0;
 
   /// Starts a new episode in every world (episode 0 of the seed) and writes observations and scene.
-  virtual void reset(Stream stream = {}) = 0;
+  void reset(Stream stream = {}) { reset_worlds({}, config().seed, stream); }
   /// The same in the worlds whose mask is not 0, which from now on draw their random numbers from `seed`: bit for bit
   /// what these worlds of a simulator of that seed are. The others stay as they are, and so do totals: episodes that
   /// are cut off are not counted. world_mask: u8 [worlds] on device(). Throws Error for another array. A CUDA graph can
@@ -213,25 +222,6 @@ class Simulator {
   /// Waits for the work on this stream, then polls.
   virtual void check(Stream /*stream*/ = {}) {}
 
-  /// Of the state after the last reset() or step().
-  virtual ObservationView observations() = 0;
-  /// The scene of all worlds: controlled agents in slot order, each world's parked cars after its controlled agents.
-  virtual const SceneBatch& scene() = 0;
-  /// One view per slot. That of an absent agent (one that found no place to spawn) is at its map's origin and leaves
-  /// nobody out: it can be drawn like any other, its images mean nothing, and its slot is never valid.
-  virtual Span<const View> views() = 0;
-  /// Which agent of which world each slot is.
-  virtual SlotTable slots() const = 0;
-  /// What controllers read: all of the above and the state.
-  virtual ControllerInput controller_input() = 0;
-
-  virtual AgentStateView state() = 0;
-  /// Steps done in the current episode of each world, and the number of that episode.
-  virtual Span<const int32_t> episode_step() const = 0;
-  virtual Span<const int32_t> episode_index() const = 0;
-  /// [worlds] 1: the episode has ended, and the next step begins the next one.
-  virtual Span<const uint8_t> episode_over() const = 0;
-
   // On a device each of the following waits for the work on its stream and copies to the host.
   virtual SpawnReport spawn_report(Stream stream = {}) const = 0;
   virtual const SimulatorTotals& totals(Stream stream = {}) const = 0;
@@ -247,15 +237,25 @@ class Simulator {
   virtual std::unique_ptr<StateSnapshot> snapshot(Stream stream = {}) const = 0;
   virtual void restore(const StateSnapshot& snapshot, Stream stream = {}) = 0;
 
+ protected:
+  explicit Simulator(std::string_view name) : name_(name) {}
+
+  // What an executor shows: its parts once, its arrays whenever it has other worlds or other memory.
+  const SimulatorParts* parts_ = nullptr;
+  SimulatorArrays arrays_;
+  uint64_t generation_ = 0;
+
  private:
   // step() once it has checked everything but the values.
   virtual StepResult step_actions(Span<const int32_t> actions, Stream stream) = 0;
   virtual StepResult step_commands(Span<const Command> commands, Stream stream) = 0;
-  // reset() and set_state() likewise.
+  // reset() and set_state() likewise. An empty mask: all worlds.
   virtual void reset_worlds(Span<const uint8_t> world_mask, uint64_t seed, Stream stream) = 0;
   virtual void apply_edit(const StateEdit& edit, Stream stream) = 0;
   // observe() likewise.
   virtual void answer_queries(const ObservationQueries& asked, Stream stream) = 0;
+
+  std::string_view name_;
 };
 
 }  // namespace pictura

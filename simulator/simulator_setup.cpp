@@ -181,7 +181,7 @@ SimulatorCapacity capacity_of(const CompiledMaps& maps, const std::vector<WorldS
 
 SimulatorSetup::SimulatorSetup(const SimulatorConfig& config_in, CompiledMaps maps_in,
                                std::vector<GeometryHandle> handles_in, std::vector<WorldSpec> worlds_in)
-    : config(config_in), maps(std::move(maps_in)), handles(std::move(handles_in)), worlds(std::move(worlds_in)) {
+    : SimulatorParts{config_in, std::move(maps_in), std::move(handles_in), std::move(worlds_in)} {
   check(config);
   if (handles.empty()) {
     handles.resize(maps.size());

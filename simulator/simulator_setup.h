@@ -12,7 +12,7 @@
 
 namespace pictura {
 
-struct SimulatorSetup {
+struct SimulatorSetup : SimulatorParts {
   /// Checks everything that comes from outside: throws UsageError for what cannot be simulated. handles [maps] are what
   /// the scene names the maps by; empty for 0, 1, ...
   SimulatorSetup(const SimulatorConfig& config, CompiledMaps maps, std::vector<GeometryHandle> handles,
@@ -37,10 +37,6 @@ struct SimulatorSetup {
   /// A view of a world without state: its map, its place in the arrays and the keys of its random numbers.
   WorldView view(int world, const MapView& map, const RuleOptions& its_options) const;
 
-  SimulatorConfig config;
-  CompiledMaps maps;
-  std::vector<GeometryHandle> handles;  // [maps]
-  std::vector<WorldSpec> worlds;
   RuleOptions options;
   std::vector<MapView> map_views;                           // [maps] of their rules
   std::vector<int32_t> slot_begin, box_begin, light_begin;  // [worlds + 1]

@@ -154,8 +154,7 @@ SpawnReport SimulatorState::spawn_report(const SimulatorSetup& setup) const {
   report.refused_taken = refused_for(SpawnFailure::taken);
   report.refused = report.refused_no_place + report.refused_taken;
   report.entered = std::accumulate(agents.life.begin(), agents.life.end(), int64_t{0});
-  report.left = report.entered +
-                std::count(agents.status.begin(), agents.status.end(), AgentStatus::waiting);
+  report.left = report.entered + std::count(agents.status.begin(), agents.status.end(), AgentStatus::waiting);
   report.parked_asked = int64_t{setup.num_worlds()} * setup.config.parked_cars;
   for (size_t w = 0; w < setup.worlds.size(); ++w) {
     report.parked_placed +=

@@ -58,7 +58,7 @@ bool Collector::collect_on_stream() {
     const Decision decision = decide(&run_, step, slots);
     ask_teacher(step, slots);
     hold_actions(step, slots);
-    run_.executor->choose_actions(simulator.controller_input(), span_of<const int64_t>(slots),
+    run_.executor->choose_actions(simulator.arrays(), span_of<const int64_t>(slots),
                                   span_of<const float>(decision.log_probs),
                                   {.argmax = false, .seed = run_.config.run.seed}, rollout.actions_at(step), stream);
     const at::Tensor chosen = rollout.actions.select(0, step).index_select(0, slots).to(at::kLong).unsqueeze(1);
@@ -77,7 +77,7 @@ bool Collector::collect_on_stream() {
 
 at::Tensor Collector::record(int64_t step) {
   RolloutObservations& observations = run_.rollout.observations;
-  const ControllerInput input = run_.simulator->controller_input();
+  const SimulatorArrays input = run_.simulator->arrays();
   const at::Tensor slots =
       clock_.deciding(input, active_slots(input, {}, true, run_.executor.get()), step, run_.simulator->episode_over());
   // Those whose images are kept are others every time.
@@ -98,8 +98,8 @@ void Collector::hold_actions(int64_t step, const at::Tensor& deciding) {
 void Collector::ask_teacher(int64_t step, const at::Tensor& slots) {
   if (teacher_weight(run_) == 0) return;
   const PhaseTimer::Scope timed(&run_.timer, Phase::forward);
-  run_.rollout.teacher_log_probs.select(0, step).index_copy_(
-      0, slots, run_.teacher->log_probs(run_.simulator->controller_input(), slots));
+  run_.rollout.teacher_log_probs.select(0, step).index_copy_(0, slots,
+                                                             run_.teacher->log_probs(run_.simulator->arrays(), slots));
 }
 
 void Collector::simulate(int64_t step) {

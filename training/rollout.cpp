@@ -41,7 +41,7 @@ void RolloutObservations::set_renderer(Renderer* renderer) {
 }
 
 void RolloutObservations::record(int64_t step, const at::Tensor& slots) {
-  const ControllerInput input = simulator_->controller_input();
+  const SimulatorArrays input = simulator_->arrays();
   const Observation row = row_of(arrays_, step);
   copy_arrays(input.observations, input.device, row);
   if (scenes_) {

@@ -26,7 +26,7 @@ void Teacher::add_arrays(SimulatorConfig* config) const {
   config->wall_observations = config->wall_observations || own.wall_observations;
 }
 
-at::Tensor Teacher::log_probs(const ControllerInput& input, const at::Tensor& slots) const {
+at::Tensor Teacher::log_probs(const SimulatorArrays& input, const at::Tensor& slots) const {
   const auto num_slots = static_cast<int64_t>(input.slots.world_of_slot.size());
   return decide(slots, chunks_,
                 [&](const at::Tensor& some) {

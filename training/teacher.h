@@ -20,7 +20,7 @@ class Teacher {
 
   /// The log-probabilities of all actions for the agents of some slots, i64 [n], of what the simulator shows now: f32
   /// [n, kNumActions], without gradients.
-  at::Tensor log_probs(const ControllerInput& input, const at::Tensor& slots) const;
+  at::Tensor log_probs(const SimulatorArrays& input, const at::Tensor& slots) const;
 
  private:
   const Config config_;  // its own

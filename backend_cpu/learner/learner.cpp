@@ -24,7 +24,7 @@ class LearnerExecutorCpu final : public LearnerExecutor {
     return select(static_cast<int64_t>(slots_out.size()), slots_out, asked);
   }
 
-  void choose_actions(const ControllerInput& input, Span<const int64_t> slots, Span<const float> log_probs,
+  void choose_actions(const SimulatorArrays& input, Span<const int64_t> slots, Span<const float> log_probs,
                       const ActionChoice& choice, Span<int32_t> actions_out, Stream) override {
     const ActionRule rule(input, choice);
     for (size_t i = 0; i < slots.size(); ++i) {

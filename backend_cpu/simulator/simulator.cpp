@@ -44,15 +44,11 @@ struct HostSnapshot final : StateSnapshot {
 
 class SimulatorCpu final : public Simulator {
  public:
-  explicit SimulatorCpu(SimulatorSetup setup) : worlds_(std::move(setup)), capacity_(worlds_.setup.needs()) { begin(); }
-
-  std::string_view name() const override { return "cpu"; }
-  Device device() const override { return {}; }
-  const SimulatorConfig& config() const override { return worlds_.setup.config; }
-  const CompiledMaps& maps() const override { return worlds_.setup.maps; }
-  const std::vector<GeometryHandle>& handles() const override { return worlds_.setup.handles; }
-  const std::vector<WorldSpec>& worlds() const override { return worlds_.setup.worlds; }
-  int num_slots() const override { return worlds_.setup.num_slots(); }
+  explicit SimulatorCpu(SimulatorSetup setup)
+      : Simulator("cpu"), worlds_(std::move(setup)), capacity_(worlds_.setup.needs()) {
+    parts_ = &worlds_.setup;
+    begin();
+  }
 
   void set_worlds(CompiledMaps maps, std::vector<GeometryHandle> handles, std::vector<WorldSpec> worlds, uint64_t seed,
                   Stream) override {
@@ -67,36 +63,10 @@ class SimulatorCpu final : public Simulator {
     worlds_.reserve(capacity_);
     results_.reserve(capacity_.slots, config());
     ++generation_;
+    show_arrays();
     for_each_world([this](int w) { sort_into_cells(worlds_.world(w), &worlds_.box_cells[w]); });
   }
-  uint64_t generation() const override { return generation_; }
 
-  void reset(Stream) override {
-    for_each_world([this](int w) { begin_first_episode(w, config().seed); });
-  }
-
-  ObservationView observations() override { return results_.observation_view(); }
-  const SceneBatch& scene() override { return worlds_.scene; }
-  Span<const View> views() override { return results_.views; }
-  SlotTable slots() const override { return worlds_.setup.slot_table(); }
-
-  ControllerInput controller_input() override {
-    return {Device{},
-            slots(),
-            results_.observation_view(),
-            worlds_.scene,
-            results_.views,
-            worlds_.state.agents.view(),
-            worlds_.state.episode_step,
-            worlds_.state.episode_index,
-            worlds_.state.world_totals,
-            worlds_.state.seed};
-  }
-
-  AgentStateView state() override { return worlds_.state.agents.view(); }
-  Span<const int32_t> episode_step() const override { return worlds_.state.episode_step; }
-  Span<const int32_t> episode_index() const override { return worlds_.state.episode_index; }
-  Span<const uint8_t> episode_over() const override { return worlds_.state.episode_over; }
   SpawnReport spawn_report(Stream) const override { return worlds_.state.spawn_report(worlds_.setup); }
   const SimulatorTotals& totals(Stream) const override { return totals_; }
   uint64_t state_hash(Stream) const override { return worlds_.state.hash(worlds_.setup); }
@@ -126,7 +96,7 @@ class SimulatorCpu final : public Simulator {
 
   void reset_worlds(Span<const uint8_t> world_mask, uint64_t seed, Stream) override {
     for_each_world([this, world_mask, seed](int w) {
-      if (world_mask[w]) begin_first_episode(w, seed);
+      if (world_mask.empty() || world_mask[w]) begin_first_episode(w, seed);
     });
   }
 
@@ -177,10 +147,32 @@ class SimulatorCpu final : public Simulator {
 
   void begin() {
     worlds_token_ = new_worlds_token();
-    results_.resize(num_slots(), config());
-    chosen_try_.assign(num_slots(), -1);
+    results_.resize(worlds_.setup.num_slots(), config());
+    chosen_try_.assign(worlds_.setup.num_slots(), -1);
     totals_ = {};
-    reset({});
+    show_arrays();
+    reset();
+  }
+
+  void show_arrays() {
+    const SimulatorState& state = worlds_.state;
+    arrays_ = {.device = {},
+               .slots = worlds_.setup.slot_table(),
+               .observations = results_.observation_view(),
+               .scene = worlds_.scene,
+               .views = results_.views,
+               .state = worlds_.state.agents.view(),
+               .episode_step = state.episode_step,
+               .episode_index = state.episode_index,
+               .episode_over = state.episode_over,
+               .world_totals = state.world_totals,
+               .seed = state.seed,
+               .results = {.reward = results_.reward,
+                           .terminated = results_.terminated,
+                           .truncated = results_.truncated,
+                           .valid = results_.valid,
+                           .refusal = state.agents.refusal,
+                           .sums = results_.sums}};
   }
 
   void show_restored() {
@@ -214,8 +206,7 @@ class SimulatorCpu final : public Simulator {
       show(w);
     });
     totals_ = worlds_.state.totals();
-    return {results_.reward, results_.terminated,          results_.truncated,
-            results_.valid,  worlds_.state.agents.refusal, results_.sums};
+    return arrays_.results;
   }
 
   /// Before anything changes, so that a refused step leaves the state as it was.
@@ -334,7 +325,6 @@ class SimulatorCpu final : public Simulator {
 
   HostWorlds worlds_;
   SimulatorCapacity capacity_;
-  uint64_t generation_ = 0;
   WorldsToken worlds_token_;
   HostResults results_;
   std::vector<int32_t> chosen_try_;  // [slots] while an episode begins

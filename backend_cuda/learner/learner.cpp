@@ -33,7 +33,7 @@ class LearnerExecutorCuda final : public LearnerExecutor {
     return select(asked, slots_out.size(), slots_out, handle_of(stream));
   }
 
-  void choose_actions(const ControllerInput& input, Span<const int64_t> slots, Span<const float> log_probs,
+  void choose_actions(const SimulatorArrays& input, Span<const int64_t> slots, Span<const float> log_probs,
                       const ActionChoice& choice, Span<int32_t> actions_out, Stream stream) override {
     const DeviceGuard guard(device_);
     cuda::launch_choose_actions(ActionRule(input, choice), slots, log_probs.data(), actions_out.data(),

@@ -32,7 +32,7 @@ class CudaRandomController final : public Controller {
  public:
   CudaRandomController(Device device, uint64_t seed) : device_(device), seed_(seed) {}
   std::string_view name() const override { return "random"; }
-  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
+  void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
     check_controller_arrays(name(), input, device_, mask, commands_out);
     write(device_, RandomCommands{seed_, input.slots, input.world_totals}, mask, commands_out, stream);
   }
@@ -48,7 +48,7 @@ class CudaRuleController final : public Controller {
  public:
   CudaRuleController(std::string_view name, Device device) : name_(name), device_(device) {}
   std::string_view name() const override { return name_; }
-  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
+  void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
     check_controller_arrays(name(), input, device_, mask, commands_out);
     write(device_, Rule{}, mask, commands_out, stream);
   }
@@ -68,7 +68,7 @@ class CudaInverseController final : public Controller {
     actions_ = DeviceBuffer<int32_t>(Span<const int32_t>(table.actions));
   }
   std::string_view name() const override { return "inverse"; }
-  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
+  void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
     check_controller_arrays(name(), input, device_, mask, commands_out);
     write(device_, TabledCommands{input.slots, input.episode_step, worlds_.span(), actions_.span()}, mask, commands_out,
           stream);
@@ -98,7 +98,7 @@ class CudaHostController final : public Controller {
         on_host_(std::move(on_host)),
         name_(std::string(on_host_->name()) + ", on the host") {}
   std::string_view name() const override { return name_; }
-  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
+  void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
     check_controller_arrays(name(), input, device_, mask, commands_out);
     const DeviceGuard guard(device_);
     const auto cuda_stream = static_cast<cudaStream_t>(stream.handle);
@@ -115,7 +115,7 @@ class CudaHostController final : public Controller {
     read(commands_out, &commands_, cuda_stream);
     PICTURA_CUDA(cudaStreamSynchronize(cuda_stream));
 
-    ControllerInput on_host;
+    SimulatorArrays on_host;
     on_host.slots = setup_.slot_table();
     on_host.scene.world_begin = setup_.box_begin;
     on_host.scene.agents = boxes_;

@@ -216,27 +216,27 @@ struct DeviceLaunch {
 
 }  // namespace
 
-void launch_reset(const SimulatorArrays& arrays, const uint8_t* mask, uint64_t seed, const StepStreams& streams) {
+void launch_reset(const PhaseArrays& arrays, const uint8_t* mask, uint64_t seed, const StepStreams& streams) {
   launch_reset(DeviceLaunch{streams}, arrays, mask, seed);
 }
 
-void launch_edit(const SimulatorArrays& arrays, const StateEdit& edit, const StepStreams& streams) {
+void launch_edit(const PhaseArrays& arrays, const StateEdit& edit, const StepStreams& streams) {
   launch_edit(DeviceLaunch{streams}, arrays, edit);
 }
 
-void launch_queries(const SimulatorArrays& arrays, const ObservationQueries& asked, const StepStreams& streams) {
+void launch_queries(const PhaseArrays& arrays, const ObservationQueries& asked, const StepStreams& streams) {
   launch_queries(DeviceLaunch{streams}, arrays, asked);
 }
 
-void launch_restored(const SimulatorArrays& arrays, const StepStreams& streams) {
+void launch_restored(const PhaseArrays& arrays, const StepStreams& streams) {
   launch_restored(DeviceLaunch{streams}, arrays);
 }
 
-void launch_step(const SimulatorArrays& arrays, const int32_t* actions, const StepStreams& streams) {
+void launch_step(const PhaseArrays& arrays, const int32_t* actions, const StepStreams& streams) {
   launch_step(DeviceLaunch{streams}, arrays, actions);
 }
 
-void launch_step(const SimulatorArrays& arrays, const Command* commands, const StepStreams& streams) {
+void launch_step(const PhaseArrays& arrays, const Command* commands, const StepStreams& streams) {
   launch_step(DeviceLaunch{streams}, arrays, commands);
 }
 

@@ -16,12 +16,12 @@ struct StepStreams {
 };
 
 /// In the worlds that `mask` [worlds] names, or in all where it is null.
-void launch_reset(const SimulatorArrays& arrays, const uint8_t* mask, uint64_t seed, const StepStreams& streams);
-void launch_edit(const SimulatorArrays& arrays, const StateEdit& edit, const StepStreams& streams);
-void launch_queries(const SimulatorArrays& arrays, const ObservationQueries& asked, const StepStreams& streams);
-void launch_restored(const SimulatorArrays& arrays, const StepStreams& streams);
-void launch_step(const SimulatorArrays& arrays, const int32_t* actions, const StepStreams& streams);
-void launch_step(const SimulatorArrays& arrays, const Command* commands, const StepStreams& streams);
+void launch_reset(const PhaseArrays& arrays, const uint8_t* mask, uint64_t seed, const StepStreams& streams);
+void launch_edit(const PhaseArrays& arrays, const StateEdit& edit, const StepStreams& streams);
+void launch_queries(const PhaseArrays& arrays, const ObservationQueries& asked, const StepStreams& streams);
+void launch_restored(const PhaseArrays& arrays, const StepStreams& streams);
+void launch_step(const PhaseArrays& arrays, const int32_t* actions, const StepStreams& streams);
+void launch_step(const PhaseArrays& arrays, const Command* commands, const StepStreams& streams);
 
 /// Commands by a rule of simulator/rules/control.h: of the slots that `mask` [slots] names, or of all where it is null.
 template <typename Rule>

@@ -34,7 +34,7 @@ struct WorldScratch {
 constexpr int32_t kNoSlot = 0x7F7F7F7F;
 
 /// Everything that the phases read and write, in one memory.
-struct SimulatorArrays {
+struct PhaseArrays {
   WorldView* worlds = nullptr;             // [num_worlds] their box_cells are one cell, which lists all boxes
   WorldView* next_worlds = nullptr;        // [num_worlds] the same worlds, over memory for their next episode
   const WorldScratch* scratch = nullptr;   // [num_worlds]
@@ -208,7 +208,7 @@ PICTURA_HD void begin_episode(const Team& team, const WorldView& world, const Wo
 
 /// Begins episode 0 of `seed` in the worlds of the mask [worlds], or in all where it is null.
 struct BeginFirstEpisode {
-  SimulatorArrays arrays;
+  PhaseArrays arrays;
   const uint8_t* mask;
   uint64_t seed;
   template <typename Team>
@@ -230,7 +230,7 @@ struct BeginFirstEpisode {
 
 /// Says where the boxes of a world stand.
 struct PlaceCenters {
-  SimulatorArrays arrays;
+  PhaseArrays arrays;
   template <typename ThreadGroup>
   PICTURA_HD void operator()(const ThreadGroup& group, int w) const {
     const WorldView world = arrays.world(w);
@@ -243,7 +243,7 @@ struct PlaceCenters {
 /// Makes a world's next episode, as early as its memory is free and long before it is needed: a start depends on
 /// nothing that steps change.
 struct PrepareEpisode {
-  SimulatorArrays arrays;
+  PhaseArrays arrays;
   template <typename Team>
   PICTURA_HD void operator()(const Team& team, int w) const {
     if (!arrays.prepares[w]) return;
@@ -254,7 +254,7 @@ struct PrepareEpisode {
 /// Finds the lowest slot whose command is out of range. Commands are actions or Commands, here and in what follows.
 template <typename CommandType>
 struct CheckCommands {
-  SimulatorArrays arrays;
+  PhaseArrays arrays;
   const CommandType* commands;
   template <typename Atomics>
   PICTURA_HD void operator()(const Atomics& atomics, int slot) const {
@@ -268,7 +268,7 @@ struct CheckCommands {
 /// Moves an agent, or takes it into the episode that was prepared.
 template <typename CommandType>
 struct Advance {
-  SimulatorArrays arrays;
+  PhaseArrays arrays;
   const CommandType* commands;
   template <typename ThreadGroup>
   PICTURA_HD void operator()(const ThreadGroup& group, int slot) const {
@@ -293,7 +293,7 @@ struct Advance {
 
 /// Collisions, reward and halt of an agent.
 struct ApplyRewardAndHalt {
-  SimulatorArrays arrays;
+  PhaseArrays arrays;
   template <typename ThreadGroup>
   PICTURA_HD void operator()(const ThreadGroup& group, int slot) const {
     const int w = arrays.world_of_slot[slot];
@@ -310,7 +310,7 @@ struct ApplyRewardAndHalt {
 /// episode.
 template <typename CommandType>
 struct FinishStep {
-  SimulatorArrays arrays;
+  PhaseArrays arrays;
   const CommandType* commands;
   template <typename ThreadGroup>
   PICTURA_HD void operator()(const ThreadGroup& group, int w) const {
@@ -406,7 +406,7 @@ struct FinishStep {
 
 /// Lets waiting agents into a world of roads that end, after a step that did not end its episode.
 struct EnterWaiting {
-  SimulatorArrays arrays;
+  PhaseArrays arrays;
   template <typename ThreadGroup>
   PICTURA_HD void operator()(const ThreadGroup& group, int w) const {
     const int steps = arrays.episode_step[w];
@@ -492,7 +492,7 @@ class ObservationWriter {
 
 /// Writes a slot's view and observation.
 struct WriteObservation {
-  SimulatorArrays arrays;
+  PhaseArrays arrays;
   static constexpr int kStaging = ObservationWriter::kStaging;
 
   template <typename ThreadGroup>
@@ -519,13 +519,13 @@ struct WriteCommands {
 };
 
 template <typename Launch>
-void launch_write_observations(const Launch& launch, const SimulatorArrays& arrays) {
+void launch_write_observations(const Launch& launch, const PhaseArrays& arrays) {
   launch.template groups<kWarp>(arrays.num_slots, WriteObservation{arrays});
 }
 
 /// Notes which element of an edit names a slot first.
 struct MarkEdit {
-  SimulatorArrays arrays;
+  PhaseArrays arrays;
   StateEdit edit;
   template <typename Atomics>
   PICTURA_HD void operator()(const Atomics& atomics, int i) const {
@@ -533,11 +533,11 @@ struct MarkEdit {
   }
 };
 
-PICTURA_HD inline int64_t find_fault(const SimulatorArrays& arrays, const StateEdit& edit, int i) {
+PICTURA_HD inline int64_t find_fault(const PhaseArrays& arrays, const StateEdit& edit, int i) {
   return find_edit_fault(edit, i, arrays.num_slots, arrays.first_element,
                          [&arrays](int slot) { return arrays.world(arrays.world_of_slot[slot]); });
 }
-PICTURA_HD inline int64_t find_fault(const SimulatorArrays& arrays, const ObservationQueries& asked, int i) {
+PICTURA_HD inline int64_t find_fault(const PhaseArrays& arrays, const ObservationQueries& asked, int i) {
   return find_query_fault(asked, i, arrays.num_slots,
                           [&arrays](int slot) { return arrays.world(arrays.world_of_slot[slot]); });
 }
@@ -546,7 +546,7 @@ static_assert(kNoQueryFault == kNothingWrong);
 /// Finds the first element with a fault of an edit, or of queries.
 template <typename Request>
 struct CheckRequest {
-  SimulatorArrays arrays;
+  PhaseArrays arrays;
   Request request;
   PICTURA_HD int64_t fault(int i) const { return find_fault(arrays, request, i); }
   template <typename Atomics>
@@ -560,7 +560,7 @@ struct ApplyEdit {
   CheckRequest<StateEdit> check;
   template <typename Atomics>
   PICTURA_HD void operator()(const Atomics& atomics, int i) const {
-    const SimulatorArrays& arrays = check.arrays;
+    const PhaseArrays& arrays = check.arrays;
     if (*arrays.wrong_element != kNoSlot) {
       if (i == 0 && *arrays.wrong_edit == kNothingWrong) *arrays.wrong_edit = check.fault(*arrays.wrong_element);
       return;
@@ -574,7 +574,7 @@ struct ApplyEdit {
 };
 
 template <typename Launch>
-void launch_edit(const Launch& launch, const SimulatorArrays& arrays, const StateEdit& edit) {
+void launch_edit(const Launch& launch, const PhaseArrays& arrays, const StateEdit& edit) {
   if (edit.count == 0) return;
   launch.fill(arrays.first_element, static_cast<size_t>(arrays.num_slots) * sizeof(int32_t), kNoSlot & 0xFF);
   launch.fill(arrays.wrong_element, sizeof(int32_t), kNoSlot & 0xFF);
@@ -596,7 +596,7 @@ struct LatchQueryFault {
 
 /// answer_query(), unless there is a fault in any.
 struct AnswerQueries {
-  SimulatorArrays arrays;
+  PhaseArrays arrays;
   ObservationQueries asked;
   static constexpr int kStaging = ObservationWriter::kStaging;
 
@@ -614,7 +614,7 @@ struct AnswerQueries {
 };
 
 template <typename Launch>
-void launch_queries(const Launch& launch, const SimulatorArrays& arrays, const ObservationQueries& asked) {
+void launch_queries(const Launch& launch, const PhaseArrays& arrays, const ObservationQueries& asked) {
   const auto count = static_cast<int32_t>(asked.queries.size());
   if (count == 0) return;
   launch.fill(arrays.wrong_element, sizeof(int32_t), kNoSlot & 0xFF);
@@ -625,7 +625,7 @@ void launch_queries(const Launch& launch, const SimulatorArrays& arrays, const O
 
 /// Episode 0 of `seed` in the worlds of the mask, or in all where it is null.
 template <typename Launch>
-void launch_reset(const Launch& launch, const SimulatorArrays& arrays, const uint8_t* mask, uint64_t seed) {
+void launch_reset(const Launch& launch, const PhaseArrays& arrays, const uint8_t* mask, uint64_t seed) {
   launch.teams(arrays.num_worlds, BeginFirstEpisode{arrays, mask, seed});
   launch.template groups<kWarp>(arrays.num_worlds, PlaceCenters{arrays});
   launch_write_observations(launch, arrays);
@@ -633,7 +633,7 @@ void launch_reset(const Launch& launch, const SimulatorArrays& arrays, const uin
 
 /// Tells the worlds which episode of which seed a state that was put there is in.
 struct TakeEpisode {
-  SimulatorArrays arrays;
+  PhaseArrays arrays;
   template <typename Atomics>
   PICTURA_HD void operator()(const Atomics&, int w) const {
     arrays.worlds[w].seed = arrays.next_worlds[w].seed = arrays.seed[w];
@@ -644,7 +644,7 @@ struct TakeEpisode {
 
 /// Shows a state that was put there.
 template <typename Launch>
-void launch_restored(const Launch& launch, const SimulatorArrays& arrays) {
+void launch_restored(const Launch& launch, const PhaseArrays& arrays) {
   const auto num_slots = static_cast<size_t>(arrays.num_slots);
   launch.fill(arrays.results.reward, num_slots * sizeof(float), 0);
   launch.fill(arrays.results.sums, num_slots * sizeof(StepSums), 0);
@@ -660,7 +660,7 @@ void launch_restored(const Launch& launch, const SimulatorArrays& arrays) {
 }
 
 template <typename Launch, typename CommandType>
-void launch_step(const Launch& launch, const SimulatorArrays& arrays, const CommandType* commands) {
+void launch_step(const Launch& launch, const PhaseArrays& arrays, const CommandType* commands) {
   launch.copy(arrays.prepares, arrays.began, static_cast<size_t>(arrays.num_worlds));
   launch.fork_join([&](const Launch& side) { side.teams(arrays.num_worlds, PrepareEpisode{arrays}); },
                    [&] {

@@ -27,7 +27,8 @@ struct DeviceSnapshot final : StateSnapshot {
 
 class SimulatorCuda final : public Simulator {
  public:
-  SimulatorCuda(SimulatorSetup setup, Device device) : device_(device), setup_(std::move(setup)) {
+  SimulatorCuda(SimulatorSetup setup, Device device) : Simulator("cuda"), device_(device), setup_(std::move(setup)) {
+    parts_ = &setup_;
     const DeviceGuard guard(device_);
     side_ = std::make_unique<SideStream>();
     rejected_command_ = std::make_unique<MappedValue<int64_t>>();
@@ -40,14 +41,6 @@ class SimulatorCuda final : public Simulator {
     begin(nullptr);
     PICTURA_CUDA(cudaDeviceSynchronize());  // so that it can be used on any stream
   }
-
-  std::string_view name() const override { return "cuda"; }
-  Device device() const override { return device_; }
-  const SimulatorConfig& config() const override { return setup_.config; }
-  const CompiledMaps& maps() const override { return setup_.maps; }
-  const std::vector<GeometryHandle>& handles() const override { return setup_.handles; }
-  const std::vector<WorldSpec>& worlds() const override { return setup_.worlds; }
-  int num_slots() const override { return setup_.num_slots(); }
 
   void set_worlds(CompiledMaps maps, std::vector<GeometryHandle> handles, std::vector<WorldSpec> worlds, uint64_t seed,
                   Stream stream) override {
@@ -70,9 +63,6 @@ class SimulatorCuda final : public Simulator {
     put_state(nullptr);
     PICTURA_CUDA(cudaDeviceSynchronize());
   }
-  uint64_t generation() const override { return generation_; }
-
-  void reset(Stream stream) override { begin_episodes(nullptr, config().seed, stream); }
 
   void poll() override { throw_rejected(); }
   void check(Stream stream) override {
@@ -80,35 +70,6 @@ class SimulatorCuda final : public Simulator {
     PICTURA_CUDA(cudaStreamSynchronize(handle_of(stream)));
     throw_rejected();
   }
-
-  ObservationView observations() override { return results_.observations(slot_count(), config()); }
-  const SceneBatch& scene() override { return scene_; }
-  Span<const View> views() override { return {results_.views.data(), slot_count()}; }
-  SlotTable slots() const override {
-    const size_t num_worlds = setup_.worlds.size();
-    return {{tables_.world_of_slot.data(), slot_count()},
-            {tables_.agent_of_slot.data(), slot_count()},
-            {tables_.slot_begin.data(), num_worlds + 1},
-            {tables_.global_world.data(), num_worlds}};
-  }
-  ControllerInput controller_input() override {
-    return {device_,
-            slots(),
-            observations(),
-            scene_,
-            views(),
-            state(),
-            episode_step(),
-            episode_index(),
-            {state_.world_totals.data(), setup_.worlds.size()},
-            {state_.seed.data(), setup_.worlds.size()}};
-  }
-
-  AgentStateView state() override { return state_.agents.view(); }
-  Span<const int32_t> episode_step() const override { return {state_.episode_step.data(), setup_.worlds.size()}; }
-  Span<const int32_t> episode_index() const override { return {state_.episode_index.data(), setup_.worlds.size()}; }
-
-  Span<const uint8_t> episode_over() const override { return {state_.episode_over.data(), setup_.worlds.size()}; }
 
   SpawnReport spawn_report(Stream stream) const override {
     const DeviceGuard guard(device_);
@@ -145,7 +106,7 @@ class SimulatorCuda final : public Simulator {
     const DeviceGuard guard(device_);
     auto copy = std::make_unique<DeviceSnapshot>();
     copy->worlds = worlds_token_;
-    copy->state = DeviceState(slot_count(), setup_.num_boxes(), setup_.num_lights(), setup_.worlds.size());
+    copy->state = DeviceState(num_slots(), setup_.num_boxes(), setup_.num_lights(), setup_.worlds.size());
     state_.copy_to(copy->state, handle_of(stream));
     return copy;
   }
@@ -163,28 +124,23 @@ class SimulatorCuda final : public Simulator {
   StepResult step_commands(Span<const Command> commands, Stream stream) override { return step_all(commands, stream); }
 
   void reset_worlds(Span<const uint8_t> world_mask, uint64_t seed, Stream stream) override {
-    begin_episodes(world_mask.data(), seed, stream);
+    const DeviceGuard guard(device_);
+    throw_rejected();
+    cuda::launch_reset(phase_arrays(), world_mask.data(), seed, side_->streams_from(handle_of(stream)));
+    PICTURA_CUDA(cudaGetLastError());
   }
   void apply_edit(const StateEdit& edit, Stream stream) override {
     const DeviceGuard guard(device_);
     throw_rejected();
-    cuda::launch_edit(arrays(), edit, side_->streams_from(handle_of(stream)));
+    cuda::launch_edit(phase_arrays(), edit, side_->streams_from(handle_of(stream)));
     PICTURA_CUDA(cudaGetLastError());
   }
   void answer_queries(const ObservationQueries& asked, Stream stream) override {
     const DeviceGuard guard(device_);
     throw_rejected();
-    cuda::launch_queries(arrays(), asked, side_->streams_from(handle_of(stream)));
+    cuda::launch_queries(phase_arrays(), asked, side_->streams_from(handle_of(stream)));
     PICTURA_CUDA(cudaGetLastError());
   }
-  void begin_episodes(const uint8_t* world_mask, uint64_t seed, Stream stream) {
-    const DeviceGuard guard(device_);
-    throw_rejected();
-    cuda::launch_reset(arrays(), world_mask, seed, side_->streams_from(handle_of(stream)));
-    PICTURA_CUDA(cudaGetLastError());
-  }
-
-  size_t slot_count() const { return static_cast<size_t>(num_slots()); }
 
   /// Memory for this capacity and no less than before; whatever was there is lost.
   void grow(const SimulatorCapacity& capacity) {
@@ -217,7 +173,7 @@ class SimulatorCuda final : public Simulator {
     put_setup(stream);
     state_.put_from(host_, stream);
     results_.clear(stream);
-    cuda::launch_reset(arrays(), nullptr, config().seed, side_->streams_from(stream));
+    cuda::launch_reset(phase_arrays(), nullptr, config().seed, side_->streams_from(stream));
     PICTURA_CUDA(cudaGetLastError());
   }
 
@@ -226,13 +182,37 @@ class SimulatorCuda final : public Simulator {
     tables_.put_from(setup_, stream);
     put_scratch(stream);
     put_worlds(stream);
-    const size_t num_worlds = setup_.worlds.size();
-    scene_.device = device_;
-    scene_.world_begin = {tables_.box_begin.data(), num_worlds + 1};
-    scene_.agents = {state_.boxes.data(), setup_.num_boxes()};
-    scene_.geometry = {tables_.geometry.data(), num_worlds};
-    scene_.light_begin = {tables_.light_begin.data(), num_worlds + 1};
-    scene_.light_states = {state_.lights.data(), setup_.num_lights()};
+    show_arrays();
+  }
+
+  void show_arrays() {
+    const auto num_slots = static_cast<size_t>(setup_.num_slots()), num_worlds = setup_.worlds.size();
+    arrays_ = {.device = device_,
+               .slots = {.world_of_slot = {tables_.world_of_slot.data(), num_slots},
+                         .agent_of_slot = {tables_.agent_of_slot.data(), num_slots},
+                         .slot_begin = {tables_.slot_begin.data(), num_worlds + 1},
+                         .global_world = {tables_.global_world.data(), num_worlds}},
+               .observations = results_.observations(num_slots, config()),
+               .scene = {.device = device_,
+                         .world_begin = {tables_.box_begin.data(), num_worlds + 1},
+                         .agents = {state_.boxes.data(), setup_.num_boxes()},
+                         .geometry = {tables_.geometry.data(), num_worlds},
+                         .light_begin = {tables_.light_begin.data(), num_worlds + 1},
+                         .light_states = {state_.lights.data(), setup_.num_lights()},
+                         .hidden_agents = {}},
+               .views = {results_.views.data(), num_slots},
+               .state = state_.agents.view(),
+               .episode_step = {state_.episode_step.data(), num_worlds},
+               .episode_index = {state_.episode_index.data(), num_worlds},
+               .episode_over = {state_.episode_over.data(), num_worlds},
+               .world_totals = {state_.world_totals.data(), num_worlds},
+               .seed = {state_.seed.data(), num_worlds},
+               .results = {.reward = {results_.reward.data(), num_slots},
+                           .terminated = {results_.terminated.data(), num_slots},
+                           .truncated = {results_.truncated.data(), num_slots},
+                           .valid = {results_.valid.data(), num_slots},
+                           .refusal = {state_.agents.refusal.data(), num_slots},
+                           .sums = {results_.sums.data(), num_slots}}};
   }
 
   /// The host's state to the device.
@@ -241,7 +221,7 @@ class SimulatorCuda final : public Simulator {
     show_restored(stream);
   }
   void show_restored(cudaStream_t stream) {
-    cuda::launch_restored(arrays(), side_->streams_from(stream));
+    cuda::launch_restored(phase_arrays(), side_->streams_from(stream));
     PICTURA_CUDA(cudaGetLastError());
   }
 
@@ -256,11 +236,9 @@ class SimulatorCuda final : public Simulator {
   StepResult step_all(Span<const CommandType> commands, Stream stream) {
     const DeviceGuard guard(device_);
     throw_rejected();
-    cuda::launch_step(arrays(), commands.data(), side_->streams_from(handle_of(stream)));
+    cuda::launch_step(phase_arrays(), commands.data(), side_->streams_from(handle_of(stream)));
     PICTURA_CUDA(cudaGetLastError());
-    return {{results_.reward.data(), slot_count()},       {results_.terminated.data(), slot_count()},
-            {results_.truncated.data(), slot_count()},    {results_.valid.data(), slot_count()},
-            {state_.agents.refusal.data(), slot_count()}, {results_.sums.data(), slot_count()}};
+    return arrays_.results;
   }
 
   void throw_rejected() {
@@ -330,8 +308,8 @@ class SimulatorCuda final : public Simulator {
     put(of_worlds, scratch_.of_worlds, stream);
   }
 
-  cuda::SimulatorArrays arrays() {
-    cuda::SimulatorArrays arrays;
+  cuda::PhaseArrays phase_arrays() {
+    cuda::PhaseArrays arrays;
     arrays.worlds = scratch_.worlds.data();
     arrays.next_worlds = scratch_.next_worlds.data();
     arrays.scratch = scratch_.of_worlds.data();
@@ -348,7 +326,7 @@ class SimulatorCuda final : public Simulator {
     arrays.world_totals = state_.world_totals.data();
     arrays.results = results_.step_arrays();
     arrays.views = results_.views.data();
-    arrays.observations = observations();
+    arrays.observations = arrays_.observations;
     arrays.entity_sets = config().vector_observations;
     arrays.has_lives = setup_.has_lives();
     arrays.began = scratch_.began.data();
@@ -366,7 +344,6 @@ class SimulatorCuda final : public Simulator {
   const Device device_;
   SimulatorSetup setup_;
   SimulatorCapacity capacity_;
-  uint64_t generation_ = 0;
   WorldsToken worlds_token_;
   mutable SimulatorState host_;  // the state only once it has been copied there
   mutable SimulatorTotals totals_;
@@ -377,7 +354,6 @@ class SimulatorCuda final : public Simulator {
   DeviceScratch scratch_;
   std::unique_ptr<SideStream> side_;
   std::unique_ptr<MappedValue<int64_t>> rejected_command_, wrong_edit_, wrong_query_;
-  SceneBatch scene_;
 };
 
 }  // namespace

@@ -38,8 +38,8 @@ CornerControl corner_control_named(const std::string& name);
 struct CornerScene {
   std::vector<AgentBox> boxes;
   std::vector<AgentStatus> status;  // [boxes]
-  std::vector<Vec2> user_m;     // [kTakeoverSteps + 1] where the hidden vehicle's box is
-  int32_t removed = -1;         // who is not there in CornerCase::removed; -1: nobody
+  std::vector<Vec2> user_m;         // [kTakeoverSteps + 1] where the hidden vehicle's box is
+  int32_t removed = -1;             // who is not there in CornerCase::removed; -1: nobody
 };
 
 struct CornerResults : ProbeResults {

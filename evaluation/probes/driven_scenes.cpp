@@ -62,11 +62,8 @@ void DrivenScenes::add(Simulator& simulator, int driver) {
       }
     }
     for (size_t slot = first; slot < end; ++slot) {
-      scene.states.push_back({{x_m[slot], y_m[slot], z_m[slot]},
-                              heading_rad[slot],
-                              speed_mps[slot],
-                              lane[slot],
-                              status[slot]});
+      scene.states.push_back(
+          {{x_m[slot], y_m[slot], z_m[slot]}, heading_rad[slot], speed_mps[slot], lane[slot], status[slot]});
     }
   }
 }

@@ -46,8 +46,7 @@ struct ProbeFrame {
     return its_status == AgentStatus::active || its_status == AgentStatus::halted;
   }
   bool is_ego(size_t slot) const {
-    return status[slot] == AgentStatus::active &&
-           agent_class[slot] == AgentClass::vehicle;
+    return status[slot] == AgentStatus::active && agent_class[slot] == AgentClass::vehicle;
   }
 };
 

@@ -137,8 +137,7 @@ void TakeoverWorlds::remove(Worlds* worlds, const std::vector<TakeoverStart>& st
   const Device device = run_.device();
   const auto count = static_cast<int64_t>(slots.size());
   const DeviceCopy<int32_t> which(slots, device);
-  const DeviceCopy<AgentStatus> absent(std::vector<AgentStatus>(slots.size(), AgentStatus::absent),
-                                   device);
+  const DeviceCopy<AgentStatus> absent(std::vector<AgentStatus>(slots.size(), AgentStatus::absent), device);
   worlds->simulator->set_state(Array(which.span().data(), {count}, device),
                                std::vector<NamedArray>{{"status", Array(absent.span().data(), {count}, device)}},
                                current_stream(device));

@@ -55,7 +55,7 @@ struct ActionRule {
   Span<const int32_t> episode_index, episode_step;  // [worlds]
   ActionChoice choice;
 
-  ActionRule(const ControllerInput& input, const ActionChoice& its_choice)
+  ActionRule(const SimulatorArrays& input, const ActionChoice& its_choice)
       : slots(input.slots), episode_index(input.episode_index), episode_step(input.episode_step), choice(its_choice) {}
 
   /// log_probs: [kNumActions].

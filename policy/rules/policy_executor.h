@@ -24,7 +24,7 @@ class PolicyExecutor {
   virtual int64_t select_asked(const AskedSlots& asked, Span<int64_t> slots_out, Stream stream = {}) = 0;
   /// Chooses the actions of some slots. log_probs: [slots.size(), kNumActions]; actions_out: [slots of the simulator],
   /// of which those of all others stay as they are.
-  virtual void choose_actions(const ControllerInput& input, Span<const int64_t> slots, Span<const float> log_probs,
+  virtual void choose_actions(const SimulatorArrays& input, Span<const int64_t> slots, Span<const float> log_probs,
                               const ActionChoice& choice, Span<int32_t> actions_out, Stream stream = {}) = 0;
   /// Commands with these actions for the slots that the mask has (empty: all). All are [slots].
   virtual void write_commands(Span<const int32_t> actions, Span<const uint8_t> mask, Span<Command> commands_out,

@@ -85,8 +85,8 @@ bool walk_leads(const WorldView& world, int agent, const WalkGraph& graph, Route
 RoutePoint start_place(const WorldView& world, int agent) {
   const int slot = world.first_slot + agent;
   if (world.agents.life[slot] > 0) {
-    return entry_place(world.map, drawn_entry(world, agent, world.agents.life_step[slot]), world.agents.agent_class[slot],
-                       world.agents.length_m[slot]);
+    return entry_place(world.map, drawn_entry(world, agent, world.agents.life_step[slot]),
+                       world.agents.agent_class[slot], world.agents.length_m[slot]);
   }
   for (int i = 0; i < kSpawnTries; ++i) {
     const RoutePoint at = spawn_point(world, agent, i);

@@ -12,7 +12,7 @@
 
 namespace pictura {
 
-void check_controller_arrays(std::string_view who, const ControllerInput& input, Device device,
+void check_controller_arrays(std::string_view who, const SimulatorArrays& input, Device device,
                              Span<const uint8_t> mask, Span<const Command> commands) {
   const size_t num_slots = input.slots.world_of_slot.size();
   PICTURA_CHECK(input.device == device, "controller {}: expected input on {}, got {}", who, name_of(device),
@@ -36,7 +36,7 @@ class RandomController final : public Controller {
  public:
   explicit RandomController(uint64_t seed) : seed_(seed) {}
   std::string_view name() const override { return "random"; }
-  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream) override {
+  void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream) override {
     check_controller_arrays(name(), input, Device{}, mask, commands_out);
     fill(RandomCommands{seed_, input.slots, input.world_totals}, mask, commands_out);
   }
@@ -51,7 +51,7 @@ class RuleController final : public Controller {
  public:
   explicit RuleController(std::string_view name) : name_(name) {}
   std::string_view name() const override { return name_; }
-  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream) override {
+  void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream) override {
     check_controller_arrays(name(), input, Device{}, mask, commands_out);
     fill(Rule{}, mask, commands_out);
   }

@@ -31,7 +31,7 @@ std::unique_ptr<Controller> make_host_controller(const std::string& name, const 
 
 /// Throws Error, naming the controller, unless mask (or nothing) and commands have one element for each slot and the
 /// input lies on `device`.
-void check_controller_arrays(std::string_view who, const ControllerInput& input, Device device,
+void check_controller_arrays(std::string_view who, const SimulatorArrays& input, Device device,
                              Span<const uint8_t> mask, Span<const Command> commands);
 
 }  // namespace pictura

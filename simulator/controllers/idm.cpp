@@ -185,7 +185,7 @@ IdmController::IdmController(const Simulator& simulator, IdmPaths paths, const I
   life_.assign(paths_.size(), 0);
 }
 
-void IdmController::act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream) {
+void IdmController::act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream) {
   check_controller_arrays(name(), input, Device{}, mask, commands_out);
   for (size_t slot = 0; slot < commands_out.size(); ++slot) {
     if (!mask.empty() && !mask[slot]) continue;
@@ -195,7 +195,7 @@ void IdmController::act(const ControllerInput& input, Span<const uint8_t> mask, 
 }
 
 /// Where the agent is on its path, which is made anew along lanes where it was put elsewhere or the path runs out.
-float IdmController::place_on_path(const ControllerInput& input, size_t slot) {
+float IdmController::place_on_path(const SimulatorArrays& input, size_t slot) {
   constexpr float kAstray_m = 1, kLeast_m = 60;
   const auto world = static_cast<size_t>(input.slots.world_of_slot[slot]);
   FollowedPath& path = paths_[slot];
@@ -211,8 +211,7 @@ float IdmController::place_on_path(const ControllerInput& input, size_t slot) {
   if (on_lanes_[slot] && (begins || path.points_m.empty() || !serves())) {
     const bool walks = input.state.agent_class[slot] == AgentClass::pedestrian;
     const float length_m = input.state.length_m[slot];
-    const float front_m =
-        reference_to_center(input.state.agent_class[slot], length_m) + 0.5f * length_m;
+    const float front_m = reference_to_center(input.state.agent_class[slot], length_m) + 0.5f * length_m;
     path = path_along_lanes(views_[world], walks ? -1 : input.state.lane[slot], here, input.state.heading_rad[slot],
                             front_m);
     s_m = 0;
@@ -221,7 +220,7 @@ float IdmController::place_on_path(const ControllerInput& input, size_t slot) {
   return s_m;
 }
 
-IdmController::Front IdmController::box_ahead(const ControllerInput& input, size_t slot, float s_m) const {
+IdmController::Front IdmController::box_ahead(const SimulatorArrays& input, size_t slot, float s_m) const {
   const FollowedPath& path = paths_[slot];
   const auto agent = static_cast<int>(slot);
   const auto world = static_cast<size_t>(input.slots.world_of_slot[slot]);
@@ -251,7 +250,7 @@ IdmController::Front IdmController::box_ahead(const ControllerInput& input, size
 }
 
 /// How far the bumper is from the first line along the path that holds it up; infinite: there is none.
-float IdmController::closed_line_ahead_m(const ControllerInput& input, size_t slot, float s_m) const {
+float IdmController::closed_line_ahead_m(const SimulatorArrays& input, size_t slot, float s_m) const {
   constexpr float kLook_m = 45;
   const FollowedPath& path = paths_[slot];
   const auto world = static_cast<size_t>(input.slots.world_of_slot[slot]);
@@ -282,7 +281,7 @@ float IdmController::closed_line_ahead_m(const ControllerInput& input, size_t sl
   return nearest_m;
 }
 
-Command IdmController::command_of(const ControllerInput& input, size_t slot) {
+Command IdmController::command_of(const SimulatorArrays& input, size_t slot) {
   const float s_m = place_on_path(input, slot);
   const FollowedPath& path = paths_[slot];
   const float speed_mps = std::max(0.0f, input.state.speed_mps[slot]);

@@ -69,7 +69,7 @@ class IdmController final : public Controller {
   explicit IdmController(const Simulator& simulator, IdmPaths paths = IdmPaths::logged,
                          const IdmParameters& parameters = {});
   std::string_view name() const override { return wanted_paths_ == IdmPaths::lanes ? "idm_lanes" : "idm"; }
-  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out,
+  void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out,
            Stream stream = {}) override;
 
  private:
@@ -77,10 +77,10 @@ class IdmController final : public Controller {
     float gap_m = INFINITY, speed_mps = 0;
   };
 
-  float place_on_path(const ControllerInput& input, size_t slot);
-  Front box_ahead(const ControllerInput& input, size_t slot, float s_m) const;
-  float closed_line_ahead_m(const ControllerInput& input, size_t slot, float s_m) const;
-  Command command_of(const ControllerInput& input, size_t slot);
+  float place_on_path(const SimulatorArrays& input, size_t slot);
+  Front box_ahead(const SimulatorArrays& input, size_t slot, float s_m) const;
+  float closed_line_ahead_m(const SimulatorArrays& input, size_t slot, float s_m) const;
+  Command command_of(const SimulatorArrays& input, size_t slot);
 
   IdmPaths wanted_paths_;
   IdmParameters parameters_;

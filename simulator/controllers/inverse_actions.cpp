@@ -174,7 +174,7 @@ InverseTable::InverseTable(const Simulator& simulator) {
   for (const WorldSpec& world : simulator.worlds()) worlds.push_back(of_map[world.map]);
 }
 
-void InverseController::act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out,
+void InverseController::act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out,
                             Stream) {
   check_controller_arrays(name(), input, Device{}, mask, commands_out);
   const TabledCommands rule{input.slots, input.episode_step, table_.worlds, table_.actions};

@@ -44,7 +44,7 @@ class InverseController final : public Controller {
   /// Of one simulator, whose worlds are all recorded scenes.
   explicit InverseController(const Simulator& simulator) : table_(simulator) {}
   std::string_view name() const override { return "inverse"; }
-  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out,
+  void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out,
            Stream stream = {}) override;
 
  private:

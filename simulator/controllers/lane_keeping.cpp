@@ -346,7 +346,7 @@ LaneKeepingController::LaneKeepingController(const Simulator& simulator) {
 
 LaneKeepingController::~LaneKeepingController() = default;
 
-void LaneKeepingController::act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out,
+void LaneKeepingController::act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out,
                                 Stream) {
   check_controller_arrays(name(), input, Device{}, mask, commands_out);
   for (size_t w = 0; w < episode_.size(); ++w) {
@@ -369,7 +369,7 @@ void LaneKeepingController::act(const ControllerInput& input, Span<const uint8_t
   });
 }
 
-void LaneKeepingController::begin_episode(const ControllerInput& input, size_t world) {
+void LaneKeepingController::begin_episode(const SimulatorArrays& input, size_t world) {
   // Over the simulator's agents, boxes and lights, which nothing here writes.
   const auto map = static_cast<size_t>(setup_->worlds[world].map);
   WorldView& view =

@@ -94,13 +94,13 @@ class LaneKeepingController final : public Controller {
 
   std::string_view name() const override { return "lane"; }
   /// Throws Error besides where a world is in the middle of an episode whose first step this has not seen.
-  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out,
+  void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out,
            Stream stream = {}) override;
   /// Null for pedestrians, for the absent, and before the first act().
   const LaneKeepingAgent* agent(size_t slot) const { return agents_[slot].get(); }
 
  private:
-  void begin_episode(const ControllerInput& input, size_t world);
+  void begin_episode(const SimulatorArrays& input, size_t world);
   void begin_lives(size_t world);
 
   std::unique_ptr<SimulatorSetup> setup_;                  // a copy, for its maps and rule options

@@ -17,7 +17,7 @@ SharedControl::SharedControl(std::vector<Driver> drivers) : drivers_(std::move(d
   }
 }
 
-void SharedControl::act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out,
+void SharedControl::act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out,
                         Stream stream) {
   for (const Driver& driver : drivers_) {
     PICTURA_CHECK(mask.empty() || driver.mask.empty(),

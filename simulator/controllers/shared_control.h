@@ -29,7 +29,7 @@ class SharedControl final : public Controller {
 
   /// Their names, with commas between them.
   std::string_view name() const override { return name_; }
-  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out,
+  void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out,
            Stream stream = {}) override;
 
  private:

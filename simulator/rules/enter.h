@@ -11,8 +11,7 @@ constexpr float kEntryGap_m = 2.0f, kEntryHeadway_s = 2.0f;  // to the next box
 
 /// Whether an agent waits to enter; whoever leaves is still seen in that step.
 PICTURA_HD inline bool waits(const WorldView& world, int agent) {
-  return world.agents.status[world.first_slot + agent] == AgentStatus::waiting &&
-         !world.boxes[agent].drawn;
+  return world.agents.status[world.first_slot + agent] == AgentStatus::waiting && !world.boxes[agent].drawn;
 }
 
 /// The entry that an agent draws at the end of this step of the episode. There must be entries.

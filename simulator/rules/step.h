@@ -126,8 +126,7 @@ PICTURA_HD inline bool tells_to_follow_record(const Command& command) { return c
 
 /// Whether a command to follow the record has an effect: whoever has not halted follows, the absent too.
 PICTURA_HD inline bool may_follow_record(const WorldView& world, int agent) {
-  return has_record(world.map) &&
-         world.agents.status[world.first_slot + agent] != AgentStatus::halted;
+  return has_record(world.map) && world.agents.status[world.first_slot + agent] != AgentStatus::halted;
 }
 
 /// Where an agent is told to be after the step. Which level it is then on is looked for around *z_m_inout.

@@ -145,9 +145,8 @@ TEST(WorldPainter, SkipsAbsentAgentsAndDimsHaltedOnes) {
   WorldPainter painter(town(), 400, 300);
   std::vector<AgentBox> agents{box(500, 400, 0), box(500, 405, 0), box(500, 395, 0), box(510, 400, 0)};
   agents[3].drawn = 0;
-  const std::vector<AgentStatus> status{
-      AgentStatus::halted, AgentStatus::absent,
-      AgentStatus::active, AgentStatus::active};
+  const std::vector<AgentStatus> status{AgentStatus::halted, AgentStatus::absent, AgentStatus::active,
+                                        AgentStatus::active};
   WorldFrame frame;
   frame.agents = agents;
   frame.status = status;
@@ -318,50 +317,33 @@ TEST(WorldPainter, RejectsSizesOutOfRange) {
 /// Two worlds of two slots and, in the second, one parked car.
 class StillSimulator final : public Simulator {
  public:
-  StillSimulator() {
+  StillSimulator() : Simulator("still") {
+    parts_ = &parts_of_it_;
     agents_ = {box(500, 400, 0), box(500, 410, 0), box(500, 400, kPi), box(520, 400, 0), box(500, 390, 0)};
-    state_.status = status_.data();
-    state_.halt_reason = halt_reason_.data();
-    state_.next_waypoint = next_waypoint_.data();
-    state_.waypoint_x_m = waypoint_x_m_.data();
-    state_.waypoint_y_m = waypoint_y_m_.data();
     world_begin_ = {0, 2, 5};
     light_begin_ = {0, static_cast<int32_t>(town().lights.size()), static_cast<int32_t>(2 * town().lights.size())};
     lights_.resize(2 * town().lights.size());
-    scene_.world_begin = world_begin_;
-    scene_.agents = agents_;
-    scene_.light_begin = light_begin_;
-    scene_.light_states = lights_;
+    arrays_.slots.world_of_slot = world_of_slot_;
+    arrays_.scene.world_begin = world_begin_;
+    arrays_.scene.agents = agents_;
+    arrays_.scene.light_begin = light_begin_;
+    arrays_.scene.light_states = lights_;
+    arrays_.state.status = status_.data();
+    arrays_.state.halt_reason = halt_reason_.data();
+    arrays_.state.next_waypoint = next_waypoint_.data();
+    arrays_.state.waypoint_x_m = waypoint_x_m_.data();
+    arrays_.state.waypoint_y_m = waypoint_y_m_.data();
   }
-  std::string_view name() const override { return "still"; }
-  Device device() const override { return device_; }
-  const SimulatorConfig& config() const override { return config_; }
-  const CompiledMaps& maps() const override { return maps_; }
-  const std::vector<GeometryHandle>& handles() const override { return handles_; }
-  const std::vector<WorldSpec>& worlds() const override { return worlds_; }
-  int num_slots() const override { return 4; }
-  void reset(Stream) override {}
+  void set_device(Device device) { arrays_.device = device; }
   void set_worlds(CompiledMaps, std::vector<GeometryHandle>, std::vector<WorldSpec>, uint64_t, Stream) override {}
   void reserve(const SimulatorCapacity&) override {}
-  uint64_t generation() const override { return 0; }
-  ObservationView observations() override { return {}; }
-  const SceneBatch& scene() override { return scene_; }
-  Span<const View> views() override { return {}; }
-  SlotTable slots() const override { return {}; }
-  ControllerInput controller_input() override { return {}; }
-  AgentStateView state() override { return state_; }
   SpawnReport spawn_report(Stream) const override { return {}; }
   const SimulatorTotals& totals(Stream) const override { return totals_; }
-  Span<const int32_t> episode_step() const override { return {}; }
-  Span<const int32_t> episode_index() const override { return {}; }
-  Span<const uint8_t> episode_over() const override { return {}; }
   uint64_t state_hash(Stream) const override { return 0; }
   std::vector<uint8_t> save(Stream) const override { return {}; }
   void restore(Span<const uint8_t>, Stream) override {}
   std::unique_ptr<StateSnapshot> snapshot(Stream) const override { return nullptr; }
   void restore(const StateSnapshot&, Stream) override {}
-
-  Device device_;
 
  private:
   StepResult step_actions(Span<const int32_t>, Stream) override { return {}; }
@@ -370,11 +352,12 @@ class StillSimulator final : public Simulator {
   void apply_edit(const StateEdit&, Stream) override {}
   void answer_queries(const ObservationQueries&, Stream) override {}
 
-  SimulatorConfig config_;
+  const SimulatorParts parts_of_it_{.config = {},
+                                    .maps = {std::make_shared<const CompiledMap>()},  // heads stand as mapped
+                                    .handles = {},
+                                    .worlds = {{0, 2, 0}, {0, 2, 1}}};
   SimulatorTotals totals_;
-  CompiledMaps maps_{std::make_shared<const CompiledMap>()};  // heads stand as mapped
-  std::vector<GeometryHandle> handles_;
-  std::vector<WorldSpec> worlds_{{0, 2, 0}, {0, 2, 1}};
+  std::vector<int32_t> world_of_slot_{0, 0, 1, 1};
   std::vector<AgentBox> agents_;
   std::vector<int32_t> world_begin_, light_begin_;
   std::vector<LightState> lights_;
@@ -384,8 +367,6 @@ class StillSimulator final : public Simulator {
   std::vector<int32_t> next_waypoint_{0, 0, 1, 0};
   std::vector<float> waypoint_x_m_ = std::vector<float>(12, 505.0f);
   std::vector<float> waypoint_y_m_{0, 0, 0, 0, 0, 0, 395, 400, 405, 0, 0, 0};
-  AgentStateView state_{};
-  SceneBatch scene_;
 };
 
 TEST(DrawWorld, ShowsTheAgentsOfOneWorldAndFollowsOne) {
@@ -407,7 +388,7 @@ TEST(DrawWorld, ShowsTheAgentsOfOneWorldAndFollowsOne) {
   EXPECT_EQ(count(draw_world(painter, simulator, 0), halo), 0);
   EXPECT_THAT(test::message_of([&] { draw_world(painter, simulator, 2); }), HasSubstr("[0, 2), got 2"));
   EXPECT_THAT(test::message_of([&] { draw_world(painter, simulator, 1, 2); }), HasSubstr("below 2, got 2"));
-  simulator.device_ = {MemorySpace::cuda, 0};
+  simulator.set_device({MemorySpace::cuda, 0});
   EXPECT_THAT(test::message_of([&] { draw_world(painter, simulator, 1); }), HasSubstr("host memory"));
 }
 

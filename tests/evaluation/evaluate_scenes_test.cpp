@@ -119,7 +119,7 @@ TEST_F(SceneEvaluations, EqualASimulatorThatIsDrivenByHand) {
     ASSERT_GE(driven.size(), 2u);
     int64_t steps = 0;
     for (int step = 0; step < protocol.steps; ++step) {
-      random->act(simulator->controller_input(), {}, commands);
+      random->act(simulator->arrays(), {}, commands);
       for (size_t i = 0; i < commands.size(); ++i) {
         if (plan.roles[i] == SceneRole::removed) commands[i].kind = CommandKind::absent;
         if (plan.roles[i] == SceneRole::replayed) commands[i].kind = CommandKind::recorded;

@@ -33,7 +33,7 @@ TEST(LiveWorld, TellsWhatARecordingHolds) {
   EXPECT_EQ(live.begin()["header"]["frames"], 1);
   std::vector<Command> commands(8);
   for (int frame = 1; frame <= 60; ++frame) {
-    controller->act(recorded->controller_input(), {}, commands);
+    controller->act(recorded->arrays(), {}, commands);
     recorder.before_step(commands);
     recorder.after_step(recorded->step(commands));
     live.before_step(commands);
@@ -65,7 +65,7 @@ TEST(LiveWorld, ForgettingKeepsTheNewestChains) {
   Recorder recorder(*simulator, {});
   std::vector<Command> commands(8);
   for (int step = 0; step < 30; ++step) {
-    controller->act(simulator->controller_input(), {}, commands);
+    controller->act(simulator->arrays(), {}, commands);
     recorder.before_step(commands);
     recorder.after_step(simulator->step(commands));
   }

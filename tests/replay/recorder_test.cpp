@@ -44,7 +44,7 @@ Replay record(Simulator& simulator, const std::string& policy, int steps, const 
   std::vector<Command> commands(static_cast<size_t>(simulator.num_slots()));
   visit(0, nullptr, commands);
   for (int step = 0; step < steps; ++step) {
-    controller->act(simulator.controller_input(), {}, commands);
+    controller->act(simulator.arrays(), {}, commands);
     ReplayDecision decision;
     decision.probabilities[3] = 0.25f;
     decision.value = -0.5f * static_cast<float>(step);
@@ -193,7 +193,7 @@ TEST(Recorder, RewardTermsAddUpToTheSimulatorsRewardAndMetricsToItsTotals) {
     }
     // Theirs are the terms of the motion before the halt.
     EXPECT_GE(infractions, std::string(policy) == "random" ? 10 : 0);
-    const SimulatorTotals& totals = simulator->controller_input().world_totals[kWorld];
+    const SimulatorTotals& totals = simulator->arrays().world_totals[kWorld];
     const ReplayMoment first = replay.first_infraction;
     EXPECT_EQ(first.frame > 0, infractions > 0);
     if (first.frame > 0) {

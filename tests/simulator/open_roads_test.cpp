@@ -26,9 +26,7 @@ std::shared_ptr<const RoadMap> map_of(const std::string& text) {
   return std::make_shared<RoadMap>(parse_opendrive(text, "open.xodr"));
 }
 
-bool is(AgentStatus status, const AgentStateView& state, int slot) {
-  return state.status[slot] == status;
-}
+bool is(AgentStatus status, const AgentStateView& state, int slot) { return state.status[slot] == status; }
 
 /// Steps a simulator with a controller and calls look(result) after each step.
 template <typename Look>
@@ -36,7 +34,7 @@ void drive(Simulator* simulator, const std::string& controller, int steps, const
   const auto drives = make_controller(controller, *simulator, 1);
   std::vector<Command> commands(static_cast<size_t>(simulator->num_slots()));
   for (int step = 0; step < steps; ++step) {
-    drives->act(simulator->controller_input(), {}, commands);
+    drives->act(simulator->arrays(), {}, commands);
     look(simulator->step(Span<const Command>(commands)));
   }
 }

@@ -27,9 +27,9 @@ class RandomEdit {
       speed_mps_.push_back(random.uniform(-1, 15));
       const bool has_goal = state.goal_lane[slot] >= 0;
       status_.push_back(!has_goal                 ? AgentStatus::absent
-                                             : random.uniform() < 0.1f ? AgentStatus::absent
-                                             : random.uniform() < 0.1f ? AgentStatus::halted
-                                                                       : AgentStatus::active);
+                        : random.uniform() < 0.1f ? AgentStatus::absent
+                        : random.uniform() < 0.1f ? AgentStatus::halted
+                                                  : AgentStatus::active);
       for (int i = 0; i < kNumWaypoints; ++i) waypoint_x_m_.push_back(x_m_.back() + random.uniform(-30, 30));
     }
   }

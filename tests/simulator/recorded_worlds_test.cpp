@@ -37,9 +37,7 @@ const std::vector<Command>& recorded(const Simulator& simulator) {
   return commands;
 }
 
-AgentStatus status_of(Simulator& simulator, int slot) {
-  return simulator.state().status[slot];
-}
+AgentStatus status_of(Simulator& simulator, int slot) { return simulator.state().status[slot]; }
 
 /// Expects every agent to be where the recording has it at this step, or nowhere.
 void expect_as_recorded(Simulator& simulator, const Scenario& scene, int32_t step) {
@@ -424,8 +422,8 @@ TEST(RecordedWorlds, ControllersShareThemByMasks) {
   std::vector<uint8_t> driven(scene->tracks.size());
   driven[static_cast<size_t>(mover(*scene, 40))] = 1;
   std::vector<Command> commands(scene->tracks.size());
-  log->act(simulator->controller_input(), {}, commands);
-  idle->act(simulator->controller_input(), driven, commands);
+  log->act(simulator->arrays(), {}, commands);
+  idle->act(simulator->arrays(), driven, commands);
   simulator->step(commands);
   EXPECT_EQ(simulator->totals().agent_steps, 1);
 }
@@ -445,7 +443,7 @@ void expect_inverse_actions_to_follow_the_record(const DynamicsRules& rules) {
   std::vector<Command> commands(scene->tracks.size());
   const auto first = static_cast<size_t>(self * inverse.num_steps);
   for (int32_t step = 1; step <= 40; ++step) {
-    control.act(simulator->controller_input(), {}, commands);
+    control.act(simulator->arrays(), {}, commands);
     simulator->step(commands);
     // The dynamics do what was foreseen, and that is near.
     const TrackState& there = scene->states_of(self)[static_cast<size_t>(step)];
@@ -524,7 +522,7 @@ TEST(RecordedWorlds, IdmFollowsThePathAndStopsBehindOthers) {
     float fastest_mps = 0;
     for (int32_t step = 1; step < scene->num_steps; ++step) {
       std::vector<Command> commands = recorded(*simulator);
-      idm->act(simulator->controller_input(), driven, commands);
+      idm->act(simulator->arrays(), driven, commands);
       if (is_blocked) {
         commands[static_cast<size_t>(other)] = {.kind = CommandKind::kinematic_state,
                                                 .x_m = blocked_at.position_m.x,
@@ -566,7 +564,7 @@ TEST(RecordedWorlds, IdmFollowsLanesWhereItIsTold) {
     std::vector<Command> commands = recorded(*simulator);
     const AgentStateView state = simulator->state();
     const float before_mps = state.speed_mps[self];
-    if (step > kTakeover) idm->act(simulator->controller_input(), driven, commands);
+    if (step > kTakeover) idm->act(simulator->arrays(), driven, commands);
     simulator->step(commands);
     if (step <= kTakeover) continue;
     driven_m += 0.1f * state.speed_mps[self];
@@ -597,7 +595,7 @@ TEST(RecordedWorlds, IdmFollowsLanesWhereThereIsNoRecord) {
     std::vector<Command> commands(static_cast<size_t>(town->num_slots()));
     const AgentStateView state = town->state();
     for (int step = 1; step <= 500; ++step) {
-      idm->act(town->controller_input(), {}, commands);
+      idm->act(town->arrays(), {}, commands);
       town->step(commands);
       for (int slot = 0; slot < town->num_slots(); ++slot) {
         if (status_of(*town, slot) != AgentStatus::active) continue;

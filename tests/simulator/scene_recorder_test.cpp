@@ -61,7 +61,7 @@ TEST(SceneRecorder, EachLifeIsATrack) {
   SceneRecorder recorder(*simulator);
   std::vector<Command> commands(6);
   for (int step = 0; step < 300; ++step) {
-    driver->act(simulator->controller_input(), {}, commands);
+    driver->act(simulator->arrays(), {}, commands);
     recorder.after_step(simulator->step(Span<const Command>(commands)));
   }
   const SpawnReport report = simulator->spawn_report();
@@ -126,7 +126,7 @@ TEST(SceneRecorder, WhatWasDrivenIsSavedLoadedAndReplayed) {
       ASSERT_EQ(was.length_m, is.length_m);
       ASSERT_EQ(was.agent_class, is.agent_class);
     }
-    log->act(replay->controller_input(), {}, commands, {});
+    log->act(replay->arrays(), {}, commands, {});
     if (step < kRecordedSteps) replay->step(Span<const Command>(commands));
   }
   EXPECT_GT(compared, 20 * kRecordedSteps);
@@ -163,7 +163,7 @@ TEST(SceneRecorder, AReplayedRecordingIsTheRecording) {
   std::vector<Command> commands(scene->tracks.size());
   SceneRecorder recorder(*simulator);
   for (int step = 0; step < 40; ++step) {
-    log->act(simulator->controller_input(), {}, commands, {});
+    log->act(simulator->arrays(), {}, commands, {});
     recorder.after_step(simulator->step(Span<const Command>(commands)));
   }
   const Scenario again = recorder.scenario("again");

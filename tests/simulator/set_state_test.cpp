@@ -72,7 +72,7 @@ TEST(ResetOfWorlds, IsFollowedByTheLaneKeeper) {
   const auto lane = make_controller("lane", *simulator, 0);
   std::vector<Command> commands(6);
   const auto drive = [&] {
-    lane->act(simulator->controller_input(), {}, commands);
+    lane->act(simulator->arrays(), {}, commands);
     simulator->step(commands);
   };
   drive();

@@ -77,7 +77,7 @@ TEST(HeldActions, AreDecidedAgainWhereTheClockOrANewEpisodeSaysSo) {
   DecisionClock clock(3);
   std::string deciding;
   for (int64_t step = 0; step < 12; ++step) {
-    const ControllerInput input = simulator->controller_input();
+    const SimulatorArrays input = simulator->arrays();
     const at::Tensor active = active_slots(input, {}, true, executor.get());
     const int64_t count = clock.deciding(input, active, step, simulator->episode_over()).size(0);
     EXPECT_TRUE(count == 0 || count == active.size(0)) << step;
@@ -101,7 +101,7 @@ TEST(HeldActions, AreDecidedWhereALifeBeginsAndAgentsHaveLeft) {
   DecisionClock clock(50);
   int begun = 0, left = 0;
   for (int64_t step = 0; step < 400; ++step) {
-    const ControllerInput input = simulator->controller_input();
+    const SimulatorArrays input = simulator->arrays();
     const at::Tensor deciding = clock.deciding(input, active_slots(input, {}, true, executor.get()), step);
     std::vector<bool> decides(6);
     for (int64_t i = 0; i < deciding.size(0); ++i) decides[static_cast<size_t>(deciding[i].item<int64_t>())] = true;
@@ -177,7 +177,7 @@ TEST(HeldActions, AreHeldWhereverAPolicyDrives) {
   bool changes = false;
   for (int step = 0; step < 9; ++step) {
     before = commands;
-    controller->act(simulator->controller_input(), {}, commands);
+    controller->act(simulator->arrays(), {}, commands);
     EXPECT_EQ(controller->num_driven(), 6);
     for (size_t slot = 0; slot < 6; ++slot) {
       if (step % 3 != 0) {

@@ -430,7 +430,7 @@ TEST_F(DeviceTraining, WhatARolloutKeepsIsWhatItKeepsOnTheHost) {
     at::Tensor actions = at::arange(kSlots, at::kInt).remainder(kNumActions).to(torch_device(device));
     std::vector<at::Tensor> rows;
     for (int64_t step = 0; step < kSteps; ++step) {
-      const at::Tensor slots = active_slots(simulator->controller_input(), {}, false, executor.get());
+      const at::Tensor slots = active_slots(simulator->arrays(), {}, false, executor.get());
       for (RolloutObservations& observations : all) observations.record(step, slots);
       rows.push_back(slots + step * kSlots);
       for (int i = 0; i < 20; ++i) simulator->step(Array(actions.data_ptr<int32_t>(), {kSlots}, device));

@@ -299,7 +299,7 @@ TEST_F(Training, WhatARolloutKeepsIsWhatTheActiveAgentsSaw) {
   std::vector<uint8_t> seen;  // images of the rows
   std::vector<float> egos;
   for (int64_t step = 0; step < 4; ++step) {
-    const ControllerInput input = simulator->controller_input();
+    const SimulatorArrays input = simulator->arrays();
     const at::Tensor slots = active_slots(input, {}, false, executor.get());
     for (RolloutObservations& observations : all) observations.record(step, slots);
     rows.push_back(slots + step * 24);
@@ -802,7 +802,7 @@ TEST_F(Training, EvaluationRepeatsNoWorldOfTraining) {
     simulator->reset();
     std::vector<Command> commands(6);
     for (int step = 0; step < o.steps; ++step) {
-      controller->act(simulator->controller_input(), {}, commands);
+      controller->act(simulator->arrays(), {}, commands);
       simulator->step(commands);
     }
     double sum = 0;
@@ -887,7 +887,7 @@ TEST_F(Training, ASessionGivesLogitsAndValuesOfAnyScene) {
       make_simulator("cpu", session.training_world(), {load_map("procedural")}, {WorldSpec{0, 6, 5}});
   upload_maps(*simulator, renderer.get());
   simulator->reset();
-  const ControllerInput input = simulator->controller_input();
+  const SimulatorArrays input = simulator->arrays();
   std::vector<float> logits(6 * kNumActions), values(6);
   session.evaluate({input.observations, &input.scene, input.views, {}}, renderer.get(), logits, values);
   EXPECT_NE(values[0], values[1]);

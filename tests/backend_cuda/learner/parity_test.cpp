@@ -144,9 +144,8 @@ std::vector<int64_t> same_selection(size_t room, const Executors& executors, con
 std::vector<int64_t> same_active(const Worlds& worlds, const Executors& executors, const std::vector<uint8_t>& mask) {
   const DeviceBuffer<uint8_t> copy = on_device(mask);
   return same_selection(kSlots, executors, [&](LearnerExecutor* executor, Span<int64_t> slots, bool on_device) {
-    return on_device
-               ? executor->select_asked({worlds.cuda->controller_input().state.status, copy.span(), nullptr}, slots)
-               : executor->select_asked({worlds.cpu->controller_input().state.status, mask, nullptr}, slots);
+    return on_device ? executor->select_asked({worlds.cuda->arrays().state.status, copy.span(), nullptr}, slots)
+                     : executor->select_asked({worlds.cpu->arrays().state.status, mask, nullptr}, slots);
   });
 }
 
@@ -198,8 +197,8 @@ TEST_F(CudaLearnerTest, ChoosesTheActionsOfSomeSlots) {
     const auto chosen = [&](const ActionChoice& choice) {
       std::vector<int32_t> actions(kSlots, kUntouched);
       const DeviceBuffer<int32_t> device_actions = on_device(actions);
-      executors.host->choose_actions(worlds.cpu->controller_input(), slots, log_probs, choice, actions);
-      executors.device->choose_actions(worlds.cuda->controller_input(), slot_copy.span(), log_prob_copy.span(), choice,
+      executors.host->choose_actions(worlds.cpu->arrays(), slots, log_probs, choice, actions);
+      executors.device->choose_actions(worlds.cuda->arrays(), slot_copy.span(), log_prob_copy.span(), choice,
                                        room_in(device_actions));
       EXPECT_EQ(on_host(device_actions.span()), actions);
       return actions;
@@ -360,8 +359,8 @@ TEST_F(CudaLearnerTest, SelectingAllocatesNothingAfterTheFirstCallOfASize) {
                                          0.5f, room_in(selected), stream);
   };
   const auto select_asked = [&] {
-    return executors.device->select_asked({worlds.cuda->controller_input().state.status, {}, nullptr},
-                                          {selected.data(), kSlots}, stream);
+    return executors.device->select_asked({worlds.cuda->arrays().state.status, {}, nullptr}, {selected.data(), kSlots},
+                                          stream);
   };
   const int64_t all = select(kMany), some = select(1000), active = select_asked();
   // Selecting waits for its count, so that a capture could not show this.
@@ -405,7 +404,7 @@ TEST_F(CudaLearnerTest, AllButSelectingIsCapturedIntoAGraph) {
   const ActionChoice drawn{.argmax = false, .seed = 3};
   const auto work = [&] {
     LearnerExecutor& executor = *executors.device;
-    executor.choose_actions(worlds.cuda->controller_input(), slot_copy.span(), log_prob_copy.span(), drawn,
+    executor.choose_actions(worlds.cuda->arrays(), slot_copy.span(), log_prob_copy.span(), drawn,
                             room_in(device.actions), stream);
     executor.write_commands(device.actions.span(), {}, room_in(device.commands), stream);
     executor.compute_advantages(transitions.device(), 0.9f, 0.8f, room_in(device.advantages), stream);
@@ -423,7 +422,7 @@ TEST_F(CudaLearnerTest, AllButSelectingIsCapturedIntoAGraph) {
     device.permuted.fill(0xFF);
     PICTURA_CUDA(cudaDeviceSynchronize());
     PICTURA_CUDA(cudaGraphLaunch(graph.executable, own.stream));
-    executors.host->choose_actions(worlds.cpu->controller_input(), slots, log_probs, drawn, host.actions);
+    executors.host->choose_actions(worlds.cpu->arrays(), slots, log_probs, drawn, host.actions);
     executors.host->write_commands(host.actions, {}, host.commands);
     executors.host->compute_advantages(transitions.host(), 0.9f, 0.8f, host.advantages);
     executors.host->permute(permutation, items, host.permuted);

@@ -309,10 +309,10 @@ void expect_same_records(AfterInfraction after_infraction, bool leave_at_goal) {
     for (size_t slot = 0; slot < num_slots; ++slot) mask[slot] = (slot + static_cast<size_t>(step) / 20) % 5 == 0;
     const DeviceBuffer<uint8_t> device_mask{Span<const uint8_t>(mask)};
     const Span<Command> device_commands(commands.data(), num_slots);
-    log->act(cuda->controller_input(), {}, device_commands);
-    random->act(cuda->controller_input(), device_mask.span(), device_commands);
-    host_log->act(cpu->controller_input(), {}, host_commands);
-    host_random->act(cpu->controller_input(), mask, host_commands);
+    log->act(cuda->arrays(), {}, device_commands);
+    random->act(cuda->arrays(), device_mask.span(), device_commands);
+    host_log->act(cpu->arrays(), {}, host_commands);
+    host_random->act(cpu->arrays(), mask, host_commands);
     cuda->step(Span<const Command>(device_commands));
     cpu->step(host_commands);
   }
@@ -600,14 +600,14 @@ TEST_F(CudaSimulatorTest, TakesCommandsAndControllersInAGraph) {
   PICTURA_CUDA(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking));
   cudaGraph_t graph = nullptr;
   PICTURA_CUDA(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal));
-  cuda_controller->act(cuda->controller_input(), {}, {commands.data(), 300}, {stream});
+  cuda_controller->act(cuda->arrays(), {}, {commands.data(), 300}, {stream});
   cuda->step(commands.span(), {stream});
   PICTURA_CUDA(cudaStreamEndCapture(stream, &graph));
   cudaGraphExec_t executable = nullptr;
   PICTURA_CUDA(cudaGraphInstantiate(&executable, graph, 0));
   for (int step = 0; step < 100; ++step) {
     PICTURA_CUDA(cudaGraphLaunch(executable, stream));
-    cpu_controller->act(cpu->controller_input(), {}, host_commands);
+    cpu_controller->act(cpu->arrays(), {}, host_commands);
     cpu->step(host_commands);
   }
   cuda->check({stream});
@@ -634,8 +634,8 @@ TEST_F(CudaSimulatorTest, IsDrivenByTheLaneKeeperOnTheHost) {
   std::vector<Command> commands(200);
   DeviceBuffer<Command> device_commands{Span<const Command>(commands)};
   for (int step = 0; step < 150; ++step) {
-    cpu_controller->act(cpu->controller_input(), mask, commands);
-    cuda_controller->act(cuda->controller_input(), device_mask.span(), {device_commands.data(), 200});
+    cpu_controller->act(cpu->arrays(), mask, commands);
+    cuda_controller->act(cuda->arrays(), device_mask.span(), {device_commands.data(), 200});
     cpu->step(commands);
     cuda->step(device_commands.span());
   }
@@ -663,8 +663,8 @@ TEST_F(CudaSimulatorTest, IsDrivenByInverseActionsAndTheDriverModel) {
     std::vector<Command> commands(num_slots, Command{.kind = CommandKind::recorded});
     const DeviceBuffer<Command> device_commands{Span<const Command>(commands)};
     for (int step = 0; step < 150; ++step) {
-      cpu_controller->act(cpu->controller_input(), mask, commands);
-      cuda_controller->act(cuda->controller_input(), device_mask.span(), {device_commands.data(), num_slots});
+      cpu_controller->act(cpu->arrays(), mask, commands);
+      cuda_controller->act(cuda->arrays(), device_mask.span(), {device_commands.data(), num_slots});
       cpu->step(commands);
       cuda->step(device_commands.span());
     }

@@ -165,8 +165,8 @@ class ShuffledExecutor {
   HostResults results;
 
  private:
-  cuda::SimulatorArrays arrays() {
-    cuda::SimulatorArrays arrays;
+  cuda::PhaseArrays arrays() {
+    cuda::PhaseArrays arrays;
     arrays.worlds = worlds_.data();
     arrays.next_worlds = next_worlds_.data();
     arrays.scratch = scratch_.data();

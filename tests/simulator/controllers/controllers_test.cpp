@@ -41,7 +41,7 @@ TEST(Controller, RandomActionsAreKeyedByWorldAgentAndStep) {
   const auto controller = make_controller("random", *simulator, 11);
   std::vector<Command> commands(45);
   for (uint32_t step = 0; step < 10; ++step) {
-    controller->act(simulator->controller_input(), {}, commands);
+    controller->act(simulator->arrays(), {}, commands);
     for (uint32_t slot = 0; slot < 45; ++slot) {
       const uint32_t world = slot < 5 ? 7 : 2, agent = slot < 5 ? slot : slot - 5;
       RandomStream random({.seed = 11, .world = world, .agent = agent, .step = step, .purpose = Purpose::action});
@@ -61,7 +61,7 @@ TEST(Controller, RandomActionsOfManySlotsDiffer) {
   std::vector<Command> commands(4190);
   int alike = 0;
   for (int step = 0; step < 20; ++step) {
-    controller->act(simulator->controller_input(), {}, commands);
+    controller->act(simulator->arrays(), {}, commands);
     for (size_t slot = 0; slot + 4096 < commands.size(); ++slot) {
       alike += commands[slot].action == commands[slot + 4096].action;
     }
@@ -78,7 +78,7 @@ TEST(Controller, RandomActionsGoOnWithARestoredSimulator) {
     const auto controller = make_controller("random", *simulator, 3);
     std::vector<Command> commands(20);
     for (int step = 0; step < steps; ++step) {
-      controller->act(simulator->controller_input(), {}, commands);
+      controller->act(simulator->arrays(), {}, commands);
       simulator->step(commands);
     }
   };
@@ -93,8 +93,7 @@ TEST(Controller, RandomActionsGoOnWithARestoredSimulator) {
 TEST(Controller, AMaskSharesASimulator) {
   const auto simulator = make(testing::cars(), testing::stadium(200, 2), {{0, 4, 0}});
   std::vector<Command> commands(4, absence());
-  make_controller("idle", *simulator, 0)
-      ->act(simulator->controller_input(), std::vector<uint8_t>{1, 0, 0, 1}, commands);
+  make_controller("idle", *simulator, 0)->act(simulator->arrays(), std::vector<uint8_t>{1, 0, 0, 1}, commands);
   EXPECT_EQ(commands[0].kind, CommandKind::action);
   EXPECT_EQ(commands[0].action, kIdleAction);
   EXPECT_EQ(commands[1].kind, CommandKind::absent);
@@ -106,12 +105,11 @@ TEST(Controller, RefusesArraysOfAnotherSizeAndUnknownNames) {
   const auto simulator = make(testing::cars(), testing::stadium(200, 2), {{0, 4, 0}});
   std::vector<Command> commands(3);
   const auto controller = make_controller("random", *simulator, 0);
-  EXPECT_THAT(test::message_of([&] { controller->act(simulator->controller_input(), {}, commands); }),
+  EXPECT_THAT(test::message_of([&] { controller->act(simulator->arrays(), {}, commands); }),
               HasSubstr("controller random: expected memory for 4 commands, got 3"));
   commands.resize(4);
-  EXPECT_THAT(
-      test::message_of([&] { controller->act(simulator->controller_input(), std::vector<uint8_t>(5, 1), commands); }),
-      HasSubstr("expected a mask of 4 slots, got 5"));
+  EXPECT_THAT(test::message_of([&] { controller->act(simulator->arrays(), std::vector<uint8_t>(5, 1), commands); }),
+              HasSubstr("expected a mask of 4 slots, got 5"));
   EXPECT_THAT(test::message_of<UsageError>([&] { make_controller("pilot", *simulator, 0); }),
               HasSubstr("expected one of random, idle, lane, idm_lanes, log, inverse, idm; got 'pilot'"));
 }
@@ -121,12 +119,12 @@ TEST(Controller, LaneKeepingNeedsTheEpisodesFirstStep) {
   const auto controller = make_controller("lane", *simulator, 0);
   std::vector<Command> commands(3);
   for (int step = 0; step < 50; ++step) {  // over two ends of episodes
-    controller->act(simulator->controller_input(), {}, commands);
+    controller->act(simulator->arrays(), {}, commands);
     simulator->step(commands);
   }
   EXPECT_EQ(simulator->totals().collisions + simulator->totals().off_road, 0);
   const auto late = make_controller("lane", *simulator, 0);
-  EXPECT_THAT(test::message_of([&] { late->act(simulator->controller_input(), {}, commands); }),
+  EXPECT_THAT(test::message_of([&] { late->act(simulator->arrays(), {}, commands); }),
               HasSubstr("expected to act from the first step of episode"));
 }
 

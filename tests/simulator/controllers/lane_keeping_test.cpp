@@ -239,7 +239,7 @@ TEST(Idm, StaysOnTheRoadWhereTheThroughLaneIsTwoChangesAway) {
   const auto idm = make_controller("idm_lanes", *simulator, 0);
   std::vector<Command> commands(static_cast<size_t>(simulator->num_slots()));
   for (int step = 0; step < 600; ++step) {
-    idm->act(simulator->controller_input(), {}, commands);
+    idm->act(simulator->arrays(), {}, commands);
     simulator->step(commands);
   }
   EXPECT_EQ(simulator->totals().off_road, 0);
