@@ -17,7 +17,7 @@ void AgentState::reserve(size_t num_agents){
 }
 
 AgentStateView AgentState::view() {
-#define X(name, type, per_agent, first, comment) name.data(),
+#define X(name, type, per_agent, first, comment) .name = name.data(),
   return {PICTURA_AGENT_FIELDS(X)};
 #undef X
 }

@@ -71,7 +71,7 @@ void HostResults::resize(size_t num_slots, const SimulatorConfig& config) {
   sums.assign(num_slots, {});
   views.assign(num_slots, {});
 #define X(name, type, rows, features, part, comment) \
-  name##_.assign(config.observes(part) ? num_slots* static_cast<size_t>((rows) * (features)) : 0, 0);
+  name##_.assign(config.observes(part) ? num_slots*(rows) * (features) : 0, 0);
   PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
 }
@@ -82,13 +82,13 @@ void HostResults::reserve(size_t num_slots, const SimulatorConfig& config) {
   sums.reserve(num_slots);
   views.reserve(num_slots);
 #define X(name, type, rows, features, part, comment) \
-  if (config.observes(part)) name##_.reserve(num_slots* static_cast<size_t>((rows) * (features)));
+  if (config.observes(part)) name##_.reserve(num_slots*(rows) * (features));
   PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
 }
 
 ObservationView HostResults::observation_view() {
-#define X(name, type, rows, features, part, comment) name##_,
+#define X(name, type, rows, features, part, comment) .name = name##_,
   return {PICTURA_OBSERVATION_ARRAYS(X)};
 #undef X
 }

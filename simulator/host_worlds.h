@@ -37,7 +37,13 @@ struct HostResults {
   void resize(size_t num_slots, const SimulatorConfig& config);
   void reserve(size_t num_slots, const SimulatorConfig& config);
   ObservationView observation_view();
-  StepArrays step_arrays() { return {reward.data(), terminated.data(), truncated.data(), valid.data(), sums.data()}; }
+  StepArrays step_arrays() {
+    return {.reward = reward.data(),
+            .terminated = terminated.data(),
+            .truncated = truncated.data(),
+            .valid = valid.data(),
+            .sums = sums.data()};
+  }
 
   std::vector<float> reward;  // [slots], as the following
   std::vector<uint8_t> terminated, truncated, valid;

@@ -46,7 +46,7 @@ struct DeviceAgents {
       PICTURA_AGENT_FIELDS(X)
 #undef X
   } AgentStateView view() const {
-#define X(name, type, per_agent, first, comment) name.data(),
+#define X(name, type, per_agent, first, comment) .name = name.data(),
     return {PICTURA_AGENT_FIELDS(X)};
 #undef X
   }
@@ -204,7 +204,7 @@ struct DeviceResults {
         sums(num_slots),
         views(num_slots) {
 #define X(name, type, rows, features, part, comment) \
-  if (config.observes(part)) name = DeviceBuffer<type>(num_slots * static_cast<size_t>((rows) * (features)));
+  if (config.observes(part)) name = DeviceBuffer<type>(num_slots * (rows) * (features));
     PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
   }
@@ -222,11 +222,15 @@ struct DeviceResults {
 #undef X
   }
   StepArrays step_arrays() const {
-    return {reward.data(), terminated.data(), truncated.data(), valid.data(), sums.data()};
+    return {.reward = reward.data(),
+            .terminated = terminated.data(),
+            .truncated = truncated.data(),
+            .valid = valid.data(),
+            .sums = sums.data()};
   }
   ObservationView observations(size_t num_slots, const SimulatorConfig& config) const {
 #define X(name, type, rows, features, part, comment) \
-  Span<type>(name.data(), config.observes(part) ? num_slots * static_cast<size_t>((rows) * (features)) : 0),
+  .name = {name.data(), config.observes(part) ? num_slots * (rows) * (features) : 0},
     return {PICTURA_OBSERVATION_ARRAYS(X)};
 #undef X
   }

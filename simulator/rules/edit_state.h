@@ -60,7 +60,7 @@ struct AgentRecord {
 #undef X
 
   PICTURA_HD AgentStateView view() {
-#define X(name, type, per_agent, first, comment) name,
+#define X(name, type, per_agent, first, comment) .name = name,
     return {PICTURA_AGENT_FIELDS(X)};
 #undef X
   }

@@ -49,15 +49,15 @@ struct WorldView {
 };
 
 PICTURA_HD inline Motion motion_of(const AgentStateView& agents, int slot) {
-  return {agents.x_m[slot],
-          agents.y_m[slot],
-          agents.heading_rad[slot],
-          agents.speed_mps[slot],
-          agents.accel_long_mps2[slot],
-          agents.accel_lat_mps2[slot],
-          agents.steer_rad[slot],
-          agents.jerk_long_mps3[slot],
-          agents.jerk_lat_mps3[slot]};
+  return {.x_m = agents.x_m[slot],
+          .y_m = agents.y_m[slot],
+          .heading_rad = agents.heading_rad[slot],
+          .speed_mps = agents.speed_mps[slot],
+          .accel_long_mps2 = agents.accel_long_mps2[slot],
+          .accel_lat_mps2 = agents.accel_lat_mps2[slot],
+          .steer_rad = agents.steer_rad[slot],
+          .jerk_long_mps3 = agents.jerk_long_mps3[slot],
+          .jerk_lat_mps3 = agents.jerk_lat_mps3[slot]};
 }
 
 /// `heading` is sincos_of(motion.heading_rad).
