@@ -32,7 +32,7 @@ install(FILES ${PICTURA_INCLUDE_DIR}/pictura/version.h DESTINATION ${header_fold
 
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/picturaConfig.cmake.in
   ${PROJECT_BINARY_DIR}/picturaConfig.cmake INSTALL_DESTINATION ${package_folder})
-write_basic_package_version_file(${PROJECT_BINARY_DIR}/picturaConfigVersion.cmake COMPATIBILITY SameMajorVersion)
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/picturaConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/picturaConfig.cmake ${PROJECT_BINARY_DIR}/picturaConfigVersion.cmake
   DESTINATION ${package_folder} COMPONENT renderer)
 

@@ -982,4 +982,4 @@ QUERY_DTYPE: numpy.dtypes.VoidDType
 REWARD_TERMS: tuple = ('goal', 'collision', 'off_road', 'stop_line', 'comfort', 'lane_align', 'lane_center', 'velocity', 'overspeed', 'reverse', 'timestep')
 TRACK_TYPES: tuple = ('unset', 'vehicle', 'pedestrian', 'cyclist', 'other')
 VIEW_DTYPE: numpy.dtypes.VoidDType
-__version__: str = '0.1.0'
+__version__: str = '0.2.0'
