@@ -289,7 +289,7 @@ TEST(CpuRenderer, DrawsSizesFromOnePixelAndRigsOfMixedSizes) {
   // The same cameras alone give the same images.
   for (int k = 0; k < 4; ++k) {
     Rig alone;
-    alone.cameras = {rig.cameras[static_cast<std::size_t>(k)]};
+    alone.cameras = {rig.cameras[k]};
     const auto single = make_renderer("cpu", {.rig = alone, .num_threads = 1});
     single->upload(0, town.geometry);
     HostImages expected(alone, 3);

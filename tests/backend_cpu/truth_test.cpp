@@ -164,8 +164,8 @@ std::vector<float> drawn_down(const Snapshot& town, Camera camera, int factor, f
   for (int channel = 0; channel < 3; ++channel) {
     for (int y = 0; y < camera.height_px; ++y) {
       for (int x = 0; x < camera.width_px; ++x) {
-        small[static_cast<std::size_t>((channel * height + y / factor) * width + x / factor)] +=
-            large[static_cast<std::size_t>((channel * camera.height_px + y) * camera.width_px + x)] / (scale * scale);
+        small[(channel * height + y / factor) * width + x / factor] +=
+            large[(channel * camera.height_px + y) * camera.width_px + x] / (scale * scale);
       }
     }
   }

@@ -39,7 +39,7 @@ constexpr SampledQuality kQualities[] = {{{.grid = 1}, kMinGlPsnr1_db},
 
 Snapshot town_of(uint64_t seed, int num_views) {
   Snapshot town = make_synthetic_town(seed, 120);
-  town.views.resize(static_cast<std::size_t>(num_views));
+  town.views.resize(num_views);
   return town;
 }
 

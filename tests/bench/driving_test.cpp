@@ -18,7 +18,7 @@ TEST(Driving, AgentsThatFailToSpawnAreNotDrawn) {
   EXPECT_LT(snapshot.views.size(), static_cast<std::size_t>(kMany));
   for (const View& view : snapshot.views) {
     ASSERT_GE(view.ego_agent, 0);
-    EXPECT_TRUE(snapshot.scene.agents[static_cast<std::size_t>(view.ego_agent)].drawn);
+    EXPECT_TRUE(snapshot.scene.agents[view.ego_agent].drawn);
   }
 }
 

@@ -25,11 +25,11 @@ TEST(Grid, EveryBoxIsInEveryCellThatItTouches) {
   for (int y = 0; y < view.num_y; ++y) {
     for (int x = 0; x < view.num_x; ++x) {
       const int cell = y * view.num_x + x;
-      std::vector<int> found(view.items.begin() + view.begin[static_cast<size_t>(cell)],
+      std::vector<int> found(view.items.begin() + view.begin[cell],
                              view.items.begin() + view.begin[static_cast<size_t>(cell) + 1]);
       std::vector<int> expected;
       for (int i = 0; i < 200; ++i) {
-        const Aabb2& box = boxes[static_cast<size_t>(i)];
+        const Aabb2& box = boxes[i];
         if (view.cell_x(box.low.x) <= x && x <= view.cell_x(box.high.x) && view.cell_y(box.low.y) <= y &&
             y <= view.cell_y(box.high.y)) {
           expected.push_back(i);

@@ -75,7 +75,7 @@ TEST(Rng, UniformDrawsHaveTheMomentsOfTheirRange) {
     ASSERT_LT(u, 12.0f);
     sum += u;
     sum_squares += double{u} * u;
-    ++histogram[static_cast<size_t>(random.below(7))];
+    ++histogram[random.below(7)];
   }
   const double mean = sum / kDraws, variance = sum_squares / kDraws - mean * mean;
   EXPECT_NEAR(mean, 7.0, 0.13);  // 4 standard errors of sqrt(100 / 12 / 8000)

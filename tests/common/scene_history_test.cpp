@@ -174,8 +174,8 @@ TEST(SceneHistory, AStepThatIsPutAgainReplacesTheOneBeforeAndNoOther) {
   for (const int step : {1, 0, kSteps - 1}) {
     std::vector<Step> steps;
     for (int i = 0; i < kSteps; ++i) steps.push_back(make_step(i));
-    steps[static_cast<std::size_t>(step)] = make_step(step + 5);
-    const Step& again = steps[static_cast<std::size_t>(step)];
+    steps[step] = make_step(step + 5);
+    const Step& again = steps[step];
     history->put(step, again.scene.batch(), again.views);
     expect_holds(*history, steps);
     const Step before = make_step(step);
@@ -196,7 +196,7 @@ TEST(SceneHistory, ImagesOfAnyViewsOfAnyStepsAreThoseOfTheirOwnSteps) {
     for (std::vector<uint8_t>& image : draw(its.scene.batch(), its.views)) own.push_back(std::move(image));
   }
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    EXPECT_EQ(images[i], own[static_cast<std::size_t>(rows[i])]) << "row " << rows[i];
+    EXPECT_EQ(images[i], own[rows[i]]) << "row " << rows[i];
   }
   EXPECT_NE(own[0], own[kViews]) << "steps look different";
 }

@@ -48,7 +48,7 @@ struct Pixel {
 void PrintTo(const Pixel& p, std::ostream* out) { *out << "(" << p.r << ", " << p.g << ", " << p.b << ")"; }
 
 Pixel at(const RgbImage& image, int x, int y) {
-  const uint8_t* p = &image.rgb[static_cast<size_t>(3 * (y * image.width_px + x))];
+  const uint8_t* p = &image.rgb[3 * (y * image.width_px + x)];
   return {p[0], p[1], p[2]};
 }
 Pixel at(const RgbImage& image, Vec2 p) { return at(image, static_cast<int>(p.x), static_cast<int>(p.y)); }
@@ -287,7 +287,7 @@ TEST(WorldPainter, WaysOfARecordingLieOnTheGroundAndBoxesOverThem) {
   WorldPainter bare(scene->map, 500, 500), painter(scene->map, 500, 500, {}, scene.get());
   const TopCamera camera = painter.whole_map();
   const auto self_at = [&](int step) {
-    const TrackState& state = scene->states_of(scene->sdc_track)[static_cast<size_t>(step)];
+    const TrackState& state = scene->states_of(scene->sdc_track)[step];
     return painter.pixel_of(camera, state.position_m.xy());
   };
   WorldFrame frame;

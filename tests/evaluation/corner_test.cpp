@@ -32,8 +32,8 @@ TEST(BlindCorners, LiesWhereNoLightStopsAnybody) {
   const std::set<int32_t> lit(map->light_lanes.begin(), map->light_lanes.end());
   for (const auto& [approach, corner] : corners) {
     EXPECT_FALSE(lit.contains(approach));
-    EXPECT_FALSE(map->lanes[static_cast<size_t>(approach)].in_junction);
-    EXPECT_EQ(map->junctions[static_cast<size_t>(corner.junction)].num_phases, 0);
+    EXPECT_FALSE(map->lanes[approach].in_junction);
+    EXPECT_EQ(map->junctions[corner.junction].num_phases, 0);
     EXPECT_FALSE(corner.lanes.empty());
     for (const auto& [lane, entry_m] : corner.lanes) EXPECT_NE(lane, approach);
   }

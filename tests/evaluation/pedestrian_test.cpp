@@ -59,7 +59,7 @@ TEST(CrossingPaths, PedestriansStandInNoBoxAndNoWall) {
   ASSERT_EQ(is_free.size(), static_cast<size_t>(kPathPoints));
   for (int i = 0; i < kPathPoints; ++i) {
     const float y_m = path.point_m(i).y;
-    EXPECT_EQ(is_free[static_cast<size_t>(i)], std::abs(y_m - 10) >= 1.36f && std::abs(y_m - 5) >= 0.36f) << y_m;
+    EXPECT_EQ(is_free[i], std::abs(y_m - 10) >= 1.36f && std::abs(y_m - 5) >= 0.36f) << y_m;
   }
 }
 
@@ -68,7 +68,7 @@ TEST(CrossingPaths, AreHiddenThenSeenThenHiddenAgain) {
   // Hidden from 3 m before the origin to 1 m behind it, seen for 5 m, hidden for 12 m.
   std::vector<float> shares(kPathPoints, 0.5f);
   const auto fill = [&shares](int from, int to, float share) {
-    for (int i = from; i < to; ++i) shares[static_cast<size_t>(i)] = share;
+    for (int i = from; i < to; ++i) shares[i] = share;
   };
   const int begin = kPathOrigin - 3 * kMetre, seen = kPathOrigin + kMetre, again = seen + 5 * kMetre;
   fill(begin, seen, 0);
@@ -82,7 +82,7 @@ TEST(CrossingPaths, AreHiddenThenSeenThenHiddenAgain) {
   EXPECT_EQ(part->end, again + 8 * kMetre) << "no more than 8 m of it";
   const auto with = [&shares](int i, float share) {
     std::vector<float> others = shares;
-    others[static_cast<size_t>(i)] = share;
+    others[i] = share;
     return used_part(others);
   };
   EXPECT_FALSE(with(kPathOrigin, 0.1f)) << "not hidden at its origin";
@@ -129,13 +129,13 @@ TEST_F(Pedestrian, PathsAreFoundInAllScenes) {
     EXPECT_EQ(path.map, path.scene % 2);
     EXPECT_EQ(path.step % 4, 0);
     EXPECT_LE(path.hider_distance_m, 30);
-    EXPECT_EQ(path.boxes[static_cast<size_t>(path.hider)].agent_class, AgentClass::vehicle);
+    EXPECT_EQ(path.boxes[path.hider].agent_class, AgentClass::vehicle);
     EXPECT_EQ(path.first_point, next);
     next += path.num_points;
     std::set<PathPhase> phases;
     for (int32_t i = path.first_point; i < next; ++i) {
-      const PedestrianPoint& point = all.points[static_cast<size_t>(i)];
-      EXPECT_EQ(&all.paths[static_cast<size_t>(point.path)], &path);
+      const PedestrianPoint& point = all.points[i];
+      EXPECT_EQ(&all.paths[point.path], &path);
       EXPECT_EQ(point.along_m, kPathSpacing_m * static_cast<float>(i - path.first_point));
       EXPECT_EQ(point.visible_share > 0, path.phase_of(i) == PathPhase::seen);
       phases.insert(path.phase_of(i));

@@ -23,7 +23,7 @@ int count_of(const ScenePlan& plan, SceneRole role) {
 std::vector<AgentBox> boxes_at(const Scenario& scene, int32_t step) {
   std::vector<AgentBox> boxes;
   for (size_t track = 0; track < scene.tracks.size(); ++track) {
-    const TrackState& state = scene.states_of(static_cast<int32_t>(track))[static_cast<size_t>(step)];
+    const TrackState& state = scene.states_of(static_cast<int32_t>(track))[step];
     const SinCos heading = sincos_of(state.heading_rad);
     AgentBox box;
     box.center_m = state.position_m;
@@ -32,7 +32,7 @@ std::vector<AgentBox> boxes_at(const Scenario& scene, int32_t step) {
     box.length_m = scene.tracks[track].length_m;
     box.width_m = scene.tracks[track].width_m;
     box.height_m = scene.tracks[track].height_m;
-    box.drawn = scene.valid_of(static_cast<int32_t>(track))[static_cast<size_t>(step)];
+    box.drawn = scene.valid_of(static_cast<int32_t>(track))[step];
     boxes.push_back(box);
   }
   return boxes;
@@ -83,7 +83,7 @@ TEST(SceneProtocols, ThinTheSameRoadUsersForASeed) {
   EXPECT_EQ(thinned_out(*scene, 0.5, 1), many);
   EXPECT_NE(thinned_out(*scene, 0.5, 2), many);
   for (uint64_t seed = 0; seed < 50; ++seed) {
-    EXPECT_EQ(thinned_out(*scene, 0.1, seed)[static_cast<size_t>(scene->sdc_track)], 0) << "never the own car";
+    EXPECT_EQ(thinned_out(*scene, 0.1, seed)[scene->sdc_track], 0) << "never the own car";
   }
 }
 
@@ -113,13 +113,12 @@ TEST_F(ScenePlans, DriveWhoIsNotAtItsGoal) {
 
   const ScenePlan self = plan(scene_protocol("waymax"));
   EXPECT_EQ(count_of(self, SceneRole::driven), 1);
-  EXPECT_EQ(self.roles[static_cast<size_t>(scene_->sdc_track)], SceneRole::driven);
+  EXPECT_EQ(self.roles[scene_->sdc_track], SceneRole::driven);
 
   SceneProtocol protocol = scene_protocol("womd");
   protocol.max_driven = 2;
   EXPECT_EQ(count_of(plan(protocol), SceneRole::driven), 2);
-  EXPECT_EQ(plan(protocol).roles[static_cast<size_t>(scene_->sdc_track)],
-            all.roles[static_cast<size_t>(scene_->sdc_track)]);
+  EXPECT_EQ(plan(protocol).roles[scene_->sdc_track], all.roles[scene_->sdc_track]);
   protocol = scene_protocol("womd");
   protocol.others = Others::absent;
   EXPECT_EQ(count_of(plan(protocol), SceneRole::removed), 4);

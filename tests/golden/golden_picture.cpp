@@ -88,7 +88,7 @@ Drawing trace_scene(const SceneFile& scene) {
 RgbImage to_picture(const SceneFile& scene, const Drawing& drawing) {
   const PictureSize size = size_of(scene);
   RgbImage picture{size.width_px, size.height_px, {}};
-  picture.rgb.assign(static_cast<std::size_t>(3 * size.width_px * size.height_px), kGapGrey);
+  picture.rgb.assign(3 * size.width_px * size.height_px, kGapGrey);
   visit_values(scene, [&](std::size_t image, std::size_t value, std::size_t at) {
     picture.rgb[at] = static_cast<uint8_t>(std::lround(255 * clamp(drawing[image][value], 0.0f, 1.0f)));
   });
@@ -119,8 +119,7 @@ RgbImage enlarged(const RgbImage& picture) {
   RgbImage out{kEnlargement * picture.width_px, kEnlargement * picture.height_px, {}};
   for (int y = 0; y < out.height_px; ++y) {
     for (int x = 0; x < out.width_px; ++x) {
-      const auto* pixel =
-          &picture.rgb[static_cast<std::size_t>(3 * (y / kEnlargement * picture.width_px + x / kEnlargement))];
+      const auto* pixel = &picture.rgb[3 * (y / kEnlargement * picture.width_px + x / kEnlargement)];
       out.rgb.insert(out.rgb.end(), pixel, pixel + 3);
     }
   }

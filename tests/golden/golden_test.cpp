@@ -204,7 +204,7 @@ TEST(GoldenTolerances, EachPartFails) {
   auto complaint_of = [](int values, double off, const ImageTolerance& tolerance) {
     const Drawing expected{std::vector<float>(100000, 0.5f)};
     Drawing actual = expected;
-    for (int i = 0; i < values; ++i) actual[0][static_cast<std::size_t>(i)] += static_cast<float>(off);
+    for (int i = 0; i < values; ++i) actual[0][i] += static_cast<float>(off);
     return complaint(error_of(actual, expected), tolerance);
   };
   using testing::HasSubstr;

@@ -33,8 +33,8 @@ struct Crossing {
         map.lanes.push_back(lane);
       }
       for (int32_t lane = first; lane + 1 < first + 4; ++lane) {
-        add_link(&map.lanes[static_cast<size_t>(lane)].successors, lane + 1);
-        add_link(&map.lanes[static_cast<size_t>(lane + 1)].predecessors, lane);
+        add_link(&map.lanes[lane].successors, lane + 1);
+        add_link(&map.lanes[lane + 1].predecessors, lane);
       }
     }
   }

@@ -51,7 +51,7 @@ class CarlaTowns : public ::testing::TestWithParam<TownFacts> {
     load_s_ = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   }
 
-  const Lane& lane(int32_t index) const { return map_->lanes[static_cast<std::size_t>(index)]; }
+  const Lane& lane(int32_t index) const { return map_->lanes[index]; }
 
   std::shared_ptr<const RoadMap> map_;
   double load_s_ = 0;
@@ -84,7 +84,7 @@ TEST_P(CarlaTowns, MatchTheCountsOfTheirFiles) {
   int incoming = 0;
   for (const TrafficLight& light : map_->lights) {
     for (int32_t i = light.lanes.begin; i < light.lanes.end; ++i) {
-      incoming += lane(map_->light_lanes[static_cast<std::size_t>(i)]).in_junction ? 0 : 1;
+      incoming += lane(map_->light_lanes[i]).in_junction ? 0 : 1;
     }
   }
   EXPECT_EQ(incoming, expected.controlled_incoming_lanes);
@@ -122,7 +122,7 @@ TEST_P(CarlaTowns, LanesContinueEachOther) {
     const LanePoint end = map_->lane_points[static_cast<std::size_t>(from.points.end) - 1];
     for (const int32_t next : map_->links(from.successors)) {
       if (lane(next).type != LaneType::driving) continue;
-      const LanePoint begin = map_->lane_points[static_cast<std::size_t>(lane(next).points.begin)];
+      const LanePoint begin = map_->lane_points[lane(next).points.begin];
       EXPECT_LT(length(begin.position_m - end.position_m), 0.02);
       EXPECT_LT(std::abs(wrap_angle(begin.heading_rad - end.heading_rad)), 0.1);
     }
@@ -145,10 +145,10 @@ TEST_P(CarlaTowns, LightsFaceTheirTrafficAtItsStopLine) {
     EXPECT_GT(cross(line, heading), 0.99f * length(line));
     float incoming_width_m = 0;
     for (int32_t i = light.lanes.begin; i < light.lanes.end; ++i) {
-      const Lane& controlled = lane(map_->light_lanes[static_cast<std::size_t>(i)]);
+      const Lane& controlled = lane(map_->light_lanes[i]);
       if (controlled.in_junction) {
         EXPECT_EQ(controlled.junction, light.junction);
-        const LanePoint begin = map_->lane_points[static_cast<std::size_t>(controlled.points.begin)];
+        const LanePoint begin = map_->lane_points[controlled.points.begin];
         EXPECT_LT(std::abs(dot(begin.position_m.xy() - light.stop_a_m.xy(), heading)), 0.1f);
       } else {
         incoming_width_m += map_->lane_points[static_cast<std::size_t>(controlled.points.end) - 1].width_m;
@@ -196,7 +196,7 @@ class DrivableSurface {
     if (!grid.contains(p.xy())) return false;
     const std::size_t cell = static_cast<std::size_t>(grid.cell_y(p.y) * grid.num_x + grid.cell_x(p.x));
     for (int32_t i = grid.begin[cell]; i < grid.begin[cell + 1]; ++i) {
-      const std::array<Vec3, 4>& quad = quads_[static_cast<std::size_t>(grid.items[static_cast<std::size_t>(i)])];
+      const std::array<Vec3, 4>& quad = quads_[grid.items[i]];
       if (p.z < min_of(quad[0].z, quad[2].z) - 2.0f || p.z > max_of(quad[0].z, quad[2].z) + 2.0f) continue;
       bool inside = true;  // for a convex, counter-clockwise quad
       for (std::size_t k = 0; k < 4; ++k) {

@@ -32,7 +32,7 @@ class EdgeGrid {
       for (int x = grid.cell_x(p.x - radius_m); x <= grid.cell_x(p.x + radius_m); ++x) {
         const std::size_t cell = static_cast<std::size_t>(y * grid.num_x + x);
         for (int32_t i = grid.begin[cell]; i < grid.begin[cell + 1]; ++i) {
-          const RoadEdge& edge = edges_[static_cast<std::size_t>(grid.items[static_cast<std::size_t>(i)])];
+          const RoadEdge& edge = edges_[grid.items[i]];
           if (std::abs(0.5f * (edge.a_m.z + edge.b_m.z) - p.z) < 2.0f && test(edge)) return true;
         }
       }

@@ -86,9 +86,7 @@ TEST(MapCopy, PlansAreDrawnFromTheirRangesByNameAndNumber) {
   EXPECT_GT(high_turn, 3);
 }
 
-const LanePoint& begin_of(const RoadMap& map, const Lane& lane) {
-  return map.lane_points[static_cast<std::size_t>(lane.points.begin)];
-}
+const LanePoint& begin_of(const RoadMap& map, const Lane& lane) { return map.lane_points[lane.points.begin]; }
 const LanePoint& end_of(const RoadMap& map, const Lane& lane) {
   return map.lane_points[static_cast<std::size_t>(lane.points.end) - 1];
 }
@@ -146,7 +144,7 @@ TEST_P(Copies, KeepConnectionsWidthsHeightsAndLimits) {
       EXPECT_EQ(end_of(*map, lane).position_m.z, end_of(*original_, before).position_m.z);
       if (lane.type != LaneType::driving) continue;
       for (const int32_t next : map->links(lane.successors)) {
-        const Lane& other = map->lanes[static_cast<std::size_t>(next)];
+        const Lane& other = map->lanes[next];
         if (other.type != LaneType::driving) continue;
         largest_gap_m =
             std::max<double>(largest_gap_m, length(begin_of(*map, other).position_m - end_of(*map, lane).position_m));
@@ -154,8 +152,7 @@ TEST_P(Copies, KeepConnectionsWidthsHeightsAndLimits) {
       }
       if (lane.left_neighbor < 0) continue;
       // What widths are on the ground: neighbours' middles are half of both widths apart.
-      const LanePoint &own = end_of(*map, lane),
-                      &next_to = end_of(*map, map->lanes[static_cast<std::size_t>(lane.left_neighbor)]);
+      const LanePoint &own = end_of(*map, lane), &next_to = end_of(*map, map->lanes[lane.left_neighbor]);
       largest_width_error_m = std::max(largest_width_error_m, std::abs(length(own.position_m - next_to.position_m) -
                                                                        0.5 * (own.width_m + next_to.width_m)));
     }

@@ -74,7 +74,7 @@ TEST(OpenDriveLanes, OneSidedSectionsContinueTheOtherSide) {
   int32_t at = index_of(map, lane_named(map, "1", 0, -1));
   double s = 0;
   for (int piece = 0; piece < 3; ++piece) {
-    const Lane& lane = map.lanes[static_cast<std::size_t>(at)];
+    const Lane& lane = map.lanes[at];
     const LanePoint begin = map.points_of(lane)[0];
     EXPECT_NEAR(begin.position_m.x + map.origin_m[0], s, 1e-4);
     if (piece < 2) {
@@ -105,11 +105,10 @@ TEST(OpenDriveLanes, ALaneIsCutWhereItsSpeedLimitChanges) {
   for (int id = 1; id <= 2; ++id) {
     int32_t at = index_of(map, lane_named(map, "1", 0, -id));
     for (int piece = 0; piece < 3; ++piece) {
-      const Lane& lane = map.lanes[static_cast<std::size_t>(at)];
+      const Lane& lane = map.lanes[at];
       EXPECT_NEAR(lane.speed_limit_mps, limits[id - 1][piece], 1e-4) << id << " " << piece;
       EXPECT_NEAR(map.points_of(lane)[0].position_m.x + map.origin_m[0], begins[piece], 1e-4);
-      EXPECT_EQ((id == 1 ? map.lanes[static_cast<std::size_t>(lane.right_neighbor)].left_neighbor
-                         : map.lanes[static_cast<std::size_t>(lane.left_neighbor)].right_neighbor),
+      EXPECT_EQ((id == 1 ? map.lanes[lane.right_neighbor].left_neighbor : map.lanes[lane.left_neighbor].right_neighbor),
                 at);
       if (piece < 2) at = list(map, lane.successors).at(0);
     }
@@ -272,9 +271,9 @@ TEST(OpenDriveLeftHand, AMirroredFileGivesTheMirroredMap) {
   };
   auto mirror_index = [&](int32_t lane) {
     if (lane < 0) return -1;
-    const Lane& original = map.lanes[static_cast<std::size_t>(lane)];
-    return index_of(other, lane_named(other, map.road_names[static_cast<std::size_t>(original.source_road)],
-                                      original.source_section, -original.source_lane));
+    const Lane& original = map.lanes[lane];
+    return index_of(
+        other, lane_named(other, map.road_names[original.source_road], original.source_section, -original.source_lane));
   };
   auto mirror_indices = [&](const std::vector<int32_t>& lanes) {
     std::vector<int32_t> result;
@@ -285,8 +284,7 @@ TEST(OpenDriveLeftHand, AMirroredFileGivesTheMirroredMap) {
   ASSERT_EQ(map.lanes.size(), 12u);
   ASSERT_EQ(other.lanes.size(), 12u);
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {
-    const Lane &lane = map.lanes[i],
-               &mirror = other.lanes[static_cast<std::size_t>(mirror_index(static_cast<int32_t>(i)))];
+    const Lane &lane = map.lanes[i], &mirror = other.lanes[mirror_index(static_cast<int32_t>(i))];
     ASSERT_EQ(lane.points.size(), mirror.points.size());
     for (std::size_t k = 0; k < map.points_of(lane).size(); ++k) {
       const LanePoint &p = map.points_of(lane)[k], &q = other.points_of(mirror)[k];
@@ -325,7 +323,7 @@ TEST(OpenDriveLeftHand, AMirroredFileGivesTheMirroredMap) {
   auto painted = [](const RoadMap& of, double sign) {
     std::vector<std::array<long, 4>> ends;
     for (const Marking& marking : of.markings) {
-      const Vec3 a = of.marking_points[static_cast<std::size_t>(marking.points.begin)];
+      const Vec3 a = of.marking_points[marking.points.begin];
       const Vec3 b = of.marking_points[static_cast<std::size_t>(marking.points.end) - 1];
       auto cm = [](double value) { return std::lround(value * 50); };
       ends.push_back({cm(a.x + of.origin_m[0]), cm(sign * (a.y + of.origin_m[1])), cm(b.x + of.origin_m[0]),

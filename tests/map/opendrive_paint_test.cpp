@@ -38,7 +38,7 @@ std::vector<Stroke> strokes_of(const RoadMap& map) {
   std::vector<Stroke> strokes;
   auto rounded = [](double value) { return std::round(value * 1000) / 1000 + 0.0; };
   for (const Marking& marking : map.markings) {
-    const Vec3 a = map.marking_points[static_cast<std::size_t>(marking.points.begin)];
+    const Vec3 a = map.marking_points[marking.points.begin];
     const Vec3 b = map.marking_points[static_cast<std::size_t>(marking.points.end) - 1];
     strokes.push_back({rounded(a.x + map.origin_m[0]), rounded(b.x + map.origin_m[0]), rounded(a.y + map.origin_m[1])});
   }
@@ -62,7 +62,7 @@ TEST(OpenDrivePaint, MarksHaveTheirPatternsColoursAndWidths) {
   const RoadMap broken = marks(R"(type="broken" color="white")");
   ASSERT_EQ(broken.markings.size(), 9u);
   for (std::size_t i = 0; i < 9; ++i) {
-    const Vec3 a = broken.marking_points[static_cast<std::size_t>(broken.markings[i].points.begin)];
+    const Vec3 a = broken.marking_points[broken.markings[i].points.begin];
     const Vec3 b = broken.marking_points[static_cast<std::size_t>(broken.markings[i].points.end) - 1];
     expect_at(broken, a, 12.0 * static_cast<double>(i), 0);
     expect_at(broken, b, 12.0 * static_cast<double>(i) + 3, 0);
@@ -73,9 +73,8 @@ TEST(OpenDrivePaint, MarksHaveTheirPatternsColoursAndWidths) {
   const RoadMap both = marks(R"(type="solid broken" color="white" width="0.1")");
   ASSERT_EQ(both.markings.size(), 10u);
   for (const Marking& marking : both.markings) {
-    expect_at(both, both.marking_points[static_cast<std::size_t>(marking.points.begin)],
-              both.marking_points[static_cast<std::size_t>(marking.points.begin)].x + both.origin_m[0],
-              marking.broken ? -0.1 : 0.1);
+    expect_at(both, both.marking_points[marking.points.begin],
+              both.marking_points[marking.points.begin].x + both.origin_m[0], marking.broken ? -0.1 : 0.1);
   }
   EXPECT_EQ(marks(R"(type="solid solid" color="white")").markings.size(), 2u);
   EXPECT_EQ(marks(R"(type="none" color="white")").markings.size(), 0u);
@@ -191,7 +190,7 @@ TEST(OpenDrivePaint, RepeatedParkingSpacesAreInARow) {
   const RoadMap map = parse(road.text());
   ASSERT_EQ(map.parking_spaces.size(), 3u);
   for (int i = 0; i < 3; ++i) {
-    expect_at(map, map.parking_spaces[static_cast<std::size_t>(i)].center_m, 20 + 6 * i, -5 - i);
+    expect_at(map, map.parking_spaces[i].center_m, 20 + 6 * i, -5 - i);
   }
   road.rest = fmt::format(fmt::runtime(object), 0);
   EXPECT_EQ(parse(road.text()).mends.at(0).kind, MendKind::continuous_object);

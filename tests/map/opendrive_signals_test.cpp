@@ -120,7 +120,7 @@ TEST(OpenDriveLights, OneOnARoadStandsAloneAtItsStation) {
   // The lane is cut at the line; it counts once.
   EXPECT_EQ(map.facts.driving_lanes, 2);
   ASSERT_EQ(lanes_of(map, alone).size(), 2u);
-  EXPECT_NEAR(map.lanes[static_cast<size_t>(lanes_of(map, alone)[0])].length_m, 41.75 * angle, 0.01);
+  EXPECT_NEAR(map.lanes[lanes_of(map, alone)[0]].length_m, 41.75 * angle, 0.01);
   for (const Lane& lane : map.lanes) EXPECT_TRUE(lane.is_endless);
   // Heads on both sides, and beyond, have one line; the next line has its own light.
   EXPECT_EQ(ring_of(light("7", 60, -5) + light("8", 60.2, 2) + light("9", 75, -5)).lights.size(), 1u);

@@ -249,7 +249,7 @@ class Paint {
     const std::size_t cell = static_cast<std::size_t>(grid.cell_y(p.y) * grid.num_x + grid.cell_x(p.x));
     float distance_m = kMaxDistance_m;
     for (int32_t i = grid.begin[cell]; i < grid.begin[cell + 1]; ++i) {
-      const Piece& piece = pieces_[static_cast<std::size_t>(grid.items[static_cast<std::size_t>(i)])];
+      const Piece& piece = pieces_[grid.items[i]];
       if (piece.width_m != width_m || piece.color != color) continue;
       const Vec3 along = piece.b_m - piece.a_m;
       const float fraction = clamp(dot(p - piece.a_m, along) / dot(along, along), 0.0f, 1.0f);

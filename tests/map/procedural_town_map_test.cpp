@@ -102,7 +102,7 @@ class Edges {
       for (int ix = grid.cell_x(min_of(a.x, b.x)); ix <= grid.cell_x(max_of(a.x, b.x)); ++ix) {
         const auto cell = static_cast<std::size_t>(iy * grid.num_x + ix);
         for (int32_t i = grid.begin[cell]; i < grid.begin[cell + 1]; ++i) {
-          const RoadEdge& e = map_.road_edges[static_cast<std::size_t>(grid.items[static_cast<std::size_t>(i)])];
+          const RoadEdge& e = map_.road_edges[grid.items[i]];
           if (std::abs(0.5f * (e.a_m.z + e.b_m.z) - a.z) < kLevel_m &&
               segments_cross(a.xy(), b.xy(), e.a_m.xy(), e.b_m.xy())) {
             return true;
@@ -134,7 +134,7 @@ class Town {
   }
 
  private:
-  const Lane& lane(int32_t index) const { return map_.lanes[static_cast<std::size_t>(index)]; }
+  const Lane& lane(int32_t index) const { return map_.lanes[index]; }
   const LanePoint& first(const Lane& of) const { return map_.points_of(of)[0]; }
   const LanePoint& last(const Lane& of) const { return map_.points_of(of)[map_.points_of(of).size() - 1]; }
 
@@ -212,7 +212,7 @@ class Town {
       EXPECT_GT(dot(light.head_m.xy() - stop, direction(light.stop_heading_rad)), 1.0f) << light.name;
       int incoming = 0, connecting = 0;
       for (int32_t k = light.lanes.begin; k < light.lanes.end; ++k) {
-        const Lane& controlled = lane(map_.light_lanes[static_cast<std::size_t>(k)]);
+        const Lane& controlled = lane(map_.light_lanes[k]);
         ++(controlled.in_junction ? connecting : incoming);
         if (controlled.in_junction) continue;
         EXPECT_EQ(controlled.type, LaneType::driving) << "slip lanes bypass the light";
@@ -239,7 +239,7 @@ class Town {
     std::map<std::pair<int32_t, int32_t>, std::set<int32_t>> greens;
     for (const TrafficLight& light : map_.lights) {
       for (int32_t k = light.lanes.begin; k < light.lanes.end; ++k) {
-        const int32_t controlled = map_.light_lanes[static_cast<std::size_t>(k)];
+        const int32_t controlled = map_.light_lanes[k];
         if (lane(controlled).in_junction) greens[{light.junction, light.phase}].insert(controlled);
       }
     }
@@ -304,8 +304,8 @@ class Town {
   }
 
   std::string name(const Lane& of) const {
-    return fmt::format("road {} section {} lane {}", map_.road_names[static_cast<std::size_t>(of.source_road)],
-                       of.source_section, of.source_lane);
+    return fmt::format("road {} section {} lane {}", map_.road_names[of.source_road], of.source_section,
+                       of.source_lane);
   }
 
   RoadMap map_;

@@ -105,7 +105,7 @@ TEST(Womd, FramesOfInvalidStatesAreEmpty) {
   const auto last = static_cast<int32_t>(scenario.tracks.size()) - 1;
   EXPECT_EQ(scenario.valid_of(last)[0], 0);
   EXPECT_EQ(scenario.states_of(last)[0].position_m.z, 0) << "the file has a centre's height there";
-  EXPECT_EQ(scenario.tracks[static_cast<std::size_t>(last)].first_valid, 5);
+  EXPECT_EQ(scenario.tracks[last].first_valid, 5);
 }
 
 TEST(Womd, TruncatedRecordsAreRefusedAtEveryLength) {

@@ -131,8 +131,8 @@ inline RoadMap parse(const std::string& contents) { return parse_opendrive(file_
 
 inline const Lane& lane_named(const RoadMap& map, const std::string& road, int section, int lane) {
   for (const Lane& candidate : map.lanes) {
-    if (map.road_names[static_cast<std::size_t>(candidate.source_road)] == road &&
-        candidate.source_section == section && candidate.source_lane == lane) {
+    if (map.road_names[candidate.source_road] == road && candidate.source_section == section &&
+        candidate.source_lane == lane) {
       return candidate;
     }
   }

@@ -48,7 +48,7 @@ TEST(Chunks, HoldEachRowOnceAndFillTheLastUpWithTheFirst) {
       }
     });
     ASSERT_EQ(static_cast<int64_t>(seen.size()), total);
-    for (int64_t i = 0; i < total; ++i) EXPECT_EQ(seen[static_cast<size_t>(i)], 1000 + i);
+    for (int64_t i = 0; i < total; ++i) EXPECT_EQ(seen[i], 1000 + i);
   }
 }
 

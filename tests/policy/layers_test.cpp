@@ -53,7 +53,7 @@ TEST(RowFeatures, OfAPointAreNearCoordinatesAndTheBearing) {
                                      0.0,     20.0 / 24, 0.0,      20.0 / 40, 0.0,     20.0 / 21};
   ASSERT_EQ(features.sizes().vec(), (std::vector<int64_t>{1, 2 * RowFeatures::kOfPoint}));
   for (int64_t i = 0; i < features.numel(); ++i) {
-    EXPECT_NEAR(features[0][i].item<double>(), expected[static_cast<size_t>(i)], 1e-6) << i;
+    EXPECT_NEAR(features[0][i].item<double>(), expected[i], 1e-6) << i;
   }
 }
 

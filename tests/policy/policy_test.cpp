@@ -391,7 +391,7 @@ TEST(Policy, EveryCameraCounts) {
   const at::Tensor before = policy.forward(o).value;
   for (const auto& [block, camera] : {std::pair{0, 0}, std::pair{0, 1}, std::pair{1, 0}}) {
     Observation changed = o.map([](const at::Tensor& t) { return t.clone(); });
-    changed.images[static_cast<size_t>(block)].pixels.select(1, camera).fill_(0);
+    changed.images[block].pixels.select(1, camera).fill_(0);
     EXPECT_GT((policy.forward(changed).value - before).abs().item<double>(), 1e-9) << block << " " << camera;
   }
 }

@@ -43,8 +43,7 @@ TEST(LiveWorld, TellsWhatARecordingHolds) {
     EXPECT_EQ(message["step"], frame);
     for (size_t track = 0; track < kNumTracks; ++track) {
       for (int agent = 0; agent < 8; ++agent) {
-        ASSERT_EQ(message["tracks"][track][static_cast<size_t>(agent)],
-                  whole.at(static_cast<Track>(track), frame, agent))
+        ASSERT_EQ(message["tracks"][track][agent], whole.at(static_cast<Track>(track), frame, agent))
             << kTracks[track].name << ", agent " << agent << ", frame " << frame;
       }
     }
@@ -71,7 +70,7 @@ TEST(LiveWorld, ForgettingKeepsTheNewestChains) {
   }
   std::vector<ReplayChain> newest(8);
   for (const ReplayChain& chain : recorder.recorded().episodes.back().chains) {
-    newest[static_cast<size_t>(chain.agent)] = chain;
+    newest[chain.agent] = chain;
   }
   recorder.forget();
   const Replay& kept = recorder.recorded();
@@ -79,7 +78,7 @@ TEST(LiveWorld, ForgettingKeepsTheNewestChains) {
   EXPECT_EQ(kept.tracks[0].size(), 8u);
   for (const ReplayChain& chain : kept.episodes.back().chains) {
     EXPECT_EQ(chain.frame, 0);
-    EXPECT_EQ(chain.x_cm, newest[static_cast<size_t>(chain.agent)].x_cm);
+    EXPECT_EQ(chain.x_cm, newest[chain.agent].x_cm);
   }
 }
 

@@ -81,7 +81,7 @@ TEST(Recorder, EachLifeIsAnAgent) {
     }
     if (agent < 6 && there == 0) continue;  // found no place
     EXPECT_GT(there, 0) << agent;
-    EXPECT_GE(episode.agents[static_cast<size_t>(agent)].length_cm, 350);
+    EXPECT_GE(episode.agents[agent].length_cm, 350);
     const bool has_chain = std::any_of(episode.chains.begin(), episode.chains.end(), [&](const ReplayChain& chain) {
       return chain.agent == agent && chain.frame == first;
     });
@@ -145,7 +145,7 @@ TEST(Recorder, PlacesAreWithinHalfAUnitOfTheSimulators) {
     int drawn = 0;
     for (int frame = 0; frame < replay.num_frames; ++frame) {
       for (int agent = 0; agent < kAgents; ++agent) {
-        const AgentBox& box = boxes[static_cast<size_t>(frame)][static_cast<size_t>(agent)];
+        const AgentBox& box = boxes[frame][agent];
         const bool absent = replay.at(Track::status, frame, agent) == static_cast<int32_t>(AgentStatus::absent);
         ASSERT_EQ(absent, !box.drawn);
         if (absent) continue;
@@ -156,8 +156,7 @@ TEST(Recorder, PlacesAreWithinHalfAUnitOfTheSimulators) {
         EXPECT_NEAR(value(Track::x_m), static_cast<double>(box.center_m.x), 0.00501);
         EXPECT_NEAR(value(Track::y_m), static_cast<double>(box.center_m.y), 0.00501);
         EXPECT_NEAR(value(Track::z_m), static_cast<double>(box.center_m.z), 0.00501);
-        EXPECT_NEAR(value(Track::speed_mps),
-                    static_cast<double>(speeds[static_cast<size_t>(frame)][static_cast<size_t>(agent)]), 0.00501);
+        EXPECT_NEAR(value(Track::speed_mps), static_cast<double>(speeds[frame][agent]), 0.00501);
         const double heading = value(Track::heading_deg) * static_cast<double>(kPi) / 180;
         EXPECT_NEAR(std::cos(heading), static_cast<double>(box.cos_heading), 0.0009);
         EXPECT_NEAR(std::sin(heading), static_cast<double>(box.sin_heading), 0.0009);
@@ -188,7 +187,7 @@ TEST(Recorder, RewardTermsAddUpToTheSimulatorsRewardAndMetricsToItsTotals) {
         PICTURA_REWARD_TERMS(X)
 #undef X
         // Eleven roundings of half a unit, and that of float.
-        EXPECT_NEAR(sum, static_cast<double>(rewards[static_cast<size_t>(frame)][static_cast<size_t>(agent)]), 9e-7);
+        EXPECT_NEAR(sum, static_cast<double>(rewards[frame][agent]), 9e-7);
       }
     }
     // Theirs are the terms of the motion before the halt.
@@ -229,9 +228,8 @@ TEST(Recorder, StepsBelongToTheFrameThatTheyLeadTo) {
                                });
   for (int frame = 0; frame < replay.num_frames; ++frame) {
     for (int agent = 0; agent < kAgents; ++agent) {
-      EXPECT_EQ(replay.at(Track::action, frame, agent),
-                actions[static_cast<size_t>(frame)][static_cast<size_t>(agent)]);
-      EXPECT_EQ(replay.at(Track::events, frame, agent), events[static_cast<size_t>(frame)][static_cast<size_t>(agent)]);
+      EXPECT_EQ(replay.at(Track::action, frame, agent), actions[frame][agent]);
+      EXPECT_EQ(replay.at(Track::events, frame, agent), events[frame][agent]);
     }
   }
   // Decisions are of the frame that they were made in; none was made in the last.
@@ -243,14 +241,14 @@ TEST(Recorder, StepsBelongToTheFrameThatTheyLeadTo) {
   for (const ReplayEpisode& episode : replay.episodes) {
     std::vector<int> first(kAgents);
     for (const ReplayChain& chain : episode.chains) {
-      first[static_cast<size_t>(chain.agent)] += chain.frame == episode.first_frame;
+      first[chain.agent] += chain.frame == episode.first_frame;
       EXPECT_GE(chain.frame, episode.first_frame);
       EXPECT_LT(chain.frame, episode.first_frame + episode.num_frames);
     }
     for (int agent = 0; agent < kAgents; ++agent) {
       const bool absent =
           replay.at(Track::status, episode.first_frame, agent) == static_cast<int32_t>(AgentStatus::absent);
-      EXPECT_EQ(first[static_cast<size_t>(agent)], absent ? 0 : 1);
+      EXPECT_EQ(first[agent], absent ? 0 : 1);
     }
   }
 }

@@ -109,7 +109,7 @@ TEST(LiveServer, TellsItsPagesAllInOrderWhileOthersComeAskAndGo) {
       const std::string body = LiveJson{{"watch", i % kServedAgents}}.dump();
       std::string answer;
       Connection(address, request_to(address, "POST", "control", body)).read(&answer);
-      statuses[static_cast<size_t>(i)] = answer.starts_with("HTTP/1.1 204 ") ? 204 : 0;
+      statuses[i] = answer.starts_with("HTTP/1.1 204 ") ? 204 : 0;
     }
   });
 
@@ -136,7 +136,7 @@ TEST(LiveServer, TellsItsPagesAllInOrderWhileOthersComeAskAndGo) {
   }
   EXPECT_THAT(statuses, ::testing::Each(204));
   ASSERT_EQ(watched.size(), static_cast<size_t>(kRequests));
-  for (int i = 0; i < kRequests; ++i) EXPECT_EQ(watched[static_cast<size_t>(i)], i % kServedAgents);
+  for (int i = 0; i < kRequests; ++i) EXPECT_EQ(watched[i], i % kServedAgents);
 }
 
 TEST(LiveServer, EndsAtOnceWhateverItsConnectionsDo) {

@@ -42,7 +42,7 @@ struct PlaceInLane {
 std::optional<PlaceInLane> pose_before_end(const RoadMap& map, int32_t lane, float distance_m) {
   constexpr int kMaxLanes = 8;
   for (int i = 0; i < kMaxLanes; ++i) {
-    const Lane& at = map.lanes[static_cast<size_t>(lane)];
+    const Lane& at = map.lanes[lane];
     const Span<const LanePoint> points = map.points_of(at);
     for (size_t k = points.size() - 1; k > 0; --k) {
       const Vec3 piece = points[k - 1].position_m - points[k].position_m;
@@ -94,11 +94,9 @@ Shares shares_of(const RoadMap& map, const StaticGeometry& geometry, Span<const 
     for (const float length_m : {kBody.min_length_m, kBody.max_length_m}) {
       int seen = 0, pairs = 0;
       for (const LightHead& head : geometry.heads) {
-        const TrafficLight& light = map.lights[static_cast<size_t>(head.signal)];
-        for (const int32_t lane :
-             Span<const int32_t>(map.light_lanes)
-                 .subspan(static_cast<size_t>(light.lanes.begin), static_cast<size_t>(light.lanes.size()))) {
-          if (map.lanes[static_cast<size_t>(lane)].in_junction) continue;
+        const TrafficLight& light = map.lights[head.signal];
+        for (const int32_t lane : Span<const int32_t>(map.light_lanes).subspan(light.lanes.begin, light.lanes.size())) {
+          if (map.lanes[lane].in_junction) continue;
           const float axle_to_bumper_m = reference_to_center(AgentClass::vehicle, length_m) + 0.5f * length_m;
           const auto pose = pose_before_end(map, lane, kBeforeLine_m[d] + axle_to_bumper_m);
           if (!pose) continue;

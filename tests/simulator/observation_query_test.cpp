@@ -61,9 +61,7 @@ void set_absent(Simulator* simulator, int32_t slot) {
   simulator->set_state(slots, std::vector<NamedArray>{{"status", Array(absent)}});
 }
 
-int32_t box_of_slot(Simulator* simulator, int32_t slot) {
-  return simulator->views()[static_cast<size_t>(slot)].ego_agent;
-}
+int32_t box_of_slot(Simulator* simulator, int32_t slot) { return simulator->views()[slot].ego_agent; }
 
 Span<const float> partner(const ObservationView& observation, int row) {
   return observation.partners.subspan(static_cast<size_t>(row) * kPartnerFeatures, kPartnerFeatures);
@@ -80,10 +78,10 @@ TEST(ObservationQueries, WithoutChangesAreTheBitsOfTheObservations) {
         std::array<int, 4> of_status{};
         for (int slot = simulator->num_slots() - 1; slot >= 0; --slot) {
           queries.push_back({.slot = slot, .leaves_gaps = slot % 2});
-          ++of_status[simulator->state().status[slot]];
+          ++of_status[static_cast<int>(simulator->state().status[slot])];
         }
         for (const AgentStatus status : {AgentStatus::active, AgentStatus::halted, AgentStatus::absent}) {
-          ASSERT_GT(of_status[static_cast<size_t>(status)], 0);
+          ASSERT_GT(of_status[static_cast<int>(status)], 0);
         }
         AnswerMemory answers(queries.size(), simulator->config());
         simulator->observe(queries, {}, {}, answers.view());
@@ -169,7 +167,7 @@ TEST(ObservationQueries, ABoxInsertedInThePlaceOfAHiddenOneIsThatOne) {
     config.auxiliary_observations = auxiliary;
     const auto simulator = queue_of(20, 4, config);
     const std::vector<int32_t> hidden{box_of_slot(simulator.get(), 5)};
-    const InsertedBox same{simulator->scene().agents[static_cast<size_t>(hidden[0])], 5};
+    const InsertedBox same{simulator->scene().agents[hidden[0]], 5};
     InsertedBox invisible = same;
     invisible.box.drawn = 0;
     const std::vector<InsertedBox> inserted{same, invisible};
@@ -227,7 +225,7 @@ TEST(ObservationQueries, ShowTheNearestOfAnyHiddenAndInserted) {
       each->set_counts = each->set_counts.subspan(1, kNumEntitySets - 1);
     }
     ASSERT_EQ(testing::first_difference(others, ordinary_others), "");
-    const View& view = simulator->views()[static_cast<size_t>(query.slot)];
+    const View& view = simulator->views()[query.slot];
     if (state.status[query.slot] != AgentStatus::active && ordinary.ego[1] == 0) {
       ASSERT_EQ(answer.set_counts[0], 0);
       for (const float value : answer.partners) ASSERT_EQ(value, 0);
@@ -253,11 +251,10 @@ TEST(ObservationQueries, ShowTheNearestOfAnyHiddenAndInserted) {
           std::find(begin + query.hidden_begin, begin + query.hidden_end, box) != begin + query.hidden_end;
       if (box == view.ego_agent || (is_hidden && !query.leaves_gaps)) continue;
       const bool drives = box - first_box < num_agents;
-      meet(scene.agents[static_cast<size_t>(box)], drives ? state.speed_mps[first_slot + box - first_box] : 0,
-           is_hidden);
+      meet(scene.agents[box], drives ? state.speed_mps[first_slot + box - first_box] : 0, is_hidden);
     }
     for (int32_t k = query.inserted_begin; k < query.inserted_end; ++k) {
-      const InsertedBox& one = drawn.inserted[static_cast<size_t>(k)];
+      const InsertedBox& one = drawn.inserted[k];
       meet(one.box, one.speed_mps, false);
     }
     std::stable_sort(met.begin(), met.end(), [](const Met& a, const Met& b) { return a.distance_m < b.distance_m; });
@@ -266,7 +263,7 @@ TEST(ObservationQueries, ShowTheNearestOfAnyHiddenAndInserted) {
     ASSERT_EQ(answer.set_counts[0], count);
     for (int row = 0; row < kMaxPartners; ++row) {
       const Met nobody{0, nullptr, 0, true};
-      const Met& one = row < count ? met[static_cast<size_t>(row)] : nobody;
+      const Met& one = row < count ? met[row] : nobody;
       float expected[kPartnerFeatures] = {};
       if (!one.is_gap) {
         const Vec3 apart = one.box->center_m - view.origin_m;

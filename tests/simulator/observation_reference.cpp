@@ -121,8 +121,8 @@ ReferenceObservation reference_observation(Simulator& simulator, int slot) {
   const AgentStateView state = simulator.state();
   const SceneBatch& scene = simulator.scene();
   const SlotTable slots = simulator.slots();
-  const auto world = static_cast<size_t>(slots.world_of_slot[static_cast<size_t>(slot)]);
-  const CompiledMap& map = *simulator.maps()[static_cast<size_t>(simulator.worlds()[world].map)];
+  const auto world = static_cast<size_t>(slots.world_of_slot[slot]);
+  const CompiledMap& map = *simulator.maps()[simulator.worlds()[world].map];
   const bool has_auxiliary = simulator.config().auxiliary_observations, has_lane = state.lane[slot] >= 0;
   const Frame ego{state.x_m[slot], state.y_m[slot], state.z_m[slot], std::cos(double{state.heading_rad[slot]}),
                   std::sin(double{state.heading_rad[slot]})};
@@ -148,17 +148,16 @@ ReferenceObservation reference_observation(Simulator& simulator, int slot) {
   }
 
   const auto rows = [&](EntitySet set) -> std::vector<ReferenceRow>& {
-    return observation.sets[static_cast<size_t>(set)];
+    return observation.sets[static_cast<int>(set)];
   };
   const int first_slot = slots.slot_begin[world], num_agents = slots.slot_begin[world + 1] - first_slot;
   for (int box = scene.world_begin[world]; box < scene.world_begin[world + 1]; ++box) {
     const int agent = box - scene.world_begin[world];
     const bool is_parked = agent >= num_agents;
     const int other = first_slot + agent;
-    if (other == slot || scene.agents[static_cast<size_t>(box)].drawn == 0) continue;
+    if (other == slot || scene.agents[box].drawn == 0) continue;
     rows(EntitySet::partners)
-        .push_back(partner(ego, scene.agents[static_cast<size_t>(box)],
-                           has_auxiliary && !is_parked ? state.speed_mps[other] : 0));
+        .push_back(partner(ego, scene.agents[box], has_auxiliary && !is_parked ? state.speed_mps[other] : 0));
   }
   const Cell cell = cell_of(*map.road, ego);
   observation.is_near_lane = cell.is_near_lane;

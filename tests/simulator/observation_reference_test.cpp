@@ -95,7 +95,7 @@ void compare(Simulator& simulator, Span<const uint8_t> ended, Compared* compared
       return array.subspan(static_cast<size_t>(slot) * size, size);
     };
     const bool goes_on = takes_actions(state.status[slot]);
-    if (!goes_on && ended[static_cast<size_t>(slot)] == 0 && state.left[slot] == 0) {
+    if (!goes_on && ended[slot] == 0 && state.left[slot] == 0) {
       ++compared->zeros;
 #define X(name, type, rows, features, part, comment) \
   for (const type number : of_slot(all.name)) ASSERT_EQ(number, 0) << #name;
@@ -235,7 +235,7 @@ TEST(ObservationReference, AnAgentThatLeavesAtItsGoalObservesNothing) {
           {"goal_x_m", Array(x_m)}, {"goal_y_m", Array(y_m)}, {"goal_z_m", Array(z_m)}, {"goal_open", Array(is_open)}});
   const StepResult result = simulator->step(mixed_actions(simulator->num_slots(), 0));
   std::vector<uint8_t> nobody(static_cast<size_t>(simulator->num_slots()));
-  for (const int32_t slot : slots) EXPECT_EQ(result.terminated[static_cast<size_t>(slot)], 1);
+  for (const int32_t slot : slots) EXPECT_EQ(result.terminated[slot], 1);
   Compared compared;
   compare(*simulator, nobody, &compared);
   EXPECT_EQ(compared.zeros, 6);

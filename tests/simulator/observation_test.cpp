@@ -161,9 +161,9 @@ TEST_F(Observation, WaypointsStartWithTheActiveOne) {
   for (int i = 0; i < 3; ++i) {
     const int index = std::min(1 + i, 2);
     const Vec2 at = local(110 + 30 * static_cast<float>(index), 4 * static_cast<float>(index));
-    EXPECT_NEAR(out.waypoints[static_cast<size_t>(3 * i)], at.x / 120, 1e-5);
-    EXPECT_NEAR(out.waypoints[static_cast<size_t>(3 * i + 1)], at.y / 120, 1e-5);
-    EXPECT_NEAR(out.waypoints[static_cast<size_t>(3 * i + 2)], 0.1, 1e-6);
+    EXPECT_NEAR(out.waypoints[3 * i], at.x / 120, 1e-5);
+    EXPECT_NEAR(out.waypoints[3 * i + 1], at.y / 120, 1e-5);
+    EXPECT_NEAR(out.waypoints[3 * i + 2], 0.1, 1e-6);
   }
 }
 
@@ -243,7 +243,7 @@ TEST_F(Observation, LanesBoundariesAndWallsAreAllThatIsInSight) {
         }
       }
       ASSERT_LT(in_sight, 80);
-      EXPECT_EQ(out.set_counts[static_cast<size_t>(set)], in_sight) << i;
+      EXPECT_EQ(out.set_counts[static_cast<int>(set)], in_sight) << i;
       EXPECT_EQ(found, in_sight) << i;
       for (size_t k = static_cast<size_t>(in_sight) * kLaneFeatures; k < 80 * kLaneFeatures; ++k) ASSERT_EQ(rows[k], 0);
     }
@@ -265,7 +265,7 @@ TEST(ObservedLists, HoldWhateverIsInSight) {
     const EgoFrame frame{{at.x, at.y, 0}, {cos_of(heading_rad), sin_of(heading_rad)}};
     std::vector<uint8_t> is_listed(rules.boundary_pieces.size());
     for (const int32_t item : list_of(view.near_boundary_pieces, near_place(view, at, heading_rad).cell_and_sector())) {
-      is_listed[static_cast<size_t>(item)] = 1;
+      is_listed[item] = 1;
     }
     for (size_t k = 0; k < is_listed.size(); ++k) {
       if (!is_in_sight(rules.boundary_pieces[k], frame)) continue;

@@ -20,7 +20,7 @@ struct RandomQueries {
       RandomStream random({.seed = 11, .world = number, .agent = static_cast<uint32_t>(i), .purpose = Purpose::action});
       ObservationQuery query;
       query.slot = random.below(simulator->num_slots());
-      const View& view = simulator->views()[static_cast<size_t>(query.slot)];
+      const View& view = simulator->views()[query.slot];
       const auto world = static_cast<size_t>(view.world);
       const int32_t first_box = scene.world_begin[world], num_boxes = scene.world_begin[world + 1] - first_box;
       query.hidden_begin = static_cast<int32_t>(hidden.size());
@@ -31,7 +31,7 @@ struct RandomQueries {
       const int num_inserted = random.below(4);
       for (int k = 0; k < num_inserted; ++k) {
         InsertedBox one;
-        one.box = scene.agents[static_cast<size_t>(first_box + random.below(num_boxes))];
+        one.box = scene.agents[first_box + random.below(num_boxes)];
         one.box.center_m = view.origin_m + Vec3{random.uniform(-80, 80), random.uniform(-80, 80), 0};
         one.box.drawn = random.below(5) > 0;
         one.box.length_m = random.uniform(1, 6);

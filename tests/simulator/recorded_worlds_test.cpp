@@ -33,7 +33,7 @@ std::unique_ptr<Simulator> world_of(const std::shared_ptr<const Scenario>& scene
 
 const std::vector<Command>& recorded(const Simulator& simulator) {
   static std::vector<Command> commands;
-  commands.assign(static_cast<size_t>(simulator.num_slots()), Command{.kind = CommandKind::recorded});
+  commands.assign(simulator.num_slots(), Command{.kind = CommandKind::recorded});
   return commands;
 }
 
@@ -45,11 +45,11 @@ void expect_as_recorded(Simulator& simulator, const Scenario& scene, int32_t ste
   for (int32_t track = 0; track < static_cast<int32_t>(scene.tracks.size()); ++track) {
     SCOPED_TRACE(::testing::Message() << "track " << track << ", step " << step);
     const auto at = static_cast<size_t>(step);
-    const AgentBox& box = boxes[static_cast<size_t>(track)];
+    const AgentBox& box = boxes[track];
     const bool is_there = scene.valid_of(track)[at] != 0;
     ASSERT_EQ(box.drawn != 0, is_there);
     ASSERT_EQ(status_of(simulator, track), is_there ? AgentStatus::recorded : AgentStatus::absent);
-    const RecordedTrack& about = scene.tracks[static_cast<size_t>(track)];
+    const RecordedTrack& about = scene.tracks[track];
     ASSERT_EQ(box.length_m, about.length_m);
     ASSERT_EQ(box.height_m, about.height_m);
     if (!is_there) continue;
@@ -129,7 +129,7 @@ TEST(RecordedWorlds, RecordedLightsShowWhatWasRecordedWhereTheyAreAskedFor) {
     for (int32_t light = 0; light < static_cast<int32_t>(scene->lights.size()); ++light) {
       const Span<const RecordedLightState> states = scene->states_of_light(light);
       const auto at = static_cast<size_t>(step);
-      const LightState is = shown[static_cast<size_t>(light)];
+      const LightState is = shown[light];
       EXPECT_EQ(is == LightState::red,
                 states[at] == RecordedLightState::stop || states[at] == RecordedLightState::arrow_stop)
           << light << ", " << step;
@@ -188,7 +188,7 @@ int32_t mover(const Scenario& scene, size_t last) {
     const Span<const uint8_t> valid = scene.valid_of(track);
     bool is_there = true;
     for (size_t step = 0; step <= last; ++step) is_there = is_there && valid[step];
-    if (is_there && is_moving(scene, track) && scene.tracks[static_cast<size_t>(track)].type == TrackType::vehicle) {
+    if (is_there && is_moving(scene, track) && scene.tracks[track].type == TrackType::vehicle) {
       return track;
     }
   }
@@ -203,14 +203,14 @@ TEST(RecordedWorlds, AnActionTakesOverFromWhatTheRecordImplies) {
     const auto simulator = world_of(scene);
     for (int32_t step = 0; step < taken_at; ++step) simulator->step(recorded(*simulator));
     std::vector<Command> commands = recorded(*simulator);
-    commands[static_cast<size_t>(self)] = {};  // no jerk
+    commands[self] = {};  // no jerk
     const StepResult result = simulator->step(commands);
-    EXPECT_EQ(result.valid[static_cast<size_t>(self)], 1);
+    EXPECT_EQ(result.valid[self], 1);
     EXPECT_EQ(status_of(*simulator, self), AgentStatus::active) << int{simulator->state().halt_reason[self]};
     // It goes on straight at the recorded speed.
-    const TrackState& from = scene->states_of(self)[static_cast<size_t>(taken_at)];
+    const TrackState& from = scene->states_of(self)[taken_at];
     const float speed_mps = length(from.velocity_mps);
-    const AgentBox& box = simulator->scene().agents[static_cast<size_t>(self)];
+    const AgentBox& box = simulator->scene().agents[self];
     EXPECT_NEAR(simulator->state().speed_mps[self], speed_mps, 1e-3);
     EXPECT_NEAR(length((box.center_m - from.position_m).xy()), speed_mps * 0.1f, 1e-3);
     EXPECT_EQ(simulator->totals().agent_steps, 1);
@@ -228,7 +228,7 @@ TEST(RecordedWorlds, DriversCollideWithTheRecordedAndHalt) {
   int32_t other = 0;
   while (other == self || !scene->valid_of(other)[1]) ++other;
   std::vector<Command> commands = recorded(*simulator);
-  Command& onto = commands[static_cast<size_t>(self)];
+  Command& onto = commands[self];
   const TrackState& there = scene->states_of(other)[1];
   onto = {.kind = CommandKind::kinematic_state,
           .x_m = there.position_m.x,
@@ -241,10 +241,10 @@ TEST(RecordedWorlds, DriversCollideWithTheRecordedAndHalt) {
   EXPECT_EQ(status_of(*simulator, other), AgentStatus::recorded);
   EXPECT_EQ(simulator->totals().collisions, 1);
   // The halted stay where they are, whoever commands them.
-  const AgentBox before = simulator->scene().agents[static_cast<size_t>(self)];
+  const AgentBox before = simulator->scene().agents[self];
   simulator->step(recorded(*simulator));
   EXPECT_EQ(status_of(*simulator, self), AgentStatus::halted);
-  EXPECT_EQ(simulator->scene().agents[static_cast<size_t>(self)].center_m.x, before.center_m.x);
+  EXPECT_EQ(simulator->scene().agents[self].center_m.x, before.center_m.x);
 }
 
 TEST(RecordedWorlds, TheGoalIsTheEndOfTheRecordAndPassedOnce) {
@@ -253,19 +253,19 @@ TEST(RecordedWorlds, TheGoalIsTheEndOfTheRecordAndPassedOnce) {
   const auto simulator = world_of(scene);
   const AgentStateView state = simulator->state();
   EXPECT_EQ(state.next_waypoint[self], kNumWaypoints - 1);
-  const RecordedTrack& track = scene->tracks[static_cast<size_t>(self)];
+  const RecordedTrack& track = scene->tracks[self];
   const auto follow_by_states = [&](int32_t step) {
     std::vector<Command> commands = recorded(*simulator);
     const auto at = static_cast<size_t>(std::min(step, track.last_valid));
     if (!scene->valid_of(self)[at]) return commands;
     const TrackState& there = scene->states_of(self)[at];
     const float ahead_m = reference_to_center(AgentClass::vehicle, track.length_m);
-    commands[static_cast<size_t>(self)] = {.kind = CommandKind::kinematic_state,
-                                           .x_m = there.position_m.x - ahead_m * std::cos(there.heading_rad),
-                                           .y_m = there.position_m.y - ahead_m * std::sin(there.heading_rad),
-                                           .z_m = there.position_m.z,
-                                           .heading_rad = there.heading_rad,
-                                           .speed_mps = length(there.velocity_mps)};
+    commands[self] = {.kind = CommandKind::kinematic_state,
+                      .x_m = there.position_m.x - ahead_m * std::cos(there.heading_rad),
+                      .y_m = there.position_m.y - ahead_m * std::sin(there.heading_rad),
+                      .z_m = there.position_m.z,
+                      .heading_rad = there.heading_rad,
+                      .speed_mps = length(there.velocity_mps)};
     return commands;
   };
   for (int32_t step = 1; step < scene->num_steps; ++step) simulator->step(follow_by_states(step));
@@ -283,7 +283,7 @@ std::unique_ptr<Simulator> world_with(const std::shared_ptr<const Scenario>& sce
 }
 
 Command place(const Scenario& scene, int32_t track, const TrackState& at) {
-  const RecordedTrack& about = scene.tracks[static_cast<size_t>(track)];
+  const RecordedTrack& about = scene.tracks[track];
   const float ahead_m = reference_to_center(AgentClass::vehicle, about.length_m);
   return {.kind = CommandKind::kinematic_state,
           .x_m = at.position_m.x - ahead_m * std::cos(at.heading_rad),
@@ -297,10 +297,10 @@ TEST(RecordedWorlds, WhoArrivesLeavesAndNobodyMeetsIt) {
   const auto scene = crossing(kNobodyInTheWay);
   const int32_t self = mover(*scene, 40), other = self + 1;
   const auto simulator = world_with(scene, AfterInfraction::halt, /*leave_at_goal=*/true);
-  const RecordedTrack& track = scene->tracks[static_cast<size_t>(self)];
-  const TrackState& goal = scene->states_of(self)[static_cast<size_t>(track.last_valid)];
+  const RecordedTrack& track = scene->tracks[self];
+  const TrackState& goal = scene->states_of(self)[track.last_valid];
   std::vector<Command> commands = recorded(*simulator);
-  commands[static_cast<size_t>(self)] = place(*scene, self, goal);
+  commands[self] = place(*scene, self, goal);
   StepResult result = simulator->step(commands);
   const auto slot = static_cast<size_t>(self);
   EXPECT_EQ(result.terminated[slot], 1);
@@ -310,7 +310,7 @@ TEST(RecordedWorlds, WhoArrivesLeavesAndNobodyMeetsIt) {
   EXPECT_EQ(simulator->scene().agents[slot].drawn, 1) << "all see where it arrived";
   const std::vector<uint8_t> saved = simulator->save();
   // Another comes to the same place, and meets nobody; what the one that left is told means nothing.
-  commands[static_cast<size_t>(other)] = place(*scene, other, goal);
+  commands[other] = place(*scene, other, goal);
   commands[slot] = {};
   result = simulator->step(commands);
   EXPECT_EQ(result.valid[slot], 0);
@@ -337,8 +337,8 @@ TEST(RecordedWorlds, InfractionsHaltOrRemoveOrOnlyCount) {
     SCOPED_TRACE(static_cast<int>(after));
     const auto simulator = world_with(scene, after, false);
     std::vector<Command> commands = recorded(*simulator);
-    commands[static_cast<size_t>(self)] = place(*scene, self, aside);
-    EXPECT_EQ(simulator->step(commands).terminated[static_cast<size_t>(self)], after != AfterInfraction::drive_on);
+    commands[self] = place(*scene, self, aside);
+    EXPECT_EQ(simulator->step(commands).terminated[self], after != AfterInfraction::drive_on);
     const AgentStatus expected = after == AfterInfraction::halt    ? AgentStatus::halted
                                  : after == AfterInfraction::leave ? AgentStatus::absent
                                                                    : AgentStatus::active;
@@ -346,7 +346,7 @@ TEST(RecordedWorlds, InfractionsHaltOrRemoveOrOnlyCount) {
     EXPECT_EQ(simulator->state().episode_events[self] & kEventOffRoad, kEventOffRoad);
     simulator->step(commands);
     EXPECT_EQ(simulator->totals().off_road, after == AfterInfraction::drive_on ? 2 : 1);
-    EXPECT_EQ(simulator->scene().agents[static_cast<size_t>(self)].drawn, after != AfterInfraction::leave);
+    EXPECT_EQ(simulator->scene().agents[self].drawn, after != AfterInfraction::leave);
   }
 }
 
@@ -378,7 +378,7 @@ TEST(RecordedWorlds, DriversLeaveTheRoadWhereTheEdgesSaySo) {
   const TrackState& there = scene->states_of(self)[0];
   std::vector<Command> commands = recorded(*simulator);
   const SinCos heading = sincos_of(there.heading_rad);
-  Command& aside = commands[static_cast<size_t>(self)];
+  Command& aside = commands[self];
   aside = {.kind = CommandKind::kinematic_state,
            .x_m = there.position_m.x + 8 * heading.sin,
            .y_m = there.position_m.y - 8 * heading.cos,
@@ -420,7 +420,7 @@ TEST(RecordedWorlds, ControllersShareThemByMasks) {
   const auto simulator = world_of(scene);
   const auto log = make_controller("log", *simulator, 0), idle = make_controller("idle", *simulator, 0);
   std::vector<uint8_t> driven(scene->tracks.size());
-  driven[static_cast<size_t>(mover(*scene, 40))] = 1;
+  driven[mover(*scene, 40)] = 1;
   std::vector<Command> commands(scene->tracks.size());
   log->act(simulator->arrays(), {}, commands);
   idle->act(simulator->arrays(), driven, commands);
@@ -436,7 +436,7 @@ void expect_inverse_actions_to_follow_the_record(const DynamicsRules& rules) {
   std::vector<Driver> drivers;
   drivers.push_back({.controller = make_controller("log", *simulator, 0)});
   std::vector<uint8_t> driven(scene->tracks.size());
-  driven[static_cast<size_t>(self)] = 1;
+  driven[self] = 1;
   drivers.push_back(driver_of(make_controller("inverse", *simulator, 0), driven));
   SharedControl control(std::move(drivers));
   EXPECT_EQ(control.name(), "log, inverse");
@@ -446,9 +446,8 @@ void expect_inverse_actions_to_follow_the_record(const DynamicsRules& rules) {
     control.act(simulator->arrays(), {}, commands);
     simulator->step(commands);
     // The dynamics do what was foreseen, and that is near.
-    const TrackState& there = scene->states_of(self)[static_cast<size_t>(step)];
-    const float error_m =
-        length((simulator->scene().agents[static_cast<size_t>(self)].center_m - there.position_m).xy());
+    const TrackState& there = scene->states_of(self)[step];
+    const float error_m = length((simulator->scene().agents[self].center_m - there.position_m).xy());
     const size_t at = first + static_cast<size_t>(step) - 1;
     ASSERT_EQ(inverse.is_followed[at], 1);
     EXPECT_NEAR(inverse.error_m[at], error_m, 0.02) << step;
@@ -467,7 +466,7 @@ float largest_error_of_bus(float length_m, float radius_m, float first_speed_mps
   Scenario scene = *crossing({.num_steps = 160});
   const int32_t self = mover(scene, 40);
   const float steps_m = 6;  // over which the curvature grows and ends
-  scene.tracks[static_cast<size_t>(self)].length_m = length_m;
+  scene.tracks[self].length_m = length_m;
   float s = 0, x = 0, y = 0, heading = 0, speed = first_speed_mps;
   for (int32_t step = 0; step < scene.num_steps; ++step) {
     const size_t at = static_cast<size_t>(self) * static_cast<size_t>(scene.num_steps) + static_cast<size_t>(step);
@@ -483,7 +482,7 @@ float largest_error_of_bus(float length_m, float radius_m, float first_speed_mps
     x += 0.1f * speed * along.cos;
     y += 0.1f * speed * along.sin;
   }
-  RecordedTrack& track = scene.tracks[static_cast<size_t>(self)];
+  RecordedTrack& track = scene.tracks[self];
   track.first_valid = 0;
   track.last_valid = scene.num_steps - 1;
   track.num_valid = scene.num_steps;
@@ -513,28 +512,27 @@ TEST(RecordedWorlds, IdmFollowsThePathAndStopsBehindOthers) {
   const int32_t self = mover(*scene, 40), other = self + 1;
   for (const bool is_blocked : {false, true}) {
     const auto simulator = world_of(scene);
-    const RecordedState& end =
-        simulator->maps()[0]->rules.record.states[static_cast<size_t>((self + 1) * scene->num_steps - 1)];
+    const RecordedState& end = simulator->maps()[0]->rules.record.states[(self + 1) * scene->num_steps - 1];
     const TrackState& blocked_at = scene->states_of(self)[60];
     const auto idm = make_controller("idm", *simulator, 0);
     std::vector<uint8_t> driven(scene->tracks.size());
-    driven[static_cast<size_t>(self)] = 1;
+    driven[self] = 1;
     float fastest_mps = 0;
     for (int32_t step = 1; step < scene->num_steps; ++step) {
       std::vector<Command> commands = recorded(*simulator);
       idm->act(simulator->arrays(), driven, commands);
       if (is_blocked) {
-        commands[static_cast<size_t>(other)] = {.kind = CommandKind::kinematic_state,
-                                                .x_m = blocked_at.position_m.x,
-                                                .y_m = blocked_at.position_m.y,
-                                                .z_m = blocked_at.position_m.z};
+        commands[other] = {.kind = CommandKind::kinematic_state,
+                           .x_m = blocked_at.position_m.x,
+                           .y_m = blocked_at.position_m.y,
+                           .z_m = blocked_at.position_m.z};
       }
       simulator->step(commands);
       fastest_mps = std::max(fastest_mps, simulator->state().speed_mps[self]);
       // Never off its path.
       const TrackState& start = scene->states_of(self)[0];
       const Vec2 along{std::cos(start.heading_rad), std::sin(start.heading_rad)};
-      const Vec3 center_m = simulator->scene().agents[static_cast<size_t>(self)].center_m;
+      const Vec3 center_m = simulator->scene().agents[self].center_m;
       EXPECT_LT(std::abs(cross(along, (center_m - start.position_m).xy())), 0.05f);
     }
     EXPECT_EQ(simulator->totals().collisions, 0);
@@ -556,7 +554,7 @@ TEST(RecordedWorlds, IdmFollowsLanesWhereItIsTold) {
   const auto idm = make_controller("idm_lanes", *simulator, 0);
   EXPECT_EQ(idm->name(), "idm_lanes");
   std::vector<uint8_t> driven(scene->tracks.size());
-  driven[static_cast<size_t>(self)] = 1;
+  driven[self] = 1;
   constexpr int32_t kTakeover = 15, kMerged = 45;  // it begins in the middle of the record
   constexpr int32_t kNearsEnd = 80;                // of its lane, where it stops
   float driven_m = 0;
@@ -625,7 +623,7 @@ TEST(RecordedWorlds, PathsAlongLanesEndWhereTheyDo) {
   ASSERT_EQ(nowhere.points_m.size(), 1u);
   EXPECT_EQ(nowhere.at(10).position_m.x, here.x);
   for (int32_t lane = 0; lane < static_cast<int32_t>(map.lanes.size()); ++lane) {
-    const MapLane& about = map.lanes[static_cast<size_t>(lane)];
+    const MapLane& about = map.lanes[lane];
     if (about.num_segments == 0) continue;
     const LanePose begin = pose_on_lane(map, lane, 0);
     const FollowedPath path = path_along_lanes(map, lane, begin.position_m, begin.heading_rad, 4);

@@ -65,8 +65,8 @@ inline std::vector<Command> mixed_commands(const AgentStateView& state, int num_
   const std::vector<int32_t> actions = mixed_actions(num_slots, step);
   std::vector<Command> commands(actions.size());
   for (int slot = 0; slot < num_slots; ++slot) {
-    Command& command = commands[static_cast<size_t>(slot)];
-    command.action = actions[static_cast<size_t>(slot)];
+    Command& command = commands[slot];
+    command.action = actions[slot];
     RandomStream random({.seed = 8,
                          .world = static_cast<uint32_t>(slot / kMaxAgentsPerWorld),
                          .agent = static_cast<uint32_t>(slot % kMaxAgentsPerWorld),

@@ -143,7 +143,7 @@ TEST(SceneRecorder, LightsBecomeRecordedOnes) {
   const auto last = static_cast<size_t>(kRecordedSteps);
   const SceneBatch& scene = simulator->scene();
   for (int32_t light = 0; light < static_cast<int32_t>(driven.lights.size()); ++light) {
-    const LightState state = scene.light_states[static_cast<size_t>(scene.light_begin[1] + light)];
+    const LightState state = scene.light_states[scene.light_begin[1] + light];
     const RecordedLightState expected = state == LightState::red      ? RecordedLightState::stop
                                         : state == LightState::yellow ? RecordedLightState::caution
                                         : state == LightState::green  ? RecordedLightState::go
@@ -169,8 +169,7 @@ TEST(SceneRecorder, AReplayedRecordingIsTheRecording) {
   const Scenario again = recorder.scenario("again");
   EXPECT_EQ(again.id, "again");
   ASSERT_LE(again.tracks.size(), scene->tracks.size());
-  EXPECT_EQ(again.tracks[static_cast<size_t>(again.sdc_track)].id,
-            scene->tracks[static_cast<size_t>(scene->sdc_track)].id);
+  EXPECT_EQ(again.tracks[again.sdc_track].id, scene->tracks[scene->sdc_track].id);
   ASSERT_EQ(again.lights.size(), scene->lights.size());
   for (int32_t light = 0; light < static_cast<int32_t>(again.lights.size()); ++light) {
     for (size_t step = 0; step <= 40; ++step) {
@@ -179,7 +178,7 @@ TEST(SceneRecorder, AReplayedRecordingIsTheRecording) {
   }
   for (int32_t track = 0; track < static_cast<int32_t>(again.tracks.size()); ++track) {
     int32_t original = 0;
-    while (scene->tracks[static_cast<size_t>(original)].id != again.tracks[static_cast<size_t>(track)].id) ++original;
+    while (scene->tracks[original].id != again.tracks[track].id) ++original;
     for (size_t step = 0; step <= 40; ++step) {
       ASSERT_EQ(again.valid_of(track)[step], scene->valid_of(original)[step + 5]);
       if (!again.valid_of(track)[step]) continue;

@@ -115,7 +115,7 @@ TEST(SetState, MovesAgentsAndWhatFollows) {
   EXPECT_EQ(simulator->views()[5].origin_m.x, 60);
   EXPECT_EQ(simulator->views()[1].origin_m.y, 4);
   const SceneBatch& scene = simulator->scene();
-  const AgentBox& box = scene.agents[static_cast<size_t>(scene.world_begin[1] + 1)];
+  const AgentBox& box = scene.agents[scene.world_begin[1] + 1];
   EXPECT_FLOAT_EQ(box.center_m.x, 60 + 0.5f * kWheelbasePerLength * state.length_m[5] * std::cos(0.25f));
   EXPECT_FLOAT_EQ(simulator->observations().ego[5 * kEgoFeatures] * kScaleSpeed_mps, 7) << "speed, by its scale";
 }

@@ -73,7 +73,7 @@ TEST(Signal, TrainingTimingIsDrawnPerJunctionAndEpisode) {
 std::array<LightPlan, 2> independent_pair(bool fixed, uint32_t episode) {
   std::array<LightPlan, 2> plans;
   for (int light = 0; light < 2; ++light) {
-    plans[static_cast<size_t>(light)] =
+    plans[light] =
         draw_light_plan(line_of_phase(light, 2), light, LightCycles::independent, fixed, 0.1f, 7, 0, episode);
   }
   return plans;
@@ -286,7 +286,7 @@ std::shared_ptr<const RoadMap> short_section(bool is_endless) {
   append({102, 150, 200}, 1);
   map->lanes[0].points.end = map->lanes[0].points.begin + 11;
   map->lanes[0].length_m = 100;
-  map->lane_links[static_cast<size_t>(map->lanes[0].successors.begin)] = 4;
+  map->lane_links[map->lanes[0].successors.begin] = 4;
   map->lanes[4].is_endless = map->lanes[5].is_endless = is_endless;
   testing::add_light(map.get(), 102, 4, 1, {4, 5});
   return map;

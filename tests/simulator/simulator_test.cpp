@@ -466,7 +466,7 @@ std::array<std::vector<int32_t>, 2> episode_lengths(Simulator* simulator, int ep
     const StepResult result = simulator->step(actions);
     for (size_t w = 0; w < num_worlds; ++w) {
       if (!simulator->episode_over()[w]) continue;
-      lengths[static_cast<size_t>(simulator->episode_index()[w])][w] = simulator->episode_step()[w];
+      lengths[simulator->episode_index()[w]][w] = simulator->episode_step()[w];
       const bool drives = simulator->state().status[w] == AgentStatus::active;
       EXPECT_EQ(result.truncated[w], drives) << w;  // agents that still drive at the end bootstrap
       truncated += drives;
@@ -676,7 +676,7 @@ TEST(Simulator, TotalsHaveEachRewardTermOfLiveAgents) {
   // On straights all pass waypoints, in the first curve all leave the road.
   SimulatorConfig config = testing::cars({.walls = false});
   const auto fix = [&config](Conditioning which, float value) {
-    config.conditioning[static_cast<size_t>(which)] = {value, value, false};
+    config.conditioning[static_cast<int>(which)] = {value, value, false};
   };
   fix(Conditioning::v_goal_mps, 30);
   fix(Conditioning::off_road, 2);
@@ -717,7 +717,7 @@ TEST(Simulator, TotalsSayWhenAgentsBeganToMoveAndWhoPassedAWaypoint) {
   // Agent i of the first half rests for 3 i steps; the others stay where they are.
   std::vector<int> first_motion(10, 0);
   for (int step = 1; step <= 60; ++step) {
-    for (int i = 0; i < 5; ++i) actions[static_cast<size_t>(i)] = step > 3 * i ? kFullThrottle : kCoast;
+    for (int i = 0; i < 5; ++i) actions[i] = step > 3 * i ? kFullThrottle : kCoast;
     simulator->step(actions);
     for (size_t i = 0; i < 10; ++i) {
       if (first_motion[i] == 0 && std::fabs(state.speed_mps[i]) > kRest_mps) first_motion[i] = step;

@@ -22,7 +22,7 @@ Stage::Stage(std::shared_ptr<const RoadMap> map, int num_agents, const Simulator
 }
 
 void Stage::set(int agent, Conditioning which, float value) {
-  worlds.state.agents.conditioning[static_cast<size_t>(agent * kNumConditioning + static_cast<int>(which))] = value;
+  worlds.state.agents.conditioning[agent * kNumConditioning + static_cast<int>(which)] = value;
 }
 
 void Stage::put(int agent, Vec2 position_m, float heading_rad, float speed_mps) {
@@ -45,7 +45,7 @@ void Stage::sort_boxes() {
   const GridView view = cells.view();
   cells.items.clear();
   for (int cell = 0; cell < cells.num_x * cells.num_y; ++cell) {
-    cells.begin[static_cast<size_t>(cell)] = static_cast<int32_t>(cells.items.size());
+    cells.begin[cell] = static_cast<int32_t>(cells.items.size());
     for (size_t i = 0; i < worlds.state.boxes.size(); ++i) {
       const Vec3 at = worlds.state.boxes[i].center_m;
       if (worlds.state.boxes[i].drawn && view.cell_y(at.y) * cells.num_x + view.cell_x(at.x) == cell) {

@@ -24,7 +24,7 @@ class Stage {
   void set(int agent, Conditioning which, float value);
   /// The same action for everybody. Returns the rewards.
   std::vector<float> step(int32_t action = kCoast);
-  int events(int agent) const { return worlds.state.agents.events[static_cast<size_t>(agent)]; }
+  int events(int agent) const { return worlds.state.agents.events[agent]; }
   WorldView world() { return worlds.world(0); }
 
   HostWorlds worlds;

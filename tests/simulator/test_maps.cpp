@@ -35,8 +35,8 @@ void link(RoadMap* map, int32_t from, int32_t to) {
     map->lane_links.push_back(lane);
     range_out->end = static_cast<int32_t>(map->lane_links.size());
   };
-  append(&map->lanes[static_cast<size_t>(from)].successors, to);
-  append(&map->lanes[static_cast<size_t>(to)].predecessors, from);
+  append(&map->lanes[from].successors, to);
+  append(&map->lanes[to].predecessors, from);
 }
 
 struct Arc {
@@ -110,8 +110,8 @@ std::shared_ptr<RoadMap> stadium(float straight_m, int num_lanes) {
     for (int part = 0; part < 4; ++part) {
       const int32_t index = 4 * lane + part;
       link(map.get(), index, 4 * lane + (part + 1) % 4);
-      if (lane > 0) map->lanes[static_cast<size_t>(index)].right_neighbor = index - 4;
-      if (lane + 1 < num_lanes) map->lanes[static_cast<size_t>(index)].left_neighbor = index + 4;
+      if (lane > 0) map->lanes[index].right_neighbor = index - 4;
+      if (lane + 1 < num_lanes) map->lanes[index].left_neighbor = index + 4;
     }
   }
   const std::vector<Arc> outer = parts_at(-0.5f * kLaneWidth_m);
@@ -147,7 +147,7 @@ int32_t add_side_lane(RoadMap* map, LaneType type, const std::vector<Vec3>& poin
     headings.push_back(std::atan2(way.y, way.x));
   }
   const int32_t index = add_lane(map, points, headings);
-  Lane& lane = map->lanes[static_cast<size_t>(index)];
+  Lane& lane = map->lanes[index];
   lane.type = type;
   lane.is_endless = false;
   return index;

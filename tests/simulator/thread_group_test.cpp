@@ -40,8 +40,8 @@ TEST(NearestOfOneThread, IsTheBeginningOfTheSortedOnesWhateverTheirNumber) {
     ASSERT_EQ(together.count(), expected) << num_items;
     ASSERT_EQ(one_by_one.count(), expected) << num_items;
     for (int i = 0; i < expected; ++i) {
-      EXPECT_EQ(together.item(i), sorted[static_cast<size_t>(i)].second) << num_items;
-      EXPECT_EQ(one_by_one.item(i), sorted[static_cast<size_t>(i)].second) << num_items;
+      EXPECT_EQ(together.item(i), sorted[i].second) << num_items;
+      EXPECT_EQ(one_by_one.item(i), sorted[i].second) << num_items;
     }
   }
 }

@@ -88,7 +88,7 @@ TEST(Towns, ParkedCarsLeaveTheLanesFree) {
         ++placed;
         for (const Vec2 p : points_of(box)) {
           for (const int32_t item : items_at(view.map.segment_cells, p)) {
-            const LaneSegment& segment = view.map.segments[static_cast<size_t>(item)];
+            const LaneSegment& segment = view.map.segments[item];
             const Vec2 from_a = p - segment.a_m.xy();
             const float along = dot(from_a, segment.direction);
             if (!segment.is_driven || along < 0 || along > segment.length_m ||
@@ -116,7 +116,7 @@ TEST(Towns, EveryGoalCanBeReached) {
       const auto places = goal_places(world, agent, 0, start_place(world, agent));
       for (int i = 0; i < kNumWaypoints; ++i) {
         const Vec3 given = waypoint_of(world.agents, agent, i);
-        const Vec3 drawn = pose_of(world, agent, places[static_cast<size_t>(i)]).position_m;
+        const Vec3 drawn = pose_of(world, agent, places[i]).position_m;
         ASSERT_TRUE(given.x == drawn.x && given.y == drawn.y && given.z == drawn.z);
       }
     }

@@ -51,7 +51,7 @@ int networks(const Walkways& walkways) {
       mark[piece] = count;
       const auto node = static_cast<size_t>(walkways.pieces[piece].to_node);
       for (int32_t i = walkways.leave_begin[node]; i < walkways.leave_begin[node + 1]; ++i) {
-        const auto next = static_cast<size_t>(walkways.leaving[static_cast<size_t>(i)]);
+        const auto next = static_cast<size_t>(walkways.leaving[i]);
         open.push_back(next);
         open.push_back(next ^ 1);
       }

@@ -19,7 +19,7 @@ struct Drawn {
   Rgb at(int x, int y, int view = 0) const {
     const CameraLayout& camera = layout.cameras[0];
     const int64_t first = camera.offset + view * camera.view_stride + y * camera.row_stride + x * camera.pixel_stride;
-    auto channel = [&](int c) { return rgb[static_cast<std::size_t>(first + c * camera.channel_stride)]; };
+    auto channel = [&](int c) { return rgb[first + c * camera.channel_stride]; };
     return {channel(0), channel(1), channel(2)};
   }
 };

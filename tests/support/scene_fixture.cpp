@@ -24,8 +24,7 @@ constexpr double kPi64 = std::numbers::pi;
 
 /// A point of the crossing, turned by `arm` quarters.
 Vector3d place(double x, double y, int arm, double z = 0) {
-  const double c = std::array{1.0, 0.0, -1.0, 0.0}[static_cast<std::size_t>(arm)],
-               s = std::array{0.0, 1.0, 0.0, -1.0}[static_cast<std::size_t>(arm)];
+  const double c = std::array{1.0, 0.0, -1.0, 0.0}[arm], s = std::array{0.0, 1.0, 0.0, -1.0}[arm];
   return {kCenterX_m + c * x - s * y, kCenterY_m + s * x + c * y, kGround_m + z};
 }
 
@@ -612,7 +611,7 @@ std::string write_new(const LoggedScene& scene) {
     out.number(0);
   };
   for (const LoggedLight& light : scene.lights) {
-    const LoggedLane& lane = scene.lanes[static_cast<std::size_t>(lane_index.at(light.lanes[0]))];
+    const LoggedLane& lane = scene.lanes[lane_index.at(light.lanes[0])];
     const Vector3d way = (lane.points[1] - lane.points[0]).normalized();
     const Vector3d left(-way.y() * kHalfLane_m, way.x() * kHalfLane_m, 0);
     head(1, lane.points[0] + left, lane.points[0] - left);

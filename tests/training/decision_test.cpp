@@ -104,7 +104,7 @@ TEST(HeldActions, AreDecidedWhereALifeBeginsAndAgentsHaveLeft) {
     const SimulatorArrays input = simulator->arrays();
     const at::Tensor deciding = clock.deciding(input, active_slots(input, {}, true, executor.get()), step);
     std::vector<bool> decides(6);
-    for (int64_t i = 0; i < deciding.size(0); ++i) decides[static_cast<size_t>(deciding[i].item<int64_t>())] = true;
+    for (int64_t i = 0; i < deciding.size(0); ++i) decides[deciding[i].item<int64_t>()] = true;
     for (size_t slot = 0; slot < decides.size(); ++slot) {
       const bool begins = input.state.life[slot] > 0 && input.state.life_step[slot] == input.episode_step[0];
       const bool leaves = input.state.left[slot] != 0;

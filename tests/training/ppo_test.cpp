@@ -141,7 +141,7 @@ TEST(AdvantageFilter, QuantileIsThatOfTheSortedAdvantages) {
   for (float& advantage : advantages) advantage = std::abs(advantage);
   std::sort(advantages.begin(), advantages.end());
   for (const double share : {0.01, 0.3, 0.5, 0.9, 0.99}) {
-    const float exact = advantages[static_cast<size_t>(share * static_cast<double>(advantages.size()))];
+    const float exact = advantages[share * static_cast<double>(advantages.size())];
     EXPECT_NEAR(filter_quantile(counts, share), exact, 0.003f * exact) << share;
   }
 }
@@ -217,7 +217,7 @@ TEST(Permutation, TakesEveryElementOnceAndOnlyItsArgumentsDecide) {
     const Permutation permutation(1, 2, 3, size);
     for (int64_t i = 0; i < size; ++i) taken.push_back(permutation(i));
     std::sort(taken.begin(), taken.end());
-    for (int64_t i = 0; i < size; ++i) ASSERT_EQ(taken[static_cast<size_t>(i)], i) << "of " << size;
+    for (int64_t i = 0; i < size; ++i) ASSERT_EQ(taken[i], i) << "of " << size;
   }
   const auto order = [](uint64_t seed, int64_t update, int64_t epoch) {
     const Permutation permutation(seed, update, epoch, 1000);

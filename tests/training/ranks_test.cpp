@@ -58,7 +58,7 @@ std::vector<std::string> run_ranks(int size, const std::function<void(Ranks&)>& 
   std::vector<std::thread> threads;
   for (int rank = 0; rank < size; ++rank) {
     threads.emplace_back([&, rank] {
-      errors[static_cast<size_t>(rank)] = message_of([&] {
+      errors[rank] = message_of([&] {
         Ranks ranks(place(rank, size, port), patience);
         f(ranks);
       });
@@ -218,7 +218,7 @@ TEST(Communicators, GiveEveryRankTheSameBits) {
     const int rank = communicator->rank();
     const at::Tensor sum = (at::arange(1001, at::kFloat) * (0.1 + rank)).sin();
     communicator->sum(sum);
-    sums[static_cast<size_t>(rank)] = sum;
+    sums[rank] = sum;
     EXPECT_EQ(communicator->max_of(rank == 1 ? 7 : -rank), 7);
     const at::Tensor copied = at::full({4}, rank, at::kByte);
     communicator->broadcast(copied, 2);

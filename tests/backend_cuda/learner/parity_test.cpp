@@ -132,7 +132,7 @@ template <typename Select>
 std::vector<int64_t> same_selection(size_t room, const Executors& executors, const Select& select) {
   std::vector<int64_t> selected(room, -1);
   const DeviceBuffer<int64_t> on_the_device(room);
-  selected.resize(static_cast<size_t>(select(executors.host.get(), Span<int64_t>(selected), /*on_device=*/false)));
+  selected.resize(select(executors.host.get(), Span<int64_t>(selected), /*on_device=*/false));
   const int64_t count = select(executors.device.get(), room_in(on_the_device), /*on_device=*/true);
   EXPECT_EQ(count, static_cast<int64_t>(selected.size()));
   if (count == static_cast<int64_t>(selected.size())) {

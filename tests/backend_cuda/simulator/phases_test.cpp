@@ -42,7 +42,7 @@ void expect_same(const SimulatorConfig& config, const CompiledMaps& maps, const 
     if (by_commands) commands = testing::mixed_commands(cpu->state(), cpu->num_slots(), key);
     for (size_t slot = 0; slot < commands.size(); ++slot) {
       const auto world = static_cast<size_t>(cpu->slots().world_of_slot[slot]);
-      const bool is_recorded = maps[static_cast<size_t>(worlds[world].map)]->scenario != nullptr;
+      const bool is_recorded = maps[worlds[world].map]->scenario != nullptr;
       if (is_recorded && (slot + static_cast<size_t>(step) / 10) % 4 != 0)
         commands[slot] = {.kind = CommandKind::recorded};
     }

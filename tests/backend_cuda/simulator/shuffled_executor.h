@@ -126,9 +126,9 @@ class ShuffledExecutor {
       cell_begin_.insert(cell_begin_.end(), {0, host.world(w).num_boxes});
     }
     for (int w = 0; w < host.setup.num_worlds(); ++w) {
-      const auto first_box = static_cast<size_t>(host.setup.box_begin[static_cast<size_t>(w)]);
+      const auto first_box = static_cast<size_t>(host.setup.box_begin[w]);
       WorldView view = host.world(w);
-      const auto first_light = static_cast<size_t>(host.setup.light_begin[static_cast<size_t>(w)]);
+      const auto first_light = static_cast<size_t>(host.setup.light_begin[w]);
       view.box_cells =
           cuda::one_cell({cell_begin_.data() + 2 * w, 2}, {cell_items_.data(), static_cast<size_t>(view.num_boxes)});
       scratch_.push_back({try_boxes_.data() + first_box * kSpawnTries, free_tries_.data() + first_box,

@@ -86,7 +86,7 @@ class TestView {
       edges->resize(edges->size() + static_cast<std::size_t>(count));
       return static_cast<int32_t>(edges->size()) - count;
     }
-    void put(int32_t index, const PolygonEdge& edge) { (*edges)[static_cast<std::size_t>(index)] = edge; }
+    void put(int32_t index, const PolygonEdge& edge) { (*edges)[index] = edge; }
   };
   template <typename MakeFaces>
   Faces keep(PrimitiveRef primitive, const Extent& extent, MakeFaces&& make_faces) {
@@ -430,15 +430,14 @@ TEST(Order, VisibleSamplesDoNotDependOnTheOrderOfFragments) {
     auto visible_by_face = [&](PixelAccumulator* sum) {
       std::vector<uint64_t> visible(faces.size());
       for (const Fragment& fragment : fragments) {
-        uint64_t& of_face = visible[static_cast<std::size_t>(fragment.face)];
+        uint64_t& of_face = visible[fragment.face];
         of_face = effective_samples(fragment.coverage);
         for (const Fragment& other : fragments) {
-          of_face &= ~occlude_pair(fragment.coverage, other.coverage, faces[static_cast<std::size_t>(fragment.face)],
-                                   faces[static_cast<std::size_t>(other.face)], {}, stands)
-                          .of_a;
+          of_face &=
+              ~occlude_pair(fragment.coverage, other.coverage, faces[fragment.face], faces[other.face], {}, stands)
+                   .of_a;
         }
-        sum->add(PixelAccumulator::weight_of(fragment.coverage, of_face),
-                 faces[static_cast<std::size_t>(fragment.face)].color);
+        sum->add(PixelAccumulator::weight_of(fragment.coverage, of_face), faces[fragment.face].color);
       }
       return visible;
     };
@@ -490,8 +489,8 @@ TEST(Order, FacesBehindTheOccluderBoundAreOccluded) {
   int behind = 0;
   for (int round = 0; round < 20000; ++round) {
     const std::vector<ScreenFace> faces = random_planes(&random, 3);
-    const ScreenFace& full = faces[static_cast<std::size_t>(round % 2)];
-    const ScreenFace& face = faces[static_cast<std::size_t>(round % 3 ? 2 : 1 - round % 2)];
+    const ScreenFace& full = faces[round % 2];
+    const ScreenFace& face = faces[round % 3 ? 2 : 1 - round % 2];
     const float bound = occluder_bound(full, 0, 0);
     ASSERT_EQ(bits_from_float(bound) << kOccluderBoundBits, 0u);
     ASSERT_TRUE(passes_occluder_bound(full, bound, 0, 0)) << "no face occludes itself";

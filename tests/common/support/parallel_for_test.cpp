@@ -21,7 +21,7 @@ namespace {
 TEST(ParallelFor, VisitsEveryItemOnce) {
   for (const int threads : {0, 1, 3}) {
     std::vector<int> visits(1000, 0);
-    parallel_for(threads, 1000, [&](std::int64_t i) { ++visits[static_cast<std::size_t>(i)]; });
+    parallel_for(threads, 1000, [&](std::int64_t i) { ++visits[i]; });
     EXPECT_EQ(visits, std::vector<int>(1000, 1));
   }
 }
