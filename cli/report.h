@@ -34,7 +34,7 @@ class ProgressLine {
   std::string text_;
   bool dirty_ = false;
   std::optional<Stopwatch> since_print_;
-  const Stopwatch since_start_;
+  Stopwatch since_start_;
 };
 
 /// Parses "AxB" with both numbers in [1, max]. Throws UsageError naming the option.

@@ -1176,7 +1176,7 @@ class Replays(CommandCase):
         result = run(*evaluate, "--out", out, "--replays", 2, "--gallery", folder, "--replay", self.folder / "worst.html")
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertNotIn("notice", result.stderr)  # they count what the evaluation did
-        scenarios = json.loads(out.read_text())["rows"][0]["scenarios"]
+        scenarios = json.loads(out.read_text())["densities"][0]["scenarios"]
         rates = [s["at_fault_infraction"] / s["vehicles"] for s in scenarios]
         worst = sorted(range(4), key=lambda i: -rates[i])[:2]
         self.assertEqual(sorted(p.name for p in folder.glob("[!.]*")), sorted(["index.html", *(f"custom_{i}.html" for i in worst)]))
