@@ -187,6 +187,7 @@ void VideoWriter::finish() {
   impl_->frames.reset();
   const int status = impl_->reap();
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) impl_->fail_with_message(status);
+  PICTURA_CHECK(::lseek(impl_->film->fd(), 0, SEEK_END) > 0, "{}: ffmpeg wrote nothing", impl_->path);
   impl_->film->commit();
 }
 

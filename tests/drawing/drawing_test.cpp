@@ -765,13 +765,29 @@ TEST(Video, ReportsThatFfmpegIsMissing) {
   EXPECT_EQ(folder.num_entries(), 0u);
 }
 
+// Puts a program that is called ffmpeg, of these lines, into a folder.
+void write_ffmpeg(const ScratchFolder& programs, const std::string& lines) {
+  std::ofstream(programs / "ffmpeg") << "#!/bin/sh\n" << lines;
+  fs::permissions(programs / "ffmpeg", fs::perms::owner_all);
+}
+
+TEST(Video, ReportsAnFfmpegThatWritesNothing) {
+  const ScratchFolder folder, programs;
+  write_ffmpeg(programs, "while read -r line; do :; done\n");
+  const EnvironmentVariable path("PATH", programs.path());
+  const std::string file = folder / "film.mp4";
+  EXPECT_EQ(test::message_of([&] {
+              VideoWriter video(file, 64, 48, 10);
+              video.add(solid(64, 48, {0, 0, 0}));
+              video.finish();
+            }),
+            file + ": ffmpeg wrote nothing");
+  EXPECT_EQ(folder.num_entries(), 0u);
+}
+
 TEST(Video, ReportsFfmpegsLastLine) {
   const ScratchFolder folder, programs;
-  {
-    std::ofstream script(programs / "ffmpeg");
-    script << "#!/bin/sh\necho first line >&2\necho 'Unknown encoder' >&2\nexit 3\n";
-  }
-  fs::permissions(programs / "ffmpeg", fs::perms::owner_all);
+  write_ffmpeg(programs, "echo first line >&2\necho 'Unknown encoder' >&2\nexit 3\n");
   const EnvironmentVariable path("PATH", programs.path());
   const std::string file = folder / "film.mp4";
   const std::string message = test::message_of([&] {
