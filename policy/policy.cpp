@@ -413,7 +413,7 @@ std::unique_ptr<const Policy> make_policy(const Config& config, const Rig& rig, 
   return policy;
 }
 
-bool Decision::is_finite() const { return logits.isfinite().all().logical_and(value.isfinite().all()).item<bool>(); }
+at::Tensor Decision::are_finite() const { return logits.isfinite().all().logical_and(value.isfinite().all()); }
 
 Decision decide(const at::Tensor& rows, const ChunkSizes& chunks,
                 const std::function<Policy::Output(const at::Tensor& rows)>& act) {

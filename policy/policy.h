@@ -127,8 +127,10 @@ void scale_logits(const Policy& policy, double factor);
 struct Decision {
   at::Tensor logits, log_probs, value;
 
-  /// Waits for the device.
-  bool is_finite() const;
+  /// Whether all logits and values are finite numbers: bool, where they are.
+  at::Tensor are_finite() const;
+  /// The same. Waits for the device.
+  bool is_finite() const { return are_finite().item<bool>(); }
 };
 /// For the agents in some rows, i64 [batch], a chunk at a time: act(rows) gives what the policy makes of those of a
 /// chunk, which need not outlast the next call.

@@ -1,5 +1,6 @@
 #include "pictura/training/algorithm.h"
 
+#include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/training/schedule.h"
 
@@ -49,6 +50,8 @@ bool Collector::collect_on_stream() {
   Simulator& simulator = *run_.simulator;
   const Stream stream = current_stream(run_.device);
   rollout.values.zero_();
+  // Latched on a device, so that no step waits for it.
+  at::Tensor are_finite = at::ones({}, rollout.values.options().dtype(at::kBool));
   for (int64_t step = 0; step < rollout.num_steps(); ++step) {
     if (run_.communicator->size() == 1 && interrupted()) return false;
     run_.communicator->step();
@@ -56,6 +59,7 @@ bool Collector::collect_on_stream() {
     // Act.
     const at::Tensor slots = record(step);
     const Decision decision = decide(&run_, step, slots);
+    are_finite.logical_and_(decision.are_finite());
     ask_teacher(step, slots);
     hold_actions(step, slots);
     run_.executor->choose_actions(simulator.arrays(), span_of<const int64_t>(slots),
@@ -71,7 +75,10 @@ bool Collector::collect_on_stream() {
   const at::Tensor slots = record(rollout.num_steps());
   const Decision last = decide(&run_, rollout.num_steps(), slots);
   rollout.values.select(0, rollout.num_steps()).index_copy_(0, slots, last.value);
+  are_finite.logical_and_(last.are_finite());
   simulator.check(stream);
+  PICTURA_CHECK(are_finite.item<bool>(),
+                "update {}: expected finite logits and values in the rollout, got infinities or NaN", run_.update + 1);
   return true;
 }
 
