@@ -1,4 +1,4 @@
-// What a configuration tells cameras, renderers and simulators.
+// Settings of cameras, renderers and simulators that a configuration gives.
 #pragma once
 
 #include "pictura/common/camera.h"
@@ -18,15 +18,15 @@ int whole_factor(ImageSize from, ImageSize to);
 /// The rig that render describes for a run that has done `agent_steps`.
 Rig rig_of(const Config& config, int64_t agent_steps = 0);
 
-/// What the renderer is told: everything about an image that the policy depends on, with a rig of its run. `device` is
+/// Settings of the renderer: everything about an image that the policy depends on, with a rig of its run. `device` is
 /// where the network computes.
 RendererConfig renderer_config(const Config& config, const Rig& rig, Device device = {});
 
-/// What the simulator is told for training: entity sets only for the vector modality.
+/// Settings of the simulator for training: entity sets only for the vector modality.
 SimulatorConfig simulator_config(const Config& config, Device device = {});
 
-/// The same for evaluation (paper, appendix, evaluation protocol): episodes of `steps` that nothing ends early, fixed
-/// conditioning, fixed lights.
+/// Settings of the simulator for evaluation (paper, appendix, evaluation protocol): episodes of `steps` that nothing
+/// ends early, fixed conditioning, fixed lights.
 SimulatorConfig evaluation_simulator_config(const Config& config, int steps, Device device = {});
 
 }  // namespace pictura

@@ -6,7 +6,7 @@
 
 namespace pictura {
 
-/// Of the network on a CUDA device: IEEE fp32; products in TF32; layers in bf16. See policy/precision.h.
+/// Arithmetic of the network on a CUDA device: IEEE fp32; products in TF32; layers in bf16. See policy/precision.h.
 enum class Precision { fp32, tf32, bf16 };
 
 /// What becomes of agents that are halted or absent: they are neither drawn nor encoded; or they are, in rollouts and
@@ -63,7 +63,7 @@ struct TrainSection {
   int evaluate_scenarios = 16, evaluate_agents = 120, evaluate_steps = 600;
   Precision precision = Precision::bf16;
   bool reproducible = false;  // the same bits in every run on a device, see policy/precision.h
-  /// Of a rollout: kept, or redrawn from its scenes where they are read; auto: kept on the host,
+  /// Images of a rollout: kept, or redrawn from its scenes where they are read; auto: kept on the host,
   /// and on a device where they take at most a quarter of its memory.
   std::string images = "auto";
   std::string graphs = "auto";                   // CUDA graphs of a learner's work; off: call by call
