@@ -117,7 +117,7 @@ class Plotter {
   Descriptor messages_;
 };
 
-/// Its last line, without "error: ".
+/// The last line of what Python wrote on stderr, without "error: ".
 std::string message_in(std::string messages) {
   while (messages.ends_with('\n')) messages.pop_back();
   const size_t line = messages.rfind('\n');

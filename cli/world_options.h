@@ -33,7 +33,7 @@ void refuse_options(const CLI::App& command, std::initializer_list<const char*> 
 void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_out, std::string* policy_out,
                          BackendOptions* backends_out);
 
-/// What these options mean for a recorded scene, where MAP is one: everybody is driven as recorded unless a policy was
+/// Adapts these options to a recorded scene, where MAP is one: all road users follow the record unless a policy was
 /// asked for, for as many steps as are recorded unless --steps was given (else *steps_inout becomes 0). Throws
 /// UsageError for options that have no effect on what MAP is.
 void settle_driving_options(const CLI::App& command, WorldOptions* world_inout, int* steps_inout,

@@ -179,7 +179,7 @@ class Reader {
   void refuse_unknown(const toml::table& table, const std::string& prefix = "") const {
     for (const auto& [name, node] : table) {
       const std::string key = prefix + std::string(name.str());
-      // Of a section that is unknown, its first key is named.
+      // An unknown section is reported by its first key.
       if (const toml::table* inner = node.as_table(); inner && (sections_.count(key) || !inner->empty()))
         refuse_unknown(*inner, key + ".");
       else if (!known_.count(key))

@@ -23,6 +23,7 @@ struct RecordingOptions {
 /// Follows the world's first agent where nothing was asked for. Throws UsageError unless the world has the followed
 /// one.
 void settle_followed(const DrivenWorld& world, RecordingOptions* options_inout);
+
 /// Who drives, and what draws. A controller has no session; without it, cameras are the paper's.
 struct RecordedDriver {
   std::string policy;  // as it was asked for

@@ -1,4 +1,4 @@
-// Loads maps for programs that use them: says on stderr what was mended in their files.
+// Loading of maps with a report on stderr of what was repaired in their files.
 #pragma once
 
 #include <memory>

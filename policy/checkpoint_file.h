@@ -36,12 +36,12 @@ struct CheckpointFile {
   std::string_view data;
 };
 
-/// Such a file under construction: data are appended, and their places stand in the header.
+/// A checkpoint that is being put together: data are appended, and the header says where each begins.
 struct CheckpointWriter {
   nlohmann::ordered_json header;
   std::string data;
 
-  /// All of a policy but its weights.
+  /// Configuration, schema, rig and counters of a policy; its weights follow where add_weights() is called.
   void add_policy(const SavedPolicy& policy);
   void add_weights(const SavedPolicy& policy);
   void add_tensors(const char* list, const std::vector<NamedTensor>& tensors);
@@ -50,7 +50,7 @@ struct CheckpointWriter {
   std::string finish();
 };
 
-/// Calls read(), whose faults of JSON become an Error naming the file.
+/// Calls read() and returns its result. Throws Error naming the file where read() throws an exception of JSON.
 template <typename Read>
 auto read_header(const std::string& path, const Read& read) {
   try {

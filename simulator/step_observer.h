@@ -1,12 +1,12 @@
-// Who sees every step of a simulator: recorders, live views, probes, films; and the loop's one step that shows it to
-// them.
+// The interface of what follows a simulator step by step (recorders, live views, probes), and the step that notifies
+// it.
 #pragma once
 
 #include "pictura/simulator/simulator.h"
 
 namespace pictura {
 
-/// Sees the steps of a simulator, whose memory all spans are in.
+/// An observer of a simulator's steps. All spans lie in the simulator's memory.
 class StepObserver {
  public:
   virtual ~StepObserver() = default;
@@ -20,8 +20,8 @@ class StepObserver {
   virtual void after_reset(Span<const uint8_t> /*world_mask*/) {}
 };
 
-/// One step by these commands [slots]. Observers see it as scopes around it: what comes before in their order, what
-/// comes after in the reverse.
+/// Steps by these commands [slots]. Observers enclose the step as nested scopes do: before it they are called in their
+/// order, after it in the reverse order.
 template <typename Observers>
 StepResult step_observed(Simulator& simulator, Span<Command> commands_inout, const Observers& observers,
                          Stream stream = {}) {

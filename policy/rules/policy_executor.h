@@ -17,7 +17,7 @@ class PolicyExecutor {
   PolicyExecutor& operator=(const PolicyExecutor&) = delete;
 
   virtual Device device() const = 0;
-  /// That can be had: of a device, what is free; of the host, all, since what caches files is as good as free.
+  /// Memory that work may use: on a device what is free; on the host all, since memory that caches files can be freed.
   virtual int64_t memory_bytes() const = 0;
 
   /// The asked slots in ascending order. slots_out [slots] has room for all. Returns their number.
@@ -26,7 +26,7 @@ class PolicyExecutor {
   /// of which those of all others stay as they are.
   virtual void choose_actions(const SimulatorArrays& input, Span<const int64_t> slots, Span<const float> log_probs,
                               const ActionChoice& choice, Span<int32_t> actions_out, Stream stream = {}) = 0;
-  /// Commands with these actions for the slots that the mask has (empty: all). All are [slots].
+  /// Writes commands with these actions for the slots that the mask has (empty: all). All are [slots].
   virtual void write_commands(Span<const int32_t> actions, Span<const uint8_t> mask, Span<Command> commands_out,
                               Stream stream = {}) = 0;
 };
