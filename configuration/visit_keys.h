@@ -70,7 +70,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.texts(NamedKey{"simulator.maps", Resume::fixed, Evaluation::replaced}, c.simulator.maps);
   v.integer(NamedKey{"simulator.map_copies", Resume::fixed, Evaluation::replaced}, c.simulator.map_copies, 0,
             kMaxMapCopies);
-  v.integer(NamedKey{"simulator.num_slots", Resume::fixed, Evaluation::replaced}, c.simulator.num_slots, 1, 1 << 22);
+  v.integer(NamedKey{"simulator.num_slots", Resume::reported, Evaluation::replaced}, c.simulator.num_slots, 1, 1 << 22);
   v.integer(NamedKey{"simulator.min_agents", Resume::fixed, Evaluation::replaced}, c.simulator.min_agents, 1,
             kMaxAgentsPerWorld);
   v.integer(NamedKey{"simulator.max_agents", Resume::fixed, Evaluation::replaced}, c.simulator.max_agents, 1,
@@ -136,8 +136,8 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.integer(NamedKey{"train.warm_up_agent_steps", Resume::reported}, c.train.warm_up_agent_steps, 0, int64_t{1} << 60);
   v.integer("train.num_steps", c.train.num_steps, 1, 1 << 16);
   v.flag("train.stagger_episodes", c.train.stagger_episodes);
-  v.integer("train.minibatch_size", c.train.minibatch_size, 1, int64_t{1} << 32);
-  v.integer("train.update_epochs", c.train.update_epochs, 1, 1000);
+  v.integer(NamedKey{"train.minibatch_size", Resume::reported}, c.train.minibatch_size, 1, int64_t{1} << 32);
+  v.integer(NamedKey{"train.update_epochs", Resume::reported}, c.train.update_epochs, 1, 1000);
   v.integer(NamedKey{"train.forward_chunk", Resume::free}, c.train.forward_chunk, 1, int64_t{1} << 32);
   v.number("train.gamma", c.train.gamma, 0, 1);
   v.number("train.gae_lambda", c.train.gae_lambda, 0, 1);

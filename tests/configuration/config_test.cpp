@@ -342,11 +342,16 @@ TEST(Config, DifferencesThatChangeTheRunAreNamed) {
   b.train.weight_average = 50;
   b.train.reproducible = true;
   b.render.schedule = {{5, 6, 7}};
+  b.simulator.num_slots = 40960;
+  b.train.minibatch_size = 131072;
+  b.train.update_epochs = 1;
   EXPECT_EQ(first_difference(a, b), "");
-  EXPECT_THAT(differences_to_report(a, b),
-              ElementsAre("render.schedule: [] became [[5, 6, 7]]", "train.schedule_agent_steps: 50000000000 became 3",
-                          "train.learning_rate: 0.0005 became 1.0", "train.weight_average: 0.0 became 50.0",
-                          "train.reproducible: false became true"));
+  EXPECT_THAT(
+      differences_to_report(a, b),
+      ElementsAre("simulator.num_slots: 20480 became 40960", "render.schedule: [] became [[5, 6, 7]]",
+                  "train.schedule_agent_steps: 50000000000 became 3", "train.minibatch_size: 65536 became 131072",
+                  "train.update_epochs: 2 became 1", "train.learning_rate: 0.0005 became 1.0",
+                  "train.weight_average: 0.0 became 50.0", "train.reproducible: false became true"));
   b = a;
   b.simulator.wall_seed = 3;
   EXPECT_THAT(first_difference(a, b), HasSubstr("simulator.wall_seed"));

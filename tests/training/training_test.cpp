@@ -619,6 +619,20 @@ TEST_F(Training, RefusesToResumeUnderAnotherConfigurationByName) {
   EXPECT_THROW(train(nothing), Error);
 }
 
+TEST_F(Training, GoesOnWithOtherNumbersOfAgentsAndMinibatches) {
+  const TrainReport first = train(options("run", {"train.updates=1"}));
+  TrainOptions rest = options("run", {"train.updates=2", "simulator.num_slots=48", "train.minibatch_size=96"});
+  rest.old_run = OldRun::resume;
+  std::vector<std::string> notices;
+  rest.on_notice = [&notices](const std::string& notice) { notices.push_back(notice); };
+  const TrainReport report = train(rest);
+  EXPECT_EQ(report.updates, 2);
+  EXPECT_GT(report.agent_steps, first.agent_steps);
+  EXPECT_THAT(notices, Contains(HasSubstr("new ones begin: simulator state: saved with another worlds")));
+  EXPECT_THAT(notices, Contains(HasSubstr("simulator.num_slots: ")));
+  EXPECT_THAT(notices, Contains(HasSubstr("train.minibatch_size: ")));
+}
+
 TEST_F(Training, BeginsWithTheWeightsOfAnotherRunAtAnyImageSize) {
   const std::string first = train(options("first", {"train.updates=1"})).checkpoint;
   const std::vector<NamedTensor> other = read_checkpoint(first).parameters;
