@@ -139,11 +139,11 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.integer(NamedKey{"train.minibatch_size", Resume::reported}, c.train.minibatch_size, 1, int64_t{1} << 32);
   v.integer(NamedKey{"train.update_epochs", Resume::reported}, c.train.update_epochs, 1, 1000);
   v.integer(NamedKey{"train.forward_chunk", Resume::free}, c.train.forward_chunk, 1, int64_t{1} << 32);
-  v.number("train.gamma", c.train.gamma, 0, 1);
-  v.number("train.gae_lambda", c.train.gae_lambda, 0, 1);
+  v.number(NamedKey{"train.gamma", Resume::reported}, c.train.gamma, 0, 1);
+  v.number(NamedKey{"train.gae_lambda", Resume::reported}, c.train.gae_lambda, 0, 1);
   v.number("train.clip_coef", c.train.clip_coef, 1e-6, 100);
   v.number("train.vf_coef", c.train.vf_coef, 0, 1e6);
-  v.number("train.ent_coef", c.train.ent_coef, 0, 1e6);
+  v.number(NamedKey{"train.ent_coef", Resume::reported}, c.train.ent_coef, 0, 1e6);
   v.choice(NamedKey{"train.optimizer", Resume::free}, c.train.optimizer, kOptimizers);
   v.number(NamedKey{"train.learning_rate", Resume::reported}, c.train.learning_rate, 0, 100);
   v.number("train.adam_beta1", c.train.adam_beta1, 0, 0.999999);
