@@ -36,12 +36,13 @@ LaneKeepingAgent::LaneKeepingAgent(const WorldView& world, int agent, const Lane
       life_(world.agents.life[slot_]),
       agent_(world, agent),
       path_(world.map, graph, start_place(world, agent)),
+      max_search_nodes_(world.map.is_open ? kMaxSearchNodesOfOpen : kMaxSearchNodes),
       search_nodes_(search_nodes) {
   waypoints_.back() = points().front().at;  // where the first chain starts
 }
 
 int32_t LaneKeepingAgent::act() {
-  search_nodes_ = std::min(search_nodes_ + kSearchNodesPerStep, kMaxSearchNodes);
+  search_nodes_ = std::min(search_nodes_ + kSearchNodesPerStep, max_search_nodes_);
   find_place();
   follow_goals();
   const Motion now = agent_.now();
@@ -85,9 +86,9 @@ bool LaneKeepingAgent::renew_plan(const Motion& now) {
   if (!plan.is_clear) plan = plan_elsewhere(std::move(plan));
   const bool is_cut_off = search_nodes_ == 0;
   if (halts_) {
-    min_search_nodes_ = is_cut_off ? 2 * had_nodes : SIZE_MAX;
+    min_search_nodes_ = is_cut_off ? std::min(2 * had_nodes, max_search_nodes_) : SIZE_MAX;
   } else {
-    min_search_nodes_ = is_cut_off ? kMinSearchNodes : 0;
+    min_search_nodes_ = is_cut_off ? std::min(kMinSearchNodes, max_search_nodes_) : 0;
   }
   if (plan.is_clear || plan.actions.size() > plan_.actions.size() - next_planned_) {
     plan_ = std::move(plan);

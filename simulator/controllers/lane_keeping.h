@@ -40,9 +40,11 @@ class LaneKeepingAgent {
   static constexpr float kAstray_m = 1;
 
  private:
-  // A node takes 1 to 2 us: a slot's searches take at most 1 ms a step in the mean of a long run, and .6 s in a single
-  // step.
-  static constexpr size_t kMaxSearchNodes = 300'000, kSearchNodesPerStep = 500, kMinSearchNodes = 20'000;
+  // A node takes 1 to 4 us. Where roads end an agent's search takes at most 10 ms a step; a few vehicles then find no
+  // way round the tightest ends (docs/research/public_maps.md). In towns, where a way may need 130,000 nodes, searches
+  // take at most 1 ms a step in the mean of a long run, and .9 s in a single step.
+  static constexpr size_t kMaxSearchNodes = 300'000, kMaxSearchNodesOfOpen = 2'000, kSearchNodesPerStep = 500,
+                          kMinSearchNodes = 20'000;
 
   enum class Driving { pursues, brakes, brakes_straight };  // the path; on the path; without steering
 
@@ -79,6 +81,7 @@ class LaneKeepingAgent {
   std::array<size_t, kNumWaypoints> goals_{};  // the points where the waypoints are
   DrivingPlan plan_;
   size_t next_planned_ = 0;  // of its actions
+  const size_t max_search_nodes_;
   size_t search_nodes_;
   size_t min_search_nodes_ = 0;  // of these, to begin the next search
   bool halts_ = false;           // before it would leave the road, until it knows a way on

@@ -10,6 +10,7 @@
 #include "pictura/backends/make_controller.h"
 #include "pictura/common/error.h"
 #include "pictura/map/opendrive/opendrive.h"
+#include "pictura/simulator/controllers/lane_keeping.h"
 #include "pictura/simulator/rules/enter.h"
 #include "pictura/tests/simulator/cpu_simulator.h"
 #include "pictura/tests/simulator/stage.h"
@@ -30,13 +31,17 @@ bool is(AgentStatus status, const AgentStateView& state, int slot) { return stat
 
 /// Steps a simulator with a controller and calls look(result) after each step.
 template <typename Look>
-void drive(Simulator* simulator, const std::string& controller, int steps, const Look& look) {
-  const auto drives = make_controller(controller, *simulator, 1);
+void drive(Simulator* simulator, Controller* controller, int steps, const Look& look) {
   std::vector<Command> commands(static_cast<size_t>(simulator->num_slots()));
   for (int step = 0; step < steps; ++step) {
-    drives->act(simulator->arrays(), {}, commands);
+    controller->act(simulator->arrays(), {}, commands);
     look(simulator->step(Span<const Command>(commands)));
   }
+}
+
+template <typename Look>
+void drive(Simulator* simulator, const std::string& controller, int steps, const Look& look) {
+  drive(simulator, make_controller(controller, *simulator, 1).get(), steps, look);
 }
 
 TEST(OpenRoads, TheLaneKeeperDrivesOffAndOthersEnter) {
@@ -77,7 +82,14 @@ TEST(OpenRoads, WhatCannotGoOnStands) {
   road.right = test::lane_of(-1, "driving", 3.5);
   for (const uint64_t seed : {0, 7}) {
     const auto simulator = make({.seed = seed, .num_threads = 1}, map_of(test::file_of(road.text())), {{0, 3, 0}});
-    drive(simulator.get(), "lane", 900, [](const StepResult&) {});
+    LaneKeepingController controller(*simulator);
+    constexpr size_t kOfTenMs = 2'000;  // nodes of searches, at 1 to 4 us
+    drive(simulator.get(), &controller, 900, [&](const StepResult&) {
+      for (size_t slot = 0; slot < 3; ++slot) {
+        const LaneKeepingAgent* agent = controller.agent(slot);
+        EXPECT_LE(agent ? agent->search_nodes() : 0, kOfTenMs);
+      }
+    });
     EXPECT_GT(simulator->totals().agent_steps, 900);
     EXPECT_EQ(simulator->totals().off_road, 0) << seed;
   }
