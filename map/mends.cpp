@@ -24,7 +24,7 @@ Text text_of(MendKind kind) {
     case MendKind::late_section: return {"first sections after the start of their road", "they begin at the start"};
     case MendKind::lane_gap: return {"lane ids with gaps", "filled by lanes without surface"};
     case MendKind::center_id: return {"center lanes with another id than 0", "counted as 0"};
-    case MendKind::short_road: return {"roads of no length", "they are 1 mm long"};
+    case MendKind::short_road: return {"roads of no length", "they are 1 mm long and not counted"};
     case MendKind::short_section: return {"lane sections of no length", "left out; links lead through them"};
     case MendKind::empty_geometry: return {"geometries of no length", "left out"};
     case MendKind::parameter_range:

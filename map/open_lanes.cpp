@@ -200,7 +200,7 @@ LaneUse count_lane_use(const RoadMap& map) {
     for (const int32_t next : map.links(map.lanes[lane].successors)) reach(static_cast<std::size_t>(next));
   }
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {
-    if (!is_route(map.lanes[i].type)) continue;
+    if (!is_route(map.lanes[i].type) || map.lanes[i].length_m < kShortestLane_m) continue;
     ++(map.lanes[i].is_endless ? use.endless : is_driven[i] ? use.open : use.unreachable);
   }
   return use;

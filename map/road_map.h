@@ -140,6 +140,9 @@ struct Provenance {
       junctions, building_lines;
 };
 
+/// Lanes that are shorter are left of roads of no length: they link others, and no count has them.
+inline constexpr float kShortestLane_m = 0.01f;
+
 /// Counts that `pictura map` prints and that tests compare with the file.
 struct MapFacts {
   int32_t roads = 0, junction_roads = 0, junctions = 0, signal_junctions = 0, lanes = 0, driving_lanes = 0;

@@ -20,9 +20,10 @@ void count_facts(Build* build) {
     const Lane& lane = map.lanes[i];
     const auto [section, file_lane] = build->file_lanes[i];
     // Lanes cut where their speed limit changes are one lane of the file.
-    if (!file_lane->is_continued) ++facts.lanes;
+    const bool is_counted = !file_lane->is_continued && lane.length_m >= kShortestLane_m;
+    facts.lanes += is_counted;
     if (lane.type != LaneType::driving) continue;
-    if (!file_lane->is_continued) ++facts.driving_lanes;
+    facts.driving_lanes += is_counted;
     // Measured along the reference line, like s in the file.
     const double length_m = length_between(network.roads[lane.source_road], section->s, section->end);
     facts.driving_lane_km += 1e-3 * length_m;
