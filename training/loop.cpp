@@ -14,8 +14,8 @@
 #include "pictura/configuration/config_keys.h"
 #include "pictura/policy/precision.h"
 #include "pictura/policy/torch_device.h"
-#include "pictura/training/algorithm.h"
-#include "pictura/training/diagnosis.h"
+#include "pictura/training/agent_groups.h"
+#include "pictura/training/collector.h"
 #include "pictura/training/host_memory.h"
 #include "pictura/training/memory.h"
 #include "pictura/training/ranks/agree.h"
@@ -100,7 +100,7 @@ class TrainingLoop {
   void improve(UpdateRecord* record) {
     const Stopwatch watch;
     try {
-      record->stats = pictura::improve(&run_);
+      record->stats = run_.improve();
     } catch (const NotFinite& error) {
       run_.communicator->step();  // throws where a rank is lost, which leaves numbers that mean nothing
       if (!run_.communicator->is_first()) throw;
@@ -114,7 +114,7 @@ class TrainingLoop {
     });
     record->update_s = watch.seconds();
     record->phases_s = run_.timer.take();
-    record->diagnosis = diagnose(run_.rollout, record->stats.adv_threshold, run_.communicator);
+    record->agents = group_agents(run_.rollout, record->stats.adv_threshold, run_.communicator);
   }
 
   void count(const UpdateRecord& record) {

@@ -13,6 +13,7 @@
 #include "pictura/simulator/saved_worlds.h"
 #include "pictura/training/patch_growth.h"
 #include "pictura/training/ranks/agree.h"
+#include "pictura/training/schedule.h"
 #include "pictura/training/training_maps.h"
 
 namespace pictura {
@@ -122,6 +123,19 @@ Checkpoint Run::checkpoint(const std::vector<RecentUpdate>& recent) const {
   }
   return checkpoint;
 }
+
+UpdateStats Run::improve() {
+  const UpdateKey key{config.run.seed, update, learning_rate_at(config.train, agent_steps), teacher_weight()};
+  UpdateStats stats;
+  on_stream([&] {
+    rollout.compute_advantages(config.train.gamma, config.train.gae_lambda, executor.get());
+    stats = ppo_update(&chunks, rollout, config.train, key, executor.get(), &optimizer, &filter, &timer, communicator);
+    stats.weights = weight_rms(policy->parameters());
+  });
+  return stats;
+}
+
+double Run::teacher_weight() const { return teacher_weight_at(config.train, agent_steps); }
 
 std::string Run::update_image_size() {
   if (config.render.schedule.empty()) return "";

@@ -80,9 +80,9 @@ Scalars scalars_of(const Config& config, const TrainProgress& progress, const Up
   scalars.emplace_back("agents/first_motion_s", totals.finished_first_motion_s / moved);
   scalars.emplace_back("agents/never_moved_share", 1 - moved / finished);
   scalars.emplace_back("agents/first_waypoint_share", static_cast<double>(totals.finished_passed_waypoint) / finished);
-  scalars.emplace_back("agents/rest_share", record.diagnosis.rest_share);
+  scalars.emplace_back("agents/rest_share", record.agents.rest_share);
   for (const auto& [name, group] :
-       {std::pair{"rest", &record.diagnosis.rest}, std::pair{"moving", &record.diagnosis.moving}}) {
+       {std::pair{"rest", &record.agents.rest}, std::pair{"moving", &record.agents.moving}}) {
     scalars.emplace_back(fmt::format("agents/kept_{}", name), group->kept_share);
     scalars.emplace_back(fmt::format("agents/advantage_{}", name), group->mean_advantage);
     for (size_t action = 0; action < group->action_shares.size(); ++action) {

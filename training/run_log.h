@@ -7,8 +7,8 @@
 
 #include "pictura/common/support/stopwatch.h"
 #include "pictura/evaluation/results.h"
+#include "pictura/training/agent_groups.h"
 #include "pictura/training/checkpoint.h"
-#include "pictura/training/diagnosis.h"
 #include "pictura/training/event_file.h"
 #include "pictura/training/loop.h"
 #include "pictura/training/phase_timer.h"
@@ -38,7 +38,7 @@ class ProgressCsv {
 struct UpdateRecord {
   SimulatorTotals totals;  // counted in its rollout
   UpdateStats stats;
-  Diagnosis diagnosis;
+  AgentGroups agents;
   double rollout_s = 0, update_s = 0;  // wall time of collecting, and of improving
   PhaseSeconds phases_s{};             // in both
   ImageSize image_size;                // of the first camera; 0 without images

@@ -17,7 +17,7 @@
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/tests/training/small_runs.h"
-#include "pictura/training/algorithm.h"
+#include "pictura/training/collector.h"
 
 namespace pictura {
 namespace {

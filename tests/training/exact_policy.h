@@ -9,7 +9,7 @@
 
 #include "pictura/common/support/parallel_for.h"
 #include "pictura/policy/precision.h"
-#include "pictura/training/algorithm.h"
+#include "pictura/training/collector.h"
 
 namespace pictura::test {
 
@@ -129,7 +129,7 @@ inline ExactRun run_exactly(const Config& config) {
   ExactRun result;
   for (; run.update < 3; ++run.update) {
     EXPECT_TRUE(collector.collect());
-    const UpdateStats stats = improve(&run);
+    const UpdateStats stats = run.improve();
     const Rollout& rollout = run.rollout;
     ExactRun::Update update;
     update.kept_fraction = stats.kept_fraction;

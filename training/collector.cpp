@@ -1,8 +1,7 @@
-#include "pictura/training/algorithm.h"
+#include "pictura/training/collector.h"
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
-#include "pictura/training/schedule.h"
 
 namespace pictura {
 
@@ -14,7 +13,7 @@ at::Tensor seen_slots(const Run& run, const at::Tensor& active) {
                                                             : at::arange(run.rollout.num_slots(), active.options());
 }
 
-// What the policy makes of some active slots at a step that has been recorded.
+// Decision of the policy for some active slots at a step that has been recorded.
 Decision decide(Run* run, int64_t step, const at::Tensor& active) {
   const TrainSection& config = run->config.train;
   const at::Tensor rows = run->rollout.rows_of(step, seen_slots(*run, active));
@@ -27,8 +26,6 @@ Decision decide(Run* run, int64_t step, const at::Tensor& active) {
   }
   return decision;
 }
-
-double teacher_weight(const Run& run) { return teacher_weight_at(run.config.train, run.agent_steps); }
 
 }  // namespace
 
@@ -103,7 +100,7 @@ void Collector::hold_actions(int64_t step, const at::Tensor& deciding) {
 }
 
 void Collector::ask_teacher(int64_t step, const at::Tensor& slots) {
-  if (teacher_weight(run_) == 0) return;
+  if (run_.teacher_weight() == 0) return;
   const PhaseTimer::Scope timed(&run_.timer, Phase::forward);
   run_.rollout.teacher_log_probs.select(0, step).index_copy_(0, slots,
                                                              run_.teacher->log_probs(run_.simulator->arrays(), slots));
@@ -116,20 +113,6 @@ void Collector::simulate(int64_t step) {
     const Array actions(rollout.actions_at(step).data(), {rollout.num_slots()}, run_.device);
     rollout.set_result(step, run_.simulator->step(actions, current_stream(run_.device)), run_.device);
   });
-}
-
-UpdateStats improve(Run* run) {
-  const TrainSection& config = run->config.train;
-  const UpdateKey key{run->config.run.seed, run->update, learning_rate_at(config, run->agent_steps),
-                      teacher_weight(*run)};
-  UpdateStats stats;
-  run->on_stream([&] {
-    run->rollout.compute_advantages(config.gamma, config.gae_lambda, run->executor.get());
-    stats = ppo_update(&run->chunks, run->rollout, config, key, run->executor.get(), &run->optimizer, &run->filter,
-                       &run->timer, run->communicator);
-    stats.weights = weight_rms(run->policy->parameters());
-  });
-  return stats;
 }
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-#include "pictura/training/diagnosis.h"
+#include "pictura/training/agent_groups.h"
 
 #include <ATen/core/grad_mode.h>
 
@@ -6,7 +6,7 @@
 
 namespace pictura {
 
-Diagnosis diagnose(const Rollout& rollout, double adv_threshold, Communicator* communicator) {
+AgentGroups group_agents(const Rollout& rollout, double adv_threshold, Communicator* communicator) {
   const at::NoGradGuard no_grad;
   const at::Tensor speed_mps =
       rollout.observations.arrays().ego.narrow(0, 0, rollout.num_steps()).select(2, 0) * kScaleSpeed_mps;
