@@ -15,7 +15,7 @@ ChunkRunner::ChunkRunner(const Policy& policy, const RolloutObservations& observ
       timer_(timer),
       own_graphs_(Device{}, /*are_used=*/false),
       graphs_(graphs ? graphs : &own_graphs_),
-      stats_(at::zeros({kNumStats}, observations.arrays().ego.options().dtype(at::kDouble))) {}
+      stats_(at::zeros({kNumLossStats}, observations.arrays().ego.options().dtype(at::kDouble))) {}
 
 void ChunkRunner::clear() {
   works_.clear();
@@ -38,7 +38,7 @@ ChunkRunner::Work& ChunkRunner::work_of(int64_t size) {
     clear();
     generation_ = observations_.generation();
   }
-  if (works_.size() == kMostSizes && !works_.contains(size)) {
+  if (works_.size() == kMaxSizes && !works_.contains(size)) {
     works_.erase(std::min_element(works_.begin(), works_.end(),
                                   [](const auto& a, const auto& b) { return a.second.last_use < b.second.last_use; }));
   }
@@ -49,12 +49,12 @@ ChunkRunner::Work& ChunkRunner::work_of(int64_t size) {
 
 ChunkRunner::Work& ChunkRunner::observe(const at::Tensor& rows) {
   Work& work = work_of(rows.size(0));
-  set(&work.rows, rows);
+  set(&work.chunk.rows, rows);
   const PhaseTimer::Scope timed(observations_.draws_when_gathered() ? timer_ : nullptr, Phase::render);
   const Mode mode = work.observe.next_mode(*graphs_, observations_.are_complete());
   if (mode != Mode::launch) work.observation = {};  // before there is another
   work.observe.run(mode, graphs_,
-                   [&] { work.observation = observations_.gather(work.rows, policy_.drawn_patch_px()); });
+                   [&] { work.observation = observations_.gather(work.chunk.rows, policy_.drawn_patch_px()); });
   return work;
 }
 
@@ -67,7 +67,7 @@ Policy::Output ChunkRunner::act(const at::Tensor& rows) {
   return work.output;
 }
 
-Policy::Output ChunkRunner::look(const at::Tensor& rows) {
+Policy::Output ChunkRunner::forward_no_grad(const at::Tensor& rows) {
   const at::NoGradGuard no_grad;
   const Work& work = observe(rows);
   const PhaseTimer::Scope timed(timer_, Phase::learn);
@@ -84,14 +84,20 @@ void ChunkRunner::set_targets(const Targets& targets) {
   set(&targets_.teacher_weight, targets.teacher_weight);
 }
 
-void ChunkRunner::begin_minibatch() { stats_.zero_(); }
+at::Tensor ChunkRunner::add_gradients(const Minibatch& minibatch, int64_t forward_chunk, const LossFunction& loss) {
+  stats_.zero_();
+  for_each_chunk(minibatch.rows, {forward_chunk}, [&](const Chunk& chunk) {
+    learn(minibatch.part(chunk), static_cast<double>(chunk.count) / static_cast<double>(minibatch.global_size), loss);
+  });
+  return stats_;
+}
 
-void ChunkRunner::learn(const at::Tensor& rows, const at::Tensor& advantages, const at::Tensor& shares, double weight,
-                        const TrainSection& config) {
-  Work& work = observe(rows);
-  set(&work.advantages, advantages);
+void ChunkRunner::learn(const Minibatch& chunk, double weight, const LossFunction& loss) {
+  Work& work = observe(chunk.rows);
+  set(&work.chunk.advantages, chunk.advantages);
   // A product with 1 changes no bit, so one graph serves full chunks and those that are filled up.
-  set(&work.shares, shares.defined() || !graphs_->are_used() ? shares : at::ones_like(advantages));
+  set(&work.chunk.shares,
+      chunk.shares.defined() || !graphs_->are_used() ? chunk.shares : at::ones_like(chunk.advantages));
   if (!work.weight.defined()) work.weight = at::empty({}, stats_.options());
   work.weight.fill_(weight);
 
@@ -100,27 +106,21 @@ void ChunkRunner::learn(const at::Tensor& rows, const at::Tensor& advantages, co
   if (mode == Mode::capture) graphs_->make_room();
   {
     const PhaseTimer::Scope timed(timer_, Phase::learn);
-    work.learn.run(mode, graphs_, [&] {
-      work.losses = losses_of(policy_.forward(work.observation), targets_, work.rows, work.advantages, work.shares,
-                              config.clip_coef);
-    });
+    work.learn.run(mode, graphs_, [&] { work.losses = loss(policy_.forward(work.observation), targets_, work.chunk); });
   }
   const PhaseTimer::Scope timed(timer_, Phase::backward);
   work.backward.run(mode, graphs_, [&] {
     const Losses& losses = work.losses;
-    at::Tensor loss = losses.policy + config.vf_coef * losses.value - config.ent_coef * losses.entropy;
-    if (losses.imitation.defined()) loss = loss + losses.imitation;
-    (loss * work.weight.to(loss.scalar_type())).backward();
-    stats_.narrow(0, 0, kNumStats - 1) += work.weight * losses.stats;
+    (losses.total * work.weight.to(losses.total.scalar_type())).backward();
+    stats_.narrow(0, 0, losses.stats.size(0)) += work.weight * losses.stats;
   });
   work.losses = {};
 }
 
-Losses ChunkRunner::losses(const at::Tensor& rows, const at::Tensor& advantages, const at::Tensor& shares,
-                           const TrainSection& config) {
-  const Work& work = observe(rows);
+Losses ChunkRunner::losses(const Minibatch& chunk, const LossFunction& loss) {
+  const Work& work = observe(chunk.rows);
   const PhaseTimer::Scope timed(timer_, Phase::diagnose);
-  return losses_of(policy_.forward(work.observation), targets_, rows, advantages, shares, config.clip_coef);
+  return loss(policy_.forward(work.observation), targets_, chunk);
 }
 
 }  // namespace pictura

@@ -1,62 +1,80 @@
-// A policy at work on chunks of a rollout's rows: what they see, what it makes of that, and what it learns from it.
-// With graphs a chunk takes some ten launches instead of some hundreds, and gives the same bits.
+// A policy at work on chunks of a rollout's rows: what they see, what the policy makes of that, and the gradients of
+// its losses. With CUDA graphs a chunk takes some ten launches instead of some hundreds, and gives the same bits.
 #pragma once
 
+#include <functional>
 #include <map>
 
-#include "pictura/training/losses.h"
-#include "pictura/training/phase_timer.h"
+#include "pictura/policy/policy.h"
+#include "pictura/training/loss_stats.h"
+#include "pictura/training/minibatches.h"
 #include "pictura/training/repeated_work.h"
-#include "pictura/training/rollout.h"
 
 namespace pictura {
 
+/// Targets of all of a rollout's transitions, which losses read by row: [steps * slots].
+struct Targets {
+  at::Tensor actions;            // i64
+  at::Tensor old_log_probs;      // of these actions
+  at::Tensor returns;            // in units of rewards
+  at::Tensor teacher_log_probs;  // [steps * slots, kNumActions], of all actions; undefined without a teacher
+  at::Tensor teacher_weight;     // [], weight of the KL divergence from the teacher; undefined without one
+};
+
+/// Losses of a chunk: means over its rows, with gradients.
+struct Losses {
+  at::Tensor total;                   // the loss that is minimised: the others with their coefficients
+  at::Tensor policy, value, entropy;  // without coefficients
+  at::Tensor stats;                   // stacked() statistics, without gradients
+};
+
+/// Computes the losses of a chunk from what the policy made of it. Work with graphs calls it only while they are
+/// captured, so it must do the same whenever it is called.
+using LossFunction =
+    std::function<Losses(const Policy::Output& output, const Targets& targets, const Minibatch& chunk)>;
+
 class ChunkRunner {
  public:
-  /// All must outlive it. `graphs` may be null: then nothing is captured.
+  /// The arguments must outlive it. `graphs` may be null: then nothing is captured.
   ChunkRunner(const Policy& policy, const RolloutObservations& observations, PhaseTimer* timer = nullptr,
               Graphs* graphs = nullptr);
 
-  /// What the policy makes of rows, i64 [size], without gradients: Phase::forward. Valid until the next call.
+  /// What the policy makes of rows, i64 [n], in a rollout, without gradients: Phase::forward. Valid until the next
+  /// call.
   Policy::Output act(const at::Tensor& rows);
 
-  /// The learner's arithmetic without gradients, call by call: Phase::learn.
-  Policy::Output look(const at::Tensor& rows);
+  /// Forward pass of the update's arithmetic without gradients, call by call: Phase::learn.
+  Policy::Output forward_no_grad(const at::Tensor& rows);
 
-  /// What is learnt from then on.
+  /// Sets the targets of the losses that follow.
   void set_targets(const Targets& targets);
-  /// Sets stats() to 0.
-  void begin_minibatch();
-  /// Adds the gradient of a chunk's loss times `weight` to those of the parameters, which must be defined, and its
-  /// stats times `weight` to stats(). shares: see losses_of. Phase::learn and Phase::backward.
-  void learn(const at::Tensor& rows, const at::Tensor& advantages, const at::Tensor& shares, double weight,
-             const TrainSection& config);
-  /// The losses of a chunk with their ways back, call by call: Phase::diagnose.
-  Losses losses(const at::Tensor& rows, const at::Tensor& advantages, const at::Tensor& shares,
-                const TrainSection& config);
-  /// f64 [kNumStats], where those of all chunks since begin_minibatch() are added up; the last, the norm, is 0.
-  const at::Tensor& stats() const { return stats_; }
-  static constexpr int64_t kNumStats = 8;  // of LossStats
+  /// Adds the gradient of this rank's part of a minibatch's loss to those of the parameters, which must be defined, in
+  /// chunks of at most forward_chunk rows: Phase::learn and Phase::backward. Returns the statistics of that part, f64
+  /// [kNumLossStats] with 0 for the gradient's norm, which stay until the next call.
+  at::Tensor add_gradients(const Minibatch& minibatch, int64_t forward_chunk, const LossFunction& loss);
+  /// Losses of one chunk, from which gradients can be taken, call by call: Phase::diagnose.
+  Losses losses(const Minibatch& chunk, const LossFunction& loss);
 
-  /// Forgets all graphs. Must be called where the observations' images move, as with another renderer.
+  /// Discards all graphs. Must be called where the observations' images move, as with another renderer.
   void clear();
 
  private:
-  // The chunks of one size. Tensors that graphs read have one address: they are copied to.
+  // Work on chunks of one size. Tensors that graphs read have one address: they are copied to.
   struct Work {
     RepeatedWork observe, act, learn, backward;
-    at::Tensor rows;
+    Minibatch chunk;
     Observation observation;
     Policy::Output output;
-    at::Tensor advantages, shares, weight;
+    at::Tensor weight;  // of the chunk in its minibatch
     Losses losses;
     int64_t last_use = 0;
   };
-  // Where there are more, the graphs of the size that was last used longest ago go.
-  static constexpr size_t kMostSizes = 8;
+  // Beyond so many sizes the graphs of the least recently used one are discarded.
+  static constexpr size_t kMaxSizes = 8;
 
   Work& work_of(int64_t size);
   Work& observe(const at::Tensor& rows);
+  void learn(const Minibatch& chunk, double weight, const LossFunction& loss);
   void set(at::Tensor* to, const at::Tensor& value) const;
 
   const Policy& policy_;
@@ -64,11 +82,11 @@ class ChunkRunner {
   PhaseTimer* const timer_;
   Graphs own_graphs_;
   Graphs* const graphs_;
-  uint64_t generation_ = 0;  // of the observations' graphs
+  uint64_t generation_ = 0;  // RolloutObservations::generation() of the graphs
   int64_t num_uses_ = 0;
   std::map<int64_t, Work> works_;  // by size; without graphs one of any size
   Targets targets_;
-  at::Tensor stats_;
+  at::Tensor stats_;  // sums over the chunks of a minibatch
 };
 
 }  // namespace pictura

@@ -40,23 +40,26 @@ void Optimizer::allocate_gradients() {
 
 void Optimizer::clear_gradients() { gradients_.zero_(); }
 
-Optimizer::Step Optimizer::step(double learning_rate, const at::Tensor& loss, Communicator* communicator) {
-  const at::NoGradGuard no_grad;
-  // Summed over the ranks and only then scaled down: every rank takes the same step, to the bit.
-  communicator->sum(gradients_);
+at::Tensor Optimizer::gradient_norm() const {
   at::Tensor norm = gradients_.norm();
   // Weights that move together count as the one weight whose gradient each of them has.
   for (size_t i = 0; i < parameters_.size(); ++i) {
     if (rate_factors[i] == 1) continue;
     norm = (norm.square() - (1 - rate_factors[i]) * parameters_[i].value.grad().square().sum()).sqrt();
   }
-  const at::Tensor failed = (norm + loss).isfinite().logical_not().to(at::kFloat);
+  return norm;
+}
+
+void Optimizer::clip_gradients(const at::Tensor& norm) {
   gradients_.mul_((config_.max_grad_norm / (norm + 1e-6)).clamp_max(1.0));
+}
+
+void Optimizer::step(double learning_rate, const at::Tensor& failed) {
+  const at::NoGradGuard no_grad;
   ++steps;
   step_adamw(learning_rate, failed);
   if (muon_) muon_->step(learning_rate, failed);
   clear_gradients();
-  return {norm, failed};
 }
 
 void Optimizer::step_adamw(double learning_rate, const at::Tensor& failed) {

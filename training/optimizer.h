@@ -1,34 +1,33 @@
-// The step of an update's optimizer: AdamW (Loshchilov and Hutter, 2019; the paper's) on all parameters, or Muon on the
-// weights of hidden layers and AdamW on the rest.
+// Optimizer: AdamW (Loshchilov and Hutter, 2019; the paper's) on all parameters, or Muon on the weights of hidden
+// layers and AdamW on the rest.
 #pragma once
 
 #include <optional>
 #include <vector>
 
 #include "pictura/training/muon.h"
-#include "pictura/training/ranks/communicator.h"
 
 namespace pictura {
 
 class Optimizer {
  public:
-  /// Gives the parameters, which lie on `device`, gradients as allocate_gradients() does. uses_graphs: see Muon.
+  /// Optimizer of a policy's parameters, which lie on `device`; calls allocate_gradients(). uses_graphs: see Muon.
   Optimizer(const Policy& policy, const TrainSection& config, Device device = {}, bool uses_graphs = false);
-  /// Scalars on the parameters' device, which nothing has waited for.
-  struct Step {
-    at::Tensor norm;    // of the gradients before they were scaled, see rate_factors
-    at::Tensor failed;  // f32: 1 where it or the loss is not finite, and no step was taken
-  };
-  /// One step along the parameters' gradients, summed over all ranks and then scaled down to max_grad_norm; clears
-  /// them. The loss must be that of all ranks.
-  Step step(double learning_rate, const at::Tensor& loss, Communicator* communicator = alone());
+
+  /// Norm of the gradients, f32 scalar on their device, which nothing waits for; see rate_factors.
+  at::Tensor gradient_norm() const;
+  /// Scales the gradients, which have this norm, down to max_grad_norm.
+  void clip_gradients(const at::Tensor& norm);
+  /// Steps along the parameters' gradients, and clears them. failed: f32 scalar on their device; where it is not 0,
+  /// neither parameters nor moments change, whatever the gradients are.
+  void step(double learning_rate, const at::Tensor& failed);
 
   /// Gradients of all parameters, in their order: f32 [num_parameters].
   const at::Tensor& gradients() const { return gradients_; }
-  /// Sets them to 0.
+  /// Sets the gradients to 0.
   void clear_gradients();
-  /// Gives the parameters gradients of 0, which are parts of one vector and to which backward passes add. Must be
-  /// called after a parameter has taken another shape.
+  /// Allocates gradients of 0, which are parts of one vector and to which backward passes add. Must be called after a
+  /// parameter has taken another shape.
   void allocate_gradients();
 
   /// AdamW's first moments and Muon's momentum, in the order of the policy's parameters.

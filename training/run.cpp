@@ -128,8 +128,8 @@ UpdateStats Run::improve() {
   const UpdateKey key{config.run.seed, update, learning_rate_at(config.train, agent_steps), teacher_weight()};
   UpdateStats stats;
   on_stream([&] {
-    rollout.compute_advantages(config.train.gamma, config.train.gae_lambda, executor.get());
-    stats = ppo_update(&chunks, rollout, config.train, key, executor.get(), &optimizer, &filter, &timer, communicator);
+    stats =
+        ppo_update({&chunks, executor.get(), &optimizer, &filter, &timer, communicator}, &rollout, config.train, key);
     stats.weights = weight_rms(policy->parameters());
   });
   return stats;

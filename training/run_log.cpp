@@ -45,28 +45,23 @@ Scalars scalars_of(const Config& config, const TrainProgress& progress, const Up
 #define X(name) scalars.emplace_back("rewards/" #name "_per_1000_steps", 1000 * totals.reward_terms.name / steps);
   PICTURA_REWARD_TERMS(X)
 #undef X
-  const auto add_losses = [&scalars](const std::string& suffix, const LossStats& losses) {
-    for (const auto& [name, value] :
-         {std::pair{"entropy", losses.entropy}, std::pair{"approx_kl", losses.approx_kl},
-          std::pair{"clip_fraction", losses.clip_fraction}, std::pair{"abs_log_ratio", losses.abs_log_ratio}}) {
+  const auto add_losses = [&scalars](const std::string& suffix) {
+    return [&scalars, suffix](const char* name, double value) {
       scalars.emplace_back(fmt::format("losses/{}{}", name, suffix), value);
-    }
+    };
   };
-  scalars.emplace_back("losses/policy_loss", stats.all.policy_loss);
-  scalars.emplace_back("losses/value_loss", stats.all.value_loss);
-  scalars.emplace_back("losses/teacher_kl", stats.all.teacher_kl);
-  add_losses("", stats.all);
-  add_losses("_first", stats.first);
-  for (int epoch = 0; epoch < config.train.update_epochs; ++epoch) {
-    const auto index = static_cast<size_t>(epoch);
-    add_losses(fmt::format("_epoch_{}", epoch + 1), index < stats.epochs.size() ? stats.epochs[index] : LossStats{});
+  LossStats::visit_losses(stats.all, add_losses(""));
+  LossStats::visit_actions(stats.first, add_losses("_first"));
+  for (size_t epoch = 0; epoch < static_cast<size_t>(config.train.update_epochs); ++epoch) {
+    const LossStats losses = epoch < stats.epochs.size() ? stats.epochs[epoch] : LossStats{};
+    LossStats::visit_actions(losses, add_losses(fmt::format("_epoch_{}", epoch + 1)));
   }
   for (const auto& [name, value] :
        {std::pair{"losses/explained_variance", stats.explained_variance},
         std::pair{"losses/recomputed", stats.rejected ? 1.0 : 0.0}, std::pair{"losses/grad_norm", stats.all.grad_norm},
-        std::pair{"losses/policy_grad_norm", stats.policy_grad_norm},
-        std::pair{"losses/value_grad_norm", stats.value_grad_norm},
-        std::pair{"losses/entropy_grad_norm", stats.entropy_grad_norm},
+        std::pair{"losses/policy_grad_norm", stats.gradient_norms.policy},
+        std::pair{"losses/value_grad_norm", stats.gradient_norms.value},
+        std::pair{"losses/entropy_grad_norm", stats.gradient_norms.entropy},
         std::pair{"losses/kept_fraction", stats.kept_fraction}, std::pair{"losses/adv_threshold", stats.adv_threshold},
         std::pair{"time/rollout_s", record.rollout_s}, std::pair{"time/update_s", record.update_s}}) {
     scalars.emplace_back(name, value);
@@ -214,7 +209,7 @@ TrainProgress RunLog::add(int64_t update, int64_t agent_steps, const UpdateRecor
         "update {}: before its first step the learner's log-probabilities differ by {:.2g} in the mean from the "
         "rollout's (expected less than {}), and {:.2g} of the ratios are clipped (less than {}): they are computed "
         "again, here and wherever losses/recomputed is 1",
-        update, rejected->abs_log_ratio, kMostAbsLogRatio, rejected->clip_fraction, kMostClipFraction));
+        update, rejected->abs_log_ratio, kMaxAbsLogRatio, rejected->clip_fraction, kMaxClipFraction));
   }
 
   progress.cost = {totals.agent_steps,

@@ -24,14 +24,11 @@ struct Corridor {
   explicit Corridor(uint64_t its_seed = 9)
       : rollout(RolloutObservations(storage()), kSteps, kSlots, Device{}), seed(its_seed) {}
 
-  void compute_advantages(double gamma, double gae_lambda) {
-    rollout.compute_advantages(gamma, gae_lambda, executor.get());
-  }
   UpdateStats update(const Policy& policy, const TrainSection& train, int64_t number, Optimizer* optimizer,
                      AdvantageFilter* filter) {
     const UpdateKey key{seed, number, learning_rate_at(train, 0)};
     ChunkRunner runner(policy, rollout.observations);
-    return ppo_update(&runner, rollout, train, key, executor.get(), optimizer, filter);
+    return ppo_update({&runner, executor.get(), optimizer, filter}, &rollout, train, key);
   }
 
   static Observation storage() {

@@ -81,7 +81,7 @@ Learnt learn(const std::vector<std::string>& more) {
     learnt.improving.push_back(launches() - launches_between);
     learnt.policies.push_back(run.policy->hash());
     for (const double loss : {stats.all.policy_loss, stats.all.value_loss, stats.all.entropy, stats.all.approx_kl,
-                              stats.all.grad_norm, stats.policy_grad_norm}) {
+                              stats.all.grad_norm, stats.gradient_norms.policy}) {
       learnt.losses.push_back(loss);
     }
     learnt.teacher_kl.push_back(stats.all.teacher_kl);

@@ -79,19 +79,19 @@ TEST(AdamW, StepsAsLoshchilovAndHutterDefineIt) {
   EXPECT_GT(std::abs(expected - start), 1e-3);
 }
 
-TEST(AdamW, TakesNoStepWhereTheLossOrAGradientIsNotFinite) {
+TEST(AdamW, TakesNoFailedStep) {
   const PolicyNetwork policy(test::tiny_section(Modality::vector), 1, 3);
   const std::string before = policy.hash();
   Optimizer optimizer(policy, TrainSection{});
   at::Tensor weight = policy.parameters()[0].value;
-  for (const auto& [gradient, loss] : {std::pair{1.0, std::nan("")}, std::pair{HUGE_VAL, 1.0}}) {
+  for (const double gradient : {1.0, HUGE_VAL}) {
     weight.mutable_grad().fill_(gradient);
-    EXPECT_EQ(optimizer.step(0.01, at::full({}, loss)).failed.item<float>(), 1);
+    optimizer.step(0.01, /*failed=*/at::ones({}));
     EXPECT_EQ(policy.hash(), before);
     EXPECT_EQ(optimizer.first_moments[0].value.abs().sum().item<float>(), 0);
   }
   weight.mutable_grad().fill_(1.0);
-  EXPECT_EQ(optimizer.step(0.01, at::ones({})).failed.item<float>(), 0);
+  optimizer.step(0.01, /*failed=*/at::zeros({}));
   EXPECT_NE(policy.hash(), before);
 }
 
@@ -197,7 +197,6 @@ TEST(Muon, LearnsATaskWithDelayedReward) {
   double reward = 0;
   for (int64_t update = 0; update < 40; ++update) {
     reward = corridor.play(policy, update);
-    corridor.compute_advantages(train.gamma, train.gae_lambda);
     corridor.update(policy, train, update, &optimizer, &filter);
   }
   EXPECT_GT(reward, 0.3);

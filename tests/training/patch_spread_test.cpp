@@ -70,8 +70,9 @@ Observation blocks_of(int64_t pixels) {
   return o;
 }
 
-struct Learner {
-  explicit Learner(double max_grad_norm) : policy(small_section(2), 3, 1), optimizer(policy, setting(max_grad_norm)) {}
+struct GrowingPolicy {
+  explicit GrowingPolicy(double max_grad_norm)
+      : policy(small_section(2), 3, 1), optimizer(policy, setting(max_grad_norm)) {}
   static TrainSection setting(double max_grad_norm) {
     TrainSection train;
     train.max_grad_norm = max_grad_norm;
@@ -87,7 +88,10 @@ struct Learner {
     const at::Tensor targets = test::numbers(output.logits.sizes(), 9).to(at::kFloat);
     const at::Tensor loss = (at::log_softmax(output.logits, 1) * targets).sum() + output.value.square().sum();
     loss.backward();
-    norm = optimizer.step(1e-2, loss.detach()).norm.item<double>();
+    const at::Tensor gradient_norm = optimizer.gradient_norm();
+    optimizer.clip_gradients(gradient_norm);
+    optimizer.step(1e-2, at::zeros({}));
+    norm = gradient_norm.item<double>();
   }
   void grow(int factor) {
     spread_first_convolution(policy, factor, &optimizer);
@@ -102,12 +106,12 @@ struct Learner {
 double largest_difference(const at::Tensor& a, const at::Tensor& b) { return (a - b).abs().max().item<double>(); }
 
 void expect_equal_learning(double max_grad_norm) {
-  Learner small(max_grad_norm), large(max_grad_norm), at_whole_rate(max_grad_norm);
-  for (Learner* each : {&small, &large, &at_whole_rate}) {
+  GrowingPolicy small(max_grad_norm), large(max_grad_norm), at_whole_rate(max_grad_norm);
+  for (GrowingPolicy* each : {&small, &large, &at_whole_rate}) {
     each->step();
     each->step();
   }
-  for (Learner* each : {&large, &at_whole_rate}) {
+  for (GrowingPolicy* each : {&large, &at_whole_rate}) {
     each->grow(3);
     EXPECT_LT(largest_difference(each->logits(), small.logits()), 1e-5);
   }
@@ -115,7 +119,7 @@ void expect_equal_learning(double max_grad_norm) {
   EXPECT_EQ(large.optimizer.gradients().size(0), large.policy.num_parameters());
   at_whole_rate.optimizer.rate_factors.front() = 1;
   const at::Tensor before = small.logits();
-  for (Learner* each : {&small, &large, &at_whole_rate}) each->step();
+  for (GrowingPolicy* each : {&small, &large, &at_whole_rate}) each->step();
   EXPECT_GT(small.norm, 0.1);
   EXPECT_NEAR(large.norm, small.norm, 1e-4 * small.norm);
   EXPECT_GT(at_whole_rate.norm, 1.01 * small.norm);

@@ -160,7 +160,6 @@ TEST(AdvantageFilter, DropsTheShareOfItsQuantile) {
         at::arange(corridor.rollout.rewards.numel(), at::kFloat).sin().reshape_as(corridor.rollout.rewards));
     // One that is very large, which would move the maximum, does not count.
     corridor.rollout.rewards[7][127] = 1e6;
-    corridor.compute_advantages(0.9, 0.9);
     Optimizer optimizer(policy, train);
     AdvantageFilter filter;
     const UpdateStats stats = corridor.update(policy, train, 0, &optimizer, &filter);
@@ -168,7 +167,6 @@ TEST(AdvantageFilter, DropsTheShareOfItsQuantile) {
     EXPECT_EQ(stats.adv_threshold, filter.average);
   }
   corridor.rollout.rewards[7][127] = std::numeric_limits<float>::infinity();
-  corridor.compute_advantages(0.9, 0.9);
   Optimizer optimizer(policy, train);
   AdvantageFilter filter;
   EXPECT_THROW(corridor.update(policy, train, 0, &optimizer, &filter), Error);
@@ -279,7 +277,6 @@ TEST(Ppo, LearnsATaskWithDelayedReward) {
   for (int64_t update = 0; update < 40; ++update) {
     last = corridor.play(policy, update);
     if (update == 0) first = last;
-    corridor.compute_advantages(train.gamma, train.gae_lambda);
     stats = corridor.update(policy, train, update, &optimizer, &filter);
   }
   // Chance is 1/12 of 1/13; perfect play is paid every other step.
@@ -300,7 +297,6 @@ TEST(Ppo, ChunksChangeNothingButRounding) {
     corridor.play(*policy, 0);
     corridor.rollout.rewards.copy_(
         at::arange(corridor.rollout.rewards.numel(), at::kFloat).sin().reshape_as(corridor.rollout.rewards));
-    corridor.compute_advantages(0.9, 0.9);
     Optimizer optimizer(*policy, train);
     AdvantageFilter filter;
     corridor.update(*policy, train, 0, &optimizer, &filter);
@@ -338,7 +334,6 @@ TEST(Ppo, OneOf100TransitionsTellsTheLossesGradientsApart) {
   corridor.play(policy, 0);
   corridor.rollout.rewards.copy_(
       at::arange(corridor.rollout.rewards.numel(), at::kFloat).sin().reshape_as(corridor.rollout.rewards));
-  corridor.compute_advantages(0.9, 0.9);
   Optimizer optimizer(policy, train);
   AdvantageFilter filter;
   policy.sizes.clear();
@@ -349,9 +344,9 @@ TEST(Ppo, OneOf100TransitionsTellsTheLossesGradientsApart) {
   EXPECT_EQ(std::accumulate(policy.sizes.begin() + 1, policy.sizes.begin() + 5, int64_t{0}), 512);
   EXPECT_EQ(std::accumulate(policy.sizes.begin() + 1, policy.sizes.end(), int64_t{0}), 8 * 128 * 4)
       << "each transition is passed over once an epoch";
-  EXPECT_GT(stats.policy_grad_norm, 0);
-  EXPECT_GT(stats.value_grad_norm, 0);
-  EXPECT_GT(stats.entropy_grad_norm, 0);
+  EXPECT_GT(stats.gradient_norms.policy, 0);
+  EXPECT_GT(stats.gradient_norms.value, 0);
+  EXPECT_GT(stats.gradient_norms.entropy, 0);
 }
 
 TEST(Ppo, InvalidTransitionsTeachNothing) {
@@ -366,7 +361,6 @@ TEST(Ppo, InvalidTransitionsTeachNothing) {
         at::arange(corridor.rollout.rewards.numel(), at::kFloat).sin().reshape_as(corridor.rollout.rewards));
     corridor.rollout.valid.narrow(1, 0, 40).zero_();
     if (policy == &b) corridor.rollout.rewards.narrow(1, 0, 40).fill_(50);
-    corridor.compute_advantages(0.9, 0.9);
     Optimizer optimizer(*policy, train);
     AdvantageFilter filter;
     const UpdateStats stats = corridor.update(*policy, train, 0, &optimizer, &filter);
@@ -382,7 +376,6 @@ TEST(Ppo, StopsBeforeTheStepOfAMinibatchThatIsNotFinite) {
   corridor.play(policy, 0);
   corridor.rollout.rewards.copy_(
       at::arange(corridor.rollout.rewards.numel(), at::kFloat).sin().reshape_as(corridor.rollout.rewards));
-  corridor.compute_advantages(0.9, 0.9);
   corridor.rollout.log_probs[3][5] = std::nan("");
   const int64_t bad_row = 3 * Corridor::kSlots + 5;
   for (const int64_t minibatch_size : {100000, 100}) {
@@ -429,14 +422,13 @@ TEST(Ppo, LogProbabilitiesThatAreNotTheLearnersAreComputedAgain) {
     corridor.play(policy, 0);
     corridor.rollout.rewards.copy_(
         at::arange(corridor.rollout.rewards.numel(), at::kFloat).sin().reshape_as(corridor.rollout.rewards));
-    corridor.compute_advantages(0.9, 0.9);
     corridor.rollout.log_probs += error;
     const at::Tensor kept = corridor.rollout.log_probs.clone();
     Optimizer optimizer(policy, train);
     AdvantageFilter filter;
     const UpdateStats stats = corridor.update(policy, train, 0, &optimizer, &filter);
     EXPECT_TRUE(corridor.rollout.log_probs.equal(kept)) << "the rollout stays as it was";
-    EXPECT_EQ(stats.rejected.has_value(), error > kMostAbsLogRatio);
+    EXPECT_EQ(stats.rejected.has_value(), error > kMaxAbsLogRatio);
     if (!stats.rejected) {
       EXPECT_NEAR(stats.first.abs_log_ratio, error, 1e-5);
       continue;
@@ -445,7 +437,7 @@ TEST(Ppo, LogProbabilitiesThatAreNotTheLearnersAreComputedAgain) {
     EXPECT_NEAR(stats.rejected->clip_fraction, error > 0.2 ? 1 : 0, 1e-6);
     EXPECT_EQ(stats.first.abs_log_ratio, 0);
     EXPECT_EQ(stats.first.clip_fraction, 0);
-    EXPECT_GT(stats.policy_grad_norm, 0);
+    EXPECT_GT(stats.gradient_norms.policy, 0);
     policies.push_back(policy.hash());
   }
   ASSERT_EQ(policies.size(), 2u);
@@ -458,7 +450,6 @@ TEST(Ppo, NanIsAnError) {
   Corridor corridor;
   corridor.play(policy, 0);
   corridor.rollout.rewards.fill_(1);
-  corridor.compute_advantages(0.9, 0.9);
   {
     const at::NoGradGuard no_grad;
     at::Tensor bias = policy.parameters().back().value;
@@ -473,6 +464,21 @@ TEST(Ppo, NanIsAnError) {
     EXPECT_THAT(error.what(),
                 ::testing::HasSubstr("update 5, epoch 1, minibatch 1: the loss or its gradient is not finite"));
   }
+}
+
+TEST(Ppo, AGradientThatIsNotFiniteIsAnErrorWhereTheLossIs) {
+  const PolicyNetwork policy(test::learning_section(), 1, 7);
+  const std::string before = policy.hash();
+  Corridor corridor;
+  corridor.play(policy, 0);
+  corridor.rollout.rewards.fill_(1);
+  const auto as_infinities = [](const at::Tensor& gradient) { return gradient.abs() * HUGE_VAL; };
+  policy.parameters().back().value.register_hook(as_infinities);
+  const TrainSection train;
+  Optimizer optimizer(policy, train);
+  AdvantageFilter filter;
+  EXPECT_THROW(corridor.update(policy, train, 0, &optimizer, &filter), NotFinite);
+  EXPECT_EQ(policy.hash(), before);
 }
 
 }  // namespace

@@ -256,7 +256,7 @@ Rollout part_of(const Rollout& whole, int64_t begin, int64_t end) {
   const auto part = [&](const at::Tensor& t) { return t.narrow(1, begin, end - begin).contiguous(); };
   Rollout result(RolloutObservations(whole.observations.arrays().map(part)), whole.num_steps(), end - begin, Device{});
   for (at::Tensor Rollout::* t : {&Rollout::values, &Rollout::actions, &Rollout::log_probs, &Rollout::rewards,
-                                  &Rollout::terminated, &Rollout::truncated, &Rollout::valid, &Rollout::advantages}) {
+                                  &Rollout::terminated, &Rollout::truncated, &Rollout::valid}) {
     result.*t = part(whole.*t);
   }
   return result;
@@ -287,11 +287,10 @@ std::vector<Learnt> learn(const std::vector<int64_t>& ends, const TrainSection& 
       corridor.play(policy, update);
       // Of the last slots nothing is valid in the second update: the last rank has nothing to learn from.
       if (update == 1) corridor.rollout.valid.narrow(1, 100, test::Corridor::kSlots - 100).fill_(0);
-      corridor.compute_advantages(0.9, 0.9);
-      const Rollout own = part_of(corridor.rollout, rank == 0 ? 0 : ends[rank - 1], ends[rank]);
+      Rollout own = part_of(corridor.rollout, rank == 0 ? 0 : ends[rank - 1], ends[rank]);
       ChunkRunner runner(policy, own.observations);
-      learnt.last = ppo_update(&runner, own, train, {9, update, train.learning_rate}, corridor.executor.get(),
-                               &optimizer, &filter, nullptr, communicator.get());
+      learnt.last = ppo_update({&runner, corridor.executor.get(), &optimizer, &filter, nullptr, communicator.get()},
+                               &own, train, {9, update, train.learning_rate});
       average.update();
       learnt.hashes.push_back(policy.hash() + hash_of_parameters(average.values));
       if (update > 0) continue;
@@ -308,6 +307,8 @@ std::vector<Learnt> learn(const std::vector<int64_t>& ends, const TrainSection& 
 // Parameters step along the gradient itself, whose size nothing hides.
 TrainSection plain_steps() {
   TrainSection train;
+  train.gamma = 0.9;
+  train.gae_lambda = 0.9;
   train.schedule = Schedule::constant;
   train.learning_rate = 0.01;
   train.adam_eps = 1;
@@ -408,13 +409,11 @@ TEST(RanksLearn, AndStopTogetherWhenOneMeetsNaN) {
     Optimizer optimizer(policy, train);
     AdvantageFilter filter;
     corridor.play(policy, 0);
-    corridor.compute_advantages(0.9, 0.9);
     Rollout own = part_of(corridor.rollout, 64 * ranks.rank(), 64 * ranks.rank() + 64);
     if (ranks.rank() == 1) own.log_probs.fill_(std::numeric_limits<float>::quiet_NaN());
     ChunkRunner runner(policy, own.observations);
-    EXPECT_THROW(ppo_update(&runner, own, train, {9, 0, 0.01}, corridor.executor.get(), &optimizer, &filter, nullptr,
-                            communicator.get()),
-                 NotFinite);
+    const Learner learner{&runner, corridor.executor.get(), &optimizer, &filter, nullptr, communicator.get()};
+    EXPECT_THROW(ppo_update(learner, &own, train, {9, 0, 0.01}), NotFinite);
     EXPECT_EQ(policy.hash(), before);
   });
   EXPECT_THAT(errors, ::testing::Each(test::kNoError));

@@ -8,7 +8,7 @@
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/tests/training/small_runs.h"
-#include "pictura/training/losses.h"
+#include "pictura/training/ppo.h"
 #include "pictura/training/schedule.h"
 
 namespace pictura {
@@ -25,14 +25,16 @@ TEST(Teacher, LossIsTheWeightedDivergenceFromItsActions) {
   targets.teacher_log_probs = teacher.log();
   targets.teacher_weight = at::full({}, 0.25, doubles);
   const at::Tensor rows = at::tensor({2, 0}, at::kLong);
+  TrainSection train;
+  train.ent_coef = 0;  // policy and value have no loss where advantages, returns and values are 0
   const Losses losses =
-      losses_of({logits, at::zeros({2}, doubles)}, targets, rows, at::zeros({2}, doubles), /*shares=*/{}, 0.2);
+      ppo_losses({logits, at::zeros({2}, doubles)}, targets, {rows, 2, at::zeros({2}, doubles), /*shares=*/{}}, train);
   const at::Tensor p = teacher.index_select(0, rows), q = at::softmax(logits, 1);
   const double divergence = (p * (p / q).log()).sum(1).mean().item<double>();
-  EXPECT_NEAR(losses.imitation.item<double>(), 0.25 * divergence, 1e-12);
-  EXPECT_NEAR(losses.stats[6].item<double>(), divergence, 1e-12);
+  EXPECT_NEAR(losses.total.item<double>(), 0.25 * divergence, 1e-12);
+  EXPECT_NEAR(elements_of(at::constant_pad_nd(losses.stats, {0, 1})).teacher_kl.item<double>(), divergence, 1e-12);
   // Of a cross entropy by logits: the difference of the probabilities.
-  losses.imitation.backward();
+  losses.total.backward();
   EXPECT_LT((logits.grad() - 0.25 * (q - p) / 2).abs().max().item<double>(), 1e-12);
 }
 

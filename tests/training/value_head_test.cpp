@@ -12,7 +12,7 @@
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/tests/training/corridor.h"
 #include "pictura/tests/training/small_runs.h"
-#include "pictura/training/losses.h"
+#include "pictura/training/ppo.h"
 
 namespace pictura {
 namespace {
@@ -75,8 +75,9 @@ struct LossOfHead {
     returns = at::stack({at::full({}, -3.0, kDoubles), 0.25 * bins[70] + 0.75 * bins[71]});
     const Targets targets{at::zeros({2}, at::kLong), at::zeros({2}, kDoubles), returns};
     const at::AutoGradMode mode(true);
-    const Losses losses = losses_of({at::zeros({2, kNumActions}, kDoubles), values_of(head, outputs), outputs, head},
-                                    targets, at::arange(2), at::zeros({2}, kDoubles), /*shares=*/{}, 0.2);
+    const Minibatch chunk{at::arange(2), 2, at::zeros({2}, kDoubles), {}};
+    const Losses losses = ppo_losses({at::zeros({2, kNumActions}, kDoubles), values_of(head, outputs), outputs, head},
+                                     targets, chunk, TrainSection{});
     losses.value.backward();
     loss = losses.value.item<double>();
   }
@@ -131,7 +132,6 @@ TEST_P(EachValueHead, LearnsReturns) {
     }
     // Ten times the reward: of a size at which symlog presses together.
     corridor.rollout.rewards *= 10;
-    corridor.compute_advantages(train.gamma, train.gae_lambda);
     last = corridor.update(policy, train, update, &optimizer, &filter);
     if (update == 0) first = last;
   }
