@@ -1,0 +1,103 @@
+// Phases that write what agents observe.
+#pragma once
+
+#include "pictura/backend_cuda/simulator/phase_arrays.h"
+#include "pictura/common/portable/intrinsics.h"
+#include "pictura/simulator/rules/observe_query.h"
+
+namespace pictura::cuda {
+
+/// Writes what agents observe, a group of threads an observation.
+class ObservationWriter {
+ public:
+  /// Floats that the rows of any set need in the memory of a group.
+  static constexpr int kStaging = max_of(max_of(max_of(kMaxLanes, kMaxBoundaries), kMaxWalls) * kLaneFeatures,
+                                         max_of(kMaxPartners* kPartnerFeatures, kMaxControls* kControlFeatures));
+
+  /// observe_set() of every set, to that row of `out`.
+  template <typename ThreadGroup, typename Observation>
+  PICTURA_HD static void write_sets(const ThreadGroup& group, const WorldView& world, int agent,
+                                    const Observation& observation, const ObservationView& out, int row) {
+    for (int k = 0; k < num_observed_sets(out); ++k) {
+      const auto set = static_cast<EntitySet>(k);
+      write_set(group, world, agent, set, set_rows(out, row, set), observation);
+    }
+  }
+
+ private:
+  /// The rows are put together in the group's own memory, so that they are written whole and in order.
+  template <typename ThreadGroup, typename Observation>
+  PICTURA_HD static void write_set(const ThreadGroup& group, const WorldView& world, int agent, EntitySet set,
+                                   const SetRows& out, const Observation& observation) {
+    const int slot = world.first_slot + agent;
+    float* rows = group.staging();
+    int count = 0;
+    if (observes(world, agent)) {
+      const EgoFrame frame = ego_frame(world.agents, slot);
+      const NearPlace place = near_place(world, slot);  // kept from set to set, it would be spilled
+      if (set == EntitySet::partners) {
+        count = observation.observe_partners(world, agent, frame, rows, group);
+      } else if (set == EntitySet::controls) {
+        count = observe_controls(world, slot, place, frame, rows, group);
+      } else {
+        count = collect_pieces(group, pieces_near(world.map, place, set), frame, out.capacity, rows);
+      }
+    }
+    const int end = max_of(count, observation.num_filled(out));
+    group.sync();
+    group.write(rows, count * out.features, end * out.features, out.capacity * out.features, out.rows);
+    if (group.rank() == 0) *out.count = count;
+    group.sync();
+  }
+
+  /// observe_pieces() by several pieces a thread at a time, whose loads overlap.
+  template <typename ThreadGroup>
+  PICTURA_HD static int collect_pieces(const ThreadGroup& group, const PieceList& near, const EgoFrame& frame,
+                                       int capacity, float* rows) {
+    constexpr int kAtOnce = 2;
+    const RowFrame row_frame(frame);
+    const int num_items = static_cast<int>(near.items.size());
+    int count = 0;
+    for (int first = group.rank(); first - group.rank() < num_items && count < capacity;
+         first += kAtOnce * group.size()) {
+      ObservedPiece pieces[kAtOnce];
+      for (int k = 0; k < kAtOnce; ++k) {
+        const int i = min_of(first + k * group.size(), num_items - 1);
+        pieces[k] = group.read(near.pieces[near.items[i]]);
+      }
+      for (int k = 0; k < kAtOnce; ++k) {
+        float row[8];
+        store8(observe_piece(pieces[k], row_frame), row);
+        const bool is_seen = is_in_sight(pieces[k], frame) && first + k * group.size() < num_items;
+        const uint32_t seen = group.ballot(is_seen);
+        const int at = count + group.count_before(seen);
+        for (int f = 0; f < kLaneFeatures && is_seen && at < capacity; ++f) rows[at * kLaneFeatures + f] = row[f];
+        count = min_of(capacity, count + popcount(seen));
+      }
+    }
+    return count;
+  }
+};
+
+/// Writes a slot's view and observation.
+struct WriteObservation {
+  PhaseArrays arrays;
+  static constexpr int kStaging = ObservationWriter::kStaging;
+
+  template <typename ThreadGroup>
+  PICTURA_HD void operator()(const ThreadGroup& group, int slot) const {
+    const WorldView world = arrays.world(arrays.world_of_slot[slot]);
+    const int agent = slot - world.first_slot;
+    observe_own(world, agent, slot, arrays.observations, group);
+    if (group.rank() == group.size() - 1) arrays.views[slot] = view_of(world, agent);
+    if (!arrays.entity_sets) return;
+    ObservationWriter::write_sets(group, world, agent, StepObservation{}, arrays.observations, slot);
+  }
+};
+
+template <typename Launch>
+void launch_write_observations(const Launch& launch, const PhaseArrays& arrays) {
+  launch.template groups<kWarp>(arrays.num_slots, WriteObservation{arrays});
+}
+
+}  // namespace pictura::cuda

@@ -1,0 +1,82 @@
+// Memory that the phases of the CUDA executor read and write (phases.h).
+#pragma once
+
+#include "pictura/simulator/observation.h"
+#include "pictura/simulator/rules/episode.h"
+
+namespace pictura::cuda {
+
+/// How many threads share an agent: about as many as there are lane segments, barriers and boxes to test.
+constexpr int kThreadsPerAgent = 8, kWarp = 32;
+
+/// One world's memory for spawning.
+struct WorldScratch {
+  AgentBox* try_boxes = nullptr;   // [boxes, kSpawnTries] of the free ones
+  uint32_t* free_tries = nullptr;  // [boxes] which of the known tries are free of all that stands, as bits
+  int32_t* known_tries = nullptr;  // [boxes] how many have been looked at
+  int32_t* chosen_try = nullptr;   // [boxes] -1: none
+  int32_t* next_try = nullptr;     // [boxes]
+};
+
+/// What no step has as its lowest slot with an action out of range. All its bytes are equal, for memset.
+constexpr int32_t kNoSlot = 0x7F7F7F7F;
+
+/// Everything that the phases read and write, in one memory.
+struct PhaseArrays {
+  WorldView* worlds = nullptr;             // [num_worlds] their box_cells are one cell, which lists all boxes
+  WorldView* next_worlds = nullptr;        // [num_worlds] the same worlds, over memory for their next episode
+  const WorldScratch* scratch = nullptr;   // [num_worlds]
+  const int32_t* world_of_slot = nullptr;  // [num_slots]
+  int32_t num_worlds = 0, num_slots = 0;
+  // Of all worlds, as in their views; and here, where no store can change them.
+  AgentStateView agents{}, next_agents{};
+  // State, as in SimulatorState.
+  uint64_t* seed = nullptr;
+  int32_t* episode_step = nullptr;
+  int32_t* episode_index = nullptr;
+  uint8_t* episode_over = nullptr;
+  int32_t* spawned = nullptr;
+  SimulatorTotals* world_totals = nullptr;
+  // Results.
+  StepArrays results;
+  View* views = nullptr;
+  ObservationView observations;
+  uint8_t entity_sets = 0;
+  uint8_t has_lives = 0;  // some map has roads that end
+  // Between phases and steps.
+  uint8_t* began = nullptr;          // [num_worlds] an episode began in the last step: the one after it is to be made
+  uint8_t* prepares = nullptr;       // [num_worlds] it is made in the present step
+  int32_t* next_spawned = nullptr;   // [num_worlds] in the next episode
+  int32_t* rejected_slot = nullptr;  // the lowest one with a command out of range, or kNoSlot
+  int64_t* rejected_command = nullptr;  // the first since the host looked, or kNothingRejected
+  int32_t* first_element = nullptr;     // [num_slots] the first element of an edit that names each, or kNoSlot
+  int32_t* wrong_element = nullptr;     // the first element of the edit, or query, with a fault, or kNoSlot
+  int64_t* wrong_edit = nullptr;        // what the first since the host looked is, or kNothingWrong
+  int64_t* wrong_query = nullptr;       // likewise, or kNoQueryFault
+
+  PICTURA_HD WorldView world(int w) const {
+    WorldView world = worlds[w];
+    world.agents = agents;
+    return world;
+  }
+  PICTURA_HD WorldView next_world(int w) const {
+    WorldView world = next_worlds[w];
+    world.agents = next_agents;
+    return world;
+  }
+  PICTURA_HD bool has_rejected_command() const { return *rejected_slot != kNoSlot; }
+};
+
+/// A world's boxes as one cell: a warp tests all of them sooner than they could be sorted.
+PICTURA_HD inline GridView one_cell(Span<const int32_t> begin, Span<const int32_t> items) {
+  constexpr float kWhole_m = 1e9f;
+  return {{}, kWhole_m, 1, 1, begin, items};
+}
+
+/// The centre of a box for that cell: a box that is not drawn is far from everything.
+PICTURA_HD inline Vec2 center_of(const AgentBox& box) {
+  constexpr float kNowhere_m = 1e9f;
+  return box.drawn ? box.center_m.xy() : Vec2{kNowhere_m, kNowhere_m};
+}
+
+}  // namespace pictura::cuda

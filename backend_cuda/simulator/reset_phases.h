@@ -1,0 +1,208 @@
+// Phases that begin episodes: the first of a seed, and each next one while the one before it goes on.
+#pragma once
+
+#include "pictura/backend_cuda/simulator/observation_phases.h"
+#include "pictura/simulator/rules/spawn.h"
+
+namespace pictura::cuda {
+
+/// How many boxes of a world look for a place at once.
+constexpr int kTurn = 128;
+
+/// What a team's threads share.
+struct TeamMemory {
+  int32_t lowest_changed;
+};
+
+/// Finds for each of `count` boxes, which are the world's from first_box on, the first of its tries that the map
+/// permits and that is clear of the boxes before it: what placing them one after the other would find. As many as the
+/// team has groups for choose at once, given what the others chose last, until nobody changes: then everybody's choice
+/// agrees with the choices before it, which only the sequential result does. Every round fixes at least the lowest one
+/// that changed. Choices of an earlier turn do not change.
+///   box_of_try(i, try), permits(group, i, try, box)
+template <typename Team, typename BoxOfTry, typename Permits>
+PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const WorldScratch& scratch, int first_box,
+                             int count, const BoxOfTry& box_of_try, const Permits& permits) {
+  static_assert(kSpawnTries <= 32);
+  AgentBox* boxes = world.boxes + first_box;
+  AgentBox* try_boxes = scratch.try_boxes + first_box * kSpawnTries;
+  uint32_t* free_tries = scratch.free_tries + first_box;
+  int32_t* known_tries = scratch.known_tries + first_box;
+  int32_t* chosen_try = scratch.chosen_try + first_box;
+  int32_t* next_try = scratch.next_try + first_box;
+  int32_t& lowest_changed = team.memory().lowest_changed;
+  // The first tries of few boxes are looked at together.
+  const int first_tries = clamp(kTurn / max_of(count, 1), 2, kSpawnTries);
+  team.for_each(count, [&](int i) {
+    boxes[i].drawn = 0;
+    free_tries[i] = 0;
+    known_tries[i] = 0;
+    chosen_try[i] = -1;
+  });
+  // Whether the map, and what stands, leave a try free.
+  const auto look_at = [&](const auto& group, int turn_begin, int i, int t) {
+    const AgentBox box = box_of_try(i, t);
+    const bool is_free = permits(group, i, t, box) && is_clear(world, box, first_box, first_box + turn_begin, group);
+    if (is_free && group.rank() == 0) try_boxes[i * kSpawnTries + t] = box;
+    return is_free;
+  };
+  // Looks at a box's tries until one is free of what stands and of what the boxes of this turn chose.
+  const auto choose = [&](const auto& group, int turn_begin, int i) {
+    uint32_t free = free_tries[i];
+    int known = known_tries[i], chosen = -1;
+    for (int t = 0; t < kSpawnTries && chosen < 0; ++t) {
+      if (t == known) {
+        ++known;
+        if (look_at(group, turn_begin, i, t)) free |= 1u << t;
+        group.sync();
+      }
+      const AgentBox& box = try_boxes[i * kSpawnTries + t];
+      if ((free >> t & 1u) && is_clear(world, box, first_box + turn_begin, first_box + i, group)) chosen = t;
+    }
+    group.sync();
+    if (group.rank() > 0) return;
+    free_tries[i] = free;
+    known_tries[i] = known;
+    next_try[i] = chosen;
+    if (chosen != chosen_try[i]) team.lower(&lowest_changed, i);
+  };
+  for (int settled = 0, turn_begin = -kTurn; settled < count;) {
+    if (settled >= turn_begin + kTurn) {
+      turn_begin = settled;
+      const int num_tries = min_of(kTurn, count - turn_begin) * first_tries;
+      team.template for_each_by_groups<kThreadsPerAgent>(num_tries, [&](const auto& group, int k) {
+        const int i = turn_begin + k / first_tries, t = k % first_tries;
+        const bool is_free = look_at(group, turn_begin, i, t);
+        if (group.rank() == 0 && is_free) team.set_bits(&free_tries[i], 1u << t);
+        if (group.rank() == 0 && t == 0) known_tries[i] = first_tries;
+      });
+    }
+    const int unsettled = min_of(turn_begin + kTurn, count) - settled;
+    team.for_each(1, [&](int) { lowest_changed = settled + unsettled; });
+    team.template for_each_by_groups<kThreadsPerAgent>(
+        unsettled, [&](const auto& group, int k) { choose(group, turn_begin, settled + k); });
+    const int changed = lowest_changed;
+    team.for_each(unsettled, [&](int k) {
+      const int i = settled + k;
+      if (next_try[i] == chosen_try[i]) return;
+      chosen_try[i] = next_try[i];
+      if (chosen_try[i] >= 0) boxes[i] = try_boxes[i * kSpawnTries + chosen_try[i]];
+      boxes[i].drawn = chosen_try[i] >= 0;
+    });
+    settled = min_of(changed + 1, settled + unsettled);
+  }
+}
+
+/// Begins the episode that `world` says; counts who found a place.
+template <typename Team>
+PICTURA_HD void begin_episode(const Team& team, const WorldView& world, const WorldScratch& scratch,
+                              int32_t* spawned_out) {
+  const int num_parked = world.num_boxes - world.num_agents;
+  team.for_each(static_cast<int>(world.map.stop_lines.size()), [&](int light) { begin_light(world, light); });
+  team.for_each(world.num_agents, [&](int agent) { draw_agent(world, agent); });
+  const auto parked_at = [&](int car, int i) {
+    return parked_box(world, car, world.map.parking_spots.empty() ? ParkingSpot{} : parking_spot(world, car, i));
+  };
+  choose_tries(team, world, scratch, world.num_agents, num_parked, parked_at,
+               [&](const auto& group, int car, int i, const AgentBox& box) {
+                 return !world.map.parking_spots.empty() &&
+                        may_park(world.map, box, parking_spot(world, car, i), group);
+               });
+  team.for_each(num_parked, [&](int car) { put_parked_car(world, car, scratch.chosen_try[world.num_agents + car]); });
+  const auto agent_at = [&](int agent, int i) {
+    return has_places(world, agent) ? spawn_box(world, agent, i) : AgentBox{};
+  };
+  choose_tries(team, world, scratch, 0, world.num_agents, agent_at,
+               [&](const auto& group, int agent, int, const AgentBox& box) {
+                 return has_places(world, agent) && may_spawn(world.map, box, group) &&
+                        is_clear(world, box, world.num_agents, world.num_boxes, group);
+               });
+  team.for_each(1, [&](int) { *spawned_out = 0; });
+  team.template for_each_by_groups<kThreadsPerAgent>(world.num_agents, [&](const auto& group, int agent) {
+    place_agent(world, agent, scratch.chosen_try[agent], group);
+    if (group.rank() == 0 && joins_episode(world, scratch.chosen_try[agent])) team.add(spawned_out, 1);
+  });
+}
+
+/// Begins episode 0 of `seed` in the worlds of the mask [worlds], or in all where it is null.
+struct BeginFirstEpisode {
+  PhaseArrays arrays;
+  const uint8_t* mask;
+  uint64_t seed;
+  template <typename Team>
+  PICTURA_HD void operator()(const Team& team, int w) const {
+    if (mask && !mask[w]) return;
+    team.for_each(1, [&](int) {
+      arrays.seed[w] = arrays.worlds[w].seed = arrays.next_worlds[w].seed = seed;
+      arrays.episode_over[w] = 0;
+      arrays.episode_step[w] = arrays.episode_index[w] = 0;
+      arrays.worlds[w].episode = 0;
+      arrays.next_worlds[w].episode = 1;
+      arrays.began[w] = 1;
+    });
+    const WorldView world = arrays.world(w);
+    team.for_each(world.num_agents, [&](int agent) { clear_result(arrays.results, world.first_slot + agent); });
+    begin_episode(team, world, arrays.scratch[w], &arrays.spawned[w]);
+  }
+};
+
+/// Says where the boxes of a world stand.
+struct PlaceCenters {
+  PhaseArrays arrays;
+  template <typename ThreadGroup>
+  PICTURA_HD void operator()(const ThreadGroup& group, int w) const {
+    const WorldView world = arrays.world(w);
+    for (int i = group.rank(); i < world.num_boxes; i += group.size()) {
+      world.cell_centers[i] = center_of(world.boxes[i]);
+    }
+  }
+};
+
+/// Makes a world's next episode, as early as its memory is free and long before it is needed: a start depends on
+/// nothing that steps change.
+struct PrepareEpisode {
+  PhaseArrays arrays;
+  template <typename Team>
+  PICTURA_HD void operator()(const Team& team, int w) const {
+    if (!arrays.prepares[w]) return;
+    begin_episode(team, arrays.next_world(w), arrays.scratch[w], &arrays.next_spawned[w]);
+  }
+};
+
+/// Episode 0 of `seed` in the worlds of the mask, or in all where it is null.
+template <typename Launch>
+void launch_reset(const Launch& launch, const PhaseArrays& arrays, const uint8_t* mask, uint64_t seed) {
+  launch.teams(arrays.num_worlds, BeginFirstEpisode{arrays, mask, seed});
+  launch.template groups<kWarp>(arrays.num_worlds, PlaceCenters{arrays});
+  launch_write_observations(launch, arrays);
+}
+
+/// Tells the worlds which episode of which seed a state that was put there is in.
+struct TakeEpisode {
+  PhaseArrays arrays;
+  template <typename Atomics>
+  PICTURA_HD void operator()(const Atomics&, int w) const {
+    arrays.worlds[w].seed = arrays.next_worlds[w].seed = arrays.seed[w];
+    arrays.worlds[w].episode = static_cast<uint32_t>(arrays.episode_index[w]);
+    arrays.next_worlds[w].episode = arrays.worlds[w].episode + 1;
+  }
+};
+
+/// Shows a state that was put there.
+template <typename Launch>
+void launch_restored(const Launch& launch, const PhaseArrays& arrays) {
+  const auto num_slots = static_cast<size_t>(arrays.num_slots);
+  launch.fill(arrays.results.reward, num_slots * sizeof(float), 0);
+  launch.fill(arrays.results.sums, num_slots * sizeof(StepSums), 0);
+  for (uint8_t* flags : {arrays.results.terminated, arrays.results.truncated, arrays.results.valid}) {
+    launch.fill(flags, num_slots, 0);
+  }
+  launch.threads(arrays.num_worlds, TakeEpisode{arrays});
+  launch.fill(arrays.began, static_cast<size_t>(arrays.num_worlds), 0);
+  launch.fill(arrays.prepares, static_cast<size_t>(arrays.num_worlds), 1);
+  launch.teams(arrays.num_worlds, PrepareEpisode{arrays});
+  launch.template groups<kWarp>(arrays.num_worlds, PlaceCenters{arrays});
+  launch_write_observations(launch, arrays);
+}
+
+}  // namespace pictura::cuda
