@@ -18,10 +18,6 @@ namespace pictura {
 
 namespace {
 
-at::Tensor mean_of(const at::Tensor& values, const at::Tensor& shares) {
-  return shares.defined() ? (values * shares).mean() : values.mean();
-}
-
 // Log-probabilities of the actions that were taken at some rows. all_log_probs: [rows, kNumActions].
 at::Tensor log_probs_of(const at::Tensor& all_log_probs, const Targets& targets, const at::Tensor& rows) {
   // A sum of which all but one are 0: the gradient of gather() waits for the host where algorithms are deterministic.
@@ -43,7 +39,9 @@ at::Tensor value_losses(const Policy::Output& output, const at::Tensor& returns)
 
 Losses ppo_losses(const Policy::Output& output, const Targets& targets, const Minibatch& chunk,
                   const TrainSection& config) {
-  const auto mean = [&chunk](const at::Tensor& values) { return mean_of(values, chunk.shares); };
+  const auto mean = [&chunk](const at::Tensor& values) {
+    return chunk.shares.defined() ? (values * chunk.shares).mean() : values.mean();
+  };
   const at::Tensor all_log_probs = at::log_softmax(output.logits, 1);
   const at::Tensor log_prob = log_probs_of(all_log_probs, targets, chunk.rows);
   const at::Tensor log_ratio = log_prob - targets.old_log_probs.index_select(0, chunk.rows);

@@ -212,14 +212,14 @@ TrainProgress RunLog::add(int64_t update, int64_t agent_steps, const UpdateRecor
         update, rejected->abs_log_ratio, kMaxAbsLogRatio, rejected->clip_fraction, kMaxClipFraction));
   }
 
-  progress.cost = {totals.agent_steps,
-                   totals.slot_steps,
-                   record.stats.kept_fraction,
-                   record.stats.minibatches,
-                   record.stats.first.approx_kl,
-                   record.rollout_s,
-                   record.update_s,
-                   record.phases_s};
+  progress.cost = {.agent_steps = totals.agent_steps,
+                   .slot_steps = totals.slot_steps,
+                   .kept_fraction = record.stats.kept_fraction,
+                   .minibatches = record.stats.minibatches,
+                   .first_kl = record.stats.first.approx_kl,
+                   .rollout_s = record.rollout_s,
+                   .update_s = record.update_s,
+                   .phases_s = record.phases_s};
 
   progress.scalars = scalars_of(config_, progress, record);
   if (csv_) csv_->write(update, progress.scalars);

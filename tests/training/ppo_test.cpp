@@ -172,6 +172,25 @@ TEST(AdvantageFilter, DropsTheShareOfItsQuantile) {
   EXPECT_THROW(corridor.update(policy, train, 0, &optimizer, &filter), Error);
 }
 
+TEST(LossStats, ARowHoldsWhatTheirNamesSay) {
+  LossTensors tensors;
+  std::map<std::string, double> written;
+  LossTensors::visit_losses(tensors, [&written](const char* name, at::Tensor& tensor) {
+    written[name] = 1.5 * static_cast<double>(written.size() + 1);
+    tensor = at::full({}, written[name], at::kFloat);
+  });
+  const at::Tensor row = at::zeros({kNumLossStats}, at::kDouble);
+  row.narrow(0, 0, kNumLossStats - 1).copy_(stacked(tensors));
+  elements_of(row).grad_norm.fill_(written["grad_norm"] = 100);
+  const LossStats numbers = numbers_of(row);
+  std::map<std::string, double> read;
+  LossStats::visit(numbers, [&read](const char* name, double number) { read[name] = number; });
+  EXPECT_EQ(read, written);
+  EXPECT_EQ(numbers.entropy, written.at("entropy"));
+  EXPECT_EQ(numbers.teacher_kl, written.at("teacher_kl"));
+  EXPECT_EQ(read.size(), static_cast<size_t>(kNumLossStats));
+}
+
 TEST(Schedule, FallsToZeroOverItsLastPart) {
   TrainSection train;
   train.learning_rate = 2;
