@@ -1,5 +1,4 @@
-// What a run saves: one file (policy/checkpoint_file.h) from which training goes on exactly and a policy can be
-// loaded.
+// Checkpoint: one file (policy/checkpoint_file.h) from which training goes on exactly and a policy can be loaded.
 #pragma once
 
 #include <map>
@@ -9,7 +8,7 @@
 
 namespace pictura {
 
-/// What the mean return is taken over: one update's part of it.
+/// One update's part of the mean return.
 struct RecentUpdate {
   int64_t finished = 0;  // agent episodes that ended
   double finished_return = 0;
@@ -33,10 +32,10 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint);
 /// Throws Error naming the file when it is no checkpoint, truncated, damaged, of another version or byte order, or of
 /// another observation schema (naming the entry that differs).
 Checkpoint read_checkpoint(const std::string& path);
-/// What the bytes of such a file say.
+/// Checkpoint in the bytes of such a file.
 Checkpoint parse_checkpoint(const std::string& bytes, const std::string& path);
 
-/// Camera and property in which the two rigs first differ, with both values, or empty.
+/// First camera and property in which two rigs differ, with both values; empty where they are equal.
 std::string first_difference(const Rig& saved, const Rig& now);
 
 }  // namespace pictura

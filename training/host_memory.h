@@ -1,11 +1,11 @@
-// How the process keeps the memory of the host.
+// Memory of the host that the process keeps.
 #pragma once
 
 namespace pictura {
 
-/// From then on memory that is freed stays with the process for what is allocated next, large blocks too, instead of
-/// being mapped anew, page by page and zeroed by the kernel, for each tensor. Of the whole process; does nothing where
-/// the C library is not glibc.
+/// Keeps memory that is freed from now on in the process for what is allocated next, large blocks too, instead of
+/// mapping it anew, page by page and zeroed by the kernel, for each tensor. Holds for the whole process; does nothing
+/// where the C library is not glibc.
 void keep_freed_memory();
 
 }  // namespace pictura

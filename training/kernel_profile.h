@@ -1,4 +1,4 @@
-// How long each kernel took while something ran on a CUDA device, by torch's profiler (CUPTI). Without torch headers.
+// Profile of the kernels that ran on a CUDA device, by torch's profiler (CUPTI). Without torch headers.
 #pragma once
 
 #include <cstdint>
@@ -13,11 +13,11 @@ struct KernelTime {
   double seconds = 0;
 };
 
-/// One at a time in a process. What is timed between the two calls becomes a few per cent slower.
+/// Profile of what runs between begin() and end(), which becomes a few per cent slower. One at a time in a process.
 class KernelProfile {
  public:
   static void begin();
-  /// Waits for the device. By descending time; empty where nothing ran on a CUDA device.
+  /// Kernels by descending time; empty where nothing ran on a CUDA device. Waits for the device.
   static std::vector<KernelTime> end();
 };
 

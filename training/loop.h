@@ -13,33 +13,33 @@
 
 namespace pictura {
 
-/// What one update did and took.
+/// Work and time of one update.
 struct UpdateCost {
-  int64_t agent_steps = 0, slot_steps = 0;  // of its rollout
+  int64_t agent_steps = 0, slot_steps = 0;  // in its rollout
   double kept_fraction = 0;                 // of valid transitions, by the filter
   int64_t minibatches = 0;
-  double first_kl = 0;                 // of the first minibatch, before parameters change: what arithmetic differs by
+  double first_kl = 0;                 // KL divergence of the first minibatch, before parameters change: rounding alone
   double rollout_s = 0, update_s = 0;  // wall time of collecting, and of improving
   PhaseSeconds phases_s{};             // in both
 };
 
-/// What a run has done so far; given to on_progress after every update.
+/// Progress of a run, given to on_progress after every update.
 struct TrainProgress {
   int64_t update = 0, updates = 0;
   int64_t agent_steps = 0;
   double agent_steps_per_s = 0;
   double episode_return = 0;     // mean over agent episodes that ended in the last updates; NaN before the first
   double eta_s = 0;              // to the last update, the end of the schedule or of `minutes`, whichever comes first
-  bool ends_by_minutes = false;  // it is the end of `minutes`: a bound
-  Scalars scalars;               // what is logged of this update, as in progress.csv
-  UpdateCost cost;               // of the last update
+  bool ends_by_minutes = false;  // the end of `minutes` comes first: eta_s is a bound
+  Scalars scalars;               // logged of this update, as in progress.csv
+  UpdateCost cost;               // of this update
 };
 
-/// What happens to a run that lies in the folder already.
+/// Treatment of a run that lies in the folder already.
 enum class OldRun {
   refuse,
-  resume,     // goes on from its checkpoint
-  overwrite,  // its files are removed; others stay
+  resume,     // go on from its checkpoint
+  overwrite,  // remove its files; others stay
 };
 
 struct TrainOptions {
@@ -52,8 +52,8 @@ struct TrainOptions {
   double minutes = 0;  // of wall time, start-up included, within which the last update ends; 0: no limit
   std::string commit;  // of this program, for the metadata of policy.safetensors
   Launch launch;       // which of the processes that train together this one is
-  std::function<void(const TrainProgress&)> on_progress;  // as all that reports, of rank 0 alone
-  std::function<void(const std::string&)> on_notice;      // what a person should know, and no error is
+  std::function<void(const TrainProgress&)> on_progress;  // called by rank 0 alone, as on_notice
+  std::function<void(const std::string&)> on_notice;      // receives what a person should know and is no error
 
   void notify(const std::string& notice) const {
     if (on_notice) on_notice(notice);
@@ -61,14 +61,14 @@ struct TrainOptions {
 };
 
 struct TrainReport {
-  int64_t agent_steps = 0, updates = 0;  // of all ranks, as all below but what is of a device
+  int64_t agent_steps = 0, updates = 0;  // of all ranks, as all below but the device's bytes
   double agent_steps_per_s = 0, episode_return = 0, km_driven = 0;
   int ranks = 1;
   double evaluation_s = 0;  // of this process, in train.evaluate_every's evaluations, which count in no rate
   bool interrupted = false, out_of_time = false;
   std::string checkpoint, policy_hash;
-  // Of a CUDA device, else 0: what all processes had in use after the last update, when torch still keeps what it has
-  // ever taken; and the most that tensors took at once.
+  // Memory of a CUDA device, else 0: in use by all processes after the last update, when torch still keeps what it has
+  // ever taken; and the maximum that tensors took at once.
   int64_t device_bytes = 0, peak_tensor_bytes = 0;
   std::string device, simulator, renderer;  // what learnt, simulated and drew; no renderer where there are no images
 };
@@ -89,7 +89,7 @@ class OutOfMemory : public Error {
 /// and where one lies that old_run does not speak of; OutOfMemory where the device's memory is too small.
 ///
 /// Several processes train one policy where each calls this with its `launch` and equal settings. Rank 0 alone reads
-/// and writes files. What asks one of them to end ends all after the same update. Throws Error in all naming the rank
+/// and writes files. A request to end one of them ends all after the same update. Throws Error in all naming the rank
 /// where one fails, ends or hangs.
 TrainReport train(const TrainOptions& options);
 

@@ -1,4 +1,4 @@
-// Whether a configuration's agents and network fit into memory, before anything is made.
+// Estimates of the memory that a configuration's agents, network and maps need, before anything is allocated.
 #pragma once
 
 #include "pictura/configuration/config.h"
@@ -10,18 +10,18 @@ namespace pictura {
 /// most a quarter of its `memory_bytes`.
 bool keeps_images(const Config& config, int num_agents, Device device, int64_t memory_bytes);
 
-/// What simulator, rollout and update take for all agents of a configuration, by estimate: what grows with
+/// Estimated bytes of simulator, rollout and update for all agents of a configuration: what grows with
 /// simulator.num_slots, so neither maps nor the network.
 double estimated_bytes(const Config& config, bool keeps_images);
 
-/// What the network of a configuration takes. A program (policy.backbone) is not counted: what it computes is its own.
+/// Size of a configuration's network. A program (policy.backbone) is not counted.
 struct NetworkSize {
   double parameters = 0;
-  /// Of each parameter, its gradients and what the optimizer keeps.
+  /// Bytes of each parameter, its gradient and its moments.
   static constexpr double kBytesPerParameter = 20;
-  /// Of a transition on its way forward and back, by estimate, the largest of render.schedule's images included.
+  /// Estimated bytes of a transition on its way forward and back, with the largest images of render.schedule.
   double transition_bytes = 0;
-  /// With so many transitions at once.
+  /// Bytes with so many transitions at once.
   double bytes(double transitions) const { return kBytesPerParameter * parameters + transition_bytes * transitions; }
 };
 NetworkSize network_size(const Config& config, Device device);
@@ -31,7 +31,7 @@ NetworkSize network_size(const Config& config, Device device);
 /// one's part.
 void check_memory(const Config& config, Device device, int64_t memory_bytes, int num_ranks = 1);
 
-/// What maps take by estimate, in bytes.
+/// Estimated bytes of maps.
 struct MapMemory {
   double host = 0;    // as they are loaded, with what rules and renderers read
   double device = 0;  // what rules and renderers read of them, on a device

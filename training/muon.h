@@ -14,17 +14,17 @@ namespace pictura {
 /// pixels, and the two heads are AdamW's.
 bool is_stepped_by_muon(const NamedTensor& parameter);
 
-/// Root mean squares of the weights of hidden layers (is_stepped_by_muon), whichever optimizer steps them: of all, and
-/// the largest of one matrix. 0 where there are none.
+/// Root mean squares of the weights of hidden layers (is_stepped_by_muon), whichever optimizer steps them: over all
+/// weights, and the largest of one matrix. 0 where there are none.
 struct WeightRms {
   double all = 0, largest = 0;
 };
 /// Waits for the parameters' device.
 WeightRms weight_rms(const std::vector<NamedTensor>& parameters);
 
-/// Matrices [n, rows, columns] with the singular vectors of those given and singular values near 1 (.7 to 1.2, for
-/// values of 1/200 of the Frobenius norm or more), by five Newton-Schulz steps computed in `type`. A zero matrix stays
-/// zero.
+/// Returns matrices [n, rows, columns] with the singular vectors of those given and singular values near 1 (.7 to 1.2,
+/// for values of 1/200 of the Frobenius norm or more), by five Newton-Schulz steps computed in `type`. A zero matrix
+/// stays zero.
 at::Tensor orthogonalized(const at::Tensor& matrices, at::ScalarType type);
 
 class Muon {
@@ -40,7 +40,7 @@ class Muon {
   /// Discards the captured graph; must be called when gradients come to lie elsewhere.
   void forget_addresses();
 
-  /// Momentum of weight i, of its shape.
+  /// Momentum of weight i, in its shape.
   at::Tensor momentum(size_t i) const { return parts_of(momentum_)[i]; }
 
  private:
@@ -53,7 +53,7 @@ class Muon {
   void take_step();
   static std::vector<Batch> make_batches(const std::vector<at::Tensor>& weights);
   void index_batches();
-  // Parts of a vector of all weights' elements, of their shapes.
+  // Parts of a vector of all weights' elements, in their shapes.
   std::vector<at::Tensor> parts_of(const at::Tensor& flat) const;
 
   std::vector<at::Tensor> weights_;
@@ -63,7 +63,7 @@ class Muon {
   std::vector<Batch> batches_;
   // Where each element of the batches lies in such a vector, whose size stands for filling; and the inverse.
   at::Tensor element_of_place_, place_of_element_;
-  std::vector<at::Tensor> scales_;  // of each batch [weights, 1, 1]
+  std::vector<at::Tensor> scales_;  // factor of the step by weight, [weights, 1, 1] of each batch
   at::Tensor rate_, failed_;        // f32 scalars, of this step
   Graphs graphs_;
   RepeatedWork step_;

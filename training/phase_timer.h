@@ -12,11 +12,12 @@
 
 namespace pictura {
 
+/// Timer of the phases of one device.
 class PhaseTimer {
  public:
   explicit PhaseTimer(Device device) : device_(device) {}
 
-  /// What its lifetime took belongs to a phase; none is measured where there is no timer. Scopes do not nest. In
+  /// Scope whose lifetime counts as time of a phase; without a timer nothing is measured. Scopes do not nest. In
   /// NVIDIA's profilers each is a range of NVTX with the phase's name.
   class Scope {
    public:
@@ -28,7 +29,7 @@ class PhaseTimer {
    private:
     PhaseTimer* timer_;
     Phase phase_;
-    size_t begin_ = 0;  // on a device: index of its event
+    size_t begin_ = 0;  // index of its first event, on a device
     Stopwatch watch_;
   };
 

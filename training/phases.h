@@ -7,9 +7,9 @@
 
 namespace pictura {
 
-/// render: images, wherever they are needed; forward: the network in rollouts; learn: the network and its losses in
-/// updates; diagnose: gradients of single losses, for the log alone; backward: the gradients that are learnt from;
-/// optimize: the optimizer's steps. What is in no phase is the rest of the wall time.
+/// Phase of an update. simulate: the simulator's steps; render: images, wherever they are needed; forward: the network
+/// in rollouts; learn: the network and its losses in updates; diagnose: gradients of single losses, for the log alone;
+/// backward: the gradients that are learnt from; optimize: the optimizer's steps. The rest of the wall time is in none.
 enum class Phase : uint8_t { simulate, render, forward, learn, diagnose, backward, optimize };
 constexpr size_t kNumPhases = 7;
 constexpr const char* kPhaseNames[kNumPhases] = {"simulate", "render",   "forward", "learn",

@@ -1,5 +1,5 @@
-// Work of the learner that is done again and again over the same memory. On a CUDA device it is captured into a graph,
-// which one call launches: networks of a few thousand agents are so quick that their kernels wait for the host.
+// Work of the learner that is repeated over the same memory. On a CUDA device it is captured into a graph, which one
+// call launches: networks of a few thousand agents are so quick that their kernels wait for the host.
 #pragma once
 
 #include <functional>
@@ -19,11 +19,11 @@ class GraphMemory {
   GraphMemory(const GraphMemory&) = delete;
   GraphMemory& operator=(const GraphMemory&) = delete;
 
-  /// Does some work whose tensors on the stream come to lie there.
+  /// Calls `work`, whose tensors on the stream are allocated there.
   void serve(Stream stream, const std::function<void()>& work);
-  /// Gives back what torch keeps for later tensors outside of it: it cannot while work is captured.
+  /// Releases what torch keeps for later tensors outside of it, which it cannot do while work is captured.
   void make_room() const;
-  /// Gives it back once no tensor lies there any more. No graph may be launched that was captured before.
+  /// Releases the memory once no tensor lies there any more. No graph may be launched that was captured before.
   void release();
 
  private:
@@ -32,19 +32,19 @@ class GraphMemory {
   int uses_ = 0;
 };
 
-/// Whether work is captured, and where.
+/// Graphs of one device: whether work is captured, and the memory that the graphs share.
 class Graphs {
  public:
   Graphs(Device device, bool are_used) : device_(device), are_used_(are_used), memory_(device) {}
 
   bool are_used() const { return are_used_; }
-  /// What work puts on torch's current stream, which must be none that waits for others. Throws Error naming the key
-  /// where that cannot be captured; c10::OutOfMemoryError.
+  /// Graph of what `work` puts on torch's current stream, which must be none that waits for others. Throws Error naming
+  /// the key where that cannot be captured; c10::OutOfMemoryError.
   std::unique_ptr<DeviceGraph> capture(const std::function<void()>& work);
   void launch(DeviceGraph* graph);
-  /// Before work is captured that takes much memory.
+  /// Must be called before work is captured that takes much memory.
   void make_room() const { memory_.make_room(); }
-  /// Once no graph is left, gives back what they had taken.
+  /// Releases the memory of graphs once none is left.
   void release_memory() { memory_.release(); }
 
   /// Graphs that have been launched so far.
@@ -57,14 +57,14 @@ class Graphs {
   int64_t num_launches_ = 0;
 };
 
-/// A piece of work. It is done call by call the first time, which loads and chooses all that it needs, is captured the
-/// second time, and from then on the graph is launched.
+/// Piece of work that is done call by call the first time, which loads and chooses all that it needs, captured the
+/// second time, and launched as a graph from then on.
 class RepeatedWork {
  public:
   enum class Mode { calls, capture, launch };
-  /// How it is done now. `is_settled`: the memory that it works on will be the same from now on.
+  /// How the work is done next. `is_settled`: the memory that it works on will be the same from now on.
   Mode next_mode(const Graphs& graphs, bool is_settled);
-  /// Does it. Work that is captured or launched must wait for nothing, and do the same whenever it is done.
+  /// Does the work. Work that is captured or launched must wait for nothing, and do the same whenever it is done.
   void run(Mode mode, Graphs* graphs, const std::function<void()>& work);
   void run(Graphs* graphs, const std::function<void()>& work) { run(next_mode(*graphs, true), graphs, work); }
 

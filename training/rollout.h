@@ -1,4 +1,4 @@
-// What all slots of a simulator saw, did and got in one rollout, as tensors on the device that learns; time first.
+// Rollout: what all slots of a simulator saw, did and got, as tensors on the device that learns; time first.
 #pragma once
 
 #include "pictura/common/scene_history.h"
@@ -8,34 +8,35 @@
 
 namespace pictura {
 
-/// What the slots saw at each step. Images are kept, or drawn again from the scenes whenever they are read: those of
-/// the paper's rollout would take 163 GB, its scenes 0.25 GB.
+/// Observations of all slots at each step. Images are kept, or drawn again from the scenes whenever they are read:
+/// those of the paper's rollout would take 163 GB, its scenes 0.25 GB.
 class RolloutObservations {
  public:
-  /// For `num_steps` + 1 steps of this simulator, which must outlive it, as must the renderer and the timer (of the
-  /// images that are kept). Policies
-  /// without images need no renderer. training/memory.h says whether there is memory for it.
+  /// Allocates train.num_steps + 1 steps of this simulator, which must outlive it, as must the renderer and the timer
+  /// (for images that are kept). Policies without images need no renderer. training/memory.h estimates the memory.
   RolloutObservations(const Config& config, Simulator* simulator, Renderer* renderer, PhaseTimer* timer);
-  /// Of arrays alone, [num_steps + 1, slots, ...].
+  /// Observations without images: arrays [num_steps + 1, slots, ...].
   explicit RolloutObservations(Observation arrays) : arrays_(std::move(arrays)) {}
 
-  /// Draws with another renderer from now on, whose rig has as many cameras. What was kept is lost.
+  /// Draws with another renderer from now on, whose rig has as many cameras. Kept images are lost.
   void set_renderer(Renderer* renderer);
 
-  /// Keeps what the simulator shows now as what was seen at `step`. slots: i64 [n], those of active agents, the only
-  /// ones whose images are kept. Steps are recorded in order first.
+  /// Records what the simulator shows now as the observations of `step`. slots: i64 [n], those whose images are kept.
+  /// The first time steps are recorded in order.
   void record(int64_t step, const at::Tensor& slots);
 
-  /// What some agents saw. rows: i64 [batch] of step * slots + slot, of agents that were active at those steps. Images
-  /// that are drawn for it are as draw_images() draws them.
+  /// Observations of rows, i64 [batch] of step * slots + slot, of agents that were active at those steps. Images that
+  /// are drawn for it are as draw_images() draws them.
   Observation gather(const at::Tensor& rows, int patch_px = 0) const;
 
-  /// Whether images are kept as they are seen, or drawn in gather().
+  /// Whether images are kept as they are seen.
   bool keep_images() const { return keeps_images_; }
+  /// Whether gather() draws images.
   bool draws_when_gathered() const { return scenes_ != nullptr; }
   /// Whether every step has been recorded: then gather() always works on the same memory, and so does record() where no
-  /// images are kept, as long as generation() stays.
+  /// images are kept, until generation() changes.
   bool are_complete() const { return are_complete_; }
+  /// Renderer::generation(), 0 without images.
   uint64_t generation() const { return renderer_ ? renderer_->generation() : 0; }
 
   const Observation& arrays() const { return arrays_; }
@@ -50,7 +51,7 @@ class RolloutObservations {
 };
 
 struct Rollout {
-  RolloutObservations observations;         // of num_steps + 1 steps; the last is seen after the last action
+  RolloutObservations observations;         // num_steps + 1 steps; the last is seen after the last action
   at::Tensor values;                        // f32 [num_steps + 1, num_slots]; 0 for agents that were not active
   at::Tensor actions;                       // i32 [num_steps, num_slots], as all below
   at::Tensor log_probs;                     // f32, of the chosen actions
@@ -68,9 +69,9 @@ struct Rollout {
   at::Tensor decisions() const { return decides.defined() ? valid * decides : valid; }
   /// The row of each of these slots, i64 [n], at a step.
   at::Tensor rows_of(int64_t step, const at::Tensor& slots) const { return slots + step * num_slots(); }
-  /// The actions of one step, to be filled. [num_slots]
+  /// Actions of one step, [num_slots], to be filled in.
   Span<int32_t> actions_at(int64_t step);
-  /// Keeps what a step with these actions returned, in the memory of `device`.
+  /// Records the results of a step, which lie in the memory of `device`.
   void set_result(int64_t step, const StepResult& result, Device device);
   /// Fills `advantages` from rewards, values and flags.
   void compute_advantages(double gamma, double gae_lambda, LearnerExecutor* executor);

@@ -12,19 +12,19 @@ namespace pictura {
 
 class RunEvaluation {
  public:
-  /// Of a run, which must outlive it.
+  /// Evaluation of a run, which must outlive it.
   explicit RunEvaluation(const Run& run);
 
-  /// Whether one is made after as many updates as the run has done.
+  /// Whether an evaluation is due after as many updates as the run has done.
   bool is_due() const;
-  /// train.evaluate_scenarios worlds of train.evaluate_agents agents for train.evaluate_steps steps: what `pictura
-  /// evaluate --scenarios --agents --steps` measures of the checkpoint, and with --average where the run has an average
-  /// of weights. Nothing when ^C came.
+  /// Evaluates in train.evaluate_scenarios worlds of train.evaluate_agents agents for train.evaluate_steps steps: what
+  /// `pictura evaluate --scenarios --agents --steps` measures of the checkpoint, and with --average where the run has
+  /// an average of weights. Nothing when ^C came.
   std::optional<EvaluationRecord> evaluate();
 
  private:
   const Run& run_;
-  EvaluationWorlds worlds_;  // kept from one to the next
+  EvaluationWorlds worlds_;  // kept from one evaluation to the next
 };
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// What a training run keeps on disk: its folder is its own while it runs, and holds its checkpoints and weights.
+// Folder of a training run, which is its own while it runs, and holds its checkpoints and weights.
 #pragma once
 
 #include <functional>
@@ -14,7 +14,8 @@
 
 namespace pictura {
 
-/// Rank 0 alone reads and writes; all ranks must call what names no rank, since a checkpoint has something of each.
+/// Keeper of a run's folder. Rank 0 alone reads and writes; its functions are collective, since a checkpoint has
+/// something of each rank.
 class RunKeeper {
  public:
   /// Takes the folder for this process. Throws Error naming it where another run is at work in it, where one lies that
@@ -30,7 +31,7 @@ class RunKeeper {
   bool is_due(const Run& run) const;
   /// Saves the run as checkpoint.ckpt and keeps older ones, unless it is saved already.
   void save(const Run& run, const std::vector<RecentUpdate>& recent);
-  /// Saves it under another name of the folder, once and for all.
+  /// Saves the run under another name in the folder, which later saves leave alone.
   void save_as(const std::string& name, const Run& run, const std::vector<RecentUpdate>& recent) const;
   /// Writes the weights as policy.safetensors, and their average, where there is one, as policy_average.safetensors.
   void write_weights(const Run& run) const;

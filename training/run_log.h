@@ -1,5 +1,5 @@
-// What a run reports after each update: a row of progress.csv, a TensorBoard event, and the progress line's numbers;
-// and after each evaluation a row of evaluation.csv and an event.
+// Log of a run: after each update a row of progress.csv, a TensorBoard event and the progress line's numbers; after
+// each evaluation a row of evaluation.csv and an event.
 #pragma once
 
 #include <deque>
@@ -16,7 +16,7 @@
 
 namespace pictura {
 
-/// A file of a run with a row for an update. Of the rows of an older file it keeps those that are whole and of updates
+/// CSV file of a run with a row for an update. Of an older file's rows it keeps those that are whole and of updates
 /// that are done: a process may have been killed, or a disk full, within one. A file with other columns is renamed to
 /// PATH.1 (or the next free number), with a notice.
 class ProgressCsv {
@@ -25,7 +25,7 @@ class ProgressCsv {
               const std::function<void(const std::string&)>& on_notice);
   /// Appends a row and flushes. Throws Error naming the path when the disk is full.
   void write(int64_t update, const Scalars& scalars);
-  /// That of the last row; 0 where there is none.
+  /// Update of the last row; 0 where there is none.
   int64_t last_update() const { return last_update_; }
 
  private:
@@ -34,7 +34,7 @@ class ProgressCsv {
   int64_t last_update_ = 0;
 };
 
-/// What one update did.
+/// Record of one update.
 struct UpdateRecord {
   SimulatorTotals totals;  // counted in its rollout
   UpdateStats stats;
@@ -44,7 +44,7 @@ struct UpdateRecord {
   ImageSize image_size;                // of the first camera; 0 without images
 };
 
-/// What an evaluation within a run gave.
+/// Results of an evaluation within a run.
 struct EvaluationRecord {
   EvaluateRow row;
   std::optional<EvaluateRow> average_row;  // of the average of weights, for runs that have one
@@ -65,12 +65,12 @@ class RunLog {
 
   /// Writes the row and the event of an evaluation after `update` updates. Its time counts in no rate.
   void add_evaluation(int64_t update, int64_t agent_steps, const EvaluationRecord& record);
-  /// Whether its file has no row of one after `update` updates; false where it writes none.
+  /// Whether evaluation.csv lacks a row after `update` updates; false where there is no such file.
   bool lacks_evaluation(int64_t update) const { return evaluation_csv_ && evaluation_csv_->last_update() != update; }
-  /// What those of this process took.
+  /// Wall time of this process's evaluations.
   double evaluation_s() const { return evaluation_s_; }
 
-  /// What the mean return of the last updates is made of.
+  /// Last updates, over which episode_return() is the mean.
   std::vector<RecentUpdate> recent() const { return {recent_.begin(), recent_.end()}; }
   /// Mean over agent episodes that ended in the last updates; NaN before the first.
   double episode_return() const;

@@ -1,5 +1,5 @@
-// How long a run's updates and evaluations take on this machine, and whether one more ends within the time it was
-// given.
+// Time of a run: how long its updates and evaluations take on this machine, and whether one more ends within the time
+// that the run was given.
 #pragma once
 
 #include <string>
@@ -18,13 +18,14 @@ class RunTime {
   /// this (Run::longest_update_s), so that it is known from its first update on where it was on such a machine before.
   RunTime(double minutes, const Stopwatch& start, Run* run);
 
-  /// Whether more of the work, as long as the longest before, would end too late on some rank. All ranks must ask.
+  /// Whether more of the work, as long as the longest before, would end too late on some rank. Collective: every rank
+  /// must call it.
   bool is_too_short_for(RunWork work) const;
-  /// That work took so long.
+  /// Records how long work took.
   void add(RunWork work, double seconds);
   /// Expects work to take so many times as long, until it is measured anew.
   void expect_growth(double times);
-  /// The progress's end is that of the time, where it comes first.
+  /// Limits progress->eta_s to the time that is left.
   void bound(TrainProgress* progress) const;
 
  private:

@@ -1,4 +1,4 @@
-// The exponential average of a policy's weights over updates (train.weight_average), which smooths the noise of single
+// Exponential average of a policy's weights over updates (train.weight_average), which smooths the noise of single
 // updates.
 #pragma once
 
@@ -10,7 +10,7 @@ namespace pictura {
 /// equal averages, to the bit.
 class WeightAverage {
  public:
-  /// Begins with the policy's parameters as they are. The policy must outlive this; half_life_updates > 0.
+  /// Average that begins with the policy's parameters as they are. The policy must outlive it; half_life_updates > 0.
   WeightAverage(const Policy& policy, double half_life_updates);
 
   /// Begins again with the policy's parameters, with no update averaged.
@@ -29,7 +29,7 @@ class WeightAverage {
   double weight_;
 };
 
-/// Gives a policy other parameters in place for as long as it lives, and then its own again, to the bit.
+/// Replaces a policy's parameters in place for as long as it lives, and restores them then, to the bit.
 class ReplacedWeights {
  public:
   /// `values` are in the order of the policy's parameters.

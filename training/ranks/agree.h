@@ -1,5 +1,4 @@
-// What the ranks of a run must agree on before they go on: their settings, the files that they begin with, and when to
-// end or save.
+// Agreement of a run's ranks on their settings, on the files that they begin with, and on when to end.
 #pragma once
 
 #include <string>
@@ -9,17 +8,17 @@
 
 namespace pictura {
 
-/// Throws Error on every rank, naming the key, where two ranks would not train the same. `manner`: what else must be
-/// equal, as a text.
+/// Throws Error on every rank, naming the key, where two ranks' settings differ. `manner`: what else must be equal, as
+/// a text.
 void check_equal_settings(const Config& config, const std::string& manner, Ranks* ranks);
 
-/// Whether any rank says so.
+/// Whether `is_so` holds on any rank.
 bool any_rank(bool is_so, Communicator* communicator);
 
-/// Whether ^C or the like came to any rank. From then on it has come to this one (common/support/interrupt.h).
+/// Whether ^C or the like came to any rank. If so, this rank counts as interrupted too (common/support/interrupt.h).
 bool any_rank_interrupted(Communicator* communicator);
 
-/// The bytes of a checkpoint or of weights, which the first rank alone reads.
+/// Bytes of a checkpoint or of weights, which the first rank alone reads.
 std::string file_of_first(const std::string& path, Communicator* communicator);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// What the ranks of a run compute together: sums, maxima and copies of tensors. Every rank gets the same bits.
+// Communicator of a run's ranks: sums, maxima and copies of tensors. Every rank gets the same bits.
 #pragma once
 
 #include <memory>
@@ -14,9 +14,9 @@ namespace pictura {
 
 class Ranks;
 
-/// All ranks make the same calls in the same order, with tensors without gaps of equal type and size: f32, f64, i32,
-/// i64 or u8, on the host or on the communicator's device. Results are in place; on a device nothing waits for them.
-/// Throws RankLost, naming it, where a rank has ended or hangs.
+/// Collective operations: all ranks make the same calls in the same order, with contiguous tensors of equal type and
+/// size: f32, f64, i32, i64 or u8, on the host or on the communicator's device. Results are in place; on a device
+/// nothing waits for them. Throws RankLost, naming the rank, where one has ended or hangs.
 class Communicator {
  public:
   virtual ~Communicator() = default;
@@ -32,30 +32,30 @@ class Communicator {
 
   virtual void sum(const at::Tensor& tensor) = 0;
   virtual void max(const at::Tensor& tensor) = 0;
-  /// From rank `root` to all.
+  /// Copies rank `root`'s tensor to all.
   virtual void broadcast(const at::Tensor& tensor, int root) = 0;
-  /// A sign that this rank goes on, between calls that are far apart: as many of all ranks.
+  /// Heartbeat of this rank between calls that are far apart, as many on every rank.
   virtual void step() = 0;
 
-  /// Of single numbers on the host.
+  /// Maximum of numbers on the host.
   double max_of(double value);
-  /// The bytes of every rank, which may differ in number, in order of ranks.
+  /// Bytes of every rank, which may differ in number, in order of ranks.
   std::vector<std::vector<uint8_t>> gather(const std::vector<uint8_t>& bytes);
   /// Rank 0's bytes.
   std::string from_first(const std::string& bytes);
 };
 
-/// What the simulators of all ranks have counted.
+/// Totals of the simulators of all ranks.
 SimulatorTotals totals_of_all(SimulatorTotals own, Communicator* communicator);
 
-/// Of one process alone: nothing is sent. It lives as long as the process.
+/// Communicator of one process alone, which lives as long as the process.
 Communicator* alone();
 
-/// How these ranks compute together: alone, through NCCL where they learn on CUDA devices, one each, or through Gloo.
-/// Throws Error where this build or this machine lacks what that needs. `ranks` must outlive it.
+/// Communicator of these ranks: alone(), NCCL where they learn on CUDA devices, one each, or Gloo. Throws Error where
+/// this build or this machine lacks what that needs. `ranks` must outlive it.
 std::unique_ptr<Communicator> make_communicator(Ranks* ranks, Device device);
 
-/// These in particular. A single rank may have one too.
+/// Communicator through Gloo or NCCL, of any number of ranks.
 std::unique_ptr<Communicator> make_gloo_communicator(Ranks* ranks);
 std::unique_ptr<Communicator> make_nccl_communicator(Ranks* ranks, Device device);
 

@@ -1,11 +1,11 @@
-// How a process learns which of several it is: from the variables that torchrun, SLURM or a person set.
+// Launch of several processes that train together, from the variables that torchrun, SLURM or a person set.
 #pragma once
 
 #include <string>
 
 namespace pictura {
 
-/// One of the processes that train together. By itself it is the only one.
+/// Place of a process among those that train together; by default it is the only one.
 struct Launch {
   int rank = 0, size = 1;
   int local_rank = 0;                 // among the processes of its host
@@ -15,12 +15,12 @@ struct Launch {
   std::string attempt;                // names one of a launcher's attempts
 };
 
-/// From RANK, WORLD_SIZE, LOCAL_RANK (absent: RANK), MASTER_ADDR (127.0.0.1) and MASTER_PORT (29500), as torchrun sets
-/// them, or from what SLURM's srun sets, where MASTER_ADDR is by default the first host of the step. Without any of
-/// them there is one process. Throws Error naming the variable that is missing or makes no sense.
+/// Launch from RANK, WORLD_SIZE, LOCAL_RANK (absent: RANK), MASTER_ADDR (127.0.0.1) and MASTER_PORT (29500), as
+/// torchrun sets them, or from what SLURM's srun sets, where MASTER_ADDR is by default the first host of the step.
+/// Without any of them there is one process. Throws Error naming the variable that is missing or makes no sense.
 Launch launch_from_environment();
 
-/// The first host of SLURM's list: "node7" of "node[7-9,12],other".
+/// First host of SLURM's list: "node7" of "node[7-9,12],other".
 std::string first_slurm_host(const std::string& list);
 
 }  // namespace pictura

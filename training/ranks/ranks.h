@@ -1,5 +1,5 @@
-// The processes of a training run: they meet in a key-value store, tell each other there that they are alive and go on,
-// and learn which of them ended or hangs. What they compute together goes through a Communicator.
+// Ranks: the processes of a training run. They meet in a key-value store, where each writes that it is alive and goes
+// on, and finds out which others ended or hang. What they compute together goes through a Communicator.
 #pragma once
 
 #include <atomic>
@@ -23,19 +23,19 @@ class RankLost : public Error {
   using Error::Error;
 };
 
-/// How long the others may be silent.
+/// Time limits for other ranks.
 struct Patience {
   double join_s = 300;        // until all are there
-  double silent_s = 20;       // without a sign of life: the process was killed or stopped, or its host is gone
-  double no_progress_s = 45;  // with signs of life, but without a step: it hangs; Ranks::set_no_progress_s
+  double silent_s = 20;       // without a heartbeat: the process was killed or stopped, or its host is gone
+  double no_progress_s = 45;  // with heartbeats, but without a step: it hangs; Ranks::set_no_progress_s
 };
 
 class Ranks {
  public:
-  /// Waits until all are there. Throws Error naming address and port where they cannot meet, the ranks that did not
-  /// come, and a rank that two processes claim.
+  /// Waits until all ranks have joined. Throws Error naming address and port where they cannot meet, the ranks that did
+  /// not come, and a rank that two processes claim.
   explicit Ranks(const Launch& launch, const Patience& patience = {});
-  /// Waits a moment for the others where they meet at this process.
+  /// Waits a moment for the other ranks where they meet at this process.
   ~Ranks();
   Ranks(const Ranks&) = delete;
   Ranks& operator=(const Ranks&) = delete;
@@ -44,21 +44,21 @@ class Ranks {
   int rank() const { return launch_.rank; }
   int size() const { return launch_.size; }
 
-  /// Says that this process has come a step further, of which all ranks take equally many, and throws RankLost, saying
-  /// which rank, when another one is lost.
+  /// Counts a step of this process, of which all ranks take equally many. Throws RankLost, naming the rank, where
+  /// another one is lost.
   void step();
-  /// The same without a step.
+  /// Throws RankLost as step() does, without a step.
   void check() const;
-  /// Waits until the loss of a rank is found out, after an operation with the others has failed, and throws RankLost.
+  /// Waits until the loss of a rank is found, after an operation with the others has failed, and throws RankLost.
   /// Returns where no rank is lost.
   void find_lost() const;
-  /// Says to the others why this process ends. The first to do so is heard.
+  /// Announces to the other ranks why this process ends. The first announcement counts.
   void announce(const std::string& why) noexcept;
 
-  /// Another time without a step after which a rank is taken for one that hangs, where steps may take longer.
+  /// Sets the time without a step after which a rank is taken for one that hangs, where steps may take longer.
   void set_no_progress_s(double seconds) { no_progress_s_ = seconds; }
 
-  /// While it lives this process takes no step for long, and is not taken for one that hangs.
+  /// Scope in which this process takes no step for long, and is not taken for one that hangs.
   class LongWork {
    public:
     explicit LongWork(Ranks* ranks) : ranks_(ranks) { ++ranks_->busy_; }
@@ -70,12 +70,13 @@ class Ranks {
     Ranks* ranks_;
   };
 
-  /// Every rank's text under a key that is used once, in order of ranks. All must call it.
+  /// Every rank's text under a key that is used once, in order of ranks. Collective: every rank must call it.
   std::vector<std::string> texts(const std::string& key, const std::string& own);
 
-  /// For process groups; null where there is one rank alone.
+  /// Store for process groups; null where there is one rank alone.
   const c10::intrusive_ptr<c10d::Store>& store() const { return store_; }
-  /// Calls `abort` from another thread when a rank is lost, so that what waits for it ends. One at a time; empty: none.
+  /// Sets what is called from another thread when a rank is lost, so that calls that wait for it end. One at a time;
+  /// empty: none.
   void on_lost(std::function<void()> abort);
 
  private:
@@ -90,7 +91,7 @@ class Ranks {
   std::atomic<int64_t> steps_ = 0;
   std::atomic<int> busy_ = 0;
   std::atomic<bool> is_lost_ = false;
-  mutable std::mutex mutex_;  // of what follows
+  mutable std::mutex mutex_;  // guards the members below
   mutable std::condition_variable changed_;
   bool ends_ = false;
   std::string why_lost_;

@@ -1,5 +1,6 @@
-// Which transitions are learnt from (paper, appendix, optimization; after Gigaflow): those whose advantage is not small
-// against an exponential average over rollouts, of their largest |advantage| or of a quantile of their |advantages|.
+// Advantage filter (paper, appendix, optimization; after Gigaflow): transitions are learnt from whose advantage is not
+// small against an exponential average over rollouts, of their largest |advantage| or of a quantile of their
+// |advantages|.
 #pragma once
 
 #include <algorithm>
@@ -10,13 +11,13 @@
 
 namespace pictura {
 
-/// The average after a rollout whose largest |advantage|, or quantile, is `newest`; a negative average means: none
-/// before.
+/// Average after a rollout whose largest |advantage|, or quantile, is `newest`. A negative average stands for no
+/// rollout before.
 PICTURA_HD inline double filter_average(double average, float newest, double ema) {
   return average < 0 ? static_cast<double>(newest) : ema * static_cast<double>(newest) + (1 - ema) * average;
 }
 
-/// The least |advantage| that is kept.
+/// Smallest |advantage| that is kept.
 PICTURA_HD inline float filter_threshold(double average, double fraction) {
   return static_cast<float>(fraction * average);
 }
@@ -36,10 +37,10 @@ PICTURA_HD inline int filter_bin(float advantage) {
   return bin < kNotFiniteBin ? bin : kNotFiniteBin;
 }
 
-/// The least |advantage| of a bin.
+/// Smallest |advantage| of a bin.
 inline float filter_bin_begin(int bin) { return __builtin_bit_cast(float, static_cast<uint32_t>(bin) << 16); }
 
-/// The |advantage| below which a share of those lies that were counted in finite bins, assuming that each bin's are
+/// Quantile of the |advantages| that were counted in finite bins, `share` of which lie below it, if each bin's are
 /// spread evenly over it; 0 where there are none.
 inline float filter_quantile(Span<const int64_t> counts, double share) {
   int64_t all = 0;

@@ -6,7 +6,7 @@
 
 namespace pictura {
 
-/// One step of one agent. One that is
+/// Step of one agent. A step that is
 ///   terminated  does not bootstrap;
 ///   truncated   bootstraps from the value of the next row, which is the final observation's: the world is reset by the
 ///               next call, whose transition is not valid; nothing flows back over the end of an episode;
@@ -17,14 +17,14 @@ struct GaeTransition {
   bool is_terminated, is_truncated, is_valid, is_decision;
 };
 
-/// What comes after a step, as seen from it: the discounted rewards up to the next decision with the value there, and
-/// the discounted advantage of that decision.
+/// Tail of a slot after a step: the discounted rewards up to the next decision with the value there, and the discounted
+/// advantage of that decision.
 struct GaeTail {
   float value = 0, advantage = 0;
 };
 
-/// The advantage of a step's decision, 0 where there is none, given what comes after the slot's next step; sets that to
-/// what comes after the step before. Discounts by gamma each step, by gae_lambda each decision: an action held for k
+/// Returns the advantage of a step's decision, 0 where there is none, given the tail after the step; sets that to the
+/// tail after the step before. Discounts by gamma each step, by gae_lambda each decision: an action held for k
 /// steps returns the sum of gamma^i r_i and bootstraps with gamma^k.
 PICTURA_HD inline float gae_advantage(const GaeTransition& transition, float gamma, float gae_lambda,
                                       GaeTail* tail_inout) {
@@ -46,7 +46,7 @@ PICTURA_HD inline float gae_advantage(const GaeTransition& transition, float gam
   return advantage;
 }
 
-/// A rollout's steps, [steps, slots] each, but for `values`, which has one step more.
+/// Arrays of a rollout, [steps, slots] each, but for `values`, which has one step more.
 struct TransitionArrays {
   Span<const float> rewards, values;
   Span<const uint8_t> terminated, truncated, valid;
@@ -58,7 +58,7 @@ struct TransitionArrays {
     return {rewards[i],        values[i],     values[i + static_cast<size_t>(num_slots)], terminated[i] != 0,
             truncated[i] != 0, valid[i] != 0, decides.empty() || decides[i] != 0};
   }
-  /// What comes after the last step.
+  /// Tail after the last step.
   PICTURA_HD GaeTail tail(int64_t slot) const { return {values[num_steps * num_slots + slot], 0.0f}; }
 };
 

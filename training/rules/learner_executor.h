@@ -1,5 +1,5 @@
-// What a learner does besides its network: the rules of this folder over whole rollouts. Executors for the host and for
-// CUDA devices give the same bits.
+// Executor of a learner's work besides its network: the rules of this folder over whole rollouts. Those for the host
+// and for CUDA devices give the same bits.
 #pragma once
 
 #include "pictura/policy/rules/policy_executor.h"
@@ -8,18 +8,18 @@
 
 namespace pictura {
 
-/// It does what policies that only drive need, too.
+/// Executor for learning; as a PolicyExecutor it also serves policies that only drive.
 class LearnerExecutor : public PolicyExecutor {
  public:
-  /// Generalized advantages, see gae.h. advantages_out: [steps, slots].
+  /// Computes generalized advantages, see gae.h. advantages_out: [steps, slots].
   virtual void compute_advantages(const TransitionArrays& transitions, float gamma, float gae_lambda,
                                   Span<float> advantages_out, Stream stream = {}) = 0;
   /// Adds the valid transitions to the bins of their |advantages|, see advantage_filter.h. counts_inout:
   /// [kNumFilterBins].
   virtual void count_advantages(Span<const float> advantages, Span<const uint8_t> valid, Span<int64_t> counts_inout,
                                 Stream stream = {}) = 0;
-  /// The transitions that the advantage filter keeps, in ascending order, see advantage_filter.h. kept_out has room for
-  /// all. Returns their number.
+  /// Writes the transitions that the advantage filter keeps, in ascending order, see advantage_filter.h. kept_out has
+  /// room for all. Returns their number.
   virtual int64_t select_kept(Span<const float> advantages, Span<const uint8_t> valid, float threshold,
                               Span<int64_t> kept_out, Stream stream = {}) = 0;
   /// items_out[i] = items[permutation(i)].

@@ -1,18 +1,18 @@
-// In which order an epoch takes its transitions: a permutation that is computed one element at a time, so that any
-// number of threads, devices or ranks can each take their part of it.
+// Order of an epoch's transitions: a permutation that is computed one element at a time, so that any number of threads,
+// devices or ranks can each take their part of it.
 #pragma once
 
 #include "pictura/common/rng.h"
 
 namespace pictura {
 
-/// One permutation of [0, size): a Feistel network (Luby and Rackoff, 1988) over the next even number of bits, whose
+/// Permutation of [0, size): a Feistel network (Luby and Rackoff, 1988) over the next even number of bits, whose
 /// rounds draw from Philox, walked until it lands below size.
 struct Permutation {
   uint64_t seed = 0;
   uint32_t update = 0, epoch = 0;
   int64_t size = 0;   // in [0, 2^60]
-  int half_bits = 1;  // of half an element
+  int half_bits = 1;  // bits of half an element
 
   PICTURA_HD Permutation(uint64_t its_seed, int64_t its_update, int64_t its_epoch, int64_t its_size)
       : seed(its_seed),
@@ -22,7 +22,7 @@ struct Permutation {
     while ((int64_t{1} << (2 * half_bits)) < size) ++half_bits;
   }
 
-  /// Where element i, in [0, size), goes. Fewer than four steps are walked on average.
+  /// Place of element i, in [0, size). Fewer than four steps are walked on average.
   PICTURA_HD int64_t operator()(int64_t i) const {
     auto element = static_cast<uint64_t>(i);
     do element = encrypted(element);
