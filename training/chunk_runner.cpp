@@ -86,35 +86,33 @@ void ChunkRunner::set_targets(const Targets& targets) {
 
 at::Tensor ChunkRunner::add_gradients(const Minibatch& minibatch, int64_t forward_chunk, const LossFunction& loss) {
   stats_.zero_();
-  for_each_chunk(minibatch.rows, {forward_chunk}, [&](const Chunk& chunk) {
-    learn(minibatch.part(chunk), static_cast<double>(chunk.count) / static_cast<double>(minibatch.global_size), loss);
+  for_each_chunk(minibatch.rows, {forward_chunk}, [&](const Chunk& of_rows) {
+    const Minibatch chunk = minibatch.part(of_rows);
+    Work& work = observe(chunk.rows);
+    set(&work.chunk.advantages, chunk.advantages);
+    // A product with 1 changes no bit, so one graph serves full chunks and those that are filled up.
+    set(&work.chunk.shares,
+        chunk.shares.defined() || !graphs_->are_used() ? chunk.shares : at::ones_like(chunk.advantages));
+    if (!work.weight.defined()) work.weight = at::empty({}, stats_.options());
+    work.weight.fill_(static_cast<double>(of_rows.count) / static_cast<double>(minibatch.global_size));
+
+    // Both halves are done one way: graphs keep nothing from which calls could go on backwards.
+    const Mode mode = work.learn.next_mode(*graphs_, work.observe.is_captured());
+    if (mode == Mode::capture) graphs_->make_room();
+    {
+      const PhaseTimer::Scope timed(timer_, Phase::learn);
+      work.learn.run(mode, graphs_,
+                     [&] { work.losses = loss(policy_.forward(work.observation), targets_, work.chunk); });
+    }
+    const PhaseTimer::Scope timed(timer_, Phase::backward);
+    work.backward.run(mode, graphs_, [&] {
+      const Losses& losses = work.losses;
+      (losses.total * work.weight.to(losses.total.scalar_type())).backward();
+      stats_.narrow(0, 0, losses.stats.size(0)) += work.weight * losses.stats;
+    });
+    work.losses = {};
   });
   return stats_;
-}
-
-void ChunkRunner::learn(const Minibatch& chunk, double weight, const LossFunction& loss) {
-  Work& work = observe(chunk.rows);
-  set(&work.chunk.advantages, chunk.advantages);
-  // A product with 1 changes no bit, so one graph serves full chunks and those that are filled up.
-  set(&work.chunk.shares,
-      chunk.shares.defined() || !graphs_->are_used() ? chunk.shares : at::ones_like(chunk.advantages));
-  if (!work.weight.defined()) work.weight = at::empty({}, stats_.options());
-  work.weight.fill_(weight);
-
-  // Both halves are done one way: graphs keep nothing from which calls could go on backwards.
-  const Mode mode = work.learn.next_mode(*graphs_, work.observe.is_captured());
-  if (mode == Mode::capture) graphs_->make_room();
-  {
-    const PhaseTimer::Scope timed(timer_, Phase::learn);
-    work.learn.run(mode, graphs_, [&] { work.losses = loss(policy_.forward(work.observation), targets_, work.chunk); });
-  }
-  const PhaseTimer::Scope timed(timer_, Phase::backward);
-  work.backward.run(mode, graphs_, [&] {
-    const Losses& losses = work.losses;
-    (losses.total * work.weight.to(losses.total.scalar_type())).backward();
-    stats_.narrow(0, 0, losses.stats.size(0)) += work.weight * losses.stats;
-  });
-  work.losses = {};
 }
 
 Losses ChunkRunner::losses(const Minibatch& chunk, const LossFunction& loss) {

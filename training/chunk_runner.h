@@ -74,7 +74,6 @@ class ChunkRunner {
 
   Work& work_of(int64_t size);
   Work& observe(const at::Tensor& rows);
-  void learn(const Minibatch& chunk, double weight, const LossFunction& loss);
   void set(at::Tensor* to, const at::Tensor& value) const;
 
   const Policy& policy_;

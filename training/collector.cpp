@@ -2,6 +2,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
+#include "pictura/training/schedule.h"
 
 namespace pictura {
 
@@ -100,7 +101,7 @@ void Collector::hold_actions(int64_t step, const at::Tensor& deciding) {
 }
 
 void Collector::ask_teacher(int64_t step, const at::Tensor& slots) {
-  if (run_.teacher_weight() == 0) return;
+  if (teacher_weight_at(run_.config.train, run_.agent_steps) == 0) return;
   const PhaseTimer::Scope timed(&run_.timer, Phase::forward);
   run_.rollout.teacher_log_probs.select(0, step).index_copy_(0, slots,
                                                              run_.teacher->log_probs(run_.simulator->arrays(), slots));

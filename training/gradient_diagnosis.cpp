@@ -6,36 +6,30 @@
 
 namespace pictura {
 
-namespace {
-
-// A loss's gradient over all parameters, as one vector. Before and after there is none.
-at::Tensor gradient_of(const at::Tensor& loss, Optimizer* optimizer) {
-  loss.backward(/*gradient=*/{}, /*retain_graph=*/true);
-  const at::Tensor gradient = optimizer->gradients().clone();
-  optimizer->clear_gradients();
-  return gradient;
-}
-
-}  // namespace
-
 void GradientDiagnosis::measure(const Minibatch& first, const Minibatches& minibatches, const LossFunction& loss,
                                 const TrainSection& config, const Learner& learner) {
   constexpr int64_t kPassesPerDiagnosed = 100, kMaxDiagnosed = 1024;
   const int64_t num_diagnosed =
       std::clamp<int64_t>(minibatches.global_size() * config.update_epochs / kPassesPerDiagnosed, 1,
                           std::min({kMaxDiagnosed, config.forward_chunk, first.global_size}));
-  const Minibatch diagnosed = first.first(minibatches.own_of_first(num_diagnosed));
-  Optimizer* const optimizer = learner.optimizer;
-  at::Tensor gradients = at::zeros({3, optimizer->gradients().numel()}, optimizer->gradients().options());
+  const at::Tensor rows = first.rows.narrow(0, 0, minibatches.own_of_first(num_diagnosed));
+  const at::Tensor& gradient = learner.optimizer->gradients();
+  at::Tensor gradients = at::zeros({3, gradient.numel()}, gradient.options());
   // One chunk, or none where all of them are other ranks'.
-  for_each_chunk(diagnosed.rows, {config.forward_chunk}, [&](const Chunk& chunk) {
-    const Losses losses = learner.runner->losses(diagnosed.part(chunk), loss);
+  for_each_chunk(rows, {config.forward_chunk}, [&](const Chunk& chunk) {
+    const Losses losses = learner.runner->losses(first.part(chunk), loss);
     const PhaseTimer::Scope timed(learner.timer, Phase::diagnose);
-    gradients = at::stack({gradient_of(losses.policy, optimizer), gradient_of(config.vf_coef * losses.value, optimizer),
-                           gradient_of(config.ent_coef * losses.entropy, optimizer)});
+    const auto gradient_of = [&](const at::Tensor& single_loss) {
+      single_loss.backward(/*gradient=*/{}, /*retain_graph=*/true);
+      const at::Tensor result = gradient.clone();
+      learner.optimizer->clear_gradients();
+      return result;
+    };
+    gradients = at::stack({gradient_of(losses.policy), gradient_of(config.vf_coef * losses.value),
+                           gradient_of(config.ent_coef * losses.entropy)});
   });
   const PhaseTimer::Scope timed(learner.timer, Phase::diagnose);
-  const at::Tensor sums = at::constant_pad_nd(gradients, {0, 1}, 1) * diagnosed.rows.size(0);
+  const at::Tensor sums = at::constant_pad_nd(gradients, {0, 1}, 1) * rows.size(0);
   learner.communicator->sum(sums);
   norms_ = (sums.slice(1, 0, -1).norm(2, {1}) / sums.select(1, -1)).to(at::kDouble);
 }

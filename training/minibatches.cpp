@@ -10,11 +10,6 @@ constexpr int64_t kOfAnotherRank = -1;
 
 }  // namespace
 
-Minibatch Minibatch::first(int64_t count) const {
-  return {rows.narrow(0, 0, count), global_size, advantages.narrow(0, 0, count),
-          shares.defined() ? shares.narrow(0, 0, count) : shares};
-}
-
 Minibatch Minibatch::part(const Chunk& chunk) const {
   Minibatch result{chunk.rows, global_size, chunk.take(advantages), shares.defined() ? chunk.take(shares) : shares};
   if (chunk.count == chunk.size()) return result;

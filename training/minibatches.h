@@ -14,7 +14,6 @@ struct Minibatch {
   at::Tensor advantages;    // [n], as the losses take them
   at::Tensor shares;        // [n], what each row counts in means; undefined where each counts as one
 
-  Minibatch first(int64_t count) const;
   /// Rows of a chunk of `rows`. Those that fill it up count nothing.
   Minibatch part(const Chunk& chunk) const;
 };

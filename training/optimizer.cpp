@@ -50,10 +50,6 @@ at::Tensor Optimizer::gradient_norm() const {
   return norm;
 }
 
-void Optimizer::clip_gradients(const at::Tensor& norm) {
-  gradients_.mul_((config_.max_grad_norm / (norm + 1e-6)).clamp_max(1.0));
-}
-
 void Optimizer::step(double learning_rate, const at::Tensor& failed) {
   const at::NoGradGuard no_grad;
   ++steps;

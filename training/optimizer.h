@@ -16,8 +16,6 @@ class Optimizer {
 
   /// Norm of the gradients, f32 scalar on their device, which nothing waits for; see rate_factors.
   at::Tensor gradient_norm() const;
-  /// Scales the gradients, which have this norm, down to max_grad_norm.
-  void clip_gradients(const at::Tensor& norm);
   /// Steps along the parameters' gradients, and clears them. failed: f32 scalar on their device; where it is not 0,
   /// neither parameters nor moments change, whatever the gradients are.
   void step(double learning_rate, const at::Tensor& failed);

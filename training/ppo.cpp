@@ -13,6 +13,7 @@
 #include "pictura/policy/precision.h"
 #include "pictura/policy/torch_device.h"
 #include "pictura/policy/value_head.h"
+#include "pictura/training/rules/advantage_filter.h"
 
 namespace pictura {
 
@@ -138,8 +139,9 @@ class PpoUpdate {
     const bool by_quantile = config_.adv_filter == FilterThreshold::quantile;
     const float newest = by_quantile ? quantile_of_advantages() : largest_advantage();
     PICTURA_CHECK(std::isfinite(newest), "update {}: an advantage is not finite", key_.update + 1);
-    const float threshold =
-        learner_.filter->threshold(newest, config_.adv_filter_ema, by_quantile ? 1 : config_.adv_filter_threshold);
+    double& average = learner_.filter->average;
+    average = filter_average(average, newest, config_.adv_filter_ema);
+    const float threshold = filter_threshold(average, by_quantile ? 1 : config_.adv_filter_threshold);
     stats_.adv_threshold = static_cast<double>(threshold);
     const at::Tensor kept_and_unused = at::empty_like(advantages_, at::kLong);
     const int64_t num_kept =
@@ -253,7 +255,7 @@ class PpoUpdate {
     learner_.communicator->sum(optimizer.gradients());
     const at::Tensor norm = optimizer.gradient_norm();
     const at::Tensor failed = (norm + loss).isfinite().logical_not().to(at::kFloat);
-    optimizer.clip_gradients(norm);
+    optimizer.gradients().mul_((config_.max_grad_norm / (norm + 1e-6)).clamp_max(1.0));
     optimizer.step(key_.learning_rate, failed);
 
     elements_of(minibatch_stats).grad_norm.copy_(norm);

@@ -9,20 +9,12 @@
 #include "pictura/training/chunk_runner.h"
 #include "pictura/training/gradient_diagnosis.h"
 #include "pictura/training/optimizer.h"
-#include "pictura/training/rules/advantage_filter.h"
 
 namespace pictura {
 
 /// Memory of the advantage filter (rules/advantage_filter.h) from rollout to rollout.
 struct AdvantageFilter {
   double average = -1;  // of the rollouts' maxima or quantiles; negative before the first
-
-  /// Adds the newest rollout's largest |advantage|, or its quantile. Returns the smallest |advantage| that is kept:
-  /// that fraction of the average.
-  float threshold(float newest, double ema, double fraction) {
-    average = filter_average(average, newest, ema);
-    return filter_threshold(average, fraction);
-  }
 };
 
 /// Bounds of the difference between a rollout's log-probabilities and the learner's before the first step, when they

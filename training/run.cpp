@@ -125,7 +125,8 @@ Checkpoint Run::checkpoint(const std::vector<RecentUpdate>& recent) const {
 }
 
 UpdateStats Run::improve() {
-  const UpdateKey key{config.run.seed, update, learning_rate_at(config.train, agent_steps), teacher_weight()};
+  const UpdateKey key{config.run.seed, update, learning_rate_at(config.train, agent_steps),
+                      teacher_weight_at(config.train, agent_steps)};
   UpdateStats stats;
   on_stream([&] {
     stats =
@@ -134,8 +135,6 @@ UpdateStats Run::improve() {
   });
   return stats;
 }
-
-double Run::teacher_weight() const { return teacher_weight_at(config.train, agent_steps); }
 
 std::string Run::update_image_size() {
   if (config.render.schedule.empty()) return "";

@@ -39,8 +39,6 @@ struct Run {
   std::string restore(const Checkpoint& saved);
   /// Improves the policy on the rollout. Throws what ppo_update() throws.
   UpdateStats improve();
-  /// Weight of the teacher in this update; 0 without one.
-  double teacher_weight() const;
   /// Throws Error naming a parameter in which the ranks' policies differ by a bit.
   void check_ranks_agree() const;
 

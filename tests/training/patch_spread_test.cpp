@@ -71,14 +71,8 @@ Observation blocks_of(int64_t pixels) {
 }
 
 struct GrowingPolicy {
-  explicit GrowingPolicy(double max_grad_norm)
-      : policy(small_section(2), 3, 1), optimizer(policy, setting(max_grad_norm)) {}
-  static TrainSection setting(double max_grad_norm) {
-    TrainSection train;
-    train.max_grad_norm = max_grad_norm;
-    train.weight_decay = 0.1;
-    return train;
-  }
+  explicit GrowingPolicy(double its_max_grad_norm)
+      : max_grad_norm(its_max_grad_norm), policy(small_section(2), 3, 1), optimizer(policy, {.weight_decay = 0.1}) {}
   at::Tensor logits() const {
     const at::NoGradGuard no_grad;
     return policy.forward(blocks_of(pixels)).logits;
@@ -89,7 +83,7 @@ struct GrowingPolicy {
     const at::Tensor loss = (at::log_softmax(output.logits, 1) * targets).sum() + output.value.square().sum();
     loss.backward();
     const at::Tensor gradient_norm = optimizer.gradient_norm();
-    optimizer.clip_gradients(gradient_norm);
+    optimizer.gradients().mul_((max_grad_norm / gradient_norm).clamp_max(1.0));
     optimizer.step(1e-2, at::zeros({}));
     norm = gradient_norm.item<double>();
   }
@@ -97,6 +91,7 @@ struct GrowingPolicy {
     spread_first_convolution(policy, factor, &optimizer);
     pixels *= factor;
   }
+  const double max_grad_norm;
   int pixels = 1;
   double norm = 0;  // of the last step's gradient
   PolicyNetwork policy;

@@ -102,10 +102,12 @@ TEST(Gae, TruncationBootstrapsTerminationDoesNotAndResetsAreMasked) {
 }
 
 TEST(AdvantageFilter, FollowsTheExponentialAverageOfTheMaxima) {
-  AdvantageFilter filter;
-  EXPECT_FLOAT_EQ(filter.threshold(8, 0.25, 0.01), 0.08f);
-  EXPECT_FLOAT_EQ(filter.threshold(4, 0.25, 0.01), 0.07f);  // 0.25 * 4 + 0.75 * 8 = 7
-  EXPECT_FLOAT_EQ(filter.threshold(0, 0.25, 0.01), 0.0525f);
+  double average = AdvantageFilter{}.average;
+  for (const auto& [newest, expected] : {std::pair{8.0f, 8.0}, {4.0f, 0.25 * 4 + 0.75 * 8}, {0.0f, 0.75 * 7}}) {
+    average = filter_average(average, newest, 0.25);
+    EXPECT_DOUBLE_EQ(average, expected);
+  }
+  EXPECT_EQ(filter_threshold(average, 0.01), 0.0525f);
 }
 
 // Bins of 1, 2, 3 and 4 begin at these numbers.
