@@ -85,7 +85,7 @@ at::Tensor Collector::record(int64_t step) {
   const SimulatorArrays input = run_.simulator->arrays();
   const at::Tensor slots =
       clock_.deciding(input, active_slots(input, {}, true, run_.executor.get()), step, run_.simulator->episode_over());
-  // Those whose images are kept are others every time.
+  // The slots whose images are kept differ from rollout to rollout, so no graph can record them.
   if (observations.keep_images())
     observations.record(step, seen_slots(run_, slots));
   else

@@ -60,7 +60,7 @@ GraphMemory::~GraphMemory() {
   try {
     release();
   } catch (const std::exception&) {
-    // The device is lost, which whoever waits for it is told.
+    // The device is lost: the next call that waits for it throws.
   }
 }
 #else

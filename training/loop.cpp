@@ -32,10 +32,10 @@ namespace pictura {
 
 namespace {
 
-// Updates, one after another, until there is nothing more to do, no time left, or a request to end.
+// Loop of updates until there is nothing more to do, no time left, or a request to end.
 class TrainingLoop {
  public:
-  /// What is given must outlive it.
+  /// The arguments must outlive it.
   TrainingLoop(const TrainOptions& options, Ranks* ranks, RunKeeper* keeper, RunTime* time, RunLog* log, Run* run)
       : options_(options),
         ranks_(*ranks),
@@ -66,7 +66,7 @@ class TrainingLoop {
 
   bool is_interrupted() const { return is_interrupted_; }
   bool is_out_of_time() const { return is_out_of_time_; }
-  /// As of the last update.
+  /// Rate as of the last update.
   double agent_steps_per_s() const { return agent_steps_per_s_; }
 
  private:
@@ -165,7 +165,7 @@ class TrainingLoop {
   double agent_steps_per_s_ = 0;
 };
 
-// What torch has for all of a process.
+// Sets what torch has once for a whole process.
 void set_up_torch(const Config& config, Device device) {
   if (device.is_host()) keep_freed_memory();
   at::set_num_threads(resolve_num_threads(config.run.num_threads));

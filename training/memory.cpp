@@ -18,7 +18,7 @@ namespace pictura {
 
 namespace {
 
-// Of one agent at one step.
+// Bytes of the observation of one agent at one step.
 double observation_bytes(const Config& config) {
   double bytes = 0;
   allocate_observations(config, 1, 1, Device{}).map([&bytes](const at::Tensor& t) {
@@ -28,21 +28,21 @@ double observation_bytes(const Config& config) {
   return bytes;
 }
 
-// Of the largest that the run will draw.
+// Bytes of an agent's images at the largest size that the run will draw.
 double image_bytes(const Config& config) {
   const auto bytes_at = [&config](int64_t agent_steps) {
     return static_cast<double>(image_layout(rig_of(config, agent_steps), 1, PixelFormat::u8).bytes());
   };
-  double most = bytes_at(0);
-  for (const auto& change : config.render.schedule) most = std::max(most, bytes_at(change.agent_steps));
-  return most;
+  double largest = bytes_at(0);
+  for (const auto& change : config.render.schedule) largest = std::max(largest, bytes_at(change.agent_steps));
+  return largest;
 }
 
 // State and its snapshot, box, view and what a step needs, without observations: 690 were measured on the host.
 constexpr double kSimulatorBytesPerBox = 700;
 
-// Of a transition: the scalars of a rollout (values, actions, log-probabilities, rewards, advantages, three flags), and
-// those that an update makes of them (returns, actions and five lists of rows as i64).
+// Bytes of a transition: the scalars of a rollout (values, actions, log-probabilities, rewards, advantages, three
+// flags), and those that an update makes of them (returns, actions and five lists of rows as i64).
 constexpr double kTransitionBytes = 5 * 4 + 3 + 4 + 6 * 8;
 
 // Bytes of a map for each byte of its file: above what was measured of CARLA's towns, of procedural ones, and of
@@ -114,7 +114,7 @@ void add_entity_sets(const Config& config, Device device, LayerSum* sum) {
                              SetSize::takes(config.policy.embedding_width, config.policy.embedding_width,
                                             static_cast<int64_t>(features), array.rows));
     if (is_one_pass) {
-      // Of members their features are kept, of a set which are the largest: see largest_embedding().
+      // Kept are the features of members, and which members are the largest: see largest_embedding().
       sum->add_parameters((features + 1) * width + (width + 1) * width);
       sum->add_values(array.rows * features, 1);
       sum->add_values(width, 1);

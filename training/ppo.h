@@ -35,7 +35,7 @@ struct UpdateStats {
   WeightRms weights;  // after the update
 };
 
-/// What an update works with.
+/// Objects that an update works with, which must outlive it.
 struct Learner {
   ChunkRunner* runner;  // of the policy and of the rollout's observations
   LearnerExecutor* executor;
@@ -45,7 +45,7 @@ struct Learner {
   Communicator* communicator = alone();
 };
 
-/// What an update depends on besides its rollout and its settings.
+/// Key of an update: what it depends on besides its rollout and its settings.
 struct UpdateKey {
   uint64_t seed = 0;  // with `update`, of the transitions' order
   int64_t update = 0;

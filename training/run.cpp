@@ -186,7 +186,7 @@ void Run::begin_with(const SavedPolicy& other) {
   PICTURA_CHECK(other.config.policy.value_head == config.policy.value_head,
                 "{}: policy.value_head: its policy has \"{}\", expected \"{}\"", other.path,
                 name_of(other.config.policy.value_head), name_of(config.policy.value_head));
-  // Those without parameters would not show, and shapes of parameters would not say why they differ.
+  // Settings that add no parameters would go unseen, and shapes of parameters would not say why they differ.
   for (const auto& [key, got, expected] :
        {std::tuple{"policy.segment_features", other.config.policy.segment_features, config.policy.segment_features},
         std::tuple{"policy.goal_features", other.config.policy.goal_features, config.policy.goal_features},

@@ -69,7 +69,7 @@ Scalars scalars_of(const Config& config, const TrainProgress& progress, const Up
   for (size_t i = 0; i < kNumPhases; ++i) {
     scalars.emplace_back(fmt::format("time/{}_s", kPhaseNames[i]), record.phases_s[i]);
   }
-  // Of the agents whose episode ended; NaN where there are none.
+  // Means over agents whose episode ended; NaN where there are none.
   const auto finished = static_cast<double>(totals.finished_agent_episodes),
              moved = static_cast<double>(totals.finished_moved);
   scalars.emplace_back("agents/first_motion_s", totals.finished_first_motion_s / moved);

@@ -32,7 +32,8 @@ class GlooCommunicator final : public Communicator {
     }
   }
   ~GlooCommunicator() override {
-    // Its threads wait for the lost rank, and its destructor would wait for them: left to the end of the process.
+    // The group's threads wait for the lost rank, and its destructor would wait for them: it is left to the end of the
+    // process.
     if (has_failed_) static_cast<void>(group_.release());
   }
 

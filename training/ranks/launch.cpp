@@ -15,7 +15,7 @@ std::optional<std::string> variable(const char* name) {
   return text && *text ? std::optional<std::string>(text) : std::nullopt;
 }
 
-// Of a variable that is an integer in [low, high]; `absent` where it is not set.
+// Value of a variable that is an integer in [low, high]; `absent` where it is not set.
 std::optional<int> integer(const char* name, int low, int high, std::optional<int> absent = std::nullopt) {
   const std::optional<std::string> text = variable(name);
   if (!text) return absent;

@@ -10,7 +10,7 @@ struct Launch {
   int rank = 0, size = 1;
   int local_rank = 0;                 // among the processes of its host
   std::string address = "127.0.0.1";  // of the host of rank 0, where the processes meet
-  int port = 29500;                   // there
+  int port = 29500;                   // at that address
   bool is_served = false;             // the launcher listens there (torchrun); else rank 0 does
   std::string attempt;                // names one of a launcher's attempts
 };

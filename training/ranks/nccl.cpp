@@ -14,7 +14,7 @@ namespace pictura {
 
 namespace {
 
-// As nccl.h of NCCL 2 has them.
+// Types as in nccl.h of NCCL 2.
 struct NcclId {
   char bytes[128];
 };
@@ -101,7 +101,7 @@ class NcclCommunicator final : public Communicator {
     });
   }
 
-  // What lies on the host goes over the device, and is waited for.
+  // Runs an operation on a tensor. One that lies on the host goes over the device, and is waited for.
   template <typename Operation>
   void run(const at::Tensor& tensor, const char* name, const Operation& operation) {
     ranks_->step();

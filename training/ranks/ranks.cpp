@@ -17,7 +17,7 @@ using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kBetweenBeats{500};
-// Of one request to the store, once all have met there.
+// Time limit of one request to the store, once all ranks have met there.
 constexpr milliseconds kStoreTimeout{20000};
 constexpr milliseconds kFarewell{5000};  // for the others to leave before the store does
 
@@ -34,7 +34,7 @@ std::vector<std::string> keys_of_ranks(const std::string& name, int size) {
   return keys;
 }
 
-// What a rank says of itself twice a second.
+// Heartbeat that a rank writes twice a second.
 struct Beat {
   int64_t number = 0, steps = 0;
   bool is_busy = false, has_left = false;
@@ -142,7 +142,7 @@ void Ranks::announce(const std::string& why) noexcept {
   try {
     store_->compareSet(kFault, "", fmt::format("rank {} ended: {}", rank(), why));
   } catch (const std::exception&) {
-    // Those that cannot be told find out.
+    // Ranks that cannot be reached find out by themselves.
   }
 }
 
@@ -221,7 +221,7 @@ struct Exchange {
 
 double seconds_since(Clock::time_point time) { return std::chrono::duration<double>(Clock::now() - time).count(); }
 
-// What the ranks' beats have told so far.
+// History of the ranks' heartbeats.
 class BeatHistory {
  public:
   BeatHistory(int num_ranks, double silent_s) : silent_s_(silent_s), seen_(static_cast<size_t>(num_ranks)) {}
