@@ -6,7 +6,7 @@
 #include "pictura/configuration/config.h"
 #include "pictura/policy/rules/network_passes.h"
 #include "pictura/simulator/observation.h"
-#include "pictura/simulator/rules/observe.h"
+#include "pictura/simulator/rules/ego_frame.h"
 
 namespace pictura {
 

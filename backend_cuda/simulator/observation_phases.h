@@ -67,7 +67,7 @@ class ObservationWriter {
       }
       for (int k = 0; k < kAtOnce; ++k) {
         float row[8];
-        store8(observe_piece(pieces[k], row_frame), row);
+        write_piece(pieces[k], row_frame, row);
         const bool is_seen = is_in_sight(pieces[k], frame) && first + k * group.size() < num_items;
         const uint32_t seen = group.ballot(is_seen);
         const int at = count + group.count_before(seen);

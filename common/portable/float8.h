@@ -221,9 +221,8 @@ struct alignas(32) LeastKeys {
 }  // namespace float8_in_memory
 #endif
 
-// A single float where a rule is written for both.
-PICTURA_HD inline uint32_t less(float a, float b) { return a < b; }
-PICTURA_HD inline uint32_t at_most(float a, float b) { return a <= b; }
-PICTURA_HD inline float magnitude(float a) { return fabsf(a); }
+/// Bits of the first or last `count` of eight: which of them are new where eights overlap or are filled up.
+PICTURA_HD constexpr uint32_t first_of_eight(int count) { return (1u << count) - 1; }
+PICTURA_HD constexpr uint32_t last_of_eight(int count) { return 0xFFu << (8 - count) & 0xFF; }
 
 }  // namespace pictura

@@ -1,39 +1,15 @@
-// What an agent observes, in its own frame (x forward, y left, at the reference point) and scaled to about [-1, 1].
-// docs/observation.md is the table of slots, units and scales; the constants here are its source.
+// What an agent observes, in its own frame (ego_frame.h) and scaled to about [-1, 1]: the table of slots in
+// docs/observation.md.
 #pragma once
 
 #include "pictura/common/portable/async_copy.h"
-#include "pictura/common/portable/float8.h"
 #include "pictura/simulator/observation.h"
+#include "pictura/simulator/rules/ego_frame.h"
+#include "pictura/simulator/rules/fast/observed_rows.h"
+#include "pictura/simulator/rules/fast/pieces_in_sight.h"
 #include "pictura/simulator/rules/step.h"
 
 namespace pictura {
-
-// What a value of 1 means.
-constexpr float kScalePosition_m = 120.0f, kScaleHeight_m = 10.0f, kScaleSpeed_mps = 20.0f;
-constexpr float kScaleLength_m = 6.0f, kScaleWidth_m = 3.0f, kScaleHalfPiece_m = 5.0f, kScaleLaneWidth_m = 5.0f;
-constexpr float kScaleWallHeight_m = 12.0f;
-constexpr float kMinConditioning = -2.0f;  // no observed coefficient is lower
-constexpr float kScaleSteer_rad = 0.55f, kScaleAccelLong_mps2 = 5.0f, kScaleAccelLat_mps2 = 4.0f;
-
-/// What to multiply by: every observation scales by a constant, and dividing would take ten times as long.
-PICTURA_HD constexpr float per(float scale) { return 1.0f / scale; }
-
-// What is in sight.
-constexpr float kPartnerRange_m = 100.0f, kControlRange_m = 100.0f;
-constexpr float kRoadAhead_m = 120.0f, kRoadBehind_m = 20.0f, kRoadAside_m = 30.0f;
-
-/// The ego frame.
-struct EgoFrame {
-  Vec3 origin_m;
-  Vec2 forward;
-
-  PICTURA_HD Vec2 turn(Vec2 v) const { return {dot(v, forward), cross(forward, v)}; }
-  PICTURA_HD Vec3 to_local(Vec3 p) const {
-    const Vec2 xy = turn(p.xy() - origin_m.xy());
-    return {xy.x, xy.y, p.z - origin_m.z};
-  }
-};
 
 PICTURA_HD inline EgoFrame ego_frame(const AgentStateView& agents, int slot) {
   return {{agents.x_m[slot], agents.y_m[slot], agents.z_m[slot]}, {agents.cos_heading[slot], agents.sin_heading[slot]}};
@@ -80,45 +56,6 @@ PICTURA_HD void observe_waypoints(const WorldView& world, int slot, const EgoFra
   }
 }
 
-/// The ego frame for eight floats that hold a place (0, 1, 2) and a direction (4, 5), or two places.
-struct RowFrame {
-  Float8 minus_origin, cos, sin;
-
-  PICTURA_HD explicit RowFrame(const EgoFrame& frame) : RowFrame(frame, {}) {}
-  PICTURA_HD static RowFrame of_two_places(const EgoFrame& frame) { return {frame, frame.origin_m}; }
-
-  /// EgoFrame::to_local() of the place and turn() of the direction.
-  PICTURA_HD Float8 to_local(const Float8& row) const {
-    const Float8 moved = row + minus_origin;
-    return blend<0b00110011>(moved, moved * cos + swap_pairs(moved) * sin);
-  }
-
- private:
-  // x + -0 is x, also where x is -0.
-  PICTURA_HD RowFrame(const EgoFrame& frame, Vec3 second_origin_m)
-      : minus_origin(set8(-frame.origin_m.x, -frame.origin_m.y, -frame.origin_m.z, -0.0f, -second_origin_m.x,
-                          -second_origin_m.y, -second_origin_m.z, -0.0f)),
-        cos(set8(frame.forward.x, frame.forward.x, 0, 0, frame.forward.x, frame.forward.x, 0, 0)),
-        sin(set8(frame.forward.y, -frame.forward.y, 0, 0, frame.forward.y, -frame.forward.y, 0, 0)) {}
-};
-
-#ifdef offsetof  // NVRTC has none
-// What is read as eight floats.
-static_assert(offsetof(AgentBox, cos_heading) == 3 * sizeof(float) &&
-              offsetof(AgentBox, height_m) == 7 * sizeof(float));
-static_assert(offsetof(StopLine, right_m) == 3 * sizeof(float) && sizeof(StopLine) >= 8 * sizeof(float));
-#endif
-
-/// The row of a partner, but for the last feature.
-PICTURA_HD inline Float8 observe_box(const AgentBox& box, const RowFrame& frame) {
-  // x, y, z, length, cos, sin, width, height
-  const Float8 turnable = permute<0, 1, 2, 5, 3, 4, 6, 7>(load8(&box.center_m.x));
-  const Float8 scaled =
-      frame.to_local(turnable) * set8(per(kScalePosition_m), per(kScalePosition_m), per(kScaleHeight_m),
-                                      per(kScaleLength_m), 1, 1, per(kScaleWidth_m), 1);
-  return permute<0, 1, 2, 3, 6, 4, 5, 7>(scaled);
-}
-
 /// The partners of `agent` by distance from its reference point to their box centres: from the near cells where enough
 /// stand there, else from all that are in range.
 template <typename ThreadGroup>
@@ -152,7 +89,7 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
           }
           for (int k = 0; k < kAtOnce; ++k) {
             const Vec2 apart = centers[k] - origin;
-            const float d2 = length2(apart.x, apart.y);
+            const float d2 = dot(apart, apart);
             const bool is_one = first + k * group.size() < end && others[k] != agent && d2 < square(reach);
             nearest.offer(is_one, d2, others[k]);
           }
@@ -174,7 +111,7 @@ PICTURA_HD auto nearest_boxes(int num_boxes, const BoxAt& box_at, const IsThere&
     const int i = min_of(first + group.rank(), num_boxes - 1);
     const AgentBox& box = box_at(i);
     const Vec2 apart = box.center_m.xy() - origin;
-    const float d2 = length2(apart.x, apart.y);
+    const float d2 = dot(apart, apart);
     nearest.offer(first + group.rank() < num_boxes && box.drawn && is_there(i) && d2 < square(kPartnerRange_m), d2, i);
   }
   nearest.settle();
@@ -187,11 +124,6 @@ PICTURA_HD inline float observed_speed_mps(const WorldView& world, int box) {
   return moves ? world.agents.speed_mps[world.first_slot + box] : 0.0f;
 }
 
-PICTURA_HD inline void observe_partner(const AgentBox& box, float speed_mps, const RowFrame& frame, float* out) {
-  store8(observe_box(box, frame), out);
-  out[7] = speed_mps * per(kScaleSpeed_mps);
-}
-
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD int observe_partners(const WorldView& world, int agent, const EgoFrame& frame, float* rows,
                                 const ThreadGroup& group = {}) {
@@ -200,31 +132,9 @@ PICTURA_HD int observe_partners(const WorldView& world, int agent, const EgoFram
   const RowFrame row_frame(frame);
   for (int i = group.rank(); i < count; i += group.size()) {
     const int other = nearest.item(i);
-    observe_partner(world.boxes[other], observed_speed_mps(world, other), row_frame, rows + i * kPartnerFeatures);
+    write_partner(world.boxes[other], observed_speed_mps(world, other), row_frame, rows + i * kPartnerFeatures);
   }
   return count;
-}
-
-/// Whether the middles of pieces are in sight, of one or of eight: a bit each.
-template <typename Number>
-PICTURA_HD uint32_t in_sight(Number x_m, Number y_m, Number minus_origin_x_m, Number minus_origin_y_m, Number cos,
-                             Number sin, Number middle_m, Number half_m, Number aside_m) {
-  const Number from_ego_x = x_m + minus_origin_x_m, from_ego_y = y_m + minus_origin_y_m;
-  const Number ahead = from_ego_x * cos + from_ego_y * sin, left = cos * from_ego_y - sin * from_ego_x;
-  return at_most(magnitude(ahead - middle_m), half_m) & at_most(magnitude(left), aside_m);
-}
-constexpr float kRoadMiddle_m = 0.5f * (kRoadAhead_m - kRoadBehind_m);
-constexpr float kRoadHalf_m = 0.5f * (kRoadAhead_m + kRoadBehind_m);
-
-PICTURA_HD inline bool is_in_sight(const ObservedPiece& piece, const EgoFrame& frame) {
-  return in_sight(piece.middle_m.x, piece.middle_m.y, -frame.origin_m.x, -frame.origin_m.y, frame.forward.x,
-                  frame.forward.y, kRoadMiddle_m, kRoadHalf_m, kRoadAside_m) != 0;
-}
-
-/// The row of a piece, and a zero behind it.
-PICTURA_HD inline Float8 observe_piece(const ObservedPiece& piece, const RowFrame& frame) {
-  return frame.to_local(load8(&piece.middle_m.x)) *
-         set8(per(kScalePosition_m), per(kScalePosition_m), per(kScaleHeight_m), per(kScaleHalfPiece_m), 1, 1, 1, 1);
 }
 
 /// The pieces of a map that a set of them shows, and which of them can be seen from where the agent is.
@@ -234,55 +144,15 @@ struct PieceList {
   Span<const int32_t> items;
 };
 
-/// Which of the pieces listed are in sight: the first of them, at least `capacity` if there are so many.
-PICTURA_HD inline int find_pieces_in_sight(Span<const Vec2> middles, Span<const int32_t> items, const EgoFrame& frame,
-                                           int capacity, int32_t* found_out) {
-  const Float8 minus_origin_x = fill8(-frame.origin_m.x), minus_origin_y = fill8(-frame.origin_m.y);
-  const Float8 cos = fill8(frame.forward.x), sin = fill8(frame.forward.y);
-  const int num_items = static_cast<int>(items.size());
-  int count = 0;
-  const auto look_at = [&](const int32_t* eight, uint32_t these) {
-    Float8 x, y;
-    gather_pairs(&middles.data()->x, eight, &x, &y);
-    const uint32_t seen = these & in_sight(x, y, minus_origin_x, minus_origin_y, cos, sin, fill8(kRoadMiddle_m),
-                                           fill8(kRoadHalf_m), fill8(kRoadAside_m));
-    copy_chosen(eight, seen, found_out + count);
-    count += popcount(seen);
-  };
-  int i = 0;
-  for (; i + 8 <= num_items && count < capacity; i += 8) look_at(items.data() + i, 0xFF);
-  const int left = num_items - i;
-  if (left > 0 && count < capacity) {
-    if (num_items >= 8) {
-      look_at(items.data() + num_items - 8, last_of_eight(left));
-    } else {
-      int32_t few[8];
-      for (int k = 0; k < 8; ++k) few[k] = items[min_of(k, left - 1)];
-      look_at(few, first_of_eight(left));
-    }
-  }
-  return count;
-}
-
 /// Lanes, boundaries or walls: of the pieces listed for the ego's cell, the first `capacity` whose middles are in
 /// sight.
 PICTURA_HD inline int observe_pieces(const PieceList& near, const EgoFrame& frame, int capacity, float* out) {
   constexpr int kMaxPieces = max_of(max_of(kMaxLanes, kMaxBoundaries), kMaxWalls);
-  int32_t found[kMaxPieces + 8];
+  int32_t found[kMaxPieces + kFoundBeyond];
   const int count = min_of(capacity, find_pieces_in_sight(near.middles, near.items, frame, capacity, found));
-  const RowFrame row_frame(frame);
-  const auto row_of = [&](int i) { return observe_piece(near.pieces[found[i]], row_frame); };
-  // The zero behind a row lies where the next one begins; only the set's last row has none behind it.
-  const int num_followed = min_of(count, capacity - 1);
-  for (int i = 0; i < num_followed; ++i, out += kLaneFeatures) store8(row_of(i), out);
-  if (num_followed < count) {
-    float row[8];
-    store8(row_of(num_followed), row);
-    for (int f = 0; f < kLaneFeatures; ++f) out[f] = row[f];
-  }
+  write_pieces(near.pieces, found, count, capacity, RowFrame(frame), out);
   return count;
 }
-static_assert(kLaneFeatures == kBoundaryFeatures && kLaneFeatures == kWallFeatures);
 
 /// Red 1, yellow 0.5, green -1, else 0; in integers, since compilers then need no branches, and the lights around an
 /// agent differ.
@@ -302,7 +172,7 @@ PICTURA_HD int observe_controls(const WorldView& world, int slot, const NearPlac
     const int i = first + group.rank();
     const int32_t light = items[min_of(i, num_items - 1)];
     const Vec2 apart = world.map.stop_lines[light].middle_m.xy() - frame.origin_m.xy();
-    const float d2 = length2(apart.x, apart.y);
+    const float d2 = dot(apart, apart);
     nearest.offer(i < num_items && d2 < square(kControlRange_m), d2, light);
   }
   nearest.settle();
@@ -313,15 +183,12 @@ PICTURA_HD int observe_controls(const WorldView& world, int slot, const NearPlac
   for (int i = group.rank(); i < count; i += group.size()) {
     float* out = rows + i * kControlFeatures;
     const int32_t light = nearest.item(i);
-    const StopLine& line = world.map.stop_lines[light];
-    const Float8 ends = permute<0, 1, 2, 6, 3, 4, 5, 7>(load8(&line.left_m.x));  // left, right
-    float local[8];
-    store8(ends_frame.to_local(ends), local);
-    out[0] = local[0] * per(kScalePosition_m);
-    out[1] = local[1] * per(kScalePosition_m);
-    out[2] = local[4] * per(kScalePosition_m);
-    out[3] = local[5] * per(kScalePosition_m);
-    out[4] = 0.5f * (local[2] + local[6]) * per(kScaleHeight_m);
+    const LocalEnds ends = ends_of(world.map.stop_lines[light], ends_frame);
+    out[0] = ends.left_m.x * per(kScalePosition_m);
+    out[1] = ends.left_m.y * per(kScalePosition_m);
+    out[2] = ends.right_m.x * per(kScalePosition_m);
+    out[3] = ends.right_m.y * per(kScalePosition_m);
+    out[4] = 0.5f * (ends.left_m.z + ends.right_m.z) * per(kScaleHeight_m);
     out[5] = light_code(world.lights[light]);
     out[6] = light == own_light ? 1.0f : 0.0f;
   }

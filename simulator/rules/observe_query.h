@@ -27,11 +27,11 @@ class QueriedObservation {
       const int item = nearest.item(i);
       if (item >= world.num_boxes) {
         const InsertedBox& one = inserted_[item - world.num_boxes];
-        observe_partner(one.box, world.options.auxiliary_observations ? one.speed_mps : 0.0f, row_frame, out);
+        write_partner(one.box, world.options.auxiliary_observations ? one.speed_mps : 0.0f, row_frame, out);
       } else if (leaves_gaps_ && hides(world, item)) {
         for (int f = 0; f < kPartnerFeatures; ++f) out[f] = 0.0f;
       } else {
-        observe_partner(world.boxes[item], observed_speed_mps(world, item), row_frame, out);
+        write_partner(world.boxes[item], observed_speed_mps(world, item), row_frame, out);
       }
     }
     return count;
@@ -107,11 +107,9 @@ PICTURA_HD constexpr int64_t query_fault(QueryFault what, int32_t query, int32_t
 
 /// Whether all that is observed of a box are numbers.
 PICTURA_HD inline bool is_sound(const InsertedBox& one) {
-  float values[8];
-  store8(load8(&one.box.center_m.x), values);
-  bool sound = is_finite(one.speed_mps);
-  for (const float value : values) sound = sound && is_finite(value);
-  return sound;
+  const AgentBox& box = one.box;
+  return is_finite(box.center_m) && is_finite(box.cos_heading) && is_finite(box.sin_heading) &&
+         is_finite(box.length_m) && is_finite(box.width_m) && is_finite(box.height_m) && is_finite(one.speed_mps);
 }
 
 /// world_of(slot) is its WorldView.

@@ -17,7 +17,8 @@ TRAINING = EVALUATION | {"training", "training/rules"}
 MAY_INCLUDE = {
     "common": set(),
     "map": {"common"},
-    "simulator": {"common", "map"},
+    "simulator": {"common", "map", "simulator/rules/fast"},
+    "simulator/rules/fast": {"common", "map", "simulator"},
     "backend_cpu/renderer": {"common"},
     "backend_cpu/simulator": SIMULATION,
     "backend_cpu/learner": SIMULATION | {"policy/rules", "training/rules"},
@@ -51,6 +52,7 @@ STAYS_IN = [
     (re.compile(r"^(Eigen|unsupported)/"), re.compile(r"^((tests/)?map|drawing|bench/truth)/|^common/.*\.cpp$")),
     (re.compile(r"^pugixml"), re.compile(r"^(tests/)?map/")),
     (re.compile(r"^cairo"), re.compile(r"^(tests/)?drawing/")),
+    (re.compile(r"^pictura/common/portable/float8\.h$"), re.compile(r"^(tests/)?(common|map|simulator/rules/fast)/")),
     (re.compile(r"^CLI/"), re.compile(r"^(apps|cli|bench/commands)/")),
 ]
 INCLUDE = re.compile(r'^\s*#\s*include\s+([<"])([^>"]+)[>"]')
@@ -148,6 +150,8 @@ def self_test() -> None:
         "common/o.h": "#include <Eigen/Core>\n",
         "common/p.cpp": "#include <Eigen/Core>\n",
         "simulator/m.h": "/// Throws UsageError.\nvoid f();\n",
+        "simulator/rules/u.h": '#include "pictura/common/portable/float8.h"\n',
+        "simulator/rules/fast/v.h": '#include "pictura/common/portable/float8.h"\n',
         "map/n.h": '#include "pictura/common/error.h"\n/// Throws Error.\nvoid f();\n',
         "map/d.cpp": "#ifdef __CUDACC__\n#endif\n",
         "common/portable/hd.h": "#ifdef __CUDACC__\n#endif\n",
@@ -165,7 +169,7 @@ def self_test() -> None:
         "map/t.cpp": "std::ofstream out(path);\n",
     }
     expected = {"common/a.h", "backend_cpu/renderer/renderer.cpp", "backend_cpu/elsewhere.cpp", "simulator/b.cpp",
-                "simulator/h.cpp", "simulator/l.h", "common/o.h", "simulator/m.h", "map/c.cpp", "map/d.cpp", "map/q.cpp", "map/r.cpp", "apps/s.cpp", "map/t.cpp", "backend_gl/f.cpp", "common/g.h", "apps/i.cpp", "bench/j.cpp"}
+                "simulator/h.cpp", "simulator/l.h", "common/o.h", "simulator/m.h", "simulator/rules/u.h", "map/c.cpp", "map/d.cpp", "map/q.cpp", "map/r.cpp", "apps/s.cpp", "map/t.cpp", "backend_gl/f.cpp", "common/g.h", "apps/i.cpp", "bench/j.cpp"}
     with tempfile.TemporaryDirectory() as folder:
         root = pathlib.Path(folder)
         for name, text in cases.items():

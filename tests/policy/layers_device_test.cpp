@@ -7,7 +7,7 @@
 #include "pictura/policy/precision.h"
 #include "pictura/policy/row_features.h"
 #include "pictura/policy/torch_device.h"
-#include "pictura/simulator/rules/observe.h"
+#include "pictura/simulator/rules/ego_frame.h"
 #include "pictura/tests/backend_cuda/device_test.h"
 #include "pictura/tests/policy/numbers.h"
 

@@ -8,7 +8,7 @@
 
 #include "pictura/policy/policy.h"
 #include "pictura/policy/row_features.h"
-#include "pictura/simulator/rules/observe.h"
+#include "pictura/simulator/rules/ego_frame.h"
 #include "pictura/tests/policy/numbers.h"
 
 namespace pictura {

@@ -1,5 +1,5 @@
 // The nearest of many items, against sorting them all.
-#include "pictura/simulator/rules/thread_group.h"
+#include "pictura/simulator/rules/fast/nearest.h"
 
 #include <algorithm>
 #include <utility>

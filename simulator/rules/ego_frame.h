@@ -1,0 +1,44 @@
+// The ego frame in which an agent observes (x forward, y left, at the reference point), the scales of what it observes
+// there and what of the map is in sight. docs/observation.md is the table of scales; the constants here are its source.
+#pragma once
+
+#include "pictura/simulator/rules/map_view.h"
+
+namespace pictura {
+
+// What a value of 1 means.
+constexpr float kScalePosition_m = 120.0f, kScaleHeight_m = 10.0f, kScaleSpeed_mps = 20.0f;
+constexpr float kScaleLength_m = 6.0f, kScaleWidth_m = 3.0f, kScaleHalfPiece_m = 5.0f, kScaleLaneWidth_m = 5.0f;
+constexpr float kScaleWallHeight_m = 12.0f;
+constexpr float kMinConditioning = -2.0f;  // no observed coefficient is lower
+constexpr float kScaleSteer_rad = 0.55f, kScaleAccelLong_mps2 = 5.0f, kScaleAccelLat_mps2 = 4.0f;
+
+/// What to multiply by: every observation scales by a constant, and dividing would take ten times as long.
+PICTURA_HD constexpr float per(float scale) { return 1.0f / scale; }
+
+// What is in sight.
+constexpr float kPartnerRange_m = 100.0f, kControlRange_m = 100.0f;
+constexpr float kRoadAhead_m = 120.0f, kRoadBehind_m = 20.0f, kRoadAside_m = 30.0f;
+
+/// The ego frame.
+struct EgoFrame {
+  Vec3 origin_m;
+  Vec2 forward;
+
+  PICTURA_HD Vec2 turn(Vec2 v) const { return {dot(v, forward), cross(forward, v)}; }
+  PICTURA_HD Vec3 to_local(Vec3 p) const {
+    const Vec2 xy = turn(p.xy() - origin_m.xy());
+    return {xy.x, xy.y, p.z - origin_m.z};
+  }
+};
+
+constexpr float kRoadMiddle_m = 0.5f * (kRoadAhead_m - kRoadBehind_m);
+constexpr float kRoadHalf_m = 0.5f * (kRoadAhead_m + kRoadBehind_m);
+
+/// Whether the piece's middle is in sight; fast/pieces_in_sight.h computes the same bits of eight.
+PICTURA_HD inline bool is_in_sight(const ObservedPiece& piece, const EgoFrame& frame) {
+  const Vec2 local_m = frame.turn(piece.middle_m.xy() - frame.origin_m.xy());
+  return fabsf(local_m.x - kRoadMiddle_m) <= kRoadHalf_m && fabsf(local_m.y) <= kRoadAside_m;
+}
+
+}  // namespace pictura

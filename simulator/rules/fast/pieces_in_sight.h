@@ -1,0 +1,46 @@
+// is_in_sight() of eight pieces at a time.
+#pragma once
+
+#include "pictura/common/portable/float8.h"
+#include "pictura/common/portable/intrinsics.h"
+#include "pictura/simulator/rules/ego_frame.h"
+
+namespace pictura {
+
+/// How many items find_pieces_in_sight() may write beyond the capacity.
+constexpr int kFoundBeyond = 8;
+
+/// Which of the pieces listed are in sight: the first of them, at least `capacity` if there are so many. found_out has
+/// room for kFoundBeyond more.
+PICTURA_HD inline int find_pieces_in_sight(Span<const Vec2> middles, Span<const int32_t> items, const EgoFrame& frame,
+                                           int capacity, int32_t* found_out) {
+  const Float8 minus_origin_x = fill8(-frame.origin_m.x), minus_origin_y = fill8(-frame.origin_m.y);
+  const Float8 cos = fill8(frame.forward.x), sin = fill8(frame.forward.y);
+  const int num_items = static_cast<int>(items.size());
+  int count = 0;
+  const auto look_at = [&](const int32_t* eight, uint32_t these) {
+    Float8 x, y;
+    gather_pairs(&middles.data()->x, eight, &x, &y);
+    const Float8 from_ego_x = x + minus_origin_x, from_ego_y = y + minus_origin_y;
+    const Float8 ahead = from_ego_x * cos + from_ego_y * sin, aside = cos * from_ego_y - sin * from_ego_x;
+    const uint32_t seen = these & at_most(magnitude(ahead - fill8(kRoadMiddle_m)), fill8(kRoadHalf_m)) &
+                          at_most(magnitude(aside), fill8(kRoadAside_m));
+    copy_chosen(eight, seen, found_out + count);
+    count += popcount(seen);
+  };
+  int i = 0;
+  for (; i + 8 <= num_items && count < capacity; i += 8) look_at(items.data() + i, 0xFF);
+  const int left = num_items - i;
+  if (left > 0 && count < capacity) {
+    if (num_items >= 8) {
+      look_at(items.data() + num_items - 8, last_of_eight(left));
+    } else {
+      int32_t few[8];
+      for (int k = 0; k < 8; ++k) few[k] = items[min_of(k, left - 1)];
+      look_at(few, first_of_eight(left));
+    }
+  }
+  return count;
+}
+
+}  // namespace pictura
