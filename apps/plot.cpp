@@ -4,6 +4,7 @@
 #include "pictura/cli/draw_chart.h"
 #include "pictura/cli/file_options.h"
 #include "pictura/cli/report.h"
+#include "pictura/common/error.h"
 
 namespace pictura {
 

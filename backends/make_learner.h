@@ -4,7 +4,7 @@
 #include <functional>
 #include <memory>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/common/scene_history.h"
 #include "pictura/training/rules/device_graph.h"
 #include "pictura/training/rules/learner_executor.h"

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/policy/rules/network_passes.h"
 #include "pictura/policy/rules/policy_executor.h"
 

@@ -5,6 +5,8 @@
 #include <fstream>
 #include <sstream>
 
+#include <fmt/format.h>
+
 #include "pictura/common/cuda/device_scene.h"
 
 namespace pictura {

@@ -4,6 +4,8 @@
 
 #include <fmt/ranges.h>
 
+#include "pictura/common/error.h"
+
 namespace pictura {
 
 std::size_t bytes_of(ElementType type) {

@@ -10,7 +10,7 @@
 #include <type_traits>
 
 #include "pictura/common/device.h"
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/common/span.h"
 
 namespace pictura {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/common/math.h"
 
 namespace pictura {

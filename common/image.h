@@ -10,7 +10,7 @@
 #include "pictura/common/camera.h"
 #include "pictura/common/color.h"
 #include "pictura/common/device.h"
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/common/patches.h"
 #include "pictura/common/span.h"
 

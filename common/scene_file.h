@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/common/renderer.h"
 
 namespace pictura {

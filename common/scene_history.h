@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "pictura/common/array.h"
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/common/history_views.h"
 #include "pictura/common/scene.h"
 

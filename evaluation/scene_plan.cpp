@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "pictura/common/error.h"
 #include "pictura/common/rng.h"
 #include "pictura/common/support/hash.h"
 #include "pictura/map/scenario/scenario.h"

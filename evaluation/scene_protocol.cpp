@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "pictura/common/error.h"
 #include "pictura/common/support/numbers.h"
 #include "pictura/common/support/suggestion.h"
 #include "pictura/map/scenario/scenario.h"

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/simulator/fields.h"
 
 namespace pictura {

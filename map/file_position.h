@@ -3,7 +3,6 @@
 
 #include <array>
 
-#include "pictura/common/error.h"
 #include "pictura/common/math.h"
 
 namespace pictura {

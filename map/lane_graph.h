@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/map/road_map.h"
 
 namespace pictura {

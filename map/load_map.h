@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/map/opendrive/opendrive.h"
 #include "pictura/map/road_map.h"
 

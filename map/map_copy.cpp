@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "pictura/common/error.h"
 #include "pictura/common/rng.h"
 #include "pictura/common/support/hash.h"
 #include "pictura/common/support/numbers.h"

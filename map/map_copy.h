@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/map/plan_map.h"
 
 namespace pictura {

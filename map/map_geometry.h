@@ -4,7 +4,7 @@
 #include <array>
 #include <string>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/common/scene.h"
 #include "pictura/map/road_map.h"
 

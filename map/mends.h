@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "pictura/common/error.h"
 #include "pictura/common/span.h"
 
 namespace pictura {

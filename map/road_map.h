@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/common/grid.h"
 #include "pictura/common/math.h"
 #include "pictura/common/span.h"

@@ -2,6 +2,7 @@
 
 #include <cstring>
 
+#include "pictura/common/error.h"
 #include "pictura/common/support/hash.h"
 #include "pictura/common/support/json.h"
 #include "pictura/common/support/json_text.h"

@@ -5,6 +5,8 @@
 
 #include <zlib.h>
 
+#include "pictura/common/error.h"
+
 namespace pictura {
 
 namespace {

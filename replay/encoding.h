@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/common/span.h"
 
 namespace pictura {

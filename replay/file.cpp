@@ -4,6 +4,7 @@
 #include <cstring>
 #include <optional>
 
+#include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/json.h"
 #include "pictura/common/support/numbers.h"

@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/replay/replay.h"
 
 namespace pictura {

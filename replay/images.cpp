@@ -7,6 +7,8 @@
 
 #include <zlib.h>
 
+#include "pictura/common/error.h"
+
 namespace pictura {
 
 namespace {

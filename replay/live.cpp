@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "pictura/common/error.h"
 #include "pictura/common/support/json.h"
 #include "pictura/replay/encoding.h"
 #include "pictura/replay/file.h"

@@ -8,7 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/replay/recorder.h"
 #include "pictura/simulator/controllers/keyboard.h"
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "pictura/common/error.h"
 #include "pictura/replay/server.h"
 
 namespace pictura {

@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/common/renderer.h"
 #include "pictura/replay/recorder.h"
 #include "pictura/simulator/simulator.h"

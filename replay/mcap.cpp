@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <png.h>
 
+#include "pictura/common/error.h"
 #include "pictura/common/support/json_text.h"
 #include "pictura/replay/encoding.h"
 #include "pictura/replay/images.h"

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/replay/replay.h"
 
 namespace pictura {

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/common/support/output_file.h"
 
 namespace pictura {

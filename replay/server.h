@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/replay/live.h"
 
 namespace pictura {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "pictura/common/array.h"
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/simulator/state_edit.h"
 
 namespace pictura {

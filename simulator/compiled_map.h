@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/common/scene.h"
 #include "pictura/map/map_geometry.h"
 #include "pictura/map/road_map.h"

@@ -4,6 +4,7 @@
 #include <iterator>
 #include <vector>
 
+#include "pictura/common/error.h"
 #include "pictura/common/support/suggestion.h"
 
 namespace pictura {

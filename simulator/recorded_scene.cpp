@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "pictura/common/error.h"
 #include "pictura/simulator/rules/limits.h"
 
 namespace pictura {

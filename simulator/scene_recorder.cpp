@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "pictura/common/error.h"
 #include "pictura/simulator/rules/limits.h"
 
 namespace pictura {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "pictura/common/array.h"
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/common/scene.h"
 #include "pictura/simulator/actions.h"
 #include "pictura/simulator/command.h"

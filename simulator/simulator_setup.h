@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/simulator/compiled_map.h"
 #include "pictura/simulator/rules/world_view.h"
 #include "pictura/simulator/simulator.h"

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/simulator/agent_state.h"
 #include "pictura/simulator/rules/signal.h"
 #include "pictura/simulator/simulator_setup.h"

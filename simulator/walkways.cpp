@@ -5,6 +5,8 @@
 #include <numeric>
 #include <unordered_map>
 
+#include <fmt/format.h>
+
 #include "pictura/common/support/interrupt.h"
 #include "pictura/simulator/rules/road.h"
 

@@ -2,6 +2,7 @@
 
 #include "pictura/backend_cuda/renderer/kernel_build.h"
 #include "pictura/common/cuda/check.h"
+#include "pictura/common/error.h"
 
 namespace pictura::cuda {
 

@@ -3,7 +3,7 @@
 
 #include <string_view>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/common/raster/cull.h"
 #include "pictura/common/raster/host_geometries.h"
 #include "pictura/common/renderer.h"

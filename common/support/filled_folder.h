@@ -4,7 +4,7 @@
 #include <set>
 #include <string>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/common/support/output_file.h"
 
 namespace pictura {

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 
 namespace pictura {
 

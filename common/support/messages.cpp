@@ -8,6 +8,8 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include "pictura/common/error.h"
+
 namespace pictura {
 
 void open_standard_streams() {

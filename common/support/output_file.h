@@ -8,7 +8,7 @@
 
 #include <sys/stat.h>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 
 namespace pictura {
 

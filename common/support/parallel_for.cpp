@@ -8,6 +8,8 @@
 #include <omp.h>
 #include <pthread.h>
 
+#include "pictura/common/error.h"
+
 namespace pictura {
 
 namespace {

@@ -12,7 +12,7 @@
 #include <mutex>
 #include <type_traits>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 
 namespace pictura {
 

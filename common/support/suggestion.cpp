@@ -5,6 +5,8 @@
 
 #include <fmt/ranges.h>
 
+#include "pictura/common/error.h"
+
 namespace pictura {
 
 namespace {

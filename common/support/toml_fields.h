@@ -12,7 +12,7 @@
 #include <toml++/toml.h>
 
 #include "pictura/common/camera.h"
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/common/span.h"
 
 namespace pictura {

@@ -7,6 +7,7 @@
 #include <map>
 #include <numbers>
 
+#include "pictura/common/error.h"
 #include "pictura/common/support/json.h"
 
 namespace pictura::gpudrive {

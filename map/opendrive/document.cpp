@@ -2,6 +2,8 @@
 
 #include <cstring>
 
+#include "pictura/common/error.h"
+
 namespace pictura::opendrive {
 
 namespace {

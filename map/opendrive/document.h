@@ -5,7 +5,7 @@
 
 #include <pugixml.hpp>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/map/opendrive/model.h"
 
 namespace pictura::opendrive {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "pictura/common/error.h"
+
 namespace pictura::opendrive {
 
 namespace {

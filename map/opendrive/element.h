@@ -11,6 +11,7 @@
 
 #include <pugixml.hpp>
 
+#include "pictura/common/error.h"
 #include "pictura/map/opendrive/model.h"
 
 namespace pictura::opendrive {

@@ -1,7 +1,7 @@
 // Checks that a road's offsets, heights, banking and widths are plausible, so that later stages need not check again.
 #pragma once
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/map/opendrive/faults.h"
 #include "pictura/map/opendrive/model.h"
 

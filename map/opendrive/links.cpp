@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <set>
 
+#include <fmt/format.h>
+
 #include "pictura/map/opendrive/build.h"
 
 namespace pictura::opendrive {

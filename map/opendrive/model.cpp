@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "pictura/common/error.h"
+
 namespace pictura::opendrive {
 
 const FileLane* FileSection::lane(int id) const {

@@ -5,6 +5,8 @@
 #include <numbers>
 #include <optional>
 
+#include <fmt/format.h>
+
 #include "pictura/map/opendrive/curves.h"
 #include "pictura/map/opendrive/read_parts.h"
 #include "pictura/map/opendrive/spread_jumps.h"

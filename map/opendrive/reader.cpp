@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 
+#include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/map/opendrive/document.h"
 #include "pictura/map/opendrive/extent.h"

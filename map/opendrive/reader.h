@@ -1,7 +1,7 @@
 // Reads the text of an OpenDRIVE file into a Network.
 #pragma once
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/map/opendrive/faults.h"
 #include "pictura/map/opendrive/model.h"
 

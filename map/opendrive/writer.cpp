@@ -7,6 +7,7 @@
 #include <unordered_set>
 #include <utility>
 
+#include <fmt/format.h>
 #include <pugixml.hpp>
 
 #include "pictura/map/opendrive/reader.h"

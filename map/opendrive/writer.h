@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/map/opendrive/model.h"
 
 namespace pictura::opendrive {

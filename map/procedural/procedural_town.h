@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/map/procedural/town_options.h"
 
 namespace pictura {

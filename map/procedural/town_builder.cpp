@@ -1,6 +1,8 @@
 // Builds streets and bends, and links the lanes of roads.
 #include "pictura/map/procedural/town_builder.h"
 
+#include <fmt/format.h>
+
 #include "pictura/map/procedural/elevation.h"
 
 namespace pictura::town {

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "pictura/map/opendrive/model.h"
 #include "pictura/map/procedural/cross_section.h"
 #include "pictura/map/procedural/layout.h"

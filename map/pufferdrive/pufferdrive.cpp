@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <vector>
 
+#include "pictura/common/error.h"
+
 namespace pictura::pufferdrive {
 
 namespace {

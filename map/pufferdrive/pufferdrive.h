@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/map/scenario/logged_scene.h"
 
 namespace pictura::pufferdrive {

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "pictura/common/error.h"
 #include "pictura/common/grid.h"
 #include "pictura/map/road_map.h"
 #include "pictura/map/scenario/road_side.h"

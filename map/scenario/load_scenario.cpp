@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/hash.h"
 #include "pictura/common/support/numbers.h"

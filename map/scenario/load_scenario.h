@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/map/scenario/scenario.h"
 
 namespace pictura {

@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/map/scenario/field_error.h"
 #include "pictura/map/scenario/scenario.h"
 

@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 
+#include "pictura/common/error.h"
 #include "pictura/common/scene.h"
 #include "pictura/map/scenario/conversion.h"
 #include "pictura/map/speed_limit.h"

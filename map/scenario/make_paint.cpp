@@ -4,6 +4,7 @@
 #include <limits>
 #include <numbers>
 
+#include "pictura/common/error.h"
 #include "pictura/common/scene.h"
 #include "pictura/map/scenario/conversion.h"
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "pictura/common/error.h"
 #include "pictura/common/scene.h"
 #include "pictura/map/endless_lanes.h"
 #include "pictura/map/scenario/conversion.h"

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "pictura/common/error.h"
 #include "pictura/map/map_fields.h"
 #include "pictura/map/scenario/scenario_fields.h"
 

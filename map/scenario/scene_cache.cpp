@@ -4,6 +4,7 @@
 #include <cstring>
 #include <type_traits>
 
+#include "pictura/common/error.h"
 #include "pictura/common/support/crc32c.h"
 #include "pictura/map/scenario/scenario_fields.h"
 #include "pictura/map_fingerprint.h"

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/map/field_codec.h"
 #include "pictura/map/scenario/scenario.h"
 

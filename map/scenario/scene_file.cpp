@@ -1,5 +1,6 @@
 #include "pictura/map/scenario/scene_file.h"
 
+#include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/hash.h"
 #include "pictura/map/scenario/scenario_fields.h"

@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "pictura/common/error.h"
 #include "pictura/common/support/crc32c.h"
 #include "pictura/common/support/regular_file.h"
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <map>
 
+#include <fmt/format.h>
+
 #include "pictura/map/womd/wire.h"
 
 namespace pictura::womd {

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/map/scenario/logged_scene.h"
 #include "pictura/map/womd/tfrecord.h"
 

@@ -3,6 +3,7 @@
 
 #include <string_view>
 
+#include "pictura/common/error_types.h"
 #include "pictura/simulator/command.h"
 #include "pictura/simulator/simulator_arrays.h"
 

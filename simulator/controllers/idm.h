@@ -6,7 +6,6 @@
 #include <memory>
 #include <vector>
 
-#include "pictura/common/error.h"
 #include "pictura/simulator/compiled_map.h"
 #include "pictura/simulator/controllers/controller.h"
 #include "pictura/simulator/rules/map_view.h"

@@ -5,6 +5,7 @@
 #include <map>
 #include <tuple>
 
+#include "pictura/common/error.h"
 #include "pictura/common/support/parallel_for.h"
 #include "pictura/map/scenario/scenario.h"
 #include "pictura/simulator/controllers/host_controllers.h"

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/simulator/compiled_map.h"
 #include "pictura/simulator/controllers/controller.h"
 #include "pictura/simulator/rules/control.h"

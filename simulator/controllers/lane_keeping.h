@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/simulator/controllers/controller.h"
 #include "pictura/simulator/controllers/lane_path.h"
 #include "pictura/simulator/controllers/steering_search.h"

@@ -6,7 +6,6 @@
 #include <optional>
 #include <vector>
 
-#include "pictura/common/error.h"
 #include "pictura/map/lane_graph.h"
 #include "pictura/simulator/rules/goal.h"
 

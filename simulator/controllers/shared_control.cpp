@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "pictura/common/error.h"
+
 namespace pictura {
 
 Driver driver_of(std::unique_ptr<Controller> controller, std::vector<uint8_t> mask) {

@@ -1,4 +1,6 @@
 // Evaluations in recorded scenes on a CUDA device give the figures of the host. Skipped as device_test.cpp says.
+#include <fmt/format.h>
+
 #include "pictura/evaluation/evaluate_scenes.h"
 #include "pictura/map/scenario/scene_file.h"
 #include "pictura/tests/backend_cuda/device_test.h"

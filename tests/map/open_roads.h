@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "pictura/tests/map/small_roads.h"
 
 namespace pictura::test {

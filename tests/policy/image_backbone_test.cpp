@@ -1,6 +1,7 @@
 // Programs in the place of the convolutions: what they are given, what becomes of it, and gradients.
 #include "pictura/policy/image_backbone.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <torch/csrc/jit/api/module.h>
 

@@ -1,6 +1,7 @@
 // Simulator::set_state of chosen agents and reset of chosen worlds.
 #include <cmath>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

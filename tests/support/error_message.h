@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 
 namespace pictura::test {
 

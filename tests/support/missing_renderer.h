@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "pictura/backends/make_renderer.h"
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 
 namespace pictura {
 

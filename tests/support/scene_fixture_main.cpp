@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "pictura/common/support/file.h"
 #include "pictura/map/scenario/load_scenario.h"
 #include "pictura/tests/support/scene_fixture.h"

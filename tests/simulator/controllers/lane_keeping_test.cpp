@@ -2,6 +2,7 @@
 // and reaches goals.
 #include "pictura/simulator/controllers/lane_keeping.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "pictura/backends/make_controller.h"
