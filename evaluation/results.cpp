@@ -14,26 +14,6 @@ namespace pictura {
 
 namespace {
 
-// The names of all fields of a ScenarioCounts, in files.
-#define PICTURA_SCENARIO_COUNTS(X) \
-  X(vehicles)                      \
-  X(collision)                     \
-  X(at_fault)                      \
-  X(off_road)                      \
-  X(red_light)                     \
-  X(wall_contact)                  \
-  X(any_infraction)                \
-  X(at_fault_infraction)           \
-  X(active_at_end)                 \
-  X(goals)                         \
-  X(waypoints)                     \
-  X(distance_m)                    \
-  X(returns)                       \
-  X(asked)                         \
-  X(spawned)                       \
-  X(entered)                       \
-  X(left)
-
 constexpr const char* kResultsFormat = "pictura evaluation 2";
 constexpr const char* kResultsFormatAtFaultAlone = "pictura evaluation 1";
 // Format 1 lacks these counts, and its "infractions" are at_fault_infraction.
@@ -56,21 +36,9 @@ Json from_format_1(Json json) {
   return json;
 }
 
-Json to_json(const ScenarioCounts& counts) {
-  Json json;
-#define X(name) json[#name] = counts.name;
-  PICTURA_SCENARIO_COUNTS(X)
-#undef X
-  return json;
-}
-
 ScenarioCounts scenario_counts_from(Json json) {
-  ScenarioCounts counts;
   for (const char* name : kAgentCounts) json.emplace(name, 0);
-#define X(name) json.at(#name).get_to(counts.name);
-  PICTURA_SCENARIO_COUNTS(X)
-#undef X
-  return counts;
+  return counts_from<ScenarioCounts>(json);
 }
 
 struct Part {
@@ -205,7 +173,7 @@ void write_results(const std::string& path, const EvaluationResults& results) {
   for (const DensityResult& density : results.densities) {
     Json scenarios = Json::array();
     for (const ScenarioCounts& counts : density.scenarios) {
-      scenarios.push_back(results.counts_all_collisions ? to_json(counts) : as_format_1(to_json(counts)));
+      scenarios.push_back(results.counts_all_collisions ? counts_json(counts) : as_format_1(counts_json(counts)));
     }
     densities.push_back({{"density", density.density},
                          {"agents_per_world", density.agents_per_world},

@@ -14,6 +14,15 @@
 
 namespace pictura {
 
+/// Whether Counts::visit() visits all counts of a struct of nothing else.
+template <typename Counts>
+constexpr bool visits_all() {
+  Counts counts;
+  size_t bytes = 0;
+  Counts::visit(counts, [&bytes](const char*, const auto& count) { bytes += sizeof(count); });
+  return bytes == sizeof(Counts);
+}
+
 /// Counts over the vehicles of one scenario; on roads that end, over their lives, each of which counts as a vehicle. An
 /// event counts once a vehicle, however often it happens.
 struct ScenarioCounts {
@@ -28,7 +37,30 @@ struct ScenarioCounts {
   double distance_m = 0, returns = 0;
   // Agents of all classes: as SpawnReport. 0 in files of earlier versions.
   int64_t asked = 0, spawned = 0, entered = 0, left = 0;
+
+  /// Calls visit(name in files, count) for all counts of `counts`, a ScenarioCounts.
+  template <typename Counts, typename Visit>
+  static constexpr void visit(Counts& counts, Visit&& visit) {
+    visit("vehicles", counts.vehicles);
+    visit("collision", counts.collision);
+    visit("at_fault", counts.at_fault);
+    visit("off_road", counts.off_road);
+    visit("red_light", counts.red_light);
+    visit("wall_contact", counts.wall_contact);
+    visit("any_infraction", counts.any_infraction);
+    visit("at_fault_infraction", counts.at_fault_infraction);
+    visit("active_at_end", counts.active_at_end);
+    visit("goals", counts.goals);
+    visit("waypoints", counts.waypoints);
+    visit("distance_m", counts.distance_m);
+    visit("returns", counts.returns);
+    visit("asked", counts.asked);
+    visit("spawned", counts.spawned);
+    visit("entered", counts.entered);
+    visit("left", counts.left);
+  }
 };
+static_assert(visits_all<ScenarioCounts>());
 
 /// The scenarios first, first + 1, ... of one density.
 struct DensityResult {

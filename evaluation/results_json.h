@@ -13,6 +13,20 @@ namespace pictura {
 Json to_json(const EvaluationSetting& setting);
 EvaluationSetting setting_from(const Json& json);
 
+/// A ScenarioCounts' or a SceneCounts' counts by their names.
+template <typename Counts>
+Json counts_json(const Counts& counts) {
+  Json json;
+  Counts::visit(counts, [&](const char* name, const auto& count) { json[name] = count; });
+  return json;
+}
+template <typename Counts>
+Counts counts_from(const Json& json) {
+  Counts counts;
+  Counts::visit(counts, [&json](const char* name, auto& count) { json.at(name).get_to(count); });
+  return counts;
+}
+
 /// Throws Error naming the first key whose values differ in two parts' objects, and the parts. Keys of objects in them
 /// are named as "rules.box_scale"; `within` is what stands before all keys.
 void check_same(const Json& first, const std::string& first_name, const Json& other, const std::string& other_name,

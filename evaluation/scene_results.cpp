@@ -16,36 +16,7 @@ namespace pictura {
 
 namespace {
 
-// The names of all fields of a SceneCounts, in files.
-#define PICTURA_SCENE_COUNTS(X) \
-  X(vehicles)                   \
-  X(at_fault)                   \
-  X(collision)                  \
-  X(off_road)                   \
-  X(goals)                      \
-  X(infractions)                \
-  X(measured)                   \
-  X(displacement_m)             \
-  X(distance_m)                 \
-  X(driven_steps)
-
 constexpr const char* kSceneResultsFormat = "pictura evaluation in scenes 1";
-
-Json to_json(const SceneCounts& counts) {
-  Json json;
-#define X(name) json[#name] = counts.name;
-  PICTURA_SCENE_COUNTS(X)
-#undef X
-  return json;
-}
-
-SceneCounts scene_counts_from(const Json& json) {
-  SceneCounts counts;
-#define X(name) json.at(#name).get_to(counts.name);
-  PICTURA_SCENE_COUNTS(X)
-#undef X
-  return counts;
-}
 
 Json to_json(const SceneProtocol& protocol) {
   Json json{{"name", protocol.name},
@@ -162,7 +133,7 @@ void write_results(const std::string& path, const SceneResults& results) {
   Json counts = Json::array();
   for (const std::vector<SceneCounts>& density : results.counts) {
     Json& scenes = counts.emplace_back(Json::array());
-    for (const SceneCounts& scene : density) scenes.push_back(to_json(scene));
+    for (const SceneCounts& scene : density) scenes.push_back(counts_json(scene));
   }
   const Json json = {{"format", kSceneResultsFormat},
                      {"setting", to_json(results.setting)},
@@ -189,7 +160,7 @@ SceneResults read_scene_results(const std::string& path) {
     json.at("faults").get_to(results.faults);
     for (const Json& density : json.at("counts")) {
       std::vector<SceneCounts>& scenes = results.counts.emplace_back();
-      for (const Json& scene : density) scenes.push_back(scene_counts_from(scene));
+      for (const Json& scene : density) scenes.push_back(counts_from<SceneCounts>(scene));
     }
     const size_t num_densities = results.protocol.densities.size();
     PICTURA_CHECK(results.counts.size() == num_densities, "counts: expected {} densities, got {}", num_densities,

@@ -23,7 +23,23 @@ struct SceneCounts {
   double displacement_m = 0;                          // sum of their means
   double distance_m = 0;
   int64_t driven_steps = 0;  // of all driven road users
+
+  /// Calls visit(name in files, count) for all counts of `counts`, a SceneCounts.
+  template <typename Counts, typename Visit>
+  static constexpr void visit(Counts& counts, Visit&& visit) {
+    visit("vehicles", counts.vehicles);
+    visit("at_fault", counts.at_fault);
+    visit("collision", counts.collision);
+    visit("off_road", counts.off_road);
+    visit("goals", counts.goals);
+    visit("infractions", counts.infractions);
+    visit("measured", counts.measured);
+    visit("displacement_m", counts.displacement_m);
+    visit("distance_m", counts.distance_m);
+    visit("driven_steps", counts.driven_steps);
+  }
 };
+static_assert(visits_all<SceneCounts>());
 
 /// What an evaluation counted in the scenes first_scene, first_scene + 1, ... of all that its setting names.
 struct SceneResults {

@@ -2,6 +2,9 @@
 // bin i mod kTotalsBins, and the bins are added up in order.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+
 #include "pictura/common/portable/hd.h"
 #include "pictura/simulator/reward_terms.h"
 
@@ -29,7 +32,7 @@ struct SimulatorTotals {
 
   /// Calls visit(member of a, member of b) for all counts, and for all sums of floating-point numbers.
   template <typename Other, typename Visit>
-  PICTURA_HD static void visit_counts(SimulatorTotals& a, Other& b, Visit&& visit) {
+  PICTURA_HD static constexpr void visit_counts(SimulatorTotals& a, Other& b, Visit&& visit) {
     visit(a.agent_steps, b.agent_steps);
     visit(a.slot_steps, b.slot_steps);
     visit(a.episodes, b.episodes);
@@ -45,7 +48,7 @@ struct SimulatorTotals {
     visit(a.finished_moved, b.finished_moved);
   }
   template <typename Other, typename Visit>
-  PICTURA_HD static void visit_sums(SimulatorTotals& a, Other& b, Visit&& visit) {
+  PICTURA_HD static constexpr void visit_sums(SimulatorTotals& a, Other& b, Visit&& visit) {
     visit(a.distance_m, b.distance_m);
     visit(a.reward, b.reward);
 #define X(name) visit(a.reward_terms.name, b.reward_terms.name);
@@ -65,6 +68,15 @@ struct SimulatorTotals {
     visit_sums(*this, before, Subtract{});
   }
 
+  /// Whether each member is one of those that are visited.
+  static constexpr bool visits_all() {
+    SimulatorTotals totals;
+    size_t bytes = 0;
+    visit_counts(totals, totals, CountBytes{&bytes});
+    visit_sums(totals, totals, CountBytes{&bytes});
+    return bytes == sizeof(SimulatorTotals);
+  }
+
  private:
   struct Subtract {
     template <typename T>
@@ -78,6 +90,12 @@ struct SimulatorTotals {
       sum += value;
     }
   };
+  struct CountBytes {
+    size_t* bytes;
+    PICTURA_HD constexpr void operator()(int64_t count, int64_t) const { *bytes += sizeof(count); }
+    PICTURA_HD constexpr void operator()(double sum, double) const { *bytes += sizeof(sum); }
+  };
 };
+static_assert(SimulatorTotals::visits_all());
 
 }  // namespace pictura
