@@ -1,8 +1,8 @@
 #include "pictura/policy/layers.h"
 
+#include <algorithm>
 #include <cstring>
-#include <map>
-#include <mutex>
+#include <memory>
 #include <optional>
 
 #include <ATen/Parallel.h>
@@ -36,13 +36,9 @@ ActivationSize size_of(const at::Tensor& x) {
   return {activation_type_of(x.scalar_type()), x.numel() / x.size(-1), x.size(-1)};
 }
 
-NetworkPasses& passes_on(at::Device device) {
-  static std::mutex mutex;
-  static std::map<c10::DeviceIndex, std::unique_ptr<NetworkPasses>> of_devices;
-  const std::lock_guard lock(mutex);
-  std::unique_ptr<NetworkPasses>& passes = of_devices[device.index()];
-  if (!passes) passes = make_network_passes({MemorySpace::cuda, device.index()});
-  return *passes;
+/// Passes hold no state: each call has its own, so that threads of autograd share none.
+std::unique_ptr<NetworkPasses> passes_on(at::Device device) {
+  return make_network_passes({MemorySpace::cuda, device.index()});
 }
 
 Stream stream_on(at::Device device) { return current_stream({MemorySpace::cuda, device.index()}); }
@@ -59,8 +55,8 @@ struct BiasGelu : Function<BiasGelu<kHasNorm>> {
     context->save_for_backward({x, bias});
     at::Tensor out = at::empty_like(x);
     constexpr auto kPass = kHasNorm ? &NetworkPasses::bias_norm_gelu : &NetworkPasses::bias_gelu;
-    (passes_on(x.device()).*kPass)(size_of(x), x.const_data_ptr(), floats_of(bias), out.mutable_data_ptr(),
-                                   stream_on(x.device()));
+    ((*passes_on(x.device())).*kPass)(size_of(x), x.const_data_ptr(), floats_of(bias), out.mutable_data_ptr(),
+                                      stream_on(x.device()));
     return out;
   }
 
@@ -72,8 +68,8 @@ struct BiasGelu : Function<BiasGelu<kHasNorm>> {
     const at::Tensor grad_x = at::empty_like(x),
                      sums = at::empty({num_sums, size.channels}, bias.options().requires_grad(false));
     constexpr auto kPass = kHasNorm ? &NetworkPasses::bias_norm_gelu_backward : &NetworkPasses::bias_gelu_backward;
-    (passes_on(x.device()).*kPass)(size, x.const_data_ptr(), floats_of(bias), grad.const_data_ptr(),
-                                   grad_x.mutable_data_ptr(), sums.mutable_data_ptr<float>(), stream_on(x.device()));
+    ((*passes_on(x.device())).*kPass)(size, x.const_data_ptr(), floats_of(bias), grad.const_data_ptr(),
+                                      grad_x.mutable_data_ptr(), sums.mutable_data_ptr<float>(), stream_on(x.device()));
     return {grad_x, sums.sum(0)};
   }
 };
@@ -86,8 +82,8 @@ struct Norm : Function<Norm> {
     context->save_for_backward({x, position, weight});
     at::Tensor out = at::empty_like(x);
     passes_on(x.device())
-        .norm(size_of(x), x.const_data_ptr(), data_of(position), period_of(position), floats_of(weight),
-              floats_of(bias), out.mutable_data_ptr(), stream_on(x.device()));
+        ->norm(size_of(x), x.const_data_ptr(), data_of(position), period_of(position), floats_of(weight),
+               floats_of(bias), out.mutable_data_ptr(), stream_on(x.device()));
     return out;
   }
 
@@ -100,8 +96,8 @@ struct Norm : Function<Norm> {
                      sums = at::empty({NetworkPasses::num_norm_sums(size.rows, period), period, 3, size.channels},
                                       weight.options().requires_grad(false));
     passes_on(x.device())
-        .norm_backward(size, x.const_data_ptr(), data_of(position), period, floats_of(weight), grad.const_data_ptr(),
-                       grad_x.mutable_data_ptr(), sums.mutable_data_ptr<float>(), stream_on(x.device()));
+        ->norm_backward(size, x.const_data_ptr(), data_of(position), period, floats_of(weight), grad.const_data_ptr(),
+                        grad_x.mutable_data_ptr(), sums.mutable_data_ptr<float>(), stream_on(x.device()));
     const at::Tensor by_position = sums.sum(0), all = by_position.sum(0);
     return {grad_x, position.defined() ? by_position.select(1, 0).to(position.scalar_type()) : at::Tensor(), all[1],
             all[2]};
@@ -119,7 +115,7 @@ struct TokenSoftmax : Function<TokenSoftmax> {
   static at::Tensor forward(AutogradContext* context, const at::Tensor& scores) {
     at::Tensor out = at::empty_like(scores);
     passes_on(scores.device())
-        .token_softmax(tokens_of(scores), scores.const_data_ptr(), out.mutable_data_ptr(), stream_on(scores.device()));
+        ->token_softmax(tokens_of(scores), scores.const_data_ptr(), out.mutable_data_ptr(), stream_on(scores.device()));
     context->save_for_backward({out});
     return out;
   }
@@ -128,8 +124,8 @@ struct TokenSoftmax : Function<TokenSoftmax> {
     const at::Tensor out = context->get_saved_variables()[0], grad = arranged(grads[0], out);
     at::Tensor grad_scores = at::empty_like(out);
     passes_on(out.device())
-        .token_softmax_backward(tokens_of(out), out.const_data_ptr(), grad.const_data_ptr(),
-                                grad_scores.mutable_data_ptr(), stream_on(out.device()));
+        ->token_softmax_backward(tokens_of(out), out.const_data_ptr(), grad.const_data_ptr(),
+                                 grad_scores.mutable_data_ptr(), stream_on(out.device()));
     return {grad_scores};
   }
 
@@ -491,11 +487,11 @@ struct DeviceSets : Function<DeviceSets> {
     at::Tensor out = at::empty({size.sets(), SetSize::kChannels}, options.dtype(at::kBFloat16));
     if (which_out) *which_out = at::empty(out.sizes(), options.dtype(at::kByte));
     passes_on(members.device())
-        .largest_embedding(size, floats_of(members), goals.defined() ? floats_of(goals) : nullptr,
-                           counts.const_data_ptr<int32_t>(),
-                           {floats_of(hidden_weight), floats_of(hidden_bias), floats_of(weight), floats_of(bias)},
-                           out.mutable_data_ptr(), which_out ? which_out->mutable_data_ptr<uint8_t>() : nullptr,
-                           stream_on(members.device()));
+        ->largest_embedding(size, floats_of(members), goals.defined() ? floats_of(goals) : nullptr,
+                            counts.const_data_ptr<int32_t>(),
+                            {floats_of(hidden_weight), floats_of(hidden_bias), floats_of(weight), floats_of(bias)},
+                            out.mutable_data_ptr(), which_out ? which_out->mutable_data_ptr<uint8_t>() : nullptr,
+                            stream_on(members.device()));
     return out;
   }
 
@@ -528,7 +524,7 @@ struct DeviceSets : Function<DeviceSets> {
     const at::Tensor hidden_weight_sums = sums_of(hidden_weight), hidden_bias_sums = sums_of(hidden_bias),
                      weight_sums = sums_of(weight), bias_sums = sums_of(bias);
     passes_on(members.device())
-        .largest_embedding_backward(
+        ->largest_embedding_backward(
             size, floats_of(members), goals.defined() ? floats_of(goals) : nullptr,
             {floats_of(hidden_weight), floats_of(hidden_bias), floats_of(weight), floats_of(bias)},
             which.const_data_ptr<uint8_t>(), grad.const_data_ptr(),
@@ -671,9 +667,9 @@ at::Tensor feature_rows(const at::Tensor& rows, const at::Tensor& goals, const R
   shape.back() = size.width();
   at::Tensor out = at::empty(shape, rows.options().dtype(type));
   passes_on(rows.device())
-      .row_features(size, rows.contiguous().const_data_ptr<float>(),
-                    features.of_goal ? its_goals.const_data_ptr<float>() : nullptr, activation_type_of(type),
-                    out.mutable_data_ptr(), stream_on(rows.device()));
+      ->row_features(size, rows.contiguous().const_data_ptr<float>(),
+                     features.of_goal ? its_goals.const_data_ptr<float>() : nullptr, activation_type_of(type),
+                     out.mutable_data_ptr(), stream_on(rows.device()));
   return out;
 }
 
@@ -688,8 +684,8 @@ at::Tensor image_patches(const at::Tensor& images, int64_t patch_px, at::ScalarT
       at::empty({size.cameras * size.views, size.rows(), size.columns(), PatchSize::channels_of(patch_px)},
                 images.options().dtype(type));
   passes_on(images.device())
-      .patches(size, images.contiguous().const_data_ptr<uint8_t>(), activation_type_of(type), out.mutable_data_ptr(),
-               stream_on(images.device()));
+      ->patches(size, images.contiguous().const_data_ptr<uint8_t>(), activation_type_of(type), out.mutable_data_ptr(),
+                stream_on(images.device()));
   return out.permute({0, 3, 1, 2});
 }
 
