@@ -314,8 +314,8 @@ class Town {
   Edges edges_;
 };
 
-/// Checks a town; false after a failure.
-bool is_valid(const TownOptions& options) {
+/// Returns false after a failure.
+bool expect_valid(const TownOptions& options) {
   std::string text = fmt::format("procedural:{}:blocks={}x{}", options.seed, options.blocks_x, options.blocks_y);
   for (const TownFeature& feature : town_features())
     text += fmt::format(",{}={}", feature.name, options.*feature.value);
@@ -334,7 +334,7 @@ TEST(ProceduralTownMap, SmallTownsAreValid) {
   constexpr std::array<std::array<int, 2>, 5> kSizes{{{1, 1}, {1, 2}, {2, 2}, {3, 1}, {3, 3}}};
   for (uint64_t seed = 0; seed < num_seeds(); ++seed) {
     const auto& [x, y] = kSizes[seed % kSizes.size()];
-    if (!is_valid(test::options_of(seed, x, y))) return;
+    if (!expect_valid(test::options_of(seed, x, y))) return;
   }
 }
 
@@ -346,7 +346,7 @@ TEST(ProceduralTownMap, TownsWithRandomOptionsAreValid) {
       const double value = feature.low + (feature.high - feature.low) * static_cast<double>(stream.uniform());
       options.*feature.value = feature.value == &TownOptions::max_lanes ? std::round(value) : value;
     }
-    if (!is_valid(options)) return;
+    if (!expect_valid(options)) return;
   }
 }
 
@@ -356,7 +356,7 @@ TEST(ProceduralTownMap, TownsWithOneFeatureAtItsMinimumOrMaximumAreValid) {
     for (const double value : {feature.low, feature.high}) {
       TownOptions options = test::options_of(seed++, 3, 2);
       options.*feature.value = value;
-      if (!is_valid(options)) return;
+      if (!expect_valid(options)) return;
     }
   }
 }
@@ -367,7 +367,7 @@ TEST(ProceduralTownMap, TheLargestTownIsRead) {
   EXPECT_GT(parse_opendrive(text, "largest").lanes.size(), 10'000u);
 }
 
-TEST(ProceduralTownMap, LargeTownsAreValid) { EXPECT_TRUE(is_valid(test::options_of(100, 7, 6))); }
+TEST(ProceduralTownMap, LargeTownsAreValid) { expect_valid(test::options_of(100, 7, 6)); }
 
 TEST(ProceduralTownMap, OverpassesHaveClearanceBelow) {
   TownOptions options = test::options_of(4, 3, 3);

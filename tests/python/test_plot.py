@@ -35,7 +35,7 @@ def lines_of(chart, panel=0):
     return {line.get_label(): (list(line.get_xdata()), list(line.get_ydata())) for line in axes.lines if line.get_label()[0] != "_"}
 
 
-def refused(message, function, *arguments, **options):
+def expect_refused(message, function, *arguments, **options):
     with pytest.raises(plot.PlotError) as caught:
         function(*arguments, **options)
     assert message in str(caught.value)
@@ -63,7 +63,7 @@ def test_seeds_of_one_configuration_are_a_mean_with_a_band_where_all_of_them_are
     assert len(goals(*town, other, group="none").facts["lines"]) == 3
     os.remove(f"{other}/config.toml")
     assert goals(other, group="none").panels[0].series[0].name == "other"
-    refused("other/config.toml: expected beside progress.csv", goals, other)
+    expect_refused("other/config.toml: expected beside progress.csv", goals, other)
 
 
 def test_a_mean_has_a_gap_where_a_seed_has_no_number(tmp_path):
@@ -96,24 +96,24 @@ def test_names_are_those_of_folders_and_whole_where_they_are_alike(tmp_path):
 def test_what_is_missing_of_a_run_is_named(tmp_path):
     a = run_folder(tmp_path / "a", 1, "0,1,1 10,1,1")
     progress = pathlib.Path(a) / "progress.csv"
-    refused("nowhere: expected the folder of a training run", goals, f"{tmp_path}/nowhere")
+    expect_refused("nowhere: expected the folder of a training run", goals, f"{tmp_path}/nowhere")
     (tmp_path / "empty").mkdir()
-    refused("/empty: expected the folder of a training run: it has no progress.csv", goals, f"{tmp_path}/empty")
-    refused("young/progress.csv: has no update yet", goals, run_folder(tmp_path / "young"))
-    refused("is the same folder as", goals, a, a + "/.")
-    refused("a/progress.csv: expected a column 'speed'; it has update, ", plot.run_curves, [a], metrics=["speed"])
-    refused("'kept' may be a/kept or b/kept", plot.run_curves, [a], metrics=["kept"])
+    expect_refused("/empty: expected the folder of a training run: it has no progress.csv", goals, f"{tmp_path}/empty")
+    expect_refused("young/progress.csv: has no update yet", goals, run_folder(tmp_path / "young"))
+    expect_refused("is the same folder as", goals, a, a + "/.")
+    expect_refused("a/progress.csv: expected a column 'speed'; it has update, ", plot.run_curves, [a], metrics=["speed"])
+    expect_refused("'kept' may be a/kept or b/kept", plot.run_curves, [a], metrics=["kept"])
     assert plot.run_curves([a], metrics=["a/kept"]).facts["metrics"] == ["a/kept"]
-    refused("no stretch in common", goals, a, run_folder(tmp_path / "b", 2, "50,1,1 60,1,1"))
+    expect_refused("no stretch in common", goals, a, run_folder(tmp_path / "b", 2, "50,1,1 60,1,1"))
     progress.write_text("update,charts/agent_steps,charts/agent_steps\n1,2,3\n")
-    refused("a/progress.csv:1: column 'charts/agent_steps' stands twice", goals, a)
+    expect_refused("a/progress.csv:1: column 'charts/agent_steps' stands twice", goals, a)
     for text, message in {"2,x,3": "got 'x' as number 2", "2,3": "got 2", "2,3,4,5": "got '5' as number 4", "2,1_0,3": "got '1_0' as number 2"}.items():
         progress.write_text(f"update,charts/agent_steps,driving/goals_per_1000_steps\n1,2,3\n{text}\n")
-        refused(f"a/progress.csv:3: expected 3 numbers, {message}", goals, a)
+        expect_refused(f"a/progress.csv:3: expected 3 numbers, {message}", goals, a)
     progress.write_text("update,charts/agent_steps,driving/goals_per_1000_steps\n1,2,3\n")
-    refused("expected a column 'time/rollout_s'", goals, a, x="hours")
+    expect_refused("expected a column 'time/rollout_s'", goals, a, x="hours")
     (tmp_path / "a/config.toml").write_text('[run]\ndevice = "cpu"\n')
-    refused("a/config.toml: expected a number run.seed", goals, a)
+    expect_refused("a/config.toml: expected a number run.seed", goals, a)
 
 
 # ---- evaluations
@@ -168,17 +168,17 @@ def test_distances_per_infraction_are_panels_where_rows_have_them(curves):
 
 
 def test_what_is_missing_of_evaluations_is_named(curves, tmp_path):
-    def refused_lines(message, *lines):
-        refused(message, plot.evaluation_curves, curves(*lines))
+    def expect_refused_lines(message, *lines):
+        expect_refused(message, plot.evaluation_curves, curves(*lines))
 
-    refused_lines("curves.json: expected a line or more")
-    refused_lines("line 1: expected a key 'name'", {"points": []})
-    refused_lines("line 'a': expected a point or more", {"name": "a", "points": []})
-    refused_lines("line 'a': expected a row of medium density", {"name": "a", "points": [point(1, row("light", 1))]})
-    refused_lines("line 'a': expected points in ascending order", {"name": "a", "points": [point(2, row("medium", 1)), point(1, row("medium", 1))]})
-    refused_lines("line 'a': expected a key 'at_fault_collision_rate'", {"name": "a", "points": [point(1, {"density": "medium"})]})
+    expect_refused_lines("curves.json: expected a line or more")
+    expect_refused_lines("line 1: expected a key 'name'", {"points": []})
+    expect_refused_lines("line 'a': expected a point or more", {"name": "a", "points": []})
+    expect_refused_lines("line 'a': expected a row of medium density", {"name": "a", "points": [point(1, row("light", 1))]})
+    expect_refused_lines("line 'a': expected points in ascending order", {"name": "a", "points": [point(2, row("medium", 1)), point(1, row("medium", 1))]})
+    expect_refused_lines("line 'a': expected a key 'at_fault_collision_rate'", {"name": "a", "points": [point(1, {"density": "medium"})]})
     (tmp_path / "text.json").write_text("curves")
-    refused("text.json: expected JSON", plot.evaluation_curves, f"{tmp_path}/text.json")
+    expect_refused("text.json: expected JSON", plot.evaluation_curves, f"{tmp_path}/text.json")
 
 
 # ---- benchmarks
@@ -203,7 +203,7 @@ def test_rates_of_rendering_are_read_from_results_of_one_benchmark_or_of_several
     axes = plot.figure(chart).axes[0]
     assert (axes.get_xscale(), axes.get_yscale(), list(axes.get_xticks())) == ("log", "log", [32, 96])
     assert plot.render_rates(results({"bench": [{"results": [each]} for each in rows]})) == chart
-    refused("results.json: expected results of a benchmark", plot.render_rates, results([]))
+    expect_refused("results.json: expected results of a benchmark", plot.render_rates, results([]))
 
 
 def test_the_cost_of_steps_is_a_rate_turned_over(results):
@@ -223,7 +223,7 @@ def test_rates_on_several_gpus_are_what_gpu_ranks_measured(results):
     assert [lines_of(chart, panel)["96x54 tf32"] for panel in range(4)] == [([1, 2], y) for y in ([1e5, 2e5], [1e5, 1.5e5], [1, 1], [1, 0.75])]
     assert (chart.panels[0].series[0].low, chart.panels[0].series[0].high) == ([5e4, 1e5], [2e5, 4e5])
     assert list(lines_of(plot.rank_rates(results({"rate": {"96x54": rows}})))) == ["96x54 bf16"]
-    refused("expected rates of scripts/gpu_ranks", plot.rank_rates, results({}))
+    expect_refused("expected rates of scripts/gpu_ranks", plot.rank_rates, results({}))
 
 
 def test_a_breakdown_stands_beside_the_papers(results):
@@ -239,7 +239,7 @@ def test_a_breakdown_stands_beside_the_papers(results):
     drawn = plot.figure(chart)
     assert [axes.get_legend() is not None for axes in drawn.axes] == [False, False, True]
     assert [text.get_text() for text in drawn.legends[0].get_texts()] == list(lines_of(chart, 0))
-    refused("expected results of bench breakdown", plot.breakdown_parts, results({"results": [{"name": "cpu 8x8 3 egos", "value": 1}]}), ["env"], paper)
+    expect_refused("expected results of bench breakdown", plot.breakdown_parts, results({"results": [{"name": "cpu 8x8 3 egos", "value": 1}]}), ["env"], paper)
 
 
 # ---- probes
@@ -347,8 +347,8 @@ def test_charts_go_below_pictures(tmp_path):
 
 def test_what_is_no_summary_is_refused(tmp_path):
     (tmp_path / "summary.json").write_text("[]")
-    refused("summary.json: expected the summary of a probe of removal, pedestrian, corner", plot.probe_means, f"{tmp_path}/summary.json")
-    refused("expected a key 'paths'", plot.probe_means, write_summary(tmp_path, "pedestrian", [{"from_first_sight_m": 0, "cases": 1}]))
+    expect_refused("summary.json: expected the summary of a probe of removal, pedestrian, corner", plot.probe_means, f"{tmp_path}/summary.json")
+    expect_refused("expected a key 'paths'", plot.probe_means, write_summary(tmp_path, "pedestrian", [{"from_first_sight_m": 0, "cases": 1}]))
 
 
 # ---- drawing

@@ -1,7 +1,6 @@
 // The CUDA simulator against the CPU's, on a device: the same bits. Without a device these tests are skipped, unless
 // PICTURA_REQUIRE_GPU=1 says that there must be one.
 #include <algorithm>
-#include <chrono>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -715,33 +714,6 @@ TEST_F(CudaSimulatorTest, ActionsThatAreNotTheArrayThatItExpectsAreRefusedAtOnce
             "step: expected 40 commands, got 39");
   EXPECT_NO_THROW(cuda->check());
   EXPECT_EQ(cuda->state_hash(), before);
-}
-
-// Printed, not judged: the paper's number of agents, with and without entity sets.
-TEST_F(CudaSimulatorTest, RateOf20480Agents) {
-  for (const bool sets : {true, false}) {
-    SimulatorConfig config;
-    config.vector_observations = sets;
-    const Maps maps{load_map("procedural:1"), load_map("procedural:2"), load_map("procedural:3")};
-    const auto cuda = make_simulator("cuda", config, maps, draw_worlds(1, 20480, 1, 120, 3));
-    std::vector<DeviceBuffer<int32_t>> actions;
-    for (uint32_t step = 0; step < 16; ++step) {
-      const std::vector<int32_t> host = testing::mixed_actions(20480, step);
-      actions.emplace_back(Span<const int32_t>(host));
-    }
-    const auto run = [&](size_t steps) {
-      for (size_t step = 0; step < steps; ++step) cuda->step(array_of(actions[step % actions.size()], *cuda));
-      cuda->check();
-    };
-    run(200);
-    const int64_t agent_steps = cuda->totals().agent_steps;
-    const auto begin = std::chrono::steady_clock::now();
-    run(1000);
-    const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    fmt::print("entity sets {}: {:.3f} ms a step, {:.1f} M agent-steps/s, {:.1f} M slot-steps/s\n", sets, elapsed_s,
-               static_cast<double>(cuda->totals().agent_steps - agent_steps) / elapsed_s / 1e6,
-               20480 * 1000 / elapsed_s / 1e6);
-  }
 }
 
 }  // namespace

@@ -24,8 +24,8 @@ std::vector<std::string> towns_to_drive() {
 }
 
 /// Nothing may halt an agent, and it seldom leaves the middle of the lane.
-void drive_everywhere(const std::vector<std::string>& towns, float cyclist_fraction, int drivers, int drivers_each,
-                      int steps) {
+void expect_lane_keeping(const std::vector<std::string>& towns, float cyclist_fraction, int drivers, int drivers_each,
+                         int steps) {
   for (const std::string& town : towns) {
     SCOPED_TRACE(town);
     const auto map = load_map(town);
@@ -50,20 +50,20 @@ void drive_everywhere(const std::vector<std::string>& towns, float cyclist_fract
 }
 
 TEST(LaneKeeping, OfABicycleKeepsItsLaneAndStopsAtRedLightsInEveryTown) {
-  drive_everywhere(towns_to_drive(), 1, 16, 1, 600);
+  expect_lane_keeping(towns_to_drive(), 1, 16, 1, 600);
 }
 
 TEST(LaneKeeping, OfACarKeepsItsLaneAndStopsAtRedLightsInEveryTown) {
-  drive_everywhere(towns_to_drive(), 0, 24, 1, 1280);
+  expect_lane_keeping(towns_to_drive(), 0, 24, 1, 1280);
 }
 
 TEST(LaneKeeping, OfACarKeepsItsLaneAndStopsAtRedLightsInACopyOfEveryTown) {
   std::vector<std::string> copies;
   for (const std::string& town : towns_to_drive()) copies.push_back(map_copy_name(town, 1));
-  drive_everywhere(copies, 0, 12, 1, 1280);
+  expect_lane_keeping(copies, 0, 12, 1, 1280);
 }
 
-TEST(LaneKeeping, OfThreeTouchesNoOtherInEveryTown) { drive_everywhere(towns_to_drive(), 0.2f, 48, 3, 600); }
+TEST(LaneKeeping, OfThreeTouchesNoOtherInEveryTown) { expect_lane_keeping(towns_to_drive(), 0.2f, 48, 3, 600); }
 
 /// As many as in evaluation's medium density. Of these 1,080 agents 277 halted as long as they relied on the one ahead
 /// to brake and did not look beside them before changing lanes; now 10: five pairs where one changes lanes in a bend,
