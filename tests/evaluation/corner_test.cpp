@@ -75,25 +75,34 @@ TEST(CornerPairs, TakeNobodyTwiceAndScenesInTurn) {
 
 // ---- the probe
 
-/// Before three policies, in towns through which the lane keeper drives.
-class Corner : public test::ProbedPolicies {
- protected:
-  static CornerOptions options(int64_t pairs) {
-    CornerOptions o;
-    ask(&o);
-    o.worlds.controller = "lane";
-    o.worlds.agents_per_world = 90;
-    o.worlds.steps = 300;
-    o.sample_steps = 5;
-    o.pairs = pairs;
-    return o;
+bool same_runs(const CornerResults& a, const CornerResults& b) {
+  if (a.takeovers.size() != b.takeovers.size()) return false;
+  const auto same = [](float x, float y) { return x == y || (std::isnan(x) && std::isnan(y)); };
+  for (size_t i = 0; i < a.takeovers.size(); ++i) {
+    const Takeover &x = a.takeovers[i], &y = b.takeovers[i];
+    if (x.steps != y.steps || x.input_step != y.input_step || x.sight_step != y.sight_step) return false;
+    if (!std::equal(x.speed_mps.begin(), x.speed_mps.end(), y.speed_mps.begin(), same)) return false;
+    if (!std::equal(x.x_m.begin(), x.x_m.end(), y.x_m.begin(), same)) return false;
   }
-  /// Of which several tests read.
-  static const CornerResults& results() {
-    static const CornerResults all = probe_corner(options(12));
-    return all;
+  return true;
+}
+
+/// In towns through which the lane keeper drives.
+struct CornerKind {
+  using Options = CornerOptions;
+  using Results = CornerResults;
+  static constexpr int64_t kCases = 12;
+  static void set_cases(int64_t pairs, CornerOptions* options) {
+    options->worlds.controller = "lane";
+    options->worlds.agents_per_world = 90;
+    options->worlds.steps = 300;
+    options->sample_steps = 5;
+    options->pairs = pairs;
   }
+  static CornerResults probe(const CornerOptions& options) { return probe_corner(options); }
+  static bool is_same(const CornerResults& a, const CornerResults& b) { return same_runs(a, b); }
 };
+using Corner = test::ProbeTest<CornerKind>;
 
 TEST_F(Corner, PairsAreFoundAndAllPoliciesStartAlike) {
   const CornerResults& all = results();
@@ -188,29 +197,13 @@ TEST_F(Corner, WallsAloneAreGone) {
   EXPECT_GT(compared, all.pairs.size());
 }
 
-bool same_runs(const CornerResults& a, const CornerResults& b) {
-  if (a.takeovers.size() != b.takeovers.size()) return false;
-  const auto same = [](float x, float y) { return x == y || (std::isnan(x) && std::isnan(y)); };
-  for (size_t i = 0; i < a.takeovers.size(); ++i) {
-    const Takeover &x = a.takeovers[i], &y = b.takeovers[i];
-    if (x.steps != y.steps || x.input_step != y.input_step || x.sight_step != y.sight_step) return false;
-    if (!std::equal(x.speed_mps.begin(), x.speed_mps.end(), y.speed_mps.begin(), same)) return false;
-    if (!std::equal(x.x_m.begin(), x.x_m.end(), y.x_m.begin(), same)) return false;
-  }
-  return true;
-}
-
 TEST_F(Corner, BatchesDecideNothing) {
-  CornerOptions o = options(12);
-  o.batch = 1;
   ASSERT_GT(results().pairs.size(), static_cast<size_t>(takeover_pass({}))) << "else there is but one batch";
-  EXPECT_TRUE(same_runs(probe_corner(o), results()));
+  expect_the_same_of_batches({1});
 }
 
 TEST_F(Corner, AnotherOneIsRemovedInstead) {
-  CornerOptions o = options(12);
-  o.control = CornerControl::permuted;
-  const CornerResults permuted = probe_corner(o);
+  const CornerResults permuted = controlled(CornerControl::permuted);
   const CornerResults& all = results();
   ASSERT_EQ(permuted.pairs.size(), all.pairs.size());
   size_t removed = 0, differ = 0;
@@ -235,9 +228,7 @@ TEST_F(Corner, AnotherOneIsRemovedInstead) {
 }
 
 TEST_F(Corner, UntrainedPoliciesTakeOverInTheSameStates) {
-  CornerOptions o = options(12);
-  o.control = CornerControl::untrained;
-  const CornerResults control = probe_corner(o);
+  const CornerResults control = controlled(CornerControl::untrained);
   const CornerResults& all = results();
   ASSERT_EQ(control.pairs.size(), all.pairs.size());
   std::array<size_t, 3> differ{};
@@ -279,12 +270,10 @@ TEST_F(Corner, SeedsDecideWhatIsFound) {
 TEST_F(Corner, RefusesWhatCannotBe) {
   CornerOptions o = options(2);
   o.worlds.steps = 85;
-  EXPECT_THAT(message_of([&] { probe_corner(o); }),
-              HasSubstr("more than 85 steps, of which a takeover takes 80, got 85"));
+  EXPECT_THAT(message_of([&] { probe(o); }), HasSubstr("more than 85 steps, of which a takeover takes 80, got 85"));
   o = options(2);
   o.search.max_distance_m = 5;
-  EXPECT_THAT(message_of([&] { probe_corner(o); }),
-              HasSubstr("distances of 0 to 60 m in ascending order, got 8 and 5"));
+  EXPECT_THAT(message_of([&] { probe(o); }), HasSubstr("distances of 0 to 60 m in ascending order, got 8 and 5"));
 }
 
 // ---- results

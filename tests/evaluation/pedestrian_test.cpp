@@ -21,7 +21,6 @@ using test::kLikeForLike;
 using test::kVectorized;
 using test::message_of;
 using test::read_table;
-using test::same_bits;
 using ::testing::HasSubstr;
 
 // ---- paths
@@ -97,23 +96,19 @@ TEST(CrossingPaths, AreHiddenThenSeenThenHiddenAgain) {
 
 // ---- the probe
 
-/// Pedestrians before three policies.
-class Pedestrian : public test::ProbedPolicies {
- protected:
-  static PedestrianOptions options(int64_t paths) {
-    PedestrianOptions o;
-    ask(&o);
-    o.worlds.scenarios = 3;
-    o.paths = paths;
-    o.min_speed_mps = -10;  // they may reverse
-    return o;
+struct PedestrianKind {
+  using Options = PedestrianOptions;
+  using Results = PedestrianResults;
+  static constexpr int64_t kCases = 6;
+  static void set_cases(int64_t paths, PedestrianOptions* options) {
+    options->worlds.scenarios = 3;
+    options->paths = paths;
+    options->min_speed_mps = -10;  // they may reverse
   }
-  /// Of which several tests read.
-  static const PedestrianResults& results() {
-    static const PedestrianResults all = probe_pedestrian(options(6));
-    return all;
-  }
+  static PedestrianResults probe(const PedestrianOptions& options) { return probe_pedestrian(options); }
+  static bool is_same(const PedestrianResults& a, const PedestrianResults& b) { return test::same_bits(a, b); }
 };
+using Pedestrian = test::ProbeTest<PedestrianKind>;
 
 TEST_F(Pedestrian, PathsAreFoundInAllScenes) {
   const PedestrianResults& all = results();
@@ -171,9 +166,7 @@ TEST_F(Pedestrian, WhoIsHiddenChangesNothingForCamerasAndMuchForVectors) {
 }
 
 TEST_F(Pedestrian, NobodyChangesNothing) {
-  PedestrianOptions o = options(6);
-  o.control = PedestrianControl::nobody;
-  const PedestrianResults control = probe_pedestrian(o);
+  const PedestrianResults control = controlled(PedestrianControl::nobody);
   ASSERT_EQ(control.points.size(), results().points.size());
   for (size_t i = 0; i < control.responses.size(); ++i) {
     EXPECT_TRUE(control.responses[i].is_unchanged()) << i;
@@ -182,9 +175,7 @@ TEST_F(Pedestrian, NobodyChangesNothing) {
 }
 
 TEST_F(Pedestrian, UntrainedPoliciesAnswerOnTheSamePaths) {
-  PedestrianOptions o = options(6);
-  o.control = PedestrianControl::untrained;
-  const PedestrianResults control = probe_pedestrian(o);
+  const PedestrianResults control = controlled(PedestrianControl::untrained);
   const PedestrianResults& all = results();
   ASSERT_EQ(control.points.size(), all.points.size());
   std::array<int, 3> differ{};
@@ -202,34 +193,17 @@ TEST_F(Pedestrian, UntrainedPoliciesAnswerOnTheSamePaths) {
   EXPECT_GT(seen_changes, 10);
 }
 
-TEST_F(Pedestrian, BatchesDecideNothing) {
-  PedestrianOptions o = options(6);
-  for (const int batch : {1, 300}) {
-    o.batch = batch;
-    EXPECT_TRUE(same_bits(probe_pedestrian(o), results())) << batch;
-  }
-}
+TEST_F(Pedestrian, BatchesDecideNothing) { expect_the_same_of_batches({1, 300}); }
 
-TEST_F(Pedestrian, SeedsDecideWhatIsFound) {
-  PedestrianOptions o = options(2);
-  o.policies = {policies_[kAgent]};
-  o.worlds.scenarios = 1;
-  o.worlds.steps = 30;
-  const PedestrianResults first = probe_pedestrian(o), again = probe_pedestrian(o);
-  o.worlds.seed = 2;
-  const PedestrianResults other = probe_pedestrian(o);
-  ASSERT_EQ(first.paths.size(), 2u);
-  EXPECT_TRUE(same_bits(first, again));
-  EXPECT_FALSE(same_bits(first, other));
-}
+TEST_F(Pedestrian, SeedsDecideWhatIsFound) { EXPECT_EQ(expect_seeds_to_decide(2).paths.size(), 2u); }
 
 TEST_F(Pedestrian, RefusesWhatCannotBe) {
   PedestrianOptions o = options(2);
   o.worlds.scenarios = 4;
-  EXPECT_THAT(message_of([&] { probe_pedestrian(o); }), HasSubstr("3 policies can drive equal shares of, got 4"));
+  EXPECT_THAT(message_of([&] { probe(o); }), HasSubstr("3 policies can drive equal shares of, got 4"));
   o = options(2);
   o.hider_range_m = 3;
-  EXPECT_THAT(message_of([&] { probe_pedestrian(o); }), HasSubstr("a range above 5 m, got 3"));
+  EXPECT_THAT(message_of([&] { probe(o); }), HasSubstr("a range above 5 m, got 3"));
   EXPECT_THAT(message_of([&] { pedestrian_control_named("some"); }), HasSubstr("none, nobody, untrained, got 'some'"));
 }
 

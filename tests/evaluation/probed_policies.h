@@ -1,6 +1,7 @@
-// Small policies that probes are asked about.
+// Small policies that probes are asked about, and what tests of all probes do.
 #pragma once
 
+#include <initializer_list>
 #include <string>
 #include <vector>
 
@@ -63,5 +64,53 @@ inline bool same_bits(const ProbeResults& a, const ProbeResults& b) {
   }
   return true;
 }
+
+/// Tests of one probe, of which Kind says: Options and Results, kCases, how many cases most tests read,
+/// set_cases(cases, &options), probe(options), and is_same(results, results).
+template <typename Kind>
+class ProbeTest : public ProbedPolicies {
+ protected:
+  using Options = typename Kind::Options;
+  using Results = typename Kind::Results;
+  using Control = decltype(Options::control);
+
+  static Options options(int64_t cases = Kind::kCases) {
+    Options o;
+    ask(&o);
+    Kind::set_cases(cases, &o);
+    return o;
+  }
+  static Results probe(const Options& o) { return Kind::probe(o); }
+  /// The results without a control.
+  static const Results& results() {
+    static const Results all = probe(options());
+    return all;
+  }
+  static Results controlled(Control control) {
+    Options o = options();
+    o.control = control;
+    return probe(o);
+  }
+
+  static void expect_the_same_of_batches(std::initializer_list<int> batches) {
+    Options o = options();
+    for (const int batch : batches) {
+      o.batch = batch;
+      EXPECT_TRUE(Kind::is_same(probe(o), results())) << batch;
+    }
+  }
+  /// Returns what the first of two seeds gave: cases of one policy in one scene.
+  static Results expect_seeds_to_decide(int64_t cases) {
+    Options o = options(cases);
+    o.policies = {policies_[kAgent]};
+    o.worlds.scenarios = 1;
+    o.worlds.steps = 30;
+    Results first = probe(o);
+    EXPECT_TRUE(Kind::is_same(first, probe(o)));
+    o.worlds.seed = 2;
+    EXPECT_FALSE(Kind::is_same(first, probe(o)));
+    return first;
+  }
+};
 
 }  // namespace pictura::test

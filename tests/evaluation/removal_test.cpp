@@ -22,25 +22,18 @@ using test::kLikeForLike;
 using test::kVectorized;
 using test::message_of;
 using test::read_table;
-using test::same_bits;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-/// Removals by three policies.
-class Removal : public test::ProbedPolicies {
- protected:
-  static RemovalOptions options(int64_t removals) {
-    RemovalOptions o;
-    ask(&o);
-    o.removals = removals;
-    return o;
-  }
-  /// Many cases, of which several tests read.
-  static const RemovalResults& results() {
-    static const RemovalResults all = probe_removal(options(600));
-    return all;
-  }
+struct RemovalKind {
+  using Options = RemovalOptions;
+  using Results = RemovalResults;
+  static constexpr int64_t kCases = 600;
+  static void set_cases(int64_t cases, RemovalOptions* options) { options->removals = cases; }
+  static RemovalResults probe(const RemovalOptions& options) { return probe_removal(options); }
+  static bool is_same(const RemovalResults& a, const RemovalResults& b) { return test::same_bits(a, b); }
 };
+using Removal = test::ProbeTest<RemovalKind>;
 
 TEST_F(Removal, EachPolicyDrivesAnEqualShareOfTheScenes) {
   const RemovalResults& all = results();
@@ -113,9 +106,7 @@ TEST_F(Removal, VectorPoliciesMissThePartnersThatTheyRead) {
 }
 
 TEST_F(Removal, HidingNobodyChangesNothing) {
-  RemovalOptions o = options(600);
-  o.control = RemovalControl::nobody;
-  const RemovalResults control = probe_removal(o);
+  const RemovalResults control = controlled(RemovalControl::nobody);
   ASSERT_EQ(control.cases.size(), 600u);
   for (const RemovalCase& one : control.cases) EXPECT_EQ(one.hidden, -1);
   for (size_t i = 0; i < control.responses.size(); ++i) {
@@ -126,9 +117,7 @@ TEST_F(Removal, HidingNobodyChangesNothing) {
 }
 
 TEST_F(Removal, HidingAnotherUserGivesOtherNumbers) {
-  RemovalOptions o = options(600);
-  o.control = RemovalControl::permuted;
-  const RemovalResults control = probe_removal(o);
+  const RemovalResults control = controlled(RemovalControl::permuted);
   ASSERT_EQ(control.cases.size(), results().cases.size());
   int others = 0, differ = 0;
   for (size_t i = 0; i < control.cases.size(); ++i) {
@@ -145,9 +134,7 @@ TEST_F(Removal, HidingAnotherUserGivesOtherNumbers) {
 }
 
 TEST_F(Removal, UntrainedPoliciesAnswerInTheSameStates) {
-  RemovalOptions o = options(600);
-  o.control = RemovalControl::untrained;
-  const RemovalResults control = probe_removal(o);
+  const RemovalResults control = controlled(RemovalControl::untrained);
   const RemovalResults& all = results();
   ASSERT_EQ(control.cases.size(), all.cases.size());
   int hidden = 0, seen_changes = 0;
@@ -190,33 +177,16 @@ TEST_F(Removal, WeightsOfUntrainedPoliciesAreOfTheSeed) {
   EXPECT_EQ(trained.untrained(1)->training_world().walls, trained.training_world().walls);
 }
 
-TEST_F(Removal, BatchesDecideNothing) {
-  RemovalOptions o = options(600);
-  for (const int batch : {1, 300}) {
-    o.batch = batch;
-    EXPECT_TRUE(same_bits(probe_removal(o), results())) << batch;
-  }
-}
+TEST_F(Removal, BatchesDecideNothing) { expect_the_same_of_batches({1, 300}); }
 
-TEST_F(Removal, SeedsDecideWhatIsDrawn) {
-  RemovalOptions o = options(30);
-  o.policies = {policies_[kAgent]};
-  o.worlds.scenarios = 1;
-  o.worlds.steps = 30;
-  const RemovalResults first = probe_removal(o), again = probe_removal(o);
-  o.worlds.seed = 2;
-  const RemovalResults other = probe_removal(o);
-  ASSERT_EQ(first.cases.size(), 30u);
-  EXPECT_TRUE(same_bits(first, again));
-  EXPECT_FALSE(same_bits(first, other));
-}
+TEST_F(Removal, SeedsDecideWhatIsDrawn) { EXPECT_EQ(expect_seeds_to_decide(30).cases.size(), 30u); }
 
 TEST_F(Removal, PoliciesOfVectorsNeedNoImages) {
   RemovalOptions o = options(60);
   o.policies = {policies_[kLikeForLike], policies_[kLikeForLike]};
   o.worlds.scenarios = 2;
   o.worlds.steps = 30;
-  const RemovalResults one = probe_removal(o);
+  const RemovalResults one = probe(o);
   EXPECT_EQ(one.cases.size(), 60u);
   EXPECT_FALSE(one.policies[0].reads_images);
   EXPECT_THAT(one.policies[1].name, ::testing::EndsWith("like_for_like/checkpoint.ckpt (2)"));
@@ -229,13 +199,13 @@ TEST_F(Removal, PoliciesOfVectorsNeedNoImages) {
 TEST_F(Removal, RefusesWhatCannotBe) {
   RemovalOptions o = options(10);
   o.worlds.scenarios = 4;
-  EXPECT_THAT(message_of([&] { probe_removal(o); }), HasSubstr("3 policies can drive equal shares of, got 4"));
+  EXPECT_THAT(message_of([&] { probe(o); }), HasSubstr("3 policies can drive equal shares of, got 4"));
   o = options(10);
   o.sample_steps = 60;
-  EXPECT_THAT(message_of([&] { probe_removal(o); }), HasSubstr("every 1 to 59 steps, got 60"));
+  EXPECT_THAT(message_of([&] { probe(o); }), HasSubstr("every 1 to 59 steps, got 60"));
   o = options(10);
   o.policies = {*folder_ / "no.ckpt", *folder_ / "no.ckpt"};
-  EXPECT_THAT(message_of([&] { probe_removal(o); }), HasSubstr("no.ckpt"));
+  EXPECT_THAT(message_of([&] { probe(o); }), HasSubstr("no.ckpt"));
   EXPECT_THAT(message_of([&] { removal_control_named("some"); }), HasSubstr("none, nobody, permuted"));
   EXPECT_EQ(default_probe_scenes(3, 8), 24);
   EXPECT_EQ(default_probe_scenes(2, 8), 16);
