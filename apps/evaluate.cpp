@@ -10,6 +10,7 @@
 #include "pictura/cli/evaluation_options.h"
 #include "pictura/cli/file_options.h"
 #include "pictura/cli/number_options.h"
+#include "pictura/cli/recording_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/cli/world_options.h"
 #include "pictura/common/error.h"

@@ -88,7 +88,7 @@ function(pictura_optimize_little target)
   target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-O1>)
 endfunction()
 
-# pictura_compile_together(TARGET): several sources as one, for code whose templates, each source's own, take a compiler
+# pictura_compile_together(TARGET): with PICTURA_UNITY several sources as one, for code whose templates, each source's own, take a compiler
 # longer than what they are used for. Libraries that others build upon are compiled source by source, so that a missing
 # include shows.
 function(pictura_compile_together target)

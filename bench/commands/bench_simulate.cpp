@@ -13,6 +13,7 @@
 #include "pictura/cli/backend_options.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
+#include "pictura/cli/world_options.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/map/load_map.h"

@@ -7,6 +7,7 @@
 
 #include "pictura/evaluation/csv.h"
 #include "pictura/evaluation/probes/probe_json.h"
+#include "pictura/simulator/simulator.h"
 
 namespace pictura {
 
