@@ -1,0 +1,232 @@
+"""Usage of the `pictura` command: help, typed commands, and files that it reads and writes."""
+
+import json
+import os
+import pathlib
+import re
+import resource
+import socket
+import subprocess
+import unittest.mock
+
+from command_case import CONFIGS, PICTURA, CommandCase, has_torch, run
+
+
+class Usage(CommandCase):
+    def test_help_teaches_by_example(self):
+        for command in ["town", "map", "render", "simulate", "replay", "plot", "bench", *(["train", "evaluate", "probe"] if has_torch() else [])]:
+            result = run(command, "--help")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn(f"pictura {command}", result.stdout)
+
+    def test_numbers_that_are_not_finite_or_out_of_range_are_refused(self):
+        line_floor = ("render", "procedural:1", "--out", self.folder, "--line-floor")
+        self.assert_bad_numbers_are_refused(
+            line_floor,
+            ("town", "--out", self.folder / "town.xodr", "--hills-m"),
+            ("render", "procedural:1", "--out", self.folder, "--pedestrians"),
+            ("simulate", "procedural:1", "--cyclists"),
+            ("simulate", "procedural:1", "--film-width"),
+        )
+        self.assert_refused(2, "--line-floor: expected a number of 0 to 8, got '8.5'", *line_floor, "8.5")
+
+    def test_wrong_usage_exits_with_2(self):
+        self.assert_refused(2, "--out", "town", "--seed", 1)
+        self.assert_refused(2, "--blocks", "town", "--blocks", "3", "--out", self.folder / "t.xodr")
+        self.assert_refused(2, "--blocks", "town", "--blocks", "0x2", "--out", self.folder / "t.xodr")
+        self.assertEqual(run("fly").returncode, 2)
+        self.assertEqual(run().returncode, 2)
+
+
+class Typing(CommandCase):
+    """What people type: numbers, misspelt words, options that are wrong together."""
+
+    COMMANDS = [
+        ("town",), ("map",), ("render",), ("simulate",), ("replay",), ("train",), ("evaluate",), ("plot",), ("bench", "render"),
+        ("bench", "simulate"), ("bench", "history"), ("bench", "quality"), ("bench", "soak"), ("bench", "worlds"),
+        ("bench", "train"), ("bench", "breakdown"), ("probe", "removal"), ("probe", "pedestrian"), ("probe", "corner"),
+    ]  # fmt: skip
+
+    def test_numbers_are_decimal_in_any_notation(self):
+        def town(seed):
+            path = self.folder / "town.xodr"
+            self.assertEqual(run("town", "--blocks", "1x1", "--seed", seed, "--out", path).returncode, 0, seed)
+            return path.read_bytes()
+
+        self.assertEqual(town("010"), town("10"))
+        self.assertEqual(town("1e3"), town("1000"))
+        for seed in ("-1", "0x10", "1.5", "18446744073709551616", "1e20"):
+            self.assert_refused(2, f"--seed: expected a whole number of 0 to 18446744073709551615, got '{seed}'",
+                                "town", "--out", self.folder / "town.xodr", "--seed", seed)  # fmt: skip
+
+    def test_every_option_that_takes_a_number_reads_it_alike(self):
+        for command in self.COMMANDS:
+            page = run(*command, "--help")
+            if page.returncode != 0:
+                continue  # this build lacks it
+            options = re.findall(r"^ +(--[a-z-]+)(?:,--[a-z-]+)* +(?:INT|UINT|FLOAT)", page.stdout, re.MULTILINE)
+            for option in options:
+                if option == "--at":
+                    continue  # two of them
+                with self.subTest(command=command, option=option):
+                    count = 4 if option == "--box" else 1
+                    self.assert_refused(2, "number", *command, option, *["0x1"] * count)
+
+    def test_one_bound_on_threads(self):
+        commands = [("render", "procedural:1", "--out", self.folder), ("simulate", "procedural:1")]
+        if has_torch():
+            commands.append(("evaluate", "no.ckpt"))
+        for command in commands:
+            for threads in ("33000", "100000", "-1"):
+                self.assert_refused(2, f"--threads: expected a whole number of 0 to 1024, got '{threads}'", *command,
+                                    "--threads", threads)  # fmt: skip
+
+    def test_unknown_words_suggest_the_nearest(self):
+        self.assert_refused(2, "unknown subcommand 'simulat'; did you mean 'simulate'?", "simulat")
+        self.assert_refused(2, "unknown option '--sede'; did you mean '--seed'?", "town", "--sede", 3)
+        self.assert_refused(2, "unexpected argument 'b'", "map", "a", "b")
+        self.assert_refused(2, "did you mean 'null'?", "simulate", "procedural:1", "--renderer", "nul")
+        self.assert_refused(2, "expected one of seeds, none; got 'seed'; did you mean 'seeds'?", "plot", "runs", "--group", "seed")
+        (self.folder / "Town01.xodr").write_text("")
+        with unittest.mock.patch.dict(os.environ, {"PICTURA_DATA": str(self.folder)}):
+            self.assert_refused(2, "did you mean 'Town01'?", "map", "town01")
+        if has_torch():
+            self.assert_refused(2, "unknown subcommand 'trian'; did you mean 'train'?", "trian")
+            self.assert_refused(2, "unknown option '--confg'; did you mean '--config'?", "train", "--confg", "a.toml")
+            self.assert_refused(1, "got 'bf61'; did you mean 'bf16'?", "train", "--config", CONFIGS / "smoke.toml", "--set", "train.precision=bf61", "--out", "x")
+        else:
+            self.assert_refused(2, "pictura train: this build has no torch", "train", "--config", "a.toml")
+
+    def test_values_that_would_be_ignored_are_refused(self):
+        town = self.town(blocks="1x1")
+        self.assert_refused(2, "--png: expected a value, got an empty text", "map", town, "--png", "")
+        self.assert_refused(2, "--at: has no effect without --png or --svg", "map", town, "--at", 0, 0)
+        self.assert_refused(2, "expected a name that ends in .png, got 'x.jpg'", "map", town, "--png", "x.jpg")
+        self.assert_refused(2, "parking: given twice", "map", "procedural:1:parking=0,parking=1")
+        self.assert_refused(2, "--renderer: has no effect with the policy 'random'", "simulate", town, "--renderer", "null")
+        self.assert_refused(2, "--film-width: has no effect without --video", "simulate", town, "--film-width", 9)
+        self.assert_refused(2, "expected at most 1 together", "simulate", town, "--pedestrians", 1, "--cyclists", 1)
+
+    def test_a_share_that_was_not_given_gives_way(self):
+        facts = self.json_of("simulate", self.town(), "--agents", 6, "--steps", 1, "--pedestrians", 1)
+        self.assertEqual((facts["vehicles"], facts["cyclists"]), (0, 0))
+
+    def test_messages_are_one_line_whatever_a_name_holds(self):
+        self.assert_refused(2, "map 'a\\nb\\x1b': expected", "map", "a\nb\x1b")
+        if has_torch():
+            self.assert_refused(1, "no.toml: no such file", "train", "--config", "no.toml", "--out", self.folder / "run")
+
+
+class Files(CommandCase):
+    """What output files do to what is there, and what a full disk and a closed end get."""
+
+    def test_devices_links_and_fifos_stay_what_they_are(self):
+        town, link, fifo = self.town(blocks="1x1"), self.folder / "link", self.folder / "fifo"
+        self.assert_refused(1, "/dev/full: cannot be written: No space left on device", "map", town, "--png", "/dev/full")
+        self.assertTrue(pathlib.Path("/dev/full").is_char_device())
+        link.symlink_to("picture.png")
+        self.json_of("map", town, "--png", link, "--size", 64)
+        self.assertTrue(link.is_symlink())
+        self.assertEqual((self.folder / "picture.png").read_bytes()[:4], b"\x89PNG")
+        os.mkfifo(fifo)
+        reader = subprocess.Popen(["cat", str(fifo)], stdout=subprocess.PIPE)
+        self.json_of("map", town, "--png", fifo, "--size", 64)
+        self.assertEqual(reader.communicate(timeout=60)[0], (self.folder / "picture.png").read_bytes())
+        self.assertTrue(fifo.is_fifo())
+        self.assert_refused(1, "expected a file, got a folder", "map", town, "--png", self.folder)
+
+    def test_names_of_descriptors_are_written_where_they_are(self):
+        expected = self.town(blocks="1x1").read_text()
+        town = [PICTURA, "town", "--seed", "3", "--blocks", "1x1", "--out"]
+        for name in ("/dev/stdout", "/proc/self/fd/1", "/dev/fd/1"):
+            for mode in ("w", "a"):
+                path = self.folder / "redirected"
+                path.write_text("of before\n")
+                with open(path, mode) as out:
+                    out.write("head\n")
+                    out.flush()
+                    subprocess.run([*town, name], stdout=out, check=True)
+                    out.write("tail\n")
+                before = "of before\n" if mode == "a" else ""
+                got = path.read_text()
+                self.assertTrue(got.startswith(before + "head\n" + expected) and got.endswith("tail\n"), (name, mode))
+        reading, writing = socket.socketpair()  # which can be opened by no name
+        with reading, reading.makefile() as text:
+            with writing:
+                subprocess.run([*town, "/dev/stdout"], stdout=writing, check=True, timeout=60)
+            self.assertTrue(text.read().startswith(expected))
+
+    def test_every_byte_of_stdout_counts(self):
+        town = self.town()
+        listing = [PICTURA, "map", str(town), "--full", "--json"]
+        self.assertGreater(len(subprocess.run(listing, capture_output=True).stdout), 1 << 16)
+        limit = (1 << 16, 1 << 16)
+        with open(self.folder / "out.json", "wb") as out:
+            result = subprocess.run(listing, stdout=out, stderr=subprocess.PIPE, text=True,
+                                    preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limit))  # fmt: skip
+        self.assertEqual((result.returncode, "error: stdout: cannot be written" in result.stderr), (1, True), result.stderr)
+        for arguments in (["--help"], ["town", "--help"], ["map", str(town)], ["map", str(town), "--json"]):
+            with self.subTest(arguments), open("/dev/full", "wb") as full:
+                result = subprocess.run([PICTURA, *arguments], stdout=full, stderr=subprocess.PIPE, text=True)
+                self.assertEqual((result.returncode, "No space left on device" in result.stderr), (1, True), result.stderr)
+
+    def test_closed_descriptors_are_no_outputs(self):
+        for closed in ([2], [0, 1, 2]):
+            with self.subTest(closed=closed):
+                video = self.folder / "film.mp4"
+                arguments = ["simulate", "procedural:1", "--agents", 4, "--steps", 10, "--video", video, "--film-width", 60]
+                result = subprocess.run([PICTURA, *map(str, arguments)], stdout=subprocess.DEVNULL,
+                                        preexec_fn=lambda closed=closed: [os.close(descriptor) for descriptor in closed])  # fmt: skip
+                self.assertEqual(result.returncode, 1 if 1 in closed else 0)
+                self.assertEqual(video.read_bytes()[4:8], b"ftyp")
+
+    def test_what_stderr_does_not_take_is_lost_and_nothing_else(self):
+        reader, closed_pipe = os.pipe()
+        os.close(reader)
+        self.addCleanup(os.close, closed_pipe)
+        with open("/dev/full", "wb") as full:
+            for stderr in (full.fileno(), closed_pipe):
+                page = self.folder / "page.html"
+                result = subprocess.run([PICTURA, "replay", "procedural:1", "--agents", "4", "--steps", "20", "--out", str(page), "--json"],
+                                        stdout=subprocess.PIPE, stderr=stderr)  # fmt: skip
+                self.assertEqual((result.returncode, json.loads(result.stdout)["steps"]), (0, 20))
+                self.assertTrue(page.exists())
+
+    def test_a_closed_stdout_is_an_error_after_the_work_is_saved(self):
+        reader, closed_pipe = os.pipe()
+        os.close(reader)
+        self.addCleanup(os.close, closed_pipe)
+        for number, arguments in enumerate((["--seed", "3"], ["--seed", "3", "--json"])):
+            town = self.folder / f"town{number}.xodr"
+            result = subprocess.run([PICTURA, "town", "--blocks", "1x1", *arguments, "--out", str(town)],
+                                    stdout=closed_pipe, stderr=subprocess.PIPE, text=True)  # fmt: skip
+            self.assertEqual((result.returncode, town.exists()), (1, True), result.stderr)
+            self.assertIn("error: stdout: cannot be written: Broken pipe", result.stderr)
+
+    def test_no_two_options_write_one_file(self):
+        town, page = self.town(blocks="1x1"), self.folder / "page"
+        for first, second in [("--replay", "--mcap"), ("--mcap", "--scene"), ("--policy", "--replay")]:
+            with self.subTest(first=first, second=second):
+                self.assert_refused(2, "expected another file than that of --", "simulate", town, first, page, second, page)
+        relative = [os.path.abspath(PICTURA), "simulate", town, "--replay", "page", "--mcap", "./page"]
+        self.assertEqual(subprocess.run(relative, cwd=self.folder, stderr=subprocess.DEVNULL).returncode, 2)
+        self.assertFalse(page.exists())
+        self.json_of("simulate", town, "--agents", 2, "--steps", 2, "--replay", "/dev/null", "--mcap", "/dev/null")
+        before = town.stat().st_ino
+        self.json_of("map", town, "--xodr", town)  # a map may be replaced
+        self.assertNotEqual(town.stat().st_ino, before)
+
+    def test_the_contact_sheet_of_many_views_has_pages(self):
+        out = self.folder / "images"
+        facts = self.json_of("render", self.town(), "--agents", 80, "--steps", 0, "--views", 80, "--backend", "null",
+                             "--size", "96x54", "--out", out)  # fmt: skip
+        self.assertEqual([pathlib.Path(path).name for path in facts["contact_sheets"]],
+                         ["contact_sheet.png", "contact_sheet_2.png", "contact_sheet_3.png"])  # fmt: skip
+        # One row is as high as a page, not the more the narrower its images are.
+        facts = self.json_of("render", self.town(), "--agents", 2, "--steps", 0, "--views", 1, "--backend", "null",
+                             "--size", "8x1000", "--out", out)  # fmt: skip
+        self.assertEqual(len(facts["contact_sheets"]), 1)
+
+
+if __name__ == "__main__":
+    unittest.main()
