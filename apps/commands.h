@@ -1,5 +1,6 @@
 // The subcommands of `pictura`, one file each. A function here registers its command with CLI11; the command's callback
-// does the work and throws Error, UsageError or Interrupted, which main() turns into one line and an exit status.
+// does the work and throws Error, UsageError or Interrupted, which run_command() turns into one line and an exit
+// status.
 #pragma once
 
 #include <CLI/CLI.hpp>

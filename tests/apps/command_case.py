@@ -3,10 +3,16 @@
     python3 X_command_test.py PICTURA [unittest arguments]
 """
 
+import atexit
+import functools
 import json
 import os
 import pathlib
 import re
+import select
+import signal
+import socket
+import struct
 import subprocess
 import sys
 import tempfile
@@ -25,10 +31,56 @@ TINY = [
 ]  # fmt: skip
 
 
-def run(*arguments, timeout=300, cwd=None, **variables):
-    """A call of the command. Skips the test where it would draw a chart and the machine has no Matplotlib."""
+class CommandServer:
+    """A process whose children are calls of the command: most of a start is the loading of libraries (command_server.cpp)."""
+
+    def __init__(self, program):
+        self.socket, stdin = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.process = subprocess.Popen([program], stdin=stdin)
+        stdin.close()
+        atexit.register(self.close)
+
+    def close(self):
+        self.socket.close()
+        self.process.wait()
+
+    def run(self, words, cwd, environment, timeout):
+        """As subprocess.run() with its outputs captured as text."""
+        variables = [f"{name}={value}" for name, value in environment.items()]
+        texts = [os.path.abspath(cwd or "."), str(len(variables)), *variables, str(len(words)), *words]
+        packet = b"".join(os.fsencode(text) + b"\0" for text in texts)
+        answers, answer = os.pipe()
+        with tempfile.TemporaryFile("w+") as stdout, tempfile.TemporaryFile("w+") as stderr, open(answers, "rb", buffering=0) as answers:
+            try:
+                socket.send_fds(self.socket, [packet], [0, stdout.fileno(), stderr.fileno(), answer])
+            finally:
+                os.close(answer)
+            (child,) = struct.unpack("i", answers.read(4))
+            if not select.select([answers], [], [], timeout)[0]:
+                os.kill(child, signal.SIGKILL)
+                raise subprocess.TimeoutExpired(words, timeout)
+            (status,) = struct.unpack("i", answers.read(4))
+            stdout.seek(0)
+            stderr.seek(0)
+            return subprocess.CompletedProcess(words, os.waitstatus_to_exitcode(status), stdout.read(), stderr.read())
+
+
+@functools.cache
+def server():
+    """None where the build has no server."""
+    program = os.environ.get("PICTURA_COMMAND_SERVER")
+    return CommandServer(program) if program else None
+
+
+def run(*arguments, timeout=300, cwd=None, started=False, **variables):
+    """A call of the command; `started`: as a program, whose command line is its own. Skips the test where it would draw a chart
+    and the machine has no Matplotlib."""
     environment = {**os.environ, **{name: str(value) for name, value in variables.items()}}
-    result = subprocess.run([PICTURA, *map(str, arguments)], capture_output=True, text=True, timeout=timeout, env=environment, cwd=cwd)
+    words = [PICTURA, *map(str, arguments)]
+    if server() and not started:
+        result = server().run(words, cwd, environment, timeout)
+    else:
+        result = subprocess.run(words, capture_output=True, text=True, timeout=timeout, env=environment, cwd=cwd)
     if "has no Matplotlib" in result.stderr and "PICTURA_PYTHON" not in variables:
         raise unittest.SkipTest("no Matplotlib on this machine")
     return result
@@ -47,8 +99,8 @@ class CommandCase(unittest.TestCase):
     def tearDown(self):
         self._folder.cleanup()
 
-    def json_of(self, *arguments):
-        result = run(*arguments, "--json")
+    def json_of(self, *arguments, **options):
+        result = run(*arguments, "--json", **options)
         self.assertEqual(result.returncode, 0, result.stderr)
         return json.loads(result.stdout)
 

@@ -24,7 +24,7 @@ class Replays(CommandCase):
     def test_simulate_records_what_it_counts_and_drives_alike(self):
         path = self.folder / "a.html"
         simulate = ["simulate", *self.WORLD, "--steps", 60, "--policy", "random"]
-        facts = self.json_of(*simulate, "--replay", path, "--follow", 3)
+        facts = self.json_of(*simulate, "--replay", path, "--follow", 3, started=True)
         self.assertEqual(facts["state_hash"], self.json_of(*simulate)["state_hash"])
         header = header_of(path)
         for name in ("collisions", "at_fault_collisions", "off_road", "red_light", "wall_contacts", "agent_steps", "goals_reached"):

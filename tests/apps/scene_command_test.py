@@ -7,11 +7,13 @@ import subprocess
 import sys
 import tempfile
 
-PICTURA, FIXTURE = sys.argv[1:3]
+import command_case
+
+FIXTURE = sys.argv[1]
 
 
 def run(*words, status=0, command="map"):
-    done = subprocess.run([PICTURA, command, *map(str, words)], capture_output=True, text=True)
+    done = command_case.run(command, *words)
     assert done.returncode == status, (words, done)
     return done
 
@@ -132,7 +134,7 @@ with tempfile.TemporaryDirectory() as name:
 
     # Evaluations: one damaged scene of six is left out.
     words = ("--policy", "idm", "--protocol", "womd", "--scenes", folder, "--threads", 1)
-    if "evaluate" in subprocess.run([PICTURA, "--help"], capture_output=True, text=True).stdout:
+    if command_case.has_torch():
         done = run(*words, "--csv", folder / "agents.csv", "--json", command="evaluate")
         report = json.loads(done.stdout)
         assert "warning: left out: " in done.stderr and "damaged.tfrecord: record 0" in done.stderr, done.stderr
