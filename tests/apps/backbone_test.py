@@ -4,14 +4,20 @@ Run by ctest: python3 backbone_test.py PICTURA [unittest arguments], by a Python
 """
 
 import json
+import multiprocessing
+import os
 import pathlib
+import runpy
 import struct
 import subprocess
 import sys
 import tempfile
 import unittest
 
-PICTURA = ""
+import torch  # noqa: F401: children of this process, which export, have it then
+
+import command_case
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 EXPORT = ROOT / "scripts" / "export_backbone"
 TRAIN = [
@@ -62,8 +68,27 @@ def make_unscriptable():
 """
 
 
-def run(*arguments):
-    return subprocess.run([*map(str, arguments)], capture_output=True, text=True, timeout=300)
+def export(words, stdout, stderr):
+    os.dup2(stdout, 1)
+    os.dup2(stderr, 2)
+    sys.argv = words
+    runpy.run_path(words[0], run_name="__main__")
+
+
+def run_export(*arguments):
+    """scripts/export_backbone in a child of this process: it takes seconds to import torch."""
+    words = [str(EXPORT), *map(str, arguments)]
+    with tempfile.TemporaryFile("w+") as stdout, tempfile.TemporaryFile("w+") as stderr:
+        child = multiprocessing.get_context("fork").Process(target=export, args=(words, stdout.fileno(), stderr.fileno()))
+        child.start()
+        child.join(300)
+        stdout.seek(0)
+        stderr.seek(0)
+        return subprocess.CompletedProcess(words, child.exitcode, stdout.read(), stderr.read())
+
+
+def run(program, *arguments):
+    return run_export(*arguments) if program == EXPORT else command_case.run(program, *arguments)
 
 
 class Backbones(unittest.TestCase):
@@ -76,13 +101,13 @@ class Backbones(unittest.TestCase):
         self._folder.cleanup()
 
     def export(self, function, name, *more):
-        result = run(sys.executable, EXPORT, f"{self.folder}/models.py:{function}", "--patch", 8, "--out",
+        result = run(EXPORT, f"{self.folder}/models.py:{function}", "--patch", 8, "--out",
                      self.folder / name, *more)  # fmt: skip
         self.assertEqual(result.returncode, 0, result.stderr)
         return self.folder / name
 
     def train(self, program, name, updates, *more):
-        return [PICTURA, *TRAIN, "--set", f"policy.backbone={program}", "--set", f"train.updates={updates}", "--out",
+        return [*TRAIN, "--set", f"policy.backbone={program}", "--set", f"train.updates={updates}", "--out",
                 self.folder / name, *more]  # fmt: skip
 
     def json_of(self, *arguments):
@@ -121,7 +146,7 @@ class Backbones(unittest.TestCase):
         self.assertEqual(self.json_of(*self.train(moved, "parts", 2, "--resume"))["policy_hash"], whole["policy_hash"])
         self.assertNotEqual(self.json_of(*self.train(other, "other", 2))["policy_hash"], whole["policy_hash"])
 
-        evaluate = [PICTURA, "evaluate", self.folder / "whole" / "checkpoint.ckpt", "--map", "procedural", "--agents", 4,
+        evaluate = ["evaluate", self.folder / "whole" / "checkpoint.ckpt", "--map", "procedural", "--agents", 4,
                     "--scenarios", 1, "--steps", 4, "--device", "cpu", "--threads", 1]  # fmt: skip
         self.assert_refused([str(vit)], *evaluate)
         self.assert_refused(["policy.backbone"], *evaluate, "--backbone", other)
@@ -148,7 +173,7 @@ class Backbones(unittest.TestCase):
         text.write_text("no program")
         self.assert_refused([str(text), "TorchScript"], *self.train(text, "run", 1))
         self.assert_refused(["none.pt"], *self.train(self.folder / "none.pt", "run", 1))
-        export = [sys.executable, EXPORT, f"{self.folder}/models.py:make_unscriptable", "--patch", 8, "--out",
+        export = [EXPORT, f"{self.folder}/models.py:make_unscriptable", "--patch", 8, "--out",
                   self.folder / "traced.pt"]  # fmt: skip
         self.assert_refused(["cannot be scripted", "--size"], *export)
         traced = self.export("make_unscriptable", "traced.pt", "--size", "24x16")
@@ -161,13 +186,12 @@ class Backbones(unittest.TestCase):
         vit = self.export("make", "vit.pt")
         self.assert_refused(["16 channels", "policy.attention_heads (3)"],
                             *self.train(vit, "heads", 1, "--set", "policy.attention_heads=3"))  # fmt: skip
-        self.assert_refused(["--patch 7", " tokens"], *export[:2], f"{self.folder}/models.py:make", "--patch", 7,
+        self.assert_refused(["--patch 7", " tokens"], EXPORT, f"{self.folder}/models.py:make", "--patch", 7,
                             "--out", self.folder / "none.pt")  # fmt: skip
         for patch, size in (4, []), (16, []), (16, ["--size", "64x64"]):
-            self.assert_refused([f"--patch {patch}", " tokens"], *export[:2], f"{self.folder}/models.py:make", "--patch",
+            self.assert_refused([f"--patch {patch}", " tokens"], EXPORT, f"{self.folder}/models.py:make", "--patch",
                                 patch, *size, "--out", self.folder / "none.pt")  # fmt: skip
 
 
 if __name__ == "__main__":
-    PICTURA = sys.argv.pop(1)
     unittest.main(verbosity=2)
