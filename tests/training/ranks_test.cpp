@@ -1,5 +1,5 @@
 // Ranks: who is which, how they meet and lose each other, what they compute together, and that they learn what one
-// would. Ranks are threads here; tests/apps/command_test.py has them as processes.
+// would. Ranks are threads here; tests/apps/ranks_command_test.py has them as processes.
 #include "pictura/training/ranks/ranks.h"
 
 #include <cstdlib>
