@@ -52,7 +52,7 @@ struct ImageTolerance {
   const char* name;
   double worst, usual, share_above_usual, min_psnr_db;
 };
-/// The oracle against its own images: its arithmetic is the same on every machine (docs/house.md).
+/// The oracle against its own images: its arithmetic is the same on every machine (docs/developer/house.md).
 constexpr ImageTolerance kGoldenOracle{"oracle", 0, 0, 0, 0};
 /// The CUDA renderer against the oracle's images: the design's promise, as above.
 constexpr ImageTolerance kGoldenKernel{"kernel", kKernelWorstError, kKernelError, 1 - kKernelShareWithin, 0};
