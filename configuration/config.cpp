@@ -1,7 +1,5 @@
 #include "pictura/configuration/config.h"
 
-#include <algorithm>
-
 #include "pictura/configuration/config_writer.h"
 #include "pictura/configuration/visit_keys.h"
 
@@ -42,18 +40,8 @@ std::string to_toml(const Config& config) {
   return writer.toml;
 }
 
-namespace {
-
-template <typename Enum>
-std::string name_among(const Choices<Enum>& choices, Enum value) {
-  return std::find_if(choices.begin(), choices.end(), [&](const auto& choice) { return choice.second == value; })
-      ->first;
-}
-
-}  // namespace
-
-std::string name_of(Precision precision) { return name_among(kPrecisions, precision); }
-std::string name_of(OptimizerKind kind) { return name_among(kOptimizers, kind); }
-std::string name_of(ValueHead head) { return name_among(kValueHeads, head); }
+std::string name_of(Precision precision) { return kPrecisions[static_cast<size_t>(precision)]; }
+std::string name_of(OptimizerKind kind) { return kOptimizers[static_cast<size_t>(kind)]; }
+std::string name_of(ValueHead head) { return kValueHeads[static_cast<size_t>(head)]; }
 
 }  // namespace pictura

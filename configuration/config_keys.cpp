@@ -49,9 +49,7 @@ class Describer {
     add(key, fmt::format("{}, in ascending order", kSizeChangesExpected));
   }
   template <typename Enum>
-  void choice(const std::string& key, const Enum&, const Choices<Enum>& choices) {
-    std::vector<std::string> names;
-    for (const auto& [each, chosen] : choices) names.push_back(each);
+  void choice(const std::string& key, const Enum&, const Names& names) {
     add(key, fmt::format("{}", fmt::join(names, ", ")));
   }
   void range(const std::string& key, const ConditioningRange& value) {

@@ -51,10 +51,8 @@ class ConfigWriter {
     line(key, fmt::format("[{}]", fmt::join(all, ", ")));
   }
   template <typename Enum>
-  void choice(const NamedKey& key, const Enum& value, const Choices<Enum>& choices) {
-    for (const auto& [name, chosen] : choices) {
-      if (chosen == value) text(key, name);
-    }
+  void choice(const NamedKey& key, const Enum& value, const Names& names) {
+    text(key, names[static_cast<size_t>(value)]);
   }
   void range(const NamedKey& key, const ConditioningRange& value) {
     line(key, fmt::format("[{}, {}]", shortest(value.low), shortest(value.high)));

@@ -149,16 +149,13 @@ class Reader {
   }
 
   template <typename Enum>
-  void choice(const std::string& key, Enum& value, const Choices<Enum>& choices) {
+  void choice(const std::string& key, Enum& value, const Names& names) {
     const toml::node* node = find(key);
     if (!node) return;
     const std::string text = text_of(key, *node);
-    std::vector<std::string> known;
-    for (const auto& [name, chosen] : choices) {
-      if (text == name) return void(value = chosen);
-      known.push_back(name);
-    }
-    refuse_name(key, *node, text, known);
+    const auto found = std::find(names.begin(), names.end(), text);
+    if (found == names.end()) refuse_name(key, *node, text, names);
+    value = static_cast<Enum>(found - names.begin());
   }
 
   void range(const std::string& key, ConditioningRange& value) {

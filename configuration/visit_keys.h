@@ -1,6 +1,7 @@
 // The list of keys of the configuration: what reads, writes, compares and describes them walks it.
 #pragma once
 
+#include <iterator>
 #include <limits>
 #include <string>
 #include <utility>
@@ -15,23 +16,17 @@
 
 namespace pictura {
 
-template <typename Enum>
-using Choices = std::vector<std::pair<std::string, Enum>>;
-inline const Choices<Modality> kModalities{{"perspective", Modality::perspective}, {"vector", Modality::vector}};
-inline const Choices<Precision> kPrecisions{
-    {"fp32", Precision::fp32}, {"tf32", Precision::tf32}, {"bf16", Precision::bf16}};
-inline const Choices<Schedule> kSchedules{
-    {"constant", Schedule::constant}, {"linear", Schedule::linear}, {"cosine", Schedule::cosine}};
-inline const Choices<OptimizerKind> kOptimizers{{"adamw", OptimizerKind::adamw}, {"muon", OptimizerKind::muon}};
-inline const Choices<ValueHead> kValueHeads{
-    {"linear", ValueHead::linear}, {"symlog", ValueHead::symlog}, {"two_hot", ValueHead::two_hot}};
-inline const Choices<FilterThreshold> kFilterThresholds{{"maximum", FilterThreshold::maximum},
-                                                        {"quantile", FilterThreshold::quantile}};
-inline const Choices<LightCycles> kLightCycles{{name_of(LightCycles::phases), LightCycles::phases},
-                                               {name_of(LightCycles::independent), LightCycles::independent}};
-inline const Choices<LightHeads> kLightHeads{{name_of(LightHeads::as_mapped), LightHeads::as_mapped},
-                                             {name_of(LightHeads::visible), LightHeads::visible}};
-inline const Choices<HaltedSlots> kHaltedSlots{{"skip", HaltedSlots::skip}, {"draw", HaltedSlots::draw}};
+// Names of choices, in the order of their enums.
+using Names = std::vector<std::string>;
+inline const Names kModalities{"perspective", "vector"};
+inline const Names kPrecisions{"fp32", "tf32", "bf16"};
+inline const Names kSchedules{"constant", "linear", "cosine"};
+inline const Names kOptimizers{"adamw", "muon"};
+inline const Names kValueHeads{"linear", "symlog", "two_hot"};
+inline const Names kFilterThresholds{"maximum", "quantile"};
+inline const Names kLightCycles{std::begin(kLightCyclesNames), std::end(kLightCyclesNames)};
+inline const Names kLightHeads{kLightHeadsNames.begin(), kLightHeadsNames.end()};
+inline const Names kHaltedSlots{"skip", "draw"};
 
 inline constexpr const char* kDevices = "cpu, cuda, cuda:N, auto";
 inline constexpr const char* kSizeChangesExpected =
@@ -46,9 +41,9 @@ enum class Evaluation { counts, replaced };
 
 /// A key and what is to be said of it beside its type, default and range.
 struct NamedKey {
-  NamedKey(const char* its_name) : name(its_name) {}             // NOLINT: most keys are a name alone
-  NamedKey(std::string its_name) : name(std::move(its_name)) {}  // NOLINT
-  NamedKey(std::string its_name, Resume at_resume, Evaluation in_evaluation = Evaluation::counts)
+  NamedKey(const char* its_name) : name(its_name) {}                // NOLINT: most keys are a name alone
+  NamedKey(std::string its_name, Resume at_resume = Resume::fixed,  // NOLINT
+           Evaluation in_evaluation = Evaluation::counts)
       : name(std::move(its_name)), resume(at_resume), evaluation(in_evaluation) {}
   operator const std::string&() const { return name; }  // NOLINT: most visitors need no more
 
