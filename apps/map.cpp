@@ -207,9 +207,7 @@ void add_map_command(CLI::App& app) {
                    "Draw lanes, markings, edges, lights, signs, crosswalks, parking and building lines into this file")
       ->check(file_ending(".png"));
   command->add_option("--svg", arguments->svg, "Draw the same as vector graphics")->check(file_ending(".svg"));
-  command->add_option("--size", arguments->size_px, "Longer side of the picture in pixels")
-      ->transform(whole_number(64, 16384))
-      ->capture_default_str();
+  add_number_option(command, "--size", arguments->size_px, "Longer side of the picture in pixels", 64, 16384);
   CLI::Option* box =
       command->add_option("--box", arguments->box, "Draw only this part: two corners, in the file's metres")
           ->expected(4)
@@ -221,10 +219,9 @@ void add_map_command(CLI::App& app) {
           ->transform(number(-kFarthest_m, kFarthest_m))
           ->type_name("X Y")
           ->excludes(box);
-  command->add_option("--radius", arguments->radius_m, "How far to draw around --at, in metres")
-      ->needs(at)
-      ->transform(number(0.5, kFarthest_m))
-      ->capture_default_str();
+  add_number_option(command, "--radius", arguments->radius_m, "How far to draw around --at, in metres", 0.5,
+                    kFarthest_m)
+      ->needs(at);
   command->add_option("--xodr", arguments->xodr, "Write the map as OpenDRIVE, with only what the importer uses")
       ->check(file_ending(".xodr"));
   command->add_flag("--strict", arguments->strict,

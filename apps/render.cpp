@@ -234,12 +234,8 @@ void add_render_command(CLI::App& app) {
   add_world_options(command, &arguments->world);
   add_light_cycles_option(command, &arguments->world.light_cycles, name_of(SimulatorConfig{}.light_cycles));
   add_light_heads_option(command, &arguments->world.light_heads);
-  command->add_option("--steps", arguments->steps, "Steps of random actions before the pictures")
-      ->transform(whole_number(0))
-      ->capture_default_str();
-  command->add_option("--views", arguments->views, "Draw the cameras of the first so many agents")
-      ->transform(whole_number(1))
-      ->capture_default_str();
+  add_number_option(command, "--steps", arguments->steps, "Steps of random actions before the pictures", 0);
+  add_number_option(command, "--views", arguments->views, "Draw the cameras of the first so many agents", 1);
   add_scene_options(command, &arguments->world);
   command->add_option("--tracks", arguments->tracks,
                       "Of a recorded scene, whose cameras are drawn, of those who are there at --start: self, vehicles "
@@ -251,11 +247,8 @@ void add_render_command(CLI::App& app) {
                     "At sizes that are not 16:9, keep pixels square and the horizontal field of view");
   add_backend_options(command, "auto", &arguments->backends);
   command->add_option("--rig", arguments->rig, "TOML file with [[camera]] tables instead of the paper's four cameras");
-  command
-      ->add_option("--line-floor", arguments->line_floor_px,
-                   "Least width of a line on screen in pixels; 0 turns it off")
-      ->transform(number(0, kMaxLineFloor_px))
-      ->capture_default_str();
+  add_number_option(command, "--line-floor", arguments->line_floor_px,
+                    "Least width of a line on screen in pixels; 0 turns it off", 0, kMaxLineFloor_px);
   command->add_option("--planes", arguments->planes, "Also write these planes as pictures: depth, class, instance")
       ->delimiter(',')
       ->allow_extra_args(false)

@@ -104,9 +104,8 @@ void add_replay_command(CLI::App& app) {
   command->add_option("--mcap", arguments->mcap, "The same as an MCAP file, for Foxglove; with or without a page")
       ->check(file_ending(".mcap"))
       ->excludes(gallery);
-  command->add_option("--episodes", arguments->episodes, "How many seeds, from --seed on, --gallery records")
-      ->transform(whole_number(1, 10000))
-      ->capture_default_str();
+  add_number_option(command, "--episodes", arguments->episodes, "How many seeds, from --seed on, --gallery records", 1,
+                    10000);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "The page holds everything: it opens from disk, in any browser, without a network.\n"

@@ -148,8 +148,8 @@ void add_scene_options(CLI::App* command, SceneArguments* arguments) {
                       "Who is driven: self (or sdc), vehicles (the others), others (who is no vehicle), all, "
                       "tracks_to_predict, objects_of_interest, and ids, with commas between them; default: the "
                       "protocol's");
-  command->add_option("--start", arguments->start_step, "The step of recordings to start at; default: the protocol's")
-      ->transform(whole_number(0, kMaxScenarioSteps - 1));
+  add_number_option(command, "--start", arguments->start_step,
+                    "The step of recordings to start at; default: the protocol's", 0, kMaxScenarioSteps - 1);
   command
       ->add_option("--rule", arguments->rules,
                    fmt::format("NAME=VALUE in place of one of the protocol's; may be given many times. {}",
@@ -181,7 +181,7 @@ void run_scene_evaluation(const CLI::App& command, const SceneArguments& argumen
   SceneProtocol& protocol = options.protocol;
   protocol = scene_protocol(arguments.protocol);
   if (command.count("--control") > 0) protocol.control = arguments.control;
-  if (command.count("--start") > 0) protocol.start_step = arguments.start_step;
+  protocol.start_step = arguments.start_step.value_or(protocol.start_step);
   if (command.count("--steps") > 0) protocol.steps = steps;
   if (command.count("--density") > 0) {
     protocol.densities.clear();

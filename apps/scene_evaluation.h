@@ -1,6 +1,7 @@
 // `pictura evaluate --protocol`: evaluations in recorded scenes, and their reports.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,7 +16,7 @@ struct SceneArguments {
   std::string protocol;  // empty: no recorded scenes
   std::vector<std::string> scenes, rules;
   std::string control, csv, rollouts;
-  int start_step = 0;
+  std::optional<int> start_step;
 };
 
 /// Adds --protocol, --scenes, --control, --start, --rule, --csv and --rollouts.

@@ -270,13 +270,10 @@ void add_simulate_command(CLI::App& app) {
       "--video", arguments->video,
       "Film it into this .mp4 or .gif: from above, with goals, lights and why agents halted, and from one "
       "agent's cameras");
-  command->add_option("--film-width", arguments->film_width_m, "Metres that it shows from above; 0: the whole map")
-      ->transform(number(0, 1e5))
-      ->capture_default_str();
-  command
-      ->add_option("--film-agent", arguments->film_agent,
-                   "The agent that the film follows; default: 0, in recorded scenes the self-driving car")
-      ->transform(whole_number(0));
+  add_number_option(command, "--film-width", arguments->film_width_m,
+                    "Metres that it shows from above; 0: the whole map", 0, 1e5);
+  add_number_option(command, "--film-agent", arguments->film_agent,
+                    "The agent that the film follows; default: 0, in recorded scenes the self-driving car", 0);
   command->add_option("--replay", arguments->replay, "Record it as a page that a browser plays")
       ->check(file_ending(".html"));
   command->add_option("--mcap", arguments->mcap, "The same as an MCAP file, for Foxglove")->check(file_ending(".mcap"));

@@ -20,9 +20,8 @@ void add_town_command(CLI::App& app) {
   add_seed_option(command, &arguments->town.seed, "Equal seeds give equal files");
   command->add_option("--blocks", arguments->blocks, "Blocks of houses along x and y, as AxB")->capture_default_str();
   for (const TownFeature& feature : town_features()) {
-    command->add_option(fmt::format("--{}", feature.name), arguments->town.*feature.value, feature.help)
-        ->transform(number(feature.low, feature.high))
-        ->capture_default_str();
+    add_number_option(command, fmt::format("--{}", feature.name), arguments->town.*feature.value, feature.help,
+                      feature.low, feature.high);
   }
   command->add_option("--out", arguments->out, "The .xodr file to write")->check(file_ending(".xodr"))->required();
   command->add_flag("--json", arguments->json, "Print one JSON object");

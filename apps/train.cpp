@@ -36,11 +36,10 @@ void add_train_command(CLI::App& app) {
       ->add_option("--init-from", arguments->train.init_from,
                    "Begin with the weights of this checkpoint or safetensors, of the same network at any image size")
       ->excludes(resume);
-  command
-      ->add_option("--minutes", arguments->train.minutes,
-                   "Save and end before this much wall time has passed, as far as the longest update until now tells; "
-                   "go on with --resume")
-      ->transform(number(1e-9, 1e9));
+  add_number_option(command, "--minutes", arguments->train.minutes,
+                    "Save and end before this much wall time has passed, as far as the longest update until now tells; "
+                    "go on with --resume",
+                    1e-9, 1e9);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "Several processes train one policy, each on its GPU, where torchrun, srun or the variables RANK, WORLD_SIZE,\n"

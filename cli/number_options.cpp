@@ -38,9 +38,7 @@ CLI::Option* add_seed_option(CLI::App* command, uint64_t* seed_out, const std::s
 }
 
 CLI::Option* add_threads_option(CLI::App* command, int* num_threads_out) {
-  return command->add_option("--threads", *num_threads_out, "Host threads; 0: all")
-      ->transform(whole_number(0, kMaxThreads))
-      ->capture_default_str();
+  return add_number_option(command, "--threads", *num_threads_out, "Host threads; 0: all", 0, kMaxThreads);
 }
 
 }  // namespace pictura

@@ -6,11 +6,10 @@
 namespace pictura {
 
 void add_recording_options(CLI::App* command, RecordingOptions* options_out) {
-  command
-      ->add_option("--follow", options_out->followed,
-                   "The agent whose decisions and images the replay holds, and that it opens with; default: 0, in "
-                   "recorded scenes the self-driving car")
-      ->transform(whole_number(0, kMaxAgentsPerWorld - 1));
+  add_number_option(command, "--follow", options_out->followed,
+                    "The agent whose decisions and images the replay holds, and that it opens with; default: 0, in "
+                    "recorded scenes the self-driving car",
+                    0, kMaxAgentsPerWorld - 1);
   add_cameras_option(command, options_out);
 }
 

@@ -11,27 +11,23 @@
 namespace pictura {
 
 void add_world_options(CLI::App* command, WorldOptions* options_out) {
-  command->add_option("--agents", options_out->agents, "Vehicles, cyclists and pedestrians in the world")
-      ->transform(whole_number(1, kMaxAgentsPerWorld))
-      ->capture_default_str();
+  add_number_option(command, "--agents", options_out->agents, "Vehicles, cyclists and pedestrians in the world", 1,
+                    kMaxAgentsPerWorld);
   // What a command sets beforehand is its default; else the policy decides, or the simulator.
   const SimulatorConfig simulator;
   auto with_default = [](const char* what, auto preset, auto simulators) {
     return fmt::format("{}; default: {}{}", what, preset.value_or(simulators),
                        preset ? "" : ", or, with a trained policy, what it was trained with");
   };
-  command
-      ->add_option("--pedestrians", options_out->pedestrian_fraction,
-                   with_default("Share of the agents", options_out->pedestrian_fraction, simulator.pedestrian_fraction))
-      ->transform(number(0, 1));
-  command
-      ->add_option("--cyclists", options_out->cyclist_fraction,
-                   with_default("Share of the agents", options_out->cyclist_fraction, simulator.cyclist_fraction))
-      ->transform(number(0, 1));
-  command
-      ->add_option("--parked", options_out->parked_cars,
-                   with_default("Parked cars", options_out->parked_cars, simulator.parked_cars))
-      ->transform(whole_number(0, kMaxAgentsPerWorld));
+  add_number_option(
+      command, "--pedestrians", options_out->pedestrian_fraction,
+      with_default("Share of the agents", options_out->pedestrian_fraction, simulator.pedestrian_fraction), 0, 1);
+  add_number_option(command, "--cyclists", options_out->cyclist_fraction,
+                    with_default("Share of the agents", options_out->cyclist_fraction, simulator.cyclist_fraction), 0,
+                    1);
+  add_number_option(command, "--parked", options_out->parked_cars,
+                    with_default("Parked cars", options_out->parked_cars, simulator.parked_cars), 0,
+                    kMaxAgentsPerWorld);
   add_seed_option(command, &options_out->seed, "Places, sizes, goals and actions");
   add_threads_option(command, &options_out->num_threads);
   command->add_flag("!--no-walls", options_out->walls, "Leave out the walls along the building lines");
@@ -58,9 +54,8 @@ void add_light_heads_option(CLI::App* command, std::optional<LightHeads>* heads_
 }
 
 void add_scene_options(CLI::App* command, WorldOptions* options_out) {
-  command->add_option("--start", options_out->start_step, "The step of a recorded scene to start at")
-      ->transform(whole_number(0, kMaxScenarioSteps - 1))
-      ->capture_default_str();
+  add_number_option(command, "--start", options_out->start_step, "The step of a recorded scene to start at", 0,
+                    kMaxScenarioSteps - 1);
   command->add_flag("--recorded-lights", options_out->recorded_lights,
                     "Put the lights of a recorded scene there, as recorded: drawn, observed, and red ones hold");
 }
@@ -92,9 +87,8 @@ void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_
                    "is not there at the start follows the recording")
       ->capture_default_str();
   add_scene_options(command, world_out);
-  command->add_option("--steps", *steps_out, "Steps of 0.1 s; of a recorded scene by default as many as are recorded")
-      ->transform(whole_number(1))
-      ->capture_default_str();
+  add_number_option(command, "--steps", *steps_out,
+                    "Steps of 0.1 s; of a recorded scene by default as many as are recorded", 1);
   command
       ->add_option(
           "--policy", *policy_out,

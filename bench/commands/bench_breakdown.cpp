@@ -285,25 +285,16 @@ void add_breakdown_benchmark(CLI::App& bench) {
       ->delimiter(',')
       ->transform(whole_number(1, kMaxAgentsPerWorld))
       ->capture_default_str();
-  command
-      ->add_option("--chunk", arguments->chunk, "Transitions through the network at once, or less where memory lacks")
-      ->transform(whole_number(1, 1 << 30))
-      ->capture_default_str();
+  add_number_option(command, "--chunk", arguments->chunk,
+                    "Transitions through the network at once, or less where memory lacks", 1, 1 << 30);
   command->add_option("--device", arguments->device, "What learns: cpu, cuda, cuda:N, auto")->capture_default_str();
   command->add_option("--simulator", arguments->simulator, "cpu, cuda, auto")->capture_default_str();
   command->add_flag("--host-steps", arguments->host_steps,
                     "Also time the steps of an update by the simulator on the host, on their own");
-  command->add_option("--warm-up", measured.warm_up, "Updates before those that are measured, in each case")
-      ->transform(whole_number(1))
-      ->capture_default_str();
-  command->add_option("--updates", measured.updates, "Updates that are measured")
-      ->transform(whole_number(1))
-      ->capture_default_str();
-  command
-      ->add_option("--check", arguments->checked_views,
-                   "Number of egos whose images are compared with the oracle's before each case")
-      ->transform(whole_number(0))
-      ->capture_default_str();
+  add_number_option(command, "--warm-up", measured.warm_up, "Updates before those that are measured, in each case", 1);
+  add_number_option(command, "--updates", measured.updates, "Updates that are measured", 1);
+  add_number_option(command, "--check", arguments->checked_views,
+                    "Number of egos whose images are compared with the oracle's before each case", 0);
   add_plot_options(command, "Plot these results instead of measuring", &arguments->plot);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(

@@ -88,24 +88,13 @@ void add_history_benchmark(CLI::App& bench) {
   add_world_options(command, &arguments->world);
   command->add_option("--backend", measured.backend, "cpu or cuda: simulator, history and renderer")
       ->capture_default_str();
-  command->add_option("--slots", arguments->slots, "So many agents in worlds of 1 to --agents")
-      ->transform(whole_number(1, kMaxSlots))
-      ->capture_default_str();
-  command->add_option("--steps", measured.num_steps, "Of the history")
-      ->transform(whole_number(1, 1 << 16))
-      ->capture_default_str();
-  command->add_option("--warm-up", measured.warm_up_steps, "Steps before the history begins")
-      ->transform(whole_number(0))
-      ->capture_default_str();
-  command->add_option("--views", measured.num_views, "Agents drawn in one call")
-      ->transform(whole_number(1, kMaxSlots))
-      ->capture_default_str();
+  add_number_option(command, "--slots", arguments->slots, "So many agents in worlds of 1 to --agents", 1, kMaxSlots);
+  add_number_option(command, "--steps", measured.num_steps, "Of the history", 1, 1 << 16);
+  add_number_option(command, "--warm-up", measured.warm_up_steps, "Steps before the history begins", 0);
+  add_number_option(command, "--views", measured.num_views, "Agents drawn in one call", 1, kMaxSlots);
   command->add_option("--size", arguments->size, "Pixels of an image, WxH")->capture_default_str();
-  command
-      ->add_option("--check", measured.checked_images,
-                   "Number of agents whose images are compared with those drawn at the time")
-      ->transform(whole_number(1, 1 << 16))
-      ->capture_default_str();
+  add_number_option(command, "--check", measured.checked_images,
+                    "Number of agents whose images are compared with those drawn at the time", 1, 1 << 16);
   add_repeat_options(command, &arguments->rate);
   command->footer(
       "Examples:\n  pictura bench history --slots 240 --views 64 --repeats 3\n"

@@ -76,9 +76,7 @@ void add_map_benchmark(CLI::App& bench) {
   CLI::App* command = bench.add_subcommand("map", "Time to import, load and compile a large map");
   command->add_option("--map", arguments->map, "A .xodr file, a town's name, or procedural[:SEED]")
       ->capture_default_str();
-  command->add_option("--repeats", arguments->repeats, "Measurements; the median is printed")
-      ->transform(whole_number(1, 1000))
-      ->capture_default_str();
+  add_number_option(command, "--repeats", arguments->repeats, "Measurements; the median is printed", 1, 1000);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "Examples:\n"

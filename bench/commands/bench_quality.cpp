@@ -126,25 +126,17 @@ void add_quality_benchmark(CLI::App& bench) {
   CLI::App* command = bench.add_subcommand("quality", "PSNR of images against a ray caster");
   add_maps_option(command, &arguments->maps, "all towns of the map folder and two procedural ones");
   command->add_option("--size", arguments->sizes, "Sizes, WxH; default: the paper's five")->delimiter(',');
-  command->add_option("--agents", arguments->world.agents, "Agents in each world")
-      ->transform(whole_number(1, kMaxAgentsPerWorld))
-      ->capture_default_str();
-  command->add_option("--views", arguments->world.views, "Agents whose cameras are drawn, of each world")
-      ->transform(whole_number(1))
-      ->capture_default_str();
-  command->add_option("--steps", arguments->world.steps, "Steps of random actions before the images")
-      ->transform(whole_number(0))
-      ->capture_default_str();
+  add_number_option(command, "--agents", arguments->world.agents, "Agents in each world", 1, kMaxAgentsPerWorld);
+  add_number_option(command, "--views", arguments->world.views, "Agents whose cameras are drawn, of each world", 1);
+  add_number_option(command, "--steps", arguments->world.steps, "Steps of random actions before the images", 0);
   add_seed_option(command, &arguments->world.seed, "Worlds are drawn from it");
   add_threads_option(command, &arguments->world.num_threads);
   command->add_flag("!--no-walls", arguments->world.walls, "Leave out the walls along the building lines");
-  command->add_option("--line-floor", arguments->line_floor_px, "Minimum width of a line on screen in pixels")
-      ->transform(number(0, kMaxLineFloor_px))
-      ->capture_default_str();
-  command
-      ->add_option("--random", arguments->random,
-                   "Measure this many random scenes of each kind (bench/truth/random_scenes.h) instead, from --seed on")
-      ->transform(whole_number(1));
+  add_number_option(command, "--line-floor", arguments->line_floor_px, "Minimum width of a line on screen in pixels", 0,
+                    kMaxLineFloor_px);
+  add_number_option(
+      command, "--random", arguments->random,
+      "Measure this many random scenes of each kind (bench/truth/random_scenes.h) instead, from --seed on", 1);
   command->add_option("--figure", arguments->figure, "Write crops of all methods to this PNG file")
       ->check(file_ending(".png"));
   command->add_flag("--json", arguments->json, "Print one JSON object");

@@ -219,10 +219,9 @@ void add_render_benchmark(CLI::App& bench) {
   command->add_option("--format", arguments->format, "Type of a channel's value")
       ->check(one_of({"u8", "f16", "f32", "bf16"}).description("{u8,f16,f32,bf16}"))
       ->capture_default_str();
-  command
-      ->add_option("--patch", arguments->patch_px,
-                   "Draw patches of 4, 8, 12 or 16 px squared, as first convolutions take them; default: planar images")
-      ->transform(whole_number(4, 16))
+  add_number_option(
+      command, "--patch", arguments->patch_px,
+      "Draw patches of 4, 8, 12 or 16 px squared, as first convolutions take them; default: planar images", 4, 16)
       ->check(one_of({"4", "8", "12", "16"}).description("{4,8,12,16}"));
   command->add_flag("--planes", arguments->planes, "Draw depth, class and instance planes too");
   command->add_flag("--host-memory", arguments->host_memory,
@@ -232,11 +231,8 @@ void add_render_benchmark(CLI::App& bench) {
                    "sizes: the paper's five and 768x432; squares: without walls; egos: 64 to 20,480")
       ->check(one_of({"sizes", "squares", "egos"}).description("{sizes,squares,egos}"));
   command->add_flag("--memory", arguments->memory, "Measure device memory of a single case instead of rates");
-  command
-      ->add_option("--check", arguments->checked_views,
-                   "Number of egos compared with the oracle, before and after timing")
-      ->transform(whole_number(0))
-      ->capture_default_str();
+  add_number_option(command, "--check", arguments->checked_views,
+                    "Number of egos compared with the oracle, before and after timing", 0);
   add_rate_options(command, &arguments->rate);
   add_compare_option(command, &arguments->earlier);
   command->footer(

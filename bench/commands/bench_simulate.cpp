@@ -150,12 +150,11 @@ void add_simulate_benchmark(CLI::App& bench) {
   add_maps_option(command, &arguments->maps);
   add_world_options(command, &arguments->world);
   command->add_option("--backend", arguments->backends, "cpu, cuda")->delimiter(',')->capture_default_str();
-  auto* worlds = command->add_option("--worlds", arguments->num_worlds, "Default: one for each map")
-                     ->transform(whole_number(1, kMaxSlots));
-  auto* slots = command
-                    ->add_option("--slots", arguments->slots,
-                                 "So many agents in worlds of 1 to --agents, as in training, instead of equal worlds")
-                    ->transform(whole_number(1, kMaxSlots))
+  auto* worlds =
+      add_number_option(command, "--worlds", arguments->num_worlds, "Default: one for each map", 1, kMaxSlots);
+  auto* slots = add_number_option(command, "--slots", arguments->slots,
+                                  "So many agents in worlds of 1 to --agents, as in training, instead of equal worlds",
+                                  1, kMaxSlots)
                     ->excludes(worlds);
   command
       ->add_option(
@@ -164,9 +163,7 @@ void add_simulate_benchmark(CLI::App& bench) {
       ->check(one_of({"agents", "worlds"}).description("{agents,worlds}"))
       ->excludes(worlds)
       ->excludes(slots);
-  command->add_option("--warm-up", arguments->warm_up_steps, "Steps before timing")
-      ->transform(whole_number(1))
-      ->capture_default_str();
+  add_number_option(command, "--warm-up", arguments->warm_up_steps, "Steps before timing", 1);
   add_rate_options(command, &arguments->rate);
   add_compare_option(command, &arguments->earlier);
   command->footer(

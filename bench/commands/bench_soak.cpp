@@ -118,22 +118,12 @@ void add_soak_benchmark(CLI::App& bench) {
   CLI::App* command = bench.add_subcommand("soak", "Compare a renderer with the oracle on random scenes for minutes");
   command->add_option("--backend", arguments->backend, "The renderer")->capture_default_str();
   add_maps_option(command, &soak.maps);
-  command->add_option("--minutes", arguments->minutes, "Time limit")
-      ->transform(number(1e-3, 1e5))
-      ->capture_default_str();
-  command->add_option("--scenes", soak.max_scenes, "Maximum number of scenes; 0: limited by time only")
-      ->transform(whole_number(0))
-      ->capture_default_str();
-  command
-      ->add_option("--first", soak.first_scene, "Number of the first scene; a number gives the same scene in every run")
-      ->transform(whole_number(0))
-      ->capture_default_str();
-  command->add_option("--agents", soak.agents, "Maximum number of agents of a world")
-      ->transform(whole_number(1, kMaxAgentsPerWorld))
-      ->capture_default_str();
-  command->add_option("--views", soak.views, "Views of a scene")
-      ->transform(whole_number(1, 4096))
-      ->capture_default_str();
+  add_number_option(command, "--minutes", arguments->minutes, "Time limit", 1e-3, 1e5);
+  add_number_option(command, "--scenes", soak.max_scenes, "Maximum number of scenes; 0: limited by time only", 0);
+  add_number_option(command, "--first", soak.first_scene,
+                    "Number of the first scene; a number gives the same scene in every run", 0);
+  add_number_option(command, "--agents", soak.agents, "Maximum number of agents of a world", 1, kMaxAgentsPerWorld);
+  add_number_option(command, "--views", soak.views, "Views of a scene", 1, 4096);
   add_seed_option(command, &soak.seed, "Worlds are drawn from it");
   add_threads_option(command, &soak.num_threads);
   command->add_flag("--json", arguments->json, "Print one JSON object");

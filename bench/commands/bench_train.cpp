@@ -95,12 +95,9 @@ void add_train_benchmark(CLI::App& bench) {
       ->allow_extra_args(false);
   add_policy_backend_options(command, "as the configuration says", &arguments->backends);
   command->add_option("--init-from", measured.init_from, "Begin with the weights of this checkpoint");
-  command->add_option("--warm-up", measured.warm_up, "Updates before those that are measured")
-      ->transform(whole_number(1))
-      ->capture_default_str();
-  command->add_option("--updates", measured.updates, "Updates that are measured, whatever train.updates says")
-      ->transform(whole_number(1))
-      ->capture_default_str();
+  add_number_option(command, "--warm-up", measured.warm_up, "Updates before those that are measured", 1);
+  add_number_option(command, "--updates", measured.updates, "Updates that are measured, whatever train.updates says",
+                    1);
   command->add_flag("--kernels", measured.profiles_kernels,
                     "Time each kernel in one update more: the longest, and the share of the wall time without any");
   command->add_flag("--json", arguments->json, "Print one JSON object");

@@ -50,12 +50,8 @@ void add_worlds_benchmark(CLI::App& bench) {
   CLI::App* command =
       bench.add_subcommand("worlds", "Distributions over many episodes: who is there, what befalls them");
   add_maps_option(command, &arguments->maps, "all towns of the map folder, else procedural:1");
-  command->add_option("--episodes", arguments->options.episodes, "Episodes on each map")
-      ->transform(whole_number(1, 10'000))
-      ->capture_default_str();
-  command->add_option("--agents", arguments->options.agents, "Asked for in each world")
-      ->transform(whole_number(1, kMaxAgentsPerWorld))
-      ->capture_default_str();
+  add_number_option(command, "--episodes", arguments->options.episodes, "Episodes on each map", 1, 10'000);
+  add_number_option(command, "--agents", arguments->options.agents, "Asked for in each world", 1, kMaxAgentsPerWorld);
   add_seed_option(command, &arguments->options.seed, "Worlds are drawn from it");
   add_threads_option(command, &arguments->options.num_threads);
   command->add_flag("--json", arguments->json, "Print one JSON object");

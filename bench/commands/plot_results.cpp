@@ -26,12 +26,8 @@ void draw_results(const std::string& chart, const PlotArguments& arguments, Json
 }
 
 void add_repeat_options(CLI::App* command, RateArguments* arguments) {
-  command->add_option("--repeats", arguments->repeats, "Measurements of each case; the median is printed")
-      ->transform(whole_number(1))
-      ->capture_default_str();
-  command->add_option("--repeat-seconds", arguments->repeat_s, "Least length of a measurement, s")
-      ->transform(number(1e-3, 3600))
-      ->capture_default_str();
+  add_number_option(command, "--repeats", arguments->repeats, "Measurements of each case; the median is printed", 1);
+  add_number_option(command, "--repeat-seconds", arguments->repeat_s, "Least length of a measurement, s", 1e-3, 3600);
   command->add_flag("--json", arguments->json, "Print one JSON object");
 }
 
