@@ -154,7 +154,7 @@ EvaluateReport merged(const std::vector<std::string>& paths) {
 }
 
 struct EvaluateArguments {
-  EvaluationArguments evaluation;
+  EvaluateOptions evaluation;
   std::vector<std::string> densities{kDensityNames.begin(), kDensityNames.end()};
   std::vector<std::string> parts;
   std::string size, scenarios = "200", out, infractions;
@@ -166,7 +166,7 @@ struct EvaluateArguments {
 };
 
 void evaluate_in_scenes(const CLI::App& command, const EvaluateArguments& arguments) {
-  const EvaluateOptions& evaluation = arguments.evaluation.evaluate;
+  const EvaluateOptions& evaluation = arguments.evaluation;
   check_driver(evaluation, /*has_parts=*/false, /*has_scenes=*/true);
   refuse_recording_options(command, "--replay or --gallery");
   refuse_options(command, {"--light-heads"}, "in recorded scenes, whose heads all stand beyond their line");
@@ -180,7 +180,7 @@ void evaluate_in_scenes(const CLI::App& command, const EvaluateArguments& argume
 
 // Records the worst scenarios again, where that was asked for.
 void replay_worst(const EvaluateArguments& arguments, const EvaluationResults& results) {
-  const EvaluateOptions& evaluation = arguments.evaluation.evaluate;
+  const EvaluateOptions& evaluation = arguments.evaluation;
   if (!arguments.replay.empty()) {
     write_scenario_replay(evaluation, results, arguments.recording, arguments.replay);
   }
@@ -191,7 +191,7 @@ void replay_worst(const EvaluateArguments& arguments, const EvaluationResults& r
 
 // In towns, or parts of that joined.
 void evaluate_in_towns(const CLI::App& command, EvaluateArguments* arguments) {
-  EvaluateOptions& evaluation = arguments->evaluation.evaluate;
+  EvaluateOptions& evaluation = arguments->evaluation;
   const bool merges = !arguments->parts.empty(), lists_infractions = !arguments->infractions.empty();
   evaluation.densities.clear();
   for (const std::string& name : arguments->densities) evaluation.densities.push_back(density_named(name));
@@ -229,8 +229,7 @@ void evaluate_in_towns(const CLI::App& command, EvaluateArguments* arguments) {
 }
 
 void run_evaluate(const CLI::App& command, EvaluateArguments* arguments) {
-  settle_evaluation_options(&arguments->evaluation);
-  EvaluateOptions& evaluation = arguments->evaluation.evaluate;
+  EvaluateOptions& evaluation = arguments->evaluation;
   if (!arguments->size.empty()) {
     const Pair pixels = parse_pair("--size", arguments->size, 8192);
     evaluation.width_px = pixels.first;
@@ -252,7 +251,7 @@ void run_evaluate(const CLI::App& command, EvaluateArguments* arguments) {
 
 void add_evaluate_command(CLI::App& app) {
   auto arguments = std::make_shared<EvaluateArguments>();
-  EvaluateOptions& options = arguments->evaluation.evaluate;
+  EvaluateOptions& options = arguments->evaluation;
   CLI::App* command = app.add_subcommand("evaluate", "Measure a policy's driving (the paper's protocols)");
   CLI::Option* const checkpoint =
       command->add_option("CHECKPOINT", options.checkpoint, "A checkpoint that train wrote, or safetensors");
@@ -298,9 +297,8 @@ void add_evaluate_command(CLI::App& app) {
       ->check(file_ending(".csv"));
   command->add_option("--replay", arguments->replay, "Record the worst scenario again, as a page that a browser plays")
       ->check(file_ending(".html"));
-  CLI::Option* const replays =
-      command->add_option("--replays", arguments->replays, "Record the N worst scenarios again, into --gallery")
-          ->transform(whole_number(1));
+  CLI::Option* const replays = add_number_option(command, "--replays", arguments->replays,
+                                                 "Record the N worst scenarios again, into --gallery", 1);
   CLI::Option* const gallery = command->add_option(
       "--gallery", arguments->gallery,
       "A folder for the pages of --replays, in place of an earlier gallery's, and an index of them");

@@ -53,7 +53,7 @@ std::string footer(const std::array<const char*, 3>& examples) {
 
 // What all probes are given.
 struct ProbeArguments {
-  EvaluationArguments evaluation;
+  EvaluateOptions evaluation;
   std::string density = "medium", out;
   int scenes = 0;  // 0: not given
   bool json = false;
@@ -61,7 +61,7 @@ struct ProbeArguments {
 
 // The policies, and options that come first in the help.
 void add_world_options(CLI::App* command, ProbeArguments* arguments, ProbeOptions* probe) {
-  EvaluateOptions& worlds = arguments->evaluation.evaluate;
+  EvaluateOptions& worlds = arguments->evaluation;
   worlds.steps = kProbeSteps;
   command
       ->add_option("POLICY", probe->policies, "Checkpoints that train wrote, or safetensors; the world is the first's")
@@ -98,10 +98,9 @@ void add_output_options(CLI::App* command, ProbeArguments* arguments, ProbeOptio
 // Runs a probe with a progress line; makes the folder for its files before.
 template <typename Results, typename Options>
 Results run_probe(Results (*probe)(const Options&), ProbeArguments* arguments, Options* options) {
-  settle_evaluation_options(&arguments->evaluation);
   EvaluateOptions& driven = options->worlds;
-  arguments->evaluation.evaluate.adds_walls = driven.adds_walls;  // the probe's own
-  driven = arguments->evaluation.evaluate;
+  arguments->evaluation.adds_walls = driven.adds_walls;  // the probe's own
+  driven = arguments->evaluation;
   driven.densities = {density_named(arguments->density)};
   driven.scenarios =
       arguments->scenes > 0 ? arguments->scenes : default_probe_scenes(options->policies.size(), driven.maps.size());
@@ -332,7 +331,7 @@ void add_corner_command(CLI::App& probe) {
       ->transform(number(1, kCornerLead_m))
       ->capture_default_str();
   command
-      ->add_option("--driver", arguments->evaluation.evaluate.controller,
+      ->add_option("--driver", arguments->evaluation.controller,
                    "Who drives the scenes in which policies take over, instead of the policies: lane, the lane keeper")
       ->check(one_of({"lane"}));
   command

@@ -8,6 +8,7 @@
 #include "pictura/backends/make_simulator.h"
 #include "pictura/common/pixel_samples.h"
 #include "pictura/common/support/suggestion.h"
+#include "pictura/policy/session_options.h"
 
 namespace pictura {
 
@@ -19,7 +20,8 @@ CLI::Validator one_of(const std::vector<std::string>& names) {
   return {complaint, ""};
 }
 
-void add_backend_options(CLI::App* command, const std::string& otherwise, BackendOptions* options_out) {
+template <typename Options>
+void add_backend_options(CLI::App* command, const std::string& otherwise, Options* options_out) {
   const auto described = [&otherwise](const char* what, const std::vector<std::string>& names) {
     return fmt::format("{}: {}; default: {}", what, fmt::join(names, ", "), otherwise);
   };
@@ -36,11 +38,16 @@ void add_backend_options(CLI::App* command, const std::string& otherwise, Backen
       ->check(CLI::Validator(complaint, ""));
 }
 
-void add_policy_backend_options(CLI::App* command, const std::string& otherwise, BackendOptions* options_out) {
+template <typename Options>
+void add_policy_backend_options(CLI::App* command, const std::string& otherwise, Options* options_out) {
   command->add_option("--device", options_out->device,
                       fmt::format("What the policy runs on: cpu, cuda, cuda:N or auto; default: {}", otherwise));
   add_backend_options(command, otherwise, options_out);
 }
+
+template void add_backend_options(CLI::App*, const std::string&, BackendOptions*);
+template void add_policy_backend_options(CLI::App*, const std::string&, BackendOptions*);
+template void add_policy_backend_options(CLI::App*, const std::string&, SessionOptions*);
 
 std::vector<std::string> overrides_of(const BackendOptions& options) {
   std::vector<std::string> overrides;

@@ -14,10 +14,13 @@ namespace pictura {
 CLI::Validator one_of(const std::vector<std::string>& names);
 
 /// Adds --simulator, --renderer (or --backend) and --samples, whose help names `otherwise` as what counts without them.
-void add_backend_options(CLI::App* command, const std::string& otherwise, BackendOptions* options_out);
+/// Options are BackendOptions, or SessionOptions, which are left as they are by what is not given.
+template <typename Options>
+void add_backend_options(CLI::App* command, const std::string& otherwise, Options* options_out);
 
 /// Adds --device as well: what a policy runs on.
-void add_policy_backend_options(CLI::App* command, const std::string& otherwise, BackendOptions* options_out);
+template <typename Options>
+void add_policy_backend_options(CLI::App* command, const std::string& otherwise, Options* options_out);
 
 /// The options that were given as overrides of a training configuration.
 std::vector<std::string> overrides_of(const BackendOptions& options);

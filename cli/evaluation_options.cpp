@@ -12,22 +12,18 @@
 
 namespace pictura {
 
-EvaluationArguments::EvaluationArguments() { evaluate.maps = Config().simulator.maps; }
-
-CLI::Option* add_evaluation_options(CLI::App* command, EvaluationArguments* arguments) {
-  EvaluateOptions& options = arguments->evaluate;
+CLI::Option* add_evaluation_options(CLI::App* command, EvaluateOptions* options_out) {
+  EvaluateOptions& options = *options_out;
+  options.maps = Config().simulator.maps;
   add_map_list_option(
       command, &options.maps,
       "Maps that the scenarios are spread over, with commas between them; procedural:1-64 is a town for each seed");
-  command->add_option("--agents", options.agents_per_world, "Agents a world, instead of the densities' own numbers")
-      ->transform(whole_number(1, kMaxAgentsPerWorld));
-  command->add_option("--steps", options.steps, "Steps of 0.1 s per scenario")
-      ->transform(whole_number(1))
-      ->capture_default_str();
-  CLI::Option* const sampled = command->add_flag("--sampled", arguments->sampled,
-                                                 "Draw actions from the policy instead of taking the most likely");
+  add_number_option(command, "--agents", options.agents_per_world,
+                    "Agents a world, instead of the densities' own numbers", 1, kMaxAgentsPerWorld);
+  add_number_option(command, "--steps", options.steps, "Steps of 0.1 s per scenario", 1);
+  CLI::Option* const sampled = add_sampled_option(command, &options.argmax);
   add_seed_option(command, &options.seed, "Scenarios are drawn from it");
-  add_policy_backend_options(command, "auto, and drawn as in training", &arguments->backends);
+  add_policy_backend_options<SessionOptions>(command, "auto, and drawn as in training", &options);
   command
       ->add_option("--conditioning", options.conditioning,
                    "What every agent is told, as collision=1, in place of a value of the configuration's "
@@ -39,23 +35,17 @@ CLI::Option* add_evaluation_options(CLI::App* command, EvaluationArguments* argu
   return sampled;
 }
 
+CLI::Option* add_sampled_option(CLI::App* command, bool* argmax_out) {
+  return command->add_flag_function(
+      "--sampled", [argmax_out](int64_t) { *argmax_out = false; },
+      "Draw actions from the policy instead of taking the most likely");
+}
+
 CLI::Option* add_average_option(CLI::App* command, bool* average_out) {
   return command->add_flag(
       "--average", *average_out,
       "The average of the weights that a checkpoint holds (train.weight_average), instead of those "
       "after its last update");
-}
-
-void set_backends(const BackendOptions& backends, DriverOptions* options_out) {
-  if (!backends.device.empty()) options_out->device = backends.device;
-  if (!backends.simulator.empty()) options_out->simulator = backends.simulator;
-  options_out->renderer = backends.renderer;
-  options_out->samples = backends.samples;
-}
-
-void settle_evaluation_options(EvaluationArguments* arguments) {
-  arguments->evaluate.argmax = !arguments->sampled;
-  set_backends(arguments->backends, &arguments->evaluate);
 }
 
 std::string interval_text(const Estimate& estimate, int decimals) {

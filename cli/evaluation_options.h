@@ -12,26 +12,16 @@
 
 namespace pictura {
 
-/// Made with the paper's eight towns.
-struct EvaluationArguments {
-  EvaluationArguments();
-  EvaluateOptions evaluate;
-  BackendOptions backends;
-  bool sampled = false;
-};
-
 /// Adds --map, --agents, --steps, --sampled, --seed, --device, --simulator, --renderer, --samples, --conditioning,
-/// --light-cycles, --light-heads and --threads. Returns --sampled.
-CLI::Option* add_evaluation_options(CLI::App* command, EvaluationArguments* arguments);
+/// --light-cycles, --light-heads and --threads. The maps are the paper's eight towns unless others are given. Returns
+/// --sampled.
+CLI::Option* add_evaluation_options(CLI::App* command, EvaluateOptions* options_out);
+
+/// Adds --sampled, which makes *argmax_out false.
+CLI::Option* add_sampled_option(CLI::App* command, bool* argmax_out);
 
 /// Adds --average, which chooses the average of weights that a checkpoint holds.
 CLI::Option* add_average_option(CLI::App* command, bool* average_out);
-
-/// Lets those that were named compute.
-void set_backends(const BackendOptions& backends, DriverOptions* options_out);
-
-/// Puts into arguments->evaluate what has been parsed beside it.
-void settle_evaluation_options(EvaluationArguments* arguments);
 
 /// "0.123 +- 0.045": the estimate and the half width of its interval; "-" for what there is not.
 std::string interval_text(const Estimate& estimate, int decimals = 3);

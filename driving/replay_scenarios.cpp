@@ -75,7 +75,7 @@ EvaluateOptions options_of(const EvaluateOptions& options, const RecordedScenari
 // An evaluation in the world of another policy, of which the driver observes what it reads.
 EvaluateReport evaluate_in_world_of(const std::string& path, PolicySession* driver, const EvaluateOptions& options) {
   const SimulatorConfig its = driver->evaluation_world(options.steps);
-  SimulatorConfig world = PolicySession(path, session_options(options)).evaluation_world(options.steps);
+  SimulatorConfig world = PolicySession(path, options).evaluation_world(options.steps);
   world.seed = options.seed;
   world.vector_observations = its.vector_observations;
   world.wall_observations = its.wall_observations;
@@ -91,7 +91,7 @@ EvaluateReport evaluate_in_world_of(const std::string& path, PolicySession* driv
 // The policy that drives; null where a controller does.
 std::unique_ptr<PolicySession> session_of(const EvaluateOptions& options) {
   if (!options.controller.empty()) return nullptr;
-  return std::make_unique<PolicySession>(options.checkpoint, session_options(options));
+  return std::make_unique<PolicySession>(options.checkpoint, options);
 }
 
 // Drives the scenario, and returns what it counts. session: as session_of() gives it.
@@ -168,7 +168,7 @@ Replay record_takeover(const EvaluateOptions& options, const RecordedScenario& s
   if (!keeper.kept()) fail("scenario {} was over before step {}", scenario.number, takeover.step);
   const DrivenScene& scene = keeper.scene(scenario.number);
 
-  auto session = std::make_unique<PolicySession>(takeover.policy, session_options(one));
+  auto session = std::make_unique<PolicySession>(takeover.policy, one);
   if (takeover.untrained) session = session->untrained(one.seed);
   SimulatorConfig world = session->evaluation_world(one.steps);
   world.seed = one.seed;

@@ -237,7 +237,7 @@ CompiledMaps compile_maps_of(const EvaluateOptions& options, const SimulatorConf
 
 EvaluateReport evaluate(const EvaluateOptions& options) {
   if (options.controller.empty()) {
-    PolicySession session(options.checkpoint, session_options(options));
+    PolicySession session(options.checkpoint, options);
     return evaluate(&session, options);
   }
   EvaluationWorlds worlds;

@@ -520,7 +520,7 @@ SceneEvaluation evaluate_scenes(const SceneEvaluateOptions& options) {
   if (!options.controller.empty()) {
     return evaluate_scenes(controller_driver(options, options.protocol.steps), nullptr, options);
   }
-  PolicySession session(options.checkpoint, session_options(options));
+  PolicySession session(options.checkpoint, options);
   const std::unique_ptr<Renderer> renderer = session.make_renderer();
   return evaluate_scenes(policy_driver(&session, renderer.get(), options, options.protocol.steps), renderer.get(),
                          options);

@@ -26,23 +26,6 @@ int64_t count_active(Simulator& simulator) {
 
 }  // namespace
 
-SessionOptions session_options(const DriverOptions& options) {
-  return {.num_threads = options.num_threads,
-          .device = options.device,
-          .simulator = options.simulator,
-          .renderer = options.renderer,
-          .samples = options.samples,
-          .rig = options.rig,
-          .width_px = options.width_px,
-          .height_px = options.height_px,
-          .backbone = options.backbone,
-          .conditioning = options.conditioning,
-          .adds_walls = options.adds_walls,
-          .average = options.average,
-          .light_cycles = options.light_cycles,
-          .light_heads = options.light_heads};
-}
-
 EvaluationSetting setting_of(const PolicySession& session) {
   const Config& config = session.config();
   const bool is_on_host = session.device().is_host();

@@ -3,44 +3,29 @@
 
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "pictura/evaluation/results.h"
+#include "pictura/policy/session_options.h"
 #include "pictura/simulator/simulator.h"
 
 namespace pictura {
 
 class PolicySession;
 class Renderer;
-struct SessionOptions;
 
-struct DriverOptions {
+/// Who drives: a policy, and how it is opened, or a controller.
+struct DriverOptions : SessionOptions {
+  DriverOptions() { simulator = "auto"; }
+
   std::string checkpoint;
   // A controller of make_controller, "lane" for one, that drives instead of the checkpoint's policy, in its world, or
   // in the paper's if there is no checkpoint.
   std::string controller;
   bool argmax = true;
   uint64_t seed = 1;
-  int num_threads = 0;
-  std::string device = "auto", simulator = "auto";  // as run.device and simulator.backend of a configuration
-  // As render.backend and render.samples; empty: as the policy was trained.
-  std::string renderer, samples;
-  // Cameras other than those of training, see SessionOptions.
-  std::string rig;
-  int width_px = 0, height_px = 0;
-  // As in SessionOptions.
-  std::string backbone;
-  std::vector<std::string> conditioning;
-  bool adds_walls = false;
-  bool average = false;
-  std::optional<LightCycles> light_cycles;
-  std::optional<LightHeads> light_heads;
 };
-
-/// With which the checkpoint's policy is opened.
-SessionOptions session_options(const DriverOptions& options);
 
 /// What drives the agents of a batch of worlds, and how many it drove when it last acted.
 struct Driving {

@@ -3,11 +3,11 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "pictura/common/renderer.h"
 #include "pictura/configuration/apply_config.h"
+#include "pictura/policy/session_options.h"
 #include "pictura/simulator/controllers/controller.h"
 #include "pictura/simulator/simulator.h"
 
@@ -15,24 +15,6 @@ namespace pictura {
 
 class Policy;
 struct Config;
-
-struct SessionOptions {
-  int num_threads = 0;            // of torch and renderers; 0: all
-  std::string device = "auto";    // as run.device of a configuration
-  std::string simulator = "cpu";  // as simulator.backend: of the simulators that it drives in
-  std::string renderer, samples;  // as render.backend and render.samples; empty: as the policy was trained
-  // Cameras other than those of training, as many: a rig file, or the paper's at another size (0: as trained).
-  std::string rig;
-  int width_px = 0, height_px = 0;
-  std::string backbone;  // where the program of policy.backbone lies now; empty: where it did
-  // Of [evaluate.conditioning], in place of the policy's own: "name=value".
-  std::vector<std::string> conditioning;
-  bool adds_walls = false;  // its worlds have walls, also where it was trained without
-  bool average = false;     // drives with the average of weights that a checkpoint holds
-  // Of its worlds; no value: those of its training.
-  std::optional<LightCycles> light_cycles;
-  std::optional<LightHeads> light_heads;
-};
 
 /// What a batch of agents sees, in the memory of the session's device.
 struct PolicyInput {

@@ -19,11 +19,10 @@ namespace {
 
 struct ScenesArguments {
   SceneEvaluateOptions evaluate;
-  BackendOptions backends;
   std::string protocol = "womd";
   std::vector<std::string> rules;
   int copies = 1, repeats = 5;
-  bool sampled = false, json = false;
+  bool json = false;
   std::optional<EarlierReport> earlier;
 };
 
@@ -39,8 +38,6 @@ void run_scenes(const ScenesArguments& arguments) {
   const bool has_policy = options.controller.empty();
   if (options.checkpoint.empty() && has_policy) fail_usage("bench scenes: expected a CHECKPOINT or --policy");
   if (options.scenes.empty()) fail_usage("bench scenes: expected --scenes");
-  set_backends(arguments.backends, &options);
-  options.argmax = !arguments.sampled;
   options.protocol = scene_protocol(arguments.protocol);
   for (const std::string& rule : arguments.rules) set_scene_rule(rule, &options.protocol);
   ProgressLine progress;
@@ -98,22 +95,17 @@ void add_scenes_benchmark(CLI::App& bench) {
                    "Files, folders of them, FILE#K or FILE#SCENARIO_ID, with commas between")
       ->delimiter(',')
       ->allow_extra_args(false);
-  command->add_option("--copies", arguments->copies, "How often each scene is evaluated in one measurement")
-      ->transform(whole_number(1, 100'000))
-      ->capture_default_str();
+  add_number_option(command, "--copies", arguments->copies, "How often each scene is evaluated in one measurement", 1,
+                    100'000);
   command
       ->add_option("--rule", arguments->rules, "NAME=VALUE in place of one of the protocol's; may be given many times")
       ->allow_extra_args(false);
-  command
-      ->add_option("--at-once", options.scenes_at_once,
-                   "Scenes that are simulated together; default: 256 on a device, 16 on the host")
-      ->transform(whole_number(1, 100'000));
-  command->add_flag("--sampled", arguments->sampled, "Draw actions from the policy instead of taking the most likely");
-  add_policy_backend_options(command, "auto, and drawn as in training", &arguments->backends);
+  add_number_option(command, "--at-once", options.scenes_at_once,
+                    "Scenes that are simulated together; default: 256 on a device, 16 on the host", 1, 100'000);
+  add_sampled_option(command, &options.argmax);
+  add_policy_backend_options<SessionOptions>(command, "auto, and drawn as in training", &options);
   add_threads_option(command, &options.num_threads);
-  command->add_option("--repeats", arguments->repeats, "Measurements; the median is printed")
-      ->transform(whole_number(1, 1000))
-      ->capture_default_str();
+  add_number_option(command, "--repeats", arguments->repeats, "Measurements; the median is printed", 1, 1000);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   add_compare_option(command, &arguments->earlier);
   command->footer(

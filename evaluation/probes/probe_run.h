@@ -184,7 +184,7 @@ Results with_opened(const Options& options,
   std::vector<std::unique_ptr<PolicySession>> opened;
   std::vector<PolicySession*> sessions;
   for (const std::string& path : options.policies) {
-    opened.push_back(std::make_unique<PolicySession>(path, session_options(options.worlds)));
+    opened.push_back(std::make_unique<PolicySession>(path, options.worlds));
     sessions.push_back(opened.back().get());
   }
   return probe(sessions, options);

@@ -1,0 +1,31 @@
+// How a saved policy is opened: what computes, its cameras, and what differs from its training.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pictura/map/map_geometry.h"
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+struct SessionOptions {
+  int num_threads = 0;            // of torch and renderers; 0: all
+  std::string device = "auto";    // as run.device of a configuration
+  std::string simulator = "cpu";  // as simulator.backend: of the simulators that it drives in
+  std::string renderer, samples;  // as render.backend and render.samples; empty: as the policy was trained
+  // Cameras other than those of training, as many: a rig file, or the paper's at another size (0: as trained).
+  std::string rig;
+  int width_px = 0, height_px = 0;
+  std::string backbone;  // where the program of policy.backbone lies now; empty: where it did
+  // Of [evaluate.conditioning], in place of the policy's own: "name=value".
+  std::vector<std::string> conditioning;
+  bool adds_walls = false;  // its worlds have walls, also where it was trained without
+  bool average = false;     // drives with the average of weights that a checkpoint holds
+  // Of its worlds; no value: those of its training.
+  std::optional<LightCycles> light_cycles;
+  std::optional<LightHeads> light_heads;
+};
+
+}  // namespace pictura
