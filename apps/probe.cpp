@@ -8,11 +8,10 @@
 #include "pictura/apps/commands.h"
 #include "pictura/apps/corner_figure.h"
 #include "pictura/apps/pedestrian_figure.h"
-#include "pictura/cli/backend_options.h"
 #include "pictura/cli/case_replay_options.h"
 #include "pictura/cli/draw_chart.h"
 #include "pictura/cli/evaluation_options.h"
-#include "pictura/cli/number_options.h"
+#include "pictura/cli/option_flags.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
@@ -51,65 +50,40 @@ std::string footer(const std::array<const char*, 3>& examples) {
       fmt::join(examples, "\n  "));
 }
 
-// What all probes are given.
+template <typename Probe>
 struct ProbeArguments {
-  EvaluateOptions evaluation;
-  std::string density = "medium", out;
-  int scenes = 0;  // 0: not given
+  Probe probe;
+  CaseReplayOptions replay;
+  std::string out;
   bool json = false;
 };
 
-// The policies, and options that come first in the help.
-void add_world_options(CLI::App* command, ProbeArguments* arguments, ProbeOptions* probe) {
-  EvaluateOptions& worlds = arguments->evaluation;
-  worlds.steps = kProbeSteps;
+/// Adds all options of a probe. `files` are those that it writes.
+template <typename Probe>
+void add_options(CLI::App* command, ProbeArguments<Probe>* arguments, const std::string& case_help,
+                 const std::string& files, const std::array<const char*, 3>& examples) {
+  Probe& probe = arguments->probe;
   command
-      ->add_option("POLICY", probe->policies, "Checkpoints that train wrote, or safetensors; the world is the first's")
+      ->add_option("POLICY", probe.policies, "Checkpoints that train wrote, or safetensors; the world is the first's")
       ->required();
-  add_evaluation_options(command, &arguments->evaluation);
-  command->add_option("--density", arguments->density, "light, medium or dense: 60, 120 or 150 agents a world")
-      ->check(one_of({kDensityNames.begin(), kDensityNames.end()}))
-      ->capture_default_str();
-  command
-      ->add_option("--scenes", arguments->scenes,
-                   "Scenarios that are driven, an equal share by each policy; default: as many on each map for each "
-                   "policy, two a map or more")
-      ->transform(whole_number(1));
-  command->add_option("--first-scene", worlds.first_scenario, "The number of the first scenario")
-      ->transform(whole_number(0))
-      ->capture_default_str();
-  command->add_option("--every", probe->sample_steps, "Steps between sampled states")
-      ->transform(whole_number(1))
-      ->capture_default_str();
-}
-
-void add_output_options(CLI::App* command, ProbeArguments* arguments, ProbeOptions* probe, const char* out,
-                        const char* files) {
-  arguments->out = out;
-  command
-      ->add_option("--batch", probe->batch,
-                   "Cases in a call, rounded up to whole passes of a network; changes memory and time alone")
-      ->transform(whole_number(1, 1 << 20))
-      ->capture_default_str();
-  command->add_option("--out", arguments->out, fmt::format("The folder for {}", files))->capture_default_str();
+  add_evaluation_options(command, &probe.worlds);
+  visit_options(probe, FlagAdder(command));
+  add_case_replay_options(command, &arguments->replay, case_help);
+  arguments->out = "probe_" + command->get_name();
+  command->add_option("--out", arguments->out, "The folder for " + files)->capture_default_str();
   command->add_flag("--json", arguments->json, "Print one JSON object, that of summary.json");
+  command->footer(footer(examples));
 }
 
 // Runs a probe with a progress line; makes the folder for its files before.
-template <typename Results, typename Options>
-Results run_probe(Results (*probe)(const Options&), ProbeArguments* arguments, Options* options) {
-  EvaluateOptions& driven = options->worlds;
-  arguments->evaluation.adds_walls = driven.adds_walls;  // the probe's own
-  driven = arguments->evaluation;
-  driven.densities = {density_named(arguments->density)};
-  driven.scenarios =
-      arguments->scenes > 0 ? arguments->scenes : default_probe_scenes(options->policies.size(), driven.maps.size());
+template <typename Results, typename Probe>
+Results run_probe(Results (*ask)(const Probe&), ProbeArguments<Probe>* arguments) {
   make_output_folder(arguments->out);
   ProgressLine line;
-  driven.on_progress = [&line](double done, double eta_s) {
+  arguments->probe.worlds.on_progress = [&line](double done, double eta_s) {
     line.update(fmt::format("probing: {:.0f} %  ETA {}", 100 * done, format_duration(eta_s)));
   };
-  Results results = probe(*options);
+  Results results = ask(arguments->probe);
   line.finish();
   return results;
 }
@@ -184,8 +158,8 @@ void draw_charts(const std::string& name, const Json& pages, FilledFolder* out) 
 }
 
 /// Writes summary.json, draws the charts, unless it has no pages (null), and prints the summary or a table.
-template <typename Results, typename Row>
-void report(const ProbeArguments& arguments, const std::string& summary, const Results& results,
+template <typename Probe, typename Results, typename Row>
+void report(const ProbeArguments<Probe>& arguments, const std::string& summary, const Results& results,
             const std::vector<Row>& rows, const Json& pages, FilledFolder* out) {
   write_file(out->file("summary.json"), summary + "\n");
   const Json object = parse_json(summary);
@@ -198,36 +172,13 @@ void report(const ProbeArguments& arguments, const std::string& summary, const R
 }
 
 void add_removal_command(CLI::App& probe) {
-  struct Arguments : ProbeArguments {
-    RemovalOptions removal;
-    CaseReplayOptions replay;
-    std::string control = kRemovalControlNames[0];
-  };
-  auto arguments = std::make_shared<Arguments>();
-  RemovalOptions& options = arguments->removal;
+  auto arguments = std::make_shared<ProbeArguments<RemovalOptions>>();
   CLI::App* command = probe.add_subcommand(
       "removal", "How value and braking change when one road user is taken away, by how occluded it is");
-  add_world_options(command, arguments.get(), &options);
-  command->add_option("--removals", options.removals, "Cases in all: one user hidden for one ego in one state")
-      ->transform(whole_number(1))
-      ->capture_default_str();
-  command->add_option("--range", options.range_m, "How far away a user may be, m")
-      ->transform(number(1, 1000))
-      ->capture_default_str();
-  command
-      ->add_option("--control", arguments->control,
-                   "A control: nobody hides no one; permuted hides another of the ego's users, drawn anew for each "
-                   "case; untrained has policies with fresh weights answer in the same states")
-      ->check(one_of({kRemovalControlNames.begin(), kRemovalControlNames.end()}))
-      ->capture_default_str();
-  add_case_replay_options(command, &arguments->replay, kCaseOfReplay);
-  add_output_options(command, arguments.get(), &options, "probe_removal", "cases.csv, summary.json and removal.png");
-  command->footer(footer(kRemovalExamples));
+  add_options(command, arguments.get(), kCaseOfReplay, "cases.csv, summary.json and removal.png", kRemovalExamples);
   command->callback([arguments] {
-    RemovalOptions& removal = arguments->removal;
-    removal.control = removal_control_named(arguments->control);
-    check_case_number(arguments->replay, removal.removals);
-    const RemovalResults results = run_probe(&probe_removal, arguments.get(), &removal);
+    check_case_number(arguments->replay, arguments->probe.removals);
+    const RemovalResults results = run_probe(&probe_removal, arguments.get());
     const std::vector<RemovalRow> rows = summarize(results);
     FilledFolder out(arguments->out, "probe");
     const std::string cases_file = out.file("cases.csv");
@@ -237,48 +188,18 @@ void add_removal_command(CLI::App& probe) {
       throw Interrupted(fmt::format("interrupted; {} of {} removals are done, and written to {}", results.cases.size(),
                                     results.removals_asked, arguments->out));
     }
-    if (!arguments->replay.path.empty()) write_case_replay(arguments->replay, removal, results);
+    if (!arguments->replay.path.empty()) write_case_replay(arguments->replay, arguments->probe, results);
   });
 }
 
 void add_pedestrian_command(CLI::App& probe) {
-  struct Arguments : ProbeArguments {
-    PedestrianOptions pedestrian;
-    CaseReplayOptions replay;
-    std::string control = kPedestrianControlNames[0];
-  };
-  auto arguments = std::make_shared<Arguments>();
-  PedestrianOptions& options = arguments->pedestrian;
+  auto arguments = std::make_shared<ProbeArguments<PedestrianOptions>>();
   CLI::App* command = probe.add_subcommand(
       "pedestrian", "How value and braking change as a pedestrian comes out from behind a vehicle and is hidden again");
-  add_world_options(command, arguments.get(), &options);
-  command->add_option("--paths", options.paths, "Paths in all, each through one state; each has a figure")
-      ->transform(whole_number(1))
-      ->capture_default_str();
-  command->add_option("--range", options.hider_range_m, "How far away the vehicle that a path begins behind may be, m")
-      ->transform(number(6, 1000))
-      ->capture_default_str();
-  command->add_option("--min-speed", options.min_speed_mps, "Of the ego, forwards, m/s")
-      ->transform(number(-100, 100))
-      ->capture_default_str();
-  command->add_option("--height", options.height_m, "Of the pedestrian, m; vehicles are 1.5 m high")
-      ->transform(number(0.1, 3))
-      ->capture_default_str();
-  command
-      ->add_option(
-          "--control", arguments->control,
-          "A control: nobody puts no pedestrian there; untrained has policies with fresh weights answer in the "
-          "same states")
-      ->check(one_of({kPedestrianControlNames.begin(), kPedestrianControlNames.end()}))
-      ->capture_default_str();
-  add_case_replay_options(command, &arguments->replay, kCaseOfReplay);
-  add_output_options(command, arguments.get(), &options, "probe_pedestrian",
-                     "cases.csv, summary.json, pedestrian.png and path_000.png, path_001.png, ...");
-  command->footer(footer(kPedestrianExamples));
+  add_options(command, arguments.get(), kCaseOfReplay,
+              "cases.csv, summary.json, pedestrian.png and path_000.png, path_001.png, ...", kPedestrianExamples);
   command->callback([arguments] {
-    PedestrianOptions& pedestrian = arguments->pedestrian;
-    pedestrian.control = pedestrian_control_named(arguments->control);
-    const PedestrianResults results = run_probe(&probe_pedestrian, arguments.get(), &pedestrian);
+    const PedestrianResults results = run_probe(&probe_pedestrian, arguments.get());
     const std::vector<PedestrianRow> rows = summarize(results);
     FilledFolder out(arguments->out, "probe");
     const std::string cases_file = out.file("cases.csv");
@@ -298,59 +219,19 @@ void add_pedestrian_command(CLI::App& probe) {
       throw Interrupted(fmt::format("interrupted; {} of {} paths are done, and written to {} without figures",
                                     results.paths.size(), results.paths_asked, arguments->out));
     }
-    if (!arguments->replay.path.empty()) write_case_replay(arguments->replay, pedestrian, results);
+    if (!arguments->replay.path.empty()) write_case_replay(arguments->replay, arguments->probe, results);
   });
 }
 
 void add_corner_command(CLI::App& probe) {
-  struct Arguments : ProbeArguments {
-    CornerOptions corner;
-    CaseReplayOptions replay;
-    std::string control = kCornerControlNames[0];
-  };
-  auto arguments = std::make_shared<Arguments>();
-  CornerOptions& options = arguments->corner;
+  auto arguments = std::make_shared<ProbeArguments<CornerOptions>>();
   CLI::App* command = probe.add_subcommand(
       "corner", "How policies drive on towards blind corners with a hidden vehicle, and towards empty ones like them");
-  add_world_options(command, arguments.get(), &options);
-  command->add_option("--pairs", options.pairs, "Pairs in all: a corner with a hidden vehicle, and an empty one")
-      ->transform(whole_number(1))
-      ->capture_default_str();
-  command
-      ->add_option("--max-distance", options.search.max_distance_m,
-                   "How far before the corner a policy may take over, m; at least 8 m")
-      ->transform(number(8.1, kCornerLead_m))
-      ->capture_default_str();
-  command
-      ->add_option("--min-speed", options.search.min_speed_mps,
-                   "Of the ego at the takeover and of who is hidden, forwards, m/s")
-      ->transform(number(-100, 100))
-      ->capture_default_str();
-  command
-      ->add_option("--range", options.search.user_range_m, "How far before the junction the hidden vehicle may be, m")
-      ->transform(number(1, kCornerLead_m))
-      ->capture_default_str();
-  command
-      ->add_option("--driver", arguments->evaluation.controller,
-                   "Who drives the scenes in which policies take over, instead of the policies: lane, the lane keeper")
-      ->check(one_of({"lane"}));
-  command
-      ->add_option(
-          "--control", arguments->control,
-          "A control: permuted removes another vehicle near the ego instead of who is hidden; untrained has policies "
-          "with fresh weights take over in the same states")
-      ->check(one_of({kCornerControlNames.begin(), kCornerControlNames.end()}))
-      ->capture_default_str();
-  add_case_replay_options(command, &arguments->replay,
-                          "The pair of --replay, as numbered in cases.csv; default: that of example.png");
-  add_output_options(command, arguments.get(), &options, "probe_corner",
-                     "cases.csv, summary.json, corner.png and example.png");
-  command->footer(footer(kCornerExamples));
+  add_options(command, arguments.get(), "The pair of --replay, as numbered in cases.csv; default: that of example.png",
+              "cases.csv, summary.json, corner.png and example.png", kCornerExamples);
   command->callback([arguments] {
-    CornerOptions& corner = arguments->corner;
-    corner.control = corner_control_named(arguments->control);
-    check_case_number(arguments->replay, corner.pairs);
-    const CornerResults results = run_probe(&probe_corner, arguments.get(), &corner);
+    check_case_number(arguments->replay, arguments->probe.pairs);
+    const CornerResults results = run_probe(&probe_corner, arguments.get());
     const std::vector<CornerRow> rows = summarize(results);
     FilledFolder out(arguments->out, "probe");
     const std::string cases_file = out.file("cases.csv");
@@ -365,7 +246,7 @@ void add_corner_command(CLI::App& probe) {
       throw Interrupted(fmt::format("interrupted; {} of {} pairs are done, and written to {}", results.pairs.size(),
                                     results.pairs_asked, arguments->out));
     }
-    if (!arguments->replay.path.empty()) write_case_replay(arguments->replay, corner, results);
+    if (!arguments->replay.path.empty()) write_case_replay(arguments->replay, arguments->probe, results);
   });
 }
 

@@ -103,9 +103,6 @@ Inside inside_of(const py::handle& object, std::string_view what, std::string_vi
   return py::cast<Inside>(inside);
 }
 
-/// "cpu", "cuda" or "cuda:1". Throws UsageError for others.
-Device device_of(const std::string& name);
-
 /// Throws Error where a device was asked for and the CPU chosen; `choice` says why.
 void check_device(std::string_view what, Device wanted, Device given, std::string_view choice);
 

@@ -7,6 +7,7 @@
 #include "pictura/backends/make_renderer.h"
 #include "pictura/bindings/call.h"
 #include "pictura/bindings/objects.h"
+#include "pictura/bindings/options.h"
 #include "pictura/bindings/owned_memory.h"
 #include "pictura/common/pixel_samples.h"
 #include "pictura/common/scene_file.h"
@@ -351,16 +352,6 @@ PixelSamples samples_of(const std::string& text) {
 }
 
 }  // namespace
-
-Device device_of(const std::string& name) {
-  if (name == "cpu") return {};
-  if (name == "cuda") return {MemorySpace::cuda, 0};
-  if (name.rfind("cuda:", 0) == 0 && name.size() > 5 && name.size() < 9 &&
-      name.find_first_not_of("0123456789", 5) == std::string::npos) {
-    return {MemorySpace::cuda, std::stoi(name.substr(5))};
-  }
-  fail_usage("device: expected 'cpu', 'cuda' or 'cuda:INDEX', got '{}'", name);
-}
 
 void check_device(std::string_view what, Device wanted, Device given, std::string_view choice) {
   PICTURA_CHECK(wanted.is_host() || !given.is_host(), "{}: expected device '{}', got {}", what, name_of(wanted),

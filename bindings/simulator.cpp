@@ -10,12 +10,13 @@
 #include "pictura/backends/make_simulator.h"
 #include "pictura/bindings/call.h"
 #include "pictura/bindings/objects.h"
+#include "pictura/bindings/options.h"
 #include "pictura/bindings/owned_memory.h"
 #include "pictura/drawing/world.h"
 #include "pictura/simulator/agent_state_arrays.h"
-#include "pictura/simulator/conditioning_lookup.h"
 #include "pictura/simulator/controllers/shared_control.h"
 #include "pictura/simulator/observation_arrays.h"
+#include "pictura/simulator/simulator_options.h"
 #ifdef PICTURA_HAS_CUDA
 #include "pictura/common/cuda/device_buffer.h"
 #include "pictura/common/cuda/device_guard.h"
@@ -42,22 +43,6 @@ std::vector<WorldSpec> worlds_of(const py::sequence& worlds) {
     }
   }
   return specs;
-}
-
-void set_conditioning(const py::dict& given, SimulatorConfig* config) {
-  for (const auto& [key, value] : given) {
-    const auto name = cast_checked<std::string>(key, "conditioning", "names");
-    ConditioningRange& range = config->conditioning[conditioning_index(name, "conditioning")];
-    if (py::isinstance<py::float_>(value) || py::isinstance<py::int_>(value)) {
-      const auto fixed = py::cast<float>(value);
-      range = {fixed, fixed, false};
-    } else {
-      const auto [low, high] =
-          cast_checked<std::pair<float, float>>(value, "conditioning: " + name, "a number or (low, high)");
-      range.low = low;
-      range.high = high;
-    }
-  }
 }
 
 template <typename Terms>
@@ -730,54 +715,32 @@ What a step returns, one element a slot, in the simulator's memory: every step w
       .def_readonly("distance_m", &StepArraysOfPython::distance_m, "float32 [slots]: driven in this step.");
 }
 
+struct SimulatorArguments {
+  std::vector<std::shared_ptr<Map>> maps;
+  py::sequence worlds = py::list();
+  std::string executor = "auto";
+  SimulatorConfig config;
+  py::object stream = py::none();
+};
+
+template <typename Visitor>
+void visit_options(SimulatorArguments& arguments, Visitor&& v) {
+  v.value({"maps"}, arguments.maps);
+  v.value({"worlds"}, arguments.worlds);
+  v.value({"executor"}, arguments.executor);
+  visit_options(arguments.config, v);
+  v.value({"stream"}, arguments.stream);
+}
+
 // How one is made, and what it is made of.
 void define_construction(py::class_<PySimulator>* simulator) {
-  (*simulator)
-      .def(
-          py::init([](const std::vector<std::shared_ptr<Map>>& maps, const py::sequence& worlds,
-                      const std::string& executor, const std::string& device, uint64_t seed, int num_threads,
-                      float dt_s, int episode_steps, float reset_inactive_fraction, bool stagger_episodes,
-                      float pedestrian_fraction, float cyclist_fraction, int parked_cars, bool walls,
-                      uint64_t wall_seed, const std::string& light_heads, bool fixed_lights,
-                      const std::string& light_cycles, bool reset_at_standstill, bool forbid_reversing,
-                      bool auxiliary_observations, bool vector_observations, bool wall_observations,
-                      const py::dict& conditioning, const py::object& stream) {
-            SimulatorConfig config;
-            config.seed = seed;
-            config.device = device_of(device);
-            config.num_threads = num_threads;
-            config.dt_s = dt_s;
-            config.episode_steps = episode_steps;
-            config.reset_inactive_fraction = reset_inactive_fraction;
-            config.stagger_episodes = stagger_episodes;
-            config.pedestrian_fraction = pedestrian_fraction;
-            config.cyclist_fraction = cyclist_fraction;
-            config.parked_cars = parked_cars;
-            config.walls = walls;
-            config.wall_seed = wall_seed;
-            config.light_heads = light_heads_named(light_heads);
-            config.fixed_lights = fixed_lights;
-            config.light_cycles = light_cycles_named(light_cycles);
-            config.dynamics = {reset_at_standstill, forbid_reversing};
-            config.auxiliary_observations = auxiliary_observations;
-            config.vector_observations = vector_observations;
-            config.wall_observations = wall_observations;
-            set_conditioning(conditioning, &config);
-            return std::make_unique<PySimulator>(executor, config, maps, worlds_of(worlds), stream_of(stream));
-          }),
-          py::arg("maps"), py::arg("worlds"), py::kw_only(), py::arg("executor") = "auto", py::arg("device") = "cpu",
-          py::arg("seed") = 0, py::arg("num_threads") = 0, py::arg("dt_s") = SimulatorConfig{}.dt_s,
-          py::arg("episode_steps") = SimulatorConfig{}.episode_steps,
-          py::arg("reset_inactive_fraction") = SimulatorConfig{}.reset_inactive_fraction,
-          py::arg("stagger_episodes") = false, py::arg("pedestrian_fraction") = SimulatorConfig{}.pedestrian_fraction,
-          py::arg("cyclist_fraction") = SimulatorConfig{}.cyclist_fraction,
-          py::arg("parked_cars") = SimulatorConfig{}.parked_cars, py::arg("walls") = true, py::arg("wall_seed") = 0,
-          py::arg("light_heads") = name_of(SimulatorConfig{}.light_heads), py::arg("fixed_lights") = false,
-          py::arg("light_cycles") = name_of(SimulatorConfig{}.light_cycles), py::arg("reset_at_standstill") = false,
-          py::arg("forbid_reversing") = false, py::arg("auxiliary_observations") = true,
-          py::arg("vector_observations") = true, py::arg("wall_observations") = false,
-          py::arg("conditioning") = py::dict(), py::arg("stream") = py::none(),
-          R"(maps: of pictura.Map. worlds: of (index of the map, agents), or (map, agents, global world), which keys the
+  def_init_with_options<SimulatorArguments>(
+      simulator, {"Simulator", {"maps", "worlds"}},
+      [](const SimulatorArguments& arguments) {
+        return std::make_unique<PySimulator>(arguments.executor, arguments.config, arguments.maps,
+                                             worlds_of(arguments.worlds), stream_of(arguments.stream));
+      },
+      R"(maps: of pictura.Map. worlds: of (index of the map, agents), or (map, agents, global world), which keys the
 world's random numbers. executor: 'cpu', 'cuda' or 'auto'. device: where observations and scenes are wanted. num_threads: of
 the host, 0 for all. reset_inactive_fraction: a world resets when this part of its agents is inactive; more than 1: never.
 stagger_episodes: the first episode of each world ends after a drawn number of steps. light_cycles: 'phases', those of a junction
@@ -786,7 +749,8 @@ forbid_reversing: agents at rest do not begin to drive backwards.
 light_heads: 'as_mapped', or 'visible': heads beside or before their stop line stand 10 m beyond it, 3.5 m high.
 conditioning: a number or (low, high) by name, see CONDITIONING_NAMES; the paper's ranges otherwise. stream: a cudaStream_t
 as int; None: the legacy default stream. The other defaults are the paper's training world.
-Raises pictura.UsageError naming what cannot be simulated, pictura.Error where there is no device.)")
+Raises pictura.UsageError naming what cannot be simulated, pictura.Error where there is no device.)");
+  (*simulator)
       .def("_inside",
            [](PySimulator& self) {
              py::object inside = py::cast(self.inside());

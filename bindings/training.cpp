@@ -1,6 +1,7 @@
 // The extension module pictura._training: training, evaluation and saved policies, beside the torch that it was built
 // with. What it takes and gives are objects of pictura._pictura.
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -10,6 +11,7 @@
 #include "pictura/bindings/arrays.h"
 #include "pictura/bindings/call.h"
 #include "pictura/bindings/objects.h"
+#include "pictura/bindings/options.h"
 #include "pictura/commit.h"
 #include "pictura/common/error.h"
 #include "pictura/driving/replay_cases.h"
@@ -18,9 +20,9 @@
 #include "pictura/evaluation/probes/corner.h"
 #include "pictura/evaluation/probes/pedestrian.h"
 #include "pictura/evaluation/probes/removal.h"
-#include "pictura/map/map_copy.h"
 #include "pictura/policy/session.h"
 #include "pictura/simulator/observation_arrays.h"
+#include "pictura/simulator/simulator_options.h"
 #include "pictura/training/loop.h"
 #ifdef PICTURA_HAS_CUDA
 #include "pictura/common/cuda/device_buffer.h"
@@ -138,54 +140,17 @@ py::dict dict_of(const SceneEvaluation& evaluation, const std::vector<SceneAgent
 }
 
 /// The options by which pictura.Simulator makes such a world.
-py::dict dict_of(const SimulatorConfig& config) {
+py::dict dict_of(SimulatorConfig config) {
+  py::dict d;
+  for (const Parameter& parameter : parameters_of("", config)) d[parameter.name.c_str()] = parameter.value;
   py::dict conditioning;
   for (int i = 0; i < kNumConditioning; ++i) {
     const ConditioningRange& range = config.conditioning[i];
-    const py::str name(std::string(kConditioningNames[i]));
-    if (range.low == range.high) {
-      conditioning[name] = range.low;
-    } else {
-      conditioning[name] = py::make_tuple(range.low, range.high);
-    }
+    conditioning[kConditioningNames[i]] =
+        range.low == range.high ? py::cast(range.low) : py::make_tuple(range.low, range.high);
   }
-  py::dict d;
-  d["device"] = name_of(config.device);
-  d["num_threads"] = config.num_threads;
-  d["seed"] = config.seed;
-  d["dt_s"] = config.dt_s;
-  d["episode_steps"] = config.episode_steps;
-  d["reset_inactive_fraction"] = config.reset_inactive_fraction;
-  d["stagger_episodes"] = config.stagger_episodes;
-  d["pedestrian_fraction"] = config.pedestrian_fraction;
-  d["cyclist_fraction"] = config.cyclist_fraction;
-  d["parked_cars"] = config.parked_cars;
-  d["walls"] = config.walls;
-  d["wall_seed"] = config.wall_seed;
-  d["light_heads"] = name_of(config.light_heads);
-  d["fixed_lights"] = config.fixed_lights;
-  d["light_cycles"] = name_of(config.light_cycles);
-  d["reset_at_standstill"] = config.dynamics.reset_at_standstill;
-  d["forbid_reversing"] = config.dynamics.forbid_reversing;
-  d["auxiliary_observations"] = config.auxiliary_observations;
-  d["vector_observations"] = config.vector_observations;
-  d["wall_observations"] = config.wall_observations;
   d["conditioning"] = conditioning;
   return d;
-}
-
-// Light cycles by their name; none for an empty one.
-std::optional<LightCycles> light_cycles_or_none(const std::string& name) {
-  if (name.empty()) return std::nullopt;
-  return light_cycles_named(name);
-}
-
-std::vector<std::string> texts_of(const py::dict& conditioning) {
-  std::vector<std::string> texts;
-  for (const auto& [name, value] : conditioning) {
-    texts.push_back(fmt::format("{}={}", py::cast<std::string>(name), py::cast<double>(value)));
-  }
-  return texts;
 }
 
 py::dict train_from_python(const std::string& config, const std::string& out, const std::vector<std::string>& overrides,
@@ -221,54 +186,99 @@ py::dict train_from_python(const std::string& config, const std::string& out, co
   return dict_of(run_to_an_orderly_end("train", 0, {}, [&options] { return train(options); }));
 }
 
-std::vector<Density> densities_of(const std::vector<std::string>& names) {
-  std::vector<Density> densities;
-  for (const std::string& name : names) densities.push_back(density_named(name));
-  return densities;
+struct SceneArguments {
+  SceneEvaluateOptions options;
+  std::string protocol = "womd";
+  std::optional<std::string> control;
+  std::optional<int> start_step, steps;
+  std::optional<std::vector<double>> densities;
+  py::dict rules;
+  std::string rollouts;
+};
+
+template <typename Visitor>
+void visit_options(SceneArguments& arguments, Visitor&& v) {
+  SceneEvaluateOptions& options = arguments.options;
+  v.value({"checkpoint"}, options.checkpoint);
+  v.value({"scenes"}, options.scenes);
+  v.value({"protocol"}, arguments.protocol);
+  v.value({"controller"}, options.controller);
+  v.value({"control"}, arguments.control);
+  v.value({"start_step"}, arguments.start_step);
+  v.value({"steps"}, arguments.steps);
+  v.value({"densities"}, arguments.densities);
+  v.value({"rules"}, arguments.rules);
+  v.value({"first_scene"}, options.first_scene);
+  v.value({"num_scenes"}, options.num_scenes);
+  visit_options(static_cast<DriverOptions&>(options), v);
+  v.value({"rollouts"}, arguments.rollouts);
+  v.progress({"on_progress"}, options.on_progress);
 }
 
-/// Calls a function of Python's, which must outlive it, if there is one.
-std::function<void(double, double)> progress_to(const py::object& on_progress) {
-  if (on_progress.is_none()) return {};
-  return [&on_progress](double done_fraction, double eta_s) {
-    const py::gil_scoped_acquire gil;
-    on_progress(done_fraction, eta_s);
-  };
+template <typename Probe>
+struct ProbeArguments {
+  Probe probe;
+  std::string cases_file;
+  CaseReplayOptions replay;
+};
+
+template <typename Probe, typename Visitor>
+void visit_options(ProbeArguments<Probe>& arguments, Visitor&& v) {
+  EvaluateOptions& worlds = arguments.probe.worlds;
+  v.value({"policies"}, arguments.probe.policies);
+  v.maps({"maps"}, worlds.maps);
+  v.value({"agents_per_world"}, worlds.agents_per_world);
+  v.value({"steps"}, worlds.steps);
+  visit_options(arguments.probe, v);
+  visit_options(static_cast<DriverOptions&>(worlds), v);
+  visit_light_options(worlds, v);
+  v.value({"cases_file"}, arguments.cases_file);
+  v.value({"replay"}, arguments.replay.path);
+  v.value({"case"}, arguments.replay.number);
+  v.value({"cameras"}, arguments.replay.recording.cameras);
+  v.progress({"on_progress"}, worlds.on_progress);
 }
 
-/// What all probes are asked.
-void fill_probe(ProbeOptions* options, const std::vector<std::string>& policies, const std::vector<std::string>& maps,
-                const std::string& density, int agents_per_world, int first_scene, int scenes, int steps,
-                int sample_steps, int batch, bool argmax, uint64_t seed, int num_threads, const std::string& device,
-                const std::string& simulator, const std::string& renderer, const std::string& samples,
-                const py::dict& conditioning, const py::object& on_progress) {
-  options->policies = policies;
-  options->sample_steps = sample_steps;
-  options->batch = batch;
-  EvaluateOptions& worlds = options->worlds;
-  worlds.maps = expand_map_names(maps);
-  worlds.densities = {density_named(density)};
-  worlds.agents_per_world = agents_per_world;
-  worlds.first_scenario = first_scene;
-  worlds.scenarios = scenes > 0 ? scenes : default_probe_scenes(policies.size(), worlds.maps.size());
-  worlds.steps = steps;
-  worlds.argmax = argmax;
-  worlds.seed = seed;
-  worlds.num_threads = num_threads;
-  worlds.device = device;
-  worlds.simulator = simulator;
-  worlds.renderer = renderer;
-  worlds.samples = samples;
-  worlds.conditioning = texts_of(conditioning);
-  worlds.on_progress = progress_to(on_progress);
+/// A policy of a checkpoint.
+struct PolicyArguments : DriverOptions {};
+
+template <typename Visitor>
+void visit_options(PolicyArguments& arguments, Visitor&& v) {
+  v.value({"checkpoint"}, arguments.checkpoint);
+  visit_options(static_cast<SessionOptions&>(arguments), v);
+  visit_light_options(arguments, v);
 }
 
-/// What is written of one case; nothing without a path.
-CaseReplayOptions case_replay(const std::string& path, std::optional<int64_t> number, bool cameras) {
-  if (path.empty() && (number || cameras)) fail_usage("replay: expected a file *.html for a case or cameras, got none");
+/// Throws UsageError where `replay` is no page, or a case was asked for that is none of `count`.
+void check_case_replay(const CaseReplayOptions& replay, int64_t count) {
+  const std::string& path = replay.path;
+  if (path.empty() && (replay.number || replay.recording.cameras)) {
+    fail_usage("replay: expected a file *.html for a case or cameras, got none");
+  }
   if (!path.empty() && !path.ends_with(".html")) fail_usage("replay: expected a file *.html, got '{}'", path);
-  if (number && *number < 0) fail_usage("case: expected 0 or more, got {}", *number);
-  return {.path = path, .number = number, .recording = {.cameras = cameras}};
+  if (replay.number && *replay.number < 0) fail_usage("case: expected 0 or more, got {}", *replay.number);
+  check_case_number(replay, count);
+}
+
+/// Defines a probe, which writes what was asked for and returns its summary. `most` is its largest number of cases,
+/// where that is known before.
+template <typename Probe, typename Results, typename Row>
+void def_probe(py::module_* module, const char* name, Results (*ask)(const Probe&),
+               void (*write_cases)(const std::string&, const Results&),
+               std::string (*summary_json)(const Results&, const std::vector<Row>&, const std::string&),
+               std::type_identity_t<int64_t Probe::*> most, const char* doc) {
+  const auto probe = [=](const ProbeArguments<Probe>& arguments) -> py::object {
+    const std::string& cases_file = arguments.cases_file;
+    check_case_replay(arguments.replay, most ? arguments.probe.*most : std::numeric_limits<int64_t>::max());
+    const Results results = run_to_an_orderly_end(name, arguments.probe.worlds.num_threads, {}, [&] {
+      Results found = ask(arguments.probe);
+      if (!cases_file.empty()) write_cases(cases_file, found);
+      if (!arguments.replay.path.empty()) write_case_replay(arguments.replay, arguments.probe, found);
+      return found;
+    });
+    return py::module_::import("json").attr("loads")(summary_json(results, summarize(results), cases_file));
+  };
+  def_with_options<ProbeArguments<Probe>>(module, {name, {"policies", "maps"}}, probe, doc);
 }
 
 /// Logits and values of a batch, in the memory of a session's device.
@@ -433,108 +443,48 @@ after the present update, saves, and raises KeyboardInterrupt. Raises pictura.Er
 }
 
 void bind_evaluation(py::module_& module) {
-  module.def(
-      "evaluate",
-      [](const std::string& checkpoint, const std::vector<std::string>& maps, const std::string& controller,
-         const std::vector<std::string>& densities, int agents_per_world, int first_scenario, int scenarios, int steps,
-         bool argmax, uint64_t seed, int num_threads, const std::string& device, const std::string& simulator,
-         const std::string& renderer, const std::string& samples, const std::string& rig, int width_px, int height_px,
-         const py::dict& conditioning, const std::string& light_cycles, bool average, const py::object& on_progress) {
-        EvaluateOptions options;
-        options.average = average;
-        options.checkpoint = checkpoint;
-        options.controller = controller;
-        options.maps = expand_map_names(maps);
-        options.densities = densities_of(densities);
-        options.agents_per_world = agents_per_world;
-        options.first_scenario = first_scenario;
-        options.scenarios = scenarios;
-        options.steps = steps;
-        options.argmax = argmax;
-        options.seed = seed;
-        options.num_threads = num_threads;
-        options.device = device;
-        options.simulator = simulator;
-        options.renderer = renderer;
-        options.samples = samples;
-        options.rig = rig;
-        options.width_px = width_px;
-        options.height_px = height_px;
-        options.conditioning = texts_of(conditioning);
-        options.light_cycles = light_cycles_or_none(light_cycles);
-        options.on_progress = progress_to(on_progress);
-        return dict_of(
-            run_to_an_orderly_end("evaluate", num_threads, {}, [&options] { return pictura::evaluate(options); }));
+  def_with_options<EvaluateOptions>(
+      &module, {"evaluate", {"checkpoint", "maps"}},
+      [](const EvaluateOptions& options) {
+        return dict_of(run_to_an_orderly_end("evaluate", options.num_threads, {},
+                                             [&options] { return pictura::evaluate(options); }));
       },
-      py::arg("checkpoint"), py::arg("maps"), py::kw_only(), py::arg("controller") = "",
-      py::arg("densities") = std::vector<std::string>{"light", "medium", "dense"}, py::arg("agents_per_world") = 0,
-      py::arg("first_scenario") = 0, py::arg("scenarios") = 200, py::arg("steps") = 3000, py::arg("argmax") = true,
-      py::arg("seed") = 1, py::arg("num_threads") = 0, py::arg("device") = "auto", py::arg("simulator") = "auto",
-      py::arg("renderer") = "", py::arg("samples") = "", py::arg("rig") = "", py::arg("width_px") = 0,
-      py::arg("height_px") = 0, py::arg("conditioning") = py::dict(), py::arg("light_cycles") = "",
-      py::arg("average") = false, py::arg("on_progress") = py::none(),
       R"(The paper's evaluation, as `pictura evaluate` does it, in worlds that no training has.
 
 checkpoint: of a policy; '' with a controller of the paper's world. maps: names, files or ranges as procedural:1-64. controller: 'lane', 'idm_lanes', 'random' or 'idle',
 which drives instead. densities: 'light', 'medium' and 'dense', 60, 120 and 150 agents a world, or agents_per_world of them.
 device, simulator, renderer: 'auto' or names; renderer '': as it was trained. rig, or width_px and height_px: other cameras.
-conditioning: numbers by name. light_cycles: 'phases' or 'independent'; '': as it was trained. average: with the average of
-weights that the checkpoint holds. on_progress: called with the fraction that is done and the seconds to come, from a thread of
+backbone: where the program of policy.backbone lies now. conditioning: numbers by name. light_cycles: 'phases' or 'independent',
+light_heads: 'as_mapped' or 'visible'; '': as it was trained. average: with the average of weights that the checkpoint holds. on_progress: called with the fraction that is done and the seconds to come, from a thread of
 its own. Returns a dict: rows, one a density: its counts, and each metric as (value, half of its 95 % interval); seconds,
 agent_steps, policy_hash, light_cycles. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
-  module.def(
-      "evaluate_scenes",
-      [](const std::string& checkpoint, const std::vector<std::string>& scenes, const std::string& protocol,
-         const std::string& controller, const std::optional<std::string>& control, const std::optional<int>& start_step,
-         const std::optional<int>& steps, const std::optional<std::vector<double>>& densities, const py::dict& rules,
-         int first_scene, int num_scenes, bool argmax, uint64_t seed, int num_threads, const std::string& device,
-         const std::string& simulator, const std::string& renderer, const std::string& samples,
-         const py::dict& conditioning, bool average, const std::string& rollouts, const py::object& on_progress) {
-        SceneEvaluateOptions options;
-        options.average = average;
-        options.checkpoint = checkpoint;
-        options.controller = controller;
-        options.scenes = scenes;
-        options.protocol = scene_protocol(protocol);
-        options.protocol.control = control.value_or(options.protocol.control);
-        options.protocol.start_step = start_step.value_or(options.protocol.start_step);
-        options.protocol.steps = steps.value_or(options.protocol.steps);
-        options.protocol.densities = densities.value_or(options.protocol.densities);
-        for (const auto& [name, value] : rules) {
+  def_with_options<SceneArguments>(
+      &module, {"evaluate_scenes", {"checkpoint", "scenes"}},
+      [](SceneArguments& arguments) {
+        SceneEvaluateOptions& options = arguments.options;
+        SceneProtocol& protocol = options.protocol;
+        protocol = scene_protocol(arguments.protocol);
+        protocol.control = arguments.control.value_or(protocol.control);
+        protocol.start_step = arguments.start_step.value_or(protocol.start_step);
+        protocol.steps = arguments.steps.value_or(protocol.steps);
+        protocol.densities = arguments.densities.value_or(protocol.densities);
+        for (const auto& [name, value] : arguments.rules) {
           set_scene_rule(fmt::format("{}={}", py::cast<std::string>(name), py::cast<std::string>(py::str(value))),
-                         &options.protocol);
+                         &protocol);
         }
-        options.first_scene = first_scene;
-        options.num_scenes = num_scenes;
-        options.argmax = argmax;
-        options.seed = seed;
-        options.num_threads = num_threads;
-        options.device = device;
-        options.simulator = simulator;
-        options.renderer = renderer;
-        options.samples = samples;
-        options.conditioning = texts_of(conditioning);
-        options.on_progress = progress_to(on_progress);
         std::vector<SceneAgent> agents;
         options.on_agent = [&agents](const SceneAgent& agent) { agents.push_back(agent); };
         std::optional<RolloutsFile> file;
-        if (!rollouts.empty()) {
-          check_rollouts(options.protocol);
-          file.emplace(rollouts);
+        if (!arguments.rollouts.empty()) {
+          check_rollouts(protocol);
+          file.emplace(arguments.rollouts);
           options.on_rollouts = [&file](const SceneRollouts& scene) { file->write(scene); };
         }
         const SceneEvaluation evaluation = run_to_an_orderly_end(
-            "evaluate_scenes", num_threads, {}, [&options] { return pictura::evaluate_scenes(options); });
+            "evaluate_scenes", options.num_threads, {}, [&options] { return pictura::evaluate_scenes(options); });
         if (file) file->commit();
         return dict_of(evaluation, agents);
       },
-      py::arg("checkpoint"), py::arg("scenes"), py::kw_only(), py::arg("protocol") = "womd", py::arg("controller") = "",
-      py::arg("control") = py::none(), py::arg("start_step") = py::none(), py::arg("steps") = py::none(),
-      py::arg("densities") = py::none(), py::arg("rules") = py::dict(), py::arg("first_scene") = 0,
-      py::arg("num_scenes") = 0, py::arg("argmax") = true, py::arg("seed") = 1, py::arg("num_threads") = 0,
-      py::arg("device") = "auto", py::arg("simulator") = "auto", py::arg("renderer") = "", py::arg("samples") = "",
-      py::arg("conditioning") = py::dict(), py::arg("average") = false, py::arg("rollouts") = "",
-      py::arg("on_progress") = py::none(),
       R"(The paper's zero-shot evaluation in recorded scenes, as `pictura evaluate --protocol` does it.
 
 checkpoint: of a policy; '' with a controller: 'log', 'inverse', 'idm', 'idm_lanes', 'random' or 'idle', which drives
@@ -548,39 +498,8 @@ KeyboardInterrupt. Raises pictura.Error where no scene can be used.)");
 }
 
 void bind_probes(py::module_& module) {
-  module.def(
-      "probe_removal",
-      [](const std::vector<std::string>& policies, const std::vector<std::string>& maps, const std::string& density,
-         int agents_per_world, int first_scene, int scenes, int steps, int64_t removals, int sample_steps,
-         float range_m, const std::string& control, int batch, bool argmax, uint64_t seed, int num_threads,
-         const std::string& device, const std::string& simulator, const std::string& renderer,
-         const std::string& samples, const py::dict& conditioning, const std::string& cases_file,
-         const std::string& replay, std::optional<int64_t> case_number, bool cameras, const py::object& on_progress) {
-        const CaseReplayOptions shown = case_replay(replay, case_number, cameras);
-        RemovalOptions options;
-        fill_probe(&options, policies, maps, density, agents_per_world, first_scene, scenes, steps, sample_steps, batch,
-                   argmax, seed, num_threads, device, simulator, renderer, samples, conditioning, on_progress);
-        options.removals = removals;
-        options.range_m = range_m;
-        options.control = removal_control_named(control);
-        check_case_number(shown, options.removals);
-        const RemovalResults results = run_to_an_orderly_end("probe_removal", num_threads, {}, [&] {
-          RemovalResults found = probe_removal(options);
-          if (!cases_file.empty()) write_removal_cases(cases_file, found);
-          if (!shown.path.empty()) write_case_replay(shown, options, found);
-          return found;
-        });
-        return py::module_::import("json").attr("loads")(removal_summary_json(results, summarize(results), cases_file));
-      },
-      py::arg("policies"), py::arg("maps"), py::kw_only(), py::arg("density") = "medium",
-      py::arg("agents_per_world") = 0, py::arg("first_scene") = 0, py::arg("scenes") = 0,
-      py::arg("steps") = kProbeSteps, py::arg("removals") = RemovalOptions{}.removals,
-      py::arg("sample_steps") = RemovalOptions{}.sample_steps, py::arg("range_m") = RemovalOptions{}.range_m,
-      py::arg("control") = "none", py::arg("batch") = RemovalOptions{}.batch, py::arg("argmax") = true,
-      py::arg("seed") = 1, py::arg("num_threads") = 0, py::arg("device") = "auto", py::arg("simulator") = "auto",
-      py::arg("renderer") = "", py::arg("samples") = "", py::arg("conditioning") = py::dict(),
-      py::arg("cases_file") = "", py::arg("replay") = "", py::arg("case") = py::none(), py::arg("cameras") = false,
-      py::arg("on_progress") = py::none(),
+  def_probe(
+      &module, "probe_removal", &probe_removal, &write_removal_cases, &removal_summary_json, &RemovalOptions::removals,
       R"(How policies' value and braking change when one road user is taken away, as `pictura probe removal` asks it.
 
 policies: checkpoints or safetensors; the world is the first one's. maps, density, agents_per_world, steps and what follows
@@ -590,44 +509,8 @@ policy, two a map or more. removals: in all. sample_steps: between states. range
 its images with and without the road user (docs/replay.md); case: its number in cases_file, by default the one where the first
 policy's value changes most; cameras: keeps the ego's images of every step. Returns a dict, that of the command's
 summary.json (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
-  module.def(
-      "probe_pedestrian",
-      [](const std::vector<std::string>& policies, const std::vector<std::string>& maps, const std::string& density,
-         int agents_per_world, int first_scene, int scenes, int steps, int64_t paths, int sample_steps,
-         float hider_range_m, float min_speed_mps, float height_m, const std::string& control, int batch, bool argmax,
-         uint64_t seed, int num_threads, const std::string& device, const std::string& simulator,
-         const std::string& renderer, const std::string& samples, const py::dict& conditioning,
-         const std::string& cases_file, const std::string& replay, std::optional<int64_t> case_number, bool cameras,
-         const py::object& on_progress) {
-        const CaseReplayOptions shown = case_replay(replay, case_number, cameras);
-        PedestrianOptions options;
-        fill_probe(&options, policies, maps, density, agents_per_world, first_scene, scenes, steps, sample_steps, batch,
-                   argmax, seed, num_threads, device, simulator, renderer, samples, conditioning, on_progress);
-        options.paths = paths;
-        options.hider_range_m = hider_range_m;
-        options.min_speed_mps = min_speed_mps;
-        options.height_m = height_m;
-        options.control = pedestrian_control_named(control);
-        const PedestrianResults results = run_to_an_orderly_end("probe_pedestrian", num_threads, {}, [&] {
-          PedestrianResults found = probe_pedestrian(options);
-          if (!cases_file.empty()) write_pedestrian_cases(cases_file, found);
-          if (!shown.path.empty()) write_case_replay(shown, options, found);
-          return found;
-        });
-        return py::module_::import("json").attr("loads")(
-            pedestrian_summary_json(results, summarize(results), cases_file));
-      },
-      py::arg("policies"), py::arg("maps"), py::kw_only(), py::arg("density") = "medium",
-      py::arg("agents_per_world") = 0, py::arg("first_scene") = 0, py::arg("scenes") = 0,
-      py::arg("steps") = kProbeSteps, py::arg("paths") = PedestrianOptions{}.paths,
-      py::arg("sample_steps") = PedestrianOptions{}.sample_steps,
-      py::arg("hider_range_m") = PedestrianOptions{}.hider_range_m,
-      py::arg("min_speed_mps") = PedestrianOptions{}.min_speed_mps, py::arg("height_m") = PedestrianOptions{}.height_m,
-      py::arg("control") = "none", py::arg("batch") = PedestrianOptions{}.batch, py::arg("argmax") = true,
-      py::arg("seed") = 1, py::arg("num_threads") = 0, py::arg("device") = "auto", py::arg("simulator") = "auto",
-      py::arg("renderer") = "", py::arg("samples") = "", py::arg("conditioning") = py::dict(),
-      py::arg("cases_file") = "", py::arg("replay") = "", py::arg("case") = py::none(), py::arg("cameras") = false,
-      py::arg("on_progress") = py::none(),
+  def_probe(
+      &module, "probe_pedestrian", &probe_pedestrian, &write_pedestrian_cases, &pedestrian_summary_json, nullptr,
       R"(How policies' value and braking change as a pedestrian comes out from behind a vehicle and is hidden again, as
 `pictura probe pedestrian` asks it.
 
@@ -636,46 +519,8 @@ paths: in all, each through one state. hider_range_m: how far away the vehicle m
 of the ego, forwards. height_m: of the pedestrian. control: 'none', 'nobody' or 'untrained'. cases_file: a CSV file for every place of every path. replay, case, cameras: as in probe_removal(). Returns a dict, that of
 the command's summary.json (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad
 input.)");
-  module.def(
-      "probe_corner",
-      [](const std::vector<std::string>& policies, const std::vector<std::string>& maps, const std::string& density,
-         int agents_per_world, int first_scene, int scenes, int steps, int64_t pairs, int sample_steps,
-         float max_distance_m, float min_speed_mps, float user_range_m, const std::string& driver,
-         const std::string& control, int batch, bool argmax, uint64_t seed, int num_threads, const std::string& device,
-         const std::string& simulator, const std::string& renderer, const std::string& samples,
-         const py::dict& conditioning, const std::string& cases_file, const std::string& replay,
-         std::optional<int64_t> case_number, bool cameras, const py::object& on_progress) {
-        const CaseReplayOptions shown = case_replay(replay, case_number, cameras);
-        CornerOptions options;
-        fill_probe(&options, policies, maps, density, agents_per_world, first_scene, scenes, steps, sample_steps, batch,
-                   argmax, seed, num_threads, device, simulator, renderer, samples, conditioning, on_progress);
-        options.pairs = pairs;
-        options.search.max_distance_m = max_distance_m;
-        options.search.min_speed_mps = min_speed_mps;
-        options.search.user_range_m = user_range_m;
-        options.worlds.controller = driver;
-        options.control = corner_control_named(control);
-        check_case_number(shown, options.pairs);
-        const CornerResults results = run_to_an_orderly_end("probe_corner", num_threads, {}, [&] {
-          CornerResults found = probe_corner(options);
-          if (!cases_file.empty()) write_corner_cases(cases_file, found);
-          if (!shown.path.empty()) write_case_replay(shown, options, found);
-          return found;
-        });
-        return py::module_::import("json").attr("loads")(corner_summary_json(results, summarize(results), cases_file));
-      },
-      py::arg("policies"), py::arg("maps"), py::kw_only(), py::arg("density") = "medium",
-      py::arg("agents_per_world") = 0, py::arg("first_scene") = 0, py::arg("scenes") = 0,
-      py::arg("steps") = kProbeSteps, py::arg("pairs") = CornerOptions{}.pairs,
-      py::arg("sample_steps") = CornerOptions{}.sample_steps,
-      py::arg("max_distance_m") = CornerOptions{}.search.max_distance_m,
-      py::arg("min_speed_mps") = CornerOptions{}.search.min_speed_mps,
-      py::arg("user_range_m") = CornerOptions{}.search.user_range_m, py::arg("driver") = "",
-      py::arg("control") = "none", py::arg("batch") = CornerOptions{}.batch, py::arg("argmax") = true,
-      py::arg("seed") = 1, py::arg("num_threads") = 0, py::arg("device") = "auto", py::arg("simulator") = "auto",
-      py::arg("renderer") = "", py::arg("samples") = "", py::arg("conditioning") = py::dict(),
-      py::arg("cases_file") = "", py::arg("replay") = "", py::arg("case") = py::none(), py::arg("cameras") = false,
-      py::arg("on_progress") = py::none(),
+  def_probe(
+      &module, "probe_corner", &probe_corner, &write_corner_cases, &corner_summary_json, &CornerOptions::pairs,
       R"(How policies drive on towards blind corners with a hidden vehicle, and towards empty ones like them, as `pictura probe
 corner` asks it.
 
@@ -688,38 +533,19 @@ in probe_removal(); a case is a pair, by default that of the example's figure. R
 }
 
 void bind_session(py::module_& module) {
-  py::class_<PySession>(module, "PolicySession", R"(
+  py::class_<PySession> session(module, "PolicySession", R"(
 A saved policy: what it makes of scenes and observations, and the world and cameras that it was trained with. One thread at a
-time, also for a renderer that it is given.)")
-      .def(
-          py::init([](const std::string& checkpoint, int num_threads, const std::string& device,
-                      const std::string& simulator, const std::string& renderer, const std::string& samples,
-                      const std::string& rig, int width_px, int height_px, const std::string& backbone,
-                      const py::dict& conditioning, const std::string& light_cycles, bool average) {
-            SessionOptions options;
-            options.average = average;
-            options.num_threads = num_threads;
-            options.device = device;
-            options.simulator = simulator;
-            options.renderer = renderer;
-            options.samples = samples;
-            options.rig = rig;
-            options.width_px = width_px;
-            options.height_px = height_px;
-            options.backbone = backbone;
-            options.conditioning = texts_of(conditioning);
-            options.light_cycles = light_cycles_or_none(light_cycles);
-            check_process("PolicySession", num_threads, {});
-            return std::make_unique<PySession>(checkpoint, options);
-          }),
-          py::arg("checkpoint"), py::kw_only(), py::arg("num_threads") = 0, py::arg("device") = "auto",
-          py::arg("simulator") = "auto", py::arg("renderer") = "", py::arg("samples") = "", py::arg("rig") = "",
-          py::arg("width_px") = 0, py::arg("height_px") = 0, py::arg("backbone") = "",
-          py::arg("conditioning") = py::dict(), py::arg("light_cycles") = "", py::arg("average") = false,
-          R"(checkpoint: a .ckpt file. num_threads: 0 for all. device: 'auto', 'cpu' or 'cuda', where it computes; simulators, renderers
+time, also for a renderer that it is given.)");
+  def_init_with_options<PolicyArguments>(
+      &session, {"PolicySession", {"checkpoint"}},
+      [](const PolicyArguments& arguments) {
+        check_process("PolicySession", arguments.num_threads, {});
+        return std::make_unique<PySession>(arguments.checkpoint, arguments);
+      },
+      R"(checkpoint: a .ckpt file. num_threads: 0 for all. device: 'auto', 'cpu' or 'cuda', where it computes; simulators, renderers
 and arrays that it is given work there too. The others as in pictura.evaluate(). Raises pictura.Error naming the file, or
-pictura.UsageError where it cannot see through these cameras.)")
-      .def_property_readonly("reads_images", [](PySession& self) { return self.session().reads_images(); })
+pictura.UsageError where it cannot see through these cameras.)");
+  session.def_property_readonly("reads_images", [](PySession& self) { return self.session().reads_images(); })
       .def_property_readonly("rig", [](PySession& self) { return self.session().rig(); })
       .def_property_readonly("device", [](PySession& self) { return name_of(self.session().device()); })
       .def(

@@ -42,6 +42,21 @@ struct EvaluateOptions : DriverOptions {
   EvaluationObserver* observer = nullptr;
 };
 
+template <typename Visitor>
+void visit_options(EvaluateOptions& options, Visitor&& v) {
+  v.value({"checkpoint"}, options.checkpoint);
+  v.maps({"maps"}, options.maps);
+  v.value({"controller"}, options.controller);
+  v.choice({"densities"}, options.densities, kDensityNames);
+  v.value({"agents_per_world"}, options.agents_per_world);
+  v.value({"first_scenario"}, options.first_scenario);
+  v.value({"scenarios"}, options.scenarios);
+  v.value({"steps"}, options.steps);
+  visit_options(static_cast<DriverOptions&>(options), v);
+  visit_light_options(options, v);
+  v.progress({"on_progress"}, options.on_progress);
+}
+
 struct EvaluateReport {
   EvaluationResults results;      // of the densities that were finished, in the order of options.densities
   std::vector<EvaluateRow> rows;  // of each

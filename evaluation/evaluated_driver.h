@@ -27,6 +27,14 @@ struct DriverOptions : SessionOptions {
   uint64_t seed = 1;
 };
 
+/// Visits the options of a driver, but for its name.
+template <typename Visitor>
+void visit_options(DriverOptions& options, Visitor&& v) {
+  v.value({"argmax"}, options.argmax);
+  v.value({"seed"}, options.seed);
+  visit_options(static_cast<SessionOptions&>(options), v);
+}
+
 /// What drives the agents of a batch of worlds, and how many it drove when it last acted.
 struct Driving {
   std::unique_ptr<Controller> controller;

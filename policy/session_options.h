@@ -1,10 +1,12 @@
 // How a saved policy is opened: what computes, its cameras, and what differs from its training.
 #pragma once
 
+#include <iterator>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "pictura/common/support/named_option.h"
 #include "pictura/map/map_geometry.h"
 #include "pictura/simulator/simulator.h"
 
@@ -27,5 +29,28 @@ struct SessionOptions {
   std::optional<LightCycles> light_cycles;
   std::optional<LightHeads> light_heads;
 };
+
+/// Visits the options of how a policy is opened.
+template <typename Visitor>
+void visit_options(SessionOptions& options, Visitor&& v) {
+  v.value({"num_threads"}, options.num_threads);
+  v.value({"device"}, options.device);
+  v.value({"simulator"}, options.simulator);
+  v.value({"renderer"}, options.renderer);
+  v.value({"samples"}, options.samples);
+  v.value({"rig"}, options.rig);
+  v.value({"width_px"}, options.width_px);
+  v.value({"height_px"}, options.height_px);
+  v.value({"backbone"}, options.backbone);
+  v.conditioning({"conditioning"}, options.conditioning);
+  v.value({"average"}, options.average);
+}
+
+/// Visits the options of lights, which worlds of recorded scenes do not have.
+template <typename Visitor>
+void visit_light_options(SessionOptions& options, Visitor&& v) {
+  v.choice({"light_cycles"}, options.light_cycles, {kLightCyclesNames, std::size(kLightCyclesNames)});
+  v.choice({"light_heads"}, options.light_heads, kLightHeadsNames);
+}
 
 }  // namespace pictura

@@ -20,6 +20,27 @@ struct CornerOptions : ProbeOptions {
   CornerControl control = CornerControl::none;
 };
 
+template <typename Visitor>
+void visit_options(CornerOptions& options, Visitor&& v) {
+  visit_options(static_cast<ProbeOptions&>(options), v);
+  CornerSearch& search = options.search;
+  v.value({"pairs", "--pairs", "Pairs in all: a corner with a hidden vehicle, and an empty one", 1}, options.pairs);
+  v.value({"max_distance_m", "--max-distance", "How far before the corner a policy may take over, m; at least 8 m", 8.1,
+           kCornerLead_m},
+          search.max_distance_m);
+  v.value({"min_speed_mps", "--min-speed", "Of the ego at the takeover and of who is hidden, forwards, m/s", -100, 100},
+          search.min_speed_mps);
+  v.value({"user_range_m", "--range", "How far before the junction the hidden vehicle may be, m", 1, kCornerLead_m},
+          search.user_range_m);
+  v.name({"driver", "--driver",
+          "Who drives the scenes in which policies take over, instead of the policies: lane, the lane keeper"},
+         options.worlds.controller, {"lane"});
+  v.choice({"control", "--control",
+            "A control: permuted removes another vehicle near the ego instead of who is hidden; untrained has policies "
+            "with fresh weights take over in the same states"},
+           options.control, kCornerControlNames);
+}
+
 /// Drives evaluation worlds as probe_removal() does, or has options.worlds.controller drive all of them, and looks in
 /// their states for egos before blind corners (find_corner_states()). Kept are those in which nothing of who is hidden
 /// is seen (Renderer::visibility, in the cameras of the first policy that reads images, or in the paper's), who enters

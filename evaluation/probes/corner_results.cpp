@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include "pictura/common/support/output_file.h"
-#include "pictura/common/support/suggestion.h"
 #include "pictura/evaluation/csv.h"
 #include "pictura/evaluation/probes/probe_json.h"
 
@@ -176,10 +175,6 @@ std::vector<CornerRow> summarize(const CornerResults& results) {
     }
   }
   return rows;
-}
-
-CornerControl corner_control_named(const std::string& name) {
-  return static_cast<CornerControl>(index_of_word("control", name, kCornerControlNames));
 }
 
 size_t example_of(const CornerResults& results) {

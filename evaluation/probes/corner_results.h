@@ -31,8 +31,6 @@ enum class CornerControl : uint8_t {
   untrained,  // a control: who comes hidden, and policies with fresh weights take over in the same states
 };
 constexpr std::array<const char*, 3> kCornerControlNames{"none", "permuted", "untrained"};
-/// Throws UsageError listing the known names.
-CornerControl corner_control_named(const std::string& name);
 
 /// A world at a takeover, for pictures: agents, then parked cars.
 struct CornerScene {

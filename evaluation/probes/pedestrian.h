@@ -19,6 +19,20 @@ struct PedestrianOptions : ProbeOptions {
   PedestrianControl control = PedestrianControl::none;
 };
 
+template <typename Visitor>
+void visit_options(PedestrianOptions& options, Visitor&& v) {
+  visit_options(static_cast<ProbeOptions&>(options), v);
+  v.value({"paths", "--paths", "Paths in all, each through one state; each has a figure", 1}, options.paths);
+  v.value({"hider_range_m", "--range", "How far away the vehicle that a path begins behind may be, m", 6, 1000},
+          options.hider_range_m);
+  v.value({"min_speed_mps", "--min-speed", "Of the ego, forwards, m/s", -100, 100}, options.min_speed_mps);
+  v.value({"height_m", "--height", "Of the pedestrian, m; vehicles are 1.5 m high", 0.1, 3}, options.height_m);
+  v.choice({"control", "--control",
+            "A control: nobody puts no pedestrian there; untrained has policies with fresh weights answer in the same "
+            "states"},
+           options.control, kPedestrianControlNames);
+}
+
 /// Drives evaluation worlds as probe_removal() does, and looks in their states for paths that nobody has drawn by hand:
 /// an active vehicle, the ego; a vehicle or parked car ahead of it, the hider, within hider_range_m; and one of
 /// paths_behind() it, along which a pedestrian is wholly hidden, seen, and wholly hidden again (used_part()), first by

@@ -5,7 +5,6 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/output_file.h"
-#include "pictura/common/support/suggestion.h"
 #include "pictura/evaluation/csv.h"
 #include "pictura/evaluation/probes/crossing_path.h"
 #include "pictura/evaluation/probes/probe_json.h"
@@ -42,10 +41,6 @@ Json to_json(const PedestrianRow& row, const PedestrianResults& results) {
 }
 
 }  // namespace
-
-PedestrianControl pedestrian_control_named(const std::string& name) {
-  return static_cast<PedestrianControl>(index_of_word("control", name, kPedestrianControlNames));
-}
 
 std::vector<PedestrianRow> summarize(const PedestrianResults& results) {
   std::vector<PedestrianRow> rows;

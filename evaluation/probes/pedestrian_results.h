@@ -20,8 +20,6 @@ enum class PedestrianControl : uint8_t {
   untrained,  // a control: it is, and policies with fresh weights answer in the same states
 };
 constexpr std::array<const char*, 3> kPedestrianControlNames{"none", "nobody", "untrained"};
-/// Throws UsageError listing the names.
-PedestrianControl pedestrian_control_named(const std::string& name);
 
 /// A part of a path.
 enum class PathPhase : uint8_t { hidden, seen, hidden_again };

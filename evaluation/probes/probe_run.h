@@ -178,13 +178,15 @@ void check_probe(const ProbeOptions& options, size_t num_policies);
 
 /// Opens options.policies, and calls `probe` with them.
 template <typename Results, typename Options>
-Results with_opened(const Options& options,
+Results with_opened(Options options,
                     Results (*probe)(const std::vector<PolicySession*>& sessions, const Options& options)) {
+  EvaluateOptions& worlds = options.worlds;
+  if (worlds.scenarios == 0) worlds.scenarios = default_probe_scenes(options.policies.size(), worlds.maps.size());
   check_probe(options, options.policies.size());
   std::vector<std::unique_ptr<PolicySession>> opened;
   std::vector<PolicySession*> sessions;
   for (const std::string& path : options.policies) {
-    opened.push_back(std::make_unique<PolicySession>(path, options.worlds));
+    opened.push_back(std::make_unique<PolicySession>(path, worlds));
     sessions.push_back(opened.back().get());
   }
   return probe(sessions, options);

@@ -17,6 +17,17 @@ struct RemovalOptions : ProbeOptions {
   RemovalControl control = RemovalControl::none;
 };
 
+template <typename Visitor>
+void visit_options(RemovalOptions& options, Visitor&& v) {
+  visit_options(static_cast<ProbeOptions&>(options), v);
+  v.value({"removals", "--removals", "Cases in all: one user hidden for one ego in one state", 1}, options.removals);
+  v.value({"range_m", "--range", "How far away a user may be, m", 1, 1000}, options.range_m);
+  v.choice({"control", "--control",
+            "A control: nobody hides no one; permuted hides another of the ego's users, drawn anew for each case; "
+            "untrained has policies with fresh weights answer in the same states"},
+           options.control, kRemovalControlNames);
+}
+
 /// Drives evaluation worlds, those of evaluate() with the same numbers, in the world of the first policy: its
 /// population, walls and conditioning, which are put to all. In states of every `sample_steps` steps, pairs are drawn
 /// of an active vehicle, the ego, and another active or halted agent within range_m, the user, none twice; parked cars

@@ -7,7 +7,6 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/output_file.h"
-#include "pictura/common/support/suggestion.h"
 #include "pictura/evaluation/csv.h"
 #include "pictura/evaluation/infractions.h"
 #include "pictura/evaluation/probes/probe_json.h"
@@ -64,10 +63,6 @@ Json to_json(const RemovalRow& row, const RemovalResults& results) {
 }
 
 }  // namespace
-
-RemovalControl removal_control_named(const std::string& name) {
-  return static_cast<RemovalControl>(index_of_word("control", name, kRemovalControlNames));
-}
 
 std::string RemovalGroup::occlusion_name() const {
   if (occlusion_bin < 0) return "no camera";

@@ -20,8 +20,6 @@ enum class RemovalControl : uint8_t {
   untrained,  // a control: the user, and policies with fresh weights answer in the same states
 };
 constexpr std::array<const char*, 4> kRemovalControlNames{"none", "nobody", "permuted", "untrained"};
-/// Throws UsageError listing the names.
-RemovalControl removal_control_named(const std::string& name);
 
 /// One road user hidden for one ego, in one state. Agents are numbered in their world.
 struct RemovalCase {

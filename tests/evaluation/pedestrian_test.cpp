@@ -204,7 +204,6 @@ TEST_F(Pedestrian, RefusesWhatCannotBe) {
   o = options(2);
   o.hider_range_m = 3;
   EXPECT_THAT(message_of([&] { probe(o); }), HasSubstr("a range above 5 m, got 3"));
-  EXPECT_THAT(message_of([&] { pedestrian_control_named("some"); }), HasSubstr("none, nobody, untrained, got 'some'"));
 }
 
 // ---- results

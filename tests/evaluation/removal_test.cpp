@@ -206,7 +206,6 @@ TEST_F(Removal, RefusesWhatCannotBe) {
   o = options(10);
   o.policies = {*folder_ / "no.ckpt", *folder_ / "no.ckpt"};
   EXPECT_THAT(message_of([&] { probe(o); }), HasSubstr("no.ckpt"));
-  EXPECT_THAT(message_of([&] { removal_control_named("some"); }), HasSubstr("none, nobody, permuted"));
   EXPECT_EQ(default_probe_scenes(3, 8), 24);
   EXPECT_EQ(default_probe_scenes(2, 8), 16);
   EXPECT_EQ(default_probe_scenes(1, 8), 16);

@@ -331,6 +331,15 @@ def test_what_cannot_be_simulated_is_named(town):
     ):
         with pytest.raises(pictura.UsageError, match=message):
             pictura.Simulator([town], [(0, 4)], **options)
+    for arguments, options, message in (
+        ([[town], [(0, 4)]], {"wals": True}, r"Simulator\(\) got an unexpected keyword argument 'wals'; did you mean 'walls'\?"),
+        ([[town]], {}, "misses the argument 'worlds'"),
+        ([[town], [(0, 4)]], {"maps": [town]}, "got two values of 'maps'"),
+        ([[town], [(0, 4)], "cpu"], {}, "takes 2 arguments by place, got 3"),
+        ([[town], [(0, 4)]], {"parked_cars": "many"}, r"Simulator\(\).*\n.*parked_cars: typing.SupportsInt[^\n]*\n\nInvoked with: 'many'"),
+    ):
+        with pytest.raises(TypeError, match=message):
+            pictura.Simulator(*arguments, **options)
     for make in (pictura.Recorder, pictura.LiveView, pictura.SceneRecorder):
         with pytest.raises(pictura.UsageError, match="expected a pictura.Simulator, got NoneType"):
             make(None)

@@ -425,6 +425,23 @@ def test_a_controller_is_evaluated_without_a_policy():
         pictura.evaluate("", [], controller="lane")
     with pytest.raises(pictura.UsageError, match="densities: expected light, medium, dense, got 'thick'"):
         pictura.evaluate("", ["procedural:1"], controller="lane", densities=["thick"])
+    with pytest.raises(pictura.UsageError, match="light_heads: expected as_mapped, visible, got 'seen'"):
+        pictura.evaluate("", ["procedural:1"], controller="lane", light_heads="seen")
+
+
+def test_unknown_arguments_are_answered_with_the_nearest():
+    for function, name, nearest in (
+        (pictura.evaluate, "densitys", "densities"),
+        (pictura.evaluate_scenes, "protocoll", "protocol"),
+        (pictura.probe_removal, "removal", "removals"),
+        (pictura.probe_pedestrian, "hight_m", "height_m"),
+        (pictura.probe_corner, "light_cycle", "light_cycles"),
+    ):
+        expected = rf"{function.__name__}\(\) got an unexpected keyword argument '{name}'; did you mean '{nearest}'\?"
+        with pytest.raises(TypeError, match=expected):
+            function([], [], **{name: 3})
+    with pytest.raises(TypeError, match=r"PolicySession\(\) misses the argument 'checkpoint'"):
+        pictura.PolicySession(device="cpu")
 
 
 def test_a_controller_is_evaluated_in_recorded_scenes(tmp_path):

@@ -1,0 +1,157 @@
+// Functions of Python whose arguments are options of a struct, which its list, visit_options(options, visitor), has
+// once.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include "pictura/common/array.h"
+#include "pictura/common/span.h"
+#include "pictura/common/support/named_option.h"
+#include "pictura/common/support/suggestion.h"
+#include "pictura/simulator/conditioning.h"
+
+namespace pictura::python {
+
+namespace py = pybind11;
+
+/// "cpu", "cuda" or "cuda:1". Throws UsageError for others.
+Device device_of(const std::string& name);
+
+using ConditioningRanges = std::array<ConditioningRange, kNumConditioning>;
+
+/// An option of a struct as an argument of a function.
+struct Parameter {
+  std::string name;
+  py::object value;      // what it has now
+  py::cpp_function set;  // set(value) converts a value and writes it into the struct
+};
+
+/// A visitor of lists that collects their options as parameters, which the options must outlive.
+class ParameterVisitor {
+ public:
+  /// Messages name `function`.
+  explicit ParameterVisitor(std::string function) : function_(std::move(function)) {}
+
+  template <typename T>
+  void value(const NamedOption& option, T& value) {
+    add<T>(option, value, [&value](const T& given) { value = given; });
+  }
+  void name(const NamedOption& option, std::string& text, const std::vector<std::string>&) { value(option, text); }
+  template <typename Enum>
+  void choice(const NamedOption& option, Enum& value, Span<const char* const> names) {
+    add<std::string>(option, names[static_cast<int>(value)],
+                     [=, &value](const std::string& given) { value = chosen<Enum>(option, given, names); });
+  }
+  /// The empty name stands for no value.
+  template <typename Enum>
+  void choice(const NamedOption& option, std::optional<Enum>& value, Span<const char* const> names) {
+    add<std::string>(option, value ? names[static_cast<int>(*value)] : "", [=, &value](const std::string& given) {
+      value = given.empty() ? std::nullopt : std::optional(chosen<Enum>(option, given, names));
+    });
+  }
+  template <typename Enum>
+  void choice(const NamedOption& option, std::vector<Enum>& values, Span<const char* const> names) {
+    std::vector<std::string> texts;
+    for (const Enum value : values) texts.emplace_back(names[static_cast<int>(value)]);
+    add<std::vector<std::string>>(option, texts, [=, &values](const std::vector<std::string>& given) {
+      values.clear();
+      for (const std::string& name : given) values.push_back(chosen<Enum>(option, name, names));
+    });
+  }
+  void device(const NamedOption& option, Device& value);
+  /// Names of maps, with ranges of seeds expanded.
+  void maps(const NamedOption& option, std::vector<std::string>& names);
+  /// Numbers or (low, high) by name, in place of those that are there.
+  void conditioning(const NamedOption& option, ConditioningRanges& ranges);
+  /// Numbers by name, as "name=value".
+  void conditioning(const NamedOption& option, std::vector<std::string>& texts);
+  void progress(const NamedOption& option, std::function<void(double, double)>& on_progress);
+
+  const std::vector<Parameter>& parameters() const { return parameters_; }
+
+ private:
+  template <typename Enum>
+  static Enum chosen(const NamedOption& option, const std::string& name, Span<const char* const> names) {
+    return static_cast<Enum>(index_of_word(option.name, name, names));
+  }
+  template <typename T, typename Set>
+  void add(const NamedOption& option, const T& value, const Set& set) {
+    const py::arg_v argument = (py::arg(option.name) = value);
+    parameters_.push_back(
+        {option.name, argument.value,
+         py::cpp_function([set](const T& given) { set(given); }, argument, py::name(function_.c_str()))});
+  }
+
+  std::string function_;
+  std::vector<Parameter> parameters_;
+};
+
+/// A signature as pybind11 writes it: "(steps: int = 3) -> str".
+std::string signature_of(const py::cpp_function& function);
+
+template <typename Options>
+std::vector<Parameter> parameters_of(const std::string& function, Options& options) {
+  ParameterVisitor visitor(function);
+  visit_options(options, visitor);
+  return visitor.parameters();
+}
+
+/// A function of options: the arguments `required` are given by place or by name, all others by name.
+struct OptionsFunction {
+  std::string name;
+  std::vector<std::string> required;
+
+  /// The text of help(): a signature as pybind11 writes it, "(config: str, *, minutes: float = 0.0) -> dict", and
+  /// `doc`. `first` are parameters before the options.
+  template <typename Options>
+  std::string help(const std::string& first, const std::string& result, const std::string& doc) const {
+    Options defaults;
+    return signature(parameters_of(name, defaults), first, result) + "\n\n" + doc;
+  }
+  /// Returns what Python calls for function(Options&), which throws TypeError for arguments that do not fit.
+  template <typename Options, typename Function>
+  auto caller(const Function& function) const {
+    return [*this, function](const py::args& by_place, const py::kwargs& by_name) {
+      Options options;
+      read(by_place, by_name, parameters_of(name, options));
+      return function(options);
+    };
+  }
+
+ private:
+  std::string signature(const std::vector<Parameter>& parameters, std::string first, const std::string& result) const;
+  void read(const py::args& by_place, const py::dict& by_name, const std::vector<Parameter>& parameters) const;
+};
+
+/// Defines a function of a module.
+template <typename Options, typename Function>
+void def_with_options(py::module_* module, const OptionsFunction& arguments, const Function& function,
+                      const std::string& doc) {
+  const std::string result = signature_of(py::cpp_function([] { return std::invoke_result_t<Function, Options&>(); }));
+  const std::string help = arguments.name + arguments.help<Options>("", result.substr(sizeof("() ->")), doc);
+  py::options without_signature;
+  without_signature.disable_function_signatures();
+  module->def(arguments.name.c_str(), arguments.caller<Options>(function), help.c_str());
+}
+
+/// Defines how objects of the class of the function's name are made.
+template <typename Options, typename Class, typename Function>
+void def_init_with_options(Class* its_class, const OptionsFunction& arguments, const Function& make,
+                           const std::string& doc) {
+  const std::string self = "self: " + py::cast<std::string>(its_class->attr("__module__")) + "." + arguments.name;
+  const std::string help = "__init__" + arguments.help<Options>(self, "None", doc);
+  py::options without_signature;
+  without_signature.disable_function_signatures();
+  its_class->def(py::init(arguments.caller<Options>(make)), help.c_str());
+}
+
+}  // namespace pictura::python
