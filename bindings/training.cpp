@@ -1,5 +1,6 @@
 // The extension module pictura._training: training, evaluation and saved policies, beside the torch that it was built
 // with. What it takes and gives are objects of pictura._pictura.
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -153,34 +154,39 @@ py::dict dict_of(SimulatorConfig config) {
   return d;
 }
 
-py::dict train_from_python(const std::string& config, const std::string& out, const std::vector<std::string>& overrides,
-                           const std::string& old_run, const std::string& init_from, double minutes,
-                           const py::object& on_progress, const py::object& on_notice) {
+struct TrainArguments {
   TrainOptions options;
-  options.config_path = config;
-  options.out_folder = out;
-  options.overrides = overrides;
-  options.init_from = init_from;
-  options.minutes = minutes;
+  py::object on_progress = py::none(), on_notice = py::none();
+};
+
+template <typename Visitor>
+void visit_options(TrainArguments& arguments, Visitor&& v) {
+  static constexpr std::array<const char*, 3> kOldRunNames{"refuse", "resume", "overwrite"};
+  TrainOptions& options = arguments.options;
+  v.value({"config"}, options.config_path);
+  v.value({"out"}, options.out_folder);
+  v.value({"overrides"}, options.overrides);
+  v.choice({"old_run"}, options.old_run, kOldRunNames);
+  v.value({"init_from"}, options.init_from);
+  v.value({"minutes"}, options.minutes);
+  v.value({"on_progress"}, arguments.on_progress);
+  v.value({"on_notice"}, arguments.on_notice);
+}
+
+py::dict train_from_python(TrainArguments& arguments) {
+  TrainOptions& options = arguments.options;
   options.commit = PICTURA_COMMIT;
   options.launch = launch_from_environment();
-  if (old_run == "resume") {
-    options.old_run = OldRun::resume;
-  } else if (old_run == "overwrite") {
-    options.old_run = OldRun::overwrite;
-  } else if (old_run != "refuse") {
-    fail_usage("train: old_run: expected 'refuse', 'resume' or 'overwrite', got '{}'", old_run);
-  }
-  if (!on_progress.is_none()) {
-    options.on_progress = [&on_progress](const TrainProgress& progress) {
+  if (!arguments.on_progress.is_none()) {
+    options.on_progress = [&arguments](const TrainProgress& progress) {
       const py::gil_scoped_acquire gil;
-      on_progress(dict_of(progress));
+      arguments.on_progress(dict_of(progress));
     };
   }
-  if (!on_notice.is_none()) {
-    options.on_notice = [&on_notice](const std::string& notice) {
+  if (!arguments.on_notice.is_none()) {
+    options.on_notice = [&arguments](const std::string& notice) {
       const py::gil_scoped_acquire gil;
-      on_notice(notice);
+      arguments.on_notice(notice);
     };
   }
   return dict_of(run_to_an_orderly_end("train", 0, {}, [&options] { return train(options); }));
@@ -428,11 +434,9 @@ class PySession {
 };
 
 void bind_train(py::module_& module) {
-  module.def("train", &train_from_python, py::arg("config"), py::arg("out"), py::kw_only(),
-             py::arg("overrides") = std::vector<std::string>(), py::arg("old_run") = "refuse",
-             py::arg("init_from") = "", py::arg("minutes") = 0.0, py::arg("on_progress") = py::none(),
-             py::arg("on_notice") = py::none(),
-             R"(Trains by self-play as `pictura train` does, and writes the same files into the folder `out`.
+  def_with_options<TrainArguments>(
+      &module, {"train", {"config", "out"}}, &train_from_python,
+      R"(Trains by self-play as `pictura train` does, and writes the same files into the folder `out`.
 
 config: a TOML file (docs/configuration.md). overrides: 'train.updates=2'. old_run: of a run that lies in `out`, 'refuse', 'resume'
 or 'overwrite'. init_from: a checkpoint whose weights it begins with. minutes: of wall time; 0: no limit. on_progress: called

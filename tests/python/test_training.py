@@ -431,6 +431,7 @@ def test_a_controller_is_evaluated_without_a_policy():
 
 def test_unknown_arguments_are_answered_with_the_nearest():
     for function, name, nearest in (
+        (pictura.train, "overides", "overrides"),
         (pictura.evaluate, "densitys", "densities"),
         (pictura.evaluate_scenes, "protocoll", "protocol"),
         (pictura.probe_removal, "removal", "removals"),
