@@ -1,7 +1,6 @@
 #include "pictura/bindings/options.h"
 
 #include <algorithm>
-#include <memory>
 
 #include <fmt/format.h>
 
@@ -54,18 +53,6 @@ void ParameterVisitor::conditioning(const NamedOption& option, std::vector<std::
     for (const auto& [name, value] : given) {
       texts.push_back(fmt::format("{}={}", py::cast<std::string>(name), py::cast<double>(value)));
     }
-  });
-}
-
-void ParameterVisitor::progress(const NamedOption& option, std::function<void(double, double)>& on_progress) {
-  add<py::object>(option, py::none(), [&on_progress](const py::object& given) {
-    if (given.is_none()) return;
-    // The options are copied where nobody has the GIL.
-    const auto function = std::make_shared<const py::object>(given);
-    on_progress = [function](double done_fraction, double eta_s) {
-      const py::gil_scoped_acquire gil;
-      (*function)(done_fraction, eta_s);
-    };
   });
 }
 

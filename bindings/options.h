@@ -4,6 +4,7 @@
 
 #include <array>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <type_traits>
@@ -74,7 +75,18 @@ class ParameterVisitor {
   void conditioning(const NamedOption& option, ConditioningRanges& ranges);
   /// Numbers by name, as "name=value".
   void conditioning(const NamedOption& option, std::vector<std::string>& texts);
-  void progress(const NamedOption& option, std::function<void(double, double)>& on_progress);
+  /// A function of Python's, or None.
+  template <typename... Arguments>
+  void callback(const NamedOption& option, std::function<void(Arguments...)>& value) {
+    add<py::object>(option, py::none(), [&value](const py::object& given) {
+      if (given.is_none()) return;
+      // The options are copied where nobody has the GIL.
+      value = [function = std::make_shared<const py::object>(given)](Arguments... arguments) {
+        const py::gil_scoped_acquire gil;
+        (*function)(arguments...);
+      };
+    });
+  }
 
   const std::vector<Parameter>& parameters() const { return parameters_; }
 

@@ -156,7 +156,7 @@ py::dict dict_of(SimulatorConfig config) {
 
 struct TrainArguments {
   TrainOptions options;
-  py::object on_progress = py::none(), on_notice = py::none();
+  py::object on_progress = py::none();
 };
 
 template <typename Visitor>
@@ -170,7 +170,7 @@ void visit_options(TrainArguments& arguments, Visitor&& v) {
   v.value({"init_from"}, options.init_from);
   v.value({"minutes"}, options.minutes);
   v.value({"on_progress"}, arguments.on_progress);
-  v.value({"on_notice"}, arguments.on_notice);
+  v.callback({"on_notice"}, options.on_notice);
 }
 
 py::dict train_from_python(TrainArguments& arguments) {
@@ -181,12 +181,6 @@ py::dict train_from_python(TrainArguments& arguments) {
     options.on_progress = [&arguments](const TrainProgress& progress) {
       const py::gil_scoped_acquire gil;
       arguments.on_progress(dict_of(progress));
-    };
-  }
-  if (!arguments.on_notice.is_none()) {
-    options.on_notice = [&arguments](const std::string& notice) {
-      const py::gil_scoped_acquire gil;
-      arguments.on_notice(notice);
     };
   }
   return dict_of(run_to_an_orderly_end("train", 0, {}, [&options] { return train(options); }));
@@ -218,7 +212,7 @@ void visit_options(SceneArguments& arguments, Visitor&& v) {
   v.value({"num_scenes"}, options.num_scenes);
   visit_options(static_cast<DriverOptions&>(options), v);
   v.value({"rollouts"}, arguments.rollouts);
-  v.progress({"on_progress"}, options.on_progress);
+  v.callback({"on_progress"}, options.on_progress);
 }
 
 template <typename Probe>
@@ -242,7 +236,7 @@ void visit_options(ProbeArguments<Probe>& arguments, Visitor&& v) {
   v.value({"replay"}, arguments.replay.path);
   v.value({"case"}, arguments.replay.number);
   v.value({"cameras"}, arguments.replay.recording.cameras);
-  v.progress({"on_progress"}, worlds.on_progress);
+  v.callback({"on_progress"}, worlds.on_progress);
 }
 
 /// A policy of a checkpoint.

@@ -54,7 +54,7 @@ void visit_options(EvaluateOptions& options, Visitor&& v) {
   v.value({"steps"}, options.steps);
   visit_options(static_cast<DriverOptions&>(options), v);
   visit_light_options(options, v);
-  v.progress({"on_progress"}, options.on_progress);
+  v.callback({"on_progress"}, options.on_progress);
 }
 
 struct EvaluateReport {
