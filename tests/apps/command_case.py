@@ -10,6 +10,7 @@ import os
 import pathlib
 import re
 import select
+import shutil
 import signal
 import socket
 import struct
@@ -20,6 +21,7 @@ import unittest
 
 # The command.
 PICTURA = os.path.abspath(sys.argv.pop(1))
+needs_ffmpeg = unittest.skipUnless(shutil.which("ffmpeg"), "no ffmpeg on this machine")
 CONFIGS = pathlib.Path(__file__).resolve().parents[2] / "configs"
 # A policy and a world so small that an update takes well under a second. On the host, whose runs are exact.
 TINY = [

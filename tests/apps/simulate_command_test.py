@@ -7,7 +7,7 @@ import signal
 import subprocess
 import unittest
 
-from command_case import PICTURA, CommandCase, has_torch, run
+from command_case import PICTURA, CommandCase, has_torch, needs_ffmpeg, run
 
 TOWNS = sorted(path.stem for path in pathlib.Path(os.environ.get("PICTURA_DATA", "/nowhere")).glob("carla/*.xodr"))
 
@@ -56,7 +56,7 @@ class Simulation(CommandCase):
         self.assert_refused(2, "at most 1 together", "simulate", town, "--pedestrians", 0.7, "--cyclists", 0.7)
         self.assert_refused(2, "--parked", "simulate", town, "--parked", -1)
 
-    @unittest.skipUnless(shutil.which("ffmpeg"), "no ffmpeg on this machine")
+    @needs_ffmpeg
     def test_a_film_that_is_interrupted_before_its_first_frame_has_the_status_of_the_signal(self):
         video = self.folder / "film.mp4"
         # Served worlds wait for a page.
@@ -67,6 +67,7 @@ class Simulation(CommandCase):
             self.assertIn("error: interrupted at step 0", process.stderr.read())
         self.assertEqual((process.returncode, video.exists()), (130, False))
 
+    @needs_ffmpeg
     def test_a_video_is_written(self):
         video = self.folder / "drive.mp4"
         film = ["simulate", self.town(), "--agents", 5, "--steps", 12, "--policy", "random", "--video", video]

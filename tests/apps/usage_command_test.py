@@ -9,7 +9,7 @@ import socket
 import subprocess
 import unittest.mock
 
-from command_case import CONFIGS, PICTURA, CommandCase, has_torch, run
+from command_case import CONFIGS, PICTURA, CommandCase, has_torch, needs_ffmpeg, run
 
 
 class Usage(CommandCase):
@@ -170,6 +170,7 @@ class Files(CommandCase):
                 result = subprocess.run([PICTURA, *arguments], stdout=full, stderr=subprocess.PIPE, text=True)
                 self.assertEqual((result.returncode, "No space left on device" in result.stderr), (1, True), result.stderr)
 
+    @needs_ffmpeg
     def test_closed_descriptors_are_no_outputs(self):
         for closed in ([2], [0, 1, 2]):
             with self.subTest(closed=closed):
