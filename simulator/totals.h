@@ -2,9 +2,6 @@
 // bin i mod kTotalsBins, and the bins are added up in order.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
-
 #include "pictura/common/portable/hd.h"
 #include "pictura/simulator/reward_terms.h"
 
@@ -69,7 +66,7 @@ struct SimulatorTotals {
   }
 
   /// Whether each member is one of those that are visited.
-  static constexpr bool visits_all() {
+  PICTURA_HD static constexpr bool visits_all() {
     SimulatorTotals totals;
     size_t bytes = 0;
     visit_counts(totals, totals, CountBytes{&bytes});

@@ -1,8 +1,6 @@
 // Rows of entity sets, computed as eight floats at a time: EgoFrame::to_local() and turn(), times the features' scales.
 #pragma once
 
-#include <cstddef>
-
 #include "pictura/common/portable/float8.h"
 #include "pictura/common/scene_types.h"
 #include "pictura/simulator/observation.h"
@@ -32,10 +30,12 @@ struct RowFrame {
         sin(set8(frame.forward.y, -frame.forward.y, 0, 0, frame.forward.y, -frame.forward.y, 0, 0)) {}
 };
 
+#ifdef offsetof  // NVRTC has none
 // What is read as eight floats.
 static_assert(offsetof(AgentBox, cos_heading) == 3 * sizeof(float) &&
               offsetof(AgentBox, height_m) == 7 * sizeof(float));
 static_assert(offsetof(StopLine, right_m) == 3 * sizeof(float) && sizeof(StopLine) >= 8 * sizeof(float));
+#endif
 
 // No function returns a Float8: a program may hold code of both of its types, and a function's name does not include
 // the type that it returns.
