@@ -92,11 +92,10 @@ class Plotter {
 
   /// What it writes to stderr until it ends. Throws Interrupted.
   std::string read_messages() {
-    const InterruptibleWork work("interrupted while a chart was drawn");
     std::string messages;
     char buffer[4096];
     for (;;) {
-      work.check();
+      work_.check();
       pollfd ready{messages_.get(), POLLIN, 0};
       if (::poll(&ready, 1, 100) <= 0) continue;
       const ssize_t length = ::read(messages_.get(), buffer, sizeof buffer);
@@ -113,6 +112,7 @@ class Plotter {
   }
 
  private:
+  const InterruptibleWork work_{"interrupted while a chart was drawn"};  // from before the child runs
   pid_t child_ = -1;
   Descriptor messages_;
 };
