@@ -20,7 +20,7 @@ class HeldController final : public Controller {
   std::shared_ptr<Controller> held_;
 };
 
-/// What several controllers of one simulator become; a mask that is None is everybody.
+/// Controller of several that share a simulator's slots; a mask of None stands for all slots.
 ControllerInside shared_controller(const std::vector<std::pair<PyController*, py::object>>& drivers,
                                    const PySimulator& simulator) {
   std::vector<Driver> driving;

@@ -80,7 +80,7 @@ class ParameterVisitor {
   void callback(const NamedOption& option, std::function<void(Arguments...)>& value) {
     add<py::object>(option, py::none(), [&value](const py::object& given) {
       if (given.is_none()) return;
-      // The options are copied where nobody has the GIL.
+      // Options are copied where the GIL is not held.
       value = [function = std::make_shared<const py::object>(given)](Arguments... arguments) {
         const py::gil_scoped_acquire gil;
         (*function)(arguments...);
