@@ -25,7 +25,7 @@ struct SessionOptions {
   std::vector<std::string> conditioning;
   bool adds_walls = false;  // its worlds have walls, also where it was trained without
   bool average = false;     // drives with the average of weights that a checkpoint holds
-  // Of its worlds; no value: those of its training.
+  // Lights of its worlds; without a value those that the policy was trained with.
   std::optional<LightCycles> light_cycles;
   std::optional<LightHeads> light_heads;
 };

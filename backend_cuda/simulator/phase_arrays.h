@@ -28,7 +28,7 @@ struct PhaseArrays {
   const WorldScratch* scratch = nullptr;   // [num_worlds]
   const int32_t* world_of_slot = nullptr;  // [num_slots]
   int32_t num_worlds = 0, num_slots = 0;
-  // Of all worlds, as in their views; and here, where no store can change them.
+  // Agents of all worlds, which the views hold too: from there a kernel would read them again after each store.
   AgentStateView agents{}, next_agents{};
   // State, as in SimulatorState.
   uint64_t* seed = nullptr;

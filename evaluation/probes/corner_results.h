@@ -37,7 +37,7 @@ struct CornerScene {
   std::vector<AgentBox> boxes;
   std::vector<AgentStatus> status;  // [boxes]
   std::vector<Vec2> user_m;         // [kTakeoverSteps + 1] where the hidden vehicle's box is
-  int32_t removed = -1;             // who is not there in CornerCase::removed; -1: nobody
+  int32_t removed = -1;             // agent that is hidden in CornerCase::removed; -1: none
 };
 
 struct CornerResults : ProbeResults {
