@@ -48,6 +48,11 @@ void print_table(const EvaluateReport& report) {
         "{}: vehicles are lives on roads that end: {} of {} agents spawned, {} entered, {} left; {} goals/km\n",
         row.density, row.spawned, row.asked, row.entered, row.left, interval_text(row.goals_per_km));
   }
+  for (const EvaluateRow& row : report.rows) {
+    print_result("{}: {} of the time in reverse, {} m moved a wait at red ({} waits), {} stuck at the end\n",
+                 row.density, interval_text(row.reversing_share), interval_text(row.red_wait_moved_m), row.red_waits,
+                 interval_text(row.stuck_at_end_share));
+  }
   print_result("traffic lights: {}\n", name_of(report.results.setting.light_cycles));
   print_result("+- is the half width of a 95 % confidence interval over scenarios\n");
   if (report.agent_steps > 0) {
@@ -60,11 +65,11 @@ void print_table(const EvaluateReport& report) {
 void print_report(const EvaluateOptions& options, const EvaluateReport& report, const Json& infractions) {
   Json table = Json::array();
   for (const EvaluateRow& row : report.rows) {
-    Json json = {{"density", row.density},    {"scenarios", row.scenarios},
-                 {"steps", row.steps},        {"asked", row.asked},
-                 {"spawned", row.spawned},    {"entered", row.entered},
-                 {"left", row.left},          {"vehicle_episodes", row.vehicle_episodes},
-                 {"km_driven", row.km_driven}};
+    Json json = {{"density", row.density},     {"scenarios", row.scenarios},
+                 {"steps", row.steps},         {"asked", row.asked},
+                 {"spawned", row.spawned},     {"entered", row.entered},
+                 {"left", row.left},           {"vehicle_episodes", row.vehicle_episodes},
+                 {"km_driven", row.km_driven}, {"red_waits", row.red_waits}};
     for (const auto& [name, estimate] : metrics_of(row)) add_estimate(name, estimate, &json);
     add_estimate("at_fault_collisions_per_km", row.at_fault_collisions_per_km, &json);
     add_estimate("off_road_per_km", row.off_road_per_km, &json);

@@ -9,6 +9,7 @@
 #include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/suggestion.h"
 #include "pictura/evaluation/progress.h"
+#include "pictura/evaluation/standing.h"
 #include "pictura/map/load_map.h"
 #include "pictura/map/map_cache.h"
 #include "pictura/policy/session.h"
@@ -136,10 +137,11 @@ std::vector<WorldSpec> worlds_of(const EvaluateOptions& options, size_t num_maps
 // now and then, and on_left(state, slot) for each agent that left a road that ends.
 template <typename OnSteps, typename OnLeft>
 bool drive_to_the_end(const EvaluatedDriver& driver, const EvaluateOptions& options, Simulator* simulator,
-                      const OnSteps& on_steps, const OnLeft& on_left, int64_t* agent_steps_inout) {
+                      const OnSteps& on_steps, const OnLeft& on_left, StandingObserver* standing,
+                      int64_t* agent_steps_inout) {
   const Driving driving = driver.drive(*simulator);
   EvaluationObserver* const observer = options.observer;
-  std::vector<StepObserver*> observers;
+  std::vector<StepObserver*> observers{standing};
   if (observer) {
     observer->begin(*simulator);
     observers.push_back(observer);
@@ -203,7 +205,8 @@ EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& op
       const auto on_steps = [&](int steps) { clock.update((done + num_slots * steps) / work); };
       const auto counts_of = [&](int64_t slot) { return &result.scenarios[first + slot / density.agents]; };
       const auto on_left = [&](const AgentStateView& state, int64_t slot) { add_life(state, slot, counts_of(slot)); };
-      if (!drive_to_the_end(driver, options, simulator.get(), on_steps, on_left, &report.agent_steps)) {
+      StandingObserver standing(*simulator);
+      if (!drive_to_the_end(driver, options, simulator.get(), on_steps, on_left, &standing, &report.agent_steps)) {
         report.interrupted = true;
         result.scenarios.resize(first);  // those of the batches before are finished
         break;
@@ -212,6 +215,9 @@ EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& op
       AgentState state = counted_state(*simulator);
       for (int slot = 0; slot < simulator->num_slots(); ++slot) {
         add_slot(state.view(), slot, counts_of(slot));
+      }
+      for (size_t world = 0; world < worlds.size(); ++world) {
+        result.scenarios[static_cast<size_t>(first) + world].standing = standing.counts_of(world);
       }
     }
     if (!result.scenarios.empty()) {

@@ -10,8 +10,8 @@
 #include "pictura/common/math.h"
 #include "pictura/common/support/file.h"
 #include "pictura/evaluation/csv.h"
+#include "pictura/evaluation/world_arrays.h"
 #include "pictura/map/file_position.h"
-#include "pictura/policy/struct_copies.h"
 #include "pictura/simulator/rules/collision.h"
 
 namespace pictura {
@@ -22,11 +22,6 @@ constexpr float kLaneChange_s = 3, kMergeAhead_m = 30;
 constexpr float kCurveRadius_m = 50;       // of a curve: at most
 constexpr float kJunctionTurn_rad = 0.5f;  // a junction's lane that turns less goes straight on
 constexpr float kJustRed_s = 1, kFarHead_m = 10;
-
-template <typename T>
-std::vector<T> copy_of(const T* values, size_t count, Device device) {
-  return host_copy(Span<const T>(values, count), device);
-}
 
 // The place on a lane's centre line that is nearest to a position.
 struct LanePlace {
@@ -108,39 +103,18 @@ const char* to_string(RoadShape shape) {
   return kNames[static_cast<size_t>(shape)];
 }
 
-// What is read of all worlds, on the host.
-struct InfractionObserver::Frame {
-  std::vector<AgentStatus> status;
-  std::vector<AgentClass> agent_class;
+struct InfractionObserver::Frame : WorldArrays {
   std::vector<uint8_t> events;
-  std::vector<float> speed_mps, lane_offset_m, lane_angle_rad;
+  std::vector<float> lane_offset_m, lane_angle_rad;
   std::vector<int32_t> lane;
-  std::vector<AgentBox> boxes;
-  std::vector<uint8_t> lights;  // LightState
-  std::vector<int32_t> box_begin, light_begin, slot_begin;
 
-  explicit Frame(Simulator& simulator) {
-    const Device device = simulator.device();
+  explicit Frame(Simulator& simulator) : WorldArrays(simulator) {
     const AgentStateView state = simulator.state();
-    const auto slots = static_cast<size_t>(simulator.num_slots());
-    status = copy_of<AgentStatus>(state.status, slots, device);
-    events = copy_of<uint8_t>(state.events, slots, device);
-    agent_class = copy_of<AgentClass>(state.agent_class, slots, device);
-    speed_mps = copy_of<float>(state.speed_mps, slots, device);
-    lane_offset_m = copy_of<float>(state.lane_offset_m, slots, device);
-    lane_angle_rad = copy_of<float>(state.lane_angle_rad, slots, device);
-    lane = copy_of<int32_t>(state.lane, slots, device);
-    const SceneBatch& scene = simulator.scene();
-    boxes = host_copy_of_structs(scene.agents, device);
-    static_assert(sizeof(LightState) == 1);
-    lights = copy_of(reinterpret_cast<const uint8_t*>(scene.light_states.data()), scene.light_states.size(), device);
-    box_begin = host_copy(scene.world_begin, device);
-    light_begin = host_copy(scene.light_begin, device);
-    slot_begin = host_copy(simulator.slots().slot_begin, device);
+    events = of_slots(simulator, state.events);
+    lane_offset_m = of_slots(simulator, state.lane_offset_m);
+    lane_angle_rad = of_slots(simulator, state.lane_angle_rad);
+    lane = of_slots(simulator, state.lane);
   }
-
-  AgentStatus status_of(size_t slot) const { return status[slot]; }
-  bool is_red(size_t light) const { return lights[light] == static_cast<uint8_t>(LightState::red); }
 };
 
 // One world's step: what was before it and what is after it. Agents, boxes and lights are the world's own.
@@ -159,11 +133,11 @@ struct InfractionObserver::WorldStep {
         heads(simulator.maps()[spec.map]->geometry.heads),
         before(before_step),
         after(after_step),
-        first_slot(static_cast<size_t>(after.slot_begin[world])),
-        num_agents(static_cast<size_t>(after.slot_begin[world + 1]) - first_slot),
-        first_box(static_cast<size_t>(after.box_begin[world])),
-        num_boxes(static_cast<size_t>(after.box_begin[world + 1]) - first_box),
-        first_light(static_cast<size_t>(after.light_begin[world])) {}
+        first_slot(after.first_slot(world)),
+        num_agents(after.num_agents(world)),
+        first_box(after.first_box(world)),
+        num_boxes(after.num_boxes(world)),
+        first_light(after.first_light(world)) {}
 
   // Whether the agent is in a neighbour of the lane that it was in.
   bool has_changed_lane(size_t slot) const {
@@ -191,7 +165,7 @@ struct InfractionObserver::WorldStep {
     for (size_t other = 0; other < num_boxes; ++other) {
       const bool is_parked = other >= num_agents;
       if (other == agent) continue;
-      if (!is_parked && !has_body(before.status_of(first_slot + other))) continue;
+      if (!is_parked && !has_body(before.status[first_slot + other])) continue;
       const AgentBox &its = before.boxes[first_box + other], &its_after = after.boxes[first_box + other];
       const float apart_m = length((its.center_m - own.center_m).xy());
       if (apart_m >= least_m || !collide(own, own_after, its, its_after)) continue;
@@ -201,7 +175,7 @@ struct InfractionObserver::WorldStep {
       out->contact = contact_of(own, its);
       out->partner_speed_mps = is_parked ? 0 : before.speed_mps[first_slot + other];
       out->partner_motion = PartnerMotion::standing;
-      if (!is_parked && before.status_of(first_slot + other) == AgentStatus::halted)
+      if (!is_parked && before.status[first_slot + other] == AgentStatus::halted)
         out->partner_motion = PartnerMotion::halted;
       else if (std::fabs(out->partner_speed_mps) > kRest_mps)
         out->partner_motion = PartnerMotion::moving;
@@ -248,9 +222,9 @@ void InfractionObserver::after_step(const StepResult& /*result*/) {
     const WorldStep step(*simulator_, world, *before_, *after_);
     for (size_t agent = 0; agent < step.num_agents; ++agent) {
       const size_t slot = step.first_slot + agent;
-      if (before_->status_of(slot) != AgentStatus::active) continue;
+      if (before_->status[slot] != AgentStatus::active) continue;
       if (step.has_changed_lane(slot)) lane_change_step_[slot] = step_;
-      if (after_->status_of(slot) == AgentStatus::halted) found_now_.push_back(describe(step, agent));
+      if (after_->status[slot] == AgentStatus::halted) found_now_.push_back(describe(step, agent));
     }
   }
   for (size_t i = 0; i < after_->lights.size(); ++i) {

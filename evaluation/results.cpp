@@ -19,13 +19,17 @@ constexpr const char* kResultsFormatAtFaultAlone = "pictura evaluation 1";
 // Format 1 lacks these counts, and its "infractions" are at_fault_infraction.
 constexpr const char* kCountsOfFormat2[] = {"collision", "wall_contact", "any_infraction", "at_fault_infraction"};
 // Files of format 2 may lack these.
-constexpr const char* kAgentCounts[] = {"asked", "spawned", "entered", "left"};
+constexpr const char* kLaterCounts[] = {"asked",     "spawned",          "entered",
+                                        "left",      "driven_steps",     "reversing_steps",
+                                        "red_waits", "red_wait_moved_m", "stuck_at_end"};
+
+constexpr Estimate kUnknown{std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()};
 
 // Returns a scenario's counts as format 1 has them.
 Json as_format_1(Json json) {
   json["infractions"] = json.at("at_fault_infraction");
   for (const char* name : kCountsOfFormat2) json.erase(name);
-  for (const char* name : kAgentCounts) json.erase(name);
+  for (const char* name : kLaterCounts) json.erase(name);
   return json;
 }
 
@@ -37,7 +41,7 @@ Json from_format_1(Json json) {
 }
 
 ScenarioCounts scenario_counts_from(Json json) {
-  for (const char* name : kAgentCounts) json.emplace(name, 0);
+  for (const char* name : kLaterCounts) json.emplace(name, 0);
   return counts_from<ScenarioCounts>(json);
 }
 
@@ -97,6 +101,7 @@ EvaluateRow row_of(const DensityResult& result, int steps) {
   row.density = result.density;
   row.scenarios = static_cast<int>(all.size());
   row.steps = steps;
+  int64_t driven_steps = 0;
   for (const Counts& counts : all) {
     row.vehicle_episodes += counts.vehicles;
     row.km_driven += km_of(counts);
@@ -104,6 +109,8 @@ EvaluateRow row_of(const DensityResult& result, int steps) {
     row.spawned += counts.spawned;
     row.entered += counts.entered;
     row.left += counts.left;
+    row.red_waits += counts.standing.red_waits;
+    driven_steps += counts.standing.driven_steps;
   }
   row.at_fault_collision_rate = per_vehicle([](const Counts& c) { return c.at_fault; });
   row.off_road_rate = per_vehicle([](const Counts& c) { return c.off_road; });
@@ -122,16 +129,28 @@ EvaluateRow row_of(const DensityResult& result, int steps) {
   row.off_road_per_km = per_km([](const Counts& c) { return c.off_road; });
   row.red_lights_per_km = per_km([](const Counts& c) { return c.red_light; });
   row.goals_per_km = per_km([](const Counts& c) { return c.goals; });
+
+  row.reversing_share = row.red_wait_moved_m = row.stuck_at_end_share = kUnknown;
+  if (driven_steps > 0) {
+    row.reversing_share = estimate_ratio(
+        all, [](const Counts& c) { return c.standing.reversing_steps; },
+        [](const Counts& c) { return c.standing.driven_steps; });
+    row.stuck_at_end_share = per_vehicle([](const Counts& c) { return c.standing.stuck_at_end; });
+  }
+  if (row.red_waits > 0) {
+    row.red_wait_moved_m = estimate_ratio(
+        all, [](const Counts& c) { return c.standing.red_wait_moved_m; },
+        [](const Counts& c) { return c.standing.red_waits; });
+  }
   return row;
 }
 
 std::vector<EvaluateRow> rows_of(const EvaluationResults& results) {
-  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   std::vector<EvaluateRow> rows;
   for (const DensityResult& density : results.densities) {
     EvaluateRow& row = rows.emplace_back(row_of(density, results.setting.steps));
     if (results.counts_all_collisions) continue;
-    row.collision_rate = row.wall_contact_rate = row.km_per_infraction = {kUnknown, kUnknown};
+    row.collision_rate = row.wall_contact_rate = row.km_per_infraction = kUnknown;
   }
   return rows;
 }
@@ -148,7 +167,10 @@ std::vector<std::pair<std::string, Estimate>> metrics_of(const EvaluateRow& row)
           {"active_at_end_share", row.active_at_end_share},
           {"collision_rate", row.collision_rate},
           {"wall_contact_rate", row.wall_contact_rate},
-          {"km_per_at_fault_infraction", row.km_per_at_fault_infraction}};
+          {"km_per_at_fault_infraction", row.km_per_at_fault_infraction},
+          {"reversing_share", row.reversing_share},
+          {"red_wait_moved_m", row.red_wait_moved_m},
+          {"stuck_at_end_share", row.stuck_at_end_share}};
 }
 
 EvaluationResults merge(const std::vector<EvaluationResults>& parts, const std::vector<std::string>& names) {

@@ -23,6 +23,16 @@ constexpr bool visits_all() {
   return bytes == sizeof(Counts);
 }
 
+/// How the vehicles of one scenario stand and go backwards. 0 in files of earlier versions.
+struct StandingCounts {
+  int64_t driven_steps = 0, reversing_steps = 0;  // steps of active vehicles; those backwards, not at rest (kRest_mps)
+  // Waits at red lights: from a step in which the bumper is at most 5 m before the line, at rest (kRest_mps), to the
+  // light's change or the vehicle's; and the way gone meanwhile, forwards or backwards.
+  int64_t red_waits = 0;
+  double red_wait_moved_m = 0;
+  int64_t stuck_at_end = 0;  // active in the last step, and not 5 m on for 60 s
+};
+
 /// Counts over the vehicles of one scenario; on roads that end, over their lives, each of which counts as a vehicle. An
 /// event counts once a vehicle, however often it happens.
 struct ScenarioCounts {
@@ -37,6 +47,7 @@ struct ScenarioCounts {
   double distance_m = 0, returns = 0;
   // Agents of all classes: as SpawnReport. 0 in files of earlier versions.
   int64_t asked = 0, spawned = 0, entered = 0, left = 0;
+  StandingCounts standing;
 
   /// Calls visit(name in files, count) for all counts of `counts`, a ScenarioCounts.
   template <typename Counts, typename Visit>
@@ -58,6 +69,11 @@ struct ScenarioCounts {
     visit("spawned", counts.spawned);
     visit("entered", counts.entered);
     visit("left", counts.left);
+    visit("driven_steps", counts.standing.driven_steps);
+    visit("reversing_steps", counts.standing.reversing_steps);
+    visit("red_waits", counts.standing.red_waits);
+    visit("red_wait_moved_m", counts.standing.red_wait_moved_m);
+    visit("stuck_at_end", counts.standing.stuck_at_end);
   }
 };
 static_assert(visits_all<ScenarioCounts>());
@@ -135,6 +151,9 @@ struct EvaluateRow {
   // Per km, since lives on roads that end are short.
   Estimate at_fault_collisions_per_km, off_road_per_km, red_lights_per_km, goals_per_km;
   int64_t asked = 0, spawned = 0, entered = 0, left = 0;
+  // See StandingCounts: of the time that vehicles drive; of a wait; of vehicles. The second is NaN without any wait.
+  Estimate reversing_share, red_wait_moved_m, stuck_at_end_share;
+  int64_t red_waits = 0;
 };
 
 /// Its metrics with the names that they have in files.

@@ -88,6 +88,26 @@ TEST(Results, DistancePerInfractionIsOverAnyCollision) {
   EXPECT_DOUBLE_EQ(row.km_per_at_fault_infraction.value, 4);
 }
 
+TEST(Results, StandingIsOverTimeWaitsAndVehicles) {
+  ScenarioCounts c = counts(10, 0, 12000);
+  EXPECT_TRUE(std::isnan(row_of(part(0, {c, c}).densities[0], 100).reversing_share.value)) << "of an earlier version";
+  c.standing.driven_steps = 1000;
+  const EvaluateRow none = row_of(part(0, {c, c}).densities[0], 100);
+  EXPECT_DOUBLE_EQ(none.reversing_share.value, 0);
+  EXPECT_TRUE(std::isnan(none.red_wait_moved_m.value)) << "nobody waited";
+  ScenarioCounts other = c;
+  c.standing.reversing_steps = 50;
+  c.standing.red_waits = 3;
+  c.standing.red_wait_moved_m = 1.5;
+  c.standing.stuck_at_end = 2;
+  other.standing.red_waits = 1;
+  const EvaluateRow row = row_of(part(0, {c, other}).densities[0], 100);
+  EXPECT_DOUBLE_EQ(row.reversing_share.value, 0.025);
+  EXPECT_EQ(row.red_waits, 4);
+  EXPECT_DOUBLE_EQ(row.red_wait_moved_m.value, 0.375);
+  EXPECT_DOUBLE_EQ(row.stuck_at_end_share.value, 0.1);
+}
+
 TEST(Results, FilesOfFormat1LackWhatTheyDidNotCount) {
   test::ScratchFolder folder;
   const std::string old_path = folder / "old.json", next_path = folder / "next.json", again = folder / "again.json";

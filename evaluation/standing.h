@@ -1,0 +1,38 @@
+// How vehicles stand: whether they wait at red lights without creeping, drive backwards, or stay for good where they
+// are.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "pictura/evaluation/results.h"
+#include "pictura/simulator/step_observer.h"
+
+namespace pictura {
+
+/// Counts StandingCounts of worlds that are driven to their end. On a device it copies what it reads to the host at
+/// every step.
+class StandingObserver final : public StepObserver {
+ public:
+  /// Of the simulator's worlds at the start of their episodes.
+  explicit StandingObserver(Simulator& simulator);
+
+  void after_step(const StepResult& result) override;
+  /// Of one of the worlds, after the last step.
+  StandingCounts counts_of(size_t world) const;
+
+ private:
+  // Where a vehicle was when it had last got on.
+  struct Progress {
+    int step = 0;
+    float distance_m = 0;
+  };
+
+  Simulator& simulator_;
+  int step_ = 0;
+  std::vector<int32_t> awaited_light_;  // [slots] of the world; -1: none
+  std::vector<Progress> progress_;      // [slots]
+  std::vector<StandingCounts> counts_;  // [worlds]
+};
+
+}  // namespace pictura

@@ -1,0 +1,45 @@
+// A copy on the host of what observers of an evaluation read of its worlds after a step.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "pictura/policy/struct_copies.h"
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+struct WorldArrays {
+  std::vector<AgentStatus> status;                          // [slots]
+  std::vector<AgentClass> agent_class;                      // [slots]
+  std::vector<float> speed_mps;                             // [slots]
+  std::vector<AgentBox> boxes;                              // of agents, then of parked cars, a world after the other
+  std::vector<LightState> lights;                           // of the maps' stop lines, a world after the other
+  std::vector<int32_t> slot_begin, box_begin, light_begin;  // [worlds + 1]
+
+  explicit WorldArrays(Simulator& simulator)
+      : status(of_slots(simulator, simulator.state().status)),
+        agent_class(of_slots(simulator, simulator.state().agent_class)),
+        speed_mps(of_slots(simulator, simulator.state().speed_mps)),
+        boxes(host_copy_of_structs(simulator.scene().agents, simulator.device())),
+        lights(host_copy_of_structs(simulator.scene().light_states, simulator.device())),
+        slot_begin(host_copy(simulator.slots().slot_begin, simulator.device())),
+        box_begin(host_copy(simulator.scene().world_begin, simulator.device())),
+        light_begin(host_copy(simulator.scene().light_begin, simulator.device())) {}
+
+  /// A copy of a field of the agents' state.
+  template <typename T>
+  static std::vector<T> of_slots(Simulator& simulator, const T* values) {
+    return host_copy_of_structs(Span<const T>(values, static_cast<size_t>(simulator.num_slots())), simulator.device());
+  }
+
+  size_t first_slot(size_t world) const { return static_cast<size_t>(slot_begin[world]); }
+  size_t num_agents(size_t world) const { return first_slot(world + 1) - first_slot(world); }
+  size_t first_box(size_t world) const { return static_cast<size_t>(box_begin[world]); }
+  size_t num_boxes(size_t world) const { return first_box(world + 1) - first_box(world); }
+  size_t first_light(size_t world) const { return static_cast<size_t>(light_begin[world]); }
+  bool is_red(size_t light) const { return lights[light] == LightState::red; }
+};
+
+}  // namespace pictura
