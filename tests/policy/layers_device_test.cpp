@@ -184,9 +184,10 @@ TEST_P(DeviceLayers, LargestEmbedding) {
                   ? with_row_features(its_members.to(is_double ? at::kDouble : at::kFloat), features, type,
                                       its_goals.defined() && is_double ? its_goals.to(at::kDouble) : its_goals)
                   : its_members.to(type);
-          const at::Tensor before = at::linear(as_held(rows), in[0], in[1]);
-          // Its gradient is rounded too: sums over sets cancel to a hundredth of their terms.
+          at::Tensor before = at::linear(as_held(rows), in[0]);
+          // The product's gradient is rounded too, not the bias's: sums over sets cancel to a hundredth of their terms.
           if (is_double) before.register_hook(rounded);
+          before = before + in[1];
           const at::Tensor hidden = gelu(has_norm ? at::layer_norm(before, {64}).to(before.scalar_type()) : before);
           return masked_max(at::linear(as_held(hidden), as_held(in[2]), in[3]), on(counts, in[0]));
         };
