@@ -46,6 +46,9 @@ enum class Purpose : uint8_t {
   first_episode,
   map_copies,
   entry,
+  removal_case,
+  pedestrian_path,
+  corner_user,
 };
 
 /// Whose draws they are, when, and what for. Ids are global across ranks. Fields that are not given are 0.

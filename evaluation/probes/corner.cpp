@@ -161,7 +161,7 @@ class CornerProbe {
                          .world = static_cast<uint32_t>(state.scene),
                          .agent = static_cast<uint32_t>(state.ego),
                          .step = static_cast<uint32_t>(state.step),
-                         .purpose = Purpose::minibatch});
+                         .purpose = Purpose::corner_user});
     return others[random.below(static_cast<int>(others.size()))];
   }
 

@@ -108,12 +108,11 @@ class PedestrianProbe {
       }
     }
     for (size_t i = 0; i < std::min(kMaxTries, all.size()); ++i) {
-      // The purpose is that of training's minibatches: their draws have other keys, and published ones stay.
       RandomStream random({.seed = options_.worlds.seed,
                            .world = spec.global_world,
                            .agent = static_cast<uint32_t>(i),
                            .step = static_cast<uint32_t>(frame.step),
-                           .purpose = Purpose::minibatch});
+                           .purpose = Purpose::pedestrian_path});
       std::swap(all[i], all[i + static_cast<size_t>(random.below(static_cast<int>(all.size() - i)))]);
     }
     all.resize(std::min(kMaxTries, all.size()));

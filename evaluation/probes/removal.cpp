@@ -92,13 +92,12 @@ class RemovalProbe {
     for (size_t i = 0; i < order.size(); ++i) order[i] = static_cast<int>(i);
     const auto first = static_cast<std::ptrdiff_t>(out->size());
     for (int i = 0; i < count; ++i) {
-      // The purpose is that of training's minibatches: their draws have other keys, and published ones stay.
       RandomStream random({.seed = options_.worlds.seed,
                            .world = frame.worlds[pairs[0].world].global_world,
                            .agent = static_cast<uint32_t>(i) % RandomKey::kMaxAgents,
                            .episode = static_cast<uint32_t>(i) / RandomKey::kMaxAgents,
                            .step = static_cast<uint32_t>(frame.step),
-                           .purpose = Purpose::minibatch});
+                           .purpose = Purpose::removal_case});
       const auto chosen = static_cast<size_t>(i + random.below(static_cast<int>(order.size()) - i));
       std::swap(order[i], order[chosen]);
       DrawnCase one = pairs[order[i]];
