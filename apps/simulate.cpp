@@ -167,16 +167,12 @@ void print_simulation(const SimulationRun& run, const StepCounter& counted, cons
               {"agent_steps_per_s", finite_or_null(static_cast<double>(totals.agent_steps) / run.drive_s)},
               {"slot_steps_per_s", finite_or_null(static_cast<double>(totals.slot_steps) / run.drive_s)},
               {"simulator_agent_steps_per_s", finite_or_null(static_cast<double>(totals.agent_steps) / run.simulate_s)},
-              {"episodes", totals.episodes},
-              {"goals_reached", totals.goals_reached},
-              {"waypoints_reached", totals.waypoints_reached},
-              {"collisions", totals.collisions},
-              {"at_fault_collisions", totals.at_fault_collisions},
-              {"off_road", totals.off_road},
-              {"red_light", totals.red_light},
-              {"wall_contacts", totals.wall_contacts},
-              {"km_driven", totals.distance_m / 1000},
-              {"state_hash", fmt::format("{:016x}", simulator.state_hash())}};
+              {"episodes", totals.episodes}};
+#define X(name, ...) object[#name] = totals.name;
+  PICTURA_EVENT_TOTALS(X)
+#undef X
+  object["km_driven"] = totals.distance_m / 1000;
+  object["state_hash"] = fmt::format("{:016x}", simulator.state_hash());
   if (scene) {
     object["scenario_id"] = scene->id;
     object["start_step"] = simulator.maps()[0]->start_step;

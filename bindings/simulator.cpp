@@ -55,24 +55,11 @@ py::dict dict_of_terms(const Terms& terms) {
 
 py::dict dict_of(const SimulatorTotals& t) {
   py::dict d;
-  d["agent_steps"] = t.agent_steps;
-  d["slot_steps"] = t.slot_steps;
-  d["episodes"] = t.episodes;
-  d["goals_reached"] = t.goals_reached;
-  d["waypoints_reached"] = t.waypoints_reached;
-  d["collisions"] = t.collisions;
-  d["at_fault_collisions"] = t.at_fault_collisions;
-  d["off_road"] = t.off_road;
-  d["red_light"] = t.red_light;
-  d["wall_contacts"] = t.wall_contacts;
-  d["distance_m"] = t.distance_m;
-  d["reward"] = t.reward;
-  d["reward_terms"] = dict_of_terms(t.reward_terms);
-  d["finished_agent_episodes"] = t.finished_agent_episodes;
-  d["finished_return"] = t.finished_return;
-  d["finished_passed_waypoint"] = t.finished_passed_waypoint;
-  d["finished_moved"] = t.finished_moved;
-  d["finished_first_motion_s"] = t.finished_first_motion_s;
+#define X(name, ...) d[#name] = t.name;
+#define TERMS(name) d[#name] = dict_of_terms(t.name);
+  PICTURA_TOTALS(X, X, TERMS)
+#undef X
+#undef TERMS
   return d;
 }
 

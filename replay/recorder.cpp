@@ -301,17 +301,11 @@ struct Recorder::Parts {
   }
 
   void count(int events, const StepSums& sums, float reward) {
-    SimulatorTotals totals;
-    count_events(events, &totals);
     ReplayMetrics& m = replay.metrics;
     ++m.agent_steps;
-    m.collisions += totals.collisions;
-    m.at_fault_collisions += totals.at_fault_collisions;
-    m.off_road += totals.off_road;
-    m.red_light += totals.red_light;
-    m.wall_contacts += totals.wall_contacts;
-    m.goals_reached += totals.goals_reached;
-    m.waypoints_reached += totals.waypoints_reached;
+#define X(name, logged, counted) m.name += (events & (counted)) != 0;
+    PICTURA_EVENT_TOTALS(X)
+#undef X
     m.km_driven += static_cast<double>(sums.distance_m) / 1000;
     m.reward += static_cast<double>(reward);
   }

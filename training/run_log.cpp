@@ -34,14 +34,13 @@ Scalars scalars_of(const Config& config, const TrainProgress& progress, const Up
       {"charts/reward_per_step", totals.reward / steps},
       {"charts/live_share", steps / static_cast<double>(totals.slot_steps)},
       {"driving/mean_speed_mps", totals.distance_m / (static_cast<double>(simulator_config(config).dt_s) * steps)}};
-  for (const auto& [name, count] :
-       {std::pair{"goals", totals.goals_reached}, std::pair{"waypoints", totals.waypoints_reached},
-        std::pair{"collisions", totals.collisions}, std::pair{"at_fault_collisions", totals.at_fault_collisions},
-        std::pair{"off_road", totals.off_road}, std::pair{"red_light", totals.red_light},
-        std::pair{"wall_contacts", totals.wall_contacts}}) {
+  const auto add_count = [&](const char* name, int64_t count) {
     scalars.emplace_back(fmt::format("driving/{}_per_km", name), static_cast<double>(count) / km);
     scalars.emplace_back(fmt::format("driving/{}_per_1000_steps", name), 1000 * static_cast<double>(count) / steps);
-  }
+  };
+#define X(name, logged, ...) add_count(#logged, totals.name);
+  PICTURA_EVENT_TOTALS(X)
+#undef X
 #define X(name) scalars.emplace_back("rewards/" #name "_per_1000_steps", 1000 * totals.reward_terms.name / steps);
   PICTURA_REWARD_TERMS(X)
 #undef X

@@ -146,15 +146,18 @@ struct FinishStep {
   /// Counts in any order; sums in that of the totals' bins, see simulator/totals.h.
   template <typename ThreadGroup, int kParts>
   PICTURA_HD static void add_up(const ThreadGroup& group, SimulatorTotals (&parts)[kParts], SimulatorTotals* sum_out) {
+    const auto skip = [](auto&, auto) {};
     for (SimulatorTotals& part : parts) {
-      SimulatorTotals::visit_counts(*sum_out, part, [&group](int64_t& sum, int64_t count) {
+      const auto add_count = [&group](int64_t& sum, int64_t count) {
         sum += group.sum(static_cast<int>(count));  // at most a world's agents
-      });
+      };
+      SimulatorTotals::visit(*sum_out, part, add_count, skip);
     }
     for (int lane = 0; lane < kTotalsBins; ++lane) {
-      SimulatorTotals::visit_sums(
-          *sum_out, parts[lane / ThreadGroup::kSize],
-          [&group, lane](double& sum, double value) { sum += group.from(lane % ThreadGroup::kSize, value); });
+      const auto add_sum = [&group, lane](double& sum, double value) {
+        sum += group.from(lane % ThreadGroup::kSize, value);
+      };
+      SimulatorTotals::visit(*sum_out, parts[lane / ThreadGroup::kSize], skip, add_sum);
     }
   }
 };

@@ -64,14 +64,10 @@ PICTURA_HD inline void begin_light(const WorldView& world, int light) {
   world.lights[light] = light_state(world.map, light, world.light_plans[light], 0);
 }
 
-PICTURA_HD inline void count_events(int events, SimulatorTotals* totals_inout) {
-  totals_inout->goals_reached += (events & kEventMetricGoal) != 0;
-  totals_inout->waypoints_reached += (events & (kEventWaypoint | kEventGoal)) != 0;
-  totals_inout->collisions += (events & kEventCollision) != 0;
-  totals_inout->at_fault_collisions += (events & kEventAtFault) != 0;
-  totals_inout->off_road += (events & kEventOffRoad) != 0;
-  totals_inout->red_light += (events & kEventRedLight) != 0;
-  totals_inout->wall_contacts += (events & kEventWall) != 0;
+PICTURA_HD inline void count_events(int events, SimulatorTotals* totals_inout){
+#define X(name, logged, counted) totals_inout->name += (events & (counted)) != 0;
+    PICTURA_EVENT_TOTALS(X)
+#undef X
 }
 
 /// Phase 3 of one agent in the episode's step of this number, from 1: writes its reward and its end.

@@ -61,14 +61,12 @@ SimulatorTotals totals_of_all(SimulatorTotals own, Communicator* communicator) {
   // Counts are far below 2^53.
   std::vector<double> values;
   const auto put = [&values](const auto& value, const auto&) { values.push_back(static_cast<double>(value)); };
-  SimulatorTotals::visit_counts(own, own, put);
-  SimulatorTotals::visit_sums(own, own, put);
+  SimulatorTotals::visit(own, own, put, put);
   const at::Tensor sums = at::tensor(values, at::kDouble);
   communicator->sum(sums);
   const double* next = sums.const_data_ptr<double>();
   const auto take = [&next](auto& value, const auto&) { value = static_cast<std::decay_t<decltype(value)>>(*next++); };
-  SimulatorTotals::visit_counts(own, own, take);
-  SimulatorTotals::visit_sums(own, own, take);
+  SimulatorTotals::visit(own, own, take, take);
   return own;
 }
 
