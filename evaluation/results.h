@@ -14,69 +14,61 @@
 
 namespace pictura {
 
-/// Whether Counts::visit() visits all counts of a struct of nothing else.
-template <typename Counts>
-constexpr bool visits_all() {
-  Counts counts;
-  size_t bytes = 0;
-  Counts::visit(counts, [&bytes](const char*, const auto& count) { bytes += sizeof(count); });
-  return bytes == sizeof(Counts);
-}
+// X(type, name in files).
+#define PICTURA_SCENARIO_COUNTS(X)                                                                                     \
+  X(int64_t, vehicles)                                                                                                 \
+  X(int64_t, collision) /* at fault or not */                                                                          \
+  X(int64_t, at_fault)  /* collisions at fault alone */                                                                \
+  X(int64_t, off_road)                                                                                                 \
+  X(int64_t, red_light)                                                                                                \
+  X(int64_t, wall_contact)   /* belongs to neither kind of infraction below */                                         \
+  X(int64_t, any_infraction) /* a collision, off-road or a red light: the paper's (appendix, metric definitions) */    \
+  X(int64_t, at_fault_infraction) /* a collision at fault, off-road or a red light */                                  \
+  X(int64_t, active_at_end)       /* vehicles that have not halted by the last step, or before they left */            \
+  X(int64_t, goals)                                                                                                    \
+  X(int64_t, waypoints)                                                                                                \
+  X(double, distance_m)                                                                                                \
+  X(double, returns)                                                                                                   \
+  X(int64_t, asked) /* as the three below of agents of all classes, see SpawnReport; 0 in files of earlier versions */ \
+  X(int64_t, spawned)                                                                                                  \
+  X(int64_t, entered)                                                                                                  \
+  X(int64_t, left)
+
+// Likewise. Waits at red lights are from a step in which the bumper is at most 5 m before the line, at rest
+// (kRest_mps), to the light's change or the vehicle's.
+#define PICTURA_STANDING_COUNTS(X)                                               \
+  X(int64_t, driven_steps)    /* of active vehicles */                           \
+  X(int64_t, reversing_steps) /* of those, backwards, not at rest (kRest_mps) */ \
+  X(int64_t, red_waits)                                                          \
+  X(double, red_wait_moved_m) /* forwards or backwards */                        \
+  X(int64_t, stuck_at_end)    /* active in the last step, and not 5 m on for 60 s */
 
 /// How the vehicles of one scenario stand and go backwards. 0 in files of earlier versions.
 struct StandingCounts {
-  int64_t driven_steps = 0, reversing_steps = 0;  // steps of active vehicles; those backwards, not at rest (kRest_mps)
-  // Waits at red lights: from a step in which the bumper is at most 5 m before the line, at rest (kRest_mps), to the
-  // light's change or the vehicle's; and the way gone meanwhile, forwards or backwards.
-  int64_t red_waits = 0;
-  double red_wait_moved_m = 0;
-  int64_t stuck_at_end = 0;  // active in the last step, and not 5 m on for 60 s
+#define X(type, name) type name = 0;
+  PICTURA_STANDING_COUNTS(X)
+#undef X
 };
 
 /// Counts over the vehicles of one scenario; on roads that end, over their lives, each of which counts as a vehicle. An
 /// event counts once a vehicle, however often it happens.
 struct ScenarioCounts {
-  int64_t vehicles = 0;
-  int64_t collision = 0, at_fault = 0;  // any collision; collisions at fault alone
-  int64_t off_road = 0, red_light = 0;
-  int64_t wall_contact = 0;         // belongs to neither kind of infraction below
-  int64_t any_infraction = 0;       // a collision, off-road or a red light: the paper's (appendix, metric definitions)
-  int64_t at_fault_infraction = 0;  // a collision at fault, off-road or a red light
-  int64_t active_at_end = 0;        // vehicles that have not halted by the last step, or before they left
-  int64_t goals = 0, waypoints = 0;
-  double distance_m = 0, returns = 0;
-  // Agents of all classes: as SpawnReport. 0 in files of earlier versions.
-  int64_t asked = 0, spawned = 0, entered = 0, left = 0;
+#define X(type, name) type name = 0;
+  PICTURA_SCENARIO_COUNTS(X)
+#undef X
   StandingCounts standing;
 
   /// Calls visit(name in files, count) for all counts of `counts`, a ScenarioCounts.
   template <typename Counts, typename Visit>
-  static constexpr void visit(Counts& counts, Visit&& visit) {
-    visit("vehicles", counts.vehicles);
-    visit("collision", counts.collision);
-    visit("at_fault", counts.at_fault);
-    visit("off_road", counts.off_road);
-    visit("red_light", counts.red_light);
-    visit("wall_contact", counts.wall_contact);
-    visit("any_infraction", counts.any_infraction);
-    visit("at_fault_infraction", counts.at_fault_infraction);
-    visit("active_at_end", counts.active_at_end);
-    visit("goals", counts.goals);
-    visit("waypoints", counts.waypoints);
-    visit("distance_m", counts.distance_m);
-    visit("returns", counts.returns);
-    visit("asked", counts.asked);
-    visit("spawned", counts.spawned);
-    visit("entered", counts.entered);
-    visit("left", counts.left);
-    visit("driven_steps", counts.standing.driven_steps);
-    visit("reversing_steps", counts.standing.reversing_steps);
-    visit("red_waits", counts.standing.red_waits);
-    visit("red_wait_moved_m", counts.standing.red_wait_moved_m);
-    visit("stuck_at_end", counts.standing.stuck_at_end);
+  static void visit(Counts& counts, const Visit& visit) {
+#define X(type, name) visit(#name, counts.name);
+    PICTURA_SCENARIO_COUNTS(X)
+#undef X
+#define X(type, name) visit(#name, counts.standing.name);
+    PICTURA_STANDING_COUNTS(X)
+#undef X
   }
 };
-static_assert(visits_all<ScenarioCounts>());
 
 /// The scenarios first, first + 1, ... of one density.
 struct DensityResult {

@@ -13,33 +13,33 @@
 
 namespace pictura {
 
-/// Of the driven vehicles of all rollouts of one scene at one density.
+// X(type, name in files).
+#define PICTURA_SCENE_COUNTS(X)                                      \
+  X(int64_t, vehicles)                                               \
+  X(int64_t, at_fault)                                               \
+  X(int64_t, collision)                                              \
+  X(int64_t, off_road)                                               \
+  X(int64_t, goals)         /* that arrived */                       \
+  X(int64_t, infractions)   /* that were at fault or off the road */ \
+  X(int64_t, measured)      /* whose displacement is known */        \
+  X(double, displacement_m) /* sum of their means */                 \
+  X(double, distance_m)                                              \
+  X(int64_t, driven_steps) /* of all driven road users */
+
+/// Of the driven vehicles of all rollouts of one scene at one density. Those with an event had it once or more.
 struct SceneCounts {
-  int64_t vehicles = 0;
-  int64_t at_fault = 0, collision = 0, off_road = 0;  // that did so at least once
-  int64_t goals = 0;                                  // that arrived
-  int64_t infractions = 0;                            // that were at fault or off the road
-  int64_t measured = 0;                               // whose displacement is known
-  double displacement_m = 0;                          // sum of their means
-  double distance_m = 0;
-  int64_t driven_steps = 0;  // of all driven road users
+#define X(type, name) type name = 0;
+  PICTURA_SCENE_COUNTS(X)
+#undef X
 
   /// Calls visit(name in files, count) for all counts of `counts`, a SceneCounts.
   template <typename Counts, typename Visit>
-  static constexpr void visit(Counts& counts, Visit&& visit) {
-    visit("vehicles", counts.vehicles);
-    visit("at_fault", counts.at_fault);
-    visit("collision", counts.collision);
-    visit("off_road", counts.off_road);
-    visit("goals", counts.goals);
-    visit("infractions", counts.infractions);
-    visit("measured", counts.measured);
-    visit("displacement_m", counts.displacement_m);
-    visit("distance_m", counts.distance_m);
-    visit("driven_steps", counts.driven_steps);
+  static void visit(Counts& counts, const Visit& visit) {
+#define X(type, name) visit(#name, counts.name);
+    PICTURA_SCENE_COUNTS(X)
+#undef X
   }
 };
-static_assert(visits_all<SceneCounts>());
 
 /// What an evaluation counted in the scenes first_scene, first_scene + 1, ... of all that its setting names.
 struct SceneResults {
