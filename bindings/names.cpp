@@ -56,6 +56,11 @@ void bind_names(py::module_& module) {
   events["waypoint"] = static_cast<int>(kEventWaypoint);
   events["metric_goal"] = static_cast<int>(kEventMetricGoal);
   module.attr("EVENTS") = events;
+  py::dict event_totals;
+#define X(name, logged, counted) event_totals[#name] = static_cast<int>(counted);
+  PICTURA_EVENT_TOTALS(X)
+#undef X
+  module.attr("EVENT_TOTALS") = event_totals;
 }
 
 }  // namespace pictura::python

@@ -17,6 +17,7 @@ from pictura._pictura import (  # noqa: E402, F401
     BOX_DTYPE,
     COMMAND_DTYPE,
     CONDITIONING_NAMES,
+    EVENT_TOTALS,
     EVENTS,
     HAS_CUDA,
     IDLE_ACTION,

@@ -7,7 +7,7 @@ import numpy
 import numpy.dtypes
 import numpy.typing
 import typing
-__all__: list[str] = ['AGENT_FIELDS', 'Array', 'BOX_DTYPE', 'COMMAND_DTYPE', 'CONDITIONING_NAMES', 'Camera', 'Controller', 'EVENTS', 'Error', 'Geometry', 'HAS_CUDA', 'IDLE_ACTION', 'INSERTED_DTYPE', 'Images', 'LANE_TYPES', 'LiveView', 'Map', 'NUM_ACTIONS', 'OBSERVATION_ARRAYS', 'QUERY_DTYPE', 'REWARD_TERMS', 'Recorder', 'Renderer', 'Rig', 'Scenario', 'Scene', 'SceneFile', 'SceneRecorder', 'Simulator', 'Snapshot', 'StepResult', 'TRACK_TYPES', 'UsageError', 'VIEW_DTYPE', 'draw_worlds', 'known_towns', 'make_views', 'map_folder', 'renderer_names', 'simulator_names', 'write_gallery']
+__all__: list[str] = ['AGENT_FIELDS', 'Array', 'BOX_DTYPE', 'COMMAND_DTYPE', 'CONDITIONING_NAMES', 'Camera', 'Controller', 'EVENTS', 'EVENT_TOTALS', 'Error', 'Geometry', 'HAS_CUDA', 'IDLE_ACTION', 'INSERTED_DTYPE', 'Images', 'LANE_TYPES', 'LiveView', 'Map', 'NUM_ACTIONS', 'OBSERVATION_ARRAYS', 'QUERY_DTYPE', 'REWARD_TERMS', 'Recorder', 'Renderer', 'Rig', 'Scenario', 'Scene', 'SceneFile', 'SceneRecorder', 'Simulator', 'Snapshot', 'StepResult', 'TRACK_TYPES', 'UsageError', 'VIEW_DTYPE', 'draw_worlds', 'known_towns', 'make_views', 'map_folder', 'renderer_names', 'simulator_names', 'write_gallery']
 class Error(RuntimeError):
     """
     The work failed; the message names what was expected and what came.
@@ -972,6 +972,7 @@ BOX_DTYPE: numpy.dtypes.VoidDType
 COMMAND_DTYPE: numpy.dtypes.VoidDType
 CONDITIONING_NAMES: tuple = ('delta_goal_m', 'v_goal_mps', 'collision', 'off_road', 'stop_line', 'comfort', 'lane_align', 'vel_align', 'lane_center', 'center_bias_m', 'velocity', 'reverse', 'overspeed', 'timestep', 'throttle', 'steer', 'acceleration')
 EVENTS: dict = {'collision': 1, 'at_fault': 2, 'off_road': 4, 'red_light': 8, 'wall': 16, 'goal': 32, 'waypoint': 64, 'metric_goal': 128}
+EVENT_TOTALS: dict = {'goals_reached': 128, 'waypoints_reached': 96, 'collisions': 1, 'at_fault_collisions': 2, 'off_road': 4, 'red_light': 8, 'wall_contacts': 16}
 HAS_CUDA: bool = True
 IDLE_ACTION: int = 7
 INSERTED_DTYPE: numpy.dtypes.VoidDType

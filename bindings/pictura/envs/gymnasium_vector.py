@@ -111,8 +111,7 @@ class AgentStatistics(gymnasium.vector.VectorWrapper):
 
     def __init__(self, env: DriveVectorEnv) -> None:
         super().__init__(env)
-        names = ("agent_steps", "finished_agent_episodes", "goals_reached", "waypoints_reached", "collisions")
-        names += ("at_fault_collisions", "off_road", "red_light", "wall_contacts")
+        names = ("agent_steps", "finished_agent_episodes", *pictura.EVENT_TOTALS)
         self.statistics: dict[str, float] = dict.fromkeys(names, 0) | {"reward": 0.0, "distance_m": 0.0, "finished_return": 0.0}
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
@@ -122,16 +121,7 @@ class AgentStatistics(gymnasium.vector.VectorWrapper):
         ended = terminated | truncated
         count["agent_steps"] += int(valid.sum())
         count["finished_agent_episodes"] += int(ended.sum())
-        bits = pictura.EVENTS
-        for name, mask in (
-            ("goals_reached", bits["metric_goal"]),
-            ("waypoints_reached", bits["waypoint"] | bits["goal"]),
-            ("collisions", bits["collision"]),
-            ("at_fault_collisions", bits["at_fault"]),
-            ("off_road", bits["off_road"]),
-            ("red_light", bits["red_light"]),
-            ("wall_contacts", bits["wall"]),
-        ):
+        for name, mask in pictura.EVENT_TOTALS.items():
             count[name] += int(((events & mask) != 0).sum())
         count["reward"] += float(reward.sum())
         count["distance_m"] += float(info["distance_m"].sum())
