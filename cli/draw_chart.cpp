@@ -17,6 +17,7 @@
 #include <unistd.h>
 
 #include "pictura/cli/chart_source.h"
+#include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/json_text.h"
 #include "pictura/common/support/output_file.h"

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/common/image.h"
 #include "pictura/common/support/json.h"
 

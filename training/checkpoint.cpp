@@ -1,5 +1,6 @@
 #include "pictura/training/checkpoint.h"
 
+#include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/policy/checkpoint_file.h"
 #include "pictura/policy/policy_json.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/common/portable/hd.h"
 #include "pictura/training/event_file.h"
 #include "pictura/training/phases.h"

@@ -5,7 +5,7 @@
 
 #include <optional>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/training/chunk_runner.h"
 #include "pictura/training/gradient_diagnosis.h"
 #include "pictura/training/optimizer.h"

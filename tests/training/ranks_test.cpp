@@ -12,6 +12,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "pictura/common/error.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/training/corridor.h"
 #include "pictura/training/ranks/communicator.h"

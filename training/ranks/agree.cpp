@@ -1,5 +1,6 @@
 #include "pictura/training/ranks/agree.h"
 
+#include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/configuration/compare_configs.h"
 #include "pictura/policy/saved_policy.h"

@@ -12,7 +12,7 @@
 
 #include <torch/csrc/distributed/c10d/Store.hpp>
 
-#include "pictura/common/error.h"
+#include "pictura/common/error_types.h"
 #include "pictura/training/ranks/launch.h"
 
 namespace pictura {
