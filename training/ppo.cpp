@@ -5,11 +5,13 @@
 #include "pictura/training/ppo.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
 #include <ATen/core/grad_mode.h>
 
+#include "pictura/common/error.h"
 #include "pictura/policy/precision.h"
 #include "pictura/policy/torch_device.h"
 #include "pictura/policy/value_head.h"
@@ -182,12 +184,13 @@ class PpoUpdate {
                                        returns.sum(), returns.square().sum(), errors.sum(), errors.square().sum()});
     learner_.communicator->sum(sums);
     const at::Tensor host = sums.cpu();
-    const double* const of_all = host.const_data_ptr<double>();
-    const double kept = of_all[0], n = of_all[1];
+    std::array<double, 6> of_all;
+    std::copy_n(host.const_data_ptr<double>(), of_all.size(), of_all.begin());
+    const auto [kept, n, sum, squares, error_sum, error_squares] = of_all;
     if (kept == 0) return false;
     stats_.kept_fraction = kept / n;
-    const double variance = variance_of(n, of_all[2], of_all[3]);
-    stats_.explained_variance = variance > 0 ? 1 - variance_of(n, of_all[4], of_all[5]) / variance : 0;
+    const double variance = variance_of(n, sum, squares);
+    stats_.explained_variance = variance > 0 ? 1 - variance_of(n, error_sum, error_squares) / variance : 0;
     return true;
   }
 
