@@ -23,6 +23,7 @@
 #include "pictura/drawing/planes.h"
 #include "pictura/driving/world.h"
 #include "pictura/map/scenario/load_scenario.h"
+#include "pictura/simulator/drive_steps.h"
 #include "pictura/simulator/recorded_scene.h"
 
 namespace pictura {
@@ -168,11 +169,8 @@ void render_world(const RenderArguments& arguments) {
   const auto renderer = open_renderer(arguments, config_of(arguments));
   DrivenWorld world = make_world(arguments.world, "random", arguments.backends);
   Simulator* const simulator = world.simulator.get();
-  for (int step = 0; step < arguments.steps; ++step) {
-    if (interrupted()) throw Interrupted(fmt::format("interrupted at step {} of {}", step, arguments.steps));
-    world.act();
-    world.step();
-  }
+  const DriveEnd end = drive_steps(*simulator, *world.controller, arguments.steps);
+  if (end.is_interrupted) throw Interrupted(fmt::format("interrupted at step {} of {}", end.steps, arguments.steps));
 
   Subject subject{
       {simulator->maps()[0]->geometry}, simulator->scene(), simulator->views().subspan(0, arguments.views), {}, {}};

@@ -7,10 +7,10 @@
 #include "pictura/cli/world_options.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/filled_folder.h"
-#include "pictura/common/support/interrupt.h"
 #include "pictura/driving/recording.h"
 #include "pictura/driving/world.h"
 #include "pictura/replay/gallery.h"
+#include "pictura/simulator/drive_steps.h"
 
 namespace pictura {
 
@@ -48,12 +48,11 @@ Replay record(ReplayArguments arguments, uint64_t seed, ProgressLine* line_out) 
   settle_followed(world, &arguments.recording);
   Recording recording(*world.simulator, {arguments.policy, world.session.get(), world.renderer.get()},
                       arguments.recording);
-  for (int step = 0; step < arguments.steps; ++step) {
-    if (interrupted()) throw Interrupted(fmt::format("interrupted at step {} of {}", step, arguments.steps));
-    world.act();
-    world.step({&recording});
+  const auto on_step = [&](int step, const StepResult&) {
     line_out->update(fmt::format("seed {}: step {}/{}", seed, step + 1, arguments.steps));
-  }
+  };
+  const DriveEnd end = drive_steps(*world.simulator, *world.controller, arguments.steps, {&recording}, on_step);
+  if (end.is_interrupted) throw Interrupted(fmt::format("interrupted at step {} of {}", end.steps, arguments.steps));
   return recording.finish();
 }
 

@@ -2,6 +2,7 @@
 // cameras.
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <optional>
 
 #include "pictura/apps/commands.h"
@@ -12,7 +13,6 @@
 #include "pictura/cli/serve_options.h"
 #include "pictura/cli/world_options.h"
 #include "pictura/common/error.h"
-#include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/stopwatch.h"
 #include "pictura/drawing/drawing.h"
 #include "pictura/drawing/film.h"
@@ -21,6 +21,7 @@
 #include "pictura/driving/world.h"
 #include "pictura/map/scenario/scenario.h"
 #include "pictura/map/scenario/scene_file.h"
+#include "pictura/simulator/drive_steps.h"
 #include "pictura/simulator/recorded_scene.h"
 #include "pictura/simulator/scene_recorder.h"
 
@@ -224,23 +225,26 @@ void run_simulate(SimulateArguments arguments) {
   std::vector<StepObserver*> observers{live.get(), recording.get(), saved ? &*saved : nullptr, &counter, &clock};
   std::erase(observers, nullptr);
   ProgressLine line;
-  int& step = run.steps;
-  for (; (arguments.endless || step < arguments.steps) && !interrupted(); ++step) {
-    if (live && !await_step(*live)) break;
+  const auto act = [&](int) {
+    if (live && !await_step(*live)) return false;
     if (film) film->add_frame(*simulator);
     const Stopwatch acting;
     world.act();
     run.drive_s += acting.seconds();
-    world.step(observers);
+    return true;
+  };
+  const auto on_step = [&](int step, const StepResult&) {
     if (!live)
       line.update(fmt::format("step {}/{}", step + 1, arguments.steps),
                   static_cast<double>(step + 1) / arguments.steps);
-  }
+  };
+  const int most_steps = arguments.endless ? std::numeric_limits<int>::max() : arguments.steps;
+  const int steps = run.steps = drive_steps(*simulator, world.commands, most_steps, act, observers, on_step).steps;
   run.simulate_s = clock.seconds();
   run.drive_s += run.simulate_s;
   line.finish();
   if (live) live->finish();
-  if (film && step > 0) film->close();  // ^C may come before the first frame
+  if (film && steps > 0) film->close();  // ^C may come before the first frame
   if (recording) {
     const Replay replay = recording->finish();
     if (!arguments.replay.empty()) write_replay_and_say_so(arguments.replay, replay);
@@ -252,8 +256,8 @@ void run_simulate(SimulateArguments arguments) {
   }
 
   print_simulation(run, counter, world, arguments.json);
-  if (arguments.endless) throw Interrupted(fmt::format("interrupted at step {}", step));
-  if (step < arguments.steps) throw Interrupted(fmt::format("interrupted at step {} of {}", step, arguments.steps));
+  if (arguments.endless) throw Interrupted(fmt::format("interrupted at step {}", steps));
+  if (steps < arguments.steps) throw Interrupted(fmt::format("interrupted at step {} of {}", steps, arguments.steps));
 }
 
 }  // namespace

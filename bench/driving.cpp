@@ -7,17 +7,13 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/map/load_map.h"
+#include "pictura/simulator/drive_steps.h"
 
 namespace pictura {
 
 void step_randomly(Simulator* simulator, uint64_t seed, int steps) {
   const auto controller = make_controller("random", *simulator, seed);
-  std::vector<Command> commands(static_cast<std::size_t>(simulator->num_slots()));
-  for (int step = 0; step < steps; ++step) {
-    throw_if_interrupted();
-    controller->act(simulator->arrays(), {}, commands);
-    simulator->step(commands);
-  }
+  if (drive_steps(*simulator, *controller, steps).is_interrupted) throw_if_interrupted();
 }
 
 DrivenWorlds drive_worlds(const DrivenOptions& options) {

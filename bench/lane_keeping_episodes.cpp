@@ -3,6 +3,7 @@
 #include "pictura/backends/make_simulator.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/simulator/controllers/lane_keeping.h"
+#include "pictura/simulator/drive_steps.h"
 
 namespace pictura {
 
@@ -20,15 +21,10 @@ std::vector<DrivenEpisode> drive_lane_keeping_episodes(const std::shared_ptr<con
   for (int w = 0; w < num_worlds; ++w) specs.push_back({0, drivers_each, static_cast<uint32_t>(w)});
   const auto simulator = make_simulator("cpu", config, {map}, specs);
   LaneKeepingController controller(*simulator);
-  std::vector<Command> commands(static_cast<size_t>(simulator->num_slots()));
-  for (int step = 0; step < steps; ++step) {
-    throw_if_interrupted();
-    controller.act(simulator->arrays(), {}, commands);
-    simulator->step(commands);
-  }
+  if (drive_steps(*simulator, controller, steps).is_interrupted) throw_if_interrupted();
   const AgentStateView state = simulator->state();
   std::vector<DrivenEpisode> episodes;
-  for (size_t slot = 0; slot < commands.size(); ++slot) {
+  for (size_t slot = 0; slot < static_cast<size_t>(simulator->num_slots()); ++slot) {
     const LaneKeepingAgent* agent = controller.agent(slot);
     episodes.push_back({state.goals_reached[slot],
                         state.halt_reason[slot],

@@ -1,6 +1,7 @@
 #include "pictura/bench/world_statistics.h"
 
 #include <algorithm>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -10,6 +11,7 @@
 #include "pictura/common/support/interrupt.h"
 #include "pictura/simulator/controllers/goal_places.h"
 #include "pictura/simulator/controllers/lane_keeping.h"
+#include "pictura/simulator/drive_steps.h"
 #include "pictura/simulator/host_worlds.h"
 
 namespace pictura {
@@ -73,12 +75,14 @@ void count_random_policy(Simulator& simulator, const WorldStatisticsOptions& opt
   const auto controller = make_controller("random", simulator, options.seed);
   std::vector<Command> commands(static_cast<size_t>(simulator.num_slots()));
   const auto in_first_episode = [](int32_t episode) { return episode == 0; };
-  for (uint32_t step = 0;; ++step) {
+  std::vector<int32_t> episode;
+  const auto act = [&](int) {
     const Span<const int32_t> before = simulator.episode_index();
-    const std::vector<int32_t> episode(before.begin(), before.end());
-    if (std::none_of(episode.begin(), episode.end(), in_first_episode)) break;
+    episode.assign(before.begin(), before.end());
     controller->act(simulator.arrays(), {}, commands);
-    const StepResult result = simulator.step(commands);
+    return std::any_of(episode.begin(), episode.end(), in_first_episode);
+  };
+  const auto on_step = [&](int step, const StepResult& result) {
     size_t slot = 0;
     for (size_t w = 0; w < worlds.size(); ++w) {
       const bool counts = episode[w] == 0 && simulator.episode_index()[w] == 0;
@@ -89,9 +93,10 @@ void count_random_policy(Simulator& simulator, const WorldStatisticsOptions& opt
         }
       }
     }
-    throw_if_interrupted();
     if (options.on_progress && step % 10 == 0) options.on_progress(fmt::format("random policy, step {}", step));
-  }
+  };
+  constexpr int kEndless = std::numeric_limits<int>::max();
+  if (drive_steps(simulator, commands, kEndless, act, {}, on_step).is_interrupted) throw_if_interrupted();
 }
 
 void drive_lanes(const std::shared_ptr<const RoadMap>& map, const SimulatorConfig& config, int episodes,

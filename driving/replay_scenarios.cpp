@@ -1,7 +1,6 @@
 #include "pictura/driving/replay_scenarios.h"
 
 #include <algorithm>
-#include <array>
 #include <optional>
 
 #include "pictura/backends/make_simulator.h"
@@ -12,6 +11,7 @@
 #include "pictura/common/support/messages.h"
 #include "pictura/evaluation/probes/driven_scenes.h"
 #include "pictura/policy/session.h"
+#include "pictura/simulator/drive_steps.h"
 #include "pictura/simulator/saved_worlds.h"
 
 namespace pictura {
@@ -180,17 +180,17 @@ Replay record_takeover(const EvaluateOptions& options, const RecordedScenario& s
   RecordingOptions followed = recording;
   followed.followed = takeover.agent;
   Recording recorded(*simulator, {takeover.policy, session.get(), renderer.get()}, followed);
-  const std::array<StepObserver*, 1> observers{&recorded};
   const std::unique_ptr<PolicyController> controller = session->make_controller(renderer.get(), one.argmax, one.seed);
   std::vector<uint8_t> mask(static_cast<size_t>(simulator->num_slots()));
   mask[takeover.agent] = 1;
   std::vector<Command> commands(mask.size());
-  for (int step = 0; step < takeover.steps; ++step) {
+  const auto act = [&](int step) {
     scene.command_places(takeover.step + step + 1, commands.data());
     controller->act(simulator->arrays(), mask, commands);
-    if (controller->num_driven() == 0) break;
-    step_observed(*simulator, Span<Command>(commands), observers);
-  }
+    return controller->num_driven() > 0;
+  };
+  if (drive_steps(*simulator, commands, takeover.steps, act, {&recorded}).is_interrupted)
+    throw Interrupted("interrupted while a takeover was recorded");
   return recorded.finish();
 }
 

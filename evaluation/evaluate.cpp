@@ -6,7 +6,6 @@
 #include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/hash.h"
-#include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/suggestion.h"
 #include "pictura/evaluation/progress.h"
 #include "pictura/evaluation/standing.h"
@@ -16,6 +15,7 @@
 #include "pictura/policy/struct_copies.h"
 #include "pictura/policy/torch_device.h"
 #include "pictura/simulator/agent_state.h"
+#include "pictura/simulator/drive_steps.h"
 
 namespace pictura {
 
@@ -148,13 +148,13 @@ bool drive_to_the_end(const EvaluatedDriver& driver, const EvaluateOptions& opti
   }
   DeviceCopy<Command> command_memory(std::vector<Command>(static_cast<size_t>(simulator->num_slots())), driver.device);
   const Span<Command> commands = command_memory.span();
-  for (int step = 0; step < options.steps; ++step) {
-    if (interrupted()) return false;
+  const auto act = [&](int) {
     driving.controller->act(simulator->arrays(), {}, commands);
     const int64_t num_driven = driving.num_driven();
-    if (num_driven == 0 && !is_awaited(*simulator)) break;
     *agent_steps_inout += num_driven;
-    step_observed(*simulator, commands, observers);
+    return num_driven > 0 || is_awaited(*simulator);
+  };
+  const auto on_step = [&](int step, const StepResult&) {
     if (has_lives(*simulator)) {
       AgentState state = counted_state(*simulator);
       for (size_t slot = 0; slot < state.left.size(); ++slot) {
@@ -162,7 +162,8 @@ bool drive_to_the_end(const EvaluatedDriver& driver, const EvaluateOptions& opti
       }
     }
     if (step % 10 == 0 || step == 1) on_steps(step + 1);
-  }
+  };
+  if (drive_steps(*simulator, commands, options.steps, act, observers, on_step).is_interrupted) return false;
   if (observer) observer->end();
   return true;
 }

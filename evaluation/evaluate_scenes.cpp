@@ -14,7 +14,6 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/hash.h"
-#include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/parallel_for.h"
 #include "pictura/evaluation/evaluate.h"
 #include "pictura/evaluation/progress.h"
@@ -24,6 +23,7 @@
 #include "pictura/policy/session.h"
 #include "pictura/policy/struct_copies.h"
 #include "pictura/policy/torch_device.h"
+#include "pictura/simulator/drive_steps.h"
 #include "pictura/simulator/recorded_scene.h"
 #include "pictura/simulator/rules/limits.h"
 
@@ -171,8 +171,8 @@ class BatchDrive {
     const Span<Command> commands = command_memory.span();
     std::vector<uint8_t> driven, replayed;
     std::optional<DeviceCopy<uint8_t>> driven_mask, replayed_mask;
-    for (int step = 0; step < protocol_.steps && (!kept_slots_.empty() || has_open(step)); ++step) {
-      if (interrupted()) return false;
+    const auto act = [&](int step) {
+      if (kept_slots_.empty() && !has_open(step)) return false;
       if (protocol_.record_end == RecordEnd::vanish) {
         take_out(slots_where([&](size_t slot) {
           return last_steps_[slot] == step && !is_driven(slot, step) && status_[slot] == AgentStatus::recorded;
@@ -189,12 +189,14 @@ class BatchDrive {
       }
       driver->act(simulator_.arrays(), driven_mask->span(), commands);
       log->act(simulator_.arrays(), replayed_mask->span(), commands);
-      simulator_.step(Span<const Command>(commands));
+      return true;
+    };
+    const auto after_step = [&](int step, const StepResult&) {
       measure(step + 1);
       if (!kept_slots_.empty()) note_places(step);
       on_step(step + 1);
-    }
-    return true;
+    };
+    return !drive_steps(simulator_, commands, protocol_.steps, act, {}, after_step).is_interrupted;
   }
 
   /// [scenes] of the batch, its driven road users in the order of tracks.
