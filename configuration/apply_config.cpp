@@ -37,25 +37,13 @@ RendererConfig renderer_config(const Config& config, const Rig& rig, Device devi
 }
 
 SimulatorConfig simulator_config(const Config& config, Device device) {
-  SimulatorConfig result;
+  SimulatorConfig result = config.simulator;
   result.device = device;
   result.seed = config.run.seed;
   result.num_threads = config.run.num_threads;
-  result.episode_steps = config.simulator.episode_steps;
-  result.reset_inactive_fraction = static_cast<float>(config.simulator.reset_inactive_fraction);
   result.stagger_episodes = config.train.stagger_episodes;
-  result.pedestrian_fraction = static_cast<float>(config.simulator.pedestrian_fraction);
-  result.cyclist_fraction = static_cast<float>(config.simulator.cyclist_fraction);
-  result.parked_cars = config.simulator.parked_cars;
-  result.light_cycles = config.simulator.light_cycles;
-  result.dynamics = config.simulator.dynamics;
-  result.walls = config.simulator.walls;
-  result.wall_seed = config.simulator.wall_seed;
-  result.light_heads = config.simulator.light_heads;
-  result.auxiliary_observations = config.policy.modality == Modality::vector && config.policy.auxiliary;
   result.vector_observations = config.policy.modality == Modality::vector;
-  result.wall_observations = config.simulator.wall_observations;
-  result.conditioning = config.simulator.conditioning;
+  result.auxiliary_observations = result.vector_observations && config.policy.auxiliary;
   return result;
 }
 

@@ -6,12 +6,6 @@
 
 namespace pictura {
 
-std::string shortest(float value) { return fmt::format("{}", value); }
-std::string shortest(double value) {
-  const std::string text = fmt::format("{}", value);
-  return text.find_first_of(".en") == std::string::npos ? text + ".0" : text;
-}
-
 std::string ConfigWriter::quoted(const std::string& value) {
   std::ostringstream out;
   out << toml::value<std::string>(value);

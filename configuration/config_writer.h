@@ -12,9 +12,12 @@
 
 namespace pictura {
 
-/// The shortest text that reads back to the same float: 0.8f is 0.8, not 0.800000011920929.
-std::string shortest(float value);
-std::string shortest(double value);
+/// The shortest text that reads back to the same real number, as TOML has it: 0.8f is 0.8, not 0.800000011920929.
+template <typename Real>
+std::string shortest(Real value) {
+  const std::string text = fmt::format("{}", value);
+  return text.find_first_of(".en") == std::string::npos ? text + ".0" : text;
+}
 
 /// A visitor of keys that writes them.
 class ConfigWriter {
@@ -27,7 +30,10 @@ class ConfigWriter {
   void integer_unless(const NamedKey&, bool is_set, const NamedKey& key, const Int& value, int64_t low, int64_t high) {
     if (!is_set) integer(key, value, low, high);
   }
-  void number(const NamedKey& key, const double& value, double, double) { line(key, shortest(value)); }
+  template <typename Real>
+  void number(const NamedKey& key, const Real& value, double, double) {
+    line(key, shortest(value));
+  }
   void flag(const NamedKey& key, const bool& value) { line(key, value ? "true" : "false"); }
   void text(const NamedKey& key, const std::string& value) { line(key, quoted(value)); }
   void name(const NamedKey& key, const std::string& value, const std::vector<std::string>&) { text(key, value); }
@@ -55,7 +61,7 @@ class ConfigWriter {
     text(key, names[static_cast<size_t>(value)]);
   }
   void range(const NamedKey& key, const ConditioningRange& value) {
-    line(key, fmt::format("[{}, {}]", shortest(value.low), shortest(value.high)));
+    line(key, fmt::format("[{}, {}]", value.low, value.high));
   }
 
   std::string toml;                                     // the whole file

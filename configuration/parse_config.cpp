@@ -44,8 +44,9 @@ class Reader {
     integer(key, value, low, high);
   }
 
-  void number(const std::string& key, double& value, double low, double high) {
-    if (const toml::node* node = find(key)) value = number_of(key, *node, low, high);
+  template <typename Real>
+  void number(const std::string& key, Real& value, double low, double high) {
+    if (const toml::node* node = find(key)) value = static_cast<Real>(number_of(key, *node, low, high));
   }
 
   void flag(const std::string& key, bool& value) {

@@ -127,10 +127,13 @@ TEST(Config, WrittenTextReadsBackEqual) {
   c.simulator.conditioning[0] = {3.3f, 4.7f, false};
   c.train.learning_rate = 1.0 / 3.0;
   c.train.ent_coef = 0;
+  c.simulator.pedestrian_fraction = 0;
+  c.simulator.cyclist_fraction = 0.7f;
   c.policy.modality = Modality::perspective;
   c.render.schedule = {{800, 20, 12}, {900, 40, 24, 8, 0.7}};
   const Config back = parse_config(to_toml(c), "b.toml");
   EXPECT_EQ(to_toml(back), to_toml(c));
+  EXPECT_THAT(to_toml(c), HasSubstr("pedestrian_fraction = 0.0\ncyclist_fraction = 0.7\n"));
   EXPECT_EQ(back.simulator.maps, c.simulator.maps);
   EXPECT_EQ(back.train.learning_rate, c.train.learning_rate);
   EXPECT_EQ(back.render.schedule.at(1).width_px, 40);
