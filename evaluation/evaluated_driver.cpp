@@ -61,16 +61,9 @@ EvaluatedDriver policy_driver(PolicySession* session, Renderer* renderer, const 
 }
 
 EvaluatedDriver controller_driver(const DriverOptions& options, int steps) {
-  Config config = options.checkpoint.empty() ? Config() : read_policy(options.checkpoint).config;
-  config = with_evaluate_conditioning(config, options.conditioning);
+  Config config = adapted(options.checkpoint.empty() ? Config() : read_policy(options.checkpoint).config, options);
   config.policy.modality = Modality::perspective;  // nobody reads vectors,
   config.render.backend = "auto";                  // and nothing is drawn
-  config.run.num_threads = options.num_threads;
-  config.run.device = options.device;
-  config.simulator.backend = options.simulator;
-  config.simulator.walls |= options.adds_walls;
-  config.simulator.light_cycles = options.light_cycles.value_or(config.simulator.light_cycles);
-  config.simulator.light_heads = options.light_heads.value_or(config.simulator.light_heads);
   const std::string& name = options.controller;
   const bool is_on_host = drives_on_host(name);
   if (is_on_host && options.device == "auto" && options.simulator == "auto") config.run.device = "cpu";

@@ -17,10 +17,6 @@
 
 namespace pictura {
 
-namespace {
-
-// The settings of training with what the options change. Those of devices are of the machine that trained it: here
-// whatever draws the same images will do.
 Config adapted(const Config& trained, const SessionOptions& options) {
   Config config = with_evaluate_conditioning(trained, options.conditioning);
   config.run.num_threads = options.num_threads;
@@ -44,6 +40,8 @@ Config adapted(const Config& trained, const SessionOptions& options) {
   }
   return config;
 }
+
+namespace {
 
 Config with_seed(Config config, uint64_t seed) {
   config.run.seed = seed;

@@ -16,6 +16,10 @@ namespace pictura {
 class Policy;
 struct Config;
 
+/// The settings of training with what the options change. Those of devices are of the machine that trained it: here
+/// whatever draws the same images will do.
+Config adapted(const Config& trained, const SessionOptions& options);
+
 /// What a batch of agents sees, in the memory of the session's device.
 struct PolicyInput {
   ObservationView observations;       // [batch]; arrays that the policy does not read may be empty
