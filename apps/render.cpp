@@ -34,7 +34,6 @@ struct RenderArguments {
   WorldOptions world;
   int steps = 50, views = 4;
   std::string tracks;  // of a recorded scene, whose cameras are drawn
-  BackendOptions backends;
   std::string size = "96x54", rig, out;
   std::vector<std::string> planes;
   float line_floor_px = RendererConfig{}.line_floor_px;
@@ -56,9 +55,10 @@ bool is_scene_file(const std::string& map) {
 }
 
 std::unique_ptr<Renderer> open_renderer(const RenderArguments& arguments, RendererConfig config) {
-  config.num_threads = arguments.world.num_threads;
-  if (!arguments.backends.samples.empty()) config.samples = parse_samples("--samples", arguments.backends.samples);
-  const std::string name = arguments.backends.renderer.empty() ? "auto" : arguments.backends.renderer;
+  const WorldOptions& world = arguments.world;
+  config.num_threads = world.num_threads;
+  if (!world.samples.empty()) config.samples = parse_samples("--samples", world.samples);
+  const std::string name = world.renderer.empty() ? "auto" : world.renderer;
   std::string choice;
   auto renderer = make_renderer(name, config, &choice);
   PICTURA_CHECK(renderer->device().is_host(), "--renderer {}: pictures are written from host memory; choose cpu",
@@ -167,7 +167,7 @@ void render_world(const RenderArguments& arguments) {
     fail_usage("--views: expected 1 to {} (one per agent), got {}", arguments.world.agents, arguments.views);
   }
   const auto renderer = open_renderer(arguments, config_of(arguments));
-  DrivenWorld world = make_world(arguments.world, "random", arguments.backends);
+  DrivenWorld world = make_world(arguments.world, "random");
   Simulator* const simulator = world.simulator.get();
   const DriveEnd end = drive_steps(*simulator, *world.controller, arguments.steps);
   if (end.is_interrupted) throw Interrupted(fmt::format("interrupted at step {} of {}", end.steps, arguments.steps));
@@ -197,7 +197,7 @@ std::vector<uint8_t> looking_tracks(const RenderArguments& arguments, const Comp
 
 void render_recorded_scene(const RenderArguments& arguments) {
   const RendererConfig config = config_of(arguments);
-  DrivenWorld world = make_world(arguments.world, "log", arguments.backends);
+  DrivenWorld world = make_world(arguments.world, "log");
   const CompiledMap& map = *world.simulator->maps()[0];
   const std::vector<uint8_t> looks = looking_tracks(arguments, map);
   const auto renderer = open_renderer(arguments, config);
@@ -243,7 +243,7 @@ void add_render_command(CLI::App& app) {
       command->add_option("--size", arguments->size, "Image size in pixels, WxH")->capture_default_str();
   command->add_flag("--square-pixels", arguments->square_pixels,
                     "At sizes that are not 16:9, keep pixels square and the horizontal field of view");
-  add_backend_options(command, "auto", &arguments->backends);
+  add_backend_options(command, "auto", &arguments->world);
   command->add_option("--rig", arguments->rig, "TOML file with [[camera]] tables instead of the paper's four cameras");
   add_number_option(command, "--line-floor", arguments->line_floor_px,
                     "Least width of a line on screen in pixels; 0 turns it off", 0, kMaxLineFloor_px);

@@ -19,7 +19,6 @@ namespace {
 struct ReplayArguments {
   WorldOptions world;
   int steps = 600, episodes = 10;
-  BackendOptions backends;
   RecordingOptions recording;
   std::string policy = "lane", out, gallery, mcap;
   bool json = false;
@@ -42,7 +41,7 @@ Json facts_of(const std::string& path, const Replay& replay) {
 Replay record(ReplayArguments arguments, uint64_t seed, ProgressLine* line_out) {
   WorldOptions options = arguments.world;
   options.seed = seed;
-  DrivenWorld world = make_world(options, arguments.policy, arguments.backends);
+  DrivenWorld world = make_world(options, arguments.policy);
   if (arguments.steps == 0) arguments.steps = world.simulator->config().episode_steps;
   check_replay_room(world.simulator->num_slots(), arguments.steps);
   settle_followed(world, &arguments.recording);
@@ -91,7 +90,7 @@ void run_replay(const ReplayArguments& arguments) {
 void add_replay_command(CLI::App& app) {
   auto arguments = std::make_shared<ReplayArguments>();
   CLI::App* command = app.add_subcommand("replay", "Record a world as a page that a browser plays");
-  add_driving_options(command, &arguments->world, &arguments->steps, &arguments->policy, &arguments->backends);
+  add_driving_options(command, &arguments->world, &arguments->steps, &arguments->policy);
   add_recording_options(command, &arguments->recording);
   CLI::Option* const out =
       command->add_option("--out", arguments->out, "The page to write")->check(file_ending(".html"));

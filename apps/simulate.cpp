@@ -32,7 +32,6 @@ namespace {
 struct SimulateArguments {
   WorldOptions world;
   int steps = 300;
-  BackendOptions backends;
   std::string policy = "random", video, replay, mcap, scene;
   RecordingOptions recording;
   ServeOptions serve;
@@ -192,7 +191,7 @@ void print_simulation(const SimulationRun& run, const StepCounter& counted, cons
 }
 
 void run_simulate(SimulateArguments arguments) {
-  DrivenWorld world = make_world(arguments.world, arguments.policy, arguments.backends);
+  DrivenWorld world = make_world(arguments.world, arguments.policy);
   Simulator* const simulator = world.simulator.get();
   const Scenario* const scene = simulator->maps()[0]->scenario.get();
   if (arguments.steps == 0) arguments.steps = simulator->config().episode_steps;
@@ -265,7 +264,7 @@ void run_simulate(SimulateArguments arguments) {
 void add_simulate_command(CLI::App& app) {
   auto arguments = std::make_shared<SimulateArguments>();
   CLI::App* command = app.add_subcommand("simulate", "Drive a world and count what happens");
-  add_driving_options(command, &arguments->world, &arguments->steps, &arguments->policy, &arguments->backends);
+  add_driving_options(command, &arguments->world, &arguments->steps, &arguments->policy);
   command->add_option(
       "--video", arguments->video,
       "Film it into this .mp4 or .gif: from above, with goals, lights and why agents halted, and from one "

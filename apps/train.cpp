@@ -13,7 +13,7 @@ namespace pictura {
 void add_train_command(CLI::App& app) {
   struct Arguments {
     TrainOptions train;
-    BackendOptions backends;
+    SessionOptions backends{.device = "", .simulator = ""};
     bool resume = false, overwrite = false, json = false;
   };
   auto arguments = std::make_shared<Arguments>();

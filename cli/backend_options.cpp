@@ -8,7 +8,6 @@
 #include "pictura/backends/make_simulator.h"
 #include "pictura/common/pixel_samples.h"
 #include "pictura/common/support/suggestion.h"
-#include "pictura/policy/session_options.h"
 
 namespace pictura {
 
@@ -20,8 +19,7 @@ CLI::Validator one_of(const std::vector<std::string>& names) {
   return {complaint, ""};
 }
 
-template <typename Options>
-void add_backend_options(CLI::App* command, const std::string& otherwise, Options* options_out) {
+void add_backend_options(CLI::App* command, const std::string& otherwise, SessionOptions* options_out) {
   const auto described = [&otherwise](const char* what, const std::vector<std::string>& names) {
     return fmt::format("{}: {}; default: {}", what, fmt::join(names, ", "), otherwise);
   };
@@ -38,18 +36,13 @@ void add_backend_options(CLI::App* command, const std::string& otherwise, Option
       ->check(CLI::Validator(complaint, ""));
 }
 
-template <typename Options>
-void add_policy_backend_options(CLI::App* command, const std::string& otherwise, Options* options_out) {
+void add_policy_backend_options(CLI::App* command, const std::string& otherwise, SessionOptions* options_out) {
   command->add_option("--device", options_out->device,
                       fmt::format("What the policy runs on: cpu, cuda, cuda:N or auto; default: {}", otherwise));
   add_backend_options(command, otherwise, options_out);
 }
 
-template void add_backend_options(CLI::App*, const std::string&, BackendOptions*);
-template void add_policy_backend_options(CLI::App*, const std::string&, BackendOptions*);
-template void add_policy_backend_options(CLI::App*, const std::string&, SessionOptions*);
-
-std::vector<std::string> overrides_of(const BackendOptions& options) {
+std::vector<std::string> overrides_of(const SessionOptions& options) {
   std::vector<std::string> overrides;
   for (const auto& [key, value] :
        {std::pair{"run.device", &options.device}, std::pair{"simulator.backend", &options.simulator},

@@ -6,7 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "pictura/driving/world.h"
+#include "pictura/policy/session_options.h"
 
 namespace pictura {
 
@@ -14,15 +14,12 @@ namespace pictura {
 CLI::Validator one_of(const std::vector<std::string>& names);
 
 /// Adds --simulator, --renderer (or --backend) and --samples, whose help names `otherwise` as what counts without them.
-/// Options are BackendOptions, or SessionOptions, which are left as they are by what is not given.
-template <typename Options>
-void add_backend_options(CLI::App* command, const std::string& otherwise, Options* options_out);
+void add_backend_options(CLI::App* command, const std::string& otherwise, SessionOptions* options_out);
 
 /// Adds --device as well: what a policy runs on.
-template <typename Options>
-void add_policy_backend_options(CLI::App* command, const std::string& otherwise, Options* options_out);
+void add_policy_backend_options(CLI::App* command, const std::string& otherwise, SessionOptions* options_out);
 
-/// The options that were given as overrides of a training configuration.
-std::vector<std::string> overrides_of(const BackendOptions& options);
+/// What of these is not empty as overrides of a training configuration.
+std::vector<std::string> overrides_of(const SessionOptions& options);
 
 }  // namespace pictura

@@ -23,7 +23,7 @@ CLI::Option* add_evaluation_options(CLI::App* command, EvaluateOptions* options_
   add_number_option(command, "--steps", options.steps, "Steps of 0.1 s per scenario", 1);
   CLI::Option* const sampled = add_sampled_option(command, &options.argmax);
   add_seed_option(command, &options.seed, "Scenarios are drawn from it");
-  add_policy_backend_options<SessionOptions>(command, "auto, and drawn as in training", &options);
+  add_policy_backend_options(command, "auto, and drawn as in training", &options);
   command
       ->add_option("--conditioning", options.conditioning,
                    "What every agent is told, as collision=1, in place of a value of the configuration's "

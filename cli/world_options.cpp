@@ -72,8 +72,7 @@ void refuse_options(const CLI::App& command, std::initializer_list<const char*> 
   }
 }
 
-void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_out, std::string* policy_out,
-                         BackendOptions* backends_out) {
+void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_out, std::string* policy_out) {
   add_map_or_scene(command, &world_out->map);
   add_world_options(command, world_out);
   add_light_cycles_option(
@@ -96,7 +95,7 @@ void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_
           "default there), inverse (by the actions that follow the recording) or idm (along recorded paths, "
           "behind others), or a checkpoint or safetensors that train wrote")
       ->capture_default_str();
-  add_policy_backend_options(command, "auto, and drawn as in training", backends_out);
+  add_policy_backend_options(command, "auto, and drawn as in training", world_out);
 }
 
 void settle_driving_options(const CLI::App& command, WorldOptions* world_inout, int* steps_inout,

@@ -30,8 +30,7 @@ void refuse_options(const CLI::App& command, std::initializer_list<const char*> 
 
 /// Adds MAP, which may be a recorded scene, those options, --light-cycles, --light-heads, --control, --start, --steps,
 /// --policy and where the policy runs.
-void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_out, std::string* policy_out,
-                         BackendOptions* backends_out);
+void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_out, std::string* policy_out);
 
 /// Adapts these options to a recorded scene, where MAP is one: all road users follow the record unless a policy was
 /// asked for, for as many steps as are recorded unless --steps was given (else *steps_inout becomes 0). Throws

@@ -50,8 +50,8 @@ std::vector<uint8_t> controlled_tracks(const WorldOptions& options, const Compil
 
 }  // namespace
 
-DrivenWorld make_world(const WorldOptions& options, const std::string& policy, const BackendOptions& backends) {
-  if (backends.simulator == "cuda") {
+DrivenWorld make_world(const WorldOptions& options, const std::string& policy) {
+  if (options.simulator == "cuda") {
     fail_usage(
         "--simulator cuda: its states and scenes lie on the device, and reading them back for pictures and reports "
         "is missing from this version: choose cpu");
@@ -66,12 +66,9 @@ DrivenWorld make_world(const WorldOptions& options, const std::string& policy, c
     if (const std::string near = suggestion(policy, names); !near.empty() && !std::filesystem::exists(policy)) {
       fail_usage("--policy: expected {}, or a checkpoint's file, got '{}'{}", fmt::join(names, ", "), policy, near);
     }
-    world.session = std::make_shared<PolicySession>(
-        policy, SessionOptions{.num_threads = options.num_threads,
-                               .device = backends.device.empty() ? "auto" : backends.device,
-                               .simulator = "cpu",
-                               .renderer = backends.renderer,
-                               .samples = backends.samples});
+    SessionOptions session = options;
+    session.simulator = "cpu";
+    world.session = std::make_shared<PolicySession>(policy, session);
     world.renderer = world.session->make_renderer();
     if (world.renderer) world.trained_view = world.session->renderer_config();
     const SimulatorConfig defaults;
@@ -91,7 +88,6 @@ DrivenWorld make_world(const WorldOptions& options, const std::string& policy, c
   config.fixed_lights = true;
   set_population(options, &config);
   config.parked_cars = options.parked_cars.value_or(config.parked_cars);
-  const std::string simulator = backends.simulator.empty() ? "cpu" : backends.simulator;
   std::vector<uint8_t> controlled;  // of a recorded scene, by other than the record
   if (is_scene_name(options.map)) {
     const auto scene = std::make_shared<const Scenario>(load_scenario(options.map));
@@ -101,10 +97,11 @@ DrivenWorld make_world(const WorldOptions& options, const std::string& policy, c
     compiled.recorded_lights = options.recorded_lights;
     const auto map = compile_scenario(scene, compiled, options.start_step);
     if (policy != "log") controlled = controlled_tracks(options, *map);
-    world.simulator = make_simulator(simulator, config, CompiledMaps{map}, {scene_world(*map)});
+    world.simulator = make_simulator(options.simulator, config, CompiledMaps{map}, {scene_world(*map)});
     world.first_agent = std::max(scene->sdc_track, 0);
   } else {
-    world.simulator = make_simulator(simulator, config, {load_reported_map(options.map)}, {{0, options.agents, 0}});
+    world.simulator =
+        make_simulator(options.simulator, config, {load_reported_map(options.map)}, {{0, options.agents, 0}});
   }
   world.commands.resize(static_cast<size_t>(world.simulator->num_slots()));
 #ifdef PICTURA_HAS_TORCH

@@ -8,36 +8,29 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/renderer.h"
+#include "pictura/policy/session_options.h"
 #include "pictura/simulator/controllers/controller.h"
 #include "pictura/simulator/simulator.h"
 #include "pictura/simulator/step_observer.h"
 
 namespace pictura {
 
-/// What all worlds that are driven here share.
-struct WorldOptions {
+/// What all worlds that are driven here share. Threads, lights and simulator of a policy are the world's as well.
+struct WorldOptions : SessionOptions {
   std::string map;
   int agents = 32;
   uint64_t seed = 0;
-  int num_threads = 0;
   bool walls = true;
   bool vector_observations = true;
   // Where nothing is said, as the policy was trained, or as in the paper.
   std::optional<float> pedestrian_fraction, cyclist_fraction;
   std::optional<int> parked_cars;
-  std::optional<LightCycles> light_cycles;
-  std::optional<LightHeads> light_heads;
   // Of recorded scenes: which tracks the policy drives, where the recording starts, and whether its lights are there.
   // An episode is as long as what is left of the recording, or as so many steps.
   std::string controlled = "self";
   int start_step = 0;
   bool recorded_lights = false;
   int min_episode_steps = 1;
-};
-
-/// What computes; empty where nothing was asked for.
-struct BackendOptions {
-  std::string device, simulator, renderer, samples;
 };
 
 /// Sets the shares of pedestrians and cyclists that were given; a share that was not gives way to one that was. Throws
@@ -73,8 +66,8 @@ struct DrivenWorld {
 /// recorded scene it drives the controlled tracks that are there at the start; all others, or with the policy log all,
 /// follow the recording.
 /// Then the world is the one that the policy was trained in, with its walls, population, observations and evaluation's
-/// conditioning, and its images are drawn as they were in training; `backends` and options say otherwise. Throws
-/// UsageError for a simulator that does not work in host memory.
-DrivenWorld make_world(const WorldOptions& options, const std::string& policy, const BackendOptions& backends);
+/// conditioning, and its images are drawn as they were in training; the options say otherwise. Throws UsageError for a
+/// simulator that does not work in host memory.
+DrivenWorld make_world(const WorldOptions& options, const std::string& policy);
 
 }  // namespace pictura

@@ -26,6 +26,15 @@ std::string processor_name() {
   return "unknown processor";
 }
 
+WorldOptions bench_world(int num_threads, float share, int parked_cars) {
+  WorldOptions world;
+  world.agents = 120;
+  world.num_threads = num_threads;
+  world.pedestrian_fraction = world.cyclist_fraction = share;
+  world.parked_cars = parked_cars;
+  return world;
+}
+
 std::string population_of(const WorldOptions& world) {
   const float pedestrians = *world.pedestrian_fraction, cyclists = *world.cyclist_fraction;
   std::string text = fmt::format("{} agents", world.agents);

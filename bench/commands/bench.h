@@ -15,6 +15,8 @@ namespace pictura {
 
 /// Name of the first processor.
 std::string processor_name();
+/// Options of worlds of 120 agents, of which such a share are pedestrians, and as many cyclists.
+WorldOptions bench_world(int num_threads, float share, int parked_cars);
 /// Describes the agents of a world; its options must set all fractions.
 std::string population_of(const WorldOptions& world);
 

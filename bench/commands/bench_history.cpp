@@ -19,8 +19,7 @@ namespace pictura {
 namespace {
 
 struct HistoryArguments {
-  WorldOptions world{
-      .agents = 120, .num_threads = 0, .pedestrian_fraction = 0.1f, .cyclist_fraction = 0.1f, .parked_cars = 32};
+  WorldOptions world = bench_world(/*num_threads=*/0, /*share=*/0.1f, /*parked_cars=*/32);
   std::vector<std::string> maps;
   std::string size = "96x54";
   int slots = 20480;

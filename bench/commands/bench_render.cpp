@@ -21,8 +21,7 @@ namespace pictura {
 namespace {
 
 struct RenderArguments {
-  WorldOptions world{
-      .agents = 120, .num_threads = 1, .pedestrian_fraction = 0.0f, .cyclist_fraction = 0.0f, .parked_cars = 0};
+  WorldOptions world = bench_world(/*num_threads=*/1, /*share=*/0, /*parked_cars=*/0);
   std::vector<std::string> maps, backends = {"cpu"}, sizes, samples = {"1"};
   std::vector<int> egos;
   std::string sweep, format = "u8";

@@ -24,8 +24,7 @@ namespace {
 
 struct SimulateArguments {
   // Vehicles alone, as the peers that rates are compared with; what a world of all classes costs is an option.
-  WorldOptions world{
-      .agents = 120, .num_threads = 1, .pedestrian_fraction = 0.0f, .cyclist_fraction = 0.0f, .parked_cars = 0};
+  WorldOptions world = bench_world(/*num_threads=*/1, /*share=*/0, /*parked_cars=*/0);
   std::vector<std::string> maps, backends = {"cpu"};
   int num_worlds = 0, slots = 0;
   std::string sweep;

@@ -14,7 +14,7 @@ namespace {
 
 struct TrainArguments {
   TrainingCase measured{.config_path = "configs/smoke.toml"};
-  BackendOptions backends;
+  SessionOptions backends{.device = "", .simulator = ""};
   bool json = false;
   std::optional<EarlierReport> earlier;
   PlotArguments plot;

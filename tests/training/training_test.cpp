@@ -867,7 +867,7 @@ TEST_F(Training, PoliciesDriveInTheWorldAndSeeTheImagesThatTheyWereTrainedOn) {
   WorldOptions world_options;
   world_options.map = "procedural";
   world_options.agents = 4;
-  DrivenWorld world = make_world(world_options, checkpoint, {});
+  DrivenWorld world = make_world(world_options, checkpoint);
   EXPECT_EQ(world.simulator->config().wall_seed, 77u);
   EXPECT_EQ(world.simulator->config().parked_cars, 3);
   EXPECT_EQ(world.simulator->config().light_cycles, LightCycles::independent);
@@ -884,13 +884,17 @@ TEST_F(Training, PoliciesDriveInTheWorldAndSeeTheImagesThatTheyWereTrainedOn) {
   world_options.walls = false;
   world_options.parked_cars = 1;
   world_options.light_cycles = LightCycles::phases;
-  world = make_world(world_options, checkpoint, {.renderer = "null"});
+  world_options.renderer = "null";
+  world = make_world(world_options, checkpoint);
   EXPECT_FALSE(world.simulator->config().walls);
   EXPECT_EQ(world.simulator->config().parked_cars, 1);
   EXPECT_EQ(world.simulator->config().light_cycles, LightCycles::phases);
   EXPECT_EQ(world.renderer->name(), "null");
-  EXPECT_THROW(make_world(world_options, checkpoint, {.simulator = "cuda"}), UsageError);
-  EXPECT_THAT(message_of([&] { make_world(world_options, checkpoint, {.device = "cuda"}); }), HasSubstr("run.device"));
+  WorldOptions on_device = world_options;
+  on_device.device = "cuda";
+  EXPECT_THAT(message_of([&] { make_world(on_device, checkpoint); }), HasSubstr("run.device"));
+  on_device.simulator = "cuda";
+  EXPECT_THROW(make_world(on_device, checkpoint), UsageError);
 }
 
 TEST_F(Training, ASessionGivesLogitsAndValuesOfAnyScene) {
