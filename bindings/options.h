@@ -42,8 +42,9 @@ class ParameterVisitor {
   /// Messages name `function`.
   explicit ParameterVisitor(std::string function) : function_(std::move(function)) {}
 
-  template <typename T>
-  void value(const NamedOption& option, T& value) {
+  /// Ranges are the simulator's to check.
+  template <typename T, typename... Range>
+  void value(const NamedOption& option, T& value, Range...) {
     add<T>(option, value, [&value](const T& given) { value = given; });
   }
   void name(const NamedOption& option, std::string& text, const std::vector<std::string>&) { value(option, text); }
@@ -97,7 +98,7 @@ class ParameterVisitor {
   }
   template <typename T, typename Set>
   void add(const NamedOption& option, const T& value, const Set& set) {
-    const py::arg_v argument = (py::arg(option.name) = value);
+    const py::arg_v argument = (py::arg(option.name.c_str()) = value);
     parameters_.push_back(
         {option.name, argument.value,
          py::cpp_function([set](const T& given) { set(given); }, argument, py::name(function_.c_str()))});

@@ -21,20 +21,20 @@ class Describer {
  public:
   explicit Describer(const Config& defaults) { visit(defaults, writer_); }
 
-  template <typename Int>
-  void integer(const std::string& key, const Int&, int64_t low, int64_t high) {
+  template <std::integral Int>
+  void value(const std::string& key, const Int&, int64_t low, int64_t high) {
     add(key, fmt::format("{} to {}", low, high));
   }
   template <typename Int>
-  void integer_unless(const std::string& other, bool, const std::string& key, const Int&, int64_t low, int64_t high) {
+  void value_unless(const std::string& other, bool, const std::string& key, const Int&, int64_t low, int64_t high) {
     add(key, fmt::format("{} to {}, without `{}`", low, high, other));
   }
-  void number(const std::string& key, const double&, double low, double high) {
+  void value(const std::string& key, const double&, double low, double high) {
     add(key, std::isinf(high) ? fmt::format("{} or more", text_of_number(low))
                               : fmt::format("{} to {}", text_of_number(low), text_of_number(high)));
   }
-  void flag(const std::string& key, const bool&) { add(key, "true, false"); }
-  void text(const std::string& key, const std::string&) { add(key, "a text"); }
+  void value(const std::string& key, const bool&) { add(key, "true, false"); }
+  void value(const std::string& key, const std::string&) { add(key, "a text"); }
   void name(const std::string& key, const std::string&, const std::vector<std::string>& known) {
     // Which backends there are depends on the build.
     add(key, key.ends_with(".backend") ? "a backend" : fmt::format("{}", fmt::join(known, ", ")));
@@ -49,7 +49,7 @@ class Describer {
     add(key, fmt::format("{}, in ascending order", kSizeChangesExpected));
   }
   template <typename Enum>
-  void choice(const std::string& key, const Enum&, const Names& names) {
+  void choice(const std::string& key, const Enum&, Span<const char* const> names) {
     add(key, fmt::format("{}", fmt::join(names, ", ")));
   }
   void range(const std::string& key, const ConditioningRange& value) {

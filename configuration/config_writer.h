@@ -1,6 +1,7 @@
 // Keys and values of a configuration as TOML.
 #pragma once
 
+#include <concepts>
 #include <string>
 #include <utility>
 #include <vector>
@@ -8,6 +9,7 @@
 #include <fmt/ranges.h>
 
 #include "pictura/common/pixel_samples.h"
+#include "pictura/common/span.h"
 #include "pictura/configuration/visit_keys.h"
 
 namespace pictura {
@@ -22,23 +24,24 @@ std::string shortest(Real value) {
 /// A visitor of keys that writes them.
 class ConfigWriter {
  public:
-  template <typename Int>
-  void integer(const NamedKey& key, const Int& value, int64_t, int64_t) {
+  template <std::integral Int>
+  void value(const NamedKey& key, const Int& value, int64_t, int64_t) {
     line(key, fmt::format("{}", value));
   }
   template <typename Int>
-  void integer_unless(const NamedKey&, bool is_set, const NamedKey& key, const Int& value, int64_t low, int64_t high) {
-    if (!is_set) integer(key, value, low, high);
+  void value_unless(const NamedKey&, bool is_set, const NamedKey& key, const Int& its_value, int64_t low,
+                    int64_t high) {
+    if (!is_set) value(key, its_value, low, high);
   }
-  template <typename Real>
-  void number(const NamedKey& key, const Real& value, double, double) {
+  template <std::floating_point Real>
+  void value(const NamedKey& key, const Real& value, double, double) {
     line(key, shortest(value));
   }
-  void flag(const NamedKey& key, const bool& value) { line(key, value ? "true" : "false"); }
-  void text(const NamedKey& key, const std::string& value) { line(key, quoted(value)); }
-  void name(const NamedKey& key, const std::string& value, const std::vector<std::string>&) { text(key, value); }
-  void device(const NamedKey& key, const std::string& value) { text(key, value); }
-  void samples(const NamedKey& key, const PixelSamples& value) { text(key, text_of(value)); }
+  void value(const NamedKey& key, const bool& value) { line(key, value ? "true" : "false"); }
+  void value(const NamedKey& key, const std::string& value) { line(key, quoted(value)); }
+  void name(const NamedKey& key, const std::string& text, const std::vector<std::string>&) { value(key, text); }
+  void device(const NamedKey& key, const std::string& text) { value(key, text); }
+  void samples(const NamedKey& key, const PixelSamples& samples) { value(key, text_of(samples)); }
   void texts(const NamedKey& key, const std::vector<std::string>& values) {
     std::vector<std::string> all;
     for (const std::string& value : values) all.push_back(quoted(value));
@@ -57,8 +60,8 @@ class ConfigWriter {
     line(key, fmt::format("[{}]", fmt::join(all, ", ")));
   }
   template <typename Enum>
-  void choice(const NamedKey& key, const Enum& value, const Names& names) {
-    text(key, names[static_cast<size_t>(value)]);
+  void choice(const NamedKey& key, const Enum& choice, Span<const char* const> names) {
+    value(key, std::string(names[static_cast<size_t>(choice)]));
   }
   void range(const NamedKey& key, const ConditioningRange& value) {
     line(key, fmt::format("[{}, {}]", value.low, value.high));

@@ -28,8 +28,8 @@ class Reader {
   Reader(const toml::table& table, std::string source, const std::set<std::string>& overridden, bool any_name)
       : table_(table), source_(std::move(source)), overridden_(overridden), any_name_(any_name) {}
 
-  template <typename Int>
-  void integer(const std::string& key, Int& value, int64_t low, int64_t high) {
+  template <std::integral Int>
+  void value(const std::string& key, Int& value, int64_t low, int64_t high) {
     if (const toml::node* node = find(key)) {
       const int64_t number = integer_of(key, *node, low, high);
       value = static_cast<Int>(number);
@@ -38,25 +38,25 @@ class Reader {
 
   /// A key that means nothing once `other` is set, which must have been visited before.
   template <typename Int>
-  void integer_unless(const std::string& other, bool is_set, const std::string& key, Int& value, int64_t low,
-                      int64_t high) {
+  void value_unless(const std::string& other, bool is_set, const std::string& key, Int& its_value, int64_t low,
+                    int64_t high) {
     if (find(key) && is_set) refuse(key, fmt::format("has no effect together with {}: leave one of them out", other));
-    integer(key, value, low, high);
+    value(key, its_value, low, high);
   }
 
-  template <typename Real>
-  void number(const std::string& key, Real& value, double low, double high) {
+  template <std::floating_point Real>
+  void value(const std::string& key, Real& value, double low, double high) {
     if (const toml::node* node = find(key)) value = static_cast<Real>(number_of(key, *node, low, high));
   }
 
-  void flag(const std::string& key, bool& value) {
+  void value(const std::string& key, bool& value) {
     if (const toml::node* node = find(key)) {
       if (!node->is_boolean()) refuse(key, *node, "expected true or false");
       value = node->as_boolean()->get();
     }
   }
 
-  void text(const std::string& key, std::string& value) {
+  void value(const std::string& key, std::string& value) {
     if (const toml::node* node = find(key)) value = text_of(key, *node);
   }
 
@@ -105,7 +105,7 @@ class Reader {
     if (find("train.schedule_agent_steps")) refuse(key, "has no effect together with train.schedule_agent_steps");
     constexpr int64_t kMost = int64_t{1} << 60;
     int64_t updates = 0;
-    integer(key, updates, 1, int64_t{1} << 40);
+    value(key, updates, 1, int64_t{1} << 40);
     schedule_agent_steps = updates > kMost / agent_steps_per_update ? kMost : updates * agent_steps_per_update;
   }
 
@@ -150,12 +150,12 @@ class Reader {
   }
 
   template <typename Enum>
-  void choice(const std::string& key, Enum& value, const Names& names) {
+  void choice(const std::string& key, Enum& value, Span<const char* const> names) {
     const toml::node* node = find(key);
     if (!node) return;
     const std::string text = text_of(key, *node);
     const auto found = std::find(names.begin(), names.end(), text);
-    if (found == names.end()) refuse_name(key, *node, text, names);
+    if (found == names.end()) refuse_name(key, *node, text, {names.begin(), names.end()});
     value = static_cast<Enum>(found - names.begin());
   }
 

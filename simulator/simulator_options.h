@@ -1,12 +1,32 @@
 // The options of a simulator that callers choose by name.
 #pragma once
 
+#include <cstdint>
 #include <iterator>
+#include <limits>
 
 #include "pictura/common/support/named_option.h"
 #include "pictura/simulator/simulator.h"
 
 namespace pictura {
+
+/// Visits those that are keys of [simulator] in configurations, in the order in which they are written.
+template <typename AnyConfig, typename Visitor>
+void visit_simulator_keys(AnyConfig& c, Visitor&& v) {
+  v.value(NamedKey("simulator.episode_steps", Evaluation::replaced), c.episode_steps, 1, 1 << 24);
+  v.value(NamedKey("simulator.reset_inactive_fraction", Evaluation::replaced), c.reset_inactive_fraction, 1e-6, 2);
+  v.value(NamedKey("simulator.pedestrian_fraction"), c.pedestrian_fraction, 0, 1);
+  v.value(NamedKey("simulator.cyclist_fraction"), c.cyclist_fraction, 0, 1);
+  v.value(NamedKey("simulator.parked_cars"), c.parked_cars, 0, kMaxAgentsPerWorld);
+  v.choice(NamedKey("simulator.light_cycles", Evaluation::replaced), c.light_cycles,
+           {kLightCyclesNames, std::size(kLightCyclesNames)});
+  v.value(NamedKey("simulator.walls"), c.walls);
+  v.value(NamedKey("simulator.wall_seed"), c.wall_seed, 0, std::numeric_limits<int64_t>::max());
+  v.choice(NamedKey("simulator.light_heads", Evaluation::replaced), c.light_heads, kLightHeadsNames);
+  v.value(NamedKey("simulator.wall_observations"), c.wall_observations);
+  v.value(NamedKey("simulator.dynamics.reset_at_standstill"), c.dynamics.reset_at_standstill);
+  v.value(NamedKey("simulator.dynamics.forbid_reversing"), c.dynamics.forbid_reversing);
+}
 
 template <typename Visitor>
 void visit_options(SimulatorConfig& config, Visitor&& v) {
@@ -14,22 +34,11 @@ void visit_options(SimulatorConfig& config, Visitor&& v) {
   v.value({"seed"}, config.seed);
   v.value({"num_threads"}, config.num_threads);
   v.value({"dt_s"}, config.dt_s);
-  v.value({"episode_steps"}, config.episode_steps);
-  v.value({"reset_inactive_fraction"}, config.reset_inactive_fraction);
+  visit_simulator_keys(config, v);
   v.value({"stagger_episodes"}, config.stagger_episodes);
-  v.value({"pedestrian_fraction"}, config.pedestrian_fraction);
-  v.value({"cyclist_fraction"}, config.cyclist_fraction);
-  v.value({"parked_cars"}, config.parked_cars);
-  v.value({"walls"}, config.walls);
-  v.value({"wall_seed"}, config.wall_seed);
-  v.choice({"light_heads"}, config.light_heads, kLightHeadsNames);
   v.value({"fixed_lights"}, config.fixed_lights);
-  v.choice({"light_cycles"}, config.light_cycles, {kLightCyclesNames, std::size(kLightCyclesNames)});
-  v.value({"reset_at_standstill"}, config.dynamics.reset_at_standstill);
-  v.value({"forbid_reversing"}, config.dynamics.forbid_reversing);
   v.value({"auxiliary_observations"}, config.auxiliary_observations);
   v.value({"vector_observations"}, config.vector_observations);
-  v.value({"wall_observations"}, config.wall_observations);
   v.conditioning({"conditioning"}, config.conditioning);
 }
 
