@@ -17,13 +17,7 @@ void step_randomly(Simulator* simulator, uint64_t seed, int steps) {
 }
 
 DrivenWorlds drive_worlds(const DrivenOptions& options) {
-  SimulatorConfig config;
-  config.seed = options.seed;
-  config.num_threads = options.num_threads;
-  config.pedestrian_fraction = options.pedestrian_fraction;
-  config.cyclist_fraction = options.cyclist_fraction;
-  config.parked_cars = options.parked_cars;
-  config.walls = options.walls;
+  SimulatorConfig config = options.simulator;
   config.fixed_lights = true;
   config.vector_observations = false;
   std::vector<std::shared_ptr<const RoadMap>> maps;
@@ -37,7 +31,7 @@ DrivenWorlds drive_worlds(const DrivenOptions& options) {
 
   DrivenWorlds worlds;
   worlds.simulator = make_simulator("cpu", config, maps, specs);
-  step_randomly(worlds.simulator.get(), options.seed, options.steps);
+  step_randomly(worlds.simulator.get(), config.seed, options.steps);
   const SpawnFailure* refusal = worlds.simulator->state().refusal;
   const Span<const View> views = worlds.simulator->views();
   for (int agent = 0; agent < options.agents; ++agent) {

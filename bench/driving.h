@@ -16,12 +16,8 @@ struct DrivenOptions {
   std::vector<std::string> maps;
   int num_views = 0;  // 0: one world a map, all its agents
   int agents = 120;   // of each world
-  float pedestrian_fraction = 0, cyclist_fraction = 0;
-  int parked_cars = 0;
-  bool walls = true;
-  uint64_t seed = 0;
   int steps = 30;
-  int num_threads = 0;  // 0: all
+  SimulatorConfig simulator{.pedestrian_fraction = 0, .cyclist_fraction = 0, .parked_cars = 0};
 };
 
 struct DrivenWorlds {

@@ -13,15 +13,11 @@
 namespace pictura {
 
 Snapshot drive_snapshot(const SnapshotOptions& options) {
-  DrivenWorlds worlds = drive_worlds({.maps = {options.map},
-                                      .agents = options.agents,
-                                      .pedestrian_fraction = 0.1f,
-                                      .cyclist_fraction = 0.1f,
-                                      .parked_cars = SimulatorConfig{}.parked_cars,
-                                      .walls = options.walls,
-                                      .seed = options.seed,
-                                      .steps = options.steps,
-                                      .num_threads = options.num_threads});
+  DrivenWorlds worlds =
+      drive_worlds({.maps = {options.map},
+                    .agents = options.agents,
+                    .steps = options.steps,
+                    .simulator = {.seed = options.seed, .num_threads = options.num_threads, .walls = options.walls}});
   const SceneBatch scene = worlds.simulator->scene();
   Snapshot snapshot;
   snapshot.geometry = worlds.simulator->maps()[0]->geometry;

@@ -25,9 +25,15 @@ bool is_host_controller(const std::string& policy) {
   return std::find(names.begin(), names.end(), policy) != names.end();
 }
 
-void set_population(const WorldOptions& options, SimulatorConfig* config_inout) {
-  float& pedestrians = config_inout->pedestrian_fraction;
-  float& cyclists = config_inout->cyclist_fraction;
+void apply_world_options(const WorldOptions& options, SimulatorConfig* config_inout) {
+  SimulatorConfig& config = *config_inout;
+  config.seed = options.seed;
+  config.num_threads = options.num_threads;
+  config.walls = config.walls && options.walls;
+  config.light_heads = options.light_heads.value_or(config.light_heads);
+  config.light_cycles = options.light_cycles.value_or(config.light_cycles);
+  config.parked_cars = options.parked_cars.value_or(config.parked_cars);
+  float &pedestrians = config.pedestrian_fraction, &cyclists = config.cyclist_fraction;
   pedestrians = options.pedestrian_fraction.value_or(pedestrians);
   cyclists = options.cyclist_fraction.value_or(cyclists);
   if (pedestrians + cyclists <= 1) return;
@@ -80,14 +86,8 @@ DrivenWorld make_world(const WorldOptions& options, const std::string& policy) {
                policy, suggestion(policy, names));
 #endif
   }
-  config.seed = options.seed;
-  config.num_threads = options.num_threads;
-  config.walls = config.walls && options.walls;
-  config.light_heads = options.light_heads.value_or(config.light_heads);
-  config.light_cycles = options.light_cycles.value_or(config.light_cycles);
+  apply_world_options(options, &config);
   config.fixed_lights = true;
-  set_population(options, &config);
-  config.parked_cars = options.parked_cars.value_or(config.parked_cars);
   std::vector<uint8_t> controlled;  // of a recorded scene, by other than the record
   if (is_scene_name(options.map)) {
     const auto scene = std::make_shared<const Scenario>(load_scenario(options.map));

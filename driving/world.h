@@ -33,9 +33,9 @@ struct WorldOptions : SessionOptions {
   int min_episode_steps = 1;
 };
 
-/// Sets the shares of pedestrians and cyclists that were given; a share that was not gives way to one that was. Throws
-/// UsageError where both were given and are more than 1.
-void set_population(const WorldOptions& options, SimulatorConfig* config_inout);
+/// Sets what was given of a simulator's options; a share of pedestrians or cyclists that was not gives way to one that
+/// was. Throws UsageError where both were given and are more than 1.
+void apply_world_options(const WorldOptions& options, SimulatorConfig* config_inout);
 
 /// Whether a policy is the name of a controller that needs no checkpoint.
 bool is_host_controller(const std::string& policy);

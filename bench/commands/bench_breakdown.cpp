@@ -202,7 +202,11 @@ void run_breakdown(const BreakdownArguments& arguments) {
   ProgressLine progress;
   progress.update("driving");
   std::optional<DrivenWorlds> worlds;
-  if (arguments.checked_views > 0) worlds = drive_worlds({.maps = maps, .agents = 60, .seed = first.run.seed});
+  if (arguments.checked_views > 0) {
+    DrivenOptions driven{.maps = maps, .agents = 60};
+    driven.simulator.seed = first.run.seed;
+    worlds = drive_worlds(driven);
+  }
 
   BenchContext context;
   std::vector<BenchResult> results;

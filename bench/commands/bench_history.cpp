@@ -35,12 +35,7 @@ void run_history(HistoryArguments arguments) {
   measured.rig = paper_rig(pixels.first, pixels.second);
   measured.repeats = arguments.rate.repeats;
   measured.repeat_s = arguments.rate.repeat_s;
-  measured.simulator.seed = world.seed;
-  measured.simulator.num_threads = world.num_threads;
-  measured.simulator.walls = world.walls;
-  measured.simulator.pedestrian_fraction = *world.pedestrian_fraction;
-  measured.simulator.cyclist_fraction = *world.cyclist_fraction;
-  measured.simulator.parked_cars = *world.parked_cars;
+  apply_world_options(world, &measured.simulator);
   measured.simulator.vector_observations = false;
   const std::vector<std::string> names = named_maps(arguments.maps);
   std::vector<std::shared_ptr<const RoadMap>> maps;

@@ -160,15 +160,12 @@ void run_render(RenderArguments arguments) {
   ProgressLine progress;
   progress.update("driving");
   const WorldOptions& world = arguments.world;
-  const DrivenWorlds worlds =
-      drive_worlds({.maps = arguments.maps,
-                    .num_views = *std::max_element(arguments.egos.begin(), arguments.egos.end()),
-                    .agents = world.agents,
-                    .pedestrian_fraction = *world.pedestrian_fraction,
-                    .cyclist_fraction = *world.cyclist_fraction,
-                    .parked_cars = *world.parked_cars,
-                    .walls = world.walls,
-                    .seed = world.seed});
+  DrivenOptions driven{.maps = arguments.maps,
+                       .num_views = *std::max_element(arguments.egos.begin(), arguments.egos.end()),
+                       .agents = world.agents};
+  apply_world_options(world, &driven.simulator);
+  driven.simulator.num_threads = 0;  // only drawing is measured
+  const DrivenWorlds worlds = drive_worlds(driven);
   std::vector<BenchResult> results;
   std::vector<std::string> choices;  // of the last case of each renderer
   for (std::size_t i = 0; i < cases.size(); ++i) {

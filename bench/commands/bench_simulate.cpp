@@ -89,12 +89,7 @@ void measure(const SimulateArguments& arguments, const std::string& backend, con
              const SimulateCase& measured, std::vector<BenchResult>* results_out) {
   const WorldOptions& world = arguments.world;
   SimulatorConfig config;
-  config.seed = world.seed;
-  config.num_threads = world.num_threads;
-  config.walls = world.walls;
-  config.pedestrian_fraction = *world.pedestrian_fraction;
-  config.cyclist_fraction = *world.cyclist_fraction;
-  config.parked_cars = *world.parked_cars;
+  apply_world_options(world, &config);
   config.vector_observations = measured.vector_observations;
   const auto simulator = make_simulator(backend, config, maps, measured.worlds);
   StepBench bench(simulator.get(), world.seed);
