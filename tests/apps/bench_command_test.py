@@ -94,6 +94,7 @@ class Benchmarks(CommandCase):
             self.assertTrue(0 < live <= slots)
         packed = self.json_of("bench", "simulate", *self.QUICK, "--slots", 20)
         self.assertEqual(packed["results"][0]["name"], "cpu, 20 agents in worlds of 1 to 6")
+        self.assert_refused(2, "--pedestrians and --cyclists", "bench", "simulate", *self.QUICK, "--pedestrians", 0.7, "--cyclists", 0.7)
 
     def test_a_measurement_is_compared_with_an_earlier_one(self):
         earlier = self.folder / "earlier.json"

@@ -427,6 +427,8 @@ def test_a_controller_is_evaluated_without_a_policy():
         pictura.evaluate("", ["procedural:1"], controller="lane", densities=["thick"])
     with pytest.raises(pictura.UsageError, match="light_heads: expected as_mapped, visible, got 'seen'"):
         pictura.evaluate("", ["procedural:1"], controller="lane", light_heads="seen")
+    with pytest.raises(pictura.UsageError, match="samples: expected .*, got 'many'"):
+        pictura.evaluate("", ["procedural:1"], controller="lane", samples="many")
 
 
 def test_unknown_arguments_are_answered_with_the_nearest():
