@@ -64,7 +64,7 @@ struct TrainSection {
   Precision precision = Precision::bf16;
   bool reproducible = false;  // the same bits in every run on a device, see policy/precision.h
   /// Images of a rollout: kept, or redrawn from its scenes where they are read; auto: kept on the host,
-  /// and on a device where they take at most a quarter of its memory.
+  /// and on a device where they take at most two fifths of its memory.
   std::string images = "auto";
   std::string graphs = "auto";                   // CUDA graphs of a learner's work; off: call by call
   HaltedSlots halted_slots = HaltedSlots::skip;  // draw: for measuring alone, with every slot at every step

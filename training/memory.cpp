@@ -50,14 +50,14 @@ constexpr double kTransitionBytes = 5 * 4 + 3 + 4 + 6 * 8;
 constexpr double kHostBytesPerFileByte = 17, kDeviceBytesPerFileByte = 11;
 
 double kept_image_bytes(const Config& config, double agents) {
-  return agents * image_bytes(config) * (config.train.num_steps + 1);
+  return agents * image_bytes(config) * double(num_kept_images(config.train.num_steps, config.policy.decision_steps));
 }
 
 }  // namespace
 
 bool keeps_images(const Config& config, int num_agents, Device device, int64_t memory_bytes) {
   if (config.train.images != "auto") return config.train.images == "kept";
-  return device.is_host() || kept_image_bytes(config, num_agents) <= 0.25 * static_cast<double>(memory_bytes);
+  return device.is_host() || kept_image_bytes(config, num_agents) <= 0.4 * static_cast<double>(memory_bytes);
 }
 
 double estimated_bytes(const Config& config, bool keeps_images) {

@@ -7,8 +7,11 @@ namespace pictura {
 
 /// Whether rollouts of so many agents keep the images that a policy sees, rather than drawing them again: as
 /// train.images says; with auto on the host, where drawing costs more than memory, and on a device where they take at
-/// most a quarter of its `memory_bytes`.
+/// most two fifths of its `memory_bytes`.
 bool keeps_images(const Config& config, int num_agents, Device device, int64_t memory_bytes);
+
+/// Images that a rollout of num_steps keeps of an agent that is active all the time: where an action is held, none.
+constexpr int64_t num_kept_images(int64_t num_steps, int decision_steps) { return num_steps / decision_steps + 1; }
 
 /// Estimated bytes of simulator, rollout and update for all agents of a configuration: what grows with
 /// simulator.num_slots, so neither maps nor the network.

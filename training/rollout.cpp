@@ -26,18 +26,24 @@ RolloutObservations::RolloutObservations(const Config& config, Simulator* simula
                 name_of(device), renderer->name(), name_of(renderer->device()));
   const int num_slots = simulator->num_slots(), num_steps = config.train.num_steps + 1;
   arrays_ = allocate_observations(config, num_steps, num_slots, device);
+  decision_steps_ = config.policy.decision_steps;
   if (!config.reads_images()) return;
-  keeps_images_ = keeps_images(config, num_slots, device, available_bytes(device));
-  if (!keeps_images_) scenes_ = make_scene_history(device, history_size(*simulator, num_steps));
-  set_renderer(renderer);
+  if (keeps_images(config, num_slots, device, available_bytes(device)))
+    keep_images_of(renderer->config().rig);
+  else
+    scenes_ = make_scene_history(device, history_size(*simulator, num_steps));
 }
 
 void RolloutObservations::set_renderer(Renderer* renderer) {
   renderer_ = renderer;
-  if (!keeps_images_) return;
-  arrays_.images.clear();  // before there are others
-  arrays_.images =
-      allocate_images(renderer->config().rig, {arrays_.ego.size(0), arrays_.ego.size(1)}, renderer->device());
+  if (kept_images_) keep_images_of(renderer->config().rig);
+}
+
+void RolloutObservations::keep_images_of(const Rig& rig) {
+  kept_images_.reset();  // before there are others
+  const int64_t num_rows = arrays_.ego.size(0), num_slots = arrays_.ego.size(1);
+  kept_images_ = std::make_unique<KeptImages>(
+      rig, num_rows, num_slots, num_slots * num_kept_images(num_rows - 1, decision_steps_), simulator_->device());
 }
 
 void RolloutObservations::record(int64_t step, const at::Tensor& slots) {
@@ -46,11 +52,10 @@ void RolloutObservations::record(int64_t step, const at::Tensor& slots) {
   copy_arrays(input.observations, input.device, row);
   if (scenes_) {
     scenes_->put(static_cast<int>(step), input.scene, input.views, current_stream(input.device));
-  } else if (!arrays_.images.empty()) {
+  } else if (kept_images_) {
     const PhaseTimer::Scope timed(timer_, Phase::render);
     const SelectedViews selected(input.views, input.device, slots);
-    const std::vector<ImageBlock> drawn = draw_images(input.scene, selected.views(), renderer_);
-    for (size_t i = 0; i < drawn.size(); ++i) row.images[i].pixels.index_copy_(0, slots, drawn[i].pixels);
+    kept_images_->put(step, slots, draw_images(input.scene, selected.views(), renderer_));
   }
   are_complete_ = are_complete_ || step + 1 == arrays_.ego.size(0);
 }
@@ -61,6 +66,8 @@ Observation RolloutObservations::gather(const at::Tensor& rows, int patch_px) co
     SelectedViews selected(rows.size(0), scenes_->device());
     scenes_->gather(span_of<const int64_t>(rows), selected.views(), current_stream(scenes_->device()));
     result.images = draw_images(scenes_->scene(), selected.views(), renderer_, patch_px);
+  } else if (kept_images_) {
+    result.images = kept_images_->gather(rows);
   }
   return result;
 }

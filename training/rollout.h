@@ -3,13 +3,14 @@
 
 #include "pictura/common/scene_history.h"
 #include "pictura/policy/observation.h"
+#include "pictura/training/kept_images.h"
 #include "pictura/training/phase_timer.h"
 #include "pictura/training/rules/learner_executor.h"
 
 namespace pictura {
 
-/// Observations of all slots at each step. Images are kept, or drawn again from the scenes whenever they are read:
-/// those of the paper's rollout would take 163 GB, its scenes 0.25 GB.
+/// Observations of all slots at each step. Images of agents that decide are kept, or drawn again from the scenes
+/// whenever they are read: those of the paper's rollout would take 163 GB, its scenes 0.25 GB.
 class RolloutObservations {
  public:
   /// Allocates train.num_steps + 1 steps of this simulator, which must outlive it, as must the renderer and the timer
@@ -30,23 +31,30 @@ class RolloutObservations {
   Observation gather(const at::Tensor& rows, int patch_px = 0) const;
 
   /// Whether images are kept as they are seen.
-  bool keep_images() const { return keeps_images_; }
+  bool keep_images() const { return kept_images_ != nullptr; }
   /// Whether gather() draws images.
   bool draws_when_gathered() const { return scenes_ != nullptr; }
   /// Whether every step has been recorded: then gather() always works on the same memory, and so does record() where no
   /// images are kept, until generation() changes.
   bool are_complete() const { return are_complete_; }
-  /// Renderer::generation(), 0 without images.
-  uint64_t generation() const { return renderer_ ? renderer_->generation() : 0; }
+  /// How often the renderer's memory or that of kept images has moved.
+  uint64_t generation() const {
+    return (renderer_ ? renderer_->generation() : 0) + (kept_images_ ? kept_images_->generation() : 0);
+  }
 
+  /// All but images.
   const Observation& arrays() const { return arrays_; }
 
  private:
-  Observation arrays_;  // with the images that are kept
+  void keep_images_of(const Rig& rig);
+
+  Observation arrays_;  // [num_steps + 1, slots, ...], without images
   Simulator* simulator_ = nullptr;
   Renderer* renderer_ = nullptr;
   PhaseTimer* timer_ = nullptr;
-  bool keeps_images_ = false, are_complete_ = false;
+  bool are_complete_ = false;
+  int decision_steps_ = 1;
+  std::unique_ptr<KeptImages> kept_images_;
   std::unique_ptr<SceneHistory> scenes_;  // where images are drawn again
 };
 

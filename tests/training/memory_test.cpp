@@ -174,21 +174,24 @@ TEST_P(EachNetwork, TakesAboutWhatIsEstimatedOnTheWayForwardAndBack) {
   EXPECT_LT(by_estimate, 1.6 * of_transition) << of_transition << " bytes";
 }
 
-TEST(Memory, ImagesAreKeptOnADeviceWhereTheyTakeAQuarterOfItsMemory) {
+TEST(Memory, ImagesAreKeptOnADeviceWhereTheyTakeTwoFifthsOfItsMemory) {
   const auto keeps = [](const std::vector<std::string>& overrides, int64_t memory_bytes,
                         Device device = {MemorySpace::cuda}) {
     return keeps_images(load_config(PICTURA_SOURCE_DIR "/configs/paper.toml", overrides), 1000, device, memory_bytes);
   };
   // 1,000 agents, 129 steps, four images of 96x54 with three channels.
   const int64_t bytes = int64_t{1000} * 129 * 4 * 96 * 54 * 3;
-  EXPECT_TRUE(keeps({}, 4 * bytes));
-  EXPECT_FALSE(keeps({}, 4 * bytes - 4));
+  EXPECT_TRUE(keeps({}, bytes / 2 * 5));
+  EXPECT_FALSE(keeps({}, bytes / 2 * 5 - 5));
+  // Of an action that is held for four steps there is one: of steps 0, 4, ..., 128.
+  EXPECT_TRUE(keeps({"policy.decision_steps=4"}, bytes / 129 * 33 / 2 * 5));
+  EXPECT_FALSE(keeps({"policy.decision_steps=4"}, bytes / 129 * 33 / 2 * 5 - 5));
   EXPECT_TRUE(keeps({}, 1, Device{}));
   EXPECT_TRUE(keeps({"train.images=kept"}, 1));
   EXPECT_FALSE(keeps({"train.images=redrawn"}, 100 * bytes));
   // The largest that the run will draw count.
-  EXPECT_FALSE(keeps({"render.schedule=[[1000, 192, 108]]"}, 4 * bytes));
-  EXPECT_TRUE(keeps({"render.schedule=[[1000, 192, 108]]"}, 16 * bytes));
+  EXPECT_FALSE(keeps({"render.schedule=[[1000, 192, 108]]"}, 9 * bytes));
+  EXPECT_TRUE(keeps({"render.schedule=[[1000, 192, 108]]"}, 10 * bytes));
 }
 
 TEST(Memory, MapsTakeLessThanIsEstimatedAndNotMuchLess) {

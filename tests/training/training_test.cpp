@@ -282,7 +282,10 @@ TEST_F(Training, WhatARolloutKeepsIsWhatTheActiveAgentsSaw) {
                                                                              "train.num_steps=3", "train.images=kept"}),
                redrawn = load_config(
                    PICTURA_SOURCE_DIR "/configs/smoke.toml",
-                   {"run.num_threads=1", "render.backend=cpu", "train.num_steps=3", "train.images=redrawn"});
+                   {"run.num_threads=1", "render.backend=cpu", "train.num_steps=3", "train.images=redrawn"}),
+               held = load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml",
+                                  {"run.num_threads=1", "render.backend=cpu", "train.num_steps=3", "train.images=kept",
+                                   "policy.decision_steps=3"});
   const std::unique_ptr<Simulator> simulator =
       make_simulator("cpu", simulator_config(kept), {load_map("procedural")}, draw_worlds(1, 24, 8, 8, 1));
   const Rig rig = rig_of(kept);
@@ -290,7 +293,10 @@ TEST_F(Training, WhatARolloutKeepsIsWhatTheActiveAgentsSaw) {
   upload_maps(*simulator, renderer.get());
   const std::unique_ptr<LearnerExecutor> executor = make_learner_executor(Device{});
   RolloutObservations all[] = {{kept, simulator.get(), renderer.get(), nullptr},
-                               {redrawn, simulator.get(), renderer.get(), nullptr}};
+                               {redrawn, simulator.get(), renderer.get(), nullptr},
+                               // It has room for a decision in three steps, and is given one at every step.
+                               {held, simulator.get(), renderer.get(), nullptr}};
+  const uint64_t generation = all[2].generation();
   simulator->reset();
   // Full throttle and full lock: some leave the road, and some do so before the others.
   std::vector<int32_t> actions(24);
@@ -317,6 +323,8 @@ TEST_F(Training, WhatARolloutKeepsIsWhatTheActiveAgentsSaw) {
   }
   ASSERT_LT(rows.back().size(0), 24) << "some have halted";
   ASSERT_GT(rows.back().size(0), 0);
+  EXPECT_EQ(all[0].generation(), generation);
+  EXPECT_GT(all[2].generation(), generation) << "its memory has moved";
   const at::Tensor in_order = at::cat(rows), mixed = at::arange(in_order.size(0) - 1, -1, -1, at::kLong);
   for (const RolloutObservations& observations : all) {
     const Observation saw = observations.gather(in_order),
