@@ -275,6 +275,7 @@ void add_evaluate_command(CLI::App& app) {
       ->excludes(policy);
   add_evaluation_options(command, &arguments->evaluation)->excludes(policy);
   add_average_option(command, &options.average)->excludes(policy);
+  add_decision_steps_option(command, &options.decision_steps)->excludes(policy);
   command
       ->add_option("--density", arguments->densities,
                    "light, medium, dense: 60, 120, 150 agents a world; with --protocol the shares of road users that "

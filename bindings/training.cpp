@@ -453,8 +453,8 @@ checkpoint: of a policy; '' with a controller of the paper's world. maps: names,
 which drives instead. densities: 'light', 'medium' and 'dense', 60, 120 and 150 agents a world, or agents_per_world of them.
 device, simulator, renderer: 'auto' or names; renderer '': as it was trained. rig, or width_px and height_px: other cameras.
 backbone: where the program of policy.backbone lies now. conditioning: numbers by name. light_cycles: 'phases' or 'independent',
-light_heads: 'as_mapped' or 'visible'; '': as it was trained. average: with the average of weights that the checkpoint holds. on_progress: called with the fraction that is done and the seconds to come, from a thread of
-its own. Returns a dict: rows, one a density: its counts, and each metric as (value, half of its 95 % interval); seconds,
+light_heads: 'as_mapped' or 'visible'; '': as it was trained. average: with the average of weights that the checkpoint holds. decision_steps: for which an
+action is held; 0: as it was trained. on_progress: called with the fraction that is done and the seconds to come, from a thread of its own. Returns a dict: rows, one a density: its counts, and each metric as (value, half of its 95 % interval); seconds,
 agent_steps, policy_hash, light_cycles. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
   def_with_options<SceneArguments>(
       &module, {"evaluate_scenes", {"checkpoint", "scenes"}},

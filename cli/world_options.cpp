@@ -6,6 +6,7 @@
 #include "pictura/cli/file_options.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/common/error.h"
+#include "pictura/configuration/policy_section.h"
 #include "pictura/map/scenario/load_scenario.h"
 
 namespace pictura {
@@ -41,6 +42,12 @@ void add_light_cycles_option(CLI::App* command, std::optional<LightCycles>* cycl
                       "alone); default: {}",
                       otherwise))
       ->check(one_of({std::begin(kLightCyclesNames), std::end(kLightCyclesNames)}));
+}
+
+CLI::Option* add_decision_steps_option(CLI::App* command, int* steps_out) {
+  return add_number_option(command, "--decision-steps", *steps_out,
+                           "Steps for which a trained policy holds each action; 0: as in training", 0,
+                           kMaxDecisionSteps);
 }
 
 void add_light_heads_option(CLI::App* command, std::optional<LightHeads>* heads_out) {
@@ -95,6 +102,7 @@ void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_
           "default there), inverse (by the actions that follow the recording) or idm (along recorded paths, "
           "behind others), or a checkpoint or safetensors that train wrote")
       ->capture_default_str();
+  add_decision_steps_option(command, &world_out->decision_steps);
   add_policy_backend_options(command, "auto, and drawn as in training", world_out);
 }
 

@@ -17,6 +17,9 @@ void add_world_options(CLI::App* command, WorldOptions* options_out);
 /// Adds --light-cycles. `otherwise` says what holds where it is not given.
 void add_light_cycles_option(CLI::App* command, std::optional<LightCycles>* cycles_out, const std::string& otherwise);
 
+/// Adds --decision-steps.
+CLI::Option* add_decision_steps_option(CLI::App* command, int* steps_out);
+
 /// Adds --light-heads, for commands whose worlds are seen by cameras.
 void add_light_heads_option(CLI::App* command, std::optional<LightHeads>* heads_out);
 

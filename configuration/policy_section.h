@@ -15,6 +15,8 @@ enum class ValueHead { linear, symlog, two_hot };
 /// Largest side of a policy's patches that a configuration may have.
 constexpr int kMaxPatch_px = 16;
 
+constexpr int kMaxDecisionSteps = 1000;
+
 struct PolicySection {
   Modality modality = Modality::perspective;
   bool auxiliary = false;  // vector: fill the slots that no camera could (the paper's Vectorized)
@@ -38,7 +40,7 @@ struct PolicySection {
   ValueHead value_head = ValueHead::linear;
   bool layer_norm = false;  // layers of groups and trunk are normalized, see docs/network.md
   bool residual = false;    // every layer of the trunk but the first adds its input
-  int decision_steps = 1;   // steps for which an action is held, see policy/decision_clock.h
+  int decision_steps = 1;   // steps for which an action is held, at most kMaxDecisionSteps, see policy/decision_clock.h
 };
 
 }  // namespace pictura

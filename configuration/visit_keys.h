@@ -80,7 +80,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.choice("policy.value_head", c.policy.value_head, kValueHeads);
   v.value("policy.layer_norm", c.policy.layer_norm);
   v.value("policy.residual", c.policy.residual);
-  v.value("policy.decision_steps", c.policy.decision_steps, 1, 1000);
+  v.value("policy.decision_steps", c.policy.decision_steps, 1, kMaxDecisionSteps);
 
   v.value(NamedKey{"train.updates", Resume::free}, c.train.updates, 1, int64_t{1} << 40);
   v.choice(NamedKey{"train.schedule", Resume::reported}, c.train.schedule, kSchedules);

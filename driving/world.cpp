@@ -86,6 +86,8 @@ DrivenWorld make_world(const WorldOptions& options, const std::string& policy) {
                policy, suggestion(policy, names));
 #endif
   }
+  if (!is_trained && options.decision_steps > 0)
+    fail_usage("--decision-steps: expected a trained policy, got --policy {}", policy);
   apply_world_options(options, &config);
   config.fixed_lights = true;
   std::vector<uint8_t> controlled;  // of a recorded scene, by other than the record

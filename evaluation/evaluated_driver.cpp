@@ -61,6 +61,8 @@ EvaluatedDriver policy_driver(PolicySession* session, Renderer* renderer, const 
 }
 
 EvaluatedDriver controller_driver(const DriverOptions& options, int steps) {
+  if (options.decision_steps > 0)
+    fail_usage("decision_steps: expected a trained policy, got the controller {}", options.controller);
   Config config = adapted(options.checkpoint.empty() ? Config() : read_policy(options.checkpoint).config, options);
   config.policy.modality = Modality::perspective;  // nobody reads vectors,
   config.render.backend = "auto";                  // and nothing is drawn

@@ -26,6 +26,10 @@ Config adapted(const Config& trained, const SessionOptions& options) {
   config.simulator.light_cycles = options.light_cycles.value_or(config.simulator.light_cycles);
   config.simulator.light_heads = options.light_heads.value_or(config.simulator.light_heads);
   if (!options.backbone.empty()) config.policy.backbone = options.backbone;
+  if (options.decision_steps < 0 || options.decision_steps > kMaxDecisionSteps) {
+    fail_usage("decision_steps: expected 0 to {}, got {}", kMaxDecisionSteps, options.decision_steps);
+  }
+  if (options.decision_steps > 0) config.policy.decision_steps = options.decision_steps;
   std::string& renderer = config.render.backend;
   if (!options.renderer.empty())
     renderer = options.renderer;

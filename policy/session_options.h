@@ -25,6 +25,7 @@ struct SessionOptions {
   std::vector<std::string> conditioning;
   bool adds_walls = false;  // its worlds have walls, also where it was trained without
   bool average = false;     // drives with the average of weights that a checkpoint holds
+  int decision_steps = 0;   // steps for which an action is held; 0: as in training (policy.decision_steps)
   // Lights of its worlds; without a value those that the policy was trained with.
   std::optional<LightCycles> light_cycles;
   std::optional<LightHeads> light_heads;
@@ -44,6 +45,7 @@ void visit_options(SessionOptions& options, Visitor&& v) {
   v.value({"backbone"}, options.backbone);
   v.conditioning({"conditioning"}, options.conditioning);
   v.value({"average"}, options.average);
+  v.value({"decision_steps"}, options.decision_steps);
 }
 
 /// Visits the options of lights, which worlds of recorded scenes do not have.

@@ -270,6 +270,19 @@ def test_the_average_of_weights_is_loaded_and_evaluated(trained):
             refuse(average, average=True)
 
 
+def test_a_policy_decides_as_often_as_asked(trained):
+    checkpoint = str(trained[1] / "checkpoint.ckpt")
+    options = {"scenarios": 1, "steps": 30, "agents_per_world": 8, "num_threads": 2, "device": "cpu", "argmax": False}
+    returns = [
+        pictura.evaluate(checkpoint, ["procedural:1"], decision_steps=steps, **options)["rows"][0]["return_per_vehicle"] for steps in (0, 1, 3)
+    ]
+    assert returns[0] == returns[1] != returns[2], "it was trained to decide at every step"
+    with pytest.raises(pictura.UsageError, match="decision_steps: expected 0 to 1000, got -1"):
+        pictura.PolicySession(checkpoint, device="cpu", decision_steps=-1)
+    with pytest.raises(pictura.UsageError, match="decision_steps: expected a trained policy, got the controller lane"):
+        pictura.evaluate("", ["procedural:1"], controller="lane", decision_steps=3)
+
+
 def test_evaluation_gives_the_commands_numbers(trained):
     command = os.environ.get("PICTURA_COMMAND")
     folder, done = trained[1], []
