@@ -5,6 +5,7 @@
 #include "pictura/bindings/objects.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/hash.h"
+#include "pictura/configuration/removed_keys.h"
 #include "pictura/version.h"
 
 PYBIND11_MODULE(_pictura, module) {
@@ -38,6 +39,15 @@ PYBIND11_MODULE(_pictura, module) {
   module.def(
       "_hash64", [](const py::bytes& bytes) { return pictura::hash_of(std::string_view(bytes)); }, py::arg("data"),
       "FNV-1a, with which files of the library end.");
+  module.def(
+      "_removed_keys",
+      [] {
+        py::list keys;
+        for (const auto& [name, value, reason] : pictura::kRemovedKeys)
+          keys.append(py::make_tuple(name, value, reason));
+        return keys;
+      },
+      "Removed keys of configurations, a tuple each: name, the one value that is still read, as JSON, and the reason.");
   pictura::python::bind_arrays(module);
   pictura::python::bind_maps(module);
   pictura::python::bind_scenarios(module);

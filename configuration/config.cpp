@@ -42,6 +42,5 @@ std::string to_toml(const Config& config) {
 
 std::string name_of(Precision precision) { return kPrecisions[static_cast<size_t>(precision)]; }
 std::string name_of(OptimizerKind kind) { return kOptimizers[static_cast<size_t>(kind)]; }
-std::string name_of(ValueHead head) { return kValueHeads[static_cast<size_t>(head)]; }
 
 }  // namespace pictura

@@ -55,6 +55,5 @@ std::string to_toml(const Config& config);
 /// Names as in a configuration.
 std::string name_of(Precision precision);
 std::string name_of(OptimizerKind kind);
-std::string name_of(ValueHead head);
 
 }  // namespace pictura

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <filesystem>
 #include <set>
+#include <sstream>
 
 #include <fmt/ranges.h>
 #include <toml++/toml.h>
@@ -13,6 +14,7 @@
 #include "pictura/common/support/toml_fields.h"
 #include "pictura/configuration/apply_config.h"
 #include "pictura/configuration/config_writer.h"
+#include "pictura/configuration/removed_keys.h"
 #include "pictura/configuration/visit_keys.h"
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/conditioning_lookup.h"
@@ -107,6 +109,16 @@ class Reader {
     int64_t updates = 0;
     value(key, updates, 1, int64_t{1} << 40);
     schedule_agent_steps = updates > kMost / agent_steps_per_update ? kMost : updates * agent_steps_per_update;
+  }
+
+  /// A key that is no more: its one value changes nothing.
+  void removed(const RemovedKey& key) {
+    const toml::node* node = find(key.name);
+    if (!node) return;
+    std::ostringstream value;
+    value << toml::json_formatter(*node);
+    if (value.str() == key.value) return;
+    refuse(key.name, fmt::format("expected {}, got {}: {}", key.value, value.str(), key.reason));
   }
 
   void texts(const std::string& key, std::vector<std::string>& value) {
@@ -437,6 +449,7 @@ Config parse(const std::string& text, const std::string& source, const std::vect
   reader.old_backend("run.backend", config.simulator.backend, config.render.backend);
   reader.old_schedule("train.schedule_updates", int64_t{config.simulator.num_slots} * config.train.num_steps,
                       config.train.schedule_agent_steps);
+  for (const RemovedKey& key : kRemovedKeys) reader.removed(key);
   reader.refuse_unknown(table);
   try {
     config.simulator.maps = expand_map_names(config.simulator.maps);

@@ -8,10 +8,6 @@ namespace pictura {
 
 enum class Modality { perspective, vector };
 
-/// What the critic's head predicts, see policy/value_head.h: values; their symlog; or how probable each of a row of
-/// values is.
-enum class ValueHead { linear, symlog, two_hot };
-
 /// Largest side of a policy's patches that a configuration may have.
 constexpr int kMaxPatch_px = 16;
 
@@ -36,8 +32,7 @@ struct PolicySection {
   std::string backbone = "conv";
   bool backbone_frozen = true;  // the program's weights stay as they are
   int backbone_layers = 4, backbone_width = 512;
-  int critic_layers = 0;  // of a trunk that the critic has for itself; 0: it shares the actor's
-  ValueHead value_head = ValueHead::linear;
+  int critic_layers = 0;    // of a trunk that the critic has for itself; 0: it shares the actor's
   bool layer_norm = false;  // layers of groups and trunk are normalized, see docs/network.md
   bool residual = false;    // every layer of the trunk but the first adds its input
   int decision_steps = 1;   // steps for which an action is held, at most kMaxDecisionSteps, see policy/decision_clock.h

@@ -21,7 +21,6 @@ inline constexpr std::array kModalities{"perspective", "vector"};
 inline constexpr std::array kPrecisions{"fp32", "tf32", "bf16"};
 inline constexpr std::array kSchedules{"constant", "linear", "cosine"};
 inline constexpr std::array kOptimizers{"adamw", "muon"};
-inline constexpr std::array kValueHeads{"linear", "symlog", "two_hot"};
 inline constexpr std::array kFilterThresholds{"maximum", "quantile"};
 inline constexpr std::array kHaltedSlots{"skip", "draw"};
 
@@ -77,7 +76,6 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.value("policy.backbone_layers", c.policy.backbone_layers, 1, 64);
   v.value("policy.backbone_width", c.policy.backbone_width, 1, 1 << 14);
   v.value("policy.critic_layers", c.policy.critic_layers, 0, 64);
-  v.choice("policy.value_head", c.policy.value_head, kValueHeads);
   v.value("policy.layer_norm", c.policy.layer_norm);
   v.value("policy.residual", c.policy.residual);
   v.value("policy.decision_steps", c.policy.decision_steps, 1, kMaxDecisionSteps);

@@ -28,8 +28,4 @@ inline RowFeatures row_features_of(const PolicySection& policy, std::string_view
 /// size.
 constexpr int kPositionFeatures = 8;
 
-/// Outputs of the critic's head: one, or those of as many bins (policy/value_head.h).
-constexpr int kValueBins = 101;
-constexpr int num_value_outputs(ValueHead head) { return head == ValueHead::two_hot ? kValueBins : 1; }
-
 }  // namespace pictura

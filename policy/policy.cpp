@@ -16,7 +16,6 @@
 #include "pictura/policy/row_features.h"
 #include "pictura/policy/rules/network_passes.h"
 #include "pictura/policy/torch_device.h"
-#include "pictura/policy/value_head.h"
 
 namespace pictura {
 
@@ -312,7 +311,6 @@ PolicyNetwork::PolicyNetwork(const PolicySection& config, int num_cameras, uint6
                              bool reads_walls, Device device, Precision precision)
     : type_(type),
       precision_(precision),
-      value_head_(config.value_head),
       waypoint_features_(row_features_of(config, "waypoints")),
       layer_norm_(config.layer_norm),
       residual_(config.residual) {
@@ -329,12 +327,9 @@ PolicyNetwork::PolicyNetwork(const PolicySection& config, int num_cameras, uint6
       "conditioning", kNumConditioning + kNumWaypoints * (kWaypointFeatures + waypoint_features_.count()), config);
   const int64_t in = scene_->width() + 2 * int64_t{config.embedding_width}, inside = config.backbone_width;
   backbone_ = make.trunk("backbone", in, config.backbone_layers, inside);
-  // A small actor head: every action is about as likely as any other at first. A critic whose values grow exponentially
-  // with its outputs begins as small, with values near 0.
-  constexpr double kSmallGain = 0.01;
-  actor_ = make.linear("actor", inside, kNumActions, kSmallGain);
-  critic_ = make.linear("critic", inside, num_value_outputs(value_head_),
-                        value_head_ == ValueHead::linear ? 1.0 : kSmallGain);
+  // A small actor head: every action is about as likely as any other at first.
+  actor_ = make.linear("actor", inside, kNumActions, 0.01);
+  critic_ = make.linear("critic", inside, 1, 1.0);
   // Drawn last, so that the actor begins as it does without.
   critic_backbone_ = make.trunk("critic_backbone", in, config.critic_layers, inside);
 }
@@ -365,8 +360,7 @@ Policy::Output PolicyNetwork::forward(const Observation& o) const {
     for_actor = run_trunk(backbone_, x);
     for_critic = critic_backbone_.empty() ? for_actor : run_trunk(critic_backbone_, x);
   }
-  const at::Tensor value_outputs = apply(critic_, for_critic.to(type_));
-  return {apply(actor_, for_actor.to(type_)), values_of(value_head_, value_outputs), value_outputs, value_head_};
+  return {apply(actor_, for_actor.to(type_)), apply(critic_, for_critic.to(type_)).squeeze(1)};
 }
 
 int64_t Policy::num_parameters() const {

@@ -52,10 +52,6 @@ class Policy {
   struct Output {
     at::Tensor logits;  // [batch, kNumActions]
     at::Tensor value;   // [batch], in units of rewards
-    /// What the critic's head gave, of which the value is made: [batch, num_value_outputs(value_head)]. A linear head's
-    /// may be undefined, since it is the value.
-    at::Tensor value_outputs = {};
-    ValueHead value_head = ValueHead::linear;
   };
   virtual Output forward(const Observation& observation) const = 0;
 
@@ -93,7 +89,6 @@ class PolicyNetwork final : public Policy {
   std::unique_ptr<SceneEncoder> scene_;
   at::ScalarType type_;
   Precision precision_;
-  ValueHead value_head_;
   int64_t ego_features_;  // the image branch comes without the auxiliary slots
   RowFeatures waypoint_features_;
 

@@ -178,7 +178,7 @@ LayerSum layers_of(const Config& config, const Rig& rig, Device device) {
     for (int i = 0; i < layers; ++i) sum.add(1, i == 0 ? in : inside, inside, policy.layer_norm ? 3 : 2);
   }
   sum.add(1, inside, kNumActions, 3);
-  sum.add(1, inside, num_value_outputs(policy.value_head), policy.value_head == ValueHead::two_hot ? 3 : 1);
+  sum.add(1, inside, 1, 1);
   return sum;
 }
 

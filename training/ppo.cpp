@@ -14,7 +14,6 @@
 #include "pictura/common/error.h"
 #include "pictura/policy/precision.h"
 #include "pictura/policy/torch_device.h"
-#include "pictura/policy/value_head.h"
 #include "pictura/training/rules/advantage_filter.h"
 
 namespace pictura {
@@ -26,16 +25,6 @@ at::Tensor log_probs_of(const at::Tensor& all_log_probs, const Targets& targets,
   // A sum of which all but one are 0: the gradient of gather() waits for the host where algorithms are deterministic.
   const at::Tensor actions = targets.actions.index_select(0, rows).unsqueeze(1);
   return all_log_probs.masked_fill(at::arange(all_log_probs.size(1), actions.options()) != actions, 0).sum(1);
-}
-
-// Value loss of each row.
-at::Tensor value_losses(const Policy::Output& output, const at::Tensor& returns) {
-  switch (output.value_head) {
-    case ValueHead::linear: return 0.5 * (output.value - returns).square();
-    case ValueHead::symlog: return 0.5 * (output.value_outputs.squeeze(1) - symlog(returns)).square();
-    case ValueHead::two_hot: return -(two_hot(returns) * at::log_softmax(output.value_outputs, 1)).sum(1);
-  }
-  fail("losses: unknown value head");
 }
 
 }  // namespace
@@ -52,7 +41,7 @@ Losses ppo_losses(const Policy::Output& output, const Targets& targets, const Mi
   const at::Tensor clipped = ratio.clamp(1 - config.clip_coef, 1 + config.clip_coef);
   Losses losses;
   losses.policy = -mean(at::minimum(chunk.advantages * ratio, chunk.advantages * clipped));
-  losses.value = mean(value_losses(output, targets.returns.index_select(0, chunk.rows)));
+  losses.value = mean(0.5 * (output.value - targets.returns.index_select(0, chunk.rows)).square());
   losses.entropy = -mean((all_log_probs.exp() * all_log_probs).sum(1));
   at::Tensor teacher_kl = at::zeros({}, losses.entropy.options()), imitation;
   if (targets.teacher_log_probs.defined()) {

@@ -183,9 +183,6 @@ void Run::begin_with(const SavedPolicy& other) {
       !config.reads_images() || !other.config.reads_images() || other.rig.cameras.size() == rig.cameras.size(),
       "{}: its policy sees through {} cameras, expected {}, as {} has", other.path, other.rig.cameras.size(),
       rig.cameras.size(), config.render.rig.empty() ? "the paper's rig" : config.render.rig);
-  PICTURA_CHECK(other.config.policy.value_head == config.policy.value_head,
-                "{}: policy.value_head: its policy has \"{}\", expected \"{}\"", other.path,
-                name_of(other.config.policy.value_head), name_of(config.policy.value_head));
   // Settings that add no parameters would go unseen, and shapes of parameters would not say why they differ.
   for (const auto& [key, got, expected] :
        {std::tuple{"policy.segment_features", other.config.policy.segment_features, config.policy.segment_features},

@@ -936,6 +936,10 @@ def _hash64(data: bytes) -> int:
     """
     FNV-1a, with which files of the library end.
     """
+def _removed_keys() -> list:
+    """
+    Removed keys of configurations, a tuple each: name, the one value that is still read, as JSON, and the reason.
+    """
 def draw_worlds(seed: typing.SupportsInt | typing.SupportsIndex, num_slots: typing.SupportsInt | typing.SupportsIndex, min_agents: typing.SupportsInt | typing.SupportsIndex, max_agents: typing.SupportsInt | typing.SupportsIndex, num_maps: typing.SupportsInt | typing.SupportsIndex) -> list[tuple[int, int, int]]:
     """
     Worlds of sizes drawn from U{min, max} until they fill the slots; maps are taken in turn.

@@ -21,15 +21,13 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 import pictura
-from pictura._pictura import _hash64
+from pictura._pictura import _hash64, _removed_keys
 
 _SCALE_POSITION_M, _SCALE_HALF_LENGTH_M = 120.0, 5.0  # of x and y in observations, and of half lengths of segments
 _NUM_ACTIONS = 12
 # The entity sets, as the columns of set_counts: numbers of a row and points that it begins with.
 _SETS = {"partners": (8, 1), "lanes": (7, 1), "boundaries": (7, 1), "controls": (7, 2), "walls": (7, 1)}
 _SEGMENTS = {"lanes", "boundaries", "walls"}  # the sets of them
-_VALUE_OUTPUTS = {"linear": 1, "symlog": 1, "two_hot": 101}  # of the critic, by policy.value_head
-_LARGEST_BIN_SYMLOG = 6.0
 _MAGIC = b"PICTCKPT"
 _PREAMBLE = "<8sIIQ"
 
@@ -68,18 +66,12 @@ def _normalize(x: Tensor) -> Tensor:
     return functional.layer_norm(x, x.shape[-1:])
 
 
-def _symexp(x: Tensor) -> Tensor:
-    return x.sign() * x.abs().expm1()
-
-
-def _values(head: str, outputs: Tensor) -> Tensor:
-    """Values [batch] in units of rewards, of the critic's outputs [batch, outputs]."""
-    if head == "two_hot":
-        largest = _LARGEST_BIN_SYMLOG
-        bins = _symexp(torch.linspace(-largest, largest, outputs.shape[1], dtype=outputs.dtype, device=outputs.device))
-        return (outputs.softmax(1) * bins).sum(1)
-    values = outputs.squeeze(1)
-    return _symexp(values) if head == "symlog" else values
+def _refuse_removed(config: Mapping[str, Any]) -> None:
+    """Raises pictura.UsageError where the `policy` table holds a key that is no more with another value than its one."""
+    for key, value, reason in _removed_keys():
+        name = key.removeprefix("policy.")
+        if name in config and json.dumps(config[name]) != value:
+            raise pictura.UsageError(f"{key}: expected {value}, got {json.dumps(config[name])}: {reason}")
 
 
 def _as_tensors(array: Any, device: torch.device) -> Any:
@@ -153,6 +145,7 @@ class Policy(nn.Module):
         super().__init__()
         if config.get("backbone", "conv") != "conv":
             raise pictura.UsageError(f"policy.backbone: expected 'conv', got '{config['backbone']}', which is a program of its own")
+        _refuse_removed(config)
         self.config = dict(config)
         self.metadata: dict[str, Any] = {}
         self.modality = config["modality"]
@@ -191,10 +184,7 @@ class Policy(nn.Module):
             nn.ModuleList(nn.Linear(around + 2 * width if i == 0 else inside, inside) for i in range(n))
             for n in (layers, config.get("critic_layers", 0))
         )
-        self.value_head = config.get("value_head", "linear")
-        if self.value_head not in _VALUE_OUTPUTS:
-            raise pictura.UsageError(f"policy.value_head: expected one of {', '.join(_VALUE_OUTPUTS)}, got '{self.value_head}'")
-        self.actor, self.critic = nn.Linear(inside, _NUM_ACTIONS), nn.Linear(inside, _VALUE_OUTPUTS[self.value_head])
+        self.actor, self.critic = nn.Linear(inside, _NUM_ACTIONS), nn.Linear(inside, 1)
 
     def forward(self, observation: Mapping[str, Any]) -> tuple[Tensor, Tensor]:
         observation = self._read(observation)
@@ -207,7 +197,7 @@ class Policy(nn.Module):
         x = torch.cat([around, self.ego(ego), self.conditioning(torch.cat(own, 1))], 1)
         for_actor = self._trunk(self.backbone, x)
         for_critic = self._trunk(self.critic_backbone, x) if len(self.critic_backbone) > 0 else for_actor
-        return self.actor(for_actor), _values(self.value_head, self.critic(for_critic))
+        return self.actor(for_actor), self.critic(for_critic).squeeze(1)
 
     def act(self, observation: Mapping[str, Any], argmax: bool = True) -> Tensor:
         """Actions int32 [batch], which pictura.Simulator.step takes; without gradients."""

@@ -254,6 +254,15 @@ TEST(Config, KeysWithoutEffectAreRefused) {
   EXPECT_EQ(to_toml(parse_config(to_toml(c), "b.toml")), to_toml(c));
 }
 
+TEST(Config, RemovedKeysAreReadWithTheirOneValueAlone) {
+  const std::string kept = "[policy]\nvalue_head = 'linear'\n";
+  EXPECT_EQ(to_toml(parse_config(kept, "a.toml")), to_toml(Config{}));
+  EXPECT_EQ(to_toml(parse_saved_config(kept, "a.ckpt")), to_toml(Config{}));
+  EXPECT_EQ(error_in("[policy]\nvalue_head = 'two_hot'\n"),
+            "a.toml:2: policy.value_head: expected \"linear\", got \"two_hot\": other heads were removed: "
+            "docs/research/experiments.md");
+}
+
 TEST(Config, BackendsAreCheckedWhereTheyAreRead) {
   const std::string text = "[run]\ndevice = \"cuda:1\"\n[simulator]\nbackend = \"cpu\"\n[render]\nbackend = \"null\"\n";
   const Config c = parse_config(text, "a.toml");

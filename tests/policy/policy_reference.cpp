@@ -74,11 +74,6 @@ int main(int argc, char** argv) try {
     pictura::write_reference(argv[1], "perspective" + suffix, config);
   }
   config.policy.modality = Modality::vector;
-  for (const pictura::ValueHead head : {pictura::ValueHead::symlog, pictura::ValueHead::two_hot}) {
-    config.policy.value_head = head;
-    pictura::write_reference(argv[1], pictura::name_of(head), config);
-  }
-  config.policy.value_head = pictura::ValueHead::linear;
   config.policy.segment_features = true;
   pictura::write_reference(argv[1], "segments", config);
   config.policy.segment_features = false;

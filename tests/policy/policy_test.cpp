@@ -114,14 +114,6 @@ TEST_P(BothModalities, GradientsEqualDifferenceQuotients) {
   expect_gradients(PolicyNetwork(tiny_section(GetParam()), 3, 5, at::kDouble), observation(GetParam(), 2));
 }
 
-TEST(Policy, GradientsOfValuesOfOtherHeadsEqualDifferenceQuotients) {
-  PolicySection section = tiny_section(Modality::vector);
-  for (const ValueHead head : {ValueHead::symlog, ValueHead::two_hot}) {
-    section.value_head = head;
-    expect_gradients(PolicyNetwork(section, 3, 5, at::kDouble), observation(Modality::vector, 2));
-  }
-}
-
 TEST(Policy, GradientsOfFeaturesOfSegmentsEqualDifferenceQuotients) {
   PolicySection section = tiny_section(Modality::vector);
   section.segment_features = section.goal_features = true;

@@ -14,11 +14,11 @@ import pytest
 import pictura
 
 torch = pytest.importorskip("torch")
-from pictura.torch import _read_safetensors, load_policy, save_policy  # noqa: E402
+from pictura.torch import Policy, _read_safetensors, load_policy, save_policy  # noqa: E402
 
-MODELS = sorted((pathlib.Path(__file__).parents[2] / "models").glob("*.safetensors"))
+MODELS = sorted((pathlib.Path(__file__).parents[2] / "models").rglob("*.safetensors"))
 NAMES = (
-    "vector", "vector_points", "perspective", "perspective_points", "patches", "symlog", "two_hot", "normalized", "segments",
+    "vector", "vector_points", "perspective", "perspective_points", "patches", "normalized", "segments",
     "goals",
 )  # fmt: skip
 
@@ -65,6 +65,16 @@ def test_released_weights_are_read_and_written(path, tmp_path):
     assert all(value.dtype == torch.float32 for value in policy.state_dict().values())
     save_policy(policy, tmp_path / "again.safetensors", like=path)
     assert (tmp_path / "again.safetensors").read_bytes() == path.read_bytes()
+
+
+def test_removed_keys_are_read_with_their_one_value_alone(reference):
+    policy = load_policy(reference / "vector.safetensors")
+    for name, kept, other, message in (
+        ("value_head", "linear", "two_hot", 'policy.value_head: expected "linear", got "two_hot": other heads were removed'),
+    ):
+        Policy(policy.config | {name: kept}).load_state_dict(policy.state_dict())
+        with pytest.raises(pictura.UsageError, match=message):
+            Policy(policy.config | {name: other})
 
 
 def test_broken_files_are_named(reference, tmp_path):

@@ -132,19 +132,16 @@ TEST_P(EachModality, TheFirstUpdateIsTheHosts) {
   expect_same_first_update(folder_ / "host", folder_ / "device", 1e-6, 2e-2);
 }
 
-TEST_P(EachModality, OtherCriticsAndAQuantileFilterLearnAsOnTheHost) {
-  for (const std::string head : {"symlog", "two_hot"}) {
-    SCOPED_TRACE(head);
-    std::vector<std::string> more = one_update();
-    more.insert(more.end(), {"policy.value_head=" + head, "train.adv_filter=quantile"});
-    train(options("host_" + head, "cpu", more));
-    train(options("device_" + head, "cuda", more));
-    expect_same_first_update(folder_ / ("host_" + head), folder_ / ("device_" + head), 1e-6, 2e-2);
-    more.insert(more.end(), {"train.reproducible=true", "train.precision=bf16"});
-    const auto [whole, again, resumed] = test::policies_of_equal_runs(folder_ / head, "cuda", more);
-    EXPECT_EQ(again, whole);
-    EXPECT_EQ(resumed, whole);
-  }
+TEST_P(EachModality, AQuantileFilterLearnsAsOnTheHost) {
+  std::vector<std::string> more = one_update();
+  more.push_back("train.adv_filter=quantile");
+  train(options("host", "cpu", more));
+  train(options("device", "cuda", more));
+  expect_same_first_update(folder_ / "host", folder_ / "device", 1e-6, 2e-2);
+  more.insert(more.end(), {"train.reproducible=true", "train.precision=bf16"});
+  const auto [whole, again, resumed] = test::policies_of_equal_runs(folder_ / "bf16", "cuda", more);
+  EXPECT_EQ(again, whole);
+  EXPECT_EQ(resumed, whole);
 }
 
 TEST_F(DeviceTraining, SegmentsAndGoalsAreReadAsOnTheHost) {

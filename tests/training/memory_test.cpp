@@ -86,7 +86,6 @@ INSTANTIATE_TEST_SUITE_P(
     Memory, EachNetwork,
     ::testing::Values(
         std::vector<std::string>{"policy.modality=vector"},
-        std::vector<std::string>{"policy.modality=vector", "policy.value_head=two_hot"},
         std::vector<std::string>{"policy.modality=vector", "policy.point_features=false", "policy.embedding_width=200"},
         std::vector<std::string>{"policy.modality=vector", "policy.segment_features=true", "policy.goal_features=true",
                                  "simulator.wall_observations=true"},

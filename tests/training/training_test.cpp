@@ -661,11 +661,6 @@ TEST_F(Training, BeginsWithTheWeightsOfAnotherRunAtAnyImageSize) {
   TrainOptions wider = options("wider", {"policy.backbone_width=64"});
   wider.init_from = first;
   EXPECT_THAT(message_of([&] { train(wider); }), AllOf(HasSubstr(first), HasSubstr("another architecture")));
-  // A critic of the same shape that predicts something else.
-  TrainOptions pressed = options("pressed", {"policy.value_head=symlog"});
-  pressed.init_from = first;
-  EXPECT_THAT(message_of([&] { train(pressed); }),
-              AllOf(HasSubstr(first), HasSubstr("policy.value_head: its policy has \"linear\", expected \"symlog\"")));
   TrainOptions normalized = options("normalized", {"policy.layer_norm=true"});
   normalized.init_from = first;
   EXPECT_THAT(message_of([&] { train(normalized); }),
@@ -721,6 +716,13 @@ TEST_F(Training, APolicyThatReadsSegmentsAndGoalsGoesOnExactlyAndIsEvaluatedAsSa
   const SavedPolicy saved = read_policy(folder_ / "runs/whole/policy.safetensors");
   EXPECT_TRUE(saved.config.policy.segment_features && saved.config.policy.goal_features);
   EXPECT_GT(evaluate(test::one_scenario(folder_ / "runs/whole/policy.safetensors", 10)).agent_steps, 0);
+}
+
+TEST_F(Training, AQuantileFilterGoesOnExactly) {
+  const auto [whole, again, resumed] =
+      test::policies_of_equal_runs(folder_ / "runs", "cpu", {"policy.modality=vector", "train.adv_filter=quantile"});
+  EXPECT_EQ(whole, again);
+  EXPECT_EQ(whole, resumed);
 }
 
 TEST_F(Training, VectorPolicyTrainsAndIsEvaluated) {
