@@ -11,6 +11,7 @@ struct RemovedKey {
 };
 
 inline constexpr std::array kRemovedKeys{
+    RemovedKey{"policy.critic_layers", "0", "trunks of the critic's own were removed: docs/research/experiments.md"},
     RemovedKey{"policy.value_head", "\"linear\"", "other heads were removed: docs/research/experiments.md"},
 };
 

@@ -69,13 +69,6 @@ class ParameterMaker {
     return {linear(name + ".hidden", in, width, std::numbers::sqrt2), linear(name + ".out", width, width, 1.0),
             config.layer_norm};
   }
-  std::vector<PolicyNetwork::Linear> trunk(const std::string& name, int64_t in, int num_layers, int64_t width) {
-    std::vector<PolicyNetwork::Linear> layers;
-    for (int i = 0; i < num_layers; ++i) {
-      layers.push_back(linear(fmt::format("{}.{}", name, i), i == 0 ? in : width, width, std::numbers::sqrt2));
-    }
-    return layers;
-  }
 
  private:
   uint64_t seed_;
@@ -326,19 +319,19 @@ PolicyNetwork::PolicyNetwork(const PolicySection& config, int num_cameras, uint6
   conditioning_ = make.group(
       "conditioning", kNumConditioning + kNumWaypoints * (kWaypointFeatures + waypoint_features_.count()), config);
   const int64_t in = scene_->width() + 2 * int64_t{config.embedding_width}, inside = config.backbone_width;
-  backbone_ = make.trunk("backbone", in, config.backbone_layers, inside);
+  for (int i = 0; i < config.backbone_layers; ++i) {
+    backbone_.push_back(make.linear(fmt::format("backbone.{}", i), i == 0 ? in : inside, inside, std::numbers::sqrt2));
+  }
   // A small actor head: every action is about as likely as any other at first.
   actor_ = make.linear("actor", inside, kNumActions, 0.01);
   critic_ = make.linear("critic", inside, 1, 1.0);
-  // Drawn last, so that the actor begins as it does without.
-  critic_backbone_ = make.trunk("critic_backbone", in, config.critic_layers, inside);
 }
 
-at::Tensor PolicyNetwork::run_trunk(const std::vector<Linear>& layers, at::Tensor x) const {
-  for (size_t i = 0; i < layers.size(); ++i) {
+at::Tensor PolicyNetwork::run_trunk(at::Tensor x) const {
+  for (size_t i = 0; i < backbone_.size(); ++i) {
     // The first layer's input is of another width, and made of what encoders give.
     const bool is_first = i == 0;
-    const at::Tensor y = apply_gelu(layers[i], layer_norm_ && !is_first ? normalize(x) : x);
+    const at::Tensor y = apply_gelu(backbone_[i], layer_norm_ && !is_first ? normalize(x) : x);
     x = residual_ && !is_first ? x + y : y;
   }
   return layer_norm_ ? normalize(x) : x;
@@ -351,16 +344,14 @@ Policy::Output PolicyNetwork::forward(const Observation& o) const {
                                o.waypoints.scalar_type())
                       .flatten(1));
   }
-  at::Tensor for_actor, for_critic;
+  at::Tensor x;
   {
     const LayerPrecision precision(precision_, o.ego.device().type());
-    const at::Tensor x = at::cat(
+    x = run_trunk(at::cat(
         {scene_->forward(o), encode(ego_, o.ego.narrow(1, 0, ego_features_)), encode(conditioning_, at::cat(own, 1))},
-        1);
-    for_actor = run_trunk(backbone_, x);
-    for_critic = critic_backbone_.empty() ? for_actor : run_trunk(critic_backbone_, x);
+        1));
   }
-  return {apply(actor_, for_actor.to(type_)), apply(critic_, for_critic.to(type_)).squeeze(1)};
+  return {apply(actor_, x.to(type_)), apply(critic_, x.to(type_)).squeeze(1)};
 }
 
 int64_t Policy::num_parameters() const {

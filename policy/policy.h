@@ -99,11 +99,11 @@ class PolicyNetwork final : public Policy {
     Linear hidden, out;
     bool layer_norm = false;
   };
-  at::Tensor run_trunk(const std::vector<Linear>& layers, at::Tensor x) const;
+  at::Tensor run_trunk(at::Tensor x) const;
 
   GroupEncoder ego_, conditioning_;
-  bool layer_norm_, residual_;                      // of trunks
-  std::vector<Linear> backbone_, critic_backbone_;  // the latter empty where the critic reads what the actor does
+  bool layer_norm_, residual_;  // of the trunk
+  std::vector<Linear> backbone_;
   Linear actor_, critic_;
 
   friend class ParameterMaker;

@@ -174,8 +174,8 @@ LayerSum layers_of(const Config& config, const Rig& rig, Device device) {
   sum.add_group(1, kNumConditioning + kNumWaypoints * waypoint, width, policy.layer_norm);
   const double in = (sets + 2) * width, inside = policy.backbone_width;
   sum.add_values(in, 1);
-  for (const int layers : {policy.backbone_layers, policy.critic_layers}) {
-    for (int i = 0; i < layers; ++i) sum.add(1, i == 0 ? in : inside, inside, policy.layer_norm ? 3 : 2);
+  for (int i = 0; i < policy.backbone_layers; ++i) {
+    sum.add(1, i == 0 ? in : inside, inside, policy.layer_norm ? 3 : 2);
   }
   sum.add(1, inside, kNumActions, 3);
   sum.add(1, inside, 1, 1);

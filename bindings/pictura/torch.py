@@ -180,10 +180,7 @@ class Policy(nn.Module):
         self.ego = _Encoder(ego, width, self.layer_norm)
         self.conditioning = _Encoder(17 + 3 * (3 + 6 * self.points), width, self.layer_norm)
         layers, inside = config["backbone_layers"], config["backbone_width"]
-        self.backbone, self.critic_backbone = (
-            nn.ModuleList(nn.Linear(around + 2 * width if i == 0 else inside, inside) for i in range(n))
-            for n in (layers, config.get("critic_layers", 0))
-        )
+        self.backbone = nn.ModuleList(nn.Linear(around + 2 * width if i == 0 else inside, inside) for i in range(layers))
         self.actor, self.critic = nn.Linear(inside, _NUM_ACTIONS), nn.Linear(inside, 1)
 
     def forward(self, observation: Mapping[str, Any]) -> tuple[Tensor, Tensor]:
@@ -194,10 +191,8 @@ class Policy(nn.Module):
             own.append(point_features(waypoints.unflatten(1, (3, 3)), 1).flatten(1))
         around = self._images(observation["rgb"]) if self.modality == "perspective" else self._entities(observation)
         ego = observation["ego"].flatten(1)[:, : self.ego_features]
-        x = torch.cat([around, self.ego(ego), self.conditioning(torch.cat(own, 1))], 1)
-        for_actor = self._trunk(self.backbone, x)
-        for_critic = self._trunk(self.critic_backbone, x) if len(self.critic_backbone) > 0 else for_actor
-        return self.actor(for_actor), self.critic(for_critic).squeeze(1)
+        x = self._trunk(torch.cat([around, self.ego(ego), self.conditioning(torch.cat(own, 1))], 1))
+        return self.actor(x), self.critic(x).squeeze(1)
 
     def act(self, observation: Mapping[str, Any], argmax: bool = True) -> Tensor:
         """Actions int32 [batch], which pictura.Simulator.step takes; without gradients."""
@@ -220,8 +215,8 @@ class Policy(nn.Module):
             )
         return {name: _as_tensors(observation[name], self.actor.weight.device) for name in names}
 
-    def _trunk(self, layers: nn.ModuleList, x: Tensor) -> Tensor:
-        for i, layer in enumerate(layers):
+    def _trunk(self, x: Tensor) -> Tensor:
+        for i, layer in enumerate(self.backbone):
             y = functional.gelu(layer(_normalize(x) if self.layer_norm and i > 0 else x))
             x = x + y if self.residual and i > 0 else y
         return _normalize(x) if self.layer_norm else x

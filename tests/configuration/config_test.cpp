@@ -255,12 +255,14 @@ TEST(Config, KeysWithoutEffectAreRefused) {
 }
 
 TEST(Config, RemovedKeysAreReadWithTheirOneValueAlone) {
-  const std::string kept = "[policy]\nvalue_head = 'linear'\n";
+  const std::string kept = "[policy]\ncritic_layers = 0\nvalue_head = 'linear'\n";
   EXPECT_EQ(to_toml(parse_config(kept, "a.toml")), to_toml(Config{}));
   EXPECT_EQ(to_toml(parse_saved_config(kept, "a.ckpt")), to_toml(Config{}));
   EXPECT_EQ(error_in("[policy]\nvalue_head = 'two_hot'\n"),
             "a.toml:2: policy.value_head: expected \"linear\", got \"two_hot\": other heads were removed: "
             "docs/research/experiments.md");
+  EXPECT_THAT(error_in("", {"policy.critic_layers=2"}),
+              HasSubstr("--set policy.critic_layers: expected 0, got 2: trunks of the critic's own were removed"));
 }
 
 TEST(Config, BackendsAreCheckedWhereTheyAreRead) {

@@ -81,11 +81,9 @@ int main(int argc, char** argv) try {
   pictura::write_reference(argv[1], "goals", config);
   config.policy.goal_features = false;
   config.policy.layer_norm = config.policy.residual = true;
-  config.policy.critic_layers = 2;
   config.policy.modality = Modality::vector;
   pictura::write_reference(argv[1], "normalized", config);
   config.policy.layer_norm = config.policy.residual = false;
-  config.policy.critic_layers = 0;
   config.policy.modality = Modality::perspective;
   config.policy.patch_px = 4;
   config.policy.conv_channels = {24, 32};

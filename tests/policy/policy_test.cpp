@@ -153,28 +153,6 @@ TEST(Policy, HeadsReadNormalizedActivations) {
   EXPECT_LT(policy.forward(observation(Modality::vector, 3)).value.abs().max().item<double>(), 1e-9);
 }
 
-TEST_P(BothModalities, GradientsOfACriticWithATrunkOfItsOwnEqualDifferenceQuotients) {
-  PolicySection section = tiny_section(GetParam());
-  section.critic_layers = 2;
-  expect_gradients(PolicyNetwork(section, 3, 5, at::kDouble), observation(GetParam(), 2));
-}
-
-TEST_P(BothModalities, ACriticWithATrunkOfItsOwnLeavesTheActorAsItIs) {
-  PolicySection section = tiny_section(GetParam());
-  const PolicyNetwork shared(section, 3, 5, at::kDouble);
-  section.critic_layers = 1;
-  const PolicyNetwork apart(section, 3, 5, at::kDouble);
-  ASSERT_EQ(apart.parameters().size(), shared.parameters().size() + 2);
-  EXPECT_EQ(apart.parameters().end()[-2].name, "critic_backbone.0.weight");
-  // backbone 0 and 1, actor, critic, critic_backbone 0: a weight and a bias each.
-  EXPECT_EQ(apart.parameters().end()[-2].value.sizes(), apart.parameters().end()[-10].value.sizes());
-  const at::NoGradGuard no_grad;
-  const Observation seen = observation(GetParam(), 3);
-  const Policy::Output expected = shared.forward(seen), got = apart.forward(seen);
-  EXPECT_TRUE(got.logits.equal(expected.logits));
-  EXPECT_GT((got.value - expected.value).abs().min().item<double>(), 1e-6);
-}
-
 // A layer of zeros gives gelu(0) = 0, so that only its input is left.
 TEST(Policy, ResidualsPassOverLayersOfTheTrunk) {
   PolicySection section = tiny_section(Modality::vector);

@@ -89,8 +89,7 @@ INSTANTIATE_TEST_SUITE_P(
         std::vector<std::string>{"policy.modality=vector", "policy.point_features=false", "policy.embedding_width=200"},
         std::vector<std::string>{"policy.modality=vector", "policy.segment_features=true", "policy.goal_features=true",
                                  "simulator.wall_observations=true"},
-        std::vector<std::string>{"policy.modality=vector", "policy.layer_norm=true", "policy.residual=true",
-                                 "policy.critic_layers=3"},
+        std::vector<std::string>{"policy.modality=vector", "policy.layer_norm=true", "policy.residual=true"},
         std::vector<std::string>{"policy.modality=perspective"},
         std::vector<std::string>{"policy.modality=perspective", "policy.patch_px=1",
                                  "policy.conv_kernels=[5, 3, 3, 3, 3]", "policy.conv_strides=[2, 2, 2, 1, 1]"}));

@@ -152,11 +152,9 @@ TEST(Muon, ChangesNothingWhereAGradientIsNotFinite) {
   EXPECT_TRUE(muon.momentum(0).equal(momentum));
 }
 
-// The names of the parameters that AdamW steps beside Muon, where the critic has a trunk of its own.
+// The names of the parameters that AdamW steps beside Muon.
 std::vector<std::string> stepped_by_adamw(Modality modality) {
-  PolicySection section = test::tiny_section(modality);
-  section.critic_layers = 2;
-  const PolicyNetwork policy(section, 1, 3);
+  const PolicyNetwork policy(test::tiny_section(modality), 1, 3);
   std::vector<std::string> names;
   for (const NamedTensor& moment : Optimizer(policy, muon_config()).second_moments) {
     if (!moment.name.ends_with(".bias")) names.push_back(moment.name);
