@@ -14,9 +14,6 @@ struct DynamicsRules {
   /// The longitudinal acceleration ends in the step in which the speed would change its sign, and becomes 0 as the
   /// speed does. Without it the acceleration lasts, and drives the agent on in the next step.
   bool reset_at_standstill = false;
-  /// An agent at rest does not begin to drive backwards: a step that would take it below speed 0 leaves it at rest,
-  /// without acceleration. So speeds of 0 or more never fall below 0.
-  bool forbid_reversing = false;
   bool operator==(const DynamicsRules&) const = default;
 };
 

@@ -25,7 +25,6 @@ void visit_simulator_keys(AnyConfig& c, Visitor&& v) {
   v.choice(NamedKey("simulator.light_heads", Evaluation::replaced), c.light_heads, kLightHeadsNames);
   v.value(NamedKey("simulator.wall_observations"), c.wall_observations);
   v.value(NamedKey("simulator.dynamics.reset_at_standstill"), c.dynamics.reset_at_standstill);
-  v.value(NamedKey("simulator.dynamics.forbid_reversing"), c.dynamics.forbid_reversing);
 }
 
 template <typename Visitor>

@@ -60,8 +60,9 @@ std::vector<Fingerprint> fingerprints(const SimulatorSetup& setup) {
   for (const ConditioningRange& range : config.conditioning) {
     add_values(&conditioning, range.low, range.high, range.mixture);
   }
-  prints.push_back({"conditioning or dynamics (reset_at_standstill, forbid_reversing)", conditioning.value()});
-  add_unusual(config.dynamics != DynamicsRules{}, config.dynamics);
+  prints.push_back({"conditioning or dynamics (reset_at_standstill)", conditioning.value()});
+  // Two flags: the second is that of a rule of earlier versions, which is no more.
+  add_unusual(config.dynamics.reset_at_standstill, std::array{true, false});
   for (const WorldSpec& world : setup.worlds) add_values(&worlds, world.map, world.num_agents, world.global_world);
   prints.push_back({"worlds", worlds.value()});
   add("number of maps", setup.maps.size());

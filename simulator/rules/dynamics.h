@@ -59,7 +59,6 @@ PICTURA_HD inline LongitudinalMotion move_along(LongitudinalMotion from, float j
   to.speed_mps = stop_at_zero(from.speed_mps, wanted_mps, limits.min_speed_mps, limits.max_speed_mps);
   const bool changes_sign = from.speed_mps * wanted_mps < 0.0f;
   if (parameters.rules.reset_at_standstill && changes_sign) to.accel_mps2 = 0.0f;
-  if (parameters.rules.forbid_reversing && from.speed_mps >= 0.0f && to.speed_mps < 0.0f) to = {};
   return to;
 }
 

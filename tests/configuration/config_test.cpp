@@ -255,7 +255,8 @@ TEST(Config, KeysWithoutEffectAreRefused) {
 }
 
 TEST(Config, RemovedKeysAreReadWithTheirOneValueAlone) {
-  const std::string kept = "[policy]\ncritic_layers = 0\nvalue_head = 'linear'\n";
+  const std::string kept =
+      "[simulator.dynamics]\nforbid_reversing = false\n[policy]\ncritic_layers = 0\nvalue_head = 'linear'\n";
   EXPECT_EQ(to_toml(parse_config(kept, "a.toml")), to_toml(Config{}));
   EXPECT_EQ(to_toml(parse_saved_config(kept, "a.ckpt")), to_toml(Config{}));
   EXPECT_EQ(error_in("[policy]\nvalue_head = 'two_hot'\n"),
@@ -263,6 +264,9 @@ TEST(Config, RemovedKeysAreReadWithTheirOneValueAlone) {
             "docs/research/experiments.md");
   EXPECT_THAT(error_in("", {"policy.critic_layers=2"}),
               HasSubstr("--set policy.critic_layers: expected 0, got 2: trunks of the critic's own were removed"));
+  EXPECT_THAT(
+      error_in("[simulator.dynamics]\nforbid_reversing = true\n"),
+      HasSubstr("a.toml:2: simulator.dynamics.forbid_reversing: expected false, got true: the rule was removed"));
 }
 
 TEST(Config, BackendsAreCheckedWhereTheyAreRead) {
@@ -467,13 +471,12 @@ TEST(Config, LightCyclesAreReadByTheirNames) {
 }
 
 TEST(Config, StaggeringIsOfTrainingAloneAndDynamicsOfEveryWorld) {
-  const Config c = parse_config(
-      "[simulator.dynamics]\nreset_at_standstill = true\nforbid_reversing = true\n[train]\nstagger_episodes = true\n",
-      "a.toml");
+  const Config c =
+      parse_config("[simulator.dynamics]\nreset_at_standstill = true\n[train]\nstagger_episodes = true\n", "a.toml");
   const SimulatorConfig training = simulator_config(c), evaluation = evaluation_simulator_config(c, 9);
   EXPECT_TRUE(training.stagger_episodes);
   EXPECT_FALSE(evaluation.stagger_episodes);
-  EXPECT_TRUE(training.dynamics.reset_at_standstill && training.dynamics.forbid_reversing);
+  EXPECT_TRUE(training.dynamics.reset_at_standstill);
   EXPECT_EQ(evaluation.dynamics, training.dynamics);
   EXPECT_EQ(simulator_config(Config{}).dynamics, DynamicsRules{});
   Config slow;

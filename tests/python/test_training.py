@@ -162,7 +162,7 @@ def test_worlds_of_its_training_and_of_evaluations(session, town):
     assert training["episode_steps"] == 60 and evaluation["episode_steps"] == 77
     assert set(training["conditioning"]) == set(pictura.CONDITIONING_NAMES)
     assert all(isinstance(value, float) for value in evaluation["conditioning"].values()) and evaluation["fixed_lights"]
-    assert (training["light_cycles"], training["stagger_episodes"], training["forbid_reversing"]) == ("phases", False, False)
+    assert (training["light_cycles"], training["stagger_episodes"], training["reset_at_standstill"]) == ("phases", False, False)
     simulator = pictura.Simulator([town], [(0, 4)], **evaluation)
     assert len(np.unique(simulator.observations["conditioning"].numpy(), axis=0)) == 1
 

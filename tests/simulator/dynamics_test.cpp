@@ -59,14 +59,8 @@ TEST(Dynamics, StopsAtZeroBeforeItReverses) {
   EXPECT_EQ(m.speed_mps, -2.0f);
 }
 
-DynamicsParameters with_rules(bool reset_at_standstill, bool forbid_reversing) {
-  DynamicsParameters parameters;
-  parameters.rules = {reset_at_standstill, forbid_reversing};
-  return parameters;
-}
-
 TEST(Dynamics, ResetAtStandstillEndsTheAccelerationWhereTheSpeedChangesItsSign) {
-  const DynamicsParameters resets = with_rules(true, false);
+  const DynamicsParameters resets{.rules = {.reset_at_standstill = true}};
   Motion m;
   m.speed_mps = 0.1f;
   m.accel_long_mps2 = -5;
@@ -95,34 +89,12 @@ TEST(Dynamics, WithoutAChangeOfSignNothingIsReset) {
   for (int step = 0; step < 12; ++step) {
     const Controls controls = controls_of_action(step < 6 ? 10 : 4);  // never slower than 2 m/s
     a = move(a, controls, {}, kVehicle, 0.1f);
-    b = move(b, controls, with_rules(true, true), kVehicle, 0.1f);
+    b = move(b, controls, {.rules = {.reset_at_standstill = true}}, kVehicle, 0.1f);
     ASSERT_GT(a.speed_mps, 2.0f);
     EXPECT_EQ(a.speed_mps, b.speed_mps);
     EXPECT_EQ(a.accel_long_mps2, b.accel_long_mps2);
     EXPECT_EQ(a.x_m, b.x_m);
   }
-}
-
-TEST(Dynamics, ForbidReversingKeepsAgentsAtRestWithoutAcceleration) {
-  const DynamicsParameters forbids = with_rules(false, true);
-  Motion m;
-  m.speed_mps = 0.1f;
-  m.accel_long_mps2 = -5;
-  m = move(m, {}, forbids, kVehicle, 0.1f);
-  EXPECT_EQ(m.speed_mps, 0.0f);
-  EXPECT_EQ(m.accel_long_mps2, -5.0f);  // lasts, since it is not reset
-  for (int step = 0; step < 20; ++step) {
-    m = move(m, controls_of_action(1), forbids, kVehicle, 0.1f);
-    EXPECT_EQ(m.speed_mps, 0.0f);
-    EXPECT_EQ(m.accel_long_mps2, 0.0f);
-  }
-  m = move(m, {4, 0}, forbids, kVehicle, 0.1f);  // so it starts at once: 0.5 x 0.4 m/s2 x 0.1 s
-  EXPECT_FLOAT_EQ(m.speed_mps, 0.02f);
-  // An agent that reverses already may go on.
-  m = {};
-  m.speed_mps = -1;
-  m = move(m, {-4, 0}, forbids, kVehicle, 0.1f);
-  EXPECT_FLOAT_EQ(m.speed_mps, -1.02f);
 }
 
 TEST(Dynamics, RespectsLimitsAndMultipliers) {

@@ -458,7 +458,7 @@ void expect_inverse_actions_to_follow_the_record(const DynamicsRules& rules) {
 
 TEST(RecordedWorlds, InverseActionsFollowTheRecord) {
   expect_inverse_actions_to_follow_the_record({});
-  expect_inverse_actions_to_follow_the_record({.reset_at_standstill = true, .forbid_reversing = true});
+  expect_inverse_actions_to_follow_the_record({.reset_at_standstill = true});
 }
 
 /// The largest distance to its record of a bus that turns left by a quarter on an arc of that radius.

@@ -549,7 +549,6 @@ TEST(Simulator, RestoreSaysWhatDiffers) {
   EXPECT_THAT(difference({.fixed_lights = true}, make_map()), HasSubstr("fixed_lights"));
   EXPECT_THAT(difference({.stagger_episodes = true}, make_map()), HasSubstr("stagger_episodes"));
   EXPECT_THAT(difference({.dynamics = {.reset_at_standstill = true}}, make_map()), HasSubstr("reset_at_standstill"));
-  EXPECT_THAT(difference({.dynamics = {.forbid_reversing = true}}, make_map()), HasSubstr("forbid_reversing"));
   EXPECT_THAT(difference({.light_cycles = LightCycles::independent}, make_map()), HasSubstr("light_cycles"));
   SimulatorConfig config;
   config.conditioning[3].high = 2;

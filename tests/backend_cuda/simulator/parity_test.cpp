@@ -219,11 +219,11 @@ TEST_F(CudaSimulatorTest, LightsThatCycleAlone) {
   }
 }
 
-TEST_F(CudaSimulatorTest, StaggeredEpisodesAndRulesOfStandstill) {
+TEST_F(CudaSimulatorTest, StaggeredEpisodesAndResetsAtStandstill) {
   SimulatorConfig config = whole_world();
   config.episode_steps = 200;
   config.stagger_episodes = true;
-  config.dynamics = {.reset_at_standstill = true, .forbid_reversing = true};
+  config.dynamics = {.reset_at_standstill = true};
   config.reset_inactive_fraction = 2;
   expect_parity(config, {load_map("procedural:1")}, draw_worlds(5, 120, 1, 20, 1), 500);
 }

@@ -115,15 +115,13 @@ TEST(Phases, LeaveAndEnterRoadsThatEnd) {
   EXPECT_GT(left, 20);
 }
 
-TEST(Phases, StaggerEpisodesAndObeyTheRulesOfStandstill) {
+TEST(Phases, StaggerEpisodesAndResetAtStandstill) {
   SimulatorConfig config;
   config.episode_steps = 90;
   config.stagger_episodes = true;
   config.reset_inactive_fraction = 2;
-  for (const bool forbids : {false, true}) {
-    config.dynamics = {.reset_at_standstill = !forbids, .forbid_reversing = forbids};
-    expect_same(config, {load_map("procedural:1"), testing::stadium(200, 2)}, draw_worlds(5, 60, 1, 8, 2), 200, 13);
-  }
+  config.dynamics = {.reset_at_standstill = true};
+  expect_same(config, {load_map("procedural:1"), testing::stadium(200, 2)}, draw_worlds(5, 60, 1, 8, 2), 200, 13);
 }
 
 TEST(Phases, PlaceCrowdsAsOneAfterTheOtherWould) {
