@@ -402,11 +402,9 @@ void check_contradictions(const Config& c, const Reader& reader) {
   if (c.policy.auxiliary && c.policy.modality == Modality::perspective) {
     reader.refuse("policy.auxiliary", "has no effect with the modality \"perspective\": images have no such slots");
   }
-  for (const auto& [key, is_set] : {std::pair{"policy.segment_features", c.policy.segment_features},
-                                    std::pair{"policy.goal_features", c.policy.goal_features}}) {
-    if (is_set && c.policy.modality == Modality::perspective) {
-      reader.refuse(key, "has no effect with the modality \"perspective\", which reads no lists of segments");
-    }
+  if (c.policy.segment_features && c.policy.modality == Modality::perspective) {
+    reader.refuse("policy.segment_features",
+                  "has no effect with the modality \"perspective\", which reads no lists of segments");
   }
   if (c.simulator.wall_observations && c.policy.modality == Modality::perspective) {
     reader.refuse("simulator.wall_observations",

@@ -26,7 +26,6 @@ struct PolicySection {
   int embedding_width = 64;       // of every group
   bool point_features = true;     // encoders read points near the agent apart, see policy/row_features.h
   bool segment_features = false;  // vector: encoders read the agent's place beside lanes, boundaries and walls
-  bool goal_features = false;     // vector: encoders read the distance of lanes to the goal
   /// "conv": the convolutions; or the path of a program of scripts/export_backbone, relative to the configuration's
   /// folder.
   std::string backbone = "conv";

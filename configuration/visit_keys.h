@@ -72,7 +72,6 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.value("policy.embedding_width", c.policy.embedding_width, 1, 1 << 14);
   v.value("policy.point_features", c.policy.point_features);
   v.value("policy.segment_features", c.policy.segment_features);
-  v.value("policy.goal_features", c.policy.goal_features);
   v.value("policy.backbone_layers", c.policy.backbone_layers, 1, 64);
   v.value("policy.backbone_width", c.policy.backbone_width, 1, 1 << 14);
   v.value("policy.layer_norm", c.policy.layer_norm);

@@ -57,10 +57,10 @@ void patches(const uint8_t* images, int64_t views, int64_t cameras, int64_t came
              int64_t patch_px, float* out);
 
 /// The members that there are of sets, those of one set after those of the one before, each followed by its
-/// features. members: [sets, most, size.columns]; goals: [sets, size.goal_columns], null for none; counts: [sets], at
-/// most `most`; size.keeps_rows must be set, its rows are not read. out: [sum of counts, size.width()].
-void member_rows(const float* members, const float* goals, const int32_t* counts, int64_t sets, int64_t most,
-                 const RowSize& size, float* out);
+/// features. members: [sets, most, size.columns]; counts: [sets], at most `most`; size.keeps_rows must be set, its rows
+/// are not read. out: [sum of counts, size.width()].
+void member_rows(const float* members, const int32_t* counts, int64_t sets, int64_t most, const RowSize& size,
+                 float* out);
 
 /// Of each set the largest of its members in each channel, and which member that is, the first of equal ones; 0 and -1
 /// in an empty set. members: [sum of counts, channels], those of one set after those of the one before.

@@ -135,14 +135,8 @@ struct TokenSoftmax : Function<TokenSoftmax> {
   }
 };
 
-RowSize row_size(const at::Tensor& rows, const at::Tensor& goals, const RowFeatures& features, bool keeps_rows) {
-  const int64_t columns = rows.size(-1);
-  RowSize size{rows.numel() / columns, columns, features, keeps_rows};
-  if (features.of_goal) {
-    size.rows_per_goal = rows.size(-2);
-    size.goal_columns = goals.size(-1);
-  }
-  return size;
+RowSize row_size(const at::Tensor& rows, const RowFeatures& features, bool keeps_rows) {
+  return {rows.numel() / rows.size(-1), rows.size(-1), features, keeps_rows};
 }
 
 // Whether the host's own passes (host_passes.h) take it: those are fp32, which layers in bf16 are not.
@@ -334,12 +328,12 @@ struct HostConvolution : Function<HostConvolution> {
 struct HostSets : Function<HostSets> {
   /// Returns {the largest, [sets, channels]; the members that there are with their features, [all, width];
   /// which member of its set is the largest, i32 [sets, channels]}.
-  static variable_list compute(const at::Tensor& members, const at::Tensor& goals, const at::Tensor& counts,
-                               const RowFeatures& features, bool has_norm, const at::Tensor& hidden_weight,
-                               const at::Tensor& hidden_bias, const at::Tensor& weight, const at::Tensor& bias) {
+  static variable_list compute(const at::Tensor& members, const at::Tensor& counts, const RowFeatures& features,
+                               bool has_norm, const at::Tensor& hidden_weight, const at::Tensor& hidden_bias,
+                               const at::Tensor& weight, const at::Tensor& bias) {
     const int64_t sets = members.size(0), most = members.size(1), hidden = hidden_weight.size(0),
                   channels = weight.size(0);
-    const RowSize size = row_size(members, goals, features, /*keeps_rows=*/true);
+    const RowSize size = row_size(members, features, /*keeps_rows=*/true);
     const std::vector<int64_t> begins = begins_of(counts);
     const auto options = members.options().requires_grad(false);
     const at::Tensor rows = at::empty({begins.back(), size.width()}, options),
@@ -354,8 +348,7 @@ struct HostSets : Function<HostSets> {
         const auto first = begins[begin], count = begins[end] - first;
         const int32_t* const its_counts = counts.const_data_ptr<int32_t>() + begin;
         const at::Tensor some = rows.narrow(0, first, count);
-        host::member_rows(read(members, begin), features.of_goal ? read(goals, begin) : nullptr, its_counts,
-                          end - begin, most, size, write(some));
+        host::member_rows(read(members, begin), its_counts, end - begin, most, size, write(some));
         at::Tensor activations = hidden_memory.narrow(0, 0, count), embeddings = memory.narrow(0, 0, count);
         at::mm_out(activations, some, hidden_transposed);
         if (has_norm) host::bias_norm(read(activations), read(hidden_bias), count, hidden, write(activations), nullptr);
@@ -369,12 +362,10 @@ struct HostSets : Function<HostSets> {
     return {largest + bias.detach() * counts.gt(0).unsqueeze(1), rows, which};
   }
 
-  static at::Tensor forward(AutogradContext* context, const at::Tensor& members, const std::optional<at::Tensor>& goals,
-                            const at::Tensor& counts, const RowFeatures& features, bool has_norm,
-                            const at::Tensor& hidden_weight, const at::Tensor& hidden_bias, const at::Tensor& weight,
-                            const at::Tensor& bias) {
-    const variable_list made = compute(members, goals.value_or(at::Tensor()), counts, features, has_norm, hidden_weight,
-                                       hidden_bias, weight, bias);
+  static at::Tensor forward(AutogradContext* context, const at::Tensor& members, const at::Tensor& counts,
+                            const RowFeatures& features, bool has_norm, const at::Tensor& hidden_weight,
+                            const at::Tensor& hidden_bias, const at::Tensor& weight, const at::Tensor& bias) {
+    const variable_list made = compute(members, counts, features, has_norm, hidden_weight, hidden_bias, weight, bias);
     context->save_for_backward({made[1], made[2], counts, hidden_weight, hidden_bias, weight});
     context->saved_data["has_norm"] = has_norm;
     return made[0];
@@ -449,7 +440,6 @@ struct HostSets : Function<HostSets> {
             none,
             none,
             none,
-            none,
             hidden_weight_sums.sum(0),
             hidden_bias_sums.sum(0),
             weight_sums.sum(0),
@@ -480,66 +470,55 @@ bool is_bf16_on_device(const at::Tensor& x) {
 // largest somewhere.
 struct DeviceSets : Function<DeviceSets> {
   /// Sets which member is the largest, u8 [sets, channels], where `which_out` is not null.
-  static at::Tensor compute(const at::Tensor& members, const at::Tensor& goals, const at::Tensor& counts,
-                            const SetSize& size, const at::Tensor& hidden_weight, const at::Tensor& hidden_bias,
-                            const at::Tensor& weight, const at::Tensor& bias, at::Tensor* which_out) {
+  static at::Tensor compute(const at::Tensor& members, const at::Tensor& counts, const SetSize& size,
+                            const at::Tensor& hidden_weight, const at::Tensor& hidden_bias, const at::Tensor& weight,
+                            const at::Tensor& bias, at::Tensor* which_out) {
     const at::TensorOptions options = members.options().requires_grad(false);
     at::Tensor out = at::empty({size.sets(), SetSize::kChannels}, options.dtype(at::kBFloat16));
     if (which_out) *which_out = at::empty(out.sizes(), options.dtype(at::kByte));
     passes_on(members.device())
-        ->largest_embedding(size, floats_of(members), goals.defined() ? floats_of(goals) : nullptr,
-                            counts.const_data_ptr<int32_t>(),
+        ->largest_embedding(size, floats_of(members), counts.const_data_ptr<int32_t>(),
                             {floats_of(hidden_weight), floats_of(hidden_bias), floats_of(weight), floats_of(bias)},
                             out.mutable_data_ptr(), which_out ? which_out->mutable_data_ptr<uint8_t>() : nullptr,
                             stream_on(members.device()));
     return out;
   }
 
-  static at::Tensor forward(AutogradContext* context, const at::Tensor& members, const std::optional<at::Tensor>& goals,
-                            const at::Tensor& counts, const SetSize& size, const at::Tensor& hidden_weight,
-                            const at::Tensor& hidden_bias, const at::Tensor& weight, const at::Tensor& bias) {
+  static at::Tensor forward(AutogradContext* context, const at::Tensor& members, const at::Tensor& counts,
+                            const SetSize& size, const at::Tensor& hidden_weight, const at::Tensor& hidden_bias,
+                            const at::Tensor& weight, const at::Tensor& bias) {
     at::Tensor which;
-    const at::Tensor out =
-        compute(members, goals.value_or(at::Tensor()), counts, size, hidden_weight, hidden_bias, weight, bias, &which);
+    const at::Tensor out = compute(members, counts, size, hidden_weight, hidden_bias, weight, bias, &which);
     // A context keeps tensors: the size is kept as its bytes.
     const at::Tensor size_bytes = at::empty({sizeof(SetSize)}, at::kByte);
     std::memcpy(size_bytes.mutable_data_ptr(), &size, sizeof(SetSize));
-    context->save_for_backward(
-        {members, goals.value_or(at::Tensor()), which, hidden_weight, hidden_bias, weight, bias, size_bytes});
+    context->save_for_backward({members, which, hidden_weight, hidden_bias, weight, bias, size_bytes});
     return out;
   }
 
   static variable_list backward(AutogradContext* context, const variable_list& grads) {
     const variable_list saved = context->get_saved_variables();
-    const at::Tensor &members = saved[0], &goals = saved[1], &which = saved[2],
-                     grad = grads[0].to(at::kBFloat16).contiguous();
+    const at::Tensor &members = saved[0], &which = saved[1], grad = grads[0].to(at::kBFloat16).contiguous();
     SetSize size;
-    std::memcpy(&size, saved[7].const_data_ptr(), sizeof(SetSize));
+    std::memcpy(&size, saved[6].const_data_ptr(), sizeof(SetSize));
     const auto sums_of = [&](const at::Tensor& parameter) {
       std::vector<int64_t> shape{SetSize::kSums};
       shape.insert(shape.end(), parameter.sizes().begin(), parameter.sizes().end());
       return at::empty(shape, parameter.options().requires_grad(false));
     };
-    const at::Tensor &hidden_weight = saved[3], &hidden_bias = saved[4], &weight = saved[5], &bias = saved[6];
+    const at::Tensor &hidden_weight = saved[2], &hidden_bias = saved[3], &weight = saved[4], &bias = saved[5];
     const at::Tensor hidden_weight_sums = sums_of(hidden_weight), hidden_bias_sums = sums_of(hidden_bias),
                      weight_sums = sums_of(weight), bias_sums = sums_of(bias);
     passes_on(members.device())
         ->largest_embedding_backward(
-            size, floats_of(members), goals.defined() ? floats_of(goals) : nullptr,
+            size, floats_of(members),
             {floats_of(hidden_weight), floats_of(hidden_bias), floats_of(weight), floats_of(bias)},
             which.const_data_ptr<uint8_t>(), grad.const_data_ptr(),
             {hidden_weight_sums.mutable_data_ptr<float>(), hidden_bias_sums.mutable_data_ptr<float>(),
              weight_sums.mutable_data_ptr<float>(), bias_sums.mutable_data_ptr<float>()},
             stream_on(members.device()));
     const at::Tensor none;
-    return {none,
-            none,
-            none,
-            none,
-            hidden_weight_sums.sum(0),
-            hidden_bias_sums.sum(0),
-            weight_sums.sum(0),
-            bias_sums.sum(0)};
+    return {none, none, none, hidden_weight_sums.sum(0), hidden_bias_sums.sum(0), weight_sums.sum(0), bias_sums.sum(0)};
   }
 };
 
@@ -631,23 +610,20 @@ bool takes_sets(const at::Tensor& members, const RowFeatures& features, const at
          SetSize::takes(weight.size(0), hidden_weight.size(0), members.size(2) + features.count(), members.size(1));
 }
 
-at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& goals, const at::Tensor& counts,
-                             const RowFeatures& features, bool has_norm, const at::Tensor& hidden_weight,
-                             const at::Tensor& hidden_bias, const at::Tensor& weight, const at::Tensor& bias) {
-  const at::Tensor all = members.contiguous(), its_goals = features.of_goal ? goals.contiguous() : at::Tensor();
+at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& counts, const RowFeatures& features,
+                             bool has_norm, const at::Tensor& hidden_weight, const at::Tensor& hidden_bias,
+                             const at::Tensor& weight, const at::Tensor& bias) {
+  const at::Tensor all = members.contiguous();
   const bool has_way_back = keeps_gradients({hidden_weight, hidden_bias, weight, bias});
   if (members.is_cuda()) {
-    const SetSize size{row_size(members, goals, features, /*keeps_rows=*/true), members.size(1), counts.stride(0),
-                       has_norm};
-    if (has_way_back)
-      return DeviceSets::apply(all, std::optional(its_goals), counts, size, hidden_weight, hidden_bias, weight, bias);
-    return DeviceSets::compute(all, its_goals, counts, size, hidden_weight, hidden_bias, weight, bias, nullptr);
+    const SetSize size{row_size(members, features, /*keeps_rows=*/true), members.size(1), counts.stride(0), has_norm};
+    if (has_way_back) return DeviceSets::apply(all, counts, size, hidden_weight, hidden_bias, weight, bias);
+    return DeviceSets::compute(all, counts, size, hidden_weight, hidden_bias, weight, bias, nullptr);
   }
   const at::Tensor its_counts = counts.contiguous();
   if (has_way_back)
-    return HostSets::apply(all, std::optional(its_goals), its_counts, features, has_norm, hidden_weight, hidden_bias,
-                           weight, bias);
-  return HostSets::compute(all, its_goals, its_counts, features, has_norm, hidden_weight, hidden_bias, weight, bias)[0];
+    return HostSets::apply(all, its_counts, features, has_norm, hidden_weight, hidden_bias, weight, bias);
+  return HostSets::compute(all, its_counts, features, has_norm, hidden_weight, hidden_bias, weight, bias)[0];
 }
 
 at::Tensor token_softmax(const at::Tensor& scores) {
@@ -659,17 +635,14 @@ bool takes_feature_rows(const at::Tensor& rows, const RowFeatures& features) {
   return rows.is_cuda() && rows.scalar_type() == at::kFloat && rows.size(-1) + features.count() <= RowSize::kMostWidth;
 }
 
-at::Tensor feature_rows(const at::Tensor& rows, const at::Tensor& goals, const RowFeatures& features, bool keeps_rows,
-                        at::ScalarType type) {
-  const RowSize size = row_size(rows, goals, features, keeps_rows);
-  const at::Tensor its_goals = features.of_goal ? goals.contiguous() : at::Tensor();
+at::Tensor feature_rows(const at::Tensor& rows, const RowFeatures& features, bool keeps_rows, at::ScalarType type) {
+  const RowSize size = row_size(rows, features, keeps_rows);
   std::vector<int64_t> shape = rows.sizes().vec();
   shape.back() = size.width();
   at::Tensor out = at::empty(shape, rows.options().dtype(type));
   passes_on(rows.device())
-      ->row_features(size, rows.contiguous().const_data_ptr<float>(),
-                     features.of_goal ? its_goals.const_data_ptr<float>() : nullptr, activation_type_of(type),
-                     out.mutable_data_ptr(), stream_on(rows.device()));
+      ->row_features(size, rows.contiguous().const_data_ptr<float>(), activation_type_of(type), out.mutable_data_ptr(),
+                     stream_on(rows.device()));
   return out;
 }
 

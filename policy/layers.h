@@ -32,21 +32,18 @@ bool takes_sets(const at::Tensor& members, const RowFeatures& features, const at
                 const at::Tensor& weight);
 /// Largest value of each channel over the members of a set: [sets, channels], 0 for an empty set. Each member goes
 /// through a linear layer with GELU, as linear_norm_gelu() with `has_norm`, and a second linear layer. members: [sets,
-/// maximum, columns], without gradient, each followed by its features; goals: [sets, columns], undefined without
-/// features of them; counts: i32 [sets], the members of each set.
-at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& goals, const at::Tensor& counts,
-                             const RowFeatures& features, bool has_norm, const at::Tensor& hidden_weight,
-                             const at::Tensor& hidden_bias, const at::Tensor& weight, const at::Tensor& bias);
+/// maximum, columns], without gradient, each followed by its features; counts: i32 [sets], the members of each set.
+at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& counts, const RowFeatures& features,
+                             bool has_norm, const at::Tensor& hidden_weight, const at::Tensor& hidden_bias,
+                             const at::Tensor& weight, const at::Tensor& bias);
 
 /// Softmax over tokens. scores: [matrices, tokens, columns].
 at::Tensor token_softmax(const at::Tensor& scores);
 
 /// Whether feature_rows() takes such rows, [..., columns]: f32 on a CUDA device, few enough numbers a row.
 bool takes_feature_rows(const at::Tensor& rows, const RowFeatures& features);
-/// What RowSize says of rows, [..., columns], as `type`. Without gradient. goals: [goals, columns], f32, undefined
-/// without features of them.
-at::Tensor feature_rows(const at::Tensor& rows, const at::Tensor& goals, const RowFeatures& features, bool keeps_rows,
-                        at::ScalarType type);
+/// What RowSize says of rows, [..., columns], as `type`. Without gradient.
+at::Tensor feature_rows(const at::Tensor& rows, const RowFeatures& features, bool keeps_rows, at::ScalarType type);
 
 /// Patches of images, u8 [views, cameras, 3, height, width], as pixels of [cameras * views, channels, height /
 /// patch_px, width / patch_px] of `type`, rounded up with black, channels last in memory: channel (c * patch_px + y) *

@@ -19,9 +19,7 @@ inline RowFeatures row_features_of(const PolicySection& policy, std::string_view
   const bool is_segment = array == "lanes" || array == "boundaries" || array == "walls";
   return {.points = policy.point_features ? points : 0,
           .of_segment = policy.segment_features && is_segment,
-          .of_goal = policy.goal_features && array == "lanes",
-          .position_unit_m = kScalePosition_m,
-          .half_length_unit_m = kScaleHalfPiece_m};
+          .position_unit_m = kScalePosition_m};
 }
 
 /// Sines and cosines of a pixel's position in the image, so that attention knows where a token is whatever the image's

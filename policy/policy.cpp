@@ -123,14 +123,13 @@ class VectorEncoder final : public SceneEncoder {
     for (const Group& group : groups_) {
       at::Tensor members = o.*group.members;
       const at::Tensor counts = o.set_counts.select(1, group.set);
-      const at::Tensor& goals = o.waypoints;  // each begins with the active one
       const PolicyNetwork::Linear &hidden = group.encoder.hidden, &out = group.encoder.out;
       if (takes_sets(members, group.features, hidden.weight, out.weight)) {
-        embeddings.push_back(largest_embedding(members, goals, counts, group.features, group.encoder.layer_norm,
-                                               hidden.weight, hidden.bias, out.weight, out.bias));
+        embeddings.push_back(largest_embedding(members, counts, group.features, group.encoder.layer_norm, hidden.weight,
+                                               hidden.bias, out.weight, out.bias));
         continue;
       }
-      if (group.features.count() > 0) members = with_row_features(members, group.features, input_type_, goals);
+      if (group.features.count() > 0) members = with_row_features(members, group.features, input_type_);
       embeddings.push_back(masked_max(encode(group.encoder, members), counts));
     }
     return at::cat(embeddings, 1);

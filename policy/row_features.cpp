@@ -6,25 +6,23 @@ namespace pictura {
 
 namespace {
 
-// Metres [..., n] as 2 n numbers that tell them apart near and far.
-at::Tensor near_and_far(const at::Tensor& lengths_m) {
-  const at::Tensor size_m = lengths_m.abs();
-  return at::cat({lengths_m / (size_m + double{kNearPoint_m}), lengths_m / (size_m + double{kFarPoint_m})}, -1);
+// Pairs of metres [..., 2] as four numbers that tell them apart near and far.
+at::Tensor near_and_far(const at::Tensor& pairs_m) {
+  const at::Tensor size_m = pairs_m.abs();
+  return at::cat({pairs_m / (size_m + double{kNearPoint_m}), pairs_m / (size_m + double{kFarPoint_m})}, -1);
 }
 
-// Places [..., 2] in metres relative to segments: along each from its middle, and to the left of its line.
-at::Tensor beside_segments(const at::Tensor& rows, const at::Tensor& places_m, double unit_m) {
-  const at::Tensor from_middle_m = places_m - rows.narrow(-1, 0, 2) * unit_m,
-                   direction = rows.narrow(-1, SegmentColumn::kCos, 2),
+// The agent's places [..., 2] in metres relative to segments: along each from its middle, and to the left of its line.
+at::Tensor beside_segments(const at::Tensor& rows, double unit_m) {
+  const at::Tensor from_middle_m = rows.narrow(-1, 0, 2) * -unit_m, direction = rows.narrow(-1, SegmentColumn::kCos, 2),
                    to_left = at::stack({-direction.select(-1, 1), direction.select(-1, 0)}, -1);
   return at::stack({(from_middle_m * direction).sum(-1), (from_middle_m * to_left).sum(-1)}, -1);
 }
 
 }  // namespace
 
-at::Tensor row_features(const at::Tensor& rows, const RowFeatures& features, at::ScalarType type,
-                        const at::Tensor& goals) {
-  if (takes_feature_rows(rows, features)) return feature_rows(rows, goals, features, /*keeps_rows=*/false, type);
+at::Tensor row_features(const at::Tensor& rows, const RowFeatures& features, at::ScalarType type) {
+  if (takes_feature_rows(rows, features)) return feature_rows(rows, features, /*keeps_rows=*/false, type);
   const double unit_m = features.position_unit_m;
   std::vector<at::Tensor> all;
   if (features.points > 0) {
@@ -32,23 +30,13 @@ at::Tensor row_features(const at::Tensor& rows, const RowFeatures& features, at:
                      distance_m = xy_m.norm(2, -1, /*keepdim=*/true);
     all.push_back(at::cat({near_and_far(xy_m), xy_m / (distance_m + double{kPointDirection_m})}, -1).flatten(-2));
   }
-  if (features.of_segment) {
-    all.push_back(near_and_far(beside_segments(rows, at::zeros({2}, rows.options()), unit_m)));
-  }
-  if (features.of_goal) {
-    const at::Tensor goals_m = (goals.narrow(-1, 0, 2) * unit_m).unsqueeze(1),
-                     beside_m = beside_segments(rows, goals_m, unit_m),
-                     half_m = rows.select(-1, SegmentColumn::kHalfLength) * double{features.half_length_unit_m},
-                     beyond_m = (beside_m.select(-1, 0).abs() - half_m).clamp_min(0);
-    all.push_back(near_and_far(at::hypot(beyond_m, beside_m.select(-1, 1)).unsqueeze(-1)));
-  }
+  if (features.of_segment) all.push_back(near_and_far(beside_segments(rows, unit_m)));
   return at::cat(all, -1).to(type);
 }
 
-at::Tensor with_row_features(const at::Tensor& rows, const RowFeatures& features, at::ScalarType type,
-                             const at::Tensor& goals) {
-  if (takes_feature_rows(rows, features)) return feature_rows(rows, goals, features, /*keeps_rows=*/true, type);
-  return at::cat({rows.to(type), row_features(rows, features, type, goals)}, -1);
+at::Tensor with_row_features(const at::Tensor& rows, const RowFeatures& features, at::ScalarType type) {
+  if (takes_feature_rows(rows, features)) return feature_rows(rows, features, /*keeps_rows=*/true, type);
+  return at::cat({rows.to(type), row_features(rows, features, type)}, -1);
 }
 
 }  // namespace pictura

@@ -13,15 +13,11 @@ namespace pictura {
 /// columns]. In this order:
 /// - of each point x and y as p / (|p| + 4 m) and as p / (|p| + 20 m), and (x, y) over its distance plus 1 m;
 /// - of a segment the agent's place beside it, along it from its middle and to the left of its line, as p / (|p| + 4 m)
-///   and as p / (|p| + 20 m);
-/// - of a segment its distance d to a goal, between its ends and in the plane, as d / (d + 4 m) and as d / (d + 20 m).
-/// goals: [n, columns], x and y first, one for each of rows [n, members, columns]; undefined without features of them.
+///   and as p / (|p| + 20 m).
 /// On a CUDA device it is one pass (rules/network_passes.h).
-at::Tensor row_features(const at::Tensor& rows, const RowFeatures& features, at::ScalarType type,
-                        const at::Tensor& goals = {});
+at::Tensor row_features(const at::Tensor& rows, const RowFeatures& features, at::ScalarType type);
 
 /// The rows followed by these.
-at::Tensor with_row_features(const at::Tensor& rows, const RowFeatures& features, at::ScalarType type,
-                             const at::Tensor& goals = {});
+at::Tensor with_row_features(const at::Tensor& rows, const RowFeatures& features, at::ScalarType type);
 
 }  // namespace pictura

@@ -186,7 +186,6 @@ void Run::begin_with(const SavedPolicy& other) {
   // Settings that add no parameters would go unseen, and shapes of parameters would not say why they differ.
   for (const auto& [key, got, expected] :
        {std::tuple{"policy.segment_features", other.config.policy.segment_features, config.policy.segment_features},
-        std::tuple{"policy.goal_features", other.config.policy.goal_features, config.policy.goal_features},
         std::tuple{"policy.layer_norm", other.config.policy.layer_norm, config.policy.layer_norm},
         std::tuple{"policy.residual", other.config.policy.residual, config.policy.residual}}) {
     PICTURA_CHECK(got == expected, "{}: of another architecture: {}: expected {}, got {}", other.path, key, expected,

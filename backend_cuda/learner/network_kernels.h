@@ -20,13 +20,12 @@ void launch_norm(const ActivationSize& size, const void* x, const void* position
 void launch_norm_backward(const ActivationSize& size, const void* x, const void* position, int64_t period,
                           const float* weight, const void* grad_out, void* grad_x_out, float* sums_out,
                           cudaStream_t stream);
-void launch_row_features(const RowSize& size, const float* rows, const float* goals, ActivationType type, void* out,
-                         cudaStream_t stream);
+void launch_row_features(const RowSize& size, const float* rows, ActivationType type, void* out, cudaStream_t stream);
 void launch_patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, cudaStream_t stream);
-void launch_largest_embedding(const SetSize& size, const float* members, const float* goals, const int32_t* counts,
+void launch_largest_embedding(const SetSize& size, const float* members, const int32_t* counts,
                               const SetParameters<const float>& parameters, void* out, uint8_t* which_out,
                               cudaStream_t stream);
-void launch_largest_embedding_backward(const SetSize& size, const float* members, const float* goals,
+void launch_largest_embedding_backward(const SetSize& size, const float* members,
                                        const SetParameters<const float>& parameters, const uint8_t* which,
                                        const void* grad_out, const SetParameters<float>& sums_out, cudaStream_t stream);
 

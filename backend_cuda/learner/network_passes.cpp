@@ -51,10 +51,9 @@ class NetworkPassesCuda final : public NetworkPasses {
     launch(cuda::launch_norm_backward, stream, size, x, position, period, weight, grad_out, grad_x_out, sums_out);
   }
 
-  void row_features(const RowSize& size, const float* rows, const float* goals, ActivationType type, void* out,
-                    Stream stream) override {
+  void row_features(const RowSize& size, const float* rows, ActivationType type, void* out, Stream stream) override {
     PICTURA_CHECK(size.width() <= RowSize::kMostWidth, "row_features: {} numbers a row", size.width());
-    launch(cuda::launch_row_features, stream, size, rows, goals, type, out);
+    launch(cuda::launch_row_features, stream, size, rows, type, out);
   }
 
   void patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, Stream stream) override {
@@ -62,19 +61,18 @@ class NetworkPassesCuda final : public NetworkPasses {
     launch(cuda::launch_patches, stream, size, images, type, out);
   }
 
-  void largest_embedding(const SetSize& size, const float* members, const float* goals, const int32_t* counts,
+  void largest_embedding(const SetSize& size, const float* members, const int32_t* counts,
                          const SetParameters<const float>& parameters, void* out, uint8_t* which_out,
                          Stream stream) override {
     check(size);
-    launch(cuda::launch_largest_embedding, stream, size, members, goals, counts, parameters, out, which_out);
+    launch(cuda::launch_largest_embedding, stream, size, members, counts, parameters, out, which_out);
   }
 
-  void largest_embedding_backward(const SetSize& size, const float* members, const float* goals,
+  void largest_embedding_backward(const SetSize& size, const float* members,
                                   const SetParameters<const float>& parameters, const uint8_t* which,
                                   const void* grad_out, const SetParameters<float>& sums_out, Stream stream) override {
     check(size);
-    launch(cuda::launch_largest_embedding_backward, stream, size, members, goals, parameters, which, grad_out,
-           sums_out);
+    launch(cuda::launch_largest_embedding_backward, stream, size, members, parameters, which, grad_out, sums_out);
   }
 
   void token_softmax(const TokenSize& size, const void* scores, void* out, Stream stream) override {

@@ -253,14 +253,13 @@ __global__ void __launch_bounds__(kThreads)
 // A thread writes a number. A block has whole rows, so that none is divided by in 64 bits.
 template <typename T>
 __global__ void __launch_bounds__(kThreads)
-    row_features(RowSize size, int width, int rows_a_block, const float* rows, const float* goals, T* out) {
+    row_features(RowSize size, int width, int rows_a_block, const float* rows, T* out) {
   const int i = static_cast<int>(threadIdx.x), kept = static_cast<int>(size.kept());
   const int64_t row = blockIdx.x * int64_t{rows_a_block} + i / width;
   if (i >= rows_a_block * width || row >= size.rows) return;
   const float* const its_row = rows + row * size.columns;
   const int column = i % width;
-  const float* const goal = size.features.of_goal ? goals + row / size.rows_per_goal * size.goal_columns : nullptr;
-  const float value = column < kept ? its_row[column] : row_feature(size.features, its_row, goal, column - kept);
+  const float value = column < kept ? its_row[column] : row_feature(size.features, its_row, column - kept);
   out[row * width + column] = from_float<T>(value);
 }
 
@@ -487,14 +486,13 @@ void launch_norm_backward(const ActivationSize& size, const void* x, const void*
   });
 }
 
-void launch_row_features(const RowSize& size, const float* rows, const float* goals, ActivationType type, void* out,
-                         cudaStream_t stream) {
+void launch_row_features(const RowSize& size, const float* rows, ActivationType type, void* out, cudaStream_t stream) {
   if (size.rows == 0) return;
   const int width = static_cast<int>(size.width()), rows_a_block = kThreads / width;
   const auto blocks = static_cast<unsigned>((size.rows + rows_a_block - 1) / rows_a_block);
   with_type(type, [&](auto element) {
     using T = decltype(element);
-    row_features<T><<<blocks, kThreads, 0, stream>>>(size, width, rows_a_block, rows, goals, static_cast<T*>(out));
+    row_features<T><<<blocks, kThreads, 0, stream>>>(size, width, rows_a_block, rows, static_cast<T*>(out));
   });
 }
 

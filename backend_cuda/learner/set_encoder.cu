@@ -171,7 +171,7 @@ struct Inputs {
   }
   /// The members number(0), ..., number(count - 1) of a set, below them zeros.
   template <typename Number>
-  __device__ void load(const SetSize& size, const float* members, const float* goal, int count, const Number& number) {
+  __device__ void load(const SetSize& size, const float* members, int count, const Number& number) {
     const RowSize& row_size = size.members;
     const int row = lane() / 2, columns = static_cast<int>(row_size.columns),
               width = static_cast<int>(row_size.width());
@@ -179,7 +179,7 @@ struct Inputs {
     for (int column = lane() % 2; column < width; column += 2) {
       float value = 0;
       if (its_row) {
-        value = column < columns ? its_row[column] : row_feature(row_size.features, its_row, goal, column - columns);
+        value = column < columns ? its_row[column] : row_feature(row_size.features, its_row, column - columns);
       }
       rows[row][column] = __float2bfloat16(value);
     }
@@ -253,8 +253,8 @@ struct Largest {
 
 // A warp has every so many sets.
 __global__ void __launch_bounds__(kThreads)
-    largest_embedding(SetSize size, const float* members, const float* goals, const int32_t* counts,
-                      SetParameters<const float> parameters, Half* out, uint8_t* which_out) {
+    largest_embedding(SetSize size, const float* members, const int32_t* counts, SetParameters<const float> parameters,
+                      Half* out, uint8_t* which_out) {
   __shared__ HiddenLayer hidden;
   __shared__ alignas(16) Half weight[kChannels][kChannelStride];
   __shared__ float bias[kChannels];
@@ -269,10 +269,9 @@ __global__ void __launch_bounds__(kThreads)
   for (int64_t set = blockIdx.x * int64_t{kWarps} + warp(); set < size.sets(); set += gridDim.x * int64_t{kWarps}) {
     const int count = counts[set * size.counts_stride];
     const float* const its_members = members + set * size.most * size.members.columns;
-    const float* const goal = goals ? goals + set * size.members.goal_columns : nullptr;
     Largest largest;
     for (int first = 0; first < count; first += kTile) {
-      inputs.load(size, its_members, goal, count - first, [first](int row) { return first + row; });
+      inputs.load(size, its_members, count - first, [first](int row) { return first + row; });
       float inverse_deviations[2];
       Sums activations = hidden.apply(inputs, size.has_norm, inverse_deviations), embeddings;
       activations.each([](int, int, int, float& v) { v = gelu(v); });
@@ -369,9 +368,8 @@ __device__ void store(const Sums& sums, Half* rows) {
 // A warp has a set, of which it computes the chosen members, a tile at a time; then each warp of the block adds its
 // quarter of the rows of both weights' gradients, of all warps' tiles.
 __global__ void __launch_bounds__(kThreads)
-    largest_embedding_backward(SetSize size, const float* members, const float* goals,
-                               SetParameters<const float> parameters, const uint8_t* which, const Half* grad_out,
-                               SetParameters<float> sums_out) {
+    largest_embedding_backward(SetSize size, const float* members, SetParameters<const float> parameters,
+                               const uint8_t* which, const Half* grad_out, SetParameters<float> sums_out) {
   __shared__ HiddenLayer hidden;
   __shared__ alignas(16) Half weight[kChannels][kChannelStride];  // [hidden, out]
   __shared__ BackwardTile tiles[kWarps];
@@ -407,8 +405,7 @@ __global__ void __launch_bounds__(kThreads)
     for (int t = 0; t < most_tiles; ++t) {
       const int first = t * kTile;
       if (first < count) {
-        tile.inputs.load(size, members + set * size.most * size.members.columns,
-                         goals ? goals + set * size.members.goal_columns : nullptr, count - first,
+        tile.inputs.load(size, members + set * size.most * size.members.columns, count - first,
                          [&](int row) { return tile.chosen.members[first + row]; });
         tile.scatter(first, places, its_grads);
         float inverse_deviations[2];
@@ -481,22 +478,22 @@ __global__ void __launch_bounds__(kThreads)
 
 }  // namespace
 
-void launch_largest_embedding(const SetSize& size, const float* members, const float* goals, const int32_t* counts,
+void launch_largest_embedding(const SetSize& size, const float* members, const int32_t* counts,
                               const SetParameters<const float>& parameters, void* out, uint8_t* which_out,
                               cudaStream_t stream) {
   if (size.sets() == 0) return;
   // A block loads the weights once, so there are no more blocks than work at once.
   constexpr int64_t kMostBlocks = 132 * 4;
   const int64_t blocks = std::min((size.sets() + kWarps - 1) / kWarps, kMostBlocks);
-  largest_embedding<<<static_cast<unsigned>(blocks), kThreads, 0, stream>>>(size, members, goals, counts, parameters,
+  largest_embedding<<<static_cast<unsigned>(blocks), kThreads, 0, stream>>>(size, members, counts, parameters,
                                                                             static_cast<Half*>(out), which_out);
 }
 
-void launch_largest_embedding_backward(const SetSize& size, const float* members, const float* goals,
+void launch_largest_embedding_backward(const SetSize& size, const float* members,
                                        const SetParameters<const float>& parameters, const uint8_t* which,
                                        const void* grad_out, const SetParameters<float>& sums_out,
                                        cudaStream_t stream) {
-  largest_embedding_backward<<<SetSize::kSums, kThreads, 0, stream>>>(size, members, goals, parameters, which,
+  largest_embedding_backward<<<SetSize::kSums, kThreads, 0, stream>>>(size, members, parameters, which,
                                                                       static_cast<const Half*>(grad_out), sums_out);
 }
 

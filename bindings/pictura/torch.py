@@ -23,7 +23,7 @@ from torch.nn import functional
 import pictura
 from pictura._pictura import _hash64, _removed_keys
 
-_SCALE_POSITION_M, _SCALE_HALF_LENGTH_M = 120.0, 5.0  # of x and y in observations, and of half lengths of segments
+_SCALE_POSITION_M = 120.0  # of x and y in observations
 _NUM_ACTIONS = 12
 # The entity sets, as the columns of set_counts: numbers of a row and points that it begins with.
 _SETS = {"partners": (8, 1), "lanes": (7, 1), "boundaries": (7, 1), "controls": (7, 2), "walls": (7, 1)}
@@ -32,16 +32,9 @@ _MAGIC = b"PICTCKPT"
 _PREAMBLE = "<8sIIQ"
 
 
-def _near_and_far(lengths_m: Tensor) -> Tensor:
-    size_m = lengths_m.abs()
-    return torch.cat([lengths_m / (size_m + 4.0), lengths_m / (size_m + 20.0)], -1)
-
-
-def _beside_segments(rows: Tensor, places: Tensor) -> tuple[Tensor, Tensor]:
-    """Metres of places [..., 2] along the segments of rows [..., 7] from their middles, and to the left of their lines."""
-    x_m, y_m = ((places - rows[..., :2]) * _SCALE_POSITION_M).unbind(-1)
-    cos, sin = rows[..., 4:6].unbind(-1)
-    return x_m * cos + y_m * sin, cos * y_m - sin * x_m
+def _near_and_far(pairs_m: Tensor) -> Tensor:
+    size_m = pairs_m.abs()
+    return torch.cat([pairs_m / (size_m + 4.0), pairs_m / (size_m + 20.0)], -1)
 
 
 def point_features(rows: Tensor, points: int) -> Tensor:
@@ -52,14 +45,9 @@ def point_features(rows: Tensor, points: int) -> Tensor:
 
 def segment_features(rows: Tensor) -> Tensor:
     """Features [..., 4] of the agent's place beside the segments of rows [..., 7]: along them and to their left."""
-    return _near_and_far(torch.stack(_beside_segments(rows, torch.zeros_like(rows[..., :2])), -1))
-
-
-def goal_features(rows: Tensor, goals: Tensor) -> Tensor:
-    """Features [batch, n, 2] of the distances from the segments of rows [batch, n, 7] to goals [batch, 2]."""
-    along_m, left_m = _beside_segments(rows, goals.unsqueeze(1))
-    beyond_m = (along_m.abs() - rows[..., 3] * _SCALE_HALF_LENGTH_M).clamp_min(0)
-    return _near_and_far(torch.hypot(beyond_m, left_m).unsqueeze(-1))
+    x_m, y_m = (rows[..., :2] * -_SCALE_POSITION_M).unbind(-1)  # of the agent from the middle
+    cos, sin = rows[..., 4:6].unbind(-1)
+    return _near_and_far(torch.stack([x_m * cos + y_m * sin, cos * y_m - sin * x_m], -1))
 
 
 def _normalize(x: Tensor) -> Tensor:
@@ -149,9 +137,7 @@ class Policy(nn.Module):
         self.config = dict(config)
         self.metadata: dict[str, Any] = {}
         self.modality = config["modality"]
-        self.points, self.segments, self.goals = (
-            bool(config.get(f"{of}_features", False)) for of in ("point", "segment", "goal")
-        )
+        self.points, self.segments = bool(config.get("point_features", False)), bool(config.get("segment_features", False))
         self.layer_norm, self.residual = bool(config.get("layer_norm", False)), bool(config.get("residual", False))
         width = config["embedding_width"]
         self.num_cameras = num_cameras
@@ -171,7 +157,7 @@ class Policy(nn.Module):
             self.sets = [name for name in _SETS if name != "walls" or walls]
             for name in self.sets:
                 features, points = _SETS[name]
-                features += 6 * points * self.points + 4 * (self.segments and name in _SEGMENTS) + 2 * (self.goals and name == "lanes")
+                features += 6 * points * self.points + 4 * (self.segments and name in _SEGMENTS)
                 self.add_module(name, _Encoder(features, width, self.layer_norm))
             around, ego = len(self.sets) * width, 9
         else:
@@ -231,8 +217,6 @@ class Policy(nn.Module):
                 parts.append(point_features(rows, _SETS[name][1]))
             if self.segments and name in _SEGMENTS:
                 parts.append(segment_features(rows))
-            if self.goals and name == "lanes":
-                parts.append(goal_features(rows, observation["waypoints"].flatten(1)[:, :2]))
             members = torch.cat(parts, 2)
             column = list(_SETS).index(name)
             there = torch.arange(members.shape[1], device=members.device) < counts[:, column : column + 1]

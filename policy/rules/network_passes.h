@@ -34,29 +34,24 @@ struct PatchSize {
 
 /// Where a segment's row (docs/observation.md) holds what features are made of, after the x and y of its middle.
 struct SegmentColumn {
-  static constexpr int kHalfLength = 3, kCos = 4, kSin = 5;  // the latter of its direction
+  static constexpr int kCos = 4, kSin = 5;  // of its direction
 };
 
 /// Features that are read of a row beside its numbers (see policy/row_features.h): those of each of the `points`
-/// pairs (x, y) that the row begins with; where the row is a segment, those of the agent's place beside it, and those
-/// of its distance to a goal.
+/// pairs (x, y) that the row begins with, and where the row is a segment, those of the agent's place beside it.
 struct RowFeatures {
   int points = 0;
-  bool of_segment = false, of_goal = false;
-  float position_unit_m = 1, half_length_unit_m = 1;  // of x and y, goals' too, and of half lengths
-  static constexpr int kOfPoint = 6, kOfSegment = 4, kOfGoal = 2;
-  PICTURA_HD constexpr int count() const {
-    return points * kOfPoint + (of_segment ? kOfSegment : 0) + (of_goal ? kOfGoal : 0);
-  }
+  bool of_segment = false;
+  float position_unit_m = 1;  // of x and y
+  static constexpr int kOfPoint = 6, kOfSegment = 4;
+  PICTURA_HD constexpr int count() const { return points * kOfPoint + (of_segment ? kOfSegment : 0); }
 };
 
-/// Rows of f32 without gaps that become their features, each behind the row itself where keeps_rows says so. With
-/// features.of_goal every rows_per_goal of them share a goal, of goal_columns numbers, x and y first.
+/// Rows of f32 without gaps that become their features, each behind the row itself where keeps_rows says so.
 struct RowSize {
   int64_t rows = 0, columns = 0;
   RowFeatures features;
   bool keeps_rows = false;
-  int64_t rows_per_goal = 1, goal_columns = 0;
   PICTURA_HD int64_t kept() const { return keeps_rows ? columns : 0; }
   PICTURA_HD int64_t width() const { return kept() + features.count(); }
   static constexpr int64_t kMostWidth = 256;
@@ -65,41 +60,27 @@ struct RowSize {
 /// What is added to what lengths are divided by (see policy/row_features.h).
 constexpr float kNearPoint_m = 4.0f, kFarPoint_m = 20.0f, kPointDirection_m = 1.0f;
 
-/// A length, or a coordinate, between -1 and 1.
-PICTURA_HD inline float bounded_length(float length_m, float added_m) { return length_m / (fabsf(length_m) + added_m); }
-
 /// A feature of a point in metres. The first four are of x and y alone.
 PICTURA_HD inline float point_feature(Vec2 point_m, int feature) {
   const float its_m = feature % 2 == 0 ? point_m.x : point_m.y;
   if (feature >= 4) return its_m / (length(point_m) + kPointDirection_m);
-  return bounded_length(its_m, feature < 2 ? kNearPoint_m : kFarPoint_m);
+  return its_m / (fabsf(its_m) + (feature < 2 ? kNearPoint_m : kFarPoint_m));
 }
 
-/// A place relative to the segment of a row, in metres: x along the segment from its middle, y to the left of its line.
-PICTURA_HD inline Vec2 beside_segment(const RowFeatures& features, const float* row, Vec2 place_m) {
-  const Vec2 from_middle_m = place_m - Vec2{row[0], row[1]} * features.position_unit_m,
+/// The agent's place relative to the segment of a row, in metres: x along the segment from its middle, y to the left of
+/// its line.
+PICTURA_HD inline Vec2 beside_segment(const RowFeatures& features, const float* row) {
+  const Vec2 from_middle_m = Vec2{} - Vec2{row[0], row[1]} * features.position_unit_m,
              direction{row[SegmentColumn::kCos], row[SegmentColumn::kSin]};
   return {dot(from_middle_m, direction), cross(direction, from_middle_m)};
 }
 
-/// The distance of a place from the segment of a row, between its ends.
-PICTURA_HD inline float segment_distance_m(const RowFeatures& features, const float* row, Vec2 place_m) {
-  const Vec2 beside_m = beside_segment(features, row, place_m);
-  const float half_length_m = row[SegmentColumn::kHalfLength] * features.half_length_unit_m;
-  return length(Vec2{max_of(fabsf(beside_m.x) - half_length_m, 0.0f), beside_m.y});
-}
-
-/// One of the features of a row. `goal` is read with features.of_goal alone.
-PICTURA_HD inline float row_feature(const RowFeatures& features, const float* row, const float* goal, int feature) {
-  const auto place_m = [&features](const float* xy) { return Vec2{xy[0], xy[1]} * features.position_unit_m; };
-  const int end_of_points = features.points * RowFeatures::kOfPoint;
-  if (feature < end_of_points) {
-    return point_feature(place_m(row + 2 * (feature / RowFeatures::kOfPoint)), feature % RowFeatures::kOfPoint);
-  }
-  const int end_of_segment = end_of_points + (features.of_segment ? RowFeatures::kOfSegment : 0);
-  if (feature < end_of_segment) return point_feature(beside_segment(features, row, Vec2{}), feature - end_of_points);
-  return bounded_length(segment_distance_m(features, row, place_m(goal)),
-                        feature == end_of_segment ? kNearPoint_m : kFarPoint_m);
+/// One of the features of a row.
+PICTURA_HD inline float row_feature(const RowFeatures& features, const float* row, int feature) {
+  const int of_points = features.points * RowFeatures::kOfPoint;
+  if (feature >= of_points) return point_feature(beside_segment(features, row), feature - of_points);
+  const float* const xy = row + 2 * (feature / RowFeatures::kOfPoint);
+  return point_feature(Vec2{xy[0], xy[1]} * features.position_unit_m, feature % RowFeatures::kOfPoint);
 }
 
 /// Sets of members, each read by a linear layer, GELU, and a second linear layer, both of kChannels outputs. With
@@ -174,21 +155,19 @@ class NetworkPasses {
     return std::clamp<int64_t>((8448 + period - 1) / period, 1, std::max<int64_t>(1, rows / period));
   }
 
-  /// out: [rows, width()], at most kMostWidth wide. goals: [rows / rows_per_goal, goal_columns], null for none.
-  virtual void row_features(const RowSize& size, const float* rows, const float* goals, ActivationType type, void* out,
-                            Stream stream) = 0;
+  /// out: [rows, width()], at most kMostWidth wide.
+  virtual void row_features(const RowSize& size, const float* rows, ActivationType type, void* out, Stream stream) = 0;
 
   virtual void patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, Stream stream) = 0;
 
   /// The largest value of each channel over the members of each set, bf16 [sets, kChannels], 0 for an empty set, and
   /// which member has it, [sets, kChannels], the first of equal ones, kNoMember in an empty set; null where it is not
-  /// asked for. members: f32; goals: as row_features() has them; counts: as size.counts_stride says. Products are in
-  /// bf16.
-  virtual void largest_embedding(const SetSize& size, const float* members, const float* goals, const int32_t* counts,
+  /// asked for. members: f32; counts: as size.counts_stride says. Products are in bf16.
+  virtual void largest_embedding(const SetSize& size, const float* members, const int32_t* counts,
                                  const SetParameters<const float>& parameters, void* out, uint8_t* which_out,
                                  Stream stream) = 0;
   /// The gradients of the parameters as partial sums [kSums, ...], from that of `out`, bf16.
-  virtual void largest_embedding_backward(const SetSize& size, const float* members, const float* goals,
+  virtual void largest_embedding_backward(const SetSize& size, const float* members,
                                           const SetParameters<const float>& parameters, const uint8_t* which,
                                           const void* grad_out, const SetParameters<float>& sums_out,
                                           Stream stream) = 0;

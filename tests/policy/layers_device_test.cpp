@@ -149,26 +149,19 @@ TEST_P(DeviceLayers, Norm) {
 }
 
 TEST_P(DeviceLayers, LargestEmbedding) {
-  const int64_t sets = 300, goal_columns = 9;
-  const RowFeatures all{.points = 1,
-                        .of_segment = true,
-                        .of_goal = true,
-                        .position_unit_m = kScalePosition_m,
-                        .half_length_unit_m = kScaleHalfPiece_m};
+  const int64_t sets = 300;
   for (const RowFeatures& features :
-       {RowFeatures{}, RowFeatures{.points = 1, .position_unit_m = kScalePosition_m}, all}) {
+       {RowFeatures{}, RowFeatures{.points = 1, .position_unit_m = kScalePosition_m},
+        RowFeatures{.points = 1, .of_segment = true, .position_unit_m = kScalePosition_m}}) {
     for (const int64_t most : {1, 10, 80}) {
       for (const bool has_norm : {false, true}) {
         const at::Tensor members = numbers({sets, most, 7}, 1).to(at::kFloat),
-                         goals = features.of_goal ? numbers({sets, goal_columns}, 2).to(at::kFloat) : at::Tensor(),
                          // Empty sets and full ones; what lies beyond a column of counts is not read.
             counts = at::arange(sets, at::kInt).remainder(most + 1).unsqueeze(1).repeat({1, 2}).select(1, 0);
         const int64_t width = 7 + features.count();
         const std::vector<at::Tensor> parameters{numbers({64, width}, 1), numbers({64}, 2), 0.3 * numbers({64, 64}, 3),
                                                  numbers({64}, 4)};
-        const auto on = [](const at::Tensor& t, const at::Tensor& where) {
-          return t.defined() ? t.to(where.device()) : at::Tensor();
-        };
+        const auto on = [](const at::Tensor& t, const at::Tensor& where) { return t.to(where.device()); };
         // Doubles rounded as the device holds them, with the gradient of what they were: of members that are nearly
         // equal, rounding decides which one the gradient reaches.
         const auto rounded = [&](const at::Tensor& x) { return x.detach().to(activations()).to(at::kDouble); };
@@ -178,11 +171,10 @@ TEST_P(DeviceLayers, LargestEmbedding) {
         const Layer plain = [&](const auto& in) {
           const bool is_double = in[0].scalar_type() == at::kDouble;
           const at::ScalarType type = is_double ? at::kDouble : activations();
-          const at::Tensor its_members = on(members, in[0]), its_goals = on(goals, in[0]);
+          const at::Tensor its_members = on(members, in[0]);
           const at::Tensor rows =
               features.count() > 0
-                  ? with_row_features(its_members.to(is_double ? at::kDouble : at::kFloat), features, type,
-                                      its_goals.defined() && is_double ? its_goals.to(at::kDouble) : its_goals)
+                  ? with_row_features(its_members.to(is_double ? at::kDouble : at::kFloat), features, type)
                   : its_members.to(type);
           at::Tensor before = at::linear(as_held(rows), in[0]);
           // The product's gradient is rounded too, not the bias's: sums over sets cancel to a hundredth of their terms.
@@ -196,8 +188,7 @@ TEST_P(DeviceLayers, LargestEmbedding) {
           const at::Tensor its_members = on(members, in[0]), its_counts = on(counts, in[0]);
           EXPECT_EQ(takes_sets(its_members, features, in[0], in[2]), GetParam() == Precision::bf16);
           if (GetParam() != Precision::bf16) return plain(in);
-          return largest_embedding(its_members, on(goals, in[0]), its_counts, features, has_norm, in[0], in[1], in[2],
-                                   in[3]);
+          return largest_embedding(its_members, its_counts, features, has_norm, in[0], in[1], in[2], in[3]);
         };
         // ATen rounds the embeddings as well, and so prefers other members.
         expect_as_on_the_host(layer, plain, parameters, 0, GetParam() == Precision::bf16 ? 0 : 2);
@@ -221,7 +212,7 @@ TEST_P(DeviceLayers, LargestEmbeddingGivesWayToNoNumberThatIsNone) {
   at::Tensor members = at::zeros({1, 40, 2}, options);
   members[0][20][0] = std::numeric_limits<float>::quiet_NaN();
   const auto largest = [&](int count) {
-    return largest_embedding(members, {}, at::full({1}, count, options.dtype(at::kInt)), {}, /*has_norm=*/false,
+    return largest_embedding(members, at::full({1}, count, options.dtype(at::kInt)), {}, /*has_norm=*/false,
                              at::ones({64, 2}, options), at::zeros({64}, options), at::ones({64, 64}, options),
                              at::zeros({64}, options))
         .to(at::kCPU, at::kFloat);
@@ -243,29 +234,21 @@ TEST_P(DeviceLayers, RowFeatures) {
   struct Case {
     int64_t columns;
     int points;
-    bool of_segment, of_goal;
+    bool of_segment;
   };
-  for (const Case& c :
-       {Case{7, 1, false, false}, Case{4, 2, false, false}, Case{2, 1, false, false}, Case{40, 20, false, false},
-        Case{7, 0, true, false}, Case{7, 0, false, true}, Case{7, 1, true, true}}) {
-    const RowFeatures features{.points = c.points,
-                               .of_segment = c.of_segment,
-                               .of_goal = c.of_goal,
-                               .position_unit_m = kScalePosition_m,
-                               .half_length_unit_m = kScaleHalfPiece_m};
+  for (const Case& c : {Case{7, 1, false}, Case{4, 2, false}, Case{2, 1, false}, Case{40, 20, false}, Case{7, 0, true},
+                        Case{7, 1, true}}) {
+    const RowFeatures features{.points = c.points, .of_segment = c.of_segment, .position_unit_m = kScalePosition_m};
     const at::Tensor rows = numbers({31, 17, c.columns}, 1).to(at::kFloat), on_device = rows.to(at::kCUDA);
-    const at::Tensor goals = numbers({31, 9}, 2).to(at::kFloat),
-                     device_goals = c.of_goal ? goals.to(at::kCUDA) : at::Tensor();
-    const at::Tensor expected = with_row_features(rows.to(at::kDouble), features, at::kDouble, goals.to(at::kDouble));
+    const at::Tensor expected = with_row_features(rows.to(at::kDouble), features, at::kDouble);
     ASSERT_TRUE(takes_feature_rows(on_device, features));
-    const at::Tensor got = with_row_features(on_device, features, activations(), device_goals);
+    const at::Tensor got = with_row_features(on_device, features, activations());
     ASSERT_EQ(got.sizes(), expected.sizes());
     EXPECT_EQ(got.scalar_type(), activations());
     EXPECT_TRUE(got.narrow(-1, 0, c.columns).to(at::kCPU, at::kFloat).equal(rows)) << "bf16 holds these";
     const double error = (got.to(at::kCPU, at::kDouble) - expected).abs().max().item<double>();
     EXPECT_LE(error, activations() == at::kBFloat16 ? 1.0 / 500 : 1e-5) << c.columns << " " << c.points;
-    EXPECT_TRUE(got.narrow(-1, c.columns, features.count())
-                    .equal(row_features(on_device, features, activations(), device_goals)));
+    EXPECT_TRUE(got.narrow(-1, c.columns, features.count()).equal(row_features(on_device, features, activations())));
   }
 }
 

@@ -88,34 +88,14 @@ TEST(RowFeatures, OfASegmentAreTheOffsetAlongItAndTheDistanceToItsLineAtTwoScale
   }
 }
 
-TEST(RowFeatures, OfAGoalAreItsDistanceFromTheSegmentBetweenItsEndsAtTwoScales) {
-  const at::Tensor rows = at::stack({
-      at::stack({segment_row(20, 0, 5, 0), segment_row(20, 3.5, 5, 0)}),             // two lanes, the goal on the first
-      at::stack({segment_row(0, 10, 2, kPi / 2), segment_row(30, 30, 5, kPi / 4)}),  // before one, beyond the other
-  });
-  const at::Tensor goals = at::tensor({23.0, 0.0, /*z*/ 9.0, 0.0, 4.0, 9.0}, at::kDouble).view({2, 3}) / 120;
-  const double distance_m[]{0, 3.5, 4,
-                            std::hypot(std::hypot(30, 26) * std::cos(std::atan2(26, 30) - kPi / 4) - 5,
-                                       std::hypot(30, 26) * std::sin(std::atan2(26, 30) - kPi / 4))};
-  const at::Tensor features = row_features(
-      rows, {.of_goal = true, .position_unit_m = kUnit_m, .half_length_unit_m = kScaleHalfPiece_m}, at::kDouble, goals);
-  ASSERT_EQ(features.sizes().vec(), (std::vector<int64_t>{2, 2, RowFeatures::kOfGoal}));
-  for (int64_t i = 0; i < 4; ++i) {
-    const double d = distance_m[i];
-    EXPECT_NEAR(features[i / 2][i % 2][0].item<double>(), d / (d + 4), 1e-6) << i;
-    EXPECT_NEAR(features[i / 2][i % 2][1].item<double>(), d / (d + 20), 1e-6) << i;
-  }
-}
-
 TEST(RowFeatures, FollowTheRowAndEachOther) {
-  const at::Tensor row = segment_row(6, 1.75, 5, 0.3).view({1, 1, 7}), goal = at::full({1, 2}, 0.1, at::kDouble);
+  const at::Tensor row = segment_row(6, 1.75, 5, 0.3).view({1, 1, 7});
   const RowFeatures points{.points = 1, .position_unit_m = kUnit_m},
-      segment{.of_segment = true, .position_unit_m = kUnit_m}, goals{.of_goal = true, .position_unit_m = kUnit_m},
-      all{.points = 1, .of_segment = true, .of_goal = true, .position_unit_m = kUnit_m};
-  EXPECT_EQ(all.count(), points.count() + segment.count() + goals.count());
-  const at::Tensor parts[]{row, row_features(row, points, at::kDouble), row_features(row, segment, at::kDouble),
-                           row_features(row, goals, at::kDouble, goal)};
-  EXPECT_TRUE(with_row_features(row, all, at::kDouble, goal).equal(at::cat(parts, 2)));
+      segment{.of_segment = true, .position_unit_m = kUnit_m},
+      both{.points = 1, .of_segment = true, .position_unit_m = kUnit_m};
+  EXPECT_EQ(both.count(), points.count() + segment.count());
+  const at::Tensor parts[]{row, row_features(row, points, at::kDouble), row_features(row, segment, at::kDouble)};
+  EXPECT_TRUE(with_row_features(row, both, at::kDouble).equal(at::cat(parts, 2)));
 }
 
 TEST(ConvolveGelu, ReadsNothingFromChannelsBeyondThoseOfItsWeight) {
@@ -206,30 +186,23 @@ TEST(HostLayers, ConvolveGeluIsAtens) {
 
 TEST(HostLayers, LargestEmbeddingIsTheMaximumOverTheMembersThatThereAre) {
   const int64_t sets = 40, most = 23;
-  const at::Tensor members = float_numbers({sets, most, 7}, 0.1), goals = float_numbers({sets, 9}, 0.7),
+  const at::Tensor members = float_numbers({sets, most, 7}, 0.1),
                    counts = at::arange(sets, at::kInt).remainder(most + 1);
   for (const RowFeatures& features : {RowFeatures{}, RowFeatures{.points = 1, .position_unit_m = kUnit_m},
                                       RowFeatures{.points = 2, .position_unit_m = kUnit_m},
                                       RowFeatures{.of_segment = true, .position_unit_m = kUnit_m},
-                                      RowFeatures{.of_goal = true, .half_length_unit_m = 0.5f},
-                                      RowFeatures{.points = 1,
-                                                  .of_segment = true,
-                                                  .of_goal = true,
-                                                  .position_unit_m = kUnit_m,
-                                                  .half_length_unit_m = kScaleHalfPiece_m}}) {
-    const at::Tensor floats = members.to(at::kFloat),
-                     float_goals = features.of_goal ? goals.to(at::kFloat) : at::Tensor();
+                                      RowFeatures{.points = 1, .of_segment = true, .position_unit_m = kUnit_m}}) {
+    const at::Tensor floats = members.to(at::kFloat);
     const at::Tensor hidden_weight = float_numbers({16, 7 + features.count()}, 1), weight = float_numbers({24, 16}, 3);
     ASSERT_TRUE(takes_sets(floats, features, hidden_weight, weight));
     for (const bool has_norm : {false, true}) {
       const auto plain = [&](const std::vector<at::Tensor>& in) {
-        const at::Tensor rows =
-            features.count() > 0 ? with_row_features(members, features, at::kDouble, goals) : members;
+        const at::Tensor rows = features.count() > 0 ? with_row_features(members, features, at::kDouble) : members;
         const at::Tensor hidden = at::linear(rows, in[0], in[1]);
         return masked_max(at::linear(at::gelu(has_norm ? at::layer_norm(hidden, {16}) : hidden), in[2], in[3]), counts);
       };
       const auto layer = [&](const std::vector<at::Tensor>& in) {
-        return largest_embedding(floats, float_goals, counts, features, has_norm, in[0], in[1], in[2], in[3]);
+        return largest_embedding(floats, counts, features, has_norm, in[0], in[1], in[2], in[3]);
       };
       expect_as_in_double(layer, plain, {hidden_weight, float_numbers({16}, 2), weight, float_numbers({24}, 4)});
     }
@@ -241,7 +214,7 @@ TEST(HostLayers, LargestEmbeddingGivesWayToNoNumberThatIsNone) {
   members[0][1][0] = std::numeric_limits<float>::quiet_NaN();
   const at::Tensor one = at::ones({1, 2});
   const auto largest = [&](int count) {
-    return largest_embedding(members, {}, at::full({1}, count, at::kInt), {}, /*has_norm=*/false, one, at::zeros({1}),
+    return largest_embedding(members, at::full({1}, count, at::kInt), {}, /*has_norm=*/false, one, at::zeros({1}),
                              at::ones({1, 1}), at::zeros({1}))
         .item<float>();
   };

@@ -77,9 +77,6 @@ int main(int argc, char** argv) try {
   config.policy.segment_features = true;
   pictura::write_reference(argv[1], "segments", config);
   config.policy.segment_features = false;
-  config.policy.goal_features = true;
-  pictura::write_reference(argv[1], "goals", config);
-  config.policy.goal_features = false;
   config.policy.layer_norm = config.policy.residual = true;
   config.policy.modality = Modality::vector;
   pictura::write_reference(argv[1], "normalized", config);

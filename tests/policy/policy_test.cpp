@@ -116,7 +116,7 @@ TEST_P(BothModalities, GradientsEqualDifferenceQuotients) {
 
 TEST(Policy, GradientsOfFeaturesOfSegmentsEqualDifferenceQuotients) {
   PolicySection section = tiny_section(Modality::vector);
-  section.segment_features = section.goal_features = true;
+  section.segment_features = true;
   expect_gradients(PolicyNetwork(section, 3, 5, at::kDouble, /*reads_walls=*/true), observation(Modality::vector, 2));
 }
 
@@ -224,32 +224,6 @@ TEST_P(BothModalities, ReadsFeaturesOfPointsBesideTheirCoordinates) {
   }
 }
 
-TEST(Policy, ReadsTheDistanceOfLanesToTheActiveWaypointAlone) {
-  PolicySection config = tiny_section(Modality::vector);
-  const Observation seen = observation(Modality::vector, 4);
-  const auto moved = [&seen](int64_t number) {
-    Observation result = seen.map([](const at::Tensor& t) { return t.clone(); });
-    result.waypoints.select(1, number).add_(0.1);
-    return result;
-  };
-  const at::NoGradGuard no_grad;
-  for (const bool reads_goals : {false, true}) {
-    config.goal_features = reads_goals;
-    const PolicyNetwork policy(config, 3, 5, at::kDouble);
-    EXPECT_EQ(inputs_of(policy, "lanes"),
-              kLaneFeatures + RowFeatures::kOfPoint + (reads_goals ? RowFeatures::kOfGoal : 0));
-    EXPECT_EQ(inputs_of(policy, "boundaries"), kBoundaryFeatures + RowFeatures::kOfPoint);
-    // What the waypoints' own encoder makes of them aside.
-    for (const NamedTensor& p : policy.parameters()) {
-      at::Tensor value = p.value;
-      if (p.name == "conditioning.hidden.weight") value.zero_();
-    }
-    const at::Tensor values = policy.forward(seen).value;
-    for (const int64_t number : {0, 1}) EXPECT_EQ(policy.forward(moved(number)).value.equal(values), !reads_goals);
-    for (const int64_t number : {2, 3, 8}) EXPECT_TRUE(policy.forward(moved(number)).value.equal(values)) << number;
-  }
-}
-
 TEST(Policy, ReadsItsPlaceBesideLanesBoundariesAndWalls) {
   PolicySection config;
   config.modality = Modality::vector;
@@ -269,7 +243,7 @@ TEST(Policy, ReadsItsPlaceBesideLanesBoundariesAndWalls) {
 // The host's own passes in fp32 against ATen's layers in fp64.
 TEST(Policy, FeaturesOfRowsAreTheSameInSingleAndDoublePrecision) {
   PolicySection config = tiny_section(Modality::vector);
-  config.segment_features = config.goal_features = true;
+  config.segment_features = true;
   const PolicyNetwork doubles(config, 3, 5, at::kDouble, /*reads_walls=*/true), floats(config, 3, 5, at::kFloat, true);
   const Observation seen = observation(Modality::vector, 6);
   const at::NoGradGuard no_grad;

@@ -19,7 +19,6 @@ from pictura.torch import Policy, _read_safetensors, load_policy, save_policy  #
 MODELS = sorted((pathlib.Path(__file__).parents[2] / "models").rglob("*.safetensors"))
 NAMES = (
     "vector", "vector_points", "perspective", "perspective_points", "patches", "normalized", "segments",
-    "goals",
 )  # fmt: skip
 
 
@@ -70,6 +69,7 @@ def test_released_weights_are_read_and_written(path, tmp_path):
 def test_removed_keys_are_read_with_their_one_value_alone(reference):
     policy = load_policy(reference / "vector.safetensors")
     for name, kept, other, message in (
+        ("goal_features", False, True, "policy.goal_features: expected false, got true: distances to goals were removed"),
         ("critic_layers", 0, 2, "policy.critic_layers: expected 0, got 2: trunks of the critic's own were removed"),
         ("value_head", "linear", "two_hot", 'policy.value_head: expected "linear", got "two_hot": other heads were removed'),
     ):

@@ -87,7 +87,7 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(
         std::vector<std::string>{"policy.modality=vector"},
         std::vector<std::string>{"policy.modality=vector", "policy.point_features=false", "policy.embedding_width=200"},
-        std::vector<std::string>{"policy.modality=vector", "policy.segment_features=true", "policy.goal_features=true",
+        std::vector<std::string>{"policy.modality=vector", "policy.segment_features=true",
                                  "simulator.wall_observations=true"},
         std::vector<std::string>{"policy.modality=vector", "policy.layer_norm=true", "policy.residual=true"},
         std::vector<std::string>{"policy.modality=perspective"},

@@ -665,12 +665,10 @@ TEST_F(Training, BeginsWithTheWeightsOfAnotherRunAtAnyImageSize) {
   normalized.init_from = first;
   EXPECT_THAT(message_of([&] { train(normalized); }),
               AllOf(HasSubstr(first), HasSubstr("policy.layer_norm: expected true, got false")));
-  for (const std::string key : {"policy.segment_features", "policy.goal_features"}) {
-    TrainOptions reads_more = options("reads more", {"policy.modality=vector", key + "=true"});
-    reads_more.init_from = first;
-    EXPECT_THAT(message_of([&] { train(reads_more); }),
-                AllOf(HasSubstr(first), HasSubstr(key + ": expected true, got false")));
-  }
+  TrainOptions reads_more = options("reads more", {"policy.modality=vector", "policy.segment_features=true"});
+  reads_more.init_from = first;
+  EXPECT_THAT(message_of([&] { train(reads_more); }),
+              AllOf(HasSubstr(first), HasSubstr("policy.segment_features: expected true, got false")));
 }
 
 TEST_F(Training, EndsWhereLogitsAreFiniteNoLonger) {
@@ -708,13 +706,13 @@ TEST_F(Training, ANormalizedPolicyWithAQuantileFilterGoesOnExactly) {
   EXPECT_EQ(whole, resumed);
 }
 
-TEST_F(Training, APolicyThatReadsSegmentsAndGoalsGoesOnExactlyAndIsEvaluatedAsSaved) {
-  const auto [whole, again, resumed] = test::policies_of_equal_runs(
-      folder_ / "runs", "cpu", {"policy.modality=vector", "policy.segment_features=true", "policy.goal_features=true"});
+TEST_F(Training, APolicyThatReadsSegmentsGoesOnExactlyAndIsEvaluatedAsSaved) {
+  const auto [whole, again, resumed] =
+      test::policies_of_equal_runs(folder_ / "runs", "cpu", {"policy.modality=vector", "policy.segment_features=true"});
   EXPECT_EQ(whole, again);
   EXPECT_EQ(whole, resumed);
   const SavedPolicy saved = read_policy(folder_ / "runs/whole/policy.safetensors");
-  EXPECT_TRUE(saved.config.policy.segment_features && saved.config.policy.goal_features);
+  EXPECT_TRUE(saved.config.policy.segment_features);
   EXPECT_GT(evaluate(test::one_scenario(folder_ / "runs/whole/policy.safetensors", 10)).agent_steps, 0);
 }
 
