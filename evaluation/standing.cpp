@@ -10,7 +10,8 @@ namespace pictura {
 
 namespace {
 
-// Of a bumper from the line that it waits at: who waits behind another is farther away, and may close up.
+// Largest distance of a waiting front bumper from its line. Vehicles behind the first are farther away, and may close
+// up.
 constexpr float kWaitReach_m = 5;
 constexpr float kStuckWithin_m = 5, kStuckFor_s = 60;
 

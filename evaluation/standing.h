@@ -14,11 +14,11 @@ namespace pictura {
 /// every step.
 class StandingObserver final : public StepObserver {
  public:
-  /// Of the simulator's worlds at the start of their episodes.
+  /// The simulator's worlds are at the start of their episodes.
   explicit StandingObserver(Simulator& simulator);
 
   void after_step(const StepResult& result) override;
-  /// Of one of the worlds, after the last step.
+  /// Counts of one world, after the last step.
   StandingCounts counts_of(size_t world) const;
 
  private:
