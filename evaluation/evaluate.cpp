@@ -217,8 +217,9 @@ EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& op
       for (int slot = 0; slot < simulator->num_slots(); ++slot) {
         add_slot(state.view(), slot, counts_of(slot));
       }
-      for (size_t world = 0; world < worlds.size(); ++world) {
-        result.scenarios[static_cast<size_t>(first) + world].standing = standing.counts_of(world);
+      const std::vector<StandingCounts> stood = standing.counts();
+      for (size_t world = 0; world < stood.size(); ++world) {
+        result.scenarios[static_cast<size_t>(first) + world].standing = stood[world];
       }
     }
     if (!result.scenarios.empty()) {

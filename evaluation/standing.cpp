@@ -72,13 +72,16 @@ void StandingObserver::after_step(const StepResult& /*result*/) {
   }
 }
 
-StandingCounts StandingObserver::counts_of(size_t world) const {
-  StandingCounts counts = counts_[world];
+std::vector<StandingCounts> StandingObserver::counts() const {
+  std::vector<StandingCounts> counts = counts_;
   const WorldArrays now(simulator_);
   const auto stuck_steps = static_cast<int>(std::lround(kStuckFor_s / simulator_.config().dt_s));
-  for (size_t slot = now.first_slot(world); slot < now.first_slot(world) + now.num_agents(world); ++slot) {
-    counts.stuck_at_end += now.agent_class[slot] == AgentClass::vehicle && now.status[slot] == AgentStatus::active &&
-                           step_ - progress_[slot].step >= stuck_steps;
+  for (size_t world = 0; world < counts.size(); ++world) {
+    for (size_t slot = now.first_slot(world); slot < now.first_slot(world + 1); ++slot) {
+      counts[world].stuck_at_end += now.agent_class[slot] == AgentClass::vehicle &&
+                                    now.status[slot] == AgentStatus::active &&
+                                    step_ - progress_[slot].step >= stuck_steps;
+    }
   }
   return counts;
 }

@@ -18,8 +18,8 @@ class StandingObserver final : public StepObserver {
   explicit StandingObserver(Simulator& simulator);
 
   void after_step(const StepResult& result) override;
-  /// Counts of one world, after the last step.
-  StandingCounts counts_of(size_t world) const;
+  /// Counts of each world, after the last step.
+  std::vector<StandingCounts> counts() const;
 
  private:
   // Where a vehicle was when it had last got on.

@@ -20,7 +20,7 @@ struct DriveEnd {
 DriveEnd drive_steps(Simulator& simulator, Span<Command> commands, int steps, const std::function<bool(int)>& act,
                      const std::vector<StepObserver*>& observers = {},
                      const std::function<void(int, const StepResult&)>& on_step = {});
-/// The same where a controller acts for all agents of a simulator in host memory.
+/// Steps likewise by the commands of a controller, which acts for all agents of a simulator in host memory.
 DriveEnd drive_steps(Simulator& simulator, Controller& controller, int steps,
                      const std::vector<StepObserver*>& observers = {},
                      const std::function<void(int, const StepResult&)>& on_step = {});

@@ -40,7 +40,7 @@ TEST(Standing, WaitsReversingAndStuckVehicles) {
   ASSERT_GT(waits, 0);
   ASSERT_LT(red_steps_of_waits + waits, kSteps);
   for (int slot = 0; slot < 3; ++slot) ASSERT_EQ(simulator->state().status[slot], AgentStatus::active);
-  StandingCounts counts = observer.counts_of(0);
+  StandingCounts counts = observer.counts().at(0);
   EXPECT_EQ(counts.driven_steps, 3 * kSteps);
   EXPECT_EQ(counts.reversing_steps, kSteps);
   EXPECT_EQ(counts.red_waits, waits);
@@ -54,7 +54,7 @@ TEST(Standing, WaitsReversingAndStuckVehicles) {
     observer.after_step(simulator->step(Span<const Command>(commands)));
   }
   for (int slot = 0; slot < 3; ++slot) ASSERT_EQ(simulator->state().status[slot], AgentStatus::active);
-  EXPECT_EQ(observer.counts_of(0).stuck_at_end, 1);
+  EXPECT_EQ(observer.counts().at(0).stuck_at_end, 1);
 }
 
 }  // namespace
