@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "pictura/backend_cpu/renderer/coverage_x8.h"
 #include "pictura/common/raster/visible_primitives.h"
 
 namespace pictura {
@@ -83,13 +84,17 @@ bool ImageDrawer::stands(uint32_t solid, uint32_t strip) const {
   return stands_on(extent_of(solid, pieces, agents), extent_of(strip, pieces, agents));
 }
 
-// Calls visit(y, pixel, span) for each row of a face within `rows`; pixel is the index of the row's first pixel.
+// Calls visit(y, row, spans, lane) for each row of a face within `rows`; `row` is the index of its first pixel, and the
+// row's span is that of a lane of `spans`.
 template <typename Visit>
 void ImageDrawer::visit_spans(const ScreenFace& face, RowRange rows, Visit&& visit) const {
   const int width = setting_.camera.width_px;
-  for (int y = max_of(rows.y_begin, face.box.y_begin); y < min_of(rows.y_end, face.box.y_end); ++y) {
-    visit(y, static_cast<std::size_t>(y - rows.y_begin) * static_cast<std::size_t>(width),
-          row_span(edges_.at(face.edge_begin), face.edge_count, face.box, y));
+  const int y_begin = max_of(rows.y_begin, face.box.y_begin), y_end = min_of(rows.y_end, face.box.y_end);
+  for (int y = y_begin; y < y_end; y += kLanes) {
+    const RowSpansX8 spans = row_spans_x8(edges_.at(face.edge_begin), face.edge_count, face.box, y);
+    for (int lane = 0; lane < min_of(kLanes, y_end - y); ++lane) {
+      visit(y + lane, (y + lane - rows.y_begin) * width, spans, lane);
+    }
   }
 }
 
@@ -99,9 +104,9 @@ void ImageDrawer::find_occluder_bounds(FaceRange faces, RowRange rows) {
   for (int32_t f = faces.begin; f < faces.end; ++f) {
     const ScreenFace& face = faces_[f];
     if (is_strip(face)) continue;  // has no bound
-    visit_spans(face, rows, [&](int y, std::size_t row, const RowSpan& span) {
-      for (int x = span.full_begin; x < span.full_end; ++x) {
-        float& bound = occluder_bounds_[row + static_cast<std::size_t>(x)];
+    visit_spans(face, rows, [&](int y, int row, const RowSpansX8& spans, int lane) {
+      for (int x = spans.full_begin[lane]; x < spans.full_end[lane]; ++x) {
+        float& bound = occluder_bounds_[row + x];
         bound = max_of(bound, occluder_bound(face, x, y));
       }
     });
@@ -113,39 +118,52 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
   find_occluder_bounds(faces, rows);
   first_fragment_.assign(occluder_bounds_.size(), -1);
   fragments_.clear();
+  // Pixels that a face covers partly, as far as is known before their coverage is.
+  struct alignas(32) {
+    float x[kLanes] = {}, y[kLanes] = {};
+    int32_t pixel[kLanes];
+    int count = 0;
+  } partial;
   for (int32_t f = faces.begin; f < faces.end; ++f) {
     const ScreenFace& face = faces_[f];
-    const PolygonEdge* edges = edges_.at(face.edge_begin);
-    visit_spans(face, rows, [&](int y, std::size_t row, const RowSpan& span) {
-      for (int x = span.begin; x < span.end; ++x) {
-        const bool covers_fully = x >= span.full_begin && x < span.full_end;
-        const std::size_t pixel = row + static_cast<std::size_t>(x);
-        if (!passes_occluder_bound(face, occluder_bounds_[pixel], x, y)) continue;
-        const PixelCoverage coverage = covers_fully ? PixelCoverage{1.0f, kAllSamples}
-                                                    : pixel_coverage(edges, face.edge_count, face.min_area(), x, y);
-        if (coverage.area <= 0.0f) continue;
-        fragments_.push_back({make_fragment(face, f, coverage, x, y), first_fragment_[pixel]});
-        first_fragment_[pixel] = static_cast<int32_t>(fragments_.size()) - 1;
+    auto add = [&](int32_t pixel, const PixelCoverage& coverage) {
+      fragments_.push_back({coverage, f, first_fragment_[pixel]});
+      first_fragment_[pixel] = static_cast<int32_t>(fragments_.size()) - 1;
+    };
+    auto add_partial = [&] {
+      coverage_x8(edges_.at(face.edge_begin), face.edge_count, face.min_area(), partial.x, partial.y, partial.count,
+                  [&](int lane, const PixelCoverage& coverage) { add(partial.pixel[lane], coverage); });
+      partial.count = 0;
+    };
+    visit_spans(face, rows, [&](int y, int row, const RowSpansX8& spans, int lane) {
+      for (int x = spans.begin[lane]; x < spans.end[lane]; ++x) {
+        const float bound = occluder_bounds_[row + x];
+        if (bound != 0.0f && !passes_occluder_bound(face, bound, x, y)) continue;
+        if (x >= spans.full_begin[lane] && x < spans.full_end[lane]) {
+          add(row + x, {1.0f, kAllSamples});
+          continue;
+        }
+        partial.x[partial.count] = static_cast<float>(x);
+        partial.y[partial.count] = static_cast<float>(y);
+        partial.pixel[partial.count] = row + x;
+        if (++partial.count == kLanes) add_partial();
       }
     });
+    if (partial.count > 0) add_partial();
   }
 }
 
-// Copies the fragments of a pixel from its list and sorts them, nearest first.
+// Copies the fragments of pixel (x, y) from its list.
 void ImageDrawer::collect_fragments(int32_t first) {
   pixel_.clear();
-  for (int32_t i = first; i >= 0; i = fragments_[i].next) {
-    pixel_.push_back(fragments_[i].fragment);
-  }
-  std::sort(pixel_.begin(), pixel_.end(),
-            [this](const Fragment& a, const Fragment& b) { return is_nearer(a, b, faces_.data()); });
+  for (int32_t i = first; i >= 0; i = fragments_[i].next) pixel_.push_back(fragments_[i]);
 }
 
 // Finds the visible samples of the collected fragments of a pixel.
 void ImageDrawer::resolve_occlusion(int x, int y) {
   const Vec2 corner{static_cast<float>(x), static_cast<float>(y)};
   visible_.clear();
-  for (const Fragment& fragment : pixel_) visible_.push_back(effective_samples(fragment.coverage));
+  for (const PixelFragment& fragment : pixel_) visible_.push_back(effective_samples(fragment.coverage));
   for (std::size_t i = 0; i < pixel_.size(); ++i) {
     const PixelCoverage& a = pixel_[i].coverage;
     for (std::size_t j = i + 1; j < pixel_.size(); ++j) {
@@ -174,11 +192,11 @@ void ImageDrawer::composite_rows(RowRange rows, Visit&& visit, Finish&& finish) 
         finish(pixel, Rgb{});
         continue;
       }
-      const LinkedFragment& alone = fragments_[first];
+      const PixelFragment& alone = fragments_[first];
       if (alone.next < 0) {
-        const float weight = alone.fragment.coverage.area;
-        visit(pixel, alone.fragment, weight);
-        finish(pixel, faces_[alone.fragment.face].color * weight);
+        const float weight = alone.coverage.area;
+        visit(pixel, alone, weight);
+        finish(pixel, faces_[alone.face].color * weight);
         continue;
       }
       collect_fragments(first);
@@ -210,7 +228,7 @@ void ImageDrawer::draw(const ImageTarget& target) {
       make_fragments({0, static_cast<int32_t>(faces_.size())}, rows);
       auto* first = out + int64_t{y_begin} * width;
       composite_rows(
-          rows, [](int, const Fragment&, float) {},
+          rows, [](int, const PixelFragment&, float) {},
           [&](int pixel, Rgb color) {
             auto* const to =
                 in_patches ? out + place_in_patches(target.patch_px, width, 0, pixel % width, y_begin + pixel / width)
@@ -236,9 +254,15 @@ void ImageDrawer::draw(const ImageTarget& target) {
 // Orders the collected fragments of a pixel front to back: next is the nearest one that no remaining one occludes; in a
 // cycle, the nearest.
 void ImageDrawer::order_pixel(int x, int y) {
+  auto at_centroid = [&](const PixelFragment& fragment) {
+    return make_fragment(faces_[fragment.face], fragment.face, fragment.coverage, x, y);
+  };
+  std::sort(pixel_.begin(), pixel_.end(), [&](const PixelFragment& a, const PixelFragment& b) {
+    return is_nearer(at_centroid(a), at_centroid(b), faces_.data());
+  });
   const Vec2 corner{static_cast<float>(x), static_cast<float>(y)};
   auto stands_here = [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); };
-  auto occludes = [&](const Fragment& other, const Fragment& fragment) {
+  auto occludes = [&](const PixelFragment& other, const PixelFragment& fragment) {
     const uint64_t shared = shared_samples(other.coverage, fragment.coverage);
     const ScreenFace& face = faces_[fragment.face];
     const ScreenFace& other_face = faces_[other.face];
@@ -246,8 +270,8 @@ void ImageDrawer::order_pixel(int x, int y) {
            is_in_front(other_face, face, corner + centroid_of(shared), stands_here);
   };
   for (auto next = pixel_.begin(); next != pixel_.end(); ++next) {
-    auto is_occluded = [&](const Fragment& fragment) {
-      return std::any_of(next, pixel_.end(), [&](const Fragment& other) { return occludes(other, fragment); });
+    auto is_occluded = [&](const PixelFragment& fragment) {
+      return std::any_of(next, pixel_.end(), [&](const PixelFragment& other) { return occludes(other, fragment); });
     };
     const auto front = std::find_if_not(next, pixel_.end(), is_occluded);
     if (front != pixel_.end()) std::rotate(next, front, front + 1);
@@ -260,7 +284,7 @@ void ImageDrawer::visit_fragments(const std::function<void(int, const PixelCover
   for (int pixel = 0; pixel < width * height; ++pixel) {
     collect_fragments(first_fragment_[pixel]);
     order_pixel(pixel % width, pixel / width);
-    for (const Fragment& fragment : pixel_) {
+    for (const PixelFragment& fragment : pixel_) {
       visit(pixel, fragment.coverage, faces_[fragment.face].color);
     }
   }
@@ -319,7 +343,7 @@ void ImageDrawer::accumulate_visibility(int32_t agent, VisibilitySum* sum_inout)
       make_fragments(faces, rows);
       composite_rows(
           rows,
-          [&](int, const Fragment& fragment, float fragment_weight) {
+          [&](int, const PixelFragment& fragment, float fragment_weight) {
             if (fragment.face >= wanted.begin && fragment.face < wanted.end)
               weight += VisibilitySum::units_of(fragment_weight);
           },

@@ -63,9 +63,10 @@ class ImageDrawer {
     std::vector<PolygonEdge> edges_;
   };
 
-  // A fragment and the index of the next one of its pixel.
-  struct LinkedFragment {
-    Fragment fragment;
+  // A face's coverage of a pixel, and the index of the pixel's next fragment.
+  struct PixelFragment {
+    PixelCoverage coverage;
+    int32_t face;
     int32_t next;
   };
 
@@ -120,9 +121,9 @@ class ImageDrawer {
   std::vector<ScreenFace> faces_;
   std::vector<float> occluder_bounds_;   // [pixels of the rows] the largest occluder_bound()
   std::vector<int32_t> first_fragment_;  // [pixels of the rows] the first of each list
-  std::vector<LinkedFragment> fragments_;
+  std::vector<PixelFragment> fragments_;
   // Of one pixel.
-  std::vector<Fragment> pixel_;
+  std::vector<PixelFragment> pixel_;
   std::vector<uint64_t> visible_;
   std::vector<PixelAccumulator::Weight> weights_;
 };

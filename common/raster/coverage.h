@@ -41,6 +41,11 @@ PICTURA_HD inline uint64_t effective_samples(const PixelCoverage& coverage) {
 
 /// A coverage of all samples and more than 1 minus this area counts as full.
 constexpr float kFullCoverage = 1e-3f;
+/// The coverage of an area summed over a polygon's edges.
+PICTURA_HD inline PixelCoverage rounded_coverage(float area, uint64_t samples) {
+  if (samples == kAllSamples && area > 1.0f - kFullCoverage) return {1.0f, kAllSamples};
+  return {min_of(area, 1.0f), samples};
+}
 
 /// Heights at which an edge's line crosses the left and right sides of a pixel, in pixels from its top.
 struct EdgeCrossing {
@@ -56,31 +61,41 @@ PICTURA_HD inline EdgeCrossing edge_crossing(const PolygonEdge& edge, float left
 struct SampleRange {
   Int16x8 low, high;
 };
+constexpr int kFar_units = 64 * kRowUnits;
 PICTURA_HD inline SampleRange whole_range() {
-  constexpr int kFar = 64 * kRowUnits;
-  return {make_int16x8([](int) { return -kFar; }), make_int16x8([](int) { return kFar; })};
+  return {make_int16x8([](int) { return -kFar_units; }), make_int16x8([](int) { return kFar_units; })};
+}
+
+/// Added to a height as a fraction of kLines_rows, moves it to the lowest bits of a float's mantissa.
+constexpr float kToLowestBits = 1 << 8;  // a sum's lowest mantissa bit is 1 / (kLines_rows * kRowUnits)
+/// The changes of an edge's height from the first column right of the pixel's centre to each column. A height of the
+/// lowest bits is 2^14 at the pixel's centre; the base of the sequence moves that to 0.
+PICTURA_HD inline Int16x8 column_heights(const PolygonEdge& edge) {
+  return arithmetic_sequence(edge.rows_step, (1 << 16) - (1 << 14));
 }
 
 /// Clips a range to the inner side of an edge.
 PICTURA_HD inline void narrow(const PolygonEdge& edge, const EdgeCrossing& crossing, SampleRange* range_inout) {
-  constexpr float kWhole = 1 << 8;  // a sum's lowest mantissa bit is 1 / (kLines_rows * kRowUnits)
   constexpr uint32_t kLowest = 0, kHighest = 0x80008000u;
   const float at = saturate((crossing.left + crossing.right) * fabsf(edge.rows_scale) + edge.rows_offset);
-  const uint32_t height = broadcast_low16(bits_from_float(at + kWhole));
-  // `height` is 2^14 at the pixel's centre; the base of the sequence moves that to 0.
-  const Int16x8 columns = arithmetic_sequence(edge.rows_step, (1 << 16) - (1 << 14));
+  const uint32_t height = broadcast_low16(bits_from_float(at + kToLowestBits));
+  const Int16x8 columns = column_heights(edge);
   const bool is_below = edge.rows_scale > 0.0f;
   range_inout->low = add_max(columns, is_below ? height : kLowest, range_inout->low);
   range_inout->high = add_min(columns, is_below ? kHighest : height, range_inout->high);
 }
 
-/// The mask of the samples within a range.
-PICTURA_HD inline uint64_t samples_within(const SampleRange& range) {
-  // Offsets that turn a height into the number of samples above it, as whole rows.
-  const Int16x8 from_top = make_int16x8([](int column) {
+/// For each column, the offset that turns a height into the number of samples above it, as whole rows.
+PICTURA_HD inline Int16x8 offsets_from_top() {
+  return make_int16x8([](int column) {
     return kSampleRows / 2 * kRowUnits + kRowUnits - 1 -
            static_cast<int>(sample_column_offset(column) * static_cast<float>(kRowUnits));
   });
+}
+
+/// The mask of the samples within a range.
+PICTURA_HD inline uint64_t samples_within(const SampleRange& range) {
+  const Int16x8 from_top = offsets_from_top();
   const Int16x8 to = add_clamp(range.high, from_top, make_int16x8([](int) { return kSampleRows * kRowUnits; }));
   return bits_between(add_clamp(range.low, from_top, to), to);
 }
@@ -119,15 +134,16 @@ PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int cou
     narrow(edge, crossing, &range);
   });
   if (area < min_area) return {0.0f, 0};
-  const uint64_t samples = samples_within(range);
-  if (samples == kAllSamples && area > 1.0f - kFullCoverage) return {1.0f, kAllSamples};
-  return {min_of(area, 1.0f), samples};
+  return rounded_coverage(area, samples_within(range));
 }
 
 /// Pixels of row y that the polygon may touch, and within them the range that it covers fully.
 struct RowSpan {
   int32_t begin = 0, end = 0, full_begin = 0, full_end = 0;
 };
+
+/// Margin of spans: the exact tests of pixel_coverage decide at the borders.
+constexpr float kSpanLeeway_px = 1e-3f;
 
 PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const PixelBox& box, int y) {
   const float y_px = static_cast<float>(y), middle_px = y_px + 0.5f;
@@ -155,16 +171,14 @@ PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const Pi
     }
   });
   if (is_outside) return {};
-  // Conservative margin: the exact tests of pixel_coverage decide at the borders.
-  constexpr float kLeeway_px = 1e-3f;
   const float begin = static_cast<float>(box.x_begin), end = static_cast<float>(box.x_end);
   auto first_at_or_after = [&](float x) { return static_cast<int>(ceilf(clamp(x, begin, end))); };
   auto first_after = [&](float x) { return static_cast<int>(floorf(clamp(x, begin - 1.0f, end - 1.0f))) + 1; };
   RowSpan span;
-  span.begin = first_at_or_after(touch_low - kLeeway_px);
-  span.end = max_of(first_after(touch_high + kLeeway_px), span.begin);
-  span.full_begin = min_of(max_of(first_at_or_after(full_low + kLeeway_px), span.begin), span.end);
-  span.full_end = min_of(max_of(first_after(full_high - kLeeway_px), span.full_begin), span.end);
+  span.begin = first_at_or_after(touch_low - kSpanLeeway_px);
+  span.end = max_of(first_after(touch_high + kSpanLeeway_px), span.begin);
+  span.full_begin = min_of(max_of(first_at_or_after(full_low + kSpanLeeway_px), span.begin), span.end);
+  span.full_end = min_of(max_of(first_after(full_high - kSpanLeeway_px), span.full_begin), span.end);
   return span;
 }
 
