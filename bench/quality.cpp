@@ -63,7 +63,7 @@ std::vector<float> composite_areas(ImageDrawer* drawer, std::size_t pixels) {
 }
 
 // The oracle's faces of one image, ready to be drawn.
-ImageDrawer prepared_drawer(const StaticGeometryView& pieces, const SceneBatch& scene, const View& view,
+ImageDrawer prepared_drawer(const CulledGeometry& pieces, const SceneBatch& scene, const View& view,
                             const Camera& camera, float line_floor_px) {
   Rig rig;
   rig.cameras = {camera};
@@ -80,7 +80,7 @@ MethodImages draw_all_methods(const StaticGeometry& geometry, const SceneBatch& 
                      trace(TruthSamples::grid_2x2).rgb,
                      {},
                      {}};
-  const StaticGeometryView pieces = geometry.view();
+  const CulledGeometry pieces(geometry.view());
   const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
   ImageDrawer drawer = prepared_drawer(pieces, scene, view, camera, line_floor_px);
   drawn.oracle.resize(3 * pixels);
@@ -124,7 +124,7 @@ PooledError measure_random_scene(RandomKind kind, uint64_t seed) {
   const View& view = town.views.at(0);
   const Camera& camera = config.rig.cameras.at(0);
   const TruthImage truth = trace_image(town.geometry, scene, view, camera, config.line_floor_px);
-  const StaticGeometryView pieces = town.geometry.view();
+  const CulledGeometry pieces(town.geometry.view());
   std::vector<float> oracle(truth.rgb.size());
   prepared_drawer(pieces, scene, view, camera, config.line_floor_px).draw({PixelFormat::f32, oracle.data()});
   return {oracle, truth.rgb};

@@ -4,15 +4,10 @@
 
 #include <bit>
 
-#if defined(__AVX2__)
-#include <immintrin.h>
-#endif
-
+#include "pictura/backend_cpu/renderer/float8.h"
 #include "pictura/common/raster/coverage.h"
 
 namespace pictura {
-
-constexpr int kLanes = 8;
 
 /// row_span() of the rows y to y + 7.
 struct alignas(32) RowSpansX8 {

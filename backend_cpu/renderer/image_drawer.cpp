@@ -28,11 +28,12 @@ void ImageDrawer::prepare(const ImageRequest& request) {
   edges_.clear();
   faces_.clear();
   for (const Solid& solid : solids_) face_maker(solid.primitive)(make_camera_face(solid.in_camera, 0.0f));
-  visit_lights(setting_, *request.geometry, *request.scene, *request.view,
+  visit_lights(setting_, request.geometry->view, *request.scene, *request.view,
                [&](const LightHead& head, LightState state, int32_t index) {
                  light_faces(head, state, setting_.camera, face_maker(light_ref(index)));
                });
-  visit_strips(setting_, *request.geometry, [&](const Strip& strip, int32_t index) {
+  request.geometry->strips.visit_visible(setting_.camera, setting_.frustum, [&](int32_t index) {
+    const Strip& strip = request.geometry->view.strips[index];
     strip_faces(strip, setting_.camera, setting_.line_floor_px, face_maker(strip_ref(strip, index)));
   });
 }
@@ -50,7 +51,8 @@ void ImageDrawer::find_solids() {
                        {primitive, face_entry(primitive.object_id, face), may_occlude_others, {}});
     });
   });
-  visit_walls(setting_, *request_.geometry, [&](const WallFace& wall, int32_t index) {
+  request_.geometry->walls.visit_visible(setting_.camera, setting_.frustum, [&](int32_t index) {
+    const WallFace& wall = request_.geometry->view.walls[index];
     const PrimitiveRef primitive = wall_ref(index);
     add_unless_black(wall_quad(wall), {primitive, primitive.object_id, may_occlude(wall, setting_.camera), {}});
   });
@@ -79,7 +81,7 @@ void ImageDrawer::find_occluders() {
 }
 
 bool ImageDrawer::stands(uint32_t solid, uint32_t strip) const {
-  const StaticGeometryView& pieces = *request_.geometry;
+  const StaticGeometryView& pieces = request_.geometry->view;
   const AgentBox* agents = request_.scene->agents.data() + world_begin();
   return stands_on(extent_of(solid, pieces, agents), extent_of(strip, pieces, agents));
 }

@@ -6,6 +6,7 @@
 #include <functional>
 #include <vector>
 
+#include "pictura/backend_cpu/renderer/cull_x8.h"
 #include "pictura/common/image.h"
 #include "pictura/common/raster/face_setup.h"
 
@@ -13,7 +14,7 @@ namespace pictura {
 
 /// Inputs of one image.
 struct ImageRequest {
-  const StaticGeometryView* geometry = nullptr;
+  const CulledGeometry* geometry = nullptr;
   const SceneBatch* scene = nullptr;
   const View* view = nullptr;
   PinholeCamera camera;  // in the world

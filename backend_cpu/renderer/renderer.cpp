@@ -2,6 +2,7 @@
 // distributes images over threads.
 #include <cstddef>
 #include <memory>
+#include <vector>
 
 #include <omp.h>
 
@@ -31,10 +32,14 @@ class CpuRenderer final : public Renderer {
     check_handle(name(), handle);
     check_geometry(name(), geometry);
     geometries_.upload(handle, geometry);
+    const auto index = static_cast<std::size_t>(handle);
+    if (index >= culled_.size()) culled_.resize(index + 1);
+    culled_[index] = std::make_unique<const CulledGeometry>(*geometries_.find(handle));
   }
   void release(GeometryHandle handle, Stream) override {
     check_handle(name(), handle);
     geometries_.release(handle);
+    if (static_cast<std::size_t>(handle) < culled_.size()) culled_[handle].reset();
   }
 
   void render(const SceneBatch& scene, const ViewBatch& batch, const ImageBatch& images_out, Stream) override {
@@ -78,7 +83,7 @@ class CpuRenderer final : public Renderer {
 
   ImageRequest request(const SceneBatch& scene, const View& view, std::size_t camera) const {
     const GeometryHandle handle = scene.geometry[view.world];
-    return {geometries_.find(handle), &scene, &view, place_camera(cameras_[camera], view), config_.line_floor_px,
+    return {culled_[handle].get(), &scene, &view, place_camera(cameras_[camera], view), config_.line_floor_px,
             config_.debug_palette};
   }
 
@@ -97,7 +102,8 @@ class CpuRenderer final : public Renderer {
   RendererConfig config_;
   std::vector<PinholeCamera> cameras_;  // in the ego frame
   HostGeometries geometries_;
-  std::vector<ImageDrawer> drawers_;  // one per thread
+  std::vector<std::unique_ptr<const CulledGeometry>> culled_;  // [handle]
+  std::vector<ImageDrawer> drawers_;                           // one per thread
 };
 
 }  // namespace

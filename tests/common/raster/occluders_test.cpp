@@ -106,7 +106,7 @@ TEST(Occluders, AreThoseThatCoverMost) {
   const auto scene = scene_of({make_box(AgentClass::vehicle, {12.25f, 0, 0}, 0, {4.5f, 2, 1.6f})});
   const View view = make_view({}, 0);
   const SceneBatch batch = scene.batch();
-  const StaticGeometryView pieces = geometry.view();
+  const CulledGeometry pieces(geometry.view());
   ImageDrawer drawer;
   drawer.prepare({&pieces, &batch, &view, setting_ahead().camera});
   const Occluders& occluders = drawer.occluders();
@@ -123,7 +123,7 @@ TEST_P(OccludersOfTowns, DoNotChangeTheImage) {
   const std::string map = GetParam();
   if (const std::string why = test::missing(map); !why.empty()) GTEST_SKIP() << why;
   const Snapshot snapshot = drive_snapshot({.map = map, .views = 24});
-  const StaticGeometryView pieces = snapshot.geometry.view();
+  const CulledGeometry pieces(snapshot.geometry.view());
   const SceneBatch scene = snapshot.scene.batch();
   const std::vector<PinholeCamera> cameras = pinhole_cameras(paper_rig());
   ImageDrawer drawer;

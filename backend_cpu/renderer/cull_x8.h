@@ -1,0 +1,117 @@
+// Culling of eight pieces of a map at once: the rules of common/raster/cull.h, with the balls around the pieces stored
+// in the order of a grid's items.
+#pragma once
+
+#include <bit>
+#include <vector>
+
+#include "pictura/backend_cpu/renderer/float8.h"
+#include "pictura/common/raster/cull.h"
+
+namespace pictura {
+
+inline Vec3x8 to_camera(const PinholeCamera& camera, const Vec3x8& world_m) {
+  const Vec3x8 d{world_m.x - camera.position_m.x, world_m.y - camera.position_m.y, world_m.z - camera.position_m.z};
+  auto along = [&d](Vec3 axis) { return axis.x * d.x + axis.y * d.y + axis.z * d.z; };
+  return {along(camera.right), along(camera.down), along(camera.forward)};
+}
+
+/// sphere_in_frustum() of eight spheres.
+inline Mask8 sphere_in_frustum(const Frustum& f, const Vec3x8& center, Float8 radius_m) {
+  const Mask8 in_range = (center.z + radius_m > kNear_m) & (center.z - radius_m < kVisibleRange_m);
+  const Mask8 in_width = ((center.x - f.x_low * center.z) * f.x_low_scale > -radius_m) &
+                         ((f.x_high * center.z - center.x) * f.x_high_scale > -radius_m);
+  const Mask8 in_height = ((center.y - f.y_low * center.z) * f.y_low_scale > -radius_m) &
+                          ((f.y_high * center.z - center.y) * f.y_high_scale > -radius_m);
+  return in_range & in_width & in_height;
+}
+
+/// The balls around the items of a grid.
+class BallGrid {
+ public:
+  struct Ball {
+    Vec3 middle_m;
+    float radius_m = 0;
+  };
+  /// ball_of(item), and box_of(item), by which the item was put into the grid.
+  template <typename BallOf, typename BoxOf>
+  BallGrid(const GridView& grid, BallOf&& ball_of, BoxOf&& box_of) : grid_(grid) {
+    const std::size_t padded = grid.items.size() + kLanes;
+    for (std::vector<float>* of : {&x_m_, &y_m_, &z_m_, &radius_m_}) of->resize(padded);
+    starts_.resize(padded);
+    if (grid.items.empty()) return;
+    for (int y = 0; y < grid.num_y; ++y) {
+      for (int x = 0; x < grid.num_x; ++x) {
+        for (int32_t i = begin(x, y); i < begin(x + 1, y); ++i) {
+          const Ball ball = ball_of(grid.items[i]);
+          const Aabb2 box = box_of(grid.items[i]);
+          x_m_[i] = ball.middle_m.x;
+          y_m_[i] = ball.middle_m.y;
+          z_m_[i] = ball.middle_m.z;
+          radius_m_[i] = ball.radius_m;
+          starts_[i] = static_cast<uint8_t>((x == grid.cell_x(box.low.x) ? kStartsColumn : 0) |
+                                            (y == grid.cell_y(box.low.y) ? kStartsRow : 0));
+        }
+      }
+    }
+  }
+
+  /// Calls visit(item) for each item that for_each_item() visits and whose ball is in the frustum, in its order.
+  template <typename Visit>
+  void visit_visible(const PinholeCamera& camera, const Frustum& f, Visit&& visit) const {
+    const CellRange cells = cells_of(grid_, frustum_ground_box(camera, f));
+    for (int y = cells.y_begin; y < cells.y_end; ++y) {
+      // An item is visited in its first column and row of those that the box touches.
+      const int32_t first_column_end = begin(cells.x_begin + 1, y), row_end = begin(cells.x_end, y);
+      const int row_starts = y == cells.y_begin ? kStartsRow : 0;
+      for (int32_t i = begin(cells.x_begin, y); i < row_end; i += kLanes) {
+        const Vec3x8 middle_m{load8(&x_m_[i]), load8(&y_m_[i]), load8(&z_m_[i])};
+        unsigned lanes = lanes_of(sphere_in_frustum(f, to_camera(camera, middle_m), load8(&radius_m_[i])));
+        if (row_end - i < kLanes) lanes &= (1u << (row_end - i)) - 1;
+        for (; lanes != 0; lanes &= lanes - 1) {
+          const int32_t at = i + std::countr_zero(lanes);
+          const int starts = starts_[at] | row_starts | (at < first_column_end ? kStartsColumn : 0);
+          if (starts == (kStartsColumn | kStartsRow)) visit(grid_.items[at]);
+        }
+      }
+    }
+  }
+
+ private:
+  static constexpr int kStartsColumn = 1, kStartsRow = 2;
+  // The first item of a cell; x of num_x: of the next row.
+  int32_t begin(int x, int y) const {
+    return grid_
+        .begin[static_cast<std::size_t>(y) * static_cast<std::size_t>(grid_.num_x) + static_cast<std::size_t>(x)];
+  }
+
+  GridView grid_;
+  // Of the grid's items, and of a vector beyond.
+  std::vector<float> x_m_, y_m_, z_m_, radius_m_;
+  std::vector<uint8_t> starts_;  // whether the item's box begins in this cell's column and row
+};
+
+/// A geometry with the balls around its pieces.
+struct CulledGeometry {
+  /// What the view points to must outlive the object.
+  explicit CulledGeometry(const StaticGeometryView& geometry)
+      : view(geometry),
+        strips(
+            geometry.strip_grid,
+            [&](int32_t i) {
+              const Strip& strip = geometry.strips[i];
+              return BallGrid::Ball{strip_middle(strip), strip_radius_m(strip)};
+            },
+            [&](int32_t i) { return ground_box(geometry.strips[i]); }),
+        walls(
+            geometry.wall_grid,
+            [&](int32_t i) {
+              const WallFace& wall = geometry.walls[i];
+              return BallGrid::Ball{wall_middle(wall), wall_radius_m(wall)};
+            },
+            [&](int32_t i) { return ground_box(geometry.walls[i]); }) {}
+  StaticGeometryView view;
+  BallGrid strips, walls;
+};
+
+}  // namespace pictura

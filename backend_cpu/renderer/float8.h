@@ -1,0 +1,97 @@
+// Eight floats, the elements of eight objects: arithmetic by the operations of scalars, so that a rule written with
+// them has the bits of the scalar one.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#if defined(__AVX2__)
+#include <immintrin.h>
+#endif
+
+// Without AVX these types are passed in memory, which concerns inlined functions alone.
+#pragma GCC diagnostic ignored "-Wpsabi"
+
+namespace pictura {
+
+constexpr int kLanes = 8;
+
+using FloatVector = float __attribute__((vector_size(32)));
+using IntVector = int32_t __attribute__((vector_size(32)));
+
+/// For each lane, all bits or none.
+struct Mask8 {
+  IntVector bits;
+};
+inline Mask8 operator&(Mask8 a, Mask8 b) { return {a.bits & b.bits}; }
+inline Mask8 operator|(Mask8 a, Mask8 b) { return {a.bits | b.bits}; }
+inline Mask8 operator~(Mask8 a) { return {~a.bits}; }
+/// Bit i is that of lane i.
+inline unsigned lanes_of(Mask8 mask) {
+#if defined(__AVX2__)
+  return static_cast<unsigned>(_mm256_movemask_ps(reinterpret_cast<__m256>(mask.bits)));
+#else
+  unsigned lanes = 0;
+  for (int i = 0; i < kLanes; ++i) lanes |= mask.bits[i] != 0 ? 1u << i : 0u;
+  return lanes;
+#endif
+}
+
+struct Float8 {
+  FloatVector of_lane;
+  Float8() = default;
+  Float8(FloatVector vector) : of_lane(vector) {}
+  Float8(float of_all) : of_lane(FloatVector{} + of_all) {}
+  float operator[](int lane) const { return of_lane[lane]; }
+};
+inline Float8 load8(const float* from) {
+  Float8 result;
+  __builtin_memcpy(&result.of_lane, from, sizeof(result.of_lane));
+  return result;
+}
+inline Float8 operator+(Float8 a, Float8 b) { return a.of_lane + b.of_lane; }
+inline Float8 operator-(Float8 a, Float8 b) { return a.of_lane - b.of_lane; }
+inline Float8 operator*(Float8 a, Float8 b) { return a.of_lane * b.of_lane; }
+inline Float8 operator/(Float8 a, Float8 b) { return a.of_lane / b.of_lane; }
+inline Float8 operator-(Float8 a) { return -a.of_lane; }
+inline Mask8 operator<(Float8 a, Float8 b) { return {a.of_lane < b.of_lane}; }
+inline Mask8 operator<=(Float8 a, Float8 b) { return {a.of_lane <= b.of_lane}; }
+inline Mask8 operator>(Float8 a, Float8 b) { return {a.of_lane > b.of_lane}; }
+inline Mask8 operator>=(Float8 a, Float8 b) { return {a.of_lane >= b.of_lane}; }
+inline Float8 select(Mask8 mask, Float8 a, Float8 b) { return mask.bits ? a.of_lane : b.of_lane; }
+inline Float8 min_no_nan(Float8 a, Float8 b) { return a.of_lane < b.of_lane ? a.of_lane : b.of_lane; }
+inline Float8 max_no_nan(Float8 a, Float8 b) { return a.of_lane > b.of_lane ? a.of_lane : b.of_lane; }
+inline Float8 saturate(Float8 x) { return min_no_nan(max_no_nan(x, 0.0f), 1.0f); }
+inline Float8 fabs8(Float8 x) {
+  return reinterpret_cast<FloatVector>(reinterpret_cast<IntVector>(x.of_lane) & 0x7FFFFFFF);
+}
+inline Float8 reciprocal_in_range(Float8 x) { return Float8(1.0f) / x; }
+inline Float8 sqrt_in_range(Float8 x) {
+#if defined(__AVX2__)
+  return reinterpret_cast<FloatVector>(_mm256_sqrt_ps(reinterpret_cast<__m256>(x.of_lane)));
+#else
+  for (int i = 0; i < kLanes; ++i) x.of_lane[i] = sqrtf(x.of_lane[i]);
+  return x;
+#endif
+}
+
+struct Vec2x8 {
+  Float8 x, y;
+};
+inline Vec2x8 operator+(Vec2x8 a, Vec2x8 b) { return {a.x + b.x, a.y + b.y}; }
+inline Vec2x8 operator-(Vec2x8 a, Vec2x8 b) { return {a.x - b.x, a.y - b.y}; }
+inline Vec2x8 operator*(Vec2x8 a, Float8 s) { return {a.x * s, a.y * s}; }
+inline Float8 dot(Vec2x8 a, Vec2x8 b) { return a.x * b.x + a.y * b.y; }
+inline Float8 cross(Vec2x8 a, Vec2x8 b) { return a.x * b.y - a.y * b.x; }
+
+struct Vec3x8 {
+  Float8 x, y, z;
+};
+inline Vec3x8 operator+(Vec3x8 a, Vec3x8 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+inline Vec3x8 operator-(Vec3x8 a, Vec3x8 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+inline Float8 dot(Vec3x8 a, Vec3x8 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline Vec3x8 cross(Vec3x8 a, Vec3x8 b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+}  // namespace pictura
