@@ -1,9 +1,11 @@
 #include "pictura/backend_cpu/renderer/image_drawer.h"
 
 #include <algorithm>
+#include <bit>
 #include <limits>
 
 #include "pictura/backend_cpu/renderer/coverage_x8.h"
+#include "pictura/backend_cpu/renderer/strips_x8.h"
 #include "pictura/common/raster/visible_primitives.h"
 
 namespace pictura {
@@ -32,10 +34,35 @@ void ImageDrawer::prepare(const ImageRequest& request) {
                [&](const LightHead& head, LightState state, int32_t index) {
                  light_faces(head, state, setting_.camera, face_maker(light_ref(index)));
                });
-  request.geometry->strips.visit_visible(setting_.camera, setting_.frustum, [&](int32_t index) {
-    const Strip& strip = request.geometry->view.strips[index];
-    strip_faces(strip, setting_.camera, setting_.line_floor_px, face_maker(strip_ref(strip, index)));
-  });
+  make_strips();
+}
+
+void ImageDrawer::make_strips() {
+  strips_.clear();
+  request_.geometry->strips.visit_visible(setting_.camera, setting_.frustum,
+                                          [this](int32_t index) { strips_.push_back(index); });
+  const Span<const Strip> strips = request_.geometry->view.strips;
+  for (std::size_t begin = 0; begin < strips_.size(); begin += kLanes) {
+    const int count = static_cast<int>(std::min(strips_.size() - begin, std::size_t{kLanes}));
+    const Strip* eight[kLanes];
+    for (int lane = 0; lane < kLanes; ++lane) eight[lane] = &strips[strips_[begin + (lane < count ? lane : 0)]];
+    const StripsX8 made = set_up_strips(setting_, eight);
+    for (unsigned lanes = (made.visible | made.crossing) & ((1u << count) - 1); lanes != 0; lanes &= lanes - 1) {
+      const int lane = std::countr_zero(lanes);
+      const Strip& strip = *eight[lane];
+      const PrimitiveRef primitive = strip_ref(strip, strips_[begin + lane]);
+      if ((made.crossing >> lane & 1) != 0) {
+        strip_faces(strip, setting_.camera, setting_.line_floor_px, face_maker(primitive));
+        continue;
+      }
+      const int32_t edge_begin = edges_.take(4);
+      ScreenFace face;
+      make_quad_face(
+          setting_.camera, setting_.frustum, made.quad(lane), (made.clockwise >> lane & 1) != 0, made.plane(lane),
+          made.color_of(lane), [&](int i, const PolygonEdge& edge) { edges_.put(edge_begin + i, edge); }, &face);
+      faces_.push_back(complete_face(face, primitive, edge_begin));
+    }
+  }
 }
 
 void ImageDrawer::find_solids() {

@@ -96,6 +96,7 @@ class ImageDrawer {
   };
 
   void find_solids();
+  void make_strips();
   void find_occluders();
   // Returns a function that sets up the faces of a primitive.
   auto face_maker(PrimitiveRef primitive);
@@ -120,6 +121,7 @@ class ImageDrawer {
   std::vector<OccludingFace> occluding_;
   EdgePool edges_;
   std::vector<ScreenFace> faces_;
+  std::vector<int32_t> strips_;          // that may be visible
   std::vector<float> occluder_bounds_;   // [pixels of the rows] the largest occluder_bound()
   std::vector<int32_t> first_fragment_;  // [pixels of the rows] the first of each list
   std::vector<PixelFragment> fragments_;
