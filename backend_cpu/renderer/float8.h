@@ -37,6 +37,19 @@ inline unsigned lanes_of(Mask8 mask) {
 #endif
 }
 
+/// The lanes below a number of any size.
+inline unsigned lanes_below(int number) {
+  return number >= kLanes ? (1u << kLanes) - 1 : number <= 0 ? 0u : (1u << number) - 1;
+}
+/// Bit i is set if from[i] is negative.
+inline unsigned negative_lanes(const int32_t* from) {
+  Mask8 mask;
+  __builtin_memcpy(&mask.bits, from, sizeof(mask.bits));
+  return lanes_of({mask.bits < 0});
+}
+/// 0 to 7.
+constexpr FloatVector kLaneNumbers{0, 1, 2, 3, 4, 5, 6, 7};
+
 struct Float8 {
   FloatVector of_lane;
   Float8() = default;
@@ -49,6 +62,7 @@ inline Float8 load8(const float* from) {
   __builtin_memcpy(&result.of_lane, from, sizeof(result.of_lane));
   return result;
 }
+inline void store8(float* to, Float8 from) { __builtin_memcpy(to, &from.of_lane, sizeof(from.of_lane)); }
 inline Float8 operator+(Float8 a, Float8 b) { return a.of_lane + b.of_lane; }
 inline Float8 operator-(Float8 a, Float8 b) { return a.of_lane - b.of_lane; }
 inline Float8 operator*(Float8 a, Float8 b) { return a.of_lane * b.of_lane; }

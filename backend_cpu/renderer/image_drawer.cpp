@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "pictura/backend_cpu/renderer/coverage_x8.h"
+#include "pictura/backend_cpu/renderer/occlusion_x8.h"
 #include "pictura/backend_cpu/renderer/strips_x8.h"
 #include "pictura/common/raster/visible_primitives.h"
 
@@ -129,14 +130,16 @@ void ImageDrawer::visit_spans(const ScreenFace& face, RowRange rows, Visit&& vis
 
 // Finds, for each pixel of the rows, the largest occluder_bound() of the faces that cover it fully.
 void ImageDrawer::find_occluder_bounds(FaceRange faces, RowRange rows) {
-  occluder_bounds_.assign((rows.y_end - rows.y_begin) * setting_.camera.width_px, 0.0f);
+  occluder_bounds_.assign((rows.y_end - rows.y_begin) * setting_.camera.width_px + kLanes, 0.0f);
   for (int32_t f = faces.begin; f < faces.end; ++f) {
     const ScreenFace& face = faces_[f];
     if (is_strip(face)) continue;  // has no bound
     visit_spans(face, rows, [&](int y, int row, const RowSpansX8& spans, int lane) {
-      for (int x = spans.full_begin[lane]; x < spans.full_end[lane]; ++x) {
-        float& bound = occluder_bounds_[row + x];
-        bound = max_of(bound, occluder_bound(face, x, y));
+      const int x_end = spans.full_end[lane];
+      for (int x = spans.full_begin[lane]; x < x_end; x += kLanes) {
+        float* const bounds = &occluder_bounds_[row + x];
+        const Float8 before = load8(bounds), bound = max_no_nan(before, occluder_bound_x8(face, x, y));
+        store8(bounds, select(Float8(kLaneNumbers) < static_cast<float>(x_end - x), bound, before));
       }
     });
   }
@@ -145,8 +148,8 @@ void ImageDrawer::find_occluder_bounds(FaceRange faces, RowRange rows) {
 // Rasterizes faces into fragments, a linked list per pixel of the rows.
 void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
   find_occluder_bounds(faces, rows);
-  first_fragment_.assign(occluder_bounds_.size(), -1);
-  fragments_.clear();
+  first_fragment_.assign((rows.y_end - rows.y_begin) * setting_.camera.width_px + kLanes, -1);
+  int32_t num_fragments = 0;
   // Pixels that a face covers partly, as far as is known before their coverage is.
   struct alignas(32) {
     float x[kLanes] = {}, y[kLanes] = {};
@@ -156,8 +159,8 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
   for (int32_t f = faces.begin; f < faces.end; ++f) {
     const ScreenFace& face = faces_[f];
     auto add = [&](int32_t pixel, const PixelCoverage& coverage) {
-      fragments_.push_back({coverage, f, first_fragment_[pixel]});
-      first_fragment_[pixel] = static_cast<int32_t>(fragments_.size()) - 1;
+      fragments_[num_fragments] = {coverage, f, first_fragment_[pixel]};
+      first_fragment_[pixel] = num_fragments++;
     };
     auto add_partial = [&] {
       coverage_x8(edges_.at(face.edge_begin), face.edge_count, face.min_area(), partial.x, partial.y, partial.count,
@@ -165,17 +168,25 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
       partial.count = 0;
     };
     visit_spans(face, rows, [&](int y, int row, const RowSpansX8& spans, int lane) {
-      for (int x = spans.begin[lane]; x < spans.end[lane]; ++x) {
-        const float bound = occluder_bounds_[row + x];
-        if (bound != 0.0f && !passes_occluder_bound(face, bound, x, y)) continue;
-        if (x >= spans.full_begin[lane] && x < spans.full_end[lane]) {
-          add(row + x, {1.0f, kAllSamples});
-          continue;
+      for (int x = spans.begin[lane]; x < spans.end[lane]; x += kLanes) {
+        // The pixels of a step and those that are partial from before.
+        if (static_cast<std::size_t>(num_fragments) + 2 * kLanes > fragments_.size()) {
+          fragments_.resize(2 * fragments_.size() + 2 * kLanes);
         }
-        partial.x[partial.count] = static_cast<float>(x);
-        partial.y[partial.count] = static_cast<float>(y);
-        partial.pixel[partial.count] = row + x;
-        if (++partial.count == kLanes) add_partial();
+        const unsigned passing =
+            lanes_below(spans.end[lane] - x) & passes_occluder_bound_x8(face, load8(&occluder_bounds_[row + x]), x, y);
+        const unsigned full =
+            passing & lanes_below(spans.full_end[lane] - x) & ~lanes_below(spans.full_begin[lane] - x);
+        for (unsigned lanes = full; lanes != 0; lanes &= lanes - 1) {
+          add(row + x + std::countr_zero(lanes), {1.0f, kAllSamples});
+        }
+        for (unsigned lanes = passing & ~full; lanes != 0; lanes &= lanes - 1) {
+          const int at = x + std::countr_zero(lanes);
+          partial.x[partial.count] = static_cast<float>(at);
+          partial.y[partial.count] = static_cast<float>(y);
+          partial.pixel[partial.count] = row + at;
+          if (++partial.count == kLanes) add_partial();
+        }
       }
     });
     if (partial.count > 0) add_partial();
