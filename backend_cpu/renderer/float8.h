@@ -18,6 +18,7 @@ constexpr int kLanes = 8;
 
 using FloatVector = float __attribute__((vector_size(32)));
 using IntVector = int32_t __attribute__((vector_size(32)));
+using UintVector = uint32_t __attribute__((vector_size(32)));
 
 /// For each lane, all bits or none.
 struct Mask8 {
@@ -25,6 +26,7 @@ struct Mask8 {
 };
 inline Mask8 operator&(Mask8 a, Mask8 b) { return {a.bits & b.bits}; }
 inline Mask8 operator|(Mask8 a, Mask8 b) { return {a.bits | b.bits}; }
+inline Mask8 operator^(Mask8 a, Mask8 b) { return {a.bits ^ b.bits}; }
 inline Mask8 operator~(Mask8 a) { return {~a.bits}; }
 /// Bit i is that of lane i.
 inline unsigned lanes_of(Mask8 mask) {
@@ -86,6 +88,31 @@ inline Float8 sqrt_in_range(Float8 x) {
 #else
   for (int i = 0; i < kLanes; ++i) x.of_lane[i] = sqrtf(x.of_lane[i]);
   return x;
+#endif
+}
+
+/// Loads four floats, unaligned, from from(lane) on for each lane.
+template <typename From>
+inline void transpose_four(From&& from, Float8* floats_out) {
+#if defined(__AVX2__)
+  // Rows i and i + 4, then pairs of columns.
+  __m256 rows[4];
+  for (int i = 0; i < 4; ++i) {
+    auto row = [&](int lane) { return _mm_loadu_ps(reinterpret_cast<const float*>(from(lane))); };
+    rows[i] = _mm256_insertf128_ps(_mm256_castps128_ps256(row(i)), row(i + 4), 1);
+  }
+  const __m256 low_01 = _mm256_unpacklo_ps(rows[0], rows[1]), low_23 = _mm256_unpacklo_ps(rows[2], rows[3]);
+  const __m256 high_01 = _mm256_unpackhi_ps(rows[0], rows[1]), high_23 = _mm256_unpackhi_ps(rows[2], rows[3]);
+  floats_out[0] = reinterpret_cast<FloatVector>(_mm256_shuffle_ps(low_01, low_23, 0x44));
+  floats_out[1] = reinterpret_cast<FloatVector>(_mm256_shuffle_ps(low_01, low_23, 0xEE));
+  floats_out[2] = reinterpret_cast<FloatVector>(_mm256_shuffle_ps(high_01, high_23, 0x44));
+  floats_out[3] = reinterpret_cast<FloatVector>(_mm256_shuffle_ps(high_01, high_23, 0xEE));
+#else
+  for (int lane = 0; lane < kLanes; ++lane) {
+    float floats[4];
+    __builtin_memcpy(floats, from(lane), sizeof(floats));
+    for (int i = 0; i < 4; ++i) floats_out[i].of_lane[lane] = floats[i];
+  }
 #endif
 }
 

@@ -6,6 +6,7 @@
 
 #include "pictura/backend_cpu/renderer/coverage_x8.h"
 #include "pictura/backend_cpu/renderer/occlusion_x8.h"
+#include "pictura/backend_cpu/renderer/pairs_x8.h"
 #include "pictura/backend_cpu/renderer/strips_x8.h"
 #include "pictura/common/raster/visible_primitives.h"
 
@@ -193,64 +194,103 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
   }
 }
 
-// Copies the fragments of pixel (x, y) from its list.
+// Appends the fragments of a pixel's list to those collected.
 void ImageDrawer::collect_fragments(int32_t first) {
-  pixel_.clear();
-  for (int32_t i = first; i >= 0; i = fragments_[i].next) pixel_.push_back(fragments_[i]);
+  for (int32_t i = first; i >= 0; i = fragments_[i].next) collected_.push_back(fragments_[i]);
 }
 
-// Finds the visible samples of the collected fragments of a pixel.
-void ImageDrawer::resolve_occlusion(int x, int y) {
-  const Vec2 corner{static_cast<float>(x), static_cast<float>(y)};
+// Collects the fragments of the pixels that have several, pixel after pixel, and finds their visible samples.
+void ImageDrawer::resolve_occlusion(RowRange rows) {
+  collected_.clear();
   visible_.clear();
-  for (const PixelFragment& fragment : pixel_) visible_.push_back(effective_samples(fragment.coverage));
-  for (std::size_t i = 0; i < pixel_.size(); ++i) {
-    const PixelCoverage& a = pixel_[i].coverage;
-    for (std::size_t j = i + 1; j < pixel_.size(); ++j) {
-      const PixelCoverage& b = pixel_[j].coverage;
-      if (!may_occlude_more(visible_[i], a.samples, visible_[j], b.samples)) continue;
+  pixel_ends_.clear();
+  struct Pair {
+    std::size_t a, b;  // indices of the fragments
+  } pair[kLanes];
+  PairsX8 pairs;
+  int num_pairs = 0;
+  auto resolve = [&] {
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const Pair& one = pair[lane < num_pairs ? lane : 0];
+      pairs.a[lane] = &faces_[collected_[one.a].face];
+      pairs.b[lane] = &faces_[collected_[one.b].face];
+    }
+    const PairOrder order = order_pairs(pairs);
+    for (int lane = 0; lane < num_pairs; ++lane) {
+      const PixelCoverage &a = collected_[pair[lane].a].coverage, &b = collected_[pair[lane].b].coverage;
+      const bool is_decided = (order.undecided >> lane & 1) == 0 && a.samples != 0 && b.samples != 0;
+      const uint64_t shared = pairs.shared[lane], a_first = (order.a_first >> lane & 1) != 0 ? shared : 0;
       const OccludedSamples occluded =
-          occlude_pair(a, b, faces_[pixel_[i].face], faces_[pixel_[j].face], corner,
-                       [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
-      visible_[i] &= ~occluded.of_a;
-      visible_[j] &= ~occluded.of_b;
+          is_decided ? occluded_samples(a, b, shared, a_first)
+                     : occlude_pair(a, b, *pairs.a[lane], *pairs.b[lane], {pairs.x[lane], pairs.y[lane]},
+                                    [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
+      visible_[pair[lane].a] &= ~occluded.of_a;
+      visible_[pair[lane].b] &= ~occluded.of_b;
+    }
+    num_pairs = 0;
+  };
+  const int width = setting_.camera.width_px;
+  for (int y = rows.y_begin; y < rows.y_end; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const int32_t first = first_fragment_[(y - rows.y_begin) * width + x];
+      if (first < 0 || fragments_[first].next < 0) continue;
+      const std::size_t begin = collected_.size();
+      collect_fragments(first);
+      const std::size_t end = collected_.size();
+      pixel_ends_.push_back(end);
+      for (std::size_t i = begin; i < end; ++i) visible_.push_back(effective_samples(collected_[i].coverage));
+      for (std::size_t i = begin; i < end; ++i) {
+        const PixelCoverage a = collected_[i].coverage;
+        for (std::size_t j = i + 1; j < end; ++j) {
+          // Without a branch, which would be mispredicted: a pair that shares nothing is overwritten by the next.
+          const uint64_t shared = shared_samples(a, collected_[j].coverage);
+          pair[num_pairs] = {i, j};
+          pairs.shared[num_pairs] = shared;
+          pairs.x[num_pairs] = static_cast<float>(x);
+          pairs.y[num_pairs] = static_cast<float>(y);
+          num_pairs += shared != 0 ? 1 : 0;
+          if (num_pairs == kLanes) resolve();
+        }
+      }
     }
   }
-  divide_remainder([this](auto&& visit) {
-    for (std::size_t i = 0; i < pixel_.size(); ++i) visit(pixel_[i].coverage, &visible_[i]);
-  });
+  if (num_pairs > 0) resolve();
 }
 
 template <typename Visit, typename Finish>
 void ImageDrawer::composite_rows(RowRange rows, Visit&& visit, Finish&& finish) {
-  const int width = setting_.camera.width_px;
-  int pixel = 0;
-  for (int y = rows.y_begin; y < rows.y_end; ++y) {
-    for (int x = 0; x < width; ++x, ++pixel) {
-      const int32_t first = first_fragment_[pixel];
-      if (first < 0) {
-        finish(pixel, Rgb{});
-        continue;
-      }
-      const PixelFragment& alone = fragments_[first];
-      if (alone.next < 0) {
-        const float weight = alone.coverage.area;
-        visit(pixel, alone, weight);
-        finish(pixel, faces_[alone.face].color * weight);
-        continue;
-      }
-      collect_fragments(first);
-      resolve_occlusion(x, y);
-      PixelAccumulator sum;
-      weights_.resize(pixel_.size());
-      for (std::size_t i = 0; i < pixel_.size(); ++i) {
-        weights_[i] = PixelAccumulator::weight_of(pixel_[i].coverage, visible_[i]);
-        sum.add(weights_[i], faces_[pixel_[i].face].color);
-      }
-      const PixelAccumulator::Shares shares = sum.shares();
-      for (std::size_t i = 0; i < pixel_.size(); ++i) visit(pixel, pixel_[i], shares.of(weights_[i]));
-      finish(pixel, sum.color(shares));
+  resolve_occlusion(rows);
+  const int num_pixels = (rows.y_end - rows.y_begin) * setting_.camera.width_px;
+  std::size_t begin = 0;
+  auto next_end = pixel_ends_.begin();
+  for (int pixel = 0; pixel < num_pixels; ++pixel) {
+    const int32_t first = first_fragment_[pixel];
+    if (first < 0) {
+      finish(pixel, Rgb{});
+      continue;
     }
+    const PixelFragment& alone = fragments_[first];
+    if (alone.next < 0) {
+      const float weight = alone.coverage.area;
+      visit(pixel, alone, weight);
+      finish(pixel, faces_[alone.face].color * weight);
+      continue;
+    }
+    const std::size_t end = *next_end++;
+    divide_remainder([&](auto&& visit_visible) {
+      for (std::size_t i = begin; i < end; ++i) visit_visible(collected_[i].coverage, &visible_[i]);
+    });
+    PixelAccumulator sum;
+    weights_.resize(end - begin);
+    for (std::size_t i = begin; i < end; ++i) {
+      PixelAccumulator::Weight& weight = weights_[i - begin];
+      weight = PixelAccumulator::weight_of(collected_[i].coverage, visible_[i]);
+      sum.add(weight, faces_[collected_[i].face].color);
+    }
+    const PixelAccumulator::Shares shares = sum.shares();
+    for (std::size_t i = begin; i < end; ++i) visit(pixel, collected_[i], shares.of(weights_[i - begin]));
+    finish(pixel, sum.color(shares));
+    begin = end;
   }
 }
 
@@ -297,7 +337,7 @@ void ImageDrawer::order_pixel(int x, int y) {
   auto at_centroid = [&](const PixelFragment& fragment) {
     return make_fragment(faces_[fragment.face], fragment.face, fragment.coverage, x, y);
   };
-  std::sort(pixel_.begin(), pixel_.end(), [&](const PixelFragment& a, const PixelFragment& b) {
+  std::sort(collected_.begin(), collected_.end(), [&](const PixelFragment& a, const PixelFragment& b) {
     return is_nearer(at_centroid(a), at_centroid(b), faces_.data());
   });
   const Vec2 corner{static_cast<float>(x), static_cast<float>(y)};
@@ -309,12 +349,12 @@ void ImageDrawer::order_pixel(int x, int y) {
     return shared != 0 && face.object_id != other_face.object_id &&
            is_in_front(other_face, face, corner + centroid_of(shared), stands_here);
   };
-  for (auto next = pixel_.begin(); next != pixel_.end(); ++next) {
+  for (auto next = collected_.begin(); next != collected_.end(); ++next) {
     auto is_occluded = [&](const PixelFragment& fragment) {
-      return std::any_of(next, pixel_.end(), [&](const PixelFragment& other) { return occludes(other, fragment); });
+      return std::any_of(next, collected_.end(), [&](const PixelFragment& other) { return occludes(other, fragment); });
     };
-    const auto front = std::find_if_not(next, pixel_.end(), is_occluded);
-    if (front != pixel_.end()) std::rotate(next, front, front + 1);
+    const auto front = std::find_if_not(next, collected_.end(), is_occluded);
+    if (front != collected_.end()) std::rotate(next, front, front + 1);
   }
 }
 
@@ -322,9 +362,10 @@ void ImageDrawer::visit_fragments(const std::function<void(int, const PixelCover
   const int width = setting_.camera.width_px, height = setting_.camera.height_px;
   make_fragments({0, static_cast<int32_t>(faces_.size())}, {0, height});
   for (int pixel = 0; pixel < width * height; ++pixel) {
+    collected_.clear();
     collect_fragments(first_fragment_[pixel]);
     order_pixel(pixel % width, pixel / width);
-    for (const PixelFragment& fragment : pixel_) {
+    for (const PixelFragment& fragment : collected_) {
       visit(pixel, fragment.coverage, faces_[fragment.face].color);
     }
   }

@@ -106,7 +106,7 @@ class ImageDrawer {
   void make_fragments(FaceRange faces, RowRange rows);
   void collect_fragments(int32_t first);
   void order_pixel(int x, int y);
-  void resolve_occlusion(int x, int y);
+  void resolve_occlusion(RowRange rows);
   // Composites the pixels of the rows: visit(pixel index, fragment, weight) for each fragment, then finish(pixel index,
   // color) for each pixel.
   template <typename Visit, typename Finish>
@@ -125,10 +125,10 @@ class ImageDrawer {
   std::vector<float> occluder_bounds_;   // [pixels of the rows] the largest occluder_bound()
   std::vector<int32_t> first_fragment_;  // [pixels of the rows] the first of each list
   std::vector<PixelFragment> fragments_;
-  // Of one pixel.
-  std::vector<PixelFragment> pixel_;
-  std::vector<uint64_t> visible_;
-  std::vector<PixelAccumulator::Weight> weights_;
+  std::vector<PixelFragment> collected_;
+  std::vector<uint64_t> visible_;                  // of the collected fragments
+  std::vector<std::size_t> pixel_ends_;            // of each pixel's in those collected
+  std::vector<PixelAccumulator::Weight> weights_;  // of one pixel
 };
 
 }  // namespace pictura

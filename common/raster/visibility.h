@@ -320,20 +320,25 @@ struct OccludedSamples {
   uint64_t of_a = 0, of_b = 0;
 };
 
-/// Resolves the occlusion of two fragments; corner is the pixel's. Faces of one primitive do not occlude each other. A
-/// sliver occludes nothing and is occluded as a whole; a fragment that covers the whole pixel is occluded only by
-/// another such (see PixelAccumulator).
+/// The samples that two fragments of different primitives occlude of each other, given the samples that they share and
+/// those of them at which a is in front. A sliver occludes nothing and is occluded as a whole; a fragment that covers
+/// the whole pixel is occluded only by another such (see PixelAccumulator).
+PICTURA_HD inline OccludedSamples occluded_samples(const PixelCoverage& a, const PixelCoverage& b, uint64_t shared,
+                                                   uint64_t a_first) {
+  if (a.samples == 0 || b.samples == 0) {
+    return {a.samples == 0 && a_first == 0 ? kAllSamples : 0, b.samples == 0 && a_first != 0 ? kAllSamples : 0};
+  }
+  return {a.is_full() && !b.is_full() ? 0 : shared & ~a_first, b.is_full() && !a.is_full() ? 0 : a_first};
+}
+
+/// Resolves the occlusion of two fragments; corner is the pixel's. Faces of one primitive do not occlude each other.
 template <typename Stands>
 PICTURA_HD inline OccludedSamples occlude_pair(const PixelCoverage& a, const PixelCoverage& b, const ScreenFace& face_a,
                                                const ScreenFace& face_b, Vec2 corner, Stands&& stands) {
   const uint64_t shared = shared_samples(a, b);
   if (shared == 0 || face_a.object_id == face_b.object_id || are_complementary(a, b)) return {};
   const bool has_sliver = a.samples == 0 || b.samples == 0;
-  const uint64_t a_first = samples_in_front(face_a, face_b, shared, corner, has_sliver, stands);
-  if (has_sliver) {
-    return {a.samples == 0 && a_first == 0 ? kAllSamples : 0, b.samples == 0 && a_first != 0 ? kAllSamples : 0};
-  }
-  return {a.is_full() && !b.is_full() ? 0 : shared & ~a_first, b.is_full() && !a.is_full() ? 0 : a_first};
+  return occluded_samples(a, b, shared, samples_in_front(face_a, face_b, shared, corner, has_sliver, stands));
 }
 
 }  // namespace pictura
