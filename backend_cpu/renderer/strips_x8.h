@@ -2,6 +2,8 @@
 // is_quad_visible().
 #pragma once
 
+#include <cstddef>
+
 #include "pictura/backend_cpu/renderer/cull_x8.h"
 #include "pictura/common/raster/face_setup.h"
 
@@ -83,27 +85,21 @@ inline Mask8 occludes(const Occluders& occluders, const PinholeCamera& camera, c
   return are_occluded;
 }
 
-/// `members` has the first floats of eight strips, each up to its colour.
+/// Sets up eight strips.
 inline StripsX8 set_up_strips(const ImageSetting& setting, const Strip* const* strip) {
-  // The members of the strips, floats up to their colours.
-  constexpr int kMembers = 14;
-  static_assert(offsetof(Strip, color) == (kMembers - 3) * sizeof(float));
-  alignas(32) float members[kMembers][kLanes];
-  for (int lane = 0; lane < kLanes; ++lane) {
-    float of_strip[kMembers];
-    __builtin_memcpy(of_strip, strip[lane], sizeof(of_strip));
-    for (int i = 0; i < kMembers; ++i) members[i][lane] = of_strip[i];
+  // The members of the strips, by fours.
+  static_assert(offsetof(Strip, color) == 11 * sizeof(float));
+  Float8 member[16];
+  for (int first : {0, 4, 8, 12}) {
+    transpose_four([&](int lane) { return reinterpret_cast<const char*>(strip[lane]) + first * sizeof(float); },
+                   &member[first]);
   }
-  auto vec2 = [&](int first) { return Vec2x8{load8(members[first]), load8(members[first + 1])}; };
-  auto vec3 = [&](int first) {
-    return Vec3x8{load8(members[first]), load8(members[first + 1]), load8(members[first + 2])};
-  };
   const PinholeCamera& camera = setting.camera;
-  const Vec3x8 a_m = vec3(0), b_m = vec3(3), base_color = vec3(11);
-  const Float8 half_width_m = 0.5f * load8(members[10]);
+  const Vec3x8 a_m{member[0], member[1], member[2]}, b_m{member[3], member[4], member[5]};
+  const Float8 half_width_m = 0.5f * member[10];
 
   // strip_corners() in camera coordinates, as quad_to_camera().
-  const Vec2x8 at_a = vec2(6) * half_width_m, at_b = vec2(8) * half_width_m;
+  const Vec2x8 at_a = Vec2x8{member[6], member[7]} * half_width_m, at_b = Vec2x8{member[8], member[9]} * half_width_m;
   const Vec3x8 corner[4] = {to_camera(camera, {a_m.x + at_a.x, a_m.y + at_a.y, a_m.z}),
                             to_camera(camera, {a_m.x - at_a.x, a_m.y - at_a.y, a_m.z}),
                             to_camera(camera, {b_m.x - at_b.x, b_m.y - at_b.y, b_m.z}),
@@ -114,7 +110,7 @@ inline StripsX8 set_up_strips(const ImageSetting& setting, const Strip* const* s
   const Mask8 is_bright = brightness > 0.0f;
 
   StripsX8 strips;
-  strips.color = {base_color.x * brightness, base_color.y * brightness, base_color.z * brightness};
+  strips.color = {member[11] * brightness, member[12] * brightness, member[13] * brightness};
   strips.normal = cross(corner[2] - corner[0], corner[3] - corner[1]);
   strips.offset = dot(strips.normal, corner[0]);
 
