@@ -78,12 +78,12 @@ inline RowSpansX8 row_spans_x8(const PolygonEdge* edges, int count, const PixelB
   return spans;
 }
 
-/// Calls visit(lane, coverage) for each of the first num_pixels of eight pixels of which pixel_coverage() is not 0; x
-/// and y are aligned to 32 bytes.
+/// Calls visit(lane, coverage) for each of the first num_pixels of eight pixels of which pixel_coverage() is not 0.
 template <typename Visit>
-inline void coverage_x8(const PolygonEdge* edges, int count, float min_area, const float* x, const float* y,
+inline void coverage_x8(const PolygonEdge* edges, int count, float min_area, const int32_t* x, const int32_t* y,
                         int num_pixels, Visit&& visit) {
-  const __m256 x_px = _mm256_load_ps(x), y_px = _mm256_load_ps(y);
+  const __m256 x_px = _mm256_cvtepi32_ps(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(x)));
+  const __m256 y_px = _mm256_cvtepi32_ps(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(y)));
   const __m256 half = _mm256_set1_ps(0.5f);
   constexpr int kPairs = kLanes / 2;
   // Element i has the columns of pixels i and i + 4.
@@ -169,11 +169,10 @@ inline RowSpansX8 row_spans_x8(const PolygonEdge* edges, int count, const PixelB
 }
 
 template <typename Visit>
-inline void coverage_x8(const PolygonEdge* edges, int count, float min_area, const float* x, const float* y,
+inline void coverage_x8(const PolygonEdge* edges, int count, float min_area, const int32_t* x, const int32_t* y,
                         int num_pixels, Visit&& visit) {
   for (int i = 0; i < num_pixels; ++i) {
-    const PixelCoverage coverage =
-        pixel_coverage(edges, count, min_area, static_cast<int>(x[i]), static_cast<int>(y[i]));
+    const PixelCoverage coverage = pixel_coverage(edges, count, min_area, x[i], y[i]);
     if (coverage.area > 0.0f) visit(i, coverage);
   }
 }

@@ -49,6 +49,30 @@ inline unsigned negative_lanes(const int32_t* from) {
   __builtin_memcpy(&mask.bits, from, sizeof(mask.bits));
   return lanes_of({mask.bits < 0});
 }
+/// Writes base + lane for each of the lanes, and something behind them; `to` has room for eight.
+inline void store_lanes(unsigned lanes, int32_t base, int32_t* to) {
+#if defined(__AVX2__)
+  struct Table {
+    alignas(8) uint8_t lanes[1 << kLanes][kLanes] = {};
+    constexpr Table() {
+      for (int mask = 0; mask < 1 << kLanes; ++mask) {
+        int count = 0;
+        for (int lane = 0; lane < kLanes; ++lane) {
+          if ((mask >> lane & 1) != 0) lanes[mask][count++] = static_cast<uint8_t>(lane);
+        }
+      }
+    }
+  };
+  static constexpr Table kTable;
+  const __m128i of_mask = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(kTable.lanes[lanes]));
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(to),
+                      _mm256_add_epi32(_mm256_cvtepu8_epi32(of_mask), _mm256_set1_epi32(base)));
+#else
+  for (int lane = 0; lane < kLanes; ++lane) {
+    if ((lanes >> lane & 1) != 0) *to++ = base + lane;
+  }
+#endif
+}
 /// 0 to 7.
 constexpr FloatVector kLaneNumbers{0, 1, 2, 3, 4, 5, 6, 7};
 

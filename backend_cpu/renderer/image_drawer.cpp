@@ -152,11 +152,11 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
   first_fragment_.assign((rows.y_end - rows.y_begin) * setting_.camera.width_px + kLanes, -1);
   int32_t num_fragments = 0;
   // Pixels that a face covers partly, as far as is known before their coverage is.
-  struct alignas(32) {
-    float x[kLanes] = {}, y[kLanes] = {};
-    int32_t pixel[kLanes];
+  struct {
+    int32_t x[2 * kLanes] = {}, y[2 * kLanes] = {};
     int count = 0;
   } partial;
+  const int width = setting_.camera.width_px;
   for (int32_t f = faces.begin; f < faces.end; ++f) {
     const ScreenFace& face = faces_[f];
     auto add = [&](int32_t pixel, const PixelCoverage& coverage) {
@@ -164,9 +164,13 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
       first_fragment_[pixel] = num_fragments++;
     };
     auto add_partial = [&] {
-      coverage_x8(edges_.at(face.edge_begin), face.edge_count, face.min_area(), partial.x, partial.y, partial.count,
-                  [&](int lane, const PixelCoverage& coverage) { add(partial.pixel[lane], coverage); });
-      partial.count = 0;
+      coverage_x8(edges_.at(face.edge_begin), face.edge_count, face.min_area(), partial.x, partial.y,
+                  min_of(partial.count, kLanes), [&](int lane, const PixelCoverage& coverage) {
+                    add((partial.y[lane] - rows.y_begin) * width + partial.x[lane], coverage);
+                  });
+      std::copy_n(partial.x + kLanes, kLanes, partial.x);
+      std::copy_n(partial.y + kLanes, kLanes, partial.y);
+      partial.count -= kLanes;
     };
     visit_spans(face, rows, [&](int y, int row, const RowSpansX8& spans, int lane) {
       for (int x = spans.begin[lane]; x < spans.end[lane]; x += kLanes) {
@@ -181,16 +185,14 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
         for (unsigned lanes = full; lanes != 0; lanes &= lanes - 1) {
           add(row + x + std::countr_zero(lanes), {1.0f, kAllSamples});
         }
-        for (unsigned lanes = passing & ~full; lanes != 0; lanes &= lanes - 1) {
-          const int at = x + std::countr_zero(lanes);
-          partial.x[partial.count] = static_cast<float>(at);
-          partial.y[partial.count] = static_cast<float>(y);
-          partial.pixel[partial.count] = row + at;
-          if (++partial.count == kLanes) add_partial();
-        }
+        store_lanes(passing & ~full, x, &partial.x[partial.count]);
+        std::fill_n(&partial.y[partial.count], kLanes, y);
+        partial.count += std::popcount(passing & ~full);
+        if (partial.count >= kLanes) add_partial();
       }
     });
     if (partial.count > 0) add_partial();
+    partial.count = 0;
   }
 }
 
