@@ -43,12 +43,6 @@ inline unsigned lanes_of(Mask8 mask) {
 inline unsigned lanes_below(int number) {
   return number >= kLanes ? (1u << kLanes) - 1 : number <= 0 ? 0u : (1u << number) - 1;
 }
-/// Bit i is set if from[i] is negative.
-inline unsigned negative_lanes(const int32_t* from) {
-  Mask8 mask;
-  __builtin_memcpy(&mask.bits, from, sizeof(mask.bits));
-  return lanes_of({mask.bits < 0});
-}
 /// Writes base + lane for each of the lanes, and something behind them; `to` has room for eight.
 inline void store_lanes(unsigned lanes, int32_t base, int32_t* to) {
 #if defined(__AVX2__)
@@ -73,6 +67,7 @@ inline void store_lanes(unsigned lanes, int32_t base, int32_t* to) {
   }
 #endif
 }
+
 /// 0 to 7.
 constexpr FloatVector kLaneNumbers{0, 1, 2, 3, 4, 5, 6, 7};
 
