@@ -149,7 +149,7 @@ void ImageDrawer::find_occluder_bounds(FaceRange faces, RowRange rows) {
 // Rasterizes faces into fragments, a linked list per pixel of the rows.
 void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
   find_occluder_bounds(faces, rows);
-  first_fragment_.assign((rows.y_end - rows.y_begin) * setting_.camera.width_px + kLanes, -1);
+  first_fragment_.assign((rows.y_end - rows.y_begin) * setting_.camera.width_px, -1);
   int32_t num_fragments = 0;
   // Pixels that a face covers partly, as far as is known before their coverage is.
   struct {
@@ -209,7 +209,7 @@ void ImageDrawer::resolve_occlusion(RowRange rows) {
   struct Pair {
     std::size_t a, b;  // indices of the fragments
   } pair[kLanes];
-  PairsX8 pairs;
+  PairsX8 pairs{};
   int num_pairs = 0;
   auto resolve = [&] {
     for (int lane = 0; lane < kLanes; ++lane) {
