@@ -4,10 +4,10 @@
 #include <bit>
 #include <limits>
 
-#include "pictura/backend_cpu/renderer/coverage_x8.h"
-#include "pictura/backend_cpu/renderer/occlusion_x8.h"
-#include "pictura/backend_cpu/renderer/pairs_x8.h"
-#include "pictura/backend_cpu/renderer/strips_x8.h"
+#include "pictura/backend_cpu/renderer/fast/coverage_x8.h"
+#include "pictura/backend_cpu/renderer/fast/occlusion_x8.h"
+#include "pictura/backend_cpu/renderer/fast/pairs_x8.h"
+#include "pictura/backend_cpu/renderer/fast/strips_x8.h"
 #include "pictura/common/raster/visible_primitives.h"
 
 namespace pictura {

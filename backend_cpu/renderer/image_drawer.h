@@ -6,7 +6,7 @@
 #include <functional>
 #include <vector>
 
-#include "pictura/backend_cpu/renderer/cull_x8.h"
+#include "pictura/backend_cpu/renderer/fast/cull_x8.h"
 #include "pictura/common/image.h"
 #include "pictura/common/raster/face_setup.h"
 

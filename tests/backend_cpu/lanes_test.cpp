@@ -5,10 +5,10 @@
 
 #include <gtest/gtest.h>
 
-#include "pictura/backend_cpu/renderer/coverage_x8.h"
-#include "pictura/backend_cpu/renderer/cull_x8.h"
-#include "pictura/backend_cpu/renderer/occlusion_x8.h"
-#include "pictura/backend_cpu/renderer/pairs_x8.h"
+#include "pictura/backend_cpu/renderer/fast/coverage_x8.h"
+#include "pictura/backend_cpu/renderer/fast/cull_x8.h"
+#include "pictura/backend_cpu/renderer/fast/occlusion_x8.h"
+#include "pictura/backend_cpu/renderer/fast/pairs_x8.h"
 #include "pictura/bench/quality.h"
 #include "pictura/common/camera.h"
 #include "pictura/common/raster/check.h"

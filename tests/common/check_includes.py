@@ -19,7 +19,8 @@ MAY_INCLUDE = {
     "map": {"common"},
     "simulator": {"common", "map", "simulator/rules/fast"},
     "simulator/rules/fast": {"common", "map", "simulator"},
-    "backend_cpu/renderer": {"common"},
+    "backend_cpu/renderer": {"common", "backend_cpu/renderer/fast"},
+    "backend_cpu/renderer/fast": {"common"},
     "backend_cpu/simulator": SIMULATION,
     "backend_cpu/learner": SIMULATION | {"policy/rules", "training/rules"},
     "backend_cuda/renderer": {"common"},
@@ -148,6 +149,7 @@ def self_test() -> None:
     cases = {
         "common/a.h": '#include "pictura/map/road_map.h"\n',
         "backend_cpu/renderer/renderer.cpp": '#include "pictura/simulator/simulator.h"\n',
+        "backend_cpu/renderer/fast/z.h": '#include "pictura/backend_cpu/renderer/renderer.h"\n',
         "backend_cpu/simulator/simulator.cpp": '#include "pictura/simulator/simulator.h"\n',
         "backend_cpu/elsewhere.cpp": "",
         "simulator/b.cpp": "#include <torch/torch.h>\n",
@@ -179,7 +181,7 @@ def self_test() -> None:
         "evaluation/x.cpp": "RandomStream random({.purpose = Purpose::minibatch});\n",
         "evaluation/y.cpp": "RandomStream random({.purpose = Purpose::removal_case});\n",
     }
-    expected = {"common/a.h", "backend_cpu/renderer/renderer.cpp", "backend_cpu/elsewhere.cpp", "simulator/b.cpp",
+    expected = {"common/a.h", "backend_cpu/renderer/renderer.cpp", "backend_cpu/renderer/fast/z.h", "backend_cpu/elsewhere.cpp", "simulator/b.cpp",
                 "simulator/h.cpp", "simulator/l.h", "common/o.h", "simulator/m.h", "simulator/rules/u.h", "map/c.cpp", "map/d.cpp", "map/q.cpp", "map/r.cpp", "apps/s.cpp", "map/t.cpp", "training/w.cpp", "backend_gl/f.cpp", "common/g.h", "apps/i.cpp", "bench/j.cpp"}
     with tempfile.TemporaryDirectory() as folder:
         root = pathlib.Path(folder)

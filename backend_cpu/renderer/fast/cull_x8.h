@@ -5,7 +5,7 @@
 #include <bit>
 #include <vector>
 
-#include "pictura/backend_cpu/renderer/float8.h"
+#include "pictura/backend_cpu/renderer/fast/float8.h"
 #include "pictura/common/raster/cull.h"
 
 namespace pictura {

@@ -4,7 +4,7 @@
 
 #include <cstddef>
 
-#include "pictura/backend_cpu/renderer/cull_x8.h"
+#include "pictura/backend_cpu/renderer/fast/cull_x8.h"
 #include "pictura/common/raster/face_setup.h"
 
 namespace pictura {

@@ -1,7 +1,7 @@
 // Occlusion by solids in eight pixels of a row at once: the rules of common/raster/visibility.h.
 #pragma once
 
-#include "pictura/backend_cpu/renderer/float8.h"
+#include "pictura/backend_cpu/renderer/fast/float8.h"
 #include "pictura/common/raster/visibility.h"
 
 namespace pictura {

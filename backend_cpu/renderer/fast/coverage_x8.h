@@ -4,7 +4,7 @@
 
 #include <bit>
 
-#include "pictura/backend_cpu/renderer/float8.h"
+#include "pictura/backend_cpu/renderer/fast/float8.h"
 #include "pictura/common/raster/coverage.h"
 
 namespace pictura {

@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-#include "pictura/backend_cpu/renderer/float8.h"
+#include "pictura/backend_cpu/renderer/fast/float8.h"
 #include "pictura/common/raster/visibility.h"
 
 namespace pictura {
