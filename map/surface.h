@@ -89,9 +89,9 @@ class Surface {
     /// Bit k is set where the bounds of item first + k contain a place; bits of what follows the last item are set too.
     uint32_t that_contain(std::size_t first, const Float8& x, const Float8& y, const Float8& z) const {
       const auto between = [&](const std::vector<float>& low, const Float8& value, const std::vector<float>& high) {
-        return at_most(load8(&low[first]), value) & at_most(value, load8(&high[first]));
+        return (load8(&low[first]) <= value) & (value <= load8(&high[first]));
       };
-      return between(low_x, x, high_x) & between(low_y, y, high_y) & between(low_z, z, high_z);
+      return bits_of(between(low_x, x, high_x) & between(low_y, y, high_y) & between(low_z, z, high_z));
     }
   };
 
@@ -102,7 +102,7 @@ class Surface {
     const GridView grid = grid_.view();
     const auto begin = static_cast<std::size_t>(grid.begin[cell]), end = static_cast<std::size_t>(grid.begin[cell + 1]);
     count_lookups(static_cast<int64_t>(end - begin));
-    const Float8 x = fill8(p.x), y = fill8(p.y), z = fill8(static_cast<float>(z_m));
+    const Float8 x = p.x, y = p.y, z = static_cast<float>(z_m);
     for (std::size_t first = begin; first < end; first += 8) {
       uint32_t items = bounds_.that_contain(first, x, y, z);
       if (end - first < 8) items &= (1u << (end - first)) - 1;

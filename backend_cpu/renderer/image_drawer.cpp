@@ -49,7 +49,7 @@ void ImageDrawer::make_strips() {
     const Strip* eight[kLanes];
     for (int lane = 0; lane < kLanes; ++lane) eight[lane] = &strips[strips_[begin + (lane < count ? lane : 0)]];
     const StripsX8 made = set_up_strips(setting_, eight);
-    for (unsigned lanes = (made.visible | made.crossing) & ((1u << count) - 1); lanes != 0; lanes &= lanes - 1) {
+    for (unsigned lanes = (made.visible | made.crossing) & first_of_eight(count); lanes != 0; lanes &= lanes - 1) {
       const int lane = std::countr_zero(lanes);
       const Strip& strip = *eight[lane];
       const PrimitiveRef primitive = strip_ref(strip, strips_[begin + lane]);
@@ -138,9 +138,7 @@ void ImageDrawer::find_occluder_bounds(FaceRange faces, RowRange rows) {
     visit_spans(face, rows, [&](int y, int row, const RowSpansX8& spans, int lane) {
       const int x_end = spans.full_end[lane];
       for (int x = spans.full_begin[lane]; x < x_end; x += kLanes) {
-        float* const bounds = &occluder_bounds_[row + x];
-        const Float8 before = load8(bounds), bound = max_no_nan(before, occluder_bound_x8(face, x, y));
-        store8(bounds, select(Float8(kLaneNumbers) < static_cast<float>(x_end - x), bound, before));
+        raise_occluder_bounds_x8(face, x, x_end, y, &occluder_bounds_[row + x]);
       }
     });
   }
@@ -179,13 +177,13 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
           fragments_.resize(2 * fragments_.size() + 2 * kLanes);
         }
         const unsigned passing =
-            lanes_below(spans.end[lane] - x) & passes_occluder_bound_x8(face, load8(&occluder_bounds_[row + x]), x, y);
+            first_of_eight(spans.end[lane] - x) & passes_occluder_bound_x8(face, &occluder_bounds_[row + x], x, y);
         const unsigned full =
-            passing & lanes_below(spans.full_end[lane] - x) & ~lanes_below(spans.full_begin[lane] - x);
+            passing & first_of_eight(spans.full_end[lane] - x) & ~first_of_eight(spans.full_begin[lane] - x);
         for (unsigned lanes = full; lanes != 0; lanes &= lanes - 1) {
           add(row + x + std::countr_zero(lanes), {1.0f, kAllSamples});
         }
-        store_lanes(passing & ~full, x, &partial.x[partial.count]);
+        store_chosen(x, passing & ~full, &partial.x[partial.count]);
         std::fill_n(&partial.y[partial.count], kLanes, y);
         partial.count += std::popcount(passing & ~full);
         if (partial.count >= kLanes) add_partial();

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "pictura/common/portable/hd.h"
+#include "pictura/common/portable/intrinsics.h"
 #if defined(__AVX2__) && !defined(__CUDACC__)
 #include <immintrin.h>
 #endif
@@ -16,16 +17,66 @@ inline namespace float8_in_a_register {
 
 struct Float8 {
   __m256 value;
+  Float8() = default;
+  Float8(__m256 elements) : value(elements) {}
+  Float8(float of_all) : value(_mm256_set1_ps(of_all)) {}
+  float operator[](int k) const { return value[k]; }
 };
 inline Float8 set8(float a, float b, float c, float d, float e, float f, float g, float h) {
   return {_mm256_setr_ps(a, b, c, d, e, f, g, h)};
 }
-inline Float8 fill8(float a) { return {_mm256_set1_ps(a)}; }
 inline Float8 load8(const float* from) { return {_mm256_loadu_ps(from)}; }
 inline void store8(const Float8& a, float* to) { _mm256_storeu_ps(to, a.value); }
+/// Integers, as floats that must hold them exactly.
+inline Float8 load8_integers(const int32_t* from) {
+  return {_mm256_cvtepi32_ps(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)))};
+}
+inline void store8_integers(const Float8& a, int32_t* to) {
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_cvttps_epi32(a.value));
+}
 inline Float8 operator+(const Float8& a, const Float8& b) { return {_mm256_add_ps(a.value, b.value)}; }
 inline Float8 operator-(const Float8& a, const Float8& b) { return {_mm256_sub_ps(a.value, b.value)}; }
 inline Float8 operator*(const Float8& a, const Float8& b) { return {_mm256_mul_ps(a.value, b.value)}; }
+inline Float8 operator/(const Float8& a, const Float8& b) { return {_mm256_div_ps(a.value, b.value)}; }
+inline Float8 operator-(const Float8& a) { return {_mm256_xor_ps(_mm256_set1_ps(-0.0f), a.value)}; }
+inline Float8 magnitude(const Float8& a) { return {_mm256_andnot_ps(_mm256_set1_ps(-0.0f), a.value)}; }
+inline Float8 round_down(const Float8& a) { return {_mm256_floor_ps(a.value)}; }
+inline Float8 round_up(const Float8& a) { return {_mm256_ceil_ps(a.value)}; }
+/// As the functions of scalars.
+inline Float8 min_no_nan(const Float8& a, const Float8& b) { return {_mm256_min_ps(a.value, b.value)}; }
+inline Float8 max_no_nan(const Float8& a, const Float8& b) { return {_mm256_max_ps(a.value, b.value)}; }
+inline Float8 sqrt_in_range(const Float8& a) { return {_mm256_sqrt_ps(a.value)}; }
+/// The elements with the other bits cleared.
+inline Float8 keep_bits(const Float8& a, uint32_t bits) {
+  return {_mm256_and_ps(a.value, _mm256_castsi256_ps(_mm256_set1_epi32(static_cast<int32_t>(bits))))};
+}
+
+/// For each element, all bits or none.
+struct Mask8 {
+  __m256 bits;
+};
+inline Mask8 operator&(const Mask8& a, const Mask8& b) { return {_mm256_and_ps(a.bits, b.bits)}; }
+inline Mask8 operator|(const Mask8& a, const Mask8& b) { return {_mm256_or_ps(a.bits, b.bits)}; }
+inline Mask8 operator^(const Mask8& a, const Mask8& b) { return {_mm256_xor_ps(a.bits, b.bits)}; }
+inline Mask8 operator~(const Mask8& a) { return {_mm256_xor_ps(a.bits, _mm256_castsi256_ps(_mm256_set1_epi32(-1)))}; }
+inline Mask8 operator<(const Float8& a, const Float8& b) { return {_mm256_cmp_ps(a.value, b.value, _CMP_LT_OQ)}; }
+inline Mask8 operator<=(const Float8& a, const Float8& b) { return {_mm256_cmp_ps(a.value, b.value, _CMP_LE_OQ)}; }
+/// Compares elements as the unsigned integers of the same bits.
+inline Mask8 less_bits(const Float8& a, const Float8& b) {
+  const __m256i lowest = _mm256_set1_epi32(INT32_MIN);
+  const __m256i of_a = _mm256_xor_si256(_mm256_castps_si256(a.value), lowest);
+  const __m256i of_b = _mm256_xor_si256(_mm256_castps_si256(b.value), lowest);
+  return {_mm256_castsi256_ps(_mm256_cmpgt_epi32(of_b, of_a))};
+}
+inline Mask8 equal_bits(const Float8& a, const Float8& b) {
+  return {_mm256_castsi256_ps(_mm256_cmpeq_epi32(_mm256_castps_si256(a.value), _mm256_castps_si256(b.value)))};
+}
+/// Bit k: that of element k.
+inline uint32_t bits_of(const Mask8& mask) { return static_cast<uint32_t>(_mm256_movemask_ps(mask.bits)); }
+/// The elements of a where the mask is set, else of b.
+inline Float8 select(const Mask8& mask, const Float8& a, const Float8& b) {
+  return {_mm256_blendv_ps(b.value, a.value, mask.bits)};
+}
 
 /// Elements 2k and 2k + 1 exchanged.
 inline Float8 swap_pairs(const Float8& a) { return {_mm256_permute_ps(a.value, 0xB1)}; }
@@ -41,15 +92,6 @@ template <int k0, int k1, int k2, int k3, int k4, int k5, int k6, int k7>
 inline Float8 permute(const Float8& a) {
   return {_mm256_permutevar8x32_ps(a.value, _mm256_setr_epi32(k0, k1, k2, k3, k4, k5, k6, k7))};
 }
-
-/// Bit k: whether element k of a is below, or at most, that of b.
-inline uint32_t less(const Float8& a, const Float8& b) {
-  return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(a.value, b.value, _CMP_LT_OQ)));
-}
-inline uint32_t at_most(const Float8& a, const Float8& b) {
-  return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(a.value, b.value, _CMP_LE_OQ)));
-}
-inline Float8 magnitude(const Float8& a) { return {_mm256_andnot_ps(_mm256_set1_ps(-0.0f), a.value)}; }
 
 /// Eight pairs that follow one another, their first elements and their second ones.
 inline void load_pairs(const float* from, Float8* first_out, Float8* second_out) {
@@ -68,6 +110,22 @@ inline void gather_pairs(const float* from, const int32_t* indices, Float8* firs
   first_out->value = _mm256_shuffle_ps(low, high, 0x88);
   second_out->value = _mm256_shuffle_ps(low, high, 0xDD);
 }
+/// Four floats, unaligned, at from(k) for each element k: their first ones, their second ones and so on.
+template <typename From>
+inline void gather_fours(From&& from, Float8* four_out) {
+  // Elements k and k + 4 have their floats in halves of one register.
+  const auto two = [&](int k) {
+    const auto four = [&](int i) { return _mm_loadu_ps(static_cast<const float*>(from(i))); };
+    return _mm256_set_m128(four(k + 4), four(k));
+  };
+  const __m256 rows[4] = {two(0), two(1), two(2), two(3)};
+  const __m256 low_01 = _mm256_unpacklo_ps(rows[0], rows[1]), low_23 = _mm256_unpacklo_ps(rows[2], rows[3]);
+  const __m256 high_01 = _mm256_unpackhi_ps(rows[0], rows[1]), high_23 = _mm256_unpackhi_ps(rows[2], rows[3]);
+  four_out[0].value = _mm256_shuffle_ps(low_01, low_23, 0x44);
+  four_out[1].value = _mm256_shuffle_ps(low_01, low_23, 0xEE);
+  four_out[2].value = _mm256_shuffle_ps(high_01, high_23, 0x44);
+  four_out[3].value = _mm256_shuffle_ps(high_01, high_23, 0xEE);
+}
 
 /// The places of the set bits of every byte, in ascending order.
 struct SetBits {
@@ -82,13 +140,21 @@ struct SetBits {
 };
 inline constexpr SetBits kSetBits;
 
+/// Those of one byte, as integers.
+inline __m256i set_bits(uint32_t mask) {
+  return _mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(kSetBits.places[mask])));
+}
+
 /// Copies the 32-bit elements whose bits are set in the mask; what is behind them, up to eight in all, is overwritten.
 template <typename Word>
 inline void copy_chosen(const Word* from, uint32_t mask, Word* to) {
   static_assert(sizeof(Word) == sizeof(int32_t));
-  const __m256i places = _mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(kSetBits.places[mask])));
   const __m256i all = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
-  _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_permutevar8x32_epi32(all, places));
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_permutevar8x32_epi32(all, set_bits(mask)));
+}
+/// As copy_chosen() from the integers first to first + 7.
+inline void store_chosen(int32_t first, uint32_t mask, int32_t* to) {
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_add_epi32(set_bits(mask), _mm256_set1_epi32(first)));
 }
 /// Bit k: whether integer k is the value.
 inline uint32_t equal8(const int32_t* integers, int32_t value) {
@@ -129,21 +195,34 @@ inline namespace float8_in_memory {
 
 struct alignas(32) Float8 {
   float value[8];
+  Float8() = default;
+  PICTURA_HD Float8(float of_all) {
+    for (float& element : value) element = of_all;
+  }
+  PICTURA_HD float operator[](int k) const { return value[k]; }
 };
 /// The elements of(0) to of(7).
 template <typename Of>
 PICTURA_HD inline Float8 make_float8(Of&& of) {
-  return {{of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7)}};
+  Float8 result;
+  for (int k = 0; k < 8; ++k) result.value[k] = of(k);
+  return result;
 }
 PICTURA_HD inline Float8 set8(float a, float b, float c, float d, float e, float f, float g, float h) {
-  return {{a, b, c, d, e, f, g, h}};
+  const float elements[8] = {a, b, c, d, e, f, g, h};
+  return make_float8([&](int k) { return elements[k]; });
 }
-PICTURA_HD inline Float8 fill8(float a) { return {{a, a, a, a, a, a, a, a}}; }
 PICTURA_HD inline Float8 load8(const float* from) {
   return make_float8([=](int k) { return from[k]; });
 }
 PICTURA_HD inline void store8(const Float8& a, float* to) {
   for (int k = 0; k < 8; ++k) to[k] = a.value[k];
+}
+PICTURA_HD inline Float8 load8_integers(const int32_t* from) {
+  return make_float8([=](int k) { return static_cast<float>(from[k]); });
+}
+PICTURA_HD inline void store8_integers(const Float8& a, int32_t* to) {
+  for (int k = 0; k < 8; ++k) to[k] = static_cast<int32_t>(a.value[k]);
 }
 PICTURA_HD inline Float8 operator+(const Float8& a, const Float8& b) {
   return make_float8([&](int k) { return a.value[k] + b.value[k]; });
@@ -154,6 +233,77 @@ PICTURA_HD inline Float8 operator-(const Float8& a, const Float8& b) {
 PICTURA_HD inline Float8 operator*(const Float8& a, const Float8& b) {
   return make_float8([&](int k) { return a.value[k] * b.value[k]; });
 }
+PICTURA_HD inline Float8 operator/(const Float8& a, const Float8& b) {
+  return make_float8([&](int k) { return a.value[k] / b.value[k]; });
+}
+PICTURA_HD inline Float8 operator-(const Float8& a) {
+  return make_float8([&](int k) { return -a.value[k]; });
+}
+PICTURA_HD inline Float8 magnitude(const Float8& a) {
+  return make_float8([&](int k) { return fabsf(a.value[k]); });
+}
+PICTURA_HD inline Float8 round_down(const Float8& a) {
+  return make_float8([&](int k) { return floorf(a.value[k]); });
+}
+PICTURA_HD inline Float8 round_up(const Float8& a) {
+  return make_float8([&](int k) { return ceilf(a.value[k]); });
+}
+PICTURA_HD inline Float8 min_no_nan(const Float8& a, const Float8& b) {
+  return make_float8([&](int k) { return pictura::min_no_nan(a.value[k], b.value[k]); });
+}
+PICTURA_HD inline Float8 max_no_nan(const Float8& a, const Float8& b) {
+  return make_float8([&](int k) { return pictura::max_no_nan(a.value[k], b.value[k]); });
+}
+PICTURA_HD inline Float8 sqrt_in_range(const Float8& a) {
+  return make_float8([&](int k) { return pictura::sqrt_in_range(a.value[k]); });
+}
+PICTURA_HD inline Float8 keep_bits(const Float8& a, uint32_t bits) {
+  return make_float8([&](int k) { return float_from_bits(bits_from_float(a.value[k]) & bits); });
+}
+
+struct alignas(32) Mask8 {
+  int32_t bits[8];
+};
+/// Set where is(0) to is(7).
+template <typename Is>
+PICTURA_HD inline Mask8 make_mask8(Is&& is) {
+  Mask8 mask;
+  for (int k = 0; k < 8; ++k) mask.bits[k] = is(k) ? -1 : 0;
+  return mask;
+}
+PICTURA_HD inline Mask8 operator&(const Mask8& a, const Mask8& b) {
+  return make_mask8([&](int k) { return (a.bits[k] & b.bits[k]) != 0; });
+}
+PICTURA_HD inline Mask8 operator|(const Mask8& a, const Mask8& b) {
+  return make_mask8([&](int k) { return (a.bits[k] | b.bits[k]) != 0; });
+}
+PICTURA_HD inline Mask8 operator^(const Mask8& a, const Mask8& b) {
+  return make_mask8([&](int k) { return (a.bits[k] ^ b.bits[k]) != 0; });
+}
+PICTURA_HD inline Mask8 operator~(const Mask8& a) {
+  return make_mask8([&](int k) { return a.bits[k] == 0; });
+}
+PICTURA_HD inline Mask8 operator<(const Float8& a, const Float8& b) {
+  return make_mask8([&](int k) { return a.value[k] < b.value[k]; });
+}
+PICTURA_HD inline Mask8 operator<=(const Float8& a, const Float8& b) {
+  return make_mask8([&](int k) { return a.value[k] <= b.value[k]; });
+}
+PICTURA_HD inline Mask8 less_bits(const Float8& a, const Float8& b) {
+  return make_mask8([&](int k) { return bits_from_float(a.value[k]) < bits_from_float(b.value[k]); });
+}
+PICTURA_HD inline Mask8 equal_bits(const Float8& a, const Float8& b) {
+  return make_mask8([&](int k) { return bits_from_float(a.value[k]) == bits_from_float(b.value[k]); });
+}
+PICTURA_HD inline uint32_t bits_of(const Mask8& mask) {
+  uint32_t bits = 0;
+  for (int k = 0; k < 8; ++k) bits |= (static_cast<uint32_t>(mask.bits[k]) & 1u) << k;
+  return bits;
+}
+PICTURA_HD inline Float8 select(const Mask8& mask, const Float8& a, const Float8& b) {
+  return make_float8([&](int k) { return mask.bits[k] != 0 ? a.value[k] : b.value[k]; });
+}
+
 PICTURA_HD inline Float8 swap_pairs(const Float8& a) {
   return make_float8([&](int k) { return a.value[k ^ 1]; });
 }
@@ -163,20 +313,7 @@ PICTURA_HD inline Float8 blend(const Float8& a, const Float8& b) {
 }
 template <int k0, int k1, int k2, int k3, int k4, int k5, int k6, int k7>
 PICTURA_HD inline Float8 permute(const Float8& a) {
-  return {{a.value[k0], a.value[k1], a.value[k2], a.value[k3], a.value[k4], a.value[k5], a.value[k6], a.value[k7]}};
-}
-PICTURA_HD inline uint32_t less(const Float8& a, const Float8& b) {
-  uint32_t bits = 0;
-  for (int k = 0; k < 8; ++k) bits |= static_cast<uint32_t>(a.value[k] < b.value[k]) << k;
-  return bits;
-}
-PICTURA_HD inline uint32_t at_most(const Float8& a, const Float8& b) {
-  uint32_t bits = 0;
-  for (int k = 0; k < 8; ++k) bits |= static_cast<uint32_t>(a.value[k] <= b.value[k]) << k;
-  return bits;
-}
-PICTURA_HD inline Float8 magnitude(const Float8& a) {
-  return make_float8([&](int k) { return fabsf(a.value[k]); });
+  return set8(a.value[k0], a.value[k1], a.value[k2], a.value[k3], a.value[k4], a.value[k5], a.value[k6], a.value[k7]);
 }
 PICTURA_HD inline void load_pairs(const float* from, Float8* first_out, Float8* second_out) {
   *first_out = make_float8([=](int k) { return from[2 * k]; });
@@ -186,10 +323,24 @@ PICTURA_HD inline void gather_pairs(const float* from, const int32_t* indices, F
   *first_out = make_float8([=](int k) { return from[2 * int64_t{indices[k]}]; });
   *second_out = make_float8([=](int k) { return from[2 * int64_t{indices[k]} + 1]; });
 }
+template <typename From>
+PICTURA_HD inline void gather_fours(From&& from, Float8* four_out) {
+  for (int k = 0; k < 8; ++k) {
+    float four[4];
+    __builtin_memcpy(four, from(k), sizeof(four));
+    for (int i = 0; i < 4; ++i) four_out[i].value[k] = four[i];
+  }
+}
 template <typename Word>
 PICTURA_HD inline void copy_chosen(const Word* from, uint32_t mask, Word* to) {
   for (int k = 0, count = 0; k < 8; ++k) {
     to[count] = from[k];
+    count += mask >> k & 1;
+  }
+}
+PICTURA_HD inline void store_chosen(int32_t first, uint32_t mask, int32_t* to) {
+  for (int k = 0, count = 0; k < 8; ++k) {
+    to[count] = first + k;
     count += mask >> k & 1;
   }
 }
@@ -221,8 +372,17 @@ struct alignas(32) LeastKeys {
 }  // namespace float8_in_memory
 #endif
 
-/// Bits of the first or last `count` of eight: which of them are new where eights overlap or are filled up.
-PICTURA_HD constexpr uint32_t first_of_eight(int count) { return (1u << count) - 1; }
+PICTURA_HD inline Mask8 operator>(const Float8& a, const Float8& b) { return b < a; }
+PICTURA_HD inline Mask8 operator>=(const Float8& a, const Float8& b) { return b <= a; }
+/// As the functions of scalars.
+PICTURA_HD inline Float8 reciprocal_in_range(const Float8& a) { return 1.0f / a; }
+PICTURA_HD inline Float8 saturate(const Float8& a) { return min_no_nan(max_no_nan(a, 0.0f), 1.0f); }
+
+/// Bits of the first or last `count` of eight: which of them are new where eights overlap or are filled up. The first
+/// of any number: of one beyond eight, all; of one below 0, none.
+PICTURA_HD constexpr uint32_t first_of_eight(int count) {
+  return count >= 8 ? 0xFFu : count <= 0 ? 0u : (1u << count) - 1;
+}
 PICTURA_HD constexpr uint32_t last_of_eight(int count) { return 0xFFu << (8 - count) & 0xFF; }
 
 }  // namespace pictura

@@ -190,20 +190,28 @@ PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec
   return stands(strip_a ? b.object_id : a.object_id, strip_a ? a.object_id : b.object_id) ? !first : first;
 }
 
-/// Centroid of samples, relative to the pixel's corner; the pixel's centre if there are no samples.
-PICTURA_HD inline Vec2 centroid_of(uint64_t samples) {
-  const int count = popcount(samples);
-  if (count == 0) return {0.5f, 0.5f};
-  // Sums of the samples' columns and rows, bit by bit.
+/// Sums of samples' columns, of their rows, and of their columns' offsets in eighths of a row, see
+/// sample_column_offset.
+struct SampleSums {
+  int32_t columns, rows, offsets;
+};
+PICTURA_HD inline SampleSums sums_of(uint64_t samples) {
+  // Bit by bit.
   const int column_0 = popcount(samples & 0xFF00FF00FF00FF00ull), column_1 = popcount(samples & 0xFFFF0000FFFF0000ull),
             column_2 = popcount(samples & 0xFFFFFFFF00000000ull);
   const int rows = popcount(samples & 0xAAAAAAAAAAAAAAAAull) + 2 * popcount(samples & 0xCCCCCCCCCCCCCCCCull) +
                    4 * popcount(samples & 0xF0F0F0F0F0F0F0F0ull);
-  const int columns = column_0 + 2 * column_1 + 4 * column_2;
-  const int offsets = 4 * column_0 + 2 * column_1 + column_2;  // in eighths of a row, see sample_column_offset
+  return {column_0 + 2 * column_1 + 4 * column_2, rows, 4 * column_0 + 2 * column_1 + column_2};
+}
+
+/// Centroid of samples, relative to the pixel's corner; the pixel's centre if there are no samples.
+PICTURA_HD inline Vec2 centroid_of(uint64_t samples) {
+  const int count = popcount(samples);
+  if (count == 0) return {0.5f, 0.5f};
+  const SampleSums sums = sums_of(samples);
   const float n = static_cast<float>(count);
-  return {(static_cast<float>(columns) + 0.5f * n) / (8.0f * n),
-          (static_cast<float>(rows) + (static_cast<float>(offsets) + 0.5f * n) / 8.0f) / (8.0f * n)};
+  return {(static_cast<float>(sums.columns) + 0.5f * n) / (8.0f * n),
+          (static_cast<float>(sums.rows) + (static_cast<float>(sums.offsets) + 0.5f * n) / 8.0f) / (8.0f * n)};
 }
 
 /// A face's coverage of one pixel.

@@ -91,7 +91,8 @@ TEST(Lanes, HaveTheOrderAndBoundsOfFaces) {
       pairs.shared[lane] = ((uint64_t{random()} << 32 | random()) & (uint64_t{random()} << 32 | random())) | 1;
       pairs.x[lane] = static_cast<float>(lane);
       pairs.y[lane] = static_cast<float>(round % 7);
-      const Float8 bound = occluder_bound_x8(face[0], 3, round % 7);
+      float bound[kLanes];
+      store8(occluder_bound_x8(face[0], 3, round % 7), bound);
       ASSERT_EQ(bits_of(bound[lane]),
                 bits_of(is_strip(face[0]) ? bound[lane] : occluder_bound(face[0], 3 + lane, round % 7)));
       ASSERT_EQ(passes_occluder_bound_x8(face[1], bound, 3, round % 7) >> lane & 1,

@@ -53,7 +53,7 @@ STAYS_IN = [
     (re.compile(r"^(Eigen|unsupported)/"), re.compile(r"^((tests/)?map|drawing|bench/truth)/|^common/.*\.cpp$")),
     (re.compile(r"^pugixml"), re.compile(r"^(tests/)?map/")),
     (re.compile(r"^cairo"), re.compile(r"^(tests/)?drawing/")),
-    (re.compile(r"^pictura/common/portable/float8\.h$"), re.compile(r"^(tests/)?(common|map|simulator/rules/fast)/")),
+    (re.compile(r"^pictura/common/portable/float8\.h$"), re.compile(r"^(tests/)?(common|map|simulator/rules/fast|backend_cpu/renderer/fast)/")),
     (re.compile(r"^CLI/"), re.compile(r"^(apps|cli|bench/commands)/")),
 ]
 INCLUDE = re.compile(r'^\s*#\s*include\s+([<"])([^>"]+)[>"]')
@@ -149,6 +149,7 @@ def self_test() -> None:
     cases = {
         "common/a.h": '#include "pictura/map/road_map.h"\n',
         "backend_cpu/renderer/renderer.cpp": '#include "pictura/simulator/simulator.h"\n',
+        "backend_cpu/renderer/a.h": '#include "pictura/common/portable/float8.h"\n',
         "backend_cpu/renderer/fast/z.h": '#include "pictura/backend_cpu/renderer/renderer.h"\n',
         "backend_cpu/simulator/simulator.cpp": '#include "pictura/simulator/simulator.h"\n',
         "backend_cpu/elsewhere.cpp": "",
@@ -181,7 +182,7 @@ def self_test() -> None:
         "evaluation/x.cpp": "RandomStream random({.purpose = Purpose::minibatch});\n",
         "evaluation/y.cpp": "RandomStream random({.purpose = Purpose::removal_case});\n",
     }
-    expected = {"common/a.h", "backend_cpu/renderer/renderer.cpp", "backend_cpu/renderer/fast/z.h", "backend_cpu/elsewhere.cpp", "simulator/b.cpp",
+    expected = {"common/a.h", "backend_cpu/renderer/renderer.cpp", "backend_cpu/renderer/a.h", "backend_cpu/renderer/fast/z.h", "backend_cpu/elsewhere.cpp", "simulator/b.cpp",
                 "simulator/h.cpp", "simulator/l.h", "common/o.h", "simulator/m.h", "simulator/rules/u.h", "map/c.cpp", "map/d.cpp", "map/q.cpp", "map/r.cpp", "apps/s.cpp", "map/t.cpp", "training/w.cpp", "backend_gl/f.cpp", "common/g.h", "apps/i.cpp", "bench/j.cpp"}
     with tempfile.TemporaryDirectory() as folder:
         root = pathlib.Path(folder)

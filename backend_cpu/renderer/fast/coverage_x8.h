@@ -1,10 +1,9 @@
-// The rules of common/raster/coverage.h for eight rows or pixels at once: the same bits, in AVX2 where the compiler may
-// use it.
+// The rules of common/raster/coverage.h for eight rows or pixels at once.
 #pragma once
 
 #include <bit>
 
-#include "pictura/backend_cpu/renderer/fast/float8.h"
+#include "pictura/backend_cpu/renderer/fast/vectors_x8.h"
 #include "pictura/common/raster/coverage.h"
 
 namespace pictura {
@@ -14,63 +13,42 @@ struct alignas(32) RowSpansX8 {
   int32_t begin[kLanes], end[kLanes], full_begin[kLanes], full_end[kLanes];
 };
 
-#if defined(__AVX2__)
-
-inline __m256 saturate_x8(__m256 x) {
-  return _mm256_min_ps(_mm256_max_ps(x, _mm256_setzero_ps()), _mm256_set1_ps(1.0f));
-}
-
 inline RowSpansX8 row_spans_x8(const PolygonEdge* edges, int count, const PixelBox& box, int y) {
-  const __m256 one = _mm256_set1_ps(1.0f);
-  const __m256 y_px =
-      _mm256_cvtepi32_ps(_mm256_add_epi32(_mm256_set1_epi32(y), _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7)));
-  const __m256 middle_px = _mm256_add_ps(y_px, _mm256_set1_ps(0.5f));
-  const __m256 begin = _mm256_set1_ps(static_cast<float>(box.x_begin)),
-               end = _mm256_set1_ps(static_cast<float>(box.x_end));
-  __m256 touch_low = begin, touch_high = end, full_low = begin, full_high = end, is_outside = _mm256_setzero_ps();
+  const Float8 y_px = lane_numbers() + static_cast<float>(y), middle_px = y_px + 0.5f;
+  const Float8 begin = static_cast<float>(box.x_begin), end = static_cast<float>(box.x_end);
+  Float8 touch_low = begin, touch_high = end, full_low = begin, full_high = end;
+  Mask8 is_outside = y_px < y_px;
   for (int i = 0; i < count; ++i) {
     const PolygonEdge& edge = edges[i];
     const float side = side_of(edge);
-    const __m256 y0 = _mm256_set1_ps(edge.y0);
     if (side == 0.0f) {
-      const __m256 inner_px =
-          edge.rows_scale > 0.0f ? _mm256_sub_ps(y_px, y0) : _mm256_sub_ps(y0, _mm256_add_ps(y_px, one));
-      is_outside = _mm256_or_ps(is_outside, _mm256_cmp_ps(inner_px, _mm256_set1_ps(-1.0f), _CMP_LE_OQ));
-      full_high =
-          _mm256_blendv_ps(full_high, _mm256_set1_ps(-1.0f), _mm256_cmp_ps(inner_px, _mm256_setzero_ps(), _CMP_LT_OQ));
+      const Float8 inner_px = edge.rows_scale > 0.0f ? y_px - edge.y0 : edge.y0 - (y_px + 1.0f);
+      is_outside = is_outside | (inner_px <= -1.0f);
+      full_high = select(inner_px < 0.0f, -1.0f, full_high);
       continue;
     }
-    const __m256 twice_above_px = _mm256_mul_ps(_mm256_set1_ps(2.0f), _mm256_sub_ps(middle_px, y0));
-    const __m256 middle =
-        _mm256_add_ps(_mm256_set1_ps(edge.x0), _mm256_mul_ps(twice_above_px, _mm256_set1_ps(edge.half_dx_dy)));
-    const __m256 reach = _mm256_set1_ps(fabsf(edge.half_dx_dy));
-    const __m256 low = _mm256_sub_ps(middle, reach), high = _mm256_add_ps(middle, reach);
+    const Float8 twice_above_px = 2.0f * (middle_px - edge.y0), middle = edge.x0 + twice_above_px * edge.half_dx_dy;
+    const float reach = fabsf(edge.half_dx_dy);
+    const Float8 low = middle - reach, high = middle + reach;
     if (side < 0.0f) {
-      touch_low = _mm256_max_ps(touch_low, _mm256_sub_ps(low, one));
-      full_low = _mm256_max_ps(full_low, high);
+      touch_low = max_no_nan(touch_low, low - 1.0f);
+      full_low = max_no_nan(full_low, high);
     } else {
-      touch_high = _mm256_min_ps(touch_high, high);
-      full_high = _mm256_min_ps(full_high, _mm256_sub_ps(low, one));
+      touch_high = min_no_nan(touch_high, high);
+      full_high = min_no_nan(full_high, low - 1.0f);
     }
   }
-  const __m256 leeway_px = _mm256_set1_ps(kSpanLeeway_px);
-  auto first_at_or_after = [&](__m256 x) {
-    return _mm256_cvttps_epi32(_mm256_ceil_ps(_mm256_min_ps(_mm256_max_ps(x, begin), end)));
+  auto clamped = [](const Float8& x, const Float8& low, const Float8& high) {
+    return min_no_nan(max_no_nan(x, low), high);
   };
-  auto first_after = [&](__m256 x) {
-    const __m256 clamped = _mm256_min_ps(_mm256_max_ps(x, _mm256_sub_ps(begin, one)), _mm256_sub_ps(end, one));
-    return _mm256_add_epi32(_mm256_cvttps_epi32(_mm256_floor_ps(clamped)), _mm256_set1_epi32(1));
-  };
-  const __m256i first = first_at_or_after(_mm256_sub_ps(touch_low, leeway_px));
-  const __m256i last = _mm256_max_epi32(first_after(_mm256_add_ps(touch_high, leeway_px)), first);
-  const __m256i full_first =
-      _mm256_min_epi32(_mm256_max_epi32(first_at_or_after(_mm256_add_ps(full_low, leeway_px)), first), last);
-  const __m256i full_last =
-      _mm256_min_epi32(_mm256_max_epi32(first_after(_mm256_sub_ps(full_high, leeway_px)), full_first), last);
+  auto first_at_or_after = [&](const Float8& x) { return round_up(clamped(x, begin, end)); };
+  auto first_after = [&](const Float8& x) { return round_down(clamped(x, begin - 1.0f, end - 1.0f)) + 1.0f; };
+  const Float8 first = first_at_or_after(touch_low - kSpanLeeway_px);
+  const Float8 last = max_no_nan(first_after(touch_high + kSpanLeeway_px), first);
+  const Float8 full_first = clamped(first_at_or_after(full_low + kSpanLeeway_px), first, last);
+  const Float8 full_last = clamped(first_after(full_high - kSpanLeeway_px), full_first, last);
   RowSpansX8 spans;
-  auto store = [&](int32_t* to, __m256i from) {
-    _mm256_store_si256(reinterpret_cast<__m256i*>(to), _mm256_andnot_si256(_mm256_castps_si256(is_outside), from));
-  };
+  auto store = [&](int32_t* to, const Float8& x) { store8_integers(select(is_outside, 0.0f, x), to); };
   store(spans.begin, first);
   store(spans.end, last);
   store(spans.full_begin, full_first);
@@ -79,12 +57,11 @@ inline RowSpansX8 row_spans_x8(const PolygonEdge* edges, int count, const PixelB
 }
 
 /// Calls visit(lane, coverage) for each of the first num_pixels of eight pixels of which pixel_coverage() is not 0.
+#if defined(__AVX2__)
 template <typename Visit>
 inline void coverage_x8(const PolygonEdge* edges, int count, float min_area, const int32_t* x, const int32_t* y,
                         int num_pixels, Visit&& visit) {
-  const __m256 x_px = _mm256_cvtepi32_ps(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(x)));
-  const __m256 y_px = _mm256_cvtepi32_ps(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(y)));
-  const __m256 half = _mm256_set1_ps(0.5f);
+  const Float8 x_px = load8_integers(x), y_px = load8_integers(y);
   constexpr int kPairs = kLanes / 2;
   // Element i has the columns of pixels i and i + 4.
   __m256i low[kPairs], high[kPairs];
@@ -92,29 +69,23 @@ inline void coverage_x8(const PolygonEdge* edges, int count, float min_area, con
     low[i] = _mm256_set1_epi16(-kFar_units);
     high[i] = _mm256_set1_epi16(kFar_units);
   }
-  __m256 area = _mm256_setzero_ps();
+  Float8 area = 0.0f;
   for (int e = 0; e < count; ++e) {
     const PolygonEdge& edge = edges[e];
     const bool is_below = edge.rows_scale > 0.0f;
-    const __m256 x0 = _mm256_set1_ps(edge.x0), y0 = _mm256_set1_ps(edge.y0), dy_dx = _mm256_set1_ps(edge.dy_dx);
     // edge_crossing()
-    const __m256 left_crossing = _mm256_sub_ps(_mm256_mul_ps(_mm256_sub_ps(x_px, x0), dy_dx), _mm256_sub_ps(y_px, y0));
-    const __m256 right_crossing = _mm256_add_ps(left_crossing, dy_dx);
-    const __m256 crossings = _mm256_add_ps(left_crossing, right_crossing);
+    const Float8 left_crossing = (x_px - edge.x0) * edge.dy_dx - (y_px - edge.y0);
+    const Float8 right_crossing = left_crossing + edge.dy_dx, crossings = left_crossing + right_crossing;
     // area_of()
-    const __m256 from = saturate_x8(_mm256_sub_ps(y0, y_px));
-    const __m256 to = saturate_x8(_mm256_sub_ps(_mm256_set1_ps(edge.y1), y_px));
-    const __m256 left = _mm256_max_ps(_mm256_min_ps(left_crossing, to), from);
-    const __m256 right = _mm256_max_ps(_mm256_min_ps(right_crossing, to), from);
-    const __m256 beyond = _mm256_sub_ps(_mm256_add_ps(left, right), crossings);
-    const __m256 width = saturate_x8(_mm256_add_ps(_mm256_mul_ps(beyond, _mm256_set1_ps(edge.half_dx_dy)), half));
-    const __m256 part = _mm256_add_ps(_mm256_mul_ps(_mm256_sub_ps(right, left), width),
-                                      _mm256_sub_ps(edge.dy_dx > 0.0f ? to : from, right));
-    area = is_below ? _mm256_add_ps(area, part) : _mm256_sub_ps(area, part);
+    const Float8 from = saturate(edge.y0 - y_px), to = saturate(edge.y1 - y_px);
+    const Float8 left = max_no_nan(min_no_nan(left_crossing, to), from);
+    const Float8 right = max_no_nan(min_no_nan(right_crossing, to), from);
+    const Float8 width = saturate(((left + right) - crossings) * edge.half_dx_dy + 0.5f);
+    const Float8 part = (right - left) * width + ((edge.dy_dx > 0.0f ? to : from) - right);
+    area = is_below ? area + part : area - part;
     // narrow(): an edge bounds the heights on one side.
-    const __m256 at = saturate_x8(_mm256_add_ps(_mm256_mul_ps(crossings, _mm256_set1_ps(fabsf(edge.rows_scale))),
-                                                _mm256_set1_ps(edge.rows_offset)));
-    const __m256i heights = _mm256_castps_si256(_mm256_add_ps(at, _mm256_set1_ps(kToLowestBits)));
+    const Float8 at = saturate(crossings * fabsf(edge.rows_scale) + edge.rows_offset);
+    const __m256i heights = _mm256_castps_si256((at + kToLowestBits).value);
     const __m256i columns = _mm256_broadcastsi128_si256(std::bit_cast<__m128i>(column_heights(edge).value));
     __m256i broadcast_low16 = _mm256_set1_epi16(0x0100);
     for (int i = 0; i < kPairs; ++i) {
@@ -143,7 +114,7 @@ inline void coverage_x8(const PolygonEdge* edges, int count, float min_area, con
   }
   alignas(32) float areas[kLanes];
   alignas(32) uint64_t masks[kLanes];
-  _mm256_store_ps(areas, area);
+  store8(area, areas);
   const __m256i pixels_01_45 = _mm256_unpacklo_epi64(samples[0], samples[1]);
   const __m256i pixels_23_67 = _mm256_unpacklo_epi64(samples[2], samples[3]);
   _mm256_store_si256(reinterpret_cast<__m256i*>(masks), _mm256_permute2x128_si256(pixels_01_45, pixels_23_67, 0x20));
@@ -155,18 +126,6 @@ inline void coverage_x8(const PolygonEdge* edges, int count, float min_area, con
 }
 
 #else
-
-inline RowSpansX8 row_spans_x8(const PolygonEdge* edges, int count, const PixelBox& box, int y) {
-  RowSpansX8 spans;
-  for (int i = 0; i < kLanes; ++i) {
-    const RowSpan span = row_span(edges, count, box, y + i);
-    spans.begin[i] = span.begin;
-    spans.end[i] = span.end;
-    spans.full_begin[i] = span.full_begin;
-    spans.full_end[i] = span.full_end;
-  }
-  return spans;
-}
 
 template <typename Visit>
 inline void coverage_x8(const PolygonEdge* edges, int count, float min_area, const int32_t* x, const int32_t* y,

@@ -5,7 +5,7 @@
 #include <bit>
 #include <vector>
 
-#include "pictura/backend_cpu/renderer/fast/float8.h"
+#include "pictura/backend_cpu/renderer/fast/vectors_x8.h"
 #include "pictura/common/raster/cull.h"
 
 namespace pictura {
@@ -66,8 +66,8 @@ class BallGrid {
       const int row_starts = y == cells.y_begin ? kStartsRow : 0;
       for (int32_t i = begin(cells.x_begin, y); i < row_end; i += kLanes) {
         const Vec3x8 middle_m{load8(&x_m_[i]), load8(&y_m_[i]), load8(&z_m_[i])};
-        unsigned lanes = lanes_of(sphere_in_frustum(f, to_camera(camera, middle_m), load8(&radius_m_[i])));
-        if (row_end - i < kLanes) lanes &= (1u << (row_end - i)) - 1;
+        unsigned lanes = bits_of(sphere_in_frustum(f, to_camera(camera, middle_m), load8(&radius_m_[i])));
+        lanes &= first_of_eight(row_end - i);
         for (; lanes != 0; lanes &= lanes - 1) {
           const int32_t at = i + std::countr_zero(lanes);
           const int starts = starts_[at] | row_starts | (at < first_column_end ? kStartsColumn : 0);

@@ -39,14 +39,14 @@ struct WideningX8 {
   WideningX8(const PinholeCamera& camera, float min_width_px, const Vec3x8& a, const Vec3x8& b)
       : floor_px(min_width_px) {
     const Vec2x8 ahead{camera.focal_x_px * (b.x * a.z - a.x * b.z), camera.focal_y_px * (b.y * a.z - a.y * b.z)};
-    const Float8 length2 = dot(ahead, ahead), min_length = max_no_nan(1e-6f * fabs8(a.z * b.z), 1e-12f);
+    const Float8 length2 = dot(ahead, ahead), min_length = max_no_nan(1e-6f * magnitude(a.z * b.z), 1e-12f);
     const Float8 scale = sqrt_in_range(reciprocal_in_range(length2));
     const Mask8 is_long = length2 > min_length * min_length;
     across = {select(is_long, -ahead.y * scale, 0.0f), select(is_long, ahead.x * scale, 0.0f)};
   }
   Vec2x8 push_px(const Vec2x8& gap_px) const {
     const Float8 width_px = dot(gap_px, across);
-    const Float8 missing_px = 0.5f * max_no_nan(floor_px - fabs8(width_px), 0.0f);
+    const Float8 missing_px = 0.5f * max_no_nan(floor_px - magnitude(width_px), 0.0f);
     return across * select(width_px < 0.0f, -missing_px, missing_px);
   }
 };
@@ -56,7 +56,7 @@ inline Float8 nearest_standing(const Vec3x8& normal, Float8 offset) {
   constexpr float kMinMagnitude = 1e-30f;
   const Float8 length2 = dot(normal, normal);
   const Mask8 has_distance = (length2 > kMinMagnitude) & (offset > kMinMagnitude);
-  if (lanes_of(has_distance) == 0) return 1.0f;
+  if (bits_of(has_distance) == 0) return 1.0f;
   const Float8 distance_m = offset * reciprocal_in_range(sqrt_in_range(length2));
   const Float8 nearest =
       select(distance_m > kThroughStrip_m, distance_m * reciprocal_in_range(distance_m - kThroughStrip_m),
@@ -74,7 +74,7 @@ inline Mask8 occludes(const Occluders& occluders, const PinholeCamera& camera, c
     return of.x * (of.x > 0.0f ? low.x : high.x) + of.y * (of.y > 0.0f ? low.y : high.y) + of.z;
   };
   const Float8 inverse_depth = inverse_depth_high * kOccluderDepthFactor;
-  Mask8 are_occluded{};
+  Mask8 are_occluded = Float8(0.0f) < 0.0f;
   for (int k = 0; k < occluders.count; ++k) {
     const Occluder& one = occluders.occluder[k];
     Float8 inside_px = min_over_box(one.side[0]);
@@ -91,8 +91,9 @@ inline StripsX8 set_up_strips(const ImageSetting& setting, const Strip* const* s
   static_assert(offsetof(Strip, color) == 11 * sizeof(float));
   Float8 member[16];
   for (int first : {0, 4, 8, 12}) {
-    transpose_four([&](int lane) { return reinterpret_cast<const char*>(strip[lane]) + first * sizeof(float); },
-                   &member[first]);
+    gather_fours(
+        [&](int lane) -> const void* { return reinterpret_cast<const char*>(strip[lane]) + first * sizeof(float); },
+        &member[first]);
   }
   const PinholeCamera& camera = setting.camera;
   const Vec3x8 a_m{member[0], member[1], member[2]}, b_m{member[3], member[4], member[5]};
@@ -150,19 +151,19 @@ inline StripsX8 set_up_strips(const ImageSetting& setting, const Strip* const* s
   const Mask8 meets_image =
       (strips.high.x >= 0.0f) & (strips.high.y >= 0.0f) & (strips.low.x < width_px) & (strips.low.y < height_px);
   const Mask8 is_near = nearest_m < kNear_m;
-  strips.crossing = lanes_of(is_bright & (is_near | (meets_image & ~is_in_guard_band)));
+  strips.crossing = bits_of(is_bright & (is_near | (meets_image & ~is_in_guard_band)));
   const Mask8 is_inside = is_bright & ~is_near & meets_image & is_in_guard_band;
-  if (lanes_of(is_inside) == 0) return strips;
+  if (bits_of(is_inside) == 0) return strips;
 
   // is_quad_visible() and min_area_of()
   const Float8 twice_area = cross(strips.corner[2] - strips.corner[0], strips.corner[3] - strips.corner[1]);
   const Float8 brightest = max_no_nan(strips.color.x, max_no_nan(strips.color.y, strips.color.z));
   const Float8 min_area = kMinWeight * reciprocal_in_range(max_no_nan(brightest, kMinWeight / kMaxSparedArea));
-  strips.clockwise = lanes_of(twice_area > 0.0f);
-  const Mask8 is_large = is_inside & (fabs8(twice_area) >= 2.0f * min_area);
+  strips.clockwise = bits_of(twice_area > 0.0f);
+  const Mask8 is_large = is_inside & (magnitude(twice_area) >= 2.0f * min_area);
   const Float8 standing = nearest_standing(strips.normal, strips.offset);
   strips.visible =
-      lanes_of(is_large & ~occludes(setting.occluders, camera, strips, strips.inverse_depth_high * standing));
+      bits_of(is_large & ~occludes(setting.occluders, camera, strips, strips.inverse_depth_high * standing));
   return strips;
 }
 

@@ -14,8 +14,8 @@ constexpr int kFoundBeyond = 8;
 /// room for kFoundBeyond more.
 PICTURA_HD inline int find_pieces_in_sight(Span<const Vec2> middles, Span<const int32_t> items, const EgoFrame& frame,
                                            int capacity, int32_t* found_out) {
-  const Float8 minus_origin_x = fill8(-frame.origin_m.x), minus_origin_y = fill8(-frame.origin_m.y);
-  const Float8 cos = fill8(frame.forward.x), sin = fill8(frame.forward.y);
+  const Float8 minus_origin_x = -frame.origin_m.x, minus_origin_y = -frame.origin_m.y;
+  const Float8 cos = frame.forward.x, sin = frame.forward.y;
   const int num_items = static_cast<int>(items.size());
   int count = 0;
   const auto look_at = [&](const int32_t* eight, uint32_t these) {
@@ -23,8 +23,8 @@ PICTURA_HD inline int find_pieces_in_sight(Span<const Vec2> middles, Span<const 
     gather_pairs(&middles.data()->x, eight, &x, &y);
     const Float8 from_ego_x = x + minus_origin_x, from_ego_y = y + minus_origin_y;
     const Float8 ahead = from_ego_x * cos + from_ego_y * sin, aside = cos * from_ego_y - sin * from_ego_x;
-    const uint32_t seen = these & at_most(magnitude(ahead - fill8(kRoadMiddle_m)), fill8(kRoadHalf_m)) &
-                          at_most(magnitude(aside), fill8(kRoadAside_m));
+    const uint32_t seen =
+        these & bits_of((magnitude(ahead - kRoadMiddle_m) <= kRoadHalf_m) & (magnitude(aside) <= kRoadAside_m));
     copy_chosen(eight, seen, found_out + count);
     count += popcount(seen);
   };

@@ -1,0 +1,8 @@
+// Compiled without AVX.
+#include "pictura/tests/common/portable/float8_results.h"
+
+namespace pictura {
+
+std::vector<uint32_t> results_in_memory(const Float8Inputs& in) { return results_of(in); }
+
+}  // namespace pictura
