@@ -9,6 +9,7 @@
 #include "pictura/backend_cpu/renderer/fast/cull_x8.h"
 #include "pictura/backend_cpu/renderer/fast/occlusion_x8.h"
 #include "pictura/backend_cpu/renderer/fast/pairs_x8.h"
+#include "pictura/backend_cpu/renderer/fast/strips_x8.h"
 #include "pictura/bench/quality.h"
 #include "pictura/common/camera.h"
 #include "pictura/common/raster/check.h"
@@ -118,28 +119,121 @@ TEST(Lanes, HaveTheOrderAndBoundsOfFaces) {
   EXPECT_LT(undecided, 2000);
 }
 
+// Calls visit(camera) for each camera of each view.
+template <typename Visit>
+void visit_cameras(const Snapshot& snapshot, Visit&& visit) {
+  for (const View& view : snapshot.views) {
+    for (const PinholeCamera& in_ego : pinhole_cameras(paper_rig())) visit(place_camera(in_ego, view));
+  }
+}
+
 TEST(Lanes, VisitThePiecesThatMayBeVisible) {
   const Snapshot snapshot = drive_snapshot({.map = "procedural:1", .views = 8});
   const StaticGeometryView pieces = snapshot.geometry.view();
   const CulledGeometry culled(pieces);
-  int visited = 0;
-  for (const View& view : snapshot.views) {
-    for (const PinholeCamera& in_ego : pinhole_cameras(paper_rig())) {
-      const PinholeCamera camera = place_camera(in_ego, view);
-      const Frustum frustum = make_frustum(camera);
-      std::vector<int32_t> expected, actual;
-      for_each_item(
-          pieces.strip_grid, frustum_ground_box(camera, frustum),
-          [&](int32_t i) { return ground_box(pieces.strips[i]); },
-          [&](int32_t i) {
-            if (may_be_visible(pieces.strips[i], camera, frustum)) expected.push_back(i);
-          });
-      culled.strips.visit_visible(camera, frustum, [&](int32_t i) { actual.push_back(i); });
-      ASSERT_EQ(actual, expected);
-      visited += static_cast<int>(actual.size());
-    }
+  // Compares the items visited, and returns their number.
+  auto compare = [](const BallGrid& balls, const GridView& grid, const auto& items, const PinholeCamera& camera) {
+    const Frustum frustum = make_frustum(camera);
+    std::vector<int32_t> expected, actual;
+    for_each_item(
+        grid, frustum_ground_box(camera, frustum), [&](int32_t i) { return ground_box(items[i]); },
+        [&](int32_t i) {
+          if (may_be_visible(items[i], camera, frustum)) expected.push_back(i);
+        });
+    balls.visit_visible(camera, frustum, [&](int32_t i) { actual.push_back(i); });
+    EXPECT_EQ(actual, expected);
+    return actual.size();
+  };
+  std::size_t strips = 0, walls = 0;
+  visit_cameras(snapshot, [&](const PinholeCamera& camera) {
+    strips += compare(culled.strips, pieces.strip_grid, pieces.strips, camera);
+    walls += compare(culled.walls, pieces.wall_grid, pieces.walls, camera);
+  });
+  EXPECT_GT(strips, 1000u);
+  EXPECT_GT(walls, 100u);
+}
+
+// An upright face before the camera that fills the middle of its image.
+Occluder occluder_before(const ImageSetting& setting) {
+  CameraQuad face{{{-4, -2, 12}, {4, -2, 12}, {4, 2, 12}, {-4, 2, 12}}, {}, {}};
+  face.plane = quad_plane(face.corner);
+  ScreenQuad quad;
+  bool is_clockwise = false;
+  EXPECT_GT(occluder_area_px2(setting.camera, face, &quad, &is_clockwise), 0.0f);
+  return make_occluder(setting.camera, setting.frustum, face.plane, quad, is_clockwise);
+}
+
+// Bits of what a strip is drawn by.
+std::vector<uint32_t> bits_of_strip(const ScreenQuad& quad, const FacePlane& plane, Rgb color, bool is_clockwise) {
+  std::vector<uint32_t> bits;
+  for (const Vec2 corner : quad.corner) bits.insert(bits.end(), {bits_of(corner.x), bits_of(corner.y)});
+  const ScreenBounds& bounds = quad.bounds;
+  for (const float of : {bounds.low.x, bounds.low.y, bounds.high.x, bounds.high.y, bounds.inverse_depth_low,
+                         bounds.inverse_depth_high, plane.normal.x, plane.normal.y, plane.normal.z, plane.offset,
+                         color.r, color.g, color.b, is_clockwise ? 1.0f : 0.0f}) {
+    bits.push_back(bits_of(of));
   }
-  EXPECT_GT(visited, 1000);
+  return bits;
+}
+
+TEST(Lanes, SetStripsUpAsOne) {
+  const Snapshot snapshot = drive_snapshot({.map = "procedural:1", .views = 8});
+  const StaticGeometryView pieces = snapshot.geometry.view();
+  const CulledGeometry culled(pieces);
+  int visible = 0, crossing = 0, occluded = 0, from_below = 0;
+  auto compare = [&](const ImageSetting& setting, const Strip* const* strip, const int32_t* index) {
+    const StripsX8 lanes = set_up_strips(setting, strip);
+    for (int lane = 0; lane < kLanes; ++lane) {
+      CameraQuad in_camera;
+      ScreenQuad quad;
+      bool is_clockwise = false;
+      ClipClass clip_class = ClipClass::outside;
+      if (quad_to_camera(strip_quad(*strip[lane]), setting.camera, &in_camera)) {
+        clip_class = project_quad(setting.camera, in_camera.corner, setting.line_floor_px, &quad);
+      }
+      auto is_visible = [&](const ImageSetting& under) {
+        return is_quad_visible(under, quad, in_camera.plane, in_camera.color, strip_ref(*strip[lane], index[lane]),
+                               &is_clockwise);
+      };
+      const bool is_inside = clip_class == ClipClass::inside, is_seen = is_inside && is_visible(setting);
+      ASSERT_EQ((lanes.crossing >> lane & 1) != 0, clip_class == ClipClass::crossing) << index[lane];
+      ASSERT_EQ((lanes.visible >> lane & 1) != 0, is_seen) << index[lane];
+      crossing += clip_class == ClipClass::crossing ? 1 : 0;
+      if (is_seen) {
+        ASSERT_EQ(bits_of_strip(lanes.quad(lane), lanes.plane(lane), lanes.color_of(lane),
+                                (lanes.clockwise >> lane & 1) != 0),
+                  bits_of_strip(quad, in_camera.plane, in_camera.color, is_clockwise))
+            << index[lane];
+        ++visible;
+        from_below += in_camera.plane.offset > 0.0f ? 1 : 0;
+      } else if (is_inside) {
+        ImageSetting alone = setting;
+        alone.occluders.count = 0;
+        occluded += is_visible(alone) ? 1 : 0;
+      }
+    }
+  };
+  visit_cameras(snapshot, [&](PinholeCamera camera) {
+    for (const float below_m : {0.0f, 3.0f}) {
+      camera.position_m.z -= below_m;
+      for (const float line_floor_px : {0.0f, 1.0f}) {
+        ImageSetting setting{camera, make_frustum(camera), line_floor_px};
+        setting.occluders.occluder[0] = occluder_before(setting);
+        setting.occluders.count = 1;
+        std::vector<int32_t> index;
+        culled.strips.visit_visible(camera, setting.frustum, [&](int32_t i) { index.push_back(i); });
+        for (std::size_t begin = 0; begin + kLanes <= index.size(); begin += kLanes) {
+          const Strip* strip[kLanes];
+          for (int lane = 0; lane < kLanes; ++lane) strip[lane] = &pieces.strips[index[begin + lane]];
+          compare(setting, strip, &index[begin]);
+        }
+      }
+    }
+  });
+  EXPECT_GT(visible, 1000);
+  EXPECT_GT(crossing, 100);
+  EXPECT_GT(occluded, 100);
+  EXPECT_GT(from_below, 100);
 }
 
 }  // namespace
