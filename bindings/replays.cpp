@@ -99,8 +99,8 @@ class PyLiveView final : public StepObserver {
   }
 
   bool is_due() override { return !view_ || view_->is_due(); }
-  void drive(Span<Command> commands_inout) override {
-    if (view_) view_->drive(commands_inout);
+  void override_commands(Span<Command> commands_inout) override {
+    if (view_) view_->override_commands(commands_inout);
   }
   void before_step(Span<const Command> commands) override {
     if (view_) view_->before_step(commands);

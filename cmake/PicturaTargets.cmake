@@ -29,7 +29,7 @@ set(CMAKE_UNITY_BUILD_BATCH_SIZE 12)  # sources, in unity builds
 
 # Flags of this build, which nothing that is installed passes on.
 add_compile_options(
-  "$<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wpedantic;-Wshadow>"
+  "$<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wpedantic;-Wshadow;-Woverloaded-virtual>"
   # Designated initializers leave the other members at their defaults, on purpose.
   $<$<COMPILE_LANGUAGE:CXX>:-Wno-missing-field-initializers>
   # For libraries and programs alike, so that both can read one precompiled header.

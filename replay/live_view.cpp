@@ -89,7 +89,7 @@ struct LiveView::Parts {
     return false;
   }
 
-  void drive(Span<Command> commands_inout) {
+  void override_commands(Span<Command> commands_inout) {
     if (driven >= 0) {
       const DrivingKeys held = Clock::now() - heard > kKeysHold ? DrivingKeys{} : keys;
       commands_inout[driven] = {.action = action_of_keys(held, simulator.state(), driven, simulator.config().dt_s)};
@@ -120,7 +120,7 @@ LiveView::~LiveView() = default;
 const std::string& LiveView::address() const { return parts_->server.address(); }
 int LiveView::num_pages() const { return parts_->server.num_pages(); }
 bool LiveView::is_due() { return parts_->is_due(); }
-void LiveView::drive(Span<Command> commands_inout) { parts_->drive(commands_inout); }
+void LiveView::override_commands(Span<Command> commands_inout) { parts_->override_commands(commands_inout); }
 void LiveView::before_step(Span<const Command> commands) { parts_->world.before_step(commands); }
 
 void LiveView::after_step(const StepResult& result) {

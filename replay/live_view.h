@@ -42,7 +42,7 @@ class LiveView final : public StepObserver {
   /// Does what pages ask and waits, 50 ms at most, until the next step is due.
   bool is_due() override;
   /// Puts what a person's keys ask for among the commands [slots].
-  void drive(Span<Command> commands_inout) override;
+  void override_commands(Span<Command> commands_inout) override;
   void before_step(Span<const Command> commands) override;
   void after_step(const StepResult& result) override;
   void after_reset(Span<const uint8_t> world_mask) override;

@@ -13,7 +13,7 @@ class StepObserver {
   /// Whether the next step may be taken; waits for it a little.
   virtual bool is_due() { return true; }
   /// Gives agents that it drives other commands, of [slots], before any observer sees them.
-  virtual void drive(Span<Command> /*commands_inout*/) {}
+  virtual void override_commands(Span<Command> /*commands_inout*/) {}
   virtual void before_step(Span<const Command> /*commands*/) {}
   virtual void after_step(const StepResult& /*result*/) {}
   /// After new episodes that no step began, of the worlds of the mask [worlds]; empty: of all.
@@ -25,7 +25,7 @@ class StepObserver {
 template <typename Observers>
 StepResult step_observed(Simulator& simulator, Span<Command> commands_inout, const Observers& observers,
                          Stream stream = {}) {
-  for (const auto& observer : observers) observer->drive(commands_inout);
+  for (const auto& observer : observers) observer->override_commands(commands_inout);
   for (const auto& observer : observers) observer->before_step(Span<const Command>(commands_inout));
   const StepResult result = simulator.step(Span<const Command>(commands_inout), stream);
   for (auto observer = observers.rbegin(); observer != observers.rend(); ++observer) (*observer)->after_step(result);
