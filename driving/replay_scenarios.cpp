@@ -1,6 +1,7 @@
 #include "pictura/driving/replay_scenarios.h"
 
 #include <algorithm>
+#include <array>
 #include <optional>
 
 #include "pictura/backends/make_simulator.h"
@@ -105,8 +106,12 @@ ScenarioCounts drive(const EvaluateOptions& options, const RecordedScenario& sce
   return report.results.densities[0].scenarios[0];
 }
 
-double at_fault_infractions_per_vehicle(const ScenarioCounts& counts) {
-  return static_cast<double>(counts.at_fault_infraction) / static_cast<double>(std::max<int64_t>(1, counts.vehicles));
+// By how a scenario is compared to another: the greater, the worse. Infractions by vehicle, then collisions at fault,
+// then how little was driven.
+std::array<double, 3> badness(const ScenarioCounts& counts) {
+  const auto vehicles = static_cast<double>(std::max<int64_t>(1, counts.vehicles));
+  return {static_cast<double>(counts.at_fault_infraction) / vehicles, static_cast<double>(counts.at_fault) / vehicles,
+          -counts.distance_m / vehicles};
 }
 
 const ScenarioCounts& counts_of(const EvaluationResults& results, const ScenarioPlace& place) {
@@ -140,8 +145,7 @@ std::vector<ScenarioPlace> worst_scenarios(const EvaluationResults& results, int
     }
   }
   std::stable_sort(places.begin(), places.end(), [&](const ScenarioPlace& a, const ScenarioPlace& b) {
-    return at_fault_infractions_per_vehicle(counts_of(results, a)) >
-           at_fault_infractions_per_vehicle(counts_of(results, b));
+    return badness(counts_of(results, a)) > badness(counts_of(results, b));
   });
   places.resize(std::min(places.size(), static_cast<size_t>(count)));
   return places;

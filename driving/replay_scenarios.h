@@ -15,8 +15,8 @@ struct ScenarioPlace {
   int scenario = 0;    // its number
 };
 
-/// Returns the scenarios with the largest share of vehicles with an at-fault infraction, worst first; `count` of them,
-/// or all.
+/// The scenarios with the largest share of vehicles with an at-fault infraction, worst first; `count` of them, or all.
+/// Of equals those with more collisions at fault come first, then those where less was driven.
 std::vector<ScenarioPlace> worst_scenarios(const EvaluationResults& results, int count);
 
 /// A scenario to drive again.
