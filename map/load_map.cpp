@@ -54,7 +54,7 @@ std::string file_path_of(const std::string& name) {
   known.emplace_back(kProcedural);
   fail_usage("map '{}': expected an {} file, procedural[:SEED[:OPTIONS]], or a town in {}, which has {}{}", name,
              kExtension, map_folder(),
-             towns.empty() ? "none: CARLA's come with CARLA, as Maps/OpenDrive/*.xodr"
+             towns.empty() ? "none: CARLA's come with CARLA, as Maps/OpenDrive/*.xodr; procedural:1 needs no file"
                            : fmt::format("{}", fmt::join(towns, ", ")),
              suggestion(name, known));
 }

@@ -21,9 +21,10 @@ RunKeeper::RunKeeper(const TrainOptions& options, Ranks* ranks, Communicator* co
   make_output_folder(options.out_folder);
   lock_.emplace(options.out_folder);
   old_files_ = run_files(options.out_folder);
-  PICTURA_CHECK(old_files_.empty() || options.old_run != OldRun::refuse,
-                "{}: holds a run already ({}): resume it, overwrite it, or name another folder", options.out_folder,
-                fmt::join(old_files_, ", "));
+  PICTURA_CHECK(
+      old_files_.empty() || options.old_run != OldRun::refuse,
+      "{}: holds a run already ({}): expected to resume or overwrite it (--resume, --overwrite), or another folder",
+      options.out_folder, fmt::join(old_files_, ", "));
 }
 
 std::vector<RecentUpdate> RunKeeper::begin(Run* run) {
