@@ -51,7 +51,11 @@ void add_train_command(CLI::App& app) {
       "  torchrun --nproc-per-node 2 --no-python pictura train --config configs/paper.toml --out runs/paper");
   command->callback([arguments] {
     ProgressLine line;
-    arguments->train.on_progress = [&line](const TrainProgress& progress) { line.update(progress_text(progress)); };
+    std::string phases;
+    arguments->train.on_progress = [&line, &phases](const TrainProgress& progress) {
+      line.update(progress_text(progress));
+      phases = phase_shares(progress);
+    };
     arguments->train.on_notice = [](const std::string& notice) { print_message("notice: {}\n", notice); };
     if (arguments->resume) arguments->train.old_run = OldRun::resume;
     if (arguments->overwrite) arguments->train.old_run = OldRun::overwrite;
@@ -84,6 +88,7 @@ void add_train_command(CLI::App& app) {
       print_result("{} agent-steps in {} updates, {:.1f} km driven; checkpoint {}, policy hash {}\n",
                    format_count(static_cast<double>(report.agent_steps)), report.updates, report.km_driven,
                    report.checkpoint, report.policy_hash);
+      if (!phases.empty()) print_result("time of the last update: {}\n", phases);
       if (report.out_of_time) print_result("out of time: go on with --resume --out {}\n", arguments->train.out_folder);
     }
     end_as_asked();

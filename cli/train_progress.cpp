@@ -17,7 +17,8 @@ double scalar(const TrainProgress& progress, std::string_view name) {
   return found->second;
 }
 
-/// "simulate 4 %, render 31 %, ..., other 4 %": each phase, and what is in none, of an update's wall time.
+}  // namespace
+
 std::string phase_shares(const TrainProgress& progress) {
   const double whole_s = scalar(progress, "time/rollout_s") + scalar(progress, "time/update_s");
   std::string text;
@@ -30,21 +31,19 @@ std::string phase_shares(const TrainProgress& progress) {
   return text + fmt::format("other {:.0f} %", 100 * std::max(0.0, other));
 }
 
-}  // namespace
-
 std::string progress_text(const TrainProgress& progress) {
   const std::string episode_return =
       std::isfinite(progress.episode_return) ? fmt::format("{:.2f}", progress.episode_return) : "-";
-  const auto per_1000_steps = [&progress](const char* event) {
-    return fmt::format("{:.2f}", scalar(progress, fmt::format("driving/{}_per_1000_steps", event)));
+  const auto per_km = [&progress](const char* event) {
+    return scalar(progress, fmt::format("driving/{}_per_km", event));
   };
+  const double infractions_per_km = per_km("at_fault_collisions") + per_km("off_road") + per_km("red_light");
+  const std::string km = infractions_per_km > 0 ? fmt::format("{:.2f}", 1 / infractions_per_km) : "-";
   return fmt::format(
-      "update {}/{}  ETA {}{}  {} agent-steps  {}/s  return {}  in 1,000 steps {} goals, {} at fault, {} off-road, {} "
-      "red lights  {:.1f} m/s  {}",
+      "update {}/{}  ETA {}{}  {} agent-steps  {}/s  return {}  {:.1f} m/s  {:.2f} goals/km  {} km/infraction",
       progress.update, progress.updates, progress.ends_by_minutes ? "at most " : "", format_duration(progress.eta_s),
-      format_count(static_cast<double>(progress.agent_steps)), format_count(progress.agent_steps_per_s), episode_return,
-      per_1000_steps("goals"), per_1000_steps("at_fault_collisions"), per_1000_steps("off_road"),
-      per_1000_steps("red_light"), scalar(progress, "driving/mean_speed_mps"), phase_shares(progress));
+      format_count(static_cast<double>(progress.agent_steps)), format_count(progress.recent_agent_steps_per_s),
+      episode_return, scalar(progress, "driving/mean_speed_mps"), per_km("goals"), km);
 }
 
 }  // namespace pictura

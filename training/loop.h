@@ -27,8 +27,9 @@ struct UpdateCost {
 struct TrainProgress {
   int64_t update = 0, updates = 0;
   int64_t agent_steps = 0;
-  double agent_steps_per_s = 0;
-  double episode_return = 0;     // mean over agent episodes that ended in the last updates; NaN before the first
+  double agent_steps_per_s = 0;         // since the run began or went on
+  double recent_agent_steps_per_s = 0;  // of the last minute
+  double episode_return = 0;            // mean over agent episodes that ended in the last updates; NaN before the first
   double eta_s = 0;              // to the last update, the end of the schedule or of `minutes`, whichever comes first
   bool ends_by_minutes = false;  // the end of `minutes` comes first: eta_s is a bound
   Scalars scalars;               // logged of this update, as in progress.csv

@@ -170,7 +170,8 @@ RunLog::RunLog(const std::string& folder, const Config& config, int64_t updates_
       first_update_(updates_done),
       first_agent_steps_(agent_steps),
       on_notice_(on_notice),
-      recent_(recent.begin(), recent.end()) {
+      recent_(recent.begin(), recent.end()),
+      minute_{{0, agent_steps}} {
   if (folder.empty()) return;
   events_.emplace(folder);
   csv_.emplace(folder + "/progress.csv", scalars_of(config, {}, {}), updates_done, on_notice);
@@ -192,6 +193,10 @@ TrainProgress RunLog::add(int64_t update, int64_t agent_steps, const UpdateRecor
   progress.updates = config_.train.updates;
   progress.agent_steps = agent_steps;
   progress.agent_steps_per_s = static_cast<double>(agent_steps - first_agent_steps_) / (elapsed_s - evaluation_s_);
+  minute_.push_back({elapsed_s - evaluation_s_, agent_steps});
+  while (minute_.size() > 2 && minute_.back().s - minute_.front().s > 60) minute_.pop_front();
+  progress.recent_agent_steps_per_s =
+      static_cast<double>(agent_steps - minute_.front().agent_steps) / (minute_.back().s - minute_.front().s);
   progress.episode_return = episode_return();
   // To the last update, or to the end of the schedule, whichever comes first.
   const auto done = static_cast<double>(update - first_update_),

@@ -85,6 +85,12 @@ class RunLog {
   std::optional<ProgressCsv> evaluation_csv_;  // where the run evaluates
   double evaluation_s_ = 0;
   std::deque<RecentUpdate> recent_;
+  // What was done at a time of the run, without evaluations.
+  struct Moment {
+    double s;
+    int64_t agent_steps;
+  };
+  std::deque<Moment> minute_;
   Stopwatch since_start_;
 };
 

@@ -30,7 +30,7 @@ class Training(CommandCase):
         train = ["train", *TINY, "--set", "train.updates=4"]
         lines = run(*train, "--out", self.folder / "plain").stderr.splitlines()
         self.assertEqual((lines[0][:12], lines[-1][:12]), ("update 1/4  ", "update 4/4  "))
-        self.assertRegex(lines[-1], r"ETA .* agent-steps .*/s .* goals, .* at fault, .* m/s  simulate \d+ %, render")
+        self.assertRegex(lines[-1], r"ETA .* agent-steps .*/s .* m/s .* goals/km .* km/infraction")
         self.assertNotIn("\r", "".join(lines))
         child, terminal = pty.fork()
         if child == 0:
@@ -48,7 +48,7 @@ class Training(CommandCase):
         self.assertEqual(begin, "")
         self.assertEqual([len(line) for line in updates], [49] * len(updates))
         self.assertTrue(updates[0].startswith("update 1/4  ETA "), updates)
-        self.assertRegex(last, r"^update 4/4  .* m/s  simulate \d+ %, .*\r\n.* agent-steps in 4 updates")
+        self.assertRegex(last, r"^update 4/4  .* km/infraction\r\n.* agent-steps in 4 updates.*\r\ntime of the last update: simulate \d+ %, ")
 
     def test_resume_is_exact(self):
         whole = self.json_of("train", *TINY, "--set", "train.updates=4", "--out", self.folder / "whole")
@@ -63,6 +63,7 @@ class Training(CommandCase):
         one = ["train", *TINY, "--set", "train.updates=1", "--out", self.folder / "run"]
         first = self.json_of(*one)
         self.assert_refused(1, f"{self.folder}/run: holds a run already (checkpoint.ckpt, ", *one)
+        self.assert_refused(1, "(--resume, --overwrite)", *one)
         self.assert_refused(2, "excludes", *one, "--overwrite", "--resume")
         self.assertEqual(self.json_of(*one, "--overwrite")["policy_hash"], first["policy_hash"])
 

@@ -127,14 +127,19 @@ TEST_F(LoggedRun, TheProgressLineShowsRateTimeLeftMetricsAndPhases) {
   EXPECT_FALSE(seen[0].ends_by_minutes);
   EXPECT_THAT(progress_text(seen[0]),
               ::testing::MatchesRegex("update 1/2  ETA [0-9]+ s  [0-9]+ agent-steps  [0-9.]+[ K]*/s  return [-0-9.]+  "
-                                      "in 1,000 steps [0-9.]+ goals, [0-9.]+ at fault, [0-9.]+ off-road, [0-9.]+ red "
-                                      "lights  [0-9.]+ m/s  simulate [0-9]+ %, render [0-9]+ %, forward [0-9]+ %, "
-                                      "learn [0-9]+ %, diagnose [0-9]+ %, backward [0-9]+ %, optimize [0-9]+ %, other "
-                                      "[0-9]+ %"));
+                                      "[0-9.]+ m/s  [0-9.]+ goals/km  [-0-9.]+ km/infraction"));
+  EXPECT_THAT(phase_shares(seen[0]),
+              ::testing::MatchesRegex("simulate [0-9]+ %, render [0-9]+ %, forward [0-9]+ %, learn [0-9]+ %, diagnose "
+                                      "[0-9]+ %, backward [0-9]+ %, optimize [0-9]+ %, other [0-9]+ %"));
   const std::string last = progress_text(seen[1]);
   EXPECT_THAT(last, HasSubstr("update 2/2  ETA 0 s  "));
-  EXPECT_THAT(last,
-              HasSubstr(fmt::format("{:.2f} off-road", logged(folder_ / "run", "driving/off_road_per_1000_steps"))));
+  double infractions_per_km = 0;
+  for (const char* event : {"at_fault_collisions", "off_road", "red_light"}) {
+    infractions_per_km += logged(folder_ / "run", fmt::format("driving/{}_per_km", event));
+  }
+  const std::string km = infractions_per_km > 0 ? fmt::format("{:.2f}", 1 / infractions_per_km) : "-";
+  EXPECT_THAT(last, HasSubstr("  " + km + " km/infraction"));
+  EXPECT_LT(last.size(), 120u);
   EXPECT_THAT(last, HasSubstr(fmt::format("{:.1f} m/s", logged(folder_ / "run", "driving/mean_speed_mps"))));
 
   // Before a hundred million updates, and before the schedule's end, the minutes end the run.
