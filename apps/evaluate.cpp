@@ -2,6 +2,7 @@
 #include "pictura/evaluation/evaluate.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <map>
 
 #include "pictura/apps/commands.h"
@@ -29,14 +30,22 @@ namespace {
 
 constexpr int kShownGroups = 6;  // of each kind of infraction
 
+// The density; of another driver also its name, of a file without folders.
+std::string label_of(const EvaluateRow& row) {
+  if (row.driver.empty()) return row.density;
+  return fmt::format("{} {}", row.density, std::filesystem::path(row.driver).filename().string());
+}
+
 void print_table(const EvaluateReport& report) {
-  print_result("{:10} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>17} {:>19} {:>9}\n",
-               "density", "scenarios", "steps", "vehicles", "return", "collision", "at-fault", "off-road", "red light",
-               "wall", "goals", "waypoints", "km/infraction", "km/at-fault infr.", "km");
+  size_t width = 10;
+  for (const EvaluateRow& row : report.rows) width = std::max(width, label_of(row).size());
+  print_result("{:{}} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>17} {:>19} {:>9}\n",
+               "density", width, "scenarios", "steps", "vehicles", "return", "collision", "at-fault", "off-road",
+               "red light", "wall", "goals", "waypoints", "km/infraction", "km/at-fault infr.", "km");
   for (const EvaluateRow& row : report.rows) {
     print_result(
-        "{:10} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>17} {:>19} {:>9.2f}\n",
-        row.density, row.scenarios, row.steps, row.vehicle_episodes, interval_text(row.return_per_vehicle),
+        "{:{}} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>17} {:>19} {:>9.2f}\n",
+        label_of(row), width, row.scenarios, row.steps, row.vehicle_episodes, interval_text(row.return_per_vehicle),
         interval_text(row.collision_rate), interval_text(row.at_fault_collision_rate), interval_text(row.off_road_rate),
         interval_text(row.red_light_rate), interval_text(row.wall_contact_rate), interval_text(row.goals_per_vehicle),
         interval_text(row.waypoints_per_vehicle), interval_text(row.km_per_infraction),
@@ -46,14 +55,17 @@ void print_table(const EvaluateReport& report) {
     if (row.left == 0) continue;
     print_result(
         "{}: vehicles are lives on roads that end: {} of {} agents spawned, {} entered, {} left; {} goals/km\n",
-        row.density, row.spawned, row.asked, row.entered, row.left, interval_text(row.goals_per_km));
+        label_of(row), row.spawned, row.asked, row.entered, row.left, interval_text(row.goals_per_km));
   }
   for (const EvaluateRow& row : report.rows) {
     print_result("{}: {} of the time in reverse, {} m moved a wait at red ({} waits), {} stuck at the end\n",
-                 row.density, interval_text(row.reversing_share), interval_text(row.red_wait_moved_m), row.red_waits,
+                 label_of(row), interval_text(row.reversing_share), interval_text(row.red_wait_moved_m), row.red_waits,
                  interval_text(row.stuck_at_end_share));
   }
   print_result("traffic lights: {}\n", name_of(report.results.setting.light_cycles));
+  if (!report.results.setting.others.empty()) {
+    print_result("among others, shares of vehicles: {}\n", fmt::join(report.results.setting.others, ", "));
+  }
   print_result("+- is the half width of a 95 % confidence interval over scenarios\n");
   if (report.agent_steps > 0) {
     const auto steps = static_cast<double>(report.agent_steps);
@@ -65,11 +77,17 @@ void print_table(const EvaluateReport& report) {
 void print_report(const EvaluateOptions& options, const EvaluateReport& report, const Json& infractions) {
   Json table = Json::array();
   for (const EvaluateRow& row : report.rows) {
-    Json json = {{"density", row.density},     {"scenarios", row.scenarios},
-                 {"steps", row.steps},         {"asked", row.asked},
-                 {"spawned", row.spawned},     {"entered", row.entered},
-                 {"left", row.left},           {"vehicle_episodes", row.vehicle_episodes},
-                 {"km_driven", row.km_driven}, {"red_waits", row.red_waits}};
+    Json json = {{"density", row.density},
+                 {"driver", row.driver.empty() ? Json(nullptr) : Json(row.driver)},
+                 {"scenarios", row.scenarios},
+                 {"steps", row.steps},
+                 {"asked", row.asked},
+                 {"spawned", row.spawned},
+                 {"entered", row.entered},
+                 {"left", row.left},
+                 {"vehicle_episodes", row.vehicle_episodes},
+                 {"km_driven", row.km_driven},
+                 {"red_waits", row.red_waits}};
     for (const auto& [name, estimate] : metrics_of(row)) add_estimate(name, estimate, &json);
     add_estimate("at_fault_collisions_per_km", row.at_fault_collisions_per_km, &json);
     add_estimate("off_road_per_km", row.off_road_per_km, &json);
@@ -79,6 +97,7 @@ void print_report(const EvaluateOptions& options, const EvaluateReport& report, 
   }
   Json json = driver_json(options, report.results.setting);
   json.update({{"light_cycles", name_of(report.results.setting.light_cycles)},
+               {"others", report.results.setting.others},
                {"interrupted", report.interrupted},
                {"agent_steps", report.agent_steps > 0 ? Json(report.agent_steps) : Json(nullptr)},
                {"seconds", report.agent_steps > 0 ? Json(report.seconds) : Json(nullptr)},
@@ -175,6 +194,7 @@ void evaluate_in_scenes(const CLI::App& command, const EvaluateArguments& argume
   check_driver(evaluation, /*has_parts=*/false, /*has_scenes=*/true);
   refuse_recording_options(command, "--replay or --gallery");
   refuse_options(command, {"--light-heads"}, "in recorded scenes, whose heads all stand beyond their line");
+  refuse_options(command, {"--others"}, "in recorded scenes");
   SceneEvaluateOptions in_scenes;
   static_cast<DriverOptions&>(in_scenes) = evaluation;
   in_scenes.first_scene = evaluation.first_scenario;
@@ -206,6 +226,10 @@ void evaluate_in_towns(const CLI::App& command, EvaluateArguments* arguments) {
   if (!records) refuse_recording_options(command, "--replay or --gallery");
   if (records && merges) fail_usage("--replay, --gallery: have no effect with --merge");
   if (lists_infractions && merges) fail_usage("--infractions: has no effect with --merge");
+  if (!evaluation.others.empty()) {
+    if (merges) fail_usage("--others: has no effect with --merge");
+    if (records || lists_infractions) fail_usage("--others: not with --replay, --gallery or --infractions");
+  }
   if (!arguments->gallery.empty()) {
     make_output_folder(arguments->gallery);
     check_gallery(arguments->gallery);
@@ -284,6 +308,13 @@ void add_evaluate_command(CLI::App& app) {
       ->allow_extra_args(false)
       ->capture_default_str();
   command
+      ->add_option("--others", options.others,
+                   fmt::format("Who else drives, as lane=0.25,models/vector.safetensors=0.25: policies' files or {}, "
+                               "each with its share of vehicles. A row each shows who drives well among whom",
+                               fmt::join(town_controller_names(), ", ")))
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command
       ->add_option("--scenarios", arguments->scenarios,
                    "Scenarios per density: N, or A:B for the part of them from A up to but not including B; with "
                    "--protocol scenes, by default all")
@@ -320,6 +351,7 @@ void add_evaluate_command(CLI::App& app) {
       "  pictura evaluate run.ckpt --map Town05 --scenarios 50 --replays 10 --gallery replays\n"
       "  pictura evaluate run.ckpt --density medium --scenarios 40 --infractions infractions.csv\n"
       "  pictura evaluate run.ckpt --protocol womd --scenes validation/ --density 100,50 --csv agents.csv\n"
+      "  pictura evaluate run.ckpt --density medium --scenarios 40 --others lane=0.3,idm_lanes=0.2\n"
       "In parts, on several machines or after one another:\n"
       "  pictura evaluate run.ckpt --scenarios 0:100 --out a.json\n"
       "  pictura evaluate run.ckpt --scenarios 100:200 --out b.json\n"

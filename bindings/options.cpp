@@ -48,7 +48,7 @@ void ParameterVisitor::conditioning(const NamedOption& option, ConditioningRange
   });
 }
 
-void ParameterVisitor::conditioning(const NamedOption& option, std::vector<std::string>& texts) {
+void ParameterVisitor::numbers_by_name(const NamedOption& option, std::vector<std::string>& texts) {
   add<py::dict>(option, {}, [&texts](const py::dict& given) {
     for (const auto& [name, value] : given) {
       texts.push_back(fmt::format("{}={}", py::cast<std::string>(name), py::cast<double>(value)));

@@ -75,7 +75,7 @@ class ParameterVisitor {
   /// Numbers or (low, high) by name, in place of those that are there.
   void conditioning(const NamedOption& option, ConditioningRanges& ranges);
   /// Numbers by name, as "name=value".
-  void conditioning(const NamedOption& option, std::vector<std::string>& texts);
+  void numbers_by_name(const NamedOption& option, std::vector<std::string>& texts);
   /// A function of Python's, or None.
   template <typename... Arguments>
   void callback(const NamedOption& option, std::function<void(Arguments...)>& value) {

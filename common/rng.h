@@ -49,6 +49,7 @@ enum class Purpose : uint8_t {
   removal_case,
   pedestrian_path,
   corner_user,
+  driver,
 };
 
 /// Whose draws they are, when, and what for. Ids are global across ranks. Fields that are not given are 0.

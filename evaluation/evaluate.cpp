@@ -7,6 +7,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/hash.h"
 #include "pictura/common/support/suggestion.h"
+#include "pictura/evaluation/mixed_traffic.h"
 #include "pictura/evaluation/progress.h"
 #include "pictura/evaluation/standing.h"
 #include "pictura/map/load_map.h"
@@ -136,17 +137,17 @@ std::vector<WorldSpec> worlds_of(const EvaluateOptions& options, size_t num_maps
 // to enter, since halted ones stay as they are. False: it was interrupted. Calls on_steps with the steps that are done,
 // now and then, and on_left(state, slot) for each agent that left a road that ends.
 template <typename OnSteps, typename OnLeft>
-bool drive_to_the_end(const EvaluatedDriver& driver, const EvaluateOptions& options, Simulator* simulator,
+bool drive_to_the_end(const Driving& driving, const EvaluateOptions& options, Simulator* simulator,
                       const OnSteps& on_steps, const OnLeft& on_left, StandingObserver* standing,
                       int64_t* agent_steps_inout) {
-  const Driving driving = driver.drive(*simulator);
   EvaluationObserver* const observer = options.observer;
   std::vector<StepObserver*> observers{standing};
   if (observer) {
     observer->begin(*simulator);
     observers.push_back(observer);
   }
-  DeviceCopy<Command> command_memory(std::vector<Command>(static_cast<size_t>(simulator->num_slots())), driver.device);
+  DeviceCopy<Command> command_memory(std::vector<Command>(static_cast<size_t>(simulator->num_slots())),
+                                     simulator->device());
   const Span<Command> commands = command_memory.span();
   const auto act = [&](int) {
     driving.controller->act(simulator->arrays(), {}, commands);
@@ -170,7 +171,8 @@ bool drive_to_the_end(const EvaluatedDriver& driver, const EvaluateOptions& opti
 
 EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& options, EvaluationWorlds* shared) {
   const CompiledMaps& maps = shared->maps;
-  SimulatorConfig simulator_config = driver.world;
+  const MixedTraffic traffic(other_drivers(options.others), options, driver.device, maps);
+  SimulatorConfig simulator_config = traffic.observed(driver.world);
   simulator_config.seed = options.seed;
   std::vector<DensityOf> densities;
   if (options.agents_per_world > 0)
@@ -191,9 +193,13 @@ EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& op
   setting.argmax = options.argmax;
   setting.seed = options.seed;
   setting.light_heads = name_of(maps.front()->options.light_heads);
+  setting.others = traffic.setting();
   for (const DensityOf& density : densities) {
-    DensityResult result{density.name, density.agents, options.first_scenario, {}};
-    result.scenarios.resize(options.scenarios);
+    std::vector<DensityResult> results;  // by driver
+    for (size_t i = 0; i < traffic.num_drivers(); ++i) {
+      results.push_back({density.name, density.agents, options.first_scenario, {}, traffic.name(i)});
+      results.back().scenarios.resize(static_cast<size_t>(options.scenarios));
+    }
     const int per_batch = worlds_per_batch(driver.device, density.agents);
     for (int first = 0; first < options.scenarios && !report.interrupted; first += per_batch) {
       const std::vector<WorldSpec> worlds = worlds_of(options, maps.size(), density.agents, first, per_batch);
@@ -204,12 +210,19 @@ EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& op
         simulator = make_simulator(options.simulator, simulator_config, maps, worlds);
       const auto num_slots = double(simulator->num_slots());
       const auto on_steps = [&](int steps) { clock.update((done + num_slots * steps) / work); };
-      const auto counts_of = [&](int64_t slot) { return &result.scenarios[first + slot / density.agents]; };
+      const std::vector<uint8_t> driver_of_slot = traffic.driver_of_slots(*simulator);
+      const auto counts_of = [&](int64_t slot) {
+        DensityResult& result = results[driver_of_slot[static_cast<size_t>(slot)]];
+        return &result.scenarios[static_cast<size_t>(first + slot / density.agents)];
+      };
       const auto on_left = [&](const AgentStateView& state, int64_t slot) { add_life(state, slot, counts_of(slot)); };
-      StandingObserver standing(*simulator);
-      if (!drive_to_the_end(driver, options, simulator.get(), on_steps, on_left, &standing, &report.agent_steps)) {
+      StandingObserver standing(*simulator, driver_of_slot, traffic.num_drivers());
+      const Driving driving = traffic.share(driver.drive(*simulator), *simulator, driver_of_slot);
+      if (!drive_to_the_end(driving, options, simulator.get(), on_steps, on_left, &standing, &report.agent_steps)) {
         report.interrupted = true;
-        result.scenarios.resize(first);  // those of the batches before are finished
+        for (DensityResult& result : results) {
+          result.scenarios.resize(static_cast<size_t>(first));  // those of the batches before are finished
+        }
         break;
       }
       done += num_slots * options.steps;
@@ -217,12 +230,15 @@ EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& op
       for (int slot = 0; slot < simulator->num_slots(); ++slot) {
         add_slot(state.view(), slot, counts_of(slot));
       }
-      const std::vector<StandingCounts> stood = standing.counts();
-      for (size_t world = 0; world < stood.size(); ++world) {
-        result.scenarios[static_cast<size_t>(first) + world].standing = stood[world];
+      for (size_t i = 0; i < results.size(); ++i) {
+        const std::vector<StandingCounts> stood = standing.counts(i);
+        for (size_t world = 0; world < stood.size(); ++world) {
+          results[i].scenarios[static_cast<size_t>(first) + world].standing = stood[world];
+        }
       }
     }
-    if (!result.scenarios.empty()) {
+    for (DensityResult& result : results) {
+      if (result.scenarios.empty()) continue;
       report.rows.push_back(row_of(result, options.steps));
       report.results.densities.push_back(std::move(result));
     }

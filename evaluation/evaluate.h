@@ -36,7 +36,8 @@ class EvaluationObserver : public StepObserver {
 struct EvaluateOptions : DriverOptions {
   std::vector<std::string> maps;  // as load_map takes them; the paper's eight towns
   std::vector<Density> densities{Density::light, Density::medium, Density::dense};
-  int agents_per_world = 0;  // > 0: instead of the densities' own numbers
+  int agents_per_world = 0;         // > 0: instead of the densities' own numbers
+  std::vector<std::string> others;  // who else drives, as other_drivers() reads them; see evaluation/mixed_traffic.h
   int first_scenario = 0, scenarios = 200, steps = 3000;
   std::function<void(double done_fraction, double eta_s)> on_progress;
   EvaluationObserver* observer = nullptr;
@@ -49,6 +50,7 @@ void visit_options(EvaluateOptions& options, Visitor&& v) {
   v.value({"controller"}, options.controller);
   v.choice({"densities"}, options.densities, kDensityNames);
   v.value({"agents_per_world"}, options.agents_per_world);
+  v.numbers_by_name({"others"}, options.others);
   v.value({"first_scenario"}, options.first_scenario);
   v.value({"scenarios"}, options.scenarios);
   v.value({"steps"}, options.steps);
@@ -58,7 +60,9 @@ void visit_options(EvaluateOptions& options, Visitor&& v) {
 }
 
 struct EvaluateReport {
-  EvaluationResults results;      // of the densities that were finished, in the order of options.densities
+  // Of the densities that were finished, in the order of options.densities; of each first of whom the evaluation is,
+  // then of the others.
+  EvaluationResults results;
   std::vector<EvaluateRow> rows;  // of each
   bool interrupted = false;       // ^C came (common/support/interrupt.h) before the last one was
   // Without the making of maps and renderer, and 0 where parts were merged. Agent-steps are of active agents of all

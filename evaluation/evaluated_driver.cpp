@@ -16,15 +16,18 @@
 
 namespace pictura {
 
-namespace {
-
 int64_t count_active(Simulator& simulator) {
   const Span<const AgentStatus> status(simulator.state().status, static_cast<size_t>(simulator.num_slots()));
   const std::vector<AgentStatus> all = host_copy(status, simulator.device());
   return std::count(all.begin(), all.end(), AgentStatus::active);
 }
 
-}  // namespace
+std::unique_ptr<PolicyController> policy_controller(PolicySession& session, Renderer* renderer,
+                                                    const DriverOptions& options, const Simulator& simulator) {
+  const bool hides_auxiliary =
+      simulator.config().auxiliary_observations && !session.training_world().auxiliary_observations;
+  return session.make_controller(renderer, options.argmax, options.seed, hides_auxiliary);
+}
 
 EvaluationSetting setting_of(const PolicySession& session) {
   const Config& config = session.config();
@@ -52,9 +55,8 @@ EvaluationSetting setting_of(const PolicySession& session) {
 
 EvaluatedDriver policy_driver(PolicySession* session, Renderer* renderer, const DriverOptions& options, int steps) {
   return {session->evaluation_world(steps), setting_of(*session), session->device(),
-          [session, renderer, &options](Simulator&) {
-            std::unique_ptr<PolicyController> controller =
-                session->make_controller(renderer, options.argmax, options.seed);
+          [session, renderer, &options](Simulator& simulator) {
+            std::unique_ptr<PolicyController> controller = policy_controller(*session, renderer, options, simulator);
             const PolicyController* const policy = controller.get();
             return Driving{std::move(controller), [policy] { return policy->num_driven(); }};
           }};

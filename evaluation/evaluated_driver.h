@@ -12,6 +12,7 @@
 
 namespace pictura {
 
+class PolicyController;
 class PolicySession;
 class Renderer;
 
@@ -40,6 +41,13 @@ struct Driving {
   std::unique_ptr<Controller> controller;
   std::function<int64_t()> num_driven;
 };
+
+/// How many agents of all worlds are active.
+int64_t count_active(Simulator& simulator);
+/// A session's policy in a simulator, by argmax and seed of the options. Where the simulator fills auxiliary slots, a
+/// policy that was trained without them gets zeros, as in training.
+std::unique_ptr<PolicyController> policy_controller(PolicySession& session, Renderer* renderer,
+                                                    const DriverOptions& options, const Simulator& simulator);
 
 /// What it drives with lives as long as session, renderer and options do.
 struct EvaluatedDriver {

@@ -99,6 +99,7 @@ EvaluateRow row_of(const DensityResult& result, int steps) {
 
   EvaluateRow row;
   row.density = result.density;
+  row.driver = result.driver;
   row.scenarios = static_cast<int>(all.size());
   row.steps = steps;
   int64_t driven_steps = 0;
@@ -175,18 +176,20 @@ std::vector<std::pair<std::string, Estimate>> metrics_of(const EvaluateRow& row)
 
 EvaluationResults merge(const std::vector<EvaluationResults>& parts, const std::vector<std::string>& names) {
   PICTURA_CHECK(!parts.empty(), "merge: expected one part or more");
-  std::vector<std::string> order;
-  std::map<std::string, std::vector<Part>> by_density;
+  using Key = std::pair<std::string, std::string>;  // density and driver
+  std::vector<Key> order;
+  std::map<Key, std::vector<Part>> by_key;
   EvaluationResults all{parts[0].setting};
   for (size_t i = 0; i < parts.size(); ++i) {
     check_same(to_json(parts[0].setting), names[0], to_json(parts[i].setting), names[i]);
     all.counts_all_collisions &= parts[i].counts_all_collisions;
     for (const DensityResult& density : parts[i].densities) {
-      if (!by_density.contains(density.density)) order.push_back(density.density);
-      by_density[density.density].push_back({&density, &names[i]});
+      const Key key{density.density, density.driver};
+      if (!by_key.contains(key)) order.push_back(key);
+      by_key[key].push_back({&density, &names[i]});
     }
   }
-  for (const std::string& density : order) all.densities.push_back(joined(by_density[density]));
+  for (const Key& key : order) all.densities.push_back(joined(by_key[key]));
   return all;
 }
 
@@ -198,6 +201,7 @@ void write_results(const std::string& path, const EvaluationResults& results) {
       scenarios.push_back(results.counts_all_collisions ? counts_json(counts) : as_format_1(counts_json(counts)));
     }
     densities.push_back({{"density", density.density},
+                         {"driver", density.driver},
                          {"agents_per_world", density.agents_per_world},
                          {"first_scenario", density.first_scenario},
                          {"scenarios", scenarios}});
@@ -217,6 +221,7 @@ EvaluationResults read_results(const std::string& path) {
     for (const Json& density : json.at("densities")) {
       DensityResult result;
       density.at("density").get_to(result.density);
+      result.driver = density.value("driver", "");  // files of earlier versions lack it
       density.at("agents_per_world").get_to(result.agents_per_world);
       density.at("first_scenario").get_to(result.first_scenario);
       for (const Json& counts : density.at("scenarios")) {

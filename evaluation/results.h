@@ -76,6 +76,7 @@ struct DensityResult {
   int agents_per_world = 0;
   int first_scenario = 0;
   std::vector<ScenarioCounts> scenarios;
+  std::string driver;  // whose vehicles, one of EvaluateOptions::others; empty: of whom the evaluation is
 };
 
 /// What decides an evaluation's numbers. Parts are merged where all of it is the same.
@@ -95,6 +96,7 @@ struct EvaluationSetting {
   std::string light_heads = "as_mapped";                // see map/map_geometry.h; files without it have this one
   std::array<double, kNumConditioning> conditioning{};  // of every agent, in the order of simulator/conditioning.h
   LightCycles light_cycles = LightCycles::phases;
+  std::vector<std::string> others;  // who else drives, see MixedTraffic::setting()
   friend bool operator==(const EvaluationSetting&, const EvaluationSetting&) = default;
 };
 
@@ -130,7 +132,7 @@ Estimate estimate_ratio(const std::vector<Counts>& scenarios, const Part& part_o
 /// The paper's five metrics (appendix, metric definitions) over the vehicles of one density, and more. Metrics of what
 /// was not counted are NaN.
 struct EvaluateRow {
-  std::string density;
+  std::string density, driver;  // as DensityResult's
   int scenarios = 0, steps = 0;
   int64_t vehicle_episodes = 0;
   Estimate at_fault_collision_rate, off_road_rate, red_light_rate, goals_per_vehicle;

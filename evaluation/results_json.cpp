@@ -33,7 +33,8 @@ Json to_json(const EvaluationSetting& s) {
           {"image_sizes", s.image_sizes},
           {"conditioning", conditioning},
           {"light_cycles", name_of(s.light_cycles)},
-          {"light_heads", s.light_heads}};
+          {"light_heads", s.light_heads},
+          {"others", s.others}};
 }
 
 EvaluationSetting setting_from(const Json& json) {
@@ -52,6 +53,7 @@ EvaluationSetting setting_from(const Json& json) {
   json.at("samples").get_to(s.samples);
   json.at("image_sizes").get_to(s.image_sizes);
   s.light_heads = json.value("light_heads", s.light_heads);
+  s.others = json.value("others", s.others);
   for (size_t i = 0; i < kNumConditioning; ++i) {
     json.at("conditioning").at(kConditioningNames[i]).get_to(s.conditioning[i]);
   }

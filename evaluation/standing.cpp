@@ -1,6 +1,7 @@
 #include "pictura/evaluation/standing.h"
 
 #include <cmath>
+#include <utility>
 
 #include "pictura/evaluation/world_arrays.h"
 #include "pictura/simulator/rules/collision.h"
@@ -34,19 +35,22 @@ int32_t red_light_before(const MapView& map, const AgentBox& box, const WorldArr
 }  // namespace
 
 StandingObserver::StandingObserver(Simulator& simulator)
+    : StandingObserver(simulator, std::vector<uint8_t>(static_cast<size_t>(simulator.num_slots()), 0), 1) {}
+
+StandingObserver::StandingObserver(Simulator& simulator, std::vector<uint8_t> driver_of_slot, size_t num_drivers)
     : simulator_(simulator),
       awaited_light_(static_cast<size_t>(simulator.num_slots()), -1),
       progress_(static_cast<size_t>(simulator.num_slots())),
-      counts_(simulator.worlds().size()) {}
+      driver_of_slot_(std::move(driver_of_slot)),
+      counts_(num_drivers, std::vector<StandingCounts>(simulator.worlds().size())) {}
 
 void StandingObserver::after_step(const StepResult& /*result*/) {
   ++step_;
   const WorldArrays now(simulator_);
   const std::vector<float> distance_m = WorldArrays::of_slots(simulator_, simulator_.state().distance_m);
   const float dt_s = simulator_.config().dt_s;
-  for (size_t world = 0; world < counts_.size(); ++world) {
+  for (size_t world = 0; world < simulator_.worlds().size(); ++world) {
     const MapView map = simulator_.maps()[simulator_.worlds()[world].map]->rules.view();
-    StandingCounts& counts = counts_[world];
     for (size_t agent = 0; agent < now.num_agents(world); ++agent) {
       const size_t slot = now.first_slot(world) + agent;
       int32_t& awaited = awaited_light_[slot];
@@ -54,6 +58,7 @@ void StandingObserver::after_step(const StepResult& /*result*/) {
         awaited = -1;
         continue;
       }
+      StandingCounts& counts = counts_[driver_of_slot_[slot]][world];
       const float speed_mps = now.speed_mps[slot];
       ++counts.driven_steps;
       counts.reversing_steps += speed_mps < -kRest_mps;
@@ -72,13 +77,13 @@ void StandingObserver::after_step(const StepResult& /*result*/) {
   }
 }
 
-std::vector<StandingCounts> StandingObserver::counts() const {
-  std::vector<StandingCounts> counts = counts_;
+std::vector<StandingCounts> StandingObserver::counts(size_t driver) const {
+  std::vector<StandingCounts> counts = counts_[driver];
   const WorldArrays now(simulator_);
   const auto stuck_steps = static_cast<int>(std::lround(kStuckFor_s / simulator_.config().dt_s));
   for (size_t world = 0; world < counts.size(); ++world) {
     for (size_t slot = now.first_slot(world); slot < now.first_slot(world + 1); ++slot) {
-      counts[world].stuck_at_end += now.agent_class[slot] == AgentClass::vehicle &&
+      counts[world].stuck_at_end += driver_of_slot_[slot] == driver && now.agent_class[slot] == AgentClass::vehicle &&
                                     now.status[slot] == AgentStatus::active &&
                                     step_ - progress_[slot].step >= stuck_steps;
     }

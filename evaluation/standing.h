@@ -16,10 +16,12 @@ class StandingObserver final : public StepObserver {
  public:
   /// The simulator's worlds are at the start of their episodes.
   explicit StandingObserver(Simulator& simulator);
+  /// Counts vehicles of each driver apart: driver_of_slot [slots] holds their numbers, below num_drivers.
+  StandingObserver(Simulator& simulator, std::vector<uint8_t> driver_of_slot, size_t num_drivers);
 
   void after_step(const StepResult& result) override;
-  /// Counts of each world, after the last step.
-  std::vector<StandingCounts> counts() const;
+  /// Counts of each world, after the last step: of one driver's vehicles.
+  std::vector<StandingCounts> counts(size_t driver = 0) const;
 
  private:
   // Where a vehicle was when it had last got on.
@@ -30,9 +32,10 @@ class StandingObserver final : public StepObserver {
 
   Simulator& simulator_;
   int step_ = 0;
-  std::vector<int32_t> awaited_light_;  // [slots] of the world; -1: none
-  std::vector<Progress> progress_;      // [slots]
-  std::vector<StandingCounts> counts_;  // [worlds]
+  std::vector<int32_t> awaited_light_;               // [slots] of the world; -1: none
+  std::vector<Progress> progress_;                   // [slots]
+  std::vector<uint8_t> driver_of_slot_;              // [slots]
+  std::vector<std::vector<StandingCounts>> counts_;  // [drivers][worlds]
 };
 
 }  // namespace pictura

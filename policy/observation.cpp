@@ -1,6 +1,7 @@
 #include "pictura/policy/observation.h"
 
 #include "pictura/common/error.h"
+#include "pictura/policy/network_shape.h"
 #include "pictura/policy/torch_device.h"
 
 namespace pictura {
@@ -61,6 +62,13 @@ Observation select_arrays(const Config& config, const ObservationView& view, Dev
   PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
   return result;
+}
+
+void hide_auxiliary(Observation* observation_inout) {
+  constexpr int64_t kOfEgo = kEgoFeatures - num_ego_features(/*sees_images=*/true), kOfPartner = 1;
+  at::Tensor &ego = observation_inout->ego, &partners = observation_inout->partners;
+  ego.narrow(-1, kEgoFeatures - kOfEgo, kOfEgo).zero_();
+  if (partners.defined()) partners.narrow(-1, kPartnerFeatures - kOfPartner, kOfPartner).zero_();
 }
 
 std::vector<ImageBlock> allocate_images(const Rig& rig, std::vector<int64_t> batch, Device device) {

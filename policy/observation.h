@@ -75,6 +75,8 @@ void copy_arrays(const ObservationView& view, Device device, const Observation& 
 /// [0, batch). Throws Error naming an array that is not one of `batch` agents.
 Observation select_arrays(const Config& config, const ObservationView& view, Device device, int64_t batch,
                           const at::Tensor& indices);
+/// Writes zeros to the auxiliary slots of vectors (see simulator/observation.h), as a world without them has.
+void hide_auxiliary(Observation* observation_inout);
 
 /// Uninitialised memory for images of a rig, [batch..., cameras of one size, 3, height, width].
 std::vector<ImageBlock> allocate_images(const Rig& rig, std::vector<int64_t> batch, Device device);

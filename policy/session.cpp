@@ -110,6 +110,7 @@ struct PolicySession::Parts {
         input.full_chunk > 0 ? ChunkSizes{input.full_chunk, true} : ChunkSizes{config.train.forward_chunk};
     Decision decision = pictura::decide(indices, chunks, [&](const at::Tensor& some) {
       Observation observation = select_arrays(config, input.observations, device, batch, some);
+      if (input.hides_auxiliary) hide_auxiliary(&observation);
       if (config.reads_images()) observation.images = draw(input, some, renderer);
       return policy.forward(observation);
     });
@@ -156,8 +157,13 @@ struct PolicySession::Parts {
 /// A policy for one simulator.
 class SessionController final : public PolicyController {
  public:
-  SessionController(const PolicySession::Parts* parts, Renderer* renderer, const ActionChoice& choice)
-      : parts_(*parts), renderer_(renderer), choice_(choice), clock_(parts->config.policy.decision_steps) {}
+  SessionController(const PolicySession::Parts* parts, Renderer* renderer, const ActionChoice& choice,
+                    bool hides_auxiliary)
+      : parts_(*parts),
+        renderer_(renderer),
+        choice_(choice),
+        hides_auxiliary_(hides_auxiliary),
+        clock_(parts->config.policy.decision_steps) {}
 
   std::string_view name() const override { return "policy"; }
 
@@ -170,8 +176,11 @@ class SessionController final : public PolicyController {
     const at::Tensor active = active_slots(input, mask, false, parts_.executor.get());
     num_driven_ = active.size(0);
     const at::Tensor slots = clock_.deciding(input, active, step_++);
-    const Decision decision =
-        parts_.decide({input.observations, &input.scene, input.views, {}}, num_slots, slots, renderer_);
+    const Decision decision = parts_.decide({.observations = input.observations,
+                                             .scene = &input.scene,
+                                             .views = input.views,
+                                             .hides_auxiliary = hides_auxiliary_},
+                                            num_slots, slots, renderer_);
     const Span<int32_t> actions = span_of<int32_t>(actions_);
     parts_.executor->choose_actions(input, span_of<const int64_t>(slots), span_of<const float>(decision.log_probs),
                                     choice_, actions);
@@ -184,6 +193,7 @@ class SessionController final : public PolicyController {
   const PolicySession::Parts& parts_;
   Renderer* renderer_;
   ActionChoice choice_;
+  bool hides_auxiliary_;
   DecisionClock clock_;
   int64_t step_ = 0;    // calls of act()
   at::Tensor actions_;  // i32 [slots], held until the next decision
@@ -241,9 +251,10 @@ void PolicySession::evaluate(const PolicyInput& input, Renderer* renderer, Span<
   tensor_over(values_out, parts_->device, {batch}).copy_(decision.value);
 }
 
-std::unique_ptr<PolicyController> PolicySession::make_controller(Renderer* renderer, bool argmax, uint64_t seed) {
+std::unique_ptr<PolicyController> PolicySession::make_controller(Renderer* renderer, bool argmax, uint64_t seed,
+                                                                 bool hides_auxiliary) {
   PICTURA_CHECK(!reads_images() || renderer, "policy: it reads images: expected a renderer");
-  return std::make_unique<SessionController>(parts_.get(), renderer, ActionChoice{argmax, seed});
+  return std::make_unique<SessionController>(parts_.get(), renderer, ActionChoice{argmax, seed}, hides_auxiliary);
 }
 
 }  // namespace pictura

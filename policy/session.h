@@ -29,6 +29,8 @@ struct PolicyInput {
   // > 0: so many agents go through the network at once, always, so that what comes out for one depends on its place
   // among them and not on the batch. 0: at most train.forward_chunk, in equal parts of the batch.
   int64_t full_chunk = 0;
+  // Zeros instead of what the auxiliary slots hold, for a policy that was trained without them.
+  bool hides_auxiliary = false;
 };
 
 /// A policy that drives. On a device act() waits for how many agents it drives, and how many of these decide.
@@ -83,8 +85,9 @@ class PolicySession {
   /// Drives in a simulator on device(): the most likely action, or a draw keyed by (seed, global world, agent,
   /// episode, step) as in training. Actions are held for the steps that the policy was trained with (policy.
   /// decision_steps), counted from the first act(). Session and renderer, which is as for evaluate(), must outlive it.
-  /// Images are drawn for agents that decide alone.
-  std::unique_ptr<PolicyController> make_controller(Renderer* renderer, bool argmax, uint64_t seed);
+  /// Images are drawn for agents that decide alone. hides_auxiliary: as PolicyInput's.
+  std::unique_ptr<PolicyController> make_controller(Renderer* renderer, bool argmax, uint64_t seed,
+                                                    bool hides_auxiliary = false);
 
  private:
   friend class SessionController;

@@ -43,7 +43,7 @@ void visit_options(SessionOptions& options, Visitor&& v) {
   v.value({"width_px"}, options.width_px);
   v.value({"height_px"}, options.height_px);
   v.value({"backbone"}, options.backbone);
-  v.conditioning({"conditioning"}, options.conditioning);
+  v.numbers_by_name({"conditioning"}, options.conditioning);
   v.value({"average"}, options.average);
   v.value({"decision_steps"}, options.decision_steps);
 }

@@ -1,0 +1,148 @@
+#include "pictura/evaluation/mixed_traffic.h"
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include "pictura/backends/make_controller.h"
+#include "pictura/backends/upload_maps.h"
+#include "pictura/common/error.h"
+#include "pictura/common/rng.h"
+#include "pictura/common/support/numbers.h"
+#include "pictura/configuration/config.h"
+#include "pictura/evaluation/world_arrays.h"
+#include "pictura/policy/session.h"
+#include "pictura/simulator/controllers/host_controllers.h"
+#include "pictura/simulator/controllers/shared_control.h"
+
+namespace pictura {
+
+namespace {
+
+bool is_controller(const std::string& name) {
+  const std::vector<std::string> names = town_controller_names();
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+SessionOptions options_of(const DriverOptions& options, Device device) {
+  SessionOptions result;
+  result.device = name_of(device);
+  result.num_threads = options.num_threads;
+  return result;
+}
+
+}  // namespace
+
+std::vector<OtherDriver> other_drivers(const std::vector<std::string>& texts) {
+  std::vector<OtherDriver> others;
+  double sum = 0;
+  for (const std::string& text : texts) {
+    const size_t sign = text.rfind('=');
+    const std::optional<double> share =
+        sign == std::string::npos ? std::nullopt : parse_number(std::string_view(text).substr(sign + 1));
+    if (!share || !(*share > 0) || sign == 0) {
+      fail_usage("others: expected a policy's file or one of {}, and its share above 0, as lane=0.25; got '{}'",
+                 fmt::join(town_controller_names(), ", "), text);
+    }
+    others.push_back({text.substr(0, sign), *share});
+    sum += *share;
+  }
+  if (others.size() > kMaxOtherDrivers) {
+    fail_usage("others: expected {} at most, got {}", kMaxOtherDrivers, others.size());
+  }
+  if (sum >= 1) fail_usage("others: expected shares below 1 in all, since somebody is to be measured, got {}", sum);
+  return others;
+}
+
+/// A policy and what it sees with, or neither for a controller.
+struct MixedTraffic::Other {
+  OtherDriver driver;
+  std::unique_ptr<PolicySession> session;
+  std::unique_ptr<Renderer> renderer;
+  DriverOptions options;  // of which argmax and seed count
+};
+
+MixedTraffic::MixedTraffic(const std::vector<OtherDriver>& others, const DriverOptions& options, Device device,
+                           const CompiledMaps& maps)
+    : seed_(options.seed) {
+  for (const OtherDriver& driver : others) {
+    auto other = std::make_unique<Other>();
+    other->driver = driver;
+    other->options.argmax = options.argmax;
+    other->options.seed = options.seed;
+    if (!is_controller(driver.name)) {
+      other->session = std::make_unique<PolicySession>(driver.name, options_of(options, device));
+      other->renderer = other->session->make_renderer();
+      if (other->renderer) upload_maps(maps, {}, other->renderer.get());
+    }
+    others_.push_back(std::move(other));
+  }
+}
+
+MixedTraffic::~MixedTraffic() = default;
+
+size_t MixedTraffic::num_drivers() const { return others_.size() + 1; }
+
+std::string MixedTraffic::name(size_t driver) const { return driver == 0 ? "" : others_[driver - 1]->driver.name; }
+
+std::vector<std::string> MixedTraffic::setting() const {
+  std::vector<std::string> texts;
+  for (const std::unique_ptr<Other>& other : others_) {
+    texts.push_back(
+        fmt::format("{}={}", other->session ? other->session->policy_hash() : other->driver.name, other->driver.share));
+  }
+  return texts;
+}
+
+SimulatorConfig MixedTraffic::observed(SimulatorConfig world) const {
+  for (const std::unique_ptr<Other>& other : others_) {
+    if (!other->session) continue;
+    const SimulatorConfig its = other->session->training_world();
+    world.vector_observations |= its.vector_observations;
+    world.auxiliary_observations |= its.auxiliary_observations;
+    world.wall_observations |= its.wall_observations;
+  }
+  return world;
+}
+
+std::vector<uint8_t> MixedTraffic::driver_of_slots(Simulator& simulator) const {
+  const std::vector<AgentClass> agent_class = WorldArrays::of_slots(simulator, simulator.state().agent_class);
+  const std::vector<int32_t> slot_begin = host_copy(simulator.slots().slot_begin, simulator.device());
+  std::vector<uint8_t> driver_of_slot(agent_class.size(), 0);
+  for (size_t world = 0; world < simulator.worlds().size(); ++world) {
+    for (int32_t slot = slot_begin[world]; slot < slot_begin[world + 1]; ++slot) {
+      if (agent_class[static_cast<size_t>(slot)] != AgentClass::vehicle) continue;
+      RandomStream random({.seed = seed_,
+                           .world = simulator.worlds()[world].global_world,
+                           .agent = static_cast<uint32_t>(slot - slot_begin[world]),
+                           .purpose = Purpose::driver});
+      double left = static_cast<double>(random.uniform());
+      for (size_t i = 0; i < others_.size() && left >= 0; ++i) {
+        left -= others_[i]->driver.share;
+        if (left < 0) driver_of_slot[static_cast<size_t>(slot)] = static_cast<uint8_t>(i + 1);
+      }
+    }
+  }
+  return driver_of_slot;
+}
+
+Driving MixedTraffic::share(Driving own, Simulator& simulator, const std::vector<uint8_t>& driver_of_slot) const {
+  if (others_.empty()) return own;
+  std::vector<Driver> drivers;
+  for (size_t i = 0; i < num_drivers(); ++i) {
+    std::vector<uint8_t> mask(driver_of_slot.size());
+    std::transform(driver_of_slot.begin(), driver_of_slot.end(), mask.begin(), [i](size_t its) { return its == i; });
+    const auto memory = std::make_shared<const DeviceCopy<uint8_t>>(mask, simulator.device());
+    Driver driver{std::move(own.controller), memory->span(), memory};
+    if (i > 0) {
+      const Other& other = *others_[i - 1];
+      driver.controller = other.session
+                              ? policy_controller(*other.session, other.renderer.get(), other.options, simulator)
+                              : make_controller(other.driver.name, simulator, seed_);
+    }
+    drivers.push_back(std::move(driver));
+  }
+  return {std::make_unique<SharedControl>(std::move(drivers)), [&simulator] { return count_active(simulator); }};
+}
+
+}  // namespace pictura
