@@ -12,8 +12,8 @@
 
 namespace {
 
-// About 40 us: the shortest that costs nothing on an idle machine (bench/README.md). bindings/pictura/__init__.py has
-// it too.
+// About 40 us: the shortest that costs nothing on an idle machine (docs/research/benchmarks.md).
+// bindings/pictura/__init__.py has it too.
 char spin_count[] = "GOMP_SPINCOUNT=2000";
 
 // Nothing of the standard library is set up yet.

@@ -36,7 +36,7 @@ struct RenderArguments {
 constexpr int kSweptEgos = 2048;
 constexpr const char* kSweptSize = "96x54";
 
-// The paper's cases and larger ones, see bench/README.md.
+// The paper's cases and larger ones, see docs/developer/benchmarks.md.
 void apply_sweep(RenderArguments* arguments) {
   const std::string& sweep = arguments->sweep;
   if (sweep.empty()) return;
