@@ -70,7 +70,7 @@ int run_command(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);
   CLI::App app{
       "Self-play driving from rendered views: maps, simulation, images, training and evaluation.\n"
-      "MAP is a .xodr file, a CARLA town's name (looked up in $PICTURA_DATA), or procedural[:SEED]."};
+      "MAP is a .xodr file, a CARLA town's name (looked up in $PICTURA_DATA), procedural[:SEED], or city[:SEED]."};
   app.name("pictura");
   app.set_version_flag("--version", PICTURA_VERSION);
   app.require_subcommand(1);

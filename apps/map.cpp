@@ -231,6 +231,7 @@ void add_map_command(CLI::App& app) {
   command->add_flag("--full", arguments->full, "With --json: list every element with its position in the file");
   command->footer(
       "Examples:\n  pictura map Town01 --json\n  pictura map procedural:7 --png town.png\n"
+      "  pictura map city:7 --png city.png\n"
       "  pictura map Town03 --svg crossing.svg --at 0 0 --radius 40\n"
       "  pictura map validation.tfrecord-00000-of-00150#7 --png scene.png");
   command->callback([arguments, command] { run_map(*command, *arguments); });

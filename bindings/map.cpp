@@ -190,9 +190,10 @@ Raises pictura.Error for other shapes; a renderer refuses what is not finite.)")
 A road network: lanes, markings, edges, lights. Immutable; simulators and renderers share it.
 
 Positions are metres in the map's frame, z up; `origin_m` is its place in the file's coordinates.)")
-      .def_static("load", load_named_map, py::arg("name"), py::kw_only(), py::arg("strict") = false,
-                  py::arg("chord_error_m") = OpenDriveOptions{}.chord_error_m,
-                  R"(Loads a map by name: an OpenDRIVE file (.xodr), a town of the map folder, or 'procedural:SEED'.
+      .def_static(
+          "load", load_named_map, py::arg("name"), py::kw_only(), py::arg("strict") = false,
+          py::arg("chord_error_m") = OpenDriveOptions{}.chord_error_m,
+          R"(Loads a map by name: an OpenDRIVE file (.xodr), a town of the map folder, 'procedural:SEED', or 'city:SEED'.
 
 Faults that have one sensible meaning are mended, as `mends` says; strict: refuse them too. chord_error_m: how far sampled curves
 may lie from true ones.

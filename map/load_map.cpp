@@ -21,20 +21,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kProcedural = "procedural";
 constexpr std::string_view kExtension = ".xodr";
 // Bytes for each crossing of a procedural town with streets of default length, in a file as large as CARLA's.
 constexpr double kFileBytesPerCrossing = 80e3;
+constexpr double kCrossingsPerMotorway = 12;  // that weigh as much as it does; one more for each block along it
 constexpr std::size_t kMaxFile_bytes = std::size_t{1} << 29;
 
 std::vector<fs::path> town_folders() { return {fs::path(map_folder()), fs::path(map_folder()) / "carla"}; }
-
-/// The options of `procedural[:SEED[:NAME=VALUE,...]]`, or nothing when the name is of another kind.
-std::optional<TownOptions> procedural_options(std::string_view name) {
-  if (name == kProcedural) return TownOptions();
-  if (!name.starts_with(kProcedural) || name[kProcedural.size()] != ':') return std::nullopt;
-  return parse_town_options(name.substr(kProcedural.size() + 1), name);
-}
 
 /// The file of a name that is not procedural. Throws UsageError when there is none.
 std::string file_path_of(const std::string& name) {
@@ -51,9 +44,13 @@ std::string file_path_of(const std::string& name) {
   }
   const std::vector<std::string> towns = known_towns();
   std::vector<std::string> known = towns;
-  known.emplace_back(kProcedural);
-  fail_usage("map '{}': expected an {} file, procedural[:SEED[:OPTIONS]], or a town in {}, which has {}{}", name,
-             kExtension, map_folder(),
+  std::vector<std::string> families;
+  for (const TownFamily& family : town_families()) {
+    known.emplace_back(family.name);
+    families.push_back(fmt::format("{}[:SEED[:OPTIONS]]", family.name));
+  }
+  fail_usage("map '{}': expected an {} file, {}, or a town in {}, which has {}{}", name, kExtension,
+             fmt::join(families, ", "), map_folder(),
              towns.empty() ? "none: CARLA's come with CARLA, as Maps/OpenDrive/*.xodr; procedural:1 needs no file"
                            : fmt::format("{}", fmt::join(towns, ", ")),
              suggestion(name, known));
@@ -84,7 +81,7 @@ RoadMap load_file(const std::string& path, const OpenDriveOptions& options, cons
 }  // namespace
 
 bool is_map_file(std::string_view name) {
-  return !name.starts_with(fmt::format("{}:", kProcedural)) && parse_map_copy(name).map.ends_with(kExtension);
+  return !town_family_of(name) && parse_map_copy(name).map.ends_with(kExtension);
 }
 
 std::vector<std::string> known_towns() {
@@ -122,9 +119,10 @@ std::shared_ptr<const RoadMap> load_map(const std::string& name, const OpenDrive
     if (asked.copy > 0) its_options.plan = draw_map_copy(map_name, asked.copy);
   };
   auto map = std::make_shared<RoadMap>();
-  if (const std::optional<TownOptions> town = procedural_options(original)) {
+  if (const std::optional<TownOptions> town = parse_town_name(original)) {
     report.source = original;
-    const std::string map_name = original == kProcedural ? fmt::format("{}:{}", kProcedural, town->seed) : original;
+    const bool has_seed = original.find(':') != std::string::npos;
+    const std::string map_name = has_seed ? original : fmt::format("{}:{}", original, town->seed);
     set_plan(map_name);
     *map = parse_opendrive(procedural_town(*town), original, its_options, progress);
     map->name = map_name;
@@ -150,8 +148,9 @@ std::vector<std::shared_ptr<const RoadMap>> load_maps(const std::vector<std::str
 
 int64_t map_file_bytes(const std::string& name) {
   const std::string original(parse_map_copy(name).map);
-  if (const std::optional<TownOptions> town = procedural_options(original)) {
-    const double crossings = (town->blocks_x + 1.0) * (town->blocks_y + 1.0);
+  if (const std::optional<TownOptions> town = parse_town_name(original)) {
+    const double motorway = town->motorway > 0 ? kCrossingsPerMotorway + town->blocks_x + town->blocks_y : 0;
+    const double crossings = (town->blocks_x + 1.0) * (town->blocks_y + 1.0) + motorway;
     return static_cast<int64_t>(kFileBytesPerCrossing * crossings * town->block_m / TownOptions().block_m);
   }
   std::error_code error;
@@ -163,7 +162,7 @@ MapText map_text(const std::string& name) {
   if (parse_map_copy(name).copy > 0) {
     fail_usage("map '{}': expected a map with a text of its own, got a copy, which is deformed after reading", name);
   }
-  if (const std::optional<TownOptions> town = procedural_options(name)) return {procedural_town(*town), name};
+  if (const std::optional<TownOptions> town = parse_town_name(name)) return {procedural_town(*town), name};
   const std::string path = file_path_of(name);
   return {read_file(path, kMaxFile_bytes), path};
 }

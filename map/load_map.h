@@ -20,10 +20,10 @@ struct LoadReport {
 };
 
 /// Loads `name`: a file (.xodr), a town's name looked up as NAME.xodr in the map folder,
-/// `procedural[:SEED[:NAME=VALUE,...]]`, or one of these with #COPY behind it, its affine copy of that number
-/// (map_copy.h), which replaces options.plan. Files and their copies are imported once and stored in the cache
-/// (map_cache.h); a cache that cannot be read or written only costs time. Throws Error naming the file and the line or
-/// element; UsageError when there is no such map.
+/// `procedural[:SEED[:NAME=VALUE,...]]`, `city[...]` likewise, or one of these with #COPY behind it, its affine copy of
+/// that number (map_copy.h), which replaces options.plan. Files and their copies are imported once and stored in the
+/// cache (map_cache.h); a cache that cannot be read or written only costs time. Throws Error naming the file and the
+/// line or element; UsageError when there is no such map.
 std::shared_ptr<const RoadMap> load_map(const std::string& name, const OpenDriveOptions& options = {},
                                         LoadReport* report_out = nullptr, const ImportProgress& progress = {});
 

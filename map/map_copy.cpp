@@ -9,32 +9,33 @@
 #include "pictura/common/rng.h"
 #include "pictura/common/support/hash.h"
 #include "pictura/common/support/numbers.h"
+#include "pictura/map/procedural/town_options.h"
 
 namespace pictura {
 
 namespace {
 
-constexpr std::string_view kTownPrefix = "procedural:";
-
 bool is_digits(std::string_view text) {
   return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
-/// Appends the towns of procedural:FIRST-LAST[REST]; false for other names.
+/// Appends the towns of FAMILY:FIRST-LAST[REST]; false for other names.
 bool append_range(const std::string& name, std::vector<std::string>* names_out) {
-  if (!name.starts_with(kTownPrefix)) return false;
-  const std::size_t end = std::min(name.find_first_of(":#", kTownPrefix.size()), name.size());
-  const std::string seeds = name.substr(kTownPrefix.size(), end - kTownPrefix.size());
+  const TownFamily* family = town_family_of(name);
+  if (!family || name == family->name) return false;
+  const std::size_t begin = name.find(':') + 1;
+  const std::size_t end = std::min(name.find_first_of(":#", begin), name.size());
+  const std::string seeds = name.substr(begin, end - begin);
   const std::size_t dash = seeds.find('-');
   if (dash == std::string::npos) return false;
   const std::optional<uint64_t> first = parse_unsigned(seeds.substr(0, dash)),
                                 last = parse_unsigned(seeds.substr(dash + 1));
   if (!first || !last || *last < *first || *last - *first >= uint64_t{kMaxTownRange}) {
-    fail_usage("map '{}': expected procedural:FIRST-LAST with ascending seeds of at most {} towns, got '{}'", name,
-               kMaxTownRange, seeds);
+    fail_usage("map '{}': expected {}:FIRST-LAST with ascending seeds of at most {} towns, got '{}'", name,
+               family->name, kMaxTownRange, seeds);
   }
   for (uint64_t i = 0; i <= *last - *first; ++i) {
-    names_out->push_back(fmt::format("{}{}{}", kTownPrefix, *first + i, name.substr(end)));
+    names_out->push_back(fmt::format("{}:{}{}", family->name, *first + i, name.substr(end)));
   }
   return true;
 }

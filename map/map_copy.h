@@ -34,7 +34,7 @@ std::string map_copy_name(std::string_view map, int copy);
 /// copy's number alone, so that a copy's name means the same town everywhere.
 PlanMap draw_map_copy(std::string_view map_name, int copy);
 
-/// The names with every range of procedural towns, as procedural:1000-1063 or procedural:1-4:blocks=2x2, in full.
+/// The names with every range of procedural towns, as procedural:1000-1063 or city:1-4:blocks=2x2, in full.
 /// Throws UsageError naming the range unless its ends ascend and it has at most kMaxTownRange towns.
 std::vector<std::string> expand_map_names(const std::vector<std::string>& names);
 

@@ -74,7 +74,7 @@ void run_map(const MapArguments& arguments) {
 void add_map_benchmark(CLI::App& bench) {
   auto arguments = std::make_shared<MapArguments>();
   CLI::App* command = bench.add_subcommand("map", "Time to import, load and compile a large map");
-  command->add_option("--map", arguments->map, "A .xodr file, a town's name, or procedural[:SEED]")
+  command->add_option("--map", arguments->map, "A .xodr file, a town's name, procedural[:SEED], or city[:SEED]")
       ->capture_default_str();
   add_number_option(command, "--repeats", arguments->repeats, "Measurements; the median is printed", 1, 1000);
   command->add_flag("--json", arguments->json, "Print one JSON object");

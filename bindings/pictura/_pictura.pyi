@@ -120,7 +120,7 @@ class Map:
     @staticmethod
     def load(name: str, *, strict: bool = False, chord_error_m: typing.SupportsFloat | typing.SupportsIndex = 0.019999999552965164) -> Map:
         """
-        Loads a map by name: an OpenDRIVE file (.xodr), a town of the map folder, or 'procedural:SEED'.
+        Loads a map by name: an OpenDRIVE file (.xodr), a town of the map folder, 'procedural:SEED', or 'city:SEED'.
         
         Faults that have one sensible meaning are mended, as `mends` says; strict: refuse them too. chord_error_m: how far sampled curves
         may lie from true ones.

@@ -28,6 +28,7 @@ Profile parking_bay(double width_m, double length_m) {
 
 Profile width_of(LaneKind kind, double length_m, bool left, const SectionStyle& style) {
   switch (kind) {
+    case LaneKind::median: return {{{0, kHalfMedian_m, 0, 0, 0}}};
     case LaneKind::driving:
       if (style.driving_from_m == style.driving_middle_m && style.driving_middle_m == style.driving_to_m) {
         return {{{0, style.driving_from_m, 0, 0, 0}}};
@@ -53,6 +54,7 @@ struct TypeName {
 
 TypeName type_of(LaneKind kind) {
   switch (kind) {
+    case LaneKind::median: return {"median", LaneType::median};
     case LaneKind::driving: return {"driving", LaneType::driving};
     case LaneKind::slip: return {"exit", LaneType::ramp};  // OpenDRIVE 1.4's type of a diverging lane
     case LaneKind::parking: return {"parking", LaneType::parking};
@@ -74,6 +76,11 @@ opendrive::RoadMark make_mark(const char* type) {
 opendrive::RoadMark outer_mark(const Side& side, int rank, const SectionStyle& style) {
   const LaneKind kind = side.kind_at(rank);
   if (kind == LaneKind::shoulder) return make_mark("curb");
+  if (kind == LaneKind::median) {
+    opendrive::RoadMark mark = make_mark("solid");
+    mark.color = MarkColor::yellow;
+    return mark;
+  }
   if (style.in_junction || (kind != LaneKind::driving && kind != LaneKind::slip)) {
     return make_mark("none");
   }
@@ -101,10 +108,12 @@ std::vector<FileLane> make_side(const Side& side, bool left, double length_m, co
 }  // namespace
 
 int Side::count() const {
-  return driving + (has_slip ? 1 : 0) + (has_parking ? 1 : 0) + (has_shoulder ? 1 : 0) + (has_sidewalk ? 1 : 0);
+  return driving + (has_median ? 1 : 0) + (has_slip ? 1 : 0) + (has_parking ? 1 : 0) + (has_shoulder ? 1 : 0) +
+         (has_sidewalk ? 1 : 0);
 }
 
 LaneKind Side::kind_at(int rank) const {
+  if (has_median && rank-- == 1) return LaneKind::median;
   if (rank <= driving) return LaneKind::driving;
   for (const auto& [kind, exists] :
        {std::pair{LaneKind::slip, has_slip}, std::pair{LaneKind::parking, has_parking},
@@ -116,8 +125,10 @@ LaneKind Side::kind_at(int rank) const {
 }
 
 int Side::rank(LaneKind kind, int index) const {
-  if (kind == LaneKind::driving) return index < driving ? index + 1 : 0;
-  for (int rank = driving + 1; rank <= count(); ++rank) {
+  const int inside = has_median ? 1 : 0;
+  if (kind == LaneKind::driving) return index < driving ? inside + index + 1 : 0;
+  if (kind == LaneKind::median) return inside;
+  for (int rank = inside + driving + 1; rank <= count(); ++rank) {
     if (kind_at(rank) == kind) return rank;
   }
   return 0;
@@ -128,7 +139,7 @@ FileSection make_section(double s, double end, const Side& left, const Side& rig
   section.s = s;
   section.end = end;
   section.center.type_name = "none";
-  const bool is_plain = style.in_junction || style.one_way;
+  const bool is_plain = style.in_junction || style.one_way || right.has_median;
   opendrive::RoadMark middle = make_mark(is_plain ? "none" : right.driving > 1 ? "solid solid" : "broken");
   middle.color = is_plain ? MarkColor::white : MarkColor::yellow;
   section.center.marks.push_back(std::move(middle));
@@ -143,7 +154,7 @@ void link_sections(FileSection* before, const Side& before_left, const Side& bef
                        const Side& next, int sign) {
     for (int rank = 1; rank <= side.count(); ++rank) {
       const LaneKind kind = side.kind_at(rank);
-      const int next_rank = next.rank(kind, rank - 1);
+      const int next_rank = next.rank(kind, side.index_at(rank));
       if (next_rank == 0) continue;
       (*lanes)[rank - 1].successors = {sign * next_rank};
       (*next_lanes)[next_rank - 1].predecessors = {sign * rank};

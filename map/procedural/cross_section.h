@@ -7,17 +7,19 @@
 
 namespace pictura::town {
 
-enum class LaneKind { driving, slip, parking, shoulder, sidewalk };
+enum class LaneKind { median, driving, slip, parking, shoulder, sidewalk };
 
-/// One side of a road, from the reference line outwards: driving lanes, then a slip lane, a parking bay, a shoulder and
-/// a sidewalk, each optional.
+/// One side of a road, from the reference line outwards: half of a median, driving lanes, then a slip lane, a parking
+/// bay, a shoulder and a sidewalk, each optional.
 struct Side {
   int driving = 1;
-  bool has_slip = false, has_parking = false, has_shoulder = true, has_sidewalk = true;
+  bool has_median = false, has_slip = false, has_parking = false, has_shoulder = true, has_sidewalk = true;
 
   /// The position of the lane of this kind (of the `index`-th driving lane), counted from 1 at the reference line; 0:
   /// none.
   int rank(LaneKind kind, int index = 0) const;
+  /// The index of the driving lane at a position.
+  int index_at(int rank) const { return rank - 1 - (has_median ? 1 : 0); }
   int count() const;
   LaneKind kind_at(int rank) const;
 };

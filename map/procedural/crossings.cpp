@@ -32,8 +32,9 @@ int TownBuilder::build_movement(const Node& node, const Movement& movement, open
   const Arm &from = node.arm(movement.from), &to = node.arm(movement.to);
   const Street &in = street_of(from), &out = street_of(to);
   const int first_in = movement.is_slip ? in.lanes : movement.first_in;
-  const Pose start = offset_right(reversed(mouth_of(node, from)), first_in * kLaneWidth_m);
-  const Pose end = offset_right(mouth_of(node, to), movement.first_out * kLaneWidth_m);
+  const bool has_median = in.kind == StreetKind::motorway && out.kind == StreetKind::motorway;
+  const Pose start = offset_right(reversed(mouth_of(node, from)), has_median ? 0 : lane_offset_m(in, first_in));
+  const Pose end = offset_right(mouth_of(node, to), has_median ? 0 : lane_offset_m(out, movement.first_out));
   // A right turn into the next arm makes a corner, whose sidewalk follows the outermost lane.
   const bool turns_right = movement.to == (movement.from + 1) % node.degree();
   const int in_lanes = in.lanes + (layout_.has_slip(from) ? 1 : 0);
@@ -43,11 +44,14 @@ int TownBuilder::build_movement(const Node& node, const Movement& movement, open
   const double radius = movement.is_slip ? kNoRadiusLimit_m
                         : turns_right    ? right_turn_radius_m(wrap_to_2pi(to.heading - from.heading))
                                          : kMaxTurnRadius_m;
-  const double speed = !is_straight ? kJunctionSpeed_mps : in.is_avenue ? kAvenueSpeed_mps : kStreetSpeed_mps;
+  const bool is_fork = node.kind == NodeKind::fork;
+  const double speed = is_straight || is_fork ? speed_mps(in.kind) : kJunctionSpeed_mps;
   const Side right{.driving = movement.lanes,
+                   .has_median = has_median,
                    .has_shoulder = has_corner,
                    .has_sidewalk = has_corner && in.has_sidewalks && out.has_sidewalks};
-  SectionStyle style{.in_junction = true, .one_way = true};
+  // The lanes of a motorway are marked at its forks too.
+  SectionStyle style{.in_junction = !is_fork, .one_way = true};
   if (!is_straight && !has_corner) style.driving_middle_m = kTurningWidth_m;
   const int connecting = add_road(is_straight ? biarc(start, end) : fillet(start, end, radius), node.z, junction->id,
                                   speed, kNoSide, right, style);

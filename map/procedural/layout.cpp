@@ -10,8 +10,6 @@ namespace {
 
 // Block lengths vary by this fraction of their mean, node positions by this much in each coordinate.
 constexpr double kSpacingSpread = 0.12, kJitter_m = 3.5;
-constexpr int kStepX[kNumDirections] = {1, 1, 0, -1, -1, -1, 0, 1};
-constexpr int kStepY[kNumDirections] = {0, 1, 1, 1, 0, -1, -1, -1};
 
 }  // namespace
 
@@ -20,6 +18,7 @@ Layout::Layout(const TownOptions& options) : options_(options) {
   plan_streets();
   choose_avenues();
   choose_overpasses();
+  add_motorway();
   choose_roundabouts();
   add_diagonals();
   remove_streets();
@@ -77,6 +76,7 @@ Street& Layout::add_street(int from, int to, int direction) {
   street.from = from;
   street.to = to;
   street.direction = direction;
+  street.end_direction = opposite(direction);
   return street;
 }
 
@@ -103,7 +103,7 @@ void Layout::choose_avenues() {
   if (options_.max_lanes < 2) lines.clear();
   lines = pick(options_.avenues, lines, kAvenues);
   const auto widen = [](Street* street, int lanes) {
-    street->is_avenue = true;
+    street->kind = StreetKind::avenue;
     street->lanes = lanes;
   };
   for (Street& street : streets_) {
@@ -125,7 +125,7 @@ void Layout::choose_overpasses() {
   const auto wanted = static_cast<std::ptrdiff_t>(pick(options_.overpasses, inner, kOverpasses).size());
   std::ptrdiff_t count = 0;
   inner = shuffled(std::move(inner), kOverpasses);
-  std::stable_partition(inner.begin(), inner.end(), [&](int n) { return !has_single_lanes(n); });
+  std::stable_partition(inner.begin(), inner.end(), [&](int n) { return max_lanes_at(n) > 1; });
   for (const int n : inner) {
     if (count == wanted) break;
     const int column = n % (options_.blocks_x + 1), row = n / (options_.blocks_x + 1);
@@ -149,18 +149,24 @@ std::vector<int> Layout::streets_at(int node) const {
   return found;
 }
 
-bool Layout::has_single_lanes(int node) const {
-  for (const int street : streets_at(node)) {
-    if (streets_[street].lanes > 1) return false;
-  }
-  return true;
+int Layout::max_lanes_at(int node) const {
+  int lanes = 0;
+  for (const int street : streets_at(node)) lanes = std::max(lanes, streets_[street].lanes);
+  return lanes;
+}
+
+bool Layout::has_ramps(int node) const {
+  const std::vector<int> at = streets_at(node);
+  return std::any_of(at.begin(), at.end(), [this](int street) { return streets_[street].kind == StreetKind::ramp; });
 }
 
 void Layout::choose_roundabouts() {
   std::vector<int> candidates;
   for (int n = 0; n < static_cast<int>(nodes_.size()); ++n) {
-    if (nodes_[n].kind == NodeKind::crossing && streets_at(n).size() > 2 && has_single_lanes(n))
+    if (nodes_[n].kind == NodeKind::crossing && streets_at(n).size() > 2 &&
+        max_lanes_at(n) <= options_.roundabout_lanes && !has_ramps(n)) {
       candidates.push_back(n);
+    }
   }
   for (const int n : pick(options_.roundabouts, candidates, kRoundabouts)) nodes_[n].kind = NodeKind::roundabout;
 }
@@ -189,7 +195,7 @@ void Layout::add_diagonals() {
   }
   std::vector<int> candidates;
   for (int n = 0; n < static_cast<int>(nodes_.size()); ++n) {
-    if (!nodes_[n].on_border && nodes_[n].kind == NodeKind::crossing && has_single_lanes(n)) candidates.push_back(n);
+    if (!nodes_[n].on_border && nodes_[n].kind == NodeKind::crossing && max_lanes_at(n) == 1) candidates.push_back(n);
   }
   for (const int n : pick(options_.five_arms, candidates, kFiveArms)) {
     for (const int direction : shuffled({1, 3, 5, 7}, kDiagonals + 1000u * static_cast<uint32_t>(n + 1))) {
@@ -224,7 +230,7 @@ bool Layout::is_connected() const {
 /// Whether a street may be removed: neither end becomes a dead end, and both keep what their kind of node needs.
 bool Layout::is_removable(int s) const {
   const Street& street = streets_[s];
-  if (street.is_avenue || street.direction % 2 == 1) return false;
+  if (street.kind != StreetKind::street || street.direction % 2 == 1) return false;
   for (const int node : {street.from, street.to}) {
     const std::vector<int> at = streets_at(node);
     if (nodes_[node].kind == NodeKind::overpass || at.size() < 3) return false;
@@ -274,8 +280,9 @@ void Layout::choose_street_features() {
   std::vector<int> all, sides;  // side: twice the street index, plus one for the left side
   for (int s = 0; s < static_cast<int>(streets_.size()); ++s) {
     streets_[s].has_sidewalks = false;
+    if (streets_[s].kind == StreetKind::ramp || streets_[s].kind == StreetKind::motorway) continue;
     all.push_back(s);
-    if (streets_[s].lanes > 1) continue;
+    if (streets_[s].lanes > 1 || streets_[s].kind == StreetKind::connector) continue;
     sides.push_back(2 * s);
     sides.push_back(2 * s + 1);
   }
@@ -287,8 +294,9 @@ void Layout::choose_street_features() {
 
 void Layout::join_streets() {
   for (int s = 0; s < static_cast<int>(streets_.size()); ++s) {
-    nodes_[streets_[s].from].arms.push_back({s, streets_[s].direction, true, 0, 0});
-    nodes_[streets_[s].to].arms.push_back({s, opposite(streets_[s].direction), false, 0, 0});
+    const bool is_two_way = streets_[s].kind != StreetKind::ramp;
+    nodes_[streets_[s].from].arms.push_back({s, streets_[s].direction, true, is_two_way, true});
+    nodes_[streets_[s].to].arms.push_back({s, streets_[s].end_direction, false, true, is_two_way});
   }
   for (Node& node : nodes_) {
     std::sort(node.arms.begin(), node.arms.end(), [](const Arm& a, const Arm& b) { return a.direction < b.direction; });
@@ -299,7 +307,8 @@ void Layout::choose_crossing_features() {
   std::vector<int> crossings, with_crosswalks;
   for (int n = 0; n < static_cast<int>(nodes_.size()); ++n) {
     if (nodes_[n].is_crossing()) crossings.push_back(n);
-    if (nodes_[n].is_crossing() || nodes_[n].kind == NodeKind::roundabout) with_crosswalks.push_back(n);
+    if ((nodes_[n].is_crossing() && !has_ramps(n)) || nodes_[n].kind == NodeKind::roundabout)
+      with_crosswalks.push_back(n);
   }
   const std::vector<int> lit = pick(options_.lights, crossings, kLights);
   for (const int n : lit) nodes_[n].has_lights = true;
@@ -312,6 +321,12 @@ double Layout::end_height_m(int street, bool at_start) const {
   const Node& node = nodes_[at_start ? s.from : s.to];
   const bool runs_north = s.direction % 4 == 2;
   return node.kind == NodeKind::overpass && runs_north == node.upper_runs_north ? node.upper_z : node.z;
+}
+
+int Layout::max_lanes_of(const Node& node) const {
+  int lanes = 1;
+  for (const Arm& arm : node.arms) lanes = std::max(lanes, streets_[arm.street].lanes);
+  return lanes;
 }
 
 bool Layout::has_slip(const Arm& arm) const {

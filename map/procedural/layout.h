@@ -12,22 +12,30 @@ namespace pictura::town {
 
 // Dimensions of streets.
 inline constexpr double kMinStreetRadius_m = 30;  // may be smaller next to a fifth arm
-inline constexpr double kLaneWidth_m = 3.5, kShoulderWidth_m = 0.5, kSidewalkWidth_m = 2.5, kParkingWidth_m = 2.3;
+inline constexpr double kLaneWidth_m = 3.5, kShoulderWidth_m = 0.5, kSidewalkWidth_m = 2.5, kParkingWidth_m = 2.3,
+                        kHalfMedian_m = 1;
 
 /// Eight directions of arms, counter-clockwise from east; streets of the grid have even ones, diagonals odd ones.
 inline constexpr int kNumDirections = 8;
+inline constexpr int kStepX[kNumDirections] = {1, 1, 0, -1, -1, -1, 0, 1};
+inline constexpr int kStepY[kNumDirections] = {0, 1, 1, 1, 0, -1, -1, -1};
 constexpr int opposite(int direction) { return (direction + kNumDirections / 2) % kNumDirections; }
 
 /// The end of a street at a node.
 struct Arm {
   int street = -1;
   int direction = 0;
-  bool at_start = false;  // the street starts here
-  double heading = 0;     // of the reference line, away from the node
-  double mouth_m = 0;     // distance from the node to the street's end
+  bool at_start = false;                            // the street starts here
+  bool has_arrivals = true, has_departures = true;  // whether traffic comes to the node, and leaves it, on this arm
+  double heading = 0;                               // of the reference line, away from the node
+  double mouth_m = 0;                               // distance from the node to the street's end
 };
 
-enum class NodeKind { crossing, roundabout, overpass };
+/// At a fork a ramp leaves a motorway's outermost lane, and another becomes the outermost one of the other direction.
+enum class NodeKind { crossing, roundabout, overpass, fork };
+
+/// Connectors lead from the town to its motorway. Ramps are one-way, from their first node to their second.
+enum class StreetKind { street, avenue, connector, ramp, motorway };
 
 struct Node {
   Eigen::Vector2d position_m{0, 0};
@@ -48,15 +56,33 @@ struct Node {
 /// A street between two nodes; `leave` and `arrive` are its headings at the two ends.
 struct Street {
   int from = 0, to = 0;
-  int direction = 0;  // of the arm at `from`
-  int lanes = 1;      // each way
-  bool is_avenue = false, is_present = true, has_sidewalks = true;
+  int direction = 0, end_direction = 0;  // of the arms at `from` and at `to`
+  StreetKind kind = StreetKind::street;
+  int lanes = 1;  // each way
+  bool is_present = true, has_sidewalks = true;
   bool parks_left = false, parks_right = false;
   bool slip_at_start = false, slip_at_end = false;  // a right-turn lane of traffic that arrives at that end
   double leave = 0, arrive = 0;
+  double start_offset_m = 0, end_offset_m = 0;  // of its ends, to the right of the lines through their nodes
   Curve curve;
   double length_m = 0;
 };
+
+/// Distance of a lane's left border from the street's reference line; lanes count from 0.
+inline double lane_offset_m(const Street& street, int lane) {
+  return (street.kind == StreetKind::motorway ? kHalfMedian_m : 0) + lane * kLaneWidth_m;
+}
+
+/// The nodes of a motorway at an interchange, in the direction of its inner carriageway.
+struct Interchange {
+  int entry_fork = -1, overpass = -1, exit_fork = -1;
+};
+
+/// The pose of a street's end at that distance from the node, heading away from it.
+inline Pose mouth_pose(const Node& node, const Arm& arm, const Street& street, double mouth_m) {
+  const Pose on_ray = moved_forward({node.position_m, arm.heading}, mouth_m);
+  return offset_right(on_ray, arm.at_start ? street.start_offset_m : -street.end_offset_m);
+}
 
 /// Radius of the left border of a right turn into an arm that is `gap_rad` away: wide, but close enough to the corner
 /// that no hole is left next to lanes that go straight on or cross.
@@ -74,6 +100,8 @@ class Layout {
   double end_height_m(int street, bool at_start) const;
   /// Whether traffic arriving on this arm has a separate right-turn lane.
   bool has_slip(const Arm& arm) const;
+  /// The largest number of lanes each way of its arms: that of a roundabout's circle.
+  int max_lanes_of(const Node& node) const;
 
  private:
   /// Purposes of random draws; each has its own stream.
@@ -94,6 +122,7 @@ class Layout {
     kLights,
     kFarSide,
     kCrosswalks,
+    kMotorway,
     kCurved = 100,
     kCurveShape,
     kSlipLanes,
@@ -105,6 +134,7 @@ class Layout {
   void plan_streets();
   void choose_avenues();
   void choose_overpasses();
+  void add_motorway();
   void choose_roundabouts();
   void add_diagonals();
   void remove_streets();
@@ -133,8 +163,13 @@ class Layout {
 
   int node_at(int column, int row) const { return row * (options_.blocks_x + 1) + column; }
   Street& add_street(int from, int to, int direction);
+  // layout_motorway.cpp
+  int add_node(const Eigen::Vector2d& position_m);
+  Interchange add_interchange(int border_node, int side, double motorway_m);
+  void add_ramp(int from, int to, int direction, int end_direction);
   std::vector<int> streets_at(int node) const;
-  bool has_single_lanes(int node) const;
+  int max_lanes_at(int node) const;
+  bool has_ramps(int node) const;
   bool is_connected() const;
   bool is_removable(int street) const;
   double mouth_distance_m(const Node& node, int arm) const;

@@ -15,13 +15,17 @@ constexpr double kMinGap_rad = degrees(72), kMinOppositeGap_rad = degrees(150), 
 constexpr double kFlatGap_rad = degrees(140);
 constexpr double kMinMouth_m = 9, kMinBendMouth_m = 10;
 constexpr double kOverpassMargin_m = 2;
+// Of the inner edge of a bend.
+constexpr double kBendRadius_m = 10, kMotorwayBendRadius_m = 90;
+// Distances of a fork's mouths from its node: before the ramps, and where they have left the motorway.
+constexpr double kForkBefore_m = 10, kForkBeyond_m = 40;
 constexpr double kSlipRadius_m = 16;
 // Minimum lengths between the mouths of streets with a slip lane and of those that one leads into; and the minimum
 // radius of the former: on the inside of a sharper curve the lane would open abruptly.
 constexpr double kMinSlipStreet_m = 42, kMinSlipExit_m = 25, kMinSlipStreetRadius_m = 60;
 
 double side_width_m(const Street& street) {
-  return street.lanes * kLaneWidth_m + kShoulderWidth_m + (street.has_sidewalks ? kSidewalkWidth_m : 0);
+  return lane_offset_m(street, street.lanes) + kShoulderWidth_m + (street.has_sidewalks ? kSidewalkWidth_m : 0);
 }
 
 }  // namespace
@@ -43,14 +47,17 @@ void Layout::set_headings() {
   for (int s = 0; s < static_cast<int>(streets_.size()); ++s) {
     const Node &from = nodes_[streets_[s].from], &to = nodes_[streets_[s].to];
     const Eigen::Vector2d apart = to.position_m - from.position_m;
-    const double heading = std::atan2(apart.y(), apart.x());
+    // A ramp runs along its motorway at both ends, in the direction that is one of the grid's.
+    const int along = streets_[s].direction % 2 == 0 ? streets_[s].direction : opposite(streets_[s].end_direction);
+    const double heading =
+        streets_[s].kind == StreetKind::ramp ? degrees(45.0 * along) : std::atan2(apart.y(), apart.x());
     set_arm_heading(s, true, heading);
     set_arm_heading(s, false, heading + kPi_rad);
   }
   for (Node& node : nodes_) {
     const bool has_diagonal =
         std::any_of(node.arms.begin(), node.arms.end(), [](const Arm& arm) { return arm.direction % 2 == 1; });
-    if (has_diagonal) spread_arms(&node);
+    if (has_diagonal && node.kind != NodeKind::fork) spread_arms(&node);
   }
 }
 
@@ -85,7 +92,7 @@ bool Layout::has_close_arms(const Node& node) const {
 void Layout::curve_streets() {
   std::vector<int> candidates;
   for (int s = 0; s < static_cast<int>(streets_.size()); ++s) {
-    bool may_bend = true;
+    bool may_bend = streets_[s].kind == StreetKind::street || streets_[s].kind == StreetKind::avenue;
     for (const int n : {streets_[s].from, streets_[s].to}) {
       may_bend = may_bend && nodes_[n].kind != NodeKind::overpass;
       for (const Arm& arm : nodes_[n].arms) may_bend = may_bend && arm.direction % 2 == 0;
@@ -120,15 +127,20 @@ double Layout::mouth_distance_m(const Node& node, int index) const {
            kOverpassMargin_m;
   }
   if (node.is_bend()) {
-    constexpr double kInnerRadius_m = 10;
+    const double radius = street.kind == StreetKind::motorway ? kMotorwayBendRadius_m : kBendRadius_m;
     const double gap = std::abs(wrap_to_pi(node.arm(index + 1).heading - arm.heading));
-    return std::max(kMinBendMouth_m, (side_width_m(street) + kInnerRadius_m) / std::tan(0.5 * gap));
+    return std::max(kMinBendMouth_m, (side_width_m(street) + radius) / std::tan(0.5 * gap));
+  }
+  if (node.kind == NodeKind::fork) {
+    const bool is_before = street.lanes == max_lanes_of(node);
+    return is_before ? kForkBefore_m : kForkBeyond_m;
   }
   if (node.kind == NodeKind::roundabout) {
+    const double edge_m = circle_edge_m(max_lanes_of(node), street.lanes);
     double mouth = 0;
     for (const int side : {1, -1}) {
       const double gap = wrap_to_2pi(side * (node.arm(index + side).heading - arm.heading));
-      mouth = std::max(mouth, roundabout_mouth_m(roundabout_half_angle(gap)));
+      mouth = std::max(mouth, roundabout_mouth_m(roundabout_half_angle(gap), edge_m));
     }
     return mouth;
   }
@@ -157,8 +169,8 @@ Curve Layout::curve_of(const Street& street) const {
     return mouth_distance_m(node, index);
   };
   const Node &from = nodes_[street.from], &to = nodes_[street.to];
-  return biarc(moved_forward({from.position_m, street.leave}, mouth(street.from)),
-               moved_forward({to.position_m, street.arrive}, -mouth(street.to)));
+  return biarc(offset_right(moved_forward({from.position_m, street.leave}, mouth(street.from)), street.start_offset_m),
+               offset_right(moved_forward({to.position_m, street.arrive}, -mouth(street.to)), street.end_offset_m));
 }
 
 /// Chooses right turns at lights, where both streets are long enough for the larger corner.
@@ -172,10 +184,11 @@ void Layout::choose_slip_lanes() {
     const Node& node = nodes_[n];
     const bool has_diagonal =
         std::any_of(node.arms.begin(), node.arms.end(), [](const Arm& arm) { return arm.direction % 2 == 1; });
-    if (!node.is_crossing() || !node.has_lights || has_diagonal) continue;
+    if (!node.is_crossing() || !node.has_lights || has_diagonal || has_ramps(n)) continue;
     for (int i = 0; i < node.degree(); ++i) {
-      // A stem needs its lanes for both directions.
-      if (straight_on(node, i) < 0 && streets_[node.arm(i).street].lanes > 1) continue;
+      // A stem needs its lanes for both directions, and a street that narrows its outermost lane for right turns.
+      const int straight = straight_on(node, i), lanes = streets_[node.arm(i).street].lanes;
+      if (lanes > (straight < 0 ? 1 : streets_[node.arm(straight).street].lanes)) continue;
       if (wrap_to_2pi(node.arm(i + 1).heading - node.arm(i).heading) > degrees(115)) continue;
       candidates.push_back(static_cast<int>(turns.size()));
       turns.push_back({n, i});

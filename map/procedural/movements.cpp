@@ -12,7 +12,9 @@ class Approach {
 
   std::vector<Movement> movements() {
     const int straight = straight_on(node_, arm_);
-    if (straight >= 0) {
+    if (node_.kind == NodeKind::fork) {
+      pass_fork(straight);
+    } else if (straight >= 0) {
       go_straight(straight);
     } else {
       split_left_and_right();
@@ -28,6 +30,7 @@ class Approach {
   int lanes_of(int arm) const { return layout_.streets()[node_.arm(arm).street].lanes; }
   /// The arm of an exit: exit 1 is on the right, degree - 1 on the left.
   int arm_at(int exit) const { return (arm_ + exit) % node_.degree(); }
+  bool may_leave(int arm) const { return node_.arm(arm).has_departures; }
   void add(int to, int first_in, int first_out, int lanes) {
     movements_.push_back({arm_, to, first_in, first_out, lanes});
   }
@@ -38,13 +41,15 @@ class Approach {
   /// All lanes go straight on, the innermost also turns left and the outermost right. Paths do not cross; a turn into a
   /// stem may take any lane on its side of the stem.
   void go_straight(int straight) {
-    add(straight, 0, 0, in_);
+    add(straight, 0, 0, std::min(in_, lanes_of(straight)));
     bool is_left = false;
     for (int exit = 1; exit < node_.degree(); ++exit) {
       const int to = arm_at(exit);
       const int last = lanes_of(to) - 1;
       if (to == straight) {
         is_left = true;
+      } else if (!may_leave(to)) {
+        continue;
       } else if (is_left) {
         for (int lane = 0; lane < (is_stem(to) ? num_left(last + 1) : 1); ++lane) add(to, 0, lane, 1);
       } else if (exit > 1 || !has_slip_) {
@@ -57,15 +62,25 @@ class Approach {
   void split_left_and_right() {
     const int left = arm_at(node_.degree() - 1), right = arm_at(1);
     const int to_left = std::min(lanes_of(left), num_left(in_));
-    add(left, 0, 0, to_left);
+    if (may_leave(left)) add(left, 0, 0, to_left);
     for (int exit = 2; exit < node_.degree() - 1; ++exit) {
       const int to = arm_at(exit);
       const bool turns_right = wrap_to_pi(node_.arm(to).heading - node_.arm(arm_).heading - kPi_rad) < 0;
       add(to, to_left - 1, turns_right ? lanes_of(to) - 1 : 0, 1);
     }
-    if (has_slip_) return;
+    if (has_slip_ || !may_leave(right)) return;
     const int to_right = std::min(lanes_of(right), in_ - first_right(in_));
     add(right, in_ - to_right, lanes_of(right) - to_right, to_right);
+  }
+
+  /// The motorway's lanes that both sides have go on; where there is one more, it becomes the ramp on its right. A ramp
+  /// becomes the outermost lane of the arm on its right.
+  void pass_fork(int straight) {
+    const int right = arm_at(1);
+    if (straight < 0) return add(right, 0, lanes_of(right) - 1, 1);
+    const int out = lanes_of(straight);
+    add(straight, 0, 0, std::min(in_, out));
+    if (in_ > out) add(right, out, 0, 1);
   }
 
   // The middle lane of a stem serves both turns, lanes inside it only left turns, lanes outside it only right turns.
@@ -83,7 +98,7 @@ class Approach {
 
 int straight_on(const Node& node, int arm) {
   for (int i = 0; i < node.degree(); ++i) {
-    if (node.arm(i).direction == opposite(node.arm(arm).direction)) return i;
+    if (node.arm(i).direction == opposite(node.arm(arm).direction) && node.arm(i).has_departures) return i;
   }
   return -1;
 }
@@ -91,6 +106,7 @@ int straight_on(const Node& node, int arm) {
 std::vector<Movement> movements_of(const Layout& layout, const Node& node) {
   std::vector<Movement> all;
   for (int arm = 0; arm < node.degree(); ++arm) {
+    if (!node.arm(arm).has_arrivals) continue;
     for (const Movement& movement : Approach(layout, node, arm).movements()) all.push_back(movement);
   }
   return all;

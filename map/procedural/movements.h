@@ -15,11 +15,11 @@ struct Movement {
   bool is_slip = false;
 };
 
-/// The arm into which traffic from `arm` goes straight on, -1: none.
+/// The arm into which traffic from `arm` goes straight on; -1: none.
 int straight_on(const Node& node, int arm);
 
-/// All movements of a crossing, grouped by arriving arm, the first of each group starting at the innermost lane. Every
-/// arriving lane leads somewhere.
+/// All movements of a crossing or a fork, grouped by arriving arm, the first of each group starting at the innermost
+/// lane. Every arriving lane leads somewhere.
 std::vector<Movement> movements_of(const Layout& layout, const Node& node);
 
 }  // namespace pictura::town

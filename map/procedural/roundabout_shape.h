@@ -8,7 +8,13 @@
 namespace pictura::town {
 
 // The reference line of the circle is its inner edge; traffic circulates counter-clockwise, on the right of the line.
-inline constexpr double kCircleRadius_m = 12, kCircleLaneWidth_m = 4.5;
+inline constexpr double kCircleLaneWidth_m = 4.5;
+constexpr double circle_radius_m(int lanes) { return lanes == 1 ? 12 : 18; }
+
+/// Radius of the circle's border on which entries end and exits begin: of that many lanes, they use the outermost.
+constexpr double circle_edge_m(int lanes, int arm_lanes) {
+  return circle_radius_m(lanes) + (lanes - arm_lanes) * kCircleLaneWidth_m;
+}
 
 /// The angle between an arm and the end of its entry (or the start of its exit) on the circle, if the next arm on that
 /// side is `gap_rad` away. A piece of the circle remains between the two.
@@ -18,9 +24,9 @@ inline double roundabout_half_angle(double gap_rad) {
 }
 
 /// The distance from the centre at which an arm must end so that its entry is one arc, tangent to the arm's centre line
-/// and to the circle at that angle.
-inline double roundabout_mouth_m(double half_angle_rad) {
-  return kCircleRadius_m / std::cos(half_angle_rad) + kCircleRadius_m * std::tan(half_angle_rad);
+/// and to the circle at that angle. `edge_m` is the radius where it does; see circle_edge_m().
+inline double roundabout_mouth_m(double half_angle_rad, double edge_m) {
+  return edge_m / std::cos(half_angle_rad) + edge_m * std::tan(half_angle_rad);
 }
 
 }  // namespace pictura::town

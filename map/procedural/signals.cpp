@@ -70,6 +70,7 @@ void TownBuilder::add_lights(const Node& node, const std::vector<Movement>& move
                              opendrive::FileJunction* junction) {
   for (int i = 0; i < node.degree(); ++i) {
     const Arm& arm = node.arm(i);
+    if (!arm.has_arrivals) continue;
     const int straight = straight_on(node, i);
     SignalPosition position = near_side(reversed(mouth_of(node, arm)), street_of(arm).lanes, layout_.has_slip(arm));
     if (node.far_side_heads && straight >= 0) {

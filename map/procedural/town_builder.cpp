@@ -71,8 +71,11 @@ void TownBuilder::build_street(int index) {
   const double length = street.length_m;
   const double slip = std::min(kSlipSection_m, kMaxSlipFraction * length);
   const double begin = street.slip_at_start ? slip : 0, end = street.slip_at_end ? length - slip : length;
-  const Side plain{.driving = street.lanes, .has_sidewalk = street.has_sidewalks};
-  Side left = plain, right = plain, with_slip = plain;
+  const Side plain{
+      .driving = street.lanes, .has_median = street.kind == StreetKind::motorway, .has_sidewalk = street.has_sidewalks};
+  const bool is_one_way = street.kind == StreetKind::ramp;
+  const SectionStyle style{.one_way = is_one_way};
+  Side left = is_one_way ? kNoSide : plain, right = plain, with_slip = plain;
   constexpr double kRounding = 1 + 1e-9;
   const bool may_park = end - begin >= kMinParking_m && max_curvature(street.curve) <= kRounding / kMinStreetRadius_m;
   left.has_parking = street.parks_left && may_park;
@@ -87,13 +90,12 @@ void TownBuilder::build_street(int index) {
   if (street.slip_at_start) parts.insert(parts.begin(), {0, begin, with_slip, plain});
   if (street.slip_at_end) parts.push_back({end, length, plain, with_slip});
 
-  const int added =
-      add_road(street.curve, 0, "", street.is_avenue ? kAvenueSpeed_mps : kStreetSpeed_mps, left, right, {});
+  const int added = add_road(street.curve, 0, "", speed_mps(street.kind), left, right, style);
   opendrive::FileRoad& built = road(added);
   built.elevation = elevation_profile(layout_.end_height_m(index, true), layout_.end_height_m(index, false), length);
   built.sections.clear();
   for (const Part& part : parts)
-    built.sections.push_back(make_section(part.begin, part.end, part.left, part.right, {}));
+    built.sections.push_back(make_section(part.begin, part.end, part.left, part.right, style));
   for (std::size_t i = 1; i < parts.size(); ++i) {
     link_sections(&built.sections[i - 1], parts[i - 1].left, parts[i - 1].right, &built.sections[i], parts[i].left,
                   parts[i].right);
@@ -109,10 +111,14 @@ void TownBuilder::build_street(int index) {
 
 /// A road from one arm to another without a junction: a bend, or one of the streets of an overpass.
 void TownBuilder::build_bend(const Node& node, const Arm& from, const Arm& to, double height_m) {
+  const StreetKind kind = street_of(from).kind;
   const Side side{.driving = street_of(from).lanes,
+                  .has_median = kind == StreetKind::motorway,
                   .has_sidewalk = street_of(from).has_sidewalks && street_of(to).has_sidewalks};
   const bool is_corner = node.is_bend();
-  const double speed = is_corner ? kJunctionSpeed_mps : street_of(from).is_avenue ? kAvenueSpeed_mps : kStreetSpeed_mps;
+  const double speed = !is_corner                     ? speed_mps(kind)
+                       : kind == StreetKind::motorway ? kMotorwayBendSpeed_mps
+                                                      : kJunctionSpeed_mps;
   const int bend = add_road(fillet(reversed(mouth_of(node, from)), mouth_of(node, to), kNoRadiusLimit_m), height_m, "",
                             speed, side, side, {});
   join({bend, true}, end_of(from));
@@ -146,7 +152,8 @@ void TownBuilder::join(RoadEnd a, RoadEnd b) {
     const Side& own = side(a, arriving);
     for (int rank = 1; rank <= own.count(); ++rank) {
       const LaneKind kind = own.kind_at(rank);
-      const int lane = lane_id(a, arriving, kind, rank - 1), other = lane_id(b, !arriving, kind, rank - 1);
+      const int lane = lane_id(a, arriving, kind, own.index_at(rank)),
+                other = lane_id(b, !arriving, kind, own.index_at(rank));
       if (other == 0) continue;
       set_lane_link(a, lane, other);
       set_lane_link(b, other, lane);
@@ -166,8 +173,8 @@ void TownBuilder::connect(RoadEnd from, int connecting, RoadEnd to, const Moveme
     const LaneKind kind = own.kind_at(rank);
     const int in = movement.is_slip && kind == LaneKind::driving
                        ? lane_id(from, true, LaneKind::slip)
-                       : lane_id(from, true, kind, movement.first_in + rank - 1);
-    const int out = lane_id(to, false, kind, movement.first_out + rank - 1);
+                       : lane_id(from, true, kind, movement.first_in + own.index_at(rank));
+    const int out = lane_id(to, false, kind, movement.first_out + own.index_at(rank));
     if (in != 0) {
       set_lane_link({connecting, true}, -rank, in);
       connection.lane_links.push_back({in, -rank, {}});

@@ -46,9 +46,7 @@ class TownBuilder {
   const Street& street_of(const Arm& arm) const { return layout_.streets()[arm.street]; }
   /// The first roads are the streets, in their order.
   static RoadEnd end_of(const Arm& arm) { return {arm.street, arm.at_start}; }
-  static Pose mouth_of(const Node& node, const Arm& arm) {
-    return moved_forward({node.position_m, arm.heading}, arm.mouth_m);
-  }
+  Pose mouth_of(const Node& node, const Arm& arm) const { return mouth_pose(node, arm, street_of(arm), arm.mouth_m); }
 
   /// Adds a road with one section; the left side is ignored for one-way roads. Returns its index.
   int add_road(Curve curve, double height_m, const std::string& junction, double speed_mps, const Side& left,
@@ -80,7 +78,17 @@ class TownBuilder {
 };
 
 inline constexpr double mph(double speed) { return speed * 0.44704; }
-inline constexpr double kStreetSpeed_mps = mph(25), kAvenueSpeed_mps = mph(35), kJunctionSpeed_mps = mph(20),
-                        kRoundaboutSpeed_mps = mph(15);
+inline constexpr double kJunctionSpeed_mps = mph(20), kRoundaboutSpeed_mps = mph(15), kMotorwayBendSpeed_mps = mph(45);
+/// The speed limit of a street.
+constexpr double speed_mps(StreetKind kind) {
+  switch (kind) {
+    case StreetKind::street: return mph(25);
+    case StreetKind::avenue:
+    case StreetKind::connector:
+    case StreetKind::ramp: return mph(35);
+    case StreetKind::motorway: return mph(55);
+  }
+  return 0;
+}
 
 }  // namespace pictura::town

@@ -58,10 +58,14 @@ const std::vector<TownFeature>& town_features() {
       {"density", &TownOptions::density, 0, 1, "Share of the removable streets that are kept"},
       {"curved", &TownOptions::curved, 0, 1, "Share of curved streets"},
       {"five-arms", &TownOptions::five_arms, 0, 1, "Share of inner crossings with a fifth arm"},
-      {"roundabouts", &TownOptions::roundabouts, 0, 1, "Share of crossings of single-lane streets"},
+      {"roundabouts", &TownOptions::roundabouts, 0, 1, "Share of crossings whose streets are narrow enough"},
+      {"roundabout-lanes", &TownOptions::roundabout_lanes, 1, 2,
+       "Maximum number of lanes of roundabouts, and each way of their streets", true},
       {"avenues", &TownOptions::avenues, 0, 1, "Share of inner rows and columns with several lanes each way"},
-      {"max-lanes", &TownOptions::max_lanes, 1, 3, "Maximum number of lanes each way of avenues and the ring road"},
+      {"max-lanes", &TownOptions::max_lanes, 1, 3, "Maximum number of lanes each way of avenues and the ring road",
+       true},
       {"ring-road", &TownOptions::ring_road, 0, 1, "Chance of an avenue around the town"},
+      {"motorway", &TownOptions::motorway, 0, 1, "Chance of a motorway around the town, with two interchanges"},
       {"slip-lanes", &TownOptions::slip_lanes, 0, 1, "Share of right turns that bypass their light"},
       {"hills-m", &TownOptions::hills_m, 0, 50, "Maximum height difference, before grades are limited"},
       {"overpasses", &TownOptions::overpasses, 0, 1, "Share of inner crossings where one street crosses over another"},
@@ -88,19 +92,52 @@ void check_town_options(const TownOptions& options) {
     if (!(value >= feature.low && value <= feature.high)) {
       fail_usage("procedural town: {}: expected {} to {}, got {}", feature.name, feature.low, feature.high, value);
     }
-  }
-  if (options.max_lanes != std::floor(options.max_lanes)) {
-    fail_usage("procedural town: max-lanes: expected a whole number, got {}", options.max_lanes);
+    if (feature.is_whole && value != std::floor(value)) {
+      fail_usage("procedural town: {}: expected a whole number, got {}", feature.name, value);
+    }
   }
 }
 
-TownOptions parse_town_options(std::string_view text, std::string_view map_name) {
-  TownOptions options;
+const std::vector<TownFamily>& town_families() {
+  static const std::vector<TownFamily> kFamilies = {
+      {"procedural", {}},
+      {"city",
+       {.blocks_x = 4,
+        .block_m = 110,
+        .curved = 0.5,
+        .five_arms = 0.1,
+        .roundabouts = 0.25,
+        .roundabout_lanes = 2,
+        .avenues = 0.3,
+        .ring_road = 0.4,
+        .motorway = 1,
+        .slip_lanes = 0.25,
+        .hills_m = 12,
+        .parking = 0.85,
+        .far_side = 0.65}},
+  };
+  return kFamilies;
+}
+
+const TownFamily* town_family_of(std::string_view map_name) {
+  const std::string_view first_word = map_name.substr(0, map_name.find(':'));
+  for (const TownFamily& family : town_families()) {
+    if (first_word == family.name) return &family;
+  }
+  return nullptr;
+}
+
+std::optional<TownOptions> parse_town_name(std::string_view map_name) {
+  const TownFamily* family = town_family_of(map_name);
+  if (!family) return std::nullopt;
+  TownOptions options = family->defaults;
+  if (map_name == family->name) return options;
+  const std::string_view text = map_name.substr(map_name.find(':') + 1);
   const std::size_t colon = std::min(text.find(':'), text.size());
   const std::optional<uint64_t> seed = parse_unsigned(text.substr(0, colon));
   if (!seed) {
-    fail_usage("map '{}': expected procedural or procedural:SEED with an integer of 0 to {}, got '{}'", map_name,
-               std::numeric_limits<uint64_t>::max(), text);
+    fail_usage("map '{}': expected {} or {}:SEED with an integer of 0 to {}, got '{}'", map_name, family->name,
+               family->name, std::numeric_limits<uint64_t>::max(), text);
   }
   options.seed = *seed;
   std::vector<std::string_view> given;

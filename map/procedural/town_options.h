@@ -1,7 +1,9 @@
-// Options of procedural towns: seed, size, and the amount of each feature.
+// Options of procedural towns: seed, size, and the amount of each feature; the families of towns and their names.
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -17,10 +19,12 @@ struct TownOptions {
   double density = 0.9;            // fraction of the removable streets that are kept
   double curved = 0.6;             // of the streets
   double five_arms = 0.2;          // of the inner crossings, made by a diagonal street
-  double roundabouts = 0.2;        // of the crossings of single-lane streets
+  double roundabouts = 0.2;        // of the crossings of streets with at most roundabout_lanes
+  double roundabout_lanes = 1;     // maximum, of a roundabout and each way of its arms
   double avenues = 0.2;            // of the inner rows and columns: two or more lanes each way
   double max_lanes = 3;            // each way, of avenues and the ring road
   double ring_road = 1;            // chance that an avenue runs around the town
+  double motorway = 0;             // chance that a motorway runs around the town
   double slip_lanes = 0.1;         // of the right turns at lights that are large enough
   double hills_m = 6;              // maximum height difference, before grades are limited
   double overpasses = 0.1;         // of the inner crossings of four arms
@@ -37,6 +41,7 @@ struct TownFeature {
   double TownOptions::* value;
   double low, high;
   const char* help;
+  bool is_whole = false;
 };
 
 const std::vector<TownFeature>& town_features();
@@ -45,8 +50,20 @@ constexpr int kMaxTownBlocks = 32;
 /// Throws UsageError naming the option, its range and its value.
 void check_town_options(const TownOptions& options);
 
-/// Parses `SEED[:NAME=VALUE,...]`, where NAME is `blocks` (as AxB) or a feature's name. `map_name` is the user's text,
-/// for messages. Throws UsageError.
-TownOptions parse_town_options(std::string_view text, std::string_view map_name);
+/// Towns that share the defaults of their options; their maps' names begin with the family's.
+struct TownFamily {
+  const char* name;
+  TownOptions defaults;
+};
+
+/// `procedural`, small towns; `city`, with two-lane roundabouts, a motorway, and parking on both sides.
+const std::vector<TownFamily>& town_families();
+
+/// The family of a map named `FAMILY` or `FAMILY:...`, or nullptr when the name is of another kind.
+const TownFamily* town_family_of(std::string_view map_name);
+
+/// Parses `FAMILY[:SEED[:NAME=VALUE,...]]`, where NAME is `blocks` (as AxB) or a feature's name. Nothing when the name
+/// is of another kind; throws UsageError for bad options.
+std::optional<TownOptions> parse_town_name(std::string_view map_name);
 
 }  // namespace pictura

@@ -274,7 +274,7 @@ std::set<int32_t> endless_components(const RoadMap& map, const LaneComponents& c
 }
 
 TEST(LaneGraph, ProceduralTownsHaveOneComponent) {
-  for (const char* name : {"procedural:1", "procedural:8"}) {
+  for (const char* name : {"procedural:1", "procedural:8", "city:1"}) {
     const std::shared_ptr<const RoadMap> map = load_map(name);
     const LaneGraph graph(*map, 20);
     EXPECT_EQ(endless_components(*map, graph.components()).size(), 1u) << name;

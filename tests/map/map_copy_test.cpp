@@ -45,6 +45,7 @@ TEST(MapCopy, RangesOfTownsAreExpanded) {
       expand_map_names({"Town01", "procedural:8-10", "procedural:3", "procedural:1-2:blocks=2x1", "procedural:4-4#2"}),
       ElementsAre("Town01", "procedural:8", "procedural:9", "procedural:10", "procedural:3", "procedural:1:blocks=2x1",
                   "procedural:2:blocks=2x1", "procedural:4#2"));
+  EXPECT_THAT(expand_map_names({"city:8-9:motorway=0#1"}), ElementsAre("city:8:motorway=0#1", "city:9:motorway=0#1"));
   EXPECT_EQ(expand_map_names({"procedural:1000-1063"}).size(), 64u);
   for (const char* name : {"procedural:5-4", "procedural:0-4096", "procedural:a-4", "procedural:1-"}) {
     EXPECT_THAT(message_of<UsageError>([&] { expand_map_names({name}); }),
@@ -115,7 +116,7 @@ class Copies : public ::testing::TestWithParam<const char*> {
 
 INSTANTIATE_TEST_SUITE_P(All, Copies,
                          ::testing::Values("Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07",
-                                           "Town10HD", "procedural:1", "procedural:5"),
+                                           "Town10HD", "procedural:1", "procedural:5", "city:1"),
                          test::map_name);
 
 TEST_P(Copies, KeepConnectionsWidthsHeightsAndLimits) {

@@ -125,7 +125,7 @@ class Walls : public ::testing::TestWithParam<const char*> {
 
 INSTANTIATE_TEST_SUITE_P(All, Walls,
                          ::testing::Values("Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07",
-                                           "Town10HD", "procedural:1", "procedural:2"));
+                                           "Town10HD", "procedural:1", "procedural:2", "city:1"));
 
 TEST_P(Walls, DependOnTheirSeedAndLeaveGaps) {
   const std::vector<WallFace> walls = make_walls(*map_, {.wall_seed = 7}), again = make_walls(*map_, {.wall_seed = 7}),

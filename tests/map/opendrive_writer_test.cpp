@@ -161,10 +161,12 @@ TEST_P(CarlaExport, KeepsTheMapAndThenEveryByte) {
 
 TEST(OpenDriveExport, OfProceduralTownsKeepsEveryByte) {
   for (uint64_t seed = 0; seed < 20; ++seed) {
-    TownOptions options;
-    options.seed = seed;
-    const std::string text = procedural_town(options);
-    ASSERT_EQ(export_opendrive(text, "town"), text) << "seed " << seed;
+    for (const TownFamily& family : town_families()) {
+      TownOptions options = family.defaults;
+      options.seed = seed;
+      const std::string text = procedural_town(options);
+      ASSERT_EQ(export_opendrive(text, "town"), text) << family.name << " seed " << seed;
+    }
   }
 }
 

@@ -306,7 +306,8 @@ class PaintOfTowns : public ::testing::TestWithParam<const char*> {
 
 INSTANTIATE_TEST_SUITE_P(All, PaintOfTowns,
                          ::testing::Values("Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07",
-                                           "Town10HD", "procedural:1", "procedural:2", "procedural:5:blocks=5x4"));
+                                           "Town10HD", "procedural:1", "procedural:2", "procedural:5:blocks=5x4",
+                                           "city:1"));
 
 TEST_P(PaintOfTowns, MatchesTheMarkings) {
   constexpr float kRounding_m = 1e-4f;

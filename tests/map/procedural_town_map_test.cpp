@@ -344,7 +344,7 @@ TEST(ProceduralTownMap, TownsWithRandomOptionsAreValid) {
     RandomStream stream({.seed = seed, .purpose = Purpose::town});
     for (const TownFeature& feature : town_features()) {
       const double value = feature.low + (feature.high - feature.low) * static_cast<double>(stream.uniform());
-      options.*feature.value = feature.value == &TownOptions::max_lanes ? std::round(value) : value;
+      options.*feature.value = feature.is_whole ? std::round(value) : value;
     }
     if (!expect_valid(options)) return;
   }
@@ -361,6 +361,14 @@ TEST(ProceduralTownMap, TownsWithOneFeatureAtItsMinimumOrMaximumAreValid) {
   }
 }
 
+TEST(ProceduralTownMap, CitiesAreValid) {
+  constexpr std::array<std::array<int, 2>, 5> kSizes{{{3, 3}, {1, 2}, {2, 2}, {4, 3}, {1, 1}}};
+  for (uint64_t seed = 0; seed < num_seeds(); ++seed) {
+    const auto& [x, y] = seed < 20 ? kSizes[0] : kSizes[seed % kSizes.size()];
+    if (!expect_valid(test::options_of(seed, x, y, "city"))) return;
+  }
+}
+
 // One, for it takes long: half a minute of a core.
 TEST(ProceduralTownMap, TheLargestTownIsRead) {
   const std::string text = procedural_town(test::options_of(0, kMaxTownBlocks, kMaxTownBlocks));
@@ -369,8 +377,12 @@ TEST(ProceduralTownMap, TheLargestTownIsRead) {
 
 TEST(ProceduralTownMap, LargeTownsAreValid) { expect_valid(test::options_of(100, 7, 6)); }
 
-TEST(ProceduralTownMap, OverpassesHaveClearanceBelow) {
-  TownOptions options = test::options_of(4, 3, 3);
+class ProceduralTownMapOf : public testing::TestWithParam<const char*> {};
+
+INSTANTIATE_TEST_SUITE_P(Family, ProceduralTownMapOf, testing::Values("procedural", "city"));
+
+TEST_P(ProceduralTownMapOf, OverpassesHaveClearanceBelow) {
+  TownOptions options = test::options_of(4, 3, 3, GetParam());
   options.hills_m = 0;
   const RoadMap map = parse_opendrive(procedural_town(options), "town");
   float min_clearance_m = 1e9f;

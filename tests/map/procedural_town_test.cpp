@@ -50,6 +50,7 @@ std::vector<TownOptions> many_towns() {
   for (uint64_t seed = 0; seed < 3; ++seed) {
     for (const TownOptions& options : extremes(seed)) all.push_back(options);
   }
+  for (uint64_t seed = 0; seed < 20; ++seed) all.push_back(test::options_of(seed, 3, 3, "city"));
   return all;
 }
 
@@ -179,7 +180,7 @@ TEST(ProceduralTownText, EqualOptionsGiveEqualBytesAndOthersDiffer) {
 struct Counts {
   double streets_m = 0;
   int arcs = 0, five_arms = 0, roundabouts = 0, max_lanes = 0, slips = 0, heights = 0, crosswalks = 0, sidewalks = 0,
-      parking = 0, lights = 0, crossings = 0;
+      parking = 0, lights = 0, crossings = 0, wide_roundabouts = 0, ramps = 0, motorways = 0;
 };
 
 Counts count(const TownOptions& options) {
@@ -191,8 +192,12 @@ Counts count(const TownOptions& options) {
   counts.parking = town.count("//lane[@type='parking']");
   counts.slips = town.count("//lane[@type='exit']");
   counts.arcs = town.count("//road[@junction='-1']//arc");
-  // Outside junctions only the circles of roundabouts are one-way.
-  counts.roundabouts = town.count("//road[@junction='-1'][not(.//left)]");
+  // Outside junctions only ramps and the circles of roundabouts are one-way.
+  const std::string one_way = "//road[@junction='-1'][not(.//left)]", slow = "[type/speed/@max < 8]";
+  counts.roundabouts = town.count((one_way + slow).c_str());
+  counts.wide_roundabouts = town.count((one_way + slow + "[.//right/lane[@id='-2'][@type='driving']]").c_str());
+  counts.ramps = town.count(one_way.c_str()) - counts.roundabouts;
+  counts.motorways = town.count("//road[@junction='-1'][type/speed/@max > 24]");
   for (int lanes = 1; lanes <= 3; ++lanes) {
     if (town.count(fmt::format("//road[@junction='-1']//right/lane[@id='{}'][@type='driving']", -lanes).c_str()) > 0) {
       counts.max_lanes = lanes;
@@ -287,6 +292,27 @@ TEST(ProceduralTownOptions, TheDefaultTownHasEverything) {
   }
 }
 
+TEST(ProceduralTownOptions, ACityHasEverything) {
+  int wide_roundabouts = 0;
+  for (uint64_t seed = 0; seed < 20; ++seed) {
+    const Counts counts = count(test::options_of(seed, 3, 3, "city"));
+    for (const int feature : {counts.roundabouts, counts.slips, counts.heights - 1, counts.crosswalks, counts.sidewalks,
+                              counts.parking, counts.lights, counts.max_lanes - 1, counts.arcs}) {
+      EXPECT_GT(feature, 0) << "seed " << seed;
+    }
+    EXPECT_EQ(counts.ramps, 8) << "seed " << seed;
+    EXPECT_GE(counts.motorways, 10) << "seed " << seed;
+    wide_roundabouts += counts.wide_roundabouts > 0 ? 1 : 0;
+  }
+  EXPECT_GT(wide_roundabouts, 10);
+}
+
+TEST(ProceduralTownOptions, AMotorwayNeedsACrossingBetweenCorners) {
+  EXPECT_EQ(count(test::options_of(0, 1, 1, "city")).ramps, 0);
+  EXPECT_EQ(count(test::options_of(0, 1, 2, "city")).ramps, 8);
+  EXPECT_EQ(count(test::options_of(0, 2, 1, "city")).ramps, 8);
+}
+
 TEST(ProceduralTownOptions, RejectsValuesOutOfRange) {
   const auto message_of = [](const TownOptions& options) -> std::string {
     return test::message_of<UsageError>([&] { procedural_town(options); });
@@ -307,20 +333,31 @@ TEST(ProceduralTownOptions, RejectsValuesOutOfRange) {
   TownOptions options;
   options.max_lanes = 1.5;
   EXPECT_THAT(message_of(options), HasSubstr("max-lanes: expected a whole number, got 1.5"));
+  options.max_lanes = 2;
+  options.roundabout_lanes = 1.5;
+  EXPECT_THAT(message_of(options), HasSubstr("roundabout-lanes: expected a whole number, got 1.5"));
 }
 
 TEST(ProceduralTownOptions, AreReadFromMapNames) {
-  const TownOptions options = parse_town_options("7:blocks=4x2,roundabouts=0.5,hills-m=0", "procedural");
+  const auto parsed = [](const std::string& name) { return parse_town_name(name).value(); };
+  const TownOptions options = parsed("procedural:7:blocks=4x2,roundabouts=0.5,hills-m=0");
   EXPECT_EQ(options.seed, 7u);
   EXPECT_EQ(options.blocks_x, 4);
   EXPECT_EQ(options.blocks_y, 2);
   EXPECT_EQ(options.roundabouts, 0.5);
   EXPECT_EQ(options.hills_m, 0);
   EXPECT_EQ(options.parking, TownOptions().parking);
-  EXPECT_EQ(parse_town_options("010", "procedural").seed, 10u);
-  EXPECT_EQ(parse_town_options("1e3:blocks=1e1x2", "procedural").seed, 1000u);
+  EXPECT_EQ(parsed("procedural:010").seed, 10u);
+  EXPECT_EQ(parsed("procedural:1e3:blocks=1e1x2").seed, 1000u);
+  EXPECT_EQ(parsed("city").seed, 0u);
+  EXPECT_EQ(parsed("city:3:parking=0").motorway, 1);
+  EXPECT_EQ(parsed("city:3:parking=0").parking, 0);
+  for (const char* name : {"", "Town01", "citys:1", "cit", "procedural2", "city.xodr"}) {
+    EXPECT_FALSE(parse_town_name(name)) << name;
+  }
+  EXPECT_THAT(test::message_of<UsageError>([&] { parsed("city:x"); }), HasSubstr("expected city or city:SEED"));
   const auto message_of = [](const char* text) -> std::string {
-    return test::message_of<UsageError>([&] { parse_town_options(text, "the map"); });
+    return test::message_of<UsageError>([&] { parse_town_name(std::string("procedural:") + text); });
   };
   for (const char* text : {"", "x", "-1", "1x", "18446744073709551616"}) {
     EXPECT_THAT(message_of(text), HasSubstr("expected procedural or procedural:SEED")) << text;

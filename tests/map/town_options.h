@@ -1,12 +1,14 @@
-// Procedural towns of a seed and a size.
+// Procedural towns of a seed, a size and a family.
 #pragma once
+
+#include <string_view>
 
 #include "pictura/map/procedural/town_options.h"
 
 namespace pictura::test {
 
-inline TownOptions options_of(uint64_t seed, int blocks_x, int blocks_y) {
-  TownOptions options;
+inline TownOptions options_of(uint64_t seed, int blocks_x, int blocks_y, std::string_view family = "procedural") {
+  TownOptions options = town_family_of(family)->defaults;
   options.seed = seed;
   options.blocks_x = blocks_x;
   options.blocks_y = blocks_y;

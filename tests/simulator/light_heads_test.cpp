@@ -131,7 +131,7 @@ class LightHeadsOf : public ::testing::TestWithParam<const char*> {
 INSTANTIATE_TEST_SUITE_P(Towns, LightHeadsOf,
                          ::testing::Values("Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07",
                                            "Town10HD", "procedural:1", "procedural:2", "procedural:3", "Town04#2",
-                                           "Town05#1", "Town07#4", "procedural:3#3"),
+                                           "Town05#1", "Town07#4", "procedural:3#3", "city:1", "city:2", "city:3#1"),
                          test::map_name);
 
 TEST_P(LightHeadsOf, AreSeenFromTheirLineIfTheyAreToBeVisible) {

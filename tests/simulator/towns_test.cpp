@@ -34,7 +34,7 @@ std::unique_ptr<HostWorlds> first_step(const SimulatorConfig& config, std::share
 /// The eight CARLA towns where they are, and procedural ones everywhere.
 std::vector<std::string> all_towns() {
   std::vector<std::string> towns = known_towns();
-  for (const char* town : {"procedural:1", "procedural:2"}) towns.emplace_back(town);
+  for (const char* town : {"procedural:1", "procedural:2", "city:1", "city:2"}) towns.emplace_back(town);
   return towns;
 }
 

@@ -193,7 +193,8 @@ TEST(Memory, ImagesAreKeptOnADeviceWhereTheyTakeTwoFifthsOfItsMemory) {
 }
 
 TEST(Memory, MapsTakeLessThanIsEstimatedAndNotMuchLess) {
-  const std::vector<std::string> names{"procedural:1", "procedural:1#1", "procedural:2:blocks=2x2", "procedural:5"};
+  const std::vector<std::string> names{"procedural:1", "procedural:1#1", "procedural:2:blocks=2x2", "procedural:5",
+                                       "city:1"};
   const MapMemory estimate = estimated_map_memory(names);
   const double before = heap_bytes();
   const CompiledMaps maps = compile_maps(load_maps(names, 1), {}, 1);

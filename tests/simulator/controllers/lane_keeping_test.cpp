@@ -19,7 +19,7 @@ namespace {
 
 std::vector<std::string> towns_to_drive() {
   std::vector<std::string> towns = known_towns();
-  for (const char* town : {"procedural:1", "procedural:2"}) towns.emplace_back(town);
+  for (const char* town : {"procedural:1", "procedural:2", "city:1", "city:2"}) towns.emplace_back(town);
   return towns;
 }
 
