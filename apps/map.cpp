@@ -16,6 +16,7 @@
 #include "pictura/map/load_map.h"
 #include "pictura/map/map_fields.h"
 #include "pictura/map/map_geometry.h"
+#include "pictura/map/map_statistics.h"
 #include "pictura/map/open_lanes.h"
 #include "pictura/map/opendrive/writer.h"
 #include "pictura/map/scenario/drivable_area.h"
@@ -45,6 +46,12 @@ std::optional<FileBox> shown_box(const MapArguments& arguments) {
 Json facts_of(const RoadMap& map) {
   Json object{{"map", map.name}, {"origin_m", map.origin_m}};
   visit_fields(map.facts, [&object](const std::string& name, const auto& value) { object[name] = value; });
+  return object;
+}
+
+Json statistics_of(const RoadMap& map) {
+  Json object;
+  visit_fields(map_statistics(map), [&object](const std::string& name, const auto& value) { object[name] = value; });
   return object;
 }
 
@@ -185,9 +192,11 @@ void run_map(const CLI::App& command, const MapArguments& arguments) {
   if (!report.cache_rejection.empty()) object["cache_refused"] = report.cache_rejection;
   object["load_ms"] = load_ms;
   object["mends"] = mends_of(*map, report.source);
+  object["statistics"] = statistics_of(*map);
   if (arguments.full) return print_listing(object, *map);
   if (arguments.json) return print_json(object);
   object.erase("mends");  // said on stderr
+  object.erase("statistics");
   print_table(object);
   for (const std::string& path : {arguments.png, arguments.svg}) {
     if (!path.empty()) print_result("drawn into {}\n", path);

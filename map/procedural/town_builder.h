@@ -86,7 +86,7 @@ constexpr double speed_mps(StreetKind kind) {
     case StreetKind::avenue:
     case StreetKind::connector:
     case StreetKind::ramp: return mph(35);
-    case StreetKind::motorway: return mph(55);
+    case StreetKind::motorway: return mph(65);
   }
   return 0;
 }

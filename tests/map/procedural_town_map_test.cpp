@@ -126,6 +126,7 @@ class Town {
 
   void check() {
     validate(map_);
+    EXPECT_TRUE(map_.mends.empty()) << map_.mends.front().message;
     check_network();
     check_driving();
     check_overlaps();

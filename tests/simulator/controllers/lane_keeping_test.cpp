@@ -63,6 +63,10 @@ TEST(LaneKeeping, OfACarKeepsItsLaneAndStopsAtRedLightsInACopyOfEveryTown) {
   expect_lane_keeping(copies, 0, 12, 1, 1280);
 }
 
+TEST(LaneKeeping, OfACarKeepsItsLaneAndStopsAtRedLightsInTwentyCities) {
+  expect_lane_keeping(expand_map_names({"city:1000-1019"}), 0, 16, 1, 600);
+}
+
 TEST(LaneKeeping, OfThreeTouchesNoOtherInEveryTown) { expect_lane_keeping(towns_to_drive(), 0.2f, 48, 3, 600); }
 
 /// As many as in evaluation's medium density. Of these 1,080 agents 277 halted as long as they relied on the one ahead
