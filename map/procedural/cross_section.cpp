@@ -37,9 +37,10 @@ Profile width_of(LaneKind kind, double length_m, bool left, const SectionStyle& 
                step(0.5 * length_m, style.driving_middle_m, style.driving_to_m, 0.5 * length_m)}};
     case LaneKind::slip:
       if (left) {
-        return {{{0, kLaneWidth_m, 0, 0, 0}, step(length_m - kSlipTaper_m, kLaneWidth_m, 0, kSlipTaper_m)}};
+        return {
+            {{0, style.driving_from_m, 0, 0, 0}, step(length_m - kSlipTaper_m, style.driving_from_m, 0, kSlipTaper_m)}};
       }
-      return {{step(0, 0, kLaneWidth_m, kSlipTaper_m), {kSlipTaper_m, kLaneWidth_m, 0, 0, 0}}};
+      return {{step(0, 0, style.driving_from_m, kSlipTaper_m), {kSlipTaper_m, style.driving_from_m, 0, 0, 0}}};
     case LaneKind::parking: return parking_bay(kParkingWidth_m, length_m);
     case LaneKind::shoulder: return {{{0, kShoulderWidth_m, 0, 0, 0}}};
     case LaneKind::sidewalk: return {{{0, kSidewalkWidth_m, 0, 0, 0}}};

@@ -27,10 +27,13 @@ inline constexpr Side kNoSide{.driving = 0, .has_shoulder = false, .has_sidewalk
 
 /// Properties of a section other than the kinds of its lanes.
 struct SectionStyle {
+  explicit SectionStyle(double lane_width_m)
+      : driving_from_m(lane_width_m), driving_middle_m(lane_width_m), driving_to_m(lane_width_m) {}
+
   bool in_junction = false;
   bool one_way = false;  // no left side
-  // Width of driving lanes at the start, half-way and at the end.
-  double driving_from_m = kLaneWidth_m, driving_middle_m = kLaneWidth_m, driving_to_m = kLaneWidth_m;
+  // Width of driving lanes at the start, half-way and at the end; slip lanes keep the first.
+  double driving_from_m, driving_middle_m, driving_to_m;
 };
 
 // Parking bays open and close over the taper, at a distance (lead) from the ends of their section.

@@ -6,8 +6,8 @@ namespace pictura::town {
 namespace {
 
 constexpr double kMaxTurnRadius_m = 14;  // of the left border of turns other than right turns
-// Lanes that turn across the junction are wider half-way, so that no sliver is left between adjacent lanes.
-constexpr double kTurningWidth_m = 4;
+// Lanes that turn across the junction are this much wider half-way, so that no sliver is left between adjacent lanes.
+constexpr double kTurningExtra_m = 0.5;
 constexpr double kCrosswalkBegin_m = 0.6, kCrosswalkEnd_m = 3.4;  // beyond the stop line
 
 }  // namespace
@@ -42,7 +42,7 @@ int TownBuilder::build_movement(const Node& node, const Movement& movement, open
       turns_right && first_in + movement.lanes == in_lanes && movement.first_out + movement.lanes == out.lanes;
   const bool is_straight = straight_on(node, movement.from) == movement.to;
   const double radius = movement.is_slip ? kNoRadiusLimit_m
-                        : turns_right    ? right_turn_radius_m(wrap_to_2pi(to.heading - from.heading))
+                        : turns_right    ? right_turn_radius_m(wrap_to_2pi(to.heading - from.heading), in.lane_width_m)
                                          : kMaxTurnRadius_m;
   const bool is_fork = node.kind == NodeKind::fork;
   const double speed = is_straight || is_fork ? speed_mps(in.kind) : kJunctionSpeed_mps;
@@ -51,8 +51,10 @@ int TownBuilder::build_movement(const Node& node, const Movement& movement, open
                    .has_shoulder = has_corner,
                    .has_sidewalk = has_corner && in.has_sidewalks && out.has_sidewalks};
   // The lanes of a motorway are marked at its forks too.
-  SectionStyle style{.in_junction = !is_fork, .one_way = true};
-  if (!is_straight && !has_corner) style.driving_middle_m = kTurningWidth_m;
+  SectionStyle style(in.lane_width_m);
+  style.in_junction = !is_fork;
+  style.one_way = true;
+  if (!is_straight && !has_corner) style.driving_middle_m += kTurningExtra_m;
   const int connecting = add_road(is_straight ? biarc(start, end) : fillet(start, end, radius), node.z, junction->id,
                                   speed, kNoSide, right, style);
   connect(end_of(from), connecting, end_of(to), movement, junction);
@@ -62,8 +64,9 @@ int TownBuilder::build_movement(const Node& node, const Movement& movement, open
 /// Adds a crosswalk across the arm, just inside the junction, from kerb to kerb; `owner_road` begins at the arm's
 /// centre.
 void TownBuilder::add_crosswalk(const Arm& arm, int owner_road) {
-  const double out = street_of(arm).lanes * kLaneWidth_m + kShoulderWidth_m;
-  const double in = out + (layout_.has_slip(arm) ? kLaneWidth_m : 0);
+  const Street& street = street_of(arm);
+  const double out = lane_offset_m(street, street.lanes) + kShoulderWidth_m;
+  const double in = out + (layout_.has_slip(arm) ? street.lane_width_m : 0);
   opendrive::FileObject crosswalk;
   crosswalk.kind = opendrive::FileObject::Kind::crosswalk;
   crosswalk.length = kCrosswalkEnd_m - kCrosswalkBegin_m;

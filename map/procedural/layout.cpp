@@ -9,11 +9,14 @@ namespace pictura::town {
 namespace {
 
 // Block lengths vary by this fraction of their mean, node positions by this much in each coordinate.
+constexpr double kUsualLaneWidth_m = 3.5;
 constexpr double kSpacingSpread = 0.12, kJitter_m = 3.5;
 
 }  // namespace
 
 Layout::Layout(const TownOptions& options) : options_(options) {
+  const float spread = draw(kLaneWidth, 0).uniform(-1, 1);
+  lane_width_m_ = kUsualLaneWidth_m + options_.lane_spread_m * static_cast<double>(spread);
   place_nodes();
   plan_streets();
   choose_avenues();
@@ -77,6 +80,7 @@ Street& Layout::add_street(int from, int to, int direction) {
   street.to = to;
   street.direction = direction;
   street.end_direction = opposite(direction);
+  street.lane_width_m = lane_width_m_;
   return street;
 }
 

@@ -12,8 +12,7 @@ namespace pictura::town {
 
 // Dimensions of streets.
 inline constexpr double kMinStreetRadius_m = 30;  // may be smaller next to a fifth arm
-inline constexpr double kLaneWidth_m = 3.5, kShoulderWidth_m = 0.5, kSidewalkWidth_m = 2.5, kParkingWidth_m = 2.3,
-                        kHalfMedian_m = 1;
+inline constexpr double kShoulderWidth_m = 0.5, kSidewalkWidth_m = 2.5, kParkingWidth_m = 2.3, kHalfMedian_m = 1;
 
 /// Eight directions of arms, counter-clockwise from east; streets of the grid have even ones, diagonals odd ones.
 inline constexpr int kNumDirections = 8;
@@ -59,6 +58,7 @@ struct Street {
   int direction = 0, end_direction = 0;  // of the arms at `from` and at `to`
   StreetKind kind = StreetKind::street;
   int lanes = 1;  // each way
+  double lane_width_m = 0;
   bool is_present = true, has_sidewalks = true;
   bool parks_left = false, parks_right = false;
   bool slip_at_start = false, slip_at_end = false;  // a right-turn lane of traffic that arrives at that end
@@ -70,7 +70,7 @@ struct Street {
 
 /// Distance of a lane's left border from the street's reference line; lanes count from 0.
 inline double lane_offset_m(const Street& street, int lane) {
-  return (street.kind == StreetKind::motorway ? kHalfMedian_m : 0) + lane * kLaneWidth_m;
+  return (street.kind == StreetKind::motorway ? kHalfMedian_m : 0) + lane * street.lane_width_m;
 }
 
 /// The nodes of a motorway at an interchange, in the direction of its inner carriageway.
@@ -86,13 +86,14 @@ inline Pose mouth_pose(const Node& node, const Arm& arm, const Street& street, d
 
 /// Radius of the left border of a right turn into an arm that is `gap_rad` away: wide, but close enough to the corner
 /// that no hole is left next to lanes that go straight on or cross.
-double right_turn_radius_m(double gap_rad);
+double right_turn_radius_m(double gap_rad, double lane_width_m);
 
 class Layout {
  public:
   explicit Layout(const TownOptions& options);
 
   const TownOptions& options() const { return options_; }
+  double lane_width_m() const { return lane_width_m_; }
   const std::vector<Node>& nodes() const { return nodes_; }
   const std::vector<Street>& streets() const { return streets_; }
 
@@ -123,6 +124,7 @@ class Layout {
     kFarSide,
     kCrosswalks,
     kMotorway,
+    kLaneWidth,
     kCurved = 100,
     kCurveShape,
     kSlipLanes,
@@ -178,6 +180,7 @@ class Layout {
   bool has_close_arms(const Node& node) const;
 
   TownOptions options_;
+  double lane_width_m_ = 0;
   bool has_ring_road_ = false;
   std::vector<Node> nodes_;
   std::vector<Street> streets_;

@@ -30,9 +30,9 @@ double side_width_m(const Street& street) {
 
 }  // namespace
 
-double right_turn_radius_m(double gap_rad) {
+double right_turn_radius_m(double gap_rad, double lane_width_m) {
   constexpr double kMin_m = 7.5, kMax_m = 12, kOverlap = 0.95;
-  return std::clamp(kOverlap * kLaneWidth_m / (1 - std::sin(0.5 * gap_rad)), kMin_m, kMax_m);
+  return std::clamp(kOverlap * lane_width_m / (1 - std::sin(0.5 * gap_rad)), kMin_m, kMax_m);
 }
 
 void Layout::set_arm_heading(int street, bool at_start, double heading) {
@@ -152,10 +152,11 @@ double Layout::mouth_distance_m(const Node& node, int index) const {
     if (gap > kFlatGap_rad) continue;
     // Traffic arriving on the right arm turns right into the left one. Its path begins on the left border of the
     // outermost lane of the one and ends on that of the other.
-    const double in_offset = (streets_[right.street].lanes - (has_slip(right) ? 0 : 1)) * kLaneWidth_m;
-    const double out_offset = (streets_[left.street].lanes - 1) * kLaneWidth_m;
+    const Street &in = streets_[right.street], &out = streets_[left.street];
+    const double in_offset = lane_offset_m(in, in.lanes - (has_slip(right) ? 0 : 1));
+    const double out_offset = lane_offset_m(out, out.lanes - 1);
     const double own = side > 0 ? in_offset : out_offset, other = side > 0 ? out_offset : in_offset;
-    const double radius = has_slip(right) ? kSlipRadius_m : right_turn_radius_m(gap);
+    const double radius = has_slip(right) ? kSlipRadius_m : right_turn_radius_m(gap, lane_width_m_);
     mouth = std::max(mouth, (other + own * std::cos(gap)) / std::sin(gap) + radius / std::tan(0.5 * gap));
   }
   return mouth;

@@ -33,7 +33,7 @@ void Layout::add_ramp(int from, int to, int direction, int end_direction) {
   Street& ramp = add_street(from, to, direction);
   ramp.kind = StreetKind::ramp;
   ramp.end_direction = end_direction;
-  const double offset_m = kHalfMedian_m + kThroughLanes * kLaneWidth_m + kGore_m;
+  const double offset_m = kHalfMedian_m + kThroughLanes * lane_width_m_ + kGore_m;
   (nodes_[from].kind == NodeKind::fork ? ramp.start_offset_m : ramp.end_offset_m) = offset_m;
 }
 

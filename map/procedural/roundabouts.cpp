@@ -29,10 +29,8 @@ void TownBuilder::build_roundabout(const Node& node) {
   const auto corner = [&](int driving, const Arm& a, const Arm& b) {
     return Side{.driving = driving, .has_sidewalk = street_of(a).has_sidewalks && street_of(b).has_sidewalks};
   };
-  const SectionStyle on_the_circle{.one_way = true,
-                                   .driving_from_m = kCircleLaneWidth_m,
-                                   .driving_middle_m = kCircleLaneWidth_m,
-                                   .driving_to_m = kCircleLaneWidth_m};
+  SectionStyle on_the_circle(kCircleLaneWidth_m);
+  on_the_circle.one_way = true;
   SectionStyle inside = on_the_circle;
   inside.in_junction = true;
 
@@ -55,7 +53,7 @@ void TownBuilder::build_roundabout(const Node& node) {
                             node.z, junction.id, kRoundaboutSpeed_mps, kNoSide, bare, inside);
     connect(before, on, after, {}, &junction);
     SectionStyle narrowing = inside, widening = inside;
-    narrowing.driving_to_m = widening.driving_from_m = kLaneWidth_m;
+    narrowing.driving_to_m = widening.driving_from_m = layout_.lane_width_m();
     const int exit = add_road(fillet(on_circle(node, edge, exit_angle(i)), mouth_of(node, arm), kNoRadiusLimit_m),
                               node.z, junction.id, kRoundaboutSpeed_mps, kNoSide,
                               corner(arm_lanes, node.arm(i + count - 1), arm), narrowing);

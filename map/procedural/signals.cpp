@@ -18,27 +18,32 @@ struct SignalPosition {
   double z_offset_m = 0;
 };
 
-double behind_kerb_m(int lanes) { return lanes * kLaneWidth_m + kShoulderWidth_m + kPostSetback_m; }
+double behind_kerb_m(const Street& street) {
+  return lane_offset_m(street, street.lanes) + kShoulderWidth_m + kPostSetback_m;
+}
 
 SignalPosition position_at(const Pose& pose, double z_offset_m = 0) { return {pose.position_m, z_offset_m}; }
 
 /// Just beyond the stop line: next to a single lane, above several.
-SignalPosition near_side(const Pose& arriving, int lanes, bool has_slip) {
-  if (lanes == 1 && !has_slip) return position_at(moved_forward(offset_right(arriving, behind_kerb_m(1)), kNearPost_m));
-  return position_at(moved_forward(offset_right(arriving, 0.5 * lanes * kLaneWidth_m), kNearArm_m), kArmRise_m);
+SignalPosition near_side(const Pose& arriving, const Street& street, bool has_slip) {
+  if (street.lanes == 1 && !has_slip) {
+    return position_at(moved_forward(offset_right(arriving, behind_kerb_m(street)), kNearPost_m));
+  }
+  const double middle_m = 0.5 * lane_offset_m(street, street.lanes);
+  return position_at(moved_forward(offset_right(arriving, middle_m), kNearArm_m), kArmRise_m);
 }
 
 /// Beyond the junction, between the arms on both sides of the direction of travel, behind the kerbs of both.
 SignalPosition far_side_between(const Layout& layout, const Node& node, int arm) {
   const double forward = node.arm(arm).heading + kPi_rad;
   double nearest = 0.5 * kPi_rad;
-  int max_lanes = 0;
+  double kerb_m = 0;
   for (int i = 0; i < node.degree(); ++i) {
     if (i == arm) continue;
     nearest = std::min(nearest, std::abs(wrap_to_pi(node.arm(i).heading - forward)));
-    max_lanes = std::max(max_lanes, layout.streets()[node.arm(i).street].lanes);
+    kerb_m = std::max(kerb_m, behind_kerb_m(layout.streets()[node.arm(i).street]));
   }
-  return position_at(moved_forward({node.position_m, forward}, behind_kerb_m(max_lanes) / std::sin(nearest)));
+  return position_at(moved_forward({node.position_m, forward}, kerb_m / std::sin(nearest)));
 }
 
 /// Road coordinates of a point: its projection onto the reference line and its distance to the left.
@@ -72,10 +77,10 @@ void TownBuilder::add_lights(const Node& node, const std::vector<Movement>& move
     const Arm& arm = node.arm(i);
     if (!arm.has_arrivals) continue;
     const int straight = straight_on(node, i);
-    SignalPosition position = near_side(reversed(mouth_of(node, arm)), street_of(arm).lanes, layout_.has_slip(arm));
+    SignalPosition position = near_side(reversed(mouth_of(node, arm)), street_of(arm), layout_.has_slip(arm));
     if (node.far_side_heads && straight >= 0) {
       const Arm& exit = node.arm(straight);
-      position = position_at(offset_right(mouth_of(node, exit), behind_kerb_m(street_of(exit).lanes)));
+      position = position_at(offset_right(mouth_of(node, exit), behind_kerb_m(street_of(exit))));
     } else if (node.far_side_heads) {
       position = far_side_between(layout_, node, i);
     }

@@ -13,10 +13,10 @@ constexpr double kMinParking_m = 30;  // of a section with parking bays
 constexpr double kSlipSection_m = 32, kMaxSlipFraction = 0.48;
 constexpr double kSpaceLength_m = 6, kParkedLength_m = 5, kParkedWidth_m = 2;
 
-void add_parking_spaces(opendrive::FileRoad* road, const opendrive::FileSection& section, bool left) {
+void add_parking_spaces(opendrive::FileRoad* road, const opendrive::FileSection& section, double inner_m, bool left) {
   const double begin = section.s + kParkingLead_m + kParkingTaper_m;
   const double available_m = section.end - kParkingLead_m - kParkingTaper_m - begin;
-  const double t = kLaneWidth_m + 0.5 * kParkingWidth_m;
+  const double t = inner_m + 0.5 * kParkingWidth_m;
   const int spaces = static_cast<int>(available_m / kSpaceLength_m);
   for (int i = 0; i < spaces; ++i) {
     opendrive::FileObject space;
@@ -74,7 +74,8 @@ void TownBuilder::build_street(int index) {
   const Side plain{
       .driving = street.lanes, .has_median = street.kind == StreetKind::motorway, .has_sidewalk = street.has_sidewalks};
   const bool is_one_way = street.kind == StreetKind::ramp;
-  const SectionStyle style{.one_way = is_one_way};
+  SectionStyle style(street.lane_width_m);
+  style.one_way = is_one_way;
   Side left = is_one_way ? kNoSide : plain, right = plain, with_slip = plain;
   constexpr double kRounding = 1 + 1e-9;
   const bool may_park = end - begin >= kMinParking_m && max_curvature(street.curve) <= kRounding / kMinStreetRadius_m;
@@ -102,8 +103,8 @@ void TownBuilder::build_street(int index) {
   }
   for (const opendrive::FileSection& section : built.sections) {
     if (section.s != begin) continue;
-    if (left.has_parking) add_parking_spaces(&built, section, true);
-    if (right.has_parking) add_parking_spaces(&built, section, false);
+    if (left.has_parking) add_parking_spaces(&built, section, street.lane_width_m, true);
+    if (right.has_parking) add_parking_spaces(&built, section, street.lane_width_m, false);
   }
   sides_at({added, true}) = {parts.front().left, parts.front().right};
   sides_at({added, false}) = {parts.back().left, parts.back().right};
@@ -120,7 +121,7 @@ void TownBuilder::build_bend(const Node& node, const Arm& from, const Arm& to, d
                        : kind == StreetKind::motorway ? kMotorwayBendSpeed_mps
                                                       : kJunctionSpeed_mps;
   const int bend = add_road(fillet(reversed(mouth_of(node, from)), mouth_of(node, to), kNoRadiusLimit_m), height_m, "",
-                            speed, side, side, {});
+                            speed, side, side, SectionStyle(layout_.lane_width_m()));
   join({bend, true}, end_of(from));
   join({bend, false}, end_of(to));
 }

@@ -26,6 +26,7 @@ struct TownOptions {
   double ring_road = 1;            // chance that an avenue runs around the town
   double motorway = 0;             // chance that a motorway runs around the town
   double slip_lanes = 0.1;         // of the right turns at lights that are large enough
+  double lane_spread_m = 0;        // maximum difference of the width of the town's lanes from 3.5 m
   double hills_m = 6;              // maximum height difference, before grades are limited
   double overpasses = 0.1;         // of the inner crossings of four arms
   double crosswalks = 0.9;         // of the crossings
