@@ -167,8 +167,8 @@ class Layout {
   Street& add_street(int from, int to, int direction);
   // layout_motorway.cpp
   int add_node(const Eigen::Vector2d& position_m);
-  Interchange add_interchange(int border_node, int side, double motorway_m);
-  void add_ramp(int from, int to, int direction, int end_direction);
+  Interchange add_interchange(int border_node, int side, double motorway_m, int through_lanes);
+  void add_ramp(int from, int to, int direction, int end_direction, int through_lanes);
   std::vector<int> streets_at(int node) const;
   int max_lanes_at(int node) const;
   bool has_ramps(int node) const;

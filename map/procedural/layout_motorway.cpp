@@ -8,7 +8,6 @@ namespace pictura::town {
 
 namespace {
 
-constexpr int kThroughLanes = 2;             // each way at interchanges; one more between them
 constexpr double kMotorwayDistance_m = 110;  // from the outermost crossings
 constexpr double kTerminal_m = 45;           // from the motorway to the crossings where its ramps end
 constexpr double kFork_m = 150;              // from the overpass to the forks
@@ -29,16 +28,16 @@ int Layout::add_node(const Eigen::Vector2d& position_m) {
   return static_cast<int>(nodes_.size()) - 1;
 }
 
-void Layout::add_ramp(int from, int to, int direction, int end_direction) {
+void Layout::add_ramp(int from, int to, int direction, int end_direction, int through_lanes) {
   Street& ramp = add_street(from, to, direction);
   ramp.kind = StreetKind::ramp;
   ramp.end_direction = end_direction;
-  const double offset_m = kHalfMedian_m + kThroughLanes * lane_width_m_ + kGore_m;
+  const double offset_m = kHalfMedian_m + through_lanes * lane_width_m_ + kGore_m;
   (nodes_[from].kind == NodeKind::fork ? ramp.start_offset_m : ramp.end_offset_m) = offset_m;
 }
 
 /// A diamond: a connector from the town under the motorway, a crossing of it with the ramps of each carriageway.
-Interchange Layout::add_interchange(int border_node, int side, double motorway_m) {
+Interchange Layout::add_interchange(int border_node, int side, double motorway_m, int through_lanes) {
   const int forward = along(side), back = opposite(forward);
   const Eigen::Vector2d origin = nodes_[border_node].position_m;
   const Eigen::Vector2d center = origin + (motorway_m - origin.dot(unit(side))) * unit(side);
@@ -63,10 +62,10 @@ Interchange Layout::add_interchange(int border_node, int side, double motorway_m
   connect(added.overpass, outer, 1);
   // At forks ramps have the odd directions next to the motorway's.
   const auto turned = [](int direction, int steps) { return (direction + steps) % kNumDirections; };
-  add_ramp(added.entry_fork, inner, turned(forward, 7), back);
-  add_ramp(inner, added.exit_fork, forward, turned(back, 1));
-  add_ramp(added.exit_fork, outer, turned(back, 7), forward);
-  add_ramp(outer, added.entry_fork, back, turned(forward, 1));
+  add_ramp(added.entry_fork, inner, turned(forward, 7), back, through_lanes);
+  add_ramp(inner, added.exit_fork, forward, turned(back, 1), through_lanes);
+  add_ramp(added.exit_fork, outer, turned(back, 7), forward, through_lanes);
+  add_ramp(outer, added.entry_fork, back, turned(forward, 1), through_lanes);
   return added;
 }
 
@@ -107,6 +106,7 @@ void Layout::add_motorway() {
     const std::size_t next = (k + 1) % 4;
     corners[k] = add_node(motorway_m[k] * unit(kSides[k]) + motorway_m[next] * unit(kSides[next]));
   }
+  const int through_lanes = 2 + draw(kMotorway, 6).below(2);  // each way at interchanges; one more between them
   const auto build = [&](int from, int to, int side, int lanes) {
     Street& street = add_street(from, to, along(side));
     street.kind = StreetKind::motorway;
@@ -115,13 +115,13 @@ void Layout::add_motorway() {
   for (std::size_t k = 0; k < 4; ++k) {
     int from = corners[(k + 3) % 4];
     if (chosen[k] >= 0) {
-      const Interchange added = add_interchange(chosen[k], kSides[k], motorway_m[k]);
-      build(from, added.entry_fork, kSides[k], kThroughLanes + 1);
-      build(added.entry_fork, added.overpass, kSides[k], kThroughLanes);
-      build(added.overpass, added.exit_fork, kSides[k], kThroughLanes);
+      const Interchange added = add_interchange(chosen[k], kSides[k], motorway_m[k], through_lanes);
+      build(from, added.entry_fork, kSides[k], through_lanes + 1);
+      build(added.entry_fork, added.overpass, kSides[k], through_lanes);
+      build(added.overpass, added.exit_fork, kSides[k], through_lanes);
       from = added.exit_fork;
     }
-    build(from, corners[k], kSides[k], kThroughLanes + 1);
+    build(from, corners[k], kSides[k], through_lanes + 1);
   }
 }
 
