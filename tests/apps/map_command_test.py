@@ -34,6 +34,16 @@ class Maps(CommandCase):
         self.assertEqual(first, self.town(seed=5).read_bytes())
         self.assertNotEqual(first, self.town(seed=6).read_bytes())
 
+    def test_a_family_has_the_options_that_are_not_given(self):
+        town, named = self.folder / "city.xodr", self.folder / "named.xodr"
+        written = self.json_of("town", "--family", "city", "--seed", 5, "--hills-m", 0, "--out", town)
+        self.assertEqual((written["blocks_x"], written["blocks_y"], written["motorway"], written["hills-m"]), (4, 3, 1, 0))
+        facts = self.json_of("map", "city:5:hills-m=0", "--xodr", named)
+        self.assertEqual(town.read_bytes(), named.read_bytes())
+        self.assertEqual(facts["mends"], [])
+        self.assertAlmostEqual(sum(facts["statistics"]["lanes_shares"]), 1, places=5)
+        self.assert_refused(2, "--family", "town", "--family", "village", "--out", town)
+
     def test_facts_have_their_keys_and_the_picture_is_drawn(self):
         picture = self.folder / "map.png"
         facts = self.json_of("map", self.town(), "--png", picture)
