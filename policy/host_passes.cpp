@@ -7,13 +7,15 @@
 #include <cstring>
 #include <limits>
 
+#include "pictura/policy/wide_vectors.h"
+
 namespace pictura::host {
 
 namespace {
 
 // exp(x) for x <= 0, within 2e-7 of it. That of common/math.h, whose bits devices share, multiplies by 2^n in a loop;
 // here 2^n is written as an exponent, which vectors can.
-inline float exp_of_negative(float x) {
+PICTURA_INLINE float exp_of_negative(float x) {
   x = x < -87.0f ? -87.0f : x;  // NaN stays
   // The sum's last bits are the whole number; the difference rounds to it.
   constexpr float kRounder = 12582912.0f;  // 1.5 * 2^23
@@ -33,7 +35,7 @@ struct Normal {
 
 // The standard normal distribution at x, by the error function's approximation 7.1.26 of Abramowitz and Stegun, which
 // is within 1.5e-7 and whose exponential is the density's.
-inline Normal normal_at(float x) {
+PICTURA_INLINE Normal normal_at(float x) {
   const float size = x < 0 ? -x : x;
   const float t = 1.0f / (1.0f + 0.3275911f * 0.70710678f * size);
   const float density = exp_of_negative(-0.5f * x * x);
@@ -44,23 +46,31 @@ inline Normal normal_at(float x) {
 
 constexpr float kDensityFactor = 0.39894228f;
 
-}  // namespace
+// Rows of few channels are taken several at a time, since loops over short rows cost more than what they do: as rows of
+// kRowNumbers, the last of which may be shorter.
+constexpr int64_t kRowNumbers = 64;
 
-void bias_gelu(const float* x, const float* bias, int64_t rows, int64_t channels, float* out, float* slope_out) {
-  for (int64_t row = 0; row < rows; ++row) {
-    const float* const from = x + row * channels;
-    float* const to = out + row * channels;
+int64_t channels_at_once(int64_t channels) {
+  return channels < kRowNumbers && kRowNumbers % channels == 0 ? kRowNumbers : channels;
+}
+
+PICTURA_INLINE void bias_gelu_of_rows(const float* x, const float* bias, int64_t numbers, int64_t channels, float* out,
+                                      float* slope_out) {
+  for (int64_t first = 0; first < numbers; first += channels) {
+    const int64_t count = std::min(channels, numbers - first);
+    const float* const from = x + first;
+    float* const to = out + first;
     if (!slope_out) {
 #pragma omp simd
-      for (int64_t c = 0; c < channels; ++c) {
+      for (int64_t c = 0; c < count; ++c) {
         const float v = from[c] + bias[c];
         to[c] = v * normal_at(v).cumulative;
       }
       continue;
     }
-    float* const slope = slope_out + row * channels;
+    float* const slope = slope_out + first;
 #pragma omp simd
-    for (int64_t c = 0; c < channels; ++c) {
+    for (int64_t c = 0; c < count; ++c) {
       const float v = from[c] + bias[c];
       const Normal normal = normal_at(v);
       slope[c] = normal.cumulative + v * kDensityFactor * normal.density;
@@ -69,18 +79,50 @@ void bias_gelu(const float* x, const float* bias, int64_t rows, int64_t channels
   }
 }
 
-void bias_gelu_backward(const float* slope, const float* grad_out, int64_t rows, int64_t channels, float* grad_x_out,
-                        float* bias_grad_inout) {
-  for (int64_t row = 0; row < rows; ++row) {
-    const float *const its_slope = slope + row * channels, *const grad = grad_out + row * channels;
-    float* const to = grad_x_out + row * channels;
+PICTURA_INLINE void bias_gelu_backward_of_rows(const float* slope, const float* grad_out, int64_t numbers,
+                                               int64_t channels, float* grad_x_out, float* bias_grad_inout) {
+  for (int64_t first = 0; first < numbers; first += channels) {
+    const int64_t count = std::min(channels, numbers - first);
+    const float *const its_slope = slope + first, *const grad = grad_out + first;
+    float* const to = grad_x_out + first;
 #pragma omp simd
-    for (int64_t c = 0; c < channels; ++c) {
+    for (int64_t c = 0; c < count; ++c) {
       const float g = grad[c] * its_slope[c];
       to[c] = g;
       bias_grad_inout[c] += g;
     }
   }
+}
+
+PICTURA_WIDE void wide_bias_gelu(const float* x, const float* bias, int64_t numbers, int64_t channels, float* out,
+                                 float* slope_out) {
+  bias_gelu_of_rows(x, bias, numbers, channels, out, slope_out);
+}
+PICTURA_WIDE void wide_bias_gelu_backward(const float* slope, const float* grad_out, int64_t numbers, int64_t channels,
+                                          float* grad_x_out, float* bias_grad_inout) {
+  bias_gelu_backward_of_rows(slope, grad_out, numbers, channels, grad_x_out, bias_grad_inout);
+}
+
+}  // namespace
+
+void bias_gelu(const float* x, const float* bias, int64_t rows, int64_t channels, float* out, float* slope_out) {
+  const int64_t at_once = channels_at_once(channels);
+  float repeated[kRowNumbers];
+  if (at_once > channels) {
+    for (int64_t c = 0; c < at_once; ++c) repeated[c] = bias[c % channels];
+    bias = repeated;
+  }
+  (has_wide_vectors() ? wide_bias_gelu : bias_gelu_of_rows)(x, bias, rows * channels, at_once, out, slope_out);
+}
+
+void bias_gelu_backward(const float* slope, const float* grad_out, int64_t rows, int64_t channels, float* grad_x_out,
+                        float* bias_grad_inout) {
+  const int64_t at_once = channels_at_once(channels);
+  float repeated[kRowNumbers] = {};
+  (has_wide_vectors() ? wide_bias_gelu_backward : bias_gelu_backward_of_rows)(
+      slope, grad_out, rows * channels, at_once, grad_x_out, at_once > channels ? repeated : bias_grad_inout);
+  if (at_once == channels) return;
+  for (int64_t c = 0; c < at_once; ++c) bias_grad_inout[c % channels] += repeated[c];
 }
 
 void bias_norm(const float* x, const float* bias, int64_t rows, int64_t channels, float* out,
