@@ -5,6 +5,7 @@
 
 #include <cstdint>
 
+#include "pictura/policy/host_convolution.h"
 #include "pictura/policy/rules/network_passes.h"
 
 namespace pictura::host {
@@ -32,17 +33,6 @@ void bias_norm(const float* x, const float* bias, int64_t rows, int64_t channels
 /// bias_grad_inout, [channels]. grad_x_out may be grad_out.
 void bias_norm_backward(const float* normalized, const float* inverse_deviations, const float* grad_out, int64_t rows,
                         int64_t channels, float* grad_x_out, float* bias_grad_inout);
-
-/// A convolution over images whose pixels have their channels together, padded by zeros by half the kernel on all
-/// sides.
-struct ConvolutionSize {
-  int64_t height = 0, width = 0, channels = 0, kernel = 1, stride = 1;
-  int64_t rows() const { return (height + 2 * (kernel / 2) - kernel) / stride + 1; }
-  int64_t columns() const { return (width + 2 * (kernel / 2) - kernel) / stride + 1; }
-  int64_t pixels() const { return rows() * columns(); }
-  /// Of the input that an output reads.
-  int64_t taps() const { return kernel * kernel * channels; }
-};
 
 /// What each output of the convolution reads, so that it becomes a matrix product. images: [n, height, width,
 /// channels]; taps_out: [n, rows, columns, kernel, kernel, channels].

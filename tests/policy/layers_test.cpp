@@ -6,6 +6,7 @@
 #include <ATen/core/grad_mode.h>
 #include <gtest/gtest.h>
 
+#include "pictura/policy/host_convolution.h"
 #include "pictura/policy/policy.h"
 #include "pictura/policy/row_features.h"
 #include "pictura/simulator/rules/ego_frame.h"
@@ -181,6 +182,41 @@ TEST(HostLayers, ConvolveGeluIsAtens) {
                         }),
                         {float_numbers({c.images, c.in, c.height, c.width}, 0),
                          float_numbers({c.out, c.in, c.kernel, c.kernel}, 1), float_numbers({c.out}, 2)});
+  }
+}
+
+TEST(HostLayers, ConvolveGeluOfImagesWithoutGradientsIsAtens) {
+  for (const int64_t out : {8, 16, 32}) {
+    const at::Tensor images = float_numbers({9, 3, 9, 14}, 0).to(at::kFloat).contiguous(at::MemoryFormat::ChannelsLast);
+    const auto plain = [&images](const auto& in) {
+      return at::gelu(
+          at::conv2d(images.to(in[0].scalar_type()), in[0], in[1], at::IntArrayRef({2, 2}), at::IntArrayRef({1, 1})));
+    };
+    expect_as_in_double([&images](const auto& in) { return convolve_gelu(images, in[0], in[1], 2); }, plain,
+                        {float_numbers({out, 3, 3, 3}, 1), float_numbers({out}, 2)});
+  }
+}
+
+TEST(HostLayers, DirectConvolutionsHaveTheSameBitsByVectorsOfAnyWidth) {
+  if (!host::has_wide_vectors()) GTEST_SKIP() << "this processor has no wide vectors";
+  const host::ConvolutionSize size{.height = 5, .width = 7, .channels = 24, .kernel = 3, .stride = 2};
+  const int64_t images = 5;
+  for (const int64_t outputs : {8, 16, 32}) {
+    const auto results_of = [&](bool is_wide) {
+      const at::Tensor x = test::numbers({images, size.height, size.width, size.channels}, 0).to(at::kFloat),
+                       weight = test::numbers({size.taps(), outputs}, 1).to(at::kFloat),
+                       grad = test::numbers({images, size.pixels(), outputs}, 2).to(at::kFloat);
+      std::vector<at::Tensor> made{at::empty_like(grad), at::zeros_like(weight), at::empty_like(x)};
+      host::DirectConvolution convolution(size, outputs, images, is_wide);
+      convolution.read(x.const_data_ptr<float>(), images);
+      convolution.compute(weight.const_data_ptr<float>(), made[0].mutable_data_ptr<float>());
+      convolution.add_weight_gradient(grad.const_data_ptr<float>(), made[1].mutable_data_ptr<float>());
+      convolution.compute_image_gradient(grad.const_data_ptr<float>(), weight.t().contiguous().const_data_ptr<float>(),
+                                         made[2].mutable_data_ptr<float>());
+      return made;
+    };
+    const std::vector<at::Tensor> wide = results_of(true), narrow = results_of(false);
+    for (size_t i = 0; i < wide.size(); ++i) EXPECT_TRUE(wide[i].equal(narrow[i])) << outputs << ", " << i;
   }
 }
 
