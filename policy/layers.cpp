@@ -235,6 +235,18 @@ host::ConvolutionSize convolution_size(const at::Tensor& x, const at::Tensor& we
   return {x.size(1), x.size(2), x.size(3), weight.size(2), stride};
 }
 
+// Computes a convolution with its GELU by Pass::compute(), and keeps what the way back needs: images, weight, and the
+// slopes of the GELUs.
+template <typename Pass>
+at::Tensor forward_with_slopes(AutogradContext* context, const at::Tensor& x, const at::Tensor& weight,
+                               const at::Tensor& bias, int64_t stride) {
+  at::Tensor slope;
+  const at::Tensor out = Pass::compute(x, weight, bias, stride, &slope);
+  context->save_for_backward({x, weight, slope});
+  context->saved_data["stride"] = stride;
+  return out;
+}
+
 // A convolution of few outputs by host::DirectConvolution, a block of images at a time. Shapes as HostConvolution's.
 struct HostDirectConvolution : Function<HostDirectConvolution> {
   static bool takes(const at::Tensor& x, const at::Tensor& weight) {
@@ -265,11 +277,7 @@ struct HostDirectConvolution : Function<HostDirectConvolution> {
 
   static at::Tensor forward(AutogradContext* context, const at::Tensor& x, const at::Tensor& weight,
                             const at::Tensor& bias, int64_t stride) {
-    at::Tensor slope;
-    const at::Tensor out = compute(x, weight, bias, stride, &slope);
-    context->save_for_backward({x, weight, slope});
-    context->saved_data["stride"] = stride;
-    return out;
+    return forward_with_slopes<HostDirectConvolution>(context, x, weight, bias, stride);
   }
 
   static variable_list backward(AutogradContext* context, const variable_list& grads) {
@@ -359,11 +367,7 @@ struct HostConvolution : Function<HostConvolution> {
 
   static at::Tensor forward(AutogradContext* context, const at::Tensor& x, const at::Tensor& weight,
                             const at::Tensor& bias, int64_t stride) {
-    at::Tensor slope;
-    const at::Tensor out = compute(x, weight, bias, stride, &slope);
-    context->save_for_backward({x, weight, slope});
-    context->saved_data["stride"] = stride;
-    return out;
+    return forward_with_slopes<HostConvolution>(context, x, weight, bias, stride);
   }
 
   static variable_list backward(AutogradContext* context, const variable_list& grads) {
