@@ -1,7 +1,7 @@
 #include "pictura/evaluation/mixed_traffic.h"
 
 #include <algorithm>
-#include <numeric>
+#include <optional>
 #include <utility>
 
 #include "pictura/backends/make_controller.h"
@@ -9,7 +9,6 @@
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
 #include "pictura/common/support/numbers.h"
-#include "pictura/configuration/config.h"
 #include "pictura/evaluation/world_arrays.h"
 #include "pictura/policy/session.h"
 #include "pictura/simulator/controllers/host_controllers.h"
@@ -59,17 +58,14 @@ struct MixedTraffic::Other {
   OtherDriver driver;
   std::unique_ptr<PolicySession> session;
   std::unique_ptr<Renderer> renderer;
-  DriverOptions options;  // of which argmax and seed count
 };
 
 MixedTraffic::MixedTraffic(const std::vector<OtherDriver>& others, const DriverOptions& options, Device device,
                            const CompiledMaps& maps)
-    : seed_(options.seed) {
+    : options_(options) {
   for (const OtherDriver& driver : others) {
     auto other = std::make_unique<Other>();
     other->driver = driver;
-    other->options.argmax = options.argmax;
-    other->options.seed = options.seed;
     if (!is_controller(driver.name)) {
       other->session = std::make_unique<PolicySession>(driver.name, options_of(options, device));
       other->renderer = other->session->make_renderer();
@@ -112,7 +108,7 @@ std::vector<uint8_t> MixedTraffic::driver_of_slots(Simulator& simulator) const {
   for (size_t world = 0; world < simulator.worlds().size(); ++world) {
     for (int32_t slot = slot_begin[world]; slot < slot_begin[world + 1]; ++slot) {
       if (agent_class[static_cast<size_t>(slot)] != AgentClass::vehicle) continue;
-      RandomStream random({.seed = seed_,
+      RandomStream random({.seed = options_.seed,
                            .world = simulator.worlds()[world].global_world,
                            .agent = static_cast<uint32_t>(slot - slot_begin[world]),
                            .purpose = Purpose::driver});
@@ -136,9 +132,8 @@ Driving MixedTraffic::share(Driving own, Simulator& simulator, const std::vector
     Driver driver{std::move(own.controller), memory->span(), memory};
     if (i > 0) {
       const Other& other = *others_[i - 1];
-      driver.controller = other.session
-                              ? policy_controller(*other.session, other.renderer.get(), other.options, simulator)
-                              : make_controller(other.driver.name, simulator, seed_);
+      driver.controller = other.session ? policy_controller(*other.session, other.renderer.get(), options_, simulator)
+                                        : make_controller(other.driver.name, simulator, options_.seed);
     }
     drivers.push_back(std::move(driver));
   }

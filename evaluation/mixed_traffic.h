@@ -1,4 +1,4 @@
-// Mixed traffic: vehicles that others drive than whom an evaluation is of, saved policies of any kind or controllers.
+// Mixed traffic: evaluations in which other saved policies, of any kind, or controllers drive some of the vehicles.
 #pragma once
 
 #include <cstdint>
@@ -11,24 +11,23 @@
 
 namespace pictura {
 
-/// One of the others.
+/// A driver beside the evaluated one.
 struct OtherDriver {
   std::string name;  // a saved policy's file, or one of town_controller_names()
   double share = 0;  // of vehicles
 };
 constexpr size_t kMaxOtherDrivers = 8;
 
-/// Others of texts like "lane=0.25" or "models/vector.safetensors=0.5". Throws UsageError naming the text that is not
-/// of this form, or whose share is not above 0; or where all shares together leave nobody, or there are more than
-/// kMaxOtherDrivers.
+/// Parses texts like "lane=0.25" or "models/vector.safetensors=0.5". Throws UsageError naming a text that has another
+/// form, or a share that is not above 0; also if the shares sum to 1 or more, or there are more than kMaxOtherDrivers.
 std::vector<OtherDriver> other_drivers(const std::vector<std::string>& texts);
 
-/// Who drives which vehicles of an evaluation's worlds. Drivers are numbered: 0 is whom the evaluation is of, others
-/// follow in their order.
+/// Assigns the vehicles of an evaluation's worlds to drivers. Driver 0 is the evaluated one; the others follow in their
+/// order.
 class MixedTraffic {
  public:
-  /// Others drive on `device`, by argmax and seed of the options; those who see images get the maps as 0, 1, ... What
-  /// agents are told is the world's.
+  /// Opens the others on `device`, with argmax and seed of the options. Renderers of those that see images hold the
+  /// maps under the handles 0, 1, ... Conditioning is the world's.
   MixedTraffic(const std::vector<OtherDriver>& others, const DriverOptions& options, Device device,
                const CompiledMaps& maps);
   ~MixedTraffic();
@@ -36,22 +35,23 @@ class MixedTraffic {
   MixedTraffic& operator=(const MixedTraffic&) = delete;
 
   size_t num_drivers() const;
-  /// The driver's name; empty for number 0.
+  /// The driver's name; empty for driver 0.
   std::string name(size_t driver) const;
-  /// What of an evaluation's setting the others are: a policy's hash or a controller's name, and its share.
+  /// The others in an evaluation's setting: a policy's hash or a controller's name, and its share.
   std::vector<std::string> setting() const;
-  /// The world in which all drivers observe what they read.
+  /// The world with every array that some driver reads.
   SimulatorConfig observed(SimulatorConfig world) const;
 
-  /// The number of the driver of each slot, [slots], drawn by seed, global world and agent. Pedestrians and cyclists
-  /// are number 0's.
+  /// The driver of each slot, [slots], drawn from seed, global world and agent. Driver 0 has all pedestrians and
+  /// cyclists.
   std::vector<uint8_t> driver_of_slots(Simulator& simulator) const;
-  /// The simulator's drivers at the start of its episodes, of whom `own` is number 0. The result needs this.
+  /// Combines `own`, driver 0, with the others for a simulator at the start of its episodes. This must outlive the
+  /// result.
   Driving share(Driving own, Simulator& simulator, const std::vector<uint8_t>& driver_of_slot) const;
 
  private:
   struct Other;
-  uint64_t seed_;
+  DriverOptions options_;  // of whom is evaluated; others take argmax and seed
   std::vector<std::unique_ptr<Other>> others_;
 };
 

@@ -35,6 +35,9 @@ class DeviceTraining : public test::DeviceTest {
   TrainOptions options(const std::string& run, const std::string& device, std::vector<std::string> more) const {
     return test::small_run(folder_ / run, device, std::move(more));
   }
+  /// That a device's first update does the same as the host's, and that its reproducible runs in bf16 are equal.
+  void expect_learns_as_on_the_host(std::vector<std::string> more) const;
+
   test::ScratchFolder folder_;
 };
 
@@ -72,6 +75,16 @@ void expect_same_first_update(const std::string& run, const std::string& other, 
     EXPECT_NEAR(x, y, (is_of_learning ? loss_tolerance : tolerance) * (1 + std::abs(x))) << name;
   }
   EXPECT_GT(a.at(1, "charts/agent_steps"), 0);
+}
+
+void DeviceTraining::expect_learns_as_on_the_host(std::vector<std::string> more) const {
+  train(options("host", "cpu", more));
+  train(options("device", "cuda", more));
+  expect_same_first_update(folder_ / "host", folder_ / "device", 1e-6, 2e-2);
+  more.insert(more.end(), {"train.reproducible=true", "train.precision=bf16"});
+  const auto [whole, again, resumed] = test::policies_of_equal_runs(folder_ / "bf16", "cuda", more);
+  EXPECT_EQ(again, whole);
+  EXPECT_EQ(resumed, whole);
 }
 
 class EachModality : public DeviceTraining, public testing::WithParamInterface<const char*> {
@@ -135,25 +148,12 @@ TEST_P(EachModality, TheFirstUpdateIsTheHosts) {
 TEST_P(EachModality, AQuantileFilterLearnsAsOnTheHost) {
   std::vector<std::string> more = one_update();
   more.push_back("train.adv_filter=quantile");
-  train(options("host", "cpu", more));
-  train(options("device", "cuda", more));
-  expect_same_first_update(folder_ / "host", folder_ / "device", 1e-6, 2e-2);
-  more.insert(more.end(), {"train.reproducible=true", "train.precision=bf16"});
-  const auto [whole, again, resumed] = test::policies_of_equal_runs(folder_ / "bf16", "cuda", more);
-  EXPECT_EQ(again, whole);
-  EXPECT_EQ(resumed, whole);
+  expect_learns_as_on_the_host(more);
 }
 
 TEST_F(DeviceTraining, SegmentsAreReadAsOnTheHost) {
-  std::vector<std::string> more{"policy.modality=vector", "policy.segment_features=true", "train.precision=fp32",
-                                "train.updates=1",        "train.num_steps=30",           "train.forward_chunk=3"};
-  train(options("host", "cpu", more));
-  train(options("device", "cuda", more));
-  expect_same_first_update(folder_ / "host", folder_ / "device", 1e-6, 2e-2);
-  more.insert(more.end(), {"train.reproducible=true", "train.precision=bf16"});
-  const auto [whole, again, resumed] = test::policies_of_equal_runs(folder_ / "bf16", "cuda", more);
-  EXPECT_EQ(again, whole);
-  EXPECT_EQ(resumed, whole);
+  expect_learns_as_on_the_host({"policy.modality=vector", "policy.segment_features=true", "train.precision=fp32",
+                                "train.updates=1", "train.num_steps=30", "train.forward_chunk=3"});
 }
 
 TEST_P(EachModality, ATeacherTeachesAsOnTheHost) {
