@@ -16,7 +16,7 @@ struct ScenarioPlace {
 };
 
 /// The scenarios with the largest share of vehicles with an at-fault infraction, worst first; `count` of them, or all.
-/// Of equals those with more collisions at fault come first, then those where less was driven.
+/// Ties are broken by more collisions at fault, then by less distance driven.
 std::vector<ScenarioPlace> worst_scenarios(const EvaluationResults& results, int count);
 
 /// A scenario to drive again.

@@ -60,8 +60,8 @@ void visit_options(EvaluateOptions& options, Visitor&& v) {
 }
 
 struct EvaluateReport {
-  // Of the densities that were finished, in the order of options.densities; of each first of whom the evaluation is,
-  // then of the others.
+  // Counts of the finished densities, in the order of options.densities; for each density first the evaluated driver's,
+  // then the others'.
   EvaluationResults results;
   std::vector<EvaluateRow> rows;  // of each
   bool interrupted = false;       // ^C came (common/support/interrupt.h) before the last one was

@@ -76,7 +76,7 @@ struct DensityResult {
   int agents_per_world = 0;
   int first_scenario = 0;
   std::vector<ScenarioCounts> scenarios;
-  std::string driver;  // whose vehicles, one of EvaluateOptions::others; empty: of whom the evaluation is
+  std::string driver;  // whose vehicles: one of EvaluateOptions::others; empty: the evaluated driver's
 };
 
 /// What decides an evaluation's numbers. Parts are merged where all of it is the same.

@@ -42,7 +42,7 @@ inline Float8 operator-(const Float8& a) { return {_mm256_xor_ps(_mm256_set1_ps(
 inline Float8 magnitude(const Float8& a) { return {_mm256_andnot_ps(_mm256_set1_ps(-0.0f), a.value)}; }
 inline Float8 round_down(const Float8& a) { return {_mm256_floor_ps(a.value)}; }
 inline Float8 round_up(const Float8& a) { return {_mm256_ceil_ps(a.value)}; }
-/// As the functions of scalars.
+/// Lane by lane the functions of the same names for floats.
 inline Float8 min_no_nan(const Float8& a, const Float8& b) { return {_mm256_min_ps(a.value, b.value)}; }
 inline Float8 max_no_nan(const Float8& a, const Float8& b) { return {_mm256_max_ps(a.value, b.value)}; }
 inline Float8 sqrt_in_range(const Float8& a) { return {_mm256_sqrt_ps(a.value)}; }
@@ -152,7 +152,7 @@ inline void copy_chosen(const Word* from, uint32_t mask, Word* to) {
   const __m256i all = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_permutevar8x32_epi32(all, set_bits(mask)));
 }
-/// As copy_chosen() from the integers first to first + 7.
+/// Writes those of the integers first to first + 7 that the mask chooses, as copy_chosen() does.
 inline void store_chosen(int32_t first, uint32_t mask, int32_t* to) {
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_add_epi32(set_bits(mask), _mm256_set1_epi32(first)));
 }
@@ -374,7 +374,7 @@ struct alignas(32) LeastKeys {
 
 PICTURA_HD inline Mask8 operator>(const Float8& a, const Float8& b) { return b < a; }
 PICTURA_HD inline Mask8 operator>=(const Float8& a, const Float8& b) { return b <= a; }
-/// As the functions of scalars.
+/// Lane by lane the functions of the same names for floats.
 PICTURA_HD inline Float8 reciprocal_in_range(const Float8& a) { return 1.0f / a; }
 PICTURA_HD inline Float8 saturate(const Float8& a) { return min_no_nan(max_no_nan(a, 0.0f), 1.0f); }
 

@@ -15,7 +15,7 @@ constexpr double kMinGap_rad = degrees(72), kMinOppositeGap_rad = degrees(150), 
 constexpr double kFlatGap_rad = degrees(140);
 constexpr double kMinMouth_m = 9, kMinBendMouth_m = 10;
 constexpr double kOverpassMargin_m = 2;
-// Of the inner edge of a bend.
+// Radii of the inner edge of a bend.
 constexpr double kBendRadius_m = 10, kMotorwayBendRadius_m = 90;
 // Distances of a fork's mouths from its node: before the ramps, and where they have left the motorway.
 constexpr double kForkBefore_m = 10, kForkBeyond_m = 40;

@@ -86,7 +86,7 @@ class BallGrid {
   }
 
   GridView grid_;
-  // Of the grid's items, and of a vector beyond.
+  // Centres and radii of the grid's items, padded by one vector.
   std::vector<float> x_m_, y_m_, z_m_, radius_m_;
   std::vector<uint8_t> starts_;  // whether the item's box begins in this cell's column and row
 };
