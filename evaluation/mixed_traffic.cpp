@@ -26,6 +26,7 @@ bool is_controller(const std::string& name) {
 SessionOptions options_of(const DriverOptions& options, Device device) {
   SessionOptions result;
   result.device = name_of(device);
+  result.simulator = options.simulator;
   result.num_threads = options.num_threads;
   return result;
 }
