@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/parallel_for.h"
@@ -236,26 +237,35 @@ class SimulatorCpu final : public Simulator {
     worlds_.state.episode_over[index] = 0;
     const WorldView world = worlds_.world(w);
     for (int light = 0; light < static_cast<int>(world.map.stop_lines.size()); ++light) begin_light(world, light);
+    // The cells hold chains until all boxes stand.
+    CellLists& cells = worlds_.box_cells[index];
+    const BoxChains standing{cells.view(), cells.begin.data(), cells.items.data()};
+    std::fill(cells.begin.begin(), cells.begin.end(), -1);
+    const auto add = [&world, &standing](int box) {
+      if (!world.boxes[box].drawn) return;
+      add_box(standing, box, world.boxes[box].center_m.xy(),
+              [](int32_t* value, int32_t other) { return std::exchange(*value, other); });
+    };
     const int num_parked = world.num_boxes - world.num_agents;
     for (int car = 0; car < num_parked; ++car) {
       put_parked_car(world, car, first_try(!world.map.parking_spots.empty(), [&](int i) {
                        const ParkingSpot& spot = parking_spot(world, car, i);
                        const AgentBox box = parked_box(world, car, spot);
-                       return may_park(world.map, box, spot) &&
-                              is_clear(world, box, world.num_agents, world.num_agents + car);
+                       return is_clear(world, box, standing) && may_park(world.map, box, spot);
                      }));
+      add(world.num_agents + car);
     }
     // All choose before any is placed, since who is placed takes the height of its road.
     for (int agent = 0; agent < world.num_agents; ++agent) {
       draw_agent(world, agent);
       const int chosen = first_try(has_places(world, agent), [&](int i) {
         const AgentBox box = spawn_box(world, agent, i);
-        return may_spawn(world.map, box) && is_clear(world, box, 0, agent) &&
-               is_clear(world, box, world.num_agents, world.num_boxes);
+        return is_clear(world, box, standing) && may_spawn(world.map, box);
       });
       if (chosen >= 0) world.boxes[agent] = spawn_box(world, agent, chosen);
       world.boxes[agent].drawn = chosen >= 0;
       chosen_try_[world.first_slot + agent] = chosen;
+      add(agent);
     }
     int spawned = 0;
     for (int agent = 0; agent < world.num_agents; ++agent) {

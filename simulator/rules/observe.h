@@ -56,14 +56,14 @@ PICTURA_HD void observe_waypoints(const WorldView& world, int slot, const EgoFra
   }
 }
 
-/// The partners of `agent` by distance from its reference point to their box centres: from the near cells where enough
-/// stand there, else from all that are in range.
+/// The partners of `agent` by distance from its reference point to their box centres: from the nearest cells where
+/// enough stand there, else from farther and farther ones, up to all in range.
 template <typename ThreadGroup>
 PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin, const ThreadGroup& group) {
   using Nearest = typename ThreadGroup::template Nearest<kMaxPartners>;
   const GridView& cells = world.box_cells;
   // A cell may be wider than what is in sight: a device has but one.
-  for (float reach = min_of(cells.cell_m, kPartnerRange_m);; reach = kPartnerRange_m) {
+  for (float reach = min_of(cells.cell_m, kPartnerRange_m);; reach = min_of(2.0f * reach, kPartnerRange_m)) {
     const CellRows range = cells_around(cells, origin, reach);
     const bool is_near = reach < kPartnerRange_m;
     int found = 0;
@@ -71,10 +71,18 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
     if (is_near && found <= kMaxPartners) continue;
     Nearest nearest;
     if constexpr (ThreadGroup::kSize == 1) {
-      // Rows follow one another: what stands beside the range is read as well, which costs less than a loop a row.
+      const auto offer = [&](int32_t begin, int32_t end) {
+        nearest.offer_all(world.cell_centers + begin, cells.items.data() + begin, end - begin, agent, origin,
+                          square(reach));
+      };
+      // Rows follow one another. What stands beside the range is read as well where that costs less than a loop a row.
+      constexpr int32_t kReadAtOnce = 256;
       const int32_t begin = range.begin(cells, range.y0), end = range.end(cells, range.y1);
-      nearest.offer_all(world.cell_centers + begin, cells.items.data() + begin, end - begin, agent, origin,
-                        square(reach));
+      if (end - begin <= kReadAtOnce) {
+        offer(begin, end);
+      } else {
+        for (int y = range.y0; y <= range.y1; ++y) offer(range.begin(cells, y), range.end(cells, y));
+      }
     } else {
       for (int y = range.y0; y <= range.y1; ++y) {
         const int32_t begin = range.begin(cells, y), end = range.end(cells, y);

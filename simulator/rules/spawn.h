@@ -1,6 +1,7 @@
 // The start of an episode or a life: what an agent is, how it is conditioned, where it stands, and where it goes first.
 #pragma once
 
+#include "pictura/simulator/rules/box_chains.h"
 #include "pictura/simulator/rules/collision.h"
 #include "pictura/simulator/rules/goal.h"
 #include "pictura/simulator/rules/record.h"
@@ -90,21 +91,44 @@ PICTURA_HD inline void draw_agent(const WorldView& world, int agent) {
   draw_body(world, agent);
 }
 
+/// A box with kSpawnClearance_m around it.
+PICTURA_HD inline AgentBox with_clearance(AgentBox box) {
+  box.length_m += 2.0f * kSpawnClearance_m;
+  box.width_m += 2.0f * kSpawnClearance_m;
+  return box;
+}
+
+/// How far from the centre of a box with clearance others of the map may stand that reach into it.
+PICTURA_HD inline float clearance_reach_m(const MapView& map, const AgentBox& inflated) {
+  return radius(inflated) + map.max_box_radius_m;
+}
+
+/// Whether another box reaches into one with clearance.
+PICTURA_HD inline bool blocks(const AgentBox& other, const MapView& map, const AgentBox& inflated) {
+  const Vec2 apart = (other.center_m - inflated.center_m).xy();
+  if (!other.drawn || dot(apart, apart) > square(clearance_reach_m(map, inflated))) return false;
+  return same_level(inflated, other) && overlap(footprint(inflated), footprint(other));
+}
+
 /// Whether a box keeps kSpawnClearance_m from the boxes [begin, end).
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool is_clear(const WorldView& world, const AgentBox& box, int begin, int end,
                          const ThreadGroup& group = {}) {
-  AgentBox inflated = box;
-  inflated.length_m += 2.0f * kSpawnClearance_m;
-  inflated.width_m += 2.0f * kSpawnClearance_m;
+  const AgentBox inflated = with_clearance(box);
   bool is_taken = false;
   for (int i = begin + group.rank(); i < end && !is_taken; i += group.size()) {
-    const AgentBox& other = world.boxes[i];
-    const Vec2 apart = (other.center_m - box.center_m).xy();
-    if (!other.drawn || dot(apart, apart) > square(radius(inflated) + world.map.max_box_radius_m)) continue;
-    is_taken = same_level(inflated, other) && overlap(footprint(inflated), footprint(other));
+    is_taken = blocks(world.boxes[i], world.map, inflated);
   }
   return !group.any(is_taken);
+}
+
+/// The same of the boxes in chains.
+template <typename ThreadGroup = SingleThread>
+PICTURA_HD bool is_clear(const WorldView& world, const AgentBox& box, const BoxChains& chains,
+                         const ThreadGroup& group = {}) {
+  const AgentBox inflated = with_clearance(box);
+  return !any_box_near(chains, inflated.center_m.xy(), clearance_reach_m(world.map, inflated), group,
+                       [&](int32_t other) { return blocks(world.boxes[other], world.map, inflated); });
 }
 
 template <typename ThreadGroup = SingleThread>

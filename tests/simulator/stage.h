@@ -30,7 +30,7 @@ class Stage {
   HostWorlds worlds;
   HostResults results;
 
- private:
+ protected:
   void sort_boxes();
 };
 

@@ -1,0 +1,43 @@
+// Boxes that are put into a world one after the other, by the cells of their centres: what stands near a place is found
+// without a look at all of them. The same code on both devices.
+#pragma once
+
+#include "pictura/common/cells_around.h"
+#include "pictura/common/scene_types.h"
+
+namespace pictura {
+
+/// A chain of boxes for each cell, which begins with the box added last; -1 ends it.
+struct BoxChains {
+  GridView cells;            // their place and size; without items
+  int32_t* first = nullptr;  // [cells.num_x * cells.num_y]
+  int32_t* next = nullptr;   // [boxes]
+
+  PICTURA_HD int num_cells() const { return cells.num_x * cells.num_y; }
+  PICTURA_HD int32_t* first_at(Vec2 p) const { return first + cells.cell_y(p.y) * cells.num_x + cells.cell_x(p.x); }
+};
+
+/// Adds a box that stands at a place to its chain. exchange(value, other) stores the other value and returns the
+/// one before; where threads add boxes at once, as one operation.
+template <typename Exchange>
+PICTURA_HD void add_box(const BoxChains& chains, int32_t box, Vec2 center_m, const Exchange& exchange) {
+  chains.next[box] = exchange(chains.first_at(center_m), box);
+}
+
+/// Whether test(box) holds for any box within reach_m of a place; boxes that are farther may be tested too. The threads
+/// of a group take the cells in turn.
+template <typename ThreadGroup, typename Test>
+PICTURA_HD bool any_box_near(const BoxChains& chains, Vec2 p, float reach_m, const ThreadGroup& group,
+                             const Test& test) {
+  constexpr float kLeeway_m = 0.1f;  // more than sums of coordinates are rounded by
+  const CellRows range = cells_around(chains.cells, p, reach_m + kLeeway_m);
+  const int columns = range.x1 - range.x0 + 1, count = columns * (range.y1 - range.y0 + 1);
+  bool found = false;
+  for (int k = group.rank(); k < count && !found; k += group.size()) {
+    const int cell = (range.y0 + k / columns) * chains.cells.num_x + range.x0 + k % columns;
+    for (int32_t box = chains.first[cell]; box >= 0 && !found; box = chains.next[box]) found = test(box);
+  }
+  return group.any(found);
+}
+
+}  // namespace pictura
