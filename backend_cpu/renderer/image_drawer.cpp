@@ -32,16 +32,24 @@ void ImageDrawer::prepare(const ImageRequest& request) {
   edges_.clear();
   faces_.clear();
   for (const Solid& solid : solids_) face_maker(solid.primitive)(make_camera_face(solid.in_camera, 0.0f));
-  visit_lights(setting_, request.geometry->view, *request.scene, *request.view,
-               [&](const LightHead& head, LightState state, int32_t index) {
-                 light_faces(head, state, setting_.camera, face_maker(light_ref(index)));
-               });
+  make_lights();
   make_strips();
+}
+
+void ImageDrawer::make_lights() {
+  const Span<const LightState> states = light_states_of(*request_.scene, *request_.view);
+  if (states.empty()) return;
+  request_.geometry->heads.find_visible(setting_.camera, setting_.frustum, &found_);
+  for (const int32_t index : found_) {
+    const LightHead& head = request_.geometry->view.heads[index];
+    light_faces(head, states[head.signal], setting_.camera, face_maker(light_ref(index)));
+  }
 }
 
 void ImageDrawer::make_strips() {
   strips_.clear();
   request_.geometry->strips.visit_visible(setting_.camera, setting_.frustum,
+                                          frustum_ground_box(setting_.camera, setting_.frustum),
                                           [this](int32_t index) { strips_.push_back(index); });
   const Span<const Strip> strips = request_.geometry->view.strips;
   for (std::size_t begin = 0; begin < strips_.size(); begin += kLanes) {
@@ -67,12 +75,24 @@ void ImageDrawer::make_strips() {
   }
 }
 
+// Calls visit(box, agent) for each agent that may be visible, in ascending order.
+template <typename Visit>
+void ImageDrawer::visit_boxes(Visit&& visit) {
+  const SceneBatch& scene = *request_.scene;
+  if (!request_.crowd) return visit_agents(setting_, scene, *request_.view, visit);
+  request_.crowd->find_visible(setting_.camera, setting_.frustum, &found_);
+  for (const int32_t found : found_) {
+    const int32_t agent = world_begin() + found;
+    if (!is_excluded(*request_.view, scene.hidden_agents, agent)) visit(scene.agents[agent], agent);
+  }
+}
+
 void ImageDrawer::find_solids() {
   solids_.clear();
   auto add_unless_black = [this](const WorldQuad& quad, Solid solid) {
     if (quad_to_camera(quad, setting_.camera, &solid.in_camera)) solids_.push_back(solid);
   };
-  visit_agents(setting_, *request_.scene, *request_.view, [&](const AgentBox& box, int32_t agent) {
+  visit_boxes([&](const AgentBox& box, int32_t agent) {
     const PrimitiveRef primitive = agent_ref(box, agent - world_begin());
     const bool may_occlude_others = may_occlude(box, setting_.camera);
     visit_front_facing(box, setting_.camera, [&](int face) {
@@ -80,7 +100,8 @@ void ImageDrawer::find_solids() {
                        {primitive, face_entry(primitive.object_id, face), may_occlude_others, {}});
     });
   });
-  request_.geometry->walls.visit_visible(setting_.camera, setting_.frustum, [&](int32_t index) {
+  const Aabb2 seen = frustum_ground_box(setting_.camera, setting_.frustum);
+  request_.geometry->walls.visit_visible(setting_.camera, setting_.frustum, seen, [&](int32_t index) {
     const WallFace& wall = request_.geometry->view.walls[index];
     const PrimitiveRef primitive = wall_ref(index);
     add_unless_black(wall_quad(wall), {primitive, primitive.object_id, may_occlude(wall, setting_.camera), {}});

@@ -20,7 +20,8 @@ struct ImageRequest {
   PinholeCamera camera;  // in the world
   float line_floor_px = 0;
   bool debug_palette = false;
-  bool culls_occluded = true;  // drop faces behind the solids that cover most of the image
+  bool culls_occluded = true;    // drop faces behind the solids that cover most of the image
+  const Crowd* crowd = nullptr;  // of the view's world; null: every box is tested
 };
 
 /// Outputs of one image.
@@ -96,7 +97,10 @@ class ImageDrawer {
   };
 
   void find_solids();
+  void make_lights();
   void make_strips();
+  template <typename Visit>
+  void visit_boxes(Visit&& visit);
   void find_occluders();
   // Returns a function that sets up the faces of a primitive.
   auto face_maker(PrimitiveRef primitive);
@@ -121,6 +125,7 @@ class ImageDrawer {
   std::vector<OccludingFace> occluding_;
   EdgePool edges_;
   std::vector<ScreenFace> faces_;
+  std::vector<int32_t> found_;           // boxes, or light heads, that may be visible
   std::vector<int32_t> strips_;          // that may be visible
   std::vector<float> occluder_bounds_;   // [pixels of the rows] the largest occluder_bound()
   std::vector<int32_t> first_fragment_;  // [pixels of the rows] the first of each list

@@ -47,6 +47,7 @@ class CpuRenderer final : public Renderer {
     const Span<const View> views = counted_views(name(), batch);
     check_scene(name(), scene, geometries_);
     check_views(name(), scene, views);
+    sort_crowds(scene, views);
     const std::size_t num_cameras = cameras_.size();
     parallel_for(num_threads(), static_cast<int64_t>(views.size() * num_cameras), [&](int64_t image, int thread) {
       const std::size_t view = static_cast<std::size_t>(image) / num_cameras;
@@ -63,6 +64,7 @@ class CpuRenderer final : public Renderer {
     check_scene(name(), scene, geometries_);
     check_views(name(), scene, views);
     check_queries(name(), scene, views, batch.size(), queries, visibility_out.size());
+    crowds_.clear();
     parallel_for(num_threads(), static_cast<int64_t>(queries.size()), [&](int64_t i, int thread) {
       const VisibilityQuery& query = queries[i];
       ImageDrawer& drawer = drawers_[thread];
@@ -81,10 +83,32 @@ class CpuRenderer final : public Renderer {
  private:
   int num_threads() const { return static_cast<int>(drawers_.size()); }
 
+  // Sorts the boxes of worlds in which a look at all of them, in every image, would take longer.
+  void sort_crowds(const SceneBatch& scene, Span<const View> views) {
+    constexpr int32_t kMinBoxes = 256, kMinViews = 16;
+    std::vector<int32_t> num_views(scene.geometry.size());
+    for (const View& view : views) ++num_views[view.world];
+    crowds_.clear();
+    crowds_.resize(scene.geometry.size());
+    parallel_for(num_threads(), static_cast<int64_t>(crowds_.size()), [&](int64_t world) {
+      const auto index = static_cast<std::size_t>(world);
+      const int32_t begin = scene.world_begin[index], num_boxes = scene.world_begin[index + 1] - begin;
+      if (num_boxes < kMinBoxes || num_views[index] < kMinViews) return;
+      crowds_[index] = std::make_unique<const Crowd>(
+          Span<const AgentBox>(scene.agents.data() + begin, static_cast<std::size_t>(num_boxes)));
+    });
+  }
+
   ImageRequest request(const SceneBatch& scene, const View& view, std::size_t camera) const {
     const GeometryHandle handle = scene.geometry[view.world];
-    return {culled_[handle].get(), &scene, &view, place_camera(cameras_[camera], view), config_.line_floor_px,
-            config_.debug_palette};
+    const auto world = static_cast<std::size_t>(view.world);
+    return {.geometry = culled_[handle].get(),
+            .scene = &scene,
+            .view = &view,
+            .camera = place_camera(cameras_[camera], view),
+            .line_floor_px = config_.line_floor_px,
+            .debug_palette = config_.debug_palette,
+            .crowd = world < crowds_.size() ? crowds_[world].get() : nullptr};
   }
 
   static ImageTarget target(const ImageBatch& images, std::size_t view, std::size_t camera) {
@@ -103,6 +127,7 @@ class CpuRenderer final : public Renderer {
   std::vector<PinholeCamera> cameras_;  // in the ego frame
   HostGeometries geometries_;
   std::vector<std::unique_ptr<const CulledGeometry>> culled_;  // [handle]
+  std::vector<std::unique_ptr<const Crowd>> crowds_;           // [worlds of the scene] null: not sorted
   std::vector<ImageDrawer> drawers_;                           // one per thread
 };
 

@@ -99,6 +99,25 @@ PICTURA_HD inline Aabb2 frustum_ground_box(const PinholeCamera& camera, const Fr
   return box;
 }
 
+/// Bounding box on the ground of the centres of all spheres up to this radius that sphere_in_frustum() passes. At a
+/// given depth, those are in the frustum's rectangle, widened on all sides.
+PICTURA_HD inline Aabb2 ground_box_of_spheres(const PinholeCamera& camera, const Frustum& f, float radius_m) {
+  const float leeway_m = 0.01f * radius_m + 0.1f;  // more than sums of coordinates are rounded by
+  const float reach_m = radius_m + leeway_m;
+  Aabb2 box;
+  for (int corner = 0; corner < 8; ++corner) {
+    const float z = (corner & 4) ? kVisibleRange_m + reach_m : kNear_m - reach_m;
+    const float x = (corner & 1) ? f.x_high * z + reach_m * reciprocal_in_range(f.x_high_scale)
+                                 : f.x_low * z - reach_m * reciprocal_in_range(f.x_low_scale);
+    const float y = (corner & 2) ? f.y_high * z + reach_m * reciprocal_in_range(f.y_high_scale)
+                                 : f.y_low * z - reach_m * reciprocal_in_range(f.y_low_scale);
+    const Vec3 p = camera.position_m + (camera.right * x + camera.down * y + camera.forward * z);
+    box.low = corner == 0 ? p.xy() : Vec2{min_of(box.low.x, p.x), min_of(box.low.y, p.y)};
+    box.high = corner == 0 ? p.xy() : Vec2{max_of(box.high.x, p.x), max_of(box.high.y, p.y)};
+  }
+  return box;
+}
+
 /// Cells of a grid that a box touches, as half-open ranges; empty if the grid has no items.
 struct CellRange {
   int x_begin = 0, x_end = 0, y_begin = 0, y_end = 0;

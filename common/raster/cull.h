@@ -24,6 +24,15 @@ PICTURA_HD inline float wall_radius_m(const WallFace& wall) {
   return 0.5f * (length(wall.b_m - wall.a_m) + wall.height_m);
 }
 
+/// Slightly more than the disk: the polygon that it is drawn as has the disk's area.
+constexpr float kHeadRadius_m = 1.1f * kLightRadius_m;
+
+PICTURA_HD inline Vec3 box_middle(const AgentBox& box) { return box.center_m + Vec3{0.0f, 0.0f, 0.5f * box.height_m}; }
+PICTURA_HD inline float box_radius_m(const AgentBox& box) {
+  const Vec3 size{box.length_m, box.width_m, box.height_m};
+  return 0.5f * sqrt_in_range(max_no_nan(dot(size, size), 1e-12f));
+}
+
 PICTURA_HD inline bool may_be_visible(const Strip& strip, const PinholeCamera& camera, const Frustum& f) {
   // The minimum width on screen widens a strip by less than the guard band, which the frustum includes.
   return sphere_in_frustum(f, to_camera(camera, strip_middle(strip)), strip_radius_m(strip));
@@ -34,16 +43,11 @@ PICTURA_HD inline bool may_be_visible(const WallFace& wall, const PinholeCamera&
 }
 
 PICTURA_HD inline bool may_be_visible(const LightHead& head, const PinholeCamera& camera, const Frustum& f) {
-  // Slightly larger than the disk: the polygon that it is drawn as has the disk's area.
-  const float radius_m = 1.1f * kLightRadius_m;
-  return sphere_in_frustum(f, to_camera(camera, head.position_m), radius_m);
+  return sphere_in_frustum(f, to_camera(camera, head.position_m), kHeadRadius_m);
 }
 
 PICTURA_HD inline bool may_be_visible(const AgentBox& box, const PinholeCamera& camera, const Frustum& f) {
-  const Vec3 center = box.center_m + Vec3{0.0f, 0.0f, 0.5f * box.height_m};
-  const Vec3 size{box.length_m, box.width_m, box.height_m};
-  const float radius_m = 0.5f * sqrt_in_range(max_no_nan(dot(size, size), 1e-12f));
-  return box.drawn != 0 && sphere_in_frustum(f, to_camera(camera, center), radius_m);
+  return box.drawn != 0 && sphere_in_frustum(f, to_camera(camera, box_middle(box)), box_radius_m(box));
 }
 
 /// Whether a view excludes an agent: its own ego and those it hides.

@@ -31,17 +31,24 @@ PICTURA_HD inline void visit_walls(const ImageSetting& setting, const StaticGeom
       });
 }
 
+/// The states of the lights of a view's world; empty: no light is drawn.
+PICTURA_HD inline Span<const LightState> light_states_of(const SceneBatch& scene, const View& view) {
+  const int32_t begin = scene.light_begin[view.world];
+  const int32_t end = scene.light_begin[static_cast<size_t>(view.world) + 1];
+  return {scene.light_states.data() + begin, static_cast<size_t>(end - begin)};
+}
+
 /// Calls visit(head, state, index) for each light head that may be visible.
 template <typename Visit>
 PICTURA_HD inline void visit_lights(const ImageSetting& setting, const StaticGeometryView& geometry,
                                     const SceneBatch& scene, const View& view, Visit&& visit) {
-  const int32_t begin = scene.light_begin[view.world];
-  if (begin == scene.light_begin[static_cast<size_t>(view.world) + 1]) return;
+  const Span<const LightState> states = light_states_of(scene, view);
+  if (states.empty()) return;
   const Span<const LightHead> heads = geometry.heads;
   for (int32_t i = 0; i < static_cast<int32_t>(heads.size()); ++i) {
     const LightHead& head = heads[i];
     if (!may_be_visible(head, setting.camera, setting.frustum)) continue;
-    visit(head, scene.light_states[begin + head.signal], i);
+    visit(head, states[head.signal], i);
   }
 }
 

@@ -68,7 +68,8 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
     const bool is_near = reach < kPartnerRange_m;
     int found = 0;
     for (int y = range.y0; y <= range.y1 && is_near; ++y) found += range.end(cells, y) - range.begin(cells, y);
-    if (is_near && found <= kMaxPartners) continue;
+    // A half or less of what stands in cells is within reach.
+    if (is_near && found < 2 * kMaxPartners) continue;
     Nearest nearest;
     if constexpr (ThreadGroup::kSize == 1) {
       const auto offer = [&](int32_t begin, int32_t end) {

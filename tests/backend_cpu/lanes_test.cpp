@@ -1,5 +1,6 @@
 // The rules for eight at once against those for one: equal to the bit.
 #include <bit>
+#include <cmath>
 #include <random>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "pictura/common/camera.h"
 #include "pictura/common/raster/check.h"
 #include "pictura/common/raster/face_setup.h"
+#include "pictura/common/rng.h"
 
 namespace pictura {
 namespace {
@@ -140,7 +142,8 @@ TEST(Lanes, VisitThePiecesThatMayBeVisible) {
         [&](int32_t i) {
           if (may_be_visible(items[i], camera, frustum)) expected.push_back(i);
         });
-    balls.visit_visible(camera, frustum, [&](int32_t i) { actual.push_back(i); });
+    balls.visit_visible(camera, frustum, frustum_ground_box(camera, frustum),
+                        [&](int32_t i) { actual.push_back(i); });
     EXPECT_EQ(actual, expected);
     return actual.size();
   };
@@ -151,6 +154,62 @@ TEST(Lanes, VisitThePiecesThatMayBeVisible) {
   });
   EXPECT_GT(strips, 1000u);
   EXPECT_GT(walls, 100u);
+}
+
+// A place near the middle, on the border of a cell, or anywhere between there and far outside any map.
+Vec3 draw_place(RandomStream* random_inout) {
+  const float kind = random_inout->uniform();
+  const float reach_m = kind < 0.6f ? 150.0f : kind < 0.95f ? 600.0f : kind < 0.98f ? 1e5f : 1e8f;
+  Vec3 p{random_inout->uniform(-reach_m, reach_m), random_inout->uniform(-reach_m, reach_m),
+         random_inout->uniform(-10, 20)};
+  if (random_inout->uniform() < 0.2f) p.x = 16.0f * std::floor(p.x / 16.0f);
+  if (random_inout->uniform() < 0.2f) p.y = 16.0f * std::floor(p.y / 16.0f);
+  return p;
+}
+
+TEST(Lanes, FindTheBoxesAndHeadsThatMayBeVisible) {
+  RandomStream random({.seed = 7, .purpose = Purpose::town});
+  std::size_t boxes_seen = 0, heads_seen = 0;
+  for (const int size : {0, 1, 300, 3000}) {
+    for (const float longest_m : {6.0f, 90.0f}) {
+      std::vector<AgentBox> boxes;
+      StaticGeometry geometry;
+      for (int i = 0; i < size; ++i) {
+        const bool is_long = random.uniform() < 0.01f;
+        boxes.push_back(make_box(AgentClass::vehicle, draw_place(&random), random.uniform(-3, 3),
+                                 {is_long ? longest_m : random.uniform(0, 5), random.uniform(0, 3), 1.5f}));
+        boxes.back().drawn = random.uniform() < 0.9f;
+        geometry.heads.push_back({draw_place(&random), {1, 0}});
+      }
+      geometry.build_grids();
+      const Crowd crowd(boxes);
+      const CulledGeometry culled(geometry.view());
+      for (int round = 0; round < 100; ++round) {
+        const Vec3 at = draw_place(&random);
+        const View view = make_view({at.x, at.y, 0}, random.uniform(-3, 3));
+        for (const PinholeCamera& in_ego : pinhole_cameras(paper_rig())) {
+          const PinholeCamera camera = place_camera(in_ego, view);
+          const Frustum frustum = make_frustum(camera);
+          const auto expected = [&](const auto& items) {
+            std::vector<int32_t> visible;
+            for (std::size_t i = 0; i < items.size(); ++i) {
+              if (may_be_visible(items[i], camera, frustum)) visible.push_back(static_cast<int32_t>(i));
+            }
+            return visible;
+          };
+          std::vector<int32_t> found;
+          crowd.find_visible(camera, frustum, &found);
+          ASSERT_EQ(found, expected(boxes)) << size;
+          boxes_seen += found.size();
+          culled.heads.find_visible(camera, frustum, &found);
+          ASSERT_EQ(found, expected(geometry.heads)) << size;
+          heads_seen += found.size();
+        }
+      }
+    }
+  }
+  EXPECT_GT(boxes_seen, 10000u);
+  EXPECT_GT(heads_seen, 10000u);
 }
 
 // An upright face before the camera that fills the middle of its image.
@@ -221,7 +280,8 @@ TEST(Lanes, SetStripsUpAsOne) {
         setting.occluders.occluder[0] = occluder_before(setting);
         setting.occluders.count = 1;
         std::vector<int32_t> index;
-        culled.strips.visit_visible(camera, setting.frustum, [&](int32_t i) { index.push_back(i); });
+        culled.strips.visit_visible(camera, setting.frustum, frustum_ground_box(camera, setting.frustum),
+                                    [&](int32_t i) { index.push_back(i); });
         for (std::size_t begin = 0; begin + kLanes <= index.size(); begin += kLanes) {
           const Strip* strip[kLanes];
           for (int lane = 0; lane < kLanes; ++lane) strip[lane] = &pieces.strips[index[begin + lane]];

@@ -2,10 +2,12 @@
 // in the order of a grid's items.
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <vector>
 
 #include "pictura/backend_cpu/renderer/fast/vectors_x8.h"
+#include "pictura/common/grid.h"
 #include "pictura/common/raster/cull.h"
 
 namespace pictura {
@@ -56,10 +58,11 @@ class BallGrid {
     }
   }
 
-  /// Calls visit(item) for each item that for_each_item() visits and whose ball is in the frustum, in its order.
+  /// Calls visit(item) for each item that for_each_item() visits in a box on the ground and whose ball is in the
+  /// frustum, in its order.
   template <typename Visit>
-  void visit_visible(const PinholeCamera& camera, const Frustum& f, Visit&& visit) const {
-    const CellRange cells = cells_of(grid_, frustum_ground_box(camera, f));
+  void visit_visible(const PinholeCamera& camera, const Frustum& f, const Aabb2& query_box, Visit&& visit) const {
+    const CellRange cells = cells_of(grid_, query_box);
     for (int y = cells.y_begin; y < cells.y_end; ++y) {
       // An item is visited in its first column and row of those that the box touches.
       const int32_t first_column_end = begin(cells.x_begin + 1, y), row_end = begin(cells.x_end, y);
@@ -91,6 +94,84 @@ class BallGrid {
   std::vector<uint8_t> starts_;  // whether the item's box begins in this cell's column and row
 };
 
+/// Balls by the cells of their centres, all of which are found that a frustum may show.
+class CenteredBalls {
+ public:
+  explicit CenteredBalls(const std::vector<BallGrid::Ball>& balls)
+      : grid_(make_grid(balls)),
+        balls_(
+            grid_.view(), [&balls](int32_t i) { return balls[i]; },
+            [&balls](int32_t i) { return center_of(balls[i]); }) {
+    for (const BallGrid::Ball& ball : balls) largest_radius_m_ = max_of(largest_radius_m_, ball.radius_m);
+  }
+  CenteredBalls(const CenteredBalls&) = delete;
+  CenteredBalls& operator=(const CenteredBalls&) = delete;
+
+  /// Writes the indices of the balls that sphere_in_frustum() passes, in ascending order.
+  void find_visible(const PinholeCamera& camera, const Frustum& f, std::vector<int32_t>* found_out) const {
+    found_out->clear();
+    const Aabb2 box = ground_box_of_spheres(camera, f, largest_radius_m_);
+    balls_.visit_visible(camera, f, {within_bounds(box.low), within_bounds(box.high)},
+                         [found_out](int32_t i) { found_out->push_back(i); });
+    std::sort(found_out->begin(), found_out->end());
+  }
+
+ private:
+  /// What is farther out than any map belongs to the outermost cells.
+  static Vec2 within_bounds(Vec2 p) {
+    constexpr float kBound_m = 1e6f;
+    return {clamp(p.x, -kBound_m, kBound_m), clamp(p.y, -kBound_m, kBound_m)};
+  }
+  static Aabb2 center_of(const BallGrid::Ball& ball) {
+    const Vec2 center = within_bounds(ball.middle_m.xy());
+    return {center, center};
+  }
+  static Grid make_grid(const std::vector<BallGrid::Ball>& balls) {
+    std::vector<Aabb2> centers;
+    for (const BallGrid::Ball& ball : balls) centers.push_back(center_of(ball));
+    Aabb2 all = centers.empty() ? Aabb2{} : centers[0];
+    for (const Aabb2& center : centers) {
+      all.low = {min_of(all.low.x, center.low.x), min_of(all.low.y, center.low.y)};
+      all.high = {max_of(all.high.x, center.high.x), max_of(all.high.y, center.high.y)};
+    }
+    constexpr float kMinCell_m = 16.0f, kMaxCellsInRow = 64.0f;
+    const float extent_m = max_of(all.high.x - all.low.x, all.high.y - all.low.y);
+    return Grid(centers, max_of(kMinCell_m, extent_m / kMaxCellsInRow));
+  }
+
+  Grid grid_;
+  BallGrid balls_;
+  float largest_radius_m_ = 0;
+};
+
+/// The drawn boxes of a world of many agents, by cells.
+class Crowd {
+ public:
+  explicit Crowd(Span<const AgentBox> boxes) : agents_(drawn(boxes)), balls_(balls_of(boxes, agents_)) {}
+  /// Writes the indices of the boxes that may_be_visible() passes, in ascending order.
+  void find_visible(const PinholeCamera& camera, const Frustum& f, std::vector<int32_t>* found_out) const {
+    balls_.find_visible(camera, f, found_out);
+    for (int32_t& found : *found_out) found = agents_[found];
+  }
+
+ private:
+  static std::vector<int32_t> drawn(Span<const AgentBox> boxes) {
+    std::vector<int32_t> agents;
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      if (boxes[i].drawn) agents.push_back(static_cast<int32_t>(i));
+    }
+    return agents;
+  }
+  static std::vector<BallGrid::Ball> balls_of(Span<const AgentBox> boxes, const std::vector<int32_t>& agents) {
+    std::vector<BallGrid::Ball> balls;
+    for (const int32_t agent : agents) balls.push_back({box_middle(boxes[agent]), box_radius_m(boxes[agent])});
+    return balls;
+  }
+
+  std::vector<int32_t> agents_;
+  CenteredBalls balls_;
+};
+
 /// A geometry with the balls around its pieces.
 struct CulledGeometry {
   /// What the view points to must outlive the object.
@@ -109,9 +190,18 @@ struct CulledGeometry {
               const WallFace& wall = geometry.walls[i];
               return BallGrid::Ball{wall_middle(wall), wall_radius_m(wall)};
             },
-            [&](int32_t i) { return ground_box(geometry.walls[i]); }) {}
+            [&](int32_t i) { return ground_box(geometry.walls[i]); }),
+        heads(balls_of(geometry.heads)) {}
   StaticGeometryView view;
   BallGrid strips, walls;
+  CenteredBalls heads;
+
+ private:
+  static std::vector<BallGrid::Ball> balls_of(Span<const LightHead> heads) {
+    std::vector<BallGrid::Ball> balls;
+    for (const LightHead& head : heads) balls.push_back({head.position_m, kHeadRadius_m});
+    return balls;
+  }
 };
 
 }  // namespace pictura
