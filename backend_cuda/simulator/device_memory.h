@@ -246,6 +246,7 @@ struct DeviceScratch {
   DeviceBuffer<AgentBox> try_boxes;
   DeviceBuffer<uint32_t> free_tries;
   DeviceBuffer<int32_t> known_tries, chosen_try, next_try;
+  DeviceBuffer<int32_t> chain_first, chain_next, crowd_begin, crowd_items;
   DeviceBuffer<uint8_t> began, prepares;
   DeviceBuffer<int32_t> rejected_slot, first_element, wrong_element;
   // The part of the state that an episode begins with, for the next one.
@@ -269,6 +270,10 @@ struct DeviceScratch {
         known_tries(num_boxes),
         chosen_try(num_boxes),
         next_try(num_boxes),
+        chain_first(num_boxes),
+        chain_next(num_boxes),
+        crowd_begin(num_boxes + num_worlds),
+        crowd_items(num_boxes),
         began(num_worlds),
         prepares(num_worlds),
         rejected_slot(1),

@@ -14,6 +14,8 @@ constexpr int kTeamThreads =
 struct DeviceAtomics {
   /// Returns the value before.
   __device__ int32_t add(int32_t* value, int32_t change) const { return atomicAdd(value, change); }
+  /// Likewise.
+  __device__ int32_t exchange(int32_t* value, int32_t other) const { return atomicExch(value, other); }
   __device__ void set_bits(uint32_t* value, uint32_t bits) const { atomicOr(value, bits); }
   __device__ void lower(int32_t* value, int32_t bound) const { atomicMin(value, bound); }
 };

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "pictura/simulator/observation.h"
+#include "pictura/simulator/rules/box_chains.h"
 #include "pictura/simulator/rules/episode.h"
 
 namespace pictura::cuda {
@@ -16,6 +17,9 @@ struct WorldScratch {
   int32_t* known_tries = nullptr;  // [boxes] how many have been looked at
   int32_t* chosen_try = nullptr;   // [boxes] -1: none
   int32_t* next_try = nullptr;     // [boxes]
+  BoxChains standing;              // the boxes that have a place
+  // Of a crowd's box_cells, to be written; null: the world has one cell.
+  int32_t *cell_begin = nullptr, *cell_items = nullptr;
 };
 
 /// What no step has as its lowest slot with an action out of range. All its bytes are equal, for memset.
@@ -23,7 +27,7 @@ constexpr int32_t kNoSlot = 0x7F7F7F7F;
 
 /// Everything that the phases read and write, in one memory.
 struct PhaseArrays {
-  WorldView* worlds = nullptr;             // [num_worlds] their box_cells are one cell, which lists all boxes
+  WorldView* worlds = nullptr;             // [num_worlds] box_cells: see one_cell() and is_crowd()
   WorldView* next_worlds = nullptr;        // [num_worlds] the same worlds, over memory for their next episode
   const WorldScratch* scratch = nullptr;   // [num_worlds]
   const int32_t* world_of_slot = nullptr;  // [num_slots]
@@ -42,7 +46,8 @@ struct PhaseArrays {
   View* views = nullptr;
   ObservationView observations;
   uint8_t entity_sets = 0;
-  uint8_t has_lives = 0;  // some map has roads that end
+  uint8_t has_lives = 0;   // some map has roads that end
+  uint8_t has_crowds = 0;  // some world is a crowd
   // Between phases and steps.
   uint8_t* began = nullptr;          // [num_worlds] an episode began in the last step: the one after it is to be made
   uint8_t* prepares = nullptr;       // [num_worlds] it is made in the present step
@@ -67,13 +72,23 @@ struct PhaseArrays {
   PICTURA_HD bool has_rejected_command() const { return *rejected_slot != kNoSlot; }
 };
 
-/// A world's boxes as one cell: a warp tests all of them sooner than they could be sorted.
+/// Whether a world has so many boxes that they are sorted into cells.
+PICTURA_HD constexpr bool is_crowd(int num_boxes) { return num_boxes > 512; }
+
+/// A world's boxes as one cell, unless they are a crowd: a warp tests all of them sooner than they could be sorted.
 PICTURA_HD inline GridView one_cell(Span<const int32_t> begin, Span<const int32_t> items) {
   constexpr float kWhole_m = 1e9f;
   return {{}, kWhole_m, 1, 1, begin, items};
 }
 
-/// The centre of a box for that cell: a box that is not drawn is far from everything.
+/// A crowd's boxes in cells, of which there are no more than boxes.
+PICTURA_HD inline GridView crowd_cells(GridView cells, const int32_t* begin, Span<const int32_t> items) {
+  cells.begin = {begin, static_cast<size_t>(cells.num_x * cells.num_y) + 1};
+  cells.items = items;
+  return cells;
+}
+
+/// The centre of a box for one cell: a box that is not drawn is far from everything.
 PICTURA_HD inline Vec2 center_of(const AgentBox& box) {
   constexpr float kNowhere_m = 1e9f;
   return box.drawn ? box.center_m.xy() : Vec2{kNowhere_m, kNowhere_m};

@@ -1,7 +1,7 @@
 // Phases of what a host asks between steps: edits of the state, queries of observations, commands of controllers.
 #pragma once
 
-#include "pictura/backend_cuda/simulator/observation_phases.h"
+#include "pictura/backend_cuda/simulator/reset_phases.h"
 #include "pictura/simulator/rules/edit_state.h"
 
 namespace pictura::cuda {
@@ -64,6 +64,7 @@ void launch_edit(const Launch& launch, const PhaseArrays& arrays, const StateEdi
   launch.threads(edit.count, MarkEdit{arrays, edit});
   launch.threads(edit.count, CheckRequest<StateEdit>{arrays, edit});
   launch.threads(edit.count, ApplyEdit{{arrays, edit}});
+  launch_sort_boxes(launch, arrays);
   launch_write_observations(launch, arrays);
 }
 

@@ -15,10 +15,11 @@ struct TeamMemory {
 };
 
 /// Finds for each of `count` boxes, which are the world's from first_box on, the first of its tries that the map
-/// permits and that is clear of the boxes before it: what placing them one after the other would find. As many as the
-/// team has groups for choose at once, given what the others chose last, until nobody changes: then everybody's choice
-/// agrees with the choices before it, which only the sequential result does. Every round fixes at least the lowest one
-/// that changed. Choices of an earlier turn do not change.
+/// permits and that is clear of the boxes before it and of those that stand already, to which they are added: what
+/// placing them one after the other would find. As many as the team has groups for choose at once, given what the
+/// others chose last, until nobody changes: then everybody's choice agrees with the choices before it, which only the
+/// sequential result does. Every round fixes at least the lowest one that changed. Choices of an earlier turn do not
+/// change.
 ///   box_of_try(i, try), permits(group, i, try, box)
 template <typename Team, typename BoxOfTry, typename Permits>
 PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const WorldScratch& scratch, int first_box,
@@ -39,10 +40,10 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
     known_tries[i] = 0;
     chosen_try[i] = -1;
   });
-  // Whether the map, and what stands, leave a try free.
-  const auto look_at = [&](const auto& group, int turn_begin, int i, int t) {
+  // Whether what stood before this turn, and the map, leave a try free.
+  const auto look_at = [&](const auto& group, int i, int t) {
     const AgentBox box = box_of_try(i, t);
-    const bool is_free = permits(group, i, t, box) && is_clear(world, box, first_box, first_box + turn_begin, group);
+    const bool is_free = is_clear(world, box, scratch.standing, group) && permits(group, i, t, box);
     if (is_free && group.rank() == 0) try_boxes[i * kSpawnTries + t] = box;
     return is_free;
   };
@@ -53,7 +54,7 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
     for (int t = 0; t < kSpawnTries && chosen < 0; ++t) {
       if (t == known) {
         ++known;
-        if (look_at(group, turn_begin, i, t)) free |= 1u << t;
+        if (look_at(group, i, t)) free |= 1u << t;
         group.sync();
       }
       const AgentBox& box = try_boxes[i * kSpawnTries + t];
@@ -66,13 +67,23 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
     next_try[i] = chosen;
     if (chosen != chosen_try[i]) team.lower(&lowest_changed, i);
   };
-  for (int settled = 0, turn_begin = -kTurn; settled < count;) {
+  const auto add_to_standing = [&](int begin, int end) {
+    team.for_each(end - begin, [&](int k) {
+      const int i = begin + k;
+      if (!boxes[i].drawn) return;
+      add_box(scratch.standing, first_box + i, boxes[i].center_m.xy(),
+              [&team](int32_t* value, int32_t other) { return team.exchange(value, other); });
+    });
+  };
+  int turn_begin = -kTurn;
+  for (int settled = 0; settled < count;) {
     if (settled >= turn_begin + kTurn) {
+      add_to_standing(max_of(turn_begin, 0), settled);
       turn_begin = settled;
       const int num_tries = min_of(kTurn, count - turn_begin) * first_tries;
       team.template for_each_by_groups<kThreadsPerAgent>(num_tries, [&](const auto& group, int k) {
         const int i = turn_begin + k / first_tries, t = k % first_tries;
-        const bool is_free = look_at(group, turn_begin, i, t);
+        const bool is_free = look_at(group, i, t);
         if (group.rank() == 0 && is_free) team.set_bits(&free_tries[i], 1u << t);
         if (group.rank() == 0 && t == 0) known_tries[i] = first_tries;
       });
@@ -91,6 +102,7 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
     });
     settled = min_of(changed + 1, settled + unsettled);
   }
+  add_to_standing(max_of(turn_begin, 0), count);
 }
 
 /// Begins the episode that `world` says; counts who found a place.
@@ -100,6 +112,7 @@ PICTURA_HD void begin_episode(const Team& team, const WorldView& world, const Wo
   const int num_parked = world.num_boxes - world.num_agents;
   team.for_each(static_cast<int>(world.map.stop_lines.size()), [&](int light) { begin_light(world, light); });
   team.for_each(world.num_agents, [&](int agent) { draw_agent(world, agent); });
+  team.for_each(scratch.standing.num_cells(), [&](int cell) { scratch.standing.first[cell] = -1; });
   const auto parked_at = [&](int car, int i) {
     return parked_box(world, car, world.map.parking_spots.empty() ? ParkingSpot{} : parking_spot(world, car, i));
   };
@@ -114,8 +127,7 @@ PICTURA_HD void begin_episode(const Team& team, const WorldView& world, const Wo
   };
   choose_tries(team, world, scratch, 0, world.num_agents, agent_at,
                [&](const auto& group, int agent, int, const AgentBox& box) {
-                 return has_places(world, agent) && may_spawn(world.map, box, group) &&
-                        is_clear(world, box, world.num_agents, world.num_boxes, group);
+                 return has_places(world, agent) && may_spawn(world.map, box, group);
                });
   team.for_each(1, [&](int) { *spawned_out = 0; });
   team.template for_each_by_groups<kThreadsPerAgent>(world.num_agents, [&](const auto& group, int agent) {
@@ -158,6 +170,55 @@ struct PlaceCenters {
   }
 };
 
+/// Sorts the boxes of crowds into their cells, by counting: of all of them, or of those whose boxes the end of a step
+/// has changed. Within a cell they come in any order, on which no rule depends.
+struct SortBoxes {
+  PhaseArrays arrays;
+  bool ends_step = false;
+  template <typename Team>
+  PICTURA_HD void operator()(const Team& team, int w) const {
+    int32_t* const begin = arrays.scratch[w].cell_begin;
+    int32_t* const items = arrays.scratch[w].cell_items;
+    if (!begin || (ends_step && !arrays.began[w] && !arrays.has_lives)) return;
+    const WorldView world = arrays.world(w);
+    const GridView& cells = world.box_cells;
+    const int num_cells = cells.num_x * cells.num_y;
+    const auto for_each_drawn = [&](const auto& body) {
+      team.for_each(world.num_boxes, [&](int i) {
+        if (!world.boxes[i].drawn) return;
+        const Vec2 center = world.boxes[i].center_m.xy();
+        body(i, center, begin + cells.cell_y(center.y) * cells.num_x + cells.cell_x(center.x));
+      });
+    };
+    team.for_each(num_cells, [&](int cell) { begin[cell] = 0; });
+    for_each_drawn([&](int, Vec2, int32_t* count) { team.add(count, 1); });
+    // From the number of each to its end.
+    team.template for_each_by_groups<kWarp>(1, [&](const auto& group, int) {
+      const int share = (num_cells + group.size() - 1) / group.size();
+      const int first = min_of(group.rank() * share, num_cells), end = min_of(first + share, num_cells);
+      int32_t own = 0, before = 0, all = 0;
+      for (int cell = first; cell < end; ++cell) own += begin[cell];
+      for (int lane = 0; lane < group.size(); ++lane) {
+        const int32_t other = group.from(lane, own);
+        before += lane < group.rank() ? other : 0;
+        all += other;
+      }
+      for (int cell = first; cell < end; ++cell) begin[cell] = before += begin[cell];
+      if (group.rank() == 0) begin[num_cells] = all;
+    });
+    for_each_drawn([&](int i, Vec2 center, int32_t* cell_end) {
+      const int32_t at = team.add(cell_end, -1) - 1;
+      items[at] = i;
+      world.cell_centers[at] = center;
+    });
+  }
+};
+
+template <typename Launch>
+void launch_sort_boxes(const Launch& launch, const PhaseArrays& arrays, bool ends_step = false) {
+  if (arrays.has_crowds) launch.teams(arrays.num_worlds, SortBoxes{arrays, ends_step});
+}
+
 /// Makes a world's next episode, as early as its memory is free and long before it is needed: a start depends on
 /// nothing that steps change.
 struct PrepareEpisode {
@@ -174,6 +235,7 @@ template <typename Launch>
 void launch_reset(const Launch& launch, const PhaseArrays& arrays, const uint8_t* mask, uint64_t seed) {
   launch.teams(arrays.num_worlds, BeginFirstEpisode{arrays, mask, seed});
   launch.template groups<kWarp>(arrays.num_worlds, PlaceCenters{arrays});
+  launch_sort_boxes(launch, arrays);
   launch_write_observations(launch, arrays);
 }
 
@@ -202,6 +264,7 @@ void launch_restored(const Launch& launch, const PhaseArrays& arrays) {
   launch.fill(arrays.prepares, static_cast<size_t>(arrays.num_worlds), 1);
   launch.teams(arrays.num_worlds, PrepareEpisode{arrays});
   launch.template groups<kWarp>(arrays.num_worlds, PlaceCenters{arrays});
+  launch_sort_boxes(launch, arrays);
   launch_write_observations(launch, arrays);
 }
 

@@ -280,6 +280,7 @@ class SimulatorCuda final : public Simulator {
   void put_worlds(cudaStream_t stream) {
     std::vector<WorldView> worlds, next_worlds;
     std::vector<cuda::WorldScratch> of_worlds;
+    has_crowds_ = false;
     for (int w = 0; w < setup_.num_worlds(); ++w) {
       const auto index = static_cast<size_t>(w);
       const int32_t first_box = setup_.box_begin[index], first_light = setup_.light_begin[index];
@@ -288,8 +289,15 @@ class SimulatorCuda final : public Simulator {
       view.agents = state_.agents.view();
       view.boxes = state_.boxes.data() + first_box;
       view.boxes_before = state_.boxes_before.data() + first_box;
-      view.box_cells = cuda::one_cell({scratch_.cell_begin.data() + 2 * w, 2},
-                                      {scratch_.cell_items.data(), static_cast<size_t>(view.num_boxes)});
+      const auto num_boxes = static_cast<size_t>(view.num_boxes);
+      const GridView cells = chain_cells(map->rules.low_m, map->rules.high_m, view.num_boxes, kBoxCell_m);
+      const bool is_crowd = cuda::is_crowd(view.num_boxes);
+      has_crowds_ = has_crowds_ || is_crowd;
+      int32_t* const crowd_begin = scratch_.crowd_begin.data() + first_box + w;
+      int32_t* const crowd_items = scratch_.crowd_items.data() + first_box;
+      view.box_cells =
+          is_crowd ? cuda::crowd_cells(cells, crowd_begin, {crowd_items, num_boxes})
+                   : cuda::one_cell({scratch_.cell_begin.data() + 2 * w, 2}, {scratch_.cell_items.data(), num_boxes});
       view.cell_centers = scratch_.cell_centers.data() + first_box;
       view.light_plans = state_.light_plans.data() + first_light;
       view.lights = state_.lights.data() + first_light;
@@ -299,9 +307,14 @@ class SimulatorCuda final : public Simulator {
       view.light_plans = scratch_.next_light_plans.data() + first_light;
       view.lights = scratch_.next_lights.data() + first_light;
       next_worlds.push_back(view);
-      of_worlds.push_back({scratch_.try_boxes.data() + first_box * kSpawnTries, scratch_.free_tries.data() + first_box,
-                           scratch_.known_tries.data() + first_box, scratch_.chosen_try.data() + first_box,
-                           scratch_.next_try.data() + first_box});
+      of_worlds.push_back({scratch_.try_boxes.data() + first_box * kSpawnTries,
+                           scratch_.free_tries.data() + first_box,
+                           scratch_.known_tries.data() + first_box,
+                           scratch_.chosen_try.data() + first_box,
+                           scratch_.next_try.data() + first_box,
+                           {cells, scratch_.chain_first.data() + first_box, scratch_.chain_next.data() + first_box},
+                           is_crowd ? crowd_begin : nullptr,
+                           is_crowd ? crowd_items : nullptr});
     }
     put(worlds, scratch_.worlds, stream);
     put(next_worlds, scratch_.next_worlds, stream);
@@ -329,6 +342,7 @@ class SimulatorCuda final : public Simulator {
     arrays.observations = arrays_.observations;
     arrays.entity_sets = config().vector_observations;
     arrays.has_lives = setup_.has_lives();
+    arrays.has_crowds = has_crowds_;
     arrays.began = scratch_.began.data();
     arrays.prepares = scratch_.prepares.data();
     arrays.next_spawned = scratch_.next_spawned.data();
@@ -352,6 +366,7 @@ class SimulatorCuda final : public Simulator {
   DeviceState state_;
   DeviceResults results_;
   DeviceScratch scratch_;
+  bool has_crowds_ = false;  // some world is one
   std::unique_ptr<SideStream> side_;
   std::unique_ptr<MappedValue<int64_t>> rejected_command_, wrong_edit_, wrong_query_;
 };

@@ -184,9 +184,11 @@ void launch_step(const Launch& launch, const PhaseArrays& arrays, const CommandT
                      launch.fill(arrays.rejected_slot, sizeof(int32_t), kNoSlot & 0xFF);
                      launch.threads(arrays.num_slots, CheckCommands<CommandType>{arrays, commands});
                      launch.template groups<kThreadsPerAgent>(arrays.num_slots, Advance<CommandType>{arrays, commands});
+                     launch_sort_boxes(launch, arrays);
                      launch.template groups<kThreadsPerAgent>(arrays.num_slots, ApplyRewardAndHalt{arrays});
                      launch.template groups<kWarp>(arrays.num_worlds, FinishStep<CommandType>{arrays, commands});
                      if (arrays.has_lives) launch.template groups<kWarp>(arrays.num_worlds, EnterWaiting{arrays});
+                     launch_sort_boxes(launch, arrays, /*ends_step=*/true);
                      launch_write_observations(launch, arrays);
                    });
 }

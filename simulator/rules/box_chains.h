@@ -17,6 +17,14 @@ struct BoxChains {
   PICTURA_HD int32_t* first_at(Vec2 p) const { return first + cells.cell_y(p.y) * cells.num_x + cells.cell_x(p.x); }
 };
 
+/// Cells of at least min_cell_m for the chains of num_boxes boxes over a rectangle, no more of them than boxes.
+PICTURA_HD inline GridView chain_cells(Vec2 low_m, Vec2 high_m, int num_boxes, float min_cell_m) {
+  const float extent_m = max_of(max_of(high_m.x - low_m.x, high_m.y - low_m.y), min_cell_m);
+  int side = 1;
+  while ((side + 1) * (side + 1) <= num_boxes && min_cell_m * static_cast<float>(side + 1) <= extent_m) ++side;
+  return {low_m, extent_m / static_cast<float>(side), side, side, {}, {}};
+}
+
 /// Adds a box that stands at a place to its chain. exchange(value, other) stores the other value and returns the
 /// one before; where threads add boxes at once, as one operation.
 template <typename Exchange>

@@ -130,6 +130,24 @@ TEST(Phases, PlaceCrowdsAsOneAfterTheOtherWould) {
   expect_same(config, {testing::ring_road(40)}, {{0, 300, 0}, {0, 37, 1}, {0, 1, 2}}, 12, 3);
 }
 
+TEST(Phases, SortCrowdsIntoCells) {
+  SimulatorConfig config;
+  config.episode_steps = 12;
+  config.pedestrian_fraction = config.cyclist_fraction = 0.2f;
+  config.parked_cars = 200;
+  const auto town = load_map("procedural:1");
+  expect_same(config, {town, testing::ring_road(40)}, {{0, 600, 0}, {0, 1, 1}, {0, 313, 2}, {1, 700, 3}}, 30, 14);
+  expect_same(config, {town}, {{0, 600, 0}, {0, 20, 1}}, 14, 15, /*by_commands=*/true);
+}
+
+TEST(Phases, LetCrowdsEnter) {
+  SimulatorConfig config;
+  config.reset_inactive_fraction = 2;
+  config.parked_cars = 2;
+  const auto ramp = std::make_shared<RoadMap>(parse_opendrive(test::open_ramp(), "ramp.xodr"));
+  expect_same(config, {ramp}, {{0, 600, 0}, {0, 3, 1}}, 60, 18);
+}
+
 TEST(Phases, BeginWorldsThatNobodyFindsAPlaceIn) {
   SimulatorConfig config = testing::cars({.episode_steps = 30});
   config.pedestrian_fraction = 0.9f;  // and there is no walkway

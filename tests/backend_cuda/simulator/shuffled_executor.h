@@ -17,6 +17,7 @@ namespace pictura::testing {
 struct HostAtomics {
   void set_bits(uint32_t* value, uint32_t bits) const { *value |= bits; }
   int32_t add(int32_t* value, int32_t change) const { return std::exchange(*value, *value + change); }
+  int32_t exchange(int32_t* value, int32_t other) const { return std::exchange(*value, other); }
   void lower(int32_t* value, int32_t bound) const { *value = std::min(*value, bound); }
 };
 
@@ -118,6 +119,10 @@ class ShuffledExecutor {
         known_tries_(host.state.boxes.size()),
         chosen_try_(host.state.boxes.size()),
         next_try_(host.state.boxes.size()),
+        chain_first_(host.state.boxes.size()),
+        chain_next_(host.state.boxes.size()),
+        crowd_begin_(host.state.boxes.size() + host.setup.worlds.size()),
+        crowd_items_(host.state.boxes.size()),
         began_(host.setup.worlds.size()),
         prepares_(host.setup.worlds.size()),
         first_element_(static_cast<size_t>(host.setup.num_slots())) {
@@ -127,13 +132,25 @@ class ShuffledExecutor {
     }
     for (int w = 0; w < host.setup.num_worlds(); ++w) {
       const auto first_box = static_cast<size_t>(host.setup.box_begin[w]);
+      const MapRules& rules = host.setup.map_of(w).rules;
       WorldView view = host.world(w);
       const auto first_light = static_cast<size_t>(host.setup.light_begin[w]);
-      view.box_cells =
-          cuda::one_cell({cell_begin_.data() + 2 * w, 2}, {cell_items_.data(), static_cast<size_t>(view.num_boxes)});
-      scratch_.push_back({try_boxes_.data() + first_box * kSpawnTries, free_tries_.data() + first_box,
-                          known_tries_.data() + first_box, chosen_try_.data() + first_box,
-                          next_try_.data() + first_box});
+      const auto num_boxes = static_cast<size_t>(view.num_boxes);
+      const GridView cells = chain_cells(rules.low_m, rules.high_m, view.num_boxes, kBoxCell_m);
+      const bool is_crowd = cuda::is_crowd(view.num_boxes);
+      has_crowds_ = has_crowds_ || is_crowd;
+      int32_t* const crowd_begin = crowd_begin_.data() + first_box + static_cast<size_t>(w);
+      int32_t* const crowd_items = crowd_items_.data() + first_box;
+      view.box_cells = is_crowd ? cuda::crowd_cells(cells, crowd_begin, {crowd_items, num_boxes})
+                                : cuda::one_cell({cell_begin_.data() + 2 * w, 2}, {cell_items_.data(), num_boxes});
+      scratch_.push_back({try_boxes_.data() + first_box * kSpawnTries,
+                          free_tries_.data() + first_box,
+                          known_tries_.data() + first_box,
+                          chosen_try_.data() + first_box,
+                          next_try_.data() + first_box,
+                          {cells, chain_first_.data() + first_box, chain_next_.data() + first_box},
+                          is_crowd ? crowd_begin : nullptr,
+                          is_crowd ? crowd_items : nullptr});
       worlds_.push_back(view);
       view.agents = next_agents_.view();
       view.boxes = view.boxes_before = next_boxes_.data() + first_box;
@@ -186,6 +203,7 @@ class ShuffledExecutor {
     arrays.observations = results.observation_view();
     arrays.entity_sets = host.setup.config.vector_observations;
     arrays.has_lives = host.setup.has_lives();
+    arrays.has_crowds = has_crowds_;
     arrays.began = began_.data();
     arrays.prepares = prepares_.data();
     arrays.next_spawned = next_spawned_.data();
@@ -210,6 +228,8 @@ class ShuffledExecutor {
   std::vector<AgentBox> try_boxes_;
   std::vector<uint32_t> free_tries_;
   std::vector<int32_t> known_tries_, chosen_try_, next_try_;
+  std::vector<int32_t> chain_first_, chain_next_, crowd_begin_, crowd_items_;
+  bool has_crowds_ = false;
   std::vector<uint8_t> began_, prepares_;
   std::vector<int32_t> first_element_;
   int32_t rejected_slot_ = 0, wrong_element_ = 0;
