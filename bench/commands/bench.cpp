@@ -43,6 +43,10 @@ std::string population_of(const WorldOptions& world) {
   return text;
 }
 
+std::string population_of_crowds() {
+  return fmt::format("{} to {} agents", kCrowds[0], kCrowds[std::size(kCrowds) - 1]);
+}
+
 void add_maps_option(CLI::App* command, std::vector<std::string>* maps, const std::string& default_maps) {
   add_map_list_option(
       command, maps,

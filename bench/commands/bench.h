@@ -17,8 +17,12 @@ namespace pictura {
 std::string processor_name();
 /// Options of worlds of 120 agents, of which such a share are pedestrians, and as many cyclists.
 WorldOptions bench_world(int num_threads, float share, int parked_cars);
+/// Agents in the one world of `--sweep crowd`.
+constexpr int kCrowds[] = {256, 512, 1024, 2048, 4096};
 /// Describes the agents of a world; its options must set all fractions.
 std::string population_of(const WorldOptions& world);
+/// Describes the agents of the worlds of that sweep.
+std::string population_of_crowds();
 
 /// Adds the option --map, which takes several maps; default_maps describes the default in the help.
 void add_maps_option(CLI::App* command, std::vector<std::string>* maps,

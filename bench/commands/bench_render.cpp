@@ -23,7 +23,7 @@ namespace {
 struct RenderArguments {
   WorldOptions world = bench_world(/*num_threads=*/1, /*share=*/0, /*parked_cars=*/0);
   std::vector<std::string> maps, backends = {"cpu"}, sizes, samples = {"1"};
-  std::vector<int> egos;
+  std::vector<int> egos, crowds = {0};  // crowds: agents of a world; 0: as `world` has
   std::string sweep, format = "u8";
   int patch_px = 0;  // 0: planar images
   int checked_views = 8;
@@ -40,6 +40,10 @@ constexpr const char* kSweptSize = "96x54";
 void apply_sweep(RenderArguments* arguments) {
   const std::string& sweep = arguments->sweep;
   if (sweep.empty()) return;
+  if (sweep == "crowd") {
+    arguments->crowds.assign(std::begin(kCrowds), std::end(kCrowds));
+    return;
+  }
   if (!arguments->sizes.empty() || (sweep == "egos" && !arguments->egos.empty())) {
     fail_usage("--sweep {}: chooses sizes or egos itself", sweep);
   }
@@ -93,8 +97,12 @@ RenderCase case_of(const RenderArguments& arguments, const std::string& backend,
 
 struct NamedCase {
   std::string renderer, size;  // the backend, with its samples if it takes them
+  int crowd = 0;               // agents of a world, where a sweep chooses them
   RenderCase measured;         // 0 views: all spawned agents
-  std::string name() const { return fmt::format("{} {} {} egos", renderer, size, measured.num_views); }
+  std::string name() const {
+    const std::string egos = fmt::format("{} {} {} egos", renderer, size, measured.num_views);
+    return crowd > 0 ? fmt::format("{} of {} agents", egos, crowd) : egos;
+  }
 };
 
 // All cases at once, so that errors in any arguments are reported before the first case is measured.
@@ -107,9 +115,11 @@ std::vector<NamedCase> render_cases_of(const RenderArguments& arguments) {
       const bool takes_samples = backend.starts_with("gl");
       if (!takes_samples && samples != arguments.samples.front()) continue;
       for (const std::string& size : arguments.sizes) {
-        for (const int egos : arguments.egos) {
-          cases.push_back({takes_samples ? backend + " " + samples : backend, size,
-                           case_of(arguments, backend, size, takes_samples ? samples : "1", egos)});
+        for (const int crowd : arguments.crowds) {
+          for (const int egos : arguments.egos) {
+            cases.push_back({takes_samples ? backend + " " + samples : backend, size, crowd,
+                             case_of(arguments, backend, size, takes_samples ? samples : "1", egos)});
+          }
         }
       }
     }
@@ -158,18 +168,22 @@ void run_render(RenderArguments arguments) {
   apply_defaults(&arguments);
   std::vector<NamedCase> cases = render_cases_of(arguments);
   ProgressLine progress;
-  progress.update("driving");
   const WorldOptions& world = arguments.world;
-  DrivenOptions driven{.maps = arguments.maps,
-                       .num_views = *std::max_element(arguments.egos.begin(), arguments.egos.end()),
-                       .agents = world.agents};
-  apply_world_options(world, &driven.simulator);
-  driven.simulator.num_threads = 0;  // only drawing is measured
-  const DrivenWorlds worlds = drive_worlds(driven);
+  const auto drive = [&](int crowd) {
+    progress.update("driving");
+    DrivenOptions driven{.maps = arguments.maps,
+                         .num_views = *std::max_element(arguments.egos.begin(), arguments.egos.end()),
+                         .agents = crowd > 0 ? crowd : world.agents};
+    apply_world_options(world, &driven.simulator);
+    driven.simulator.num_threads = 0;  // only drawing is measured
+    return drive_worlds(driven);
+  };
+  DrivenWorlds worlds;
   std::vector<BenchResult> results;
   std::vector<std::string> choices;  // of the last case of each renderer
   for (std::size_t i = 0; i < cases.size(); ++i) {
     RenderCase& measured = cases[i].measured;
+    if (i == 0 || cases[i].crowd != cases[i - 1].crowd) worlds = drive(cases[i].crowd);
     if (measured.num_views == 0) measured.num_views = static_cast<int>(worlds.views.size());
     progress.update(cases[i].name());
     const RenderMeasurement measurement = measure_render(worlds, measured);
@@ -179,11 +193,12 @@ void run_render(RenderArguments arguments) {
   }
   progress.finish();
   BenchContext context{
-      .workload = fmt::format("render: {}, {} in each of {} worlds, walls {}, {} cameras, {}{}{}, {} threads; {}",
-                              fmt::join(arguments.maps, " "), population_of(world), worlds.simulator->worlds().size(),
-                              world.walls ? "on" : "off", paper_rig().cameras.size(), arguments.format,
-                              arguments.patch_px > 0 ? fmt::format(" in patches of {} px", arguments.patch_px) : "",
-                              arguments.planes ? " and planes" : "", world.num_threads, fmt::join(choices, "; ")),
+      .workload = fmt::format(
+          "render: {}, {} in each of {} worlds, walls {}, {} cameras, {}{}{}, {} threads; {}",
+          fmt::join(arguments.maps, " "), arguments.sweep == "crowd" ? population_of_crowds() : population_of(world),
+          worlds.simulator->worlds().size(), world.walls ? "on" : "off", paper_rig().cameras.size(), arguments.format,
+          arguments.patch_px > 0 ? fmt::format(" in patches of {} px", arguments.patch_px) : "",
+          arguments.planes ? " and planes" : "", world.num_threads, fmt::join(choices, "; ")),
       .backend = fmt::format("{}", fmt::join(arguments.backends, ","))};
   // In host memory any driver may run gl:egl; its choice names it.
   auto is_of_cuda_device = [](const NamedCase& each) {
@@ -224,8 +239,9 @@ void add_render_benchmark(CLI::App& bench) {
                     "Keep scenes and images in host memory for cuda and gl:egl, which otherwise use device memory");
   command
       ->add_option("--sweep", arguments->sweep,
-                   "sizes: the paper's five and 768x432; squares: without walls; egos: 64 to 20,480")
-      ->check(one_of({"sizes", "squares", "egos"}).description("{sizes,squares,egos}"));
+                   "sizes: the paper's five and 768x432; squares: without walls; egos: 64 to 20,480; crowd: all of one "
+                   "world of 256 to 4,096")
+      ->check(one_of({"sizes", "squares", "egos", "crowd"}).description("{sizes,squares,egos,crowd}"));
   command->add_flag("--memory", arguments->memory, "Measure device memory of a single case instead of rates");
   add_number_option(command, "--check", arguments->checked_views,
                     "Number of egos compared with the oracle, before and after timing", 0);

@@ -59,6 +59,8 @@ std::vector<SimulateCase> simulate_cases_of(const SimulateArguments& arguments) 
     for (int agents = 1; agents <= 1024; agents *= 4) cases.push_back(equal_worlds(kSweptWorlds, agents, num_maps));
   } else if (arguments.sweep == "worlds") {
     for (int worlds = 1; worlds <= 4096; worlds *= 4) cases.push_back(equal_worlds(worlds, kSweptAgents, num_maps));
+  } else if (arguments.sweep == "crowd") {
+    for (const int agents : kCrowds) cases.push_back(equal_worlds(1, agents, num_maps));
   } else {
     SimulateCase both =
         equal_worlds(arguments.num_worlds > 0 ? arguments.num_worlds : num_maps, arguments.world.agents, num_maps);
@@ -128,10 +130,12 @@ void run_simulate(SimulateArguments arguments) {
     }
   }
   progress.finish();
-  BenchContext context{.workload = fmt::format("simulate: {}, {}, walls {}, random actions with resets, {} threads",
-                                               fmt::join(arguments.maps, " "), population_of(arguments.world),
-                                               arguments.world.walls ? "on" : "off", arguments.world.num_threads),
-                       .backend = fmt::format("{}", fmt::join(arguments.backends, ","))};
+  BenchContext context{
+      .workload = fmt::format("simulate: {}, {}, walls {}, random actions with resets, {} threads",
+                              fmt::join(arguments.maps, " "),
+                              arguments.sweep == "crowd" ? population_of_crowds() : population_of(arguments.world),
+                              arguments.world.walls ? "on" : "off", arguments.world.num_threads),
+      .backend = fmt::format("{}", fmt::join(arguments.backends, ","))};
   if (on_device) context.add_gpu(cuda_device_name(), cuda_driver_name());
   report_benchmark(arguments.rate.json, context, results, arguments.earlier);
 }
@@ -153,8 +157,9 @@ void add_simulate_benchmark(CLI::App& bench) {
   command
       ->add_option(
           "--sweep", arguments->sweep,
-          fmt::format("agents: {} worlds of 1 to 1,024; worlds: 1 to 4,096 of {} agents", kSweptWorlds, kSweptAgents))
-      ->check(one_of({"agents", "worlds"}).description("{agents,worlds}"))
+          fmt::format("agents: {} worlds of 1 to 1,024; worlds: 1 to 4,096 of {} agents; crowd: one of 256 to 4,096",
+                      kSweptWorlds, kSweptAgents))
+      ->check(one_of({"agents", "worlds", "crowd"}).description("{agents,worlds,crowd}"))
       ->excludes(worlds)
       ->excludes(slots);
   add_number_option(command, "--warm-up", arguments->warm_up_steps, "Steps before timing", 1);

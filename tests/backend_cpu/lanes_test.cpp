@@ -142,8 +142,7 @@ TEST(Lanes, VisitThePiecesThatMayBeVisible) {
         [&](int32_t i) {
           if (may_be_visible(items[i], camera, frustum)) expected.push_back(i);
         });
-    balls.visit_visible(camera, frustum, frustum_ground_box(camera, frustum),
-                        [&](int32_t i) { actual.push_back(i); });
+    balls.visit_visible(camera, frustum, frustum_ground_box(camera, frustum), [&](int32_t i) { actual.push_back(i); });
     EXPECT_EQ(actual, expected);
     return actual.size();
   };
