@@ -57,13 +57,16 @@ PICTURA_HD void observe_waypoints(const WorldView& world, int slot, const EgoFra
 }
 
 /// The partners of `agent` by distance from its reference point to their box centres: from the nearest cells where
-/// enough stand there, else from farther and farther ones, up to all in range.
+/// enough stand there, else from all in range; in a crowd, first from some between.
 template <typename ThreadGroup>
 PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin, const ThreadGroup& group) {
   using Nearest = typename ThreadGroup::template Nearest<kMaxPartners>;
   const GridView& cells = world.box_cells;
-  // A cell may be wider than what is in sight: a device has but one.
-  for (float reach = min_of(cells.cell_m, kPartnerRange_m);; reach = min_of(2.0f * reach, kPartnerRange_m)) {
+  constexpr int32_t kFew = 256;  // boxes that are read sooner than the near ones are chosen
+  const bool is_crowd = cells.begin[cells.begin.size() - 1] > kFew;
+  // A cell may be wider than what is in sight: a device may have but one.
+  for (float reach = min_of(cells.cell_m, kPartnerRange_m);;
+       reach = is_crowd ? min_of(2.0f * reach, kPartnerRange_m) : kPartnerRange_m) {
     const CellRows range = cells_around(cells, origin, reach);
     const bool is_near = reach < kPartnerRange_m;
     int found = 0;
@@ -72,17 +75,13 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
     if (is_near && found < 2 * kMaxPartners) continue;
     Nearest nearest;
     if constexpr (ThreadGroup::kSize == 1) {
-      const auto offer = [&](int32_t begin, int32_t end) {
-        nearest.offer_all(world.cell_centers + begin, cells.items.data() + begin, end - begin, agent, origin,
-                          square(reach));
-      };
       // Rows follow one another. What stands beside the range is read as well where that costs less than a loop a row.
-      constexpr int32_t kReadAtOnce = 256;
-      const int32_t begin = range.begin(cells, range.y0), end = range.end(cells, range.y1);
-      if (end - begin <= kReadAtOnce) {
-        offer(begin, end);
-      } else {
-        for (int y = range.y0; y <= range.y1; ++y) offer(range.begin(cells, y), range.end(cells, y));
+      const bool at_once = range.end(cells, range.y1) - range.begin(cells, range.y0) <= kFew;
+      for (int y = range.y0; y <= range.y1; ++y) {
+        const int32_t begin = range.begin(cells, y);
+        if (at_once) y = range.y1;
+        nearest.offer_all(world.cell_centers + begin, cells.items.data() + begin, range.end(cells, y) - begin, agent,
+                          origin, square(reach));
       }
     } else {
       for (int y = range.y0; y <= range.y1; ++y) {
