@@ -1,9 +1,12 @@
 #include "pictura/cli/completion.h"
 
+#include <map>
 #include <vector>
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/suggestion.h"
+#include "pictura/configuration/config_keys.h"
+#include "pictura/simulator/controllers/host_controllers.h"
 
 namespace pictura {
 
@@ -12,15 +15,48 @@ namespace {
 struct Word {
   std::string text, help;
   bool takes_value = false;
+  std::vector<std::string> values;  // words that its value may be; files are offered beside them
 };
 
 /// One command of the tree: what can follow it.
 struct Place {
   std::string path;  // as "pictura bench render"
   std::vector<Word> commands, options;
+  std::vector<std::string> arguments;  // words that a positional argument may be
 };
 
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+
+/// The words in the braces of a type's name, as CLI11 writes a set of choices: "TEXT:{u8,f16}".
+std::vector<std::string> choices_of(const std::string& type_name) {
+  const size_t begin = type_name.find('{'), end = type_name.find('}');
+  if (begin == std::string::npos || end == std::string::npos) return {};
+  return CLI::detail::split(type_name.substr(begin + 1, end - begin - 1), ',');
+}
+
+std::vector<std::string> map_names() {
+  std::vector<std::string> names = Config{}.simulator.maps;
+  names.insert(names.end(), {"procedural:1", "city:1"});
+  return names;
+}
+
+std::vector<std::string> keys_with_sign() {
+  std::vector<std::string> words;
+  for (const ConfigKey& key : config_keys()) words.push_back(key.key + "=");
+  return words;
+}
+
+/// Words that the value of an option may be, by the option's name.
+std::vector<std::string> values_of(const CLI::Option& option) {
+  if (const std::vector<std::string> choices = choices_of(option.get_type_name()); !choices.empty()) return choices;
+  const std::string name = option.get_single_name();
+  if (name == "map" || name == "MAP") return map_names();
+  if (name == "policy" || name == "controller") return host_controller_names();
+  if (name == "set") return keys_with_sign();
+  return {};
+}
+
+std::string joined(const std::vector<std::string>& words) { return fmt::format("{}", fmt::join(words, " ")); }
 
 void add_places(const CLI::App& command, const std::string& path, std::vector<Place>* places_out) {
   const std::vector<const CLI::App*> children = command.get_subcommands([](const CLI::App*) { return true; });
@@ -29,9 +65,11 @@ void add_places(const CLI::App& command, const std::string& path, std::vector<Pl
     place.commands.push_back({child->get_name(), first_line(child->get_description()), false});
   }
   for (const CLI::Option* option : command.get_options()) {
+    const std::vector<std::string> values = values_of(*option);
+    if (option->get_positional()) place.arguments.insert(place.arguments.end(), values.begin(), values.end());
     for (const std::string& name : option->get_lnames()) {
       place.options.push_back(
-          {"--" + name, first_line(option->get_description()), option->get_items_expected_max() > 0});
+          {"--" + name, first_line(option->get_description()), option->get_items_expected_max() > 0, values});
     }
   }
   places_out->push_back(std::move(place));
@@ -58,19 +96,36 @@ std::string known_paths(const std::vector<Place>& places) {
   return paths;
 }
 
+/// `case` items that set `values` to the words that the value of an option may be, by command and option.
+std::string value_cases(const std::vector<Place>& places) {
+  std::map<std::string, std::string> patterns_of_values;
+  for (const Place& place : places) {
+    for (const Word& word : place.options) {
+      if (word.values.empty()) continue;
+      std::string& patterns = patterns_of_values[joined(word.values)];
+      patterns += (patterns.empty() ? "" : " | ") + in_quotes(place.path + " " + word.text);
+    }
+  }
+  std::string cases;
+  for (const auto& [values, patterns] : patterns_of_values) {
+    cases += fmt::format("    {}) values={} ;;\n", patterns, in_quotes(values));
+  }
+  return cases;
+}
+
 std::string bash_script(const std::string& name, const std::vector<Place>& places) {
   std::string cases;
   for (const Place& place : places) {
     std::string commands, options;
     for (const Word& word : place.commands) commands += (commands.empty() ? "" : " ") + word.text;
     for (const Word& word : place.options) options += (options.empty() ? "" : " ") + word.text;
-    cases += fmt::format("    {}) commands={} options={} ;;\n", in_quotes(place.path), in_quotes(commands),
-                         in_quotes(options));
+    cases += fmt::format("    {}) commands={} options={} values={} ;;\n", in_quotes(place.path), in_quotes(commands),
+                         in_quotes(options), in_quotes(joined(place.arguments)));
   }
   return fmt::format(
       R"(# Completion of {0} for bash: source it, or put it into ~/.local/share/bash-completion/completions/{0}.
 _{0}() {{
-  local word=${{COMP_WORDS[COMP_CWORD]}} place={0} commands='' options='' i
+  local word=${{COMP_WORDS[COMP_CWORD]}} place={0} commands='' options='' values='' i
   for ((i = 1; i < COMP_CWORD; ++i)); do
     case "$place ${{COMP_WORDS[i]}}" in
       {1}) place="$place ${{COMP_WORDS[i]}}" ;;
@@ -78,15 +133,20 @@ _{0}() {{
   done
   case $place in
 {2}  esac
+  case "$place ${{COMP_WORDS[COMP_CWORD - 1]}}" in
+{3}  esac
   if [[ $word == -* ]]; then
     mapfile -t COMPREPLY < <(compgen -W "$options" -- "$word")
   elif [[ -n $commands ]]; then
     mapfile -t COMPREPLY < <(compgen -W "$commands" -- "$word")
+  elif [[ -n $values ]]; then
+    mapfile -t COMPREPLY < <(compgen -W "$values" -- "$word"; compgen -f -- "$word")
+    if [[ ${{COMPREPLY[0]}} == *= ]]; then compopt -o nospace 2>/dev/null; fi
   fi
 }}
 complete -o default -F _{0} {0}
 )",
-      name, known_paths(places), cases);
+      name, known_paths(places), cases, value_cases(places));
 }
 
 std::string zsh_script(const std::string& name, const std::vector<Place>& places) {
@@ -98,13 +158,13 @@ std::string zsh_script(const std::string& name, const std::vector<Place>& places
   };
   std::string cases;
   for (const Place& place : places) {
-    cases += fmt::format("    {}) commands=({} ) options=({} ) ;;\n", in_quotes(place.path), entries(place.commands),
-                         entries(place.options));
+    cases += fmt::format("    {}) commands=({} ) options=({} ) values={} ;;\n", in_quotes(place.path),
+                         entries(place.commands), entries(place.options), in_quotes(joined(place.arguments)));
   }
   return fmt::format(R"(#compdef {0}
 # Completion of {0} for zsh: put it as _{0} into a folder of $fpath.
 _{0}() {{
-  local place={0} word
+  local place={0} values='' word
   local -a commands options
   for word in "${{(@)words[2,CURRENT-1]}}"; do
     case "$place $word" in
@@ -113,17 +173,22 @@ _{0}() {{
   done
   case $place in
 {2}  esac
+  case "$place $words[CURRENT-1]" in
+{3}  esac
   if [[ $words[CURRENT] == -* ]]; then
     _describe option options
   elif (( $#commands )); then
     _describe command commands
+  elif [[ $values == *= ]]; then
+    compadd -S '' -- ${{=values}}
   else
+    compadd -- ${{=values}}
     _files
   fi
 }}
 compdef _{0} {0}
 )",
-                     name, known_paths(places), cases);
+                     name, known_paths(places), cases, value_cases(places));
 }
 
 std::string fish_script(const std::string& name, const std::vector<Place>& places) {
@@ -153,9 +218,11 @@ end
       script += fmt::format("{} -f -a {} -d {}\n", here, word.text, in_fish_quotes(word.help));
     }
     for (const Word& word : place.options) {
-      script += fmt::format("{} -l {}{} -d {}\n", here, word.text.substr(2), word.takes_value ? " -r" : "",
+      script += fmt::format("{} -l {}{}{} -d {}\n", here, word.text.substr(2), word.takes_value ? " -r" : "",
+                            word.values.empty() ? "" : " -a " + in_fish_quotes(joined(word.values)),
                             in_fish_quotes(word.help));
     }
+    if (!place.arguments.empty()) script += fmt::format("{} -a {}\n", here, in_fish_quotes(joined(place.arguments)));
   }
   return script;
 }
