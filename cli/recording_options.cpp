@@ -8,7 +8,7 @@ namespace pictura {
 void add_recording_options(CLI::App* command, RecordingOptions* options_out) {
   add_number_option(command, "--follow", options_out->followed,
                     "The agent whose decisions and images the replay holds, and that it opens with; default: 0, in "
-                    "recorded scenes the self-driving car",
+                    "recorded scenes the self-driving car, in evaluated scenarios the one with the gravest infraction",
                     0, kMaxAgentsPerWorld - 1);
   add_cameras_option(command, options_out);
 }

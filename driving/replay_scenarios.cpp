@@ -119,13 +119,23 @@ const ScenarioCounts& counts_of(const EvaluationResults& results, const Scenario
   return density.scenarios[place.scenario - density.first_scenario];
 }
 
+// Follows the scenario's worst agent where nothing was asked for and the evaluation names it.
+RecordingOptions following_worst(RecordingOptions recording, const EvaluationResults& results,
+                                 const ScenarioPlace& place) {
+  const DensityResult& density = results.densities[place.density];
+  const auto index = static_cast<size_t>(place.scenario - density.first_scenario);
+  if (!recording.followed && index < density.worst_agents.size()) recording.followed = density.worst_agents[index];
+  return recording;
+}
+
 void write(const EvaluateOptions& options, const EvaluationResults& results, const RecordingOptions& recording,
            const ScenarioPlace& place, const std::string& path) {
   if (interrupted()) throw Interrupted("interrupted before all replays were written");
   ScenarioCounts counts;
   const RecordedScenario scenario{.number = place.scenario,
                                   .agents_per_world = results.densities[place.density].agents_per_world};
-  write_replay_and_say_so(path, record_scenario(options, scenario, recording, &counts));
+  write_replay_and_say_so(path,
+                          record_scenario(options, scenario, following_worst(recording, results, place), &counts));
   const ScenarioCounts& evaluated = counts_of(results, place);
   if (counts.any_infraction == evaluated.any_infraction && counts.goals == evaluated.goals) return;
   print_message(

@@ -90,6 +90,26 @@ void add_slot(const AgentStateView& state, int64_t slot, ScenarioCounts* counts)
   if (has_body(status)) add_life(state, slot, counts);
 }
 
+// How grave the worst infraction of a vehicle's episode is; 0: it has none, or is no vehicle.
+int gravity(const AgentStateView& state, int slot) {
+  if (state.agent_class[slot] != AgentClass::vehicle) return 0;
+  const uint8_t events = state.episode_events[slot];
+  return (events & kEventAtFault) ? 3 : (events & kEventOffRoad) ? 2 : (events & kEventRedLight) ? 1 : 0;
+}
+
+// Of each world of as many slots, the first agent with the gravest infraction.
+std::vector<int> worst_agents(const AgentStateView& state, int num_slots, int agents_per_world) {
+  std::vector<int> worst;
+  for (int begin = 0; begin < num_slots; begin += agents_per_world) {
+    int gravest = 0;
+    for (int agent = 1; agent < agents_per_world; ++agent) {
+      if (gravity(state, begin + agent) > gravity(state, begin + gravest)) gravest = agent;
+    }
+    worst.push_back(gravest);
+  }
+  return worst;
+}
+
 bool has_lives(const Simulator& simulator) {
   const CompiledMaps& maps = simulator.maps();
   return std::any_of(maps.begin(), maps.end(), [](const auto& map) { return map->rules.is_open; });
@@ -229,6 +249,10 @@ EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& op
       AgentState state = counted_state(*simulator);
       for (int slot = 0; slot < simulator->num_slots(); ++slot) {
         add_slot(state.view(), slot, counts_of(slot));
+      }
+      const std::vector<int> worst = worst_agents(state.view(), simulator->num_slots(), density.agents);
+      for (DensityResult& result : results) {
+        result.worst_agents.insert(result.worst_agents.end(), worst.begin(), worst.end());
       }
       for (size_t i = 0; i < results.size(); ++i) {
         const std::vector<StandingCounts> stood = standing.counts(i);

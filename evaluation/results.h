@@ -77,6 +77,9 @@ struct DensityResult {
   int first_scenario = 0;
   std::vector<ScenarioCounts> scenarios;
   std::string driver;  // whose vehicles: one of EvaluateOptions::others; empty: the evaluated driver's
+  // The agent with the gravest infraction of each scenario: a collision at fault, else off-road, else a red light; else
+  // agent 0. Not in files.
+  std::vector<int> worst_agents;
 };
 
 /// What decides an evaluation's numbers. Parts are merged where all of it is the same.

@@ -80,7 +80,13 @@ class Replays(CommandCase):
         rates = [s["at_fault_infraction"] / s["vehicles"] for s in scenarios]
         worst = sorted(range(4), key=lambda i: -rates[i])[:2]
         self.assertEqual(sorted(p.name for p in folder.glob("[!.]*")), sorted(["index.html", *(f"custom_{i}.html" for i in worst)]))
-        self.assertEqual(header_of(self.folder / "worst.html")["map"], f"procedural:{1 + worst[0] % 2}:blocks=2x2")
+        header = header_of(self.folder / "worst.html")
+        self.assertEqual(header["map"], f"procedural:{1 + worst[0] % 2}:blocks=2x2")
+        infractions = self.folder / "infractions.csv"
+        self.assertEqual(run(*evaluate, "--infractions", infractions).returncode, 0)
+        with infractions.open() as file:
+            rows = [row for row in csv.DictReader(file) if int(row["scenario"]) == worst[0] and int(row["agent"]) == header["followed"]]
+        self.assertTrue(rows)  # it opens with an agent that has one
         self.assert_refused(2, "--gallery", *evaluate, "--replays", 2)
         self.assert_refused(2, "--follow: has no effect without --replay", *evaluate, "--follow", 1)
 

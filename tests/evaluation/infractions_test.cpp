@@ -178,6 +178,13 @@ TEST(Infractions, OfAnEvaluationAreThoseThatItCounts) {
   EXPECT_EQ(by_kind["red_light"], red_light);
   EXPECT_TRUE(std::is_sorted(groups.begin(), groups.end(),
                              [](const InfractionGroup& a, const InfractionGroup& b) { return a.count > b.count; }));
+  for (int i = 0; i < options.scenarios; ++i) {
+    const int worst = report.results.densities[0].worst_agents.at(static_cast<size_t>(i));
+    EXPECT_TRUE(std::any_of(observer.found().begin(), observer.found().end(), [&](const Infraction& one) {
+      return one.scenario == options.first_scenario + i && one.agent == worst &&
+             one.agent_class == AgentClass::vehicle && one.is(kEventAtFault);
+    })) << worst;
+  }
   // Vehicles halt at their first event, so each is counted where its one entry says.
   const auto entries_with = [&observer](int any_of) {
     return std::count_if(observer.found().begin(), observer.found().end(), [any_of](const Infraction& one) {
