@@ -28,7 +28,8 @@ namespace pictura {
 
 namespace {
 
-constexpr int kShownGroups = 6;  // of each kind of infraction
+constexpr int kShownGroups = 6;          // of each kind of infraction
+constexpr double kManyNeverMoved = 0.2;  // of the vehicles
 
 // The density; of another driver also its name, of a file without folders.
 std::string label_of(const EvaluateRow& row) {
@@ -36,21 +37,46 @@ std::string label_of(const EvaluateRow& row) {
   return fmt::format("{} {}", row.density, std::filesystem::path(row.driver).filename().string());
 }
 
+// A line of the table: a metric, and its text for each row of the report.
+template <typename Text>
+void print_line(const EvaluateReport& report, size_t width, const char* metric, const Text& text_of) {
+  std::string line = fmt::format("{:30}", metric);
+  for (const EvaluateRow& row : report.rows) line += fmt::format(" {:>{}}", text_of(row), width);
+  print_result("{}\n", line);
+}
+
+// Metrics below each other, so that the table fits a terminal; a column for each density and driver.
 void print_table(const EvaluateReport& report) {
-  size_t width = 10;
+  size_t width = 18;
   for (const EvaluateRow& row : report.rows) width = std::max(width, label_of(row).size());
-  print_result("{:{}} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>17} {:>19} {:>9}\n",
-               "density", width, "scenarios", "steps", "vehicles", "return", "collision", "at-fault", "off-road",
-               "red light", "wall", "goals", "waypoints", "km/infraction", "km/at-fault infr.", "km");
-  for (const EvaluateRow& row : report.rows) {
-    print_result(
-        "{:{}} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>17} {:>19} {:>9.2f}\n",
-        label_of(row), width, row.scenarios, row.steps, row.vehicle_episodes, interval_text(row.return_per_vehicle),
-        interval_text(row.collision_rate), interval_text(row.at_fault_collision_rate), interval_text(row.off_road_rate),
-        interval_text(row.red_light_rate), interval_text(row.wall_contact_rate), interval_text(row.goals_per_vehicle),
-        interval_text(row.waypoints_per_vehicle), interval_text(row.km_per_infraction),
-        interval_text(row.km_per_at_fault_infraction), row.km_driven);
-  }
+  const auto line = [&](const char* metric, const auto& text_of) { print_line(report, width, metric, text_of); };
+  const auto estimate = [&](const char* metric, Estimate EvaluateRow::* of) {
+    line(metric, [of](const EvaluateRow& row) { return interval_text(row.*of); });
+  };
+  line("", [](const EvaluateRow& row) { return label_of(row); });
+  line("scenarios x steps", [](const EvaluateRow& row) { return fmt::format("{} x {}", row.scenarios, row.steps); });
+  line("vehicles", [](const EvaluateRow& row) { return fmt::format("{}", row.vehicle_episodes); });
+  line("km driven", [](const EvaluateRow& row) { return fmt::format("{:.2f}", row.km_driven); });
+  estimate("km per infraction", &EvaluateRow::km_per_infraction);
+  line("vehicles with an infraction", [](const EvaluateRow& row) { return fmt::format("{}", row.infractions); });
+  print_result("share of vehicles with\n");
+  estimate("  a collision", &EvaluateRow::collision_rate);
+  estimate("  a collision at fault", &EvaluateRow::at_fault_collision_rate);
+  estimate("  leaving the road", &EvaluateRow::off_road_rate);
+  estimate("  a red light", &EvaluateRow::red_light_rate);
+  estimate("km per at-fault infraction", &EvaluateRow::km_per_at_fault_infraction);
+  print_result("a vehicle's mean\n");
+  estimate("  goals", &EvaluateRow::goals_per_vehicle);
+  estimate("  waypoints", &EvaluateRow::waypoints_per_vehicle);
+  estimate("  km", &EvaluateRow::km_per_vehicle);
+  estimate("  return", &EvaluateRow::return_per_vehicle);
+  print_result("share of vehicles that\n");
+  estimate("  never moved", &EvaluateRow::never_moved_share);
+  estimate("  are stuck at the end", &EvaluateRow::stuck_at_end_share);
+  estimate("  touched a wall", &EvaluateRow::wall_contact_rate);
+  estimate("share of time in reverse", &EvaluateRow::reversing_share);
+  estimate("m moved per wait at red", &EvaluateRow::red_wait_moved_m);
+  line("waits at red", [](const EvaluateRow& row) { return fmt::format("{}", row.red_waits); });
   for (const EvaluateRow& row : report.rows) {
     if (row.left == 0) continue;
     print_result(
@@ -58,9 +84,9 @@ void print_table(const EvaluateReport& report) {
         label_of(row), row.spawned, row.asked, row.entered, row.left, interval_text(row.goals_per_km));
   }
   for (const EvaluateRow& row : report.rows) {
-    print_result("{}: {} of the time in reverse, {} m moved a wait at red ({} waits), {} stuck at the end\n",
-                 label_of(row), interval_text(row.reversing_share), interval_text(row.red_wait_moved_m), row.red_waits,
-                 interval_text(row.stuck_at_end_share));
+    if (row.never_moved_share.value < kManyNeverMoved) continue;
+    print_result("{}: {:.0f} % of the vehicles never moved, so that few infractions say little\n", label_of(row),
+                 100 * row.never_moved_share.value);
   }
   print_result("traffic lights: {}\n", name_of(report.results.setting.light_cycles));
   if (!report.results.setting.others.empty()) {
@@ -86,6 +112,7 @@ void print_report(const EvaluateOptions& options, const EvaluateReport& report, 
                  {"entered", row.entered},
                  {"left", row.left},
                  {"vehicle_episodes", row.vehicle_episodes},
+                 {"infractions", row.infractions},
                  {"km_driven", row.km_driven},
                  {"red_waits", row.red_waits}};
     for (const auto& [name, estimate] : metrics_of(row)) add_estimate(name, estimate, &json);

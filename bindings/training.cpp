@@ -83,6 +83,7 @@ py::dict dict_of(const EvaluateReport& report) {
     d["scenarios"] = row.scenarios;
     d["steps"] = row.steps;
     d["vehicle_episodes"] = row.vehicle_episodes;
+    d["infractions"] = row.infractions;
     d["km_driven"] = row.km_driven;
     add_metrics(row, &d);
     rows.append(d);

@@ -51,6 +51,7 @@ AgentState counted_state(Simulator& simulator) {
   copy(state.goals_reached, &host.goals_reached);
   copy(state.waypoints_reached, &host.waypoints_reached);
   copy(state.distance_m, &host.distance_m);
+  copy(state.first_motion_step, &host.first_motion_step);
   copy(state.episode_return, &host.episode_return);
   copy(state.refusal, &host.refusal);
   copy(state.life, &host.life);
@@ -73,6 +74,7 @@ void add_life(const AgentStateView& state, int64_t slot, ScenarioCounts* counts)
   counts->any_infraction += has(kEventCollision | kEventOffRoad | kEventRedLight);
   counts->at_fault_infraction += has(kEventAtFault | kEventOffRoad | kEventRedLight);
   counts->active_at_end += status == AgentStatus::active || status == AgentStatus::waiting;
+  counts->never_moved += state.first_motion_step[slot] == 0;
   counts->goals += state.goals_reached[slot];
   counts->waypoints += state.waypoints_reached[slot];
   counts->distance_m += static_cast<double>(state.distance_m[slot]);

@@ -19,9 +19,9 @@ constexpr const char* kResultsFormatAtFaultAlone = "pictura evaluation 1";
 // Format 1 lacks these counts, and its "infractions" are at_fault_infraction.
 constexpr const char* kCountsOfFormat2[] = {"collision", "wall_contact", "any_infraction", "at_fault_infraction"};
 // Files of format 2 may lack these.
-constexpr const char* kLaterCounts[] = {"asked",     "spawned",          "entered",
-                                        "left",      "driven_steps",     "reversing_steps",
-                                        "red_waits", "red_wait_moved_m", "stuck_at_end"};
+constexpr const char* kLaterCounts[] = {"asked",        "spawned",         "entered",   "left",
+                                        "driven_steps", "reversing_steps", "red_waits", "red_wait_moved_m",
+                                        "stuck_at_end", "never_moved"};
 
 constexpr Estimate kUnknown{std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()};
 
@@ -105,6 +105,7 @@ EvaluateRow row_of(const DensityResult& result, int steps) {
   int64_t driven_steps = 0;
   for (const Counts& counts : all) {
     row.vehicle_episodes += counts.vehicles;
+    row.infractions += counts.any_infraction;
     row.km_driven += km_of(counts);
     row.asked += counts.asked;
     row.spawned += counts.spawned;
@@ -122,6 +123,7 @@ EvaluateRow row_of(const DensityResult& result, int steps) {
   row.waypoints_per_vehicle = per_vehicle([](const Counts& c) { return c.waypoints; });
   row.return_per_vehicle = per_vehicle([](const Counts& c) { return c.returns; });
   row.active_at_end_share = per_vehicle([](const Counts& c) { return c.active_at_end; });
+  row.never_moved_share = per_vehicle([](const Counts& c) { return c.never_moved; });
   row.collision_rate = per_vehicle([](const Counts& c) { return c.collision; });
   row.wall_contact_rate = per_vehicle([](const Counts& c) { return c.wall_contact; });
   row.km_per_at_fault_infraction = estimate_ratio(all, km_of, [](const Counts& c) { return c.at_fault_infraction; });
@@ -166,6 +168,7 @@ std::vector<std::pair<std::string, Estimate>> metrics_of(const EvaluateRow& row)
           {"waypoints_per_vehicle", row.waypoints_per_vehicle},
           {"return_per_vehicle", row.return_per_vehicle},
           {"active_at_end_share", row.active_at_end_share},
+          {"never_moved_share", row.never_moved_share},
           {"collision_rate", row.collision_rate},
           {"wall_contact_rate", row.wall_contact_rate},
           {"km_per_at_fault_infraction", row.km_per_at_fault_infraction},

@@ -25,6 +25,7 @@ namespace pictura {
   X(int64_t, any_infraction) /* a collision, off-road or a red light: the paper's (appendix, metric definitions) */    \
   X(int64_t, at_fault_infraction) /* a collision at fault, off-road or a red light */                                  \
   X(int64_t, active_at_end)       /* vehicles that have not halted by the last step, or before they left */            \
+  X(int64_t, never_moved)         /* vehicles that stayed at rest (kRest_mps); 0 in files of earlier versions */       \
   X(int64_t, goals)                                                                                                    \
   X(int64_t, waypoints)                                                                                                \
   X(double, distance_m)                                                                                                \
@@ -137,12 +138,12 @@ Estimate estimate_ratio(const std::vector<Counts>& scenarios, const Part& part_o
 struct EvaluateRow {
   std::string density, driver;  // as DensityResult's
   int scenarios = 0, steps = 0;
-  int64_t vehicle_episodes = 0;
+  int64_t vehicle_episodes = 0, infractions = 0;  // the second: vehicles with any_infraction
   Estimate at_fault_collision_rate, off_road_rate, red_light_rate, goals_per_vehicle;
   Estimate km_per_infraction;  // over vehicles with any_infraction; infinite when there was none
   double km_driven = 0;
   Estimate km_per_vehicle, waypoints_per_vehicle, return_per_vehicle;
-  Estimate active_at_end_share;
+  Estimate active_at_end_share, never_moved_share;
   Estimate collision_rate, wall_contact_rate;
   Estimate km_per_at_fault_infraction;  // over vehicles with at_fault_infraction; infinite when there was none
   // Per km, since lives on roads that end are short.
