@@ -1,5 +1,7 @@
 // Recorded scenes in Python.
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstddef>
 #include <optional>
 
@@ -8,6 +10,7 @@
 
 #include "pictura/bindings/call.h"
 #include "pictura/bindings/objects.h"
+#include "pictura/bindings/scene_arrays.h"
 #include "pictura/map/scenario/load_scenario.h"
 #include "pictura/map/scenario/scene_file.h"
 #include "pictura/simulator/controllers/inverse_actions.h"
@@ -42,6 +45,51 @@ std::shared_ptr<RecordedScene> load_scene(const std::string& name, int32_t start
   auto scenario = run_interruptibly("Scenario.load", 1, {},
                                     [name] { return std::make_shared<const Scenario>(load_scenario(name)); });
   return std::make_shared<RecordedScene>(std::move(scenario), name, start_step);
+}
+
+struct SceneNumbers {
+  double dt_s, tolerance_m;
+  std::optional<int32_t> current_step, sdc_track;
+  std::optional<std::array<double, 3>> origin_m;
+};
+
+std::shared_ptr<RecordedScene> scene_of_arrays(const SceneArrays& arrays, const SceneNumbers& numbers,
+                                               const std::string& id) {
+  constexpr int32_t kHistorySteps = 10;  // as files have it that do not say it
+  LoggedScene scene = scene_from_arrays(arrays);
+  scene.id = scene.name = id;
+  scene.dt_s = numbers.dt_s;
+  scene.current_step = numbers.current_step.value_or(std::min(kHistorySteps, scene.num_steps - 1));
+  if (numbers.sdc_track && (*numbers.sdc_track < 0 || *numbers.sdc_track >= static_cast<int>(scene.tracks.size()))) {
+    fail_usage("sdc_track: expected a track in [0, {}), got {}", scene.tracks.size(), *numbers.sdc_track);
+  }
+  scene.sdc_track = numbers.sdc_track.value_or(-1);
+  if (!(numbers.tolerance_m >= 0 && numbers.tolerance_m <= 1)) {
+    fail_usage("tolerance_m: expected a number in [0, 1], got {}", numbers.tolerance_m);
+  }
+  scene.tolerance_m = numbers.tolerance_m;
+  if (numbers.origin_m) {
+    for (const double value : *numbers.origin_m) {
+      if (!std::isfinite(value)) fail_usage("origin_m: expected finite numbers, got {}", value);
+    }
+    scene.origin_m = Eigen::Vector3d(numbers.origin_m->data());
+  }
+  auto scenario = run_interruptibly("Scenario.from_arrays", 1, {}, [scene = std::move(scene)]() mutable {
+    return std::make_shared<const Scenario>(make_scenario(std::move(scene)));
+  });
+  return std::make_shared<RecordedScene>(std::move(scenario), id, 0);
+}
+
+/// The arguments of from_arrays().
+py::dict arrays_of_scene(const Scenario& scenario) {
+  py::dict d = to_arrays(state_scene(scenario));
+  d["dt_s"] = scenario.dt_s;
+  d["current_step"] = scenario.current_step;
+  d["sdc_track"] = scenario.sdc_track < 0 ? py::object(py::none()) : py::int_(scenario.sdc_track);
+  d["id"] = scenario.id;
+  d["origin_m"] = scenario.map.origin_m;
+  d["tolerance_m"] = 0.0;
+  return d;
 }
 
 py::dict facts_of_scene(const Scenario& scenario) {
@@ -174,6 +222,43 @@ pictura.Simulator([scene], [(0, scene.num_tracks)], **scene.world()). Commands o
 
 start_step: of the recording, at which episodes begin.
 Raises pictura.Error naming file, record and field; pictura.UsageError where there is no such scene or step.)")
+      .def_static(
+          "from_arrays",
+          [](const py::dict& tracks, const py::dict& lanes, const std::optional<py::dict>& lines,
+             const std::optional<py::dict>& edges, const std::optional<py::dict>& crosswalks,
+             const std::optional<py::dict>& stop_signs, const std::optional<py::dict>& lights, double dt_s,
+             std::optional<int32_t> current_step, std::optional<int32_t> sdc_track, const std::string& id,
+             std::optional<std::array<double, 3>> origin_m, double tolerance_m) {
+            return scene_of_arrays({tracks, lanes, lines, edges, crosswalks, stop_signs, lights},
+                                   {dt_s, tolerance_m, current_step, sdc_track, origin_m}, id);
+          },
+          py::arg("tracks"), py::arg("lanes"), py::kw_only(), py::arg("lines") = py::none(),
+          py::arg("edges") = py::none(), py::arg("crosswalks") = py::none(), py::arg("stop_signs") = py::none(),
+          py::arg("lights") = py::none(), py::arg("dt_s") = 0.1, py::arg("current_step") = py::none(),
+          py::arg("sdc_track") = py::none(), py::arg("id") = "", py::arg("origin_m") = py::none(),
+          py::arg("tolerance_m") = 0.01,
+          R"(A scene of arrays: NumPy's, or what becomes them, in dicts. Lengths are metres, positions float64 in any frame.
+
+tracks: id int64 [T], type [T] (counts pictura.TRACK_TYPES), size_m [T, 3] (length, width, height), valid bool [T, S], position_m
+[T, S, 3] (of the box's foot), heading_rad [T, S], velocity_mps [T, S, 2]; states that are not valid may hold anything.
+Lines are points float64 [P, 3], one after the other, and begin int32 [N + 1], where each begins among them and where the last ends.
+lanes: points and begin along the centre, id int64 [N] of 0 or more, type [N] (pictura.LANE_TYPES); where known speed_limit_mps [N] (0:
+unknown), width_m [P] (all 0 along a lane: unknown), in_junction bool [N], entries and exits, ids of lanes one after the other,
+with entries_begin and exits_begin [N + 1], left_neighbor and right_neighbor [N], ids of lanes of the same direction, or -1. Without
+entries and exits, lanes are linked where their ends meet.
+lines: points, begin, type [N] (pictura.LINE_TYPES). edges: points and begin, the road on the left. crosswalks: points and begin of their
+outlines. stop_signs: position_m [N, 3], lanes with lanes_begin. lights: lanes with lanes_begin [L + 1], states [L, S]
+(pictura.LIGHT_STATES), and stop_lines [L, 2, 3]; without those, a line lies across the lanes' starts.
+dt_s: between states. current_step: of the present; None: 10, or the last one. sdc_track: index of the self-driving car's track.
+origin_m: of the map, about which numbers are rounded to float32; None: the middle of lanes and edges. tolerance_m: how far lines may
+deviate when they are thinned; 0 keeps all their points.
+Raises pictura.UsageError naming the array and the element, pictura.Error where what they state is no scene.)")
+      .def(
+          "to_arrays", [](const RecordedScene& self) { return arrays_of_scene(*self.scenario()); },
+          R"(What pictura.Scenario.from_arrays(**arrays) makes the same scene of: its arguments by name.
+
+Not among them: who is to be predicted and who should be replayed, walls, parking spaces, signs that are no stop signs, widths of
+paint, and what a run that was saved has to replay to the bit.)")
       .def(
           "starting_at",
           [](const RecordedScene& self, int32_t start_step) {
@@ -300,6 +385,7 @@ never there.)");
   py::list types;
   for (int i = 0; i <= static_cast<int>(TrackType::other); ++i) types.append(to_string(static_cast<TrackType>(i)));
   module.attr("TRACK_TYPES") = py::tuple(types);
+  bind_scene_names(module);
 }
 
 }  // namespace pictura::python

@@ -23,6 +23,8 @@ from pictura._pictura import (  # noqa: E402, F401
     IDLE_ACTION,
     INSERTED_DTYPE,
     LANE_TYPES,
+    LIGHT_STATES,
+    LINE_TYPES,
     NUM_ACTIONS,
     OBSERVATION_ARRAYS,
     QUERY_DTYPE,

@@ -7,7 +7,7 @@ import numpy
 import numpy.dtypes
 import numpy.typing
 import typing
-__all__: list[str] = ['AGENT_FIELDS', 'Array', 'BOX_DTYPE', 'COMMAND_DTYPE', 'CONDITIONING_NAMES', 'Camera', 'Controller', 'EVENTS', 'EVENT_TOTALS', 'Error', 'Geometry', 'HAS_CUDA', 'IDLE_ACTION', 'INSERTED_DTYPE', 'Images', 'LANE_TYPES', 'LiveView', 'Map', 'NUM_ACTIONS', 'OBSERVATION_ARRAYS', 'QUERY_DTYPE', 'REWARD_TERMS', 'Recorder', 'Renderer', 'Rig', 'Scenario', 'Scene', 'SceneFile', 'SceneRecorder', 'Simulator', 'Snapshot', 'StepResult', 'TRACK_TYPES', 'UsageError', 'VIEW_DTYPE', 'draw_worlds', 'known_towns', 'make_views', 'map_folder', 'renderer_names', 'simulator_names', 'write_gallery']
+__all__: list[str] = ['AGENT_FIELDS', 'Array', 'BOX_DTYPE', 'COMMAND_DTYPE', 'CONDITIONING_NAMES', 'Camera', 'Controller', 'EVENTS', 'EVENT_TOTALS', 'Error', 'Geometry', 'HAS_CUDA', 'IDLE_ACTION', 'INSERTED_DTYPE', 'Images', 'LANE_TYPES', 'LIGHT_STATES', 'LINE_TYPES', 'LiveView', 'Map', 'NUM_ACTIONS', 'OBSERVATION_ARRAYS', 'QUERY_DTYPE', 'REWARD_TERMS', 'Recorder', 'Renderer', 'Rig', 'Scenario', 'Scene', 'SceneFile', 'SceneRecorder', 'Simulator', 'Snapshot', 'StepResult', 'TRACK_TYPES', 'UsageError', 'VIEW_DTYPE', 'draw_worlds', 'known_towns', 'make_views', 'map_folder', 'renderer_names', 'simulator_names', 'write_gallery']
 class Error(RuntimeError):
     """
     The work failed; the message names what was expected and what came.
@@ -179,6 +179,26 @@ class Scenario(Map):
     pictura.Simulator([scene], [(0, scene.num_tracks)], **scene.world()). Commands of kind 3 and the controller 'log' replay it.
     """
     @staticmethod
+    def from_arrays(tracks: dict, lanes: dict, *, lines: dict | None = None, edges: dict | None = None, crosswalks: dict | None = None, stop_signs: dict | None = None, lights: dict | None = None, dt_s: typing.SupportsFloat | typing.SupportsIndex = 0.1, current_step: typing.SupportsInt | typing.SupportsIndex | None = None, sdc_track: typing.SupportsInt | typing.SupportsIndex | None = None, id: str = '', origin_m: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"] | None = None, tolerance_m: typing.SupportsFloat | typing.SupportsIndex = 0.01) -> Scenario:
+        """
+        A scene of arrays: NumPy's, or what becomes them, in dicts. Lengths are metres, positions float64 in any frame.
+        
+        tracks: id int64 [T], type [T] (counts pictura.TRACK_TYPES), size_m [T, 3] (length, width, height), valid bool [T, S], position_m
+        [T, S, 3] (of the box's foot), heading_rad [T, S], velocity_mps [T, S, 2]; states that are not valid may hold anything.
+        Lines are points float64 [P, 3], one after the other, and begin int32 [N + 1], where each begins among them and where the last ends.
+        lanes: points and begin along the centre, id int64 [N] of 0 or more, type [N] (pictura.LANE_TYPES); where known speed_limit_mps [N] (0:
+        unknown), width_m [P] (all 0 along a lane: unknown), in_junction bool [N], entries and exits, ids of lanes one after the other,
+        with entries_begin and exits_begin [N + 1], left_neighbor and right_neighbor [N], ids of lanes of the same direction, or -1. Without
+        entries and exits, lanes are linked where their ends meet.
+        lines: points, begin, type [N] (pictura.LINE_TYPES). edges: points and begin, the road on the left. crosswalks: points and begin of their
+        outlines. stop_signs: position_m [N, 3], lanes with lanes_begin. lights: lanes with lanes_begin [L + 1], states [L, S]
+        (pictura.LIGHT_STATES), and stop_lines [L, 2, 3]; without those, a line lies across the lanes' starts.
+        dt_s: between states. current_step: of the present; None: 10, or the last one. sdc_track: index of the self-driving car's track.
+        origin_m: of the map, about which numbers are rounded to float32; None: the middle of lanes and edges. tolerance_m: how far lines may
+        deviate when they are thinned; 0 keeps all their points.
+        Raises pictura.UsageError naming the array and the element, pictura.Error where what they state is no scene.
+        """
+    @staticmethod
     def load(name: str, *, start_step: typing.SupportsInt | typing.SupportsIndex = 0) -> Scenario:
         """
         Loads a scene by name: FILE.json, FILE.bin, FILE.scenario, a file with '.tfrecord' in its name, or a folder of them; with '#7' or
@@ -222,6 +242,13 @@ class Scenario(Map):
         The same scene, whose episodes begin at another step; nothing is copied.
         
         Raises pictura.UsageError for a step that it does not have.
+        """
+    def to_arrays(self) -> dict:
+        """
+        What pictura.Scenario.from_arrays(**arrays) makes the same scene of: its arguments by name.
+        
+        Not among them: who is to be predicted and who should be replayed, walls, parking spaces, signs that are no stop signs, widths of
+        paint, and what a run that was saved has to replay to the bit.
         """
     def tracks(self) -> dict:
         """
@@ -980,6 +1007,8 @@ HAS_CUDA: bool = True
 IDLE_ACTION: int = 7
 INSERTED_DTYPE: numpy.dtypes.VoidDType
 LANE_TYPES: tuple = ('driving', 'bidirectional', 'parking', 'ramp', 'shoulder', 'sidewalk', 'biking', 'median', 'border', 'stop', 'restricted', 'other')
+LIGHT_STATES: tuple = ('none', 'arrow_stop', 'arrow_caution', 'arrow_go', 'stop', 'caution', 'go', 'flashing_stop', 'flashing_caution')
+LINE_TYPES: tuple = ('unknown', 'broken_single_white', 'solid_single_white', 'solid_double_white', 'broken_single_yellow', 'broken_double_yellow', 'solid_single_yellow', 'solid_double_yellow', 'passing_double_yellow', 'dash_white', 'dash_yellow')
 NUM_ACTIONS: int = 12
 OBSERVATION_ARRAYS: tuple = (('ego', 'f32', 1, 9), ('partners', 'f32', 16, 8), ('lanes', 'f32', 80, 7), ('boundaries', 'f32', 80, 7), ('controls', 'f32', 10, 7), ('walls', 'f32', 80, 7), ('set_counts', 'i32', 1, 5), ('conditioning', 'f32', 1, 17), ('waypoints', 'f32', 3, 3))
 QUERY_DTYPE: numpy.dtypes.VoidDType

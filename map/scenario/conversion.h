@@ -18,8 +18,6 @@ namespace pictura::conversion {
 
 /// Points nearer than this to the one before are duplicates.
 constexpr double kSamePoint_m = 0.01;
-/// How far polylines may deviate from the file's.
-constexpr double kTolerance_m = 0.02;
 
 struct Conversion {
   LoggedScene& scene;
@@ -35,9 +33,19 @@ struct Conversion {
     if (remaining_work < 0) fail("{}: its map needs more work than a scene may take", scene.source);
   }
   Eigen::Vector3d from_origin(const Eigen::Vector3d& p) const { return p - origin; }
+  /// As a map holds it and state_scene() gives it back, where a program states the scene.
+  Eigen::Vector3d rounded(const Eigen::Vector3d& p) const {
+    if (!scene.is_stated) return p;
+    const Eigen::Vector3d stated_again = origin + p.cast<float>().cast<double>();
+    return (stated_again - origin).cast<float>().cast<double>();
+  }
 };
 
-/// The points about the origin, without duplicates, none farther than a piece may be long from the next, and thinned.
+/// Points about the origin without duplicates, none farther than a piece may be long from the next.
+std::vector<CurvePoint> cut_into_pieces(Conversion* conversion, const std::vector<CurvePoint>& points,
+                                        const std::string& what);
+
+/// The points about the origin, cut into pieces and thinned.
 /// Throws Error naming `what` where a point is too far from the origin. Empty if there are fewer than two points.
 std::vector<CurvePoint> resampled(Conversion* conversion, const LoggedPoints& points, const std::vector<double>& widths,
                                   const std::string& what);

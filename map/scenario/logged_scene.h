@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -34,8 +35,9 @@ struct LoggedNeighbor {
 struct LoggedLane {
   int64_t id = 0;
   LoggedLaneType type = LoggedLaneType::undefined;
-  double speed_limit_mps = 0;  // 0: unknown
-  bool interpolating = false;  // connects two lanes, in a junction
+  std::optional<LaneType> map_type;  // instead of `type`, where a program states it
+  double speed_limit_mps = 0;        // 0: unknown
+  bool interpolating = false;        // connects two lanes, in a junction
   LoggedPoints points;
   std::vector<double> widths_m;  // [points], or empty: unknown
   std::vector<int64_t> entries, exits;
@@ -53,6 +55,8 @@ enum class LoggedLineType : uint8_t {
   solid_single_yellow,
   solid_double_yellow,
   passing_double_yellow,
+  dash_white,  // one dash as long as the line
+  dash_yellow,
 };
 
 struct LoggedLine {
@@ -78,7 +82,7 @@ struct LoggedPolygon {
 };
 
 struct LoggedState {
-  Eigen::Vector3d center_m{0, 0, 0};  // of the box
+  Eigen::Vector3d center_m{0, 0, 0};  // of the box; of its foot where LoggedScene::is_stated
   double heading_rad = 0;
   double velocity_x_mps = 0, velocity_y_mps = 0;
   double length_m = 0, width_m = 0, height_m = 0;
@@ -123,6 +127,12 @@ struct LoggedScene {
   std::vector<LoggedStopSign> stop_signs;
   std::vector<LoggedLight> lights;
   bool has_links = true;  // else lanes are linked where their ends meet
+  /// A program states the scene instead of a recording's file, so nothing is guessed: types of lanes, directions of
+  /// links, sides and gaps of edges, and which lights are one are as stated. Points are rounded first, so that what a
+  /// scenario holds can be stated again (state_scene()) and gives the same scenario.
+  bool is_stated = false;
+  double tolerance_m = 0.02;                // how far thinned polylines may deviate; 0: all points are kept
+  std::optional<Eigen::Vector3d> origin_m;  // of the map; else the centre of lanes and edges
   std::vector<ConversionNote> notes;
 
   /// Counts an occurrence of `what`; the first one's place is kept.
@@ -141,5 +151,11 @@ struct LoggedScene {
 /// map is not finite or lies beyond 10 km of the scene's centre, when there is no lane of two points or no track, and
 /// when the map would need more points than scenes may have.
 Scenario make_scenario(LoggedScene scene);
+
+/// What make_scenario() makes the same scenario of, but for what a LoggedScene has no place for: walls, parking spaces,
+/// painted stop lines, signs that are no stop signs, widths and colours of marks other than white and yellow, the
+/// lights of the map itself, and SavedMotion. A double line comes back as two stripes, a broken one as its dashes.
+/// Lanes have the ids of the file where each has one of its own, else their numbers.
+LoggedScene state_scene(const Scenario& scenario);
 
 }  // namespace pictura

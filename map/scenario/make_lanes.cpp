@@ -218,7 +218,7 @@ Links stated_links(Conversion* conversion) {
     const int32_t a = from->second, b = to->second;
     const float gap_m = length(end_of(map, a).position_m - start_of(map, b).position_m);
     const float other_m = length(end_of(map, b).position_m - start_of(map, a).position_m);
-    if (gap_m > kWideGap_m && other_m < kMeetingEnds_m) {
+    if (!scene.is_stated && gap_m > kWideGap_m && other_m < kMeetingEnds_m) {
       if (links.emplace(b, a).second)
         scene.note("links whose lanes meet the other way round swapped", place_of(stated_by));
       return;
@@ -358,7 +358,7 @@ void make_lanes(Conversion* conversion) {
     PICTURA_CHECK(conversion->lane_of_id.emplace(logged.id, index).second, "{}: lane {}: expected an id of its own",
                   scene.source, logged.id);
     Lane lane;
-    lane.type = type_of(logged.type);
+    lane.type = logged.map_type.value_or(type_of(logged.type));
     lane.in_junction = logged.interpolating;
     lane.speed_limit_mps =
         logged.speed_limit_mps > 0 ? static_cast<float>(logged.speed_limit_mps) : kDefaultSpeedLimit_mps;
@@ -375,7 +375,7 @@ void make_lanes(Conversion* conversion) {
 void link_lanes(Conversion* conversion) {
   RoadMap& map = conversion->out->map;
   set_links(conversion->scene.has_links ? stated_links(conversion) : meeting_links(conversion), &map);
-  infer_types(&map);
+  if (!conversion->scene.is_stated) infer_types(&map);
   set_neighbors(conversion);
 }
 

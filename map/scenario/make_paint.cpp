@@ -79,7 +79,13 @@ bool crosses_a_lane(Conversion* conversion, const LaneSegments& lanes, Vec3 a, V
   return crosses;
 }
 
-void append_marking(const std::vector<CurvePoint>& points, MarkColor color, bool broken, RoadMap* map) {
+void append_marking(Conversion* conversion, std::vector<CurvePoint> points, MarkColor color, bool broken) {
+  RoadMap* map = &conversion->out->map;
+  if (conversion->scene.is_stated) {
+    // So that the stripe or dash can be stated as a line.
+    for (CurvePoint& point : points) point.position_m = conversion->rounded(point.position_m);
+    points = cut_into_pieces(conversion, points, "a stripe or dash");
+  }
   if (points.size() < 2) return;
   Marking marking{.width_m = kMarkWidth_m, .color = color, .broken = broken};
   marking.points.begin = static_cast<int32_t>(map->marking_points.size());
@@ -135,7 +141,7 @@ void append_dashes(Conversion* conversion, const std::vector<CurvePoint>& line, 
   for (int i = 0; i < dashes; ++i) {
     conversion->count_work(line.size());
     const double at_m = begin_m + i * kDashPeriod_m;
-    append_marking(part_of(line, at_m, std::min(length_m, at_m + kDash_m)), color, true, &conversion->out->map);
+    append_marking(conversion, part_of(line, at_m, std::min(length_m, at_m + kDash_m)), color, true);
   }
 }
 
@@ -156,7 +162,7 @@ void make_edges(Conversion* conversion) {
       part.clear();
     };
     for (const Eigen::Vector3d& p : edge.points) {
-      if (!part.empty() && plan_distance_m(part.back(), p) > kJump_m) {
+      if (!part.empty() && !scene.is_stated && plan_distance_m(part.back(), p) > kJump_m) {
         const Vec3 a = to_vec3(conversion->from_origin(part.back())), b = to_vec3(conversion->from_origin(p));
         const bool is_near = std::abs(b.x) <= kMaxScenarioRadius_m && std::abs(b.y) <= kMaxScenarioRadius_m;
         if (is_near && crosses_a_lane(conversion, lanes, a, b)) {
@@ -169,8 +175,13 @@ void make_edges(Conversion* conversion) {
     finish();
   }
   // Our edges have the road on their right.
-  const bool is_reversed = are_reversed(conversion, lanes, lines);
-  if (is_reversed) scene.note("edges with the road on their right, for the whole file", "the first edge");
+  bool is_reversed = are_reversed(conversion, lanes, lines);
+  if (is_reversed && scene.is_stated) {
+    scene.note("edges with lanes on their right, though the road is stated to be on their left", "the first edge");
+    is_reversed = false;
+  } else if (is_reversed) {
+    scene.note("edges with the road on their right, for the whole file", "the first edge");
+  }
   for (std::vector<CurvePoint>& line : lines) {
     if (!is_reversed) std::reverse(line.begin(), line.end());
     for (std::size_t i = 1; i < line.size(); ++i) {
@@ -181,7 +192,6 @@ void make_edges(Conversion* conversion) {
 
 void make_markings(Conversion* conversion) {
   LoggedScene& scene = conversion->scene;
-  RoadMap& map = conversion->out->map;
   for (const LoggedLine& logged : scene.lines) {
     const std::vector<CurvePoint> line =
         resampled(conversion, logged.points, {}, fmt::format("road line {}", logged.id));
@@ -189,7 +199,7 @@ void make_markings(Conversion* conversion) {
     const auto left = [&] { return moved_left(line, kStripeOffset_m); };
     const auto right = [&] { return moved_left(line, -kStripeOffset_m); };
     const auto solid = [&](const std::vector<CurvePoint>& points, MarkColor color) {
-      append_marking(points, color, false, &map);
+      append_marking(conversion, points, color, false);
     };
     switch (logged.type) {
       case LoggedLineType::unknown:
@@ -197,6 +207,8 @@ void make_markings(Conversion* conversion) {
       case LoggedLineType::solid_single_yellow: solid(line, MarkColor::yellow); break;
       case LoggedLineType::broken_single_white: append_dashes(conversion, line, MarkColor::white); break;
       case LoggedLineType::broken_single_yellow: append_dashes(conversion, line, MarkColor::yellow); break;
+      case LoggedLineType::dash_white: append_marking(conversion, line, MarkColor::white, true); break;
+      case LoggedLineType::dash_yellow: append_marking(conversion, line, MarkColor::yellow, true); break;
       case LoggedLineType::solid_double_white:
         solid(left(), MarkColor::white);
         solid(right(), MarkColor::white);

@@ -17,6 +17,7 @@ namespace {
 constexpr float kSegmentCell_m = 10.0f;
 // Stop points this near, of lanes that start in about one direction, are one light's.
 constexpr double kSameStopPoint_m = 0.5, kSameHeading_rad = 0.5;
+constexpr double kStatedPiece_m = 9.99;  // instead of kMaxPiece_m
 
 float wrapped(double heading_rad) { return static_cast<float>(std::remainder(heading_rad, 2 * std::numbers::pi)); }
 
@@ -31,13 +32,10 @@ void check_radius(const Conversion& conversion, const std::string& what, const E
 
 }  // namespace
 
-std::vector<CurvePoint> resampled(Conversion* conversion, const LoggedPoints& points, const std::vector<double>& widths,
-                                  const std::string& what) {
+std::vector<CurvePoint> cut_into_pieces(Conversion* conversion, const std::vector<CurvePoint>& points,
+                                        const std::string& what) {
   std::vector<CurvePoint> dense;
-  conversion->count_work(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const CurvePoint next{0, conversion->from_origin(points[i]), widths.empty() ? 0 : widths[i]};
-    check_radius(*conversion, what, next.position_m);
+  for (const CurvePoint& next : points) {
     if (!dense.empty()) {
       const CurvePoint last = dense.back();
       const double way_m = plan_distance_m(last.position_m, next.position_m);
@@ -45,22 +43,42 @@ std::vector<CurvePoint> resampled(Conversion* conversion, const LoggedPoints& po
         conversion->scene.note("points that repeat the one before left out", what);
         continue;
       }
-      const int pieces = static_cast<int>(std::ceil(way_m / kMaxPiece_m - kPieceRounding));
+      // Rounding must not make a piece so long that it would be cut again.
+      const double piece_m = conversion->scene.is_stated && way_m > kMaxPiece_m ? kStatedPiece_m : double{kMaxPiece_m};
+      const int pieces = static_cast<int>(std::ceil(way_m / piece_m - kPieceRounding));
       conversion->count_work(static_cast<std::size_t>(pieces));
       for (int k = 1; k < pieces; ++k) {
         const double t = static_cast<double>(k) / pieces;
-        dense.push_back(
-            {0, last.position_m + t * (next.position_m - last.position_m), last.width + t * (next.width - last.width)});
+        dense.push_back({0, conversion->rounded(last.position_m + t * (next.position_m - last.position_m)),
+                         last.width + t * (next.width - last.width)});
       }
     }
     dense.push_back(next);
   }
-  if (dense.size() < 2) return {};
-  std::vector<CurvePoint> thinned;
-  // Thinning tests each point against the others of its piece, of which a straight one has some twenty.
-  conversion->count_work(dense.size() * 20);
-  for (const std::size_t index : thin_polyline(dense, kTolerance_m, kMaxPiece_m)) thinned.push_back(dense[index]);
-  return thinned;
+  return dense;
+}
+
+std::vector<CurvePoint> resampled(Conversion* conversion, const LoggedPoints& points, const std::vector<double>& widths,
+                                  const std::string& what) {
+  const LoggedScene& scene = conversion->scene;
+  std::vector<CurvePoint> line;
+  conversion->count_work(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    line.push_back({0, conversion->rounded(conversion->from_origin(points[i])), widths.empty() ? 0 : widths[i]});
+    check_radius(*conversion, what, line.back().position_m);
+  }
+  line = cut_into_pieces(conversion, line, what);
+  if (line.size() < 2) return {};
+  if (scene.tolerance_m > 0) {
+    std::vector<CurvePoint> thinned;
+    // Thinning tests each point against the others of its piece, of which a straight one has some twenty.
+    conversion->count_work(line.size() * 20);
+    for (const std::size_t index : thin_polyline(line, scene.tolerance_m, kMaxPiece_m)) thinned.push_back(line[index]);
+    line = std::move(thinned);
+  }
+  // The ends of what was left out may be duplicates.
+  if (scene.is_stated) line = cut_into_pieces(conversion, line, what);
+  return line;
 }
 
 LaneSegments segments_of(const RoadMap& map, bool (*is_wanted)(const Lane&)) {
@@ -104,6 +122,7 @@ void choose_origin(Conversion* conversion) {
   PICTURA_CHECK(any && !conversion->scene.lanes.empty(), "{}: {}: expected at least one lane, got none",
                 conversion->scene.source, conversion->scene.names.features);
   for (int axis = 0; axis < 3; ++axis) conversion->origin[axis] = std::round(0.5 * (low[axis] + high[axis])) + 0.0;
+  if (conversion->scene.origin_m) conversion->origin = *conversion->scene.origin_m;
   conversion->out->map.origin_m = {conversion->origin.x(), conversion->origin.y(), conversion->origin.z()};
 }
 
@@ -152,10 +171,10 @@ void make_tracks(Conversion* conversion) {
         out.states.emplace_back();
         continue;
       }
-      Eigen::Vector3d p = conversion->from_origin(state.center_m);
+      Eigen::Vector3d p = conversion->rounded(conversion->from_origin(state.center_m));
       check_radius(*conversion, fmt::format("{}: step {}", place, step), p);
       // Recorded sizes vary along a track: the foot is below the centre by half of the height at that step.
-      p.z() -= 0.5 * (state.height_m > 0 ? state.height_m : last->height_m);
+      if (!scene.is_stated) p.z() -= 0.5 * (state.height_m > 0 ? state.height_m : last->height_m);
       out.states.push_back({to_vec3(p),
                             wrapped(state.heading_rad),
                             {static_cast<float>(state.velocity_x_mps), static_cast<float>(state.velocity_y_mps)}});
@@ -276,8 +295,8 @@ void make_lights(Conversion* conversion) {
     if (lanes.empty()) continue;
     FoundLight one = find_light(out.map, light, std::move(lanes));
     conversion->count_work(found.size());
-    const auto same =
-        std::find_if(found.begin(), found.end(), [&](const FoundLight& other) { return are_one(other, one); });
+    const auto same = std::find_if(found.begin(), found.end(),
+                                   [&](const FoundLight& other) { return !scene.is_stated && are_one(other, one); });
     if (same == found.end()) {
       found.push_back(std::move(one));
     } else {

@@ -33,6 +33,18 @@ void exercise(const Scenario& scenario) {
   }
 }
 
+/// What a scenario states must give the same scenario again and again.
+void exercise_statement(const Scenario& scenario) {
+  Scenario stated = make_scenario(state_scene(scenario));
+  stated.notes.clear();
+  Scenario again = make_scenario(state_scene(stated));
+  again.notes.clear();
+  const std::string difference = first_difference(stated, again);
+  if (difference.empty()) return;
+  std::fprintf(stderr, "what a scene states is another scene: %s\n", difference.c_str());
+  std::abort();
+}
+
 LoggedScene small_fixture() {
   return make_fixture({.num_steps = 3, .num_vehicles = 2, .num_pedestrians = 1, .num_cyclists = 1, .lane_points = 5});
 }
@@ -86,7 +98,10 @@ bool fuzz_scene_file(std::string_view bytes) {
 bool fuzz_scene(std::string_view bytes, const std::string& name) {
   if (name == "fields") return fuzz_scene_file(bytes);
   try {
-    exercise(name == "payload" ? make_scenario(womd::parse_scenario(bytes, "fuzz")) : parse_scenario_file(bytes, name));
+    const Scenario scenario =
+        name == "payload" ? make_scenario(womd::parse_scenario(bytes, "fuzz")) : parse_scenario_file(bytes, name);
+    exercise(scenario);
+    exercise_statement(scenario);
     return true;
   } catch (const Error&) {
     return false;

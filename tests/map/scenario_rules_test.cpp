@@ -1,6 +1,7 @@
 // The rules by which a scenario is made of a recording, each where it decides: docs/scenario.md lists them.
 #include <cmath>
 #include <filesystem>
+#include <numbers>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -374,6 +375,108 @@ TEST(SceneCache, OtherBytesOfTheSameSizeAndTimeAreAnotherScene) {
   ASSERT_EQ(std::filesystem::file_size(shard), bytes);
   EXPECT_EQ(find_scene(shard).id, "fixture00000002");
   EXPECT_EQ(load_scenario(shard + "#fixture00000002").id, "fixture00000002");
+}
+
+/// What is made of the scene that a scenario states, and nothing must be said of it again.
+Scenario stated_again(const Scenario& scenario) {
+  Scenario again = make_scenario(state_scene(scenario));
+  again.notes.clear();
+  return again;
+}
+
+TEST(StatedScenes, WhatAProgramStatesIsTakenAsItIs) {
+  LoggedScene scene = small_scene();
+  scene.is_stated = true;
+  scene.tolerance_m = 0.01;
+  scene.lanes.push_back(lane_at(2, 0, 40, 20));
+  scene.lanes.push_back(lane_at(3, 0, 40, 60));
+  scene.lanes[2].type = LoggedLaneType::undefined;
+  // The other way round, and over a gap; the type of lane 3 is not known.
+  scene.lanes[1].exits = {1};
+  scene.lanes[0].exits = {3};
+  // The road on the right, and a gap of 10 m across the first lane.
+  scene.edges = {{.id = 4, .points = line_at(1, 0, 40)}, {.id = 5, .points = {{5, -5, 0}, {5, 5, 0}}}};
+  LoggedLight light{.lanes = {1}, .states = {RecordedLightState::stop, RecordedLightState::go}};
+  scene.lights = {light, light};
+  const Scenario scenario = make_scenario(scene);
+  EXPECT_THAT(scenario.notes, ::testing::ElementsAre(::testing::Field(&ConversionNote::what, HasSubstr("over a gap"))));
+  EXPECT_EQ(scenario.map.links(scenario.map.lanes[1].successors)[0], 0);
+  EXPECT_EQ(scenario.map.lanes[2].type, LaneType::other);
+  EXPECT_EQ(scenario.lights.size(), 2u);
+  EXPECT_EQ(scenario.map.road_edges.front().a_m.x - scenario.map.road_edges.front().b_m.x, 10);
+  EXPECT_EQ(scenario.map.road_edges.back().b_m.y, -5);
+  EXPECT_EQ(scenario.states[0].position_m.z, 0) << "the foot's";
+  scene.edges[0].points = line_at(1, 0, 400);
+  scene.lanes[0].points = line_at(0, 0, 400);
+  EXPECT_EQ(count_of(make_scenario(scene), "though the road is stated to be on their left"), 1);
+}
+
+TEST(StatedScenes, ComeBackToTheBit) {
+  LoggedScene scene = test::make_fixture();
+  scene.is_stated = true;
+  scene.tolerance_m = 0.01;
+  for (std::size_t i = 0; i < scene.stop_signs.size(); ++i) scene.stop_signs[i].id = static_cast<int64_t>(i);
+  Scenario first = make_scenario(scene);
+  first.notes.clear();
+  const Scenario second = stated_again(first);
+  EXPECT_EQ(first_difference(second, first), "");
+  EXPECT_GT(second.lights.size(), 0u);
+}
+
+// Pieces, dashes and duplicates are near their limits all over a winding map far from its origin.
+TEST(StatedScenes, ComeBackToTheBitFromAnyPlace) {
+  for (const double away_m : {0.0, 3000.0, 9000.0}) {
+    LoggedScene scene = small_scene();
+    scene.is_stated = true;
+    scene.origin_m = Vector3d(0.1, 1e6 + 0.3, 7.7);
+    scene.lanes[0].points.clear();
+    for (int i = 0; i < 400; ++i) {
+      const double angle = 0.02 * i, step = i % 7 == 0 ? 0.01 : i % 11 == 0 ? 20.0 : 2.5;
+      const Vector3d last = i > 0 ? scene.lanes[0].points.back() : Vector3d(away_m, 1e6 - away_m, 1e-7 * i);
+      scene.lanes[0].points.emplace_back(last + step * Vector3d(std::cos(angle), std::sin(angle), 1e-3));
+    }
+    scene.lanes[0].widths_m.assign(400, 3.3);
+    scene.lanes[0].widths_m[17] = 3.9;
+    for (LoggedState& state : scene.tracks[0].states) {
+      state.center_m = scene.lanes[0].points[3];
+      state.heading_rad = std::numbers::pi;
+    }
+    scene.edges = {{.id = 1, .points = scene.lanes[0].points}};
+    for (int type = 0; type <= static_cast<int>(LoggedLineType::dash_yellow); ++type) {
+      scene.lines.push_back({.id = type, .type = static_cast<LoggedLineType>(type), .points = scene.lanes[0].points});
+    }
+    for (const double tolerance_m : {0.0, 0.01}) {
+      scene.tolerance_m = tolerance_m;
+      Scenario first = make_scenario(scene);
+      first.notes.clear();
+      EXPECT_EQ(first_difference(first, stated_again(first)), "") << away_m << ' ' << tolerance_m;
+      EXPECT_NEAR(first.states[0].heading_rad, kPi, 1e-6);
+    }
+  }
+}
+
+TEST(StatedScenes, RecordingsComeBackWithTheirTracksLinksAndLights) {
+  Scenario recorded = make_scenario(test::make_fixture());
+  Scenario stated = stated_again(recorded);
+  EXPECT_EQ(first_difference(stated_again(stated), stated), "");
+  // Directions of lines are computed of points that are rounded now.
+  ASSERT_EQ(stated.lights.size(), recorded.lights.size());
+  for (std::size_t i = 0; i < stated.lights.size(); ++i) {
+    EXPECT_NEAR(stated.lights[i].stop_heading_rad, recorded.lights[i].stop_heading_rad, 1e-4);
+    stated.lights[i].stop_heading_rad = recorded.lights[i].stop_heading_rad;
+  }
+  ASSERT_EQ(stated.map.lane_points.size(), recorded.map.lane_points.size());
+  for (std::size_t i = 0; i < stated.map.lane_points.size(); ++i) {
+    EXPECT_LT(length(stated.map.lane_points[i].position_m - recorded.map.lane_points[i].position_m), 1e-4f);
+  }
+  EXPECT_EQ(stated.map.lane_links, recorded.map.lane_links);
+  EXPECT_EQ(stated.map.markings.size(), recorded.map.markings.size());
+  EXPECT_EQ(stated.map.road_edges.size(), recorded.map.road_edges.size());
+  EXPECT_EQ(stated.map.crosswalks.size(), recorded.map.crosswalks.size());
+  EXPECT_EQ(stated.map.signs.size(), recorded.map.signs.size());
+  stated.map = recorded.map;
+  recorded.notes.clear();
+  EXPECT_EQ(first_difference(stated, recorded), "");
 }
 
 }  // namespace

@@ -243,3 +243,151 @@ def test_the_documents_code_runs(folder, tmp_path, monkeypatch):
         exec(compile(block, "docs/python.md", "exec"), names)  # noqa: S102
     assert names["errors"].shape == (12, 81) and names["simulator"].totals()["agent_steps"] > 0
     assert pictura.Scenario.load("drive.scenario").id == "my drive"
+
+
+def equal_arrays(a: dict, b: dict) -> bool:
+    if a.keys() != b.keys():
+        return False
+    return all(equal_arrays(a[k], b[k]) if isinstance(a[k], dict) else np.array_equal(a[k], b[k]) for k in a)
+
+
+def crossing_arrays() -> dict:
+    """Two lanes one after the other and one beside the first, far from the origin, with two road users and a light."""
+    x = 650_000 + np.arange(0, 41) * 0.5
+    y = np.full_like(x, 4_800_000.25)
+    z = np.full_like(x, 12.5)
+    lane = np.stack([x, y, z], 1)
+    points = np.concatenate([lane, lane + (20, 0, 0), lane + (0, 3.5, 0)])
+    steps = 21
+    position = np.zeros((2, steps, 3))
+    position[0] = lane[:steps]
+    position[1] = lane[3] + (0, 3.5, 0.125)
+    valid = np.ones((2, steps), bool)
+    valid[1, 5:8] = False
+    position[1, 5:8] = np.nan
+    return {
+        "tracks": {
+            "id": [71, 5], "type": [pictura.TRACK_TYPES.index(name) for name in ("vehicle", "pedestrian")],
+            "size_m": [[4.5, 1.875, 1.5], [0.5, 0.625, 1.75]], "position_m": position,
+            "heading_rad": np.array([[0.0] * steps, [np.pi] * steps]), "velocity_mps": np.full((2, steps, 2), (5.0, 0.0)), "valid": valid,
+        },
+        "lanes": {
+            "id": [9, 4, 30], "type": [0, 0, pictura.LANE_TYPES.index("biking")], "points": points, "begin": [0, 41, 82, 123],
+            "speed_limit_mps": [13.5, 0, 7], "width_m": np.repeat([3.5, 0, 1.75], 41), "entries": [9], "entries_begin": [0, 0, 1, 1],
+            "left_neighbor": [-1, -1, -1],
+        },
+        "lines": {"points": lane[:5] + (0, 1.75, 0), "begin": [0, 5], "type": [pictura.LINE_TYPES.index("solid_single_yellow")]},
+        "edges": {"points": lane[[0, 40]] - (0, 1.75, 0), "begin": [0, 2]},
+        "crosswalks": {"points": lane[0] + [(5, -2, 0), (8, -2, 0), (8, 2, 0), (5, 2, 0)], "begin": [0, 4]},
+        "stop_signs": {"position_m": [lane[40]], "lanes": [9], "lanes_begin": [0, 1]},
+        "lights": {
+            "lanes": [4], "lanes_begin": [0, 1], "states": [[pictura.LIGHT_STATES.index("stop")] * steps],
+            "stop_lines": [[lane[40] + (0, 1.5, 0), lane[40] - (0, 1.5, 0)]],
+        },
+        "dt_s": 0.125, "current_step": 3, "sdc_track": 0, "id": "mine",
+    }  # fmt: skip
+
+
+def test_a_scene_of_arrays_has_what_they_state(tmp_path):
+    given = crossing_arrays()
+    scene = pictura.Scenario.from_arrays(**given)
+    assert (scene.id, scene.format, scene.num_steps, scene.dt_s, scene.current_step, scene.sdc_track) == ("mine", "arrays", 21, 0.125, 3, 0)
+    back = scene.to_arrays()
+    valid = given["tracks"]["valid"]
+    for name, values in given["tracks"].items():
+        is_state = np.ndim(values) > 1 and name != "size_m"
+        got, wanted = (array[valid] if is_state else array for array in (back["tracks"][name], np.asarray(values)))
+        np.testing.assert_array_equal(got, wanted, err_msg=name)
+    lanes = back["lanes"]
+    assert lanes["id"].tolist() == [9, 4, 30] and [pictura.LANE_TYPES[i] for i in lanes["type"]] == ["driving", "driving", "biking"]
+    assert lanes["exits"].tolist() == [4] and lanes["exits_begin"].tolist() == [0, 1, 1, 1] and lanes["entries"].tolist() == [9]
+    assert lanes["speed_limit_mps"].tolist() == [13.5, 15.0, 7.0], "unknown: 15 m/s"
+    assert lanes["width_m"][: lanes["begin"][1]].tolist() == [3.5] * 3, "20 m in pieces of 10 m"
+    for name in ("states", "lanes", "lanes_begin", "stop_lines"):
+        np.testing.assert_array_equal(back["lights"][name], given["lights"][name])
+    np.testing.assert_array_equal(back["stop_signs"]["position_m"], given["stop_signs"]["position_m"])
+    np.testing.assert_array_equal(back["edges"]["points"][[0, -1]], given["edges"]["points"])
+    np.testing.assert_array_equal(back["crosswalks"]["points"], given["crosswalks"]["points"])
+    again = pictura.Scenario.from_arrays(**back)
+    assert equal_arrays(again.to_arrays(), back)
+    paths = [str(tmp_path / name) for name in ("a.scenario", "b.scenario")]
+    again.save(paths[0])
+    pictura.Scenario.from_arrays(**again.to_arrays()).save(paths[1])
+    assert pathlib.Path(paths[0]).read_bytes() == pathlib.Path(paths[1]).read_bytes()
+    assert equal_arrays(pictura.Scenario.load(paths[0]).to_arrays(), back)
+    every = pictura.Scenario.from_arrays(**{**given, "tolerance_m": 0}).to_arrays()["lanes"]
+    np.testing.assert_array_equal(every["points"], given["lanes"]["points"])
+
+
+def test_recordings_come_back_from_their_arrays(folder, scene):
+    for name in ("womd.tfrecord", "gpudrive.json", "pufferdrive_v1.bin", "pufferdrive_v3c.bin"):
+        recorded = pictura.Scenario.load(str(folder / name))
+        back = pictura.Scenario.from_arrays(**recorded.to_arrays())
+        assert back.notes == [] and equal_arrays(back.to_arrays(), pictura.Scenario.from_arrays(**back.to_arrays()).to_arrays())
+        for quantity, values in recorded.tracks().items():
+            np.testing.assert_array_equal(back.tracks()[quantity], values, err_msg=f"{name} {quantity}")
+        was, now = recorded.to_arrays(), back.to_arrays()
+        assert equal_arrays(was["lights"], now["lights"])
+        for part in ("id", "type", "entries", "entries_begin", "exits", "left_neighbor", "speed_limit_mps"):
+            np.testing.assert_array_equal(was["lanes"][part], now["lanes"][part])
+        for part in ("lanes", "edges", "lines", "crosswalks"):
+            np.testing.assert_allclose(was[part]["points"], now[part]["points"], atol=0.01)
+    simulator = world_of(pictura.Scenario.from_arrays(**scene.to_arrays()))
+    simulator.run(pictura.Controller("log", simulator), 90)
+    assert simulator.totals()["agent_steps"] == 0
+
+
+def changed(path: str, value) -> dict:
+    arrays = crossing_arrays()
+    part, _, key = path.partition(".")
+    if not key:
+        return arrays | {part: value}
+    if value is None:
+        del arrays[part][key]
+    else:
+        arrays[part][key] = value
+    return arrays
+
+
+def with_nan(path: str, index: tuple) -> np.ndarray:
+    part, key = path.split(".")
+    array = np.array(crossing_arrays()[part][key], float)
+    array[index] = np.nan
+    return array
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "message"),
+    [
+        ("tracks.valid", None, r"tracks\['valid'\]: expected an array of shape \[2, n\], got nothing"),
+        ("tracks.heading_rad", np.zeros((2, 20)), r"tracks\['heading_rad'\]: expected shape \[2, 21\], got \[2, 20\]"),
+        ("tracks.headings", [1], r"tracks: expected id, type, .*, valid, got 'headings'"),
+        ("tracks.position_m", with_nan("tracks.position_m", (0, 3, 1)), r"tracks\['position_m'\]\[0, 3, 1\]: expected a finite number, got nan"),
+        ("tracks.type", [1, 9], r"tracks\['type'\]\[1\]: expected a number in \[0, 5\), which counts pictura.TRACK_TYPES, got 9"),
+        ("tracks.type", [1.0, 2.0], r"tracks\['type'\]: expected integers, got float64"),
+        ("tracks.id", "x", r"tracks\['id'\]: expected shape \[n\], got \[\]"),
+        ("tracks.size_m", [[4, 0, 1], [1, 1, 1]], r"tracks\[0\]: width: expected a number in \(0, 100\]"),
+        ("lanes.begin", [0, 41, 40, 123], r"lanes\['begin'\]\[2\]: expected 41 to 123, got 40"),
+        ("lanes.begin", [0, 41, 82, 120], r"lanes\['begin'\]\[3\]: expected 123, the number of elements, got 120"),
+        ("lanes.id", [9, 4, 9], r"lanes\['id'\]\[2\]: expected an id of its own, got 9 again"),
+        ("lanes.id", [9, -4, 3], r"lanes\['id'\]\[1\]: expected an id of 0 or more, got -4"),
+        ("lanes.entries", [10], r"lanes\['entries'\]\[0\]: expected the id of a lane, got 10"),
+        ("lanes.left_neighbor", [-1, 7, -1], r"lanes\['left_neighbor'\]\[1\]: expected the id of a lane, got 7"),
+        ("lanes.points", with_nan("lanes.points", (7, 2)), r"lanes\['points'\]\[7, 2\]: expected a finite number, got nan"),
+        ("lanes.width_m", np.full(123, -1.0), r"lanes\['width_m'\]\[0\]: expected a number in \[0, 50\], got -1"),
+        ("lines.type", [11], r"lines\['type'\]\[0\]: .*pictura.LINE_TYPES, got 11"),
+        ("lights.states", [[4] * 20], r"lights\['states'\]: expected shape \[n, 21\], got \[1, 20\]"),
+        ("lights.states", [[9] * 21], r"lights\['states'\]\[0, 0\]: .*pictura.LIGHT_STATES, got 9"),
+        ("lights.lanes", [5], r"lights\['lanes'\]\[0\]: expected the id of a lane, got 5"),
+        ("lights.stop_lines", [[0, 0, 0]], r"lights\['stop_lines'\]: expected shape \[1, 2, 3\], got \[1, 3\]"),
+        ("stop_signs.lanes_begin", [0], r"stop_signs\['lanes_begin'\]: expected shape \[2\], got \[1\]"),
+        ("sdc_track", 2, r"sdc_track: expected a track in \[0, 2\), got 2"),
+        ("current_step", 21, r"current_step: expected a step in \[0, 21\), got 21"),
+        ("dt_s", 0, r"dt_s: expected 0.001 to 10 s, got 0"),
+        ("tolerance_m", -1, r"tolerance_m: expected a number in \[0, 1\], got -1"),
+        ("origin_m", [0, 0, 0], r"within 10000 m of the map's centre"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_arrays_is_named(path, value, message):
+    with pytest.raises(pictura.Error, match=message):
+        pictura.Scenario.from_arrays(**changed(path, value))
