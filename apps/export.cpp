@@ -31,7 +31,8 @@ void add_export_command(CLI::App& app) {
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "The file holds what the policy needs to drive: weights, configuration, cameras. simulate, evaluate, replay and\n"
-      "train --init-from take it in the place of a checkpoint; a run cannot go on from it.\n"
+      "train --init-from take it in the place of a checkpoint; a run cannot go on from it. ONNX models are written in\n"
+      "Python: pictura.torch.export_onnx(pictura.torch.load_policy(POLICY), \"policy.onnx\").\n"
       "Examples:\n"
       "  pictura export runs/town01/checkpoint.ckpt --out town01.safetensors\n"
       "  pictura export runs/town01/checkpoint.ckpt --weights f32 --out town01.safetensors\n"

@@ -1,18 +1,22 @@
 """Policies of the library as torch modules. docs/network.md states the arithmetic.
 
 load_policy() reads the weights that training writes (policy.safetensors) or a checkpoint; save_policy() writes them back, so
-that weights trained in Python run in the `pictura` command.
+that weights trained in Python run in the `pictura` command; export_onnx() writes a policy for ONNX Runtime and others.
 """
 
 from __future__ import annotations
 
 import contextlib
+import copy
+import importlib.util
+import itertools
 import json
 import math
 import os
 import pathlib
 import struct
 import tomllib
+import warnings
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -28,6 +32,7 @@ _NUM_ACTIONS = 12
 # The entity sets, as the columns of set_counts: numbers of a row and points that it begins with.
 _SETS = {"partners": (8, 1), "lanes": (7, 1), "boundaries": (7, 1), "controls": (7, 2), "walls": (7, 1)}
 _SEGMENTS = {"lanes", "boundaries", "walls"}  # the sets of them
+_ONNX_OPSET = 20  # the first with Gelu
 _MAGIC = b"PICTCKPT"
 _PREAMBLE = "<8sIIQ"
 
@@ -187,10 +192,15 @@ class Policy(nn.Module):
             chosen = logits.argmax(1) if argmax else torch.distributions.Categorical(logits=logits).sample()
         return chosen.to(torch.int32)
 
+    @property
+    def observation_names(self) -> list[str]:
+        """The arrays of an observation that this policy reads."""
+        read = ["rgb"] if self.modality == "perspective" else ["set_counts", *self.sets]
+        return ["ego", "conditioning", "waypoints", *read]
+
     def _read(self, observation: Mapping[str, Any]) -> dict[str, Any]:
         """The arrays that this policy reads, as tensors on its device."""
-        names = ["ego", "conditioning", "waypoints"]
-        names += ["rgb"] if self.modality == "perspective" else ["set_counts", *self.sets]
+        names = self.observation_names
         if not isinstance(observation, Mapping):
             raise pictura.UsageError(f"observation: expected a dict with {', '.join(names)}, got {type(observation).__name__}")
         missing = [name for name in names if name not in observation]
@@ -401,9 +411,76 @@ def save_policy(policy: Policy, path: str | os.PathLike[str], like: str | os.Pat
         data[-8:] = struct.pack("<Q", _hash64(bytes(data[:-8])))
     elif "hash" in metadata:
         _seal(data, 8 + length, metadata["hash"])
+    _write_whole(path, data)
+
+
+def _write_whole(path: str, data: bytes | bytearray) -> None:
     beside = pathlib.Path(f"{path}.part{os.getpid()}")
     try:
         beside.write_bytes(data)
         beside.replace(path)
     finally:
         beside.unlink(missing_ok=True)
+
+
+class _PolicyOfArrays(nn.Module):
+    """A policy whose arguments are the arrays of an observation, one after the other."""
+
+    def __init__(self, policy: Policy, images: list[str]) -> None:
+        super().__init__()
+        self.policy, self.images = policy, images
+
+    def forward(self, *arrays: Tensor) -> tuple[Tensor, Tensor]:
+        names = self.policy.observation_names
+        observation: dict[str, Any] = dict(zip(names, arrays))
+        if self.images:
+            observation["rgb"] = list(arrays[names.index("rgb") :])
+        return self.policy(observation)
+
+
+def _example_observation(policy: Policy) -> dict[str, Tensor]:
+    """Two rows of zeros for each array that a policy reads; images of several sizes as rgb_0, rgb_1, ..."""
+    types = {"f32": torch.float32, "i32": torch.int32}
+    known = {name: (types[kind], (rows, numbers) if rows > 1 else (numbers,)) for name, kind, rows, numbers in pictura.OBSERVATION_ARRAYS}
+    example = {name: torch.zeros(2, *known[name][1], dtype=known[name][0]) for name in policy.observation_names if name != "rgb"}
+    if policy.modality == "perspective":
+        if "rig" not in policy.metadata:
+            raise pictura.UsageError("policy: expected one that load_policy() read, whose file says the size of its images")
+        blocks = [(size, len(list(group))) for size, group in itertools.groupby(tuple(each["size_px"]) for each in policy.metadata["rig"])]
+        for number, ((width, height), cameras) in enumerate(blocks):
+            name = "rgb" if len(blocks) == 1 else f"rgb_{number}"
+            example[name] = torch.zeros(2, cameras, 3, height, width, dtype=torch.uint8)
+    return example
+
+
+def export_onnx(policy: Policy, path: str | os.PathLike[str]) -> None:
+    """Writes a policy as an ONNX model of opset 20, by torch's exporter, which needs the packages onnx and onnxscript.
+
+    Inputs are the arrays of an observation by their names, as forward() reads them, [batch, ...] of any batch; images of cameras of
+    several sizes are rgb_0, rgb_1, ... Outputs are `logits` float32 [batch, 12] and `value` float32 [batch]. The property `pictura`
+    of the model is JSON of what the policy's file says beside its weights, without the path. The file is written whole or not at all.
+    Raises pictura.Error where a package is missing, pictura.UsageError for a policy of images that is of no file.
+    """
+    for package in ("onnx", "onnxscript"):
+        if importlib.util.find_spec(package) is None:
+            raise pictura.Error(f"export_onnx: expected the package {package}, got none: pip install 'pictura[onnx]'")
+    example = _example_observation(policy)
+    images = [name for name in example if name.startswith("rgb")]
+    module = _PolicyOfArrays(copy.deepcopy(policy).cpu(), images).eval()
+    batch = torch.export.Dim("batch")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the exporter's, of its own code
+        program = torch.onnx.export(
+            module,
+            tuple(example.values()),
+            dynamo=True,
+            opset_version=_ONNX_OPSET,
+            input_names=list(example),
+            output_names=["logits", "value"],
+            dynamic_shapes=(tuple({0: batch} for _ in example),),
+            verbose=False,
+        )
+    facts = {name: value for name, value in policy.metadata.items() if name != "path"}
+    model = program.model_proto
+    model.metadata_props.add(key="pictura", value=json.dumps(facts))
+    _write_whole(os.fspath(path), model.SerializeToString())

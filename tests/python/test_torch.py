@@ -14,7 +14,7 @@ import pytest
 import pictura
 
 torch = pytest.importorskip("torch")
-from pictura.torch import Policy, _read_safetensors, load_policy, save_policy  # noqa: E402
+from pictura.torch import Policy, _read_safetensors, export_onnx, load_policy, save_policy  # noqa: E402
 
 MODELS = sorted((pathlib.Path(__file__).parents[2] / "models").rglob("*.safetensors"))
 NAMES = (
@@ -179,3 +179,76 @@ def test_weights_of_python_run_in_the_command(tmp_path):
         seen[checkpoint.name] = json.loads(out.stdout)["km_driven"]
     assert seen["throttle.ckpt"] > seen["checkpoint.ckpt"] > 0, "it does nothing but accelerate"
     assert seen["throttle.safetensors"] == seen["throttle.ckpt"]
+
+
+def run_onnx(path, observation):
+    """Logits and values of ONNX Runtime on the CPU."""
+    runtime = pytest.importorskip("onnxruntime")
+    session = runtime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
+    assert [each.name for each in session.get_inputs()] == list(observation)
+    return [torch.from_numpy(each) for each in session.run(["logits", "value"], {name: each.numpy() for name, each in observation.items()})]
+
+
+def drawn_observation(policy, like, rows: int):
+    """Rows of arrays as they are in `like`, each scaled anew, and counts and pixels drawn anew."""
+    draw = torch.Generator().manual_seed(1)
+    observation = {}
+    for name in policy.observation_names:
+        values = like[name].repeat(-(-rows // len(like[name])), *[1] * (like[name].ndim - 1))[:rows]
+        if values.is_floating_point() and name != "rgb":
+            values = values * torch.rand(len(values), *[1] * (values.ndim - 1), generator=draw) * 2
+        elif name == "rgb":
+            values = torch.randint(0, 256, values.shape, generator=draw, dtype=torch.uint8)
+        else:
+            values = torch.randint(0, 11, values.shape, generator=draw, dtype=torch.int32)
+        observation[name] = values.reshape(-1, 3, 3) if name == "waypoints" else values
+    return observation
+
+
+@pytest.mark.parametrize("name", ["segments", "perspective_points"])
+def test_onnx_models_decide_as_the_policy(reference, tmp_path, name):
+    pytest.importorskip("onnxscript")
+    policy = load_policy(reference / f"{name}.safetensors")
+    _, tensors = _read_safetensors(str(reference / f"{name}_io.safetensors"))
+    if "rig" not in policy.metadata and policy.modality == "perspective":
+        with pytest.raises(pictura.UsageError, match="size of its images"):
+            export_onnx(policy, tmp_path / "policy.onnx")
+        policy.metadata["rig"] = [{"size_px": [tensors["rgb"].shape[4], tensors["rgb"].shape[3]]}] * policy.num_cameras
+    export_onnx(policy, tmp_path / "policy.onnx")
+    assert [path.name for path in tmp_path.iterdir()] == ["policy.onnx"]
+    for rows in (1, 10_000 if policy.modality == "vector" else 1_000):
+        observation = drawn_observation(policy, tensors, rows)
+        logits, value = run_onnx(tmp_path / "policy.onnx", observation)
+        with torch.no_grad():
+            expected, expected_value = policy(observation)
+        torch.testing.assert_close(logits, expected, rtol=0, atol=1e-4)
+        torch.testing.assert_close(value, expected_value, rtol=0, atol=1e-4)
+        best = expected.topk(2).values
+        is_clear = best[:, 0] - best[:, 1] > 2 * (logits - expected).abs().amax(1)
+        assert is_clear.float().mean() > 0.9 and (logits.argmax(1) == expected.argmax(1))[is_clear].all()
+
+
+def test_onnx_models_of_cameras_of_two_sizes(reference, tmp_path):
+    onnx = pytest.importorskip("onnx")
+    pytest.importorskip("onnxscript")
+    policy = load_policy(reference / "patches.safetensors")
+    _, tensors = _read_safetensors(str(reference / "patches_io.safetensors"))
+    height, width = tensors["rgb"].shape[3:]
+    policy.metadata["rig"] = [{"size_px": [width, height]}] * policy.num_cameras
+    policy.metadata["rig"][-1] = {"size_px": [2 * width, height]}
+    export_onnx(policy, tmp_path / "policy.onnx")
+    observation = drawn_observation(policy, tensors, 5)
+    blocks = [observation.pop("rgb")[:, :-1], torch.randint(0, 256, (5, 1, 3, height, 2 * width), dtype=torch.uint8)]
+    logits, _ = run_onnx(tmp_path / "policy.onnx", observation | {"rgb_0": blocks[0].contiguous(), "rgb_1": blocks[1]})
+    with torch.no_grad():
+        torch.testing.assert_close(logits, policy(observation | {"rgb": blocks})[0], rtol=0, atol=1e-4)
+    model = onnx.load(tmp_path / "policy.onnx")
+    assert [(each.domain, each.version) for each in model.opset_import] == [("", 20)]
+    facts = json.loads({each.key: each.value for each in model.metadata_props}["pictura"])
+    assert facts["rig"] == policy.metadata["rig"] and "path" not in facts
+
+
+def test_onnx_models_need_their_packages(reference, tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "onnxscript", None)
+    with pytest.raises(pictura.Error, match="expected the package onnx"):
+        export_onnx(load_policy(reference / "vector.safetensors"), tmp_path / "policy.onnx")
