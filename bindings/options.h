@@ -9,11 +9,13 @@
 #include <string>
 #include <type_traits>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include "pictura/bindings/function_controller.h"
 #include "pictura/common/array.h"
 #include "pictura/common/span.h"
 #include "pictura/common/support/named_option.h"
@@ -76,6 +78,20 @@ class ParameterVisitor {
   void conditioning(const NamedOption& option, ConditioningRanges& ranges);
   /// Numbers by name, as "name=value".
   void numbers_by_name(const NamedOption& option, std::vector<std::string>& texts);
+  /// A controller's name, or a function of Python's that drives.
+  template <typename Options>
+  void controller(const NamedOption& option, Options& options) {
+    using Given = std::variant<std::string, py::function>;
+    add<Given>(option, Given(options.controller), [&options](const Given& given) {
+      options.make_own_controller = nullptr;
+      if (const auto* const name = std::get_if<std::string>(&given)) {
+        options.controller = *name;
+      } else {
+        options.controller = name_of_function(std::get<py::function>(given));
+        options.make_own_controller = function_controllers(std::get<py::function>(given));
+      }
+    });
+  }
   /// A function of Python's, or None.
   template <typename... Arguments>
   void callback(const NamedOption& option, std::function<void(Arguments...)>& value) {

@@ -205,7 +205,7 @@ void visit_options(SceneArguments& arguments, Visitor&& v) {
   v.value({"checkpoint"}, options.checkpoint);
   v.value({"scenes"}, options.scenes);
   v.value({"protocol"}, arguments.protocol);
-  v.value({"controller"}, options.controller);
+  v.controller({"controller"}, options);
   v.value({"control"}, arguments.control);
   v.value({"start_step"}, arguments.start_step);
   v.value({"steps"}, arguments.steps);
@@ -453,7 +453,8 @@ void bind_evaluation(py::module_& module) {
       R"(The paper's evaluation, as `pictura evaluate` does it, in worlds that no training has.
 
 checkpoint: of a policy; '' with a controller of the paper's world. maps: names, files or ranges as procedural:1-64. controller: 'lane', 'idm_lanes', 'random' or 'idle',
-which drives instead. densities: 'light', 'medium' and 'dense', 60, 120 and 150 agents a world, or agents_per_world of them.
+which drives instead, or a function(observations) of NumPy's arrays [slots, ...] by name, as pictura.Simulator.observations has them, that
+returns actions int [slots], on the CPU. densities: 'light', 'medium' and 'dense', 60, 120 and 150 agents a world, or agents_per_world of them.
 device, simulator, renderer: 'auto' or names; renderer '': as it was trained. rig, or width_px and height_px: other cameras.
 backbone: where the program of policy.backbone lies now. conditioning: numbers by name. light_cycles: 'phases' or 'independent',
 light_heads: 'as_mapped' or 'visible'; '': as it was trained. average: with the average of weights that the checkpoint holds. decision_steps: for which an

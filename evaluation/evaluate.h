@@ -47,7 +47,7 @@ template <typename Visitor>
 void visit_options(EvaluateOptions& options, Visitor&& v) {
   v.value({"checkpoint"}, options.checkpoint);
   v.maps({"maps"}, options.maps);
-  v.value({"controller"}, options.controller);
+  v.controller({"controller"}, options);
   v.choice({"densities"}, options.densities, kDensityNames);
   v.value({"agents_per_world"}, options.agents_per_world);
   v.numbers_by_name({"others"}, options.others);

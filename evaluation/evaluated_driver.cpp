@@ -66,10 +66,11 @@ EvaluatedDriver controller_driver(const DriverOptions& options, int steps) {
   if (options.decision_steps > 0)
     fail_usage("decision_steps: expected a trained policy, got the controller {}", options.controller);
   Config config = adapted(options.checkpoint.empty() ? Config() : read_policy(options.checkpoint).config, options);
-  config.policy.modality = Modality::perspective;  // nobody reads vectors,
-  config.render.backend = "auto";                  // and nothing is drawn
+  const bool is_own = options.make_own_controller != nullptr;
+  config.policy.modality = is_own ? Modality::vector : Modality::perspective;  // others read no vectors,
+  config.render.backend = "auto";                                              // and nothing is drawn
   const std::string& name = options.controller;
-  const bool is_on_host = drives_on_host(name);
+  const bool is_on_host = is_own || drives_on_host(name);
   if (is_on_host && options.device == "auto" && options.simulator == "auto") config.run.device = "cpu";
   EvaluatedDriver driver;
   driver.device = open_learning_device(config);
@@ -80,8 +81,10 @@ EvaluatedDriver controller_driver(const DriverOptions& options, int steps) {
   driver.setting.light_cycles = config.simulator.light_cycles;
   driver.setting.device = driver.device.is_host() ? "cpu" : is_on_host ? "cuda, driven from the host" : "cuda";
   driver.drive = [&options](Simulator& simulator) {
-    return Driving{make_controller(options.controller, simulator, options.seed),
-                   [&simulator] { return count_active(simulator); }};
+    std::unique_ptr<Controller> controller = options.make_own_controller
+                                                 ? options.make_own_controller(simulator)
+                                                 : make_controller(options.controller, simulator, options.seed);
+    return Driving{std::move(controller), [&simulator] { return count_active(simulator); }};
   };
   return driver;
 }

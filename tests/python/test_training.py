@@ -444,6 +444,41 @@ def test_a_controller_is_evaluated_without_a_policy():
         pictura.evaluate("", ["procedural:1"], controller="lane", samples="many")
 
 
+def test_functions_are_evaluated_in_the_place_of_controllers(tmp_path):
+    maps, options = ["procedural:1"], {"scenarios": 2, "steps": 60, "agents_per_world": 8, "device": "cpu"}
+    seen = []
+
+    def idle(observations):
+        seen.append(observations)
+        return np.full(len(observations["ego"]), pictura.IDLE_ACTION)
+
+    report = pictura.evaluate("", maps, controller=idle, **options)
+    assert report["policy_hash"] == "function idle"
+    expected = pictura.evaluate("", maps, controller="idle", **options)
+    assert repr(report["rows"]) == repr(expected["rows"]) and report["agent_steps"] == expected["agent_steps"]
+    shapes = {name: (rows, numbers) if rows > 1 else (numbers,) for name, _, rows, numbers in pictura.OBSERVATION_ARRAYS if name != "walls"}
+    assert {name: values.shape[1:] for name, values in seen[0].items() if name != "walls"} == shapes
+    assert not np.shares_memory(seen[0]["ego"], seen[1]["ego"]), "copies, which stay"
+
+    class Throttle:
+        def __call__(self, observations):
+            return torch.full((len(observations["ego"]),), 10)
+
+    assert pictura.evaluate("", maps, controller=Throttle(), **options)["rows"][0]["km_driven"] > report["rows"][0]["km_driven"]
+    for wrong, message in (
+        (lambda _: None, r"function <lambda>: expected actions, integers \[\d+\], got"),
+        (lambda seen: np.zeros((len(seen["ego"]), 2), int), r"expected actions, integers \[\d+\], got int64 \(\d+, 2\)"),
+        (lambda seen: np.zeros(len(seen["ego"])), r"expected actions, integers \[\d+\], got float64"),
+        (lambda seen: np.full(len(seen["ego"]), 12), r"expected actions in \[0, 12\), got 12 for slot 0"),
+    ):
+        with pytest.raises(pictura.UsageError, match=message):
+            pictura.evaluate("", maps, controller=wrong, **options)
+    with pytest.raises(ZeroDivisionError):
+        pictura.evaluate("", maps, controller=lambda _: 1 / 0, **options)
+    with pytest.raises(TypeError, match="controller"):
+        pictura.evaluate("", maps, controller=3, **options)
+
+
 def test_unknown_arguments_are_answered_with_the_nearest():
     for function, name, nearest in (
         (pictura.train, "overides", "overrides"),
