@@ -1,0 +1,368 @@
+"""Scenes of other libraries' files, by way of pictura.Scenario.from_arrays().
+
+load_scenarionet() reads the pickles of ScenarioNet and MetaDrive (sd_*.pkl: Waymo, nuScenes, nuPlan, Argoverse 2). Nothing in a
+pickle is run: it may hold NumPy's arrays and plain values alone.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import pathlib
+import pickle
+import re
+from typing import Any
+
+import numpy as np
+
+import pictura
+
+_MAX_BYTES = 1 << 28
+_NUMPY = re.compile(r"numpy\.(_?core\.(multiarray|numeric)\.)?(\w+)")
+
+
+def _plain_values(data: bytes) -> Any:
+    """What a pickle of NumPy's arrays and builtins holds; object arrays are lists.
+
+    Its callables are stand-ins that are made anew for every pickle, since a pickle can also change what it names.
+    """
+
+    class Type:
+        def __init__(self, name: str, *_: Any) -> None:
+            if re.fullmatch(r"[biufSU]\d{1,4}|O8", name) is None:
+                raise pickle.UnpicklingError(f"expected an array of numbers or texts, got one of {name!r}")
+            self.name, self.order = name, "="
+
+        def __setstate__(self, state: tuple) -> None:
+            self.order = {"<": "<", ">": ">", "|": "|", "=": "="}[state[1]]
+
+        def array(self, shape: tuple, data: Any, order: str) -> Any:
+            if self.name == "O8":
+                return list(data)
+            if not isinstance(data, (bytes, bytearray)):
+                raise pickle.UnpicklingError(f"expected an array's bytes, got {type(data).__name__}")
+            return np.frombuffer(bytes(data), np.dtype(self.order + self.name)).reshape(shape, order=order)
+
+    class Array:
+        value: Any = None
+
+        def __setstate__(self, state: tuple) -> None:
+            _, shape, type_, is_fortran, data = state
+            self.value = type_.array(shape, data, "F" if is_fortran else "C")
+
+    def from_buffer(data: Any, type_: Type, shape: tuple, order: str) -> Array:
+        array = Array()
+        array.value = type_.array(shape, data, order)
+        return array
+
+    stand_ins = {
+        "numpy ndarray": Array,
+        "numpy dtype": Type,
+        "numpy _reconstruct": lambda *_: Array(),
+        "numpy _frombuffer": from_buffer,
+        "numpy scalar": lambda type_, data: type_.array((), data, "C")[()],
+        # How bytes are written before protocol 3.
+        "_codecs.encode": lambda text, _: text.encode("latin1"),
+        "builtins.bytes": lambda: b"",
+        "collections.defaultdict": lambda *_: {},
+        "collections.OrderedDict": lambda *_: {},
+        **{f"builtins.{kind.__name__}": kind for kind in (int, float, set)},
+    }
+
+    # The one in Python, half as fast: the one in C takes as much memory as a pickle says that it will remember values.
+    class Unpickler(pickle._Unpickler):
+        def find_class(self, module: str, name: str) -> Any:
+            whole = f"{module.replace('__builtin__', 'builtins')}.{name}"
+            from_numpy = _NUMPY.fullmatch(whole)
+            found = stand_ins.get(f"numpy {from_numpy[3]}" if from_numpy else whole)
+            if found is None:
+                raise pickle.UnpicklingError(f"expected NumPy's arrays and builtins alone, got {whole}")
+            return found
+
+    def unwrapped(value: Any, depth: int = 0) -> Any:
+        if depth > 20:
+            raise pickle.UnpicklingError("expected values within 20 others at most, got deeper ones")
+        if isinstance(value, Array):
+            return unwrapped(value.value, depth + 1)
+        if isinstance(value, dict):
+            return {key: unwrapped(each, depth + 1) for key, each in value.items()}
+        if isinstance(value, (list, tuple)):
+            return [unwrapped(each, depth + 1) for each in value]
+        return value
+
+    return unwrapped(Unpickler(io.BytesIO(data)).load())
+
+
+_TRACK_TYPES = {"VEHICLE": "vehicle", "PEDESTRIAN": "pedestrian", "CYCLIST": "cyclist", "OTHER": "other", "UNSET": "unset"}
+_LANE_TYPES = {
+    "LANE_SURFACE_STREET": "driving", "LANE_SURFACE_UNSTRUCTURE": "driving", "LANE_FREEWAY": "driving", "LANE_BUS_LANE": "driving",
+    "LANE_BIKE_LANE": "biking", "LANE_UNKNOWN": "other",
+}  # fmt: skip
+_LIGHTS = {"TRAFFIC_LIGHT_GREEN": "go", "TRAFFIC_LIGHT_RED": "stop", "TRAFFIC_LIGHT_YELLOW": "caution"}
+_OUTLINE = re.compile(r"boundary_\d+")  # how nuScenes' and nuPlan's converters call the outlines of what is drivable
+_MAX_OUTLINE_WORK, _NEAR_M = 100_000_000, 50.0
+_MIN_HALF_WIDTH_M, _MAX_HALF_WIDTH_M = 0.5, 5.0  # as docs/scenario.md says of borders
+
+
+class _Fault(Exception):
+    """What is wrong with a part of a scene: its place, and why."""
+
+
+def _entry(mapping: Any, key: str, place: str) -> Any:
+    if not isinstance(mapping, dict):
+        raise _Fault(f"{place}: expected a dict, got {type(mapping).__name__}")
+    if key not in mapping:
+        raise _Fault(f"{place}: expected '{key}', got nothing")
+    return mapping[key]
+
+
+def _numbers(value: Any, place: str, shape: tuple[int | None, ...]) -> np.ndarray:
+    """Floats of that shape, in which None is any length; a last axis of one is dropped."""
+    try:
+        array = np.asarray(value, float)
+    except (TypeError, ValueError):
+        raise _Fault(f"{place}: expected numbers, got {type(value).__name__}") from None
+    if array.ndim == len(shape) + 1 and array.shape[-1] == 1:
+        array = array[..., 0]
+    if array.ndim != len(shape) or any(wanted not in (None, got) for wanted, got in zip(shape, array.shape)):
+        expected = ", ".join("n" if each is None else str(each) for each in shape)
+        raise _Fault(f"{place}: expected shape [{expected}], got {list(array.shape)}")
+    return array
+
+
+def _points(value: Any, place: str, is_flat: bool) -> np.ndarray:
+    """[n, 3] of points with or without a height, which flat maps have no use for."""
+    points = _numbers(value, place, (None, None))
+    if points.shape[1] not in (2, 3):
+        raise _Fault(f"{place}: expected points of 2 or 3 numbers, got {points.shape[1]}")
+    height = points[:, 2:] if points.shape[1] == 3 and not is_flat else np.zeros((len(points), 1))
+    return np.concatenate([points[:, :2], height], 1)
+
+
+def _numbered(keys: list[Any]) -> dict[str, int]:
+    """Numbers of ids: their own where all are numbers, else their places."""
+    texts = [str(key) for key in keys]
+    own = all(re.fullmatch(r"\d{1,18}", text) for text in texts) and len({int(text) for text in texts}) == len(texts)
+    return {text: int(text) if own else place for place, text in enumerate(texts)}
+
+
+def _joined(lists: list[Any], kind: type = np.int64, tail: tuple[int, ...] = ()) -> tuple[np.ndarray, np.ndarray]:
+    """Lists one after the other, and where each begins."""
+    whole = np.concatenate([np.zeros((0, *tail), kind), *(np.asarray(each, kind).reshape(-1, *tail) for each in lists)])
+    return whole, np.cumsum([0, *(len(each) for each in lists)])
+
+
+def _polylines(lines: list[np.ndarray]) -> dict[str, np.ndarray]:
+    points, begin = _joined(lines, float, (3,))
+    return {"points": points, "begin": begin}
+
+
+def _width_m(lane: dict, points: int, place: str) -> np.ndarray:
+    """Of the halves on both sides where they can be; 0 throughout where none is."""
+    if lane.get("width") is None:
+        return np.zeros(points)
+    halves_m = _numbers(lane["width"], f"{place}['width']", (points, 2))
+    is_known = (halves_m >= _MIN_HALF_WIDTH_M) & (halves_m <= _MAX_HALF_WIDTH_M)
+    sides = is_known.sum(1)
+    if not sides.any():
+        return np.zeros(points)
+    width_m = np.where(is_known, halves_m, 0).sum(1) * 2 / np.maximum(sides, 1)
+    return np.interp(np.arange(points), np.flatnonzero(sides), width_m[sides > 0])
+
+
+def _neighbor(neighbors: Any, lanes: dict[str, int], nearest: int) -> int:
+    """The lane beside which it runs longest, or the nearest of ids in their order from left to right; -1: none."""
+    if not isinstance(neighbors, list) or not neighbors:
+        return -1
+    if not isinstance(neighbors[0], dict):
+        return lanes.get(str(neighbors[nearest]), -1)
+    known = [each for each in neighbors if isinstance(each, dict) and str(each.get("feature_id")) in lanes]
+    longest = max(known, key=lambda each: int(each.get("self_end_index", 0)) - int(each.get("self_start_index", 0)), default=None)
+    return -1 if longest is None else lanes[str(longest["feature_id"])]
+
+
+def _lanes_of(features: dict, is_flat: bool) -> tuple[dict[str, Any], dict[str, int]]:
+    kept = {str(key): each for key, each in features.items() if each["type"] in _LANE_TYPES}
+    ids = _numbered(list(kept))
+
+    def linked(lane: dict, key: str) -> list[int]:
+        return [ids[str(other)] for other in lane.get(key) or [] if str(other) in ids]
+
+    def limit_mps(lane: dict) -> float:
+        return float(lane["speed_limit_kmh"] or 0) / 3.6 if "speed_limit_kmh" in lane else 0.0
+
+    lines = [_points(_entry(lane, "polyline", f"map_features['{key}']"), f"map_features['{key}']['polyline']", is_flat) for key, lane in kept.items()]
+    arrays: dict[str, Any] = _polylines(lines)
+    arrays["id"] = list(ids.values())
+    arrays["type"] = [pictura.LANE_TYPES.index(_LANE_TYPES[lane["type"]]) for lane in kept.values()]
+    arrays["speed_limit_mps"] = [limit_mps(lane) for lane in kept.values()]
+    widths = [_width_m(lane, len(line), f"map_features['{key}']") for (key, lane), line in zip(kept.items(), lines)]
+    arrays["width_m"] = _joined(widths, float)[0]
+    arrays["in_junction"] = [bool(lane.get("interpolating")) or lane["type"] == "LANE_SURFACE_UNSTRUCTURE" for lane in kept.values()]
+    if any(lane.get("entry_lanes") or lane.get("exit_lanes") for lane in kept.values()):
+        for key in ("entries", "exits"):
+            name = {"entries": "entry_lanes", "exits": "exit_lanes"}[key]
+            arrays[key], arrays[f"{key}_begin"] = _joined([linked(lane, name) for lane in kept.values()])
+    arrays["left_neighbor"] = [_neighbor(lane.get("left_neighbor"), ids, -1) for lane in kept.values()]
+    arrays["right_neighbor"] = [_neighbor(lane.get("right_neighbor"), ids, 0) for lane in kept.values()]
+    return arrays, ids
+
+
+def _is_inside(point: np.ndarray, ring: np.ndarray) -> bool:
+    """Whether a ray from the point crosses the ring an odd number of times."""
+    a, b = ring[:-1], ring[1:]
+    spans = (a[:, 1] > point[1]) != (b[:, 1] > point[1])
+    a, b = a[spans], b[spans]
+    x = a[:, 0] + (point[1] - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
+    return bool((x > point[0]).sum() % 2)
+
+
+def _edges_of_outlines(rings: list[np.ndarray]) -> list[np.ndarray]:
+    """Outlines of what is drivable as edges with the road on their left: rings around it run to the left, those of holes to the right."""
+    if len(rings) * sum(map(len, rings)) > _MAX_OUTLINE_WORK:
+        raise _Fault(f"map_features: expected fewer outlines, got {len(rings)} of {sum(map(len, rings))} points")
+    edges = []
+    for ring in rings:
+        is_hole = sum(_is_inside(ring[0], other) for other in rings if other is not ring) % 2 == 1
+        x, y = (ring - ring[0])[:, :2].T
+        runs_left = (x[:-1] * y[1:] - x[1:] * y[:-1]).sum() > 0
+        edges.append(ring if runs_left != is_hole else ring[::-1])
+    return edges
+
+
+def _parts_near(lines: list[np.ndarray], places: np.ndarray) -> list[np.ndarray]:
+    """The parts of lines that lie near a box around the places: outlines are of whole towns."""
+    low, high = places[:, :2].min(0) - _NEAR_M, places[:, :2].max(0) + _NEAR_M
+    parts = []
+    for line in lines:
+        is_near = ((line[:, :2] >= low) & (line[:, :2] <= high)).all(1)
+        for part in np.split(np.arange(len(line)), np.flatnonzero(np.diff(is_near)) + 1):
+            if is_near[part[0]] and len(part) > 1:
+                parts.append(line[part])
+    return parts
+
+
+def _map_of(features: Any, is_flat: bool) -> tuple[dict[str, Any], dict[str, int]]:
+    if not isinstance(features, dict):
+        raise _Fault(f"map_features: expected a dict, got {type(features).__name__}")
+    for key, each in features.items():
+        if not isinstance(_entry(each, "type", f"map_features['{key}']"), str):
+            raise _Fault(f"map_features['{key}']['type']: expected a text, got {type(each['type']).__name__}")
+
+    def of(wanted: Any, points: str) -> list[tuple[dict, np.ndarray]]:
+        return [
+            (each, _points(each[points], f"map_features['{key}']['{points}']", is_flat))
+            for key, each in features.items()
+            if wanted(each["type"]) and points in each
+        ]
+
+    lanes, ids = _lanes_of(features, is_flat)
+    edges = [points for _, points in of(lambda kind: kind in ("ROAD_EDGE_BOUNDARY", "ROAD_EDGE_MEDIAN"), "polyline")]
+    lines = of(lambda kind: kind == "UNKNOWN_LINE" or kind.startswith("ROAD_LINE_"), "polyline")
+    if not edges:
+        outlines = {id(each) for key, each in features.items() if _OUTLINE.fullmatch(str(key))}
+        rings = [points for each, points in lines if id(each) in outlines and len(points) > 3 and (points[0] == points[-1]).all()]
+        lines = [(each, points) for each, points in lines if not any(points is ring for ring in rings)]
+        edges = _parts_near(_edges_of_outlines(rings), lanes["points"]) if len(lanes["points"]) else []
+    names = [each["type"].removeprefix("ROAD_LINE_").lower() for each, _ in lines]
+    types = [pictura.LINE_TYPES.index(name if name in pictura.LINE_TYPES else "unknown") for name in names]
+    signs = [(key, each) for key, each in features.items() if each["type"] == "STOP_SIGN"]
+    places = [_points([_entry(each, "position", f"map_features['{key}']")], f"map_features['{key}']['position']", is_flat) for key, each in signs]
+    held, begin = _joined([[ids[str(lane)] for lane in each.get("lane") or [] if str(lane) in ids] for _, each in signs])
+    return {
+        "lanes": lanes,
+        "lines": {**_polylines([points for _, points in lines]), "type": np.asarray(types, int)},
+        "edges": _polylines(edges),
+        "crosswalks": _polylines([points for _, points in of(lambda kind: kind == "CROSSWALK", "polygon")]),
+        "stop_signs": {"position_m": _joined(places, float, (3,))[0], "lanes": held, "lanes_begin": begin},
+    }, ids
+
+
+def _tracks_of(tracks: Any, steps: int, is_flat: bool) -> tuple[dict[str, Any], dict[str, int]]:
+    if not isinstance(tracks, dict):
+        raise _Fault(f"tracks: expected a dict, got {type(tracks).__name__}")
+    kept = {str(key): each for key, each in tracks.items() if _entry(each, "type", f"tracks['{key}']") in _TRACK_TYPES}
+    arrays: dict[str, list] = {"id": list(_numbered(list(kept)).values())}
+    arrays["type"] = [pictura.TRACK_TYPES.index(_TRACK_TYPES[each["type"]]) for each in kept.values()]
+    for name in ("size_m", "position_m", "heading_rad", "velocity_mps", "valid"):
+        arrays[name] = []
+    for key, each in kept.items():
+        state, place = _entry(each, "state", f"tracks['{key}']"), f"tracks['{key}']['state']"
+
+        def column(name: str, *shape: int | None) -> np.ndarray:
+            return _numbers(_entry(state, name, place), f"{place}['{name}']", (steps, *shape))  # noqa: B023
+
+        valid = column("valid") > 0.5
+        sizes = np.stack([column(name) for name in ("length", "width", "height")], 1)
+        position = _points(column("position", None), f"{place}['position']", is_flat)
+        if not is_flat:
+            position[:, 2] -= sizes[:, 2] / 2
+        arrays["valid"].append(valid)
+        arrays["size_m"].append(sizes[np.flatnonzero(valid)[-1]] if valid.any() else np.ones(3))
+        arrays["position_m"].append(position)
+        arrays["heading_rad"].append(column("heading"))
+        arrays["velocity_mps"].append(column("velocity", None)[:, :2])
+    return arrays, {key: index for index, key in enumerate(kept)}
+
+
+def _lights_of(states: Any, lanes: dict[str, int], steps: int) -> dict[str, Any]:
+    if not isinstance(states, dict):
+        raise _Fault(f"dynamic_map_states: expected a dict, got {type(states).__name__}")
+
+    def code(state: Any) -> int:
+        name = _LIGHTS.get(str(state), str(state).removeprefix("LANE_STATE_").lower())
+        return pictura.LIGHT_STATES.index(name if name in pictura.LIGHT_STATES else "none")
+
+    held, shown = [], []
+    for key, each in states.items():
+        place = f"dynamic_map_states['{key}']"
+        lane = str(each.get("lane", key)) if isinstance(each, dict) else str(key)
+        listed = _entry(_entry(each, "state", place), "object_state", f"{place}['state']")
+        if not isinstance(listed, (list, np.ndarray)) or len(listed) != steps:
+            raise _Fault(f"{place}['state']['object_state']: expected {steps} states, got {type(listed).__name__} of {np.size(listed)}")
+        if lane in lanes:
+            held.append([lanes[lane]])
+            shown.append([code(state) for state in listed])
+    ids, begin = _joined(held)
+    return {"lanes": ids, "lanes_begin": begin, "states": np.asarray(shown, int).reshape(-1, steps)}
+
+
+def _scenarionet_arrays(scene: Any) -> dict[str, Any]:
+    metadata = _entry(scene, "metadata", "scenario")
+    time_s = _numbers(_entry(metadata, "ts", "metadata"), "metadata['ts']", (None,))
+    steps = len(time_s)
+    # Third numbers of a lane's points are headings in nuScenes' maps, and others are flat: only Waymo's frame has heights.
+    is_flat = metadata.get("coordinate") != "waymo"
+    tracks, places = _tracks_of(_entry(scene, "tracks", "scenario"), steps, is_flat)
+    arrays, lanes = _map_of(_entry(scene, "map_features", "scenario"), is_flat)
+    arrays["lights"] = _lights_of(scene.get("dynamic_map_states", {}), lanes, steps)
+    current = metadata.get("current_time_index")
+    return arrays | {
+        "tracks": tracks,
+        "dt_s": round(float(np.median(np.diff(time_s))), 4) if steps > 1 else 0.1,
+        "current_step": int(current) if isinstance(current, (int, np.integer)) else None,
+        "sdc_track": places.get(str(metadata.get("sdc_id"))),
+        "id": str(scene.get("id", "")),
+    }
+
+
+def load_scenarionet(path: str | os.PathLike[str]) -> pictura.Scenario:
+    """The scene of a pickle of ScenarioNet's or MetaDrive's (sd_*.pkl).
+
+    Kept are road users, lanes with links, neighbours, widths and limits, lines, edges, crosswalks, stop signs and lights; cones, barriers,
+    sidewalks, driveways and speed bumps are not. Ids that are no numbers become places. Maps are flat but in Waymo's frame.
+    Raises pictura.Error naming the file and the part, and where a pickle names anything but NumPy's arrays and builtins.
+    """
+    path = os.fspath(path)
+    if os.path.getsize(path) > _MAX_BYTES:
+        raise pictura.Error(f"{path}: expected at most {_MAX_BYTES >> 20} MiB, got {os.path.getsize(path) >> 20}")
+    try:
+        scene = _plain_values(pathlib.Path(path).read_bytes())
+    except Exception as error:  # whatever the bytes make of the unpickler
+        raise pictura.Error(f"{path}: no pickle of a scene: {type(error).__name__}: {error}") from None
+    try:
+        return pictura.Scenario.from_arrays(**_scenarionet_arrays(scene))
+    except (_Fault, pictura.Error) as fault:
+        raise pictura.Error(f"{path}: {fault}") from None
+    except (TypeError, ValueError, OverflowError) as error:
+        raise pictura.Error(f"{path}: no scene of ScenarioNet: {error}") from error
