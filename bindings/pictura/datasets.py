@@ -1,7 +1,7 @@
 """Scenes of other libraries' files, by way of pictura.Scenario.from_arrays().
 
 load_scenarionet() reads the pickles of ScenarioNet and MetaDrive (sd_*.pkl: Waymo, nuScenes, nuPlan, Argoverse 2). Nothing in a
-pickle is run: it may hold NumPy's arrays and plain values alone.
+pickle is run: it may hold NumPy's arrays and plain values alone. from_py123d() takes scenes of py123d, which it does not import.
 """
 
 from __future__ import annotations
@@ -158,16 +158,19 @@ def _polylines(lines: list[np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def _width_m(lane: dict, points: int, place: str) -> np.ndarray:
-    """Of the halves on both sides where they can be; 0 throughout where none is."""
     if lane.get("width") is None:
         return np.zeros(points)
-    halves_m = _numbers(lane["width"], f"{place}['width']", (points, 2))
+    return _width_of_halves(_numbers(lane["width"], f"{place}['width']", (points, 2)))
+
+
+def _width_of_halves(halves_m: np.ndarray) -> np.ndarray:
+    """Of halves [points, 2] on both sides where they can be; 0 throughout where none is."""
     is_known = (halves_m >= _MIN_HALF_WIDTH_M) & (halves_m <= _MAX_HALF_WIDTH_M)
     sides = is_known.sum(1)
     if not sides.any():
-        return np.zeros(points)
+        return np.zeros(len(halves_m))
     width_m = np.where(is_known, halves_m, 0).sum(1) * 2 / np.maximum(sides, 1)
-    return np.interp(np.arange(points), np.flatnonzero(sides), width_m[sides > 0])
+    return np.interp(np.arange(len(halves_m)), np.flatnonzero(sides), width_m[sides > 0])
 
 
 def _neighbor(neighbors: Any, lanes: dict[str, int], nearest: int) -> int:
@@ -366,3 +369,179 @@ def load_scenarionet(path: str | os.PathLike[str]) -> pictura.Scenario:
         raise pictura.Error(f"{path}: {fault}") from None
     except (TypeError, ValueError, OverflowError) as error:
         raise pictura.Error(f"{path}: no scene of ScenarioNet: {error}") from error
+
+
+_123D_LABELS = {
+    "EGO": "vehicle", "VEHICLE": "vehicle", "TRAIN": "other", "TWO_WHEELER": "cyclist", "PERSON": "pedestrian", "ANIMAL": "other", "OTHER": "other",
+}  # fmt: skip
+_123D_LANES = {"UNDEFINED": "other", "BIKE_LANE": "biking"}  # others are driven on
+_123D_LINES = {
+    "DASHED_WHITE": "broken_single_white", "DOUBLE_DASH_WHITE": "broken_single_white", "SOLID_WHITE": "solid_single_white",
+    "DASH_SOLID_WHITE": "solid_single_white", "SOLID_DASH_WHITE": "solid_single_white", "DOUBLE_SOLID_WHITE": "solid_double_white",
+    "DASHED_YELLOW": "broken_single_yellow", "DOUBLE_DASH_YELLOW": "broken_double_yellow", "SOLID_YELLOW": "solid_single_yellow",
+    "DOUBLE_SOLID_YELLOW": "solid_double_yellow", "DASH_SOLID_YELLOW": "passing_double_yellow", "SOLID_DASH_YELLOW": "passing_double_yellow",
+}  # fmt: skip
+_123D_LIGHTS = {"GREEN": "go", "YELLOW": "caution", "RED": "stop"}
+_EDGE_VOTES, _NEAR_LANE_M = 20, 10.0
+
+
+def _distances_m(points: np.ndarray, line: np.ndarray) -> np.ndarray:
+    """In plan, from each point to a polyline."""
+    a, way = line[:-1, :2], np.diff(line[:, :2], axis=0)
+    from_a = points[:, None, :2] - a
+    along = np.clip((from_a * way).sum(2) / np.maximum((way**2).sum(1), 1e-12), 0, 1)
+    return np.linalg.norm(from_a - along[..., None] * way, axis=2).min(1)
+
+
+def _with_road_on_left(edge: np.ndarray, centres: np.ndarray) -> np.ndarray:
+    """An edge, turned round if most of its pieces have the nearest point of a lane on their right."""
+    pieces = np.unique(np.linspace(0, len(edge) - 2, _EDGE_VOTES).astype(int))
+    middle, way = (edge[pieces, :2] + edge[pieces + 1, :2]) / 2, edge[pieces + 1, :2] - edge[pieces, :2]
+    to_lanes = centres[None, :, :2] - middle[:, None]
+    distance_m = np.linalg.norm(to_lanes, axis=2)
+    nearest = distance_m.argmin(1)
+    to_lane = to_lanes[np.arange(len(pieces)), nearest]
+    side = np.sign(way[:, 0] * to_lane[:, 1] - way[:, 1] * to_lane[:, 0]) * (distance_m.min(1) <= _NEAR_LANE_M)
+    return edge if side.sum() >= 0 else edge[::-1]
+
+
+def _123d_tracks(scene: Any, iterations: range, is_flat: bool, dt_s: float) -> dict[str, Any]:
+    """Tracks, the self-driving car's first."""
+    tokens: dict[str, int] = {}
+    kinds: list[str] = []
+    states: list[tuple[int, int, list[float]]] = []
+    for step, iteration in enumerate(iterations):
+        ego = scene.get_ego_state_se3_at_iteration(iteration)
+        detections = scene.get_box_detections_se3_at_iteration(iteration)
+        boxes = [] if ego is None else [("ego", ego.box_detection_se3)]
+        boxes += [] if detections is None else [(box.attributes.track_token, box) for box in detections.box_detections]
+        for token, box in boxes:
+            label = box.attributes.default_label.name
+            if label not in _123D_LABELS or (label == "EGO" and token != "ego"):
+                continue
+            if token not in tokens:
+                tokens[token] = len(tokens)
+                kinds.append(_123D_LABELS[label])
+            extent, place, velocity = box.bounding_box_se3, box.bounding_box_se3.center_se3, box.velocity_2d
+            foot_m = 0.0 if is_flat else place.z - extent.height / 2
+            motion = (np.nan, np.nan) if velocity is None else (velocity.x, velocity.y)
+            states.append((tokens[token], step, [place.x, place.y, foot_m, place.yaw, *motion, extent.length, extent.width, extent.height]))
+    if not tokens:
+        raise _Fault("tracks: expected at least one road user, got none")
+    values = np.full((len(tokens), len(iterations), 9), np.nan)
+    for track, step, numbers in states:
+        values[track, step] = numbers
+    valid = ~np.isnan(values[..., 0])
+    # Where no velocity is stated, from one place to the next, and as before at the end.
+    moved = np.diff(values[..., :2], axis=1, append=np.nan) / dt_s
+    for step in range(len(iterations)):
+        known = values[:, step, 4:6]
+        guessed = np.where(np.isnan(moved[:, step]), np.nan_to_num(moved[:, max(step - 1, 0)]), moved[:, step])
+        values[:, step, 4:6] = np.where(np.isnan(known), guessed, known)
+    last = valid.shape[1] - 1 - valid[:, ::-1].argmax(1)
+    ids = _numbered([token for token in tokens if token != "ego"])
+    return {
+        "id": [ids.get(str(token), max(ids.values(), default=-1) + 1) for token in tokens],
+        "type": [pictura.TRACK_TYPES.index(kind) for kind in kinds],
+        "size_m": values[np.arange(len(tokens)), last, 6:9],
+        "valid": valid,
+        "position_m": values[..., :3],
+        "heading_rad": values[..., 3],
+        "velocity_mps": values[..., 4:6],
+        "sdc": tokens.get("ego"),
+    }
+
+
+def _123d_map(objects: Any, is_flat: bool) -> tuple[dict[str, Any], dict[str, int]]:
+    def points(line: Any, place: str) -> np.ndarray:
+        return _points(line.array, place, is_flat)
+
+    lanes = objects("lane")
+    ids = _numbered([lane.object_id for lane in lanes])
+    centres = [points(lane.centerline, f"lane {lane.object_id}") for lane in lanes]
+    halves = [
+        np.stack([_distances_m(centre, points(side, f"lane {lane.object_id}")) for side in (lane.left_boundary, lane.right_boundary)], 1)
+        for lane, centre in zip(lanes, centres)
+    ]
+
+    def linked(others: Any) -> list[int]:
+        return [ids[str(other)] for other in others or [] if str(other) in ids]
+
+    def is_in_junction(lane: Any) -> bool:
+        group = lane.lane_group
+        return group is not None and group.intersection_id is not None
+
+    entries, entries_begin = _joined([linked(lane.predecessor_ids) for lane in lanes])
+    exits, exits_begin = _joined([linked(lane.successor_ids) for lane in lanes])
+    arrays: dict[str, Any] = {
+        **_polylines(centres),
+        "id": list(ids.values()),
+        "type": [pictura.LANE_TYPES.index(_123D_LANES.get(lane.lane_type.name, "driving")) for lane in lanes],
+        "speed_limit_mps": [lane.speed_limit_mps or 0 for lane in lanes],
+        "width_m": _joined([_width_of_halves(each) for each in halves], float)[0],
+        "in_junction": [is_in_junction(lane) for lane in lanes],
+        **{"entries": entries, "entries_begin": entries_begin, "exits": exits, "exits_begin": exits_begin},
+        **{f"{side}_neighbor": [ids.get(str(getattr(lane, f"{side}_lane_id")), -1) for lane in lanes] for side in ("left", "right")},
+    }
+    lines = [line for line in objects("road_line") if line.road_line_type.name != "NONE"]
+    names = [_123D_LINES.get(line.road_line_type.name, "unknown") for line in lines]
+    signs = [zone for zone in objects("stop_zone") if zone.stop_zone_type.name == "STOP_SIGN"]
+    held, begin = _joined([linked(zone.lane_ids) for zone in signs])
+    edges = [points(edge.polyline, f"road edge {edge.object_id}") for edge in objects("road_edge")]
+    return {
+        "lanes": arrays,
+        "lines": {**_polylines([points(line.polyline, f"road line {line.object_id}") for line in lines]),
+                  "type": np.array([pictura.LINE_TYPES.index(name) for name in names], int)},
+        "edges": _polylines([_with_road_on_left(edge, arrays["points"]) for edge in edges if len(edge) > 1]),
+        "crosswalks": _polylines([points(each.outline, f"crosswalk {each.object_id}") for each in objects("crosswalk")]),
+        "stop_signs": {"position_m": _joined([points(zone.outline, "stop zone").mean(0) for zone in signs], float, (3,))[0],
+                       "lanes": held, "lanes_begin": begin},
+    }, ids  # fmt: skip
+
+
+def _123d_lights(scene: Any, iterations: range, lanes: dict[str, int]) -> dict[str, Any]:
+    shown: dict[int, np.ndarray] = {}
+    for step, iteration in enumerate(iterations):
+        detections = scene.get_traffic_light_detections_at_iteration(iteration)
+        for light in [] if detections is None else detections.detections:
+            if str(light.lane_id) in lanes:
+                states = shown.setdefault(lanes[str(light.lane_id)], np.zeros(len(iterations), int))
+                states[step] = pictura.LIGHT_STATES.index(_123D_LIGHTS.get(light.status.name, "none"))
+    held, begin = _joined([[lane] for lane in shown])
+    return {"lanes": held, "lanes_begin": begin, "states": np.array(list(shown.values()), int).reshape(-1, len(iterations))}
+
+
+def from_py123d(scene: Any, *, radius_m: float = 200.0) -> pictura.Scenario:
+    """The scene of a py123d.api.SceneAPI: nuPlan, Argoverse 2, nuScenes, Waymo and others through one interface.
+
+    radius_m: of maps that are of whole towns, the part around the self-driving car at the scene's present. Kept are road users, lanes with
+    links, neighbours, limits and the widths between their boundaries, lines, edges, crosswalks, stop signs and lights.
+    Raises pictura.Error naming the scene and the part.
+    """
+    metadata = scene.get_scene_metadata()
+    place = f"{metadata.dataset}: {metadata.initial_uuid}"
+    iterations = range(-metadata.num_history_iterations, metadata.num_future_iterations + 1)
+    world, ego = scene.get_map_api(), scene.get_ego_state_se3_at_iteration(0)
+    if world is None or ego is None:
+        raise pictura.Error(f"{place}: expected a scene with {'a map' if world is None else 'a self-driving car'}, got none")
+    layers = {layer.name.lower() for layer in world.get_available_map_layers()}
+
+    def objects(layer: str) -> list[Any]:
+        if layer not in layers:
+            return []
+        if world.map_is_per_log:
+            return list(world.get_all_map_objects_in_layer(layer))
+        return [each for found in world.get_map_objects_in_radius(ego.center_2d, radius_m, [layer]).values() for each in found]
+
+    try:
+        # The duration is a mean of times that are no exact multiples.
+        is_flat, dt_s = not world.map_has_z, round(float(metadata.iteration_duration_s), 3)
+        tracks = _123d_tracks(scene, iterations, is_flat, dt_s)
+        sdc_track = tracks.pop("sdc")
+        arrays, lanes = _123d_map(objects, is_flat)
+        return pictura.Scenario.from_arrays(
+            tracks, **arrays, lights=_123d_lights(scene, iterations, lanes), dt_s=dt_s,
+            current_step=metadata.num_history_iterations, sdc_track=sdc_track, id=str(metadata.initial_uuid),
+        )  # fmt: skip
+    except (_Fault, pictura.Error) as fault:
+        raise pictura.Error(f"{place}: {fault}") from None

@@ -1,4 +1,4 @@
-"""Scenes of other libraries' files: pickles of ScenarioNet's format that are written here, and hostile ones."""
+"""Scenes of other libraries: pickles of ScenarioNet's format that are written here, hostile ones, and objects like py123d's."""
 
 import os
 import pathlib
@@ -7,12 +7,13 @@ import pickletools
 import resource
 import struct
 import subprocess
+from types import SimpleNamespace as NS
 
 import numpy as np
 import pytest
 
 import pictura
-from pictura.datasets import load_scenarionet
+from pictura.datasets import from_py123d, load_scenarionet
 
 FIXTURE = os.environ.get("PICTURA_SCENE_FIXTURE", "")
 STEPS = 11
@@ -270,3 +271,81 @@ def test_recordings_written_in_the_format_come_back(tmp_path):
     np.testing.assert_allclose(ours["tracks"]["position_m"], theirs["tracks"]["position_m"], atol=1e-3)
     for name in ("entries", "exits", "exits_begin"):
         np.testing.assert_array_equal(ours["lanes"][name], theirs["lanes"][name])
+
+
+def scene_123d(missing: tuple[str, ...] = ()) -> object:
+    """A scene with the attributes of py123d.api.SceneAPI that are read: the self-driving car, a walker and a cone on two lanes."""
+    x = np.arange(0, 41) * 0.5
+
+    def line(y: float, first: float = 0.0, z: float = 1.0) -> NS:
+        return NS(array=np.stack([x + first, np.full(41, y), np.full(41, z)], 1))
+
+    def lane(number: int, first: float, before: list, after: list) -> NS:
+        return NS(
+            object_id=number, lane_type=NS(name="SURFACE_STREET"), centerline=line(0, first), left_boundary=line(1.5, first), right_boundary=line(-2, first),
+            predecessor_ids=before, successor_ids=after, left_lane_id=None, right_lane_id=77, speed_limit_mps=None if first else 11.0,
+            lane_group=NS(intersection_id=4) if first else None,
+        )  # fmt: skip
+
+    layers = {
+        "lane": [lane(3, 0, [], [8]), lane(8, 20, [3, 99], [])],
+        "road_line": [NS(object_id=1, road_line_type=NS(name=name), polyline=line(1.5)) for name in ("DASH_SOLID_YELLOW", "NONE")],
+        "road_edge": [NS(object_id=2, polyline=line(3)), NS(object_id=5, polyline=line(-3))],
+        "crosswalk": [NS(object_id=6, outline=NS(array=np.array([(5, -2, 1), (8, -2, 1), (8, 2, 1), (5, 2, 1)], float)))],
+        "stop_zone": [NS(stop_zone_type=NS(name=name), lane_ids=[3], outline=line(0)) for name in ("STOP_SIGN", "TRAFFIC_LIGHT")],
+    }
+
+    def box(token: str, label: str, place: tuple[float, float], velocity: NS | None) -> NS:
+        return NS(
+            attributes=NS(track_token=token, default_label=NS(name=label)), velocity_2d=velocity,
+            bounding_box_se3=NS(center_se3=NS(x=place[0], y=place[1], z=1.75, yaw=0.25), length=4.0, width=2.0, height=1.5),
+        )  # fmt: skip
+
+    def walker(i: int) -> list[NS]:
+        return [] if i == 2 else [box("21", "PERSON", (3 + i / 4, 3.0), None), box("5", "TRAFFIC_CONE", (0, 0), None)]
+
+    world = NS(
+        map_is_per_log=True, map_has_z=True, get_available_map_layers=lambda: [NS(name=name.upper()) for name in layers],
+        get_all_map_objects_in_layer=lambda layer: iter(layers[layer]),
+    )  # fmt: skip
+    return NS(
+        get_scene_metadata=lambda: NS(dataset="mine", initial_uuid="ab", num_history_iterations=1, num_future_iterations=2, iteration_duration_s=0.5002),
+        get_map_api=lambda: None if "map" in missing else world,
+        get_ego_state_se3_at_iteration=lambda i: None if "car" in missing else NS(center_2d=None, box_detection_se3=box("ego", "EGO", (i + 2.0, 0), NS(x=2.0, y=0.0))),
+        get_box_detections_se3_at_iteration=lambda i: None if i == -1 else NS(box_detections=walker(i)),
+        get_traffic_light_detections_at_iteration=lambda i: NS(detections=[NS(lane_id=8, status=NS(name="RED" if i < 1 else "OFF")), NS(lane_id=1, status=NS(name="RED"))]),
+    )  # fmt: skip
+
+
+def test_scenes_of_py123d_become_scenes():
+    scene = from_py123d(scene_123d())
+    assert (scene.id, scene.num_steps, scene.current_step, scene.sdc_track, scene.dt_s) == ("ab", 4, 1, 0, 0.5)
+    arrays = scene.to_arrays()
+    tracks, lanes = arrays["tracks"], arrays["lanes"]
+    assert tracks["id"].tolist() == [22, 21] and [pictura.TRACK_TYPES[kind] for kind in tracks["type"]] == ["vehicle", "pedestrian"]
+    assert tracks["valid"].tolist() == [[True] * 4, [False, True, True, False]]
+    assert tracks["position_m"][0].tolist() == [[1, 0, 1], [2, 0, 1], [3, 0, 1], [4, 0, 1]] and (tracks["heading_rad"][0] == 0.25).all()
+    assert tracks["velocity_mps"][0].tolist() == [[2, 0]] * 4
+    assert tracks["velocity_mps"][1, 1:3].tolist() == [[0.5, 0]] * 2, "from one place to the next"
+    assert lanes["id"].tolist() == [3, 8] and lanes["exits"].tolist() == [8] and lanes["in_junction"].tolist() == [False, True]
+    np.testing.assert_allclose(lanes["width_m"], 3.5)
+    assert lanes["speed_limit_mps"].tolist() == [11, 15] and len(lanes["begin"]) == 3
+    assert [pictura.LIGHT_STATES[state] for state in arrays["lights"]["states"][0]] == ["stop", "stop", "none", "none"]
+    assert arrays["lights"]["lanes"].tolist() == [8] and arrays["stop_signs"]["lanes"].tolist() == [3]
+    first = arrays["edges"]["points"][arrays["edges"]["begin"][:-1]]
+    assert first.tolist() == [[20, 3, 1], [0, -3, 1]], "the road is on the left of both"
+    assert {pictura.LINE_TYPES[kind] for kind in arrays["lines"]["type"]} == {"solid_single_yellow", "dash_yellow"}
+    for missing, message in (("map", "mine: ab: expected a scene with a map"), ("car", "mine: ab: expected a scene with a self-driving car")):
+        with pytest.raises(pictura.Error, match=message):
+            from_py123d(scene_123d((missing,)))
+
+
+def test_scenes_of_py123d_have_the_attributes_that_are_read():
+    api = pytest.importorskip("py123d.api")
+    objects = pytest.importorskip("py123d.datatypes.map_objects")
+    for name in ("get_scene_metadata", "get_map_api", "get_ego_state_se3_at_iteration", "get_box_detections_se3_at_iteration"):
+        assert hasattr(api.SceneAPI, name)
+    for name in ("get_available_map_layers", "get_all_map_objects_in_layer", "get_map_objects_in_radius", "map_is_per_log", "map_has_z"):
+        assert hasattr(api.MapAPI, name)
+    for name in ("centerline", "left_boundary", "right_boundary", "predecessor_ids", "successor_ids", "left_lane_id", "speed_limit_mps", "lane_group"):
+        assert hasattr(objects.Lane, name)
