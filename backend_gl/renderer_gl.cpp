@@ -9,6 +9,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/raster/check.h"
 #include "pictura/common/raster/host_geometries.h"
+#include "pictura/common/raster/randomize_camera.h"
 #include "pictura/common/support/parallel_for.h"
 
 namespace pictura {
@@ -50,6 +51,8 @@ class GlRenderer final : public Renderer {
     PICTURA_CHECK(config_.samples.grid >= 1 && config_.samples.multisample >= 1,
                   "renderer {}: expected 1 sample or more, got a grid of {} and {} samples", name_,
                   config_.samples.grid, config_.samples.multisample);
+    PICTURA_CHECK(!config_.randomization.changes_colors(),
+                  "renderer {}: randomized brightness, noise and lost images are cpu's and cuda's", name_);
     const gl::CurrentContext current(context_.get());
     gl_ = std::make_unique<gl::Functions>(*context_);
     drawn_by_ = reinterpret_cast<const char*>(gl_->GetString(GL_RENDERER));
@@ -181,8 +184,8 @@ class GlRenderer final : public Renderer {
     const auto count = static_cast<std::size_t>(end - begin);
     if (faces_.size() < count) faces_.resize(count);
     parallel_for(config_.num_threads, end - begin, [&](int64_t i) {
-      const PinholeCamera& camera = cameras_[group.cameras[(begin + i) / num_views]];
-      build_faces(camera, scene, views[(begin + i) % num_views], static_cast<int32_t>(i));
+      const View& view = views[(begin + i) % num_views];
+      build_faces(camera_of(group.cameras[(begin + i) / num_views], view), scene, view, static_cast<int32_t>(i));
     });
     upload_faces(count);
 
@@ -192,9 +195,11 @@ class GlRenderer final : public Renderer {
     copies_planned_.clear();
     for (int64_t image = begin; image < end;) {
       const std::size_t index = group.cameras[image / num_views];
-      const int64_t view = image % num_views, last = std::min(end, image + num_views - view);
+      const int64_t view = image % num_views;
+      // Views of one camera are drawn together where they have one projection.
+      const int64_t last = config_.randomization.moves_cameras() ? image + 1 : std::min(end, image + num_views - view);
       const auto layer = static_cast<std::size_t>(image - begin), end_layer = static_cast<std::size_t>(last - begin);
-      project_by(cameras_[index]);
+      project_by(camera_of(index, views[view]));
       gl_->DrawArraysInstancedBaseInstance(GL_TRIANGLE_STRIP, 0, 4,
                                            static_cast<GLsizei>(first_face_[end_layer] - first_face_[layer]),
                                            static_cast<GLuint>(first_face_[layer]));
@@ -207,6 +212,11 @@ class GlRenderer final : public Renderer {
     }
     group.array->resolve(static_cast<int>(count));
     group.array->copy(copies_planned_, stream);
+  }
+
+  // A camera of the rig as a view's agent has it, in the ego frame.
+  PinholeCamera camera_of(std::size_t index, const View& view) const {
+    return randomized_camera(cameras_[index], config_.randomization, view.key, static_cast<int>(index));
   }
 
   void build_faces(const PinholeCamera& in_ego, const SceneBatch& scene, const View& view, int32_t layer) {

@@ -375,6 +375,9 @@ void bind_dtypes(py::module_& module) {
   fields.append(py::make_tuple("origin_m", "<f4", py::make_tuple(3)));
   for (const char* name : {"cos_heading", "sin_heading", "body_length_m"}) fields.append(field(name, "<f4"));
   for (const char* name : {"hidden_begin", "hidden_end"}) fields.append(field(name, "<i4"));
+  py::list key;
+  for (const char* name : {"world", "agent", "episode", "step"}) key.append(field(name, "<u4"));
+  fields.append(py::make_tuple("key", dtype(key)));
   module.attr("VIEW_DTYPE") = dtype(fields);
   PICTURA_CHECK(py::cast<size_t>(module.attr("VIEW_DTYPE").attr("itemsize")) == sizeof(View), "a view's layout");
   py::list box;

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "pictura/common/camera.h"
+#include "pictura/common/camera_randomization.h"
 #include "pictura/common/error_types.h"
 #include "pictura/common/image.h"
 #include "pictura/common/scene.h"
@@ -28,6 +29,7 @@ struct RendererConfig {
   float line_floor_px = 0.35f;  // minimum width of a strip on screen, measured across it; 0 turns the floor off
   bool debug_palette = false;   // tint halted and parked agents
   PixelSamples samples;
+  CameraRandomization randomization;  // gl takes poses and focal lengths alone
   /// cuda: upper bound on the device memory that it takes beyond images, scenes and maps; calls that need more are
   /// drawn in several parts.
   std::size_t max_scratch_bytes = std::size_t{512} << 20;

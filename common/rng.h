@@ -50,6 +50,8 @@ enum class Purpose : uint8_t {
   pedestrian_path,
   corner_user,
   driver,
+  camera_mounting,
+  camera_frame,
 };
 
 /// Whose draws they are, when, and what for. Ids are global across ranks. Fields that are not given are 0.

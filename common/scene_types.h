@@ -97,6 +97,14 @@ PICTURA_HD constexpr bool has_enough_lights(int32_t lights, int32_t signals) {
   return lights == 0 || lights >= signals;
 }
 
+/// By what a view's cameras are randomized (common/raster/randomize_camera.h), as random numbers are keyed
+/// (common/rng.h): images that are drawn again are the same again.
+struct ViewKey {
+  uint32_t world = 0;  // global
+  uint32_t agent = 0;  // of its world, below RandomKey::kMaxAgents
+  uint32_t episode = 0, step = 0;
+};
+
 /// The pose of a rig. The ego's own box is left out of its images.
 struct View {
   int32_t world = 0;
@@ -105,6 +113,7 @@ struct View {
   float cos_heading = 1, sin_heading = 0;
   float body_length_m = kRigBodyLength_m;    // shrinks the x offsets of the cameras of short bodies
   int32_t hidden_begin = 0, hidden_end = 0;  // further agents left out: a range of SceneBatch::hidden_agents
+  ViewKey key;
 
   static constexpr float kRigBodyLength_m = 4.5f;
 };

@@ -321,6 +321,11 @@ void ImageDrawer::draw(const ImageTarget& target) {
   const bool in_patches = target.order == ChannelOrder::patches;
   // From one channel of a pixel to the next.
   const int64_t step = in_patches ? place_in_patches(target.patch_px, width, 1, 0, 0) : int64_t{width} * height;
+  const bool has_bytes = target.format == PixelFormat::u8 || target.format == PixelFormat::bf16;
+  // Of bytes, as kernels keep them.
+  auto shown = [&](Rgb color, int x, int y) {
+    return target.effect.of(has_bytes ? rgb_of_bytes(to_bytes(color)) : color, x, y);
+  };
   auto draw_as = [&](auto* out, auto&& value_of) {
     // What reaches beyond the image.
     if (in_patches) std::fill_n(out, image_values({width, height}, target.order, target.patch_px), 0);
@@ -334,6 +339,7 @@ void ImageDrawer::draw(const ImageTarget& target) {
             auto* const to =
                 in_patches ? out + place_in_patches(target.patch_px, width, 0, pixel % width, y_begin + pixel / width)
                            : first + pixel;
+            if (target.effect.is_on) color = shown(color, pixel % width, y_begin + pixel / width);
             to[0] = value_of(color.r);
             to[step] = value_of(color.g);
             to[2 * step] = value_of(color.b);

@@ -9,6 +9,7 @@
 #include "pictura/backend_cpu/renderer/fast/cull_x8.h"
 #include "pictura/common/image.h"
 #include "pictura/common/raster/face_setup.h"
+#include "pictura/common/raster/randomize_camera.h"
 
 namespace pictura {
 
@@ -33,6 +34,7 @@ struct ImageTarget {
   uint16_t* instance_id = nullptr;
   ChannelOrder order = ChannelOrder::planar;  // or patches
   int patch_px = kDefaultPatch_px;            // side of the patches
+  ImageEffect effect;
 };
 
 /// Draws images one after another. An object serves one thread.

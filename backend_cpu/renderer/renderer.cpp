@@ -54,7 +54,9 @@ class CpuRenderer final : public Renderer {
       const std::size_t camera = static_cast<std::size_t>(image) % num_cameras;
       ImageDrawer& drawer = drawers_[thread];
       drawer.prepare(request(scene, views[view], camera));
-      drawer.draw(target(images_out, view, camera));
+      ImageTarget out = target(images_out, view, camera);
+      out.effect = image_effect(config_.randomization, views[view].key, static_cast<int>(camera));
+      drawer.draw(out);
     });
   }
 
@@ -102,10 +104,12 @@ class CpuRenderer final : public Renderer {
   ImageRequest request(const SceneBatch& scene, const View& view, std::size_t camera) const {
     const GeometryHandle handle = scene.geometry[view.world];
     const auto world = static_cast<std::size_t>(view.world);
+    const PinholeCamera in_ego =
+        randomized_camera(cameras_[camera], config_.randomization, view.key, static_cast<int>(camera));
     return {.geometry = culled_[handle].get(),
             .scene = &scene,
             .view = &view,
-            .camera = place_camera(cameras_[camera], view),
+            .camera = place_camera(in_ego, view),
             .line_floor_px = config_.line_floor_px,
             .debug_palette = config_.debug_palette,
             .crowd = world < crowds_.size() ? crowds_[world].get() : nullptr};

@@ -44,6 +44,7 @@ DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeC
   task.num_cameras = static_cast<int32_t>(cameras.size());
   task.line_floor_px = config.line_floor_px;
   task.debug_palette = config.debug_palette;
+  task.randomization = config.randomization;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     CameraSlot& slot = task.cameras[i];
     slot.camera = cameras[i];

@@ -5,6 +5,7 @@
 
 #include "pictura/backend_cuda/renderer/clip.cuh"
 #include "pictura/backend_cuda/renderer/cull.cuh"
+#include "pictura/backend_cuda/renderer/rig.cuh"
 #include "pictura/common/raster/clip.h"
 
 namespace pictura::cuda {
@@ -287,8 +288,15 @@ __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_
   if (!set_view(&state->view, task, view)) return false;
   FaceSetupContext* context = &state->context;
   const CameraSlot& slot = task.cameras[camera];
-  context->setting.camera = place_camera(slot.camera, state->view.view);
-  context->setting.frustum = slot.frustum;
+  const View& placed = state->view.view;
+  if (kRandomizesCameras && task.randomization.moves_cameras()) {
+    const PinholeCamera in_ego = randomized_camera(slot.camera, task.randomization, placed.key, camera);
+    context->setting.camera = place_camera(in_ego, placed);
+    context->setting.frustum = make_frustum(in_ego);
+  } else {
+    context->setting.camera = place_camera(slot.camera, placed);
+    context->setting.frustum = slot.frustum;
+  }
   context->setting.line_floor_px = task.line_floor_px;
   context->setting.debug_palette = task.debug_palette;
   context->setting.occluders.count = 0;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "pictura/backend_cuda/renderer/fragments.cuh"
+#include "pictura/backend_cuda/renderer/rig.cuh"
 #include "pictura/common/patches.h"
 #include "pictura/common/portable/intrinsics.h"
 
@@ -16,6 +17,7 @@ struct ImageWriter {
   int64_t first, plane;  // in elements: the image's offset, and the stride of planes
   int width_px, height_px;
   int patch_px;  // side of the patches, where the order is of patches
+  ImageEffect effect;
 
   /// Stores the colour of a pixel with a fragment list at the first of its fragments.
   template <typename Memory>
@@ -62,6 +64,15 @@ struct ImageWriter {
     }
   }
 
+  // Calls change(i) for each pixel whose colour has an effect: what reaches beyond the image stays black.
+  template <typename Change>
+  __device__ void for_each_shown(const Place& place, Change&& change) const {
+    if (!kRandomizesCameras || !effect.is_on) return;
+    for (int i = 0; i < kPixelsPerWrite; ++i) {
+      if (i < place.count) change(i);
+    }
+  }
+
   __device__ bool has_bytes() const { return format == PixelFormat::u8 || format == PixelFormat::bf16; }
 
   template <typename Memory, typename Value, typename ValueOf>
@@ -77,6 +88,7 @@ struct ImageWriter {
                  : full != Memory::kNone ? memory.faces[full].color_bytes
                                          : 0u;
     }
+    for_each_shown(place, [&](int i) { bytes[i] = effect.of_bytes(bytes[i], place.x + i, place.y); });
     store_channels(all + first, place,
                    [&](int i, int channel) { return value_of(static_cast<uint8_t>(bytes[i] >> (8 * channel))); });
   }
@@ -93,6 +105,7 @@ struct ImageWriter {
         colors[i] = memory.faces[full].color;
       }
     }
+    for_each_shown(place, [&](int i) { colors[i] = effect.of(colors[i], place.x + i, place.y); });
     store_channels(all + first, place, [&](int i, int channel) {
       return value_of(channel == 0 ? colors[i].r : channel == 1 ? colors[i].g : colors[i].b);
     });

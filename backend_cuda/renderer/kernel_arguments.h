@@ -5,6 +5,7 @@
 
 #include "pictura/common/patches.h"
 #include "pictura/common/raster/face_setup.h"
+#include "pictura/common/raster/randomize_camera.h"
 
 namespace pictura::cuda {
 
@@ -40,7 +41,7 @@ struct CameraPlanes {
 /// A camera of the rig, what is derived from it, and its outputs; strides as in CameraImages.
 struct CameraSlot {
   PinholeCamera camera;  // in the ego frame
-  Frustum frustum;       // in camera coordinates, so independent of the pose
+  Frustum frustum;       // in camera coordinates, so independent of the pose; not of a randomized focal length
   TileGrid tiles;        // see choose_tiles
   void* color = nullptr;
   int64_t view_stride = 0;
@@ -212,6 +213,7 @@ struct DrawTask {
   int32_t num_geometries = 0;
   float line_floor_px = 0;
   bool debug_palette = false;
+  CameraRandomization randomization;
   PixelFormat format = PixelFormat::u8;
   ChannelOrder order = ChannelOrder::planar;  // or patches
   int32_t patch_px = kDefaultPatch_px;        // side of the patches

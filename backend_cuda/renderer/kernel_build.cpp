@@ -98,7 +98,8 @@ Compilation compilation_for(const Nvrtc& nvrtc, const KernelProgram& program, co
                          "-default-device",  // lambdas in kernels are device functions, as with nvcc
                          fmt::format("-DPICTURA_RIG_CAMERAS={}", target.num_cameras),
                          fmt::format("-DPICTURA_RIG_WIDTH_PX={}", target.width_px),
-                         fmt::format("-DPICTURA_RIG_HEIGHT_PX={}", target.height_px)};
+                         fmt::format("-DPICTURA_RIG_HEIGHT_PX={}", target.height_px),
+                         fmt::format("-DPICTURA_RANDOMIZES_CAMERAS={}", target.randomizes_cameras ? 1 : 0)};
   int major = 0, minor = 0;
   nvrtc.check(nvrtc.nvrtcVersion(&major, &minor), "version");
   std::string all = fmt::format("{} {} {}\n{}", major, minor, fmt::join(compilation.options, " "), program.text);

@@ -8,12 +8,13 @@
 
 namespace pictura::cuda {
 
-/// The target of a compilation. Kernels get the rig as PICTURA_RIG_CAMERAS, PICTURA_RIG_WIDTH_PX,
-/// PICTURA_RIG_HEIGHT_PX.
+/// The target of a compilation. Kernels get it as PICTURA_RIG_CAMERAS, PICTURA_RIG_WIDTH_PX, PICTURA_RIG_HEIGHT_PX and
+/// PICTURA_RANDOMIZES_CAMERAS.
 struct KernelTarget {
   int compute_capability = 0;       // 10 * major + minor
   int num_cameras = 0;              // of the rig; 0: any
   int width_px = 0, height_px = 0;  // if all cameras have the same size; 0: any
+  bool randomizes_cameras = true;   // false: RendererConfig::randomization is off
 };
 
 struct KernelCode {

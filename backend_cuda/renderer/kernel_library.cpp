@@ -15,8 +15,11 @@ int compute_capability(int device) {
   return 10 * major + minor;
 }
 
-KernelTarget target_of(const Rig& rig, int device) {
-  KernelTarget target{compute_capability(device), static_cast<int>(rig.cameras.size())};
+KernelTarget target_of(const RendererConfig& config) {
+  const Rig& rig = config.rig;
+  KernelTarget target{.compute_capability = compute_capability(config.device.index),
+                      .num_cameras = static_cast<int>(rig.cameras.size()),
+                      .randomizes_cameras = config.randomization.is_on()};
   const Camera& first = rig.cameras.front();
   for (const Camera& camera : rig.cameras) {
     if (camera.width_px != first.width_px || camera.height_px != first.height_px) return target;
@@ -28,17 +31,17 @@ KernelTarget target_of(const Rig& rig, int device) {
 
 }  // namespace
 
-KernelLibrary::KernelLibrary(const Rig& rig, int device_index) {
+KernelLibrary::KernelLibrary(const RendererConfig& config) {
   const std::string why_not = nvrtc_unavailable();
   if (!why_not.empty()) {
     kernels_ = ahead_of_time_kernels();
     origin_ = fmt::format("kernels built ahead of time, for {} ({})", PICTURA_CUDA_ARCHITECTURES, why_not);
     const cudaError_t status = prepare_kernels(&kernels_);
     PICTURA_CHECK(status == cudaSuccess, "renderer cuda: {} do not run on a device of compute capability {}: {}",
-                  origin_, compute_capability(device_index), cudaGetErrorString(status));
+                  origin_, compute_capability(config.device.index), cudaGetErrorString(status));
     return;
   }
-  const KernelCode code = build_kernels(renderer_program(), target_of(rig, device_index));
+  const KernelCode code = build_kernels(renderer_program(), target_of(config));
   cudaLibrary_t library = nullptr;
   PICTURA_CUDA(cudaLibraryLoadData(&library, code.bytes.data(), nullptr, nullptr, 0, nullptr, nullptr, 0));
   library_.reset(library);

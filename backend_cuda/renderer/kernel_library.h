@@ -6,16 +6,16 @@
 #include <type_traits>
 
 #include "pictura/backend_cuda/renderer/launch.h"
-#include "pictura/common/camera.h"
+#include "pictura/common/renderer.h"
 
 namespace pictura::cuda {
 
 /// Owns the loaded code of its kernels.
 class KernelLibrary {
  public:
-  /// Builds the kernels for the rig and a CUDA device, which must be the current one; without NVRTC, uses those
-  /// compiled into this program. Throws Error if those do not run on the device.
-  KernelLibrary(const Rig& rig, int device_index);
+  /// Builds the kernels for a configuration's rig and CUDA device, which must be the current one; without NVRTC, uses
+  /// those compiled into this program. Throws Error if those do not run on the device.
+  explicit KernelLibrary(const RendererConfig& config);
 
   const KernelSet& kernels() const { return kernels_; }
   /// Their origin, for messages.

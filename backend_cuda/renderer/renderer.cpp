@@ -41,9 +41,7 @@ class CudaRenderer final : public Renderer {
  public:
   /// Its device is the current one.
   CudaRenderer(const RendererConfig& config, std::string* origin_out)
-      : config_(check_config("cuda", config)),
-        cameras_(pinhole_cameras(config.rig)),
-        library_(config.rig, config.device.index) {
+      : config_(check_config("cuda", config)), cameras_(pinhole_cameras(config.rig)), library_(config) {
     PICTURA_CUDA(cudaDeviceGetAttribute(&processors_, cudaDevAttrMultiProcessorCount, config.device.index));
     *origin_out = library_.origin();
     ensure_capacity(0, 1);  // throws where the bound is too low for any scene

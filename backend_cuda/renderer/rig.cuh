@@ -1,5 +1,6 @@
 // The rig's sizes as compile-time constants. Kernels built at run time are built for one rig (kernel_build.h defines
-// these macros); 0 means that the size is read from the task.
+// these macros); 0 means that the size is read from the task. So are those that randomize cameras: the others have no
+// instructions for it.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/kernel_arguments.h"
@@ -8,6 +9,7 @@
 #define PICTURA_RIG_CAMERAS 0
 #define PICTURA_RIG_WIDTH_PX 0  // if all cameras have the same size
 #define PICTURA_RIG_HEIGHT_PX 0
+#define PICTURA_RANDOMIZES_CAMERAS 1
 #endif
 
 namespace pictura::cuda {
@@ -21,5 +23,6 @@ __device__ inline int width_px(const PinholeCamera& camera) {
 __device__ inline int height_px(const PinholeCamera& camera) {
   return PICTURA_RIG_HEIGHT_PX > 0 ? PICTURA_RIG_HEIGHT_PX : camera.height_px;
 }
+constexpr bool kRandomizesCameras = PICTURA_RANDOMIZES_CAMERAS != 0;
 
 }  // namespace pictura::cuda

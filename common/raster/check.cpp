@@ -2,6 +2,7 @@
 
 #include "pictura/common/array.h"
 #include "pictura/common/error.h"
+#include "pictura/common/rng.h"
 
 namespace pictura {
 
@@ -32,6 +33,21 @@ void check_ranges(std::string_view renderer, std::string_view name, Span<const i
     PICTURA_CHECK(begin[i - 1] <= begin[i], "renderer {}: scene: {}[{}]: expected at least {}, got {}", renderer, name,
                   i, begin[i - 1], begin[i]);
   }
+}
+
+void check_randomization(std::string_view renderer, const CameraRandomization& ranges) {
+  constexpr CameraRandomization kMax = kMaxCameraRandomization;
+  auto check_range = [renderer](const char* name, double range, double highest) {
+    PICTURA_CHECK(range >= 0 && range <= highest, "renderer {}: randomization: {}: expected 0 to {}, got {}", renderer,
+                  name, highest, range);
+  };
+  check_range("rotation_deg", ranges.rotation_deg, kMax.rotation_deg);
+  check_range("shift_m", ranges.shift_m, kMax.shift_m);
+  check_range("focal_share", ranges.focal_share, kMax.focal_share);
+  check_range("brightness_share", ranges.brightness_share, kMax.brightness_share);
+  check_range("noise_share", ranges.noise_share, kMax.noise_share);
+  check_range("dead_probability", ranges.dead_probability, kMax.dead_probability);
+  check_range("dropped_probability", ranges.dropped_probability, kMax.dropped_probability);
 }
 
 }  // namespace
@@ -140,6 +156,9 @@ void check_views(std::string_view renderer, const SceneBatch& scene, Span<const 
                   "heading ({}, {}) and {} m",
                   renderer, i, view.origin_m.x, view.origin_m.y, view.origin_m.z, view.cos_heading, view.sin_heading,
                   view.body_length_m);
+    PICTURA_CHECK(view.key.agent < RandomKey::kMaxAgents,
+                  "renderer {}: view {}: expected a key's agent below {}, got {}", renderer, i, RandomKey::kMaxAgents,
+                  view.key.agent);
   }
 }
 
@@ -224,6 +243,7 @@ const RendererConfig& check_config(std::string_view renderer, const RendererConf
   PICTURA_CHECK(config.line_floor_px >= 0 && config.line_floor_px <= kMaxLineFloor_px,
                 "renderer {}: expected a line floor of 0 to {} pixels, got {}", renderer, kMaxLineFloor_px,
                 config.line_floor_px);
+  check_randomization(renderer, config.randomization);
   return config;
 }
 

@@ -17,7 +17,8 @@ void check_device(std::string_view renderer, std::string_view what, Device expec
 /// order and a format that it draws.
 void check_images(const Renderer& renderer, std::size_t num_views, const ImageBatch& images);
 
-/// Throws Error unless the rig is valid and the line floor within the guard band; returns the configuration.
+/// Throws Error unless the rig is valid, the line floor within the guard band and the randomization within
+/// kMaxCameraRandomization; returns the configuration.
 const RendererConfig& check_config(std::string_view renderer, const RendererConfig& config);
 
 /// Throws Error unless all spans of a host scene fit together, handles hold geometries, lights suffice for their
@@ -25,7 +26,7 @@ const RendererConfig& check_config(std::string_view renderer, const RendererConf
 void check_scene(std::string_view renderer, const SceneBatch& scene, const HostGeometries& geometries);
 
 /// Throws Error unless each view's world, ego and range of hidden agents exist in the (host) scene that check_scene
-/// passed, and its pose is finite.
+/// passed, its pose is finite, and its key's agent is one of random numbers.
 void check_views(std::string_view renderer, const SceneBatch& scene, Span<const View> views);
 
 /// The views of a batch on the host that its count includes. Throws Error unless that is 0 to the number of views.

@@ -129,6 +129,11 @@ PICTURA_HD inline uint16_t bf16_of_byte(uint8_t byte) {
 PICTURA_HD inline uint32_t to_bytes(Rgb color) {
   return uint32_t{to_byte(color.r)} | uint32_t{to_byte(color.g)} << 8 | uint32_t{to_byte(color.b)} << 16;
 }
+/// The colour that to_bytes() gives such bytes for.
+PICTURA_HD inline Rgb rgb_of_bytes(uint32_t bytes) {
+  auto byte = [bytes](int index) { return static_cast<int>(bytes >> (8 * index) & 255u); };
+  return rgb8(byte(0), byte(1), byte(2));
+}
 
 /// The visible weight of an agent in an image: sums over its fragments, as integers, so that they do not depend on the
 /// order of the fragments.

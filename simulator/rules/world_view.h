@@ -128,10 +128,12 @@ PICTURA_HD inline AgentBox box_of(const AgentStateView& agents, int slot) {
   return box;
 }
 
-/// Where the agent's cameras stand; that of an absent agent leaves nobody out, see Simulator::views().
-PICTURA_HD inline View view_of(const WorldView& world, int agent) {
+/// Where the agent's cameras stand at a step of the episode; that of an absent agent leaves nobody out, see
+/// Simulator::views().
+PICTURA_HD inline View view_of(const WorldView& world, int agent, int32_t episode_step) {
   View view;
   view.world = world.index;
+  view.key = {world.global_world, static_cast<uint32_t>(agent), world.episode, static_cast<uint32_t>(episode_step)};
   if (!world.boxes[agent].drawn) return view;
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;

@@ -10,6 +10,7 @@
 #include "pictura/bench/truth/image_truth.h"
 #include "pictura/bench/truth/tolerances.h"
 #include "pictura/tests/backend_gl/gl_support.h"
+#include "pictura/tests/support/keyed_views.h"
 #include "pictura/tests/support/renderer_interface.h"
 
 namespace pictura {
@@ -57,6 +58,16 @@ TEST_P(GlRenderer, DrawsWhatTheOracleDraws) {
       EXPECT_GE(measured_db, quality.min_psnr_db);
     }
   }
+}
+
+TEST_P(GlRenderer, MountsRandomizedCamerasAsTheOracleDoes) {
+  Snapshot town = town_of(2, 8);
+  town.views = test::keyed(town.views);
+  RendererConfig config{.num_threads = 1, .randomization = {.rotation_deg = 6, .shift_m = 0.2, .focal_share = 0.2}};
+  const std::vector<float> oracle = draw("cpu", town.geometry, town.scene, town.views, config);
+  config.samples.grid = 4;
+  EXPECT_GE(PooledError(draw(GetParam(), town.geometry, town.scene, town.views, config), oracle).psnr_db(),
+            kMinGlPsnr4x4_db);
 }
 
 TEST_P(GlRenderer, TolerancesDetectFaults) {
@@ -321,6 +332,8 @@ TEST_P(GlRenderer, RejectsUnsupportedFeaturesByName) {
   expect_error([&] { make_renderer(name, {.rig = paper_rig(8192, 8), .samples = {.grid = 16}}); },
                "samples along an axis, which is this driver's limit, got 131072");
   expect_error([&] { make_renderer(name, {.samples = {.grid = 0}}); }, "expected 1 sample or more");
+  expect_error([&] { make_renderer(name, {.randomization = {.dropped_probability = 0.1}}); },
+               "renderer " + name + ": randomized brightness, noise and lost images are cpu's and cuda's");
 }
 
 TEST(GlNames, AnUnknownOneListsAll) {

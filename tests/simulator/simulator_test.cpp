@@ -188,6 +188,21 @@ TEST(Simulator, ViewsStandAtTheRearAxle) {
   }
 }
 
+TEST(Simulator, ViewsAreKeyedByWorldAgentEpisodeAndStep) {
+  const auto simulator = make(testing::cars({.episode_steps = 2}), testing::ring_road(40), {{0, 2, 70}, {0, 3, 71}});
+  const std::vector<int32_t> actions(5, kCoast);
+  for (uint32_t step = 0; step < 5; ++step) {
+    for (uint32_t i = 0; i < 5; ++i) {
+      const ViewKey& key = simulator->views()[i].key;
+      EXPECT_EQ(key.world, i < 2 ? 70u : 71u);
+      EXPECT_EQ(key.agent, i < 2 ? i : i - 2);
+      EXPECT_EQ(key.episode, step / 3);
+      EXPECT_EQ(key.step, step % 3);
+    }
+    simulator->step(actions);
+  }
+}
+
 TEST(Simulator, EpisodesEndInTimeAndResetInTheNextStep) {
   const auto simulator = make(testing::cars({.episode_steps = 5}), testing::ring_road(40), {{0, 3, 0}});
   const std::vector<int32_t> actions(3, kCoast);

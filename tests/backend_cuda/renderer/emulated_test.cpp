@@ -19,6 +19,7 @@
 #include "pictura/tests/backend_cuda/renderer/equal_outputs.h"
 #include "pictura/tests/golden/golden_scenes.h"
 #include "pictura/tests/support/error_message.h"
+#include "pictura/tests/support/keyed_views.h"
 #include "pictura/tests/support/renderer_interface.h"
 
 namespace pictura {
@@ -131,7 +132,9 @@ TEST(EmulatedKernels, ReportInvalidViews) {
     worlds.views.resize(2);
     worlds.views[0] = valid.views[3];  // of the empty world, so that its image is valid in all cases
     each.corrupt(&worlds);
-    EmulatedRenderer renderer(config_of(rig), 15);
+    RendererConfig config = config_of(rig);
+    config.randomization.noise_share = 0.1;
+    EmulatedRenderer renderer(config, 15);
     upload_geometries(worlds.maps, &renderer);
     HostImages images(rig, 2);
     std::ranges::fill(images.bytes(), uint8_t{0xA5});
@@ -249,6 +252,38 @@ TEST(EmulatedKernels, WriteTheOraclesFormatsAndOrders) {
       EXPECT_TRUE(std::ranges::equal(result.bytes(), expected.bytes())) << static_cast<int>(format) << ", " << patch_px;
     }
   }
+}
+
+TEST(EmulatedKernels, RandomizeCamerasAsTheOracleDoes) {
+  Snapshot town = make_synthetic_town(3, 60);
+  town.views.resize(2);
+  town.views = test::keyed(town.views);
+  RendererConfig config = config_of(mixed_rig());
+  config.randomization = scaled(kFullCameraSeverity, 2);
+  config.randomization.seed = 5;
+  EmulatedRenderer emulated(config, 21);
+  expect_oracles(&emulated, town, Planes::all);
+  const auto oracle = make_renderer("cpu", config);
+  test::expect_equal_visibility(&emulated, oracle.get(), town);
+  for (const auto& [format, order] :
+       {std::pair{PixelFormat::u8, ChannelOrder::planar}, std::pair{PixelFormat::f16, ChannelOrder::planar},
+        std::pair{PixelFormat::bf16, ChannelOrder::patches}}) {
+    HostImages result(config.rig, 2, format, Planes::none, order), expected(config.rig, 2, format, Planes::none, order);
+    std::ranges::fill(result.bytes(), uint8_t{0xA5});
+    emulated.render(town.scene.batch(), town.views, result.batch(), {});
+    oracle->render(town.scene.batch(), town.views, expected.batch(), {});
+    EXPECT_TRUE(std::ranges::equal(result.bytes(), expected.bytes())) << static_cast<int>(format);
+  }
+}
+
+TEST(EmulatedKernels, RandomizeCamerasOfImagesDrawnInParts) {
+  Snapshot crowd = make_crowd();
+  crowd.views = test::keyed(crowd.views);
+  RendererConfig config = config_of(front_rig());
+  config.randomization = kFullCameraSeverity;
+  EmulatedRenderer renderer(config, 22);
+  expect_oracles(&renderer, crowd, Planes::all);
+  EXPECT_GT(renderer.overflow(), 0);
 }
 
 TEST(EmulatedKernels, DrawTooManyFragmentsInParts) {

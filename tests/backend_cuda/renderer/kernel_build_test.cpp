@@ -46,7 +46,7 @@ std::string message_of_build(const cuda::KernelProgram& program, const KernelTar
 class KernelArchitecture : public testing::TestWithParam<int> {};
 
 TEST_P(KernelArchitecture, KernelsCompileToCode) {
-  const KernelCode code = build_kernels(cuda::renderer_program(), {GetParam(), 4, 96, 54});
+  const KernelCode code = build_kernels(cuda::renderer_program(), {GetParam(), 4, 96, 54, GetParam() == 90});
   EXPECT_EQ(code.architecture, "sm_" + std::to_string(GetParam()));
   EXPECT_THAT(code.bytes, StartsWith("\x7f"
                                      "ELF"));

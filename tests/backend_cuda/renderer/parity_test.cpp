@@ -14,6 +14,7 @@
 #include "pictura/tests/backend_cuda/renderer/equal_outputs.h"
 #include "pictura/tests/golden/golden_scenes.h"
 #include "pictura/tests/support/error_message.h"
+#include "pictura/tests/support/keyed_views.h"
 #include "pictura/tests/support/renderer_interface.h"
 
 namespace pictura {
@@ -44,6 +45,29 @@ TEST_F(CudaRendererTest, OddSizesAndMixedRigsDoToo) {
 }
 
 TEST_F(CudaRendererTest, WorldsOfSeveralMapsDoToo) { expect_parity(make_synthetic_worlds(), {.rig = paper_rig()}); }
+
+TEST_F(CudaRendererTest, RandomizedCamerasDoToo) {
+  Snapshot town = make_synthetic_town(2, 60);
+  town.views.resize(5);
+  town.views = test::keyed(town.views);
+  for (const Rig& rig : {paper_rig(), mixed_rig()}) {
+    RendererConfig config{.rig = rig, .randomization = scaled(kFullCameraSeverity, 2)};
+    config.randomization.seed = 5;
+    expect_parity(town, config);
+    expect_parity_of_visibility(town, config);
+    const auto oracle = make_renderer("cpu", config), device = make_renderer("cuda", config);
+    oracle->upload(0, town.geometry);
+    device->upload(0, town.geometry);
+    for (const PixelFormat format : {PixelFormat::u8, PixelFormat::f16, PixelFormat::bf16}) {
+      for (const ChannelOrder order : {ChannelOrder::planar, ChannelOrder::patches}) {
+        HostImages result(rig, 5, format, Planes::none, order), expected(rig, 5, format, Planes::none, order);
+        device->render(town.scene.batch(), town.views, result.batch());
+        oracle->render(town.scene.batch(), town.views, expected.batch());
+        EXPECT_TRUE(std::ranges::equal(result.bytes(), expected.bytes())) << static_cast<int>(format);
+      }
+    }
+  }
+}
 
 // The paper's sizes, and one that a screen shows; each has kernels of its own to build.
 class CudaRendererSizes : public CudaRendererTest, public testing::WithParamInterface<int> {};
