@@ -33,6 +33,8 @@ RendererConfig renderer_config(const Config& config, const Rig& rig, Device devi
   result.num_threads = config.run.num_threads;
   result.line_floor_px = static_cast<float>(config.render.line_floor_px);
   result.samples = config.render.samples;
+  result.randomization = config.render.randomization;
+  result.randomization.seed = config.run.seed;
   return result;
 }
 

@@ -25,7 +25,8 @@ struct RenderSection {
     bool has_patches() const { return patch_px > 0; }
   };
   std::vector<SizeChange> schedule;
-  double line_floor_px = 0.35;  // least width of a line on screen
+  double line_floor_px = 0.35;        // least width of a line on screen
+  CameraRandomization randomization;  // in training; its seed is run.seed
 };
 
 }  // namespace pictura

@@ -57,6 +57,17 @@ void visit(AnyConfig& c, Visitor&& v) {
                  8192);
   v.size_changes(NamedKey{"render.schedule", Resume::reported}, c.render.schedule);
   v.value("render.line_floor_px", c.render.line_floor_px, 0, kMaxLineFloor_px);
+  const auto randomization = [&v](const char* name, auto& range, double highest) {
+    v.value(NamedKey{std::string("render.randomization.") + name, Resume::reported}, range, 0, highest);
+  };
+  constexpr CameraRandomization kMax = kMaxCameraRandomization;
+  randomization("rotation_deg", c.render.randomization.rotation_deg, kMax.rotation_deg);
+  randomization("shift_m", c.render.randomization.shift_m, kMax.shift_m);
+  randomization("focal_share", c.render.randomization.focal_share, kMax.focal_share);
+  randomization("brightness_share", c.render.randomization.brightness_share, kMax.brightness_share);
+  randomization("noise_share", c.render.randomization.noise_share, kMax.noise_share);
+  randomization("dead_probability", c.render.randomization.dead_probability, kMax.dead_probability);
+  randomization("dropped_probability", c.render.randomization.dropped_probability, kMax.dropped_probability);
 
   v.choice("policy.modality", c.policy.modality, kModalities);
   v.value("policy.auxiliary", c.policy.auxiliary);

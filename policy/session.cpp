@@ -30,6 +30,13 @@ Config adapted(const Config& trained, const SessionOptions& options) {
     fail_usage("decision_steps: expected 0 to {}, got {}", kMaxDecisionSteps, options.decision_steps);
   }
   if (options.decision_steps > 0) config.policy.decision_steps = options.decision_steps;
+  if (!(options.camera_severity >= 0 && options.camera_severity <= kMaxCameraSeverity)) {
+    fail_usage("camera_severity: expected 0 to {}, got {}", kMaxCameraSeverity, options.camera_severity);
+  }
+  if (options.camera_severity > 0 && !trained.reads_images()) {
+    fail_usage("camera_severity: expected a policy that reads images");
+  }
+  config.render.randomization = scaled(kFullCameraSeverity, options.camera_severity);
   std::string& renderer = config.render.backend;
   if (!options.renderer.empty())
     renderer = options.renderer;
@@ -49,6 +56,12 @@ namespace {
 
 Config with_seed(Config config, uint64_t seed) {
   config.run.seed = seed;
+  return config;
+}
+
+// With cameras that are mounted as in the rig, whatever they were in training.
+Config as_mounted(Config config) {
+  config.render.randomization = {};
   return config;
 }
 
@@ -81,6 +94,7 @@ struct PolicySession::Parts {
       : config(adapted(saved.config, options)),
         device(open_learning_device(config)),
         rig(chosen_rig(saved, options)),
+        camera_severity(options.camera_severity),
         executor(make_policy_executor(device)),
         own_policy(make_policy(config, rig, device)),
         policy(*own_policy) {
@@ -90,11 +104,12 @@ struct PolicySession::Parts {
       : config(with_seed(trained.config, seed)),
         device(trained.device),
         rig(trained.rig),
+        camera_severity(trained.camera_severity),
         executor(make_policy_executor(device)),
         own_policy(make_policy(config, rig, device)),
         policy(*own_policy) {}
   Parts(const Config& its_config, const Rig& its_rig, Device its_device, const Policy& its_policy)
-      : config(its_config),
+      : config(as_mounted(its_config)),
         device(its_device),
         rig(its_rig),
         executor(make_policy_executor(device)),
@@ -124,6 +139,7 @@ struct PolicySession::Parts {
   const Config config;
   const Device device;
   const Rig rig;
+  const double camera_severity = 0;
   const std::unique_ptr<PolicyExecutor> executor;
   const std::unique_ptr<const Policy> own_policy;  // null where it is another's
   const Policy& policy;
@@ -218,10 +234,14 @@ bool PolicySession::reads_images() const { return parts_->config.reads_images();
 
 const Rig& PolicySession::rig() const { return parts_->rig; }
 
+double PolicySession::camera_severity() const { return parts_->camera_severity; }
+
 Device PolicySession::device() const { return parts_->device; }
 
 RendererConfig PolicySession::renderer_config() const {
-  return pictura::renderer_config(parts_->config, parts_->rig, parts_->device);
+  RendererConfig result = pictura::renderer_config(parts_->config, parts_->rig, parts_->device);
+  result.randomization.seed = 0;  // all policies see through the same cameras in a world
+  return result;
 }
 
 std::unique_ptr<Renderer> PolicySession::make_renderer() const {

@@ -47,7 +47,8 @@ class PolicySession {
   /// file when it is neither, truncated, of another observation schema or architecture, or when it cannot run on this
   /// device. UsageError where it cannot see through the cameras of the options.
   explicit PolicySession(const std::string& path, const SessionOptions& options = {});
-  /// The policy of a configuration with cameras of `rig`, as it is when it is asked; it must outlive the session.
+  /// The policy of a configuration with cameras of `rig`, as it is when it is asked; it must outlive the session. Its
+  /// cameras are not randomized.
   PolicySession(const Config& config, const Rig& rig, Device device, const Policy& policy);
   ~PolicySession();
   /// The same policy as it is before training, in the same worlds and with the same cameras: weights are drawn from
@@ -58,10 +59,13 @@ class PolicySession {
 
   bool reads_images() const;
   const Rig& rig() const;
+  /// By how much its cameras are randomized: the options' camera_severity.
+  double camera_severity() const;
   /// Where it computes. Simulators, renderers and all arrays that it is given work there too.
   Device device() const;
 
-  /// What its images are drawn with: rig, line floor, palette and samples of training.
+  /// What its images are drawn with: rig, line floor, palette and samples of training, and cameras that are mounted as
+  /// the options say.
   RendererConfig renderer_config() const;
   /// A renderer for its images, in the memory of device(); the caller uploads the maps. Null where it reads no images.
   /// Throws Error when the renderer cannot run here.

@@ -23,9 +23,10 @@ struct SessionOptions {
   std::string backbone;  // where the program of policy.backbone lies now; empty: where it did
   // Of [evaluate.conditioning], in place of the policy's own: "name=value".
   std::vector<std::string> conditioning;
-  bool adds_walls = false;  // its worlds have walls, also where it was trained without
-  bool average = false;     // drives with the average of weights that a checkpoint holds
-  int decision_steps = 0;   // steps for which an action is held; 0: as in training (policy.decision_steps)
+  bool adds_walls = false;     // its worlds have walls, also where it was trained without
+  bool average = false;        // drives with the average of weights that a checkpoint holds
+  double camera_severity = 0;  // its cameras are randomized by kFullCameraSeverity times this
+  int decision_steps = 0;      // steps for which an action is held; 0: as in training (policy.decision_steps)
   // Lights of its worlds; without a value those that the policy was trained with.
   std::optional<LightCycles> light_cycles;
   std::optional<LightHeads> light_heads;
@@ -46,6 +47,7 @@ void visit_options(SessionOptions& options, Visitor&& v) {
   v.numbers_by_name({"conditioning"}, options.conditioning);
   v.value({"average"}, options.average);
   v.value({"decision_steps"}, options.decision_steps);
+  v.value({"camera_severity"}, options.camera_severity);
 }
 
 /// Visits the options of lights, which worlds of recorded scenes do not have.

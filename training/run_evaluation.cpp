@@ -1,5 +1,6 @@
 #include "pictura/training/run_evaluation.h"
 
+#include "pictura/backends/upload_maps.h"
 #include "pictura/common/support/stopwatch.h"
 #include "pictura/policy/session.h"
 
@@ -29,6 +30,12 @@ std::optional<EvaluationRecord> RunEvaluation::evaluate() {
   // Both simulators name the maps 0, 1, ..., so this one's scenes are drawn with the maps that training uploaded.
   worlds_.renderer = run_.renderer.get();
   PolicySession session(config, run_.rig, run_.device, *run_.policy);
+  std::unique_ptr<Renderer> as_mounted;
+  if (worlds_.renderer && config.render.randomization.is_on()) {
+    as_mounted = session.make_renderer();
+    upload_maps(worlds_.maps, {}, as_mounted.get());
+    worlds_.renderer = as_mounted.get();
+  }
   const EvaluateReport report = pictura::evaluate(&session, options, &worlds_);
   if (report.interrupted) return std::nullopt;
   EvaluationRecord record{report.rows.at(0), {}, 0, run_.image_size()};

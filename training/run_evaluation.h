@@ -1,5 +1,6 @@
 // The small evaluation that a run makes of itself: the protocol of evaluation/ in a few worlds on the maps of training,
-// with the run's own renderer. It shares no state with training, which goes on as if there had been none.
+// with the run's own renderer, or, where that randomizes cameras, with one that does not. It shares no state with
+// training, which goes on as if there had been none.
 #pragma once
 
 #include <optional>

@@ -345,6 +345,18 @@ TEST(Config, WhatCannotWorkInOneMemoryIsRefusedByName) {
   }
 }
 
+TEST(Config, RandomizedCamerasAreReadWrittenAndDrawn) {
+  const Config c =
+      parse_config("[run]\nseed = 7\n[render.randomization]\nrotation_deg = 3\ndead_probability = 0.1\n", "a.toml");
+  EXPECT_EQ(c.render.randomization, (CameraRandomization{.rotation_deg = 3, .dead_probability = 0.1}));
+  EXPECT_EQ(parse_config(to_toml(c), "b.toml").render.randomization, c.render.randomization);
+  const RendererConfig drawn = renderer_config(c, rig_of(c));
+  EXPECT_EQ(drawn.randomization, (CameraRandomization{.seed = 7, .rotation_deg = 3, .dead_probability = 0.1}));
+  EXPECT_FALSE(renderer_config({}, paper_rig()).randomization.is_on());
+  EXPECT_THAT(error_in("[render.randomization]\nshift_m = 2\n"),
+              HasSubstr("a.toml:2: render.randomization.shift_m: expected a number in [0, 1], got 2"));
+}
+
 TEST(Config, DifferencesThatChangeTheRunAreNamed) {
   Config a, b;
   b.policy.backbone_width = 256;
@@ -364,13 +376,15 @@ TEST(Config, DifferencesThatChangeTheRunAreNamed) {
   b.simulator.num_slots = 40960;
   b.train.minibatch_size = 131072;
   b.train.update_epochs = 1;
+  b.render.randomization.shift_m = 0.1;
   EXPECT_EQ(first_difference(a, b), "");
   EXPECT_THAT(
       differences_to_report(a, b),
       ElementsAre("simulator.num_slots: 20480 became 40960", "render.schedule: [] became [[5, 6, 7]]",
-                  "train.schedule_agent_steps: 50000000000 became 3", "train.minibatch_size: 65536 became 131072",
-                  "train.update_epochs: 2 became 1", "train.learning_rate: 0.0005 became 1.0",
-                  "train.weight_average: 0.0 became 50.0", "train.reproducible: false became true"));
+                  "render.randomization.shift_m: 0.0 became 0.1", "train.schedule_agent_steps: 50000000000 became 3",
+                  "train.minibatch_size: 65536 became 131072", "train.update_epochs: 2 became 1",
+                  "train.learning_rate: 0.0005 became 1.0", "train.weight_average: 0.0 became 50.0",
+                  "train.reproducible: false became true"));
   b = a;
   b.simulator.wall_seed = 3;
   EXPECT_THAT(first_difference(a, b), HasSubstr("simulator.wall_seed"));

@@ -95,6 +95,15 @@ TEST_F(RunWithEvaluations, WithCopiesOfMapsAreOnTheMapsAlone) {
   EXPECT_EQ(train(parts).policy_hash, with.policy_hash);
 }
 
+TEST_F(RunWithEvaluations, MeasureCamerasAsMountedWhateverTrainingHas) {
+  TrainOptions shaken = evaluating("shaken", 2, 2), plain = evaluating("plain", 2, 2);
+  shaken.overrides.insert(shaken.overrides.end(),
+                          {"render.randomization.rotation_deg=6", "render.randomization.noise_share=0.2"});
+  const TrainReport report = train(shaken);
+  EXPECT_NE(report.policy_hash, train(plain).policy_hash);
+  expect_last_row_as_evaluate_measures("shaken", report.checkpoint);
+}
+
 TEST_F(RunWithEvaluations, GoesOnWithTornAndMissingRows) {
   const TrainReport whole = train(evaluating("whole", 1));
   train(evaluating("parts", 1, 2));

@@ -278,14 +278,15 @@ TEST_F(Training, RolloutsThatCannotFitAreRefused) {
 }
 
 TEST_F(Training, WhatARolloutKeepsIsWhatTheActiveAgentsSaw) {
-  const Config kept = load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml", {"run.num_threads=1", "render.backend=cpu",
-                                                                             "train.num_steps=3", "train.images=kept"}),
-               redrawn = load_config(
-                   PICTURA_SOURCE_DIR "/configs/smoke.toml",
-                   {"run.num_threads=1", "render.backend=cpu", "train.num_steps=3", "train.images=redrawn"}),
-               held = load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml",
-                                  {"run.num_threads=1", "render.backend=cpu", "train.num_steps=3", "train.images=kept",
-                                   "policy.decision_steps=3"});
+  // With randomized cameras, whose images are the same when they are drawn again.
+  const auto config_of = [](std::vector<std::string> more) {
+    more.insert(more.end(),
+                {"run.num_threads=1", "render.backend=cpu", "train.num_steps=3", "render.randomization.rotation_deg=5",
+                 "render.randomization.noise_share=0.1", "render.randomization.dropped_probability=0.2"});
+    return load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml", more);
+  };
+  const Config kept = config_of({"train.images=kept"}), redrawn = config_of({"train.images=redrawn"}),
+               held = config_of({"train.images=kept", "policy.decision_steps=3"});
   const std::unique_ptr<Simulator> simulator =
       make_simulator("cpu", simulator_config(kept), {load_map("procedural")}, draw_worlds(1, 24, 8, 8, 1));
   const Rig rig = rig_of(kept);
