@@ -31,29 +31,62 @@ namespace {
 constexpr int kShownGroups = 6;          // of each kind of infraction
 constexpr double kManyNeverMoved = 0.2;  // of the vehicles
 
-// The density; of another driver also its name, of a file without folders.
-std::string label_of(const EvaluateRow& row) {
-  if (row.driver.empty()) return row.density;
-  return fmt::format("{} {}", row.density, std::filesystem::path(row.driver).filename().string());
+// One for each severity of randomized cameras.
+using Reports = std::vector<EvaluateReport>;
+
+// A row of the table and its label: the density; of another driver also its name, of a file without folders; the
+// severity where there are several.
+struct LabelledRow {
+  std::string label;
+  EvaluateRow row;
+};
+std::vector<LabelledRow> labelled(const Reports& reports) {
+  std::vector<LabelledRow> rows;
+  for (const EvaluateReport& report : reports) {
+    for (const EvaluateRow& row : report.rows) {
+      std::string label = row.density;
+      if (!row.driver.empty()) label += " " + std::filesystem::path(row.driver).filename().string();
+      if (reports.size() > 1) label += fmt::format(", severity {}", report.results.setting.camera_severity);
+      rows.push_back({label, row});
+    }
+  }
+  return rows;
 }
 
-// A line of the table: a metric, and its text for each row of the report.
+struct Effort {
+  int64_t agent_steps = 0;
+  double seconds = 0;
+};
+Effort effort_of(const Reports& reports) {
+  Effort sum;
+  for (const EvaluateReport& report : reports) {
+    sum.agent_steps += report.agent_steps;
+    sum.seconds += report.seconds;
+  }
+  return sum;
+}
+
+// A line of the table: a metric, and its text for each row.
 template <typename Text>
-void print_line(const EvaluateReport& report, size_t width, const char* metric, const Text& text_of) {
+void print_line(const std::vector<LabelledRow>& rows, size_t width, const char* metric, const Text& text_of) {
   std::string line = fmt::format("{:30}", metric);
-  for (const EvaluateRow& row : report.rows) line += fmt::format(" {:>{}}", text_of(row), width);
+  for (const LabelledRow& labelled : rows) line += fmt::format(" {:>{}}", text_of(labelled.row), width);
   print_result("{}\n", line);
 }
 
-// Metrics below each other, so that the table fits a terminal; a column for each density and driver.
-void print_table(const EvaluateReport& report) {
+// Metrics below each other, so that the table fits a terminal; a column for each density, driver and severity.
+void print_table(const Reports& reports) {
+  const EvaluationSetting& setting = reports.front().results.setting;
+  const std::vector<LabelledRow> rows = labelled(reports);
   size_t width = 18;
-  for (const EvaluateRow& row : report.rows) width = std::max(width, label_of(row).size());
-  const auto line = [&](const char* metric, const auto& text_of) { print_line(report, width, metric, text_of); };
+  std::string labels(30, ' ');
+  for (const auto& [label, row] : rows) width = std::max(width, label.size());
+  for (const auto& [label, row] : rows) labels += fmt::format(" {:>{}}", label, width);
+  print_result("{}\n", labels);
+  const auto line = [&](const char* metric, const auto& text_of) { print_line(rows, width, metric, text_of); };
   const auto estimate = [&](const char* metric, Estimate EvaluateRow::* of) {
     line(metric, [of](const EvaluateRow& row) { return interval_text(row.*of); });
   };
-  line("", [](const EvaluateRow& row) { return label_of(row); });
   line("scenarios x steps", [](const EvaluateRow& row) { return fmt::format("{} x {}", row.scenarios, row.steps); });
   line("vehicles", [](const EvaluateRow& row) { return fmt::format("{}", row.vehicle_episodes); });
   line("km driven", [](const EvaluateRow& row) { return fmt::format("{:.2f}", row.km_driven); });
@@ -77,57 +110,66 @@ void print_table(const EvaluateReport& report) {
   estimate("share of time in reverse", &EvaluateRow::reversing_share);
   estimate("m moved per wait at red", &EvaluateRow::red_wait_moved_m);
   line("waits at red", [](const EvaluateRow& row) { return fmt::format("{}", row.red_waits); });
-  for (const EvaluateRow& row : report.rows) {
+  for (const auto& [label, row] : rows) {
     if (row.left == 0) continue;
     print_result(
-        "{}: vehicles are lives on roads that end: {} of {} agents spawned, {} entered, {} left; {} goals/km\n",
-        label_of(row), row.spawned, row.asked, row.entered, row.left, interval_text(row.goals_per_km));
+        "{}: vehicles are lives on roads that end: {} of {} agents spawned, {} entered, {} left; {} goals/km\n", label,
+        row.spawned, row.asked, row.entered, row.left, interval_text(row.goals_per_km));
   }
-  for (const EvaluateRow& row : report.rows) {
+  for (const auto& [label, row] : rows) {
     if (row.never_moved_share.value < kManyNeverMoved) continue;
-    print_result("{}: {:.0f} % of the vehicles never moved, so that few infractions say little\n", label_of(row),
+    print_result("{}: {:.0f} % of the vehicles never moved, so that few infractions say little\n", label,
                  100 * row.never_moved_share.value);
   }
-  print_result("traffic lights: {}\n", name_of(report.results.setting.light_cycles));
-  if (!report.results.setting.others.empty()) {
-    print_result("among others, shares of vehicles: {}\n", fmt::join(report.results.setting.others, ", "));
+  print_result("traffic lights: {}\n", name_of(setting.light_cycles));
+  if (!setting.others.empty()) print_result("among others, shares of vehicles: {}\n", fmt::join(setting.others, ", "));
+  if (reports.size() == 1 && setting.camera_severity > 0) {
+    print_result("randomized cameras: severity {}\n", setting.camera_severity);
   }
   print_result("+- is the half width of a 95 % confidence interval over scenarios\n");
-  if (report.agent_steps > 0) {
-    const auto steps = static_cast<double>(report.agent_steps);
-    print_result("{} agent-steps in {}: {}/s\n", format_count(steps), format_duration(report.seconds),
-                 format_count(steps / report.seconds));
+  const Effort effort = effort_of(reports);
+  if (effort.agent_steps > 0) {
+    const auto steps = static_cast<double>(effort.agent_steps);
+    print_result("{} agent-steps in {}: {}/s\n", format_count(steps), format_duration(effort.seconds),
+                 format_count(steps / effort.seconds));
   }
 }
 
-void print_report(const EvaluateOptions& options, const EvaluateReport& report, const Json& infractions) {
+Json json_of(const EvaluateRow& row, double severity) {
+  Json json = {{"density", row.density},
+               {"driver", row.driver.empty() ? Json(nullptr) : Json(row.driver)},
+               {"camera_severity", severity},
+               {"scenarios", row.scenarios},
+               {"steps", row.steps},
+               {"asked", row.asked},
+               {"spawned", row.spawned},
+               {"entered", row.entered},
+               {"left", row.left},
+               {"vehicle_episodes", row.vehicle_episodes},
+               {"infractions", row.infractions},
+               {"km_driven", row.km_driven},
+               {"red_waits", row.red_waits}};
+  for (const auto& [name, estimate] : metrics_of(row)) add_estimate(name, estimate, &json);
+  add_estimate("at_fault_collisions_per_km", row.at_fault_collisions_per_km, &json);
+  add_estimate("off_road_per_km", row.off_road_per_km, &json);
+  add_estimate("red_lights_per_km", row.red_lights_per_km, &json);
+  add_estimate("goals_per_km", row.goals_per_km, &json);
+  return json;
+}
+
+void print_report(const EvaluateOptions& options, const Reports& reports, const Json& infractions) {
   Json table = Json::array();
-  for (const EvaluateRow& row : report.rows) {
-    Json json = {{"density", row.density},
-                 {"driver", row.driver.empty() ? Json(nullptr) : Json(row.driver)},
-                 {"scenarios", row.scenarios},
-                 {"steps", row.steps},
-                 {"asked", row.asked},
-                 {"spawned", row.spawned},
-                 {"entered", row.entered},
-                 {"left", row.left},
-                 {"vehicle_episodes", row.vehicle_episodes},
-                 {"infractions", row.infractions},
-                 {"km_driven", row.km_driven},
-                 {"red_waits", row.red_waits}};
-    for (const auto& [name, estimate] : metrics_of(row)) add_estimate(name, estimate, &json);
-    add_estimate("at_fault_collisions_per_km", row.at_fault_collisions_per_km, &json);
-    add_estimate("off_road_per_km", row.off_road_per_km, &json);
-    add_estimate("red_lights_per_km", row.red_lights_per_km, &json);
-    add_estimate("goals_per_km", row.goals_per_km, &json);
-    table.push_back(std::move(json));
+  for (const EvaluateReport& report : reports) {
+    for (const EvaluateRow& row : report.rows) table.push_back(json_of(row, report.results.setting.camera_severity));
   }
-  Json json = driver_json(options, report.results.setting);
-  json.update({{"light_cycles", name_of(report.results.setting.light_cycles)},
-               {"others", report.results.setting.others},
-               {"interrupted", report.interrupted},
-               {"agent_steps", report.agent_steps > 0 ? Json(report.agent_steps) : Json(nullptr)},
-               {"seconds", report.agent_steps > 0 ? Json(report.seconds) : Json(nullptr)},
+  const EvaluationSetting& setting = reports.front().results.setting;
+  const Effort effort = effort_of(reports);
+  Json json = driver_json(options, setting);
+  json.update({{"light_cycles", name_of(setting.light_cycles)},
+               {"others", setting.others},
+               {"interrupted", reports.back().interrupted},
+               {"agent_steps", effort.agent_steps > 0 ? Json(effort.agent_steps) : Json(nullptr)},
+               {"seconds", effort.agent_steps > 0 ? Json(effort.seconds) : Json(nullptr)},
                {"rows", table},
                {"infractions", infractions}});
   print_json(json);
@@ -208,6 +250,7 @@ struct EvaluateArguments {
   EvaluateOptions evaluation;
   std::vector<std::string> densities{kDensityNames.begin(), kDensityNames.end()};
   std::vector<std::string> parts;
+  std::vector<double> severities{0};
   std::string size, scenarios = "200", out, infractions;
   bool json = false;
   SceneArguments scenes;
@@ -222,8 +265,10 @@ void evaluate_in_scenes(const CLI::App& command, const EvaluateArguments& argume
   refuse_recording_options(command, "--replay or --gallery");
   refuse_options(command, {"--light-heads"}, "in recorded scenes, whose heads all stand beyond their line");
   refuse_options(command, {"--others"}, "in recorded scenes");
+  if (arguments.severities.size() > 1) fail_usage("--camera-severity: in recorded scenes expected one, got several");
   SceneEvaluateOptions in_scenes;
   static_cast<DriverOptions&>(in_scenes) = evaluation;
+  in_scenes.camera_severity = arguments.severities.front();
   in_scenes.first_scene = evaluation.first_scenario;
   in_scenes.num_scenes = command.count("--scenarios") > 0 ? evaluation.scenarios : 0;
   run_scene_evaluation(command, arguments.scenes, evaluation.steps, arguments.densities, std::move(in_scenes),
@@ -239,6 +284,34 @@ void replay_worst(const EvaluateArguments& arguments, const EvaluationResults& r
   if (!arguments.gallery.empty()) {
     write_scenario_replays(evaluation, results, arguments.recording, arguments.replays, arguments.gallery);
   }
+}
+
+// Refuses what takes one severity, or none.
+void check_severities(const CLI::App& command, const EvaluateArguments& arguments) {
+  if (!arguments.parts.empty()) refuse_options(command, {"--camera-severity"}, "with --merge");
+  if (arguments.severities.size() == 1) return;
+  refuse_options(command, {"--out", "--infractions", "--replay", "--gallery"},
+                 "with several values of --camera-severity");
+}
+
+// An evaluation at each severity, in the same worlds, until one is interrupted.
+Reports evaluate_severities(const std::vector<double>& severities, EvaluateOptions* evaluation) {
+  EvaluationProgress progress("the scenarios that are finished");
+  const auto count = static_cast<double>(severities.size());
+  Reports reports;
+  evaluation->on_progress = [&](double done, double eta_s) {
+    const auto finished = static_cast<double>(reports.size());
+    const double each_s = done < 1 ? eta_s / (1 - done) : 0;
+    progress.update((finished + done) / count, eta_s + (count - finished - 1) * each_s);
+  };
+  for (const double severity : severities) {
+    evaluation->camera_severity = severity;
+    reports.push_back(evaluate(*evaluation));
+    if (reports.back().interrupted) break;
+  }
+  evaluation->on_progress = nullptr;
+  progress.finish();
+  return reports;
 }
 
 // In towns, or parts of that joined.
@@ -257,31 +330,31 @@ void evaluate_in_towns(const CLI::App& command, EvaluateArguments* arguments) {
     if (merges) fail_usage("--others: has no effect with --merge");
     if (records || lists_infractions) fail_usage("--others: not with --replay, --gallery or --infractions");
   }
+  check_severities(command, *arguments);
   if (!arguments->gallery.empty()) {
     make_output_folder(arguments->gallery);
     check_gallery(arguments->gallery);
   }
-  EvaluationProgress progress("the scenarios that are finished");
-  evaluation.on_progress = [&progress](double done, double eta_s) { progress.update(done, eta_s); };
   InfractionObserver infractions;
   if (lists_infractions) evaluation.observer = &infractions;
-  const EvaluateReport report = merges ? merged(arguments->parts) : evaluate(evaluation);
+  const Reports reports =
+      merges ? Reports{merged(arguments->parts)} : evaluate_severities(arguments->severities, &evaluation);
   evaluation.observer = nullptr;
-  progress.finish();
   const std::vector<InfractionGroup> groups = group_infractions(infractions.found());
   if (lists_infractions) write_infractions_csv(arguments->infractions, infractions.found());
-  if (!arguments->out.empty()) write_results(arguments->out, report.results);
+  if (!arguments->out.empty()) write_results(arguments->out, reports.front().results);
   if (arguments->json)
-    print_report(evaluation, report, lists_infractions ? groups_json(groups) : Json(nullptr));
+    print_report(evaluation, reports, lists_infractions ? groups_json(groups) : Json(nullptr));
   else
-    print_table(report);
+    print_table(reports);
   if (lists_infractions && !arguments->json) print_groups(groups);
-  if (!report.interrupted) return replay_worst(*arguments, report.results);
+  if (!reports.back().interrupted) return replay_worst(*arguments, reports.front().results);
   int finished = 0;
-  for (const EvaluateRow& row : report.rows) finished += row.scenarios;
+  for (const auto& [label, row] : labelled(reports)) finished += row.scenarios;
   const size_t num_densities = evaluation.agents_per_world > 0 ? 1 : evaluation.densities.size();
-  throw Interrupted(fmt::format("interrupted; {} of {} scenarios are finished, and counted above", finished,
-                                num_densities * static_cast<size_t>(evaluation.scenarios)));
+  throw Interrupted(
+      fmt::format("interrupted; {} of {} scenarios are finished, and counted above", finished,
+                  arguments->severities.size() * num_densities * static_cast<size_t>(evaluation.scenarios)));
 }
 
 void run_evaluate(const CLI::App& command, EvaluateArguments* arguments) {
@@ -352,6 +425,15 @@ void add_evaluate_command(CLI::App& app) {
   command->add_option("--size", arguments->size, "Pixels of an image, WxH, of the paper's rig; default: as in training")
       ->excludes(rig)
       ->excludes(policy);
+  command
+      ->add_option("--camera-severity", arguments->severities,
+                   fmt::format("Randomizes cameras, by 0 (as mounted) to {}, 1 in full (docs/cameras.md): one number, "
+                               "or several with commas between them, a row each, as 0,0.25,0.5,1",
+                               kMaxCameraSeverity))
+      ->delimiter(',')
+      ->transform(number(0, kMaxCameraSeverity))
+      ->allow_extra_args(false)
+      ->excludes(policy);
   command->add_option("--backbone", options.backbone,
                       "The program of policy.backbone, where it does not lie where it did in training");
   command->add_option("--out", arguments->out, "A file for the counts of each scenario, or scene, which --merge reads");
@@ -379,6 +461,7 @@ void add_evaluate_command(CLI::App& app) {
       "  pictura evaluate run.ckpt --density medium --scenarios 40 --infractions infractions.csv\n"
       "  pictura evaluate run.ckpt --protocol womd --scenes validation/ --density 100,50 --csv agents.csv\n"
       "  pictura evaluate run.ckpt --density medium --scenarios 40 --others lane=0.3,idm_lanes=0.2\n"
+      "  pictura evaluate run.ckpt --density medium --scenarios 40 --camera-severity 0,0.25,0.5,1\n"
       "In parts, on several machines or after one another:\n"
       "  pictura evaluate run.ckpt --scenarios 0:100 --out a.json\n"
       "  pictura evaluate run.ckpt --scenarios 100:200 --out b.json\n"

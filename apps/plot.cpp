@@ -1,4 +1,5 @@
-// `pictura plot`: curves of training runs, or of evaluations along trainings, as one picture.
+// `pictura plot`: curves of training runs, of evaluations along trainings, or of evaluations by severity, as one
+// picture.
 #include "pictura/apps/commands.h"
 #include "pictura/cli/backend_options.h"
 #include "pictura/cli/draw_chart.h"
@@ -13,6 +14,7 @@ void add_plot_command(CLI::App& app) {
     std::vector<std::string> runs;
     std::vector<std::string> metrics;
     std::string evaluations;
+    std::vector<std::string> severities;
     std::string out = "plot.png", x = "agent_steps", group = "seeds";
     bool json = false;
   };
@@ -26,6 +28,14 @@ void add_plot_command(CLI::App& app) {
                        "writes it; five metrics of the protocol, a line at medium density in a band of all")
           ->check(CLI::ExistingFile)
           ->excludes("RUN");
+  CLI::Option* const severities =
+      command
+          ->add_option("--severities", arguments->severities,
+                       "Instead of runs: what evaluate --camera-severity --json printed; metrics of the protocol by "
+                       "severity, a line for each file and density in its 95 % interval")
+          ->check(CLI::ExistingFile)
+          ->excludes("RUN")
+          ->excludes(evaluations);
   command->add_option("--out", arguments->out, "The picture to write: a PNG, or vector graphics as .svg")
       ->check(file_ending(".png", ".svg"))
       ->capture_default_str();
@@ -33,14 +43,16 @@ void add_plot_command(CLI::App& app) {
       ->add_option("--x", arguments->x,
                    "Over agent-steps, or hours of collecting and improving (of evaluations: of one GPU)")
       ->check(one_of({"agent_steps", "hours"}).description("{agent_steps,hours}"))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->excludes(severities);
   command
       ->add_option("--metrics", arguments->metrics,
                    "Columns of progress.csv, a panel each; what follows the slash is enough where one column has it; "
                    "default: return, goals, speed and three kinds of infractions")
       ->delimiter(',')
       ->allow_extra_args(false)
-      ->excludes(evaluations);
+      ->excludes(evaluations)
+      ->excludes(severities);
   command
       ->add_option(
           "--group", arguments->group,
@@ -48,7 +60,8 @@ void add_plot_command(CLI::App& app) {
           "lowest to the highest; none: a line each")
       ->check(one_of({"seeds", "none"}).description("{seeds,none}"))
       ->capture_default_str()
-      ->excludes(evaluations);
+      ->excludes(evaluations)
+      ->excludes(severities);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "docs/training.md says what the columns are. Of many updates, points are means of consecutive ones. A mean ends\n"
@@ -60,12 +73,19 @@ void add_plot_command(CLI::App& app) {
       "  pictura plot runs/a runs/b --out curves.png\n"
       "  pictura plot runs/town01_seed* --x hours --metrics episode_return,off_road_per_km\n"
       "  pictura plot runs/a --metrics rewards/goal_per_1000_steps,rewards/collision_per_1000_steps,entropy\n"
-      "  pictura plot --evaluations out/table/curves.json --out curves.png");
+      "  pictura plot --evaluations out/table/curves.json --out curves.png\n"
+      "  pictura plot --severities cameras.json --out cameras.png");
   command->callback([arguments] {
-    if (arguments->runs.empty() && arguments->evaluations.empty()) {
-      fail_usage("pictura plot: expected RUN or --evaluations");
+    if (arguments->runs.empty() && arguments->evaluations.empty() && arguments->severities.empty()) {
+      fail_usage("pictura plot: expected RUN, --evaluations or --severities");
     }
-    Json request{{"x", arguments->x}, {"out", arguments->out}, {"report", arguments->json ? "json" : "text"}};
+    Json request{{"out", arguments->out}, {"report", arguments->json ? "json" : "text"}};
+    if (!arguments->severities.empty()) {
+      request["chart"] = "severity_curves";
+      request["results"] = arguments->severities;
+      return draw_chart(request);
+    }
+    request["x"] = arguments->x;
     if (arguments->evaluations.empty()) {
       request["chart"] = "run_curves";
       request["runs"] = arguments->runs;

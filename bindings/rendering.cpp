@@ -573,7 +573,7 @@ independent. On CUDA its work is put on `stream`.)")
       .def(
           py::init([](const std::string& name, const std::optional<Rig>& rig, const std::string& device,
                       int num_threads, float line_floor_px, bool debug_palette, const std::string& samples,
-                      const py::object& stream) {
+                      double camera_severity, const py::object& stream) {
             RendererConfig config;
             if (rig) config.rig = *rig;
             config.device = device_of(device);
@@ -581,15 +581,21 @@ independent. On CUDA its work is put on `stream`.)")
             config.line_floor_px = line_floor_px;
             config.debug_palette = debug_palette;
             config.samples = samples_of(samples);
+            if (!(camera_severity >= 0 && camera_severity <= kMaxCameraSeverity)) {
+              fail_usage("Renderer: camera_severity: expected 0 to {}, got {}", kMaxCameraSeverity, camera_severity);
+            }
+            config.randomization = scaled(kFullCameraSeverity, camera_severity);
             check_process("Renderer", num_threads, config.device);
             return std::make_unique<PyRenderer>(name, config, stream_of(stream));
           }),
           py::arg("name") = "auto", py::arg("rig") = py::none(), py::kw_only(), py::arg("device") = "cpu",
           py::arg("num_threads") = 0, py::arg("line_floor_px") = RendererConfig{}.line_floor_px,
-          py::arg("debug_palette") = false, py::arg("samples") = "1", py::arg("stream") = py::none(),
+          py::arg("debug_palette") = false, py::arg("samples") = "1", py::arg("camera_severity") = 0.0,
+          py::arg("stream") = py::none(),
           R"(rig: the paper's without one. device: where scenes, views and images lie, 'cpu' or 'cuda:0'. num_threads: 0 for
 all. line_floor_px: the least width of a line on screen. debug_palette: tint halted and parked agents. samples: for 'gl',
-'4' (MSAA) or '4x4' (supersampling). stream: a cudaStream_t as int; None: the legacy default stream.
+'4' (MSAA) or '4x4' (supersampling). camera_severity: of randomized cameras, 0 to 2, as in evaluations (docs/cameras.md); draws are keyed by the
+field `key` of views, which a simulator fills. stream: a cudaStream_t as int; None: the legacy default stream.
 Raises pictura.UsageError listing the names, pictura.Error where the backend cannot run here.)")
       .def_static(
           "_of", [](const RendererInside& inside) { return std::make_unique<PyRenderer>(inside.renderer); },

@@ -95,6 +95,7 @@ py::dict dict_of(const EvaluateReport& report) {
   d["policy_hash"] = report.results.setting.policy_hash;
   d["light_cycles"] = name_of(report.results.setting.light_cycles);
   d["others"] = report.results.setting.others;
+  d["camera_severity"] = report.results.setting.camera_severity;
   return d;
 }
 
@@ -457,7 +458,8 @@ which drives instead, or a function(observations) of NumPy's arrays [slots, ...]
 returns actions int [slots], on the CPU. densities: 'light', 'medium' and 'dense', 60, 120 and 150 agents a world, or agents_per_world of them.
 device, simulator, renderer: 'auto' or names; renderer '': as it was trained. rig, or width_px and height_px: other cameras.
 backbone: where the program of policy.backbone lies now. conditioning: numbers by name. light_cycles: 'phases' or 'independent',
-light_heads: 'as_mapped' or 'visible'; '': as it was trained. average: with the average of weights that the checkpoint holds. decision_steps: for which an
+light_heads: 'as_mapped' or 'visible'; '': as it was trained. average: with the average of weights that the checkpoint holds. camera_severity: of
+randomized cameras, 0 to 2 (docs/cameras.md). decision_steps: for which an
 action is held; 0: as it was trained. others: who else drives, as {'lane': 0.3, 'other.safetensors': 0.2}:
 policies or controllers, and their shares of vehicles. on_progress: called with the fraction that is done and the seconds to come, from a thread of its own. Returns a dict: rows, one a density and driver (None: whom it measures): its counts, and each metric as (value, half of its 95 % interval); seconds,
 agent_steps, policy_hash, light_cycles, others. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");

@@ -42,6 +42,7 @@ EvaluationSetting setting_of(const PolicySession& session) {
   if (!session.reads_images()) return setting;
   setting.renderer = config.render.backend;
   setting.samples = text_of(config.render.samples);
+  setting.camera_severity = session.camera_severity();
   Hash64 cameras;
   for (const Camera& camera : session.rig().cameras) {
     setting.image_sizes.push_back(fmt::format("{}x{}", camera.width_px, camera.height_px));

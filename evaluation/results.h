@@ -101,6 +101,7 @@ struct EvaluationSetting {
   std::array<double, kNumConditioning> conditioning{};  // of every agent, in the order of simulator/conditioning.h
   LightCycles light_cycles = LightCycles::phases;
   std::vector<std::string> others;  // who else drives, see MixedTraffic::setting()
+  double camera_severity = 0;       // of randomized cameras (SessionOptions)
   friend bool operator==(const EvaluationSetting&, const EvaluationSetting&) = default;
 };
 

@@ -34,7 +34,8 @@ Json to_json(const EvaluationSetting& s) {
           {"conditioning", conditioning},
           {"light_cycles", name_of(s.light_cycles)},
           {"light_heads", s.light_heads},
-          {"others", s.others}};
+          {"others", s.others},
+          {"camera_severity", s.camera_severity}};
 }
 
 EvaluationSetting setting_from(const Json& json) {
@@ -54,6 +55,7 @@ EvaluationSetting setting_from(const Json& json) {
   json.at("image_sizes").get_to(s.image_sizes);
   s.light_heads = json.value("light_heads", s.light_heads);
   s.others = json.value("others", s.others);
+  s.camera_severity = json.value("camera_severity", s.camera_severity);
   for (size_t i = 0; i < kNumConditioning; ++i) {
     json.at("conditioning").at(kConditioningNames[i]).get_to(s.conditioning[i]);
   }

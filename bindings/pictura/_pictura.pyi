@@ -550,11 +550,12 @@ class Renderer:
     @staticmethod
     def _of(inside: _RendererInside) -> Renderer:
         ...
-    def __init__(self, name: str = 'auto', rig: Rig | None = None, *, device: str = 'cpu', num_threads: typing.SupportsInt | typing.SupportsIndex = 0, line_floor_px: typing.SupportsFloat | typing.SupportsIndex = 0.3499999940395355, debug_palette: bool = False, samples: str = '1', stream: typing.Any = None) -> None:
+    def __init__(self, name: str = 'auto', rig: Rig | None = None, *, device: str = 'cpu', num_threads: typing.SupportsInt | typing.SupportsIndex = 0, line_floor_px: typing.SupportsFloat | typing.SupportsIndex = 0.3499999940395355, debug_palette: bool = False, samples: str = '1', camera_severity: typing.SupportsFloat | typing.SupportsIndex = 0.0, stream: typing.Any = None) -> None:
         """
         rig: the paper's without one. device: where scenes, views and images lie, 'cpu' or 'cuda:0'. num_threads: 0 for
         all. line_floor_px: the least width of a line on screen. debug_palette: tint halted and parked agents. samples: for 'gl',
-        '4' (MSAA) or '4x4' (supersampling). stream: a cudaStream_t as int; None: the legacy default stream.
+        '4' (MSAA) or '4x4' (supersampling). camera_severity: of randomized cameras, 0 to 2, as in evaluations (docs/cameras.md); draws are keyed by the
+        field `key` of views, which a simulator fills. stream: a cudaStream_t as int; None: the legacy default stream.
         Raises pictura.UsageError listing the names, pictura.Error where the backend cannot run here.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
@@ -883,7 +884,7 @@ class Simulator:
     @property
     def views(self) -> Array:
         """
-        One view a slot: uint8 [slots, 40] that render() takes; its fields are VIEW_DTYPE's.
+        One view a slot: uint8 [slots, 56] that render() takes; its fields are VIEW_DTYPE's.
         """
     @property
     def world_of_slot(self) -> Array:

@@ -399,6 +399,33 @@ def evaluation_curves(path: str, x: str = "agent_steps") -> Chart:
     return Chart(shown, columns=_columns_for(len(shown)), facts={"x": x, "band": "lowest to highest density", "lines": lines})
 
 
+def severity_curves(results: Sequence[str]) -> Chart:
+    """Metrics of the evaluation protocol by the severity of randomized cameras, each in its 95 % interval.
+
+    results: what `pictura evaluate --camera-severity ... --json` printed: a line for each file and density. Raises PlotError
+    naming the file and what is missing.
+    """
+    panels = {metric: Panel(title, "severity", y_label, starts_at_zero=True) for metric, title, y_label in _PROTOCOL}
+    for path in results:
+        content = _read_json(path)
+        try:
+            rows = [row for row in content["rows"] if row["driver"] is None]
+            _need(rows, f"{path}: expected a row or more")
+            for density in dict.fromkeys(row["density"] for row in rows):
+                name = density if len(results) == 1 else f"{pathlib.Path(path).stem} {density}"
+                for metric, panel in panels.items():
+                    series = Series(name)
+                    for row in sorted((row for row in rows if row["density"] == density), key=lambda row: row["camera_severity"]):
+                        series.add_estimate(row["camera_severity"], row[metric], row[f"{metric}_half_width_95"], least=0)
+                    panel.series.append(series)
+        except KeyError as error:
+            raise PlotError(f"{path}: expected a key {error}") from None
+        except TypeError as error:
+            raise PlotError(f"{path}: {error}") from None
+    lines = [{"name": series.name, **_extent_of(series)} for series in next(iter(panels.values())).series]
+    return Chart(list(panels.values()), facts={"band": "95 % interval", "lines": lines})
+
+
 # ---- benchmarks
 
 _RATE, _SIZE = "agent-steps/s", "width of a 16:9 image (px)"
@@ -916,7 +943,7 @@ def probe_charts(folder: str, pages: Sequence[dict[str, Any]] = ()) -> None:
         append_to(f"{folder}/{picture}", (path_curves if kind == "pedestrian" else takeover_curves)(folder, **arguments))
 
 
-CHARTS = {chart.__name__: chart for chart in (run_curves, evaluation_curves, render_rates, step_costs, rank_rates, breakdown_parts, probe_means)}
+CHARTS = {chart.__name__: chart for chart in (run_curves, evaluation_curves, severity_curves, render_rates, step_costs, rank_rates, breakdown_parts, probe_means)}
 
 
 def _answer(request: dict[str, Any]) -> None:

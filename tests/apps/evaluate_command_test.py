@@ -3,7 +3,7 @@
 import shutil
 import unittest
 
-from command_case import TINY, CommandCase
+from command_case import TINY, CommandCase, run
 
 
 class Evaluation(CommandCase):
@@ -122,6 +122,33 @@ class Evaluation(CommandCase):
         self.assertNotIn(trained["policy_hash"], hashes)
         self.assert_refused(1, "policy.safetensors: holds one set of weights", "evaluate", out / "policy.safetensors", "--average", *small)
         self.assert_refused(2, "--policy excludes --average", "evaluate", "--policy", "lane", "--average", *small)
+
+    def test_severities_of_randomized_cameras_are_rows(self):
+        out = self.folder / "run"
+        self.json_of("train", *TINY, "--set", "train.updates=1", "--out", out)
+        # Sampled, so that what a policy sees makes a difference before it has learnt to drive.
+        small = [out / "checkpoint.ckpt", "--map", "procedural:1", "--agents", 20, "--steps", 60, "--sampled", "--device", "cpu"]
+        drive = [*small, "--scenarios", 2]
+        rows = self.json_of("evaluate", *drive, "--camera-severity", "0,0.5,2")["rows"]
+        self.assertEqual([row.pop("camera_severity") for row in rows], [0, 0.5, 2])
+        (plain,) = self.json_of("evaluate", *drive)["rows"]
+        self.assertEqual(plain.pop("camera_severity"), 0)
+        self.assertEqual(rows[0], plain)
+        self.assertNotEqual(rows[2], plain)
+        (shaken,) = self.json_of("evaluate", *drive, "--camera-severity", 2, "--out", self.folder / "a.json")["rows"]
+        self.assertEqual(shaken.pop("camera_severity"), 2)
+        self.assertEqual(shaken, rows[2])
+        # Parts of other severities are not merged.
+        self.json_of("evaluate", *small, "--scenarios", "2:3", "--out", self.folder / "b.json")
+        self.assert_refused(1, "b.json: camera_severity is 0.0, in", "evaluate", "--merge", self.folder / "a.json", self.folder / "b.json")
+        (again,) = self.json_of("evaluate", "--merge", self.folder / "a.json")["rows"]
+        self.assertEqual(again["camera_severity"], 2)
+        table = run("evaluate", *drive, "--camera-severity", "0,1").stdout
+        self.assertIn("custom, severity 1 ", table)
+        several = ["evaluate", *drive, "--camera-severity", "0,1"]
+        self.assert_refused(2, "with several values of --camera-severity", *several, "--out", self.folder / "c.json")
+        self.assert_refused(2, "--camera-severity", "evaluate", *drive, "--camera-severity", 3)
+        self.assert_refused(2, "--policy excludes --camera-severity", "evaluate", "--policy", "lane", "--camera-severity", 1)
 
     def test_evaluation_has_its_keys(self):
         out = self.folder / "run"

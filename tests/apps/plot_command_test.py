@@ -35,6 +35,17 @@ class Plots(CommandCase):
             result = run("plot", *arguments, "--out", picture)
             self.assertEqual(result.returncode, 2, result.stderr)
 
+    def test_evaluations_by_severity_are_lines(self):
+        picture, result = self.folder / "cameras.png", self.folder / "cameras.json"
+        metrics = ["at_fault_collision_rate", "off_road_rate", "red_light_rate", "goals_per_vehicle", "km_per_infraction", "km_per_at_fault_infraction"]
+        numbers = {key: 0.5 for name in metrics for key in (name, f"{name}_half_width_95")}
+        rows = [{"density": "medium", "driver": None, "camera_severity": severity, **numbers} for severity in (0, 1)]
+        result.write_text(json.dumps({"rows": rows}))
+        facts = self.json_of("plot", "--severities", result, "--out", picture)
+        self.assertEqual([(line["name"], line["points"], line["x_last"]) for line in facts["lines"]], [("medium", 2, 1)])
+        self.assertGreater(picture.stat().st_size, 5000)
+        self.assert_refused(2, "--severities", "plot", "--severities", result, "--x", "hours", "--out", picture)
+
     def test_seeds_are_one_line_and_the_picture_is_drawn(self):
         a = self.run_folder("town_s1", 1, [1, 2, 3])
         b = self.run_folder("town_s2", 2, [3, 4, 7])

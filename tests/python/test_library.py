@@ -149,6 +149,26 @@ def test_images_of_the_simulator_are_those_of_the_command_line_renderer(make):
     assert (first == again).all()
 
 
+def test_randomized_cameras_are_keyed_by_agent_and_step(make):
+    simulator = make(4)
+    views = simulator.views.numpy().view(pictura.VIEW_DTYPE)[:, 0].copy()
+    assert views["key"]["agent"].tolist() == [0, 1, 2, 3] and set(views["key"]["step"].tolist()) == {0}
+
+    def images(severity, views):
+        renderer = pictura.Renderer("cpu", num_threads=1, camera_severity=severity)
+        for handle, geometry in simulator.geometries.items():
+            renderer.upload(handle, geometry)
+        return renderer.render(simulator.scene, views).rgb.numpy().copy()
+
+    plain, shaken = images(0, views), images(1, views)
+    assert (shaken != plain).mean() > 0.1
+    assert (images(1, views[::-1].copy())[::-1] == shaken).all()
+    views["key"]["step"] += 1
+    assert (images(0, views) == plain).all() and (images(1, views) != shaken).mean() > 0.1
+    with pytest.raises(pictura.UsageError, match="camera_severity: expected 0 to 2, got 3"):
+        pictura.Renderer("cpu", camera_severity=3)
+
+
 def test_steps_are_deterministic_and_saved(make):
     a, b = make(seed=5, episode_steps=20), make(seed=5, episode_steps=20)
     for step in range(30):

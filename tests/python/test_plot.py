@@ -181,6 +181,27 @@ def test_what_is_missing_of_evaluations_is_named(curves, tmp_path):
     expect_refused("text.json: expected JSON", plot.evaluation_curves, f"{tmp_path}/text.json")
 
 
+def by_severity(density, severity, value, driver=None):
+    names = ["at_fault_collision_rate", "off_road_rate", "red_light_rate", "goals_per_vehicle", "km_per_infraction", "km_per_at_fault_infraction"]
+    numbers = {key: number for name in names for key, number in ((name, value), (f"{name}_half_width_95", 2))}
+    return {"density": density, "driver": driver, "camera_severity": severity, **numbers}
+
+
+def test_severities_are_lines_by_file_and_density_in_their_intervals(tmp_path):
+    rows = [by_severity("light", 1, 5), by_severity("light", 0, 1), by_severity("light", 0, 9, "lane"), by_severity("dense", 0, 3)]
+    a, b = tmp_path / "a.json", tmp_path / "b.json"
+    a.write_text(json.dumps({"rows": rows}))
+    b.write_text(json.dumps({"rows": rows[3:]}))
+    chart = plot.severity_curves([str(a)])
+    assert len(chart.panels) == 6
+    assert lines_of(chart, 3) == {"light": ([0, 1], [1, 5]), "dense": ([0], [3])}
+    light = chart.panels[3].series[0]
+    assert (light.low, light.high) == ([0, 3], [3, 7])
+    assert [series.name for series in plot.severity_curves([str(a), str(b)]).panels[0].series] == ["a light", "a dense", "b dense"]
+    b.write_text(json.dumps({"rows": [{"driver": None, "density": "light"}]}))
+    expect_refused("b.json: expected a key 'camera_severity'", plot.severity_curves, [str(b)])
+
+
 # ---- benchmarks
 
 
