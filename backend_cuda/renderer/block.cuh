@@ -63,6 +63,7 @@ struct BlockState {
   SetupCounts listed;
   int32_t num_entries, num_faces, num_clipped, overflow, usable;
   // During drawing.
+  ImageEffect effect;  // of the current image
   int32_t num_rows, num_candidates, num_fragments, num_added, divides, num_composited, next_fragments, image;
   Part part, upcoming_part;
   PartPlan plan;

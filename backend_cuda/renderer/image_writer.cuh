@@ -17,7 +17,6 @@ struct ImageWriter {
   int64_t first, plane;  // in elements: the image's offset, and the stride of planes
   int width_px, height_px;
   int patch_px;  // side of the patches, where the order is of patches
-  ImageEffect effect;
 
   /// Stores the colour of a pixel with a fragment list at the first of its fragments.
   template <typename Memory>
@@ -64,12 +63,16 @@ struct ImageWriter {
     }
   }
 
-  // Calls change(i) for each pixel whose colour has an effect: what reaches beyond the image stays black.
+  // Calls change(effect, i) for each pixel, where the image has an effect: what reaches beyond the image stays black.
+  // The effect is in shared memory, since no register is to spare.
   template <typename Change>
   __device__ void for_each_shown(const Place& place, Change&& change) const {
-    if (!kRandomizesCameras || !effect.is_on) return;
-    for (int i = 0; i < kPixelsPerWrite; ++i) {
-      if (i < place.count) change(i);
+    if constexpr (kRandomizesCameras) {
+      const ImageEffect& effect = block_state()->effect;
+      if (!effect.is_on) return;
+      for (int i = 0; i < kPixelsPerWrite; ++i) {
+        if (i < place.count) change(effect, i);
+      }
     }
   }
 
@@ -88,7 +91,8 @@ struct ImageWriter {
                  : full != Memory::kNone ? memory.faces[full].color_bytes
                                          : 0u;
     }
-    for_each_shown(place, [&](int i) { bytes[i] = effect.of_bytes(bytes[i], place.x + i, place.y); });
+    for_each_shown(
+        place, [&](const ImageEffect& effect, int i) { bytes[i] = effect.of_bytes(bytes[i], place.x + i, place.y); });
     store_channels(all + first, place,
                    [&](int i, int channel) { return value_of(static_cast<uint8_t>(bytes[i] >> (8 * channel))); });
   }
@@ -105,7 +109,8 @@ struct ImageWriter {
         colors[i] = memory.faces[full].color;
       }
     }
-    for_each_shown(place, [&](int i) { colors[i] = effect.of(colors[i], place.x + i, place.y); });
+    for_each_shown(place,
+                   [&](const ImageEffect& effect, int i) { colors[i] = effect.of(colors[i], place.x + i, place.y); });
     store_channels(all + first, place, [&](int i, int channel) {
       return value_of(channel == 0 ? colors[i].r : channel == 1 ? colors[i].g : colors[i].b);
     });

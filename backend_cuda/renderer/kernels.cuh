@@ -20,12 +20,13 @@ __device__ bool draw_image_part(const Memory& memory, const DrawTask& task, int3
   const int width = width_px(slot.camera), height = height_px(slot.camera);
   const int num_faces = memory.state->current.face_count;
   const int64_t plane = static_cast<int64_t>(width) * height;
-  // Images of invalid views, which have no geometry, are black.
-  ImageEffect effect;
-  if (kRandomizesCameras && memory.state->current.geometry != nullptr)
-    effect = image_effect(task.randomization, task.views[view].key, camera);
-  const ImageWriter writer{task.format, task.order,    slot.color, view * slot.view_stride, plane, width,
-                           height,      task.patch_px, effect};
+  if (kRandomizesCameras && threadIdx.x == 0) {
+    // Images of invalid views, which have no geometry, are black.
+    const bool is_valid = memory.state->current.geometry != nullptr;
+    memory.state->effect = is_valid ? image_effect(task.randomization, task.views[view].key, camera) : ImageEffect{};
+  }
+  const ImageWriter writer{task.format, task.order, slot.color, view * slot.view_stride,
+                           plane,       width,      height,     task.patch_px};
   if (!draw_faces(memory, num_faces, part, NoVisit{}, writer)) return false;
   if (task.wants_planes) draw_planes<Memory>(slot.planes, width, view * plane, num_faces, part);
   return true;
