@@ -375,6 +375,7 @@ void bind_dtypes(py::module_& module) {
   fields.append(py::make_tuple("origin_m", "<f4", py::make_tuple(3)));
   for (const char* name : {"cos_heading", "sin_heading", "body_length_m"}) fields.append(field(name, "<f4"));
   for (const char* name : {"hidden_begin", "hidden_end"}) fields.append(field(name, "<i4"));
+  fields.append(field("hides", "<u4"));
   py::list key;
   for (const char* name : {"world", "agent", "episode", "step"}) key.append(field(name, "<u4"));
   fields.append(py::make_tuple("key", dtype(key)));

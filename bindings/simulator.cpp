@@ -216,7 +216,7 @@ void define_arrays(py::class_<PySimulator>* simulator) {
       .def_property_readonly("scene", &PySimulator::scene, py::doc("What renderers draw, of all worlds."))
       .def_property_readonly(
           "views", [](PySimulator& self) { return self.lend_structs<View>(self.simulator().views(), "views"); },
-          py::doc("One view a slot: uint8 [slots, 56] that render() takes; its fields are VIEW_DTYPE's."))
+          py::doc("One view a slot: uint8 [slots, 60] that render() takes; its fields are VIEW_DTYPE's."))
       .def_property_readonly(
           "episode_step",
           [](PySimulator& self) { return self.lend_span(self.simulator().episode_step(), "episode_step"); },

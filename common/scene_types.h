@@ -97,6 +97,13 @@ PICTURA_HD constexpr bool has_enough_lights(int32_t lights, int32_t signals) {
   return lights == 0 || lights >= signals;
 }
 
+/// What a view leaves out of its images, as bits.
+enum Hides : uint32_t {
+  kHidesNothing = 0,
+  kHidesAgents = 1,  // all of them
+  kHidesLights = 2,  // all traffic lights
+};
+
 /// By what a view's cameras are randomized (common/raster/randomize_camera.h), as random numbers are keyed
 /// (common/rng.h): images that are drawn again are the same again.
 struct ViewKey {
@@ -113,6 +120,7 @@ struct View {
   float cos_heading = 1, sin_heading = 0;
   float body_length_m = kRigBodyLength_m;    // shrinks the x offsets of the cameras of short bodies
   int32_t hidden_begin = 0, hidden_end = 0;  // further agents left out: a range of SceneBatch::hidden_agents
+  uint32_t hides = kHidesNothing;            // bits of Hides
   ViewKey key;
 
   static constexpr float kRigBodyLength_m = 4.5f;

@@ -220,7 +220,9 @@ __device__ inline void cull_agents(const BlockState& state, const DrawTask& task
 __device__ inline void cull_lights(const BlockState& state, EntryList* list) {
   const ImageSetting& setting = state.context.setting;
   const Span<const LightHead> heads = state.view.geometry->pieces.heads;
-  const int num_heads = state.view.light_end > state.view.light_begin ? static_cast<int>(heads.size()) : 0;
+  const bool has_lights = state.view.light_end > state.view.light_begin;
+  const bool are_hidden = (state.view.view.hides & kHidesLights) != 0;
+  const int num_heads = has_lights && !are_hidden ? static_cast<int>(heads.size()) : 0;
   PICTURA_NO_UNROLL
   for (int first = warp_index() * kWarpSize; first < num_heads; first += num_threads()) {
     const int index = first + lane_index();

@@ -433,12 +433,14 @@ class ImageSampler {
     for (int32_t i = scene.world_begin[world]; i < scene.world_begin[world + 1]; ++i) {
       const AgentBox& box = scene.agents[i];
       const auto hidden = scene.hidden_agents.subspan(view.hidden_begin, view.hidden_end - view.hidden_begin);
-      if (!box.drawn || i == view.ego_agent || std::count(hidden.begin(), hidden.end(), i)) continue;
+      if ((view.hides & kHidesAgents) != 0 || !box.drawn || i == view.ego_agent ||
+          std::count(hidden.begin(), hidden.end(), i))
+        continue;
       add_agent(&tracer_, eye, box, static_cast<uint16_t>(1 + i - scene.world_begin[world]));
     }
     for (const WallFace& wall : geometry.walls) add_wall(&tracer_, eye, wall);
     const auto lights = static_cast<std::size_t>(scene.light_begin[world]);
-    if (scene.light_begin[world + 1] > scene.light_begin[world]) {
+    if (scene.light_begin[world + 1] > scene.light_begin[world] && (view.hides & kHidesLights) == 0) {
       for (const LightHead& head : geometry.heads) {
         add_light(&tracer_, eye, head, scene.light_states[lights + static_cast<std::size_t>(head.signal)]);
       }

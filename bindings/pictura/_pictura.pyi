@@ -884,7 +884,7 @@ class Simulator:
     @property
     def views(self) -> Array:
         """
-        One view a slot: uint8 [slots, 56] that render() takes; its fields are VIEW_DTYPE's.
+        One view a slot: uint8 [slots, 60] that render() takes; its fields are VIEW_DTYPE's.
         """
     @property
     def world_of_slot(self) -> Array:

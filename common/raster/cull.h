@@ -52,7 +52,7 @@ PICTURA_HD inline bool may_be_visible(const AgentBox& box, const PinholeCamera& 
 
 /// Whether a view excludes an agent: its own ego and those it hides.
 PICTURA_HD inline bool is_excluded(const View& view, Span<const int32_t> hidden_agents, int32_t agent) {
-  if (agent == view.ego_agent) return true;
+  if (agent == view.ego_agent || (view.hides & kHidesAgents) != 0) return true;
   for (int32_t i = view.hidden_begin; i < view.hidden_end; ++i) {
     if (hidden_agents[i] == agent) return true;
   }

@@ -33,6 +33,7 @@ PICTURA_HD inline void visit_walls(const ImageSetting& setting, const StaticGeom
 
 /// The states of the lights of a view's world; empty: no light is drawn.
 PICTURA_HD inline Span<const LightState> light_states_of(const SceneBatch& scene, const View& view) {
+  if ((view.hides & kHidesLights) != 0) return {};
   const int32_t begin = scene.light_begin[view.world];
   const int32_t end = scene.light_begin[static_cast<size_t>(view.world) + 1];
   return {scene.light_states.data() + begin, static_cast<size_t>(end - begin)};

@@ -263,6 +263,35 @@ TEST(CpuRenderer, EgoHiddenAndUndrawnAgentsAreNotDrawn) {
   EXPECT_EQ(draw(no_geometry(), scene, {without}, config).at(29, 52).g, 0.0f);
 }
 
+TEST(CpuRenderer, AViewCanHideAllAgentsOrAllLights) {
+  StaticGeometry geometry = no_geometry();
+  geometry.heads.push_back({.position_m = {20, 0, 3.5f}, .facing = {-1, 0}});
+  geometry.num_signals = 1;
+  SceneOwner scene;
+  scene.agents = {make_box(AgentClass::vehicle, {10, 0, 0}, 0, {4, 2, 1.5f}),
+                  make_box(AgentClass::pedestrian, {8, 3, 0}, 0, {0.6f, 0.6f, 1.7f})};
+  scene.light_states = {LightState::red};
+  scene.end_world(0);
+  const auto drawn = [&](uint32_t hides, const std::vector<AgentBox>& agents, LightState light) {
+    SceneOwner shown = scene;
+    std::copy(agents.begin(), agents.end(), shown.agents.begin());
+    shown.light_states[0] = light;
+    View view = make_view({}, 0);
+    view.hides = hides;
+    return draw(geometry, shown, {view}, {.rig = simple_rig(), .num_threads = 1}).rgb;
+  };
+  std::vector<AgentBox> nowhere = scene.agents;
+  for (AgentBox& box : nowhere) box.drawn = 0;
+  const auto all = drawn(kHidesNothing, scene.agents, LightState::red);
+  EXPECT_NE(drawn(kHidesAgents, scene.agents, LightState::red), all);
+  EXPECT_NE(drawn(kHidesLights, scene.agents, LightState::red), all);
+  EXPECT_EQ(drawn(kHidesAgents, scene.agents, LightState::red), drawn(kHidesNothing, nowhere, LightState::red));
+  EXPECT_EQ(drawn(kHidesLights, scene.agents, LightState::red),
+            drawn(kHidesNothing, scene.agents, LightState::unknown));
+  EXPECT_EQ(drawn(kHidesAgents | kHidesLights, scene.agents, LightState::red),
+            drawn(kHidesNothing, nowhere, LightState::unknown));
+}
+
 TEST(CpuRenderer, CamerasOfShortBodiesMoveInward) {
   Rig rig = simple_rig();
   rig.cameras[0].position_m.x = 1.6f;

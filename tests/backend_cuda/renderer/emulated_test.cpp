@@ -87,6 +87,16 @@ TEST(EmulatedKernels, DrawWorldsOfSeveralMaps) {
   expect_oracles(&renderer, make_synthetic_worlds(), Planes::all);
 }
 
+TEST(EmulatedKernels, HideAllAgentsOrAllLights) {
+  Snapshot town = make_synthetic_town(1, 120);
+  town.views.resize(3);
+  town.views[0].hides = kHidesAgents;
+  town.views[1].hides = kHidesLights;
+  town.views[2].hides = kHidesAgents | kHidesLights;
+  EmulatedRenderer renderer(config_of(mixed_rig()), 15);
+  expect_oracles(&renderer, town, Planes::all);
+}
+
 TEST(EmulatedKernels, DrawBlackWhereNothingIsVisible) {
   EmulatedRenderer renderer(config_of(mixed_rig()), 14);
   Snapshot town;
