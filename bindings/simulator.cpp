@@ -124,6 +124,7 @@ world's random numbers. executor: 'cpu', 'cuda' or 'auto'. device: where observa
 the host, 0 for all. reset_inactive_fraction: a world resets when this part of its agents is inactive; more than 1: never.
 stagger_episodes: the first episode of each world ends after a drawn number of steps. light_cycles: 'phases', those of a junction
 take turns, or 'independent', each light cycles alone. reset_at_standstill: accelerations end where the speed changes its sign.
+blind, phantom_braking, inattentive: shares of agents that are impaired, drawn per episode, and never valid.
 light_heads: 'as_mapped', or 'visible': heads beside or before their stop line stand 10 m beyond it, 3.5 m high.
 conditioning: a number or (low, high) by name, see CONDITIONING_NAMES; the paper's ranges otherwise. stream: a cudaStream_t
 as int; None: the legacy default stream. The other defaults are the paper's training world.

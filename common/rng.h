@@ -52,6 +52,8 @@ enum class Purpose : uint8_t {
   driver,
   camera_mounting,
   camera_frame,
+  impairment,
+  impaired_spell,
 };
 
 /// Whose draws they are, when, and what for. Ids are global across ranks. Fields that are not given are 0.

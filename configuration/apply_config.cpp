@@ -55,6 +55,7 @@ SimulatorConfig evaluation_simulator_config(const Config& config, int steps, Dev
   result.reset_inactive_fraction = 2;
   result.stagger_episodes = false;
   result.fixed_lights = true;
+  result.others = {};
   for (size_t i = 0; i < result.conditioning.size(); ++i) {
     const auto value = static_cast<float>(config.evaluate.conditioning[i]);
     result.conditioning[i] = {value, value, false};

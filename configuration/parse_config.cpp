@@ -367,6 +367,12 @@ void check_contradictions(const Config& c, const Reader& reader) {
                   fmt::format("expected at most 1 together with simulator.cyclist_fraction, got {} + {}",
                               c.simulator.pedestrian_fraction, c.simulator.cyclist_fraction));
   }
+  const ImpairedShares& others = c.simulator.others;
+  if (others.sum() >= 1) {
+    reader.refuse("simulator.others",
+                  fmt::format("expected shares below 1 in all, since the other agents learn, got {} + {} + {}",
+                              others.blind, others.phantom_braking, others.inattentive));
+  }
   const size_t layers = c.policy.conv_channels.size();
   for (const auto& [key, values] : {std::pair{"policy.conv_kernels", &c.policy.conv_kernels},
                                     std::pair{"policy.conv_strides", &c.policy.conv_strides}}) {

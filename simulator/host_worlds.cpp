@@ -55,6 +55,7 @@ WorldView HostWorlds::world(int index) {
   WorldView view = setup.view(index, setup.map_views[setup.worlds[w].map], setup.options);
   view.seed = state.seed[w];
   view.episode = static_cast<uint32_t>(state.episode_index[w]);
+  view.step = state.episode_step[w];
   view.agents = state.agents.view();
   view.boxes = state.boxes.data() + first_box;
   view.boxes_before = state.boxes_before.data() + first_box;

@@ -17,4 +17,16 @@ struct DynamicsRules {
   bool operator==(const DynamicsRules&) const = default;
 };
 
+/// Shares of the agents that are impaired, drawn per episode. An agent has one impairment at most.
+struct ImpairedShares {
+  float blind = 0;            // now and then it sees no other road user
+  float phantom_braking = 0;  // now and then it brakes hard
+  float inattentive = 0;      // it sees no traffic light
+  PICTURA_HD constexpr float sum() const { return blind + phantom_braking + inattentive; }
+  bool operator==(const ImpairedShares&) const = default;
+};
+
+/// In the order of the members of ImpairedShares.
+enum class Impairment : uint8_t { none, blind, phantom_braking, inattentive };
+
 }  // namespace pictura

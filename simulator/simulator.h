@@ -48,6 +48,7 @@ struct SimulatorConfig {
   bool fixed_lights = false;                       // evaluation: 10/3/2 s; else timings are drawn per episode
   LightCycles light_cycles = LightCycles::phases;
   DynamicsRules dynamics{};
+  ImpairedShares others{};
   bool auxiliary_observations = true;  // false: the auxiliary slots hold zeros (the like-for-like baseline)
   bool vector_observations = true;     // false: entity sets are not computed (perspective training)
   bool wall_observations = false;      // with them the set of walls, which is empty where walls are off

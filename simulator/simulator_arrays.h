@@ -11,10 +11,10 @@ namespace pictura {
 
 /// What the last step() gave, besides the state and what is observed of it.
 struct StepResult {
-  Span<const float> reward;          // [slots]
-  Span<const uint8_t> terminated;    // [slots] 1: an infraction ended the agent's episode in this step
-  Span<const uint8_t> truncated;     // [slots] 1: it ended for another reason, or a life on a road that ends; bootstrap
-  Span<const uint8_t> valid;         // [slots] 1: the agent was active when the step began: learn from it
+  Span<const float> reward;        // [slots]
+  Span<const uint8_t> terminated;  // [slots] 1: an infraction ended the agent's episode in this step
+  Span<const uint8_t> truncated;   // [slots] 1: it ended for another reason, or a life on a road that ends; bootstrap
+  Span<const uint8_t> valid;  // [slots] 1: the agent was active when the step began, and not impaired: learn from it
   Span<const SpawnFailure> refusal;  // [slots] why the agent is absent from this episode, or `none`
   Span<const StepSums> sums;  // [slots] the reward's terms, and the distance that the agent drove; 0 if not valid
 };

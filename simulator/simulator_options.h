@@ -4,11 +4,20 @@
 #include <cstdint>
 #include <iterator>
 #include <limits>
+#include <string>
 
 #include "pictura/common/support/named_option.h"
 #include "pictura/simulator/simulator.h"
 
 namespace pictura {
+
+/// Calls visit(name, share) for the share of each impairment, in their order.
+template <typename Shares, typename Visit>
+void visit_impairments(Shares&& shares, const Visit& visit) {
+  visit("blind", shares.blind);
+  visit("phantom_braking", shares.phantom_braking);
+  visit("inattentive", shares.inattentive);
+}
 
 /// Visits those that are keys of [simulator] in configurations, in the order in which they are written.
 template <typename AnyConfig, typename Visitor>
@@ -25,6 +34,9 @@ void visit_simulator_keys(AnyConfig& c, Visitor&& v) {
   v.choice(NamedKey("simulator.light_heads", Evaluation::replaced), c.light_heads, kLightHeadsNames);
   v.value(NamedKey("simulator.wall_observations"), c.wall_observations);
   v.value(NamedKey("simulator.dynamics.reset_at_standstill"), c.dynamics.reset_at_standstill);
+  visit_impairments(c.others, [&v](const char* name, auto& share) {
+    v.value(NamedKey(std::string("simulator.others.") + name, Evaluation::replaced), share, 0, 1);
+  });
 }
 
 template <typename Visitor>

@@ -29,6 +29,14 @@ void check(const SimulatorConfig& config) {
     fail_usage("simulator: pedestrian and cyclist fractions: expected shares that sum to at most 1, got {} and {}",
                config.pedestrian_fraction, config.cyclist_fraction);
   }
+  const ImpairedShares& others = config.others;
+  if (!in(others.blind, 0, 1) || !in(others.phantom_braking, 0, 1) || !in(others.inattentive, 0, 1) ||
+      !(others.sum() < 1)) {
+    fail_usage(
+        "simulator: others: expected shares that sum to less than 1, got blind {}, phantom_braking {}, "
+        "inattentive {}",
+        others.blind, others.phantom_braking, others.inattentive);
+  }
   if (config.parked_cars < 0 || config.parked_cars > kMaxAgentsPerWorld) {
     fail_usage("simulator: parked_cars: expected 0 to {}, got {}", kMaxAgentsPerWorld, config.parked_cars);
   }
@@ -123,6 +131,7 @@ RuleOptions rule_options(const SimulatorConfig& config) {
   options.fixed_lights = config.fixed_lights;
   options.light_cycles = config.light_cycles;
   options.dynamics = config.dynamics;
+  options.others = config.others;
   options.auxiliary_observations = config.auxiliary_observations;
   std::copy(config.conditioning.begin(), config.conditioning.end(), options.conditioning);
   std::copy(std::begin(kPaperConditioning), std::end(kPaperConditioning), options.conditioning_scale);

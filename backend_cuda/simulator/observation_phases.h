@@ -32,7 +32,7 @@ class ObservationWriter {
     const int slot = world.first_slot + agent;
     float* rows = group.staging();
     int count = 0;
-    if (observes(world, agent)) {
+    if (observes_set(world, agent, set)) {
       const EgoFrame frame = ego_frame(world.agents, slot);
       const NearPlace place = near_place(world, slot);  // kept from set to set, it would be spilled
       if (set == EntitySet::partners) {

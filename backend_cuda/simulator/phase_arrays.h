@@ -62,6 +62,7 @@ struct PhaseArrays {
   PICTURA_HD WorldView world(int w) const {
     WorldView world = worlds[w];
     world.agents = agents;
+    world.step = episode_step[w];
     return world;
   }
   PICTURA_HD WorldView next_world(int w) const {

@@ -28,11 +28,12 @@ PICTURA_HD bool accepts(const WorldView& world, int agent, const CommandType& co
   return is_sound(command) && (has_record(world.map) || !tells_to_follow_record(command));
 }
 
-/// Whether a step is one of the agent's own: it drives, or begins to, and is told neither to leave nor to follow its
-/// record.
+/// Whether a step of the agent counts and is learned from: it drives, or begins to, is told neither to leave nor to
+/// follow its record, and is not impaired in this episode.
 template <typename CommandType>
 PICTURA_HD bool takes_part(const WorldView& world, int agent, const CommandType& command) {
-  return takes_actions(world, agent) && !tells_to_leave(command) && !tells_to_follow_record(command);
+  return takes_actions(world, agent) && !tells_to_leave(command) && !tells_to_follow_record(command) &&
+         impairment_of(world, agent) == Impairment::none;
 }
 
 /// Whether the agent counts among those that still drive when it is asked whether an episode ends: who follows a
@@ -76,8 +77,8 @@ PICTURA_HD inline void apply_reward_and_halt(const WorldView& world, int agent, 
   const float speed_mps = world.agents.speed_mps[slot];
   int32_t& first_motion_step = world.agents.first_motion_step[slot];
   if (results.valid[slot] && first_motion_step == 0 && fabsf(speed_mps) > kRest_mps) first_motion_step = step;
-  const float distance_m = results.valid[slot] ? driven_m(speed_mps, world.options.dt_s) : 0.0f;
-  const StepSums sums{distance_m, apply_reward_and_halt(world, agent)};
+  const StepSums done{driven_m(speed_mps, world.options.dt_s), apply_reward_and_halt(world, agent)};
+  const StepSums sums = results.valid[slot] ? done : StepSums{};
   results.sums[slot] = sums;
   results.reward[slot] = sums.reward_terms.total();
   results.terminated[slot] = results.valid[slot] && !is_active(world, agent) && !has_left(world, agent);
@@ -122,7 +123,7 @@ PICTURA_HD inline bool episode_ends(const WorldView& world, int steps, int spawn
 PICTURA_HD inline void finish_agent(const WorldView& world, int agent, bool ends, const StepArrays& results,
                                     SimulatorTotals* totals_inout) {
   const int slot = world.first_slot + agent;
-  results.truncated[slot] = (ends && is_active(world, agent)) || has_left(world, agent);
+  results.truncated[slot] = results.valid[slot] && ((ends && is_active(world, agent)) || has_left(world, agent));
   if (!results.terminated[slot] && !results.truncated[slot]) return;
   ++totals_inout->finished_agent_episodes;
   totals_inout->finished_return += static_cast<double>(world.agents.episode_return[slot]);

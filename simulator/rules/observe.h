@@ -209,6 +209,14 @@ PICTURA_HD inline bool observes(const WorldView& world, int agent) {
          (world.agents.events[world.first_slot + agent] & kInfractions) != 0;
 }
 
+/// Whether the agent's set shows anything: impaired agents miss some.
+PICTURA_HD inline bool observes_set(const WorldView& world, int agent, EntitySet set) {
+  if (!observes(world, agent)) return false;
+  if (set != EntitySet::partners && set != EntitySet::controls) return true;
+  const Hides hidden = hidden_by(shown_impairment(world, agent));
+  return hidden != (set == EntitySet::partners ? kHidesAgents : kHidesLights);
+}
+
 /// What is no set, to that row of `out`: all zeros for the absent and for those that halted in an earlier step.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void observe_own(const WorldView& world, int agent, int row, const ObservationView& out,
@@ -292,13 +300,13 @@ struct StepObservation {
   }
 };
 
-/// One entity set: empty for the absent and for those that halted in an earlier step.
+/// One entity set: empty for the absent, for those that halted in an earlier step, and for those that do not see it.
 template <typename Observation>
 PICTURA_HD void observe_set(const WorldView& world, int agent, const NearPlace& place, EntitySet set,
                             const SetRows& out, const Observation& observation) {
   const int slot = world.first_slot + agent;
   int count = 0;
-  if (observes(world, agent)) {
+  if (observes_set(world, agent, set)) {
     const EgoFrame frame = ego_frame(world.agents, slot);
     if (set == EntitySet::partners) {
       count = observation.observe_partners(world, agent, frame, out.rows, SingleThread{});

@@ -132,8 +132,14 @@ PICTURA_HD inline bool may_follow_record(const WorldView& world, int agent) {
 /// Where an agent is told to be after the step. Which level it is then on is looked for around *z_m_inout.
 PICTURA_HD inline Motion commanded_motion(const WorldView& world, int agent, int32_t action, float*) {
   const int slot = world.first_slot + agent;
-  return move(motion_of(world.agents, slot), controls_of_action(action), dynamics_of(world, slot),
-              class_limits(world.agents.agent_class[slot]), world.options.dt_s);
+  const Motion from = motion_of(world.agents, slot);
+  Controls controls = controls_of_action(action);
+  DynamicsParameters parameters = dynamics_of(world, slot);
+  if (shown_impairment(world, agent) == Impairment::phantom_braking) {
+    controls.jerk_long_mps3 = braking_jerk_mps3(from);
+    parameters.rules.reset_at_standstill = true;  // else braking would drive it on, backwards
+  }
+  return move(from, controls, parameters, class_limits(world.agents.agent_class[slot]), world.options.dt_s);
 }
 PICTURA_HD inline Motion commanded_motion(const WorldView& world, int agent, const Command& command, float* z_m_inout) {
   if (command.kind == CommandKind::action) return commanded_motion(world, agent, command.action, z_m_inout);

@@ -6,6 +6,7 @@
 #include "pictura/simulator/conditioning.h"
 #include "pictura/simulator/fields.h"
 #include "pictura/simulator/rules/dynamics.h"
+#include "pictura/simulator/rules/impairment.h"
 #include "pictura/simulator/rules/road.h"
 #include "pictura/simulator/rules/signal.h"
 
@@ -23,6 +24,7 @@ struct RuleOptions {
   bool fixed_lights = false;
   LightCycles light_cycles = LightCycles::phases;
   DynamicsRules dynamics{};
+  ImpairedShares others{};
   bool auxiliary_observations = true;
   ConditioningRange conditioning[kNumConditioning] = {};        // to draw from
   ConditioningRange conditioning_scale[kNumConditioning] = {};  // what the policy sees as [-1, 1]
@@ -35,6 +37,7 @@ struct WorldView {
   uint64_t seed = 0;
   uint32_t global_world = 0;
   uint32_t episode = 0;
+  int step = 0;                      // steps done in the episode
   AgentStateView agents{};           // of all worlds, indexed by slot
   int first_slot = 0;                // of this world
   int num_agents = 0;                // controlled
@@ -128,6 +131,20 @@ PICTURA_HD inline AgentBox box_of(const AgentStateView& agents, int slot) {
   return box;
 }
 
+/// The agent's impairment in this episode.
+PICTURA_HD inline Impairment impairment_of(const WorldView& world, int agent) {
+  return draw_impairment(world.options.others, world.seed, world.global_world, static_cast<uint32_t>(agent),
+                         world.episode);
+}
+
+/// The agent's impairment at this step, if it shows then.
+PICTURA_HD inline Impairment shown_impairment(const WorldView& world, int agent) {
+  const Impairment impairment = impairment_of(world, agent);
+  const bool shows = shows_at(impairment, world.step, world.options.dt_s, world.seed, world.global_world,
+                              static_cast<uint32_t>(agent), world.episode);
+  return shows ? impairment : Impairment::none;
+}
+
 /// Where the agent's cameras stand at a step of the episode; that of an absent agent leaves nobody out, see
 /// Simulator::views().
 PICTURA_HD inline View view_of(const WorldView& world, int agent, int32_t episode_step) {
@@ -142,6 +159,7 @@ PICTURA_HD inline View view_of(const WorldView& world, int agent, int32_t episod
   view.cos_heading = agents.cos_heading[slot];
   view.sin_heading = agents.sin_heading[slot];
   view.body_length_m = agents.length_m[slot];
+  view.hides = hidden_by(shown_impairment(world, agent));
   return view;
 }
 

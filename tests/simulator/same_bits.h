@@ -49,12 +49,12 @@ inline std::vector<int32_t> mixed_actions(int num_slots, uint32_t step) {
 
 /// Actions that drive at 3 to 8 m/s without steering. The state is on the host.
 inline std::vector<int32_t> straight_actions(const AgentStateView& state, int num_slots) {
-  constexpr int32_t kStraight = 1, kBrake = kNumLatActions, kCoast = 2 * kNumLatActions, kFaster = 3 * kNumLatActions;
+  constexpr int32_t kStraight = 1, kBrake = kNumLatActions, kHold = 2 * kNumLatActions, kFaster = 3 * kNumLatActions;
   std::vector<int32_t> actions;
   for (int slot = 0; slot < num_slots; ++slot) {
     const float wanted_mps2 =
         (3.0f + static_cast<float>(slot % 6) - state.speed_mps[slot]) - state.accel_long_mps2[slot];
-    actions.push_back(kStraight + (wanted_mps2 > 0.5f ? kFaster : wanted_mps2 < -0.5f ? kBrake : kCoast));
+    actions.push_back(kStraight + (wanted_mps2 > 0.5f ? kFaster : wanted_mps2 < -0.5f ? kBrake : kHold));
   }
   return actions;
 }

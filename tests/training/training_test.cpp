@@ -386,6 +386,45 @@ TEST_F(Training, NothingIsLearntFromHaltedSlotsThatAreDrawn) {
   EXPECT_EQ(in_minibatches.minibatches, (24 * 60 + 63) / 64);
 }
 
+TEST_F(Training, NothingIsLearntFromImpairedAgents) {
+  const auto learn = [&](const std::string& name, const std::vector<std::string>& more) {
+    TrainOptions o =
+        options(name, {"train.updates=1", "train.num_steps=60", "train.adv_filter_threshold=0", "train.update_epochs=1",
+                       "train.minibatch_size=64", "simulator.num_slots=48", "simulator.reset_inactive_fraction=2"});
+    o.overrides.insert(o.overrides.end(), more.begin(), more.end());
+    UpdateCost cost;
+    o.on_progress = [&cost](const TrainProgress& progress) { cost = progress.cost; };
+    train(o);
+    return cost;
+  };
+  const UpdateCost plain = learn("plain", {}),
+                   among = learn("among", {"simulator.others.blind=0.2", "simulator.others.phantom_braking=0.2",
+                                           "simulator.others.inattentive=0.1"});
+  EXPECT_EQ(among.slot_steps, plain.slot_steps);
+  EXPECT_NEAR(static_cast<double>(among.agent_steps) / static_cast<double>(plain.agent_steps), 0.5, 0.2);
+  // All that the unimpaired did is learnt from, and nothing else.
+  EXPECT_EQ(among.kept_fraction, 1);
+  EXPECT_EQ(among.minibatches, (among.agent_steps + 63) / 64);
+}
+
+TEST_F(Training, WithImpairedAgentsGoesOnExactly) {
+  const std::vector<std::string> impaired{"simulator.others.blind=0.3", "simulator.others.phantom_braking=0.3"};
+  const auto of = [&](const char* name, const char* updates) {
+    TrainOptions o = options(name, impaired);
+    o.overrides.emplace_back(updates);
+    return o;
+  };
+  const TrainReport whole = train(of("whole", "train.updates=4"));
+  train(of("parts", "train.updates=2"));
+  TrainOptions rest = of("parts", "train.updates=4");
+  rest.old_run = OldRun::resume;
+  const TrainReport resumed = train(rest);
+  EXPECT_EQ(resumed.policy_hash, whole.policy_hash);
+  EXPECT_EQ(resumed.agent_steps, whole.agent_steps);
+  rest.overrides.emplace_back("simulator.others.blind=0.1");
+  EXPECT_THAT(message_of([&] { train(rest); }), HasSubstr("simulator.others.blind"));
+}
+
 TEST_F(Training, AnUpdateSaysWhatItCost) {
   TrainOptions o = options("run", {"train.updates=2"});
   std::vector<UpdateCost> costs;

@@ -228,6 +228,13 @@ TEST_F(CudaSimulatorTest, StaggeredEpisodesAndResetsAtStandstill) {
   expect_parity(config, {load_map("procedural:1")}, draw_worlds(5, 120, 1, 20, 1), 500);
 }
 
+TEST_F(CudaSimulatorTest, ImpairedAgents) {
+  SimulatorConfig config = whole_world();
+  config.episode_steps = 200;
+  config.others = {.blind = 0.3f, .phantom_braking = 0.3f, .inattentive = 0.2f};
+  expect_parity(config, {load_map("procedural:1")}, draw_worlds(5, 120, 1, 60, 1), 500);
+}
+
 TEST_F(CudaSimulatorTest, RoadsThatEndOver1000Steps) {
   SimulatorConfig config = whole_world();
   config.episode_steps = 700;

@@ -124,6 +124,18 @@ TEST(Phases, StaggerEpisodesAndResetAtStandstill) {
   expect_same(config, {load_map("procedural:1"), testing::stadium(200, 2)}, draw_worlds(5, 60, 1, 8, 2), 200, 13);
 }
 
+TEST(Phases, ImpairAgents) {
+  SimulatorConfig config;
+  config.episode_steps = 90;
+  config.pedestrian_fraction = config.cyclist_fraction = 0.2f;
+  config.parked_cars = 12;
+  config.others = {.blind = 0.3f, .phantom_braking = 0.3f, .inattentive = 0.2f};
+  const std::vector<std::shared_ptr<const RoadMap>> maps{load_map("procedural:1"), load_map("procedural:2")};
+  for (const bool by_commands : {false, true}) {
+    expect_same(config, maps, draw_worlds(5, 120, 1, 60, 2), 140, 14, by_commands);
+  }
+}
+
 TEST(Phases, PlaceCrowdsAsOneAfterTheOtherWould) {
   // A ring of 251 m takes some forty cars: almost every choice depends on the ones before it.
   const SimulatorConfig config = testing::cars({.episode_steps = 3});
