@@ -20,6 +20,7 @@
 #include "pictura/driving/replay_scenarios.h"
 #include "pictura/evaluation/estimate_json.h"
 #include "pictura/evaluation/infractions.h"
+#include "pictura/evaluation/mixed_traffic.h"
 #include "pictura/replay/gallery.h"
 #include "pictura/simulator/controllers/host_controllers.h"
 #include "pictura/simulator/simulator.h"
@@ -122,7 +123,7 @@ void print_table(const Reports& reports) {
                  100 * row.never_moved_share.value);
   }
   print_result("traffic lights: {}\n", name_of(setting.light_cycles));
-  if (!setting.others.empty()) print_result("among others, shares of vehicles: {}\n", fmt::join(setting.others, ", "));
+  if (!setting.others.empty()) print_result("among others, by their shares: {}\n", fmt::join(setting.others, ", "));
   if (reports.size() == 1 && setting.camera_severity > 0) {
     print_result("randomized cameras: severity {}\n", setting.camera_severity);
   }
@@ -410,8 +411,9 @@ void add_evaluate_command(CLI::App& app) {
   command
       ->add_option("--others", options.others,
                    fmt::format("Who else drives, as lane=0.25,models/vector.safetensors=0.25: policies' files or {}, "
-                               "each with its share of vehicles. A row each shows who drives well among whom",
-                               fmt::join(town_controller_names(), ", ")))
+                               "each with its share of vehicles, or, with its share of agents, the policy itself "
+                               "while impaired: {}. A row each shows who drives well among whom",
+                               fmt::join(town_controller_names(), ", "), fmt::join(impairment_names(), ", ")))
       ->delimiter(',')
       ->allow_extra_args(false);
   command

@@ -194,7 +194,7 @@ bool drive_to_the_end(const Driving& driving, const EvaluateOptions& options, Si
 EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& options, EvaluationWorlds* shared) {
   const CompiledMaps& maps = shared->maps;
   const MixedTraffic traffic(other_drivers(options.others), options, driver.device, maps);
-  SimulatorConfig simulator_config = traffic.observed(driver.world);
+  SimulatorConfig simulator_config = traffic.adapted(driver.world);
   simulator_config.seed = options.seed;
   std::vector<DensityOf> densities;
   if (options.agents_per_world > 0)

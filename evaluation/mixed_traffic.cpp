@@ -13,14 +13,29 @@
 #include "pictura/policy/session.h"
 #include "pictura/simulator/controllers/host_controllers.h"
 #include "pictura/simulator/controllers/shared_control.h"
+#include "pictura/simulator/rules/impairment.h"
+#include "pictura/simulator/simulator_options.h"
 
 namespace pictura {
+
+std::vector<std::string> impairment_names() {
+  std::vector<std::string> names;
+  visit_impairments(ImpairedShares{}, [&names](const char* name, float) { names.emplace_back(name); });
+  return names;
+}
 
 namespace {
 
 bool is_controller(const std::string& name) {
   const std::vector<std::string> names = town_controller_names();
   return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+/// Of this name; `none` where it is no impairment's.
+Impairment impairment_named(const std::string& text) {
+  const std::vector<std::string> names = impairment_names();
+  const auto index = std::find(names.begin(), names.end(), text) - names.begin();
+  return index == std::ssize(names) ? Impairment::none : static_cast<Impairment>(1 + index);
 }
 
 SessionOptions options_of(const DriverOptions& options, Device device) {
@@ -41,10 +56,16 @@ std::vector<OtherDriver> other_drivers(const std::vector<std::string>& texts) {
     const std::optional<double> share =
         sign == std::string::npos ? std::nullopt : parse_number(std::string_view(text).substr(sign + 1));
     if (!share || !(*share > 0) || sign == 0) {
-      fail_usage("others: expected a policy's file or one of {}, and its share above 0, as lane=0.25; got '{}'",
-                 fmt::join(town_controller_names(), ", "), text);
+      fail_usage("others: expected a policy's file, one of {}, or {}, and its share above 0, as lane=0.25; got '{}'",
+                 fmt::join(town_controller_names(), ", "), fmt::join(impairment_names(), ", "), text);
     }
-    others.push_back({text.substr(0, sign), *share});
+    const std::string name = text.substr(0, sign);
+    const Impairment impairment = impairment_named(name);
+    const auto is_same = [impairment](const OtherDriver& other) { return other.impairment == impairment; };
+    if (impairment != Impairment::none && std::any_of(others.begin(), others.end(), is_same)) {
+      fail_usage("others: expected {} once, got it twice", name);
+    }
+    others.push_back({name, *share, impairment});
     sum += *share;
   }
   if (others.size() > kMaxOtherDrivers) {
@@ -54,7 +75,7 @@ std::vector<OtherDriver> other_drivers(const std::vector<std::string>& texts) {
   return others;
 }
 
-/// A policy and what it sees with, or neither for a controller.
+/// A policy and what it sees with, or neither for a controller and where impaired.
 struct MixedTraffic::Other {
   OtherDriver driver;
   std::unique_ptr<PolicySession> session;
@@ -67,7 +88,12 @@ MixedTraffic::MixedTraffic(const std::vector<OtherDriver>& others, const DriverO
   for (const OtherDriver& driver : others) {
     auto other = std::make_unique<Other>();
     other->driver = driver;
-    if (!is_controller(driver.name)) {
+    const bool is_impaired = driver.impairment != Impairment::none;
+    if (is_impaired && driver.impairment != Impairment::phantom_braking && !options.controller.empty()) {
+      fail_usage("others: {}: has no effect on the controller {}, which does not drive by observations", driver.name,
+                 options.controller);
+    }
+    if (!is_impaired && !is_controller(driver.name)) {
       other->session = std::make_unique<PolicySession>(driver.name, options_of(options, device));
       other->renderer = other->session->make_renderer();
       if (other->renderer) upload_maps(maps, {}, other->renderer.get());
@@ -91,8 +117,11 @@ std::vector<std::string> MixedTraffic::setting() const {
   return texts;
 }
 
-SimulatorConfig MixedTraffic::observed(SimulatorConfig world) const {
+SimulatorConfig MixedTraffic::adapted(SimulatorConfig world) const {
   for (const std::unique_ptr<Other>& other : others_) {
+    visit_impairments(world.others, [&other](const char* name, float& share) {
+      if (other->driver.name == name) share = static_cast<float>(other->driver.share);
+    });
     if (!other->session) continue;
     const SimulatorConfig its = other->session->training_world();
     world.vector_observations |= its.vector_observations;
@@ -102,22 +131,38 @@ SimulatorConfig MixedTraffic::observed(SimulatorConfig world) const {
   return world;
 }
 
+size_t MixedTraffic::impaired_driver(Impairment impairment) const {
+  size_t driver = 1;
+  while (others_[driver - 1]->driver.impairment != impairment) ++driver;
+  return driver;
+}
+
+size_t MixedTraffic::drawn_driver(uint32_t global_world, uint32_t agent) const {
+  RandomStream random({.seed = options_.seed, .world = global_world, .agent = agent, .purpose = Purpose::driver});
+  double left = static_cast<double>(random.uniform());
+  for (size_t i = 0; i < others_.size(); ++i) {
+    if (others_[i]->driver.impairment != Impairment::none) continue;
+    left -= others_[i]->driver.share;
+    if (left < 0) return i + 1;
+  }
+  return 0;
+}
+
 std::vector<uint8_t> MixedTraffic::driver_of_slots(Simulator& simulator) const {
   const std::vector<AgentClass> agent_class = WorldArrays::of_slots(simulator, simulator.state().agent_class);
   const std::vector<int32_t> slot_begin = host_copy(simulator.slots().slot_begin, simulator.device());
   std::vector<uint8_t> driver_of_slot(agent_class.size(), 0);
   for (size_t world = 0; world < simulator.worlds().size(); ++world) {
+    const uint32_t global_world = simulator.worlds()[world].global_world;
     for (int32_t slot = slot_begin[world]; slot < slot_begin[world + 1]; ++slot) {
-      if (agent_class[static_cast<size_t>(slot)] != AgentClass::vehicle) continue;
-      RandomStream random({.seed = options_.seed,
-                           .world = simulator.worlds()[world].global_world,
-                           .agent = static_cast<uint32_t>(slot - slot_begin[world]),
-                           .purpose = Purpose::driver});
-      double left = static_cast<double>(random.uniform());
-      for (size_t i = 0; i < others_.size() && left >= 0; ++i) {
-        left -= others_[i]->driver.share;
-        if (left < 0) driver_of_slot[static_cast<size_t>(slot)] = static_cast<uint8_t>(i + 1);
-      }
+      const auto agent = static_cast<uint32_t>(slot - slot_begin[world]);
+      const Impairment impairment =
+          draw_impairment(simulator.config().others, options_.seed, global_world, agent, /*episode=*/0);
+      const bool is_vehicle = agent_class[static_cast<size_t>(slot)] == AgentClass::vehicle;
+      driver_of_slot[static_cast<size_t>(slot)] =
+          static_cast<uint8_t>(impairment != Impairment::none ? impaired_driver(impairment)
+                               : is_vehicle                   ? drawn_driver(global_world, agent)
+                                                              : 0);
     }
   }
   return driver_of_slot;
@@ -126,9 +171,15 @@ std::vector<uint8_t> MixedTraffic::driver_of_slots(Simulator& simulator) const {
 Driving MixedTraffic::share(Driving own, Simulator& simulator, const std::vector<uint8_t>& driver_of_slot) const {
   if (others_.empty()) return own;
   std::vector<Driver> drivers;
+  // Driver 0 drives its impaired selves too.
+  const auto is_impaired = [this](size_t driver) {
+    return driver > 0 && others_[driver - 1]->driver.impairment != Impairment::none;
+  };
   for (size_t i = 0; i < num_drivers(); ++i) {
+    if (is_impaired(i)) continue;
     std::vector<uint8_t> mask(driver_of_slot.size());
-    std::transform(driver_of_slot.begin(), driver_of_slot.end(), mask.begin(), [i](size_t its) { return its == i; });
+    std::transform(driver_of_slot.begin(), driver_of_slot.end(), mask.begin(),
+                   [&](size_t its) { return its == i || (i == 0 && is_impaired(its)); });
     const auto memory = std::make_shared<const DeviceCopy<uint8_t>>(mask, simulator.device());
     Driver driver{std::move(own.controller), memory->span(), memory};
     if (i > 0) {

@@ -8,18 +8,24 @@
 
 #include "pictura/evaluation/evaluated_driver.h"
 #include "pictura/simulator/compiled_map.h"
+#include "pictura/simulator/rule_choices.h"
 
 namespace pictura {
 
-/// A driver beside the evaluated one.
+/// Names of impairments, in the order of Impairment: the keys of [simulator.others].
+std::vector<std::string> impairment_names();
+
+/// A driver beside the evaluated one: a policy, a controller, or the evaluated policy itself while impaired.
 struct OtherDriver {
-  std::string name;  // a saved policy's file, or one of town_controller_names()
-  double share = 0;  // of vehicles
+  std::string name;                          // a saved policy's file, one of town_controller_names(), or an impairment
+  double share = 0;                          // of vehicles; of all agents where impaired
+  Impairment impairment = Impairment::none;  // by its name
 };
 constexpr size_t kMaxOtherDrivers = 8;
 
-/// Parses texts like "lane=0.25" or "models/vector.safetensors=0.5". Throws UsageError naming a text that has another
-/// form, or a share that is not above 0; also if the shares sum to 1 or more, or there are more than kMaxOtherDrivers.
+/// Parses texts like "lane=0.25", "models/vector.safetensors=0.5" or "blind=0.05". Throws UsageError naming a text that
+/// has another form, or a share that is not above 0; also if the shares sum to 1 or more, an impairment is given twice,
+/// or there are more than kMaxOtherDrivers.
 std::vector<OtherDriver> other_drivers(const std::vector<std::string>& texts);
 
 /// Assigns the vehicles of an evaluation's worlds to drivers. Driver 0 is the evaluated one; the others follow in their
@@ -27,7 +33,8 @@ std::vector<OtherDriver> other_drivers(const std::vector<std::string>& texts);
 class MixedTraffic {
  public:
   /// Opens the others on `device`, with argmax and seed of the options. Renderers of those that see images hold the
-  /// maps under the handles 0, 1, ... Conditioning is the world's.
+  /// maps under the handles 0, 1, ... Conditioning is the world's. Throws UsageError for impairments of what a
+  /// controller does not look at.
   MixedTraffic(const std::vector<OtherDriver>& others, const DriverOptions& options, Device device,
                const CompiledMaps& maps);
   ~MixedTraffic();
@@ -39,11 +46,11 @@ class MixedTraffic {
   std::string name(size_t driver) const;
   /// The others in an evaluation's setting: a policy's hash or a controller's name, and its share.
   std::vector<std::string> setting() const;
-  /// The world with every array that some driver reads.
-  SimulatorConfig observed(SimulatorConfig world) const;
+  /// The world with every array that some driver reads, and with impaired agents.
+  SimulatorConfig adapted(SimulatorConfig world) const;
 
-  /// The driver of each slot, [slots], drawn from seed, global world and agent. Driver 0 has all pedestrians and
-  /// cyclists.
+  /// The driver of each slot, [slots], drawn from seed, global world and agent: first of impaired agents, of any class,
+  /// then of the other vehicles. Driver 0 has all pedestrians and cyclists that are not impaired.
   std::vector<uint8_t> driver_of_slots(Simulator& simulator) const;
   /// Combines `own`, driver 0, with the others for a simulator at the start of its episodes. This must outlive the
   /// result.
@@ -51,6 +58,9 @@ class MixedTraffic {
 
  private:
   struct Other;
+  size_t impaired_driver(Impairment impairment) const;
+  size_t drawn_driver(uint32_t global_world, uint32_t agent) const;
+
   DriverOptions options_;  // of whom is evaluated; others take argmax and seed
   std::vector<std::unique_ptr<Other>> others_;
 };

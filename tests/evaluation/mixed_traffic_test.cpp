@@ -133,6 +133,28 @@ TEST(MixedTraffic, PartsMergeIntoTheWhole) {
               HasSubstr("others"));
 }
 
+TEST(MixedTraffic, CountsImpairedAgentsByThemselves) {
+  const EvaluateReport report = evaluate_controller("lane", {"phantom_braking=0.4", "idle=0.3"});
+  ASSERT_EQ(report.rows.size(), 3u);
+  EXPECT_EQ(report.rows[1].driver, "phantom_braking");
+  EXPECT_THAT(report.results.setting.others, ElementsAre("phantom_braking=0.4", "idle=0.3"));
+  const EvaluateReport plain = evaluate_controller("lane", {});
+  const auto agents = double(plain.rows[0].asked);
+  EXPECT_EQ(report.rows[0].asked + report.rows[1].asked + report.rows[2].asked, plain.rows[0].asked);
+  EXPECT_NEAR(double(report.rows[1].asked) / agents, 0.4, 0.1) << "of any class";
+  EXPECT_GT(report.rows[1].asked, report.rows[1].vehicle_episodes);
+  EXPECT_LT(report.rows[1].km_per_vehicle.value, plain.rows[0].km_per_vehicle.value);
+  EXPECT_EQ(evaluate_controller("lane", {"phantom_braking=0.4", "idle=0.3"}).rows[1].km_driven,
+            report.rows[1].km_driven);
+}
+
+TEST(MixedTraffic, RefusesImpairmentsWithoutEffect) {
+  EXPECT_THAT(test::message_of<UsageError>([] { evaluate_controller("lane", {"blind=0.1"}); }),
+              HasSubstr("others: blind: has no effect on the controller lane"));
+  EXPECT_EQ(test::message_of<UsageError>([] { other_drivers({"blind=0.1", "blind=0.2"}); }),
+            "others: expected blind once, got it twice");
+}
+
 class MixedPolicies : public test::ProbedPolicies {};
 
 TEST_F(MixedPolicies, OfAllKindsDriveTogether) {
@@ -140,6 +162,15 @@ TEST_F(MixedPolicies, OfAllKindsDriveTogether) {
       policies_[test::kAgent], {policies_[test::kVectorized] + "=0.25", policies_[test::kLikeForLike] + "=0.25"});
   ASSERT_EQ(report.rows.size(), 3u);
   for (const EvaluateRow& row : report.rows) EXPECT_GT(row.vehicle_episodes, 0) << row.driver;
+}
+
+TEST_F(MixedPolicies, DriveWhileImpaired) {
+  for (const size_t policy : {test::kAgent, test::kVectorized}) {
+    const EvaluateReport report =
+        evaluate_policy(policies_[policy], {"blind=0.3", policies_[test::kLikeForLike] + "=0.2", "inattentive=0.2"});
+    ASSERT_EQ(report.rows.size(), 4u);
+    for (const EvaluateRow& row : report.rows) EXPECT_GT(row.vehicle_episodes, 0) << row.driver;
+  }
 }
 
 TEST_F(MixedPolicies, WithoutAuxiliarySlotsReadZerosWhereTheWorldFillsThem) {
