@@ -102,6 +102,12 @@ void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_
           "default there), inverse (by the actions that follow the recording) or idm (along recorded paths, "
           "behind others), or a checkpoint or safetensors that train wrote")
       ->capture_default_str();
+  ImpairedShares& others = world_out->others;
+  add_number_option(command, "--blind", others.blind, "Share of the agents that see no other for some seconds", 0, 1);
+  add_number_option(command, "--phantom-braking", others.phantom_braking,
+                    "Share of the agents that brake hard for some seconds", 0, 1);
+  add_number_option(command, "--inattentive", others.inattentive, "Share of the agents that see no traffic light", 0,
+                    1);
   add_decision_steps_option(command, &world_out->decision_steps);
   add_policy_backend_options(command, "auto, and drawn as in training", world_out);
 }
@@ -111,9 +117,10 @@ void settle_driving_options(const CLI::App& command, WorldOptions* world_inout, 
   if (!is_scene_name(world_inout->map)) {
     return refuse_scene_options(command, world_inout->map, {"--control"});
   }
-  refuse_options(
-      command, {"--agents", "--pedestrians", "--cyclists", "--parked", "--no-walls", "--light-cycles", "--light-heads"},
-      "on a recorded scene, which says that itself");
+  refuse_options(command,
+                 {"--agents", "--pedestrians", "--cyclists", "--parked", "--no-walls", "--light-cycles",
+                  "--light-heads", "--blind", "--phantom-braking", "--inattentive"},
+                 "on a recorded scene, which says that itself");
   if (command.count("--policy") == 0) *policy_inout = "log";
   if (*policy_inout == "log") {
     refuse_options(command, {"--control"}, "with the policy log, which drives everybody as recorded");

@@ -33,6 +33,7 @@ void apply_world_options(const WorldOptions& options, SimulatorConfig* config_in
   config.light_heads = options.light_heads.value_or(config.light_heads);
   config.light_cycles = options.light_cycles.value_or(config.light_cycles);
   config.parked_cars = options.parked_cars.value_or(config.parked_cars);
+  config.others = options.others;
   float &pedestrians = config.pedestrian_fraction, &cyclists = config.cyclist_fraction;
   pedestrians = options.pedestrian_fraction.value_or(pedestrians);
   cyclists = options.cyclist_fraction.value_or(cyclists);
@@ -88,6 +89,11 @@ DrivenWorld make_world(const WorldOptions& options, const std::string& policy) {
   }
   if (!is_trained && options.decision_steps > 0)
     fail_usage("--decision-steps: expected a trained policy, got --policy {}", policy);
+  if (!is_trained && (options.others.blind > 0 || options.others.inattentive > 0)) {
+    fail_usage(
+        "--blind and --inattentive: expected a trained policy, got --policy {}, which does not drive by observations",
+        policy);
+  }
   apply_world_options(options, &config);
   config.fixed_lights = true;
   std::vector<uint8_t> controlled;  // of a recorded scene, by other than the record
