@@ -199,8 +199,8 @@ class SessionController final : public PolicyController {
                                             num_slots, slots, renderer_);
     const Span<int32_t> actions = span_of<int32_t>(actions_);
     parts_.executor->choose_actions(input, span_of<const int64_t>(slots), span_of<const float>(decision.log_probs),
-                                    choice_, actions);
-    parts_.executor->write_commands(actions, mask, commands_out);
+                                    choice_, actions, current_stream(parts_.device));
+    parts_.executor->write_commands(actions, mask, commands_out, current_stream(parts_.device));
   }
 
   int64_t num_driven() const override { return num_driven_; }
