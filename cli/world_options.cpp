@@ -102,7 +102,7 @@ void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_
           "default there), inverse (by the actions that follow the recording) or idm (along recorded paths, "
           "behind others), or a checkpoint or safetensors that train wrote")
       ->capture_default_str();
-  ImpairedShares& others = world_out->others;
+  OtherShares& others = world_out->others;
   add_number_option(command, "--blind", others.blind, "Share of the agents that see no other for some seconds", 0, 1);
   add_number_option(command, "--phantom-braking", others.phantom_braking,
                     "Share of the agents that brake hard for some seconds", 0, 1);

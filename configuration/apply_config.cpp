@@ -44,6 +44,9 @@ SimulatorConfig simulator_config(const Config& config, Device device) {
   result.seed = config.run.seed;
   result.num_threads = config.run.num_threads;
   result.stagger_episodes = config.train.stagger_episodes;
+  for (size_t i = 0; i < config.simulator.other_policies.size(); ++i) {
+    result.others.policies[i] = static_cast<float>(parse_share(config.simulator.other_policies[i])->share);
+  }
   result.vector_observations = config.policy.modality == Modality::vector;
   result.auxiliary_observations = result.vector_observations && config.policy.auxiliary;
   return result;

@@ -1,5 +1,6 @@
 #include "pictura/configuration/config.h"
 
+#include "pictura/common/support/numbers.h"
 #include "pictura/configuration/config_writer.h"
 #include "pictura/configuration/visit_keys.h"
 
@@ -32,6 +33,14 @@ std::array<double, kNumConditioning> EvaluateSection::default_conditioning() {
 bool Config::reads(ObservationPart part) const {
   return part == ObservationPart::own ||
          (policy.modality == Modality::vector && (part != ObservationPart::walls || simulator.wall_observations));
+}
+
+std::optional<NamedShare> parse_share(const std::string& text) {
+  const size_t sign = text.rfind('=');
+  if (sign == std::string::npos || sign == 0) return std::nullopt;
+  const std::optional<double> share = parse_number(std::string_view(text).substr(sign + 1));
+  if (!share || !(*share > 0)) return std::nullopt;
+  return NamedShare{text.substr(0, sign), *share};
 }
 
 std::string to_toml(const Config& config) {

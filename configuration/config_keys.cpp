@@ -97,6 +97,12 @@ Config with_absolute_paths(Config config) {
   if (!config.render.rig.empty()) make_absolute(&config.render.rig);
   if (config.policy.backbone != "conv") make_absolute(&config.policy.backbone);
   if (!config.train.teacher.empty()) make_absolute(&config.train.teacher);
+  for (std::string& text : config.simulator.other_policies) {
+    std::string file = parse_share(text)->name;
+    const std::string share = text.substr(file.size());
+    make_absolute(&file);
+    text = file + share;
+  }
   for (std::string& map : config.simulator.maps) {
     if (is_map_file(map)) make_absolute(&map);
   }

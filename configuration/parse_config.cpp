@@ -121,8 +121,10 @@ class Reader {
     refuse(key.name, fmt::format("expected {}, got {}: {}", key.value, value.str(), key.reason));
   }
 
+  /// A list that may be empty where its default is.
   void texts(const std::string& key, std::vector<std::string>& value) {
     if (const toml::node* node = find(key)) {
+      if (value.empty() && node->is_array() && node->as_array()->empty()) return;
       value.clear();
       for (const toml::node& element : elements_of(key, *node)) value.push_back(text_of(key, element));
     }
@@ -367,11 +369,26 @@ void check_contradictions(const Config& c, const Reader& reader) {
                   fmt::format("expected at most 1 together with simulator.cyclist_fraction, got {} + {}",
                               c.simulator.pedestrian_fraction, c.simulator.cyclist_fraction));
   }
-  const ImpairedShares& others = c.simulator.others;
-  if (others.sum() >= 1) {
+  const std::string policies = "simulator.others.policies";
+  if (c.simulator.other_policies.size() > kMaxOtherPolicies) {
+    reader.refuse(policies, fmt::format("expected {} policies at most, got {}", kMaxOtherPolicies,
+                                        c.simulator.other_policies.size()));
+  }
+  const OtherShares& others = c.simulator.others;
+  double shares = static_cast<double>(others.sum());
+  for (const std::string& text : c.simulator.other_policies) {
+    const std::optional<NamedShare> policy = parse_share(text);
+    if (!policy) {
+      reader.refuse(policies,
+                    fmt::format("expected a policy's file and its share above 0, as models/vector.safetensors=0.1, "
+                                "got '{}'",
+                                text));
+    }
+    shares += policy->share;
+  }
+  if (shares >= 1) {
     reader.refuse("simulator.others",
-                  fmt::format("expected shares below 1 in all, since the other agents learn, got {} + {} + {}",
-                              others.blind, others.phantom_braking, others.inattentive));
+                  fmt::format("expected shares below 1 in all, since the other agents learn, got {:.6g}", shares));
   }
   const size_t layers = c.policy.conv_channels.size();
   for (const auto& [key, values] : {std::pair{"policy.conv_kernels", &c.policy.conv_kernels},
@@ -514,6 +531,14 @@ Config load_config(const std::string& path, const std::vector<std::string>& over
   if (!is_overridden("render.rig")) beside_config(&config.render.rig);
   if (config.policy.backbone != "conv" && !is_overridden("policy.backbone")) beside_config(&config.policy.backbone);
   if (!is_overridden("train.teacher")) beside_config(&config.train.teacher);
+  if (!is_overridden("simulator.others.policies")) {
+    for (std::string& text : config.simulator.other_policies) {
+      NamedShare policy = *parse_share(text);
+      const std::string share = text.substr(policy.name.size());
+      beside_config(&policy.name);
+      text = policy.name + share;
+    }
+  }
   if (!is_overridden("simulator.maps")) {
     for (std::string& map : config.simulator.maps) {
       if (is_map_file(map)) beside_config(&map);

@@ -44,6 +44,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.value(NamedKey{"simulator.min_agents", Evaluation::replaced}, c.simulator.min_agents, 1, kMaxAgentsPerWorld);
   v.value(NamedKey{"simulator.max_agents", Evaluation::replaced}, c.simulator.max_agents, 1, kMaxAgentsPerWorld);
   visit_simulator_keys(c.simulator, v);
+  v.texts(NamedKey{"simulator.others.policies", Resume::reported, Evaluation::replaced}, c.simulator.other_policies);
   for (int i = 0; i < kNumConditioning; ++i) {
     v.range(std::string("simulator.conditioning.") + kConditioningNames[i], c.simulator.conditioning[size_t(i)]);
   }

@@ -25,7 +25,7 @@ struct WorldOptions : SessionOptions {
   // Where nothing is said, as the policy was trained, or as in the paper.
   std::optional<float> pedestrian_fraction, cyclist_fraction;
   std::optional<int> parked_cars;
-  ImpairedShares others{};
+  OtherShares others{};
   // Of recorded scenes: which tracks the policy drives, where the recording starts, and whether its lights are there.
   // An episode is as long as what is left of the recording, or as so many steps.
   std::string controlled = "self";

@@ -8,7 +8,7 @@
 #include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
-#include "pictura/common/support/numbers.h"
+#include "pictura/configuration/simulator_section.h"
 #include "pictura/evaluation/world_arrays.h"
 #include "pictura/policy/session.h"
 #include "pictura/simulator/controllers/host_controllers.h"
@@ -20,7 +20,7 @@ namespace pictura {
 
 std::vector<std::string> impairment_names() {
   std::vector<std::string> names;
-  visit_impairments(ImpairedShares{}, [&names](const char* name, float) { names.emplace_back(name); });
+  visit_impairments(OtherShares{}, [&names](const char* name, float) { names.emplace_back(name); });
   return names;
 }
 
@@ -52,21 +52,19 @@ std::vector<OtherDriver> other_drivers(const std::vector<std::string>& texts) {
   std::vector<OtherDriver> others;
   double sum = 0;
   for (const std::string& text : texts) {
-    const size_t sign = text.rfind('=');
-    const std::optional<double> share =
-        sign == std::string::npos ? std::nullopt : parse_number(std::string_view(text).substr(sign + 1));
-    if (!share || !(*share > 0) || sign == 0) {
+    const std::optional<NamedShare> parsed = parse_share(text);
+    if (!parsed) {
       fail_usage("others: expected a policy's file, one of {}, or {}, and its share above 0, as lane=0.25; got '{}'",
                  fmt::join(town_controller_names(), ", "), fmt::join(impairment_names(), ", "), text);
     }
-    const std::string name = text.substr(0, sign);
+    const auto& [name, share] = *parsed;
     const Impairment impairment = impairment_named(name);
     const auto is_same = [impairment](const OtherDriver& other) { return other.impairment == impairment; };
     if (impairment != Impairment::none && std::any_of(others.begin(), others.end(), is_same)) {
       fail_usage("others: expected {} once, got it twice", name);
     }
-    others.push_back({name, *share, impairment});
-    sum += *share;
+    others.push_back({name, share, impairment});
+    sum += share;
   }
   if (others.size() > kMaxOtherDrivers) {
     fail_usage("others: expected {} at most, got {}", kMaxOtherDrivers, others.size());
@@ -122,11 +120,7 @@ SimulatorConfig MixedTraffic::adapted(SimulatorConfig world) const {
     visit_impairments(world.others, [&other](const char* name, float& share) {
       if (other->driver.name == name) share = static_cast<float>(other->driver.share);
     });
-    if (!other->session) continue;
-    const SimulatorConfig its = other->session->training_world();
-    world.vector_observations |= its.vector_observations;
-    world.auxiliary_observations |= its.auxiliary_observations;
-    world.wall_observations |= its.wall_observations;
+    if (other->session) world.observe_also(other->session->training_world());
   }
   return world;
 }

@@ -68,7 +68,7 @@ WorldView HostWorlds::world(int index) {
 
 void HostResults::resize(size_t num_slots, const SimulatorConfig& config) {
   reward.assign(num_slots, 0);
-  for (auto* flags : {&terminated, &truncated, &valid}) flags->assign(num_slots, 0);
+  for (auto* flags : {&terminated, &truncated, &valid, &driver}) flags->assign(num_slots, 0);
   sums.assign(num_slots, {});
   views.assign(num_slots, {});
 #define X(name, type, rows, features, part, comment) \
@@ -79,7 +79,7 @@ void HostResults::resize(size_t num_slots, const SimulatorConfig& config) {
 
 void HostResults::reserve(size_t num_slots, const SimulatorConfig& config) {
   reward.reserve(num_slots);
-  for (auto* flags : {&terminated, &truncated, &valid}) flags->reserve(num_slots);
+  for (auto* flags : {&terminated, &truncated, &valid, &driver}) flags->reserve(num_slots);
   sums.reserve(num_slots);
   views.reserve(num_slots);
 #define X(name, type, rows, features, part, comment) \

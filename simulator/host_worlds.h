@@ -46,7 +46,7 @@ struct HostResults {
   }
 
   std::vector<float> reward;  // [slots], as the following
-  std::vector<uint8_t> terminated, truncated, valid;
+  std::vector<uint8_t> terminated, truncated, valid, driver;
   std::vector<StepSums> sums;
   std::vector<View> views;
 

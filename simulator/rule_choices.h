@@ -17,16 +17,25 @@ struct DynamicsRules {
   bool operator==(const DynamicsRules&) const = default;
 };
 
-/// Shares of the agents that are impaired, drawn per episode. An agent has one impairment at most.
-struct ImpairedShares {
-  float blind = 0;            // now and then it sees no other road user
-  float phantom_braking = 0;  // now and then it brakes hard
-  float inattentive = 0;      // it sees no traffic light
-  PICTURA_HD constexpr float sum() const { return blind + phantom_braking + inattentive; }
-  bool operator==(const ImpairedShares&) const = default;
+constexpr int kMaxOtherPolicies = 8;
+
+/// Shares of the agents that are impaired, or driven by other policies, drawn per episode: an agent is of one kind at
+/// most, and the other agents learn.
+struct OtherShares {
+  float blind = 0;                         // now and then it sees no other road user
+  float phantom_braking = 0;               // now and then it brakes hard
+  float inattentive = 0;                   // it sees no traffic light
+  float policies[kMaxOtherPolicies] = {};  // driven by each
+  PICTURA_HD constexpr float sum() const {
+    float all = blind + phantom_braking + inattentive;
+    for (const float share : policies) all += share;
+    return all;
+  }
+  bool operator==(const OtherShares&) const = default;
 };
 
-/// In the order of the members of ImpairedShares.
+/// In the order of the members of OtherShares.
 enum class Impairment : uint8_t { none, blind, phantom_braking, inattentive };
+constexpr int kNumImpairments = 3;
 
 }  // namespace pictura

@@ -48,13 +48,19 @@ struct SimulatorConfig {
   bool fixed_lights = false;                       // evaluation: 10/3/2 s; else timings are drawn per episode
   LightCycles light_cycles = LightCycles::phases;
   DynamicsRules dynamics{};
-  ImpairedShares others{};
+  OtherShares others{};
   bool auxiliary_observations = true;  // false: the auxiliary slots hold zeros (the like-for-like baseline)
   bool vector_observations = true;     // false: entity sets are not computed (perspective training)
   bool wall_observations = false;      // with them the set of walls, which is empty where walls are off
   std::array<ConditioningRange, kNumConditioning> conditioning = default_conditioning();
 
   static std::array<ConditioningRange, kNumConditioning> default_conditioning();
+  /// Adds what another configuration observes.
+  void observe_also(const SimulatorConfig& other) {
+    vector_observations |= other.vector_observations;
+    auxiliary_observations |= other.auxiliary_observations;
+    wall_observations |= other.wall_observations;
+  }
   bool observes(ObservationPart part) const {
     return part == ObservationPart::own ||
            (vector_observations && (part != ObservationPart::walls || wall_observations));

@@ -25,8 +25,9 @@ struct SimulatorArrays {
   Device device;
   SlotTable slots;
   ObservationView observations;
-  SceneBatch scene;        // controlled agents in slot order, each world's parked cars after its controlled agents
-  Span<const View> views;  // [slots] where the agents' cameras stand, see Simulator::views()
+  SceneBatch scene;            // controlled agents in slot order, each world's parked cars after its controlled agents
+  Span<const uint8_t> driver;  // [slots] of agents in this episode, see driver_of() in rules/impairment.h
+  Span<const View> views;      // [slots] where the agents' cameras stand, see Simulator::views()
   AgentStateView state{};
   // [worlds] steps done in the current episode, the number of that episode, and 1 where it has ended, so that the next
   // step begins the next one.

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include <fmt/ranges.h>
+
 #include "pictura/common/error.h"
 #include "pictura/common/support/suggestion.h"
 #include "pictura/map/scenario/scenario.h"
@@ -29,13 +31,14 @@ void check(const SimulatorConfig& config) {
     fail_usage("simulator: pedestrian and cyclist fractions: expected shares that sum to at most 1, got {} and {}",
                config.pedestrian_fraction, config.cyclist_fraction);
   }
-  const ImpairedShares& others = config.others;
-  if (!in(others.blind, 0, 1) || !in(others.phantom_braking, 0, 1) || !in(others.inattentive, 0, 1) ||
-      !(others.sum() < 1)) {
+  const OtherShares& others = config.others;
+  const auto is_share = [&in](float share) { return in(share, 0, 1); };
+  if (!is_share(others.blind) || !is_share(others.phantom_braking) || !is_share(others.inattentive) ||
+      !std::all_of(std::begin(others.policies), std::end(others.policies), is_share) || !(others.sum() < 1)) {
     fail_usage(
         "simulator: others: expected shares that sum to less than 1, got blind {}, phantom_braking {}, "
-        "inattentive {}",
-        others.blind, others.phantom_braking, others.inattentive);
+        "inattentive {}, policies {}",
+        others.blind, others.phantom_braking, others.inattentive, fmt::join(others.policies, ", "));
   }
   if (config.parked_cars < 0 || config.parked_cars > kMaxAgentsPerWorld) {
     fail_usage("simulator: parked_cars: expected 0 to {}, got {}", kMaxAgentsPerWorld, config.parked_cars);

@@ -53,8 +53,7 @@ std::vector<Fingerprint> fingerprints(const SimulatorSetup& setup) {
   add_unusual(config.stagger_episodes, config.stagger_episodes);
   add("population (pedestrian_fraction, cyclist_fraction, parked_cars, others)", config.pedestrian_fraction,
       config.cyclist_fraction, config.parked_cars);
-  const ImpairedShares& others = config.others;
-  add_unusual(others != ImpairedShares{}, std::array{others.blind, others.phantom_braking, others.inattentive});
+  add_unusual(config.others != OtherShares{}, config.others);
   add("walls (walls, wall_seed)", config.walls, config.wall_seed);
   add("timing of the lights (fixed_lights, light_cycles)", config.fixed_lights);
   add_unusual(config.light_cycles != LightCycles::phases, config.light_cycles);

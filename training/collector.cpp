@@ -83,8 +83,10 @@ bool Collector::collect_on_stream() {
 at::Tensor Collector::record(int64_t step) {
   RolloutObservations& observations = run_.rollout.observations;
   const SimulatorArrays input = run_.simulator->arrays();
-  const at::Tensor slots =
-      clock_.deciding(input, active_slots(input, {}, true, run_.executor.get()), step, run_.simulator->episode_over());
+  const at::Tensor own = run_.opponents ? run_.opponents->own_slots(input) : at::Tensor();
+  const Span<const uint8_t> mask = own.defined() ? span_of<const uint8_t>(own) : Span<const uint8_t>();
+  const at::Tensor slots = clock_.deciding(input, active_slots(input, mask, true, run_.executor.get()), step,
+                                           run_.simulator->episode_over());
   // The slots whose images are kept differ from rollout to rollout, so no graph can record them.
   if (observations.keep_images())
     observations.record(step, seen_slots(run_, slots));
@@ -108,11 +110,19 @@ void Collector::ask_teacher(int64_t step, const at::Tensor& slots) {
 }
 
 void Collector::simulate(int64_t step) {
-  const PhaseTimer::Scope timed(&run_.timer, Phase::simulate);
   Rollout& rollout = run_.rollout;
+  Span<const Command> commands;
+  if (run_.opponents) {
+    const PhaseTimer::Scope timed(&run_.timer, Phase::forward);
+    commands = run_.opponents->commands(run_.simulator->arrays(), rollout.actions_at(step), run_.executor.get());
+  }
+  const PhaseTimer::Scope timed(&run_.timer, Phase::simulate);
   simulations_[step].run(&graphs_, [&] {
+    const Stream stream = current_stream(run_.device);
     const Array actions(rollout.actions_at(step).data(), {rollout.num_slots()}, run_.device);
-    rollout.set_result(step, run_.simulator->step(actions, current_stream(run_.device)), run_.device);
+    rollout.set_result(
+        step, commands.empty() ? run_.simulator->step(actions, stream) : run_.simulator->step(commands, stream),
+        run_.device);
   });
 }
 

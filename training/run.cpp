@@ -26,10 +26,16 @@ std::unique_ptr<const Teacher> make_teacher(const Config& config, Device device,
   return std::make_unique<const Teacher>(parse_policy(file_of_first(path, communicator), path), config, device);
 }
 
+std::unique_ptr<Opponents> make_opponents(const Config& config, Device device, Communicator* communicator) {
+  if (config.simulator.other_policies.empty()) return nullptr;
+  return std::make_unique<Opponents>(config, device, communicator);
+}
+
 std::unique_ptr<Simulator> make_training_simulator(const Config& config, Device device, const Teacher* teacher,
-                                                   std::vector<WorldSpec> worlds) {
+                                                   const Opponents* opponents, std::vector<WorldSpec> worlds) {
   SimulatorConfig world = simulator_config(config, device);
   if (teacher) teacher->add_arrays(&world);
+  if (opponents) opponents->add_arrays(&world);
   return make_simulator(config.simulator.backend, world, load_maps(training_maps(config), config.run.num_threads),
                         std::move(worlds));
 }
@@ -59,7 +65,8 @@ Run::Run(const Config& its_config, Device its_device, Communicator* its_communic
       all_worlds(draw_training_worlds(config)),
       rig(rig_of(config)),
       teacher(make_teacher(config, device, communicator)),
-      simulator(make_training_simulator(config, device, teacher.get(),
+      opponents(make_opponents(config, device, communicator)),
+      simulator(make_training_simulator(config, device, teacher.get(), opponents.get(),
                                         worlds_of_part(all_worlds, communicator->rank(), communicator->size()))),
       renderer(make_training_renderer(config, rig, *simulator)),
       executor(make_learner_executor(device)),
@@ -76,6 +83,7 @@ Run::Run(const Config& its_config, Device its_device, Communicator* its_communic
     rollout.teacher_log_probs =
         at::zeros({rollout.num_steps(), rollout.num_slots(), kNumActions}, rollout.log_probs.options());
   }
+  if (opponents) opponents->enter(*simulator);
   if (config.policy.decision_steps > 1) rollout.decides = at::ones_like(rollout.valid);
   for (const auto& change : config.render.schedule) policy->check_images(rig_of(config, change.agent_steps));
 }

@@ -7,6 +7,7 @@
 #include "pictura/configuration/apply_config.h"
 #include "pictura/policy/torch_device.h"
 #include "pictura/training/checkpoint.h"
+#include "pictura/training/opponents.h"
 #include "pictura/training/ppo.h"
 #include "pictura/training/ranks/communicator.h"
 #include "pictura/training/teacher.h"
@@ -55,6 +56,7 @@ struct Run {
   const std::vector<WorldSpec> all_worlds;       // of all ranks
   Rig rig;                                       // as it is now
   const std::unique_ptr<const Teacher> teacher;  // null without train.teacher
+  const std::unique_ptr<Opponents> opponents;    // null without simulator.others.policies
   const std::unique_ptr<Simulator> simulator;
   std::unique_ptr<Renderer> renderer;  // of policies with images
   const std::unique_ptr<LearnerExecutor> executor;

@@ -188,7 +188,7 @@ struct DeviceSetup {
 
 struct DeviceResults {
   DeviceBuffer<float> reward;
-  DeviceBuffer<uint8_t> terminated, truncated, valid;
+  DeviceBuffer<uint8_t> terminated, truncated, valid, driver;
   DeviceBuffer<StepSums> sums;
   DeviceBuffer<View> views;
 #define X(name, type, rows, features, part, comment) DeviceBuffer<type> name;
@@ -201,6 +201,7 @@ struct DeviceResults {
         terminated(num_slots),
         truncated(num_slots),
         valid(num_slots),
+        driver(num_slots),
         sums(num_slots),
         views(num_slots) {
 #define X(name, type, rows, features, part, comment) \

@@ -86,11 +86,13 @@ struct WriteObservation {
 
   template <typename ThreadGroup>
   PICTURA_HD void operator()(const ThreadGroup& group, int slot) const {
-    const int w = arrays.world_of_slot[slot];
-    const WorldView world = arrays.world(w);
+    const WorldView world = arrays.world(arrays.world_of_slot[slot]);
     const int agent = slot - world.first_slot;
     observe_own(world, agent, slot, arrays.observations, group);
-    if (group.rank() == group.size() - 1) arrays.views[slot] = view_of(world, agent, arrays.episode_step[w]);
+    if (group.rank() == group.size() - 1) {
+      arrays.views[slot] = view_of(world, agent);
+      arrays.driver[slot] = static_cast<uint8_t>(driver_of(other_of(world, agent)));
+    }
     if (!arrays.entity_sets) return;
     ObservationWriter::write_sets(group, world, agent, StepObservation{}, arrays.observations, slot);
   }

@@ -44,6 +44,7 @@ struct PhaseArrays {
   // Results.
   StepArrays results;
   View* views = nullptr;
+  uint8_t* driver = nullptr;
   ObservationView observations;
   uint8_t entity_sets = 0;
   uint8_t has_lives = 0;   // some map has roads that end

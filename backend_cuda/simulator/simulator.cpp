@@ -200,6 +200,7 @@ class SimulatorCuda final : public Simulator {
                          .light_begin = {tables_.light_begin.data(), num_worlds + 1},
                          .light_states = {state_.lights.data(), setup_.num_lights()},
                          .hidden_agents = {}},
+               .driver = {results_.driver.data(), num_slots},
                .views = {results_.views.data(), num_slots},
                .state = state_.agents.view(),
                .episode_step = {state_.episode_step.data(), num_worlds},
@@ -339,6 +340,7 @@ class SimulatorCuda final : public Simulator {
     arrays.world_totals = state_.world_totals.data();
     arrays.results = results_.step_arrays();
     arrays.views = results_.views.data();
+    arrays.driver = results_.driver.data();
     arrays.observations = arrays_.observations;
     arrays.entity_sets = config().vector_observations;
     arrays.has_lives = setup_.has_lives();

@@ -29,11 +29,11 @@ PICTURA_HD bool accepts(const WorldView& world, int agent, const CommandType& co
 }
 
 /// Whether a step of the agent counts and is learned from: it drives, or begins to, is told neither to leave nor to
-/// follow its record, and is not impaired in this episode.
+/// follow its record, and is neither impaired nor driven by another policy in this episode.
 template <typename CommandType>
 PICTURA_HD bool takes_part(const WorldView& world, int agent, const CommandType& command) {
   return takes_actions(world, agent) && !tells_to_leave(command) && !tells_to_follow_record(command) &&
-         impairment_of(world, agent) == Impairment::none;
+         other_of(world, agent) == 0;
 }
 
 /// Whether the agent counts among those that still drive when it is asked whether an episode ends: who follows a

@@ -1,5 +1,6 @@
-// Impaired agents: which agents of an episode are impaired, when it shows, and what they then miss or do. All of it
-// follows from counter-based numbers, so that no state holds it and no observation tells it.
+// Other agents: which agents of an episode are impaired or driven by other policies, when impairments show, and what
+// they then miss or do. All of it follows from counter-based numbers, so that no state holds it and no observation
+// tells it.
 #pragma once
 
 #include "pictura/common/rng.h"
@@ -9,16 +10,37 @@
 
 namespace pictura {
 
-/// Draws an agent's impairment in an episode.
-PICTURA_HD inline Impairment draw_impairment(const ImpairedShares& shares, uint64_t seed, uint32_t world,
-                                             uint32_t agent, uint32_t episode) {
-  if (shares.sum() <= 0.0f) return Impairment::none;
+/// Draws what an agent is in an episode: 0, an agent that learns; or one more than the index of a share in OtherShares.
+PICTURA_HD inline int draw_other(const OtherShares& shares, uint64_t seed, uint32_t world, uint32_t agent,
+                                 uint32_t episode) {
+  if (shares.sum() <= 0.0f) return 0;
   RandomStream random(
       {.seed = seed, .world = world, .agent = agent, .episode = episode, .purpose = Purpose::impairment});
   const float drawn = random.uniform();
-  if (drawn < shares.blind) return Impairment::blind;
-  if (drawn < shares.blind + shares.phantom_braking) return Impairment::phantom_braking;
-  return drawn < shares.sum() ? Impairment::inattentive : Impairment::none;
+  float bound = shares.blind;
+  if (drawn < bound) return static_cast<int>(Impairment::blind);
+  bound += shares.phantom_braking;
+  if (drawn < bound) return static_cast<int>(Impairment::phantom_braking);
+  bound += shares.inattentive;
+  if (drawn < bound) return static_cast<int>(Impairment::inattentive);
+  for (int i = 0; i < kMaxOtherPolicies; ++i) {
+    bound += shares.policies[i];
+    if (drawn < bound) return 1 + kNumImpairments + i;
+  }
+  return 0;
+}
+
+/// What draw_other() says of an agent: its impairment, and its driver: 0 for what drives the simulator, 1 + i for
+/// policy i.
+PICTURA_HD constexpr Impairment impairment_of(int other) {
+  return other > kNumImpairments ? Impairment::none : static_cast<Impairment>(other);
+}
+PICTURA_HD constexpr int driver_of(int other) { return max_of(other - kNumImpairments, 0); }
+
+/// Draws an agent's impairment in an episode.
+PICTURA_HD inline Impairment draw_impairment(const OtherShares& shares, uint64_t seed, uint32_t world, uint32_t agent,
+                                             uint32_t episode) {
+  return impairment_of(draw_other(shares, seed, world, agent, episode));
 }
 
 /// Whether an agent's impairment shows in what it sees after `step` steps of the episode, and in what it does next.

@@ -24,7 +24,7 @@ struct RuleOptions {
   bool fixed_lights = false;
   LightCycles light_cycles = LightCycles::phases;
   DynamicsRules dynamics{};
-  ImpairedShares others{};
+  OtherShares others{};
   bool auxiliary_observations = true;
   ConditioningRange conditioning[kNumConditioning] = {};        // to draw from
   ConditioningRange conditioning_scale[kNumConditioning] = {};  // what the policy sees as [-1, 1]
@@ -131,26 +131,24 @@ PICTURA_HD inline AgentBox box_of(const AgentStateView& agents, int slot) {
   return box;
 }
 
-/// The agent's impairment in this episode.
-PICTURA_HD inline Impairment impairment_of(const WorldView& world, int agent) {
-  return draw_impairment(world.options.others, world.seed, world.global_world, static_cast<uint32_t>(agent),
-                         world.episode);
+/// What the agent is in this episode, see draw_other().
+PICTURA_HD inline int other_of(const WorldView& world, int agent) {
+  return draw_other(world.options.others, world.seed, world.global_world, static_cast<uint32_t>(agent), world.episode);
 }
 
 /// The agent's impairment at this step, if it shows then.
 PICTURA_HD inline Impairment shown_impairment(const WorldView& world, int agent) {
-  const Impairment impairment = impairment_of(world, agent);
+  const Impairment impairment = impairment_of(other_of(world, agent));
   const bool shows = shows_at(impairment, world.step, world.options.dt_s, world.seed, world.global_world,
                               static_cast<uint32_t>(agent), world.episode);
   return shows ? impairment : Impairment::none;
 }
 
-/// Where the agent's cameras stand at a step of the episode; that of an absent agent leaves nobody out, see
-/// Simulator::views().
-PICTURA_HD inline View view_of(const WorldView& world, int agent, int32_t episode_step) {
+/// Where the agent's cameras stand; that of an absent agent leaves nobody out, see Simulator::views().
+PICTURA_HD inline View view_of(const WorldView& world, int agent) {
   View view;
   view.world = world.index;
-  view.key = {world.global_world, static_cast<uint32_t>(agent), world.episode, static_cast<uint32_t>(episode_step)};
+  view.key = {world.global_world, static_cast<uint32_t>(agent), world.episode, static_cast<uint32_t>(world.step)};
   if (!world.boxes[agent].drawn) return view;
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;

@@ -505,17 +505,16 @@ TEST(Config, StaggeringIsOfTrainingAloneAndDynamicsOfEveryWorld) {
 TEST(Config, ImpairedAgentsAreOfTrainingAlone) {
   const Config c =
       parse_config("[simulator.others]\nblind = 0.05\nphantom_braking = 0.1\ninattentive = 0.2\n", "a.toml");
-  const ImpairedShares expected{.blind = 0.05f, .phantom_braking = 0.1f, .inattentive = 0.2f};
+  const OtherShares expected{.blind = 0.05f, .phantom_braking = 0.1f, .inattentive = 0.2f};
   EXPECT_EQ(simulator_config(c).others, expected);
-  EXPECT_EQ(simulator_config(Config{}).others, ImpairedShares{});
-  EXPECT_EQ(evaluation_simulator_config(c, 9).others, ImpairedShares{});
+  EXPECT_EQ(simulator_config(Config{}).others, OtherShares{});
+  EXPECT_EQ(evaluation_simulator_config(c, 9).others, OtherShares{});
   EXPECT_EQ(keys_of_evaluation(c, true), keys_of_evaluation(Config{}, true));
   EXPECT_EQ(first_difference(Config{}, c), "simulator.others.blind: 0.0 became 0.05");
   EXPECT_EQ(parse_config(to_toml(c), "b.toml").simulator.others, expected);
   EXPECT_THAT(error_in("[simulator.others]\nblind = 1.5\n"), HasSubstr("a.toml:2: simulator.others.blind"));
-  EXPECT_THAT(
-      error_in("[simulator.others]\nblind = 0.5\ninattentive = 0.5\n"),
-      HasSubstr("simulator.others: expected shares below 1 in all, since the other agents learn, got 0.5 + 0 + 0.5"));
+  EXPECT_THAT(error_in("[simulator.others]\nblind = 0.5\ninattentive = 0.5\n"),
+              HasSubstr("simulator.others: expected shares below 1 in all, since the other agents learn, got 1"));
 }
 
 TEST(Config, EvaluationFixesConditioningAndLightsAndEndsNothingEarly) {

@@ -23,7 +23,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr ImpairedShares kMixed{.blind = 0.3f, .phantom_braking = 0.3f, .inattentive = 0.3f};
+constexpr OtherShares kMixed{.blind = 0.3f, .phantom_braking = 0.3f, .inattentive = 0.3f};
 
 Impairment impairment_of_slot(const Simulator& simulator, int slot) {
   const SlotTable& slots = simulator.slots();
@@ -51,7 +51,7 @@ int32_t count_of(const Simulator& simulator, int slot, EntitySet set) {
 
 TEST(Impairment, IsDrawnPerAgentAndEpisodeByItsShares) {
   constexpr int kAgents = 20000;
-  const ImpairedShares shares{.blind = 0.05f, .phantom_braking = 0.1f, .inattentive = 0.2f};
+  const OtherShares shares{.blind = 0.05f, .phantom_braking = 0.1f, .inattentive = 0.2f};
   std::array<int, 4> counts{};
   int changed = 0;
   for (int i = 0; i < kAgents; ++i) {
@@ -228,14 +228,14 @@ TEST(Impairment, GoesOnFromASavedStateAsItWouldAndIsNotMixedUp) {
 }
 
 TEST(Impairment, SharesLeaveAgentsToLearn) {
-  const auto message = [](const ImpairedShares& shares) {
+  const auto message = [](const OtherShares& shares) {
     SimulatorConfig config = testing::cars();
     config.others = shares;
     return test::message_of([&] { testing::make(config, testing::ring_road(40), {{0, 1, 0}}); });
   };
   EXPECT_EQ(message({.blind = 0.5f, .phantom_braking = 0.3f, .inattentive = 0.1f}), test::kNoError);
-  for (const ImpairedShares& shares : {ImpairedShares{.blind = 0.5f, .phantom_braking = 0.5f},
-                                       ImpairedShares{.inattentive = -0.1f}, ImpairedShares{.phantom_braking = 1.5f}}) {
+  for (const OtherShares& shares : {OtherShares{.blind = 0.5f, .phantom_braking = 0.5f},
+                                    OtherShares{.inattentive = -0.1f}, OtherShares{.phantom_braking = 1.5f}}) {
     EXPECT_THAT(message(shares), HasSubstr("simulator: others: expected shares that sum to less than 1, got blind"));
   }
 }

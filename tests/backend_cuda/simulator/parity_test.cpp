@@ -85,6 +85,7 @@ void expect_same_view(Simulator* cpu, Simulator* cuda, int step) {
   ASSERT_TRUE(same(a.agents, b.agents) && same(a.light_states, b.light_states)) << "step " << step;
   ASSERT_TRUE(same(a.world_begin, b.world_begin) && same(a.geometry, b.geometry) && same(a.light_begin, b.light_begin));
   ASSERT_TRUE(same(cpu->views(), cuda->views())) << "step " << step;
+  ASSERT_TRUE(same(cpu->arrays().driver, cuda->arrays().driver)) << "step " << step;
   ASSERT_TRUE(same(cpu->episode_step(), cuda->episode_step()) && same(cpu->episode_index(), cuda->episode_index()));
 }
 
@@ -231,7 +232,7 @@ TEST_F(CudaSimulatorTest, StaggeredEpisodesAndResetsAtStandstill) {
 TEST_F(CudaSimulatorTest, ImpairedAgents) {
   SimulatorConfig config = whole_world();
   config.episode_steps = 200;
-  config.others = {.blind = 0.3f, .phantom_braking = 0.3f, .inattentive = 0.2f};
+  config.others = {.blind = 0.3f, .phantom_braking = 0.2f, .inattentive = 0.2f, .policies = {0.1f, 0.1f}};
   expect_parity(config, {load_map("procedural:1")}, draw_worlds(5, 120, 1, 60, 1), 500);
 }
 

@@ -30,6 +30,7 @@ void expect_same(const SimulatorConfig& config, const CompiledMaps& maps, const 
     ASSERT_EQ(cpu->state_hash(), other.hash()) << "step " << step;
     ASSERT_EQ(testing::first_difference(cpu->observations(), other.results.observation_view()), "") << "step " << step;
     ASSERT_TRUE(testing::same_bits(cpu->views(), Span<const View>(other.results.views))) << "step " << step;
+    ASSERT_TRUE(testing::same_bits(cpu->arrays().driver, Span<const uint8_t>(other.results.driver)));
     ASSERT_TRUE(testing::same_bits(cpu->scene().agents, Span<const AgentBox>(other.host.state.boxes)))
         << "step " << step;
     if (step == steps) break;
@@ -129,7 +130,7 @@ TEST(Phases, ImpairAgents) {
   config.episode_steps = 90;
   config.pedestrian_fraction = config.cyclist_fraction = 0.2f;
   config.parked_cars = 12;
-  config.others = {.blind = 0.3f, .phantom_braking = 0.3f, .inattentive = 0.2f};
+  config.others = {.blind = 0.3f, .phantom_braking = 0.2f, .inattentive = 0.2f, .policies = {0.1f, 0.1f}};
   const std::vector<std::shared_ptr<const RoadMap>> maps{load_map("procedural:1"), load_map("procedural:2")};
   for (const bool by_commands : {false, true}) {
     expect_same(config, maps, draw_worlds(5, 120, 1, 60, 2), 140, 14, by_commands);

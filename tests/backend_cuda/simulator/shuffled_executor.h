@@ -200,6 +200,7 @@ class ShuffledExecutor {
     arrays.world_totals = host.state.world_totals.data();
     arrays.results = results.step_arrays();
     arrays.views = results.views.data();
+    arrays.driver = results.driver.data();
     arrays.observations = results.observation_view();
     arrays.entity_sets = host.setup.config.vector_observations;
     arrays.has_lives = host.setup.has_lives();

@@ -1,0 +1,44 @@
+// Opponents: saved policies that drive shares of a run's agents, each by the observations that it was trained with.
+// Nothing is learnt from their agents.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pictura/policy/rules/policy_executor.h"
+#include "pictura/policy/session.h"
+#include "pictura/policy/struct_copies.h"
+#include "pictura/training/ranks/communicator.h"
+
+namespace pictura {
+
+class Opponents {
+ public:
+  /// Opponents of simulator.others.policies, on `device`, with the precision of the run. Throws Error naming a file
+  /// where it holds no policy, reads slots of the ego vector that the learner must not have, or holds its actions for
+  /// steps that do not divide a rollout.
+  Opponents(const Config& config, Device device, Communicator* communicator);
+  ~Opponents();
+  Opponents(const Opponents&) = delete;
+  Opponents& operator=(const Opponents&) = delete;
+
+  /// Adds the arrays that the opponents read to those that a simulator makes.
+  void add_arrays(SimulatorConfig* config_inout) const;
+  /// Prepares to drive in the run's simulator, which must outlive this.
+  void enter(const Simulator& simulator);
+
+  /// Mask of the agents that the learner drives, u8 [slots], as of the simulator's last step.
+  at::Tensor own_slots(const SimulatorArrays& input) const;
+  /// Returns the commands of all agents, [slots]: `own_actions` [slots], and the opponents' own draws in place of them.
+  /// A later call writes to the same memory. On a device waits for how many agents each opponent drives.
+  Span<const Command> commands(const SimulatorArrays& input, Span<const int32_t> own_actions, PolicyExecutor* executor);
+
+ private:
+  struct Opponent;
+  const uint64_t seed_;
+  std::vector<std::unique_ptr<Opponent>> opponents_;
+  std::unique_ptr<DeviceCopy<Command>> commands_;
+};
+
+}  // namespace pictura
