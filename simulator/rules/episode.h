@@ -77,8 +77,9 @@ PICTURA_HD inline void apply_reward_and_halt(const WorldView& world, int agent, 
   const float speed_mps = world.agents.speed_mps[slot];
   int32_t& first_motion_step = world.agents.first_motion_step[slot];
   if (results.valid[slot] && first_motion_step == 0 && fabsf(speed_mps) > kRest_mps) first_motion_step = step;
-  const StepSums done{driven_m(speed_mps, world.options.dt_s), apply_reward_and_halt(world, agent)};
-  const StepSums sums = results.valid[slot] ? done : StepSums{};
+  const float distance_m = results.valid[slot] ? driven_m(speed_mps, world.options.dt_s) : 0.0f;
+  StepSums sums{distance_m, apply_reward_and_halt(world, agent)};
+  if (other_of(world, agent) != 0) sums = {};  // nothing of other agents counts
   results.sums[slot] = sums;
   results.reward[slot] = sums.reward_terms.total();
   results.terminated[slot] = results.valid[slot] && !is_active(world, agent) && !has_left(world, agent);
@@ -123,7 +124,8 @@ PICTURA_HD inline bool episode_ends(const WorldView& world, int steps, int spawn
 PICTURA_HD inline void finish_agent(const WorldView& world, int agent, bool ends, const StepArrays& results,
                                     SimulatorTotals* totals_inout) {
   const int slot = world.first_slot + agent;
-  results.truncated[slot] = results.valid[slot] && ((ends && is_active(world, agent)) || has_left(world, agent));
+  const bool counts = other_of(world, agent) == 0;
+  results.truncated[slot] = counts && ((ends && is_active(world, agent)) || has_left(world, agent));
   if (!results.terminated[slot] && !results.truncated[slot]) return;
   ++totals_inout->finished_agent_episodes;
   totals_inout->finished_return += static_cast<double>(world.agents.episode_return[slot]);
