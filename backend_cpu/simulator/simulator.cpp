@@ -329,7 +329,7 @@ class SimulatorCpu final : public Simulator {
     const WorldView world = worlds_.world(w);
     const ObservationView observations = results_.observation_view();
     for (int agent = 0; agent < world.num_agents; ++agent) {
-      results_.views[world.first_slot + agent] = view_of(world, agent);
+      results_.views[world.first_slot + agent] = view_of(world, agent, hidden_from(world, agent));
       results_.driver[world.first_slot + agent] = static_cast<uint8_t>(driver_of(other_of(world, agent)));
     }
     pictura::observe(world, 0, world.num_agents, worlds_.setup.config.vector_observations, observations);

@@ -17,10 +17,10 @@ class ObservationWriter {
   /// observe_set() of every set, to that row of `out`.
   template <typename ThreadGroup, typename Observation>
   PICTURA_HD static void write_sets(const ThreadGroup& group, const WorldView& world, int agent,
-                                    const Observation& observation, const ObservationView& out, int row) {
+                                    const Observation& observation, const ObservationView& out, int row, Hides hidden) {
     for (int k = 0; k < num_observed_sets(out); ++k) {
       const auto set = static_cast<EntitySet>(k);
-      write_set(group, world, agent, set, set_rows(out, row, set), observation);
+      write_set(group, world, agent, set, set_rows(out, row, set), observation, hidden);
     }
   }
 
@@ -28,11 +28,11 @@ class ObservationWriter {
   /// The rows are put together in the group's own memory, so that they are written whole and in order.
   template <typename ThreadGroup, typename Observation>
   PICTURA_HD static void write_set(const ThreadGroup& group, const WorldView& world, int agent, EntitySet set,
-                                   const SetRows& out, const Observation& observation) {
+                                   const SetRows& out, const Observation& observation, Hides hidden) {
     const int slot = world.first_slot + agent;
     float* rows = group.staging();
     int count = 0;
-    if (observes_set(world, agent, set)) {
+    if (observes_set(world, agent, set, hidden)) {
       const EgoFrame frame = ego_frame(world.agents, slot);
       const NearPlace place = near_place(world, slot);  // kept from set to set, it would be spilled
       if (set == EntitySet::partners) {
@@ -88,13 +88,14 @@ struct WriteObservation {
   PICTURA_HD void operator()(const ThreadGroup& group, int slot) const {
     const WorldView world = arrays.world(arrays.world_of_slot[slot]);
     const int agent = slot - world.first_slot;
-    observe_own(world, agent, slot, arrays.observations, group);
+    const Hides hidden = hidden_from(world, agent);
     if (group.rank() == group.size() - 1) {
-      arrays.views[slot] = view_of(world, agent);
+      arrays.views[slot] = view_of(world, agent, hidden);
       arrays.driver[slot] = static_cast<uint8_t>(driver_of(other_of(world, agent)));
     }
+    observe_own(world, agent, slot, arrays.observations, group);
     if (!arrays.entity_sets) return;
-    ObservationWriter::write_sets(group, world, agent, StepObservation{}, arrays.observations, slot);
+    ObservationWriter::write_sets(group, world, agent, StepObservation{}, arrays.observations, slot, hidden);
   }
 };
 

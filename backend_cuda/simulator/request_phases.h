@@ -92,7 +92,8 @@ struct AnswerQueries {
     const int agent = query.slot - world.first_slot;
     observe_own(world, agent, i, asked.out, group);
     if (!arrays.entity_sets) return;
-    ObservationWriter::write_sets(group, world, agent, QueriedObservation(asked, query), asked.out, i);
+    ObservationWriter::write_sets(group, world, agent, QueriedObservation(asked, query), asked.out, i,
+                                  hidden_from(world, agent));
     if (group.rank() == 0) clear_other_counts(asked.out, i);
   }
 };

@@ -209,12 +209,11 @@ PICTURA_HD inline bool observes(const WorldView& world, int agent) {
          (world.agents.events[world.first_slot + agent] & kInfractions) != 0;
 }
 
-/// Whether the agent's set shows anything: impaired agents miss some.
-PICTURA_HD inline bool observes_set(const WorldView& world, int agent, EntitySet set) {
-  if (!observes(world, agent)) return false;
-  if (set != EntitySet::partners && set != EntitySet::controls) return true;
-  const Hides hidden = hidden_by(shown_impairment(world, agent));
-  return hidden != (set == EntitySet::partners ? kHidesAgents : kHidesLights);
+/// Whether the agent's set shows anything, where this is hidden_from() it.
+PICTURA_HD inline bool observes_set(const WorldView& world, int agent, EntitySet set, Hides hidden) {
+  const bool is_hidden =
+      (set == EntitySet::partners && hidden == kHidesAgents) || (set == EntitySet::controls && hidden == kHidesLights);
+  return !is_hidden && observes(world, agent);
 }
 
 /// What is no set, to that row of `out`: all zeros for the absent and for those that halted in an earlier step.
@@ -306,7 +305,7 @@ PICTURA_HD void observe_set(const WorldView& world, int agent, const NearPlace& 
                             const SetRows& out, const Observation& observation) {
   const int slot = world.first_slot + agent;
   int count = 0;
-  if (observes_set(world, agent, set)) {
+  if (observes_set(world, agent, set, hidden_from(world, agent))) {
     const EgoFrame frame = ego_frame(world.agents, slot);
     if (set == EntitySet::partners) {
       count = observation.observe_partners(world, agent, frame, out.rows, SingleThread{});

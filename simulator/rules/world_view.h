@@ -144,8 +144,14 @@ PICTURA_HD inline Impairment shown_impairment(const WorldView& world, int agent)
   return shows ? impairment : Impairment::none;
 }
 
-/// Where the agent's cameras stand; that of an absent agent leaves nobody out, see Simulator::views().
-PICTURA_HD inline View view_of(const WorldView& world, int agent) {
+/// What is hidden from the agent at this step.
+PICTURA_HD inline Hides hidden_from(const WorldView& world, int agent) {
+  return hidden_by(shown_impairment(world, agent));
+}
+
+/// Where the agent's cameras stand; that of an absent agent leaves nobody out, see Simulator::views(). `hidden` is
+/// hidden_from() it.
+PICTURA_HD inline View view_of(const WorldView& world, int agent, Hides hidden) {
   View view;
   view.world = world.index;
   view.key = {world.global_world, static_cast<uint32_t>(agent), world.episode, static_cast<uint32_t>(world.step)};
@@ -157,7 +163,7 @@ PICTURA_HD inline View view_of(const WorldView& world, int agent) {
   view.cos_heading = agents.cos_heading[slot];
   view.sin_heading = agents.sin_heading[slot];
   view.body_length_m = agents.length_m[slot];
-  view.hides = hidden_by(shown_impairment(world, agent));
+  view.hides = hidden;
   return view;
 }
 
