@@ -60,14 +60,19 @@ struct Settings {
 
 Settings draw_settings(const SoakOptions& options, int64_t scene, const std::vector<Rig>& rigs) {
   RandomStream random = random_of(options, scene, Draw::settings);
-  Settings settings{
-      .config = {.rig = rigs[static_cast<std::size_t>(scene) % rigs.size()], .num_threads = options.num_threads}};
+  const std::size_t rig = static_cast<std::size_t>(scene) % rigs.size();
+  Settings settings{.config = {.rig = rigs[rig], .num_threads = options.num_threads}};
   const float floors_px[] = {0, settings.config.line_floor_px, random.uniform(0, kGuardBand_px)};
   settings.config.line_floor_px = floors_px[random.below(3)];
   settings.config.debug_palette = random.below(2) > 0;
   const PixelFormat formats[] = {PixelFormat::u8, PixelFormat::f16, PixelFormat::f32};
   settings.format = formats[random.below(3)];
   settings.planes = random.below(2) > 0 ? Planes::all : Planes::none;
+  // Kernels of a rig randomize cameras or do not.
+  if (rig % 2 > 0) {
+    settings.config.randomization = scaled(kFullCameraSeverity, static_cast<double>(random.uniform(0, 2)));
+    settings.config.randomization.seed = random.bits();
+  }
   return settings;
 }
 
