@@ -77,8 +77,10 @@ struct ImageEffect {
   uint32_t noise_key[2] = {};
 
   PICTURA_HD Rgb of(Rgb color, int x, int y) const {
-    const Philox4 random =
-        philox4x32_10({{static_cast<uint32_t>(x), static_cast<uint32_t>(y), 0, 0}}, noise_key[0], noise_key[1]);
+    Philox4 random{};
+    if (noise_per_unit > 0) {  // most of an effect's time
+      random = philox4x32_10({{static_cast<uint32_t>(x), static_cast<uint32_t>(y), 0, 0}}, noise_key[0], noise_key[1]);
+    }
     auto channel = [&](float value, uint32_t bits) {
       return saturate(value * brightness_factor + noise_per_unit * static_cast<float>(noise_units(bits)));
     };
