@@ -50,10 +50,13 @@ constexpr double kMaxCameraSeverity = 2;
 
 /// All ranges times a factor. The draws stay the same: a camera turns in the same direction, less or more.
 constexpr CameraRandomization scaled(CameraRandomization ranges, double factor) {
-  for (double* range : {&ranges.rotation_deg, &ranges.shift_m, &ranges.focal_share, &ranges.brightness_share,
-                        &ranges.noise_share, &ranges.dead_probability, &ranges.dropped_probability}) {
-    *range *= factor;
-  }
+  ranges.rotation_deg *= factor;
+  ranges.shift_m *= factor;
+  ranges.focal_share *= factor;
+  ranges.brightness_share *= factor;
+  ranges.noise_share *= factor;
+  ranges.dead_probability *= factor;
+  ranges.dropped_probability *= factor;
   return ranges;
 }
 
