@@ -144,7 +144,7 @@ class Evaluation(CommandCase):
         (again,) = self.json_of("evaluate", "--merge", self.folder / "a.json")["rows"]
         self.assertEqual(again["camera_severity"], 2)
         table = run("evaluate", *drive, "--camera-severity", "0,1").stdout
-        self.assertIn("custom, severity 1 ", table)
+        self.assertIn("custom, severity 1\n", table)
         several = ["evaluate", *drive, "--camera-severity", "0,1"]
         self.assert_refused(2, "with several values of --camera-severity", *several, "--out", self.folder / "c.json")
         self.assert_refused(2, "--camera-severity", "evaluate", *drive, "--camera-severity", 3)

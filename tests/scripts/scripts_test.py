@@ -578,20 +578,20 @@ class Runs(unittest.TestCase):
             return subprocess.run([self.root / "scripts/demo", *arguments], env=environment, capture_output=True, text=True,
                                   timeout=60)  # fmt: skip
 
-        # Each run's return is its seed, kept in its folder; every other metric is 2.
+        # Each run's return is its seed, kept in its folder; every other metric is 2, but no run has an infraction.
         self.write_program("build/cpu/apps/pictura", """
             if [ "$1" = train ]; then
               mkdir -p "$7"; echo "${5#run.seed=}" >"$7/seed"
             else
-              rate='"at_fault_collision_rate": 2, "off_road_rate": 2, "red_light_rate": 2, "km_driven": 2'
-              echo "{\\"rows\\": [{\\"return_per_vehicle\\": $(cat "$(dirname "$2")/seed"), \\"goals_per_vehicle\\": 2," \\
-                "\\"waypoints_per_vehicle\\": 2, $rate}]}"
+              rate='"at_fault_collision_rate": 2, "off_road_rate": 2, "red_light_rate": 2, "never_moved_share": 2'
+              counts='"km_per_infraction": null, "infractions": 2, "km_driven": 2, "goals_per_vehicle": 2'
+              echo "{\\"rows\\": [{\\"return_per_vehicle\\": $(cat "$(dirname "$2")/seed"), $counts, $rate}]}"
             fi""")  # fmt: skip
         os.symlink(sys.executable, self.root / "venv/bin/python")
         result = demo("--seeds", "3", "out/spread")
         self.assertEqual((result.returncode, result.stderr), (0, ""), result.stdout)
         trained = next(line for line in result.stdout.splitlines() if line.startswith("trained, argmax"))
-        self.assertEqual(trained.split()[2:8], ["2.00", "+-", "1.00", "2.00", "+-", "0.00"])
+        self.assertEqual(trained.split()[2:3] + trained.split()[9:15], ["-", "2.00", "+-", "0.00", "2.00", "+-", "1.00"])
         for bad in ("1", "0", "x", "100"):
             result = demo("--seeds", bad)
             self.assertEqual((result.returncode, result.stderr), (2, f"error: demo: --seeds: expected 2 to 99, got '{bad}'\n"))
