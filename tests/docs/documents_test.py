@@ -156,11 +156,12 @@ class Completion(unittest.TestCase):
         self.assertIn("town", self.bash("pictura", ""))
 
     def test_bash_completes_values(self):
-        self.assertEqual(self.bash("pictura", "train", "--set", "train.gae"), ["train.gae_lambda="])
         self.assertEqual(self.bash("pictura", "simulate", "Town0"), [f"Town0{i}" for i in range(1, 8)])
-        self.assertEqual(self.bash("pictura", "evaluate", "--map", "city"), ["city:1"])
         self.assertEqual(self.bash("pictura", "simulate", "Town01", "--policy", "idm_"), ["idm_lanes"])
         self.assertEqual(self.bash("pictura", "bench", "render", "--format", "f"), ["f16", "f32"])
+        if self.bash("pictura", "train"):  # with torch
+            self.assertEqual(self.bash("pictura", "train", "--set", "train.gae"), ["train.gae_lambda="])
+            self.assertEqual(self.bash("pictura", "evaluate", "--map", "city"), ["city:1"])
 
     def test_zsh_and_fish_take_their_scripts(self):
         shells = [shell for shell in ("zsh", "fish") if shutil.which(shell)]
