@@ -99,7 +99,7 @@ int gravity(const AgentStateView& state, int slot) {
   return (events & kEventAtFault) ? 3 : (events & kEventOffRoad) ? 2 : (events & kEventRedLight) ? 1 : 0;
 }
 
-// Of each world of as many slots, the first agent with the gravest infraction.
+// Returns the first agent with the gravest infraction of each world; worlds have `agents_per_world` slots each.
 std::vector<int> worst_agents(const AgentStateView& state, int num_slots, int agents_per_world) {
   std::vector<int> worst;
   for (int begin = 0; begin < num_slots; begin += agents_per_world) {

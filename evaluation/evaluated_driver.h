@@ -24,7 +24,7 @@ struct DriverOptions : SessionOptions {
   // A controller of make_controller, "lane" for one, that drives instead of the checkpoint's policy, in its world, or
   // in the paper's if there is no checkpoint.
   std::string controller;
-  // Of a program: makes the controller of that name, which drives on the host and reads vectors.
+  // Makes the controller of that name where a program brings its own; it drives on the host and reads vectors.
   std::function<std::unique_ptr<Controller>(const Simulator&)> make_own_controller;
   bool argmax = true;
   uint64_t seed = 1;

@@ -31,7 +31,7 @@ bool is_controller(const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-/// Of this name; `none` where it is no impairment's.
+/// Returns the impairment of this name; `none` if no impairment has it.
 Impairment impairment_named(const std::string& text) {
   const std::vector<std::string> names = impairment_names();
   const auto index = std::find(names.begin(), names.end(), text) - names.begin();

@@ -322,7 +322,7 @@ void ImageDrawer::draw(const ImageTarget& target) {
   // From one channel of a pixel to the next.
   const int64_t step = in_patches ? place_in_patches(target.patch_px, width, 1, 0, 0) : int64_t{width} * height;
   const bool has_bytes = target.format == PixelFormat::u8 || target.format == PixelFormat::bf16;
-  // Of bytes, as kernels keep them.
+  // Colours of byte formats are rounded first, since kernels store them as bytes.
   auto shown = [&](Rgb color, int x, int y) {
     return target.effect.of(has_bytes ? rgb_of_bytes(to_bytes(color)) : color, x, y);
   };

@@ -18,7 +18,7 @@ struct WorldScratch {
   int32_t* chosen_try = nullptr;   // [boxes] -1: none
   int32_t* next_try = nullptr;     // [boxes]
   BoxChains standing;              // the boxes that have a place
-  // Of a crowd's box_cells, to be written; null: the world has one cell.
+  // Writable box_cells of a crowd; null: the world has one cell.
   int32_t *cell_begin = nullptr, *cell_items = nullptr;
 };
 

@@ -86,7 +86,7 @@ struct ImageEffect {
     };
     return {channel(color.r, random.word[0]), channel(color.g, random.word[1]), channel(color.b, random.word[2])};
   }
-  /// The same of a colour as to_bytes() gives it.
+  /// Applies the effect to a colour in the form of to_bytes().
   PICTURA_HD uint32_t of_bytes(uint32_t color, int x, int y) const { return to_bytes(of(rgb_of_bytes(color), x, y)); }
 
   /// Standard deviation of noise_units(): of the sum of four bytes.

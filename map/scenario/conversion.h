@@ -33,7 +33,7 @@ struct Conversion {
     if (remaining_work < 0) fail("{}: its map needs more work than a scene may take", scene.source);
   }
   Eigen::Vector3d from_origin(const Eigen::Vector3d& p) const { return p - origin; }
-  /// As a map holds it and state_scene() gives it back, where a program states the scene.
+  /// Rounds a point as a map stores it if a program stated the scene, so that state_scene() returns it.
   Eigen::Vector3d rounded(const Eigen::Vector3d& p) const {
     if (!scene.is_stated) return p;
     const Eigen::Vector3d stated_again = origin + p.cast<float>().cast<double>();
