@@ -75,11 +75,13 @@ PICTURA_HD inline void count_events(int events, SimulatorTotals* totals_inout){
 PICTURA_HD inline void apply_reward_and_halt(const WorldView& world, int agent, int step, const StepArrays& results) {
   const int slot = world.first_slot + agent;
   const float speed_mps = world.agents.speed_mps[slot];
+  const bool is_other = other_of(world, agent) != 0;
+  const bool drives = results.valid[slot] || is_other;
   int32_t& first_motion_step = world.agents.first_motion_step[slot];
-  if (results.valid[slot] && first_motion_step == 0 && fabsf(speed_mps) > kRest_mps) first_motion_step = step;
+  if (drives && first_motion_step == 0 && fabsf(speed_mps) > kRest_mps) first_motion_step = step;
   const float distance_m = results.valid[slot] ? driven_m(speed_mps, world.options.dt_s) : 0.0f;
   StepSums sums{distance_m, apply_reward_and_halt(world, agent)};
-  if (other_of(world, agent) != 0) sums = {};  // nothing of other agents counts
+  if (is_other) sums = {};  // nothing of other agents counts
   results.sums[slot] = sums;
   results.reward[slot] = sums.reward_terms.total();
   results.terminated[slot] = results.valid[slot] && !is_active(world, agent) && !has_left(world, agent);

@@ -122,7 +122,7 @@ PICTURA_HD bool is_clear(const WorldView& world, const AgentBox& box, int begin,
   return !group.any(is_taken);
 }
 
-/// The same of the boxes in chains.
+/// Whether a box is clear of all boxes in chains.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool is_clear(const WorldView& world, const AgentBox& box, const BoxChains& chains,
                          const ThreadGroup& group = {}) {

@@ -149,8 +149,8 @@ PICTURA_HD inline Hides hidden_from(const WorldView& world, int agent) {
   return hidden_by(shown_impairment(world, agent));
 }
 
-/// Where the agent's cameras stand; that of an absent agent leaves nobody out, see Simulator::views(). `hidden` is
-/// hidden_from() it.
+/// Returns the view of the agent's cameras; that of an absent agent excludes no agent, see Simulator::views(). `hidden`
+/// is hidden_from() the agent.
 PICTURA_HD inline View view_of(const WorldView& world, int agent, Hides hidden) {
   View view;
   view.world = world.index;

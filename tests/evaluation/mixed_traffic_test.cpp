@@ -169,7 +169,10 @@ TEST_F(MixedPolicies, DriveWhileImpaired) {
     const EvaluateReport report =
         evaluate_policy(policies_[policy], {"blind=0.3", policies_[test::kLikeForLike] + "=0.2", "inattentive=0.2"});
     ASSERT_EQ(report.rows.size(), 4u);
-    for (const EvaluateRow& row : report.rows) EXPECT_GT(row.vehicle_episodes, 0) << row.driver;
+    for (const EvaluateRow& row : report.rows) {
+      EXPECT_GT(row.vehicle_episodes, 0) << row.driver;
+      EXPECT_LT(row.never_moved_share.value, 1) << row.driver;
+    }
   }
 }
 
