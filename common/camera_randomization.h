@@ -49,7 +49,7 @@ constexpr CameraRandomization kFullCameraSeverity{.rotation_deg = 6,
 constexpr double kMaxCameraSeverity = 2;
 
 /// All ranges times a factor. The draws stay the same: a camera turns in the same direction, less or more.
-constexpr CameraRandomization scaled(CameraRandomization ranges, double factor) {
+PICTURA_HD constexpr CameraRandomization scaled(CameraRandomization ranges, double factor) {
   ranges.rotation_deg *= factor;
   ranges.shift_m *= factor;
   ranges.focal_share *= factor;
