@@ -428,10 +428,12 @@ void add_evaluate_command(CLI::App& app) {
       ->excludes(rig)
       ->excludes(policy);
   command
-      ->add_option("--camera-severity", arguments->severities,
-                   fmt::format("Randomizes cameras, by 0 (as mounted) to {}, 1 in full (docs/cameras.md): one number, "
-                               "or several with commas between them, a row each, as 0,0.25,0.5,1",
-                               kMaxCameraSeverity))
+      ->add_option(
+          "--camera-severity", arguments->severities,
+          fmt::format(
+              "Randomizes cameras, by 0 (as mounted) to {}, 1 in full (docs/explanation/cameras.md): one number, "
+              "or several with commas between them, a row each, as 0,0.25,0.5,1",
+              kMaxCameraSeverity))
       ->delimiter(',')
       ->transform(number(0, kMaxCameraSeverity))
       ->allow_extra_args(false)

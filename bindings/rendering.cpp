@@ -595,7 +595,7 @@ independent. On CUDA its work is put on `stream`.)")
           py::arg("stream") = py::none(),
           R"(rig: the paper's without one. device: where scenes, views and images lie, 'cpu' or 'cuda:0'. num_threads: 0 for
 all. line_floor_px: the least width of a line on screen. debug_palette: tint halted and parked agents. samples: for 'gl',
-'4' (MSAA) or '4x4' (supersampling). camera_severity: of randomized cameras, 0 to 2, as in evaluations (docs/cameras.md); draws are keyed by the
+'4' (MSAA) or '4x4' (supersampling). camera_severity: of randomized cameras, 0 to 2, as in evaluations (docs/explanation/cameras.md); draws are keyed by the
 field `key` of views, which a simulator fills. stream: a cudaStream_t as int; None: the legacy default stream.
 Raises pictura.UsageError listing the names, pictura.Error where the backend cannot run here.)")
       .def_static(

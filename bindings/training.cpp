@@ -436,7 +436,7 @@ void bind_train(py::module_& module) {
       &module, {"train", {"config", "out"}}, &train_from_python,
       R"(Trains by self-play as `pictura train` does, and writes the same files into the folder `out`.
 
-config: a TOML file (docs/configuration.md). overrides: 'train.updates=2'. old_run: of a run that lies in `out`, 'refuse', 'resume'
+config: a TOML file (docs/reference/configuration.md). overrides: 'train.updates=2'. old_run: of a run that lies in `out`, 'refuse', 'resume'
 or 'overwrite'. init_from: a checkpoint whose weights it begins with. minutes: of wall time; 0: no limit. on_progress: called
 after every update with a dict: update, updates, agent_steps, agent_steps_per_s, episode_return, eta_s, scalars (those of
 progress.csv). on_notice: called with a text. They are called from a thread of training's own, and what they raise ends it.
@@ -459,7 +459,7 @@ returns actions int [slots], on the CPU. densities: 'light', 'medium' and 'dense
 device, simulator, renderer: 'auto' or names; renderer '': as it was trained. rig, or width_px and height_px: other cameras.
 backbone: where the program of policy.backbone lies now. conditioning: numbers by name. light_cycles: 'phases' or 'independent',
 light_heads: 'as_mapped' or 'visible'; '': as it was trained. average: with the average of weights that the checkpoint holds. camera_severity: of
-randomized cameras, 0 to 2 (docs/cameras.md). decision_steps: for which an
+randomized cameras, 0 to 2 (docs/explanation/cameras.md). decision_steps: for which an
 action is held; 0: as it was trained. others: who else drives, as {'lane': 0.3, 'other.safetensors': 0.2}:
 policies or controllers, and their shares of vehicles; 'blind', 'phantom_braking' and 'inattentive': shares of agents that the policy drives while impaired. on_progress: called with the fraction that is done and the seconds to come, from a thread of its own. Returns a dict: rows, one a density and driver (None: whom it measures): its counts, and each metric as (value, half of its 95 % interval); seconds,
 agent_steps, policy_hash, light_cycles, others. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
@@ -494,7 +494,7 @@ agent_steps, policy_hash, light_cycles, others. ^C raises KeyboardInterrupt. Rai
 
 checkpoint: of a policy; '' with a controller: 'log', 'inverse', 'idm', 'idm_lanes', 'random' or 'idle', which drives
 instead. scenes: files, folders, 'FILE#K'. protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3', 'waymax' or 'simagents'; control, start_step, steps,
-densities (shares of road users that stay) and rules (values by name, docs/evaluation.md) replace what it says.
+densities (shares of road users that stay) and rules (values by name, docs/explanation/evaluation.md) replace what it says.
 first_scene, num_scenes: a part of the scenes; 0: all from the first on. rollouts: a file for them, with the protocol
 'simagents', as the Waymo sim-agents challenge takes them. The others as in evaluate(). Returns a dict: rows, one a
 density, with each metric as (value, half of its 95 % interval); agents, one for every driven road user of a scene, density and rollout;
@@ -511,9 +511,9 @@ policies: checkpoints or safetensors; the world is the first one's. maps, densit
 argmax: as in evaluate(). scenes: how many scenarios are driven, an equal share by each policy; 0: as many on each map for each
 policy, two a map or more. removals: in all. sample_steps: between states. range_m: how far away a user may be. control: 'none',
 'nobody', 'permuted' or 'untrained'. batch: cases in a call. cases_file: a CSV file for every case. replay: a page *.html that plays the scene of one case and shows
-its images with and without the road user (docs/replay.md); case: its number in cases_file, by default the one where the first
+its images with and without the road user (docs/reference/replay.md); case: its number in cases_file, by default the one where the first
 policy's value changes most; cameras: keeps the ego's images of every step. Returns a dict, that of the command's
-summary.json (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
+summary.json (docs/explanation/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
   def_probe(
       &module, "probe_pedestrian", &probe_pedestrian, &write_pedestrian_cases, &pedestrian_summary_json, nullptr,
       R"(How policies' value and braking change as a pedestrian comes out from behind a vehicle and is hidden again, as
@@ -522,7 +522,7 @@ summary.json (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error
 policies, maps, density, agents_per_world, scenes, steps, sample_steps, batch and what follows argmax: as in probe_removal().
 paths: in all, each through one state. hider_range_m: how far away the vehicle may be that a path begins behind. min_speed_mps:
 of the ego, forwards. height_m: of the pedestrian. control: 'none', 'nobody' or 'untrained'. cases_file: a CSV file for every place of every path. replay, case, cameras: as in probe_removal(). Returns a dict, that of
-the command's summary.json (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad
+the command's summary.json (docs/explanation/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad
 input.)");
   def_probe(
       &module, "probe_corner", &probe_corner, &write_corner_cases, &corner_summary_json, &CornerOptions::pairs,
@@ -534,7 +534,7 @@ all. max_distance_m: how far before the corner a policy may take over. min_speed
 user_range_m: how far before the junction that one may be. driver: 'lane' drives the scenes instead of the policies. control: 'none',
 'permuted' or 'untrained'. batch: pairs that are run at once. cases_file: a CSV file for every run. replay, case, cameras: as
 in probe_removal(); a case is a pair, by default that of the example's figure. Returns a dict, that of the command's summary.json
-(docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
+(docs/explanation/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
 }
 
 void bind_session(py::module_& module) {

@@ -33,7 +33,8 @@ struct Rig {
 /// stretch, or, with square_pixels, the horizontal one alone. Throws unless both sizes are in [1, 8192].
 Rig paper_rig(int width_px = 96, int height_px = 54, bool square_pixels = false);
 
-/// Reads a rig from a TOML file (docs/image.md shows one). Throws Error naming the file, the camera and the key.
+/// Reads a rig from a TOML file (docs/explanation/image.md shows one). Throws Error naming the file, the camera and the
+/// key.
 Rig load_rig(const std::string& path);
 
 /// Throws Error unless the rig has 1 to 64 cameras with sizes in [1, 8192] px, positive focal lengths and finite poses.

@@ -36,7 +36,7 @@ constexpr CameraRandomization kMaxCameraRandomization{.rotation_deg = 45,
                                                       .dead_probability = 1,
                                                       .dropped_probability = 1};
 
-/// Severity 1 of evaluations (docs/cameras.md says why these numbers).
+/// Severity 1 of evaluations (docs/explanation/cameras.md says why these numbers).
 constexpr CameraRandomization kFullCameraSeverity{.rotation_deg = 6,
                                                   .shift_m = 0.2,
                                                   .focal_share = 0.1,

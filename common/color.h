@@ -1,5 +1,6 @@
 // The palette: one base colour per kind of primitive (per face for agents), and the range at which all have faded to
-// black. Vehicles take RAP's colours (vita-epfl/RAP, renderer.py); the other hues are ours, see docs/image.md.
+// black. Vehicles take RAP's colours (vita-epfl/RAP, renderer.py); the other hues are ours, see
+// docs/explanation/image.md.
 #pragma once
 
 #include "pictura/common/portable/hd.h"

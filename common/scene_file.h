@@ -1,5 +1,5 @@
-// A scene in one TOML file: boxes, lines, walls, lights, a rig and views; docs/scene_file.md documents every key. What
-// `pictura render` and the golden tests draw, and what a report of a wrong image should carry.
+// A scene in one TOML file: boxes, lines, walls, lights, a rig and views; docs/reference/scene_file.md documents every
+// key. What `pictura render` and the golden tests draw, and what a report of a wrong image should carry.
 #pragma once
 
 #include <string>

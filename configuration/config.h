@@ -1,5 +1,5 @@
 // The one configuration of training and evaluation: what it may say, its defaults (the paper's tables), its reading and
-// its writing. A header a section. docs/configuration.md explains every key; configs/*.toml are examples.
+// its writing. A header a section. docs/reference/configuration.md explains every key; configs/*.toml are examples.
 #pragma once
 
 #include <string>

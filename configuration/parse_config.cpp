@@ -272,7 +272,7 @@ class Reader {
       if (each.substr(each.rfind('.') + 1) == last) return fmt::format("; did you mean '{}'?", each);
     }
     const std::string nearest = suggestion(key, known);
-    return nearest.empty() ? "; docs/configuration.md names every key" : nearest;
+    return nearest.empty() ? "; docs/reference/configuration.md names every key" : nearest;
   }
 
   const toml::table& table_;

@@ -31,7 +31,7 @@ struct PolicySection {
   std::string backbone = "conv";
   bool backbone_frozen = true;  // the program's weights stay as they are
   int backbone_layers = 4, backbone_width = 512;
-  bool layer_norm = false;  // layers of groups and trunk are normalized, see docs/network.md
+  bool layer_norm = false;  // layers of groups and trunk are normalized, see docs/explanation/network.md
   bool residual = false;    // every layer of the trunk but the first adds its input
   int decision_steps = 1;   // steps for which an action is held, at most kMaxDecisionSteps, see policy/decision_clock.h
 };

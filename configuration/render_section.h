@@ -12,7 +12,7 @@ namespace pictura {
 struct RenderSection {
   std::string backend = "auto";       // as make_renderer takes it
   PixelSamples samples;               // of gl; the others compute exact coverage
-  std::string rig;                    // a rig file (docs/image.md)
+  std::string rig;                    // a rig file (docs/explanation/image.md)
   int width_px = 96, height_px = 54;  // without one: of each camera of the paper's rig
   /// Other sizes, each from so many agent-steps of the run on, in ascending order; not with a rig file. Where
   /// patch_px is not 0, policy.patch_px and line_floor_px are these from then on, and the first convolution is spread

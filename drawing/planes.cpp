@@ -10,7 +10,7 @@ namespace pictura {
 
 namespace {
 
-// By class of docs/image.md, from 0 (nothing).
+// By class of docs/explanation/image.md, from 0 (nothing).
 constexpr Rgb kClassColors[] = {{},
                                 agent_color(AgentClass::vehicle, BoxFace::right),
                                 agent_color(AgentClass::cyclist, BoxFace::front),

@@ -13,7 +13,8 @@ enum class Plane { depth, class_id, instance_id };
 Plane plane_by_name(const std::string& name);
 
 /// A plane of one image, black where nothing is. Depth: grey 255 x (1 - depth / 120 m), at least 1. Class: the colour
-/// of the object's kind in docs/image.md (vehicles: their right side's). Instance: a hue per agent, black elsewhere.
+/// of the object's kind in docs/explanation/image.md (vehicles: their right side's). Instance: a hue per agent, black
+/// elsewhere.
 RgbImage plane_picture(const HostImages& images, int view, int camera, Plane plane);
 
 }  // namespace pictura

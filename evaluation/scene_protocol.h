@@ -11,7 +11,7 @@
 
 namespace pictura {
 
-/// What the settings of a protocol can be: docs/evaluation.md "Protocols" says what they are.
+/// What the settings of a protocol can be: docs/explanation/evaluation.md "Protocols" says what they are.
 enum class Overlapping : uint8_t { replay, drive };
 enum class Others : uint8_t { replay, absent };
 enum class Late : uint8_t { replay, drive, absent };
@@ -19,7 +19,7 @@ enum class RecordEnd : uint8_t { stand, vanish };
 enum class Waypoints : uint8_t { goal, path };
 
 /// Who is driven in a recorded scene, where to, and what happens to them. The values here are the paper's (zero-shot
-/// evaluation, appendix B), and ours where it is silent; docs/evaluation.md says which.
+/// evaluation, appendix B), and ours where it is silent; docs/explanation/evaluation.md says which.
 struct SceneProtocol {
   std::string name = "womd";
   std::string control = "self,vehicles";  // tracks_named() of the scene

@@ -17,7 +17,7 @@ constexpr size_t kMaxWrittenImageBytes = 7'500'000;
 void write_replay(const std::string& path, const Replay& replay);
 
 /// The header, and the bytes of the section that it lists, in base64 of a zlib stream: what a page that is told of a
-/// replay reads (docs/replay.md).
+/// replay reads (docs/reference/replay.md).
 struct ReplayText {
   nlohmann::ordered_json header;
   std::string data;
@@ -27,7 +27,8 @@ ReplayText replay_text(const Replay& replay);
 /// Reads what write_replay() wrote. Throws Error naming the path and what is damaged or missing.
 Replay read_replay(const std::string& path);
 
-/// What stands in a page before its numbers: origin, metrics and sizes, see docs/replay.md. Throws as read_replay().
+/// What stands in a page before its numbers: origin, metrics and sizes, see docs/reference/replay.md. Throws as
+/// read_replay().
 nlohmann::ordered_json read_replay_header(const std::string& path);
 
 }  // namespace pictura

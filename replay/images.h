@@ -1,6 +1,6 @@
 // The images of a replay, without loss. A pixel is mostly that to its left, above it, or in the image before; where it
 // is none of them, its colour is mostly one of few hues at some brightness. Which of it holds is written by an adaptive
-// arithmetic coder, as docs/replay.md defines it. A group of frames needs no other to be read.
+// arithmetic coder, as docs/reference/replay.md defines it. A group of frames needs no other to be read.
 #pragma once
 
 #include <cstdint>

@@ -8,8 +8,8 @@
 
 namespace pictura {
 
-/// Writes the file, whole or not at all; docs/replay.md lists its topics. Time begins at 0. Throws Error naming the
-/// path.
+/// Writes the file, whole or not at all; docs/reference/replay.md lists its topics. Time begins at 0. Throws Error
+/// naming the path.
 void write_mcap(const std::string& path, const Replay& replay);
 
 }  // namespace pictura

@@ -1,5 +1,6 @@
 // A replay: what happened in one world over many steps, in whole units (1 cm, 0.1 degree), so that it is written and
-// read without loss. A frame is a state; a step leads from each frame to the next. docs/replay.md describes the file.
+// read without loss. A frame is a state; a step leads from each frame to the next. docs/reference/replay.md describes
+// the file.
 #pragma once
 
 #include <array>
@@ -123,7 +124,7 @@ struct ReplayShape {
 using ReplayHue = std::array<uint8_t, 3>;
 using ReplayPoint = std::array<int32_t, 3>;  // x, y, z in cm
 
-/// What cameras see of the map, see docs/image.md. Lines are painted on the road from point to point, as
+/// What cameras see of the map, see docs/explanation/image.md. Lines are painted on the road from point to point, as
 /// append_strips() makes strips of them, and stand in the order of the map's strips.
 struct ReplayLine {
   StripKind kind = StripKind::lane_mark;

@@ -1,5 +1,5 @@
-// Sizes of the observation (paper, table of the policy architecture) and where it lies. docs/observation.md defines
-// every slot, its unit and its scale.
+// Sizes of the observation (paper, table of the policy architecture) and where it lies. docs/reference/observation.md
+// defines every slot, its unit and its scale.
 #pragma once
 
 #include "pictura/common/span.h"
@@ -27,15 +27,15 @@ enum class ObservationPart : uint8_t { own, sets, walls };
 // X(name, type, rows, features, part, comment): the arrays of an observation, [slots, rows, features]. Everything that
 // knows them comes from this list: their layout here and in executors, observation_arrays(), and what readers of
 // observations make of those, as schemas and encoders.
-#define PICTURA_OBSERVATION_ARRAYS(X)                                                                  \
-  X(ego, float, 1, kEgoFeatures, ObservationPart::own, "")                                             \
-  X(partners, float, kMaxPartners, kPartnerFeatures, ObservationPart::sets, "")                        \
-  X(lanes, float, kMaxLanes, kLaneFeatures, ObservationPart::sets, "")                                 \
-  X(boundaries, float, kMaxBoundaries, kBoundaryFeatures, ObservationPart::sets, "")                   \
-  X(controls, float, kMaxControls, kControlFeatures, ObservationPart::sets, "")                        \
-  X(walls, float, kMaxWalls, kWallFeatures, ObservationPart::walls, "")                                \
-  X(set_counts, int32_t, 1, kNumEntitySets, ObservationPart::sets, "filled rows of each EntitySet")    \
-  X(conditioning, float, 1, kNumConditioning, ObservationPart::own, "scaled; see docs/observation.md") \
+#define PICTURA_OBSERVATION_ARRAYS(X)                                                                            \
+  X(ego, float, 1, kEgoFeatures, ObservationPart::own, "")                                                       \
+  X(partners, float, kMaxPartners, kPartnerFeatures, ObservationPart::sets, "")                                  \
+  X(lanes, float, kMaxLanes, kLaneFeatures, ObservationPart::sets, "")                                           \
+  X(boundaries, float, kMaxBoundaries, kBoundaryFeatures, ObservationPart::sets, "")                             \
+  X(controls, float, kMaxControls, kControlFeatures, ObservationPart::sets, "")                                  \
+  X(walls, float, kMaxWalls, kWallFeatures, ObservationPart::walls, "")                                          \
+  X(set_counts, int32_t, 1, kNumEntitySets, ObservationPart::sets, "filled rows of each EntitySet")              \
+  X(conditioning, float, 1, kNumConditioning, ObservationPart::own, "scaled; see docs/reference/observation.md") \
   X(waypoints, float, kNumWaypoints, kWaypointFeatures, ObservationPart::own, "ego frame")
 
 /// Observations of all slots; entity sets are padded with zeros up to their counts, and empty where they are not

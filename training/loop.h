@@ -44,7 +44,7 @@ enum class OldRun {
 };
 
 struct TrainOptions {
-  std::string config_path;             // TOML, see docs/configuration.md for every key
+  std::string config_path;             // TOML, see docs/reference/configuration.md for every key
   std::vector<std::string> overrides;  // "train.updates=2"
   std::string out_folder;
   OldRun old_run = OldRun::refuse;

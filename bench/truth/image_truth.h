@@ -1,7 +1,7 @@
 // The reference that renderers are measured against: a small ray caster in double precision. Every pixel is the box
 // filter of the nearest drawn primitive, by point samples. It shares with the renderers the colours, the brightness,
-// the outlines and ranks of strips and the constants of docs/image.md, but not widening, clipping, projection, coverage
-// or visibility.
+// the outlines and ranks of strips and the constants of docs/explanation/image.md, but not widening, clipping,
+// projection, coverage or visibility.
 #pragma once
 
 #include <vector>

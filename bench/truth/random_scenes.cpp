@@ -135,7 +135,8 @@ RandomScene make_intersecting_walls(Maker m) {
   return m.finish({0, 0, 1.5f}, m.between(-0.4f, 0.4f), 0, 0.35f);
 }
 
-// Without solids: of a strip and a solid that intersect within a pixel one is in front in all of it (docs/image.md).
+// Without solids: of a strip and a solid that intersect within a pixel one is in front in all of it
+// (docs/explanation/image.md).
 RandomScene make_wide_strips(Maker m) {
   for (int i = 0; i < 7; ++i) {
     const float x = m.between(3, 70), y = m.between(-12, 12), turn = m.between(0, kPi);

@@ -6,7 +6,7 @@ import re
 
 _HOW = (
     "with torch 2.9 or later installed, pip install --no-build-isolation -Ccmake.define.PICTURA_WITH_TORCH=ON . from a checkout"
-    " (docs/python.md)"
+    " (docs/reference/python.md)"
 )
 
 

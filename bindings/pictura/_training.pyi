@@ -64,7 +64,7 @@ def evaluate(checkpoint: str, maps: collections.abc.Sequence[str], *, controller
     device, simulator, renderer: 'auto' or names; renderer '': as it was trained. rig, or width_px and height_px: other cameras.
     backbone: where the program of policy.backbone lies now. conditioning: numbers by name. light_cycles: 'phases' or 'independent',
     light_heads: 'as_mapped' or 'visible'; '': as it was trained. average: with the average of weights that the checkpoint holds. camera_severity: of
-    randomized cameras, 0 to 2 (docs/cameras.md). decision_steps: for which an
+    randomized cameras, 0 to 2 (docs/explanation/cameras.md). decision_steps: for which an
     action is held; 0: as it was trained. others: who else drives, as {'lane': 0.3, 'other.safetensors': 0.2}:
     policies or controllers, and their shares of vehicles; 'blind', 'phantom_braking' and 'inattentive': shares of agents that the policy drives while impaired. on_progress: called with the fraction that is done and the seconds to come, from a thread of its own. Returns a dict: rows, one a density and driver (None: whom it measures): its counts, and each metric as (value, half of its 95 % interval); seconds,
     agent_steps, policy_hash, light_cycles, others. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.
@@ -75,7 +75,7 @@ def evaluate_scenes(checkpoint: str, scenes: collections.abc.Sequence[str], *, p
     
     checkpoint: of a policy; '' with a controller: 'log', 'inverse', 'idm', 'idm_lanes', 'random' or 'idle', which drives
     instead. scenes: files, folders, 'FILE#K'. protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3', 'waymax' or 'simagents'; control, start_step, steps,
-    densities (shares of road users that stay) and rules (values by name, docs/evaluation.md) replace what it says.
+    densities (shares of road users that stay) and rules (values by name, docs/explanation/evaluation.md) replace what it says.
     first_scene, num_scenes: a part of the scenes; 0: all from the first on. rollouts: a file for them, with the protocol
     'simagents', as the Waymo sim-agents challenge takes them. The others as in evaluate(). Returns a dict: rows, one a
     density, with each metric as (value, half of its 95 % interval); agents, one for every driven road user of a scene, density and rollout;
@@ -92,7 +92,7 @@ def probe_corner(policies: collections.abc.Sequence[str], maps: collections.abc.
     user_range_m: how far before the junction that one may be. driver: 'lane' drives the scenes instead of the policies. control: 'none',
     'permuted' or 'untrained'. batch: pairs that are run at once. cases_file: a CSV file for every run. replay, case, cameras: as
     in probe_removal(); a case is a pair, by default that of the example's figure. Returns a dict, that of the command's summary.json
-    (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.
+    (docs/explanation/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.
     """
 def probe_pedestrian(policies: collections.abc.Sequence[str], maps: collections.abc.Sequence[str], *, agents_per_world: typing.SupportsInt | typing.SupportsIndex = 0, steps: typing.SupportsInt | typing.SupportsIndex = 600, density: str = 'medium', scenes: typing.SupportsInt | typing.SupportsIndex = 0, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, sample_steps: typing.SupportsInt | typing.SupportsIndex = 10, batch: typing.SupportsInt | typing.SupportsIndex = 4096, paths: typing.SupportsInt | typing.SupportsIndex = 32, hider_range_m: typing.SupportsFloat | typing.SupportsIndex = 30.0, min_speed_mps: typing.SupportsFloat | typing.SupportsIndex = 1.0, height_m: typing.SupportsFloat | typing.SupportsIndex = 1.2000000476837158, control: str = 'none', argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, backbone: str = '', conditioning: dict = {}, average: bool = False, decision_steps: typing.SupportsInt | typing.SupportsIndex = 0, camera_severity: typing.SupportsFloat | typing.SupportsIndex = 0.0, light_cycles: str = '', light_heads: str = '', cases_file: str = '', replay: str = '', case: typing.SupportsInt | typing.SupportsIndex | None = None, cameras: bool = False, on_progress: typing.Any = None) -> typing.Any:
     """
@@ -102,7 +102,7 @@ def probe_pedestrian(policies: collections.abc.Sequence[str], maps: collections.
     policies, maps, density, agents_per_world, scenes, steps, sample_steps, batch and what follows argmax: as in probe_removal().
     paths: in all, each through one state. hider_range_m: how far away the vehicle may be that a path begins behind. min_speed_mps:
     of the ego, forwards. height_m: of the pedestrian. control: 'none', 'nobody' or 'untrained'. cases_file: a CSV file for every place of every path. replay, case, cameras: as in probe_removal(). Returns a dict, that of
-    the command's summary.json (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad
+    the command's summary.json (docs/explanation/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad
     input.
     """
 def probe_removal(policies: collections.abc.Sequence[str], maps: collections.abc.Sequence[str], *, agents_per_world: typing.SupportsInt | typing.SupportsIndex = 0, steps: typing.SupportsInt | typing.SupportsIndex = 600, density: str = 'medium', scenes: typing.SupportsInt | typing.SupportsIndex = 0, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, sample_steps: typing.SupportsInt | typing.SupportsIndex = 10, batch: typing.SupportsInt | typing.SupportsIndex = 4096, removals: typing.SupportsInt | typing.SupportsIndex = 88000, range_m: typing.SupportsFloat | typing.SupportsIndex = 50.0, control: str = 'none', argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, backbone: str = '', conditioning: dict = {}, average: bool = False, decision_steps: typing.SupportsInt | typing.SupportsIndex = 0, camera_severity: typing.SupportsFloat | typing.SupportsIndex = 0.0, light_cycles: str = '', light_heads: str = '', cases_file: str = '', replay: str = '', case: typing.SupportsInt | typing.SupportsIndex | None = None, cameras: bool = False, on_progress: typing.Any = None) -> typing.Any:
@@ -113,15 +113,15 @@ def probe_removal(policies: collections.abc.Sequence[str], maps: collections.abc
     argmax: as in evaluate(). scenes: how many scenarios are driven, an equal share by each policy; 0: as many on each map for each
     policy, two a map or more. removals: in all. sample_steps: between states. range_m: how far away a user may be. control: 'none',
     'nobody', 'permuted' or 'untrained'. batch: cases in a call. cases_file: a CSV file for every case. replay: a page *.html that plays the scene of one case and shows
-    its images with and without the road user (docs/replay.md); case: its number in cases_file, by default the one where the first
+    its images with and without the road user (docs/reference/replay.md); case: its number in cases_file, by default the one where the first
     policy's value changes most; cameras: keeps the ego's images of every step. Returns a dict, that of the command's
-    summary.json (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.
+    summary.json (docs/explanation/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.
     """
 def train(config: str, out: str, *, overrides: collections.abc.Sequence[str] = [], old_run: str = 'refuse', init_from: str = '', minutes: typing.SupportsFloat | typing.SupportsIndex = 0.0, on_progress: typing.Any = None, on_notice: typing.Any = None) -> dict:
     """
     Trains by self-play as `pictura train` does, and writes the same files into the folder `out`.
     
-    config: a TOML file (docs/configuration.md). overrides: 'train.updates=2'. old_run: of a run that lies in `out`, 'refuse', 'resume'
+    config: a TOML file (docs/reference/configuration.md). overrides: 'train.updates=2'. old_run: of a run that lies in `out`, 'refuse', 'resume'
     or 'overwrite'. init_from: a checkpoint whose weights it begins with. minutes: of wall time; 0: no limit. on_progress: called
     after every update with a dict: update, updates, agent_steps, agent_steps_per_s, episode_return, eta_s, scalars (those of
     progress.csv). on_notice: called with a text. They are called from a thread of training's own, and what they raise ends it.

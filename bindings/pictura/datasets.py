@@ -101,7 +101,7 @@ _LANE_TYPES = {
 _LIGHTS = {"TRAFFIC_LIGHT_GREEN": "go", "TRAFFIC_LIGHT_RED": "stop", "TRAFFIC_LIGHT_YELLOW": "caution"}
 _OUTLINE = re.compile(r"boundary_\d+")  # how nuScenes' and nuPlan's converters call the outlines of what is drivable
 _MAX_OUTLINE_WORK, _NEAR_M = 100_000_000, 50.0
-_MIN_HALF_WIDTH_M, _MAX_HALF_WIDTH_M = 0.5, 5.0  # as docs/scenario.md says of borders
+_MIN_HALF_WIDTH_M, _MAX_HALF_WIDTH_M = 0.5, 5.0  # as docs/reference/scenario.md says of borders
 
 
 class _Fault(Exception):

@@ -1,4 +1,4 @@
-"""Policies of the library as torch modules. docs/network.md states the arithmetic.
+"""Policies of the library as torch modules. docs/explanation/network.md states the arithmetic.
 
 load_policy() reads the weights that training writes (policy.safetensors) or a checkpoint; save_policy() writes them back, so
 that weights trained in Python run in the `pictura` command; export_onnx() writes a policy for ONNX Runtime and others.
@@ -86,7 +86,7 @@ class _Attention(nn.Module):
     """Learned queries of each camera, which ask the tokens of its feature map.
 
     Queries are the same for all images, so they ask tokens and not keys, q (W t) = (q W) t, and values are made of weighted
-    sums of tokens (docs/network.md): neither keys nor values are computed for each token.
+    sums of tokens (docs/explanation/network.md): neither keys nor values are computed for each token.
     """
 
     def __init__(self, cameras: int, queries: int, width: int, heads: int, mlp: int) -> None:
@@ -128,7 +128,7 @@ class Policy(nn.Module):
     observation: float32 tensors by the names of pictura.Simulator.observations, [batch, ...] on the module's device: `ego`,
     `conditioning` and `waypoints`; for the vector policy the entity sets and `set_counts`; for the perspective one `rgb` uint8
     [batch, cameras, 3, height, width], or a list of such for cameras of several sizes in the order of the rig.
-    Arrays that are NumPy's become tensors first. config: the `policy` table of a configuration (docs/configuration.md). walls: of
+    Arrays that are NumPy's become tensors first. config: the `policy` table of a configuration (docs/reference/configuration.md). walls: of
     the vector policy, whether it reads them. metadata: of a policy that load_policy() read, what its file says beside the weights:
     `path`, `config` (the whole configuration of its training), `schema`, `rig`, `update` and `agent_steps` among others; else empty.
     Raises pictura.UsageError where an observation is not what the policy was trained to read.

@@ -76,7 +76,7 @@ class TomlFields {
   std::vector<std::string> known_;
 };
 
-/// The rig of the [[camera]] tables (docs/image.md); it has no cameras where there are none.
+/// The rig of the [[camera]] tables (docs/explanation/image.md); it has no cameras where there are none.
 Rig read_cameras(TomlFields* fields_inout);
 
 }  // namespace pictura

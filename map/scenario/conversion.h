@@ -1,5 +1,5 @@
 // The stages of make_scenario(), in the order in which they run. Each fills its own parts of the scenario and may read
-// those of earlier stages. The rules are those of docs/scenario.md.
+// those of earlier stages. The rules are those of docs/reference/scenario.md.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,6 @@
 // Scenario: a recorded piece of traffic, whatever the file format: a map, the tracks of all road users, and the lights
-// as they were recorded. Positions are in the coordinates of its map; docs/scenario.md says how each part is derived.
+// as they were recorded. Positions are in the coordinates of its map; docs/reference/scenario.md says how each part is
+// derived.
 #pragma once
 
 #include <cstdint>

@@ -164,7 +164,7 @@ class Decoder {
           state = static_cast<RecordedLightState>(number);
         });
       }
-      // The stop point is that of the lane's start (docs/scenario.md).
+      // The stop point is that of the lane's start (docs/reference/scenario.md).
       if (fields.field() == 3) within("stop_point", [&] { decode_point(fields.bytes()); });
     }
     signals_[lane].emplace_back(static_cast<int32_t>(num_signal_steps_), state);

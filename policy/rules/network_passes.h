@@ -32,7 +32,8 @@ struct PatchSize {
   PICTURA_HD int64_t columns() const { return (width_px + patch_px - 1) / patch_px; }
 };
 
-/// Where a segment's row (docs/observation.md) holds what features are made of, after the x and y of its middle.
+/// Where a segment's row (docs/reference/observation.md) holds what features are made of, after the x and y of its
+/// middle.
 struct SegmentColumn {
   static constexpr int kCos = 4, kSin = 5;  // of its direction
 };

@@ -1,5 +1,5 @@
 // What the cameras of any agent see at any step, drawn by WebGL2: a twin of the renderer for images that the file does not
-// hold. docs/image.md has the rules, backend_gl/ the same for OpenGL; pixels are means of up to 8x8 samples.
+// hold. docs/explanation/image.md has the rules, backend_gl/ the same for OpenGL; pixels are means of up to 8x8 samples.
 
 const NEAR_M = 0.1, RANGE_M = 120, MAX_PIECE_M = 10, MAX_MITRE = 4, LIGHT_RADIUS_M = 0.5, LIGHT_SIDES = 24, RIG_BODY_M = 4.5;
 const STRIP_RANKS = [2, 3, 1, 0];  // lane mark, road edge, crosswalk, stop line: the lowest lies on the others

@@ -1,4 +1,4 @@
-// Reading the page's own elements: the header, and the numbers of docs/replay.md.
+// Reading the page's own elements: the header, and the numbers of docs/reference/replay.md.
 
 class Damaged extends Error {}
 

@@ -1,4 +1,4 @@
-// Images without loss, by an adaptive arithmetic coder: the twin of replay/images.cpp, see docs/replay.md.
+// Images without loss, by an adaptive arithmetic coder: the twin of replay/images.cpp, see docs/reference/replay.md.
 
 const SHIFTS = [1, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 5];
 

@@ -1,5 +1,6 @@
 // The ego frame in which an agent observes (x forward, y left, at the reference point), the scales of what it observes
-// there and what of the map is in sight. docs/observation.md is the table of scales; the constants here are its source.
+// there and what of the map is in sight. docs/reference/observation.md is the table of scales; the constants here are
+// its source.
 #pragma once
 
 #include "pictura/simulator/rules/map_view.h"

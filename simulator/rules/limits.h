@@ -1,5 +1,6 @@
-// What each class of agent can do and how big it is; docs/simulator.md prints this table. Vehicle limits are those of
-// the jerk model (reference implementation of the paper's dynamics); those of cyclists and pedestrians are ours.
+// What each class of agent can do and how big it is; docs/explanation/simulator.md prints this table. Vehicle limits
+// are those of the jerk model (reference implementation of the paper's dynamics); those of cyclists and pedestrians are
+// ours.
 #pragma once
 
 #include "pictura/common/color.h"

@@ -1,5 +1,5 @@
 // What an agent observes, in its own frame (ego_frame.h) and scaled to about [-1, 1]: the table of slots in
-// docs/observation.md.
+// docs/reference/observation.md.
 #pragma once
 
 #include "pictura/common/portable/async_copy.h"

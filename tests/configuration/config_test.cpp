@@ -48,7 +48,7 @@ TEST(Config, PaperFileSaysNothingElseThanTheDefaults) {
 
 // Rows are "| `key` | default | values | meaning |"; the first three come from the list of keys.
 TEST(Config, TheDocumentNamesEveryKeyWithItsDefaultAndRangeAndNoOther) {
-  const std::string document = read_file(PICTURA_SOURCE_DIR "/docs/configuration.md");
+  const std::string document = read_file(PICTURA_SOURCE_DIR "/docs/reference/configuration.md");
   size_t rows = 0;
   for (const ConfigKey& key : config_keys()) {
     EXPECT_THAT(document, HasSubstr(fmt::format("\n| `{}` | `{}` | {} | ", key.key, key.default_value, key.values)));
@@ -56,7 +56,7 @@ TEST(Config, TheDocumentNamesEveryKeyWithItsDefaultAndRangeAndNoOther) {
   }
   size_t written = 0;
   for (size_t at = document.find("\n| `"); at != std::string::npos; at = document.find("\n| `", at + 1)) ++written;
-  EXPECT_EQ(written, rows) << "docs/configuration.md has rows of keys that no configuration has";
+  EXPECT_EQ(written, rows) << "docs/reference/configuration.md has rows of keys that no configuration has";
 }
 
 TEST(Config, NumbersMayBeWrittenInAnyDecimalNotation) {
@@ -78,7 +78,7 @@ TEST(Config, UnknownKeysSuggestTheNearest) {
   EXPECT_THAT(error_in("", {"train.updats=1"}), HasSubstr("did you mean 'train.updates'?"));
   EXPECT_THAT(error_in("", {"train.precision=bf61"}), HasSubstr("got 'bf61'; did you mean 'bf16'?"));
   EXPECT_EQ(error_in("", {"trian.updates=1"}), "--set trian.updates: unknown key; did you mean 'train.updates'?");
-  EXPECT_THAT(error_in("", {"train.zebra=1"}), HasSubstr("docs/configuration.md names every key"));
+  EXPECT_THAT(error_in("", {"train.zebra=1"}), HasSubstr("docs/reference/configuration.md names every key"));
 }
 
 TEST(Config, KeysCanBeUnsetAndARigReplacesTheSizesOfTheFile) {

@@ -1,4 +1,4 @@
-"""docs/commands.md: the help of every command, as `pictura --help` prints it.
+"""docs/reference/commands.md: the help of every command, as `pictura --help` prints it.
 
     python3 tests/docs/commands.py PICTURA            writes it
     python3 tests/docs/commands.py PICTURA --check    says where it differs
@@ -11,7 +11,7 @@ import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs/commands.md"
+PAGE = ROOT / "docs/reference/commands.md"
 CLI11 = [2, 1]  # Debian 12's
 HEAD = """# Commands
 What `pictura COMMAND --help` prints, written by `scripts/docs --update` and compared by a test. Defaults stand after `=`, ranges
@@ -64,7 +64,7 @@ def main():
         PAGE.write_text(made)
         return 0
     before = PAGE.read_text()
-    sys.stdout.writelines(difflib.unified_diff(before.splitlines(True), made.splitlines(True), "docs/commands.md", "pictura --help"))
+    sys.stdout.writelines(difflib.unified_diff(before.splitlines(True), made.splitlines(True), "docs/reference/commands.md", "pictura --help"))
     return int(before != made)
 
 

@@ -108,7 +108,7 @@ class Documents(unittest.TestCase):
         self.assertGreater(count, 40)
 
     def test_keys_that_documents_set_are_keys(self):
-        known = set(re.findall(r"^\| `([\w.]+)`", (ROOT / "docs/configuration.md").read_text(), re.MULTILINE))
+        known = set(re.findall(r"^\| `([\w.]+)`", (ROOT / "docs/reference/configuration.md").read_text(), re.MULTILINE))
         count = 0
         for path in documents():
             if path.name == "CHANGELOG.md":

@@ -19,7 +19,7 @@ from documents_test import command_lines
 PICTURA = ""
 ROOT = commands.ROOT
 PAGES = [ROOT / "README.md"] + [ROOT / f"docs/tutorials/{name}.md" for name in ("first_run", "gpu", "reward", "rig", "map", "look", "probe")]
-PAGES += [ROOT / "docs/evaluation.md", ROOT / "docs/training.md"]
+PAGES += [ROOT / "docs/explanation/evaluation.md", ROOT / "docs/explanation/training.md"]
 # Of what takes long, less.
 AT_MOST = {"--steps": 20, "--agents": 8, "--scenarios": 2, "--episodes": 1, "--follow": 3, "--egos": 8, "--slots": 32, "--removals": 20, "--paths": 1}
 # What a page in a browser waits for has tests of its own (tests/replay/live_test.py).

@@ -1,4 +1,4 @@
-"""Checks that docs/package.md shows the consumer that tests build, letter for letter.
+"""Checks that docs/how-to/cpp_library.md shows the consumer that tests build, letter for letter.
 
 Usage: check_documents.py REPOSITORY. Prints what differs and exits with 1 if anything does.
 """
@@ -7,12 +7,12 @@ import pathlib
 import sys
 
 root = pathlib.Path(sys.argv[1])
-document = (root / "docs/package.md").read_text()
+document = (root / "docs/how-to/cpp_library.md").read_text()
 missing = [
     name
     for name, language in [("CMakeLists.txt", "cmake"), ("main.cpp", "cpp")]
     if f"```{language}\n{(root / 'tests/install/consumer' / name).read_text()}```\n" not in document
 ]
 for name in missing:
-    print(f"docs/package.md: expected the text of tests/install/consumer/{name} in a block")
+    print(f"docs/how-to/cpp_library.md: expected the text of tests/install/consumer/{name} in a block")
 sys.exit(bool(missing))

@@ -1,4 +1,4 @@
-// Small files of the kinds that other tools write, and the table of them in docs/map_cases.md.
+// Small files of the kinds that other tools write, and the table of them in docs/reference/map_cases.md.
 #include <string>
 #include <vector>
 
@@ -52,7 +52,7 @@ TEST(OpenDriveCases, ThePageSaysWhatIsMadeOfEachFile) {
                          map.facts.driving_lane_km, use.endless, use.open, done.empty() ? "read without a word" : done);
   }
   const std::string docs = read_file(PICTURA_MAP_CASES_DOCS);
-  EXPECT_TRUE(docs.find(table) != std::string::npos) << "expected in docs/map_cases.md:\n" << table;
+  EXPECT_TRUE(docs.find(table) != std::string::npos) << "expected in docs/reference/map_cases.md:\n" << table;
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // Small files that each break one of ASAM's rules for OpenDRIVE, and the table of what the importer makes of them in
-// docs/opendrive.md. A rule's id names the version of the standard since which it holds.
+// docs/reference/opendrive.md. A rule's id names the version of the standard since which it holds.
 #include <string>
 #include <vector>
 
@@ -171,7 +171,7 @@ TEST(OpenDriveConformance, TheTableSaysWhatIsMadeOfFilesThatBreakARule) {
     table += fmt::format("| {} | {} | {} |\n", rule.id, rule.file, made_of(rule.text));
   }
   const std::string docs = read_file(PICTURA_OPENDRIVE_DOCS);
-  EXPECT_TRUE(docs.find(table) != std::string::npos) << "expected in docs/opendrive.md:\n" << table;
+  EXPECT_TRUE(docs.find(table) != std::string::npos) << "expected in docs/reference/opendrive.md:\n" << table;
 }
 
 }  // namespace

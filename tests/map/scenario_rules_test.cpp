@@ -1,4 +1,4 @@
-// The rules by which a scenario is made of a recording, each where it decides: docs/scenario.md lists them.
+// The rules by which a scenario is made of a recording, each where it decides: docs/reference/scenario.md lists them.
 #include <cmath>
 #include <filesystem>
 #include <numbers>

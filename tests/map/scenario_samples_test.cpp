@@ -1,4 +1,5 @@
-// Scenes of others, where they are at hand: what docs/scenario.md and the formats' own pages say of them is read.
+// Scenes of others, where they are at hand: what docs/reference/scenario.md and the formats' own pages say of them is
+// read.
 #include <cstdlib>
 #include <filesystem>
 #include <string>

@@ -1,4 +1,4 @@
-"""docs/python.md: its tables name what there is, and its code runs."""
+"""docs/reference/python.md: its tables name what there is, and its code runs."""
 
 import importlib.util
 import pathlib
@@ -8,7 +8,7 @@ import numpy as np
 
 import pictura
 
-TEXT = (pathlib.Path(__file__).parents[2] / "docs" / "python.md").read_text()
+TEXT = (pathlib.Path(__file__).parents[2] / "docs/reference/python.md").read_text()
 
 
 def test_the_tables_name_every_observation_and_info():
@@ -32,12 +32,12 @@ def test_the_five_minutes_run(tmp_path, monkeypatch):
     if importlib.util.find_spec("gymnasium") is None:
         blocks = [block for block in blocks if "make_vec" not in block and "gymnasium" not in block]
     for block in blocks:
-        exec(compile(block, "docs/python.md", "exec"), names)  # noqa: S102
+        exec(compile(block, "docs/reference/python.md", "exec"), names)  # noqa: S102
     assert (tmp_path / "drive.html").exists()
 
 
 def test_what_is_not_there_is_observed(make):
     (block,) = re.findall(r"```python\n(.*?)```", TEXT.split("### Of what is not there")[1].split("## Infos")[0], re.S)
     names: dict[str, object] = {"np": np, "pictura": pictura, "simulator": make(8)}
-    exec(compile(block, "docs/python.md", "exec"), names)  # noqa: S102
+    exec(compile(block, "docs/reference/python.md", "exec"), names)  # noqa: S102
     assert names["answers"]["partners"].shape == (3, 16, 8)

@@ -52,7 +52,7 @@ def png_pixels(png):
 
 
 class Recorded:
-    """A replay as this file reads it, by docs/replay.md alone."""
+    """A replay as this file reads it, by docs/reference/replay.md alone."""
 
     def __init__(self, path):
         page = pathlib.Path(path).read_text()

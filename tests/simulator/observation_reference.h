@@ -1,6 +1,6 @@
-// The observation written a second time, from docs/observation.md: one number after the other, in double, over all
-// boxes, lines and pieces of a world. It shares no code with the simulator's rules, which both executors run, so that a
-// comparison of executors cannot show a fault in them.
+// The observation written a second time, from docs/reference/observation.md: one number after the other, in double,
+// over all boxes, lines and pieces of a world. It shares no code with the simulator's rules, which both executors run,
+// so that a comparison of executors cannot show a fault in them.
 #pragma once
 
 #include <array>

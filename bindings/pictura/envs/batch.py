@@ -215,7 +215,7 @@ class Batch:
         return self._state["status"] == STATUS_ACTIVE
 
     def info(self, copy: bool = True) -> dict[str, Any]:
-        """Of every slot after a step, by name; docs/python.md lists them. Views of the simulator's memory unless copied, but for
+        """Of every slot after a step, by name; docs/reference/python.md lists them. Views of the simulator's memory unless copied, but for
         "active"."""
         results = self._result_views
         names = ("events", "halt_reason", "goals_reached", "waypoints_reached", "episode_return", "agent_class")
