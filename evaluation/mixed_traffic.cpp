@@ -4,6 +4,8 @@
 #include <optional>
 #include <utility>
 
+#include <fmt/ranges.h>
+
 #include "pictura/backends/make_controller.h"
 #include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
