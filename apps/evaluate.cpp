@@ -6,6 +6,7 @@
 #include <map>
 
 #include "pictura/apps/commands.h"
+#include "pictura/apps/robust_evaluation.h"
 #include "pictura/apps/scene_evaluation.h"
 #include "pictura/cli/backend_options.h"
 #include "pictura/cli/evaluation_options.h"
@@ -21,6 +22,7 @@
 #include "pictura/evaluation/estimate_json.h"
 #include "pictura/evaluation/infractions.h"
 #include "pictura/evaluation/mixed_traffic.h"
+#include "pictura/evaluation/robust_protocol.h"
 #include "pictura/replay/gallery.h"
 #include "pictura/simulator/controllers/host_controllers.h"
 #include "pictura/simulator/simulator.h"
@@ -139,22 +141,8 @@ void print_table(const Reports& reports) {
 Json json_of(const EvaluateRow& row, double severity) {
   Json json = {{"density", row.density},
                {"driver", row.driver.empty() ? Json(nullptr) : Json(row.driver)},
-               {"camera_severity", severity},
-               {"scenarios", row.scenarios},
-               {"steps", row.steps},
-               {"asked", row.asked},
-               {"spawned", row.spawned},
-               {"entered", row.entered},
-               {"left", row.left},
-               {"vehicle_episodes", row.vehicle_episodes},
-               {"infractions", row.infractions},
-               {"km_driven", row.km_driven},
-               {"red_waits", row.red_waits}};
-  for (const auto& [name, estimate] : metrics_of(row)) add_estimate(name, estimate, &json);
-  add_estimate("at_fault_collisions_per_km", row.at_fault_collisions_per_km, &json);
-  add_estimate("off_road_per_km", row.off_road_per_km, &json);
-  add_estimate("red_lights_per_km", row.red_lights_per_km, &json);
-  add_estimate("goals_per_km", row.goals_per_km, &json);
+               {"camera_severity", severity}};
+  json.update(row_json(row));
   return json;
 }
 
@@ -365,6 +353,11 @@ void run_evaluate(const CLI::App& command, EvaluateArguments* arguments) {
     evaluation.width_px = pixels.first;
     evaluation.height_px = pixels.second;
   }
+  if (arguments->scenes.protocol == kRobustProtocol) {
+    if (command.count("--scenarios") > 0) parse_scenarios(arguments->scenarios, &evaluation);
+    check_driver(evaluation, /*has_parts=*/false, /*has_scenes=*/false);
+    return run_robust_evaluation(command, evaluation, arguments->json);
+  }
   refuse_idle_scene_options(command, arguments->scenes);
   const bool has_scenes = !arguments->scenes.protocol.empty();
   if (!has_scenes || command.count("--scenarios") > 0) parse_scenarios(arguments->scenarios, &evaluation);
@@ -466,6 +459,7 @@ void add_evaluate_command(CLI::App& app) {
       "  pictura evaluate run.ckpt --protocol womd --scenes validation/ --density 100,50 --csv agents.csv\n"
       "  pictura evaluate run.ckpt --density medium --scenarios 40 --others lane=0.3,idm_lanes=0.2\n"
       "  pictura evaluate run.ckpt --density medium --scenarios 40 --camera-severity 0,0.25,0.5,1\n"
+      "  pictura evaluate run.ckpt --protocol robust\n"
       "In parts, on several machines or after one another:\n"
       "  pictura evaluate run.ckpt --scenarios 0:100 --out a.json\n"
       "  pictura evaluate run.ckpt --scenarios 100:200 --out b.json\n"

@@ -12,6 +12,7 @@
 #include "pictura/common/support/numbers.h"
 #include "pictura/common/support/output_file.h"
 #include "pictura/evaluation/estimate_json.h"
+#include "pictura/evaluation/robust_protocol.h"
 #include "pictura/map/scenario/scenario.h"
 
 namespace pictura {
@@ -129,6 +130,8 @@ void print(const DriverOptions& options, const SceneEvaluation& evaluation, bool
 
 void add_scene_options(CLI::App* command, SceneArguments* arguments) {
   const std::vector<std::string> names = scene_protocol_names();
+  std::vector<std::string> protocols = names;
+  protocols.emplace_back(kRobustProtocol);
   std::vector<std::string> rules;
   for (const SceneRule& rule : scene_rules()) {
     rules.push_back(fmt::format("{} ({}): {}", rule.name, rule.values, rule.what));
@@ -136,9 +139,10 @@ void add_scene_options(CLI::App* command, SceneArguments* arguments) {
   command
       ->add_option("--protocol", arguments->protocol,
                    fmt::format("Evaluate in recorded scenes instead of on maps: womd, the paper's zero-shot protocol, "
-                               "or, with their settings, {}",
-                               fmt::join(names.begin() + 1, names.end(), ", ")))
-      ->check(one_of(names));
+                               "or, with their settings, {}; or {}: in generated towns, among others and with "
+                               "randomized cameras, all of it fixed, so that drivers can be compared",
+                               fmt::join(names.begin() + 1, names.end(), ", "), kRobustProtocol))
+      ->check(one_of(protocols));
   command
       ->add_option("--scenes", arguments->scenes,
                    "Its scenes: files, folders of them, FILE#K or FILE#SCENARIO_ID, with commas between them")

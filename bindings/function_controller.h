@@ -7,6 +7,7 @@
 
 #include <pybind11/pybind11.h>
 
+#include "pictura/common/renderer.h"
 #include "pictura/simulator/controllers/controller.h"
 #include "pictura/simulator/simulator.h"
 
@@ -18,8 +19,10 @@ namespace py = pybind11;
 std::string name_of_function(const py::function& function);
 
 /// Makes controllers that call function(observations), NumPy's arrays [slots, ...] by name, for actions int [slots].
-/// They throw Error where the simulator is not on the host, UsageError where what comes back is something else, and
-/// what the function raises.
-std::function<std::unique_ptr<Controller>(const Simulator&)> function_controllers(const py::function& function);
+/// With a renderer, observations have images as well: `rgb` u8 [slots, cameras, 3, height, width], black for inactive
+/// agents; `rgb_0`, `rgb_1`, ... where the cameras have several sizes. The controllers throw Error where the simulator
+/// or the renderer is not on the host, UsageError where the function returns something else, and what it raises.
+std::function<std::unique_ptr<Controller>(const Simulator&, Renderer*)> function_controllers(
+    const py::function& function);
 
 }  // namespace pictura::python

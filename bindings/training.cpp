@@ -21,6 +21,7 @@
 #include "pictura/evaluation/probes/corner.h"
 #include "pictura/evaluation/probes/pedestrian.h"
 #include "pictura/evaluation/probes/removal.h"
+#include "pictura/evaluation/robust_protocol.h"
 #include "pictura/policy/session.h"
 #include "pictura/simulator/observation_arrays.h"
 #include "pictura/simulator/simulator_options.h"
@@ -74,18 +75,24 @@ void add_metrics(const Row& row, py::dict* row_out) {
   }
 }
 
+/// Counts and metrics of a row of evaluate().
+void add_row(const EvaluateRow& row, py::dict* row_out) {
+  py::dict& d = *row_out;
+  d["scenarios"] = row.scenarios;
+  d["steps"] = row.steps;
+  d["vehicle_episodes"] = row.vehicle_episodes;
+  d["infractions"] = row.infractions;
+  d["km_driven"] = row.km_driven;
+  add_metrics(row, &d);
+}
+
 py::dict dict_of(const EvaluateReport& report) {
   py::list rows;
   for (const EvaluateRow& row : report.rows) {
     py::dict d;
     d["density"] = row.density;
     d["driver"] = row.driver.empty() ? py::object(py::none()) : py::str(row.driver);
-    d["scenarios"] = row.scenarios;
-    d["steps"] = row.steps;
-    d["vehicle_episodes"] = row.vehicle_episodes;
-    d["infractions"] = row.infractions;
-    d["km_driven"] = row.km_driven;
-    add_metrics(row, &d);
+    add_row(row, &d);
     rows.append(d);
   }
   py::dict d;
@@ -444,6 +451,31 @@ Returns a dict: agent_steps, updates, agent_steps_per_s, episode_return, km_driv
 after the present update, saves, and raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
 }
 
+py::dict dict_of(const RobustReport& report) {
+  py::list rows;
+  for (const RobustRow& row : report.rows) {
+    py::dict d;
+    d["part"] = row.condition.part;
+    d["name"] = row.condition.name;
+    d["not_driven"] = row.not_driven.empty() ? py::object(py::none()) : py::str(row.not_driven);
+    if (!row.counts.scenarios.empty()) add_row(report.metrics(row), &d);
+    rows.append(d);
+  }
+  py::dict pooled;
+  for (const auto& [part, row] : report.pooled()) {
+    py::dict d;
+    add_row(row, &d);
+    pooled[py::str(part)] = d;
+  }
+  py::dict d;
+  d["rows"] = rows;
+  d["pooled"] = pooled;
+  d["seconds"] = report.seconds;
+  d["agent_steps"] = report.agent_steps;
+  d["policy_hash"] = report.setting.policy_hash;
+  return d;
+}
+
 void bind_evaluation(py::module_& module) {
   def_with_options<EvaluateOptions>(
       &module, {"evaluate", {"checkpoint", "maps"}},
@@ -455,7 +487,8 @@ void bind_evaluation(py::module_& module) {
 
 checkpoint: of a policy; '' with a controller of the paper's world. maps: names, files or ranges as procedural:1-64. controller: 'lane', 'idm_lanes', 'random' or 'idle',
 which drives instead, or a function(observations) of NumPy's arrays [slots, ...] by name, as pictura.Simulator.observations has them, that
-returns actions int [slots], on the CPU. densities: 'light', 'medium' and 'dense', 60, 120 and 150 agents a world, or agents_per_world of them.
+returns actions int [slots], on the CPU. A function gets images too where cameras are named (rig, or width_px and height_px): `rgb` uint8
+[slots, cameras, 3, height, width], black for agents that are not active; rgb_0, rgb_1, ... where cameras have several sizes. densities: 'light', 'medium' and 'dense', 60, 120 and 150 agents a world, or agents_per_world of them.
 device, simulator, renderer: 'auto' or names; renderer '': as it was trained. rig, or width_px and height_px: other cameras.
 backbone: where the program of policy.backbone lies now. conditioning: numbers by name. light_cycles: 'phases' or 'independent',
 light_heads: 'as_mapped' or 'visible'; '': as it was trained. average: with the average of weights that the checkpoint holds. camera_severity: of
@@ -463,6 +496,20 @@ randomized cameras, 0 to 2 (docs/explanation/cameras.md). decision_steps: for wh
 action is held; 0: as it was trained. others: who else drives, as {'lane': 0.3, 'other.safetensors': 0.2}:
 policies or controllers, and their shares of vehicles; 'blind', 'phantom_braking' and 'inattentive': shares of agents that the policy drives while impaired. on_progress: called with the fraction that is done and the seconds to come, from a thread of its own. Returns a dict: rows, one a density and driver (None: whom it measures): its counts, and each metric as (value, half of its 95 % interval); seconds,
 agent_steps, policy_hash, light_cycles, others. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
+  def_with_options<RobustOptions>(
+      &module, {"evaluate_robust", {"checkpoint"}},
+      [](const RobustOptions& options) {
+        return dict_of(run_to_an_orderly_end("evaluate_robust", options.num_threads, {},
+                                             [&options] { return pictura::evaluate_robust(options); }));
+      },
+      R"(The robust protocol, as `pictura evaluate --protocol robust` runs it: a fixed set of generated towns, other drivers and randomized
+cameras (docs/how-to/robust_benchmark.md).
+
+checkpoint: of a policy; '' with a controller: a name or a function, as in evaluate(). A function whose `rig`, or width_px and height_px, is
+given gets images of these cameras. scenarios: per condition; other numbers than the default are a trial. The other arguments are those of
+evaluate(); seed, conditioning and camera_severity are fixed. Returns a dict: rows, one a condition: part, name, not_driven (why the
+condition does not apply, or None), counts, and each metric as (value, half of its 95 % interval); pooled: the same over the conditions of
+'towns', 'others', 'cameras' and 'all'; seconds, agent_steps, policy_hash. ^C raises KeyboardInterrupt.)");
   def_with_options<SceneArguments>(
       &module, {"evaluate_scenes", {"checkpoint", "scenes"}},
       [](SceneArguments& arguments) {

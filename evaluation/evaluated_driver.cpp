@@ -1,8 +1,11 @@
 #include "pictura/evaluation/evaluated_driver.h"
 
 #include <algorithm>
+#include <optional>
 
 #include "pictura/backends/make_controller.h"
+#include "pictura/backends/make_renderer.h"
+#include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
 #include "pictura/common/pixel_samples.h"
 #include "pictura/configuration/apply_config.h"
@@ -29,6 +32,24 @@ std::unique_ptr<PolicyController> policy_controller(PolicySession& session, Rend
   return session.make_controller(renderer, options.argmax, options.seed, hides_auxiliary);
 }
 
+namespace {
+
+void add_images(const Config& config, const Rig& rig, double camera_severity, EvaluationSetting* setting) {
+  setting->renderer = config.render.backend;
+  setting->samples = text_of(config.render.samples);
+  setting->camera_severity = camera_severity;
+  Hash64 cameras;
+  for (const Camera& camera : rig.cameras) {
+    setting->image_sizes.push_back(fmt::format("{}x{}", camera.width_px, camera.height_px));
+    add_values(&cameras, camera.focal_x_px, camera.focal_y_px, camera.center_x_px, camera.center_y_px,
+               camera.position_m.x, camera.position_m.y, camera.position_m.z, camera.yaw_rad, camera.pitch_rad,
+               camera.roll_rad);
+  }
+  setting->cameras_hash = cameras.hex();
+}
+
+}  // namespace
+
 EvaluationSetting setting_of(const PolicySession& session) {
   const Config& config = session.config();
   const bool is_on_host = session.device().is_host();
@@ -39,18 +60,7 @@ EvaluationSetting setting_of(const PolicySession& session) {
   setting.light_cycles = config.simulator.light_cycles;
   setting.device = is_on_host ? "cpu" : "cuda";
   setting.precision = is_on_host ? "fp32" : name_of(config.train.precision);
-  if (!session.reads_images()) return setting;
-  setting.renderer = config.render.backend;
-  setting.samples = text_of(config.render.samples);
-  setting.camera_severity = session.camera_severity();
-  Hash64 cameras;
-  for (const Camera& camera : session.rig().cameras) {
-    setting.image_sizes.push_back(fmt::format("{}x{}", camera.width_px, camera.height_px));
-    add_values(&cameras, camera.focal_x_px, camera.focal_y_px, camera.center_x_px, camera.center_y_px,
-               camera.position_m.x, camera.position_m.y, camera.position_m.z, camera.yaw_rad, camera.pitch_rad,
-               camera.roll_rad);
-  }
-  setting.cameras_hash = cameras.hex();
+  if (session.reads_images()) add_images(config, session.rig(), session.camera_severity(), &setting);
   return setting;
 }
 
@@ -66,10 +76,13 @@ EvaluatedDriver policy_driver(PolicySession* session, Renderer* renderer, const 
 EvaluatedDriver controller_driver(const DriverOptions& options, int steps) {
   if (options.decision_steps > 0)
     fail_usage("decision_steps: expected a trained policy, got the controller {}", options.controller);
-  Config config = adapted(options.checkpoint.empty() ? Config() : read_policy(options.checkpoint).config, options);
   const bool is_own = options.make_own_controller != nullptr;
-  config.policy.modality = is_own ? Modality::vector : Modality::perspective;  // others read no vectors,
-  config.render.backend = "auto";                                              // and nothing is drawn
+  const std::optional<Rig> rig = is_own ? named_rig(options) : std::nullopt;
+  Config config = options.checkpoint.empty() ? Config() : read_policy(options.checkpoint).config;
+  config.policy.modality = rig ? Modality::perspective : Modality::vector;
+  config = adapted(config, options);
+  config.policy.modality = is_own ? Modality::vector : Modality::perspective;  // other controllers read no vectors,
+  if (!rig) config.render.backend = "auto";                                    // and nothing is drawn
   const std::string& name = options.controller;
   const bool is_on_host = is_own || drives_on_host(name);
   if (is_on_host && options.device == "auto" && options.simulator == "auto") config.run.device = "cpu";
@@ -81,11 +94,22 @@ EvaluatedDriver controller_driver(const DriverOptions& options, int steps) {
   driver.setting.config = keys_of_evaluation(config, /*has_policy=*/false);
   driver.setting.light_cycles = config.simulator.light_cycles;
   driver.setting.device = driver.device.is_host() ? "cpu" : is_on_host ? "cuda, driven from the host" : "cuda";
-  driver.drive = [&options](Simulator& simulator) {
-    std::unique_ptr<Controller> controller = options.make_own_controller
-                                                 ? options.make_own_controller(simulator)
-                                                 : make_controller(options.controller, simulator, options.seed);
-    return Driving{std::move(controller), [&simulator] { return count_active(simulator); }};
+  if (!is_own) {
+    driver.drive = [&options](Simulator& simulator) {
+      return Driving{make_controller(options.controller, simulator, options.seed),
+                     [&simulator] { return count_active(simulator); }};
+    };
+    return driver;
+  }
+  std::shared_ptr<Renderer> renderer;
+  if (rig) {
+    add_images(config, *rig, options.camera_severity, &driver.setting);
+    renderer = make_renderer(config.render.backend, evaluation_renderer_config(config, *rig, driver.device));
+  }
+  driver.drive = [&options, renderer](Simulator& simulator) {
+    if (renderer) upload_maps(simulator, renderer.get());
+    return Driving{options.make_own_controller(simulator, renderer.get()),
+                   [&simulator] { return count_active(simulator); }};
   };
   return driver;
 }

@@ -24,8 +24,10 @@ struct DriverOptions : SessionOptions {
   // A controller of make_controller, "lane" for one, that drives instead of the checkpoint's policy, in its world, or
   // in the paper's if there is no checkpoint.
   std::string controller;
-  // Makes the controller of that name where a program brings its own; it drives on the host and reads vectors.
-  std::function<std::unique_ptr<Controller>(const Simulator&)> make_own_controller;
+  // Makes the controller of that name where a program brings its own. It drives on the host and reads vectors. Where
+  // the options name cameras (rig, or width_px and height_px), it reads their images, too: drawn by the renderer, which
+  // holds the simulator's maps. Without cameras the renderer is null.
+  std::function<std::unique_ptr<Controller>(const Simulator&, Renderer*)> make_own_controller;
   bool argmax = true;
   uint64_t seed = 1;
 };

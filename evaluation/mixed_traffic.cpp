@@ -89,7 +89,8 @@ MixedTraffic::MixedTraffic(const std::vector<OtherDriver>& others, const DriverO
     auto other = std::make_unique<Other>();
     other->driver = driver;
     const bool is_impaired = driver.impairment != Impairment::none;
-    if (is_impaired && driver.impairment != Impairment::phantom_braking && !options.controller.empty()) {
+    const bool is_built_in = !options.controller.empty() && !options.make_own_controller;
+    if (is_impaired && driver.impairment != Impairment::phantom_braking && is_built_in) {
       fail_usage("others: {}: has no effect on the controller {}, which does not drive by observations", driver.name,
                  options.controller);
     }

@@ -67,27 +67,36 @@ Config as_mounted(Config config) {
 
 // The cameras that the options ask for, else those of training. No weight depends on sizes or poses.
 Rig chosen_rig(const SavedPolicy& saved, const SessionOptions& options) {
-  const bool is_resized = options.width_px != 0 || options.height_px != 0;
-  if (options.rig.empty() && !is_resized) return saved.rig;
+  std::optional<Rig> named = named_rig(options);
+  if (!named) return saved.rig;
   if (!saved.config.reads_images()) fail_usage("{}: its policy reads no images: no rig or size", saved.path);
-  if (is_resized) {
-    if (!options.rig.empty()) fail_usage("rig: has sizes of its own: expected a rig or a size, got both");
-    if (!saved.config.render.rig.empty()) {
-      fail_usage("{}: trained with the cameras of {}: expected a rig file with other sizes instead of a size",
-                 saved.path, saved.config.render.rig);
-    }
-    return paper_rig(options.width_px, options.height_px);
+  if (options.rig.empty() && !saved.config.render.rig.empty()) {
+    fail_usage("{}: trained with the cameras of {}: expected a rig file with other sizes instead of a size", saved.path,
+               saved.config.render.rig);
   }
-  Rig rig = load_rig(options.rig);
   const size_t expected = saved.rig.cameras.size();
-  if (rig.cameras.size() != expected) {
+  if (named->cameras.size() != expected) {
     fail_usage("{}: expected {} cameras, as the policy was trained with, got {}", options.rig, expected,
-               rig.cameras.size());
+               named->cameras.size());
   }
-  return rig;
+  return *named;
 }
 
 }  // namespace
+
+std::optional<Rig> named_rig(const SessionOptions& options) {
+  const bool has_size = options.width_px != 0 || options.height_px != 0;
+  if (has_size && !options.rig.empty()) fail_usage("rig: has sizes of its own: expected a rig or a size, got both");
+  if (has_size) return paper_rig(options.width_px, options.height_px);
+  if (options.rig.empty()) return std::nullopt;
+  return load_rig(options.rig);
+}
+
+RendererConfig evaluation_renderer_config(const Config& config, const Rig& rig, Device device) {
+  RendererConfig result = renderer_config(config, rig, device);
+  result.randomization.seed = 0;
+  return result;
+}
 
 struct PolicySession::Parts {
   Parts(const SavedPolicy& saved, const SessionOptions& options)
@@ -239,9 +248,7 @@ double PolicySession::camera_severity() const { return parts_->camera_severity; 
 Device PolicySession::device() const { return parts_->device; }
 
 RendererConfig PolicySession::renderer_config() const {
-  RendererConfig result = pictura::renderer_config(parts_->config, parts_->rig, parts_->device);
-  result.randomization.seed = 0;  // all policies see through the same cameras in a world
-  return result;
+  return evaluation_renderer_config(parts_->config, parts_->rig, parts_->device);
 }
 
 std::unique_ptr<Renderer> PolicySession::make_renderer() const {

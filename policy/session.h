@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "pictura/common/renderer.h"
@@ -39,6 +40,14 @@ class PolicyController : public Controller {
   /// How many agents the last act() commanded: those of its mask that were active.
   virtual int64_t num_driven() const = 0;
 };
+
+/// Returns the cameras that the options name; nullopt where they name none. Throws UsageError where they name both a
+/// rig file and a size, Error as load_rig().
+std::optional<Rig> named_rig(const SessionOptions& options);
+
+/// Returns renderer_config() of a configuration for evaluations, in which all policies see through the same cameras of
+/// a world.
+RendererConfig evaluation_renderer_config(const Config& config, const Rig& rig, Device device);
 
 /// Serves one thread at a time.
 class PolicySession {

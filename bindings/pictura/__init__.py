@@ -65,6 +65,7 @@ if TYPE_CHECKING:
     from pictura._training import (  # noqa: F401
         PolicySession,
         evaluate,
+        evaluate_robust,
         evaluate_scenes,
         probe_corner,
         probe_pedestrian,
@@ -74,7 +75,7 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str):
-    if name not in ("PolicySession", "evaluate", "evaluate_scenes", "probe_corner", "probe_pedestrian", "probe_removal", "train"):
+    if name not in ("PolicySession", "evaluate", "evaluate_robust", "evaluate_scenes", "probe_corner", "probe_pedestrian", "probe_removal", "train"):
         raise AttributeError(f"module 'pictura' has no attribute '{name}'")
     from pictura._load_training import load
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import collections.abc
 import pictura._pictura
 import typing
-__all__: list[str] = ['PolicySession', 'evaluate', 'evaluate_scenes', 'probe_corner', 'probe_pedestrian', 'probe_removal', 'train']
+__all__: list[str] = ['PolicySession', 'evaluate', 'evaluate_robust', 'evaluate_scenes', 'probe_corner', 'probe_pedestrian', 'probe_removal', 'train']
 class PolicySession:
     """
     A saved policy: what it makes of scenes and observations, and the world and cameras that it was trained with. One thread at a
@@ -60,7 +60,8 @@ def evaluate(checkpoint: str, maps: collections.abc.Sequence[str], *, controller
     
     checkpoint: of a policy; '' with a controller of the paper's world. maps: names, files or ranges as procedural:1-64. controller: 'lane', 'idm_lanes', 'random' or 'idle',
     which drives instead, or a function(observations) of NumPy's arrays [slots, ...] by name, as pictura.Simulator.observations has them, that
-    returns actions int [slots], on the CPU. densities: 'light', 'medium' and 'dense', 60, 120 and 150 agents a world, or agents_per_world of them.
+    returns actions int [slots], on the CPU. A function gets images too where cameras are named (rig, or width_px and height_px): `rgb` uint8
+    [slots, cameras, 3, height, width], black for agents that are not active; rgb_0, rgb_1, ... where cameras have several sizes. densities: 'light', 'medium' and 'dense', 60, 120 and 150 agents a world, or agents_per_world of them.
     device, simulator, renderer: 'auto' or names; renderer '': as it was trained. rig, or width_px and height_px: other cameras.
     backbone: where the program of policy.backbone lies now. conditioning: numbers by name. light_cycles: 'phases' or 'independent',
     light_heads: 'as_mapped' or 'visible'; '': as it was trained. average: with the average of weights that the checkpoint holds. camera_severity: of
@@ -68,6 +69,17 @@ def evaluate(checkpoint: str, maps: collections.abc.Sequence[str], *, controller
     action is held; 0: as it was trained. others: who else drives, as {'lane': 0.3, 'other.safetensors': 0.2}:
     policies or controllers, and their shares of vehicles; 'blind', 'phantom_braking' and 'inattentive': shares of agents that the policy drives while impaired. on_progress: called with the fraction that is done and the seconds to come, from a thread of its own. Returns a dict: rows, one a density and driver (None: whom it measures): its counts, and each metric as (value, half of its 95 % interval); seconds,
     agent_steps, policy_hash, light_cycles, others. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.
+    """
+def evaluate_robust(checkpoint: str, *, controller: str | collections.abc.Callable = '', scenarios: typing.SupportsInt | typing.SupportsIndex = 24, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, backbone: str = '', conditioning: dict = {}, average: bool = False, decision_steps: typing.SupportsInt | typing.SupportsIndex = 0, camera_severity: typing.SupportsFloat | typing.SupportsIndex = 0.0, on_progress: typing.Any = None) -> dict:
+    """
+    The robust protocol, as `pictura evaluate --protocol robust` runs it: a fixed set of generated towns, other drivers and randomized
+    cameras (docs/how-to/robust_benchmark.md).
+    
+    checkpoint: of a policy; '' with a controller: a name or a function, as in evaluate(). A function whose `rig`, or width_px and height_px, is
+    given gets images of these cameras. scenarios: per condition; other numbers than the default are a trial. The other arguments are those of
+    evaluate(); seed, conditioning and camera_severity are fixed. Returns a dict: rows, one a condition: part, name, not_driven (why the
+    condition does not apply, or None), counts, and each metric as (value, half of its 95 % interval); pooled: the same over the conditions of
+    'towns', 'others', 'cameras' and 'all'; seconds, agent_steps, policy_hash. ^C raises KeyboardInterrupt.
     """
 def evaluate_scenes(checkpoint: str, scenes: collections.abc.Sequence[str], *, protocol: str = 'womd', controller: str | collections.abc.Callable = '', control: str | None = None, start_step: typing.SupportsInt | typing.SupportsIndex | None = None, steps: typing.SupportsInt | typing.SupportsIndex | None = None, densities: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, rules: dict = {}, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, num_scenes: typing.SupportsInt | typing.SupportsIndex = 0, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, backbone: str = '', conditioning: dict = {}, average: bool = False, decision_steps: typing.SupportsInt | typing.SupportsIndex = 0, camera_severity: typing.SupportsFloat | typing.SupportsIndex = 0.0, rollouts: str = '', on_progress: typing.Any = None) -> dict:
     """

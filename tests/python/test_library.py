@@ -407,7 +407,7 @@ def test_the_command_comes_along():
 def test_a_package_without_training_says_so():
     if importlib.util.find_spec("pictura._built_torch"):
         pytest.skip("built beside torch")
-    for name in ("train", "evaluate", "evaluate_scenes", "probe_corner", "probe_pedestrian", "probe_removal", "PolicySession"):
+    for name in ("train", "evaluate", "evaluate_robust", "evaluate_scenes", "probe_corner", "probe_pedestrian", "probe_removal", "PolicySession"):
         with pytest.raises(ImportError, match=f"pictura.{name}: this package was built without pictura._training, which needs torch"):
             getattr(pictura, name)
     assert not hasattr(pictura._pictura, "train")

@@ -479,10 +479,53 @@ def test_functions_are_evaluated_in_the_place_of_controllers(tmp_path):
         pictura.evaluate("", maps, controller=3, **options)
 
 
+def test_functions_see_what_the_cameras_see():
+    maps, options = ["procedural:1"], {"scenarios": 1, "steps": 8, "agents_per_world": 8, "device": "cpu", "width_px": 32, "height_px": 18}
+    seen = []
+
+    def idle(observations):
+        seen.append(observations)
+        return np.full(len(observations["ego"]), pictura.IDLE_ACTION)
+
+    report = pictura.evaluate("", maps, controller=idle, **options)
+    assert repr(report["rows"]) == repr(pictura.evaluate("", maps, controller="idle", **{**options, "width_px": 0, "height_px": 0})["rows"])
+    images = seen[0]["rgb"]
+    assert images.shape == (8, 4, 3, 18, 32) and images.dtype == np.uint8
+    assert all(image.std() > 5 for image in images.reshape(-1, 3, 18, 32)), "every camera sees something"
+    plain = [observations["rgb"] for observations in seen]
+    seen.clear()
+    pictura.evaluate("", maps, controller=idle, camera_severity=1, **options)
+    assert len(seen) == len(plain) and not np.array_equal(seen[0]["rgb"], plain[0])
+    # The same images as a renderer of one's own draws, in the same world.
+    simulator = pictura.Simulator([pictura.Map.load(maps[0])], [(0, 8, 0x80000000)], seed=1, episode_steps=8, fixed_lights=True)
+    renderer = pictura.Renderer("cpu", pictura.Rig.paper(32, 18))
+    for handle, geometry in simulator.geometries.items():
+        renderer.upload(handle, geometry)
+    assert np.array_equal(np.asarray(renderer.render(simulator.scene, simulator.views).blocks[0]), plain[0])
+    with pytest.raises(pictura.UsageError, match="rig: has sizes of its own"):
+        pictura.evaluate("", maps, controller=idle, rig="front.toml", **options)
+    with pytest.raises(pictura.UsageError, match="camera_severity: expected a policy that reads images"):
+        pictura.evaluate("", maps, controller=idle, camera_severity=1, **{**options, "width_px": 0, "height_px": 0})
+
+
+def test_functions_enter_the_robust_protocol():
+    def throttle(observations):
+        return np.full(len(observations["ego"]), pictura.IDLE_ACTION)
+
+    report = pictura.evaluate_robust("", controller=throttle, scenarios=1)
+    rows = {row["name"]: row for row in report["rows"]}
+    assert rows["impaired"]["not_driven"] is None and rows["severity 1"]["not_driven"] == "sees no images"
+    assert rows["grid towns"]["steps"] == 1200 and set(report["pooled"]) == {"towns", "others", "all"}
+    assert report["pooled"]["all"]["vehicle_episodes"] > report["pooled"]["others"]["vehicle_episodes"] > 0
+    with pytest.raises(pictura.UsageError, match="seed: has no effect"):
+        pictura.evaluate_robust("", controller=throttle, seed=2)
+
+
 def test_unknown_arguments_are_answered_with_the_nearest():
     for function, name, nearest in (
         (pictura.train, "overides", "overrides"),
         (pictura.evaluate, "densitys", "densities"),
+        (pictura.evaluate_robust, "scenario", "scenarios"),
         (pictura.evaluate_scenes, "protocoll", "protocol"),
         (pictura.probe_removal, "removal", "removals"),
         (pictura.probe_pedestrian, "hight_m", "height_m"),
