@@ -135,7 +135,7 @@ class Documents(unittest.TestCase):
         self.assertGreater(count, 100)
 
     def test_every_page_is_in_the_navigation(self):
-        navigation = set(re.findall(r"[\w/]+\.md", (ROOT / "mkdocs.yml").read_text()))
+        navigation = set(re.findall(r"[\w/-]+\.md", (ROOT / "mkdocs.yml").read_text()))
         pages = {str(path.relative_to(ROOT / "docs")) for path in (ROOT / "docs").rglob("*.md")}
         self.assertEqual(navigation, pages)
 
