@@ -10,7 +10,7 @@
 
 namespace pictura {
 
-/// The kinds, in the order of the table in docs/reference/opendrive.md.
+/// The kinds, in the order of the table in docs/reference/opendrive_conformance.md.
 enum class MendKind : uint8_t {
   record_order,
   record_beyond_end,

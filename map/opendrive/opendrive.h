@@ -24,7 +24,7 @@ using ImportProgress = std::function<void(const char* stage, double done)>;
 
 /// Parses the text of an OpenDRIVE file. `source` names it in messages. Faults that have one sensible meaning are
 /// mended and noted in RoadMap::mends; throws Error naming source, line, owner and element for all others, and in
-/// strict reading for any fault. docs/reference/opendrive.md lists them.
+/// strict reading for any fault. docs/reference/opendrive_conformance.md lists them.
 RoadMap parse_opendrive(std::string_view text, const std::string& source, const OpenDriveOptions& options = {},
                         const ImportProgress& progress = {});
 

@@ -19,22 +19,22 @@ struct MapCase {
 };
 
 const std::vector<MapCase> kCases{
-    {"center_lane_without_type", "center lanes that say no type"},
-    {"road_mark_width_minus_one", "road marks of width -1, some tool's word for none"},
-    {"tiny_road_elevation", "a road of 0.2 nm with a slope, which any other length would carry to 234,375 km"},
+    {"center_lane_without_type", "center lanes without a type"},
+    {"road_mark_width_minus_one", "road marks of width -1, which some tools write for none"},
+    {"tiny_road_elevation", "a road of 0.2 nm with a steep slope"},
     {"geometry_of_no_length", "a road and a geometry of no length"},
-    {"tiny_section_lane_offset", "a lane section of 20 micrometres, between two others whose lane offset jumps there"},
-    {"jump_in_reference_line", "a reference line that goes on 0.63 m beside itself"},
-    {"elevation_steps", "a street whose elevation jumps up by 2 m, and down by 0.8 m"},
-    {"steep_street", "a street of 70 %, on which a bumper is metres above its rear axle"},
-    {"light_without_controller", "a traffic light that no controller names, away from junctions"},
-    {"street_with_ends", "a street whose ends lead nowhere: agents enter at one end and leave at the other"},
-    {"cul_de_sac", "a street that ends in a turning circle: its only exit is its entry"},
+    {"tiny_section_lane_offset", "a lane section of 20 micrometres where the lane offset jumps"},
+    {"jump_in_reference_line", "a reference line that jumps 0.63 m sideways"},
+    {"elevation_steps", "steps of the elevation, 2 m up and 0.8 m down"},
+    {"steep_street", "a street with a grade of 70 %"},
+    {"light_without_controller", "a traffic light without a controller, away from junctions"},
+    {"street_with_ends", "a street whose ends lead nowhere"},
+    {"cul_de_sac", "a street that ends in a turning circle"},
     {"garage", "a ramp of 10 % up to a deck with parking spaces"},
     {"highway_exit", "a piece of a highway with an exit lane and its ramp"},
-    {"turnaround", "a turnaround so tight that its inner lane folds over itself"},
-    {"lane_change_in_short_sections", "lanes that must be changed within sections of a few metres"},
-    {"through_lane_two_changes_away", "a way on that begins two lanes away"},
+    {"turnaround", "a turnaround whose inner lane folds over itself"},
+    {"lane_change_in_short_sections", "lane changes within sections of a few metres"},
+    {"through_lane_two_changes_away", "a route that continues two lanes away"},
     {"utm_loop", "coordinates of a UTM zone, 5,800 km from its origin"},
 };
 
@@ -49,7 +49,7 @@ TEST(OpenDriveCases, ThePageSaysWhatIsMadeOfEachFile) {
       done += fmt::format("{}{}: {}", done.empty() ? "" : "; ", to_string(group.kind), action_of(group.kind));
     }
     table += fmt::format("| `{0}` | {1} | {2}, {3:.3f} km | {4}, {5} | {6} |\n", its.name, its.kind, map.facts.lanes,
-                         map.facts.driving_lane_km, use.endless, use.open, done.empty() ? "read without a word" : done);
+                         map.facts.driving_lane_km, use.endless, use.open, done.empty() ? "accepted" : done);
   }
   const std::string docs = read_file(PICTURA_MAP_CASES_DOCS);
   EXPECT_TRUE(docs.find(table) != std::string::npos) << "expected in docs/reference/map_cases.md:\n" << table;

@@ -1,5 +1,6 @@
 // What the importer does with each element of OpenDRIVE 1.4 to 1.8, found by reading a file with it and one without it,
-// and the table of that in docs/reference/opendrive.md. Which versions have an element is what their schemas say.
+// and the table of that in docs/reference/opendrive_conformance.md. Which versions have an element is what their
+// schemas say.
 #include <optional>
 #include <set>
 #include <string>
@@ -280,7 +281,8 @@ TEST(OpenDriveElements, TheTableSaysWhatIsDoneWithEachElement) {
     table += fmt::format("| {} | {} | {} |\n", element.path, element.versions, done_with(element));
   }
   const std::string docs = read_file(PICTURA_OPENDRIVE_DOCS);
-  EXPECT_TRUE(docs.find(table) != std::string::npos) << "expected in docs/reference/opendrive.md:\n" << table;
+  EXPECT_TRUE(docs.find(table) != std::string::npos) << "expected in docs/reference/opendrive_conformance.md:\n"
+                                                     << table;
 }
 
 }  // namespace
