@@ -1,4 +1,4 @@
-// Scenes of others, where they are at hand: what docs/reference/scenario.md and the formats' own pages say of them is
+// Scenes of others, where they are at hand: what docs/research/maps.md and the formats' own pages say of them is
 // read.
 #include <cstdlib>
 #include <filesystem>
