@@ -1,0 +1,91 @@
+"""Draws network.png, the network's layers, and summation_order.png, sums of the same numbers in other orders.
+
+    python3 scripts/drawings.py FOLDER    FOLDER: where to write, docs/images in scripts/figures
+"""
+
+import pathlib
+import sys
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+BLUE, ORANGE, GREY = "#4361ee", "#fb8500", "#8d99ae"
+
+
+def save(figure, path):
+    figure.savefig(path, dpi=110, facecolor="white")
+    plt.close(figure)
+
+
+def draw_network(path):
+    """Boxes of layers with their widths, for both modalities."""
+    figure, axes = plt.subplots(figsize=(9.2, 3.6))
+    axes.set(xlim=(0, 92), ylim=(0, 36))
+    axes.axis("off")
+
+    def box(x, y, width, text, color):
+        axes.add_patch(plt.Rectangle((x, y), width, 6, facecolor=color + "22", edgecolor=color))
+        axes.text(x + width / 2, y + 3, text, ha="center", va="center", fontsize=9)
+        return x, x + width, y + 3
+
+    def arrow(source, target):
+        axes.annotate("", (target[0], target[2]), (source[1], source[2]), arrowprops={"arrowstyle": "->", "color": "#333333"})
+
+    inputs = [
+        box(0, 28, 20, "images\n(perspective)", BLUE),
+        box(0, 19, 20, "sets of members\n(vector)", BLUE),
+        box(0, 10, 20, "ego", ORANGE),
+        box(0, 1, 20, "conditioning,\nwaypoints", ORANGE),
+    ]
+    encoders = [
+        box(25, 28, 25, "convolutions, attention\n4 x 128, linear to 256", BLUE),
+        box(25, 19, 25, "MLP and maximum\nper set: 4 x 64 = 256", BLUE),
+        box(25, 10, 25, "MLP: 64", ORANGE),
+        box(25, 1, 25, "MLP: 64", ORANGE),
+    ]
+    trunk = box(56, 14.5, 17, "trunk\n384, 4 x 512", GREY)
+    heads = [box(79, 20, 13, "actor: 12", GREY), box(79, 9, 13, "critic: 1", GREY)]
+    for source, encoder in zip(inputs, encoders, strict=True):
+        arrow(source, encoder)
+        arrow(encoder, trunk)
+    for head in heads:
+        arrow(trunk, head)
+    figure.subplots_adjust(0.01, 0.01, 0.99, 0.99)
+    save(figure, path)
+
+
+def draw_sums(path):
+    """How far single-precision and fixed-point sums of 64 weights, in 2,000 random orders, are from the exact sum."""
+    random = np.random.default_rng(1)
+    weights = random.random(64).astype(np.float32) / 64
+    orders = [random.permutation(64) for _ in range(2000)]
+    exact = weights.astype(np.float64).sum()
+    single = np.array([np.add.accumulate(weights[order], dtype=np.float32)[-1] for order in orders], np.float64)
+    fixed_weights = np.rint(weights.astype(np.float64) * 2**20).astype(np.int64)
+    fixed = np.array([fixed_weights[order].sum() for order in orders]) / 2**20
+    figure, axes = plt.subplots(1, 2, figsize=(9.2, 2.7), sharey=True)
+    panels = [("single precision", single, ORANGE), ("fixed point, units of $2^{-20}$", fixed, BLUE)]
+    for panel, (name, sums, color) in zip(axes, panels, strict=True):
+        values, counts = np.unique(sums, return_counts=True)
+        errors = (values - exact) * 1e7
+        panel.bar(errors, counts, width=0.25, color=color)
+        panel.set(title=f"{name}: {len(values)} result{'s' * (len(values) > 1)}", xlabel="difference from the exact sum, $10^{-7}$")
+        panel.set_xlim(errors.mean() - 5, errors.mean() + 5)
+    axes[0].set_ylabel("orders")
+    figure.tight_layout()
+    save(figure, path)
+
+
+def main():
+    if len(sys.argv) != 2:
+        sys.exit(f"error: drawings.py: expected a folder, got '{' '.join(sys.argv[1:])}'")
+    folder = pathlib.Path(sys.argv[1])
+    draw_network(folder / "network.png")
+    draw_sums(folder / "summation_order.png")
+
+
+if __name__ == "__main__":
+    main()
