@@ -1,4 +1,4 @@
-"""docs/reference/python.md: its tables name what there is, and its code runs."""
+"""docs/reference/python.md names in its tables what there is; its code and that of docs/how-to/own_metric.md run."""
 
 import importlib.util
 import pathlib
@@ -8,7 +8,8 @@ import numpy as np
 
 import pictura
 
-TEXT = (pathlib.Path(__file__).parents[2] / "docs/reference/python.md").read_text()
+ROOT = pathlib.Path(__file__).parents[2]
+TEXT = (ROOT / "docs/reference/python.md").read_text()
 
 
 def test_the_tables_name_every_observation_and_info():
@@ -41,3 +42,16 @@ def test_what_is_not_there_is_observed(make):
     names: dict[str, object] = {"np": np, "pictura": pictura, "simulator": make(8)}
     exec(compile(block, "docs/reference/python.md", "exec"), names)  # noqa: S102
     assert names["answers"]["partners"].shape == (3, 16, 8)
+
+
+def test_a_metric_of_ones_own_is_counted(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "models").symlink_to(ROOT / "models")
+    names: dict[str, object] = {}
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs/how-to/own_metric.md").read_text(), re.S)
+    needs = (None, None, "pictura._built_torch", "mcap")
+    for block, module in zip(blocks, needs, strict=True):
+        if module is None or importlib.util.find_spec(module) is not None:
+            exec(compile(block, "docs/how-to/own_metric.md", "exec"), names)  # noqa: S102
+    assert names["hard_steps"].sum() > 0 and names["distance_m"].sum() > 1000
+    assert (tmp_path / "drive.html").exists()
