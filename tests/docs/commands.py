@@ -1,26 +1,43 @@
-"""docs/reference/commands.md: the help of every command, as `pictura --help` prints it.
+"""docs/reference/commands/: a page a command with its help, as `pictura COMMAND --help` prints it, and an index of them.
 
-    python3 tests/docs/commands.py PICTURA            writes it
-    python3 tests/docs/commands.py PICTURA --check    says where it differs
+    python3 tests/docs/commands.py PICTURA            writes them
+    python3 tests/docs/commands.py PICTURA --check    prints where they differ, and exits with 1 if they do
 """
 
 import difflib
-import pathlib
 import re
 import subprocess
 import sys
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs/reference/commands.md"
+from pages import ROOT
+
+FOLDER = ROOT / "docs/reference/commands"
 CLI11 = [2, 1]  # Debian 12's
 HEAD = """# Commands
-What `pictura COMMAND --help` prints, written by `scripts/docs --update` and compared by a test. Defaults stand after `=`, ranges
-after `:`; units stand in the texts. `--json` prints one object on stdout and nothing else, and logs go to stderr. Exit status: 0 done, 1
-the work failed, 2 wrong usage, 130 after ^C and 143 after SIGTERM (what was finished is saved). An unknown command, option or key is
-answered with the nearest known one.
+Each page below is what `pictura COMMAND --help` prints; a test compares them.
 
-`pictura completion bash`, `zsh` or `fish` prints a script by which a shell completes commands and options.
+- **Help texts.** Defaults follow `=`, ranges follow `:`, and units are in the texts.
+- **Output.** `--json` prints one object on stdout and nothing else. Logs go to stderr.
+- **Exit status.** 0: success. 1: the work failed. 2: wrong usage. 130: interrupted by ^C. 143: ended by SIGTERM. 129: the terminal
+  was closed. Interrupted commands save what is finished.
+- **Typing errors.** An unknown command, option or key is refused with the nearest known one.
+- **Completion.** `pictura completion bash`, `zsh` or `fish` prints a completion script.
+
+| command | purpose |
+|---|---|
 """
+# Pages that explain a command's use.
+SEE = {
+    ("town",): "[Procedural towns](../../explanation/map.md#procedural-towns), [cities](../../explanation/cities.md)",
+    ("map",): "[Use your own map](../../tutorials/map.md), [OpenDRIVE](../opendrive.md), [recorded scenes](../scenario.md)",
+    ("render",): "[Scene files](../scene_file.md), [images](../../explanation/image.md)",
+    ("simulate",): "[The simulator](../../explanation/simulator.md), [replays](../replay.md)",
+    ("replay",): "[Look at an agent](../../tutorials/look.md), [replays](../replay.md)",
+    ("train",): "[Training](../../explanation/training.md), [configuration](../configuration.md)",
+    ("evaluate",): "[Evaluation](../../explanation/evaluation.md)",
+    ("probe",): "[Probe an agent](../../tutorials/probe.md), [probes](../../explanation/probes.md)",
+    ("bench",): "[How benchmarks measure](../../developer/benchmarks.md)",
+}
 
 
 def help_of(pictura, command):
@@ -36,7 +53,7 @@ def subcommands(text):
 
 
 def tree(pictura, command=()):
-    """[(command, help)] of all commands, each before those below it."""
+    """[(command, help)] of all commands, each before its subcommands."""
     text = help_of(pictura, command)
     found = [(command, text)]
     for name in subcommands(text):
@@ -45,27 +62,56 @@ def tree(pictura, command=()):
 
 
 def of_whole_build(text):
-    """What a build lacks is named all the same: the page is of all that there is."""
+    """The help of a build with every backend, whichever this build has."""
     text = re.sub(r"(What simulates: )cpu.*?(; default)", r"\1cpu, cuda, auto\2", text)
     return re.sub(r"(What draws: )cpu.*?(; default)", r"\1cpu, cuda, gl, gl:egl, gl:osmesa, null, auto\2", text)
 
 
-def page(commands):
-    parts = [HEAD]
+def page_name(command):
+    return "_".join(command or ("pictura",)) + ".md"
+
+
+def pages_of(commands):
+    """{file name: text} of the folder."""
+    made, rows = {}, []
     for command, text in commands:
         title = " ".join(("pictura", *command))
-        parts.append(f"\n## {title}\n```text\n{of_whole_build(text)}\n```\n")
-    return "".join(parts)
+        purpose = text.split("\n", 1)[0].split(": ")[0]
+        rows.append(f"| [`{title}`]({page_name(command)}) | {purpose} |\n")
+        see = SEE.get(command) or SEE.get(command[:1])
+        made[page_name(command)] = f"# {title}\n" + (f"See also: {see}.\n\n" if see else "") + f"```text\n{of_whole_build(text)}\n```\n"
+    return {"index.md": HEAD + "".join(rows), **made}
+
+
+def commands_of_pages():
+    """The commands that have a page."""
+    titles = (path.read_text().split("\n", 1)[0] for path in FOLDER.glob("*.md") if path.name != "index.md")
+    return {tuple(title.split()[2:]) for title in titles}
+
+
+def differences(made):
+    """Lines of a unified diff from the pages that are there to those of the program."""
+    there = {path.name: path.read_text() for path in FOLDER.glob("*.md")}
+    lines = []
+    for name in sorted(there.keys() | made.keys()):
+        before, after = (pages.get(name, "").splitlines(True) for pages in (there, made))
+        lines += difflib.unified_diff(before, after, f"docs/reference/commands/{name}", "pictura --help")
+    return lines
 
 
 def main():
-    made = page(tree(sys.argv[1]))
-    if "--check" not in sys.argv:
-        PAGE.write_text(made)
-        return 0
-    before = PAGE.read_text()
-    sys.stdout.writelines(difflib.unified_diff(before.splitlines(True), made.splitlines(True), "docs/reference/commands.md", "pictura --help"))
-    return int(before != made)
+    made = pages_of(tree(sys.argv[1]))
+    if "--check" in sys.argv:
+        found = differences(made)
+        sys.stdout.writelines(found)
+        return int(bool(found))
+    FOLDER.mkdir(exist_ok=True)
+    for path in FOLDER.glob("*.md"):
+        if path.name not in made:
+            path.unlink()
+    for name, text in made.items():
+        (FOLDER / name).write_text(text)
+    return 0
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
-"""The commands of README, the tutorials and some pages of reference, run as a reader would, in one folder and one after the
-other; with fewer updates, steps and agents.
+"""The commands of README, the tutorials and the how-to pages, run as a reader would, in one folder and one after the other;
+with fewer updates, steps and agents.
 
 Run by ctest: python3 tutorials_test.py PICTURA.
 """
@@ -13,16 +13,15 @@ import sys
 import tempfile
 import unittest
 
-import commands
 from documents_test import command_lines
+from pages import ROOT
 
 PICTURA = ""
-ROOT = commands.ROOT
 PAGES = [ROOT / "README.md"] + [ROOT / f"docs/tutorials/{name}.md" for name in ("first_run", "gpu", "reward", "rig", "map", "look", "probe")]
-PAGES += [ROOT / "docs/explanation/evaluation.md", ROOT / "docs/explanation/training.md"]
-# Of what takes long, less.
+PAGES += [ROOT / f"docs/how-to/{name}.md" for name in ("train", "evaluate", "probe")]
+# Maximum values of options that take long.
 AT_MOST = {"--steps": 20, "--agents": 8, "--scenarios": 2, "--episodes": 1, "--follow": 3, "--egos": 8, "--slots": 32, "--removals": 20, "--paths": 1}
-# What a page in a browser waits for has tests of its own (tests/replay/live_test.py).
+# Live pages wait for a browser; tests/replay/live_test.py tests them.
 WAITS = "--serve"
 
 

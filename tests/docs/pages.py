@@ -1,0 +1,89 @@
+"""Pages of the documentation as text: which there are, their anchors, and the blocks that readers see."""
+
+import pathlib
+import re
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+FENCE = re.compile(r"^ *```")
+ITEM = re.compile(r"^ *(?:[-*]|\d+\.) +")
+
+
+def documents():
+    found = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md", "bench/README.md", "models/README.md")]
+    return found + sorted((ROOT / "docs").rglob("*.md"))
+
+
+def without_blocks(text):
+    """The text with the lines of code blocks emptied, so that line numbers hold."""
+    lines, in_code = [], False
+    for line in text.split("\n"):
+        is_fence = bool(FENCE.match(line))
+        lines.append("" if in_code or is_fence else line)
+        in_code ^= is_fence
+    return "\n".join(lines)
+
+
+def without_code(text):
+    return re.sub(r"`[^`\n]*`", lambda code: "x" * len(code.group()), without_blocks(text))
+
+
+def slug_of(heading):
+    """The anchor of a heading, as GitHub and mkdocs make it."""
+    heading = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading)
+    return re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-")
+
+
+def headings(text):
+    """[(line, level, title)] of a page."""
+    matches = ((number, re.match(r"(#+) (.*)$", line)) for number, line in enumerate(without_blocks(text).split("\n"), 1))
+    return [(number, len(match[1]), match[2]) for number, match in matches if match]
+
+
+def anchors(path):
+    found, seen = set(), {}
+    for _, _, title in headings(path.read_text()):
+        slug = slug_of(title)
+        count = seen.get(slug, 0)
+        seen[slug] = count + 1
+        found.add(slug if count == 0 else f"{slug}-{count}")
+    return found
+
+
+def links(text):
+    """[(line, target)] of a page's links and images to files and anchors of the repository."""
+    found = []
+    for number, line in enumerate(without_code(text).split("\n"), 1):
+        found += [(number, target) for target in re.findall(r"\]\(([^)\s]+)\)", line) if not re.match(r"[a-z]+:", target)]
+    return found
+
+
+def blocks(text):
+    """[(kind, line, text)] of a page in order: "paragraph", "item" of a list, "cell" of a table, "heading". No code blocks; the line
+    is that on which the block begins."""
+    found, is_open = [], False
+    for number, line in enumerate(without_blocks(text).split("\n"), 1):
+        stripped = line.strip()
+        if not stripped or stripped.startswith("|") or re.match(r"#+ ", stripped) or ITEM.match(line) or line.startswith("    ") and not is_open:
+            is_open = False
+        if not stripped or line.startswith("    ") and not is_open and not ITEM.match(line):
+            continue
+        if stripped.startswith("|"):
+            cells = re.split(r"(?<!\\)\|", stripped.strip("|"))
+            found += [("cell", number, cell.strip()) for cell in cells if re.search(r"\w", cell)]
+        elif heading := re.match(r"#+ (.*)", stripped):
+            found.append(("heading", number, heading[1]))
+        elif is_open:
+            kind, first, before = found[-1]
+            found[-1] = (kind, first, f"{before} {stripped}")
+        else:
+            kind = "item" if ITEM.match(line) else "paragraph"
+            found.append((kind, number, ITEM.sub("", line).strip()))
+            is_open = True
+    return found
+
+
+def words(text):
+    """Words that a reader reads: a piece of code is one, a link is its text."""
+    text = re.sub(r"`[^`]*`", "code", text)
+    text = re.sub(r"\]\([^)]*\)", "]", text)
+    return [word for word in text.split() if re.search(r"\w", word)]

@@ -1,0 +1,235 @@
+"""How pages are written: lengths, turns, headings, links and navigation. Prints FILE:LINE and the rule for each violation.
+
+Run by ctest: python3 words_test.py [unittest arguments]. Also
+    python3 words_test.py --report      prints words a page, and every violation, research and CHANGELOG included
+    python3 words_test.py --comments    prints forbidden turns in comments and docstrings of sources
+"""
+
+import fnmatch
+import io
+import pathlib
+import re
+import subprocess
+import sys
+import tokenize
+import unittest
+
+import pages
+
+ROOT = pages.ROOT
+PAGE_WORDS = 1500
+README_WORDS = 700
+TOTAL_WORDS = 35_000  # of docs/ without research and generated pages
+PARAGRAPH_WORDS = 120
+CELL_WORDS = 12
+LENGTH = {"page", "total", "paragraph", "cell"}
+ALL = LENGTH | {"turn"}
+# Rules that do not hold for a page: programs or tests write it, tests compare its tables, or it is a record of experiments.
+EXEMPT = {
+    "docs/reference/commands/*.md": ALL,  # tests/docs/commands.py
+    "docs/reference/configuration.md": {"page", "total"},  # tests/configuration/config_test.cpp
+    "docs/reference/python/*.md": ALL,  # generated from docstrings
+    "docs/reference/opendrive*.md": {"cell", "turn"},  # tests/map/opendrive_elements_test.cpp and ..._conformance_test.cpp
+    "docs/reference/map_cases.md": {"cell", "turn"},  # tests/map/opendrive_cases_test.cpp
+    "docs/research/*.md": ALL,
+    "docs/developer/*.md": {"page"},
+    "CONTRIBUTING.md": {"page"},
+}
+SOURCES = ("*.h", "*.cpp", "*.cu", "*.cuh", "*.py", "*.pyi", "*.cmake", "CMakeLists.txt", "scripts/*")
+
+
+def forbidden_turns():
+    """[(pattern, what to write instead)]"""
+    lines = (pathlib.Path(__file__).parent / "forbidden_turns.txt").read_text().splitlines()
+    pairs = [line.split(" => ") for line in lines if line and not line.startswith("#")]
+    return [(re.compile(pattern, re.IGNORECASE), instead) for pattern, instead in pairs]
+
+
+TURNS = forbidden_turns()
+
+
+def turns_in(text):
+    text = re.sub(r"`[^`]*`", "``", text)
+    text = re.sub(r"\]\([^)]*\)", "]", text).replace("*", "")
+    return [(match.group(), instead) for pattern, instead in TURNS for match in pattern.finditer(text)]
+
+
+def violations(text, page_words=PAGE_WORDS):
+    """[(line, rule, message)] of one page."""
+    found = []
+    length = len(pages.words(pages.without_blocks(text)))
+    if length > page_words:
+        found.append((1, "page", f"the page has {length} words; at most {page_words}"))
+    for kind, line, block in pages.blocks(text):
+        length = len(pages.words(block))
+        if kind in ("paragraph", "item") and length > PARAGRAPH_WORDS:
+            found.append((line, "paragraph", f"the {kind} has {length} words; at most {PARAGRAPH_WORDS}"))
+        if kind == "cell" and length > CELL_WORDS:
+            found.append((line, "cell", f"the cell has {length} words; at most {CELL_WORDS}: {block}"))
+        found += [(line, "turn", f"'{turn}': {instead}") for turn, instead in turns_in(block)]
+    return found + heading_violations(text)
+
+
+def heading_violations(text):
+    found, level_before, seen = [], 0, {}
+    for line, level, title in pages.headings(text):
+        if level > level_before + 1:
+            found.append((line, "heading", f"'{title}' has level {level} after level {level_before}"))
+        if level == 1 and level_before:
+            found.append((line, "heading", f"'{title}' is a second title"))
+        slug = pages.slug_of(title)
+        if slug in seen:
+            found.append((line, "heading", f"'{title}' is also the heading of line {seen[slug]}"))
+        seen.setdefault(slug, line)
+        level_before = level
+    if not seen:
+        found.append((1, "heading", "the page has no title"))
+    return found
+
+
+def dead_links(path):
+    found = []
+    for line, target in pages.links(path.read_text()):
+        file, _, anchor = target.partition("#")
+        there = (path.parent / file).resolve() if file else path
+        if not there.exists():
+            found.append((line, "link", f"{target}: no such file"))
+        elif anchor and there.suffix == ".md" and anchor not in pages.anchors(there):
+            found.append((line, "link", f"{target}: the page has no such heading"))
+    return found
+
+
+def name_of(path):
+    return path.relative_to(ROOT).as_posix()
+
+
+def exempt_from(name):
+    return set().union(*(rules for pattern, rules in EXEMPT.items() if fnmatch.fnmatch(name, pattern)))
+
+
+def page_violations(path, with_exempt=False):
+    name = name_of(path)
+    found = violations(path.read_text(), README_WORDS if name == "README.md" else PAGE_WORDS) + dead_links(path)
+    exempt = set() if with_exempt else exempt_from(name)
+    return [f"{name}:{line}: {message} [{rule}]" for line, rule, message in sorted(found) if rule not in exempt]
+
+
+def counted_words():
+    """{page: words} of the pages of docs/ whose words count in total."""
+    counted = {}
+    for path in pages.documents():
+        name = name_of(path)
+        if name.startswith("docs/") and "total" not in exempt_from(name):
+            counted[name] = len(pages.words(pages.without_blocks(path.read_text())))
+    return counted
+
+
+def comments(path):
+    """[(line, text)] of the comments of a source file; consecutive lines of one comment are joined."""
+    text = path.read_text(errors="replace")
+    lines = []
+    if path.suffix in (".py", ".pyi") or text.startswith("#!/usr/bin/env python"):
+        try:
+            for token in tokenize.generate_tokens(io.StringIO(text).readline):
+                if token.type == tokenize.COMMENT:
+                    lines.append((token.start[0], token.string.lstrip("#! ")))
+                elif token.type == tokenize.STRING and token.string.lstrip("rRbBfF").startswith('"""'):
+                    lines += [(token.start[0] + i, part.strip(' "')) for i, part in enumerate(token.string.split("\n"))]
+        except (tokenize.TokenError, SyntaxError):
+            return []
+    else:
+        mark = r"//[/!]?<?" if path.suffix in (".h", ".cpp", ".cu", ".cuh") else r"#"
+        for number, line in enumerate(text.split("\n"), 1):
+            if match := re.search(rf"(?:^|\s){mark} ?(.*)$", line):
+                lines.append((number, match[1].strip()))
+    joined = []
+    for number, line in lines:
+        if joined and joined[-1][2] == number - 1 and line and joined[-1][1]:
+            joined[-1] = (joined[-1][0], f"{joined[-1][1]} {line}", number)
+        else:
+            joined.append((number, line, number))
+    return [(number, line) for number, line, _ in joined]
+
+
+def comment_report():
+    listed = subprocess.run(["git", "ls-files", "-z", *SOURCES], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    found = []
+    for name in listed.split("\0"):
+        path = ROOT / name
+        if name and path.is_file() and path != pathlib.Path(__file__):
+            for line, text in comments(path):
+                found += [f"{name}:{line}: '{turn}': {instead}" for turn, instead in turns_in(text)]
+    return found
+
+
+def report():
+    for path in pages.documents():
+        print(f"{len(pages.words(pages.without_blocks(path.read_text()))):6}  {name_of(path)}")
+    counted = counted_words()
+    print(f"{sum(counted.values()):6}  in all {len(counted)} pages that count; at most {TOTAL_WORDS}\n")
+    for path in pages.documents():
+        print("".join(f"{line}\n" for line in page_violations(path, with_exempt=True)), end="")
+
+
+class Rules(unittest.TestCase):
+    """Each rule finds what it is for."""
+
+    def rules(self, text, **options):
+        return sorted({rule for _, rule, _ in violations(text, **options)})
+
+    def test_a_good_page_has_no_violations(self):
+        text = "# Title\nA sentence.\n\n## One\n- an item\n\n| a | b |\n|---|---|\n| `nobody` | 1 |\n\n```\n# nobody\n```\n"
+        self.assertEqual(violations(text), [])
+
+    def test_lengths(self):
+        self.assertEqual(self.rules("# T\n" + "a b. \n\n" * 10, page_words=20), ["page"])
+        self.assertEqual(self.rules("# T\n" + "word\n" * 121), ["paragraph"])
+        self.assertEqual(self.rules("# T\n- " + "word " * 121), ["paragraph"])
+        self.assertEqual(self.rules("# T\n" + "- word\n" * 121), [])
+        self.assertEqual(self.rules("# T\n| " + "word " * 13 + "|\n"), ["cell"])
+        self.assertEqual(self.rules("# T\n|" + " word |" * 13 + "\n"), [])
+
+    def test_turns_with_their_lines(self):
+        self.assertEqual(violations("# T\ntext\n\nWhoever comes\n")[0][:2], (4, "turn"))
+        self.assertEqual(self.rules("# T\n| a | of a world |\n"), ["turn"])
+        self.assertEqual(self.rules("# T\nmeasured at f569d7d\n"), ["turn"])
+        self.assertEqual(self.rules("# T\n1280 worlds of 2026\n"), [])
+
+    def test_headings(self):
+        for text in ("no title\n", "# T\n### skipped\n", "# T\n## A\n## A\n", "# T\n# second\n"):
+            self.assertEqual(self.rules(text), ["heading"], text)
+
+    def test_dead_links(self):
+        page = ROOT / "README.md"
+        self.assertIn("licence", pages.anchors(page))
+        self.assertEqual(pages.links("[a](b.md#c) `[d](e)`\n![f](g.png) [h](https://i)"), [(1, "b.md#c"), (2, "g.png")])
+        self.assertGreater(len(pages.links(page.read_text())), 10)
+
+    def test_comments_are_found(self):
+        path = pathlib.Path(__file__)
+        self.assertIn(' Rules that do not hold'.strip(), " ".join(text for _, text in comments(path)))
+        self.assertTrue(any("Each rule finds" in text for _, text in comments(path)))
+
+
+class Pages(unittest.TestCase):
+    def test_pages_keep_the_rules(self):
+        found = [line for path in pages.documents() for line in page_violations(path)]
+        self.assertEqual(len(found), 0, "\n" + "\n".join(found))
+
+    def test_the_total_is_bounded(self):
+        counted = counted_words()
+        listing = "\n".join(f"{count:6}  {name}" for name, count in sorted(counted.items(), key=lambda item: -item[1]))
+        self.assertLessEqual(sum(counted.values()), TOTAL_WORDS, f"words of docs/ without research and generated pages:\n{listing}")
+
+    def test_every_page_is_in_the_navigation(self):
+        navigation = set(re.findall(r"[\w/.-]+\.md", (ROOT / "mkdocs.yml").read_text()))
+        self.assertEqual(navigation, {str(path.relative_to(ROOT / "docs")) for path in (ROOT / "docs").rglob("*.md")})
+
+
+if __name__ == "__main__":
+    if "--comments" in sys.argv:
+        print("\n".join(comment_report()))
+    elif "--report" in sys.argv:
+        report()
+    else:
+        unittest.main()
