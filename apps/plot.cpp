@@ -64,7 +64,7 @@ void add_plot_command(CLI::App& app) {
       ->excludes(severities);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
-      "docs/explanation/training.md says what the columns are. Of many updates, points are means of consecutive ones. "
+      "docs/reference/run_folder.md lists the columns. With many updates, points are means of consecutive updates. "
       "A mean ends\n"
       "where the first of its runs does.\n"
       "Python 3.11 with Matplotlib draws (PICTURA_PYTHON names one). Without it the data is written to OUT.json, and "

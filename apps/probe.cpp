@@ -45,7 +45,7 @@ constexpr const char* kCaseOfReplay =
 
 std::string footer(const std::array<const char*, 3>& examples) {
   return fmt::format(
-      "docs/explanation/probes.md says what is asked, how, and what the files hold.\n"
+      "docs/explanation/probes.md explains the method, docs/how-to/probe.md the files.\n"
       "Examples:\n  {}",
       fmt::join(examples, "\n  "));
 }

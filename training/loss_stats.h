@@ -5,7 +5,7 @@
 
 namespace pictura {
 
-/// Statistics of a minibatch, or their means over several; docs/explanation/training.md defines them.
+/// Statistics of a minibatch, or their means over several; docs/reference/run_folder.md defines them.
 template <typename Number>
 struct LossStatsOf {
   Number policy_loss{}, value_loss{};

@@ -33,9 +33,11 @@ SEE = {
     ("render",): "[Scene files](../scene_file.md), [images](../../explanation/image.md)",
     ("simulate",): "[The simulator](../../explanation/simulator.md), [replays](../replay.md)",
     ("replay",): "[Look at an agent](../../tutorials/look.md), [replays](../replay.md)",
-    ("train",): "[Training](../../explanation/training.md), [configuration](../configuration.md)",
-    ("evaluate",): "[Evaluation](../../explanation/evaluation.md)",
-    ("probe",): "[Probe an agent](../../tutorials/probe.md), [probes](../../explanation/probes.md)",
+    ("train",): "[Train a policy](../../how-to/train.md), [configuration](../configuration.md), [the folder of a run](../run_folder.md)",
+    ("evaluate",): "[Evaluate a policy](../../how-to/evaluate.md), [metrics and protocols](../../explanation/evaluation.md)",
+    ("probe",): "[Probe an agent](../../how-to/probe.md), [what probes measure](../../explanation/probes.md)",
+    ("export",): "[Export weights](../../how-to/train.md#export-weights)",
+    ("plot",): "[Watch a run](../../how-to/train.md#watch-a-run), [columns](../run_folder.md#logged-scalars)",
     ("bench",): "[How benchmarks measure](../../developer/benchmarks.md)",
 }
 
