@@ -5,6 +5,7 @@ Run by ctest: python3 words_test.py [unittest arguments]. Also
     python3 words_test.py --comments    prints forbidden turns in comments and docstrings of sources
 """
 
+import collections
 import fnmatch
 import io
 import pathlib
@@ -212,9 +213,12 @@ class Rules(unittest.TestCase):
 
 
 class Pages(unittest.TestCase):
+    maxDiff = 0  # the messages say it
+
     def test_pages_keep_the_rules(self):
         found = [line for path in pages.documents() for line in page_violations(path)]
-        self.assertEqual(len(found), 0, "\n" + "\n".join(found))
+        rules = collections.Counter(line.rsplit("[", 1)[1].rstrip("]") for line in found)
+        self.assertEqual(found, [], "\n" + "\n".join([*found, f"violations by rule: {dict(rules)}"]))
 
     def test_the_total_is_bounded(self):
         counted = counted_words()
@@ -228,7 +232,8 @@ class Pages(unittest.TestCase):
 
 if __name__ == "__main__":
     if "--comments" in sys.argv:
-        print("\n".join(comment_report()))
+        found = comment_report()
+        print("\n".join([*found, f"{len(found)} turns in comments"]))
     elif "--report" in sys.argv:
         report()
     else:
