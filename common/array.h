@@ -1,5 +1,6 @@
-// Arrays at public interfaces: a pointer with element type, shape, strides and device, owned by somebody else. What a
-// caller hands in is checked against what is expected; what differs is named. Kernels take spans, see span.h.
+// Arrays at public interfaces: a pointer with element type, shape, strides and device; the caller owns the memory. An
+// argument is checked against the expected type, shape and device, and an error names the difference. Kernels take
+// spans, see span.h.
 #pragma once
 
 #include <array>
@@ -17,12 +18,12 @@ namespace pictura {
 
 enum class ElementType : uint8_t { u8, u16, u32, i32, i64, f16, bf16, f32, f64 };
 std::size_t bytes_of(ElementType type);
-/// "u8", "i32", ...
+/// Name of an element type, such as "u8" or "i32".
 std::string_view name_of(ElementType type);
-/// "cpu" or "cuda:0".
+/// Name of a device, such as "cpu" or "cuda:0".
 std::string name_of(Device device);
 
-/// What elements of a C++ type are stored as: an enumeration as its integers.
+/// Storage type of the elements of a C++ type: the underlying integer of an enumeration.
 template <typename T>
 struct Stored {
   using Type = std::remove_const_t<T>;
@@ -35,7 +36,7 @@ struct Stored<T> {
 template <typename T>
 using StoredAs = typename Stored<T>::Type;
 
-/// The element type of a C++ type; f16 and bf16 have none of their own.
+/// Element type of a C++ type. No C++ type maps to f16 or bf16.
 template <typename T>
 consteval ElementType element_type() {
   using U = StoredAs<T>;
@@ -58,17 +59,17 @@ class Dims {
  public:
   static constexpr int kMaxRank = 5;
   Dims() = default;
-  /// Throws Error for more than kMaxRank.
+  /// Throws Error for more than kMaxRank dimensions.
   Dims(std::initializer_list<int64_t> values);
   int rank() const { return rank_; }
   int64_t operator[](int dimension) const { return values_[dimension]; }
   int64_t& operator[](int dimension) { return values_[dimension]; }
-  /// The product of all lengths.
+  /// Product of all lengths.
   int64_t count() const;
   /// Strides, in elements, of an array of these lengths without gaps, the last dimension fastest.
   Dims contiguous_strides() const;
   bool operator==(const Dims& other) const;
-  /// "[4096, 7]".
+  /// Text such as "[4096, 7]".
   std::string text() const;
 
  private:
@@ -76,38 +77,39 @@ class Dims {
   int rank_ = 0;
 };
 
-/// Does not own its memory. Element (i, j, ...) is at data + (i * strides[0] + j * strides[1] + ...) elements.
+/// Non-owning view of an array. Element (i, j, ...) is at data + (i * strides[0] + j * strides[1] + ...) elements.
 struct Array {
   void* data = nullptr;
   ElementType type = ElementType::u8;
   bool is_read_only = false;
-  Dims shape, strides;  // strides in elements
+  Dims shape, strides;  // in elements
   Device device;
 
   Array() = default;
   Array(void* its_data, ElementType its_type, Dims its_shape, Device its_device);
-  /// Without gaps.
+  /// Constructs a contiguous array.
   template <typename T>
     requires ArrayElement<std::remove_const_t<T>>
   Array(T* first, Dims its_shape, Device its_device)
       : Array(const_cast<std::remove_const_t<T>*>(first), element_type<T>(), its_shape, its_device) {
     is_read_only = std::is_const_v<T>;
   }
-  /// All of a container on the host, [size]: so that calls take a std::vector as it is.
+  /// Covers a whole host container, with shape [size], so that functions accept a std::vector directly.
   template <typename Container>
     requires ArrayElement<std::remove_cvref_t<decltype(*std::declval<Container&>().data())>>
   Array(Container&& container)  // NOLINT: converts
       : Array(container.data(), {static_cast<int64_t>(container.size())}, Device{}) {}
 
   bool is_contiguous() const { return strides == shape.contiguous_strides(); }
-  /// The elements of an array without gaps as a span. Throws Error naming `what` ("step: actions"), what was expected
-  /// and what came, where element type, shape or device differ, it has gaps, or T may be written and the array may not.
+  /// Returns the elements of a contiguous array as a span. Throws Error where element type, shape or device differ, the
+  /// array has gaps, or T is not const and the array is read-only. The error names `what` ("step: actions"), the
+  /// expected and the actual array.
   template <typename T>
   Span<T> checked(std::string_view what, const Dims& expected_shape, Device expected_device) const {
     check(what, element_type<T>(), !std::is_const_v<T>, expected_shape, expected_device);
     return {static_cast<T*>(data), static_cast<std::size_t>(shape.count())};
   }
-  /// "f32 [4096, 7] on cuda:0".
+  /// Text such as "f32 [4096, 7] on cuda:0".
   std::string text() const;
 
  private:

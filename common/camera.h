@@ -18,8 +18,8 @@ struct Camera {
   float focal_x_px = 0, focal_y_px = 0;    // focal lengths
   float center_x_px = 0, center_y_px = 0;  // principal point, from the image's top left corner
   Vec3 position_m;                         // in the ego frame
-  float yaw_rad = 0;                       // about z, counter-clockwise; 0 looks forward
-  float pitch_rad = 0;                     // positive looks up
+  float yaw_rad = 0;                       // about z, counter-clockwise; 0: the camera faces forward
+  float pitch_rad = 0;                     // positive: the camera faces up
   float roll_rad = 0;                      // positive turns the camera clockwise, as seen from behind it
 };
 
@@ -28,9 +28,10 @@ struct Rig {
   std::vector<Camera> cameras;
 };
 
-/// The paper's four cameras (appendix, table of the camera rig): front, front-left, front-right and back, focal length
-/// 1545 px at 1920x1080, scaled to the given size: at sizes that are not 16:9 their fields of view stay, so that pixels
-/// stretch, or, with square_pixels, the horizontal one alone. Throws unless both sizes are in [1, 8192].
+/// The paper's four cameras (appendix, table of the camera rig): front, front-left, front-right and back. The focal
+/// length of 1545 px at 1920x1080 is scaled to the given size. At sizes that are not 16:9, both fields of view are kept
+/// and pixels stretch; with square_pixels, only the horizontal field of view is kept. Throws Error unless both sizes
+/// are in [1, 8192].
 Rig paper_rig(int width_px = 96, int height_px = 54, bool square_pixels = false);
 
 /// Reads a rig from a TOML file (docs/explanation/image.md shows one). Throws Error naming the file, the camera and the
@@ -40,7 +41,7 @@ Rig load_rig(const std::string& path);
 /// Throws Error unless the rig has 1 to 64 cameras with sizes in [1, 8192] px, positive focal lengths and finite poses.
 void validate(const Rig& rig);
 
-/// Rotation rows right, down, forward of the camera in the ego frame: camera coordinates are (right, down, forward).
+/// Rotation of a camera: rows right, down and forward in the ego frame. Camera coordinates are (right, down, forward).
 struct CameraAxes {
   Vec3 right, down, forward;
 };

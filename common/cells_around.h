@@ -1,20 +1,20 @@
-// The cells of a grid within reach of a point, row by row; the same code on both devices.
+// Cells of a grid within reach of a point, row by row; shared by both devices.
 #pragma once
 
 #include "pictura/common/grid_view.h"
 
 namespace pictura {
 
-/// Cells in rows; the items of those of a row follow one another.
+/// A rectangle of cells. The items of one row of cells are contiguous.
 struct CellRows {
   int x0 = 0, x1 = 0, y0 = 0, y1 = 0;
   PICTURA_HD int32_t begin(const GridView& cells, int y) const { return cells.begin[y * cells.num_x + x0]; }
   PICTURA_HD int32_t end(const GridView& cells, int y) const { return cells.begin[y * cells.num_x + x1 + 1]; }
 };
 
-/// The cells that a square of half-width reach_m about p touches.
+/// Returns the cells that a square of half-width reach_m about p touches.
 PICTURA_HD inline CellRows cells_around(const GridView& cells, Vec2 p, float reach_m) {
-  if (cells.num_x == 1 && cells.num_y == 1) return {};  // without dividing
+  if (cells.num_x == 1 && cells.num_y == 1) return {};  // avoids the divisions
   return {cells.cell_x(p.x - reach_m), cells.cell_x(p.x + reach_m), cells.cell_y(p.y - reach_m),
           cells.cell_y(p.y + reach_m)};
 }

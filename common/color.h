@@ -1,23 +1,23 @@
-// The palette: one base colour per kind of primitive (per face for agents), and the range at which all have faded to
-// black. Vehicles take RAP's colours (vita-epfl/RAP, renderer.py); the other hues are ours, see
-// docs/explanation/image.md.
+// The palette: one base colour per kind of primitive (per face for agents), and the range at which all colours have
+// faded to black. Vehicles have RAP's colours (vita-epfl/RAP, renderer.py); docs/explanation/image.md lists the other
+// hues.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
 
 namespace pictura {
 
-/// Colour with channels in [0, 1]; files (color_rgb of scenes, PNG) have 0 to 255, see rgb8().
+/// Colour with channels in [0, 1]; files (color_rgb of scenes, PNG) hold 0 to 255, see rgb8().
 struct Rgb {
   float r = 0, g = 0, b = 0;
 };
 
-/// Storage of a channel: a byte; a half or float in [0, 1]; or the byte, 0 to 255, as a bfloat16, which holds it
+/// Storage of a channel: a byte; a half or float in [0, 1]; or a bfloat16 that holds the byte's value, 0 to 255,
 /// exactly.
 enum class PixelFormat : uint8_t { u8, f16, f32, bf16 };
 
-/// How the channels of an image are stored: [3, height, width]; [height, width, 3]; or [rows, columns, values of a
-/// patch] of patches (patches.h), black beyond the image.
+/// Layout of an image: [3, height, width]; [height, width, 3]; or patches (patches.h), [rows, columns, values of a
+/// patch], which are black beyond the image.
 enum class ChannelOrder : uint8_t { planar, interleaved, patches };
 
 PICTURA_HD constexpr Rgb rgb8(int r, int g, int b) {
@@ -36,7 +36,7 @@ constexpr int kNumBoxFaces = 5;
 constexpr float kVisibleRange_m = 120.0f;
 
 PICTURA_HD constexpr Rgb agent_color(AgentClass agent_class, BoxFace face) {
-  // Conditionals instead of a table: each thread of a kernel would have to build the table in its local memory first.
+  // Conditionals instead of a table, which each thread of a kernel would have to build in its local memory first.
   auto chosen = [face](Rgb front, Rgb back, Rgb left, Rgb right, Rgb top) {
     const Rgb of_sides = face == BoxFace::left ? left : face == BoxFace::right ? right : top;
     return face == BoxFace::front ? front : face == BoxFace::back ? back : of_sides;
@@ -51,8 +51,8 @@ PICTURA_HD constexpr Rgb agent_color(AgentClass agent_class, BoxFace face) {
   }
 }
 
-/// State of a traffic light. `unknown` (a recording has no record of it) is not drawn, nor are lights of worlds without
-/// states. Saved files hold these numbers.
+/// State of a traffic light. Lights in state `unknown` (the recording has no state) are not drawn, nor are the lights
+/// of worlds without states. Saved files hold these numbers.
 enum class LightState : uint8_t { off, red, yellow, green, unknown };
 constexpr int kNumLightStates = 5;
 

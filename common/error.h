@@ -1,5 +1,5 @@
-// How errors are thrown, with a formatted message. Headers that only document an Error include error_types.h, which
-// needs no fmt.
+// Functions that throw errors with a formatted message. Headers that only document an Error include error_types.h,
+// which needs no fmt.
 #pragma once
 
 #include <utility>

@@ -1,5 +1,5 @@
-// A uniform grid over the ground plane in compressed rows: which items touch which square cell. Built on the host, read
-// on both devices.
+// A uniform grid over the ground plane in compressed rows: the items that touch each square cell. Built on the host,
+// read on both devices.
 #pragma once
 
 #include <vector>
@@ -12,10 +12,10 @@ class Grid {
  public:
   Grid() = default;
   /// Puts item i into every cell that boxes[i] touches. Throws if a box is not finite, if the area would need more than
-  /// 2^26 cells, or if all items together touch more than 2^27.
+  /// 2^26 cells, or if all items together touch more than 2^27 cells.
   Grid(Span<const Aabb2> boxes, float cell_m);
   GridView view() const { return {origin_m_, cell_m_, num_x_, num_y_, begin_, items_}; }
-  /// Number of boxes that it was built from.
+  /// Number of boxes that the grid was built from.
   std::size_t num_boxes() const { return num_boxes_; }
 
  private:
@@ -27,7 +27,7 @@ class Grid {
   std::vector<int32_t> items_;
 };
 
-/// Of the grid that a box touches.
+/// Number of the grid's cells that a box touches.
 inline int64_t num_cells(const GridView& grid, const Aabb2& box) {
   const int64_t columns = grid.cell_x(box.high.x) - grid.cell_x(box.low.x) + 1;
   return columns * (grid.cell_y(box.high.y) - grid.cell_y(box.low.y) + 1);
@@ -41,7 +41,7 @@ void visit_cells(const GridView& grid, const Aabb2& box, Visit&& visit) {
     }
   }
 }
-/// Calls visit(item) for each item in those cells, once per cell that it is in.
+/// Calls visit(item) for each item in the cells that a box touches, once per such cell.
 template <typename Visit>
 void visit_items(const GridView& grid, const Aabb2& box, Visit&& visit) {
   visit_cells(grid, box, [&](std::size_t cell) {

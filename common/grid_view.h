@@ -1,5 +1,5 @@
-// A uniform grid over the ground plane as both devices read it: which items touch which square cell, in compressed
-// rows. Built on the host by Grid in grid.h.
+// A uniform grid over the ground plane as both devices read it: the items that touch each square cell, in compressed
+// rows. Grid in grid.h builds it on the host.
 #pragma once
 
 #include "pictura/common/math.h"

@@ -1,4 +1,4 @@
-// How a row of a SceneHistory becomes a view of its scene: the rule that both devices follow.
+// Mapping from a row of a SceneHistory to a view of its scene, shared by both devices.
 #pragma once
 
 #include "pictura/common/scene_types.h"
@@ -6,7 +6,7 @@
 namespace pictura {
 
 struct HistoryViews {
-  const View* views = nullptr;  // [steps, views_per_step], as they were put
+  const View* views = nullptr;  // [steps, views_per_step], as passed to put()
   int64_t views_per_step = 0;
   int32_t num_steps = 0, worlds_per_step = 0, agents_per_step = 0;
 
@@ -15,7 +15,7 @@ struct HistoryViews {
     nowhere.world = -1;
     if (row < 0 || row >= num_steps * views_per_step) return nowhere;
     View view = views[row];
-    // Shifted, what is no world or agent of its own step could be one of another.
+    // After the shift, an index that is out of range in its own step could be valid in another step.
     if (view.world < 0 || view.world >= worlds_per_step || view.ego_agent >= agents_per_step) return nowhere;
     const auto step = static_cast<int32_t>(row / views_per_step);
     view.world += step * worlds_per_step;

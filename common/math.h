@@ -1,6 +1,6 @@
 // Small vectors, and transcendental functions that are bit-equal on both devices. libm and CUDA differ in their last
-// bits, so sin, cos, atan and exp are our own: single-precision polynomials after S. Moshier's Cephes, built from + - *
-// / alone.
+// bits, so sin, cos, atan and exp are implemented here: single-precision polynomials after S. Moshier's Cephes, using +
+// - * / alone.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -59,7 +59,7 @@ struct SinCos {
   float sin, cos;
 };
 
-/// Sine and cosine together, within 2e-7 for |x_rad| <= 1e4; the same bits on every device.
+/// Sine and cosine together, within 2e-7 for |x_rad| <= 1e4; bit-equal on all devices.
 PICTURA_HD inline SinCos sincos_of(float x_rad) {
   const float quarter_turns = floorf(x_rad * 0.63661977236758134f + 0.5f);
   // pi/2 in three parts, so that the product with a small integer is exact (Cody and Waite).
@@ -112,7 +112,7 @@ PICTURA_HD inline float atan2_of(float y, float x) {
   return y < 0.0f ? angle - kPi : angle + kPi;
 }
 
-/// e^x within 2e-7 relative; 0 below -87, x is clamped to 88 above, and NaN is NaN.
+/// e^x within a relative error of 2e-7. Below -87 the result is 0, above 88 x is clamped, and NaN gives NaN.
 PICTURA_HD inline float exp_of(float x) {
   if (!(x >= -87.0f)) return x < -87.0f ? 0.0f : x;
   x = min_of(x, 88.0f);
@@ -124,7 +124,7 @@ PICTURA_HD inline float exp_of(float x) {
                       r +
                   5.0000001201e-1f;
   float y = p * r * r + r + 1.0f;
-  // 2^n by repeated squaring of exact powers: every factor is a power of two, so no rounding happens.
+  // 2^n by repeated squaring: every factor is a power of two, so nothing is rounded.
   int k = static_cast<int>(n);
   const float base = k < 0 ? 0.5f : 2.0f;
   k = k < 0 ? -k : k;
@@ -136,7 +136,7 @@ PICTURA_HD inline float exp_of(float x) {
   return y;
 }
 
-/// x_rad minus whole turns, in [-pi, pi].
+/// Returns x_rad minus whole turns, in [-pi, pi].
 PICTURA_HD inline float wrap_angle(float x_rad) {
   const float wrapped = x_rad - kTwoPi * floorf(x_rad * (1.0f / kTwoPi) + 0.5f);
   return clamp(wrapped, -kPi, kPi);

@@ -1,4 +1,4 @@
-// Samples of a pixel as people write them.
+// Parsing and formatting of a pixel's number of samples.
 #pragma once
 
 #include <optional>
@@ -9,13 +9,13 @@
 
 namespace pictura {
 
-/// What parse_pixel_samples takes, for messages.
+/// The accepted input of parse_pixel_samples, for messages.
 constexpr const char* kPixelSamplesExpected = "1 to 64 samples like 4, or a square grid of them like 4x4";
 
-/// "4" (MSAA) or "4x4" (supersampling), both up to 64; nothing for any other text.
+/// Parses "4" (MSAA) or "4x4" (supersampling), both up to 64 samples; returns nothing for any other text.
 std::optional<PixelSamples> parse_pixel_samples(std::string_view text);
 
-/// The text that reads back to it.
+/// Returns the text that parse_pixel_samples() parses to these samples.
 std::string text_of(const PixelSamples& samples);
 
 }  // namespace pictura

@@ -25,8 +25,8 @@ PICTURA_HD inline Philox4 philox4x32_10(Philox4 counter, uint32_t key0, uint32_t
   return counter;
 }
 
-/// What a random number is for. Two purposes never share a draw. Append only: a run is named by its seed, so that no
-/// purpose's number may change.
+/// Purpose of a random number. Two purposes never share a draw. Append only: seeds identify runs, so the number of a
+/// purpose must not change.
 enum class Purpose : uint8_t {
   world_size = 0,
   spawn = 2,
@@ -56,14 +56,14 @@ enum class Purpose : uint8_t {
   impaired_spell,
 };
 
-/// Whose draws they are, when, and what for. Ids are global across ranks. Fields that are not given are 0.
+/// Key of a stream of draws: owner, time and purpose. Ids are global across ranks. Fields that are not given are 0.
 struct RandomKey {
-  static constexpr int kAgentBits = 12, kPurposeBits = 8;  // those of the others are all of their bits
+  static constexpr int kAgentBits = 12, kPurposeBits = 8;  // the other fields use all of their bits
   static constexpr uint32_t kMaxAgents = 1u << kAgentBits;
 
   uint64_t seed = 0;
   uint32_t world = 0;
-  uint32_t agent = 0;  // of its world, below kMaxAgents: not a slot of a simulator
+  uint32_t agent = 0;  // index in its world, below kMaxAgents; not a simulator's slot
   uint32_t episode = 0;
   uint32_t step = 0;
   Purpose purpose = Purpose::world_size;
@@ -71,7 +71,7 @@ struct RandomKey {
   PICTURA_HD constexpr bool is_in_range() const { return agent < kMaxAgents; }
 };
 
-/// The stream of draws of one key. A key out of range would draw what another one draws: it ends a debug build.
+/// Stream of draws of one key. A key out of range would share the draws of another key, so it ends a debug build.
 class RandomStream {
  public:
   PICTURA_HD explicit RandomStream(const RandomKey& key)
@@ -84,7 +84,7 @@ class RandomStream {
     PICTURA_DEBUG_CHECK(key.is_in_range());
   }
 
-  /// 32 uniform bits. A stream holds 16,384 of them.
+  /// Returns 32 uniform bits. A stream holds 16,384 draws of 32 bits.
   PICTURA_HD uint32_t bits() {
     if (next_ == 4) {
       block_ = philox4x32_10(counter_, key0_, key1_);
@@ -94,7 +94,7 @@ class RandomStream {
     return block_.word[next_++];
   }
 
-  /// Passes over `count` draws, each of 32 bits.
+  /// Skips `count` draws of 32 bits.
   PICTURA_HD void skip(int count) {
     for (; count > 0 && next_ < 4; --count) ++next_;
     counter_.word[1] += static_cast<uint32_t>(count / 4) << kBlockShift;

@@ -1,5 +1,6 @@
-// The scene: all that a simulator and a renderer exchange. StaticGeometry is what is drawn of a map, uploaded once;
-// SceneBatch is what moves, written in every step; a View places a rig. The plain data types are in scene_types.h.
+// The scene: all data that a simulator and a renderer exchange. StaticGeometry is the drawn part of a map, uploaded
+// once. SceneBatch is everything that moves, written in every step. A View places a rig. The plain data types are in
+// scene_types.h.
 #pragma once
 
 #include <vector>
@@ -9,7 +10,7 @@
 
 namespace pictura {
 
-/// What is drawn of a map; shared by every world on it.
+/// The drawn part of a map; shared by all worlds on the map.
 struct StaticGeometry {
   std::vector<Strip> strips;
   std::vector<WallFace> walls;
@@ -42,14 +43,14 @@ struct SceneOwner {
   }
 };
 
-/// A drawn box in the colours of its class; size_m is its length, width and height.
+/// Makes a drawn box in the colours of its class; size_m is its length, width and height.
 AgentBox make_box(AgentClass agent_class, Vec3 center_m, float heading_rad, Vec3 size_m);
 
-/// A view at a pose that hides no agent.
+/// Makes a view at a pose; it hides no agent.
 View make_view(Vec3 origin_m, float heading_rad);
 
-/// The views of a call. Where num_views is given, it lies with the views, on their device, and only views
-/// [0, *num_views) are read: a list that was compacted on a device needs no host to be drawn.
+/// Views of a call. Where num_views is given, it lies with the views, on their device, and only views [0, *num_views)
+/// are read. So a list that was compacted on a device is drawn without the host.
 struct ViewBatch {
   Span<const View> views;
   const int32_t* num_views = nullptr;
@@ -61,9 +62,9 @@ struct ViewBatch {
   std::size_t size() const { return views.size(); }
 };
 
-/// A point of a polyline that is closer than this to the one before, in plan, is dropped.
+/// Minimum distance in plan between consecutive points of a polyline; closer points are dropped.
 constexpr float kRepeatedPoint_m = 1e-4f;
-/// Cuts polylines (at least two points each) into mitred strips of at most kMaxPiece_m and appends them.
+/// Cuts polylines (at least two points each) into mitred strips of at most kMaxPiece_m and appends these strips.
 void append_strips(Span<const Vec3> points_m, float width_m, Rgb color, StripKind kind, std::vector<Strip>* strips_out);
 
 }  // namespace pictura

@@ -1,5 +1,5 @@
-// A scene in one TOML file: boxes, lines, walls, lights, a rig and views; docs/reference/scene_file.md documents every
-// key. What `pictura render` and the golden tests draw, and what a report of a wrong image should carry.
+// A scene in one TOML file: boxes, lines, walls, lights, a rig and views. docs/reference/scene_file.md documents every
+// key. `pictura render` and the golden tests draw scene files, and reports of wrong images should contain one.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@
 
 namespace pictura {
 
-/// All that a renderer needs to draw a scene of one world on one map.
+/// Input of a renderer for a scene of one world on one map.
 struct SceneFile {
   RendererConfig config;  // rig, line floor and palette
   StaticGeometry geometry;
@@ -19,9 +19,8 @@ struct SceneFile {
   std::vector<std::string> view_names, view_captions;  // [views]; names can be used as file names
 };
 
-/// Reads a scene's text. A rig file that it names is looked up relative to `folder`. Throws Error naming source, line,
-/// table and key for unknown and missing keys, wrong types, numbers out of range and indices of agents that do not
-/// exist.
+/// Parses a scene's text. Paths of rig files are relative to `folder`. Throws Error naming source, line, table and key
+/// for unknown and missing keys, wrong types, numbers out of range and indices of agents that do not exist.
 SceneFile parse_scene(const std::string& text, const std::string& source, const std::string& folder = ".");
 
 /// Reads a scene file of up to 1 MiB.

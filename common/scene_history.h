@@ -1,5 +1,5 @@
-// The scenes of many steps as one scene, so that the images of any agents at any of those steps are drawn again by one
-// call: minibatches, films and replays read it instead of stored images.
+// The scenes of many steps as one scene. One call redraws the images of any agents at any of these steps: minibatches,
+// films and replays read the history instead of stored images.
 #pragma once
 
 #include <memory>
@@ -11,17 +11,18 @@
 
 namespace pictura {
 
-/// How much a history has room for; every step has as many of each.
+/// Capacity of a history; every step has the same number of each item.
 struct SceneHistorySize {
   int num_steps = 0;
-  std::size_t worlds = 0, agents = 0, lights = 0, views = 0;  // of one step
+  std::size_t worlds = 0, agents = 0, lights = 0, views = 0;  // per step
 };
 
-/// World w of step s is world s * worlds + w of the history, and so on for agents and lights. Works in the memory of
-/// one device, by the rules of Renderer for devices, streams and waiting: put() and gather() neither allocate nor wait.
+/// History of scenes in the memory of one device. World w of step s is world s * worlds + w of the history, and so on
+/// for agents and lights. The rules of Renderer for devices, streams and waiting apply: put() and gather() neither
+/// allocate nor wait.
 class SceneHistory {
  public:
-  /// Throws Error where there are more agents or lights than a scene can have.
+  /// Throws Error where the history has more agents or lights than a scene can have.
   explicit SceneHistory(const SceneHistorySize& size);
   virtual ~SceneHistory() = default;
   SceneHistory(const SceneHistory&) = delete;
@@ -30,22 +31,22 @@ class SceneHistory {
   virtual Device device() const = 0;
   const SceneHistorySize& size() const { return size_; }
 
-  /// Keeps a scene and the views of its agents as those of `step`, instead of what the step held before. Steps are put
+  /// Stores a scene and the views of its agents at `step`, replacing the step's previous content. Steps must be filled
   /// in order first. Throws Error where the scene is of another device or size, hides agents, or a step is left out.
   void put(int step, const SceneBatch& scene, Span<const View> views, Stream stream = {});
 
-  /// All steps that have been put.
+  /// Returns the scene of all steps that have been put.
   virtual SceneBatch scene() const = 0;
 
-  /// The views, in scene(), of rows step * size().views + view. Rows of steps that have not been put, and views that
-  /// renderers would refuse of their own step, give a view that they refuse. Throws Error where there are not as many
-  /// rows as views_out.
+  /// Copies views in scene(), by rows step * size().views + view. A row of a step that has not been put, or of a view
+  /// that renderers would refuse in its own step, gives a view that renderers refuse. Throws Error unless there are as
+  /// many rows as views_out.
   void gather(Span<const int64_t> rows, Span<View> views_out, Stream stream = {}) const;
 
  protected:
-  /// Steps that have been put.
+  /// Number of steps that have been put.
   int num_steps() const { return num_steps_; }
-  /// The rule of gather(), for views in the order of put().
+  /// Row mapping of gather(), for views in the order of put().
   HistoryViews history_views(const View* views) const {
     return {views, static_cast<int64_t>(size_.views), num_steps_, static_cast<int32_t>(size_.worlds),
             static_cast<int32_t>(size_.agents)};
@@ -59,7 +60,7 @@ class SceneHistory {
   int num_steps_ = 0;
 };
 
-/// The memory of a history, for both devices: Buffer<T>(n) holds n elements at data().
+/// Memory of a history, for both devices: Buffer<T>(n) holds n elements at data().
 template <template <typename...> class Buffer>
 struct SceneHistoryArrays {
   SceneHistorySize size;
@@ -78,7 +79,7 @@ struct SceneHistoryArrays {
         light_begin(count(s.num_steps, s.worlds) + 1),
         views(count(s.num_steps, s.views)) {}
 
-  /// The first steps of it.
+  /// Returns the scene of the first num_steps steps.
   SceneBatch scene(Device device, int num_steps) const {
     const std::size_t worlds = count(num_steps, size.worlds);
     return {device,
@@ -90,7 +91,7 @@ struct SceneHistoryArrays {
             {}};
   }
 
-  /// Writes a step: copy(from, first) copies elements, shift(from, added, first) adds a number to each.
+  /// Writes a step: copy(from, first) copies elements, and shift(from, added, first) adds a number to each element.
   template <typename Copy, typename Shift>
   void write_step(int step, const SceneBatch& scene, Span<const View> step_views, Copy&& copy, Shift&& shift) {
     const std::size_t worlds = count(step, size.worlds);
@@ -106,10 +107,10 @@ struct SceneHistoryArrays {
   static std::size_t count(int steps, std::size_t of_step) { return static_cast<std::size_t>(steps) * of_step; }
 };
 
-/// In host memory.
+/// Makes a history in host memory.
 std::unique_ptr<SceneHistory> make_host_scene_history(const SceneHistorySize& size);
 
-/// Bytes that a history takes.
+/// Size of a history in bytes.
 int64_t bytes_of(const SceneHistorySize& size);
 
 }  // namespace pictura

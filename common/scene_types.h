@@ -1,5 +1,5 @@
-// The plain data of scenes, readable on both devices: the pieces of a map, what moves, and from where images are drawn.
-// Right-handed, in metres, z up; headings in radians, counter-clockwise.
+// Plain data of scenes, readable on both devices: the pieces of a map, moving objects, and the views from which images
+// are drawn. Right-handed, in metres, z up; headings in radians, counter-clockwise.
 #pragma once
 
 #include "pictura/common/color.h"
@@ -9,7 +9,7 @@
 
 namespace pictura {
 
-/// What a strip on the road is; its class in the optional class plane is kClassOfStrip + kind.
+/// Kind of a strip on the road; its class in the optional class plane is kClassOfStrip + kind.
 enum class StripKind : uint8_t { lane_mark, road_edge, crosswalk, stop_line };
 constexpr int kNumStripKinds = 4;
 
@@ -27,7 +27,7 @@ constexpr float kMaxPiece_m = 10.0f;
 
 /// An opaque vertical face from the ground up, seen from both sides.
 struct alignas(8) WallFace {
-  Vec3 a_m, b_m;  // the two ends of its foot
+  Vec3 a_m, b_m;  // the two ends of its lower edge
   float height_m = 0;
   Rgb color = kWallColor;
 };
@@ -35,14 +35,14 @@ struct alignas(8) WallFace {
 /// A disk of kLightRadius_m in the colour of its signal's state, drawn for cameras in front of it.
 struct LightHead {
   Vec3 position_m;  // centre of the disk
-  Vec2 facing;      // unit vector, towards the traffic that it controls
+  Vec2 facing;      // unit vector, towards the traffic that the light controls
   float cos_half_angle = 0.5f;
-  int32_t signal = 0;  // index into the world's light states: the stop line that it governs
+  int32_t signal = 0;  // index into the world's light states: the stop line that the light governs
 };
 constexpr float kLightRadius_m = 0.5f;
 
-/// The box by which the uniform grids store a piece. Of a strip, the box around its four corners: where it is mitred
-/// they lie up to four half-widths from its centre line.
+/// Box by which the uniform grids store a piece. For a strip, it bounds the four corners, which lie up to four
+/// half-widths from the centre line where the strip is mitred.
 PICTURA_HD inline Aabb2 ground_box(const Strip& strip) {
   const Vec2 a = strip.a_m.xy(), b = strip.b_m.xy();
   const Vec2 at_a = strip.side_a * (0.5f * strip.width_m), at_b = strip.side_b * (0.5f * strip.width_m);
@@ -54,7 +54,7 @@ PICTURA_HD inline Aabb2 ground_box(const WallFace& wall) {
           {max_of(wall.a_m.x, wall.b_m.x), max_of(wall.a_m.y, wall.b_m.y)}};
 }
 
-/// A StaticGeometry as both devices read it.
+/// View of a StaticGeometry that both devices read.
 struct StaticGeometryView {
   Span<const Strip> strips;
   Span<const WallFace> walls;
@@ -65,50 +65,50 @@ struct StaticGeometryView {
 
 /// An agent's oriented box, standing upright on the ground.
 struct AgentBox {
-  Vec3 center_m;  // centre of the box's foot
+  Vec3 center_m;  // centre of the box's bottom face
   float cos_heading = 1, sin_heading = 0;
   float length_m = 0, width_m = 0, height_m = 0;
   AgentClass agent_class = AgentClass::vehicle;
-  uint8_t palette = 0;  // 0: the class's colours; 1: halted, 2: parked, in the debug palette alone
-  uint8_t drawn = 1;    // 0: not in any image
+  uint8_t palette = 0;  // 0: class colours; 1: halted, 2: parked, with the debug palette alone
+  uint8_t drawn = 1;    // 0: absent from all images
   uint8_t padding = 0;
 };
 
-/// Names a StaticGeometry in renderers; chosen by the caller of upload(), in [0, kNumGeometryHandles).
+/// Handle of a StaticGeometry in renderers; the caller of upload() chooses it, in [0, kNumGeometryHandles).
 using GeometryHandle = int32_t;
 constexpr GeometryHandle kNumGeometryHandles = 1 << 16;
 
-/// Upper bound on the agents of one world of a scene: 4,096 that a simulator steps, and as many parked cars.
+/// Maximum number of agents of one world of a scene: 4,096 simulated agents and as many parked cars.
 constexpr int kMaxBoxesPerWorld = 8192;
 
-/// Everything that moves, for all worlds, of one step.
+/// All moving objects of all worlds at one step.
 struct SceneBatch {
   Device device;                        // of all spans
   Span<const int32_t> world_begin;      // [worlds + 1] first agent of each world; ends with the number of agents
-  Span<const AgentBox> agents;          // [agents] controlled and parked alike
+  Span<const AgentBox> agents;          // [agents] controlled and parked agents
   Span<const GeometryHandle> geometry;  // [worlds]
   Span<const int32_t> light_begin;      // [worlds + 1] first light state of each world
   Span<const LightState> light_states;  // [light_begin.back()]
-  Span<const int32_t> hidden_agents;    // lists that views point into; usually empty
+  Span<const int32_t> hidden_agents;    // lists that views refer to; usually empty
 };
 
-/// Whether a world has a light state for each of its map's signals, or none at all: then no light is drawn.
+/// Whether a world has a light state for each of its map's signals, or no light state, in which case no light is drawn.
 PICTURA_HD constexpr bool has_enough_lights(int32_t lights, int32_t signals) {
   return lights == 0 || lights >= signals;
 }
 
-/// What a view leaves out of its images, as bits.
+/// Objects that a view leaves out of its images, as bits.
 enum Hides : uint32_t {
   kHidesNothing = 0,
-  kHidesAgents = 1,  // all of them
+  kHidesAgents = 1,  // all agents
   kHidesLights = 2,  // all traffic lights
 };
 
-/// By what a view's cameras are randomized (common/raster/randomize_camera.h), as random numbers are keyed
-/// (common/rng.h): images that are drawn again are the same again.
+/// Key of the randomization of a view's cameras (common/raster/randomize_camera.h), like the keys of random numbers
+/// (common/rng.h). With the same key, a redrawn image is the same.
 struct ViewKey {
   uint32_t world = 0;  // global
-  uint32_t agent = 0;  // of its world, below RandomKey::kMaxAgents
+  uint32_t agent = 0;  // index in its world, below RandomKey::kMaxAgents
   uint32_t episode = 0, step = 0;
 };
 
@@ -119,18 +119,18 @@ struct View {
   Vec3 origin_m;           // the rig's origin, on the ground
   float cos_heading = 1, sin_heading = 0;
   float body_length_m = kRigBodyLength_m;    // shrinks the x offsets of the cameras of short bodies
-  int32_t hidden_begin = 0, hidden_end = 0;  // further agents left out: a range of SceneBatch::hidden_agents
+  int32_t hidden_begin = 0, hidden_end = 0;  // further hidden agents: a range of SceneBatch::hidden_agents
   uint32_t hides = kHidesNothing;            // bits of Hides
   ViewKey key;
 
   static constexpr float kRigBodyLength_m = 4.5f;
 };
 
-/// A direction given by its cosine and sine; headings are computed in float, so a small drift is accepted.
+/// Whether a cosine and a sine form a direction. Headings are computed in float, so a small drift is accepted.
 PICTURA_HD inline bool is_direction(float cosine, float sine) {
   return fabsf(cosine * cosine + sine * sine - 1.0f) < 1e-2f;
 }
-/// Whether a view has a pose, and a range of a list of so many hidden agents.
+/// Whether a view's pose is finite and valid.
 PICTURA_HD inline bool has_finite_pose(const View& view) {
   return is_finite(view.origin_m) && is_direction(view.cos_heading, view.sin_heading) && view.body_length_m >= 0.0f &&
          is_finite(view.body_length_m);
@@ -140,7 +140,7 @@ PICTURA_HD inline bool hides_within(const View& view, size_t hidden_agents) {
          static_cast<size_t>(view.hidden_end) <= hidden_agents;
 }
 
-/// How much of an agent does a view see?
+/// Query of the visible share of an agent in a view.
 struct VisibilityQuery {
   int32_t view = 0;
   int32_t agent = 0;  // index into SceneBatch::agents

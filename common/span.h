@@ -1,5 +1,5 @@
-// A pointer and a length that both devices can hold; it never owns. Converts from std::vector and from Span<T> to
-// Span<const T>. Lengths and indices may be any integers: counts are int in most of the code, and need no casts.
+// A pointer and a length that both devices can hold, without ownership. Converts from std::vector and from Span<T> to
+// Span<const T>. Lengths and indices may be of any integer type: counts are int in most of the code, and need no casts.
 #pragma once
 
 #include "pictura/common/portable/hd.h"

@@ -1,4 +1,4 @@
-// Errors of the CUDA runtime as Error.
+// Conversion of CUDA runtime errors to Error.
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -9,11 +9,11 @@ namespace pictura {
 
 inline void check_cuda(cudaError_t status, const char* what) {
   if (status == cudaSuccess) return;
-  cudaGetLastError();  // reported here; a later call must not report it again
+  cudaGetLastError();  // clears the error, so that a later call does not report it again
   fail("cuda: {}: {}", what, cudaGetErrorString(status));
 }
 
 }  // namespace pictura
 
-/// Throws Error naming the call when it fails.
+/// Throws Error naming the call where the call fails.
 #define PICTURA_CUDA(call) ::pictura::check_cuda((call), #call)

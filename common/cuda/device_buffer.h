@@ -14,10 +14,10 @@
 
 namespace pictura {
 
-/// How many arrays this process has allocated in device memory; a loop that has stopped allocating leaves it as it is.
+/// Number of device arrays that this process has allocated so far; constant across a loop that allocates nothing.
 inline std::atomic<int64_t> device_allocations{0};
 
-/// An array in device memory; its contents are undefined until they are written. Moves, does not copy.
+/// An array in device memory, initially undefined. Movable, not copyable.
 template <typename T>
 class DeviceBuffer {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -29,7 +29,7 @@ class DeviceBuffer {
     PICTURA_CUDA(cudaMalloc(reinterpret_cast<void**>(&data_), size * sizeof(T)));
     ++device_allocations;
   }
-  /// A copy of host memory; returns when it is made.
+  /// Copies host memory; returns when the copy is complete.
   explicit DeviceBuffer(Span<const T> host) : DeviceBuffer(host.size()) {
     if (size_ > 0) PICTURA_CUDA(cudaMemcpy(data_, host.data(), size_ * sizeof(T), cudaMemcpyHostToDevice));
   }
@@ -47,15 +47,15 @@ class DeviceBuffer {
   T* data() const { return data_; }
   std::size_t size() const { return size_; }
   Span<const T> span() const { return {data_, size_}; }
-  /// Copies size() elements from the host; returns when they can be overwritten there.
+  /// Copies size() elements from the host; returns when the host memory may be overwritten.
   void copy_from_host(const T* host) {
     if (size_ > 0) PICTURA_CUDA(cudaMemcpy(data_, host, size_ * sizeof(T), cudaMemcpyHostToDevice));
   }
-  /// Sets every byte.
+  /// Sets every byte to the given value.
   void fill(int byte) {
     if (size_ > 0) PICTURA_CUDA(cudaMemset(data_, byte, size_ * sizeof(T)));
   }
-  /// Waits for the device's work and copies to the host.
+  /// Waits for the device's work, then copies to the host.
   void copy_to_host(T* host) const {
     if (size_ > 0) PICTURA_CUDA(cudaMemcpy(host, data_, size_ * sizeof(T), cudaMemcpyDeviceToHost));
   }
@@ -65,7 +65,7 @@ class DeviceBuffer {
   std::size_t size_ = 0;
 };
 
-/// One value in host memory that kernels can write and the host can read without a copy.
+/// A value in host memory that kernels can write and the host can read without a copy.
 template <typename T>
 class MappedValue {
  public:

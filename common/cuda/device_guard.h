@@ -1,4 +1,4 @@
-// The CUDA device that calls work on. Objects that live on one device set it in each call, so that callers need not.
+// The current CUDA device of a thread. Objects that live on one device set it in each call, so that callers need not.
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -9,16 +9,16 @@
 
 namespace pictura {
 
-/// Makes a device the current one of the calling thread, and restores the one before at the end of the scope.
+/// Makes a device the calling thread's current device, and restores the previous device at the end of the scope.
 class DeviceGuard {
  public:
-  /// Throws Error naming the device where this is no CUDA device, or one that does not exist.
+  /// Throws Error naming the device where it is not a CUDA device or does not exist.
   explicit DeviceGuard(Device device) : index_(device.index) {
     PICTURA_CHECK(!device.is_host(), "cuda: expected a CUDA device, got {}", name_of(device));
     PICTURA_CUDA(cudaGetDevice(&previous_));
     if (index_ == previous_) return;
     if (const cudaError_t status = cudaSetDevice(index_); status != cudaSuccess) {
-      cudaGetLastError();  // else the next call's check finds it
+      cudaGetLastError();  // clears the error for the next check
       fail("{}: {}", name_of(device), cudaGetErrorString(status));
     }
   }
@@ -32,7 +32,7 @@ class DeviceGuard {
   int index_ = 0, previous_ = 0;
 };
 
-/// The calling thread's current device.
+/// Returns the calling thread's current device.
 inline Device current_device() {
   Device device{MemorySpace::cuda, 0};
   PICTURA_CUDA(cudaGetDevice(&device.index));

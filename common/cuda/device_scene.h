@@ -1,4 +1,4 @@
-// Copies of host scenes and images in device memory, kept and reused from call to call.
+// Copies of host scenes and images in device memory. Their memory is reused between calls.
 #pragma once
 
 #include <vector>
@@ -10,11 +10,11 @@
 
 namespace pictura {
 
-/// Device memory that grows to what was last copied into it, and never shrinks.
+/// Device memory that grows to the largest copied array and never shrinks.
 template <typename T>
 class DeviceCopy {
  public:
-  /// Copies from the host on the stream; pageable host memory can be overwritten when the call returns.
+  /// Copies from the host on the stream. Pageable host memory may be overwritten after the call returns.
   Span<const T> assign(Span<const T> host, cudaStream_t stream) {
     if (buffer_.size() < host.size()) buffer_ = DeviceBuffer<T>(host.size());
     if (!host.empty()) {
@@ -23,7 +23,7 @@ class DeviceCopy {
     }
     return {buffer_.data(), host.size()};
   }
-  /// Makes it hold this many elements, with undefined contents.
+  /// Resizes to this many elements, with undefined contents.
   Span<T> resize(std::size_t size) {
     if (buffer_.size() < size) buffer_ = DeviceBuffer<T>(size);
     return {buffer_.data(), size};
@@ -33,7 +33,7 @@ class DeviceCopy {
   DeviceBuffer<T> buffer_;
 };
 
-/// A host scene's copy.
+/// Device copy of a host scene.
 class DeviceScene {
  public:
   DeviceScene() = default;
@@ -57,10 +57,11 @@ class DeviceScene {
   DeviceCopy<LightState> light_states_;
 };
 
-/// Device memory for images that lie on the host: colour as image_layout says, and the planes that the host has.
+/// Device memory for images whose destination is on the host: colour as in image_layout, and the planes that the host
+/// images have.
 class DeviceImages {
  public:
-  /// On the current device.
+  /// Allocates images like the host's on the current device.
   ImageBatch like(const ImageBatch& host) {
     std::vector<ImageSize> sizes;
     for (const CameraImages& camera : host.cameras) sizes.push_back({camera.width_px, camera.height_px});
@@ -82,10 +83,10 @@ class DeviceImages {
     return {current_device(), host.format, host.num_views, cameras_, host.order, host.patch_px};
   }
 
-  /// All colour of what like() made.
+  /// All colour bytes of the images that like() allocated.
   Span<uint8_t> color_bytes() const { return color_bytes_; }
 
-  /// Copies what like() made back into such images on the host, of as many views or fewer, on the stream.
+  /// Copies the images that like() allocated to host images of at most as many views, on the stream.
   void copy_to_host(const ImageBatch& host, cudaStream_t stream = nullptr) const {
     const auto views = static_cast<std::size_t>(host.num_views);
     auto copy = [&](void* to, const void* from, std::size_t bytes) {
@@ -96,7 +97,7 @@ class DeviceImages {
       const std::size_t value_bytes = bytes_per_value(host.format), pixels = pixels_of(k, host.num_views);
       const std::size_t image_bytes = static_cast<std::size_t>(layout_.cameras[k].camera_stride) * value_bytes;
       auto pitch = [&](int64_t view_stride) {
-        // A single image may have any stride; CUDA takes no pitch below a row.
+        // A single image may have any stride; CUDA rejects a pitch below the row size.
         return views > 1 ? static_cast<std::size_t>(view_stride) * value_bytes : image_bytes;
       };
       if (views > 0 && image_bytes > 0) {

@@ -1,4 +1,4 @@
-// Streams in DLPack's numbers, and work on one stream that waits for work on another.
+// DLPack's numbers of streams, and dependencies between streams.
 #pragma once
 
 #include <cstdint>
@@ -7,19 +7,20 @@
 
 namespace pictura {
 
-/// Of DLPack's number: 1 is the legacy default stream, 2 the default stream of the calling thread, others are handles.
+/// Returns the stream of a DLPack number: 1 is the legacy default stream, 2 the per-thread default stream, others are
+/// handles.
 inline Stream stream_of_number(int64_t number) {
   if (number == 1) return {cudaStreamLegacy};
   if (number == 2) return {cudaStreamPerThread};
   return {reinterpret_cast<void*>(static_cast<intptr_t>(number))};
 }
-/// Back. The null handle is the legacy default stream.
+/// Returns the DLPack number of a stream. The null handle is the legacy default stream.
 inline int64_t number_of_stream(Stream stream) {
   const auto number = static_cast<int64_t>(reinterpret_cast<intptr_t>(stream.handle));
   return number == 0 ? 1 : number;
 }
 
-/// Work that is put on `after` from now on waits for what has been put on `before`. Does not wait itself.
+/// Makes later work on `after` wait for the work that is already on `before`. The call itself does not wait.
 inline void order_streams(Device device, Stream before, Stream after) {
   if (number_of_stream(before) == number_of_stream(after)) return;
   const DeviceGuard guard(device);
@@ -28,7 +29,7 @@ inline void order_streams(Device device, Stream before, Stream after) {
   const cudaError_t recorded = cudaEventRecord(event, static_cast<cudaStream_t>(before.handle));
   const cudaError_t waits =
       recorded == cudaSuccess ? cudaStreamWaitEvent(static_cast<cudaStream_t>(after.handle), event, 0) : recorded;
-  cudaEventDestroy(event);  // once it has been recorded
+  cudaEventDestroy(event);  // deferred by CUDA until the event has completed
   PICTURA_CUDA(waits);
 }
 

@@ -1,13 +1,13 @@
 // Asynchronous copies to shared memory, prefetches, and overlapping launches. On the host, copies are immediate and
-// nothing is waited for.
+// waits do nothing.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
 
 namespace pictura {
 
-/// Copies 8 bytes, aligned to 8, into a block's shared memory. On a device asynchronously: valid after the same thread
-/// has called wait_for_copies().
+/// Copies 8 bytes, aligned to 8, into a block's shared memory. On a device the copy is asynchronous: it is valid after
+/// the same thread has called wait_for_copies().
 PICTURA_HD inline void copy_into_shared(void* to, const void* from) {
 #if defined(__CUDA_ARCH__)
   asm volatile("cp.async.ca.shared.global [%0], [%1], 8;"
@@ -24,21 +24,21 @@ PICTURA_HD inline void wait_for_copies() {
 #endif
 }
 
-/// Prefetches the memory at `first`, or so many bytes after it whether or not it is there: into a device's L2 cache, or
-/// a core's first one.
+/// Prefetches the memory at `first` + offset_bytes, which need not be allocated: into the L2 cache of a device, or the
+/// first-level cache of a core.
 PICTURA_HD inline void prefetch(const void* first, int offset_bytes = 0) {
-  // The sum of integers, for one of pointers must stay within an array.
+  // Added as integers, because a pointer sum must stay within an array.
   const uintptr_t address = reinterpret_cast<uintptr_t>(first) + static_cast<uintptr_t>(offset_bytes);
 #if defined(__CUDA_ARCH__)
   asm volatile("prefetch.global.L2 [%0];" : : "l"(address));
 #else
   __builtin_prefetch(reinterpret_cast<const void*>(address));
-  asm volatile("");  // else g++ takes callers that do nothing else for functions without effect, and drops the calls
+  asm volatile("");  // otherwise g++ treats functions that only prefetch as free of effects, and drops their calls
 #endif
 }
 
-/// Waits until the previous launch on the stream has ended and its writes are visible: with programmatic dependent
-/// launch a kernel may start earlier.
+/// Waits until the previous launch on the stream has ended and its writes are visible. With programmatic dependent
+/// launch, a kernel may start before that.
 PICTURA_HD inline void wait_for_earlier_launch() {
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
   asm volatile("griddepcontrol.wait;" : : : "memory");

@@ -1,5 +1,5 @@
-// PICTURA_DEBUG_CHECK(condition): what only a fault of ours makes false ends a debug build, on the host and in kernels;
-// other builds do not look.
+// PICTURA_DEBUG_CHECK(condition) ends a debug build where an internal invariant fails, on the host and in kernels.
+// Other builds do not evaluate the condition.
 #pragma once
 
 #if defined(NDEBUG) || defined(__CUDACC_RTC__)

@@ -1,4 +1,4 @@
-// SIMD on eight floats: one instruction an operation on a host with AVX2, eight on another host or a device. Elements
+// SIMD on eight floats: one instruction per operation on a host with AVX2, eight on another host or a device. Elements
 // are rounded as scalars are, so the bits are equal everywhere.
 #pragma once
 
@@ -10,8 +10,8 @@
 
 namespace pictura {
 
-// Two types rather than one, since a program may hold code of both: they lie in memory alike, but are passed
-// differently.
+// Two types rather than one, since a program may hold code of both: their memory layout is equal, but their calling
+// conventions differ.
 #if defined(__AVX2__) && !defined(__CUDACC__)
 inline namespace float8_in_a_register {
 
@@ -27,7 +27,7 @@ inline Float8 set8(float a, float b, float c, float d, float e, float f, float g
 }
 inline Float8 load8(const float* from) { return {_mm256_loadu_ps(from)}; }
 inline void store8(const Float8& a, float* to) { _mm256_storeu_ps(to, a.value); }
-/// Integers, as floats that must hold them exactly.
+/// Loads integers as floats, which must be able to hold them exactly.
 inline Float8 load8_integers(const int32_t* from) {
   return {_mm256_cvtepi32_ps(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)))};
 }
@@ -42,16 +42,16 @@ inline Float8 operator-(const Float8& a) { return {_mm256_xor_ps(_mm256_set1_ps(
 inline Float8 magnitude(const Float8& a) { return {_mm256_andnot_ps(_mm256_set1_ps(-0.0f), a.value)}; }
 inline Float8 round_down(const Float8& a) { return {_mm256_floor_ps(a.value)}; }
 inline Float8 round_up(const Float8& a) { return {_mm256_ceil_ps(a.value)}; }
-/// Lane by lane the functions of the same names for floats.
+/// Lane-wise versions of the scalar functions of the same names.
 inline Float8 min_no_nan(const Float8& a, const Float8& b) { return {_mm256_min_ps(a.value, b.value)}; }
 inline Float8 max_no_nan(const Float8& a, const Float8& b) { return {_mm256_max_ps(a.value, b.value)}; }
 inline Float8 sqrt_in_range(const Float8& a) { return {_mm256_sqrt_ps(a.value)}; }
-/// The elements with the other bits cleared.
+/// Clears the bits of each element that are not set in `bits`.
 inline Float8 keep_bits(const Float8& a, uint32_t bits) {
   return {_mm256_and_ps(a.value, _mm256_castsi256_ps(_mm256_set1_epi32(static_cast<int32_t>(bits))))};
 }
 
-/// For each element, all bits or none.
+/// A mask: all bits or none, for each element.
 struct Mask8 {
   __m256 bits;
 };
@@ -71,36 +71,36 @@ inline Mask8 less_bits(const Float8& a, const Float8& b) {
 inline Mask8 equal_bits(const Float8& a, const Float8& b) {
   return {_mm256_castsi256_ps(_mm256_cmpeq_epi32(_mm256_castps_si256(a.value), _mm256_castps_si256(b.value)))};
 }
-/// Bit k: that of element k.
+/// Mask as an integer: bit k is set where element k is.
 inline uint32_t bits_of(const Mask8& mask) { return static_cast<uint32_t>(_mm256_movemask_ps(mask.bits)); }
-/// The elements of a where the mask is set, else of b.
+/// Returns the elements of a where the mask is set, else of b.
 inline Float8 select(const Mask8& mask, const Float8& a, const Float8& b) {
   return {_mm256_blendv_ps(b.value, a.value, mask.bits)};
 }
 
-/// Elements 2k and 2k + 1 exchanged.
+/// Exchanges elements 2k and 2k + 1.
 inline Float8 swap_pairs(const Float8& a) { return {_mm256_permute_ps(a.value, 0xB1)}; }
 
-/// Element k of b where bit k of the mask is set, else of a.
+/// Returns element k of b where bit k of the mask is set, else of a.
 template <int kMask>
 inline Float8 blend(const Float8& a, const Float8& b) {
   return {_mm256_blend_ps(a.value, b.value, kMask)};
 }
 
-/// Elements at the given places.
+/// Returns the elements at the given places.
 template <int k0, int k1, int k2, int k3, int k4, int k5, int k6, int k7>
 inline Float8 permute(const Float8& a) {
   return {_mm256_permutevar8x32_ps(a.value, _mm256_setr_epi32(k0, k1, k2, k3, k4, k5, k6, k7))};
 }
 
-/// Eight pairs that follow one another, their first elements and their second ones.
+/// Loads eight consecutive pairs: their first elements and their second elements.
 inline void load_pairs(const float* from, Float8* first_out, Float8* second_out) {
   const __m256 a = _mm256_loadu_ps(from), b = _mm256_loadu_ps(from + 8);
   const __m256 low = _mm256_permute2f128_ps(a, b, 0x20), high = _mm256_permute2f128_ps(a, b, 0x31);
   first_out->value = _mm256_shuffle_ps(low, high, 0x88);
   second_out->value = _mm256_shuffle_ps(low, high, 0xDD);
 }
-/// As load_pairs(), of the pairs with the given indices.
+/// Loads the pairs with the given indices, as load_pairs() does.
 inline void gather_pairs(const float* from, const int32_t* indices, Float8* first_out, Float8* second_out) {
   const auto two = [&](int k) {
     const auto pair = [&](int i) { return reinterpret_cast<const __m64*>(from + 2 * int64_t{indices[i]}); };
@@ -110,10 +110,10 @@ inline void gather_pairs(const float* from, const int32_t* indices, Float8* firs
   first_out->value = _mm256_shuffle_ps(low, high, 0x88);
   second_out->value = _mm256_shuffle_ps(low, high, 0xDD);
 }
-/// Four floats, unaligned, at from(k) for each element k: their first ones, their second ones and so on.
+/// Loads four unaligned floats at from(k) for each element k: four_out[j] holds the j-th floats.
 template <typename From>
 inline void gather_fours(From&& from, Float8* four_out) {
-  // Elements k and k + 4 have their floats in halves of one register.
+  // The floats of elements k and k + 4 occupy the halves of one register.
   const auto two = [&](int k) {
     const auto four = [&](int i) { return _mm_loadu_ps(static_cast<const float*>(from(i))); };
     return _mm256_set_m128(four(k + 4), four(k));
@@ -127,7 +127,7 @@ inline void gather_fours(From&& from, Float8* four_out) {
   four_out[3].value = _mm256_shuffle_ps(high_01, high_23, 0xEE);
 }
 
-/// The places of the set bits of every byte, in ascending order.
+/// Places of the set bits of every byte, in ascending order.
 struct SetBits {
   alignas(8) uint8_t places[256][8];
   constexpr SetBits() : places{} {
@@ -140,31 +140,31 @@ struct SetBits {
 };
 inline constexpr SetBits kSetBits;
 
-/// Those of one byte, as integers.
+/// Places of the set bits of one byte, as integers.
 inline __m256i set_bits(uint32_t mask) {
   return _mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(kSetBits.places[mask])));
 }
 
-/// Copies the 32-bit elements whose bits are set in the mask; what is behind them, up to eight in all, is overwritten.
+/// Copies the 32-bit elements whose bits are set in the mask. Up to eight elements of `to` are overwritten.
 template <typename Word>
 inline void copy_chosen(const Word* from, uint32_t mask, Word* to) {
   static_assert(sizeof(Word) == sizeof(int32_t));
   const __m256i all = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_permutevar8x32_epi32(all, set_bits(mask)));
 }
-/// Writes those of the integers first to first + 7 that the mask chooses, as copy_chosen() does.
+/// Writes the integers first + k for each set bit k of the mask. Up to eight elements of `to` are overwritten.
 inline void store_chosen(int32_t first, uint32_t mask, int32_t* to) {
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_add_epi32(set_bits(mask), _mm256_set1_epi32(first)));
 }
-/// Bit k: whether integer k is the value.
+/// Bit k of the result: whether integer k equals the value.
 inline uint32_t equal8(const int32_t* integers, int32_t value) {
   const __m256i all = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(integers));
   const __m256i equal = _mm256_cmpeq_epi32(all, _mm256_set1_epi32(value));
   return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(equal)));
 }
 
-/// The least of 64-bit keys, four for each of kFours, in ascending order; each is in [0, 0x7FF0...0): ordered as the
-/// doubles of the same bits are.
+/// The smallest 64-bit keys inserted so far, four for each of kFours, in ascending order. Each key is in [0,
+/// 0x7FF0...0), where integers are ordered as the doubles with the same bits.
 template <int kFours>
 struct LeastKeys {
   static constexpr int kCount = 4 * kFours;
@@ -174,13 +174,13 @@ struct LeastKeys {
   LeastKeys() {
     for (__m256d& four : keys) four = _mm256_castsi256_pd(_mm256_set1_epi64x(kNone));
   }
-  /// Drops the last key, which may be the new one.
+  /// Inserts a key and drops the largest, which may be the new key.
   void insert(int64_t key) {
     const __m256d all_new = _mm256_castsi256_pd(_mm256_set1_epi64x(key));
     __m256d carried = _mm256_setzero_pd();  // the element before each four
     for (__m256d& four : keys) {
       const __m256d rotated = _mm256_permute4x64_pd(four, 0x93);
-      // Each element becomes the new key or the one before it where that is greater, but at most stays.
+      // Each element becomes the larger of the new key and its predecessor, if that is smaller than itself.
       four = _mm256_max_pd(_mm256_min_pd(four, all_new), _mm256_blend_pd(rotated, carried, 1));
       carried = rotated;
     }
@@ -201,7 +201,7 @@ struct alignas(32) Float8 {
   }
   PICTURA_HD float operator[](int k) const { return value[k]; }
 };
-/// The elements of(0) to of(7).
+/// Returns the elements of(0) to of(7).
 template <typename Of>
 PICTURA_HD inline Float8 make_float8(Of&& of) {
   Float8 result;
@@ -264,7 +264,7 @@ PICTURA_HD inline Float8 keep_bits(const Float8& a, uint32_t bits) {
 struct alignas(32) Mask8 {
   int32_t bits[8];
 };
-/// Set where is(0) to is(7).
+/// Returns a mask that is set at k where is(k).
 template <typename Is>
 PICTURA_HD inline Mask8 make_mask8(Is&& is) {
   Mask8 mask;
@@ -374,12 +374,12 @@ struct alignas(32) LeastKeys {
 
 PICTURA_HD inline Mask8 operator>(const Float8& a, const Float8& b) { return b < a; }
 PICTURA_HD inline Mask8 operator>=(const Float8& a, const Float8& b) { return b <= a; }
-/// Lane by lane the functions of the same names for floats.
+/// Lane-wise versions of the scalar functions of the same names.
 PICTURA_HD inline Float8 reciprocal_in_range(const Float8& a) { return 1.0f / a; }
 PICTURA_HD inline Float8 saturate(const Float8& a) { return min_no_nan(max_no_nan(a, 0.0f), 1.0f); }
 
-/// Bits of the first or last `count` of eight: which of them are new where eights overlap or are filled up. The first
-/// of any number: of one beyond eight, all; of one below 0, none.
+/// Bits of the first or last `count` of eight elements, where groups of eight overlap or are padded. first_of_eight()
+/// takes any count: above 8, all bits; below 0, none.
 PICTURA_HD constexpr uint32_t first_of_eight(int count) {
   return count >= 8 ? 0xFFu : count <= 0 ? 0u : (1u << count) - 1;
 }

@@ -1,5 +1,6 @@
-// PICTURA_HD marks a function that runs on host and device. Also defines fixed-width integers and C maths for every
-// shared header, under NVRTC too, which has no standard library. What depends on the compiler belongs in this folder.
+// PICTURA_HD marks a function that runs on host and device. This header also defines fixed-width integers and C maths
+// for every shared header, including under NVRTC, which has no standard library. Compiler-dependent code belongs in
+// this folder.
 #pragma once
 
 #if defined(__CUDACC__)
@@ -7,8 +8,8 @@
 #else
 #define PICTURA_HD
 #endif
-// Keeps a kernel's loop from being unrolled: unrolled, the kernels do not fit into the instruction cache, and fetching
-// instructions costs more than the loop does.
+// Prevents unrolling of a kernel's loop: unrolled kernels exceed the instruction cache, and instruction fetches cost
+// more than the loop.
 #if defined(__CUDA_ARCH__)
 #define PICTURA_NO_UNROLL _Pragma("unroll 1")
 #else

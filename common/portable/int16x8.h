@@ -6,14 +6,14 @@
 namespace pictura {
 
 #if !defined(__CUDA_ARCH__)
-// Vectors as the compilers know them: from arrays, g++ 12 makes scalar code where functions are inlined. Arithmetic on
+// Vector types of the compiler, because g++ 12 compiles arrays in inlined functions to scalar code. Arithmetic on
 // unsigned elements wraps around.
 using Int16Vector = int16_t __attribute__((vector_size(16)));
 using Uint16Vector = uint16_t __attribute__((vector_size(16)));
 #endif
 
-/// Eight 16-bit integers. On a device, words hold element k and element k + 4 as halves, for instructions on pairs; on
-/// a host, the elements are contiguous, in one register.
+/// Eight 16-bit integers. On a device, a word holds elements k and k + 4 as halves, for instructions on pairs. On a
+/// host, the elements are contiguous in one register.
 struct Int16x8 {
 #if defined(__CUDA_ARCH__)
   uint32_t halves[4];
@@ -23,7 +23,7 @@ struct Int16x8 {
 };
 constexpr int kInt16x8Size = 8, kInt16x8Half = 4;
 
-/// The elements of(0) to of(7).
+/// Returns the elements of(0) to of(7).
 template <typename Of>
 PICTURA_HD inline Int16x8 make_int16x8(Of&& of) {
   Int16x8 result;
@@ -62,7 +62,7 @@ PICTURA_HD inline uint32_t broadcast_low16(uint32_t word) {
 }
 
 #if !defined(__CUDA_ARCH__)
-/// a + b for each element, wrapping around; b is 16 bits.
+/// a + b for each element, wrapping around; b has 16 bits.
 inline Int16Vector wrapped_sum(const Int16x8& a, uint32_t b) {
   return reinterpret_cast<Int16Vector>(reinterpret_cast<Uint16Vector>(a.value) + static_cast<uint16_t>(b));
 }
@@ -105,8 +105,8 @@ PICTURA_HD inline Int16x8 add_clamp(const Int16x8& a, const Int16x8& b, const In
 }
 
 #if defined(__CUDA_ARCH__)
-/// Looks up four bytes of `table` by four selectors of four bits; a selector above 7 gives the sign of byte (selector -
-/// 8), replicated over 8 bits (__byte_perm does not).
+/// Looks up four bytes of `table` by four selectors of four bits. A selector above 7 gives the sign of byte (selector -
+/// 8), replicated over 8 bits (unlike __byte_perm).
 __device__ inline uint32_t bytes_of(uint64_t table, uint32_t selectors) {
   uint32_t bytes;
   asm("prmt.b32 %0, %1, %2, %3;"
@@ -114,7 +114,7 @@ __device__ inline uint32_t bytes_of(uint64_t table, uint32_t selectors) {
       : "r"(static_cast<uint32_t>(table)), "r"(static_cast<uint32_t>(table >> 32)), "r"(selectors));
   return bytes;
 }
-/// Bits 7 to 10 of the elements as selectors, those of the first four in the lower half.
+/// Returns bits 7 to 10 of the elements as selectors, with the first four elements in the lower half.
 __device__ inline uint32_t selectors_of(const Int16x8& a) {
   const uint32_t low = (a.halves[0] >> 7 & 0x000F000Fu) | (a.halves[1] >> 3 & ~0x000F000Fu),
                  high = (a.halves[2] << 1 & 0x0F000F00u) | (a.halves[3] << 5 & ~0x0F000F00u);
@@ -126,8 +126,8 @@ __device__ inline uint32_t selectors_of(const Int16x8& a) {
 /// 0 <= from[k] <= to[k] <= 8 * 128.
 PICTURA_HD inline uint64_t bits_between(const Int16x8& from, const Int16x8& to) {
 #if defined(__CUDA_ARCH__)
-  // Byte i of the table is the mask of the bits from i on, except that its upper four bits are XORed with its lower
-  // four. So byte 0 has no sign bit, and selector 8 gives 0.
+  // Byte i of the table is the mask of the bits from i on, with its upper four bits XORed with its lower four. So byte
+  // 0 has no sign bit, and selector 8 gives 0.
   constexpr uint64_t kTable = 0x80C0E0F0783C1E0Full;
   constexpr uint32_t kUpperFour = 0xF0F0F0F0u;
   const uint32_t begin = selectors_of(from), end = selectors_of(to);
@@ -140,7 +140,7 @@ PICTURA_HD inline uint64_t bits_between(const Int16x8& from, const Int16x8& to) 
   const Uint32Vector one{1, 1, 1, 1, 1, 1, 1, 1};
   const Uint32Vector bits = (one << __builtin_convertvector(to.value >> 7, Uint32Vector)) -
                             (one << __builtin_convertvector(from.value >> 7, Uint32Vector));
-  // By way of 16 bits, for which there are instructions.
+  // Converted through 16 bits, for which instructions exist.
   const auto bytes = __builtin_convertvector(__builtin_convertvector(bits, Uint16Vector), Bytes);
   return __builtin_bit_cast(uint64_t, bytes);
 #endif

@@ -1,12 +1,12 @@
-// Scalar operations that a device has one or few instructions for; the results are bit-equal on both devices.
+// Scalar operations that take one or few instructions on a device. Results are bit-equal on both devices.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
 
 namespace pictura {
 
-/// 1 / x and the square root of x, correctly rounded as IEEE demands, for |x| in [2^-100, 2^100]. The device code is
-/// the compiler's own for that range, without its test of the range.
+/// 1 / x and the square root of x, correctly rounded (IEEE 754), for |x| in [2^-100, 2^100]. The device code is the
+/// compiler's own for that range, without the range test.
 PICTURA_HD inline float reciprocal_in_range(float x) {
 #if defined(__CUDA_ARCH__)
   float guess;
@@ -38,13 +38,14 @@ PICTURA_HD inline float float_from_bits(uint32_t bits) {
 #endif
 }
 
-/// Minimum and maximum; one instruction on either device. Arguments must not be NaN: given one NaN, a device returns
-/// the other argument, a host returns b. Of +0 and -0 either may be returned.
+/// Minimum and maximum, one instruction on either device. Arguments must not be NaN: where one is NaN, a device returns
+/// the other argument and a host returns b. Of +0 and -0, either may be returned.
 PICTURA_HD inline float min_no_nan(float a, float b) {
 #if defined(__CUDA_ARCH__)
   return fminf(a, b);
 #elif defined(__AVX__)
-  // From an expression g++ 12 makes a branch where b is a constant, and a pixel's edges mispredict it.
+  // Inline assembly, because g++ 12 compiles a conditional expression with a constant b to a branch, which a pixel's
+  // edges mispredict.
   float least;
   asm("vminss %2, %1, %0" : "=x"(least) : "x"(a), "xm"(b));
   return least;
@@ -64,7 +65,7 @@ PICTURA_HD inline float max_no_nan(float a, float b) {
 #endif
 }
 
-/// x clamped to [0, 1]; one instruction on a device. Must not be NaN.
+/// x clamped to [0, 1]; one instruction on a device. x must not be NaN.
 PICTURA_HD inline float saturate(float x) {
 #if defined(__CUDA_ARCH__)
   return __saturatef(x);
@@ -82,7 +83,7 @@ PICTURA_HD inline uint32_t bits_from_float(float x) {
 #endif
 }
 
-/// x itself, as a value that the device's compiler cannot recompute: otherwise it moves cheap computations into loops.
+/// Returns x as a value that the device compiler cannot recompute; otherwise it moves cheap computations into loops.
 PICTURA_HD inline float no_rematerialize(float x) {
 #if defined(__CUDA_ARCH__)
   asm volatile("" : "+f"(x));

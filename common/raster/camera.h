@@ -10,8 +10,8 @@ namespace pictura {
 
 /// Depth of the near plane.
 constexpr float kNear_m = 0.1f;
-/// Width of the guard band: polygons are clipped this far outside the image. Large enough that most need no clipping,
-/// small enough that screen coordinates keep their precision.
+/// Width of the guard band: polygons are clipped this far outside the image. It is large enough that most polygons need
+/// no clipping, and small enough that screen coordinates keep their precision.
 constexpr float kGuardBand_px = 8.0f;
 
 /// Maximum number of cameras of a rig.
@@ -25,8 +25,8 @@ struct PinholeCamera {
   int32_t width_px = 0, height_px = 0;
 };
 
-/// A rig's camera in the world, for a view. For bodies shorter than the rig's reference length, the x offset shrinks in
-/// proportion.
+/// Returns a rig's camera in the world, for a view. For bodies shorter than the rig's reference length, the x offset
+/// shrinks in proportion.
 PICTURA_HD inline PinholeCamera place_camera(const PinholeCamera& in_ego, const View& view) {
   const float shrink = min_of(1.0f, view.body_length_m / View::kRigBodyLength_m);
   const float c = view.cos_heading, s = view.sin_heading;
@@ -45,8 +45,8 @@ PICTURA_HD inline Vec3 to_camera(const PinholeCamera& camera, Vec3 world_m) {
   return {dot(camera.right, d), dot(camera.down, d), dot(camera.forward, d)};
 }
 
-/// The frustum: slopes x/depth and y/depth of its four sides, guard band included, factors that normalise distances to
-/// those sides, and slopes per pixel. Depends only on the projection.
+/// View frustum: slopes x/depth and y/depth of its four sides (guard band included), factors that normalise distances
+/// to those sides, and slopes per pixel. Depends only on the projection.
 struct Frustum {
   float x_low = 0, x_high = 0, y_low = 0, y_high = 0;
   float x_low_scale = 0, x_high_scale = 0, y_low_scale = 0, y_high_scale = 0;
@@ -69,10 +69,10 @@ PICTURA_HD inline Frustum make_frustum(const PinholeCamera& camera) {
   return f;
 }
 
-/// False if a sphere (camera coordinates) is entirely outside the frustum or beyond the visible range, where all faces
-/// have faded to black.
+/// Returns false if a sphere (camera coordinates) is entirely outside the frustum or beyond the visible range, where
+/// all faces have faded to black.
 PICTURA_HD inline bool sphere_in_frustum(const Frustum& f, Vec3 center, float radius_m) {
-  // Without short circuits: lanes of a warp would diverge.
+  // No short circuits: lanes of a warp would diverge.
   const bool in_range = (center.z + radius_m > kNear_m) & (center.z - radius_m < kVisibleRange_m);
   const bool in_width = ((center.x - f.x_low * center.z) * f.x_low_scale > -radius_m) &
                         ((f.x_high * center.z - center.x) * f.x_high_scale > -radius_m);
@@ -81,7 +81,7 @@ PICTURA_HD inline bool sphere_in_frustum(const Frustum& f, Vec3 center, float ra
   return in_range & in_width & in_height;
 }
 
-/// Corner 0 to 3 of the frustum at the visible range, in the world.
+/// Corner 0 to 3 of the frustum at the visible range, in world coordinates.
 PICTURA_HD inline Vec3 far_corner(const PinholeCamera& camera, const Frustum& f, int corner) {
   const float x = (corner & 1) ? f.x_high : f.x_low;
   const float y = (corner & 2) ? f.y_high : f.y_low;
@@ -100,9 +100,9 @@ PICTURA_HD inline Aabb2 frustum_ground_box(const PinholeCamera& camera, const Fr
 }
 
 /// Bounding box on the ground of the centres of all spheres up to this radius that sphere_in_frustum() passes. At a
-/// given depth, those are in the frustum's rectangle, widened on all sides.
+/// given depth, the centres lie in the frustum's rectangle, widened on all sides.
 PICTURA_HD inline Aabb2 ground_box_of_spheres(const PinholeCamera& camera, const Frustum& f, float radius_m) {
-  const float leeway_m = 0.01f * radius_m + 0.1f;  // more than sums of coordinates are rounded by
+  const float leeway_m = 0.01f * radius_m + 0.1f;  // exceeds the rounding errors of coordinate sums
   const float reach_m = radius_m + leeway_m;
   Aabb2 box;
   for (int corner = 0; corner < 8; ++corner) {
@@ -128,8 +128,8 @@ PICTURA_HD inline CellRange cells_of(const GridView& grid, const Aabb2& box) {
   return {grid.cell_x(box.low.x), grid.cell_x(box.high.x) + 1, grid.cell_y(box.low.y), grid.cell_y(box.high.y) + 1};
 }
 
-/// An item is in every cell that its box touches. True only for the first of those cells that a query visits, so that
-/// the item is visited once.
+/// Returns true only in the first cell of the query that contains the item, so that an item in several cells is visited
+/// once.
 PICTURA_HD inline bool is_first_visit(const GridView& grid, const CellRange& query, const Aabb2& item_box, int cell_x,
                                       int cell_y) {
   return cell_x == max_of(grid.cell_x(item_box.low.x), query.x_begin) &&

@@ -7,11 +7,11 @@
 
 namespace pictura {
 
-/// Clipping by five planes adds at most one corner each; one more for a cut in progress.
+/// Clipping by five planes adds at most one corner per plane; one further corner is for a cut in progress.
 constexpr int kMaxPolygonCorners = kMaxFaceCorners + 6;
 
-/// One of the five planes of the frustum. inside() is a distance in units of the plane's own, negative outside.
-/// Coefficients instead of branches, so that lanes of a warp can use different planes: terms of other planes are 0.
+/// One of the five planes of the frustum. inside() is a distance in the plane's own unit, negative outside.
+/// Coefficients instead of branches let lanes of a warp use different planes: terms of other planes are 0.
 constexpr int kClipPlanes = 5;
 class ClipPlane {
  public:
@@ -30,7 +30,7 @@ class ClipPlane {
   float x_, y_, z_, offset_;
 };
 
-/// Bit mask of the planes that a point is outside of.
+/// Bit mask of the planes that have a point on their outer side.
 PICTURA_HD inline unsigned planes_outside(const Frustum& f, Vec3 p) {
   unsigned outside = 0;
   for (int plane = 0; plane < kClipPlanes; ++plane) {
@@ -39,8 +39,8 @@ PICTURA_HD inline unsigned planes_outside(const Frustum& f, Vec3 p) {
   return outside;
 }
 
-/// Bit mask of the frustum's planes that a face (camera coordinates) crosses; kOutside if it is entirely outside of
-/// one.
+/// Bit mask of the frustum's planes that a face (camera coordinates) crosses; kOutside if it is entirely outside one
+/// plane.
 constexpr unsigned kOutside = ~0u;
 template <typename Corners>
 PICTURA_HD inline unsigned planes_crossed(const Frustum& f, const Corners& corners, int count) {
@@ -54,8 +54,8 @@ PICTURA_HD inline unsigned planes_crossed(const Frustum& f, const Corners& corne
   return outside_of_all != 0 ? kOutside : outside_of_any;
 }
 
-/// The intersection of the side from a to b with a plane, given their distances inside. Computed from the inner corner
-/// in both directions: faces that share an edge get the same point.
+/// Intersection of the side from a to b with a plane, given their inside distances. Computed from the inner corner in
+/// both directions, so that faces with a common edge get the same point.
 PICTURA_HD inline Vec3 cut_between(Vec3 a, float a_inside, Vec3 b, float b_inside) {
   const bool a_is_inner = a_inside >= 0.0f;
   const Vec3 inner = a_is_inner ? a : b, outer = a_is_inner ? b : a;
@@ -65,10 +65,10 @@ PICTURA_HD inline Vec3 cut_between(Vec3 a, float a_inside, Vec3 b, float b_insid
 
 /// Maximum number of corners that widen_in_front() emits.
 constexpr int kMaxWidenedCorners = 5;
-/// Widens a strip in camera coordinates to floor_px on screen. If it crosses the near plane, what is before that is cut
-/// off first, so that its sides lead from where they cross the near plane to the widened end: a side that was moved as
-/// a whole would be far from the strip near the camera. Calls emit(i, corner) for i = 0, 1, ... and returns their
-/// number; corners of other faces (floor_px of 0) are emitted as they are.
+/// Widens a strip in camera coordinates to floor_px on screen. A strip that crosses the near plane is first cut there,
+/// so that its sides run from the near plane to the widened end: a side that moved as a whole would be far from the
+/// strip near the camera. Calls emit(i, corner) for i = 0, 1, ... and returns their number; corners of other faces
+/// (floor_px of 0) are emitted unchanged.
 template <typename Emit>
 PICTURA_HD inline int widen_in_front(const PinholeCamera& camera, float floor_px, const Vec3* corners, Emit&& emit) {
   Vec3 widened[4];
@@ -89,7 +89,7 @@ PICTURA_HD inline int widen_in_front(const PinholeCamera& camera, float floor_px
 }
 
 /// Clips a convex face to the near plane and the guard band. Writes at most kMaxPolygonCorners corners (camera
-/// coordinates) to polygon_out and returns their number; below 3 nothing is left.
+/// coordinates) to polygon_out and returns their number. A number below 3 means that nothing is left.
 PICTURA_HD inline int clip_face(const Frustum& f, const Vec3* corners, int count, Vec3* polygon_out) {
   const unsigned crossed = planes_crossed(f, corners, count);
   if (crossed == kOutside) return 0;
@@ -111,7 +111,7 @@ PICTURA_HD inline int clip_face(const Frustum& f, const Vec3* corners, int count
     int kept = 0;
     Vec3 previous = from[count - 1];
     float previous_inside = plane.inside(previous);
-    // Only a face that is not quite convex could exceed the maximum; the excess corners are dropped.
+    // Only a face that is not exactly convex can exceed the maximum; the excess corners are dropped.
     PICTURA_NO_UNROLL
     for (int i = 0; i < count && kept + 2 <= kMaxPolygonCorners; ++i) {
       const Vec3 current = from[i];

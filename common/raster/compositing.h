@@ -7,13 +7,12 @@
 
 namespace pictura {
 
-/// Accumulates the fragments of a pixel. Sums are of integers, so that they do not depend on the order of the
-/// fragments.
+/// Accumulator of a pixel's fragments. Sums are of integers, so that they do not depend on the order of the fragments.
 class PixelAccumulator {
  public:
   /// kWhole: entirely visible, weighted by its exact area. kPartial: partly occluded, weighted by its area times the
-  /// visible fraction of its samples. kRemainder: covers the whole pixel, weighted by its share of what the others
-  /// leave: in proportion to its visible samples.
+  /// visible fraction of its samples. kRemainder: covers the whole pixel, weighted in proportion to its visible samples
+  /// by its share of the area that other fragments leave.
   enum Kind : uint8_t { kWhole, kPartial, kRemainder, kNumKinds };
   struct Weight {
     float area = 0;
@@ -25,7 +24,7 @@ class PixelAccumulator {
     PICTURA_HD float of(Weight weight) const { return weight.area * of_kind[weight.kind]; }
   };
 
-  /// visible: the effective samples that no other fragment occludes.
+  /// Weight of a fragment. `visible`: its effective samples that no other fragment occludes.
   PICTURA_HD static Weight weight_of(const PixelCoverage& coverage, uint64_t visible) {
     const uint64_t samples = effective_samples(coverage);
     const float share = static_cast<float>(popcount(visible)) / static_cast<float>(popcount(samples));
@@ -34,7 +33,7 @@ class PixelAccumulator {
     return {coverage.area * share, kPartial};
   }
 
-  /// A weight, and the colour times the weight, as integers; those of one kind can be summed in any order.
+  /// A weight, and the colour times the weight, as integers. Parts of one kind can be summed in any order.
   struct Part {
     int32_t area = 0, r = 0, g = 0, b = 0;
   };
@@ -62,7 +61,7 @@ class PixelAccumulator {
     if (whole > 1.0f) shares.of_kind[kWhole] = 1.0f / whole;
     if (partial > for_partial) shares.of_kind[kPartial] = for_partial / partial;
     const float remainder = area_of(kRemainder), left = max_of(for_partial - partial, 0.0f);
-    // Less than 1 where other fragments hide some of their samples (divide_remainder).
+    // Less than 1 where other fragments hide some of the remainder's samples (divide_remainder).
     shares.of_kind[kRemainder] = remainder > 0.0f && remainder < 1.0f ? left / remainder : left;
     return shares;
   }
@@ -80,17 +79,17 @@ class PixelAccumulator {
   }
 
  private:
-  static constexpr float kUnits = 1 << 20;  // per pixel and channel of 1; a thousand fragments do not overflow
+  static constexpr float kUnits = 1 << 20;  // per pixel and channel value of 1; a thousand fragments do not overflow
   PICTURA_HD static int32_t to_units(float value) { return static_cast<int32_t>(value * kUnits + 0.5f); }
   PICTURA_HD float area_of(Kind kind) const { return static_cast<float>(part_[kind].area) * (1.0f / kUnits); }
 
   Part part_[kNumKinds];
 };
 
-/// Of the fragments of a pixel, those that cover it fully divide what the others leave by the samples that are left of
-/// each, or, if none is, as among themselves. for_each(visit) calls visit(coverage, &visible) for each fragment, where
-/// `visible` are the samples that occlude_pair left of it; for fragments that cover the pixel this function removes
-/// those that are visible of others. Without two such fragments there is nothing to divide, and nothing changes.
+/// Divides the remainder of a pixel among the fragments that cover it fully, by each fragment's remaining samples. If
+/// none has any, they are divided as if there were no other fragments. for_each(visit) calls visit(coverage, &visible)
+/// for each fragment, where `visible` are the samples that occlude_pair left of it. For fully covering fragments, this
+/// function removes the samples that other fragments hide. With fewer than two such fragments, nothing changes.
 template <typename ForEach>
 PICTURA_HD inline void divide_remainder(ForEach&& for_each) {
   uint64_t hidden = 0, left = 0;
@@ -108,7 +107,7 @@ PICTURA_HD inline void divide_remainder(ForEach&& for_each) {
   });
 }
 
-/// A channel as an IEEE half, rounded to nearest even.
+/// Converts a channel to an IEEE half, rounded to nearest even.
 PICTURA_HD inline uint16_t to_half(float channel) {
   float mantissa = saturate(channel);
   // Subnormal halves, below 2^-14, are multiples of 2^-24.
@@ -119,17 +118,17 @@ PICTURA_HD inline uint16_t to_half(float channel) {
   return static_cast<uint16_t>(1024 * exponent + static_cast<int>(rintf((mantissa - 1.0f) * 1024.0f)));
 }
 
-/// A channel as an unsigned byte.
+/// Converts a channel to an unsigned byte.
 PICTURA_HD inline uint8_t to_byte(float channel) { return static_cast<uint8_t>(saturate(channel) * 255.0f + 0.5f); }
-/// A byte's value as a bfloat16, which holds it exactly.
+/// Converts a byte's value to a bfloat16, which holds it exactly.
 PICTURA_HD inline uint16_t bf16_of_byte(uint8_t byte) {
   return static_cast<uint16_t>(bits_from_float(static_cast<float>(byte)) >> 16);
 }
-/// A colour as three bytes, red lowest.
+/// Packs a colour into three bytes, red lowest.
 PICTURA_HD inline uint32_t to_bytes(Rgb color) {
   return uint32_t{to_byte(color.r)} | uint32_t{to_byte(color.g)} << 8 | uint32_t{to_byte(color.b)} << 16;
 }
-/// The colour that to_bytes() gives such bytes for.
+/// Unpacks the bytes of to_bytes().
 PICTURA_HD inline Rgb rgb_of_bytes(uint32_t bytes) {
   auto byte = [bytes](int index) { return static_cast<int>(bytes >> (8 * index) & 255u); };
   return rgb8(byte(0), byte(1), byte(2));
@@ -145,7 +144,7 @@ struct VisibilitySum {
     constexpr float kUnits = 1 << 30;
     return static_cast<int64_t>(weight * kUnits);
   }
-  /// The visible weight among all others divided by that of the agent alone; NaN if the latter is 0.
+  /// Visible weight among all agents divided by the weight of the agent alone; NaN if the agent alone has weight 0.
   PICTURA_HD float share() const {
     if (alone <= 0) return float_from_bits(0x7FC00000u);
     const double share = static_cast<double>(among_all) / static_cast<double>(alone);

@@ -16,8 +16,8 @@ PICTURA_HD inline bool covers_point(const PolygonEdge* edges, int count, float x
   return true;
 }
 
-/// The samples of a pixel: 8 columns of 8 rows. Each column is shifted down by its own fraction of a row, so that there
-/// are 64 different heights: road scenes are full of nearly level edges. Sample (column, row) is bit 8 * column + row.
+/// Sample mask of a pixel: 8 columns of 8 rows. Each column is shifted down by its own fraction of a row, which gives
+/// 64 distinct heights, since road scenes have many nearly level edges. Sample (column, row) is bit 8 * column + row.
 constexpr uint64_t kAllSamples = ~uint64_t{0};
 /// Offset of a column's first sample from the pixel's top, in rows.
 PICTURA_HD constexpr float sample_column_offset(int column) {
@@ -33,15 +33,15 @@ struct PixelCoverage {
   PICTURA_HD bool is_full() const { return area == 1.0f && samples == kAllSamples; }
 };
 
-/// The samples of a coverage; all samples for a sliver, which touches none and counts as being wherever another
-/// fragment is.
+/// Samples of a coverage. A sliver, which touches no sample, counts as covering all samples, so that it meets every
+/// other fragment.
 PICTURA_HD inline uint64_t effective_samples(const PixelCoverage& coverage) {
   return coverage.samples != 0 ? coverage.samples : kAllSamples;
 }
 
-/// A coverage of all samples and more than 1 minus this area counts as full.
+/// Tolerance of full coverage: all samples and an area above 1 - kFullCoverage count as full.
 constexpr float kFullCoverage = 1e-3f;
-/// The coverage of an area summed over a polygon's edges.
+/// Coverage of an area summed over a polygon's edges.
 PICTURA_HD inline PixelCoverage rounded_coverage(float area, uint64_t samples) {
   if (samples == kAllSamples && area > 1.0f - kFullCoverage) return {1.0f, kAllSamples};
   return {min_of(area, 1.0f), samples};
@@ -51,7 +51,7 @@ PICTURA_HD inline PixelCoverage rounded_coverage(float area, uint64_t samples) {
 struct EdgeCrossing {
   float left = 0, right = 0;
 };
-/// left_px and top_px: the pixel's corner relative to the edge's upper end.
+/// Crossing of an edge and a pixel. left_px and top_px: the pixel's corner relative to the edge's upper end.
 PICTURA_HD inline EdgeCrossing edge_crossing(const PolygonEdge& edge, float left_px, float top_px) {
   const float left = left_px * edge.dy_dx - top_px;
   return {left, left + edge.dy_dx};
@@ -66,10 +66,10 @@ PICTURA_HD inline SampleRange whole_range() {
   return {make_int16x8([](int) { return -kFar_units; }), make_int16x8([](int) { return kFar_units; })};
 }
 
-/// Added to a height as a fraction of kLines_rows, moves it to the lowest bits of a float's mantissa.
-constexpr float kToLowestBits = 1 << 8;  // a sum's lowest mantissa bit is 1 / (kLines_rows * kRowUnits)
-/// The changes of an edge's height from the first column right of the pixel's centre to each column. A height of the
-/// lowest bits is 2^14 at the pixel's centre; the base of the sequence moves that to 0.
+/// Offset that moves a height, as a fraction of kLines_rows, to the lowest bits of a float's mantissa.
+constexpr float kToLowestBits = 1 << 8;  // the sum's lowest mantissa bit is 1 / (kLines_rows * kRowUnits)
+/// Changes of an edge's height from the first column right of the pixel's centre to each column. In the lowest bits,
+/// the pixel's centre has height 2^14; the base of the sequence moves it to 0.
 PICTURA_HD inline Int16x8 column_heights(const PolygonEdge& edge) {
   return arithmetic_sequence(edge.rows_step, (1 << 16) - (1 << 14));
 }
@@ -85,7 +85,7 @@ PICTURA_HD inline void narrow(const PolygonEdge& edge, const EdgeCrossing& cross
   range_inout->high = add_min(columns, is_below ? kHighest : height, range_inout->high);
 }
 
-/// For each column, the offset that turns a height into the number of samples above it, as whole rows.
+/// Offset for each column that turns a height into the number of samples above it, as whole rows.
 PICTURA_HD inline Int16x8 offsets_from_top() {
   return make_int16x8([](int column) {
     return kSampleRows / 2 * kRowUnits + kRowUnits - 1 -
@@ -93,7 +93,7 @@ PICTURA_HD inline Int16x8 offsets_from_top() {
   });
 }
 
-/// The mask of the samples within a range.
+/// Mask of the samples within a range.
 PICTURA_HD inline uint64_t samples_within(const SampleRange& range) {
   const Int16x8 from_top = offsets_from_top();
   const Int16x8 to = add_clamp(range.high, from_top, make_int16x8([](int) { return kSampleRows * kRowUnits; }));
@@ -108,22 +108,22 @@ PICTURA_HD inline uint64_t samples_inside(const PolygonEdge& edge, float left_px
   return samples_within(range);
 }
 
-/// An edge's contribution to a polygon's area in a pixel: a right border adds the area to its left within the rows that
-/// it spans, a left border subtracts it, both up to a term that cancels in the sum over a closed polygon.
+/// Contribution of an edge to a polygon's area in a pixel. A right border adds the area to its left within the rows
+/// that it spans; a left border subtracts it. Both omit a term that cancels in the sum over a closed polygon.
 PICTURA_HD inline float area_of(const PolygonEdge& edge, const EdgeCrossing& crossing, float y_px) {
   const float from = saturate(edge.y0 - y_px), to = saturate(edge.y1 - y_px);
-  // Between these heights the edge is within the pixel's width; beyond the second, the pixel's whole width is to its
-  // left.
+  // Heights between which the edge is within the pixel's width; beyond the second, the pixel's whole width is to the
+  // left of the edge.
   const float left = max_no_nan(min_no_nan(crossing.left, to), from);
   const float right = max_no_nan(min_no_nan(crossing.right, to), from);
-  // Mean width: half of the pixel where the line has gone half of its way across.
+  // Mean width: half of the pixel where the line has crossed half of it.
   const float width = saturate(((left + right) - (crossing.left + crossing.right)) * edge.half_dx_dy + 0.5f);
   const float area = (right - left) * width + ((edge.dy_dx > 0.0f ? to : from) - right);
   return edge.rows_scale > 0.0f ? area : -area;
 }
 
 /// Area of a convex polygon in pixel (x, y), and the samples that it covers; nothing below min_area. Edges that do not
-/// cross the pixel keep all samples and add their part of the area, so no edge needs a special case.
+/// cross the pixel keep all samples and add their part of the area, so that no edge needs a special case.
 PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int count, float min_area, int x, int y) {
   const float x_px = no_rematerialize(static_cast<float>(x)), y_px = no_rematerialize(static_cast<float>(y));
   float area = 0.0f;
@@ -137,7 +137,7 @@ PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int cou
   return rounded_coverage(area, samples_within(range));
 }
 
-/// Pixels of row y that the polygon may touch, and within them the range that it covers fully.
+/// Pixels of row y that a polygon may touch, and the range of them that it covers fully.
 struct RowSpan {
   int32_t begin = 0, end = 0, full_begin = 0, full_end = 0;
 };

@@ -1,5 +1,5 @@
-// Culling: the primitives that may be visible in an image are those that touch the camera's frustum within the visible
-// range, found through the uniform grids, except for agents that a view excludes. Shared by both devices.
+// Culling. An image may show primitives that touch the camera's frustum within the visible range, except for agents
+// that the view excludes. The uniform grids find these primitives. Shared by both devices.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -24,7 +24,7 @@ PICTURA_HD inline float wall_radius_m(const WallFace& wall) {
   return 0.5f * (length(wall.b_m - wall.a_m) + wall.height_m);
 }
 
-/// Slightly more than the disk: the polygon that it is drawn as has the disk's area.
+/// Slightly more than the radius of the disk, because a polygon of the disk's area is drawn.
 constexpr float kHeadRadius_m = 1.1f * kLightRadius_m;
 
 PICTURA_HD inline Vec3 box_middle(const AgentBox& box) { return box.center_m + Vec3{0.0f, 0.0f, 0.5f * box.height_m}; }
@@ -50,7 +50,7 @@ PICTURA_HD inline bool may_be_visible(const AgentBox& box, const PinholeCamera& 
   return box.drawn != 0 && sphere_in_frustum(f, to_camera(camera, box_middle(box)), box_radius_m(box));
 }
 
-/// Whether a view excludes an agent: its own ego and those it hides.
+/// Whether a view excludes an agent: the view's own ego or a hidden agent.
 PICTURA_HD inline bool is_excluded(const View& view, Span<const int32_t> hidden_agents, int32_t agent) {
   if (agent == view.ego_agent || (view.hides & kHidesAgents) != 0) return true;
   for (int32_t i = view.hidden_begin; i < view.hidden_end; ++i) {
@@ -59,8 +59,8 @@ PICTURA_HD inline bool is_excluded(const View& view, Span<const int32_t> hidden_
   return false;
 }
 
-/// Calls visit(item) once for each item of a grid in the cells that a box on the ground touches; box_of(item) is the
-/// box by which the item was put into the grid.
+/// Calls visit(item) once for each item of a grid in the cells that a box on the ground touches. box_of(item) must be
+/// the box by which the item was put into the grid.
 template <typename BoxOf, typename Visit>
 PICTURA_HD inline void for_each_item(const GridView& grid, const Aabb2& query_box, BoxOf&& box_of, Visit&& visit) {
   const CellRange cells = cells_of(grid, query_box);

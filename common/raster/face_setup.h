@@ -1,5 +1,5 @@
-// Face set-up: from a primitive to its faces on screen. Shared by both devices, which differ only in how they
-// distribute the work and where they store the results.
+// Face set-up: from a primitive to its faces on screen. Shared by both devices, which differ only in the distribution
+// of the work and the storage of the results.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -44,9 +44,9 @@ PICTURA_HD constexpr uint16_t instance_of(const ScreenFace& face) {
   return static_cast<uint16_t>(kind_of(face.object_id) == kAgentKind ? 1 + index_of(face.object_id) : 0);
 }
 
-/// Coverage below this area of a pixel is ignored, and so are smaller faces. Strips hardly occlude anything but each
-/// other, so more of theirs can be ignored: up to what adds less than kMinWeight to every channel, and at most an
-/// eighth of a pixel, because dark strips may occlude bright ones.
+/// Minimum coverage of a pixel: smaller coverages and smaller faces are ignored. Strips occlude hardly anything except
+/// each other, so their minimum is higher: an area that adds less than kMinWeight to every channel is ignored. It is at
+/// most an eighth of a pixel, because dark strips may occlude bright strips.
 constexpr float kMinArea = 1e-4f, kMinWeight = 2.0f / 255.0f, kMaxSparedArea = 0.125f;
 PICTURA_HD inline float min_area_of(Rgb color, PrimitiveRef primitive) {
   if (kind_of(primitive.object_id) != kStripKind) return kMinArea;
@@ -54,7 +54,7 @@ PICTURA_HD inline float min_area_of(Rgb color, PrimitiveRef primitive) {
   return kMinWeight * reciprocal_in_range(max_of(brightest, kMinWeight / kMaxSparedArea));
 }
 
-/// Whether a face that needs no clipping is large enough and not behind an occluder. Sets its winding.
+/// Whether a face that needs no clipping is large enough and not behind an occluder. Sets the winding of the face.
 PICTURA_HD inline bool is_quad_visible(const ImageSetting& setting, const ScreenQuad& quad, const FacePlane& plane,
                                        Rgb color, PrimitiveRef primitive, bool* is_clockwise_out) {
   ScreenBounds bounds = quad.bounds;
@@ -65,7 +65,7 @@ PICTURA_HD inline bool is_quad_visible(const ImageSetting& setting, const Screen
          !setting.occluders.occludes(setting.camera, bounds);
 }
 
-/// Completes a face that make_screen_face or make_quad_face made with what depends on its primitive.
+/// Completes a face of make_screen_face or make_quad_face with the members that depend on its primitive.
 PICTURA_HD inline ScreenFace complete_face(const ScreenFace& face, PrimitiveRef primitive, int32_t edge_begin) {
   ScreenFace whole = face;
   if (kind_of(primitive.object_id) == kStripKind) {
@@ -85,7 +85,7 @@ PICTURA_HD inline ScreenFace complete_face(const ScreenFace& face, PrimitiveRef 
 }
 
 /// Clips and projects a face. Its edges go to a pool: take(count) returns the index of the first, or -1 if the pool is
-/// full, and put(index, edge) stores one. False if nothing of it is in the image.
+/// full, and put(index, edge) stores one edge. Returns false if no part of the face is in the image.
 template <typename EdgePool>
 PICTURA_HD inline bool make_face(const ImageSetting& setting, PrimitiveRef primitive, const CameraFace& face,
                                  EdgePool& pool, ScreenFace* face_out) {
@@ -121,9 +121,9 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, PrimitiveRef primi
   return true;
 }
 
-/// The front surface at a screen point: faces that cover it are offered in any order, and front() returns the one in
-/// front of all, or null. Solids that are as near as the nearest one and strips on the level of the nearest strip
-/// replace it if their object ids are lower; the order of the two is that of is_in_front().
+/// The front surface at a screen point. Faces that cover the point are offered in any order; front() returns the face
+/// in front of all others, or null. Among equally near solids, and among strips on the level of the nearest strip, the
+/// lowest object id wins. is_in_front() orders the remaining solid and strip.
 class FrontFace {
  public:
   PICTURA_HD void offer(const ScreenFace& face, Vec2 at_px) {
@@ -133,8 +133,7 @@ class FrontFace {
     if (!before || nearer(face, *before, at_px)) best = &face;
     wants_again_ = wants_again_ || (before && (is_of_strip || are_equally_near(face, *before, at_px)));
   }
-  /// Whether all faces must be offered once more, after all have been, because several may be on one level or equally
-  /// near.
+  /// Whether all faces must be offered a second time, because several may be on one level or equally near.
   PICTURA_HD bool wants_again() const { return wants_again_; }
   PICTURA_HD void offer_again(const ScreenFace& face, Vec2 at_px) {
     if (is_strip(face)) {
@@ -162,9 +161,9 @@ class FrontFace {
   PICTURA_HD static bool are_equally_near(const ScreenFace& a, const ScreenFace& b, Vec2 at_px) {
     return are_equal_depths(clamped_inverse_depth(a, at_px), clamped_inverse_depth(b, at_px));
   }
-  const ScreenFace *solid_ = nullptr, *strip_ = nullptr;  // the nearest ones
-  const ScreenFace* first_solid_ = nullptr;               // of the solids that are equally near, the lowest object id
-  const ScreenFace* painted_ = nullptr;                   // the strip of its level with the lowest rank
+  const ScreenFace *solid_ = nullptr, *strip_ = nullptr;  // nearest solid and nearest strip
+  const ScreenFace* first_solid_ = nullptr;               // lowest object id among the equally near solids
+  const ScreenFace* painted_ = nullptr;  // strip with the lowest rank on the level of the nearest strip
   bool wants_again_ = false;
 };
 

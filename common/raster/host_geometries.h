@@ -1,4 +1,4 @@
-// Copies of maps' geometries that a renderer keeps on the host, by the handles that its caller chose.
+// Host copies of maps' geometries for a renderer, by the handles that its caller chose.
 #pragma once
 
 #include <memory>
@@ -8,20 +8,20 @@
 
 namespace pictura {
 
-/// Handles are checked before (check_handle).
+/// Map from handles to geometries. Callers check handles first (check_handle).
 class HostGeometries {
  public:
-  /// Keeps a copy in place of what the handle held before.
+  /// Copies a geometry, replacing the handle's previous geometry.
   void upload(GeometryHandle handle, const StaticGeometry& geometry) {
     const auto index = static_cast<std::size_t>(handle);
     if (index >= kept_.size()) kept_.resize(index + 1);
     kept_[index] = std::make_unique<const Kept>(geometry);
   }
-  /// Frees what the handle holds, if anything.
+  /// Frees the handle's geometry, if any.
   void release(GeometryHandle handle) {
     if (static_cast<std::size_t>(handle) < kept_.size()) kept_[handle].reset();
   }
-  /// What any handle holds; null where it holds nothing.
+  /// Returns the handle's geometry; null for a handle without geometry. Accepts any handle.
   const StaticGeometryView* find(GeometryHandle handle) const {
     if (handle < 0 || static_cast<std::size_t>(handle) >= kept_.size()) return nullptr;
     const auto& kept = kept_[handle];

@@ -1,5 +1,5 @@
-// Occlusion culling: the walls and box sides that cover most of an image are its occluders. A face that is behind one
-// of them, in depth and on screen, is not drawn. Shared by both devices.
+// Occlusion culling: the walls and box sides that cover most of an image are its occluders. A face that is behind an
+// occluder, in depth and on screen, is not drawn. Shared by both devices.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -10,11 +10,11 @@ namespace pictura {
 
 /// The face of a solid on screen, entirely in front of the near plane. Aligned for wide loads.
 struct alignas(16) Occluder {
-  Vec3 side[4];        // distance in px inside a side: factors of x and y, constant
-  Vec3 inverse_depth;  // of its plane, in the same form
+  Vec3 side[4];        // distance in px inside a side: factors of x and y, constant term
+  Vec3 inverse_depth;  // inverse depth of the occluder's plane, in the same form
 };
 
-/// Only solids nearer than this are occluder candidates.
+/// Range of occluder candidates: only solids nearer than this are considered.
 constexpr float kOccluderRange_m = 45.0f;
 PICTURA_HD inline bool may_occlude(const AgentBox& box, const PinholeCamera& camera) {
   return to_camera(camera, box.center_m).z - 0.5f * box.length_m < kOccluderRange_m;
@@ -27,12 +27,12 @@ PICTURA_HD inline bool may_occlude(const WallFace& wall, const PinholeCamera& ca
 constexpr float kMinOccluder_px2 = 1.0f, kMinSide_px = 1e-3f;
 /// Maximum distance of an occluder's corners from the image; beyond, precision is too low.
 constexpr float kMaxOccluder_px = 4096.0f;
-/// A face is occluded if it is inside the occluder by this margin and its depth is larger by this factor: conservative
-/// under rounding.
+/// Margins of occlusion tests, conservative under rounding: an occluded face is inside the occluder by the first, and
+/// its depth is larger by the second.
 constexpr float kOccluderMargin_px = 0.05f, kOccluderDepthFactor = 1.002f;
 
-/// The area in the image of the bounding box of a solid's face, by which occluders are chosen. 0 if the face cannot
-/// occlude; otherwise the face on screen and its winding are set.
+/// Area in the image of the bounding box of a solid's face, by which occluders are chosen. Returns 0 if the face cannot
+/// occlude; otherwise sets the face on screen and its winding.
 PICTURA_HD inline float occluder_area_px2(const PinholeCamera& camera, const CameraQuad& face, ScreenQuad* quad_out,
                                           bool* is_clockwise_out) {
   const float nearest_m =
@@ -44,7 +44,7 @@ PICTURA_HD inline float occluder_area_px2(const PinholeCamera& camera, const Cam
   return (in_image.high.x - in_image.low.x) * (in_image.high.y - in_image.low.y);
 }
 
-/// The occluder of a face for which occluder_area_px2() is positive.
+/// Makes the occluder of a face with a positive occluder_area_px2().
 PICTURA_HD inline Occluder make_occluder(const PinholeCamera& camera, const Frustum& f, const FacePlane& plane,
                                          const ScreenQuad& quad, bool is_clockwise) {
   Occluder occluder;
@@ -58,13 +58,13 @@ PICTURA_HD inline Occluder make_occluder(const PinholeCamera& camera, const Frus
   return occluder;
 }
 
-/// The occluders of an image: the faces of largest area; of equal ones, that of the lower entry.
+/// The occluders of an image: the faces of largest area. Among equal areas, the lower entry is chosen.
 struct Occluders {
   static constexpr int kMaxCount = 4;
   int32_t count = 0;
   Occluder occluder[kMaxCount];
 
-  /// Whether one of them occludes all of a face's bounds that is in the image.
+  /// Whether one occluder hides all of a face's bounds that is in the image.
   PICTURA_HD bool occludes(const PinholeCamera& camera, const ScreenBounds& bounds) const {
     const Aabb2 box = bounds.in_image(camera);
     // Minimum of a linear function over the box.

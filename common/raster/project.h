@@ -30,14 +30,14 @@ struct alignas(16) ScreenFace {
   // Inverse depth at screen point (x, y): inverse_depth_x * x + inverse_depth_y * y + inverse_depth_0.
   float inverse_depth_x = 0, inverse_depth_y = 0, inverse_depth_0 = 0;
   uint32_t object_id = 0;  // of its primitive, see common/raster/visibility.h
-  // Range of the inverse depth over the face's corners, of strips widened by kWidenedDepth.
+  // Range of the inverse depth over the face's corners; for strips, widened by kWidenedDepth.
   float inverse_depth_low = 0, inverse_depth_high = 0;
-  float nearest_standing = 1;  // see nearest_standing(); 1 unless it is a strip that is seen from below
-  float plane_distance_m = 0;  // of strips: how far their plane is above the camera, along its normal; of solids 0
+  float nearest_standing = 1;  // see nearest_standing(); 1 except for strips that are seen from below
+  float plane_distance_m = 0;  // strips: height of their plane above the camera, along its normal; solids: 0
   Rgb color;
   uint32_t color_bytes = 0;  // to_bytes(color), used by devices
 
-  /// Coverage of a pixel below this area is ignored, see min_area_of.
+  /// Coverages of a pixel below this area are ignored, see min_area_of.
   PICTURA_HD float min_area() const { return static_cast<float>(min_area_units) * (1.0f / kAreaUnits); }
   PICTURA_HD void set_min_area(float area) { min_area_units = static_cast<uint16_t>(area * kAreaUnits + 0.5f); }
 
@@ -56,12 +56,12 @@ struct ScreenBounds {
     inverse_depth_low = min_no_nan(inverse_depth_low, inverse_depth);
     inverse_depth_high = max_no_nan(inverse_depth_high, inverse_depth);
   }
-  /// Whether they are within an image enlarged by a margin.
+  /// Whether the bounds are within an image enlarged by a margin.
   PICTURA_HD bool are_within(const PinholeCamera& camera, float margin_px) const {
     return low.x >= -margin_px && low.y >= -margin_px && high.x <= static_cast<float>(camera.width_px) + margin_px &&
            high.y <= static_cast<float>(camera.height_px) + margin_px;
   }
-  /// Their intersection with the image.
+  /// Intersection of the bounds with the image.
   PICTURA_HD Aabb2 in_image(const PinholeCamera& camera) const {
     return {{max_no_nan(low.x, 0.0f), max_no_nan(low.y, 0.0f)},
             {min_no_nan(high.x, static_cast<float>(camera.width_px)),
@@ -86,26 +86,26 @@ PICTURA_HD inline PixelBox pixel_box(const PinholeCamera& camera, const ScreenBo
 /// Polygons of less than half of this area are dropped.
 constexpr float kMinTwiceArea_px2 = 1e-6f;
 
-/// Whether a plane has an inverse depth: not those of faces without area, nor those through the camera.
+/// Whether a plane has an inverse depth. Planes of faces without area and planes through the camera have none.
 PICTURA_HD inline bool has_inverse_depth(const FacePlane& plane) {
   constexpr float kMinMagnitude = 1e-30f;
   return dot(plane.normal, plane.normal) > kMinMagnitude && fabsf(plane.offset) > kMinMagnitude;
 }
-/// Inverse depth of a plane as a linear function of the screen: factors of x and y, and constant. normal . p = offset
-/// on the plane and p = depth * ray, so inverse depth is linear in the ray.
+/// Inverse depth of a plane as a linear function of the screen: factors of x and y, and a constant. On the plane,
+/// normal . p = offset and p = depth * ray, so inverse depth is linear in the ray.
 PICTURA_HD inline Vec3 inverse_depth_plane(const PinholeCamera& camera, const Frustum& f, const FacePlane& plane) {
   const Vec3 inverse = plane.normal * (has_inverse_depth(plane) ? reciprocal_in_range(plane.offset) : 0.0f);
   const float x = inverse.x * f.x_per_px, y = inverse.y * f.y_per_px;
   return {x, y, inverse.z - x * camera.center_x_px - y * camera.center_y_px};
 }
 
-/// Distance of the camera from a plane, along its normal; 0 where it has no inverse depth.
+/// Distance of the camera from a plane, along its normal; 0 where the plane has no inverse depth.
 PICTURA_HD inline float plane_distance_m(const FacePlane& plane) {
   return has_inverse_depth(plane) ? plane.offset * reciprocal_in_range(sqrt_in_range(dot(plane.normal, plane.normal)))
                                   : 0.0f;
 }
 
-/// Sets the members of a face that follow from its bounds, which must meet the image, and its plane.
+/// Sets the members of a face that follow from its plane and its bounds, which must meet the image.
 PICTURA_HD inline void set_bounds(const PinholeCamera& camera, const Frustum& f, const ScreenBounds& bounds,
                                   const FacePlane& plane, ScreenFace* face_out) {
   face_out->box = pixel_box(camera, bounds);
@@ -119,8 +119,8 @@ PICTURA_HD inline void set_bounds(const PinholeCamera& camera, const Frustum& f,
 }
 
 /// Projects a clipped face (camera coordinates) of at most kMaxCorners corners, which lies in `plane`. Calls store_edge
-/// as make_edges does, and sets all of face_out but what complete_face() sets. False if it covers
-/// nothing.
+/// as make_edges does, and sets all members of face_out except those that complete_face() sets. Returns false if the
+/// face covers nothing.
 template <int kMaxCorners, typename Corners, typename StoreEdge>
 PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Frustum& f, const Corners& polygon,
                                         int count, const FacePlane& plane, Rgb color, StoreEdge&& store_edge,
@@ -151,12 +151,12 @@ struct ScreenQuad {
   ScreenBounds bounds;
 };
 
-/// Position of a face relative to the image and its guard band: not in the image (dropped), drawn as it is, or to be
-/// clipped first.
+/// Position of a face relative to the image and its guard band: outside the image (dropped), inside (drawn unchanged),
+/// or crossing (clipped first).
 enum class ClipClass : uint8_t { outside, inside, crossing };
 
-/// Projects a face of four corners, and widens strips to at least floor_px on screen. Thus faces that need no clipping,
-/// nearly all, are never widened in camera coordinates.
+/// Projects a face of four corners, and widens strips to at least floor_px on screen. So faces that need no clipping,
+/// which are nearly all, are never widened in camera coordinates.
 PICTURA_HD inline ClipClass project_quad(const PinholeCamera& camera, const Vec3* corners, float floor_px,
                                          ScreenQuad* quad_out) {
   const float nearest_m = min_no_nan(min_no_nan(corners[0].z, corners[1].z), min_no_nan(corners[2].z, corners[3].z));
@@ -178,20 +178,20 @@ PICTURA_HD inline ClipClass project_quad(const PinholeCamera& camera, const Vec3
   *bounds = {};
   for (int i = 0; i < 4; ++i) bounds->add(corner[i], inverse_depth[i]);
   const bool is_inside_guard_band = bounds->are_within(camera, kGuardBand_px);
-  // For faces that reach behind the near plane the values computed above are meaningless.
+  // For faces that extend behind the near plane, the values computed above are meaningless.
   if (nearest_m < kNear_m) return ClipClass::crossing;
   return !bounds->meet_image(camera) ? ClipClass::outside
                                      : (is_inside_guard_band ? ClipClass::inside : ClipClass::crossing);
 }
 
-/// Sets a face's winding on screen; false if its area is too small.
+/// Sets a face's winding on screen; returns false if its area is too small.
 PICTURA_HD inline bool find_winding(const ScreenQuad& quad, float min_twice_area_px2, bool* is_clockwise_out) {
   const float twice_area = cross(quad.corner[2] - quad.corner[0], quad.corner[3] - quad.corner[1]);
   *is_clockwise_out = twice_area > 0.0f;
   return fabsf(twice_area) >= min_twice_area_px2;
 }
 
-/// make_screen_face of a quad that project_quad found inside and find_winding found large enough.
+/// Variant of make_screen_face for a quad that project_quad found inside and find_winding found large enough.
 template <typename StoreEdge>
 PICTURA_HD inline void make_quad_face(const PinholeCamera& camera, const Frustum& f, const ScreenQuad& quad,
                                       bool is_clockwise, const FacePlane& plane, Rgb color, StoreEdge&& store_edge,

@@ -1,6 +1,6 @@
-// Randomized cameras: by how much a view's camera is turned, moved and zoomed, and what becomes of the colours of its
-// image. All of it is a function of the view's key and the camera's index, so that an image that is drawn again has the
-// same bits, on every device. Every draw is made whatever the ranges are: a larger range changes no other effect.
+// Randomized cameras: rotation, shift and zoom of a view's camera, and changes to the colours of its image. All are
+// functions of the view's key and the camera's index, so that a redrawn image has the same bits on every device. Every
+// value is drawn whatever the ranges are: a larger range changes no other effect.
 #pragma once
 
 #include "pictura/common/camera_randomization.h"
@@ -10,9 +10,9 @@
 
 namespace pictura {
 
-/// How a camera is mounted for an episode, and how it sees.
+/// Mounting and sensitivity of a camera for an episode.
 struct CameraMounting {
-  float yaw_rad = 0, pitch_rad = 0, roll_rad = 0;  // about its own axes, in the directions of Camera's
+  float yaw_rad = 0, pitch_rad = 0, roll_rad = 0;  // about its own axes, with the signs of Camera's angles
   Vec3 shift_m;                                    // in the ego frame
   float focal_factor = 1, brightness_factor = 1;
   bool is_dead = false;
@@ -45,7 +45,7 @@ PICTURA_HD inline CameraMounting draw_mounting(const CameraRandomization& ranges
   return mounting;
 }
 
-/// A camera of the rig, mounted like that.
+/// Returns a rig's camera with this mounting applied.
 PICTURA_HD inline PinholeCamera mounted(PinholeCamera camera, const CameraMounting& mounting) {
   // Turns axis a towards axis b.
   auto turn = [](Vec3* a, Vec3* b, float angle_rad) {
@@ -63,14 +63,14 @@ PICTURA_HD inline PinholeCamera mounted(PinholeCamera camera, const CameraMounti
   return camera;
 }
 
-/// The rig's camera of this index as a view's agent has it, in the ego frame.
+/// Returns the rig's camera of this index, in the ego frame, as randomized for a view's agent.
 PICTURA_HD inline PinholeCamera randomized_camera(const PinholeCamera& in_ego, const CameraRandomization& ranges,
                                                   const ViewKey& key, int camera) {
   return ranges.moves_cameras() ? mounted(in_ego, draw_mounting(ranges, key, camera)) : in_ego;
 }
 
-/// What becomes of an image's colours: a factor and noise by pixel and channel. Images of dead cameras, and those that
-/// are dropped, are black.
+/// Effect on an image's colours: a factor, and noise per pixel and channel. Images of dead cameras and dropped images
+/// are black.
 struct ImageEffect {
   bool is_on = false;
   float brightness_factor = 1, noise_per_unit = 0;
@@ -78,7 +78,7 @@ struct ImageEffect {
 
   PICTURA_HD Rgb of(Rgb color, int x, int y) const {
     Philox4 random{};
-    if (noise_per_unit > 0) {  // most of an effect's time
+    if (noise_per_unit > 0) {  // takes most of an effect's time
       random = philox4x32_10({{static_cast<uint32_t>(x), static_cast<uint32_t>(y), 0, 0}}, noise_key[0], noise_key[1]);
     }
     auto channel = [&](float value, uint32_t bits) {
@@ -89,9 +89,9 @@ struct ImageEffect {
   /// Applies the effect to a colour in the form of to_bytes().
   PICTURA_HD uint32_t of_bytes(uint32_t color, int x, int y) const { return to_bytes(of(rgb_of_bytes(color), x, y)); }
 
-  /// Standard deviation of noise_units(): of the sum of four bytes.
+  /// Standard deviation of noise_units(), a sum of four bytes.
   static constexpr float kNoiseDeviation = 147.8005413f;
-  /// Nearly normal, by whole numbers alone: the sum of four uniform bytes, less its mean.
+  /// Nearly normal noise in integers alone: the sum of four uniform bytes minus its mean.
   PICTURA_HD static constexpr int noise_units(uint32_t bits) {
     return static_cast<int>((bits & 255u) + (bits >> 8 & 255u) + (bits >> 16 & 255u) + (bits >> 24)) - 510;
   }

@@ -1,5 +1,5 @@
-// The faces of each primitive: convex polygons in camera coordinates, each with its faded colour, and the minimum width
-// on screen of thin strips. Shared by both devices.
+// Faces of each primitive: convex polygons in camera coordinates, each with its faded colour, and the minimum width on
+// screen of thin strips. Shared by both devices.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -12,12 +12,12 @@ enum class SurfaceClass : uint8_t { nothing, vehicle, cyclist, pedestrian, wall,
 /// Class of a strip: kClassOfStrip + StripKind.
 constexpr int kClassOfStrip = static_cast<int>(SurfaceClass::strip);
 
-/// Number of sides of the polygon, of the disk's area, that a light is drawn as.
+/// Number of sides of the polygon, equal in area to the disk, that represents a light.
 constexpr int kLightSides = 24;
 /// Maximum number of corners of a face before clipping.
 constexpr int kMaxFaceCorners = kLightSides;
 
-/// The plane of a face, in camera coordinates: normal . p = offset. The normal has any length.
+/// Plane of a face in camera coordinates: normal . p = offset. The normal may have any length.
 struct FacePlane {
   Vec3 normal;
   float offset = 0;
@@ -27,8 +27,8 @@ PICTURA_HD inline FacePlane quad_plane(const Vec3* corners) {
   return {normal, dot(normal, corners[0])};
 }
 
-/// Brightness of a face: 1 minus the mean over its corners of depth / visible range, clamped to [0, 1]. A face that has
-/// faded to 0 is not drawn and occludes nothing.
+/// Brightness of a face: 1 minus the mean over its corners of depth / visible range, clamped to [0, 1]. A face with
+/// brightness 0 is not drawn and occludes nothing.
 PICTURA_HD inline float face_brightness(const Vec3* corners, int count) {
   float faded = 0.0f;
   PICTURA_UNROLL_FOUR
@@ -42,10 +42,10 @@ struct CameraFace {
   int count = 0;
   FacePlane plane;
   Rgb color;
-  float floor_px = 0;  // minimum width on screen of a strip that is not yet widened; 0 for other primitives
+  float floor_px = 0;  // minimum width on screen of a strip that is still to be widened; 0 for other primitives
 };
 
-/// Colour of an agent's face before fading; the debug palette pales halted agents and greys parked ones.
+/// Colour of an agent's face before fading. The debug palette pales halted agents and greys parked agents.
 PICTURA_HD inline Rgb agent_face_color(const AgentBox& box, BoxFace face, bool debug_palette) {
   const Rgb color = agent_color(box.agent_class, face);
   if (!debug_palette || box.palette == 0) return color;
@@ -53,8 +53,8 @@ PICTURA_HD inline Rgb agent_face_color(const AgentBox& box, BoxFace face, bool d
   return {0.5f * (color.r + tint), 0.5f * (color.g + tint), 0.5f * (color.b + tint)};
 }
 
-/// Faces of a cuboid: those of BoxFace, and the underside, which is visible from roads below a bridge and has the top's
-/// colour.
+/// Faces of a cuboid: the faces of BoxFace, and the underside. The underside is visible from roads below a bridge and
+/// has the colour of the top.
 constexpr int kUnderside = kNumBoxFaces, kNumCuboidFaces = kNumBoxFaces + 1;
 
 /// Bit mask of a box's front-facing faces, for a camera at eye_m.
@@ -69,8 +69,8 @@ PICTURA_HD inline unsigned front_facing_mask(const AgentBox& box, Vec3 eye_m) {
          (eye_m.z < box.center_m.z ? 1u << kUnderside : 0u);
 }
 
-/// The four corners of a face of a box, in the world. Corners 0 to 3 of the box are front left, rear left, rear right
-/// and front right on the ground, 4 to 7 the same on the roof.
+/// The four corners of a face of a box, in world coordinates. Corners 0 to 3 of the box are front left, rear left, rear
+/// right and front right on the ground; 4 to 7 are the same on the roof.
 PICTURA_HD inline void cuboid_face_corners(const AgentBox& box, int face, Vec3* corners_out) {
   const Vec2 ahead{box.cos_heading, box.sin_heading};
   const Vec2 along = ahead * (0.5f * box.length_m), across = left_normal(ahead) * (0.5f * box.width_m);
@@ -80,7 +80,7 @@ PICTURA_HD inline void cuboid_face_corners(const AgentBox& box, int face, Vec3* 
     const Vec2 ground = (i & 3) < 2 ? at_end + across : at_end - across;
     return Vec3{ground.x, ground.y, i < 4 ? box.center_m.z : box.center_m.z + box.height_m};
   };
-  // Four corners a face, three bits each, the first lowest.
+  // Four corners per face, three bits each, with the first corner in the lowest bits.
   constexpr int kFrontCorners = 07403, kBackCorners = 05621, kLeftCorners = 04510, kRightCorners = 06732,
                 kTopCorners = 07654, kUndersideCorners = 00123;
   int corners = kUndersideCorners;
@@ -95,7 +95,7 @@ PICTURA_HD inline void cuboid_face_corners(const AgentBox& box, int face, Vec3* 
   for (int i = 0; i < 4; ++i) corners_out[i] = corner(corners >> (3 * i) & 7);
 }
 
-/// A face of four corners in the world, with its colour before fading.
+/// A face of four corners in world coordinates, with its colour before fading.
 struct WorldQuad {
   Vec3 corner[4];
   Rgb color;
@@ -122,7 +122,7 @@ struct CameraQuad {
   Rgb color;
 };
 
-/// Transforms a quad to camera coordinates; false if it has faded to black.
+/// Transforms a quad to camera coordinates; returns false if it has faded to black.
 PICTURA_HD inline bool quad_to_camera(const WorldQuad& quad, const PinholeCamera& camera, CameraQuad* quad_out) {
   for (int i = 0; i < 4; ++i) quad_out->corner[i] = to_camera(camera, quad.corner[i]);
   const float brightness = face_brightness(quad_out->corner, 4);
@@ -131,12 +131,12 @@ PICTURA_HD inline bool quad_to_camera(const WorldQuad& quad, const PinholeCamera
   return brightness > 0.0f;
 }
 
-/// A quad as a CameraFace that points into it; floor_px is 0 except for strips.
+/// Wraps a quad in a CameraFace that points into it; floor_px is 0 except for strips.
 PICTURA_HD inline CameraFace make_camera_face(const CameraQuad& quad, float floor_px) {
   return {quad.corner, 4, quad.plane, quad.color, floor_px};
 }
 
-/// Calls emit(face) for a quad unless it has faded to black; floor_px as in make_camera_face.
+/// Calls emit(face) for a quad unless the quad has faded to black; floor_px as in make_camera_face.
 template <typename Emit>
 PICTURA_HD inline void emit_quad(const WorldQuad& quad, const PinholeCamera& camera, float floor_px, Emit&& emit) {
   CameraQuad in_camera;
@@ -152,7 +152,7 @@ PICTURA_HD inline void visit_front_facing(const AgentBox& box, const PinholeCame
   }
 }
 
-/// Calls emit(face) for each of those that has not faded to black.
+/// Calls emit(face) for each front-facing face of a box that has not faded to black.
 template <typename Emit>
 PICTURA_HD inline void agent_faces(const AgentBox& box, const PinholeCamera& camera, bool debug_palette, Emit&& emit) {
   visit_front_facing(box, camera,
@@ -164,7 +164,7 @@ PICTURA_HD inline void wall_faces(const WallFace& wall, const PinholeCamera& cam
   emit_quad(wall_quad(wall), camera, 0.0f, emit);
 }
 
-/// Whether a light's state is known and its head is visible from position_m: from the front and within its half-angle,
+/// Whether a light's state is known and its head is visible from position_m: from the front, and within its half-angle
 /// on the ground plane.
 PICTURA_HD inline bool light_is_visible(const LightHead& head, LightState state, Vec3 position_m) {
   if (state == LightState::unknown) return false;
@@ -175,8 +175,8 @@ PICTURA_HD inline bool light_is_visible(const LightHead& head, LightState state,
   return ahead_m > 0.0f && ahead_m * ahead_m >= cosine * cosine * dot(to_eye, to_eye);
 }
 
-/// A corner, in the world, of the polygon that a head is drawn as: corner 0 is left of the centre, the next ones go
-/// upwards.
+/// Corner, in world coordinates, of the polygon that represents a head. Corner 0 is left of the centre, and the
+/// following corners go upwards.
 PICTURA_HD inline Vec3 light_corner(const LightHead& head, int corner) {
   constexpr float kRadius_m = kLightRadius_m * 1.00574110f;  // sqrt(a / sin(a)), a = 2 pi / kLightSides
   const SinCos at = sincos_of(static_cast<float>(corner) * (kTwoPi / kLightSides));
@@ -184,12 +184,12 @@ PICTURA_HD inline Vec3 light_corner(const LightHead& head, int corner) {
   return {ground.x, ground.y, head.position_m.z + kRadius_m * at.sin};
 }
 
-/// The disk of a head: its plane in camera coordinates, and its colour, faded by the depth of its centre.
+/// Disk of a head: its plane in camera coordinates, and its colour, faded by the depth of its centre.
 struct LightDisk {
   FacePlane plane;
   Rgb color;
 };
-/// False if it has faded to black.
+/// Transforms a head to camera coordinates; returns false if it has faded to black.
 PICTURA_HD inline bool light_to_camera(const LightHead& head, LightState state, const PinholeCamera& camera,
                                        LightDisk* disk_out) {
   const Vec3 middle = to_camera(camera, head.position_m), facing{head.facing.x, head.facing.y, 0.0f};
@@ -210,7 +210,7 @@ PICTURA_HD inline void light_faces(const LightHead& head, LightState state, cons
   emit(CameraFace{corners, kLightSides, disk.plane, disk.color});
 }
 
-/// The strip's four corners in the world: left of a, right of a, right of b, left of b.
+/// Computes the strip's four corners in world coordinates: left of a, right of a, right of b, left of b.
 PICTURA_HD inline void strip_corners(const Strip& strip, Vec3* corners_out) {
   const Vec2 at_a = strip.side_a * (0.5f * strip.width_m), at_b = strip.side_b * (0.5f * strip.width_m);
   const Vec3 a = strip.a_m, b = strip.b_m;
@@ -224,7 +224,7 @@ PICTURA_HD inline void strip_corners(const Strip& strip, Vec3* corners_out) {
 struct Widening {
   Vec2 across;  // unit vector from the strip's right side to its left; 0 if the strip is a point on screen
   float floor_px = 0;
-  /// How far to move the left corner of an end of the strip on screen, given its offset from the right corner; the
+  /// Displacement on screen of the left corner of an end of the strip, given its offset from the right corner. The
   /// right corner moves the opposite way.
   PICTURA_HD Vec2 push_px(Vec2 gap_px) const {
     const float width_px = dot(gap_px, across);
@@ -233,10 +233,10 @@ struct Widening {
   }
 };
 
-/// The widening of a strip whose centre line runs from a to b, in camera coordinates; both may be scaled by the same
-/// factor. One of them may be behind the camera: the line on screen is the same, and its direction does not matter.
+/// Widening of a strip whose centre line runs from a to b, in camera coordinates; both may be scaled by the same
+/// factor. One end may be behind the camera: the line on screen is the same, and its direction does not matter.
 PICTURA_HD inline Widening widening_of(const PinholeCamera& camera, float floor_px, Vec3 a, Vec3 b) {
-  // The direction on screen, times the product of both depths.
+  // Direction on screen, times the product of both depths.
   const Vec2 ahead{camera.focal_x_px * (b.x * a.z - a.x * b.z), camera.focal_y_px * (b.y * a.z - a.y * b.z)};
   constexpr float kLeast = 1e-12f;  // its square has a reciprocal
   const float length2 = dot(ahead, ahead), min_length = max_no_nan(1e-6f * fabsf(a.z * b.z), kLeast);
@@ -244,8 +244,8 @@ PICTURA_HD inline Widening widening_of(const PinholeCamera& camera, float floor_
   return {left_normal(ahead) * sqrt_in_range(reciprocal_in_range(length2)), floor_px};
 }
 
-/// Moves the two corners of one end of a strip apart until it has its minimum width on screen, unless one of them is
-/// before the near plane. Depths do not change.
+/// Moves the two corners of one end of a strip apart to its minimum width on screen, unless one of them is before the
+/// near plane. Depths do not change.
 PICTURA_HD inline void widen_strip_end(const PinholeCamera& camera, const Widening& widening, Vec3* left, Vec3* right) {
   if (left->z < kNear_m || right->z < kNear_m) return;
   const float of_left = reciprocal_in_range(left->z), of_right = reciprocal_in_range(right->z);
@@ -279,21 +279,21 @@ PICTURA_HD inline void strip_faces(const Strip& strip, const PinholeCamera& came
   emit_quad(strip_quad(strip), camera, floor_px, emit);
 }
 
-/// Strips closer than this in height are on one level: there the rank decides, not the depth.
+/// Maximum difference in height of strips on one level, where the rank decides instead of the depth.
 constexpr float kSameLevel_m = 0.05f;
-/// The depth of a widened strip is clamped to the depths of its corners, times or divided by this factor: when the
-/// camera is close to its plane, the plane's depth varies without bound within a pixel.
+/// Factor that widens the depth range of a strip's corners, to which the strip's depth is clamped. When the camera is
+/// close to the strip's plane, the depth of the plane varies without bound within a pixel.
 constexpr float kWidenedDepth = 2.0f;
-/// Depths that differ by less than this share of them are equal: rounding must not decide between faces in one plane.
+/// Relative difference below which depths are equal, so that rounding does not decide between faces in one plane.
 constexpr float kEqualDepth = 1e-4f;
 /// A solid stands on a strip if their outlines overlap on the ground plane and the centre of its base is at most this
-/// far from the strip's plane: upright boxes cut into slopes.
+/// far from the strip's plane. The distance is positive because upright boxes cut into slopes.
 constexpr float kStanding_m = 0.5f;
-/// Solids that stand on a strip reach at most this far through its plane, but for what culling may then hide of a strip
-/// that is seen from below.
+/// Maximum depth to which solids that stand on a strip extend through its plane. It bounds only what culling may hide
+/// of a strip that is seen from below.
 constexpr float kThroughStrip_m = 4.0f * kStanding_m;
 
-/// Where strips of one level overlap, the one with the lower rank is in front.
+/// Rank of a strip: where strips of one level overlap, the lower rank is in front.
 PICTURA_HD constexpr int strip_rank(StripKind kind) {
   // Two bits per kind, from the lowest: lane mark, road edge, crosswalk, stop line.
   constexpr int kRanks = 2 | 3 << 2 | 1 << 4 | 0 << 6;

@@ -1,6 +1,6 @@
-// Visibility within a pixel: which of two faces is in front, and which samples fragments occlude of each other. It is
-// decided for each pair of fragments anew, at the centroid of the samples that both cover: the nearer plane is in
-// front. So cycles, slopes and intersections need no order of whole primitives. Shared by both devices.
+// Visibility within a pixel: the front face of two, and the samples that fragments occlude of each other. The decision
+// is made per pair of fragments, at the centroid of the samples that both cover: the nearer plane is in front. So
+// cycles, slopes and intersections need no order of whole primitives. Shared by both devices.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -9,7 +9,7 @@
 
 namespace pictura {
 
-// Object ids are unique within an image: kind, then index. Those of strips ascend with their rank.
+// Object ids are unique within an image: kind, then index. Ids of strips ascend with their rank.
 constexpr int kKindShift = 30, kRankShift = 28;
 constexpr uint32_t kAgentKind = 0, kWallKind = 1, kLightKind = 2, kStripKind = 3;
 constexpr uint32_t kIndexMask = (1u << kRankShift) - 1;
@@ -17,7 +17,7 @@ constexpr uint32_t kIndexMask = (1u << kRankShift) - 1;
 PICTURA_HD constexpr uint32_t make_object_id(uint32_t kind, int32_t index) {
   return (kind << kKindShift) | static_cast<uint32_t>(index);
 }
-/// index: of the strip in the geometry's strips.
+/// Object id of a strip; `index` is its index in the geometry's strips.
 PICTURA_HD inline uint32_t strip_object_id(const Strip& strip, int32_t index) {
   return (kStripKind << kKindShift) | (static_cast<uint32_t>(strip_rank(strip.kind)) << kRankShift) |
          static_cast<uint32_t>(index);
@@ -32,8 +32,8 @@ PICTURA_HD constexpr uint32_t kind_of(uint32_t object_id) { return object_id >> 
 PICTURA_HD constexpr int32_t index_of(uint32_t object_id) { return static_cast<int32_t>(object_id & kIndexMask); }
 PICTURA_HD constexpr bool is_strip(const ScreenFace& face) { return kind_of(face.object_id) == kStripKind; }
 
-/// The outline of a primitive on the ground: four corners, each at the height of the primitive's lower end. A line's
-/// two ends occur twice each.
+/// Outline of a primitive on the ground: four corners, each at the height of the primitive's lower end. For a line,
+/// each end occurs twice.
 struct Extent {
   Vec3 corner[4];
 };
@@ -56,7 +56,7 @@ PICTURA_HD inline Extent extent_of(const Strip& strip) {
   return extent;
 }
 
-/// The extent of a primitive, by its object id; agents: the first of the world.
+/// Extent of a primitive, by its object id. `agents` points to the first agent of the world.
 PICTURA_HD inline Extent extent_of(uint32_t object_id, const StaticGeometryView& pieces, const AgentBox* agents) {
   const int32_t index = index_of(object_id);
   switch (kind_of(object_id)) {
@@ -67,8 +67,8 @@ PICTURA_HD inline Extent extent_of(uint32_t object_id, const StaticGeometryView&
   }
 }
 
-/// Corners on the ground. turn() rotates them, so that all sides are visited without an index, which would force the
-/// corners into a device's local memory.
+/// Corners on the ground. turn() rotates the corners, so that all sides are visited without an index, which would force
+/// the corners into a device's local memory.
 struct GroundQuad {
   Vec2 corner[4];
   PICTURA_HD void turn() {
@@ -83,7 +83,7 @@ PICTURA_HD inline GroundQuad ground_quad(const Extent& extent, Vec2 origin) {
   return quad;
 }
 
-/// Whether the first side of a separates a from b on the ground. Touching counts as separated.
+/// Whether the first side of a separates a from b on the ground. Touching quads count as separated.
 PICTURA_HD inline bool first_side_separates(const GroundQuad& a, const GroundQuad& b) {
   constexpr float kTouching_m = 1e-3f;
   struct Interval {
@@ -100,14 +100,14 @@ PICTURA_HD inline bool first_side_separates(const GroundQuad& a, const GroundQua
     return interval;
   };
   const Interval of_a = project(a), of_b = project(b);
-  // How far one has to move along the axis until they touch, times the side's length: more than nothing also for a
-  // wall, whose interval may be a point, within the other's.
+  // Displacement along the axis until the quads touch, times the side's length. It is positive even for a wall, whose
+  // interval may be a point within the other interval.
   const float overlap = min_no_nan(of_a.high - of_b.low, of_b.high - of_a.low);
   const float length2_m2 = dot(side, side);
   return length2_m2 > 1e-12f && (overlap <= 0.0f || overlap * overlap <= kTouching_m * kTouching_m * length2_m2);
 }
 
-/// Whether two extents overlap on the ground plane: no side of either separates them.
+/// Whether two extents overlap on the ground plane: no side of either extent separates them.
 PICTURA_HD inline bool overlap_on_ground(const Extent& a, const Extent& b) {
   // Relative to a nearby point, for precision.
   const Vec2 origin = a.corner[0].xy();
@@ -124,8 +124,8 @@ PICTURA_HD inline bool overlap_on_ground(const Extent& a, const Extent& b) {
   return true;
 }
 
-/// Whether a solid stands on a strip (see kStanding_m). Then it is above the strip: in front of it seen from above,
-/// behind it seen from below.
+/// Whether a solid stands on a strip (see kStanding_m). Such a solid is above the strip: in front of it seen from
+/// above, behind it seen from below.
 PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip) {
   Vec3 sum{};
   for (const Vec3 corner : solid.corner) sum = sum + (corner - strip.corner[0]);
@@ -134,21 +134,21 @@ PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip) {
   return fabsf(dot(normal, middle)) <= kStanding_m * fabsf(normal.z) && overlap_on_ground(solid, strip);
 }
 
-/// Whether a face is a strip that is seen from below. It is in front of solids that stand on it, also of those that are
-/// nearer, because they reach through it.
+/// Whether a face is a strip that is seen from below. Such a strip is in front of all solids that stand on it,
+/// including nearer ones, because these extend through it.
 PICTURA_HD inline bool is_strip_from_below(const ScreenFace& face) { return face.plane_distance_m > 0.0f; }
 
-/// How many times the inverse depth of a strip's point that of a solid which stands on it can be, on one ray from an
-/// eye so far below the strip's plane: solids reach kThroughStrip_m through it. Infinite where the eye is within that,
-/// 1 where it is above the plane.
+/// Maximum ratio of the inverse depths of a solid that stands on a strip and of the strip, on one ray from an eye at
+/// this distance below the strip's plane. Solids extend up to kThroughStrip_m through the plane. The ratio is infinite
+/// where the eye is within that distance, and 1 where the eye is above the plane.
 PICTURA_HD inline float nearest_standing(float plane_distance_m) {
   if (!(plane_distance_m > 0.0f)) return 1.0f;
   return plane_distance_m > kThroughStrip_m ? plane_distance_m * reciprocal_in_range(plane_distance_m - kThroughStrip_m)
                                             : float_from_bits(0x7F800000u);
 }
 
-/// 1 / depth of a face at a screen point, clamped to the depths of its corners; for strips that range is widened by
-/// kWidenedDepth. Used to compare faces.
+/// 1 / depth of a face at a screen point, clamped to the depths of its corners, with the range widened by kWidenedDepth
+/// for strips. Used to compare faces.
 PICTURA_HD inline float clamped_inverse_depth(const ScreenFace& face, Vec2 at_px) {
   return clamp(inverse_depth(face, at_px), face.inverse_depth_low, face.inverse_depth_high);
 }
@@ -159,8 +159,8 @@ PICTURA_HD inline float face_depth_m(const ScreenFace& face, Vec2 at_px) {
   return 1.0f / clamp(inverse_depth(face, at_px), face.inverse_depth_low * widened, face.inverse_depth_high / widened);
 }
 
-/// Whether two strips are on one level at a screen point: at the nearer one's depth, their planes are at nearly the
-/// same height. A strip that is wider on screen than its plane reaches, beyond the horizon, has a depth there too.
+/// Whether two strips are on one level at a screen point: at the depth of the nearer strip, their planes have nearly
+/// the same height. A widened strip has a depth even beyond the horizon, where its plane does not reach.
 PICTURA_HD inline bool of_one_level(const ScreenFace& a, const ScreenFace& b, Vec2 at_px) {
   const float nearest = max_of(clamped_inverse_depth(a, at_px), clamped_inverse_depth(b, at_px));
   // Heights above the two planes, times the inverse depth.
@@ -174,8 +174,8 @@ PICTURA_HD inline bool are_equal_depths(float inverse_depth_a, float inverse_dep
   return fabsf(inverse_depth_a - inverse_depth_b) < kEqualDepth * max_of(inverse_depth_a, inverse_depth_b);
 }
 
-/// Whether face a is in front of face b at a screen point that both cover: the nearer one, at equal depths that of the
-/// lower object id. `stands(solid, strip)` is stands_on() of their object ids.
+/// Whether face a is in front of face b at a screen point that both cover: the nearer face, or at equal depths the
+/// lower object id. `stands(solid, strip)` evaluates stands_on() for their object ids.
 template <typename Stands>
 PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec2 at_px, Stands&& stands) {
   const bool strip_a = is_strip(a), strip_b = is_strip(b);
@@ -184,19 +184,19 @@ PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec
   const bool first = are_equal_depths(inverse_depth_a, inverse_depth_b) ? a.object_id < b.object_id
                                                                         : inverse_depth_a > inverse_depth_b;
   if (strip_a == strip_b) return first;
-  // Depth puts the solid under the strip: one that stands on it only cuts into the road.
+  // Depth puts the solid under the strip. A solid that stands on the strip only cuts into the road.
   const bool is_strip_first = first == strip_a, is_from_below = is_strip_from_below(strip_a ? a : b);
   if (is_strip_first == is_from_below) return first;
   return stands(strip_a ? b.object_id : a.object_id, strip_a ? a.object_id : b.object_id) ? !first : first;
 }
 
-/// Sums of samples' columns, of their rows, and of their columns' offsets in eighths of a row, see
-/// sample_column_offset.
+/// Sums over samples: of their columns, of their rows, and of their columns' offsets in eighths of a row (see
+/// sample_column_offset).
 struct SampleSums {
   int32_t columns, rows, offsets;
 };
 PICTURA_HD inline SampleSums sums_of(uint64_t samples) {
-  // Bit by bit.
+  // Each sum is computed bit by bit.
   const int column_0 = popcount(samples & 0xFF00FF00FF00FF00ull), column_1 = popcount(samples & 0xFFFF0000FFFF0000ull),
             column_2 = popcount(samples & 0xFFFFFFFF00000000ull);
   const int rows = popcount(samples & 0xAAAAAAAAAAAAAAAAull) + 2 * popcount(samples & 0xCCCCCCCCCCCCCCCCull) +
@@ -243,9 +243,9 @@ PICTURA_HD inline float inverse_depth_half_range(const ScreenFace& face) {
 /// Number of bits of occluder_bound() that may be set, the highest of a float.
 constexpr int kOccluderBoundBits = 21;
 /// Lower bound of the inverse depth, over a pixel, of a face that covers it fully. Faces with a smaller inverse depth
-/// everywhere in the pixel are fully occluded. 0 for strips, which occlude nothing here: others are painted over them,
-/// and a solid behind one may stand on it. Never negative or NaN, because kernels sort by its bits. Lower by more than
-/// kEqualDepth, so that no face occludes itself nor one that is equally near.
+/// everywhere in the pixel are fully occluded. The bound is 0 for strips, which occlude nothing here: other strips are
+/// painted over them, and a solid behind a strip may stand on it. Never negative or NaN, because kernels sort by its
+/// bits. Lower by more than kEqualDepth, so that a face occludes neither itself nor an equally near face.
 PICTURA_HD inline float occluder_bound(const ScreenFace& face, int x, int y) {
   if (is_strip(face)) return 0.0f;
   const float lowest =
@@ -254,24 +254,24 @@ PICTURA_HD inline float occluder_bound(const ScreenFace& face, int x, int y) {
   return float_from_bits(bits_from_float(lowest * kLower) & ~((1u << (32 - kOccluderBoundBits)) - 1));
 }
 
-/// True unless the face lies entirely behind the occluder bound of pixel (x, y), and, if it is a strip seen from below,
-/// behind all that may stand on it. If false, it gets no fragment: the face of the largest bound would occlude it. A
-/// device may test against other full faces' bounds first, in any order: they are smaller, so what they reject the
-/// largest rejects too.
+/// Returns false if the face lies entirely behind the occluder bound of pixel (x, y), including, for a strip seen from
+/// below, all solids that may stand on it. Such a face gets no fragment, because the face with the largest bound would
+/// occlude it. A device may test against the bounds of other full faces first, in any order: these bounds are smaller,
+/// so the largest bound rejects whatever they reject.
 PICTURA_HD inline bool passes_occluder_bound(const ScreenFace& face, float bound, int x, int y) {
   const float nearest = center_inverse_depth(face, x, y) + inverse_depth_half_range(face);
   return !(nearest * face.nearest_standing < bound);
 }
 
-/// Order of fragments, independent of their list: nearer first, then by object id.
+/// Order of fragments, independent of the order of their list: nearer first, then by object id.
 PICTURA_HD inline bool is_nearer(const Fragment& a, const Fragment& b, const ScreenFace* faces) {
   if (a.inverse_depth != b.inverse_depth) return a.inverse_depth > b.inverse_depth;
   const uint32_t object_id_a = faces[a.face].object_id, object_id_b = faces[b.face].object_id;
   return object_id_a != object_id_b ? object_id_a < object_id_b : a.face < b.face;
 }
 
-/// The samples that two fragments of a pixel share. A sliver, which touches no sample, shares all samples of the other.
-/// If 0, neither occludes the other.
+/// Samples that two fragments of a pixel share. A sliver, which touches no sample, shares all samples of the other
+/// fragment. If the result is 0, neither fragment occludes the other.
 PICTURA_HD inline uint64_t shared_samples(const PixelCoverage& a, const PixelCoverage& b) {
   return a.samples != 0 && b.samples != 0 ? a.samples & b.samples : a.samples | b.samples;
 }
@@ -286,10 +286,10 @@ PICTURA_HD inline uint64_t samples_where_positive(float value, Vec2 gradient, Ve
   return samples_inside(edge, -edge.x0, -edge.y0);
 }
 
-/// Of the samples that faces a and b of two primitives share, those at which a is in front: all or none, decided at
-/// their centroid. Only where two solids change places within a pixel of it, and all_or_none is false, each sample is
-/// decided, by the rule of is_in_front(): the lower object id is in front unless the other is nearer by more than
-/// kEqualDepth. At all others, b is in front.
+/// Returns the shared samples of faces a and b, of two primitives, at which a is in front. The decision is made at the
+/// centroid for all shared samples together. Only where two solids change places within a pixel of the centroid, and
+/// all_or_none is false, is it made per sample, by the rule of is_in_front(): the lower object id is in front unless
+/// the other face is nearer by more than kEqualDepth. At all other samples, b is in front.
 template <typename Stands>
 PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFace& b, uint64_t shared, Vec2 corner,
                                             bool all_or_none, Stands&& stands) {
@@ -308,29 +308,29 @@ PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFac
   return shared & (swapped ? ~low_first : low_first);
 }
 
-/// Whether two fragments, one of them a sliver, together fill a pixel exactly: neighbouring surfaces that meet there.
-/// The tolerance is that of their areas; with a larger one slivers of what is hidden would pass for neighbours. A
-/// fragment that covers the pixel alone leaves nothing to meet.
+/// Whether two fragments, at least one of them a sliver, together fill a pixel exactly: neighbouring surfaces that meet
+/// there. The tolerance equals the accuracy of their areas; a larger tolerance would take slivers of hidden surfaces
+/// for neighbours. A fragment that covers the pixel alone has no neighbour there.
 PICTURA_HD inline bool are_complementary(const PixelCoverage& a, const PixelCoverage& b) {
   constexpr float kExact = 1e-5f;
   return (a.samples == 0 || b.samples == 0) && max_of(a.area, b.area) < 1.0f && fabsf(a.area + b.area - 1.0f) < kExact;
 }
 
-/// Whether two fragments of a pixel may still occlude more of each other, given their visible samples. Those only
-/// decrease, so a pair that is skipped stays irrelevant, in any order of pairs.
+/// Whether two fragments of a pixel may still occlude more of each other, given their visible samples. Visible samples
+/// only decrease, so a skipped pair stays irrelevant, in any order of pairs.
 PICTURA_HD inline bool may_occlude_more(uint64_t visible_a, uint64_t samples_a, uint64_t visible_b,
                                         uint64_t samples_b) {
   return ((visible_a & samples_b) | (visible_b & samples_a)) != 0;
 }
 
-/// Of each of two fragments of a pixel, the samples that the other occludes.
+/// For each of two fragments of a pixel, the samples that the other fragment occludes.
 struct OccludedSamples {
   uint64_t of_a = 0, of_b = 0;
 };
 
-/// The samples that two fragments of different primitives occlude of each other, given the samples that they share and
-/// those of them at which a is in front. A sliver occludes nothing and is occluded as a whole; a fragment that covers
-/// the whole pixel is occluded only by another such (see PixelAccumulator).
+/// Samples that two fragments of different primitives occlude of each other. `shared` are the samples that they share,
+/// `a_first` those of them at which a is in front. A sliver occludes nothing and is occluded as a whole. A fragment
+/// that covers the whole pixel is occluded only by another such fragment (see PixelAccumulator).
 PICTURA_HD inline OccludedSamples occluded_samples(const PixelCoverage& a, const PixelCoverage& b, uint64_t shared,
                                                    uint64_t a_first) {
   if (a.samples == 0 || b.samples == 0) {
@@ -339,7 +339,8 @@ PICTURA_HD inline OccludedSamples occluded_samples(const PixelCoverage& a, const
   return {a.is_full() && !b.is_full() ? 0 : shared & ~a_first, b.is_full() && !a.is_full() ? 0 : a_first};
 }
 
-/// Resolves the occlusion of two fragments; corner is the pixel's. Faces of one primitive do not occlude each other.
+/// Resolves the occlusion of two fragments; `corner` is the pixel's corner. Faces of one primitive do not occlude each
+/// other.
 template <typename Stands>
 PICTURA_HD inline OccludedSamples occlude_pair(const PixelCoverage& a, const PixelCoverage& b, const ScreenFace& face_a,
                                                const ScreenFace& face_b, Vec2 corner, Stands&& stands) {

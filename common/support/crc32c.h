@@ -1,5 +1,5 @@
-// CRC-32C (Castagnoli; polynomial 0x1EDC6F41, reflected), by tables of eight bytes at a time, and TFRecord's mask of
-// it.
+// CRC-32C (Castagnoli; polynomial 0x1EDC6F41, reflected), by tables for eight bytes at a time, and TFRecord's masked
+// form.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ namespace crc32c_tables {
 
 constexpr std::uint32_t kReflectedPolynomial = 0x82F63B78u;
 
-/// Table k gives a byte's part in the sum when k more bytes follow it.
+/// Tables of the sum: table k gives a byte's contribution when k more bytes follow it.
 constexpr std::array<std::array<std::uint32_t, 256>, 8> make_tables() {
   std::array<std::array<std::uint32_t, 256>, 8> tables{};
   for (std::uint32_t byte = 0; byte < 256; ++byte) {
@@ -38,7 +38,7 @@ inline constexpr auto kTables = make_tables();
 
 }  // namespace crc32c_tables
 
-/// crc32c("123456789") is 0xE3069283.
+/// CRC-32C of bytes; crc32c("123456789") is 0xE3069283.
 constexpr std::uint32_t crc32c(std::string_view bytes) {
   const auto& tables = crc32c_tables::kTables;
   const auto at = [&](std::size_t i) { return static_cast<std::uint32_t>(static_cast<unsigned char>(bytes[i])); };
@@ -60,7 +60,7 @@ constexpr std::uint32_t crc32c(std::string_view bytes) {
   return ~crc;
 }
 
-/// As TFRecord files store it: a checksum of bytes that contain checksums should not be one of them.
+/// CRC-32C as TFRecord files store it, masked so that the checksum of bytes that contain a checksum differs from it.
 constexpr std::uint32_t masked_crc32c(std::string_view bytes) {
   const std::uint32_t crc = crc32c(bytes);
   return ((crc >> 15) | (crc << 17)) + 0xA282EAD8u;

@@ -1,4 +1,4 @@
-// Files that are read and written whole.
+// Reading and writing of whole files.
 #pragma once
 
 #include <functional>
@@ -10,35 +10,34 @@
 
 namespace pictura {
 
-/// How much of a file read_file() shows to its check.
+/// Number of bytes that read_file() passes to its check.
 constexpr std::size_t kFirst_bytes = 64;
 
-/// The bytes of a file. Throws Error naming the path and the reason; refuses folders, files above max_bytes, and files
-/// whose size or time of change differ before and after reading. Throws Interrupted while it waits for a FIFO's writer.
-/// `check`, which may throw, gets the first kFirst_bytes, or what there is, before more is read.
+/// Returns the bytes of a file. Throws Error naming the path and the reason for folders, for files above max_bytes, and
+/// for files whose size or modification time changes during reading. Throws Interrupted while it waits for a FIFO's
+/// writer. `check`, which may throw, gets the first kFirst_bytes (fewer for a shorter file) before more is read.
 std::string read_file(const std::string& path, std::size_t max_bytes = std::size_t{1} << 30,
                       const std::function<void(std::string_view first)>& check = {});
 
-/// The 16 digits of Hash64 over a file's bytes, of which only a piece is in memory at a time. Throws as read_file()
-/// does.
+/// Returns the 16 digits of Hash64 over a file's bytes, reading it in pieces. Throws as read_file() does.
 std::string hash_of_file(const std::string& path);
 
-/// Writes the bytes as OutputFile does (output_file.h): whole, or not at all.
+/// Writes the bytes through OutputFile (output_file.h): completely or not at all.
 void write_file(const std::string& path, std::string_view bytes);
 
-/// The folder for what can be made again: $XDG_CACHE_HOME/pictura/NAME, or ~/.cache/pictura/NAME. Empty when there is
-/// neither, or when $PICTURA_CACHE is `off`.
+/// Folder for reproducible files: $XDG_CACHE_HOME/pictura/NAME, or ~/.cache/pictura/NAME. Empty when neither variable
+/// is set, or when $PICTURA_CACHE is `off`.
 std::string cache_folder(const std::string& name);
 
-/// The bytes of a file of a cache folder, or nothing where there is none. Throws as read_file() does, and where it is a
-/// FIFO or a device, which might never end.
+/// Returns the bytes of a file of a cache folder, or nothing if the file does not exist. Throws as read_file() does,
+/// and for FIFOs and devices, which might never end.
 std::optional<std::string> read_cached(const std::string& path);
 
-/// Writes a file of a cache folder, which is made where it is missing. Says nothing when it cannot: such a folder is
-/// the user's choice, or not his to change.
+/// Writes a file of a cache folder, creating the folder. Failures are silent: the user chooses the cache folder, and
+/// may be unable to change its permissions.
 void try_to_cache(const std::string& path, std::string_view bytes);
 
-/// Makes the folder and its parents. Throws Error naming it unless it is there and can be written to afterwards.
+/// Creates the folder and its parents. Throws Error naming the folder unless it then exists and is writable.
 void make_output_folder(const std::string& path);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Folders that a command fills with files under names of its own.
+// Folders that a command fills with files of its own naming.
 #pragma once
 
 #include <set>
@@ -9,18 +9,18 @@
 
 namespace pictura {
 
-/// A folder that a command fills again: files that earlier calls of the same kind wrote, and this call does not, are
-/// removed. A hidden list in the folder, .pictura-KIND, names the files that were written; all others stay.
+/// A folder that a command refills: files that earlier calls of the same kind wrote, and this call does not, are
+/// removed. A hidden list in the folder, .pictura-KIND, holds the names of written files; all other files stay.
 class FilledFolder {
  public:
-  /// Makes the folder. Throws Error as make_output_folder() does, and for a list that is a link.
+  /// Creates the folder. Throws Error as make_output_folder() does, and for a list that is a link.
   FilledFolder(std::string folder, const std::string& kind);
 
   const std::string& path() const { return folder_; }
-  /// "FOLDER/NAME" for a file that is written next. Throws Error for a link of that name, which would lead out of the
-  /// folder.
+  /// Returns "FOLDER/NAME" for the next file to write. Throws Error for a link of that name, which would lead out of
+  /// the folder.
   std::string file(const std::string& name);
-  /// Removes what earlier calls wrote under names that file() was not given.
+  /// Removes files of earlier calls whose names were not passed to file().
   void remove_others();
 
  private:

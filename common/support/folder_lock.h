@@ -1,4 +1,4 @@
-// One process at a time in a folder.
+// Exclusive access to a folder for one process.
 #pragma once
 
 #include <string>
@@ -7,11 +7,11 @@
 
 namespace pictura {
 
-/// A lock on a folder for as long as this object and its process live, however the process ends: it is on the file
-/// `lock` there (flock), which stays and says who held it last. It binds those who ask for it.
+/// A lock on a folder for the lifetime of this object and its process, however the process ends. It locks the file
+/// `lock` there (flock), which remains and records the last holder. The lock is advisory.
 class FolderLock {
  public:
-  /// Throws Error naming the folder and the process that holds it.
+  /// Throws Error naming the folder and the process that holds the lock.
   explicit FolderLock(const std::string& folder);
   ~FolderLock();
   FolderLock(const FolderLock&) = delete;

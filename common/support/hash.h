@@ -1,5 +1,5 @@
-// A 64-bit hash (FNV-1a over bytes) for images, simulator states and policies: 16 hexadecimal digits that two runs can
-// be compared by. Not for security.
+// A 64-bit hash (FNV-1a over bytes) for images, simulator states and policies: 16 hexadecimal digits for comparing two
+// runs. Not for security.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ class Hash64 {
     const auto* bytes = static_cast<const unsigned char*>(data);
     for (std::size_t i = 0; i < size; ++i) state_ = (state_ ^ bytes[i]) * 0x100000001B3ull;
   }
-  /// The bytes of the elements in order; T must have no padding.
+  /// Adds the bytes of the elements in order; T must have no padding.
   template <typename T>
   void add(Span<const T> values) {
     add_bytes(values.data(), values.size() * sizeof(T));

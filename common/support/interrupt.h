@@ -1,5 +1,4 @@
-// ^C, and what else asks a process to end, as a question that long work asks between its steps, instead of a sudden
-// death.
+// Handling of ^C and of termination signals: long work polls for them between its steps instead of dying at once.
 #pragma once
 
 #include <string>
@@ -7,30 +6,30 @@
 
 namespace pictura {
 
-/// From now on the first SIGINT, SIGTERM or SIGHUP is kept; a second SIGINT or SIGTERM ends the process at once with
-/// the status 128 + its number. SIGHUP stays ignored where it is (nohup).
+/// Records the first SIGINT, SIGTERM or SIGHUP from now on. A second SIGINT or SIGTERM ends the process at once with
+/// status 128 + its number. SIGHUP stays ignored where it already is (nohup).
 void catch_interrupts();
 
-/// The signal that came first, or 0. Never another unless catch_interrupts() was called.
+/// Returns the first signal, or 0. Always 0 unless catch_interrupts() or take_interrupt() was called.
 int interrupting_signal();
 
-/// As if this signal had come, where none has: another process that this one works with got it.
+/// Records a signal if none is recorded: another process that cooperates with this one received it.
 void take_interrupt(int signal);
 
-/// For a process that goes on after it has ended what was interrupted.
+/// Clears the recorded signal, for a process that continues after it has ended the interrupted work.
 void forget_interrupt();
 
 inline bool interrupted() { return interrupting_signal() != 0; }
-/// Throws Interrupted where one has come.
+/// Throws Interrupted where a signal is recorded.
 void throw_if_interrupted();
 
-/// A piece of work that a signal stops. One that came before the work began does not: then the work is part of an
-/// orderly end, such as the curve of what was learnt until now.
+/// A piece of work that a signal stops. A signal from before the work began does not stop it: such work is part of an
+/// orderly end, such as plotting the curve learnt so far.
 class InterruptibleWork {
  public:
-  /// `message` says what was interrupted.
+  /// `message` describes the interrupted work.
   explicit InterruptibleWork(std::string message) : message_(std::move(message)) {}
-  /// Throws Interrupted.
+  /// Throws Interrupted where a signal came after the work began.
   void check() const;
 
  private:

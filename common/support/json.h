@@ -1,5 +1,4 @@
-// What is written and read as JSON. It has neither infinity nor NaN; what comes from outside is nested as deep as it
-// likes.
+// Reading and writing of JSON. JSON has neither infinity nor NaN. Input from outside may be nested to any depth.
 #pragma once
 
 #include <cmath>
@@ -9,17 +8,17 @@
 
 namespace pictura {
 
-/// Keys keep the order in which they were set.
+/// JSON values whose keys keep the order of insertion.
 using Json = nlohmann::ordered_json;
 
-/// The number, or null where it is infinite or NaN.
+/// Returns the number, or null where it is infinite or NaN.
 inline Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
-/// How deep text may be nested: far above what anything here writes or reads. The library writes, copies and compares
-/// by recursion, so that deeper values overflow the stack.
+/// Maximum nesting depth of text, far above all that pictura writes or reads. The library writes, copies and compares
+/// recursively, so that deeper values would overflow the stack.
 constexpr int kMaxJsonDepth = 64;
 
-/// The first byte of JSON text that is nested deeper than kMaxJsonDepth; npos where none is.
+/// Offset of the first byte of JSON text that is nested deeper than kMaxJsonDepth; npos if there is none.
 inline size_t first_too_deep(std::string_view text) {
   int depth = 0;
   bool in_string = false;
@@ -39,8 +38,8 @@ inline size_t first_too_deep(std::string_view text) {
   return std::string_view::npos;
 }
 
-/// The one reader of JSON from outside. Throws the library's parse_error where the text is no JSON or is nested deeper
-/// than kMaxJsonDepth; without exceptions the value is discarded then.
+/// The only parser of JSON from outside. Throws the library's parse_error where the text is not JSON or is nested
+/// deeper than kMaxJsonDepth; without exceptions, the returned value is discarded then.
 template <typename Value = Json>
 Value parse_json(std::string_view text, bool allow_exceptions = true) {
   const size_t too_deep = first_too_deep(text);

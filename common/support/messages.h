@@ -1,5 +1,5 @@
-// What programs print: results on stdout, messages on stderr, for people. Printing never throws: a stdout that takes
-// nothing is an error after the work is saved (close_stdout()), a stderr that takes nothing loses messages.
+// Output of programs for people: results on stdout, messages on stderr. Printing never throws. A failing stdout is an
+// error after the work is saved (close_stdout()); a failing stderr loses messages.
 #pragma once
 
 #include <string>
@@ -12,9 +12,9 @@
 
 namespace pictura {
 
-/// Opens /dev/null on those of descriptors 0 to 2 that are closed, so that no file that is opened later gets their
-/// number and what is printed. From now on a reader that has ended is an error of writing instead of a sudden death
-/// (SIGPIPE). For the beginning of main().
+/// Opens /dev/null on those of descriptors 0 to 2 that are closed, so that no file opened later gets their numbers and
+/// receives printed output. Also ignores SIGPIPE: a reader that has ended becomes a write error. Call at the beginning
+/// of main().
 void open_standard_streams();
 
 /// Print on stdout and on stderr.
@@ -28,10 +28,10 @@ template <typename... T>
 void print_message(fmt::format_string<T...> format, T&&... values) {
   print_message_text(fmt::format(format, std::forward<T>(values)...));
 }
-/// Ends stdout. Throws Error unless everything that was printed since the start was taken: a disk may be full.
+/// Closes stdout. Throws Error unless all output since the start was written; the disk may be full.
 void close_stdout();
 
-/// A message in one line, in which control characters of names are escaped: "a\nb".
+/// Returns a message in one line, with control characters of names escaped: "a\nb".
 std::string printable(std::string_view message);
 
 }  // namespace pictura

@@ -1,5 +1,5 @@
-// Options that a struct lists once: visit_options(options, visitor) calls the visitor with each and its value. Python
-// takes its keyword arguments from such a list, commands their flags, configurations their keys.
+// Options that a struct lists once: visit_options(options, visitor) calls the visitor with each option and its value.
+// Python's keyword arguments, flags of commands and keys of configurations come from such lists.
 #pragma once
 
 #include <limits>
@@ -8,21 +8,21 @@
 
 namespace pictura {
 
-/// An option and what is to be said of it beside its type and default.
+/// An option, with the details that its type and default do not give.
 struct NamedOption {
   std::string name;                                        // in Python
   const char *flag = nullptr, *help = nullptr;             // in commands, where it has one
-  double low = 0, high = std::numeric_limits<int>::max();  // what numbers the flag takes
+  double low = 0, high = std::numeric_limits<int>::max();  // range of the flag's numbers
 };
 
-/// What a run that goes on may change of a key: nothing; its value, without a word; or its value, with a notice.
+/// Changes of a key's value that a resumed run accepts: none (fixed), any (free), or any with a notice (reported).
 enum class Resume { fixed, free, reported };
 
-/// Whether an evaluation counts by a key's value, where its section matters to evaluations at all, or by an option of
-/// its own in its place.
+/// Relevance of a key to evaluations: its value counts where evaluations read its section at all, or a separate option
+/// of evaluations replaces it.
 enum class Evaluation { counts, replaced };
 
-/// A key of configurations and what is to be said of it beside its type, default and range.
+/// A key of configurations, with the details that its type, default and range do not give.
 struct NamedKey {
   NamedKey(const char* its_name) : name(its_name) {}                // NOLINT: most keys are a name alone
   NamedKey(std::string its_name, Resume at_resume = Resume::fixed,  // NOLINT
@@ -31,7 +31,7 @@ struct NamedKey {
   NamedKey(std::string its_name, Evaluation in_evaluation)
       : NamedKey(std::move(its_name), Resume::fixed, in_evaluation) {}
   operator const std::string&() const { return name; }  // NOLINT: most visitors need no more
-  /// Elsewhere it is named without its section.
+  /// Converts to an option, whose name lacks the key's section.
   operator NamedOption() const { return {name.substr(name.rfind('.') + 1)}; }  // NOLINT
 
   std::string name;

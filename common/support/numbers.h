@@ -1,6 +1,6 @@
-// The one parser of numbers that people write: options of the command, overrides of a configuration, names of maps.
-// Decimal alone, and whole numbers in any decimal notation: 1000, 1e3, 1000.0 and 0010 are numbers, 0x10, 1_000, nan
-// and inf are none.
+// The only parser of numbers that people write: options of commands, overrides of configurations, names of maps.
+// Decimal numbers only, and integers in any decimal notation: 1000, 1e3, 1000.0 and 0010 are accepted; 0x10, 1_000, nan
+// and inf are not.
 #pragma once
 
 #include <cstdint>
@@ -10,21 +10,22 @@
 
 namespace pictura {
 
-/// The number that the whole text is; nothing for other text, and for what no double holds.
+/// Parses the whole text as a number. Returns nothing for other text and for numbers outside the range of double.
 std::optional<double> parse_number(std::string_view text);
 
-/// The whole number that the whole text is, exactly; nothing for other text, fractions, and what lies outside the type.
+/// Parses the whole text as an integer, exactly. Returns nothing for other text, fractions, and values outside the
+/// type.
 std::optional<uint64_t> parse_unsigned(std::string_view text);
 std::optional<int64_t> parse_integer(std::string_view text);
 
-/// The number that the whole text is, as programs write them, whatever the locale: nan and inf too.
+/// Parses the whole text as a number that a program wrote, in any locale; accepts nan and inf.
 std::optional<double> parse_written_number(std::string_view text);
 
-/// Whether the text is meant as a number, though it may be none: it begins with a digit, or with a sign or a point
-/// before one.
+/// Whether a text, valid or not, is meant as a number: it begins with a digit, or with a sign or a point before a
+/// digit.
 bool looks_like_number(std::string_view text);
 
-/// A number as messages say it: without the trailing zeros and the 300 digits of a double's largest.
+/// Formats a number for messages, without trailing zeros and without the 300 digits of the largest doubles.
 std::string text_of_number(double number);
 
 }  // namespace pictura

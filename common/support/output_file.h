@@ -1,5 +1,5 @@
-// The one writer of output files. Bytes go into a file without a name, and only a whole file gets one: a reader never
-// sees half a file, a full disk leaves the old one, and a process that is killed leaves nothing behind.
+// The only writer of output files. Bytes go into a file without a name, and only a complete file gets a name. So a
+// reader never sees half a file, a full disk leaves the old file, and a killed process leaves nothing behind.
 #pragma once
 
 #include <optional>
@@ -27,32 +27,33 @@ class Descriptor {
   int fd_ = -1;
 };
 
-/// Where bytes wait for commit(). Without a name wherever the file system can; else, and for tests, in a hidden file
-/// beside the target, which the next writer into that folder removes if its own writer was killed.
+/// Storage of bytes before commit(): a file without a name wherever the file system allows it. Otherwise, and for
+/// tests, a hidden file beside the target; if its writer is killed, the next writer into that folder removes it.
 enum class Staging { unnamed, named };
 
-/// Whether a file of this name is such a hidden one: .pictura-*.tmp with 16 random hexadecimal digits, as no file of a
-/// user's is called.
+/// Whether a name is that of such a hidden file: .pictura-*.tmp with 16 random hexadecimal digits, unlike any name that
+/// a user would choose.
 bool is_temporary_name(std::string_view name);
 
 class OutputFile {
  public:
-  /// Links are followed. What is no regular file (a device, a FIFO), and what a link of /proc leads to, as /dev/stdout,
-  /// is written through and never replaced. A file that is replaced passes on its mode and, where possible, its owner.
-  /// Throws Error naming the path for folders and read-only files, and where nothing can be written.
+  /// Opens a path for writing. Links are followed. Targets that are not regular files (devices, FIFOs), and targets of
+  /// links in /proc, such as /dev/stdout, are written through and never replaced. A replaced file passes on its mode
+  /// and, where possible, its owner. Throws Error naming the path for folders, read-only files and other targets that
+  /// cannot be written.
   explicit OutputFile(const std::string& path, Staging staging = Staging::unnamed);
-  /// Without commit(), the target is as it was before.
+  /// Leaves the target unchanged unless commit() was called.
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  /// Appends. Throws Error naming the path when the disk is full.
+  /// Appends bytes. Throws Error naming the path when the disk is full.
   void write(std::string_view bytes);
-  /// For other writers: open for reading and writing, always a regular file that can be sought in.
+  /// Descriptor for other writers: open for reading and writing, always a seekable regular file.
   int fd() const { return staged_.get(); }
 
-  /// Puts what was written in the target's place, on disk before. Waits for a FIFO's reader. Throws Error naming the
-  /// path, Interrupted while it waits.
+  /// Moves the written bytes to the target's place after syncing them to disk. Waits for a FIFO's reader. Throws Error
+  /// naming the path, and Interrupted while it waits.
   void commit();
 
  private:
@@ -62,7 +63,7 @@ class OutputFile {
   void pour();
   void replace();
 
-  std::string path_;                     // as the caller says it, for messages
+  std::string path_;                     // as given by the caller, for messages
   std::string target_;                   // with links followed, except those of /proc
   bool is_through_;                      // the target is written through
   std::optional<struct stat> replaced_;  // the file that commit() replaces

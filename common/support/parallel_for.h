@@ -1,6 +1,6 @@
-// Parallel loops of host code over an explicit number of threads. The threads of a loop are the caller's own: they stay
-// with it for its next loop and sleep between loops. An exception in a body is rethrown in the caller; if several
-// bodies throw, that of the lowest item.
+// Parallel loops of host code over an explicit number of threads. The calling thread owns the threads of its loops:
+// they sleep between loops and are reused. An exception in a body is rethrown in the caller; if several bodies throw,
+// the exception of the lowest item is rethrown.
 #pragma once
 
 #include <algorithm>
@@ -16,19 +16,19 @@
 
 namespace pictura {
 
-/// Far above what a host has, and below where a system has no more threads.
+/// Maximum number of threads: far above the cores of any host, and below the thread limits of systems.
 constexpr int kMaxThreads = 1024;
 
-/// The number of threads to use; 0 means OpenMP's default, cut off at kMaxThreads. Throws Error for numbers out of 0 to
-/// kMaxThreads.
+/// Returns the number of threads to use; 0 means OpenMP's default, limited to kMaxThreads. Throws Error for numbers
+/// outside 0 to kMaxThreads.
 int resolve_num_threads(int num_threads);
 
-/// Calls call(body, number) in this thread, with number 0, and at the same time in up to num_threads - 1 others, with
-/// numbers of their own below num_threads. A thread that has not begun when this one's call ends is not waited for, so
-/// that processes which keep it from a processor do not hold up the loop. Inside a call: in this thread alone.
+/// Calls call(body, number) in this thread with number 0, and concurrently in up to num_threads - 1 other threads with
+/// distinct numbers below num_threads. Threads that have not begun when this thread's call ends are not waited for, so
+/// that processes that keep them from a processor do not delay the loop. Nested calls run in this thread alone.
 void run_on_threads(int num_threads, void (*call)(void* body, int number), void* body);
 
-/// Calls body(i), or body(i, thread) with the number of the thread below num_threads, for i in [0, count), over at most
+/// Calls body(i), or body(i, thread) with the thread's number below num_threads, for i in [0, count), on at most
 /// num_threads threads (0: all). Bodies must not touch each other's outputs.
 template <typename Body>
 void parallel_for(int num_threads, std::int64_t count, Body&& body) {
@@ -55,7 +55,7 @@ void parallel_for(int num_threads, std::int64_t count, Body&& body) {
     Body& body;
     std::int64_t count;
     std::atomic<std::int64_t> next = 0;
-    std::mutex mutex{};  // of what follows
+    std::mutex mutex{};  // guards the members below
     std::exception_ptr error{};
     std::int64_t error_item = std::numeric_limits<std::int64_t>::max();
   };

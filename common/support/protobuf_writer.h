@@ -1,4 +1,4 @@
-// The wire format of protocol buffers, written: a varint (field << 3 | kind), then the value. Numbers lie as they do in
+// Writer of the protocol buffers' wire format: a varint (field << 3 | kind), then the value. Numbers are stored as in
 // memory, which is little-endian.
 #pragma once
 
@@ -11,7 +11,7 @@ namespace pictura {
 
 static_assert(std::endian::native == std::endian::little, "the wire format is little-endian");
 
-/// The bytes of a number.
+/// Returns the bytes of a number in memory.
 template <typename T>
 std::string_view bytes_of(const T& number) {
   return {reinterpret_cast<const char*>(&number), sizeof number};
@@ -22,7 +22,7 @@ inline void append_varint(uint64_t value, std::string* out) {
   out->push_back(static_cast<char>(value));
 }
 
-/// Field: its number, or an enumeration's value.
+/// Appends an integer. `field` is the field's number, or an enumeration's value.
 template <typename Field>
 void append_integer(Field field, uint64_t value, std::string* out) {
   append_varint(static_cast<uint64_t>(field) << 3, out);
@@ -41,7 +41,7 @@ void append_float(Field field, float value, std::string* out) {
   out->append(bytes_of(value));
 }
 
-/// Also of a message that was written before, of a text, and of packed numbers.
+/// Appends bytes: a text, packed numbers, or a message that was written before.
 template <typename Field>
 void append_bytes(Field field, std::string_view bytes, std::string* out) {
   append_varint(static_cast<uint64_t>(field) << 3 | 2, out);

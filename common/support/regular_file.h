@@ -1,5 +1,5 @@
-// Refuses what is no regular file where a text is to be read whole: opening a FIFO waits for its writer, beyond the
-// reach of signals that are only looked at between steps.
+// Refusal of files that are not regular where a text is read whole: opening a FIFO waits for its writer, and signals
+// that are polled between steps would not stop the wait.
 #pragma once
 
 #include <filesystem>
@@ -9,7 +9,7 @@
 
 namespace pictura {
 
-/// Throws Error naming the path if it is a FIFO, a socket or a device. What is missing or a folder is left to the
+/// Throws Error naming the path if it is a FIFO, a socket or a device. Missing files and folders are left to the
 /// reader.
 inline void require_regular_file(const std::string& path) {
   std::error_code ignored;

@@ -1,4 +1,4 @@
-// Libraries that are opened at run time, so that a program starts where they are missing.
+// Libraries that are opened at run time, so that programs start where the libraries are missing.
 #pragma once
 
 #include <string>
@@ -7,12 +7,12 @@
 
 namespace pictura {
 
-/// A library opened for the rest of the process: drivers do not survive being unloaded.
+/// A library that stays open for the rest of the process: drivers do not survive being unloaded.
 class SharedLibrary {
  public:
-  /// Throws Error "renderer RENDERER: cannot open FILE (SOURCE): reason"; `source` says where one gets it.
+  /// Throws Error "renderer RENDERER: cannot open FILE (SOURCE): reason"; `source` says where to get the library.
   SharedLibrary(const std::string& renderer, const std::string& file, const std::string& source);
-  /// Address of a function. Throws Error naming it.
+  /// Returns the address of a function. Throws Error naming the function.
   void* function(const char* name) const;
 
  private:

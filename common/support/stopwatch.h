@@ -1,11 +1,11 @@
-// Wall time that passes.
+// Measurement of elapsed wall time.
 #pragma once
 
 #include <chrono>
 
 namespace pictura {
 
-/// Time since it was made or last restarted.
+/// Time since construction or the last restart.
 class Stopwatch {
  public:
   void restart() { start_ = Clock::now(); }

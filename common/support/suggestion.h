@@ -1,4 +1,4 @@
-// Words that are known: where one stands, and "did you mean", the one that is nearest to one that nobody knows.
+// Lookup of known words: the index of a word, and a "did you mean" suggestion for an unknown word.
 #pragma once
 
 #include <string>
@@ -10,14 +10,14 @@
 
 namespace pictura {
 
-/// The known word that takes the fewest letters inserted, left out, replaced or swapped, regardless of case; empty when
-/// none is near: more than a third of its letters would have to change.
+/// Returns the known word with the fewest inserted, omitted, replaced or swapped letters, regardless of case. Empty
+/// when more than a third of the word's letters would have to change.
 std::string nearest_word(std::string_view word, const std::vector<std::string>& known);
 
-/// "; did you mean 'NEAREST'?", or nothing where none is near.
+/// Returns "; did you mean 'NEAREST'?", or an empty text where no known word is near.
 std::string suggestion(std::string_view word, const std::vector<std::string>& known);
 
-/// The index of a word among those that are known. Throws UsageError listing them: "WHAT: expected a, b, got 'c'".
+/// Returns the index of a word in `known`. Throws UsageError listing the known words: "WHAT: expected a, b, got 'c'".
 std::size_t index_of_word(std::string_view what, std::string_view word, Span<const char* const> known);
 
 }  // namespace pictura
