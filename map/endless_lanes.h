@@ -1,4 +1,4 @@
-// Lanes where an unbounded route starts, whatever the importer.
+// Lanes where an unbounded route starts, for any importer.
 #pragma once
 
 #include <cstddef>
@@ -8,13 +8,13 @@
 
 namespace pictura {
 
-/// Lane types of which routes are made.
+/// Whether routes use lanes of this type.
 constexpr bool is_route(LaneType type) { return type == LaneType::driving || type == LaneType::ramp; }
 
-/// Lanes connected by lane changes form a group, named by its leftmost lane.
+/// Groups of lanes that lane changes connect. A group's leftmost lane identifies it.
 struct LaneGroups {
-  std::vector<std::size_t> of_lane;               // [lanes] the leftmost lane of its group
-  std::vector<std::vector<std::size_t>> members;  // [lanes] the group of that name; empty where there is none
+  std::vector<std::size_t> of_lane;               // [lanes] leftmost lane of the lane's group
+  std::vector<std::vector<std::size_t>> members;  // [lanes] members of the group with this leftmost lane; else empty
 };
 LaneGroups group_lanes(const RoadMap& map);
 

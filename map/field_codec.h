@@ -1,5 +1,5 @@
-// Structs listed by PICTURA_FIELDS (map_fields.h) as bytes: every field in order, strings and vectors preceded by their
-// 64-bit size. Shared by the caches of maps and of scenes.
+// Serialization of structs listed by PICTURA_FIELDS (map_fields.h): every field in order, with strings and vectors
+// preceded by their 64-bit size. Shared by the caches of maps and of scenes.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@
 
 namespace pictura {
 
-/// In the header of every such file: its bytes say on which kind of machine numbers were copied into it.
+/// Byte-order mark in the header of every such file: its bytes identify the byte order of the numbers in the file.
 constexpr uint32_t kByteOrder = 0x01020304;
 
 template <typename T>
@@ -29,7 +29,7 @@ constexpr bool kIsVector = false;
 template <typename T>
 constexpr bool kIsVector<std::vector<T>> = true;
 
-/// Whether a T's bytes in memory equal those in the file and any bit pattern is valid: only numbers, no padding.
+/// Whether a T's bytes in memory equal its bytes in the file and any bit pattern is valid: only numbers, no padding.
 template <typename T>
 constexpr bool is_plain() {
   if constexpr (HasFields<T>) {
@@ -41,7 +41,7 @@ constexpr bool is_plain() {
   }
 }
 
-/// The minimum size of a T in the file.
+/// Minimum size of a T in the file.
 template <typename T>
 constexpr uint64_t min_bytes() {
   if constexpr (HasFields<T>) {
@@ -55,8 +55,8 @@ constexpr uint64_t min_bytes() {
   }
 }
 
-/// Appends what a T's bytes mean: the names of its fields and the sizes of its numbers. Files that say it cannot be
-/// read as something else.
+/// Appends the layout of a T: the names of its fields and the sizes of its numbers. A file with its layout cannot be
+/// read as another type.
 template <typename T>
 void append_layout(std::string* text_out) {
   if constexpr (HasFields<T>) {

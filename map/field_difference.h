@@ -1,4 +1,4 @@
-// Where two structs listed by PICTURA_FIELDS (map_fields.h) differ, bit by bit.
+// Bitwise comparison of two structs listed by PICTURA_FIELDS (map_fields.h).
 #pragma once
 
 #include <cstring>
@@ -61,7 +61,7 @@ std::string difference(const T& a, const T& b) {
 
 }  // namespace field_difference
 
-/// The first bitwise difference, as a path like "lanes[3].length_m: 4 and 5"; empty when they are equal.
+/// Returns the first bitwise difference as a path like "lanes[3].length_m: 4 and 5"; empty if the structs are equal.
 template <typename T>
 std::string difference_of(const T& a, const T& b) {
   const std::string path = field_difference::difference(a, b);

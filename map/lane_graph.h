@@ -1,5 +1,5 @@
-// The lanes of a map as a graph, for routes over several lanes: nodes are lanes, edges lead to successors and to the
-// neighbours to which a lane change is possible.
+// The lanes of a map as a graph, for routes over several lanes: nodes are lanes; edges lead to successors and to the
+// neighbours that a lane change can reach.
 #pragma once
 
 #include <cstdint>
@@ -24,15 +24,15 @@ struct LaneRoute {
   double cost_m = 0;  // length_m plus the cost of the lane changes
 };
 
-/// Strongly connected components: from each lane all others of its component can be reached.
+/// Strongly connected components: each lane can reach all other lanes of its component.
 struct LaneComponents {
   int32_t count = 0;
   std::vector<int32_t> of_lane;  // [lanes] in [0, count); edges never lead to a higher component
 };
 
-/// Copies what it needs of the map. A lane change goes to a neighbour, at the same fraction of both lanes' lengths, and
-/// has a fixed cost in metres. Changes are made only where a route or a lane begins: neighbours begin and end together,
-/// so later changes reach nothing new.
+/// Lane graph with a copy of the map data that it needs. A lane change goes to a neighbour, at the same fraction of
+/// both lanes' lengths, and has a fixed cost in metres. Changes are made only where a route or a lane begins:
+/// neighbours begin and end together, so later changes reach nothing new.
 class LaneGraph {
  public:
   /// Throws Error unless the cost is finite and not negative. The map must be validated.
@@ -41,11 +41,11 @@ class LaneGraph {
   int32_t num_lanes() const { return static_cast<int32_t>(length_m_.size()); }
   float length_m(int32_t lane) const { return length_m_[lane]; }
 
-  /// The cheapest route, or nothing if there is none. A position behind `from` on the same lane is reached by a loop.
-  /// Throws Error for a lane that is not in the map, or an s_m beyond its ends.
+  /// Returns the cheapest route, or nothing if there is none. A position behind `from` on the same lane is reached by a
+  /// loop. Throws Error for a lane that is not in the map, or an s_m outside the lane.
   std::optional<LaneRoute> route(LanePosition from, LanePosition to) const;
 
-  /// The least cost from a position to the start of each lane, [lanes]; infinite where there is no route. Throws as
+  /// Minimum cost from a position to the start of each lane, [lanes]; infinite where there is no route. Throws as
   /// route() does.
   std::vector<double> distances_from(LanePosition from) const;
 
@@ -60,13 +60,13 @@ class LaneGraph {
     int32_t lane = 0;
     bool is_change = false;
   };
-  /// Node n < lanes is the start of lane n; node lanes + n is the position on lane n next to the one where the search
-  /// began, reached by lane changes only.
+  /// Result of a search. Node n < lanes is the start of lane n. Node lanes + n is the position on lane n beside the
+  /// start position, which only lane changes reach.
   struct Search {
-    double begin_fraction = 0;            // of the start position, of its lane's length
-    std::vector<double> cost_m;           // [nodes] least costs
+    double begin_fraction = 0;            // start position as a fraction of its lane's length
+    std::vector<double> cost_m;           // [nodes] minimum costs
     std::vector<int32_t> previous;        // [nodes] the previous node on the path, or -1
-    std::vector<uint8_t> is_lane_change;  // [nodes] whether that step is a lane change
+    std::vector<uint8_t> is_lane_change;  // [nodes] whether the step from the previous node is a lane change
   };
 
   Span<const Edge> edges_of(int32_t lane) const;

@@ -1,4 +1,4 @@
-// Whether walls stand between an eye and a vehicle.
+// Line-of-sight tests between an eye and a vehicle, past walls.
 #pragma once
 
 #include <optional>
@@ -8,10 +8,10 @@
 
 namespace pictura {
 
-/// The fraction of a-b at which c-d crosses it, if it does.
+/// Returns the fraction of a-b at which c-d crosses it, if they cross.
 std::optional<float> crossing_fraction(Vec2 a, Vec2 b, Vec2 c, Vec2 d);
 
-/// Walls in a grid. They must outlive it.
+/// Walls in a grid. The walls must outlive this object.
 class LineOfSight {
  public:
   explicit LineOfSight(Span<const WallFace> walls);

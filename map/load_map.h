@@ -1,4 +1,4 @@
-// Loads maps by the name that a user gives after MAP: the one function that knows all kinds of maps.
+// Loading of maps by the name that a user gives as MAP: load_map() alone knows all kinds of maps.
 #pragma once
 
 #include <memory>
@@ -12,18 +12,18 @@
 
 namespace pictura {
 
-/// How a map was loaded.
+/// Details of how a map was loaded.
 struct LoadReport {
   bool cached = false;          // the map was read from the cache
-  std::string cache_rejection;  // why an existing cached file was not used, or empty
-  std::string source;           // the file, or the procedural town's name: names it in messages
+  std::string cache_rejection;  // reason why an existing cached file was not used, or empty
+  std::string source;           // the file or the procedural town's name, for messages
 };
 
-/// Loads `name`: a file (.xodr), a town's name looked up as NAME.xodr in the map folder,
-/// `procedural[:SEED[:NAME=VALUE,...]]`, `city[...]` likewise, or one of these with #COPY behind it, its affine copy of
-/// that number (map_copy.h), which replaces options.plan. Files and their copies are imported once and stored in the
-/// cache (map_cache.h); a cache that cannot be read or written only costs time. Throws Error naming the file and the
-/// line or element; UsageError when there is no such map.
+/// Loads a map by name. The name is a file (.xodr), a town's name looked up as NAME.xodr in the map folder,
+/// `procedural[:SEED[:NAME=VALUE,...]]`, or `city[...]` likewise. A suffix #COPY selects the affine copy of that number
+/// (map_copy.h), which replaces options.plan. Files and their copies are imported once and stored in the cache
+/// (map_cache.h); failures of the cache only cost time. Throws Error naming the file and the line or element, and
+/// UsageError when there is no such map.
 std::shared_ptr<const RoadMap> load_map(const std::string& name, const OpenDriveOptions& options = {},
                                         LoadReport* report_out = nullptr, const ImportProgress& progress = {});
 
@@ -31,25 +31,25 @@ struct MapText {
   std::string text, source;  // OpenDRIVE, and its name in messages
 };
 
-/// Several by num_threads host threads (0: all); throws as load_map() does.
+/// Loads several maps on num_threads host threads (0: all). Throws as load_map() does.
 std::vector<std::shared_ptr<const RoadMap>> load_maps(const std::vector<std::string>& names, int num_threads = 0);
 
-/// The text that load_map() would import for this name. Throws as load_map() does, and UsageError for copies, which
-/// have none.
+/// Returns the text that load_map() would import for this name. Throws as load_map() does, and UsageError for copies,
+/// which have no text.
 MapText map_text(const std::string& name);
 
-/// The size of a map's file; of a procedural town, about that of a CARLA file with as much road. Memory is estimated
-/// from it. Throws as load_map() does.
+/// Returns the size of a map's file, from which memory is estimated. For a procedural town, it is about the size of a
+/// CARLA file with as much road. Throws as load_map() does.
 int64_t map_file_bytes(const std::string& name);
 
-/// Whether a name is a file's or its copy's, rather than a town's or a procedural map's.
+/// Whether a name is that of a file or of its copy, rather than of a town or a procedural map.
 bool is_map_file(std::string_view name);
 
-/// $PICTURA_DATA, or $XDG_DATA_HOME/pictura/maps, or ~/.local/share/pictura/maps. CARLA's towns are looked up here and
-/// in its subfolder `carla`.
+/// Folder of maps: $PICTURA_DATA, or $XDG_DATA_HOME/pictura/maps, or ~/.local/share/pictura/maps. CARLA's towns are
+/// looked up there and in its subfolder `carla`.
 std::string map_folder();
 
-/// The names of the towns in the map folder, sorted.
+/// Returns the names of the towns in the map folder, sorted.
 std::vector<std::string> known_towns();
 
 }  // namespace pictura

@@ -1,5 +1,5 @@
-// A RoadMap as a binary file, so that a map file is imported only once. The header identifies the sources; a stale or
-// damaged file is rejected.
+// Cache of imported maps: a RoadMap as a binary file. The header identifies the sources; stale or damaged files are
+// rejected.
 #pragma once
 
 #include <cstdint>
@@ -12,29 +12,29 @@
 
 namespace pictura {
 
-/// Everything that determines a map. Equal keys mean equal maps.
+/// Inputs that determine a map. Equal keys mean equal maps.
 struct MapCacheKey {
   uint64_t importer = 0;  // hash of the importer's sources and of the compiler version
   uint64_t source = 0;    // hash of the file's bytes
   uint64_t options = 0;   // hash of the options
 };
 
-/// The key of a file with these bytes, for this build of the importer.
+/// Returns the key of a file with these bytes, for this build of the importer.
 MapCacheKey map_cache_key(std::string_view source_bytes, const OpenDriveOptions& options);
 
-/// The encoded map: a header of magic, version, byte order, key, size and hash of the payload; then every field of
-/// RoadMap in the order of map_fields.h, strings and vectors preceded by their 64-bit size.
+/// Encodes a map: a header of magic, version, byte order, key, size and hash of the payload; then every field of
+/// RoadMap in the order of map_fields.h, with strings and vectors preceded by their 64-bit size.
 std::string encode_map(const RoadMap& map, const MapCacheKey& key);
 
-/// The map in `bytes`, validated. Throws Error "NAME: reason" when they are foreign (magic), of another byte order or
-/// version, truncated, stale (made by another importer, from another file, with other options), or damaged (hash,
-/// sizes, values). Memory is bounded by a few times their size whatever they contain.
+/// Decodes and validates a map. Throws Error "NAME: reason" when the bytes are foreign (magic), of another byte order
+/// or version, truncated, stale (another importer, file or options), or damaged (hash, sizes, values). For any bytes,
+/// memory is bounded by a few times their size.
 RoadMap decode_map(std::string_view bytes, const MapCacheKey& key, const std::string& name);
 
-/// The header that encode_map() puts before `payload`.
+/// Returns the header that encode_map() puts before `payload`.
 std::string map_cache_header(std::string_view payload, const MapCacheKey& key);
 
-/// The cache file for `source_path` imported with these options. Empty when caching is off.
+/// Returns the path of the cache file for `source_path` imported with these options. Empty when caching is off.
 std::string map_cache_path(const std::string& source_path, const OpenDriveOptions& options);
 
 }  // namespace pictura

@@ -1,5 +1,5 @@
-// The fields of RoadMap and of its elements, listed once: whole maps are written, read and compared through these
-// lists. A structured binding must name every field, so an incomplete list does not compile.
+// Field lists of RoadMap and of its elements, by which whole maps are written, read and compared. A structured binding
+// must name every field, so an incomplete list does not compile.
 #pragma once
 
 #include <string>
@@ -9,8 +9,8 @@
 #include "pictura/map/opendrive/opendrive.h"
 #include "pictura/map/road_map.h"
 
-/// Defines fields_of(value), a tuple of references to all fields in declaration order, and field_names_of(value), their
-/// names separated by ", ".
+/// Defines fields_of(value), a tuple of references to all fields in declaration order, and field_names_of(value), the
+/// names of the fields separated by ", ".
 #define PICTURA_FIELDS(Type, ...)            \
   inline auto fields_of(Type& value) {       \
     auto& [__VA_ARGS__] = value;             \
@@ -24,7 +24,7 @@
 
 namespace pictura {
 
-/// The i-th name passed to PICTURA_FIELDS.
+/// Returns the i-th name passed to PICTURA_FIELDS.
 inline std::string field_name_at(std::string_view names, std::size_t i) {
   for (; i > 0; --i) names.remove_prefix(names.find(',') + 2);
   return std::string(names.substr(0, names.find(',')));
@@ -59,7 +59,7 @@ PICTURA_FIELDS(RoadMap, name, origin_m, geo_reference, road_names, lanes, lane_p
 PICTURA_FIELDS(PlanMap, xx, xy, yx, yy)
 PICTURA_FIELDS(OpenDriveOptions, chord_error_m, strict, plan)
 
-/// Calls visit(name, field) for each field of one of these, in their order.
+/// Calls visit(name, field) for each field of a listed struct, in declaration order.
 template <typename T, typename Visit>
 void visit_fields(const T& value, Visit&& visit) {
   std::size_t i = 0;
@@ -67,8 +67,8 @@ void visit_fields(const T& value, Visit&& visit) {
              fields_of(value));
 }
 
-/// The first bitwise difference of two maps, as a path like "lanes[3].length_m" or "lights: 8 and 9 of them"; empty
-/// when they are equal.
+/// Returns the first bitwise difference of two maps, as a path like "lanes[3].length_m" or "lights: 8 and 9 of them";
+/// empty if the maps are equal.
 std::string first_difference(const RoadMap& a, const RoadMap& b);
 
 }  // namespace pictura

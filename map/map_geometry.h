@@ -10,21 +10,21 @@
 
 namespace pictura {
 
-/// Where the heads of lights stand. `as_mapped`: where the map has them. `visible`: a head less than
-/// kVisibleHeadAhead_m beyond the middle of its stop line, or before it, is moved along the line's traffic until it is
-/// so far beyond it, and stands kVisibleHeadHeight_m above the road of its lanes there. It keeps its side of the lanes
-/// and its facing. So cameras of a vehicle that waits at the line see it.
+/// Placement of light heads. `as_mapped`: at the map's positions. `visible`: heads less than kVisibleHeadAhead_m beyond
+/// the middle of their stop line, or before it, are moved along the line's traffic to that distance. There they stand
+/// kVisibleHeadHeight_m above the road of their lanes, with the same lateral side and facing. So the cameras of a
+/// vehicle that waits at the line see the head.
 enum class LightHeads : uint8_t { as_mapped, visible };
 constexpr std::array<const char*, 2> kLightHeadsNames{"as_mapped", "visible"};
 constexpr float kVisibleHeadAhead_m = 10.0f, kVisibleHeadHeight_m = 3.5f;
 
-/// Throws UsageError listing the names if `name` is none.
+/// Returns the placement of a name. Throws UsageError listing the valid names for any other name.
 LightHeads light_heads_named(const std::string& name);
 std::string name_of(LightHeads heads);
 
 struct MapGeometryOptions {
   bool walls = true;                        // draw walls along the building lines
-  uint64_t wall_seed = 0;                   // selects the pieces of building lines that get walls
+  uint64_t wall_seed = 0;                   // selects the pieces of building lines that have walls
   float light_half_angle_rad = kPi / 3.0f;  // half of the angle within which a head is visible (60 degrees)
   LightHeads light_heads = LightHeads::as_mapped;
 };
@@ -32,7 +32,7 @@ struct MapGeometryOptions {
 /// The map's static geometry; signal i of a head is map.lights[i].
 StaticGeometry make_static_geometry(const RoadMap& map, const MapGeometryOptions& options = {});
 
-/// The walls for `options.wall_seed`; the simulator collides with the same ones.
+/// Makes the walls for `options.wall_seed`; the simulator uses the same walls for collisions.
 std::vector<WallFace> make_walls(const RoadMap& map, const MapGeometryOptions& options);
 
 }  // namespace pictura

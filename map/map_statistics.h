@@ -1,4 +1,4 @@
-// What a map's roads are like, in numbers that can be compared between towns.
+// Statistics of a map's roads that can be compared between towns.
 #pragma once
 
 #include <array>
@@ -8,21 +8,22 @@
 
 namespace pictura {
 
-/// The fractions of the quantiles of MapStatistics.
+/// Fractions of the quantiles of MapStatistics.
 inline constexpr std::array<double, 3> kMapQuantiles{0.05, 0.5, 0.95};
-/// The radii that divide the classes of radius_shares.
+/// Radii that separate the classes of radius_shares.
 inline constexpr std::array<double, 3> kMapRadii_m{20, 50, 200};
-/// Grades above it count as steep: 2 in 100.
+/// Minimum grade that counts as steep: 2 in 100.
 inline constexpr double kSteepGrade = 0.02;
 
-/// Shares and quantiles of driving lanes are weighted by length; all of them are 0 where there is nothing to count.
+/// Statistics of a map. Shares and quantiles of driving lanes are weighted by length; they are 0 where nothing is
+/// counted.
 struct MapStatistics {
   std::array<double, 3> lane_width_m{}, speed_limit_mps{};
-  std::array<double, 4> lanes_shares{};       // outside junctions: 1, 2, 3, and 4 or more lanes in one direction
-  std::array<double, 4> radius_shares{};      // of a radius up to the first of kMapRadii_m, ..., above the last
-  double steep_share = 0, parking_share = 0;  // of kSteepGrade; length of parking lanes over that of driving lanes
-  std::array<int, 4> junctions_of_arms{};     // roads that meet: up to 3, 4, 5, and 6 or more
-  std::array<double, 3> head_ahead_m{};       // of lights, beyond the middle of their stop lines
+  std::array<double, 4> lanes_shares{};       // lanes in one direction outside junctions: 1, 2, 3, 4 or more
+  std::array<double, 4> radius_shares{};      // radii up to the first of kMapRadii_m, ..., above the last
+  double steep_share = 0, parking_share = 0;  // above kSteepGrade; parking lanes over driving lanes, by length
+  std::array<int, 4> junctions_of_arms{};     // number of roads that meet: up to 3, 4, 5, 6 or more
+  std::array<double, 3> head_ahead_m{};       // distances of lights beyond the middle of their stop lines
 };
 
 PICTURA_FIELDS(MapStatistics, lane_width_m, speed_limit_mps, lanes_shares, radius_shares, steep_share, parking_share,

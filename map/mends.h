@@ -1,5 +1,4 @@
-// Mends: faults of a map's file that have one sensible meaning, what the importer made of each, and their count by
-// kind.
+// Repairs of faults in a map's file that have one sensible meaning: the repair of each fault, and counts by kind.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +9,7 @@
 
 namespace pictura {
 
-/// The kinds, in the order of the table in docs/reference/opendrive_conformance.md.
+/// Kinds of repaired faults, in the order of the table in docs/reference/opendrive_conformance.md.
 enum class MendKind : uint8_t {
   record_order,
   record_beyond_end,
@@ -75,20 +74,20 @@ enum class MendKind : uint8_t {
   missing_link,
 };
 
-/// The fault, as "records out of order", and what is done about it, as "sorted".
+/// Names of the fault, such as "records out of order", and of its repair, such as "sorted".
 const char* to_string(MendKind kind);
 const char* action_of(MendKind kind);
 
-/// All kinds, in order.
+/// Returns all kinds, in order.
 std::vector<MendKind> mend_kinds();
 
 struct Mend {
   MendKind kind = MendKind::record_order;
-  int32_t line = 0;     // of the element in the file
-  std::string message;  // OWNER: <element>: what was expected and what came
+  int32_t line = 0;     // line of the element in the file
+  std::string message;  // "OWNER: <element>: ", then the expected and the actual value
 };
 
-/// "FILE:LINE: OWNER: <element>: ...", as errors read; `source` names the file.
+/// Returns "FILE:LINE: OWNER: <element>: ...", in the format of errors; `source` is the file's name.
 std::string message_of(const Mend& mend, const std::string& source);
 
 struct MendGroup {
@@ -96,10 +95,11 @@ struct MendGroup {
   std::vector<const Mend*> mends;  // in the order of their lines; not empty
 };
 
-/// The mends of each kind that occurs, the most frequent kinds first. Refers to `mends`.
+/// Groups repairs by kind, the most frequent kinds first. The groups refer to `mends`.
 std::vector<MendGroup> group_mends(Span<const Mend> mends);
 
-/// One line a kind: how many, what was done, and the first one's message. Empty without mends.
+/// Describes repairs in one line per kind: their number, the repair, and the message of the first. Empty without
+/// repairs.
 std::vector<std::string> describe_mends(Span<const Mend> mends, const std::string& source);
 
 }  // namespace pictura

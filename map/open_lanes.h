@@ -1,4 +1,4 @@
-// Roads that end: on maps from which no route goes on for ever, where routes end, and where traffic leaves and enters.
+// Roads that end, on maps without endless routes: where routes end, and where traffic leaves and enters.
 #pragma once
 
 #include <cstdint>
@@ -8,11 +8,11 @@
 
 namespace pictura {
 
-/// A lane is open if at least so much way lies ahead of its start.
+/// Minimum length of way ahead of an open lane's start.
 constexpr float kMinOpenWay_m = 20.0f;
 
-/// Whether a route goes on for ever from some lane outside junctions. Agents then drive on such lanes alone, and all
-/// others count for nothing.
+/// Whether an endless route starts at some lane outside junctions. Agents then drive only on endless lanes, and all
+/// other lanes are ignored.
 bool has_endless_roads(const RoadMap& map);
 
 /// A line across the end of a lane, where traffic leaves the map, or across its start, where traffic enters.
@@ -23,15 +23,15 @@ struct LaneMouth {
   float half_width_m = 0;
 };
 
-/// How the driving and ramp lanes of a map end.
+/// Ends of a map's driving and ramp lanes.
 struct OpenLanes {
-  // [lanes] The longest way of a route on from the end of the lane, or of one beside it; 0: routes end with the lane;
-  // infinite on endless lanes, and on lanes of other types.
+  // [lanes] Longest way of a route beyond the end of the lane, or of a lane beside it. 0: routes end with the lane.
+  // Infinite on endless lanes, and on lanes of other types.
   std::vector<float> way_after_m;
-  std::vector<LaneMouth> exits;    // of lanes with which routes end, but for missing links
-  std::vector<LaneMouth> entries;  // of open lanes that no lane leads to, nor to one beside them
+  std::vector<LaneMouth> exits;    // of lanes where routes end, except at missing links
+  std::vector<LaneMouth> entries;  // of open lanes without predecessors, of themselves or of lanes beside them
 
-  /// The end of a lane with which routes end, within 1 m of the start of another lane: the link is missing.
+  /// A missing link: the end of a lane where routes end, within 1 m of the start of another lane.
   struct MissingLink {
     int32_t from = -1, to = -1;
     float gap_m = 0;
@@ -40,17 +40,17 @@ struct OpenLanes {
 };
 OpenLanes find_open_lanes(const RoadMap& map);
 
-/// Whether at least kMinOpenWay_m of way lie ahead of the lane's start, and no route goes on for ever.
+/// Whether at least kMinOpenWay_m of way lie ahead of the lane's start on a map without endless routes.
 bool is_open(const RoadMap& map, const OpenLanes& open, std::size_t lane);
 
 /// Removes road edges across exits and entries, so that traffic can pass there.
 void open_mouths(const OpenLanes& open, RoadMap* map);
 
-/// Driving and ramp lanes by what agents do on them.
+/// Numbers of driving and ramp lanes by their use.
 struct LaneUse {
-  int32_t endless = 0;      // routes go on for ever
-  int32_t open = 0;         // on maps without endless roads: open lanes and those that follow them
-  int32_t unreachable = 0;  // all others: no agent is sent there
+  int32_t endless = 0;      // start of an endless route
+  int32_t open = 0;         // on maps without endless roads: open lanes and the lanes that follow them
+  int32_t unreachable = 0;  // all other lanes: agents are never sent there
 };
 LaneUse count_lane_use(const RoadMap& map);
 

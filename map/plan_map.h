@@ -1,9 +1,9 @@
-// A linear map of the plan, by which copies of a map differ from it.
+// Linear map of the plan, by which a copy of a map differs from the map.
 #pragma once
 
 namespace pictura {
 
-/// Takes (x, y) to (xx x + xy y, yx x + yy y); the identity by default.
+/// Maps (x, y) to (xx x + xy y, yx x + yy y); the identity by default.
 struct PlanMap {
   double xx = 1, xy = 0, yx = 0, yy = 1;
 

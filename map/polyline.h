@@ -1,5 +1,5 @@
-// Curves to polylines: sampled so that no chord deviates from the curve by more than a tolerance, with few points and
-// pieces of bounded length. Shared by all importers.
+// Conversion of curves to polylines: chords deviate from the curve by at most a tolerance, with few points and pieces
+// of bounded length. Shared by all importers.
 #pragma once
 
 #include <algorithm>
@@ -18,10 +18,10 @@
 
 namespace pictura {
 
-/// Rounding may make pieces longer than the maximum by this much.
+/// Length by which rounding may make pieces longer than the maximum.
 constexpr double kPieceRounding = 1e-6;
 
-/// A sample of a curve: its parameter, its position, and a width (0 for a plain line) that is approximated too.
+/// A sample of a curve: its parameter, its position, and a width (0 for a plain line), which is approximated too.
 /// Positions are in file or map coordinates, before rounding to float.
 struct CurvePoint {
   double s = 0;
@@ -44,9 +44,9 @@ inline Vec3 to_vec3(const Eigen::Vector3d& p) {
   return {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())};
 }
 
-/// The deviation of `p` from the chord a-b: its distance in space, or half the error in width if that is larger.
+/// Deviation of `p` from the chord a-b: its distance in space, or half the error in width if that is larger.
 inline double chord_error(const CurvePoint& a, const CurvePoint& b, const CurvePoint& p) {
-  // Sums in plan first: maps keep their bits.
+  // Sums in plan first, so that the bits of maps do not change.
   const auto dot = [](const Eigen::Vector3d& v, const Eigen::Vector3d& w) {
     return v.head<2>().dot(w.head<2>()) + v.z() * w.z();
   };
@@ -58,15 +58,15 @@ inline double chord_error(const CurvePoint& a, const CurvePoint& b, const CurveP
   return std::max(std::sqrt(dot(error, error)), 0.5 * std::abs(p.width - (a.width + u * (b.width - a.width))));
 }
 
-/// The indices of a subset of the points, first and last included, so that every point left out is within `tolerance_m`
-/// of the chord that replaces it and no chord is longer (in plan) than `max_piece_m`, unless two neighbouring points
-/// are.
+/// Returns the indices of a subset of the points, first and last included. Every omitted point is within `tolerance_m`
+/// of the chord that replaces it. No chord is longer (in plan) than `max_piece_m`, unless two neighbouring points are
+/// farther apart.
 std::vector<std::size_t> thin_polyline(const std::vector<CurvePoint>& points, double tolerance_m, double max_piece_m);
 
-/// Limits the number of samples, so that no input can exhaust memory, and ends sampling where `work` is interrupted.
+/// Limit on the number of samples, so that no input can exhaust memory; also ends sampling where `work` is interrupted.
 class SampleBudget {
  public:
-  /// `source` names the map in messages.
+  /// `source` is the map's name in messages.
   SampleBudget(std::int64_t max_samples, std::string source, InterruptibleWork work)
       : max_samples_(max_samples), remaining_(max_samples), source_(std::move(source)), work_(std::move(work)) {}
   const InterruptibleWork& work() const { return work_; }
@@ -84,12 +84,12 @@ class SampleBudget {
   InterruptibleWork work_;
 };
 
-/// Where a curve is cut for sampling: it is smooth between breaks. Values at the breaks themselves may belong to other
-/// formulae.
+/// Places where a curve is cut for sampling; the curve is smooth between them. Values at the breaks themselves may
+/// belong to either formula.
 struct CurveBreaks {
   std::vector<double> s;
-  // [s - 1], or empty: an upper bound of the second derivative by s, of position and of half the width, between two
-  // breaks; infinite where none is known.
+  // [s - 1], or empty: upper bound of the second derivatives by s of the position and of half the width, between two
+  // breaks; infinite where unknown.
   std::vector<double> bend;
 };
 
@@ -100,16 +100,16 @@ std::vector<CurvePoint> sample_curve(const CurveBreaks& curve, double tolerance_
   constexpr int kMaxDepth = 24;
   constexpr double kMinStep = 0.01;
   constexpr double kStepsPerPiece = 4;
-  constexpr double kDenseShare = 0.1;  // of the tolerance: for sampling; the rest is for thinning
-  constexpr double kSafety = 0.9;      // far more than rounding
+  constexpr double kDenseShare = 0.1;  // share of the tolerance for sampling; the rest is for thinning
+  constexpr double kSafety = 0.9;      // margin far above rounding errors
   const std::vector<double>& breaks = curve.s;
   std::vector<CurvePoint> dense{eval(breaks.front())};
-  double low = 0, high = 0, bend = 0;  // of the present interval
+  double low = 0, high = 0, bend = 0;  // of the current interval
   auto refine = [&](auto&& self, const CurvePoint& a, const CurvePoint& b, int depth) -> void {
     budget->count_sample();
     if (depth < kMaxDepth) {
       bool is_fine = is_within(a.position_m, b.position_m, max_piece_m + kPieceRounding);
-      // A chord over h deviates by at most h^2 / 8 times the second derivative: most need no test.
+      // A chord over h deviates by at most h^2 / 8 times the second derivative, so most chords need no test.
       const double h = b.s - a.s;
       if (is_fine && a.s > low && b.s < high && bend * h * h <= 8 * kSafety * kDenseShare * tolerance_m) {
         dense.push_back(b);

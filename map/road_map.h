@@ -1,5 +1,5 @@
-// RoadMap: the validated, immutable road network that everything else reads, whatever the file format. Positions are
-// float metres relative to an origin kept in double; indices are into the vectors of the same RoadMap, -1 means none.
+// RoadMap: the validated, immutable road network that all other code reads, for any file format. Positions are float
+// metres relative to an origin kept in double. Indices refer to the vectors of the same RoadMap; -1 means none.
 #pragma once
 
 #include <array>
@@ -30,11 +30,11 @@ enum class LaneType : uint8_t {
   other,
 };
 
-/// The road edges are the outline of the drivable lanes.
+/// Whether a lane is drivable. The road edges are the outline of the drivable lanes.
 constexpr bool is_drivable(LaneType type) { return type <= LaneType::ramp; }
 const char* to_string(LaneType type);
 
-/// What differs by more in height is on different levels of road: on a bridge and below it.
+/// Minimum difference in height between different levels of road, such as a bridge and the road below it.
 constexpr float kSameRoadLevel_m = 2.0f;
 
 /// A half-open range of elements of one of RoadMap's vectors.
@@ -54,11 +54,11 @@ struct LanePoint {
 struct Lane {
   LaneType type = LaneType::other;
   bool in_junction = false;
-  bool is_endless = false;  // an unbounded route along successors (and lane changes) starts here
+  bool is_endless = false;  // start of an unbounded route along successors (and lane changes)
   int32_t junction = -1;
   IndexRange points;                                // RoadMap::lane_points, at least two
   IndexRange successors, predecessors;              // RoadMap::lane_links: lanes
-  int32_t left_neighbor = -1, right_neighbor = -1;  // same direction, driving or ramp; marks are not considered
+  int32_t left_neighbor = -1, right_neighbor = -1;  // same direction, driving or ramp; regardless of marks
   float length_m = 0;
   float speed_limit_mps = 0;
   int32_t source_road = 0, source_section = 0, source_lane = 0;  // indices and id in the file; see RoadMap::road_names
@@ -75,7 +75,7 @@ struct Marking {
   bool broken = false;
 };
 
-/// A piece of the outline of the drivable surface, drivable on its right side, at most kMaxPiece_m long.
+/// A piece of the outline of the drivable surface, at most kMaxPiece_m long, with the drivable side on its right.
 struct RoadEdge {
   Vec3 a_m, b_m;
 };
@@ -96,25 +96,25 @@ struct PaintedStopLine {
   float width_m = 0;
 };
 
-/// A traffic sign as described in the file, and the lanes to which it applies (by its validity and references).
+/// A traffic sign of the file, and the lanes to which it applies (by its validity and references).
 struct Sign {
   std::string name;           // the signal's id in the file
-  std::string type, subtype;  // codes of the catalogue of `country`; "206" is a stop sign in OpenDRIVE's own
+  std::string type, subtype;  // codes in the catalogue of `country`; "206" is a stop sign in OpenDRIVE's own catalogue
   std::string country;
   Vec3 position_m;
-  float heading_rad = 0;  // of the traffic to which it applies
+  float heading_rad = 0;  // heading of the traffic to which the sign applies
   IndexRange lanes;       // RoadMap::sign_lanes
 };
 
-/// A traffic light: its stop line, head, phase, and the lanes that it controls (incoming and connecting ones).
+/// A traffic light: its stop line, head, phase, and the lanes that it controls (incoming and connecting lanes).
 struct TrafficLight {
   Vec3 stop_a_m, stop_b_m;     // the stop line, left end first as seen by traffic
   float stop_heading_rad = 0;  // travel direction of the controlled traffic
   Vec3 head_m;                 // centre of the head
   Vec2 head_facing;            // unit vector towards the controlled traffic
-  int32_t junction = -1;       // -1: it stands alone on a road
-  int32_t phase = 0;           // rank of its controller in the junction; without controllers, by heading
-  IndexRange lanes;            // RoadMap::light_lanes, incoming lanes first, then connecting ones
+  int32_t junction = -1;       // -1: on a road away from junctions
+  int32_t phase = 0;           // rank of its controller in the junction; without controllers, rank by heading
+  IndexRange lanes;            // RoadMap::light_lanes, incoming lanes first, then connecting lanes
   std::string name;            // the signal's id in the file
 };
 
@@ -128,19 +128,19 @@ struct BuildingLine {
   Vec3 a_m, b_m;  // the road lies to the right of a -> b
 };
 
-/// The source of an element: the road's index in RoadMap::road_names (-1: on no road) and the line of the XML element
+/// Source of an element: the road's index in RoadMap::road_names (-1: not on a road) and the line of the XML element
 /// (0: derived, or the map was not read from text).
 struct SourceElement {
   int32_t road = -1, line = 0;
 };
 
-/// The source of every element, parallel to RoadMap's vectors of the same names.
+/// Sources of all elements, parallel to RoadMap's vectors of the same names.
 struct Provenance {
   std::vector<SourceElement> lanes, markings, road_edges, crosswalks, parking_spaces, stop_lines, signs, lights,
       junctions, building_lines;
 };
 
-/// Lanes that are shorter are left of roads of no length: they link others, and no count has them.
+/// Minimum length of counted lanes. Shorter lanes remain from roads without length and only link other lanes.
 inline constexpr float kShortestLane_m = 0.01f;
 
 /// Counts that `pictura map` prints and that tests compare with the file.
@@ -176,7 +176,7 @@ struct RoadMap {
   std::vector<BuildingLine> building_lines;
   MapFacts facts;
   Provenance provenance;
-  std::vector<Mend> mends;  // faults of the file, and what was made of them
+  std::vector<Mend> mends;  // repaired faults of the file
 
   Span<const LanePoint> points_of(const Lane& lane) const {
     return {lane_points.data() + lane.points.begin, static_cast<size_t>(lane.points.size())};

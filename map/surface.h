@@ -1,4 +1,4 @@
-// Surfaces as bands between two borders, with point queries: which bands cover a position.
+// Surfaces as bands between two borders, with queries for the bands that cover a position.
 #pragma once
 
 #include <bit>
@@ -13,35 +13,34 @@
 
 namespace pictura {
 
-/// A piece of surface between two borders with equally many points; left is on the left in their direction. The surface
-/// is bounded by straight segments between the points, so they must be dense enough.
+/// A piece of surface between two borders with equally many points; `left` is on the left in their direction. Straight
+/// segments between the points bound the surface, so points must be dense enough.
 struct SurfaceBand {
   std::vector<Eigen::Vector3d> left, right;
 };
 
 /// All quads of all bands in a grid. Bands at least `level_m` above or below a position do not cover it. The total
-/// number of quads tested is bounded, far above what real road networks need; with excessively overlapping bands
+/// number of tested quads is bounded, far above the need of real road networks. With excessively overlapping bands,
 /// any_band_at() throws Error instead of running for hours.
 class Surface {
  public:
   Surface(const std::vector<SurfaceBand>& bands, double level_m);
 
-  /// Quads of which at least one point within kNear_m of `p` may be covered: a superset, from the cell of `p`.
+  /// Quads that may cover a point within kNear_m of `p`: a superset, from the cell of `p`.
   struct Candidates {
     std::vector<int32_t> quads;
-    bool are_complete = false;  // false where that circle is in several cells
+    bool are_complete = false;  // false where the circle around `p` is in several cells
   };
 
-  /// Finds the quads about `p`, so that several questions about one place look them up once.
+  /// Finds the quads near `p`, so that several queries about one place share the lookup.
   void find_near(const Eigen::Vector2d& p, double z, Candidates* out) const;
 
-  /// Whether any of the bands that `is_wanted` names covers `p`, for a place within kNear_m of where the candidates
-  /// were found.
+  /// Whether any band that `is_wanted` accepts covers `p`, which must be within kNear_m of the place of the candidates.
   template <typename IsWanted>
   bool any_near(const Candidates& near, const Eigen::Vector2d& p, double z, IsWanted&& is_wanted) const {
     return any_near(near, p, z, is_wanted, [](int32_t) { return true; });
   }
-  /// The same of bands for which `visit`, which is called for those that cover `p` alone, returns true.
+  /// Whether `visit` returns true for any such band. It is called only for bands that cover `p`.
   template <typename IsWanted, typename Visit>
   bool any_near(const Candidates& near, const Eigen::Vector2d& p, double z, IsWanted&& is_wanted, Visit&& visit) const {
     if (!near.are_complete) return any_band_at(p, z, [&](int32_t band) { return is_wanted(band) && visit(band); });
@@ -53,12 +52,12 @@ class Surface {
   }
   static constexpr double kNear_m = 0.1;
 
-  /// Whether a quad of the band that is more than `reach_m` along it from quad `from` covers `p`: in a turn tighter
-  /// than its width a band folds over itself.
+  /// Whether a quad of the band that is more than `reach_m` along the band from quad `from` covers `p`: in a turn
+  /// tighter than its width, a band folds over itself.
   bool is_folded_over(const Candidates& near, const Eigen::Vector2d& p, double z, int32_t band, std::size_t from,
                       double reach_m) const;
 
-  /// Calls visit(band) for every band that covers `p` at about height `z`, until it returns true; returns whether any
+  /// Calls visit(band) for every band that covers `p` at about height `z`, until a call returns true; returns whether a
   /// call did.
   template <typename Visit>
   bool any_band_at(const Eigen::Vector2d& p, double z, Visit&& visit) const {
@@ -69,24 +68,25 @@ class Surface {
   struct Quad {
     Eigen::Vector2d corners_m[4];  // counter-clockwise: left, right, next right, next left
     double mean_z_m = 0;
-    double s_m = 0;  // of its middle, along the longer border
+    double s_m = 0;  // station of its middle along the longer border
     int32_t band = 0;
   };
 
-  /// Bounds outside of which a quad covers nothing, with a margin of kNear_m and for rounding.
+  /// Bounds outside which a quad covers nothing, including a margin of kNear_m and rounding.
   struct QuadBounds {
     Vec2 low, high;
     float low_z = 0, high_z = 0;
   };
-  /// Those of the grid's items, in their order, an array for each side: they rule most of a cell's quads out, eight at
+  /// Bounds of the grid's items in their order, with one array per side. They exclude most of a cell's quads, eight at
   /// a time.
   struct ItemBounds {
-    static constexpr std::size_t kPadding = 7;  // eight are read from the last one on
+    static constexpr std::size_t kPadding = 7;  // eight are read from the last item on
     std::vector<float> low_x, high_x, low_y, high_y, low_z, high_z;
 
     void reserve(std::size_t count);
     void push_back(const QuadBounds& bounds);
-    /// Bit k is set where the bounds of item first + k contain a place; bits of what follows the last item are set too.
+    /// Returns a mask with bit k set where the bounds of item first + k contain a place. Bits beyond the last item are
+    /// undefined.
     uint32_t that_contain(std::size_t first, const Float8& x, const Float8& y, const Float8& z) const {
       const auto between = [&](const std::vector<float>& low, const Float8& value, const std::vector<float>& high) {
         return (load8(&low[first]) <= value) & (value <= load8(&high[first]));
@@ -95,8 +95,8 @@ class Surface {
     }
   };
 
-  /// Calls visit(quad's index) for the quads of a cell whose bounds contain a place, until it returns true; returns
-  /// whether any call did.
+  /// Calls visit(index) for the quads of a cell whose bounds contain a place, until a call returns true; returns
+  /// whether a call did.
   template <typename Visit>
   bool any_in_cell(std::size_t cell, Vec2 p, double z_m, Visit&& visit) const {
     const GridView grid = grid_.view();
@@ -113,7 +113,8 @@ class Surface {
     return false;
   }
 
-  /// Calls visit(quad) for the quads whose bounds contain a place, until it returns true; returns whether any call did.
+  /// Calls visit(quad) for the quads whose bounds contain a place, until a call returns true; returns whether a call
+  /// did.
   template <typename Visit>
   bool any_quad_at(const Eigen::Vector2d& p, double z, Visit&& visit) const {
     const GridView grid = grid_.view();

@@ -1,5 +1,5 @@
-// The stages that turn a Network into a RoadMap, in the order in which parse_opendrive runs them. Each fills its own
-// vectors of the map and may read those of earlier stages.
+// Stages that turn a Network into a RoadMap, in the order of execution in parse_opendrive. Each stage fills its own
+// vectors of the map and may read vectors of earlier stages.
 #pragma once
 
 #include <vector>
@@ -42,14 +42,14 @@ struct Build {
 
   /// Converts file coordinates to map coordinates.
   Vec3 to_map(const Eigen::Vector3d& p) const { return to_vec3(from_origin(p)); }
-  /// The same before rounding.
+  /// Coordinates relative to the map's origin, before rounding.
   Eigen::Vector3d from_origin(const Eigen::Vector3d& p) const {
     return p - Eigen::Vector3d{map->origin_m[0], map->origin_m[1], map->origin_m[2]};
   }
 };
 
-/// Whether traffic on the side of that sign (lane ids' sign) travels towards growing s: on the right of the reference
-/// line under right-hand traffic.
+/// Whether traffic on a side (given by the sign of its lane ids) travels towards growing s: on the right of the
+/// reference line under right-hand traffic.
 constexpr bool travels_forward(const FileRoad& road, int side) { return (side < 0) != road.left_hand; }
 inline bool travels_forward(const FileRoad& road, const FileLane& lane) {
   return travels_forward(road, lane.id) != (lane.direction == LaneDirection::reversed);
@@ -58,30 +58,30 @@ inline bool travels_forward(const FileRoad& road, const FileLane& lane) {
 /// Sets the map origin: the centre of the reference lines, in whole metres.
 void choose_origin(Build* build);
 
-/// The provenance of an element on road `road` of the network.
+/// Returns the provenance of an element on road `road` of the network.
 inline SourceElement source_of(std::size_t road, const SourceLocation& where) {
   return {static_cast<int32_t>(road), where.line()};
 }
 
-/// Lanes of every type but "none": centre lines and neighbours, links, and speed limits.
+/// Builds lanes of every type except "none": centre lines and neighbours, links, and speed limits.
 void build_lanes(Build* build);
 void link_lanes(Build* build);
 void set_speed_limits(Build* build);
 
-/// The outline of the drivable surface.
+/// Builds the outline of the drivable surface.
 void build_road_edges(Build* build);
 
-/// Takes road edges away from where traffic leaves and enters a map without endless roads, and notes missing links.
+/// Removes road edges where traffic leaves and enters a map without endless roads, and records missing links.
 void open_road_ends(Build* build);
 
-/// Lane marks; then crosswalks, parking spaces and stop lines.
+/// Build lane marks; then crosswalks, parking spaces and stop lines.
 void build_markings(Build* build);
 void build_objects(Build* build);
 
-/// Junctions, traffic lights and signs.
+/// Builds junctions, traffic lights and signs.
 void build_signals(Build* build);
 
-/// The lines along which walls may be placed.
+/// Builds the lines along which walls may be placed.
 void build_building_lines(Build* build);
 
 void count_facts(Build* build);

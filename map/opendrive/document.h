@@ -1,4 +1,4 @@
-// Parses the XML of an OpenDRIVE file and rejects documents that are unsafe to read.
+// Parsing of an OpenDRIVE file's XML, with rejection of unsafe documents.
 #pragma once
 
 #include <string_view>
@@ -10,7 +10,7 @@
 
 namespace pictura::opendrive {
 
-/// Parses `text`. Throws Error naming source and line unless it is well-formed UTF-8 XML without a document type,
+/// Parses `text`. Throws Error naming source and line unless the text is well-formed UTF-8 XML without a document type,
 /// nested at most 64 deep, with attributes of at most 64 KiB.
 void read_document(std::string_view text, const Source& source, pugi::xml_document* document_out);
 

@@ -1,5 +1,5 @@
-// Elements of the XML tree, read with checks: an attribute that is missing, malformed or out of range is an error that
-// names the element, its line and its owner; one that has a sensible meaning all the same is mended.
+// Checked access to elements of the XML tree. A missing, malformed or out-of-range attribute is an error naming the
+// element, its line and its owner. An attribute that still has a sensible meaning is repaired.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +28,7 @@ class Element {
   [[noreturn]] void fail(fmt::format_string<Args...> format, Args&&... args) const {
     where().fail_with(fmt::format(format, std::forward<Args>(args)...));
   }
-  /// Notes a fault that the caller mends as action_of(kind) says; strict reading throws it.
+  /// Records a fault that the caller repairs by action_of(kind); strict reading throws it.
   template <typename... Args>
   void mend(MendKind kind, fmt::format_string<Args...> format, Args&&... args) const {
     where().mend(faults_, kind, format, std::forward<Args>(args)...);
@@ -51,34 +51,34 @@ class Element {
   std::string_view name() const { return node_.name(); }
   Element with_owner(const std::string* owner) const { return {node_, source_, faults_, owner}; }
 
-  /// Whether the attribute is there and has a value: some writers leave those empty that they do not set.
+  /// Whether the attribute exists and has a value: some writers leave unset attributes empty.
   bool has(const char* attribute) const;
   std::string text(const char* attribute) const;
   std::string text(const char* attribute, const char* fallback) const;
-  /// A finite number.
+  /// Reads a finite number.
   double number(const char* attribute) const;
   double number(const char* attribute, double fallback) const { return has(attribute) ? number(attribute) : fallback; }
-  /// Nothing if it is missing or no finite number.
+  /// Reads a finite number; returns nothing if the attribute is missing or not a finite number.
   std::optional<double> finite_number(const char* attribute) const;
   double number_in(const char* attribute, double low, double high) const;
   double number_in(const char* attribute, double low, double high, double fallback) const {
     return has(attribute) ? number_in(attribute, low, high) : fallback;
   }
-  /// The same, where a missing attribute is mended: it counts as 0.
+  /// Reads a number. A missing attribute is repaired: it counts as 0.
   double number_or_zero(const char* attribute) const;
   double number_or_zero_in(const char* attribute, double low, double high) const;
-  /// A size in [0, high]; 0, for which the default counts, where it is missing. Mended: one below zero counts as
-  /// missing, since some writers set -1.
+  /// Reads a size in [0, high]; 0 (use the default) if it is missing. Repaired: a negative size counts as missing,
+  /// since some writers set -1.
   double size(const char* attribute, double high) const;
   int integer(const char* attribute) const;
-  /// False where it is missing. Mended: what is neither true nor false counts as false.
+  /// Reads a flag; false if it is missing. Repaired: a value other than true and false counts as false.
   bool flag(const char* attribute) const;
 
-  /// The text between the element's tags.
+  /// Returns the text between the element's tags.
   std::string content() const { return node_.text().as_string(); }
 
  private:
-  /// Whether the attribute is there; if not, that is mended.
+  /// Whether the attribute exists; records the repair of a missing attribute.
   bool has_or_zero(const char* attribute) const;
 
   pugi::xml_node node_;
@@ -87,17 +87,17 @@ class Element {
   const std::string* owner_;
 };
 
-// Stations that differ by less count as equal.
+// Tolerance within which stations count as equal.
 inline constexpr double kStationTolerance_m = 1e-3;
 
-/// The station in `attribute` of a record that applies from there on, within [0, length]. Mended: a record before the
-/// start, which applies from the start, and one beyond the end, for which there is no station: it is left out. A
-/// missing attribute counts as `fallback`, if there is one.
+/// Reads the station in `attribute` from which a record applies, within [0, length]. Repaired: a record before the
+/// start applies from the start; a record beyond the end has no station and is omitted. A missing attribute counts as
+/// `fallback`, if given.
 std::optional<double> read_station(const Element& record, const char* attribute, double length,
                                    std::optional<double> fallback = std::nullopt);
 
-/// Appends the record of `element`. One that begins before the last one is mended by sort_records(), after all are
-/// read.
+/// Appends the record of `element`. A record that begins before the previous record is repaired by sort_records(),
+/// after all records are read.
 template <typename Record>
 void append_record(const Element& element, const char* attribute, double Record::* station, Record record,
                    std::vector<Record>* records) {
@@ -108,18 +108,18 @@ void append_record(const Element& element, const char* attribute, double Record:
   records->push_back(std::move(record));
 }
 
-/// Of records at one station the last one counts, as in the file.
+/// Sorts records by station, keeping the file's order at equal stations: the last such record counts.
 template <typename Record>
 void sort_records(double Record::* station, std::vector<Record>* records) {
   std::stable_sort(records->begin(), records->end(),
                    [station](const Record& a, const Record& b) { return a.*station < b.*station; });
 }
 
-/// The coefficients of a cubic that begins at s.
+/// Reads the coefficients of a cubic that begins at s.
 Cubic read_cubic(const Element& element, double s);
 
-/// The cubics in the children `name` of `parent`, whose stations (the attribute named `station`) lie within
-/// [0, length], sorted.
+/// Reads the cubics in the children `name` of `parent`, sorted. Their stations (the attribute named `station`) must lie
+/// within [0, length].
 Profile read_profile(const Element& parent, const char* name, const char* station, double length);
 
 }  // namespace pictura::opendrive

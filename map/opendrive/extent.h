@@ -1,4 +1,4 @@
-// Checks that a road's offsets, heights, banking and widths are plausible, so that later stages need not check again.
+// Checks that a road's offsets, heights, banking and widths are plausible, so that later stages need no checks.
 #pragma once
 
 #include "pictura/common/error_types.h"
@@ -7,8 +7,8 @@
 
 namespace pictura::opendrive {
 
-/// Throws Error unless offsets, heights and banking are within limits along the whole road. Mended: widths below zero,
-/// which all that read them count as zero.
+/// Throws Error unless offsets, heights and banking are within limits along the whole road. Repaired: negative widths,
+/// which all readers count as zero.
 void check_extent(const FileRoad& road, Faults* faults);
 
 }  // namespace pictura::opendrive

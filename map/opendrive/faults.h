@@ -1,4 +1,4 @@
-// Faults of a file that have one sensible meaning: they are mended and noted, or, in strict reading, refused.
+// Faults of a file that have one sensible meaning. They are repaired and recorded, or refused in strict reading.
 #pragma once
 
 #include <string>
@@ -14,10 +14,11 @@ class Faults {
  public:
   explicit Faults(bool strict) : strict_(strict) {}
 
-  /// Notes a fault that the caller mends as action_of(kind) says. Strict: throws Error with its message instead.
+  /// Records a fault that the caller repairs by action_of(kind). In strict reading, throws Error with its message
+  /// instead.
   void mend(Mend mend, const std::string& source) {
     if (strict_) throw Error(message_of(mend, source));
-    // Bounds memory.
+    // The limit bounds memory.
     if (mends_.size() >= kMaxMends) {
       fail("{} (after {} other faults, the most that are mended)", message_of(mend, source), kMaxMends);
     }

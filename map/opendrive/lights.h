@@ -1,4 +1,4 @@
-// Traffic lights that stand on a road, away from junctions.
+// Traffic lights along a road, away from junctions.
 #pragma once
 
 #include <vector>
@@ -7,15 +7,15 @@
 
 namespace pictura::opendrive {
 
-/// The type of signals that are traffic lights.
+/// Type of signals that are traffic lights.
 inline constexpr std::string_view kLightType = "1000001";
 
-/// Whether a signal or reference applies to a lane of its road: by its validity, else by its orientation.
+/// Whether a signal or reference applies to a lane of its road: by its validity if given, else by its orientation.
 bool applies_to(const FileLane& lane, const FileRoad& road, Orientation orientation,
                 const std::vector<LaneRange>& validity);
 
-/// Splits sections at the stop lines of lights that no controller controls and from which no lane leads to a junction.
-/// The heads of one orientation within 20 m have one line, where traffic meets the first of them.
+/// Splits sections at the stop lines of lights that no controller controls and whose lanes lead to no junction. Heads
+/// of one orientation within 20 m share a line, where traffic reaches the first head.
 void split_at_lights(Network* network);
 
 }  // namespace pictura::opendrive

@@ -1,5 +1,5 @@
-// Checks the links between roads and junctions of a whole file, and mends those that geometry or the other side show
-// the meaning of, so that later stages can follow every link.
+// Checks of links between roads and junctions in a whole file. Links whose meaning follows from geometry or from the
+// other side are repaired, so that later stages can follow every link.
 #pragma once
 
 #include "pictura/map/opendrive/faults.h"
@@ -7,8 +7,8 @@
 
 namespace pictura::opendrive {
 
-/// Afterwards every road link, every road's junction and both roads of every connection exist, contact points are
-/// known, and Connection::incoming_end is set. Faults are mended as MendKind says.
+/// Repairs links as MendKind describes. Afterwards every road link, every road's junction and both roads of every
+/// connection exist, contact points are known, and Connection::incoming_end is set.
 void mend_links(Network* network, Faults* faults);
 
 }  // namespace pictura::opendrive

@@ -18,7 +18,7 @@
 
 namespace pictura::opendrive {
 
-/// The file's name and line index; converts an element's byte offset to a line, counted from 1.
+/// Name and line index of the file; converts an element's byte offset to a line, counted from 1.
 class Source {
  public:
   Source() = default;
@@ -32,7 +32,7 @@ class Source {
   std::vector<std::ptrdiff_t> line_ends_;
 };
 
-/// The location of an element: its byte offset in the text and its owner ("road 12", "junction 3").
+/// Location of an element: its byte offset in the text and its owner ("road 12", "junction 3").
 struct SourceLocation {
   const Source* source = nullptr;
   std::ptrdiff_t offset = 0;
@@ -48,7 +48,7 @@ struct SourceLocation {
     fail_with(fmt::format(format, std::forward<Args>(args)...));
   }
 
-  /// Notes a fault that the caller mends, or throws; see Faults.
+  /// Records a fault that the caller repairs, or throws; see Faults.
   void mend_with(Faults* faults, MendKind kind, const std::string& message) const;
 
   template <typename... Args>
@@ -74,24 +74,24 @@ struct Profile {
 struct PlaneCubic {
   std::array<double, 4> u{}, v{};  // coefficients of p^0 to p^3
   double p_end = 0;
-  std::array<double, 17> arc_length{};  // arc length from the start to p_end i / 16; see measure() in curves.h
+  std::array<double, 17> arc_length{};  // arc length from the start to p = p_end * i / 16; see measure() in curves.h
 };
 
 /// A piece of a reference line: a cubic, or a curve whose curvature changes linearly from start to end (line: both 0,
-/// arc: equal).
+/// arc: both equal).
 struct GeometryPiece {
   double s = 0, x = 0, y = 0, heading = 0, length = 0;
   double start_curvature = 0, end_curvature = 0;
   std::optional<PlaneCubic> cubic;
-  // Spirals only: the start of each integration panel, in the frame of the piece's start; see measure() in curves.h.
+  // Spirals only: start of each integration panel, in the frame of the piece's start; see measure() in curves.h.
   std::vector<std::array<double, 2>> panels;
 };
 
 /// One stripe of a mark, from <line>.
 struct MarkLine {
-  double length = 0, space = 0;  // of a dash and of the gap after it; explicit lines have no gap
-  double t_offset = 0;           // of its centre line, left of the lane's border
-  double s_offset = 0;           // start of its first dash, from the start of the mark
+  double length = 0, space = 0;  // lengths of a dash and of the following gap; explicit lines have no gap
+  double t_offset = 0;           // of the stripe's centre line, to the left of the lane's border
+  double s_offset = 0;           // start of the first dash, from the start of the mark
   double width = 0;              // 0: use the mark's width
   std::optional<MarkColor> color;
 };
@@ -104,10 +104,10 @@ struct RoadMark {
   bool bold = false;
   MarkColor color = MarkColor::white;
   double width = 0;                           // 0: not given
-  LaneChange lane_change = LaneChange::both;  // permitted directions of lane changes across it
-  std::vector<MarkLine> lines;                // repeated along the mark; they replace the pattern of the type
-  std::vector<MarkLine> explicit_lines;       // painted once each
-  Profile sway;                               // lateral shift of the lines to the left; of s - start of the mark
+  LaneChange lane_change = LaneChange::both;  // permitted directions of lane changes across the mark
+  std::vector<MarkLine> lines;                // repeated along the mark; replace the pattern of the type
+  std::vector<MarkLine> explicit_lines;       // each painted once
+  Profile sway;                               // lateral shift of the lines to the left, by s - start of the mark
   SourceLocation where;
 };
 
@@ -115,21 +115,21 @@ struct RoadMark {
 enum class LaneDirection : uint8_t { standard, reversed, both };
 
 struct FileLane {
-  int id = 0;  // positive left of the reference line, negative right, 0 the line itself
+  int id = 0;  // positive left of the reference line, negative right; 0: the line itself
   std::string type_name;
   LaneType type = LaneType::other;
-  int section = 0;            // the file's <laneSection> in its road, from 0
-  bool is_continued = false;  // continues a <lane> that an earlier FileSection also contains
+  int section = 0;            // index of the file's <laneSection> in its road, from 0
+  bool is_continued = false;  // continues a <lane> of an earlier FileSection
   bool is_void = false;       // type "none": no surface
   bool is_level = false;      // keeps the height of its inner border on banked roads
   LaneDirection direction = LaneDirection::standard;
   std::vector<int> predecessors, successors;
-  // Functions of s - the section's s.
+  // Functions of s minus the section's s.
   Profile width;
-  Profile border;  // used if there is no width: t of the outer border relative to the reference line
-  Profile inner_height, outer_height;  // constants: height above the road at the lane's borders
-  Profile speed_limit_mps;             // constants; 0: no limit
-  std::vector<RoadMark> marks;         // on its outer border, in ascending order of s_offset
+  Profile border;                      // used without widths: t of the outer border, relative to the reference line
+  Profile inner_height, outer_height;  // constant; height above the road at the lane's borders
+  Profile speed_limit_mps;             // constant; 0: no limit
+  std::vector<RoadMark> marks;         // on the outer border, in ascending order of s_offset
   SourceLocation where;
 };
 
@@ -144,16 +144,16 @@ struct FileSection {
 
 enum class ContactPoint : uint8_t { start, end };
 
-/// The predecessor or successor of a road.
+/// Predecessor or successor of a road.
 struct RoadLink {
   enum class Kind : uint8_t { none, road, junction } kind = Kind::none;
   std::string id;
   ContactPoint contact = ContactPoint::start;
-  bool has_contact = true;  // false: the file does not say; mend_links() finds it
-  SourceLocation where;     // also of a link that was left out
+  bool has_contact = true;  // false: missing in the file and determined by mend_links()
+  SourceLocation where;     // also set for a link that was omitted
 };
 
-/// The traffic to which a signal applies: along s ("+"), against it ("-"), or either.
+/// Traffic to which a signal applies: along s ("+"), against s ("-"), or either.
 enum class Orientation : uint8_t { along, against, either };
 
 struct LaneRange {
@@ -165,22 +165,22 @@ struct FileSignal {
   double s = 0, t = 0, z_offset = 0, heading_offset = 0;
   bool is_dynamic = false;
   Orientation orientation = Orientation::either;
-  std::vector<LaneRange> validity;  // empty: all lanes of its orientation
-  std::optional<double> stop_s;     // of a light away from junctions: its stop line; from split_at_lights()
+  std::vector<LaneRange> validity;  // empty: all lanes of this orientation
+  std::optional<double> stop_s;     // stop line of a light away from junctions; set by split_at_lights()
   SourceLocation where;
 };
 
-/// Declares that a signal applies to lanes of the road that contains the reference.
+/// Reference that makes a signal apply to lanes of the road that contains the reference.
 struct SignalReference {
   std::string signal;
   double s = 0, t = 0;
   Orientation orientation = Orientation::either;
-  std::vector<LaneRange> validity;  // empty: all lanes of its orientation
-  std::optional<double> stop_s;     // as of a signal
+  std::vector<LaneRange> validity;  // empty: all lanes of this orientation
+  std::optional<double> stop_s;     // see FileSignal::stop_s
   SourceLocation where;
 };
 
-/// An object; outline corners are (u, v) in the object's frame, or (s, t) along the road.
+/// An object. Outline corners are (u, v) in the object's frame, or (s, t) along the road.
 struct FileObject {
   enum class Kind : uint8_t { crosswalk, parking_space, stop_line } kind = Kind::crosswalk;
   std::string id, name;
@@ -199,21 +199,21 @@ struct CrossSection {
   Profile height;
 };
 
-/// Where the points of a road go in a copy of its map; see deform.h. The shift of the reference line changes from start
-/// to end as a smoothstep of s, so that headings at both ends are those of the plan.
+/// Deformation of a road's points in a copy of its map; see deform.h. The shift of the reference line changes from
+/// start to end as a smoothstep of s, so that headings at both ends are those of the plan.
 struct RoadDeformation {
   PlanMap plan;
   std::array<double, 2> start_shift_m{}, end_shift_m{};
 };
 
 struct FileRoad {
-  std::string id, junction;  // junction is empty if the road belongs to none
+  std::string id, junction;  // junction is empty for roads outside junctions
   double length = 0;
-  bool left_hand = false;  // traffic keeps left
+  bool left_hand = false;  // left-hand traffic
   RoadLink predecessor, successor;
-  Profile speed_limit_mps;  // constants; 0: no limit
+  Profile speed_limit_mps;  // constant; 0: no limit
   std::vector<GeometryPiece> geometry;
-  std::optional<RoadDeformation> deformation;  // where it is there, s is a parameter and no longer an arc length
+  std::optional<RoadDeformation> deformation;  // if set, s is a parameter instead of an arc length
   Profile elevation, lane_offset;
   Profile superelevation;                   // rad, about the reference line, left side up
   Profile left_crossfall, right_crossfall;  // rad, down from the reference line
@@ -231,10 +231,10 @@ struct LaneLink {
 };
 
 struct Connection {
-  std::string incoming_road, connecting_road;       // in direct junctions connecting_road is the linked road
-  ContactPoint contact = ContactPoint::start;       // the end of the connecting road at the incoming one
-  bool has_contact = true;                          // false: the file does not say; mend_links() finds it
-  ContactPoint incoming_end = ContactPoint::start;  // of the incoming road, at the junction; from mend_links()
+  std::string incoming_road, connecting_road;       // in direct junctions, connecting_road is the linked road
+  ContactPoint contact = ContactPoint::start;       // end of the connecting road at the incoming road
+  bool has_contact = true;                          // false: missing in the file and determined by mend_links()
+  ContactPoint incoming_end = ContactPoint::start;  // end of the incoming road at the junction; set by mend_links()
   std::vector<LaneLink> lane_links;
   SourceLocation where;
 };

@@ -1,4 +1,4 @@
-// Imports OpenDRIVE (.xodr) files as RoadMaps.
+// Importer of OpenDRIVE (.xodr) files.
 #pragma once
 
 #include <functional>
@@ -12,19 +12,18 @@
 namespace pictura {
 
 struct OpenDriveOptions {
-  float chord_error_m = 0.02f;  // maximum distance of a sampled curve from the true one
-  bool strict = false;          // refuse every fault, also those that have one sensible meaning
-  // What else than the identity imports a copy whose lanes keep their widths; it stretches and shrinks every length at
-  // most by half, and does not mirror.
+  float chord_error_m = 0.02f;  // maximum distance between a sampled curve and the exact curve
+  bool strict = false;          // refuse every fault, including faults with one sensible meaning
+  // Plan of a copy whose lanes keep their widths. It must not mirror, nor change any length by more than half.
   PlanMap plan;
 };
 
-/// Told before each stage of an import: its name, and the share of the work that is done by then.
+/// Callback before each stage of an import, with the stage's name and the share of the work that is done.
 using ImportProgress = std::function<void(const char* stage, double done)>;
 
-/// Parses the text of an OpenDRIVE file. `source` names it in messages. Faults that have one sensible meaning are
-/// mended and noted in RoadMap::mends; throws Error naming source, line, owner and element for all others, and in
-/// strict reading for any fault. docs/reference/opendrive_conformance.md lists them.
+/// Parses the text of an OpenDRIVE file. `source` is its name in messages. Faults that have one sensible meaning are
+/// repaired and recorded in RoadMap::mends. Throws Error naming source, line, owner and element for all other faults,
+/// and in strict reading for any fault. docs/reference/opendrive_conformance.md lists them.
 RoadMap parse_opendrive(std::string_view text, const std::string& source, const OpenDriveOptions& options = {},
                         const ImportProgress& progress = {});
 

@@ -1,4 +1,4 @@
-// Reads the text of an OpenDRIVE file into a Network.
+// Reader from the text of an OpenDRIVE file to a Network.
 #pragma once
 
 #include "pictura/common/error_types.h"
@@ -7,9 +7,9 @@
 
 namespace pictura::opendrive {
 
-/// Parses and checks `text`, which must outlive `network_out`. Throws Error naming source, line, owner and element for
-/// anything malformed, missing, out of range or not supported that has no sensible meaning; the rest is mended. The
-/// header's offset is applied.
+/// Parses and checks `text`, which must outlive `network_out`, and applies the header's offset. Throws Error naming
+/// source, line, owner and element for malformed, missing, out-of-range or unsupported input without a sensible
+/// meaning; other faults are repaired.
 void read_network(std::string_view text, const std::string& source_name, Faults* faults, Network* network_out);
 
 }  // namespace pictura::opendrive

@@ -1,4 +1,4 @@
-// Jumps of a reference line, in plan and in height, spread over the road around them.
+// Smoothing of jumps of a reference line, in plan and in height, over the road around them.
 #pragma once
 
 #include <cstddef>
@@ -10,18 +10,19 @@
 
 namespace pictura::opendrive {
 
-/// A geometry that begins elsewhere than the one before it ends.
+/// A geometry whose start differs from the end of the previous geometry.
 struct Jump {
-  std::size_t piece = 0;          // the index of the geometry
-  Eigen::Vector2d shift_m{0, 0};  // from the end of the one before
+  std::size_t piece = 0;          // index of the geometry
+  Eigen::Vector2d shift_m{0, 0};  // from the end of the previous geometry
 };
 
-/// Whether a road is long enough for a jump: spread over it, the jump turns the line by at most 0.2 rad.
+/// Whether a road is long enough for a jump: spread over the road, the jump turns the line by at most 0.2 rad.
 bool can_spread_jump(double jump_m, double road_length_m);
 
-/// Moves the line around each jump, so that it has none: before it towards what follows, and after it towards what came
-/// before, as a smoothstep of s over ten metres, or ten times the jump if that is more, or the whole of a shorter road.
-/// Stations and both ends of the road stay. Jumps are in the order of their pieces.
+/// Moves the line around each jump so that the jump vanishes. Before a jump, the line moves towards the following
+/// geometry, and after it towards the preceding geometry. The shift is a smoothstep of s over ten metres, or over ten
+/// times the jump if that is more, but at most over the whole road. Stations and both ends of the road stay. Jumps are
+/// in the order of their pieces.
 void spread_jumps(const std::vector<Jump>& jumps, FileRoad* road);
 
 /// A step of a road's elevation at s.
@@ -29,7 +30,7 @@ struct HeightJump {
   double s = 0, rise_m = 0;
 };
 
-/// Changes the elevation around each jump as spread_jumps() does the line.
+/// Smooths the elevation around each jump as spread_jumps() smooths the line.
 void spread_height_jumps(const std::vector<HeightJump>& jumps, FileRoad* road);
 
 }  // namespace pictura::opendrive

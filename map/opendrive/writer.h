@@ -1,4 +1,4 @@
-// Writes a Network as the text of an OpenDRIVE file.
+// Writer from a Network to the text of an OpenDRIVE file.
 #pragma once
 
 #include <string>
@@ -9,17 +9,17 @@
 
 namespace pictura::opendrive {
 
-/// The network as OpenDRIVE text. Numbers have as many digits as needed to read back the same double, so that reading
-/// and writing the output again changes nothing. What a Network does not contain (names, weights and materials of
-/// marks, objects other than crosswalks, parking spaces and stop lines) is not written.
+/// Writes a network as OpenDRIVE text. Numbers have enough digits to read back the same double, so that reading the
+/// output and writing it again changes nothing. Data that a Network lacks (names, weights and materials of marks,
+/// objects other than crosswalks, parking spaces and stop lines) is not written.
 std::string write_opendrive(const Network& network);
 
 }  // namespace pictura::opendrive
 
 namespace pictura {
 
-/// Reads the text of an OpenDRIVE file and writes only what the importer uses. Throws Error naming `source`, line and
-/// element for whatever the importer rejects.
+/// Reads the text of an OpenDRIVE file and writes only the data that the importer uses. Throws Error naming `source`,
+/// line and element where the importer rejects the file.
 std::string export_opendrive(std::string_view text, const std::string& source);
 
 }  // namespace pictura

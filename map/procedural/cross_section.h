@@ -15,10 +15,10 @@ struct Side {
   int driving = 1;
   bool has_median = false, has_slip = false, has_parking = false, has_shoulder = true, has_sidewalk = true;
 
-  /// The position of the lane of this kind (of the `index`-th driving lane), counted from 1 at the reference line; 0:
+  /// Position of the lane of this kind (for driving lanes, the `index`-th), counted from 1 at the reference line; 0:
   /// none.
   int rank(LaneKind kind, int index = 0) const;
-  /// The index of the driving lane at a position.
+  /// Index of the driving lane at a position.
   int index_at(int rank) const { return rank - 1 - (has_median ? 1 : 0); }
   int count() const;
   LaneKind kind_at(int rank) const;
@@ -32,15 +32,15 @@ struct SectionStyle {
 
   bool in_junction = false;
   bool one_way = false;  // no left side
-  // Width of driving lanes at the start, half-way and at the end; slip lanes keep the first.
+  // Width of driving lanes at the start, half-way and at the end; slip lanes have the first width throughout.
   double driving_from_m, driving_middle_m, driving_to_m;
 };
 
 // Parking bays open and close over the taper, at a distance (lead) from the ends of their section.
 inline constexpr double kParkingLead_m = 4, kParkingTaper_m = 4;
 
-/// The lanes, with widths and marks but without links. Slip lanes open towards the section's end on the right side, and
-/// towards its start on the left side.
+/// Makes a section's lanes, with widths and marks but without links. Slip lanes open towards the section's end on the
+/// right side, and towards its start on the left side.
 opendrive::FileSection make_section(double s, double end, const Side& left, const Side& right,
                                     const SectionStyle& style);
 

@@ -6,13 +6,13 @@
 namespace pictura::town {
 
 inline constexpr double kMaxGrade = 0.075;
-// The fraction of a street over which its grade rises from 0, and falls back to 0.
+// Fraction of a street over which its grade rises from 0, and over which it falls back to 0.
 inline constexpr double kVerticalCurveFraction = 0.25;
 
-/// The maximum height difference of a street of this length.
+/// Maximum height difference of a street of this length.
 inline double max_climb_m(double length_m) { return kMaxGrade * (1 - kVerticalCurveFraction) * length_m; }
 
-/// A profile from one height to another: a parabola, a constant grade, a parabola; level at both ends.
+/// Profile from one height to another: a parabola, a constant grade, a parabola; level at both ends.
 inline opendrive::Profile elevation_profile(double from_m, double to_m, double length_m) {
   if (from_m == to_m) return {{{0, from_m, 0, 0, 0}}};
   const double curve = kVerticalCurveFraction * length_m;

@@ -1,4 +1,4 @@
-// The plan of a town: crossings on a jittered grid, streets between them, and where each feature goes. All random
+// Plan of a town: crossings on a jittered grid, the streets between them, and the place of each feature. All random
 // decisions are made here, before any road is built.
 #pragma once
 
@@ -14,7 +14,8 @@ namespace pictura::town {
 inline constexpr double kMinStreetRadius_m = 30;  // may be smaller next to a fifth arm
 inline constexpr double kShoulderWidth_m = 0.5, kSidewalkWidth_m = 2.5, kParkingWidth_m = 2.3, kHalfMedian_m = 1;
 
-/// Eight directions of arms, counter-clockwise from east; streets of the grid have even ones, diagonals odd ones.
+/// Eight directions of arms, counter-clockwise from east. Streets of the grid have even directions, diagonals odd
+/// directions.
 inline constexpr int kNumDirections = 8;
 inline constexpr int kStepX[kNumDirections] = {1, 1, 0, -1, -1, -1, 0, 1};
 inline constexpr int kStepY[kNumDirections] = {0, 1, 1, 1, 0, -1, -1, -1};
@@ -25,24 +26,26 @@ struct Arm {
   int street = -1;
   int direction = 0;
   bool at_start = false;                            // the street starts here
-  bool has_arrivals = true, has_departures = true;  // whether traffic comes to the node, and leaves it, on this arm
+  bool has_arrivals = true, has_departures = true;  // whether traffic arrives at the node, and leaves it, on this arm
   double heading = 0;                               // of the reference line, away from the node
   double mouth_m = 0;                               // distance from the node to the street's end
 };
 
-/// At a fork a ramp leaves a motorway's outermost lane, and another becomes the outermost one of the other direction.
+/// Kind of a node. At a fork, a ramp leaves a motorway's outermost lane, and another ramp becomes the outermost lane of
+/// the other direction.
 enum class NodeKind { crossing, roundabout, overpass, fork };
 
-/// Connectors lead from the town to its motorway. Ramps are one-way, from their first node to their second.
+/// Kind of a street. Connectors lead from the town to its motorway. Ramps are one-way, from their first node to their
+/// second.
 enum class StreetKind { street, avenue, connector, ramp, motorway };
 
 struct Node {
   Eigen::Vector2d position_m{0, 0};
-  double z = 0;        // height of the junction; of the lower street of an overpass
-  double upper_z = 0;  // of the upper street of an overpass
+  double z = 0;        // height of the junction, or of an overpass's lower street
+  double upper_z = 0;  // height of an overpass's upper street
   NodeKind kind = NodeKind::crossing;
   bool on_border = false;         // of the grid
-  bool upper_runs_north = false;  // of an overpass: which street is the upper one
+  bool upper_runs_north = false;  // direction of an overpass's upper street
   bool has_lights = false, far_side_heads = false, has_crosswalks = false;
   std::vector<Arm> arms;  // counter-clockwise
 
@@ -55,15 +58,15 @@ struct Node {
 /// A street between two nodes; `leave` and `arrive` are its headings at the two ends.
 struct Street {
   int from = 0, to = 0;
-  int direction = 0, end_direction = 0;  // of the arms at `from` and at `to`
+  int direction = 0, end_direction = 0;  // directions of the arms at `from` and at `to`
   StreetKind kind = StreetKind::street;
   int lanes = 1;  // each way
   double lane_width_m = 0;
   bool is_present = true, has_sidewalks = true;
   bool parks_left = false, parks_right = false;
-  bool slip_at_start = false, slip_at_end = false;  // a right-turn lane of traffic that arrives at that end
+  bool slip_at_start = false, slip_at_end = false;  // right-turn lane for traffic that arrives at that end
   double leave = 0, arrive = 0;
-  double start_offset_m = 0, end_offset_m = 0;  // of its ends, to the right of the lines through their nodes
+  double start_offset_m = 0, end_offset_m = 0;  // offsets of its ends, to the right of the lines through their nodes
   Curve curve;
   double length_m = 0;
 };
@@ -73,19 +76,19 @@ inline double lane_offset_m(const Street& street, int lane) {
   return (street.kind == StreetKind::motorway ? kHalfMedian_m : 0) + lane * street.lane_width_m;
 }
 
-/// The nodes of a motorway at an interchange, in the direction of its inner carriageway.
+/// Nodes of a motorway at an interchange, in the direction of its inner carriageway.
 struct Interchange {
   int entry_fork = -1, overpass = -1, exit_fork = -1;
 };
 
-/// The pose of a street's end at that distance from the node, heading away from it.
+/// Pose of a street's end at this distance from the node, heading away from the node.
 inline Pose mouth_pose(const Node& node, const Arm& arm, const Street& street, double mouth_m) {
   const Pose on_ray = moved_forward({node.position_m, arm.heading}, mouth_m);
   return offset_right(on_ray, arm.at_start ? street.start_offset_m : -street.end_offset_m);
 }
 
 /// Radius of the left border of a right turn into an arm that is `gap_rad` away: wide, but close enough to the corner
-/// that no hole is left next to lanes that go straight on or cross.
+/// that no hole is left beside lanes that go straight or cross.
 double right_turn_radius_m(double gap_rad, double lane_width_m);
 
 class Layout {
@@ -101,11 +104,11 @@ class Layout {
   double end_height_m(int street, bool at_start) const;
   /// Whether traffic arriving on this arm has a separate right-turn lane.
   bool has_slip(const Arm& arm) const;
-  /// The largest number of lanes each way of its arms: that of a roundabout's circle.
+  /// Maximum number of lanes in one direction over the arms of a node: the number of lanes of a roundabout's circle.
   int max_lanes_of(const Node& node) const;
 
  private:
-  /// Purposes of random draws; each has its own stream.
+  /// Purposes of random draws; each purpose has its own stream.
   enum DrawPurpose : uint32_t {
     kSpacing,
     kJitter,
@@ -152,13 +155,13 @@ class Layout {
   // layout_heights.cpp
   void set_heights();
 
-  /// The random stream of one decision (`purpose`) about one element (`index`).
+  /// Random stream of one decision (`purpose`) about one element (`index`).
   RandomStream draw(uint32_t purpose, int index) const {
     return RandomStream(
         {.seed = options_.seed, .world = static_cast<uint32_t>(index), .episode = purpose, .purpose = Purpose::town});
   }
-  /// A random selection of the given fraction of the candidates: at least one unless the fraction is 0 or there are
-  /// none.
+  /// Random selection of the given fraction of the candidates: at least one unless the fraction is 0 or there are no
+  /// candidates.
   std::vector<int> pick(double fraction, std::vector<int> candidates, uint32_t purpose) const;
   /// All candidates in random order.
   std::vector<int> shuffled(std::vector<int> candidates, uint32_t purpose) const;

@@ -7,19 +7,19 @@
 
 namespace pictura::town {
 
-/// Lanes [first_in, first_in + lanes) arriving on one arm continue as lanes [first_out, ...) of another; or the slip
-/// lane continues as the outermost one.
+/// A movement: lanes [first_in, first_in + lanes) of one arm continue as lanes [first_out, ...) of another arm, or the
+/// slip lane continues as the outermost lane.
 struct Movement {
   int from = 0, to = 0;  // arms of the node
   int first_in = 0, first_out = 0, lanes = 1;
   bool is_slip = false;
 };
 
-/// The arm into which traffic from `arm` goes straight on; -1: none.
+/// Returns the arm into which traffic from `arm` goes straight on; -1: none.
 int straight_on(const Node& node, int arm);
 
-/// All movements of a crossing or a fork, grouped by arriving arm, the first of each group starting at the innermost
-/// lane. Every arriving lane leads somewhere.
+/// Returns all movements of a crossing or a fork, grouped by arriving arm. The first movement of each group starts at
+/// the innermost lane. Every arriving lane has a movement.
 std::vector<Movement> movements_of(const Layout& layout, const Node& node);
 
 }  // namespace pictura::town

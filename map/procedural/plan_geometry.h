@@ -29,12 +29,12 @@ inline Pose offset_right(const Pose& p, double distance_m) {
 }
 inline Pose reversed(const Pose& p) { return {p.position_m, p.heading + kPi_rad}; }
 
-/// Of the vectors' plane: the z of their cross product.
+/// z component of the cross product of two vectors in the plane.
 inline double cross_of(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-/// In [-pi, pi].
+/// Wraps an angle to [-pi, pi].
 inline double wrap_to_pi(double angle_rad) { return std::remainder(angle_rad, 2 * kPi_rad); }
-/// In [0, 2 pi).
+/// Wraps an angle to [0, 2 pi).
 inline double wrap_to_2pi(double angle_rad) {
   const double angle = wrap_to_pi(angle_rad);
   return angle < 0 ? angle + 2 * kPi_rad : angle;
@@ -62,7 +62,7 @@ inline double max_curvature(const Curve& curve) {
   return sharpest;
 }
 
-/// The arc (or line) that leaves `from` along its heading and ends at `to_m`.
+/// Arc (or line) that leaves `from` along its heading and ends at `to_m`.
 inline opendrive::GeometryPiece arc_to(const Pose& from, const Eigen::Vector2d& to_m) {
   const Eigen::Vector2d apart = to_m - from.position_m;
   const double chord = std::hypot(apart.x(), apart.y());
@@ -72,7 +72,7 @@ inline opendrive::GeometryPiece arc_to(const Pose& from, const Eigen::Vector2d& 
   return piece_of(from, chord * half_turn / std::sin(half_turn), 2 * std::sin(half_turn) / chord);
 }
 
-/// A biarc: two arcs with a common tangent and equal control arms; one piece where that is enough.
+/// Biarc: two arcs with a common tangent and equal control arms; a single piece where one suffices.
 inline Curve biarc(const Pose& from, const Pose& to) {
   const Eigen::Vector2d leaving = direction_of(from.heading), arriving = direction_of(to.heading);
   const Eigen::Vector2d chord = to.position_m - from.position_m;
@@ -88,9 +88,9 @@ inline Curve biarc(const Pose& from, const Pose& to) {
   return {first, second};
 }
 
-inline constexpr double kNoRadiusLimit_m = 1e9;  // of a fillet
+inline constexpr double kNoRadiusLimit_m = 1e9;  // maximum radius of a fillet without limit
 
-/// A fillet: line, arc and line, tangent to each other, with the largest radius that fits but at most `max_radius_m`; a
+/// Fillet: line, arc and line, tangent to each other, with the largest radius that fits but at most `max_radius_m`. A
 /// biarc if the tangents do not intersect between the poses.
 inline Curve fillet(const Pose& from, const Pose& to, double max_radius_m) {
   constexpr double kMinTurn_rad = 0.1, kMinLine_m = 1e-7;

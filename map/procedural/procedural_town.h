@@ -1,5 +1,5 @@
-// Generates a town from a seed as OpenDRIVE text: streets and avenues on a jittered grid, crossings of three to five
-// arms, roundabouts, overpasses, slip lanes, hills, lights. It is imported like any other file.
+// Generator of a town from a seed, as OpenDRIVE text: streets and avenues on a jittered grid, crossings of three to
+// five arms, roundabouts, overpasses, slip lanes, hills, lights. The text is imported like any other file.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace pictura {
 
-/// The .xodr text; equal options give equal bytes. Throws UsageError when an option is out of range.
+/// Returns the .xodr text; equal options give equal bytes. Throws UsageError when an option is out of range.
 std::string procedural_town(const TownOptions& options);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Dimensions of roundabouts, and where their arms meet the circle.
+// Dimensions of roundabouts, and the junctions of their arms with the circle.
 #pragma once
 
 #include <algorithm>
@@ -7,24 +7,25 @@
 
 namespace pictura::town {
 
-// The reference line of the circle is its inner edge; traffic circulates counter-clockwise, on the right of the line.
+// The reference line of the circle is its inner edge; traffic circulates counter-clockwise, to the right of the line.
 inline constexpr double kCircleLaneWidth_m = 4.5;
 constexpr double circle_radius_m(int lanes) { return lanes == 1 ? 12 : 18; }
 
-/// Radius of the circle's border on which entries end and exits begin: of that many lanes, they use the outermost.
+/// Radius of the circle's border on which entries end and exits begin. Arms with fewer lanes than the circle use its
+/// outermost lanes.
 constexpr double circle_edge_m(int lanes, int arm_lanes) {
   return circle_radius_m(lanes) + (lanes - arm_lanes) * kCircleLaneWidth_m;
 }
 
-/// The angle between an arm and the end of its entry (or the start of its exit) on the circle, if the next arm on that
-/// side is `gap_rad` away. A piece of the circle remains between the two.
+/// Angle between an arm and the end of its entry (or the start of its exit) on the circle, if the next arm on that side
+/// is `gap_rad` away. A piece of the circle remains between the two arms.
 inline double roundabout_half_angle(double gap_rad) {
   constexpr double kPiece_rad = 16 * std::numbers::pi / 180, kMax_rad = 36 * std::numbers::pi / 180;
   return std::min(0.5 * (gap_rad - kPiece_rad), kMax_rad);
 }
 
-/// The distance from the centre at which an arm must end so that its entry is one arc, tangent to the arm's centre line
-/// and to the circle at that angle. `edge_m` is the radius where it does; see circle_edge_m().
+/// Distance from the centre at which an arm must end so that its entry is one arc, tangent to the arm's centre line
+/// and, at this angle, to the circle. `edge_m` is the radius of that point; see circle_edge_m().
 inline double roundabout_mouth_m(double half_angle_rad, double edge_m) {
   return edge_m / std::cos(half_angle_rad) + edge_m * std::tan(half_angle_rad);
 }

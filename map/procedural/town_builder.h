@@ -1,4 +1,4 @@
-// Builds a planned town: fills a Network with roads, lanes, links, junctions, lights and objects.
+// Construction of a planned town: a Network with roads, lanes, links, junctions, lights and objects.
 #pragma once
 
 #include <string>
@@ -44,15 +44,15 @@ class TownBuilder {
                   opendrive::FileJunction* junction);
 
   const Street& street_of(const Arm& arm) const { return layout_.streets()[arm.street]; }
-  /// The first roads are the streets, in their order.
+  /// Returns the road end of an arm. The network's first roads are the streets, in their order.
   static RoadEnd end_of(const Arm& arm) { return {arm.street, arm.at_start}; }
   Pose mouth_of(const Node& node, const Arm& arm) const { return mouth_pose(node, arm, street_of(arm), arm.mouth_m); }
 
-  /// Adds a road with one section; the left side is ignored for one-way roads. Returns its index.
+  /// Adds a road with one section and returns its index; the left side is ignored for one-way roads.
   int add_road(Curve curve, double height_m, const std::string& junction, double speed_mps, const Side& left,
                const Side& right, const SectionStyle& style);
   EndSides& sides_at(RoadEnd end) { return end_sides_[2 * end.road + (end.at_start ? 0 : 1)]; }
-  /// The side of traffic that arrives at the end, or leaves from it; and the id of a lane on it, 0: none.
+  /// Sides and lane ids at an end, for traffic that arrives there or leaves; id 0: no such lane.
   const Side& side(RoadEnd end, bool arriving) {
     return arriving == end.at_start ? sides_at(end).left : sides_at(end).right;
   }
@@ -79,7 +79,7 @@ class TownBuilder {
 
 inline constexpr double mph(double speed) { return speed * 0.44704; }
 inline constexpr double kJunctionSpeed_mps = mph(20), kRoundaboutSpeed_mps = mph(15), kMotorwayBendSpeed_mps = mph(45);
-/// The speed limit of a street.
+/// Speed limit of a street.
 constexpr double speed_mps(StreetKind kind) {
   switch (kind) {
     case StreetKind::street: return mph(25);

@@ -1,5 +1,5 @@
-// The stages of make_scenario(), in the order in which they run. Each fills its own parts of the scenario and may read
-// those of earlier stages. The rules are those of docs/reference/scenario.md.
+// Stages of make_scenario(), in order of execution. Each stage fills its own parts of the scenario and may read parts
+// of earlier stages. docs/reference/scenario.md lists the rules.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@
 
 namespace pictura::conversion {
 
-/// Points nearer than this to the one before are duplicates.
+/// Minimum distance between successive points; closer points are duplicates.
 constexpr double kSamePoint_m = 0.01;
 
 struct Conversion {
@@ -25,15 +25,15 @@ struct Conversion {
   Eigen::Vector3d origin{0, 0, 0};
   std::vector<std::size_t> logged_lane{};             // [map.lanes] index into scene.lanes
   std::unordered_map<int64_t, int32_t> lane_of_id{};  // index into map.lanes
-  int64_t remaining_work = 400'000'000;               // of all loops whose length a file decides
+  int64_t remaining_work = 400'000'000;               // of all loops whose length depends on a file
 
-  /// Counts work, so that no file can take minutes. Throws Error.
+  /// Counts work, so that no file can take minutes. Throws Error at the limit.
   void count_work(std::size_t amount) {
     remaining_work -= static_cast<int64_t>(amount);
     if (remaining_work < 0) fail("{}: its map needs more work than a scene may take", scene.source);
   }
   Eigen::Vector3d from_origin(const Eigen::Vector3d& p) const { return p - origin; }
-  /// Rounds a point as a map stores it if a program stated the scene, so that state_scene() returns it.
+  /// Rounds a point as a map stores it where a program stated the scene, so that state_scene() returns the same point.
   Eigen::Vector3d rounded(const Eigen::Vector3d& p) const {
     if (!scene.is_stated) return p;
     const Eigen::Vector3d stated_again = origin + p.cast<float>().cast<double>();
@@ -41,16 +41,17 @@ struct Conversion {
   }
 };
 
-/// Points about the origin without duplicates, none farther than a piece may be long from the next.
+/// Returns the points relative to the origin, without duplicates, and with points inserted so that no piece is too
+/// long.
 std::vector<CurvePoint> cut_into_pieces(Conversion* conversion, const std::vector<CurvePoint>& points,
                                         const std::string& what);
 
-/// The points about the origin, cut into pieces and thinned.
-/// Throws Error naming `what` where a point is too far from the origin. Empty if there are fewer than two points.
+/// Returns the points relative to the origin, cut into pieces and thinned; empty if there are fewer than two points.
+/// Throws Error naming `what` where a point is too far from the origin.
 std::vector<CurvePoint> resampled(Conversion* conversion, const LoggedPoints& points, const std::vector<double>& widths,
                                   const std::string& what);
 
-/// Lanes in a grid, for what crosses them and for what is near.
+/// A segment of a lane. LaneSegments holds segments in a grid, for queries of crossings and of near lanes.
 struct LaneSegment {
   Vec3 a_m, b_m;
   int32_t lane = 0;
@@ -61,7 +62,7 @@ struct LaneSegments {
 };
 LaneSegments segments_of(const RoadMap& map, bool (*is_wanted)(const Lane&));
 
-/// Where two segments cross in plan at about one height, ends included; nothing for parallel ones.
+/// Returns the crossing in plan of two segments at about one height, ends included; nothing for parallel segments.
 std::optional<Vec2> crossing(Vec3 a, Vec3 b, Vec3 c, Vec3 d);
 
 /// Sets the origin: the centre of the lanes' and edges' bounding box, in whole metres.

@@ -1,5 +1,5 @@
-// The drivable area of a map that says only where its edges are: a place is on the road if it is on the drivable side
-// of the edge that is nearest. For logged maps, whose lanes do not say how far the road goes.
+// Drivable area of a map that has edges alone: a place is on the road if it is on the drivable side of the nearest
+// edge. For logged maps, whose lanes do not give the extent of the road.
 #pragma once
 
 #include <cstdint>
@@ -19,14 +19,14 @@ struct GroundBox {
   float length_m = 0, width_m = 0;
 };
 
-/// The edges of a map, for road_side(), and the cells that they touch.
+/// Edges of a map for road_side(), and the cells that they touch.
 struct SideEdges {
   std::vector<SideEdge> edges;  // as RoadMap::road_edges
   Grid cells;
 };
 SideEdges side_edges_of(const RoadMap& map);
 
-/// Copies what it needs of the map.
+/// Drivable area with a copy of the map data that it needs.
 class DrivableArea {
  public:
   explicit DrivableArea(const RoadMap& map) : sides_(side_edges_of(map)) {}
@@ -40,11 +40,11 @@ class DrivableArea {
   SideEdges sides_;
 };
 
-/// How well logged traffic and the map's edges agree: over the steps of vehicles that move.
+/// Agreement of logged traffic with the map's edges, over the steps of moving vehicles.
 struct LoggedDriving {
-  int64_t vehicle_steps = 0;  // valid steps at 0.5 m/s or more of vehicles whose tracks are moving (is_moving())
-  int64_t touching = 0;       // of these, the box touches an edge
-  int64_t off_road = 0;       // of these, the box's centre is not on the road
+  int64_t vehicle_steps = 0;  // valid steps at 0.5 m/s or more of vehicles with moving tracks (is_moving())
+  int64_t touching = 0;       // vehicle steps in which the box touches an edge
+  int64_t off_road = 0;       // vehicle steps in which the box's centre is not on the road
 };
 LoggedDriving logged_driving(const Scenario& scenario);
 

@@ -1,5 +1,5 @@
-// Faults inside a record of a scene file: readers throw the innermost field's name and add the names around it on the
-// way out, so that a message names the whole path and a sound file pays nothing for it.
+// Faults inside a record of a scene file. Readers throw the innermost field's name and add the enclosing names while
+// the exception propagates, so that a message has the full path and valid files have no overhead.
 #pragma once
 
 #include <cmath>
@@ -13,13 +13,13 @@
 
 namespace pictura {
 
-/// What is wrong with a field; to_error() makes an Error of it.
+/// Fault of a field; to_error() converts it to an Error.
 struct FieldError {
   std::string path;    // "tracks[4].states[17].center_x", or empty: the record itself
   std::string reason;  // "expected a finite number, got nan"
 };
 
-/// "SOURCE: PATH: REASON".
+/// Returns the Error "SOURCE: PATH: REASON".
 inline Error to_error(const std::string& source, const FieldError& error) {
   return Error(error.path.empty() ? fmt::format("{}: {}", source, error.reason)
                                   : fmt::format("{}: {}: {}", source, error.path, error.reason));
@@ -30,7 +30,7 @@ template <typename... Args>
   throw FieldError{std::string(field), fmt::format(format, std::forward<Args>(args)...)};
 }
 
-/// Runs work(); a FieldError in it gets "NAME." before its path.
+/// Runs work(), and prefixes the path of a FieldError in it with "NAME.".
 template <typename Work>
 auto within(std::string_view name, Work&& work) {
   try {
@@ -42,7 +42,7 @@ auto within(std::string_view name, Work&& work) {
   }
 }
 
-/// The same for "NAME[INDEX]".
+/// Runs work(), and prefixes the path of a FieldError in it with "NAME[INDEX].".
 template <typename Work>
 auto within(std::string_view name, std::size_t index, Work&& work) {
   try {
@@ -54,7 +54,7 @@ auto within(std::string_view name, std::size_t index, Work&& work) {
   }
 }
 
-/// The number, which must be finite and at most `largest` in magnitude. Throws FieldError.
+/// Returns the number, which must be finite and at most `largest` in magnitude. Throws FieldError.
 inline double checked_number(std::string_view field, double value, double largest = 1e9) {
   if (!std::isfinite(value)) fail_field(field, "expected a finite number, got {}", value);
   if (std::abs(value) > largest) {

@@ -1,4 +1,4 @@
-// Loads scenes by the name that a user gives after SCENE: the one function that knows all formats of scene files.
+// Loading of scenes by the name that a user gives as SCENE: load_scenario() alone knows all formats of scene files.
 #pragma once
 
 #include <cstdint>
@@ -12,47 +12,48 @@
 
 namespace pictura {
 
-/// Where one scene is.
+/// Location of one scene.
 struct SceneRef {
   std::string file;
   int32_t record = -1;             // in a TFRecord file; -1: the file is the scene
   uint64_t offset = 0, bytes = 0;  // of the record's payload
-  std::string id;                  // scenario_id where the index knows it, or empty
+  std::string id;                  // scenario_id if the index has it, or empty
 };
 
 struct SceneIndex {
-  std::vector<SceneRef> scenes;     // files in order of their names, records in the file's
-  std::vector<std::string> faults;  // files, and ends of files, that are left out, and why
+  std::vector<SceneRef> scenes;     // files in order of their names, records in file order
+  std::vector<std::string> faults;  // omitted files and omitted ends of files, with the reasons
 };
 
-/// How a scene was loaded.
+/// Details of how a scene was loaded.
 struct SceneReport {
   bool cached = false;
-  std::string cache_rejection;  // why an existing cached file was not used, or empty
+  std::string cache_rejection;  // reason why an existing cached file was not used, or empty
 };
 
-/// Whether a name is a scene's rather than a map's: FILE.json, FILE.bin, FILE.scenario, a file with `.tfrecord` in its
-/// name, or a folder; each with or without #K or #SCENARIO_ID.
+/// Whether a name is that of a scene rather than of a map: FILE.json, FILE.bin, FILE.scenario, a file with `.tfrecord`
+/// in its name, or a folder; each with or without #K or #SCENARIO_ID.
 bool is_scene_name(std::string_view name);
 
-/// The scenes of a file or a folder. Records are found from their lengths and ids; the ids of a TFRecord file are kept
-/// in the cache (cache_folder("scenes")) for as long as the records' lengths and checksums stay. Throws Error when
-/// there is no such file or folder, and when a folder holds no scene.
+/// Lists the scenes of a file or a folder. Records are found from their lengths and ids. The ids of a TFRecord file are
+/// cached (cache_folder("scenes")) while the records' lengths and checksums stay the same. Throws Error when there is
+/// no such file or folder, and when a folder holds no scene.
 SceneIndex index_scenes(const std::string& path);
 
-/// All scenes that a name says: with a selector the one of find_scene(), else those of the file or folder.
+/// Returns all scenes of a name: with a selector, the scene of find_scene(); else all scenes of the file or folder.
 SceneIndex find_scenes(const std::string& name);
 
-/// The scene that a name says: FILE, FILE#K (from 0), FILE#SCENARIO_ID, FOLDER#K, FOLDER#SCENARIO_ID; without a
-/// selector the first one. Throws UsageError for a name or selector that is none, Error naming file, record and field.
+/// Returns the scene of a name: FILE, FILE#K (from 0), FILE#SCENARIO_ID, FOLDER#K or FOLDER#SCENARIO_ID; without a
+/// selector, the first scene. Throws UsageError for an invalid name or selector, and Error naming file, record and
+/// field.
 SceneRef find_scene(const std::string& name);
 
-/// The scene, from the cache where that has it. Throws Error naming file, record and field.
+/// Loads a scene, from the cache if it is there. Throws Error naming file, record and field.
 Scenario load_scenario(const SceneRef& scene, SceneReport* report_out = nullptr);
 Scenario load_scenario(const std::string& name, SceneReport* report_out = nullptr);
 
-/// A scene from its file's bytes, by the file's name: `name` says the format and is named in messages. In a TFRecord
-/// file, the record of that number. Nothing is cached.
+/// Parses a scene from its file's bytes, without caching. `name`, the file's name, determines the format and appears in
+/// messages. `record` selects the record of a TFRecord file.
 Scenario parse_scenario_file(std::string_view bytes, const std::string& name, int32_t record = 0);
 
 }  // namespace pictura

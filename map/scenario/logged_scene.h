@@ -1,5 +1,5 @@
-// A scene as its file has it, in the file's coordinates and double precision: what every reader fills and
-// make_scenario() converts, so that each rule of conversion exists once.
+// A scene as its file has it, in the file's coordinates and in double precision. All readers fill this structure and
+// make_scenario() converts it, so that each rule of conversion exists once.
 #pragma once
 
 #include <cstdint>
@@ -20,13 +20,13 @@ using LoggedPoints = std::vector<Eigen::Vector3d>;
 
 enum class LoggedLaneType : uint8_t { undefined, freeway, surface, bike, bus };
 
-/// The points [begin, end] of this lane's centre line along which `feature` is its border.
+/// Points [begin, end] of a lane's centre line along which `feature` is the lane's border.
 struct LoggedBoundary {
   int32_t begin = 0, end = 0;
   int64_t feature = 0;  // id of a line or an edge
 };
 
-/// The points [begin, end] of this lane's centre line along which `lane` runs beside it.
+/// Points [begin, end] of a lane's centre line along which `lane` runs beside it.
 struct LoggedNeighbor {
   int32_t begin = 0, end = 0;
   int64_t lane = 0;
@@ -35,9 +35,9 @@ struct LoggedNeighbor {
 struct LoggedLane {
   int64_t id = 0;
   LoggedLaneType type = LoggedLaneType::undefined;
-  std::optional<LaneType> map_type;  // instead of `type`, where a program states it
+  std::optional<LaneType> map_type;  // overrides `type` where a program states the scene
   double speed_limit_mps = 0;        // 0: unknown
-  bool interpolating = false;        // connects two lanes, in a junction
+  bool interpolating = false;        // connects two lanes in a junction
   LoggedPoints points;
   std::vector<double> widths_m;  // [points], or empty: unknown
   std::vector<int64_t> entries, exits;
@@ -82,7 +82,7 @@ struct LoggedPolygon {
 };
 
 struct LoggedState {
-  Eigen::Vector3d center_m{0, 0, 0};  // of the box; of its foot where LoggedScene::is_stated
+  Eigen::Vector3d center_m{0, 0, 0};  // centre of the box; of its bottom face where LoggedScene::is_stated
   double heading_rad = 0;
   double velocity_x_mps = 0, velocity_y_mps = 0;
   double length_m = 0, width_m = 0, height_m = 0;
@@ -96,7 +96,7 @@ struct LoggedTrack {
   std::vector<LoggedState> states;  // [num_steps]
 };
 
-/// A light for some lanes. Without a stop line of its own, one is laid across the lanes' starts.
+/// A light for some lanes. Without a stop line of its own, it gets one across the lanes' starts.
 struct LoggedLight {
   std::vector<int64_t> lanes;
   bool has_stop_line = false;
@@ -104,7 +104,7 @@ struct LoggedLight {
   std::vector<RecordedLightState> states;  // [num_steps]
 };
 
-/// How a reader names its parts in messages.
+/// Names of a reader's fields in messages.
 struct LoggedNames {
   const char* tracks = "tracks";
   const char* features = "map_features";
@@ -122,20 +122,20 @@ struct LoggedScene {
   std::vector<std::pair<int32_t, int32_t>> predictions;  // index of a track, difficulty
   std::vector<LoggedLane> lanes;
   std::vector<LoggedLine> lines;
-  std::vector<LoggedEdge> edges;  // the road on their left
+  std::vector<LoggedEdge> edges;  // with the road on their left
   std::vector<LoggedPolygon> crosswalks;
   std::vector<LoggedStopSign> stop_signs;
   std::vector<LoggedLight> lights;
-  bool has_links = true;  // else lanes are linked where their ends meet
-  /// A program states the scene instead of a recording's file, so nothing is guessed: types of lanes, directions of
-  /// links, sides and gaps of edges, and which lights are one are as stated. Points are rounded first, so that what a
-  /// scenario holds can be stated again (state_scene()) and gives the same scenario.
+  bool has_links = true;  // if false, lanes are linked where their ends meet
+  /// Whether a program states the scene, rather than a recording's file. Then nothing is inferred: types of lanes,
+  /// directions of links, sides and gaps of edges, and the grouping of lights are as stated. Points are rounded first,
+  /// so that state_scene() of a scenario gives the same scenario again.
   bool is_stated = false;
-  double tolerance_m = 0.02;                // how far thinned polylines may deviate; 0: all points are kept
-  std::optional<Eigen::Vector3d> origin_m;  // of the map; else the centre of lanes and edges
+  double tolerance_m = 0.02;                // maximum deviation of thinned polylines; 0: all points are kept
+  std::optional<Eigen::Vector3d> origin_m;  // origin of the map; by default the centre of lanes and edges
   std::vector<ConversionNote> notes;
 
-  /// Counts an occurrence of `what`; the first one's place is kept.
+  /// Counts an occurrence of `what`, and keeps the place of the first.
   void note(const std::string& what, const std::string& place) {
     for (ConversionNote& known : notes) {
       if (known.what == what) {
@@ -147,15 +147,15 @@ struct LoggedScene {
   }
 };
 
-/// The scenario of a scene. Throws Error "SOURCE: FIELD: expected ..., got ..." when a valid state or a point of the
-/// map is not finite or lies beyond 10 km of the scene's centre, when there is no lane of two points or no track, and
-/// when the map would need more points than scenes may have.
+/// Converts a scene to a scenario. Throws Error "SOURCE: FIELD: expected ..., got ..." when a valid state or a point of
+/// the map is not finite or lies beyond 10 km of the scene's centre. Also throws Error when there is no lane of two
+/// points or no track, and when the map would need more points than the limit for scenes.
 Scenario make_scenario(LoggedScene scene);
 
-/// What make_scenario() makes the same scenario of, but for what a LoggedScene has no place for: walls, parking spaces,
-/// painted stop lines, signs that are no stop signs, widths and colours of marks other than white and yellow, the
-/// lights of the map itself, and SavedMotion. A double line comes back as two stripes, a broken one as its dashes.
-/// Lanes have the ids of the file where each has one of its own, else their numbers.
+/// Inverse of make_scenario(), except for data that a LoggedScene cannot hold: walls, parking spaces, painted stop
+/// lines, signs other than stop signs, widths and colours of marks other than white and yellow, the lights of the map
+/// itself, and SavedMotion. A double line becomes two stripes, a broken line its dashes. Lanes have the ids of the file
+/// if these are unique, else their indices.
 LoggedScene state_scene(const Scenario& scenario);
 
 }  // namespace pictura

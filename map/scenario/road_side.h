@@ -1,5 +1,5 @@
-// On which side of the road's edges a place is: the rule by which a map that says only where its edges are has a
-// drivable area, the same code on both devices.
+// Side of the road's edges on which a place lies: the rule for the drivable area of maps that have edges alone. Shared
+// by both devices.
 #pragma once
 
 #include "pictura/common/cells_around.h"
@@ -11,17 +11,17 @@ namespace pictura {
 struct SideEdge {
   Vec3 a_m, b_m;
   Vec2 left;                       // unit normal, away from the road
-  int32_t before = -1, next = -1;  // the edges that meet it at its ends
+  int32_t before = -1, next = -1;  // edges that meet this edge at its ends
 };
 
 struct RoadSide {
-  int32_t edge = -1;       // the nearest one; -1: none within kRoadSideReach_m
-  float distance_m = 0;    // to it, heights threefold
-  bool is_on_road = true;  // also where there is no edge
+  int32_t edge = -1;       // nearest edge; -1: none within kRoadSideReach_m
+  float distance_m = 0;    // distance to the edge, with heights weighted threefold
+  bool is_on_road = true;  // true without an edge
 };
 constexpr float kRoadSideReach_m = 50.0f;
 
-/// One thread that shares its loops with nobody; the simulator's rules have groups of several.
+/// A group of a single thread, which does not share its loops; the simulator's rules have groups of several threads.
 struct NoGroup {
   PICTURA_HD static int rank() { return 0; }
   PICTURA_HD static int size() { return 1; }
@@ -31,10 +31,10 @@ struct NoGroup {
   }
 };
 
-/// The side of the nearest edge, of equally near ones the first. Heights count threefold, so that the edges of a bridge
-/// are not nearest to what passes under it. At a corner the side is that of the sum of both unit normals, which is
-/// right for any angle between them (Baerentzen and Aanaes, Signed distance computation using the angle weighted
-/// pseudonormal, 2005). `cells` lists the edges that touch each.
+/// Returns the side of the nearest edge; among equally near edges, the first. Heights are weighted threefold, so that
+/// the edges of a bridge are not nearest to traffic below it. At a corner, the side is that of the sum of both unit
+/// normals, which is right for any angle between the edges (Baerentzen and Aanaes, Signed distance computation using
+/// the angle weighted pseudonormal, 2005). `cells` lists the edges that touch each cell.
 template <typename ThreadGroup = NoGroup>
 PICTURA_HD RoadSide road_side(Span<const SideEdge> edges, const GridView& cells, Vec3 position_m,
                               const ThreadGroup& group = {}) {
@@ -58,7 +58,7 @@ PICTURA_HD RoadSide road_side(Span<const SideEdge> edges, const GridView& cells,
     if (neighbor >= 0) normal = normal + edges[neighbor].left;
     best = {index, distance_m, dot(away, normal) <= 0.0f};
   };
-  // Most edges are near: wider rings are looked at only where nearer ones hold none.
+  // Most edges are near: wider rings are searched only where nearer rings contain no edge.
   const float reaches_m[] = {5.0f, 15.0f, kRoadSideReach_m};
   for (const float reach_m : reaches_m) {
     const CellRows range = cells_around(cells, p, reach_m);

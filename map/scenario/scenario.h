@@ -1,6 +1,6 @@
-// Scenario: a recorded piece of traffic, whatever the file format: a map, the tracks of all road users, and the lights
-// as they were recorded. Positions are in the coordinates of its map; docs/reference/scenario.md says how each part is
-// derived.
+// Scenario: a recorded piece of traffic, for any file format: a map, the tracks of all road users, and the recorded
+// lights. Positions are in the coordinates of its map. docs/reference/scenario.md describes the derivation of each
+// part.
 #pragma once
 
 #include <cstdint>
@@ -17,25 +17,25 @@ namespace pictura {
 enum class TrackType : uint8_t { unset, vehicle, pedestrian, cyclist, other };
 const char* to_string(TrackType type);
 
-/// A road user at one step. All zero where the recording has no valid state.
+/// State of a road user at one step. All zero where the recording has no valid state.
 struct TrackState {
-  Vec3 position_m;  // centre of the box's foot
+  Vec3 position_m;  // centre of the box's bottom face
   float heading_rad = 0;
   Vec2 velocity_mps;
 };
 
-/// Of a run that was saved: what the simulator had besides, so that a replay has the same bits.
+/// Additional simulator state of a saved run, so that a replay has the same bits.
 struct SavedMotion {
-  Vec3 reference_m;     // the reference point of its class
+  Vec3 reference_m;     // reference point of its class
   float speed_mps = 0;  // signed, along the heading
 };
 
-/// What a file says of who should drive a track.
+/// A file's statement of which controller should drive a track.
 enum class RecordedControl : uint8_t {
   unstated,
-  controllable,  // a policy may drive it
-  expert,        // it should be replayed
-  still,         // it stands throughout
+  controllable,  // a policy may drive the track
+  expert,        // the track should be replayed
+  still,         // the road user never moves
 };
 const char* to_string(RecordedControl control);
 
@@ -43,14 +43,14 @@ struct RecordedTrack {
   int64_t id = 0;  // as in the file
   TrackType type = TrackType::unset;
   RecordedControl control = RecordedControl::unstated;
-  float length_m = 0, width_m = 0, height_m = 0;  // of its last valid state
-  int32_t first_valid = 0, last_valid = 0;        // steps; there may be gaps between them
+  float length_m = 0, width_m = 0, height_m = 0;  // of the last valid state
+  int32_t first_valid = 0, last_valid = 0;        // steps; gaps in between are possible
   int32_t num_valid = 0;                          // at least one
 };
 
-/// A light as recorded; the names are WOMD's.
+/// State of a light as recorded, with WOMD's names.
 enum class RecordedLightState : uint8_t {
-  none,  // unknown, off, or not seen at that step
+  none,  // unknown, off, or not visible at that step
   arrow_stop,
   arrow_caution,
   arrow_go,
@@ -69,31 +69,31 @@ struct RecordedLight {
   IndexRange lanes;            // Scenario::light_lanes
 };
 
-/// A track that a file asks to predict.
+/// A track that a file marks for prediction.
 struct PredictedTrack {
   int32_t track = 0;
   int32_t difficulty = 0;
 };
 
-/// What was left out or changed on the way from the file, by kind.
+/// A kind of omission or change during conversion from the file.
 struct ConversionNote {
   std::string what;   // "lanes of a single point left out"
-  int32_t count = 0;  // how often
-  std::string first;  // the first place: "lane 117"
+  int32_t count = 0;  // number of occurrences
+  std::string first;  // first place, such as "lane 117"
 };
 
 struct Scenario {
-  std::string id;      // the recording's, such as "637f20cafde22ff8"; may be empty
+  std::string id;      // of the recording, such as "637f20cafde22ff8"; may be empty
   std::string format;  // "womd", "gpudrive", "pufferdrive v1", ...
   float dt_s = 0.1f;
   int32_t num_steps = 0;
-  int32_t current_step = 0;  // the last step of the history that a predictor is given
-  int32_t sdc_track = -1;    // the self-driving car; -1: not known
+  int32_t current_step = 0;  // last step of the history given to predictors
+  int32_t sdc_track = -1;    // the self-driving car; -1: unknown
   RoadMap map;
   std::vector<RecordedTrack> tracks;
   std::vector<TrackState> states;   // [tracks * num_steps]
   std::vector<uint8_t> valid;       // [tracks * num_steps] 0 or 1
-  std::vector<SavedMotion> driven;  // [tracks * num_steps], or empty: recorded on real roads
+  std::vector<SavedMotion> driven;  // [tracks * num_steps]; empty for recordings of real roads
   std::vector<int32_t> objects_of_interest;
   std::vector<PredictedTrack> tracks_to_predict;
   std::vector<RecordedLight> lights;
@@ -115,21 +115,21 @@ struct Scenario {
   size_t first_of(int32_t item) const { return static_cast<size_t>(item) * static_cast<size_t>(num_steps); }
 };
 
-/// Bounds that importers and validate() hold.
+/// Limits that importers and validate() enforce.
 constexpr int32_t kMaxScenarioSteps = 10'000, kMaxScenarioTracks = 65'536;
 
-/// Throws Error naming the element unless the map is valid, every index, size and state is, and the tracks' summaries
-/// agree with their states.
+/// Throws Error naming the element unless the map, every index, every size and every state are valid, and the tracks'
+/// summaries agree with their states.
 void validate(const Scenario& scenario);
 
-/// The first bitwise difference of two scenarios, as a path like "tracks[3].length_m: 4 and 5"; empty when they are
-/// equal.
+/// Returns the first bitwise difference of two scenarios, as a path like "tracks[3].length_m: 4 and 5"; empty if the
+/// scenarios are equal.
 std::string first_difference(const Scenario& a, const Scenario& b);
 
-/// Counts for `pictura map`.
+/// Counts that `pictura map` prints.
 struct ScenarioFacts {
   int32_t vehicles = 0, pedestrians = 0, cyclists = 0, others = 0;
-  int32_t moving_vehicles = 0;        // ends at least kMovingTrack_m from its start
+  int32_t moving_vehicles = 0;        // last position at least kMovingTrack_m from the first
   int32_t tracks_with_gaps = 0;       // absent between valid states
   int32_t recorded_light_states = 0;  // light-steps with a state
 };

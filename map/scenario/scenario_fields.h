@@ -1,5 +1,5 @@
-// The fields of Scenario and of its elements, listed once for its cache and for comparisons, as map_fields.h lists
-// those of RoadMap; and the bounds that importers share with validate().
+// Field lists of Scenario and of its elements, for its cache and for comparisons, as map_fields.h lists RoadMap's
+// fields; and the limits that importers share with validate().
 #pragma once
 
 #include "pictura/map/field_difference.h"
@@ -17,7 +17,7 @@ PICTURA_FIELDS(ConversionNote, what, count, first)
 PICTURA_FIELDS(Scenario, id, format, dt_s, num_steps, current_step, sdc_track, map, tracks, states, valid, driven,
                objects_of_interest, tracks_to_predict, lights, light_lanes, light_states, notes)
 
-/// How far anything may lie from a scene's origin: recordings are some hundred metres across.
+/// Maximum distance of all positions from a scene's origin; recordings are some hundred metres across.
 constexpr float kMaxScenarioRadius_m = 1e4f;
 constexpr float kMaxTrackSize_m = 100.0f;
 

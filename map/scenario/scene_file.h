@@ -1,5 +1,5 @@
-// Scenes as files of our own, *.scenario: what a simulator drove, saved to the bit. Importers read other projects'
-// files, derive a map from what those have of it and round; these hold the map and every state as they are.
+// Native scene files, *.scenario: the exact states that a simulator drove. Importers read other projects' files, derive
+// a map from their contents and round; native files hold the map and every state unchanged.
 #pragma once
 
 #include <string>
@@ -13,14 +13,14 @@ namespace pictura {
 
 constexpr std::string_view kSceneFileEnding = ".scenario";
 
-/// Of encode_fields() and decode_fields(), with an empty key.
+/// File kind for encode_fields() and decode_fields(), used with an empty key.
 FieldFileKind scene_file_kind();
 
-/// Writes it whole or not at all. Throws UsageError for a name without that ending, Error naming the file.
+/// Writes a file completely or not at all. Throws UsageError for a name without the ending, and Error naming the file.
 void write_scene_file(const std::string& path, const Scenario& scenario);
 
-/// The scenario of a file's bytes, validated; `name` is named in messages. Throws Error "NAME: reason" when the bytes
-/// are foreign, truncated or damaged, or written by a version whose scenes have other fields.
+/// Parses and validates a file's bytes; `name` appears in messages. Throws Error "NAME: reason" when the bytes are
+/// foreign, truncated or damaged, or written by a version whose scenes have other fields.
 Scenario parse_scene_file(std::string_view bytes, const std::string& name);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// TFRecord files: records of any bytes, each with its length and two checksums.
+// TFRecord files: records of arbitrary bytes, each with its length and two checksums.
 #pragma once
 
 #include <cstdint>
@@ -11,16 +11,16 @@
 
 namespace pictura::womd {
 
-/// Bytes that are read in any order: of a file, or in memory.
+/// Bytes with random access: of a file, or in memory.
 class ByteSource {
  public:
   virtual ~ByteSource() = default;
   virtual uint64_t size() const = 0;
-  /// The bytes [offset, offset + count), which must be within size(). Throws Error naming the file.
+  /// Reads the bytes [offset, offset + count), which must be within size(). Throws Error naming the file.
   virtual std::string read(uint64_t offset, std::size_t count) const = 0;
 };
 
-/// A regular file. Throws Error naming the path for what is none or cannot be opened.
+/// A regular file. Throws Error naming the path for other kinds of files and for files that cannot be opened.
 class FileBytes : public ByteSource {
  public:
   explicit FileBytes(const std::string& path);
@@ -45,24 +45,25 @@ class MemoryBytes : public ByteSource {
   std::string_view bytes_;
 };
 
-/// Where a record's payload is, and the checksum beside it.
+/// Place of a record's payload, and its checksum.
 struct RecordPlace {
   uint64_t offset = 0, bytes = 0;
   uint32_t sum = 0;
 };
 
-/// Scenes have about 1 MB; what is longer than this is no scene.
+/// Maximum size of a record. Scenes have about 1 MB.
 constexpr uint64_t kMaxRecord_bytes = uint64_t{1} << 28;
 
 struct RecordList {
   std::vector<RecordPlace> records;
-  std::string fault;  // what ended the list before the end of the file, or empty
+  std::string fault;  // reason why the list ends before the end of the file, or empty
 };
 
-/// The records of a file, from their lengths, whose checksums are tested. `name` names the file in `fault`.
+/// Lists the records of a file by their lengths, verifying the lengths' checksums. `name` is the file's name in
+/// `fault`.
 RecordList list_records(const ByteSource& source, const std::string& name);
 
-/// The payload of a record. Throws Error "NAME: record K: ..." unless it has its checksum.
+/// Returns the payload of a record. Throws Error "NAME: record K: ..." unless the payload matches its checksum.
 std::string read_record(const ByteSource& source, const std::string& name, std::size_t k, RecordPlace place);
 
 }  // namespace pictura::womd

@@ -1,5 +1,5 @@
-// Reads protobuf's wire format: the fields of one message, in any order, each bounded by the message around it. Knows
-// no schema; unknown fields are passed over by their wire type.
+// Reader of protobuf's wire format: the fields of one message, in any order, each bounded by the enclosing message.
+// Knows no schema; skips unknown fields by their wire type.
 #pragma once
 
 #include <bit>
@@ -14,9 +14,9 @@ namespace pictura::womd {
 
 enum class WireType : uint8_t { varint = 0, fixed64 = 1, bytes = 2, fixed32 = 5 };
 
-/// The fields of a message, one after the other. All members throw FieldError where the bytes are no message: a length
-/// or a number beyond the end, a varint of more than ten bytes or 64 bits, the wire types of groups (3, 4) or none (6,
-/// 7), field number 0.
+/// The fields of a message in sequence. All members throw FieldError where the bytes are not a message: a length or a
+/// number beyond the end, a varint of more than ten bytes or 64 bits, wire types of groups (3, 4) or undefined wire
+/// types (6, 7), field number 0.
 class WireReader {
  public:
   explicit WireReader(std::string_view message) : rest_(message) {}
@@ -42,8 +42,8 @@ class WireReader {
     return true;
   }
 
-  /// Reads only what says how long the next field is: its value may lie beyond these bytes. The lengths of the tag
-  /// (with the value's length, where it has one) and of the value.
+  /// Reads only the length of the next field, whose value may lie beyond these bytes. Returns the lengths of the tag
+  /// (including the length prefix of a bytes field) and of the value.
   std::pair<std::size_t, uint64_t> next_extent() {
     const std::size_t before = rest_.size();
     take_tag();
@@ -55,12 +55,12 @@ class WireReader {
   uint32_t field() const { return field_; }
   WireType type() const { return type_; }
 
-  // The value of the field; FieldError unless it has this wire type.
+  // Value of the field; FieldError unless the field has this wire type.
   std::string_view bytes() const { return expect(WireType::bytes), bytes_; }
   double number64() const { return expect(WireType::fixed64), std::bit_cast<double>(number_); }
   float number32() const { return expect(WireType::fixed32), std::bit_cast<float>(static_cast<uint32_t>(number_)); }
   int64_t integer() const { return expect(WireType::varint), static_cast<int64_t>(number_); }
-  /// int32 fields keep the low bits, as protobuf's own readers do.
+  /// Returns an integer's low 32 bits, as protobuf's own readers do for int32 fields.
   int32_t integer32() const { return static_cast<int32_t>(integer()); }
   bool boolean() const { return integer() != 0; }
 
@@ -71,7 +71,7 @@ class WireReader {
     WireReader packed(bytes());
     while (!packed.rest_.empty()) visit(static_cast<int64_t>(packed.take_varint()));
   }
-  /// The same for a repeated double.
+  /// Calls visit(value) for a repeated double, whether packed or not.
   template <typename Visit>
   void numbers64(Visit&& visit) const {
     if (type_ == WireType::fixed64) return visit(number64());

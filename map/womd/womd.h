@@ -13,14 +13,15 @@
 
 namespace pictura::womd {
 
-/// The scene in a record's payload; `source` names the record in messages ("FILE: record 3"), to which the scenario's
-/// id is added. Any field order is read; packed and unpacked repeated numbers are. Throws Error "SOURCE (scenario ID):
-/// FIELD: ..." for bytes that are no such message, for numbers that are not finite in points of the map and in valid
-/// states, for as many states or signals as there are no timestamps, and for more than 4 M points and states in all.
+/// Parses a record's payload; `source` is the record's name in messages ("FILE: record 3"), to which the scenario's id
+/// is added. Accepts fields in any order, and packed and unpacked repeated numbers. Throws Error "SOURCE (scenario ID):
+/// FIELD: ..." for bytes that are not such a message, and for numbers that are not finite in points of the map or in
+/// valid states. Also throws Error for more or fewer states or signals than timestamps, and for more than 4 M points
+/// and states in all.
 LoggedScene parse_scenario(std::string_view payload, const std::string& source);
 
-/// The scenario_id of a record, reading little of it; empty where there is none. Throws FieldError for bytes that are
-/// no message.
+/// Returns the scenario_id of a record, reading only a small part of it; empty if there is none. Throws FieldError for
+/// bytes that are not a message.
 std::string scan_scenario_id(const ByteSource& source, RecordPlace place);
 
 }  // namespace pictura::womd
