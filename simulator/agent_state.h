@@ -13,17 +13,18 @@ struct AgentState {
   PICTURA_AGENT_FIELDS(X)
 #undef X
 
-  /// Gives every field of num_agents agents its first value.
+  /// Initializes every field of num_agents agents.
   explicit AgentState(size_t num_agents = 0) { resize(num_agents); }
   void resize(size_t num_agents);
   void reserve(size_t num_agents);
   AgentStateView view();
-  /// Adds the bytes of every field, in the order of the list; those of lives if `with_lives`, here and below.
+  /// Adds the bytes of every field, in the order of the list; fields of lives are included if `with_lives`, here and
+  /// below.
   void add_to(Hash64* hash_inout, bool with_lives) const;
   size_t size_bytes(bool with_lives) const;
-  /// Writes the bytes of every field, in the order of the list: size_bytes() of them.
+  /// Writes the bytes of every field, in the order of the list: size_bytes() bytes.
   void copy_to(uint8_t* bytes_out, bool with_lives) const;
-  /// Reads back what copy_to wrote for as many agents; `bytes` holds at least size_bytes() bytes.
+  /// Reads the bytes that copy_to() wrote for as many agents; `bytes` holds at least size_bytes() bytes.
   void assign_from(const uint8_t* bytes, bool with_lives);
 };
 

@@ -1,4 +1,4 @@
-// The fields of agents by name, type and shape, generated from the list in fields.h.
+// Fields of agents by name, type and shape, generated from the list in fields.h.
 #pragma once
 
 #include <string_view>
@@ -17,14 +17,14 @@ struct AgentFieldInfo {
   std::string_view comment;
 };
 
-/// In the order of AgentField.
+/// Fields in the order of AgentField.
 constexpr AgentFieldInfo kAgentFields[] = {
 #define X(name, type, per_agent, first, comment) {#name, element_type<type>(), per_agent, comment},
     PICTURA_AGENT_FIELDS(X)
 #undef X
 };
 
-/// Whether a field follows from others, so that Simulator::set_state does not take it.
+/// Whether a field is computed from other fields, so that Simulator::set_state refuses it.
 constexpr bool is_derived(AgentField field) {
   switch (field) {
     case AgentField::cos_heading:
@@ -41,14 +41,13 @@ constexpr bool is_derived(AgentField field) {
   }
 }
 
-/// All fields, [slots] or [slots, per agent].
+/// Returns all fields, [slots] or [slots, per agent].
 std::vector<NamedArray> agent_state_arrays(const AgentStateView& state, int num_slots, Device device);
 
-/// The edit that these arrays describe, all of whose values are still to be checked. Throws Error as
-/// Simulator::set_state does.
+/// Returns the edit that these arrays describe, with unchecked values. Throws Error as Simulator::set_state does.
 StateEdit state_edit(const Array& slots, Span<const NamedArray> fields, int num_slots, Device device);
 
-/// Of a field's values in one slot, in memory of the host: "3", or "[1, 2, 3]".
+/// Formats a field's values in one slot, in host memory: "3", or "[1, 2, 3]".
 std::string field_text(const AgentStateView& agents, int slot, AgentField field);
 
 }  // namespace pictura

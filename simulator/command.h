@@ -1,5 +1,5 @@
-// What an agent is told to do in one step: an action of the policy's space, a state to be in, or to leave. A plain
-// struct that both devices read.
+// Command of an agent for one step: an action of the policy's space, a state, or leaving the episode. A plain struct
+// that both devices read.
 #pragma once
 
 #include "pictura/simulator/actions.h"
@@ -8,24 +8,25 @@ namespace pictura {
 
 enum class CommandKind : int32_t {
   action,           // drives by its dynamics
-  kinematic_state,  // is put at a pose and speed, as a recorded trajectory has them
+  kinematic_state,  // is placed at a pose and speed, such as those of a recorded trajectory
   absent,           // leaves its world's episode
-  recorded,         // is where the record of its world's scene has it, or nowhere
+  recorded,         // follows the record of its world's scene, or is absent where the record has no state
 };
 
-/// Of one slot for one step. Commands to agents that are neither active nor recorded are ignored, but for `recorded`.
+/// Command of one slot for one step. Except for `recorded`, commands to agents that are neither active nor recorded are
+/// ignored.
 /// - action: in [0, kNumActions).
 /// - kinematic_state: the agent's reference point (see fields.h), heading and speed after the step. Its acceleration,
-///   jerk and steering angle become 0. z_m says on which level roads are looked for; the agent's own height is then
-///   that of the road. Events are found as for actions: collisions on the straight way to the pose and there, the
-///   road, lights and waypoints. Numbers must be finite, |x_m|, |y_m| and |z_m| at most kMaxCommanded_m, |heading_rad|
-///   at most kMaxCommanded_rad, |speed_mps| at most kMaxCommanded_mps.
-/// - absent: from this step until the end of the episode the agent is AgentStatus::absent: it is not drawn, nobody
-///   meets it, and it is not valid. It counts among the inactive agents that end an episode.
-/// - recorded: the agent is AgentStatus::recorded and stands, after step n of the episode, where its record has it n
-///   steps after its start; where the record has nothing it is absent until a step that has it again. After the
-///   record's end it stays where it was. It meets no infraction, passes no waypoint and is not valid; others meet it.
-///   Who was absent comes back, who has halted stays. Only in worlds on a map with a record (compile_scenario()).
+///   jerk and steering angle become 0. z_m selects the level on which roads are searched; the agent's height is then
+///   that of the road. Events are detected as for actions: collisions on the straight way to the pose and at the pose,
+///   the road, lights and waypoints. Numbers must be finite, with |x_m|, |y_m| and |z_m| at most kMaxCommanded_m,
+///   |heading_rad| at most kMaxCommanded_rad, and |speed_mps| at most kMaxCommanded_mps.
+/// - absent: from this step until the end of the episode the agent is AgentStatus::absent: it is not drawn, does not
+///   collide, and is not valid. It counts among the inactive agents that end an episode.
+/// - recorded: the agent is AgentStatus::recorded. After step n of the episode it has the state of its record n steps
+///   after the start. Where the record has no state, it is absent until a step with a state. After the record's end it
+///   keeps its last pose. It has no infractions, passes no waypoint and is not valid; other agents can collide with it.
+///   Absent agents return; halted agents remain halted. Only in worlds on a map with a record (compile_scenario()).
 struct Command {
   CommandKind kind = CommandKind::action;
   int32_t action = kIdleAction;

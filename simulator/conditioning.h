@@ -1,5 +1,5 @@
-// The seventeen numbers that each agent's reward and dynamics are conditioned on: order, training distribution (paper,
-// table of the conditioning coefficients) and the scale to [-1, 1] in which the policy sees them.
+// The seventeen coefficients that condition each agent's reward and dynamics: their order, their training distribution
+// (paper, table of the conditioning coefficients) and the scale to [-1, 1] for the policy.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -28,13 +28,13 @@ enum class Conditioning : int32_t {
 constexpr int kNumConditioning = 17;
 constexpr int kNumRewardConditioning = 14;
 
-/// U(low, high), or, where `mixture`, U(low, 1) or U(1, high) with equal chance.
+/// Distribution U(low, high) or, if `mixture`, U(low, 1) or U(1, high) with equal probability.
 struct ConditioningRange {
   float low, high;
   bool mixture;
 };
 
-/// The paper's training distributions, in the order of Conditioning.
+/// Training distributions of the paper, in the order of Conditioning.
 constexpr ConditioningRange kPaperConditioning[kNumConditioning] = {
     {2.0f, 12.0f, false},      {0.0f, 20.0f, false},      {0.0f, 3.0f, false},       {0.0f, 3.0f, false},
     {0.0f, 1.0f, false},       {0.0f, 0.1f, false},       {2.5e-4f, 2.5e-2f, false}, {0.0f, 1.0f, false},
@@ -43,7 +43,7 @@ constexpr ConditioningRange kPaperConditioning[kNumConditioning] = {
     {2.0f / 3.0f, 1.5f, true},
 };
 
-/// Names as configuration files and tables spell them.
+/// Names in configuration files and tables.
 constexpr const char* kConditioningNames[kNumConditioning] = {
     "delta_goal_m", "v_goal_mps", "collision",   "off_road",      "stop_line",    "comfort",
     "lane_align",   "vel_align",  "lane_center", "center_bias_m", "velocity",     "reverse",

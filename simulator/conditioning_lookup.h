@@ -1,4 +1,4 @@
-// Coefficients of the conditioning by name, for configurations, commands and callers from other languages.
+// Lookup of conditioning coefficients by name, for configurations, commands and callers from other languages.
 #pragma once
 
 #include <cstddef>
@@ -10,11 +10,11 @@
 
 namespace pictura {
 
-/// The largest absolute value of a coefficient.
+/// Maximum absolute value of a coefficient.
 constexpr double kMaxConditioning = 1e6;
 
-/// The index of the coefficient of this name in the order of Conditioning. Throws UsageError that begins with `where`,
-/// as "--conditioning", and suggests the nearest name.
+/// Returns the index of a coefficient in the order of Conditioning. Throws UsageError that begins with `where`, such as
+/// "--conditioning", and suggests the nearest name.
 std::size_t conditioning_index(std::string_view name, const std::string& where);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// The loop in which a simulator is driven: a question for ^C, commands, a step.
+// Main loop of driving a simulator: check for ^C, commands, a step.
 #pragma once
 
 #include <functional>
@@ -9,18 +9,18 @@
 
 namespace pictura {
 
-/// How drive_steps() ended.
+/// Result of drive_steps().
 struct DriveEnd {
-  int steps = 0;  // that were taken
+  int steps = 0;  // number of steps taken
   bool is_interrupted = false;
 };
 
-/// Steps at most `steps` times by the commands [slots] that act(step) writes, as step_observed() does, and calls
+/// Takes at most `steps` steps by the commands [slots] that act(step) writes, through step_observed(), and calls
 /// on_step(step, result) after each. Ends before the first step that ^C precedes, or for which act() returns false.
 DriveEnd drive_steps(Simulator& simulator, Span<Command> commands, int steps, const std::function<bool(int)>& act,
                      const std::vector<StepObserver*>& observers = {},
                      const std::function<void(int, const StepResult&)>& on_step = {});
-/// Steps likewise by the commands of a controller, which acts for all agents of a simulator in host memory.
+/// Takes steps by the commands of a controller, which acts for all agents of a simulator in host memory.
 DriveEnd drive_steps(Simulator& simulator, Controller& controller, int steps,
                      const std::vector<StepObserver*>& observers = {},
                      const std::function<void(int, const StepResult&)>& on_step = {});

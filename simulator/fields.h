@@ -1,6 +1,6 @@
-// The state of all agents as structure of arrays, declared once: name, type, first value, and what it is. Allocation,
-// reset, hashing, comparison, checkpoints and bindings all come from this list, in this order. simulator/agent_state.h
-// owns them on the host.
+// State of all agents as structure of arrays, declared once: name, type, initial value and description. Allocation,
+// reset, hashing, comparison, checkpoints and bindings all use this list, in this order. simulator/agent_state.h owns
+// the fields on the host.
 #pragma once
 
 #include "pictura/common/color.h"
@@ -8,32 +8,32 @@
 
 namespace pictura {
 
-/// How a controlled agent stands in its episode. Halted agents stay where they are, in everybody's way. Recorded ones
-/// are where the record of their world's scene has them: they are met and seen, but nothing happens to them, until an
-/// action makes them active. Waiting ones have left a road that ends, and are nowhere until they enter one again.
+/// Status of a controlled agent in its episode. Halted agents remain as obstacles. Recorded agents follow the record of
+/// their world's scene: other agents see them and can collide with them, but they have no events until an action makes
+/// them active. Waiting agents have left a road that ends, and have no place until they enter a road again.
 enum class AgentStatus : uint8_t { active, halted, parked, absent, recorded, waiting };
 
-/// Whether an agent stands anywhere.
+/// Whether an agent with this status has a box in its world.
 PICTURA_HD constexpr bool has_body(AgentStatus status) {
   return status != AgentStatus::absent && status != AgentStatus::waiting;
 }
 
-/// Whether an action would move an agent: it drives, or is where its record has it.
+/// Whether an action would move an agent with this status: it is active or follows its record.
 PICTURA_HD constexpr bool takes_actions(AgentStatus status) {
   return status == AgentStatus::active || status == AgentStatus::recorded;
 }
 
-/// What an infraction does to whom it happens to: it halts, it leaves the episode, or it drives on and only counts.
+/// Consequence of an infraction for its agent: it halts, leaves the episode, or drives on with the infraction counted.
 enum class AfterInfraction : uint8_t { halt, leave, drive_on };
 
-/// Why an agent found no place at the start of its episode.
+/// Reason why an agent found no place at the start of its episode.
 enum class SpawnFailure : uint8_t {
   none,
-  no_place,  // the map has nowhere to stand for its class
-  taken,     // all places that it tried were taken, or too near to something
+  no_place,  // the map has no place for its class
+  taken,     // all tried places were occupied, or too near to another box
 };
 
-/// Why an agent halted; also the events of a step, as bits.
+/// Reason why an agent halted; also the events of a step, as bits.
 enum Event : uint8_t {
   kEventNone = 0,
   kEventCollision = 1,
@@ -45,7 +45,7 @@ enum Event : uint8_t {
   kEventWaypoint = 64,     // an intermediate waypoint was passed
   kEventMetricGoal = 128,  // a chain's last waypoint was passed within 2 m
 };
-/// The events that halt.
+/// Events that halt an agent.
 constexpr int kInfractions = kEventCollision | kEventOffRoad | kEventRedLight | kEventWall;
 
 constexpr int kNumWaypoints = 3;
@@ -95,8 +95,8 @@ constexpr int kNumWaypoints = 3;
   X(episode_events, uint8_t, 1, 0, "union of the episode's event bits")                                          \
   X(episode_return, float, 1, 0, "sum of rewards in this episode")
 
-// Lives follow each other in a slot on roads that end. Elsewhere these keep their first values, and neither saved
-// states nor hashes have them.
+// Fields of lives, which follow each other in a slot on roads that end. On other maps the fields keep their initial
+// values, and saved states and hashes omit them.
 #define PICTURA_LIFE_FIELDS(X)                                                                     \
   X(life, int32_t, 1, 0, "lives of this episode that ended before by leaving")                     \
   X(life_step, int32_t, 1, 0, "steps of this episode before the life began; counts are of a life") \
@@ -104,14 +104,15 @@ constexpr int kNumWaypoints = 3;
 
 #define PICTURA_AGENT_FIELDS(X) PICTURA_EPISODE_FIELDS(X) PICTURA_LIFE_FIELDS(X)
 
-/// What rules read and write: pointers alone, on either device.
+/// Pointers to all fields, on either device, for the rules.
 struct AgentStateView {
 #define X(name, type, per_agent, first, comment) type* name;
   PICTURA_AGENT_FIELDS(X)
 #undef X
 };
 
-/// Copies every field of one agent. All are read before any is written, so that a device need not wait for each.
+/// Copies every field of one agent. All fields are read before the first is written, so that a device need not wait for
+/// each.
 PICTURA_HD inline void copy_fields(const AgentStateView& from, int from_slot, const AgentStateView& to, int to_slot){
 #define X(name, type, per_agent, first, comment) \
   type name[per_agent];                          \
@@ -124,7 +125,7 @@ PICTURA_HD inline void copy_fields(const AgentStateView& from, int from_slot, co
 #undef X
 }
 
-/// Gives every field of one agent its first value.
+/// Sets every field of one agent to its initial value.
 PICTURA_HD inline void reset_fields(const AgentStateView& agents, int slot) {
 #define X(name, type, per_agent, first, comment) \
   for (int i = 0; i < (per_agent); ++i) agents.name[slot * (per_agent) + i] = static_cast<type>(first);

@@ -1,5 +1,5 @@
-// The worlds of an executor on the host: setup and state as WorldViews, which the rules run over, and what it writes
-// for its users besides the state.
+// Worlds of an executor on the host: setup and state as WorldViews, which the rules run over, and further results for
+// the executor's users.
 #pragma once
 
 #include <vector>
@@ -13,7 +13,7 @@ struct HostWorlds {
   explicit HostWorlds(SimulatorSetup its_setup);
   HostWorlds(const HostWorlds&) = delete;
   HostWorlds& operator=(const HostWorlds&) = delete;
-  /// Other worlds, at their first values. Arrays move only where the capacity is too small for them.
+  /// Replaces the worlds by others, at their initial values. Arrays move only where the capacity is too small.
   void assign(const SimulatorSetup& other);
   void reserve(const SimulatorCapacity& capacity);
 
@@ -21,16 +21,16 @@ struct HostWorlds {
 
   SimulatorSetup setup;
   SimulatorState state;
-  // Made anew by every step: the boxes by the cells of their centres.
+  // Rebuilt by every step: the boxes by the cells of their centres.
   std::vector<CellLists> box_cells;  // [worlds]
-  std::vector<Vec2> cell_centers;    // as boxes, in the order of each world's box_cells
+  std::vector<Vec2> cell_centers;    // centres of the boxes, in the order of each world's box_cells
   SceneBatch scene;
 
  private:
   void make_cells_and_scene();
 };
 
-/// What an executor on the host writes for its users, besides the state.
+/// Results of an executor on the host for its users, besides the state.
 struct HostResults {
   HostResults() = default;
   HostResults(size_t num_slots, const SimulatorConfig& config) { resize(num_slots, config); }
@@ -45,7 +45,7 @@ struct HostResults {
             .sums = sums.data()};
   }
 
-  std::vector<float> reward;  // [slots], as the following
+  std::vector<float> reward;  // [slots], as are the following vectors
   std::vector<uint8_t> terminated, truncated, valid, driver;
   std::vector<StepSums> sums;
   std::vector<View> views;

@@ -1,5 +1,5 @@
-// A RoadMap flattened into what the rules read: pieces, links and cell lists. Made once per map, shared by all worlds
-// on it.
+// A RoadMap flattened into the data that the rules read: pieces, links and cell lists. Made once per map, shared by all
+// worlds on the map.
 #pragma once
 
 #include <memory>
@@ -25,7 +25,7 @@ struct CellLists {
   GridView view() const { return {origin_m, cell_m, num_x, num_y, begin, items}; }
 };
 
-/// What a map was recorded with; empty for most maps.
+/// Recorded data of a map; empty for most maps.
 struct MapRecord {
   std::vector<RecordedAgent> agents;
   std::vector<RecordedState> states;     // [agents, steps]
@@ -36,10 +36,10 @@ struct MapRecord {
 
 struct MapRules {
   std::vector<LaneSegment> segments;
-  std::vector<MapLane> lanes;  // of the RoadMap, in its order; those that are not drivable have no segments
+  std::vector<MapLane> lanes;  // all lanes of the RoadMap, in its order; lanes that are not drivable have no segments
   std::vector<int32_t> successors;
   std::vector<Barrier> edges, walls;
-  std::vector<StopLine> stop_lines;  // of RoadMap::lights, in its order
+  std::vector<StopLine> stop_lines;  // lines of RoadMap::lights, in its order
   std::vector<int32_t> spawn_lanes;
   std::vector<float> spawn_end_m;
   std::vector<Exit> exits;
@@ -52,18 +52,18 @@ struct MapRules {
   CellLists near_lane_pieces, near_boundary_pieces, near_wall_pieces, near_stop_lines;
   Vec2 low_m, high_m;
   MapRecord record;
-  SideEdges sides;  // where there is a record
+  SideEdges sides;  // filled where the map has a record
   float max_box_radius_m = 0, max_speed_mps = 0;
   bool is_open = false;
 
   MapView view() const;
-  /// Of all arrays of the view in one piece of memory, each aligned to kMapAlignment_bytes.
+  /// Size of all arrays of the view in one piece of memory, each aligned to kMapAlignment_bytes.
   int64_t size_bytes() const;
 };
 constexpr size_t kMapAlignment_bytes = 256;
 
-/// Walls can be observed on it if `observe_walls`; observed_span_m is that of MapOptions. Throws Error naming the map
-/// when it has no drivable lane.
+/// Makes the rules of a map; walls are observable if `observe_walls`, and observed_span_m is that of MapOptions. Throws
+/// Error naming the map when it has no drivable lane.
 MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool observe_walls = false,
                         MapRecord record = {}, float observed_span_m = 0);
 

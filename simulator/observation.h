@@ -1,4 +1,4 @@
-// Sizes of the observation (paper, table of the policy architecture) and where it lies. docs/reference/observation.md
+// Sizes of the observation (paper, table of the policy architecture) and its arrays. docs/reference/observation.md
 // defines every slot, its unit and its scale.
 #pragma once
 
@@ -16,17 +16,17 @@ constexpr int kMaxControls = 10, kControlFeatures = 7;
 constexpr int kMaxWalls = 80, kWallFeatures = 7;
 constexpr int kWaypointFeatures = 3;
 
-/// The entity sets, in the order of ObservationView::set_counts.
+/// Entity sets, in the order of ObservationView::set_counts.
 enum class EntitySet : int32_t { partners, lanes, boundaries, controls, walls };
 constexpr int kNumEntitySets = 5;
 
-/// Which arrays are there: what is no set always, sets with SimulatorConfig::vector_observations, walls if they are
-/// requested as well.
+/// Condition for an array's presence: own arrays are always present, sets with SimulatorConfig::vector_observations,
+/// and walls if requested in addition.
 enum class ObservationPart : uint8_t { own, sets, walls };
 
-// X(name, type, rows, features, part, comment): the arrays of an observation, [slots, rows, features]. Everything that
-// knows them comes from this list: their layout here and in executors, observation_arrays(), and what readers of
-// observations make of those, as schemas and encoders.
+// X(name, type, rows, features, part, comment): the arrays of an observation, [slots, rows, features]. All code that
+// knows the arrays uses this list: their layout here and in executors, observation_arrays(), and the schemas and
+// encoders of readers.
 #define PICTURA_OBSERVATION_ARRAYS(X)                                                                            \
   X(ego, float, 1, kEgoFeatures, ObservationPart::own, "")                                                       \
   X(partners, float, kMaxPartners, kPartnerFeatures, ObservationPart::sets, "")                                  \
@@ -38,7 +38,7 @@ enum class ObservationPart : uint8_t { own, sets, walls };
   X(conditioning, float, 1, kNumConditioning, ObservationPart::own, "scaled; see docs/reference/observation.md") \
   X(waypoints, float, kNumWaypoints, kWaypointFeatures, ObservationPart::own, "ego frame")
 
-/// Observations of all slots; entity sets are padded with zeros up to their counts, and empty where they are not
+/// Observations of all slots. Entity sets are padded with zeros beyond their counts, and empty where they are not
 /// computed.
 struct ObservationView {
 #define X(name, type, rows, features, part, comment) Span<type> name;

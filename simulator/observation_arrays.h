@@ -1,4 +1,4 @@
-// The arrays of an observation by name, type and shape, generated from the list in observation.h.
+// Arrays of an observation by name, type and shape, generated from the list in observation.h.
 #pragma once
 
 #include <string_view>
@@ -17,14 +17,14 @@ struct ObservationArray {
   ObservationPart part;
 };
 
-/// All that an observation can have, in the order of the list.
+/// All possible arrays of an observation, in the order of the list.
 constexpr ObservationArray kObservationArrays[] = {
 #define X(name, type, rows, features, part, comment) {#name, element_type<type>(), rows, features, part},
     PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
 };
 
-/// Those that are there, [slots, rows, features], in the order of the list.
+/// Returns the arrays that are present, [slots, rows, features], in the order of the list.
 std::vector<NamedArray> observation_arrays(const ObservationView& observations, int num_slots, Device device);
 
 }  // namespace pictura

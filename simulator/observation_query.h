@@ -1,4 +1,4 @@
-// Observations of what is not there: what Simulator::observe is asked. Plain structs that both devices read.
+// Hypothetical observations: the input of Simulator::observe. Plain structs that both devices read.
 #pragma once
 
 #include "pictura/common/scene_types.h"
@@ -6,24 +6,23 @@
 
 namespace pictura {
 
-/// The observation of a slot as it would be if some boxes were not there, and others were.
+/// Query for the observation of a slot without some boxes and with some additional boxes.
 struct ObservationQuery {
   int32_t slot = 0;
-  int32_t hidden_begin = 0, hidden_end = 0;      // who is left out: a range of a list of indices into scene().agents
-  int32_t inserted_begin = 0, inserted_end = 0;  // who comes in: a range of a list of InsertedBoxes
-  /// 0: the partners are those of a world without the hidden boxes: who was too far to be among them comes in. 1: they
-  /// are counted and ordered with the hidden ones, whose rows are zeros.
+  int32_t hidden_begin = 0, hidden_end = 0;      // hidden boxes: a range of a list of indices into scene().agents
+  int32_t inserted_begin = 0, inserted_end = 0;  // inserted boxes: a range of a list of InsertedBoxes
+  /// 0: partners are chosen as in a world without the hidden boxes, so that farther boxes take their rows. 1: partners
+  /// are chosen with the hidden boxes, whose rows are zeros.
   int32_t leaves_gaps = 0;
 };
 
-/// A box that stands in no scene. It is not met if it is not `drawn`.
+/// A box that is in no scene. It is ignored unless `drawn`.
 struct InsertedBox {
   AgentBox box;
   float speed_mps = 0;  // signed, for the auxiliary slot
 };
 
-/// Queries with the lists that they point into, and what is to be written for them: a row each, of the parts that the
-/// simulator observes.
+/// Queries, the lists that they refer to, and the output: one row per query, of the parts that the simulator observes.
 struct ObservationQueries {
   Span<const ObservationQuery> queries;
   Span<const int32_t> hidden;

@@ -1,11 +1,11 @@
-// The eleven reward terms by name: what a step pays, and what is summed of them.
+// The eleven reward terms by name: the rewards of a step, and their sums.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
 
 namespace pictura {
 
-// X(name), in the order in which they are added up.
+// X(name), in the order of summation.
 #define PICTURA_REWARD_TERMS(X) \
   X(goal)                       \
   X(collision)                  \
@@ -36,7 +36,7 @@ struct RewardTermsOf {
 
 using RewardTerms = RewardTermsOf<float>;
 
-/// What totals sum of an agent's step; as words of 16 bytes, which devices move whole.
+/// Per-step quantities of an agent that totals sum up; aligned to words of 16 bytes, which devices move whole.
 struct alignas(16) StepSums {
   float distance_m = 0;
   RewardTerms reward_terms;

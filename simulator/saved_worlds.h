@@ -1,5 +1,5 @@
-// Worlds that leave their simulator: those of one run divided among several, whose saved states are joined and parted,
-// so that what some number of simulators saved another number can restore; and single worlds, kept to go on in others.
+// Worlds outside their simulator. Saved states of the worlds of one run are joined and split, so that another number of
+// simulators can restore them. Single worlds are kept to continue in other simulators.
 #pragma once
 
 #include <memory>
@@ -10,29 +10,31 @@
 
 namespace pictura {
 
-/// The worlds of part `part` of `num_parts`: consecutive ones, at least one each, with about as many agents as those of
-/// every other part. Throws UsageError where there are fewer worlds than parts.
+/// Returns the worlds of part `part` of `num_parts`: consecutive worlds, at least one per part, with about equally many
+/// agents in every part. Throws UsageError where there are fewer worlds than parts.
 std::vector<WorldSpec> worlds_of_part(const std::vector<WorldSpec>& all, int part, int num_parts);
 
-/// What a simulator of all these worlds would have saved, from what simulators of their parts, in order, did. The
-/// simulator is one of them: it lends configuration and maps. Throws Error as Simulator::restore does.
+/// Joins the saved states of the parts' simulators, in order, into the saved state of a simulator of all these worlds.
+/// `simulator` is one of the parts' simulators: it provides configuration and maps. Throws Error as Simulator::restore
+/// does.
 std::vector<uint8_t> join_saved_states(const Simulator& simulator, const std::vector<WorldSpec>& all,
                                        const std::vector<std::vector<uint8_t>>& parts);
 
-/// What the simulator would have saved, from what one of all these worlds, of which it has part `part` of `num_parts`,
-/// did. Throws Error as Simulator::restore does.
+/// Extracts the saved state of `simulator`, which has part `part` of `num_parts`, from the saved state of a simulator
+/// of all these worlds. Throws Error as Simulator::restore does.
 std::vector<uint8_t> part_of_saved_state(const Simulator& simulator, const std::vector<WorldSpec>& all,
                                          Span<const uint8_t> saved, int part, int num_parts);
 
-/// A world at one moment, by itself and on the host.
+/// State of one world at one moment, on the host.
 struct KeptWorld;
 
-/// Chosen worlds of what save() gave of this simulator. Throws Error as Simulator::restore does.
+/// Extracts chosen worlds from a saved state of this simulator. Throws Error as Simulator::restore does.
 std::vector<std::shared_ptr<const KeptWorld>> keep_worlds(const Simulator& simulator, Span<const uint8_t> saved,
                                                           const std::vector<size_t>& worlds);
 
-/// What this simulator's worlds, in order, would have saved at these moments: what restore() takes. They may come from
-/// simulators with other observations, and with other walls. Throws Error where a world is not the one that was kept.
+/// Returns the saved state of this simulator with its worlds, in order, in these states: input of restore(). The worlds
+/// may come from simulators with other observations or other walls. Throws Error where a world differs from the kept
+/// one.
 std::vector<uint8_t> saved_state_of(const Simulator& simulator, const std::vector<const KeptWorld*>& worlds);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// The options of a simulator that callers choose by name.
+// Options of a simulator that callers choose by name.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ void visit_impairments(Shares&& shares, const Visit& visit) {
   visit("inattentive", shares.inattentive);
 }
 
-/// Visits those that are keys of [simulator] in configurations, in the order in which they are written.
+/// Visits the options that are keys of [simulator] in configurations, in the order of writing.
 template <typename AnyConfig, typename Visitor>
 void visit_simulator_keys(AnyConfig& c, Visitor&& v) {
   v.value(NamedKey("simulator.episode_steps", Evaluation::replaced), c.episode_steps, 1, 1 << 24);

@@ -1,5 +1,5 @@
-// What a simulator is made of and does not change while it steps: its configuration, maps and worlds, all checked, and
-// where each world's part of the arrays begins.
+// Parts of a simulator that stay constant while it steps: its configuration, maps and worlds, all checked, and the
+// range of each world in the arrays.
 #pragma once
 
 #include <memory>
@@ -13,12 +13,12 @@
 namespace pictura {
 
 struct SimulatorSetup : SimulatorParts {
-  /// Checks everything that comes from outside: throws UsageError for what cannot be simulated. handles [maps] are what
-  /// the scene names the maps by; empty for 0, 1, ...
+  /// Checks all input: throws UsageError for parts that cannot be simulated. handles [maps] are the handles of the maps
+  /// in the scene; empty for 0, 1, ...
   SimulatorSetup(const SimulatorConfig& config, CompiledMaps maps, std::vector<GeometryHandle> handles,
                  std::vector<WorldSpec> worlds);
 
-  /// The same configuration but for the seed, over other worlds; handles may be empty, for 0, 1, ...
+  /// Returns a setup with the same configuration except for the seed, and other worlds; empty handles mean 0, 1, ...
   SimulatorSetup with(CompiledMaps other_maps, std::vector<GeometryHandle> other_handles,
                       std::vector<WorldSpec> other_worlds, uint64_t seed) const;
 
@@ -28,31 +28,31 @@ struct SimulatorSetup : SimulatorParts {
   size_t num_lights() const { return static_cast<size_t>(light_begin.back()); }
   SlotTable slot_table() const { return {world_of_slot, agent_of_slot, slot_begin, global_world}; }
   const CompiledMap& map_of(int world) const { return *maps[worlds[world].map]; }
-  /// Whether any of the maps has roads that end, so that agents have lives.
+  /// Whether any map has roads that end, so that agents have lives.
   bool has_lives() const;
   SimulatorCapacity needs() const { return capacity_of(maps, worlds); }
-  /// Allocates for as many worlds, slots and so on, so that assigning another setup within it moves no array.
+  /// Allocates for this capacity, so that assigning another setup within it moves no array.
   void reserve(const SimulatorCapacity& capacity);
 
-  /// A view of a world without state: its map, its place in the arrays and the keys of its random numbers.
+  /// Returns a view of a world without state: its map, its range in the arrays and the keys of its random numbers.
   WorldView view(int world, const MapView& map, const RuleOptions& its_options) const;
 
   RuleOptions options;
-  std::vector<MapView> map_views;                           // [maps] of their rules
+  std::vector<MapView> map_views;                           // [maps] views of the maps' rules
   std::vector<int32_t> slot_begin, box_begin, light_begin;  // [worlds + 1]
   std::vector<int32_t> world_of_slot, agent_of_slot;        // [slots]
   std::vector<uint32_t> global_world;                       // [worlds]
-  std::vector<GeometryHandle> geometry;                     // [worlds] the handle of its map
+  std::vector<GeometryHandle> geometry;                     // [worlds] handle of the world's map
 };
 
-/// Tells whose a snapshot is: a simulator with its present worlds and their snapshots hold the same one, and nobody
-/// else.
+/// Identity of the worlds of a snapshot: only a simulator with its current worlds and the snapshots of these worlds
+/// hold the same token.
 using WorldsToken = std::shared_ptr<const char>;
 inline WorldsToken new_worlds_token() { return std::make_shared<const char>(); }
 
-/// Sides of the cells that hosts sort a world's boxes into; see HostWorlds.
+/// Side of the cells into which hosts sort a world's boxes; see HostWorlds.
 constexpr float kBoxCell_m = 25.0f;
-/// How many cells cover a map. Of 64 bits, since a map that is too large to be simulated is counted too.
+/// Numbers of cells that cover a map. 64 bits, since maps that are too large to be simulated are counted too.
 struct BoxCellCounts {
   int64_t num_x, num_y;
 };

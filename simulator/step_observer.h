@@ -1,5 +1,5 @@
-// The interface of what follows a simulator step by step (recorders, live views, probes), and the step that notifies
-// it.
+// Interface of observers that follow a simulator step by step (recorders, live views, probes), and the step that
+// notifies observers.
 #pragma once
 
 #include "pictura/simulator/simulator.h"
@@ -10,18 +10,18 @@ namespace pictura {
 class StepObserver {
  public:
   virtual ~StepObserver() = default;
-  /// Whether the next step may be taken; waits for it a little.
+  /// Whether the next step may be taken; may wait a short time for it.
   virtual bool is_due() { return true; }
-  /// Gives agents that it drives other commands, of [slots], before any observer sees them.
+  /// Replaces the commands, [slots], of agents that the observer drives, before any observer sees the commands.
   virtual void override_commands(Span<Command> /*commands_inout*/) {}
   virtual void before_step(Span<const Command> /*commands*/) {}
   virtual void after_step(const StepResult& /*result*/) {}
-  /// After new episodes that no step began, of the worlds of the mask [worlds]; empty: of all.
+  /// Called after new episodes that no step began, in the worlds of the mask [worlds]; empty: in all worlds.
   virtual void after_reset(Span<const uint8_t> /*world_mask*/) {}
 };
 
-/// Steps by these commands [slots]. Observers enclose the step as nested scopes do: before it they are called in their
-/// order, after it in the reverse order.
+/// Takes a step by these commands [slots]. Observers enclose the step like nested scopes: they are called in their
+/// order before it, and in reverse order after it.
 template <typename Observers>
 StepResult step_observed(Simulator& simulator, Span<Command> commands_inout, const Observers& observers,
                          Stream stream = {}) {

@@ -1,5 +1,5 @@
-// What a simulator counts. Sums of floating-point numbers have one order on every executor: agent i of a world adds to
-// bin i mod kTotalsBins, and the bins are added up in order.
+// Totals of a simulator. Floating-point sums have the same order on every executor: agent i of a world adds to bin i
+// mod kTotalsBins, and the bins are added in order.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -9,9 +9,9 @@ namespace pictura {
 
 constexpr int kTotalsBins = 32;
 
-constexpr float kRest_mps = 0.3f;  // agents up to this speed are at rest
+constexpr float kRest_mps = 0.3f;  // agents up to this speed count as at rest
 
-// X(total, name in a run's log, events): counts of agent-steps that had any of these events.
+// X(total, name in a run's log, events): counts of agent-steps with any of these events.
 #define PICTURA_EVENT_TOTALS(X)                                \
   X(goals_reached, goals, kEventMetricGoal)                    \
   X(waypoints_reached, waypoints, kEventWaypoint | kEventGoal) \
@@ -21,20 +21,20 @@ constexpr float kRest_mps = 0.3f;  // agents up to this speed are at rest
   X(red_light, red_light, kEventRedLight)                      \
   X(wall_contacts, wall_contacts, kEventWall)
 
-// COUNT(total, ...) of an integer, SUM(total) of a floating-point number, TERMS(total) of a sum for each reward term.
-#define PICTURA_TOTALS(COUNT, SUM, TERMS)                                                          \
-  COUNT(agent_steps) /* active agents advanced by one step */                                      \
-  COUNT(slot_steps)  /* slots times steps */                                                       \
-  COUNT(episodes)    /* worlds reset after their first episode */                                  \
-  PICTURA_EVENT_TOTALS(COUNT)                                                                      \
-  SUM(distance_m)                                                                                  \
-  SUM(reward)                                                                                      \
-  TERMS(reward_terms)             /* of which `reward` is made, but for rounding */                \
-  COUNT(finished_agent_episodes)  /* agents whose episode ended */                                 \
-  SUM(finished_return)            /* sum of their returns */                                       \
-  COUNT(finished_passed_waypoint) /* of these agents, those that passed a waypoint */              \
-  COUNT(finished_moved)           /* ... and those that were faster than kRest_mps in some step */ \
-  SUM(finished_first_motion_s)    /* sum over the latter of the time from their start to the end of that step */
+// COUNT(total, ...) of an integer, SUM(total) of a floating-point number, TERMS(total) of a sum per reward term.
+#define PICTURA_TOTALS(COUNT, SUM, TERMS)                                                      \
+  COUNT(agent_steps) /* active agents advanced by one step */                                  \
+  COUNT(slot_steps)  /* slots times steps */                                                   \
+  COUNT(episodes)    /* worlds reset after their first episode */                              \
+  PICTURA_EVENT_TOTALS(COUNT)                                                                  \
+  SUM(distance_m)                                                                              \
+  SUM(reward)                                                                                  \
+  TERMS(reward_terms)             /* summands of `reward`, except for rounding */              \
+  COUNT(finished_agent_episodes)  /* agents whose episode ended */                             \
+  SUM(finished_return)            /* sum of the returns of these agents */                     \
+  COUNT(finished_passed_waypoint) /* of these agents, those that passed a waypoint */          \
+  COUNT(finished_moved)           /* of these agents, those faster than kRest_mps in a step */ \
+  SUM(finished_first_motion_s)    /* over moved agents: time from the start to the end of that step */
 
 /// Totals since construction; counts are of controlled agents.
 struct SimulatorTotals {
@@ -47,10 +47,10 @@ struct SimulatorTotals {
 #undef TERMS
 
   PICTURA_HD void add(const SimulatorTotals& part) { visit(*this, part, Add{}, Add{}); }
-  /// What has happened since `before`.
+  /// Subtracts earlier totals, which leaves the counts since `before`.
   PICTURA_HD void subtract(const SimulatorTotals& before) { visit(*this, before, Subtract{}, Subtract{}); }
 
-  /// Calls visit_count(member of a, member of b) for all counts, and visit_sum for all sums of floating-point numbers.
+  /// Calls visit_count(member of a, member of b) for all counts, and visit_sum for all floating-point sums.
   template <typename Other, typename VisitCount, typename VisitSum>
   PICTURA_HD static void visit(SimulatorTotals& a, Other& b, const VisitCount& visit_count, const VisitSum& visit_sum) {
 #define COUNT(name, ...) visit_count(a.name, b.name);

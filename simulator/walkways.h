@@ -1,4 +1,4 @@
-// Where pedestrians go: the centre lines of sidewalks (of shoulders, where a map has no sidewalk) and crosswalks as a
+// Walkways of pedestrians: the centre lines of sidewalks (of shoulders on maps without sidewalks) and crosswalks, as a
 // network of straight pieces that are walked in both directions.
 #pragma once
 
@@ -11,13 +11,13 @@ namespace pictura {
 
 struct Walkways {
   std::vector<WalkPiece> pieces;     // in pairs, one per direction
-  std::vector<float> end_m;          // [pieces] running sum of their lengths
-  std::vector<int32_t> leave_begin;  // [nodes + 1] of `leaving`
+  std::vector<float> end_m;          // [pieces] running sum of lengths
+  std::vector<int32_t> leave_begin;  // [nodes + 1] into `leaving`
   std::vector<int32_t> leaving;      // pieces that leave each node
 };
 
-/// Pieces on the drivable surface of `roads` (its lanes and their cells) are left out, except on crosswalks; so are
-/// networks of less than kMinWalk_m. Empty where the map has nowhere to walk.
+/// Makes the walkways of a map. Pieces on the drivable surface of `roads` (its lanes and their cells) are omitted,
+/// except on crosswalks; so are networks shorter than kMinWalk_m. Empty where the map has no walkways.
 Walkways make_walkways(const RoadMap& map, const MapView& roads);
 
 constexpr float kMinWalk_m = 40.0f;

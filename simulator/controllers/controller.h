@@ -1,4 +1,4 @@
-// Who drives: the one interface of everything that commands agents (random, idle, lane keeping, policies, logs).
+// Common interface of everything that commands agents: random and idle controllers, lane keeping, policies, logs.
 #pragma once
 
 #include <string_view>
@@ -9,7 +9,7 @@
 
 namespace pictura {
 
-/// Chooses a command for every slot. It belongs to one simulator and works in that one's memory.
+/// Chooses a command for every slot. A controller belongs to one simulator and works in that simulator's memory.
 class Controller {
  public:
   Controller() = default;
@@ -19,11 +19,11 @@ class Controller {
 
   virtual std::string_view name() const = 0;
 
-  /// Writes commands_out [slots] for the step after the state that `input` shows, but where mask [slots] is 0: those
-  /// stay as they are, so that controllers can share a simulator; an empty mask commands all. Commands of inactive
-  /// agents mean nothing. On a device all lie there, the work is put on the stream without waiting or allocating, and a
-  /// CUDA graph can capture it, unless the name ends in "on the host"; on the host it is done on return. Throws Error
-  /// when an array is of another size than the simulator's slots.
+  /// Writes commands_out [slots] for the step after the state in `input`. Commands of slots with mask [slots] 0 are
+  /// left unchanged, so that controllers can share a simulator; an empty mask commands all slots. Commands of inactive
+  /// agents have no meaning. On a device, all arrays lie on the device, and work is put on the stream without waiting
+  /// or allocating; a CUDA graph can capture it, unless the name ends in "on the host". On the host the call is
+  /// synchronous. Throws Error when an array's size differs from the simulator's number of slots.
   virtual void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out,
                    Stream stream = {}) = 0;
 };

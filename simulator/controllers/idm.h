@@ -1,5 +1,5 @@
-// The intelligent driver model along recorded paths, or along lanes: traffic that goes where it went, or where its
-// lanes lead, and stops behind what is in its way. On the host only.
+// Intelligent driver model along recorded paths or along lanes. Traffic follows its path and stops behind obstacles in
+// its way. Host only.
 #pragma once
 
 #include <cmath>
@@ -13,8 +13,8 @@
 
 namespace pictura {
 
-/// Treiber, Hennecke and Helbing, Congested traffic states in empirical observations and microscopic simulations
-/// (2000); the values are those of Waymax' agents that follow waypoints.
+/// Parameters of the model of Treiber, Hennecke and Helbing, Congested traffic states in empirical observations and
+/// microscopic simulations (2000). The values are those of Waymax's waypoint-following agents.
 struct IdmParameters {
   float wanted_mps = 30;
   float min_gap_m = 2;
@@ -24,22 +24,22 @@ struct IdmParameters {
   float look_ahead_m = 10;
 };
 
-/// By how much to change the speed, for a gap to the one in front (infinite: nobody) and its speed.
+/// Acceleration for a gap to the road user in front (infinite: none) and the speed of that road user.
 float idm_acceleration(const IdmParameters& parameters, float speed_mps, float gap_m, float front_mps);
 
-/// Where an agent goes: places of its reference point, each at least kMinPiece_m from the one before, and its heading
-/// there.
+/// Path of an agent: places of its reference point, each at least kMinPiece_m from the previous place, with headings.
 struct FollowedPath {
   static constexpr float kMinPiece_m = 0.5f;
   std::vector<Vec3> points_m;
   std::vector<float> heading_rad;
-  std::vector<float> s_m;  // along it
-  bool ends = true;        // false: lanes go on beyond it
+  std::vector<float> s_m;  // arc length along the path
+  bool ends = true;        // false: lanes continue beyond the path
 
-  /// Adds a place, unless it is too near to the last one.
+  /// Adds a place, unless it is too near to the last place.
   void add(Vec3 point_m, float its_heading_rad);
   float length_m() const { return s_m.back(); }
-  /// The place nearest to p on the pieces from `from_s_m` on, or that end just before it.
+  /// Returns the arc length of the place nearest to p, on the pieces from `from_s_m` on and the piece that ends just
+  /// before.
   float nearest_m(Vec2 p, float from_s_m) const;
   struct Pose {
     Vec3 position_m;
@@ -48,21 +48,23 @@ struct FollowedPath {
   Pose at(float s_m) const;
 };
 
-/// From a pose onto the centre line of the lane, and along it and those that follow, at forks the straightest way, for
-/// kAhead_m or to where lanes end. Of lanes from which a route goes on for ever, others do not follow. A lane without
-/// successors is left for the nearest lane beside it that has some; without room for that, the path ends where the
-/// front bumper, front_m ahead of the reference point, is before the lane's end. From no lane (-1) the pose alone.
+/// Returns a path from a pose onto the centre line of the lane and along the lanes that follow, for kAhead_m or to the
+/// end of the lanes. The path takes the straightest way at forks. After endless lanes, only endless lanes follow. At a
+/// lane without successors, the path changes to the nearest lane beside it with successors. Without room for that, the
+/// path ends where the front bumper, front_m ahead of the reference point, is before the lane's end. Without a lane
+/// (-1), the path is the pose alone.
 FollowedPath path_along_lanes(const MapView& map, int32_t lane, Vec3 position_m, float heading_rad, float front_m);
 
 enum class IdmPaths {
-  logged,  // recorded ones; where there is no record, as in towns, along lanes
-  lanes,   // for vehicles and cyclists, always
+  logged,  // recorded paths; without a record, as in towns, along lanes
+  lanes,   // along lanes for all vehicles and cyclists
 };
 
-/// Puts every agent that it commands farther along its path, by kinematic states: at the speed of the model behind the
-/// first box that its own touches within look_ahead_m of the path. It starts from where the agent is and at its speed,
-/// and stops at the path's end. Along lanes it wants the lane's limit at most, and a line whose light is red, or yellow
-/// where it can still brake, is in front of it as a box that stands is. Pedestrians without a record stand.
+/// Moves every commanded agent along its path by kinematic states. The speed follows the model behind the first box
+/// that the agent's box would touch within look_ahead_m of the path. The motion starts from the agent's current place
+/// and speed, and stops at the path's end. Along lanes, the lane's limit bounds the desired speed. A line with a red
+/// light, or with a yellow light before which the agent can still brake, counts as a standing box. Pedestrians without
+/// a record stand still.
 class IdmController final : public Controller {
  public:
   explicit IdmController(const Simulator& simulator, IdmPaths paths = IdmPaths::logged,
@@ -84,12 +86,12 @@ class IdmController final : public Controller {
   IdmPaths wanted_paths_;
   IdmParameters parameters_;
   float dt_s_;
-  std::vector<std::shared_ptr<const CompiledMap>> maps_;  // they own what the views show
+  std::vector<std::shared_ptr<const CompiledMap>> maps_;  // own the arrays of the views
   std::vector<MapView> views_;                            // [worlds]
   std::vector<FollowedPath> paths_;                       // [slots]
-  std::vector<uint8_t> on_lanes_;                         // [slots] whether its path is along lanes
-  std::vector<float> progress_m_;                         // [slots] at the last act(), where the next one looks for it
-  std::vector<int32_t> life_;                             // [slots] of the agent at the last act()
+  std::vector<uint8_t> on_lanes_;                         // [slots] whether the agent's path is along lanes
+  std::vector<float> progress_m_;                         // [slots] at the last act(); the next search starts there
+  std::vector<int32_t> life_;                             // [slots] life of the agent at the last act()
 };
 
 }  // namespace pictura

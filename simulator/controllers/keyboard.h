@@ -1,4 +1,4 @@
-// Driving by hand: which action of the policy's space a person's keys ask for.
+// Manual driving: the mapping from keys to actions of the policy's space.
 #pragma once
 
 #include <cstdint>
@@ -7,16 +7,17 @@
 
 namespace pictura {
 
-/// What is held down. Without a key the agent keeps its speed and straightens.
+/// State of the keys. Without a key, the agent keeps its speed and straightens.
 struct DrivingKeys {
-  bool forward = false;   // speeds up
-  bool backward = false;  // brakes, and at rest begins to reverse
-  bool stop = false;      // brakes as hard as it may, and stays at rest
+  bool forward = false;   // accelerates
+  bool backward = false;  // brakes, and at rest starts to reverse
+  bool stop = false;      // brakes at the maximum, and stays at rest
   bool left = false, right = false;
   bool operator==(const DrivingKeys&) const = default;
 };
 
-/// The action that brings the acceleration of a slot nearest to what the keys ask for, after a step of dt_s.
+/// Returns the action after which, at the end of a step of dt_s, the slot's acceleration is nearest to the keys'
+/// request.
 int32_t action_of_keys(const DrivingKeys& keys, const AgentStateView& state, int slot, float dt_s);
 
 }  // namespace pictura

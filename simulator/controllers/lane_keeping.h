@@ -1,7 +1,7 @@
-// The lane keeper: a controller for vehicles and cyclists among others. It goes where its waypoints lead, stops at red
-// lights and behind others, even if those halt at once, and gives way where it changes lanes. It pursues the path of
-// its lanes, and where that would leave the road, since long cars cut corners, it follows a plan that does not. Where
-// there is none it stops. On the host only.
+// The lane keeper: a controller for vehicles and cyclists in traffic. It follows its waypoints, stops at red lights and
+// behind other road users, even if these halt at once, and gives way when it changes lanes. It pursues the path of its
+// lanes. Where that would leave the road, since long cars cut corners, it follows a plan that stays on the road;
+// without a plan, it stops. Host only.
 #pragma once
 
 #include <array>
@@ -23,30 +23,30 @@ struct SimulatorSetup;
 /// Drives one vehicle or cyclist of a world through one life.
 class LaneKeepingAgent {
  public:
-  /// `world` shows the simulator's agents and lights as they are at every act(), and has not been stepped in this
-  /// life yet; the graph is its map's. Its arrays and the graph must outlive this. `search_nodes` are what the slot's
-  /// life before left.
+  /// `world` refers to the simulator's agents and lights, which are current at every act(), and must not have been
+  /// stepped in this life yet. The graph is that of the world's map. The arrays of the world and the graph must outlive
+  /// this object. `search_nodes` are the nodes that the slot's previous life left.
   LaneKeepingAgent(const WorldView& world, int agent, const LaneGraph& graph, size_t search_nodes = kMaxSearchNodes);
 
-  /// The action for what the agent and the lights are now.
+  /// Returns the action for the current state of agents and lights.
   int32_t act();
   int32_t life() const { return life_; }
-  /// How many nodes its searches may still make.
+  /// Remaining number of nodes for its searches.
   size_t search_nodes() const { return search_nodes_; }
-  /// Steps in which it waited at a red light.
+  /// Number of steps of waiting at a red light.
   int stops() const { return stops_; }
-  /// Steps in which its rear axle was more than kAstray_m from its path.
+  /// Number of steps with the rear axle more than kAstray_m from the path.
   int steps_astray() const { return steps_astray_; }
   static constexpr float kAstray_m = 1;
 
  private:
-  // A node takes 1 to 4 us. Where roads end an agent's search takes at most 10 ms a step; a few vehicles then find no
-  // way round the tightest ends (docs/research/public_maps.md). In towns, where a way may need 130,000 nodes, searches
-  // take at most 1 ms a step in the mean of a long run, and .9 s in a single step.
+  // A node takes 1 to 4 us. Where roads end, an agent's search takes at most 10 ms per step; a few vehicles then find
+  // no way round the tightest ends (docs/research/public_maps.md). In towns, where a way may need 130,000 nodes,
+  // searches take at most 1 ms per step in the mean of a long run, and 0.9 s in a single step.
   static constexpr size_t kMaxSearchNodes = 300'000, kMaxSearchNodesOfOpen = 2'000, kSearchNodesPerStep = 500,
                           kMinSearchNodes = 20'000;
 
-  enum class Driving { pursues, brakes, brakes_straight };  // the path; on the path; without steering
+  enum class Driving { pursues, brakes, brakes_straight };  // along the path; on the path; without steering
 
   void follow_goals();
   void plan();
@@ -75,31 +75,31 @@ class LaneKeepingAgent {
   const int32_t life_;
   const DrivenAgent agent_;
   std::array<RoutePoint, kNumWaypoints> waypoints_;
-  int32_t chain_ = -1;  // whose waypoints these are
+  int32_t chain_ = -1;  // chain of these waypoints
   LanePath path_;
-  size_t place_ = 0;                           // the point of the path nearest to it
-  std::array<size_t, kNumWaypoints> goals_{};  // the points where the waypoints are
+  size_t place_ = 0;                           // index of the nearest point of the path
+  std::array<size_t, kNumWaypoints> goals_{};  // indices of the waypoints' points on the path
   DrivingPlan plan_;
-  size_t next_planned_ = 0;  // of its actions
+  size_t next_planned_ = 0;  // index into the plan's actions
   const size_t max_search_nodes_;
   size_t search_nodes_;
-  size_t min_search_nodes_ = 0;  // of these, to begin the next search
-  bool halts_ = false;           // before it would leave the road, until it knows a way on
+  size_t min_search_nodes_ = 0;  // minimum of search_nodes_ to begin the next search
+  bool halts_ = false;           // halts before leaving the road, until a way is found
   int stops_ = 0, steps_astray_ = 0;
 };
 
 /// Drives all vehicles and cyclists of a simulator; pedestrians stand still.
 class LaneKeepingController final : public Controller {
  public:
-  /// Of the simulator it reads configuration, maps and worlds, wherever that computes. act() takes host memory.
+  /// Reads the simulator's configuration, maps and worlds, on any executor. act() takes host memory.
   explicit LaneKeepingController(const Simulator& simulator);
   ~LaneKeepingController() override;
 
   std::string_view name() const override { return "lane"; }
-  /// Throws Error besides where a world is in the middle of an episode whose first step this has not seen.
+  /// Also throws Error where a world is in the middle of an episode whose first step this controller has not seen.
   void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out,
            Stream stream = {}) override;
-  /// Null for pedestrians, for the absent, and before the first act().
+  /// Returns null for pedestrians, for absent agents, and before the first act().
   const LaneKeepingAgent* agent(size_t slot) const { return agents_[slot].get(); }
 
  private:
@@ -108,8 +108,8 @@ class LaneKeepingController final : public Controller {
 
   std::unique_ptr<SimulatorSetup> setup_;                  // a copy, for its maps and rule options
   std::vector<std::unique_ptr<LaneGraph>> graphs_;         // [maps]
-  std::vector<int32_t> episode_;                           // [worlds] the one that agents_ drive, or -1
-  std::vector<std::optional<WorldView>> views_;            // [worlds] of that episode
+  std::vector<int32_t> episode_;                           // [worlds] episode that agents_ drive, or -1
+  std::vector<std::optional<WorldView>> views_;            // [worlds] views of that episode
   std::vector<std::unique_ptr<LaneKeepingAgent>> agents_;  // [slots]
 };
 

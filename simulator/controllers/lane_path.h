@@ -1,5 +1,5 @@
-// The path of a lane-keeping agent: the centre lines of the lanes through its waypoints, lane changes drawn out, and
-// how fast its curves can be driven.
+// Path of a lane-keeping agent: the centre lines of the lanes through its waypoints, with gradual lane changes, and the
+// speeds at which its curves can be driven.
 #pragma once
 
 #include <cstddef>
@@ -11,14 +11,14 @@
 
 namespace pictura {
 
-/// A lane change draws nearer to its lane along a smooth step.
+/// A lane change: the lateral offset from the new lane decreases along a smooth step.
 struct LaneChange {
-  float aside_m = 0;   // to the left of the lane where it begins
+  float aside_m = 0;   // initial offset to the left of the new lane
   float length_m = 1;  // along the lane
-  float done_m = 1;    // of this
+  float done_m = 1;    // completed part of length_m
 
   float aside_now_m() const;
-  float slope() const;  // of the way against the lane
+  float slope() const;  // slope of the way relative to the lane
 };
 
 struct PathPoint {
@@ -26,14 +26,14 @@ struct PathPoint {
   LaneChange change;
   Vec3 position_m;
   float heading_rad = 0;
-  float speed_mps = 0;  // at most
+  float speed_mps = 0;  // maximum
 };
 
-/// The index of the point nearest to a place, from `from` on for so long as the path comes nearer.
+/// Returns the index of the point nearest to a place: the search goes on from `from` as long as points get nearer.
 size_t nearest_point(const std::vector<PathPoint>& path, size_t from, Vec2 place_m);
 
-/// Points every kSpacing_m along the route. The graph is that of the view's map; it and the view's arrays must
-/// outlive the path.
+/// Points every kSpacing_m along the route. `graph` is the graph of the view's map; the graph and the view's arrays
+/// must outlive the path.
 class LanePath {
  public:
   static constexpr float kSpacing_m = 0.5f;
@@ -42,18 +42,18 @@ class LanePath {
 
   const std::vector<PathPoint>& points() const { return points_; }
 
-  /// Forgets what comes after point `last`.
+  /// Removes the points after point `last`.
   void cut(size_t last);
-  /// Goes on to a place; false where no route leads there, or where lane changes lack room, also after detours: then it
-  /// has gone on somewhere.
+  /// Extends the path to a place. Returns false where no route leads there, or where lane changes lack room even with
+  /// detours; the path is then extended elsewhere.
   bool go_to(RoutePoint to);
-  /// Goes on for so long as lanes do, at forks the straightest way; from a lane that ends it changes to one that goes
-  /// on.
+  /// Extends the path as far as lanes continue, taking the straightest way at forks. From a lane that ends, it changes
+  /// to a lane that continues.
   void go_on(float distance_m);
-  /// Whether the way parts within so far from the end. Where a road ends it does not.
+  /// Whether a fork lies within this distance of the path's end. The end of a road is not a fork.
   bool forks_within(float distance_m) const;
-  /// Gives every point the speed at which its curve, and by slowing down those ahead, can be driven. Point `slow` is
-  /// passed at slow_mps at most.
+  /// Sets the speed limit of every point from its curve and, by braking, from the points ahead. Point `slow` has a
+  /// limit of at most slow_mps.
   void limit_speeds(size_t slow, float slow_mps);
 
  private:
@@ -72,7 +72,7 @@ class LanePath {
   MapView map_;
   const LaneGraph* graph_;
   std::vector<PathPoint> points_;
-  // Its end:
+  // End of the path:
   RoutePoint at_;
   LaneChange change_;
   float to_next_m_ = kSpacing_m;

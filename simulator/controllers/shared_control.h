@@ -10,24 +10,25 @@
 
 namespace pictura {
 
-/// A controller and the slots that it commands: all, or those whose mask [slots] is not 0.
+/// A controller and the slots that it commands: all slots, or those with nonzero mask [slots].
 struct Driver {
   std::unique_ptr<Controller> controller;
   Span<const uint8_t> mask;                 // in the simulator's memory
-  std::shared_ptr<const void> mask_memory;  // what holds it, if anything must
+  std::shared_ptr<const void> mask_memory;  // owner of the mask's memory, if any
 };
 
-/// With a mask on the host.
+/// Makes a driver with a mask on the host.
 Driver driver_of(std::unique_ptr<Controller> controller, std::vector<uint8_t> mask);
 
-/// Lets all drivers command in their order: of two that command a slot, the later one drives. It is captured in graphs
-/// as they are. The mask of act() leaves out more slots; it must be empty where drivers have masks of their own.
+/// Runs all drivers in their order: where two drivers command a slot, the later one prevails. It can be captured in
+/// graphs if all drivers can. The mask of act() excludes further slots; it must be empty where drivers have masks of
+/// their own.
 class SharedControl final : public Controller {
  public:
-  /// Throws UsageError where there is no driver.
+  /// Throws UsageError for an empty list of drivers.
   explicit SharedControl(std::vector<Driver> drivers);
 
-  /// Their names, with commas between them.
+  /// Names of the drivers, separated by commas.
   std::string_view name() const override { return name_; }
   void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out,
            Stream stream = {}) override;

@@ -1,4 +1,4 @@
-// How to drive where a path cannot be followed without leaving the road: a search over the agent's own motions, which
+// Search for a way where a path cannot be followed without leaving the road. The search over the agent's own motions
 // swings out before tight curves and keeps clear of kerbs.
 #pragma once
 
@@ -10,19 +10,20 @@
 
 namespace pictura {
 
-/// Plans slow down to this speed, and steer one way for so many steps.
+/// Speed to which plans slow down, and number of steps with constant steering.
 constexpr float kPlannedSpeed_mps = 2;
 constexpr size_t kStrideSteps = 4;
 
 struct DrivingPlan {
   std::vector<int32_t> actions;  // of the coming steps
-  bool is_clear = false;         // as far as plans go, or out by an exit; else only until it leaves the road
+  bool is_clear = false;  // clear to the horizon or out through an exit; otherwise it ends where it leaves the road
 };
 
-/// The cheapest way along the path, from the agent's motion now, at point `place`: it strays little from the path and
-/// seldom comes near the edge of the road. Hybrid A* without a heuristic (Dolgov et al., Path planning for autonomous
-/// vehicles in unknown semi-structured environments, 2010): motions are exact, and of those that are alike one is kept.
-/// Takes the nodes that it makes from *nodes_left_inout; without any left, the plan is the farthest way found.
+/// Finds the cheapest way along the path from the agent's current motion, at point `place`: with little deviation from
+/// the path and seldom near the edge of the road. Hybrid A* without a heuristic (Dolgov et al., Path planning for
+/// autonomous vehicles in unknown semi-structured environments, 2010): motions are exact, and one of several similar
+/// motions is kept. Subtracts the nodes that it makes from *nodes_left_inout; when none are left, the plan is the
+/// farthest way found.
 DrivingPlan search_steering(const DrivenAgent& agent, const std::vector<PathPoint>& path, size_t place,
                             size_t* nodes_left_inout);
 

@@ -1,5 +1,5 @@
-// Boxes that are put into a world one after the other, by the cells of their centres: what stands near a place is found
-// without a look at all of them. The same code on both devices.
+// Boxes added to a world one by one, indexed by the cells of their centres, so that boxes near a place are found
+// without a search of all boxes. Shared by both devices.
 #pragma once
 
 #include "pictura/common/cells_around.h"
@@ -7,9 +7,9 @@
 
 namespace pictura {
 
-/// A chain of boxes for each cell, which begins with the box added last; -1 ends it.
+/// A chain of boxes per cell, starting with the box added last; -1 ends a chain.
 struct BoxChains {
-  GridView cells;            // their place and size; without items
+  GridView cells;            // place and size of the cells; without items
   int32_t* first = nullptr;  // [cells.num_x * cells.num_y]
   int32_t* next = nullptr;   // [boxes]
 
@@ -17,7 +17,7 @@ struct BoxChains {
   PICTURA_HD int32_t* first_at(Vec2 p) const { return first + cells.cell_y(p.y) * cells.num_x + cells.cell_x(p.x); }
 };
 
-/// Cells of at least min_cell_m for the chains of num_boxes boxes over a rectangle, no more of them than boxes.
+/// Cells of at least min_cell_m for the chains of num_boxes boxes over a rectangle, at most as many cells as boxes.
 PICTURA_HD inline GridView chain_cells(Vec2 low_m, Vec2 high_m, int num_boxes, float min_cell_m) {
   const float extent_m = max_of(max_of(high_m.x - low_m.x, high_m.y - low_m.y), min_cell_m);
   int side = 1;
@@ -25,19 +25,19 @@ PICTURA_HD inline GridView chain_cells(Vec2 low_m, Vec2 high_m, int num_boxes, f
   return {low_m, extent_m / static_cast<float>(side), side, side, {}, {}};
 }
 
-/// Adds a box that stands at a place to its chain. exchange(value, other) stores the other value and returns the
-/// one before; where threads add boxes at once, as one operation.
+/// Adds a box at a place to its chain. exchange(value, other) stores the other value and returns the previous value; it
+/// must be atomic where threads add boxes concurrently.
 template <typename Exchange>
 PICTURA_HD void add_box(const BoxChains& chains, int32_t box, Vec2 center_m, const Exchange& exchange) {
   chains.next[box] = exchange(chains.first_at(center_m), box);
 }
 
-/// Whether test(box) holds for any box within reach_m of a place; boxes that are farther may be tested too. The threads
-/// of a group take the cells in turn.
+/// Whether test(box) holds for any box within reach_m of a place; farther boxes may be tested too. The threads of a
+/// group share the cells.
 template <typename ThreadGroup, typename Test>
 PICTURA_HD bool any_box_near(const BoxChains& chains, Vec2 p, float reach_m, const ThreadGroup& group,
                              const Test& test) {
-  constexpr float kLeeway_m = 0.1f;  // more than sums of coordinates are rounded by
+  constexpr float kLeeway_m = 0.1f;  // exceeds the rounding errors of coordinate sums
   const CellRows range = cells_around(chains.cells, p, reach_m + kLeeway_m);
   const int columns = range.x1 - range.x0 + 1, count = columns * (range.y1 - range.y0 + 1);
   bool found = false;

@@ -1,5 +1,5 @@
-// Contact of oriented boxes: with each other, over the whole step so that nothing tunnels, and with barriers. Who is at
-// fault follows the paper (appendix, metric definitions).
+// Contact of oriented boxes: with each other, over the whole step so that nothing tunnels, and with barriers. Fault is
+// assigned as in the paper (appendix, metric definitions).
 #pragma once
 
 #include "pictura/common/math.h"
@@ -20,7 +20,7 @@ PICTURA_HD inline OrientedBox footprint(const AgentBox& box) {
   return {box.center_m.xy(), {box.cos_heading, box.sin_heading}, 0.5f * box.length_m, 0.5f * box.width_m};
 }
 
-/// The middle of it.
+/// Middle of the box's front bumper.
 PICTURA_HD inline Vec2 front_bumper(const AgentBox& box) {
   return box.center_m.xy() + Vec2{box.cos_heading, box.sin_heading} * (0.5f * box.length_m);
 }
@@ -32,7 +32,7 @@ PICTURA_HD inline float half_extent(const OrientedBox& box, Vec2 axis) {
   return box.half_length_m * fabsf(dot(box.forward, axis)) + box.half_width_m * fabsf(cross(box.forward, axis));
 }
 
-/// Separating axes of two rectangles: touching counts as overlapping.
+/// Separating-axis test of two rectangles; touching counts as overlapping.
 PICTURA_HD inline bool overlap(const OrientedBox& a, const OrientedBox& b) {
   const Vec2 between = b.center_m - a.center_m;
   const Vec2 axes[4] = {a.forward, left_normal(a.forward), b.forward, left_normal(b.forward)};
@@ -46,7 +46,7 @@ PICTURA_HD inline bool same_level(const AgentBox& a, const AgentBox& b) {
   return a.center_m.z < b.center_m.z + b.height_m && b.center_m.z < a.center_m.z + a.height_m;
 }
 
-/// The box on its way from `from` (fraction 0) to `to` (fraction 1). Headings differ by little within a step.
+/// Interpolates a box between `from` (fraction 0) and `to` (fraction 1). Headings differ little within a step.
 PICTURA_HD inline OrientedBox between(const AgentBox& from, const AgentBox& to, float fraction) {
   OrientedBox box = footprint(to);
   const Vec2 start{from.cos_heading, from.sin_heading};
@@ -57,8 +57,8 @@ PICTURA_HD inline OrientedBox between(const AgentBox& from, const AgentBox& to, 
   return box;
 }
 
-/// Whether two boxes that move during a step touch at its end or on the way. The way is cut so finely that the boxes
-/// approach each other by less than the narrower one's width between two tests.
+/// Whether two boxes that move during a step touch on the way or at its end. The way is divided so finely that between
+/// two tests the boxes approach each other by less than the width of the narrower box.
 PICTURA_HD inline bool collide(const AgentBox& a_from, const AgentBox& a_to, const AgentBox& b_from,
                                const AgentBox& b_to) {
   const Vec2 a_path = (a_to.center_m - a_from.center_m).xy();
@@ -76,9 +76,10 @@ PICTURA_HD inline bool collide(const AgentBox& a_from, const AgentBox& a_to, con
   return false;
 }
 
-/// Paper: at fault unless essentially stopped or struck from behind. Struck from behind: not reversing, and before the
-/// step, when the two did not touch yet, the end of the other that was nearer (the middle of its front, unless it backs
-/// up) still lay behind the plane of the own rear bumper. Speed is that of the step.
+/// Whether an agent is at fault (paper): unless it is essentially stopped or struck from behind. An agent that does not
+/// reverse is struck from behind if the nearer end of the other box lay behind the plane of the agent's rear bumper
+/// before the step, when the boxes did not touch yet. That end is the middle of the other box's front, or of its rear
+/// if it backs up. The speed is that of the step.
 PICTURA_HD inline bool at_fault(const AgentBox& own_before, float own_speed_mps, const AgentBox& other_before) {
   constexpr float kStopped_mps = 0.2f;
   if (fabsf(own_speed_mps) < kStopped_mps) return false;
@@ -91,7 +92,7 @@ PICTURA_HD inline bool at_fault(const AgentBox& own_before, float own_speed_mps,
   return nearer_end > rear;
 }
 
-/// Whether the segment a-b touches the box: it is cut to the box's slab along each axis of the box.
+/// Whether the segment a-b touches the box, by clipping the segment to the box's slab along each axis of the box.
 PICTURA_HD inline bool touches(const OrientedBox& box, Vec2 a_m, Vec2 b_m) {
   const Vec2 a = a_m - box.center_m;
   const Vec2 step = b_m - a_m;
@@ -114,8 +115,8 @@ PICTURA_HD inline bool touches(const OrientedBox& box, Vec2 a_m, Vec2 b_m) {
   return true;
 }
 
-/// Whether the box touches any barrier on its level. Boxes are longer than a step's way, so that consecutive ones
-/// overlap and no barrier is passed unnoticed.
+/// Whether the box touches any barrier on its level. Boxes are longer than the way of a step, so that consecutive boxes
+/// overlap and no barrier is passed undetected.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool touches_any(const OrientedBox& box, float z_m, Span<const Barrier> barriers, const GridView& cells,
                             const ThreadGroup& group = {}) {

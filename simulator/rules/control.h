@@ -1,4 +1,4 @@
-// The controllers that need no more than a slot's number, or a table: the same rule on every executor.
+// Controllers that need only a slot's index or a table, with the same rule on every executor.
 #pragma once
 
 #include "pictura/common/rng.h"
@@ -8,7 +8,7 @@
 
 namespace pictura {
 
-/// Uniform over all actions.
+/// Action drawn uniformly from all actions.
 PICTURA_HD inline int32_t random_action(uint64_t seed, uint32_t global_world, int agent, uint32_t step) {
   RandomStream random({.seed = seed,
                        .world = global_world,
@@ -18,13 +18,13 @@ PICTURA_HD inline int32_t random_action(uint64_t seed, uint32_t global_world, in
   return random.below(kNumActions);
 }
 
-/// Steps that a world has taken since its simulator was made, the ones that began episodes included.
+/// Number of steps of a world since its simulator was made, including the steps that began episodes.
 PICTURA_HD inline uint32_t steps_of(const SimulatorTotals& world_totals, int32_t num_agents) {
   return static_cast<uint32_t>(world_totals.slot_steps / num_agents);
 }
 
-/// Random actions, keyed by world, agent in the world, and the steps that the world has taken: no state of its own, so
-/// that a restored simulator is driven on as the saved one.
+/// Random actions, keyed by the world, the agent in the world, and the world's number of steps. They have no state of
+/// their own, so that a restored simulator continues with the same actions.
 struct RandomCommands {
   uint64_t seed;
   SlotTable slots;
@@ -40,12 +40,12 @@ struct RandomCommands {
   }
 };
 
-/// No jerk.
+/// Commands without jerk.
 struct IdleCommands {
   PICTURA_HD Command operator()(size_t) const { return {}; }
 };
 
-/// As recorded.
+/// Commands to follow the record.
 struct RecordedCommands {
   PICTURA_HD Command operator()(size_t) const {
     Command command;
@@ -54,13 +54,13 @@ struct RecordedCommands {
   }
 };
 
-/// Where the actions of a world are in TabledCommands::actions: [agents, num_steps] from `first` on.
+/// Place of a world's actions in TabledCommands::actions: [agents, num_steps] from `first` on.
 struct ActionTable {
   int64_t first = 0;
   int32_t num_steps = 0;
 };
 
-/// By tables, for so many steps of each episode; no jerk after them.
+/// Commands from tables, for num_steps steps of each episode; no jerk afterwards.
 struct TabledCommands {
   SlotTable slots;
   Span<const int32_t> episode_step;  // [worlds]

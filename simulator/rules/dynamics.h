@@ -1,4 +1,4 @@
-// The jerk-controlled kinematic bicycle: actions are longitudinal and lateral jerks, the state moves along an arc about
+// Jerk-controlled kinematic bicycle: actions are longitudinal and lateral jerks, and the state moves along an arc about
 // the rear axle (Gigaflow's dynamics; formulae after the public reference of the paper's vectorised core).
 #pragma once
 
@@ -14,41 +14,41 @@ struct Motion {
   float speed_mps = 0;
   float accel_long_mps2 = 0, accel_lat_mps2 = 0;
   float steer_rad = 0;
-  float jerk_long_mps3 = 0, jerk_lat_mps3 = 0;  // realised in the step
+  float jerk_long_mps3 = 0, jerk_lat_mps3 = 0;  // effective jerks in the step
 };
 
 struct Controls {
   float jerk_long_mps3 = 0, jerk_lat_mps3 = 0;  // lateral: positive to the left
 };
 
-/// Of an action index, long * 3 + lat (paper: 4 x 3 bins).
+/// Controls of an action index, long * 3 + lat (paper: 4 x 3 bins).
 PICTURA_HD constexpr Controls controls_of_action(int action) {
   const float jerk_long[kNumLongActions] = {-15.0f, -4.0f, 0.0f, 4.0f};
   const float jerk_lat[kNumLatActions] = {-4.0f, 0.0f, 4.0f};
   return {jerk_long[action / kNumLatActions], jerk_lat[action % kNumLatActions]};
 }
 
-/// Multipliers of the conditioning, the body, and the world's rules.
+/// Parameters of the dynamics: multipliers of the conditioning, the body, and the world's rules.
 struct DynamicsParameters {
   float throttle = 1, steer = 1, acceleration = 1;
   float wheelbase_m = 2.7f;
   DynamicsRules rules{};
 };
 
-/// What a step adds to the distance driven, at the speed that it reached.
+/// Contribution of a step to the distance driven, at the speed after the step.
 PICTURA_HD inline float driven_m(float speed_mps, float dt_s) { return fabsf(speed_mps) * dt_s; }
 
-/// `value` unless it left `before`'s sign, which stops at zero first.
+/// Clamps `value`, which first stops at zero where its sign differs from that of `before`.
 PICTURA_HD inline float stop_at_zero(float before, float value, float low, float high) {
   return before * value < 0.0f ? 0.0f : clamp(value, low, high);
 }
 
-/// What of a motion is along its heading.
+/// Components of a motion along its heading.
 struct LongitudinalMotion {
   float speed_mps = 0, accel_mps2 = 0;
 };
 
-/// One step of dt_s along the heading, within `limits`.
+/// Advances the longitudinal motion by one step of dt_s, within `limits`.
 PICTURA_HD inline LongitudinalMotion move_along(LongitudinalMotion from, float jerk_mps3,
                                                 const DynamicsParameters& parameters, const ClassLimits& limits,
                                                 float dt_s) {
@@ -62,16 +62,16 @@ PICTURA_HD inline LongitudinalMotion move_along(LongitudinalMotion from, float j
   return to;
 }
 
-/// The largest steering angle. Vehicles longer than their class, which only recordings have, turn as tightly as its
-/// longest.
+/// Maximum steering angle. Vehicles longer than their class, which occur only in recordings, have the minimum turning
+/// radius of its longest vehicle.
 PICTURA_HD inline float max_steer_rad(float wheelbase_m, const ClassLimits& limits) {
   const float longest_m = kWheelbasePerLength * limits.max_length_m;
   if (wheelbase_m <= longest_m) return limits.max_steer_rad;
   return atan_of(tan_of(limits.max_steer_rad) * (wheelbase_m / longest_m));
 }
 
-/// One step of dt_s. Accelerations, speed and steering respect `limits`; the lateral acceleration is written back from
-/// the steering angle that was reached.
+/// Advances a motion by one step of dt_s. Accelerations, speed and steering respect `limits`; the lateral acceleration
+/// is recomputed from the reached steering angle.
 PICTURA_HD inline Motion move(const Motion& from, Controls controls, const DynamicsParameters& parameters,
                               const ClassLimits& limits, float dt_s) {
   constexpr float kMinTurningSpeed_mps = 1.0f;

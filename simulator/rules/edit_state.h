@@ -1,4 +1,4 @@
-// Agents whose state is set from outside: which values can be stepped on, and what follows from them.
+// Agents whose state is set from outside: validation of values, and fields that follow from them.
 #pragma once
 
 #include "pictura/simulator/command.h"
@@ -7,7 +7,7 @@
 
 namespace pictura {
 
-/// The first field of an agent that holds what no simulator writes and cannot be stepped on, or `none`.
+/// Returns the first field of an agent with a value that no simulator writes and that cannot be simulated, or `none`.
 PICTURA_HD inline AgentField invalid_field(const MapView& map, const RuleOptions& options, const AgentStateView& agents,
                                            int slot) {
 #define X(name, type, per_agent, first, comment)                                                      \
@@ -42,7 +42,7 @@ PICTURA_HD inline AgentField invalid_field(const MapView& map, const RuleOptions
   if (fabsf(agents.y_m[slot]) > kMaxCommanded_m) return AgentField::y_m;
   if (fabsf(agents.z_m[slot]) > kMaxCommanded_m) return AgentField::z_m;
   if (fabsf(agents.heading_rad[slot]) > kMaxCommanded_rad) return AgentField::heading_rad;
-  // Who is absent has no body.
+  // Absent agents have no body.
   const bool is_there = has_body(status);
   if (agents.length_m[slot] < 0 || (is_there && agents.length_m[slot] == 0)) return AgentField::length_m;
   if (agents.width_m[slot] < 0 || (is_there && agents.width_m[slot] == 0)) return AgentField::width_m;
@@ -53,7 +53,7 @@ PICTURA_HD inline AgentField invalid_field(const MapView& map, const RuleOptions
   return AgentField::none;
 }
 
-/// The fields of one agent, by themselves.
+/// Fields of one agent, stored by themselves.
 struct AgentRecord {
 #define X(name, type, per_agent, first, comment) type name[per_agent];
   PICTURA_AGENT_FIELDS(X)
@@ -66,7 +66,7 @@ struct AgentRecord {
   }
 };
 
-/// The agent of element i of an edit as it would be, but for what follows.
+/// Returns the agent of element i with the edit applied, except for fields that follow from others.
 PICTURA_HD inline AgentRecord edited_agent(const AgentStateView& agents, const StateEdit& edit, int i) {
   AgentRecord record;
   copy_fields(agents, edit.slots[i], record.view(), 0);
@@ -77,8 +77,8 @@ PICTURA_HD inline AgentRecord edited_agent(const AgentStateView& agents, const S
   return record;
 }
 
-/// What is wrong with an element of an edit, in one word that a host reads whole: a field's number or what follows
-/// them, element and slot.
+/// Fault of an element of an edit, in one word that a host reads atomically: a field's number or one of the constants
+/// below, the element and the slot.
 constexpr int64_t kNothingWrong = -1;
 constexpr int32_t kNoSuchSlot = static_cast<int32_t>(AgentField::none), kSlotAgain = kNoSuchSlot + 1;
 PICTURA_HD constexpr int64_t edit_fault(int32_t what, int32_t element, int32_t slot) {
@@ -89,7 +89,8 @@ PICTURA_HD inline bool has_slot(const StateEdit& edit, int i, int num_slots) {
   return edit.slots[i] >= 0 && edit.slots[i] < num_slots;
 }
 
-/// first_element [slots]: the first element of the edit that names each. world_of(slot) is its WorldView.
+/// Returns the fault of element i. first_element [slots]: first element of the edit for each slot. world_of(slot): its
+/// WorldView.
 template <typename WorldOf>
 PICTURA_HD int64_t find_edit_fault(const StateEdit& edit, int i, int num_slots, const int32_t* first_element,
                                    const WorldOf& world_of) {
@@ -102,8 +103,8 @@ PICTURA_HD int64_t find_edit_fault(const StateEdit& edit, int i, int num_slots, 
   return field == AgentField::none ? kNothingWrong : edit_fault(static_cast<int32_t>(field), i, slot);
 }
 
-/// Puts the agent of element i, in which there is no fault, into its world. It is there at once: nobody meets it on the
-/// way. Returns by how many more agents the world's episode now has.
+/// Writes the agent of element i, which must be without fault, into its world. The agent appears there at once, without
+/// collisions on the way. Returns the change in the number of agents in the world's episode.
 PICTURA_HD inline int apply_edit(const WorldView& world, const StateEdit& edit, int i) {
   const AgentStateView& agents = world.agents;
   const int slot = edit.slots[i], agent = slot - world.first_slot;

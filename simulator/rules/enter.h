@@ -1,28 +1,28 @@
-// Entering a road that ends: agents that left one wait, and come in again where lanes begin and there is room for them.
+// Entry on roads that end: agents that left wait, and enter again where lanes begin and there is room.
 #pragma once
 
 #include "pictura/simulator/rules/spawn.h"
 
 namespace pictura {
 
-constexpr float kEntryInside_m = 0.1f;  // of the rear bumper
+constexpr float kEntryInside_m = 0.1f;  // distance of the rear bumper from the lane's start
 constexpr float kMaxEntry_mps = 8.0f;
 constexpr float kEntryGap_m = 2.0f, kEntryHeadway_s = 2.0f;  // to the next box
 
-/// Whether an agent waits to enter; whoever leaves is still seen in that step.
+/// Whether an agent waits to enter; in the step in which it leaves, its box is still visible.
 PICTURA_HD inline bool waits(const WorldView& world, int agent) {
   return world.agents.status[world.first_slot + agent] == AgentStatus::waiting && !world.boxes[agent].drawn;
 }
 
-/// The entry that an agent draws at the end of this step of the episode. There must be entries.
+/// Returns the entry that an agent draws at the end of this step of the episode. The map must have entries.
 PICTURA_HD inline const Entry& drawn_entry(const WorldView& world, int agent, int step) {
   RandomStream random = agent_stream(world, agent, static_cast<uint32_t>(step), Purpose::entry);
   return world.map.entries[random.below(static_cast<int>(world.map.entries.size()))];
 }
 
-/// The point so far ahead on the way along first successors, at most at its end.
+/// Returns the point at a distance ahead along first successors, or the end of the way.
 PICTURA_HD inline RoutePoint point_ahead(const MapView& map, RoutePoint at, float distance_m) {
-  constexpr int kMaxLanesAhead = 64;  // a bound, not a rule
+  constexpr int kMaxLanesAhead = 64;  // a safety bound
   at.s_m += distance_m;
   for (int i = 0; i < kMaxLanesAhead; ++i) {
     const MapLane& lane = map.lanes[at.lane];
@@ -32,7 +32,7 @@ PICTURA_HD inline RoutePoint point_ahead(const MapView& map, RoutePoint at, floa
   return {at.lane, min_of(at.s_m, map.lanes[at.lane].length_m)};
 }
 
-/// Where the reference point of an agent is that enters on a lane.
+/// Returns the place of the reference point of an agent that enters on a lane.
 PICTURA_HD inline RoutePoint entry_place(const MapView& map, const Entry& entry, AgentClass agent_class,
                                          float length_m) {
   const float to_rear_m = 0.5f * length_m - reference_to_center(agent_class, length_m);
@@ -41,11 +41,11 @@ PICTURA_HD inline RoutePoint entry_place(const MapView& map, const Entry& entry,
 
 /// The next box on a way.
 struct NextBox {
-  float gap_m = 1e9f;   // from the front bumper, to within half a metre below
+  float gap_m = 1e9f;   // from the front bumper, rounded down by at most half a metre
   float speed_mps = 0;  // along the way
 };
 
-/// What is next on the way of an agent whose box stands at `at`, no farther than the largest gap that it must keep.
+/// Finds the next box on the way of an agent whose box is at `at`, up to the maximum gap that the agent must keep.
 template <typename ThreadGroup>
 PICTURA_HD NextBox next_box(const WorldView& world, const AgentBox& own, RoutePoint at, const ThreadGroup& group) {
   constexpr float kStride_m = 0.5f;
@@ -78,7 +78,7 @@ PICTURA_HD NextBox next_box(const WorldView& world, const AgentBox& own, RoutePo
   return group.of_lowest(next.gap_m, next_index, next);
 }
 
-/// Whether an agent with a lower number has entered in this step by an entry of the same turn.
+/// Whether an agent with a lower index has entered in this step through an entry of the same turn.
 template <typename ThreadGroup>
 PICTURA_HD bool is_turn_taken(const WorldView& world, int agent, int step, int32_t turn, const ThreadGroup& group) {
   bool is_taken = false;
@@ -108,7 +108,8 @@ PICTURA_HD void begin_life(const WorldView& world, int agent, int step, RoutePoi
   put_on_route(world, agent, at, speed_mps, group);
 }
 
-/// Brings a waiting agent in at the end of this step of the episode, if there is room where it draws.
+/// Makes a waiting agent enter at the end of this step of the episode, if its drawn entry has room. Returns whether it
+/// entered.
 template <typename ThreadGroup>
 PICTURA_HD bool try_to_enter(const WorldView& world, int agent, int step, const ThreadGroup& group) {
   const AgentStateView& agents = world.agents;
@@ -131,8 +132,8 @@ PICTURA_HD bool try_to_enter(const WorldView& world, int agent, int step, const 
   return true;
 }
 
-/// Lets waiting agents in at the end of this step of the episode, the lowest first, and calls entered(agent) for each
-/// that came in.
+/// Makes waiting agents enter at the end of this step of the episode, lowest index first, and calls entered(agent) for
+/// each that entered.
 template <typename ThreadGroup, typename Entered>
 PICTURA_HD void enter_waiting(const WorldView& world, int step, const ThreadGroup& group, const Entered& entered) {
   if (world.map.entries.empty()) return;

@@ -6,7 +6,7 @@
 
 namespace pictura {
 
-/// Where the results of a step go: arrays over all slots, as StepResult names them.
+/// Destinations of a step's results: arrays over all slots, named as in StepResult.
 struct StepArrays {
   float* reward = nullptr;
   uint8_t* terminated = nullptr;
@@ -21,30 +21,31 @@ PICTURA_HD inline void clear_result(const StepArrays& results, int slot) {
   results.sums[slot] = {};
 }
 
-/// Commands to agents that take no actions are ignored. Without a record nobody can follow it.
+/// Whether a command is valid. Any command to an agent that takes no actions is, because it is ignored; commands to
+/// follow a record need a record.
 template <typename CommandType>
 PICTURA_HD bool accepts(const WorldView& world, int agent, const CommandType& command) {
   if (!takes_actions(world, agent)) return true;
   return is_sound(command) && (has_record(world.map) || !tells_to_follow_record(command));
 }
 
-/// Whether a step of the agent counts and is learned from: it drives, or begins to, is told neither to leave nor to
-/// follow its record, and is neither impaired nor driven by another policy in this episode.
+/// Whether a step of the agent counts and is used for learning: the agent takes actions, the command is neither to
+/// leave nor to follow the record, and in this episode the agent is neither impaired nor driven by another policy.
 template <typename CommandType>
 PICTURA_HD bool takes_part(const WorldView& world, int agent, const CommandType& command) {
   return takes_actions(world, agent) && !tells_to_leave(command) && !tells_to_follow_record(command) &&
          other_of(world, agent) == 0;
 }
 
-/// Whether the agent counts among those that still drive when it is asked whether an episode ends: who follows a
-/// record does, also where that has nothing, and who waits to enter.
+/// Whether the agent counts as driving in the decision whether an episode ends. Agents that follow a record count, even
+/// where the record has no state, and so do agents that wait to enter.
 PICTURA_HD inline bool keeps_episode(const WorldView& world, int agent) {
   const auto status = world.agents.status[world.first_slot + agent];
   return takes_actions(status) || status == AgentStatus::waiting ||
          (status == AgentStatus::absent && has_record(world.map));
 }
 
-/// A command that a step refused, in one word that a host reads whole: slot, kind, and the action of an action.
+/// Rejected command of a step, in one word that a host reads atomically: slot, kind and, for an action, its value.
 constexpr int64_t kNothingRejected = -1;
 PICTURA_HD constexpr int64_t rejected_command(int32_t slot, CommandKind kind, int32_t action) {
   const auto kind_bits = static_cast<int64_t>(static_cast<uint32_t>(kind) < 4 ? static_cast<uint32_t>(kind) : 4u);
@@ -57,7 +58,7 @@ PICTURA_HD constexpr int64_t rejected_command(int32_t slot, const Command& comma
   return rejected_command(slot, command.kind, command.kind == CommandKind::action ? command.action : 0);
 }
 
-/// Draws the episode's cycle of one stop line and shows its first state.
+/// Draws the episode's cycle of one stop line and sets its first state.
 PICTURA_HD inline void begin_light(const WorldView& world, int light) {
   world.light_plans[light] =
       draw_light_plan(world.map.stop_lines[light], light, world.options.light_cycles, world.options.fixed_lights,
@@ -71,7 +72,7 @@ PICTURA_HD inline void count_events(int events, SimulatorTotals* totals_inout){
 #undef X
 }
 
-/// Phase 3 of one agent in the episode's step of this number, from 1: writes its reward and its end.
+/// Phase 3 of one agent in step `step` of the episode, counted from 1: writes its reward and its end.
 PICTURA_HD inline void apply_reward_and_halt(const WorldView& world, int agent, int step, const StepArrays& results) {
   const int slot = world.first_slot + agent;
   const float speed_mps = world.agents.speed_mps[slot];
@@ -81,7 +82,7 @@ PICTURA_HD inline void apply_reward_and_halt(const WorldView& world, int agent, 
   if (drives && first_motion_step == 0 && fabsf(speed_mps) > kRest_mps) first_motion_step = step;
   const float distance_m = results.valid[slot] ? driven_m(speed_mps, world.options.dt_s) : 0.0f;
   StepSums sums{distance_m, apply_reward_and_halt(world, agent)};
-  if (is_other) sums = {};  // nothing of other agents counts
+  if (is_other) sums = {};  // other agents are not counted
   results.sums[slot] = sums;
   results.reward[slot] = sums.reward_terms.total();
   results.terminated[slot] = results.valid[slot] && !is_active(world, agent) && !has_left(world, agent);
@@ -102,9 +103,9 @@ PICTURA_HD inline void count_agent(const WorldView& world, int agent, const Step
   count_events(world.agents.events[slot], totals_inout);
 }
 
-/// Steps after which the world's episode ends, if nothing ends it before: episode_steps of the options. Of staggered
-/// worlds the first episode has U{64, ..., episode_steps} steps instead, drawn per world, so that worlds which begin
-/// together do not end together for ever. Where episode_steps is at most 64 all episodes are whole.
+/// Steps after which the world's episode ends unless it ends earlier: episode_steps of the options. In staggered
+/// worlds, the first episode instead has U{64, ..., episode_steps} steps, drawn per world, so that worlds that begin
+/// together do not always end together. With episode_steps of at most 64, all episodes have full length.
 PICTURA_HD inline int max_steps_of(const WorldView& world) {
   constexpr int kMinSteps = 64;
   const int episode_steps = world.options.episode_steps;
@@ -113,16 +114,16 @@ PICTURA_HD inline int max_steps_of(const WorldView& world) {
   return kMinSteps + random.below(episode_steps - kMinSteps + 1);
 }
 
-/// After `steps` steps, with `spawned` agents of which `active` still drive: time is up, too many are inactive, or
-/// there is nobody.
+/// Whether an episode ends after `steps` steps, with `spawned` agents of which `active` still drive: the time is up,
+/// too many agents are inactive, or there are no agents.
 PICTURA_HD inline bool episode_ends(const WorldView& world, int steps, int spawned, int active) {
   if (steps >= max_steps_of(world) || spawned == 0) return true;
   const float inactive = static_cast<float>(spawned - active);
   return inactive >= world.options.reset_inactive_fraction * static_cast<float>(spawned);
 }
 
-/// Once it is known whether the world's episode ends with this step: cuts off who still drives and who has left, and
-/// counts whose episode, or life, is over.
+/// Finishes a step of an agent once it is known whether the world's episode ends with the step: truncates agents that
+/// still drive and agents that have left, and counts finished episodes and lives.
 PICTURA_HD inline void finish_agent(const WorldView& world, int agent, bool ends, const StepArrays& results,
                                     SimulatorTotals* totals_inout) {
   const int slot = world.first_slot + agent;

@@ -1,5 +1,5 @@
-// Goal chains: three waypoints along the lane network, 20 to 60 m apart along the route, lane changes included; and
-// when a waypoint is passed. The route goes only where it never ends; on open maps it ends before the lanes do.
+// Goal chains: three waypoints along the lane network, 20 to 60 m apart along the route, lane changes included, and the
+// test whether a waypoint is passed. Routes use endless lanes only; on open maps they end before the lanes do.
 #pragma once
 
 #include "pictura/common/rng.h"
@@ -9,13 +9,13 @@ namespace pictura {
 
 constexpr float kMinWaypointGap_m = 20.0f, kMaxWaypointGap_m = 60.0f;
 constexpr float kLaneChangeChance = 0.25f;
-/// Waypoints count on their level only.
+/// Maximum height difference to a waypoint at which it can be passed.
 constexpr float kWaypointLevel_m = 4.0f;
-/// The metric Goals counts last waypoints passed within this distance (paper, metric definitions).
+/// Maximum distance at which passing a last waypoint counts for the metric Goals (paper, metric definitions).
 constexpr float kMetricGoalRadius_m = 2.0f;
 
-/// The neighbour of a point, `side` < 0 left, else right, at the same fraction of its lane; the point itself where
-/// there is none.
+/// Returns the neighbour of a point (`side` < 0: left, else right) at the same fraction of its lane; the point itself
+/// if there is none.
 PICTURA_HD inline RoutePoint neighbor_of(const MapView& map, RoutePoint at, int side) {
   const MapLane& lane = map.lanes[at.lane];
   const int32_t neighbor = side < 0 ? lane.left : lane.right;
@@ -23,8 +23,8 @@ PICTURA_HD inline RoutePoint neighbor_of(const MapView& map, RoutePoint at, int 
   return {neighbor, at.s_m * (map.lanes[neighbor].length_m / lane.length_m)};
 }
 
-/// The point beside `at` on the nearest lane that has a successor, by as many lane changes as that takes, of two
-/// equally near lanes on the left one; `at` itself where its own lane has a successor or none beside it has.
+/// Returns the point beside `at` on the nearest lane with a successor, over as many lane changes as needed; of two
+/// equally near lanes, the left. Returns `at` itself where its own lane has a successor, or no lane beside it has one.
 PICTURA_HD inline RoutePoint through_lane(const MapView& map, RoutePoint at) {
   const auto goes_on = [&map](RoutePoint p) { return map.lanes[p.lane].num_successors > 0; };
   RoutePoint left = at, right = at;
@@ -37,10 +37,10 @@ PICTURA_HD inline RoutePoint through_lane(const MapView& map, RoutePoint at) {
   return goes_on(left) ? left : right;
 }
 
-/// Walks distance_m along lanes, choosing among successors with equal chance. Where a lane has no successor from which
-/// the route goes on, it changes to the nearest lane that has one. Stops where routes end.
+/// Advances distance_m along lanes, choosing among successors with equal probability. From a lane without a successor
+/// from which the route continues, it changes to the nearest lane with one. Stops where routes end.
 PICTURA_HD inline RoutePoint walk(const MapView& map, RoutePoint at, float distance_m, RandomStream* random_inout) {
-  constexpr int kMaxLanesWalked = 64;  // lanes shorter than a metre in a row: a bound, not a rule
+  constexpr int kMaxLanesWalked = 64;  // a safety bound, for many lanes shorter than a metre
   for (int i = 0; i < kMaxLanesWalked; ++i) {
     const float left_m = map.lanes[at.lane].length_m - at.s_m;
     const float route_end_m = map.lanes[at.lane].route_end_m;
@@ -57,7 +57,7 @@ PICTURA_HD inline RoutePoint walk(const MapView& map, RoutePoint at, float dista
   return {at.lane, map.lanes[at.lane].length_m};
 }
 
-/// The next waypoint of a route: perhaps a lane change, then the gap.
+/// Returns the next waypoint of a route: possibly after a lane change, then after the gap.
 PICTURA_HD inline RoutePoint next_waypoint(const MapView& map, RoutePoint at, RandomStream* random_inout) {
   const float gap_m = random_inout->uniform(kMinWaypointGap_m, kMaxWaypointGap_m);
   const float change = random_inout->uniform();
@@ -65,7 +65,7 @@ PICTURA_HD inline RoutePoint next_waypoint(const MapView& map, RoutePoint at, Ra
   return walk(map, at, gap_m, random_inout);
 }
 
-/// Whether the way from `from` to `to` comes within radius_m of `goal`, on its level.
+/// Whether the way from `from` to `to` comes within radius_m of `goal`, on the level of `goal`.
 PICTURA_HD inline bool passes(Vec3 from, Vec3 to, Vec3 goal, float radius_m) {
   if (fabsf(to.z - goal.z) >= kWaypointLevel_m) return false;
   const Vec2 way = to.xy() - from.xy();

@@ -1,6 +1,6 @@
-// Other agents: which agents of an episode are impaired or driven by other policies, when impairments show, and what
-// they then miss or do. All of it follows from counter-based numbers, so that no state holds it and no observation
-// tells it.
+// Other agents: the agents of an episode that are impaired or driven by other policies, the times at which impairments
+// are active, and their effects. All of it follows from counter-based numbers, so that it is part of neither state nor
+// observations.
 #pragma once
 
 #include "pictura/common/rng.h"
@@ -10,7 +10,8 @@
 
 namespace pictura {
 
-/// Draws what an agent is in an episode: 0, an agent that learns; or one more than the index of a share in OtherShares.
+/// Draws an agent's kind in an episode: 0 for an agent that learns, else one more than the index of a share in
+/// OtherShares.
 PICTURA_HD inline int draw_other(const OtherShares& shares, uint64_t seed, uint32_t world, uint32_t agent,
                                  uint32_t episode) {
   if (shares.sum() <= 0.0f) return 0;
@@ -30,7 +31,7 @@ PICTURA_HD inline int draw_other(const OtherShares& shares, uint64_t seed, uint3
   return 0;
 }
 
-/// What draw_other() says of an agent: its impairment, and its driver: 0 for what drives the simulator, 1 + i for
+/// Impairment and driver of a result of draw_other(). The driver is 0 for the simulator's main policy, and 1 + i for
 /// policy i.
 PICTURA_HD constexpr Impairment impairment_of(int other) {
   return other > kNumImpairments ? Impairment::none : static_cast<Impairment>(other);
@@ -43,8 +44,9 @@ PICTURA_HD inline Impairment draw_impairment(const OtherShares& shares, uint64_t
   return impairment_of(draw_other(shares, seed, world, agent, episode));
 }
 
-/// Whether an agent's impairment shows in what it sees after `step` steps of the episode, and in what it does next.
-/// Inattention lasts; the others show in one spell of U(1, 5) s in every 10 s, which begins anywhere in them.
+/// Whether an agent's impairment is active in its observation after `step` steps of the episode, and in its next
+/// action. Inattention is always active; the others are active in one spell of U(1, 5) s in every 10 s, at a random
+/// time within them.
 PICTURA_HD inline bool shows_at(Impairment impairment, int step, float dt_s, uint64_t seed, uint32_t world,
                                 uint32_t agent, uint32_t episode) {
   constexpr float kPeriod_s = 10.0f, kMinSpell_s = 1.0f, kMaxSpell_s = 5.0f;
@@ -61,13 +63,13 @@ PICTURA_HD inline bool shows_at(Impairment impairment, int step, float dt_s, uin
   return since_begin >= 0 && since_begin < spell_steps;
 }
 
-/// What the views of an agent leave out while this impairment shows.
+/// Objects that an active impairment hides from the views of an agent.
 PICTURA_HD constexpr Hides hidden_by(Impairment shown) {
   if (shown == Impairment::blind) return kHidesAgents;
   return shown == Impairment::inattentive ? kHidesLights : kHidesNothing;
 }
 
-/// The longitudinal jerk of a phantom braking, against the motion. An agent at rest is held there.
+/// Longitudinal jerk of a phantom braking, against the motion. An agent at rest stays at rest.
 PICTURA_HD inline float braking_jerk_mps3(const Motion& motion) {
   const float hardest_mps3 = controls_of_action(0).jerk_long_mps3;
   const float forwards = motion.speed_mps != 0.0f ? motion.speed_mps : motion.accel_long_mps2;

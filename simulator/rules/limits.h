@@ -1,6 +1,6 @@
-// What each class of agent can do and how big it is; docs/explanation/simulator.md prints this table. Vehicle limits
-// are those of the jerk model (reference implementation of the paper's dynamics); those of cyclists and pedestrians are
-// ours.
+// Capabilities and sizes of each class of agent; docs/explanation/simulator.md contains this table. Vehicle limits are
+// those of the jerk model (reference implementation of the paper's dynamics); limits of cyclists and pedestrians are
+// our own.
 #pragma once
 
 #include "pictura/common/color.h"
@@ -25,11 +25,12 @@ PICTURA_HD constexpr ClassLimits class_limits(AgentClass agent_class) {
   }
 }
 
-/// No class is faster. Recorded traffic may be: rules ask the map (MapView::max_speed_mps, max_box_radius_m).
+/// Maximum speed of all classes. Recorded traffic may be faster: rules ask the map (MapView::max_speed_mps,
+/// max_box_radius_m).
 constexpr float kMaxSpeed_mps = 20.0f;
-/// No box of a class has a longer half-diagonal.
+/// Maximum half-diagonal of a box of any class.
 constexpr float kMaxBoxRadius_m = 3.2f;
-/// No step lasts longer: contact with barriers is looked for at its end alone.
+/// Maximum duration of a step: contact with barriers is tested only at its end.
 constexpr float kMaxStep_s = 0.1f;
 
 PICTURA_HD constexpr bool keeps_bounds(const ClassLimits& limits) {
@@ -42,8 +43,8 @@ static_assert(keeps_bounds(class_limits(AgentClass::vehicle)) && keeps_bounds(cl
 
 constexpr float kWheelbasePerLength = 0.6f;
 
-/// From the reference point to the box's centre: the rear axle lies half a wheelbase behind it, except that pedestrians
-/// are referred to by their centre.
+/// Distance from the reference point to the box's centre. The rear axle lies half a wheelbase behind the centre; the
+/// reference point of pedestrians is their centre.
 PICTURA_HD constexpr float reference_to_center(AgentClass agent_class, float length_m) {
   return agent_class == AgentClass::pedestrian ? 0.0f : 0.5f * kWheelbasePerLength * length_m;
 }

@@ -1,5 +1,5 @@
-// What an agent observes, in its own frame (ego_frame.h) and scaled to about [-1, 1]: the table of slots in
-// docs/reference/observation.md.
+// Observations of an agent in its own frame (ego_frame.h), scaled to about [-1, 1]. docs/reference/observation.md
+// tabulates the slots.
 #pragma once
 
 #include "pictura/common/portable/async_copy.h"
@@ -29,9 +29,9 @@ PICTURA_HD inline void observe_ego(const WorldView& world, int slot, float* out)
   out[8] = auxiliary && agents.lane[slot] >= 0 ? cos_of(agents.lane_angle_rad[slot]) : 0.0f;
 }
 
-/// Scaled by the paper's training ranges, whatever the run's own are, so that a policy reads the same number for the
-/// same coefficient everywhere; fixed coefficients read 0. Values below the range, as pedestrians have them, are told
-/// apart down to -2.
+/// Observes the conditioning, scaled by the paper's training ranges whatever the ranges of the run are, so that a
+/// coefficient has the same observed value in all runs; fixed coefficients give 0. Values below the range, as
+/// pedestrians have, are distinguished down to -2.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void observe_conditioning(const WorldView& world, int slot, float* out, const ThreadGroup& group = {}) {
   for (int i = group.rank(); i < kNumConditioning; i += group.size()) {
@@ -43,7 +43,7 @@ PICTURA_HD void observe_conditioning(const WorldView& world, int slot, float* ou
   }
 }
 
-/// The active waypoint first, then those after it; where the chain has no more, its last one again.
+/// Observes the active waypoint and the waypoints after it; beyond the end of the chain, the last waypoint is repeated.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void observe_waypoints(const WorldView& world, int slot, const EgoFrame& frame, float* out,
                                   const ThreadGroup& group = {}) {
@@ -56,26 +56,26 @@ PICTURA_HD void observe_waypoints(const WorldView& world, int slot, const EgoFra
   }
 }
 
-/// The partners of `agent` by distance from its reference point to their box centres: from the nearest cells where
-/// enough stand there, else from all in range; in a crowd, first from some between.
+/// Finds the partners of `agent` by distance from its reference point to their box centres. The nearest cells are
+/// searched if they contain enough boxes, else all cells in range; in a crowd, intermediate ranges are tried first.
 template <typename ThreadGroup>
 PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin, const ThreadGroup& group) {
   using Nearest = typename ThreadGroup::template Nearest<kMaxPartners>;
   const GridView& cells = world.box_cells;
-  constexpr int32_t kFew = 256;  // boxes that are read sooner than the near ones are chosen
+  constexpr int32_t kFew = 256;  // up to this number, reading all boxes is faster than selecting the near ones
   const bool is_crowd = cells.begin[cells.begin.size() - 1] > kFew;
-  // A cell may be wider than what is in sight: a device may have but one.
+  // A cell may be wider than the visible range: a device may have a single cell.
   for (float reach = min_of(cells.cell_m, kPartnerRange_m);;
        reach = is_crowd ? min_of(2.0f * reach, kPartnerRange_m) : kPartnerRange_m) {
     const CellRows range = cells_around(cells, origin, reach);
     const bool is_near = reach < kPartnerRange_m;
     int found = 0;
     for (int y = range.y0; y <= range.y1 && is_near; ++y) found += range.end(cells, y) - range.begin(cells, y);
-    // A half or less of what stands in cells is within reach.
+    // At most half of the boxes in the cells are within reach.
     if (is_near && found < 2 * kMaxPartners) continue;
     Nearest nearest;
     if constexpr (ThreadGroup::kSize == 1) {
-      // Rows follow one another. What stands beside the range is read as well where that costs less than a loop a row.
+      // Rows of cells are contiguous. Boxes beside the range are read too where that costs less than a loop per row.
       const bool at_once = range.end(cells, range.y1) - range.begin(cells, range.y0) <= kFew;
       for (int y = range.y0; y <= range.y1; ++y) {
         const int32_t begin = range.begin(cells, y);
@@ -86,7 +86,7 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
     } else {
       for (int y = range.y0; y <= range.y1; ++y) {
         const int32_t begin = range.begin(cells, y), end = range.end(cells, y);
-        constexpr int kAtOnce = 4;  // whose loads are under way together
+        constexpr int kAtOnce = 4;  // number of loads in flight
         for (int32_t first = begin + group.rank(); first - group.rank() < end; first += kAtOnce * group.size()) {
           int32_t others[kAtOnce];
           Vec2 centers[kAtOnce];
@@ -109,8 +109,7 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
   }
 }
 
-/// As nearest_partners(), of any boxes one after the other: box_at(i) is one of num_boxes, and counts where
-/// is_there(i).
+/// Variant of nearest_partners() for a sequence of boxes: box_at(i) is one of num_boxes, and counts where is_there(i).
 template <typename ThreadGroup, typename BoxAt, typename IsThere>
 PICTURA_HD auto nearest_boxes(int num_boxes, const BoxAt& box_at, const IsThere& is_there, Vec2 origin,
                               const ThreadGroup& group) {
@@ -126,7 +125,7 @@ PICTURA_HD auto nearest_boxes(int num_boxes, const BoxAt& box_at, const IsThere&
   return nearest;
 }
 
-/// The speed of a world's box as others observe it: parked cars have none.
+/// Speed of a world's box as other agents observe it: 0 for parked cars.
 PICTURA_HD inline float observed_speed_mps(const WorldView& world, int box) {
   const bool moves = world.options.auxiliary_observations && box < world.num_agents;
   return moves ? world.agents.speed_mps[world.first_slot + box] : 0.0f;
@@ -145,15 +144,15 @@ PICTURA_HD int observe_partners(const WorldView& world, int agent, const EgoFram
   return count;
 }
 
-/// The pieces of a map that a set of them shows, and which of them can be seen from where the agent is.
+/// Pieces of a map of one kind, and the items that are visible from the agent's place.
 struct PieceList {
   Span<const ObservedPiece> pieces;
   Span<const Vec2> middles;
   Span<const int32_t> items;
 };
 
-/// Lanes, boundaries or walls: of the pieces listed for the ego's cell, the first `capacity` whose middles are in
-/// sight.
+/// Observes lanes, boundaries or walls: of the pieces listed for the ego's cell, the first `capacity` whose middles are
+/// in sight.
 PICTURA_HD inline int observe_pieces(const PieceList& near, const EgoFrame& frame, int capacity, float* out) {
   constexpr int kMaxPieces = max_of(max_of(kMaxLanes, kMaxBoundaries), kMaxWalls);
   int32_t found[kMaxPieces + kFoundBeyond];
@@ -162,14 +161,14 @@ PICTURA_HD inline int observe_pieces(const PieceList& near, const EgoFrame& fram
   return count;
 }
 
-/// Red 1, yellow 0.5, green -1, else 0; in integers, since compilers then need no branches, and the lights around an
-/// agent differ.
+/// Code of a light: red 1, yellow 0.5, green -1, else 0. Computed in integers, so that compilers need no branches: the
+/// lights around an agent differ.
 PICTURA_HD constexpr float light_code(LightState state) {
   const int halves = 2 * (state == LightState::red) + (state == LightState::yellow) - 2 * (state == LightState::green);
   return 0.5f * static_cast<float>(halves);
 }
 
-/// The nearest stop lines: left and right end, height, state, and whether it holds the ego's lane.
+/// Observes the nearest stop lines: left and right end, height, state, and whether the line controls the ego's lane.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD int observe_controls(const WorldView& world, int slot, const NearPlace& place, const EgoFrame& frame,
                                 float* rows, const ThreadGroup& group = {}) {
@@ -203,20 +202,21 @@ PICTURA_HD int observe_controls(const WorldView& world, int slot, const NearPlac
   return count;
 }
 
-/// Whether anybody learns from or acts on the agent's observation: it drives or may begin to, or this is its last one.
+/// Whether the agent's observation is used: the agent drives or may start to, or this is its last observation.
 PICTURA_HD inline bool observes(const WorldView& world, int agent) {
   return takes_actions(world, agent) || has_left(world, agent) ||
          (world.agents.events[world.first_slot + agent] & kInfractions) != 0;
 }
 
-/// Whether the agent's set shows anything, where this is hidden_from() it.
+/// Whether the agent's set may contain entities, given the kinds that are hidden_from() the agent.
 PICTURA_HD inline bool observes_set(const WorldView& world, int agent, EntitySet set, Hides hidden) {
   const bool is_hidden =
       (set == EntitySet::partners && hidden == kHidesAgents) || (set == EntitySet::controls && hidden == kHidesLights);
   return !is_hidden && observes(world, agent);
 }
 
-/// What is no set, to that row of `out`: all zeros for the absent and for those that halted in an earlier step.
+/// Observes everything except sets into a row of `out`: all zeros for absent agents and for agents that halted in an
+/// earlier step.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void observe_own(const WorldView& world, int agent, int row, const ObservationView& out,
                             const ThreadGroup& group = {}) {
@@ -236,12 +236,12 @@ PICTURA_HD void observe_own(const WorldView& world, int agent, int row, const Ob
   for (int i = group.rank(); i < kNumWaypoints * kWaypointFeatures; i += group.size()) waypoints[i] = 0.0f;
 }
 
-/// How many sets are written: all, or all but the walls.
+/// Number of sets that are written: all, or all except walls.
 PICTURA_HD inline int num_observed_sets(const ObservationView& out) {
   return out.walls.empty() ? static_cast<int>(EntitySet::walls) : kNumEntitySets;
 }
 
-/// Where a set of one observation is written.
+/// Destination of a set of one observation.
 struct SetRows {
   float* rows = nullptr;
   int features = 0, capacity = 0;
@@ -280,17 +280,18 @@ PICTURA_HD inline PieceList pieces_near(const MapView& map, const NearPlace& pla
   }
 }
 
-/// Begins to load what pieces_near() lists: the lists of all places do not fit into a core's caches.
+/// Prefetches the list that pieces_near() returns, because the lists of all places exceed a core's caches.
 PICTURA_HD inline void prefetch_list_near(const MapView& map, const NearPlace& place, EntitySet set) {
-  constexpr int kLines = 5, kLineBytes = 64;  // as many as most lists take
+  constexpr int kLines = 5, kLineBytes = 64;  // enough for most lists
   if (set == EntitySet::partners || set == EntitySet::controls) return;
   const int32_t* items = pieces_near(map, place, set).items.data();
   for (int line = 0; line < kLines; ++line) prefetch(items, line * kLineBytes);
 }
 
-/// The observation that each step writes: of all who are there, over the one of the step before.
+/// Observation that each step writes for all present agents, over the observation of the previous step.
 struct StepObservation {
-  /// How many rows may hold more than zeros. The memory is lent to callers, who may have written anything to it.
+  /// Number of rows that may contain values other than zero. Callers have access to the memory and may have written any
+  /// values.
   PICTURA_HD static int num_filled(const SetRows& set) { return min_of(max_of(*set.count, 0), set.capacity); }
   template <typename ThreadGroup>
   PICTURA_HD static int observe_partners(const WorldView& world, int agent, const EgoFrame& frame, float* rows,
@@ -299,7 +300,8 @@ struct StepObservation {
   }
 };
 
-/// One entity set: empty for the absent, for those that halted in an earlier step, and for those that do not see it.
+/// Observes one entity set: empty for absent agents, for agents that halted in an earlier step, and for agents from
+/// which the set is hidden.
 template <typename Observation>
 PICTURA_HD void observe_set(const WorldView& world, int agent, const NearPlace& place, EntitySet set,
                             const SetRows& out, const Observation& observation) {
@@ -320,13 +322,13 @@ PICTURA_HD void observe_set(const WorldView& world, int agent, const NearPlace& 
   *out.count = count;
 }
 
-/// Writes the whole observations of agents [begin, end) of a world; sets if `entity_sets`. Set by set, so that what one
-/// kind is read from stays in the cache.
+/// Writes the whole observations of agents [begin, end) of a world, including sets if `entity_sets`. Sets are written
+/// one kind at a time, so that the data of a kind stays in the cache.
 PICTURA_HD inline void observe(const WorldView& world, int begin, int end, bool entity_sets,
                                const ObservationView& out) {
   for (int agent = begin; agent < end; ++agent) observe_own(world, agent, world.first_slot + agent, out);
   if (!entity_sets) return;
-  constexpr int kBlock = 128, kAhead = 2;  // agents whose places are kept, and how early a list is asked for
+  constexpr int kBlock = 128, kAhead = 2;  // number of agents whose places are kept, and distance of prefetching
   NearPlace places[kBlock];
   for (int first = begin; first < end; first += kBlock) {
     const int count = min_of(kBlock, end - first);

@@ -1,4 +1,4 @@
-// What an agent would observe if some boxes were not there and others were: a world's observation with other partners.
+// Hypothetical observations: a world's observation without some boxes and with additional boxes as partners.
 #pragma once
 
 #include "pictura/simulator/observation_query.h"
@@ -6,7 +6,7 @@
 
 namespace pictura {
 
-/// The observation that one query asks for, in a row that may hold anything.
+/// Observation of one query, in a row that may contain any values before.
 class QueriedObservation {
  public:
   PICTURA_HD QueriedObservation(const ObservationQueries& asked, const ObservationQuery& query)
@@ -49,8 +49,8 @@ class QueriedObservation {
     return false;
   }
 
-  /// As pictura::nearest_partners(), of all boxes but those left out, and of the inserted ones, whose items follow the
-  /// world's.
+  /// Variant of pictura::nearest_partners() for all boxes except the hidden ones, and for the inserted boxes, whose
+  /// items follow the world's items.
   template <typename ThreadGroup>
   PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin, const ThreadGroup& group) const {
     const auto box_at = [&](int item) -> const AgentBox& {
@@ -67,14 +67,13 @@ class QueriedObservation {
   bool leaves_gaps_ = false;
 };
 
-/// The counts of sets that no simulator of this configuration writes.
+/// Clears the counts of sets that simulators of this configuration do not write.
 PICTURA_HD inline void clear_other_counts(const ObservationView& out, int row) {
   int32_t* counts = out.set_counts.data() + static_cast<size_t>(row) * kNumEntitySets;
   for (int set = num_observed_sets(out); set < kNumEntitySets; ++set) counts[set] = 0;
 }
 
-/// Writes the whole observation that a query, in which there is no fault, asks of its slot's world; sets if
-/// `entity_sets`.
+/// Writes the whole observation of a query, which must be without fault, including sets if `entity_sets`.
 PICTURA_HD inline void answer_query(const WorldView& world, const ObservationQueries& asked, int i, bool entity_sets) {
   const ObservationQuery& query = asked.queries[i];
   const int agent = query.slot - world.first_slot;
@@ -89,7 +88,7 @@ PICTURA_HD inline void answer_query(const WorldView& world, const ObservationQue
   clear_other_counts(asked.out, i);
 }
 
-/// What is wrong with a query, in one word that a host reads whole: what, which query, and the value.
+/// Fault of a query, in one word that a host reads atomically: its kind, the query, and the value.
 enum class QueryFault : int32_t {
   slot,
   hidden_begin,
@@ -100,19 +99,19 @@ enum class QueryFault : int32_t {
   inserted_box
 };
 constexpr int64_t kNoQueryFault = -1;
-constexpr int kMaxQueries = 1 << 24;  // of one call
+constexpr int kMaxQueries = 1 << 24;  // per call
 PICTURA_HD constexpr int64_t query_fault(QueryFault what, int32_t query, int32_t value) {
   return (int64_t{static_cast<int32_t>(what)} << 56) | (int64_t{query} << 32) | static_cast<uint32_t>(value);
 }
 
-/// Whether all that is observed of a box are numbers.
+/// Whether all observed values of a box are finite.
 PICTURA_HD inline bool is_sound(const InsertedBox& one) {
   const AgentBox& box = one.box;
   return is_finite(box.center_m) && is_finite(box.cos_heading) && is_finite(box.sin_heading) &&
          is_finite(box.length_m) && is_finite(box.width_m) && is_finite(box.height_m) && is_finite(one.speed_mps);
 }
 
-/// world_of(slot) is its WorldView.
+/// Returns the fault of query i. world_of(slot) must return the WorldView of the slot's world.
 template <typename WorldOf>
 PICTURA_HD int64_t find_query_fault(const ObservationQueries& asked, int i, int num_slots, const WorldOf& world_of) {
   const ObservationQuery& query = asked.queries[i];

@@ -1,4 +1,4 @@
-// Agents that follow the record of their world's scene: who they are, where each step has them, and where they end.
+// Agents that follow the record of their world's scene: their identity, their state at each step, and their end.
 #pragma once
 
 #include "pictura/simulator/rules/walk.h"
@@ -6,10 +6,10 @@
 
 namespace pictura {
 
-/// Of `goal_chains`: a recorded agent has one goal, where its record ends, and passes it once.
+/// Values of `goal_chains`: a recorded agent has one goal, the end of its record, and passes it once.
 constexpr int32_t kRecordedGoal = 1, kRecordedGoalReached = 2;
 
-/// Where an agent is so many steps after its episode's start. After the record's end it stands still.
+/// Returns the state of an agent `step` steps after its episode's start. After the record's end it stands still.
 PICTURA_HD inline RecordedState recorded_state(const MapView& map, int agent, int step) {
   const int last = map.recorded_steps - 1;
   RecordedState state = map.recorded_states[static_cast<size_t>(agent) * static_cast<size_t>(map.recorded_steps) +
@@ -26,7 +26,7 @@ PICTURA_HD inline void store_recorded_size(const WorldView& world, int agent) {
   world.agents.height_m[slot] = recorded.height_m;
 }
 
-/// Where pedestrians walk, and everybody else drives.
+/// Whether an agent walks: pedestrians do; all other agents drive.
 PICTURA_HD inline bool walks(const WorldView& world, int agent) {
   return world.agents.agent_class[world.first_slot + agent] == AgentClass::pedestrian;
 }
@@ -38,21 +38,21 @@ PICTURA_HD LaneFit fit_agent(const WorldView& world, int agent, Vec2 p, float z_
                              : fit_lane(world.map, p, z_m, heading_rad, current_lane, group);
 }
 
-/// Takes away the box of an agent that has no body any more.
+/// Removes the box of an agent that no longer has a body.
 PICTURA_HD inline void clear_place(const WorldView& world, int agent) {
   const int slot = world.first_slot + agent;
   world.agents.events[slot] = kEventNone;
   world.boxes[agent] = world.boxes_before[agent] = box_of(world.agents, slot);
 }
 
-/// Takes an agent out of its world's episode.
+/// Removes an agent from its world's episode.
 PICTURA_HD inline void leave(const WorldView& world, int agent) {
   world.agents.status[world.first_slot + agent] = AgentStatus::absent;
   clear_place(world, agent);
 }
 
-/// Puts an agent where its record has it so many steps after the episode's start, or nowhere. Who was not recorded
-/// before is there at once: nobody meets it on the way. The first thread of the group alone writes.
+/// Places an agent at its recorded state `step` steps after the episode's start, or nowhere. An agent that was not
+/// recorded before appears at once, without collisions on the way. Only the first thread of the group writes.
 template <typename ThreadGroup>
 PICTURA_HD void follow_record(const WorldView& world, int agent, int step, const ThreadGroup& group) {
   const AgentStateView& agents = world.agents;
@@ -82,8 +82,8 @@ PICTURA_HD void follow_record(const WorldView& world, int agent, int step, const
   world.boxes_before[agent] = goes_on ? before : world.boxes[agent];
 }
 
-/// The agent's start of an episode, and its goal: the end of its record, as all of its waypoints, of which it is on
-/// its way to the last.
+/// Starts the agent's episode with its goal, the end of its record, as all of its waypoints; the last waypoint is
+/// active.
 template <typename ThreadGroup>
 PICTURA_HD void begin_record(const WorldView& world, int agent, const ThreadGroup& group) {
   const AgentStateView& agents = world.agents;

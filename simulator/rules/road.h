@@ -1,5 +1,5 @@
-// Where an agent is on the lane network: its lane, with hysteresis, its offset and angle, the height of the road, and
-// whether a point is on the drivable surface.
+// Place of an agent on the lane network: its lane, with hysteresis, its offset and angle, the height of the road, and
+// the test whether a point is on the drivable surface.
 #pragma once
 
 #include "pictura/map/speed_limit.h"
@@ -8,21 +8,21 @@
 
 namespace pictura {
 
-/// How far beyond half a lane's width its surface still reaches, over the seams between neighbouring lanes.
+/// Margin beyond half a lane's width that still belongs to its surface, to cover the seams between neighbouring lanes.
 constexpr float kSeamTolerance_m = 0.1f;
-/// What an agent without a lane sees as its offset (reference implementation); its angle is then a right angle.
+/// Observed offset of an agent without a lane (reference implementation); its angle is then a right angle.
 constexpr float kNoLaneOffset_m = 4.0f;
 
-/// An agent's relation to its lane.
+/// Relation of an agent to its lane.
 struct LaneFit {
   int32_t lane = -1;
   float offset_m = kNoLaneOffset_m;  // positive to the left of the centre line
-  float angle_rad = kHalfPi;         // heading less the lane's direction
+  float angle_rad = kHalfPi;         // heading minus the lane's direction
   float z_m = 0;
   float speed_limit_mps = kDefaultSpeedLimit_mps;
 };
 
-/// A point's foot on a segment.
+/// Foot of the perpendicular from a point to a segment.
 struct Foot {
   float along_m = 0;  // in [0, length]
   float distance_m = 0;
@@ -35,10 +35,10 @@ PICTURA_HD inline Foot foot_on(const LaneSegment& segment, Vec2 p) {
   return {along, length(from_a - segment.direction * along), cross(segment.direction, from_a)};
 }
 
-/// The lane that fits position and heading best: distance to its centre line (weight 0.7 per 4 m) and angle to it
-/// (0.3 per half turn), with 0.05 against leaving current_lane (-1: none), so that an agent between two lanes keeps its
-/// own. z_m is the agent's present height: only lanes on its level count. Nothing within kLaneReach_m: no lane, and
-/// z_m stays.
+/// Returns the lane that fits position and heading best. The cost is the distance to its centre line (weight 0.7 per 4
+/// m) plus the angle to it (0.3 per half turn), plus 0.05 for leaving current_lane (-1: none), so that an agent between
+/// two lanes keeps its own. z_m is the agent's current height: only lanes on its level count. Without a lane within
+/// kLaneReach_m, the result has no lane and the same z_m.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD LaneFit fit_lane(const MapView& map, Vec2 p, float z_m, float heading_rad, int32_t current_lane,
                             const ThreadGroup& group = {}) {
@@ -72,8 +72,8 @@ PICTURA_HD LaneFit fit_lane(const MapView& map, Vec2 p, float z_m, float heading
   return group.of_lowest(best_score, best_item, best);
 }
 
-/// Whether a point lies on the drivable surface of its level: within half a width of some drivable lane's centre line;
-/// on maps with a record, whose lanes do not say how far the road goes, on the road's side of the nearest edge.
+/// Whether a point lies on the drivable surface of its level: within half a width of a drivable lane's centre line. On
+/// maps with a record, whose lanes do not give the extent of the road: on the road's side of the nearest edge.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool is_on_road(const MapView& map, Vec2 p, float z_m, const ThreadGroup& group = {}) {
   if (has_record(map)) return road_side(map.side_edges, map.side_cells, {p.x, p.y, z_m}, group).is_on_road;
@@ -89,7 +89,7 @@ PICTURA_HD bool is_on_road(const MapView& map, Vec2 p, float z_m, const ThreadGr
   return group.any(is_on);
 }
 
-/// A place on a route: on a lane, or for pedestrians on a piece of a walkway.
+/// A place on a route: on a lane or, for pedestrians, on a piece of a walkway.
 struct RoutePoint {
   int32_t lane = -1;
   float s_m = 0;
@@ -101,7 +101,7 @@ struct LanePose {
   float heading_rad = 0;
 };
 
-/// At arc length s_m, clamped to the lane.
+/// Returns the pose at arc length s_m, clamped to the lane.
 PICTURA_HD inline LanePose pose_on_lane(const MapView& map, int32_t lane_index, float s_m) {
   const MapLane& lane = map.lanes[lane_index];
   int low = lane.first_segment, high = lane.first_segment + lane.num_segments - 1;

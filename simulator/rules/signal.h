@@ -1,4 +1,4 @@
-// Traffic lights: when each phase of a junction shows which colour, and what counts as running a red light.
+// Traffic lights: the state of each phase of a junction over time, and the definition of running a red light.
 #pragma once
 
 #include "pictura/common/color.h"
@@ -8,8 +8,8 @@
 
 namespace pictura {
 
-/// The cycle of one stop line in one episode, in steps. Of the phases of a junction one after the other is green, then
-/// yellow, then red, while the others are red.
+/// Cycle of one stop line in one episode, in steps. The phases of a junction take turns: one is green, then yellow,
+/// then red, while the others are red.
 struct LightPlan {
   int32_t green_steps = 0, yellow_steps = 0, red_steps = 0;
   int32_t offset_steps = 0;
@@ -19,15 +19,15 @@ struct LightPlan {
 };
 
 /// Draws a stop line's plan. Training: green U(1, 10) s, yellow U(1.5, 2.25) s, red U(0.3, 10) s and the offset are
-/// drawn per episode and junction, or per episode and light where cycles are independent; in a fifth of the episodes
-/// every light is off, else a fifth of the lights are. Where cycles are independent, a light is always green with a
-/// probability of 5 % in each episode, unless it is off. Evaluation (`fixed`): 10, 3 and 2 s, only the offset is drawn,
-/// no light is off and none is always green. Lines without a junction cycle alone in either case.
+/// drawn per episode and junction, or per episode and light with independent cycles. In a fifth of the episodes all
+/// lights are off; in the others, a fifth of the lights are. With independent cycles, a light that is not off is always
+/// green with a probability of 5 % per episode. Evaluation (`fixed`): 10, 3 and 2 s; only the offset is drawn, and no
+/// light is off or always green. Lines without a junction always cycle independently.
 PICTURA_HD inline LightPlan draw_light_plan(const StopLine& line, int32_t light, LightCycles cycles, bool fixed,
                                             float dt_s, uint64_t seed, uint32_t world, uint32_t episode) {
   constexpr float kOffFraction = 0.2f, kAlwaysGreenFraction = 0.05f;
   constexpr uint32_t kEpisodeKey = 0, kJunctionKey = 1, kLightKey = 2, kLoneLightKey = 3;
-  // The stream's agent and step say whose draws these are: the episode's, a junction's, a light's.
+  // The stream's agent and step identify the owner of the draws: the episode, a junction or a light.
   const bool is_independent = cycles == LightCycles::independent;
   const bool is_alone = is_independent || line.junction < 0;
   const uint32_t group = static_cast<uint32_t>(is_alone ? light : line.junction);
@@ -76,29 +76,30 @@ PICTURA_HD inline LightState light_state(const LightPlan& plan, int step) {
   return in_slot < plan.green_steps + plan.yellow_steps ? LightState::yellow : LightState::red;
 }
 
-/// Of stop line `light` so many steps after its episode's start: as recorded, on maps whose lights are, else by its
-/// plan. After the record's end it stays as it was.
+/// State of stop line `light` `step` steps after its episode's start: the recorded state on maps with recorded lights,
+/// else that of its plan. After the record's end the last state persists.
 PICTURA_HD inline LightState light_state(const MapView& map, int light, const LightPlan& plan, int step) {
   if (map.recorded_lights.empty()) return light_state(plan, step);
   return map.recorded_lights[static_cast<size_t>(light) * static_cast<size_t>(map.recorded_steps) +
                              static_cast<size_t>(min_of(step, map.recorded_steps - 1))];
 }
 
-/// A stop line holds those who head within 45 degrees of its traffic, and reaches a little beyond its ends, or across
-/// the lanes of oncoming traffic there: nobody drives round a red light on these.
+/// Reach of a stop line: it controls traffic that heads within 45 degrees of its direction. It extends a little beyond
+/// its ends, or across the lanes of oncoming traffic there, so that an agent cannot avoid a red light through these
+/// lanes.
 constexpr float kStopLineCosine = 0.70710678f, kStopLineSideTolerance_m = 0.5f;
 
-/// Whether the line is one for who heads `forward` (a unit vector) at height z_m.
+/// Whether the line controls traffic that heads `forward` (a unit vector) at height z_m.
 PICTURA_HD inline bool holds(const StopLine& line, Vec2 forward, float z_m) {
   return dot(forward, line.direction) >= kStopLineCosine && fabsf(line.middle_m.z - z_m) < kLevel_m;
 }
 
-/// Whether a point, given from the line's middle, lies no farther to its side than the line holds its own lanes.
+/// Whether a point, relative to the line's middle, is within the line's ends plus the side tolerance.
 PICTURA_HD inline bool is_within_ends(const StopLine& line, Vec2 from_middle_m) {
   return fabsf(cross(line.direction, from_middle_m)) <= line.half_length_m + kStopLineSideTolerance_m;
 }
 
-/// An agent's step, as far as red lights are concerned.
+/// Step of an agent, reduced to the data for red lights.
 struct Crossing {
   Vec2 bumper_before, bumper_after;  // middle of the front bumper
   Vec2 forward;                      // unit vector after the step
@@ -111,7 +112,7 @@ PICTURA_HD inline Span<const int32_t> successors_of(const MapView& map, int32_t 
   return map.successors.subspan(from.first_successor, from.num_all_successors);
 }
 
-/// Whether `to` follows `from`, directly or past one lane that is shorter than a step's way.
+/// Whether `to` follows `from`, directly or after one lane that is shorter than the way of a step.
 PICTURA_HD inline bool follows(const MapView& map, int32_t from, int32_t to) {
   const Span<const int32_t> next = successors_of(map, from);
   for (size_t i = 0; i < next.size(); ++i) {
@@ -124,16 +125,16 @@ PICTURA_HD inline bool follows(const MapView& map, int32_t from, int32_t to) {
   return false;
 }
 
-/// Whether an agent has changed lanes, rather than driven on (or back) from one to the next of its route.
+/// Whether an agent has changed lanes, rather than moved forward (or back) to an adjacent lane of its route.
 PICTURA_HD inline bool is_lane_change(const MapView& map, int32_t before, int32_t after) {
   return before >= 0 && after >= 0 && before != after && !follows(map, before, after) && !follows(map, after, before);
 }
 
-/// Whether the step violates stop line `light`, whose state during the step (the one that the agent saw before it) is
-/// `state`: the front bumper crosses it while it is red, or the agent changes from a lane that no light holds into one
-/// that this light holds, its bumper already past the line, while it is red. In both cases on the line's level, heading
-/// within 45 degrees of its traffic and within 10 m of its middle. Standing on a line that turns red, clearing the
-/// junction behind it, or entering the next lane of the route is none.
+/// Whether the step violates stop line `light`. `state` is the light's state during the step, which the agent observed
+/// before it. A violation requires red and one of two events: the front bumper crosses the line, or the agent changes
+/// from a lane without a light into a lane of this light with its bumper already past the line. Both must occur on the
+/// line's level, with a heading within 45 degrees of its traffic, and within 10 m of its middle. Standing on a line
+/// that turns red, clearing the junction behind it, and entering the next lane of the route are no violations.
 PICTURA_HD inline bool violates(const MapView& map, int32_t light, const Crossing& crossing, LightState state) {
   if (state != LightState::red) return false;
   const StopLine& line = map.stop_lines[light];

@@ -1,6 +1,5 @@
-// One step of one agent, in three phases with a barrier between them, so that every phase reads only what an earlier
-// one has finished: advance (own motion, road, lights, goals), collisions (everybody's boxes), reward and
-// halt.
+// One step of one agent, in three phases with barriers between them, so that every phase reads only data that an
+// earlier phase has finished: advance (own motion, road, lights, goals), collisions (all boxes), reward and halt.
 #pragma once
 
 #include "pictura/simulator/command.h"
@@ -19,7 +18,7 @@ PICTURA_HD inline bool takes_actions(const WorldView& world, int agent) {
   return takes_actions(world.agents.status[world.first_slot + agent]);
 }
 
-/// Whether the agent left a road that ends in the last step.
+/// Whether the agent left the map in the last step, where roads end.
 PICTURA_HD inline bool has_left(const WorldView& world, int agent) {
   return world.map.is_open && world.agents.left[world.first_slot + agent] != 0;
 }
@@ -41,19 +40,19 @@ PICTURA_HD inline Vec3 waypoint_of(const AgentStateView& agents, int slot, int i
   return {agents.waypoint_x_m[i], agents.waypoint_y_m[i], agents.waypoint_z_m[i]};
 }
 
-/// With a step's event bits: the agent leaves a road that ends. Kept in a field of its own.
+/// Additional event bit of a step: the agent leaves a road that ends. Stored in a separate field.
 constexpr int kLeaves = 256;
 
-/// Whether the agent's last waypoint lies where routes end.
+/// Whether the agent's last waypoint lies at the end of routes.
 PICTURA_HD inline bool ends_way(const WorldView& world, int agent) {
   const int slot = world.first_slot + agent;
   return world.map.is_open && !walks(world, agent) &&
          is_at_route_end(world.map, {world.agents.goal_lane[slot], world.agents.goal_lane_s_m[slot]});
 }
 
-/// Passes waypoints along the way from `from` to `to`; returns event bits. The last waypoint becomes the
-/// metric's goal when it becomes the active one, and stays it until it has been passed within kMetricGoalRadius_m or
-/// the next chain's last waypoint replaces it: a wide reward radius does not keep an agent from reaching it.
+/// Passes waypoints along the way from `from` to `to`; returns event bits. The last waypoint becomes the metric's goal
+/// when it becomes active. It remains the goal until it is passed within kMetricGoalRadius_m or the next chain's last
+/// waypoint replaces it. So a wide reward radius does not keep an agent from reaching it.
 template <typename ThreadGroup>
 PICTURA_HD int pass_waypoints(const WorldView& world, int agent, Vec3 from, Vec3 to, const ThreadGroup& group) {
   const AgentStateView& agents = world.agents;
@@ -91,7 +90,7 @@ PICTURA_HD int pass_waypoints(const WorldView& world, int agent, Vec3 from, Vec3
   return events | kEventWaypoint;
 }
 
-/// The multipliers of an agent's conditioning, its body, and the world's rules.
+/// Returns the parameters of an agent's dynamics: multipliers of its conditioning, its body, and the world's rules.
 PICTURA_HD inline DynamicsParameters dynamics_of(const WorldView& world, int slot) {
   const AgentStateView& agents = world.agents;
   const float* conditioning = agents.conditioning + slot * kNumConditioning;
@@ -104,7 +103,7 @@ PICTURA_HD inline DynamicsParameters dynamics_of(const WorldView& world, int slo
   return parameters;
 }
 
-/// Whether an agent can be told this; see command.h.
+/// Whether a command to an agent is valid; see command.h.
 PICTURA_HD inline bool is_sound(int32_t action) { return action >= 0 && action < kNumActions; }
 PICTURA_HD inline bool is_sound(const Command& command) {
   switch (command.kind) {
@@ -124,12 +123,12 @@ PICTURA_HD inline bool tells_to_leave(const Command& command) { return command.k
 PICTURA_HD constexpr bool tells_to_follow_record(int32_t) { return false; }
 PICTURA_HD inline bool tells_to_follow_record(const Command& command) { return command.kind == CommandKind::recorded; }
 
-/// Whether a command to follow the record has an effect: whoever has not halted follows, the absent too.
+/// Whether a command to follow the record has an effect: on all agents that have not halted, including absent agents.
 PICTURA_HD inline bool may_follow_record(const WorldView& world, int agent) {
   return has_record(world.map) && world.agents.status[world.first_slot + agent] != AgentStatus::halted;
 }
 
-/// Where an agent is told to be after the step. Which level it is then on is looked for around *z_m_inout.
+/// Returns the commanded motion of an agent after the step. The new level is searched near *z_m_inout.
 PICTURA_HD inline Motion commanded_motion(const WorldView& world, int agent, int32_t action, float*) {
   const int slot = world.first_slot + agent;
   const Motion from = motion_of(world.agents, slot);
@@ -137,7 +136,7 @@ PICTURA_HD inline Motion commanded_motion(const WorldView& world, int agent, int
   DynamicsParameters parameters = dynamics_of(world, slot);
   if (shown_impairment(world, agent) == Impairment::phantom_braking) {
     controls.jerk_long_mps3 = braking_jerk_mps3(from);
-    parameters.rules.reset_at_standstill = true;  // else braking would drive it on, backwards
+    parameters.rules.reset_at_standstill = true;  // otherwise braking would drive it backwards
   }
   return move(from, controls, parameters, class_limits(world.agents.agent_class[slot]), world.options.dt_s);
 }
@@ -152,8 +151,8 @@ PICTURA_HD inline Motion commanded_motion(const WorldView& world, int agent, con
   return motion;
 }
 
-/// Phase 1 in the episode's step of this number, from 1: moves an agent as it is told, by an action or a Command, and
-/// finds what the road says about it. The first thread of its group alone writes, once all have read.
+/// Phase 1 in step `step` of the episode, counted from 1: moves an agent by an action or a Command, and evaluates the
+/// road at its new place. Only the first thread of its group writes, after all threads have read.
 template <typename CommandType, typename ThreadGroup = SingleThread>
 PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& command, int step,
                         const ThreadGroup& group = {}) {
@@ -167,7 +166,7 @@ PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& co
   if (!takes_actions(world, agent)) {
     if (group.rank() > 0) return;
     if (world.map.is_open) agents.left[slot] = 0;
-    // Who left at the end of the last step was still there for all to see.
+    // An agent that left at the end of the last step was still visible in it.
     const bool is_gone = !has_body(agents.status[slot]) && before.drawn;
     if (is_gone) return clear_place(world, agent);
     world.boxes_before[agent] = before;
@@ -214,7 +213,7 @@ PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& co
   if (world.map.is_open) agents.left[slot] = (events & kLeaves) != 0;
 }
 
-/// Phase 2: finds the collisions of an active agent with every other box, halted and parked ones included.
+/// Phase 2: finds the collisions of an active agent with all other boxes, including halted and parked ones.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void find_collisions(const WorldView& world, int agent, const ThreadGroup& group = {}) {
   if (!is_active(world, agent)) return;
@@ -244,7 +243,7 @@ PICTURA_HD void find_collisions(const WorldView& world, int agent, const ThreadG
   events = static_cast<uint8_t>(events | kEventCollision | (is_at_fault ? kEventAtFault : kEventNone));
 }
 
-/// What a step's events say to the reward; `motion` is the one before an infraction halts the agent.
+/// Converts a step's events for the reward; `motion` is that before an infraction halts the agent.
 PICTURA_HD inline StepFacts step_facts(const Motion& motion, const LaneFit& fit, int events) {
   StepFacts facts;
   facts.motion = motion;
@@ -257,9 +256,10 @@ PICTURA_HD inline StepFacts step_facts(const Motion& motion, const LaneFit& fit,
   return facts;
 }
 
-/// Phase 3: the reward of an active agent, and its end: the halt after an infraction, or its leaving after one, at its
-/// goal, or where its road ends. Whoever leaves is absent or waits, but its box stands there until the next step, in
-/// which nobody meets it. Returns the reward's terms. Nothing that it writes is read by another agent's phase 2.
+/// Phase 3: the reward of an active agent, and its end: the halt after an infraction, or leaving after an infraction,
+/// at its goal, or where its road ends. An agent that leaves is absent or waits, but its box remains until the next
+/// step, in which it takes no part in collisions. Returns the reward's terms. No phase 2 of another agent reads what
+/// this phase writes.
 PICTURA_HD inline RewardTerms apply_reward_and_halt(const WorldView& world, int agent) {
   if (!is_active(world, agent)) return {};
   const AgentStateView& agents = world.agents;

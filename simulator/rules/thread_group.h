@@ -1,7 +1,7 @@
-// How several threads share the loops of one agent's rules. Rules that loop over many items take a thread group, whose
-// threads run in lockstep, call the rule with the same arguments, take every size()-th item each, and all return the
-// same. A host passes SingleThread. Only results that do not depend on the order of items are shared: whether any item
-// satisfies a condition, and the smallest one.
+// Cooperation of several threads in the loops of one agent's rules. Rules that loop over many items take a thread
+// group. Its threads run in lockstep, call the rule with the same arguments, process every size()-th item each, and all
+// return the same result. A host passes SingleThread. Only results that do not depend on the order of items are shared:
+// whether any item satisfies a condition, and the smallest item.
 #pragma once
 
 #include "pictura/simulator/rules/fast/nearest.h"
@@ -16,16 +16,16 @@ struct SingleThread {
 
   PICTURA_HD static constexpr int size() { return kSize; }
   PICTURA_HD int rank() const { return 0; }
-  /// What each thread of the group wrote before, all of them see after.
+  /// Makes earlier writes of each thread of the group visible to all of its threads.
   PICTURA_HD void sync() const {}
   PICTURA_HD bool any(bool value) const { return value; }
   PICTURA_HD int sum(int value) const { return value; }
-  /// The value of the thread with the lowest (score, index); scores are not negative.
+  /// Returns the value of the thread with the lowest (score, index); scores are not negative.
   template <typename T>
   PICTURA_HD T of_lowest(float, int, const T& value) const {
     return value;
   }
-  /// The value of the thread of that rank.
+  /// Returns the value of the thread of that rank.
   template <typename T>
   PICTURA_HD T from(int, const T& value) const {
     return value;

@@ -1,4 +1,4 @@
-// Where pedestrians go: along the pieces of the walkways, turning back at dead ends.
+// Routes of pedestrians along the pieces of the walkways, which turn back at dead ends.
 #pragma once
 
 #include "pictura/common/rng.h"
@@ -6,7 +6,7 @@
 
 namespace pictura {
 
-/// At distance s_m from the start of a piece, heading along it.
+/// Returns the pose at distance s_m from the start of a piece, heading along it.
 PICTURA_HD inline LanePose pose_on_walk(const MapView& map, int32_t piece_index, float s_m) {
   const WalkPiece& piece = map.walk_pieces[piece_index];
   const float along = clamp(s_m, 0.0f, piece.length_m);
@@ -14,7 +14,7 @@ PICTURA_HD inline LanePose pose_on_walk(const MapView& map, int32_t piece_index,
   return {{xy.x, xy.y, height_on(piece, along)}, piece.heading_rad};
 }
 
-/// The piece to go on to where a piece ends: each way but the one back is as likely.
+/// Returns the piece that follows a piece: all ways except the way back are equally likely.
 PICTURA_HD inline int32_t choose_way(const MapView& map, int32_t piece_index, RandomStream* random_inout) {
   const WalkPiece& piece = map.walk_pieces[piece_index];
   if (piece.next >= 0) return piece.next;
@@ -29,9 +29,9 @@ PICTURA_HD inline int32_t choose_way(const MapView& map, int32_t piece_index, Ra
   return back;
 }
 
-/// Walks distance_m on from s_m on a piece.
+/// Advances distance_m along walkways from s_m on a piece.
 PICTURA_HD inline RoutePoint stroll(const MapView& map, RoutePoint at, float distance_m, RandomStream* random_inout) {
-  constexpr int kMaxPiecesWalked = 1024;  // pieces of a few centimetres in a row: a bound, not a rule
+  constexpr int kMaxPiecesWalked = 1024;  // a safety bound, for many pieces of a few centimetres
   for (int i = 0; i < kMaxPiecesWalked; ++i) {
     const WalkPiece& piece = map.walk_pieces[at.lane];
     const float left_m = piece.length_m - at.s_m;
@@ -42,8 +42,8 @@ PICTURA_HD inline RoutePoint stroll(const MapView& map, RoutePoint at, float dis
   return {at.lane, 0.0f};
 }
 
-/// The lane that fits as in fit_lane(). Pedestrians stand at the height of the nearest walkway within kWalkReach_m on
-/// their level, unless the lane is nearer.
+/// Returns the lane of fit_lane(). Pedestrians stand at the height of the nearest walkway within kWalkReach_m on their
+/// level, unless the lane is nearer.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD LaneFit fit_walk(const MapView& map, Vec2 p, float z_m, float heading_rad, int32_t current_lane,
                             const ThreadGroup& group = {}) {

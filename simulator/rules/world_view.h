@@ -1,5 +1,5 @@
-// One world as the rules see it: its map, its agents, its lights and how it is conditioned. Pointers alone, on either
-// device; the executor owns what they point to.
+// One world as the rules see it: its map, its agents, its lights and its configuration. Pointers alone, on either
+// device; the executor owns their targets.
 #pragma once
 
 #include "pictura/common/scene_types.h"
@@ -12,7 +12,7 @@
 
 namespace pictura {
 
-/// The part of the configuration that rules depend on.
+/// Part of the configuration that rules depend on.
 struct RuleOptions {
   float dt_s = 0.1f;
   int episode_steps = 1280;
@@ -26,8 +26,8 @@ struct RuleOptions {
   DynamicsRules dynamics{};
   OtherShares others{};
   bool auxiliary_observations = true;
-  ConditioningRange conditioning[kNumConditioning] = {};        // to draw from
-  ConditioningRange conditioning_scale[kNumConditioning] = {};  // what the policy sees as [-1, 1]
+  ConditioningRange conditioning[kNumConditioning] = {};        // ranges to draw from
+  ConditioningRange conditioning_scale[kNumConditioning] = {};  // ranges that the policy observes as [-1, 1]
 };
 
 struct WorldView {
@@ -41,12 +41,12 @@ struct WorldView {
   AgentStateView agents{};           // of all worlds, indexed by slot
   int first_slot = 0;                // of this world
   int num_agents = 0;                // controlled
-  int first_box = 0;                 // of this world, in the scene
+  int first_box = 0;                 // first box of this world in the scene
   int num_boxes = 0;                 // controlled and parked
-  AgentBox* boxes = nullptr;         // [num_boxes] this world's part of the scene: controlled, then parked
-  AgentBox* boxes_before = nullptr;  // [num_boxes] as they stood before the step
-  GridView box_cells;                // indices of boxes that stand anywhere, by the cell of their centres
-  Vec2* cell_centers = nullptr;      // [num_boxes] of box_cells.items: their boxes' centres, in that order
+  AgentBox* boxes = nullptr;         // [num_boxes] this world's part of the scene: controlled agents, then parked cars
+  AgentBox* boxes_before = nullptr;  // [num_boxes] before the step
+  GridView box_cells;                // indices of boxes with a place, by the cell of their centres
+  Vec2* cell_centers = nullptr;      // [num_boxes] centres of the boxes of box_cells.items, in that order
   LightPlan* light_plans = nullptr;  // [stop lines]
   LightState* lights = nullptr;      // [stop lines] as observed before the step, and during it
 };
@@ -63,7 +63,7 @@ PICTURA_HD inline Motion motion_of(const AgentStateView& agents, int slot) {
           .jerk_lat_mps3 = agents.jerk_lat_mps3[slot]};
 }
 
-/// `heading` is sincos_of(motion.heading_rad).
+/// Stores a motion; `heading` is sincos_of(motion.heading_rad).
 PICTURA_HD inline void store_motion(const AgentStateView& agents, int slot, const Motion& motion, SinCos heading) {
   agents.x_m[slot] = motion.x_m;
   agents.y_m[slot] = motion.y_m;
@@ -99,7 +99,7 @@ struct BodySize {
   float length_m = 0, width_m = 0, height_m = 0;
 };
 
-/// A box of this class and size whose reference point stands at `position_m`.
+/// Returns a box of this class and size with its reference point at `position_m`.
 PICTURA_HD inline AgentBox box_at(AgentClass agent_class, const BodySize& size, Vec3 position_m, SinCos heading) {
   const float ahead = reference_to_center(agent_class, size.length_m);
   AgentBox box;
@@ -113,7 +113,7 @@ PICTURA_HD inline AgentBox box_at(AgentClass agent_class, const BodySize& size, 
   return box;
 }
 
-/// The same of the agent's class and size.
+/// Returns a box of the agent's class and size.
 PICTURA_HD inline AgentBox box_at(const AgentStateView& agents, int slot, Vec3 position_m, SinCos heading) {
   const BodySize size{agents.length_m[slot], agents.width_m[slot], agents.height_m[slot]};
   return box_at(agents.agent_class[slot], size, position_m, heading);
@@ -121,7 +121,7 @@ PICTURA_HD inline AgentBox box_at(const AgentStateView& agents, int slot, Vec3 p
 
 constexpr uint8_t kHaltedPalette = 1;
 
-/// The agent's box in the scene; nothing of an agent without a body is drawn or met.
+/// Returns the agent's box in the scene; for an agent without a body, it is neither drawn nor part of collisions.
 PICTURA_HD inline AgentBox box_of(const AgentStateView& agents, int slot) {
   const AgentStatus status = agents.status[slot];
   AgentBox box = box_at(agents, slot, {agents.x_m[slot], agents.y_m[slot], agents.z_m[slot]},
@@ -131,12 +131,12 @@ PICTURA_HD inline AgentBox box_of(const AgentStateView& agents, int slot) {
   return box;
 }
 
-/// What the agent is in this episode, see draw_other().
+/// Kind of the agent in this episode, see draw_other().
 PICTURA_HD inline int other_of(const WorldView& world, int agent) {
   return draw_other(world.options.others, world.seed, world.global_world, static_cast<uint32_t>(agent), world.episode);
 }
 
-/// The agent's impairment at this step, if it shows then.
+/// The agent's impairment if it is active at this step.
 PICTURA_HD inline Impairment shown_impairment(const WorldView& world, int agent) {
   const Impairment impairment = impairment_of(other_of(world, agent));
   const bool shows = shows_at(impairment, world.step, world.options.dt_s, world.seed, world.global_world,
@@ -144,13 +144,13 @@ PICTURA_HD inline Impairment shown_impairment(const WorldView& world, int agent)
   return shows ? impairment : Impairment::none;
 }
 
-/// What is hidden from the agent at this step.
+/// Objects that are hidden from the agent at this step.
 PICTURA_HD inline Hides hidden_from(const WorldView& world, int agent) {
   return hidden_by(shown_impairment(world, agent));
 }
 
-/// Returns the view of the agent's cameras; that of an absent agent excludes no agent, see Simulator::views(). `hidden`
-/// is hidden_from() the agent.
+/// Returns the view of the agent's cameras; the view of an absent agent excludes no agent, see Simulator::views().
+/// `hidden` is hidden_from() the agent.
 PICTURA_HD inline View view_of(const WorldView& world, int agent, Hides hidden) {
   View view;
   view.world = world.index;

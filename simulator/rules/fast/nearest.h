@@ -1,4 +1,4 @@
-// The nearest of many items, by eight distances at a time.
+// Selection of the nearest of many items, eight distances at a time.
 #pragma once
 
 #include "pictura/common/math.h"
@@ -7,8 +7,8 @@
 
 namespace pictura {
 
-/// The nearest of the items offered, in ascending order of squared distance, then item; items are not negative.
-/// Without branches, since no processor predicts where an item belongs.
+/// The nearest of the offered items, in ascending order of squared distance, then item; items are not negative. Without
+/// branches, since processors cannot predict the place of an item in the order.
 template <int capacity>
 class NearestOfOneThread {
  public:
@@ -16,10 +16,10 @@ class NearestOfOneThread {
     keys_.insert(is_one ? key_of(distance2, item) : Keys::kNone);
     count_ += is_one;
   }
-  /// Offers all items but one whose places are less than the root of below2 from a point.
+  /// Offers all items except `except` whose places are less than the root of below2 from a point.
   PICTURA_HD void offer_all(const Vec2* places, const int32_t* items, int num_items, int32_t except, Vec2 from,
                             float below2) {
-    // They are gathered first: whether one is near enough is as hard to predict.
+    // Near items are gathered first, because whether an item is near is as hard to predict.
     float near_distance2[kGathered + 8];
     int32_t near_items[kGathered + 8];
     int num_near = 0;
@@ -34,7 +34,7 @@ class NearestOfOneThread {
       load_pairs(&eight_places->x, &x, &y);
       float distance2[8];
       const Float8 apart_x = x - from.x, apart_y = y - from.y;
-      const Float8 distances2 = apart_x * apart_x + apart_y * apart_y;  // as dot() of a vector with itself
+      const Float8 distances2 = apart_x * apart_x + apart_y * apart_y;  // as in dot() of a vector with itself
       store8(distances2, distance2);
       const uint32_t chosen = these & bits_of(distances2 < below2) & ~equal8(eight_items, except);
       copy_chosen(distance2, chosen, near_distance2 + num_near);
@@ -57,7 +57,7 @@ class NearestOfOneThread {
     }
     insert_near();
   }
-  /// To be called after the last offer, and before what follows.
+  /// Finishes the selection: call after the last offer and before the functions below.
   PICTURA_HD void settle() {
     int64_t keys[Keys::kCount];
     keys_.store(keys);
@@ -68,7 +68,7 @@ class NearestOfOneThread {
   PICTURA_HD int32_t item(int at) const { return items_[at]; }
 
  private:
-  // Bits of floats that are not negative are ordered as the floats are.
+  // The bits of nonnegative floats have the order of the floats.
   PICTURA_HD static int64_t key_of(float distance2, int32_t item) {
     return int64_t{static_cast<int32_t>(bits_from_float(distance2))} << 32 | item;
   }

@@ -1,4 +1,5 @@
-// Rows of entity sets, computed as eight floats at a time: EgoFrame::to_local() and turn(), times the features' scales.
+// Rows of entity sets, computed eight floats at a time: EgoFrame::to_local() and turn(), times the scales of the
+// features.
 #pragma once
 
 #include "pictura/common/portable/float8.h"
@@ -22,7 +23,7 @@ struct RowFrame {
   }
 
  private:
-  // x + -0 is x, also where x is -0.
+  // x + -0 is x, even where x is -0.
   PICTURA_HD RowFrame(const EgoFrame& frame, Vec3 second_origin_m)
       : minus_origin(set8(-frame.origin_m.x, -frame.origin_m.y, -frame.origin_m.z, -0.0f, -second_origin_m.x,
                           -second_origin_m.y, -second_origin_m.z, -0.0f)),
@@ -30,15 +31,15 @@ struct RowFrame {
         sin(set8(frame.forward.y, -frame.forward.y, 0, 0, frame.forward.y, -frame.forward.y, 0, 0)) {}
 };
 
-#ifdef offsetof  // NVRTC has none
-// What is read as eight floats.
+#ifdef offsetof  // undefined under NVRTC
+// Members that are read as eight floats.
 static_assert(offsetof(AgentBox, cos_heading) == 3 * sizeof(float) &&
               offsetof(AgentBox, height_m) == 7 * sizeof(float));
 static_assert(offsetof(StopLine, right_m) == 3 * sizeof(float) && sizeof(StopLine) >= 8 * sizeof(float));
 #endif
 
-// No function returns a Float8: a program may hold code of both of its types, and a function's name does not include
-// the type that it returns.
+// Functions here never return a Float8: a program may contain code for both of its types, and a function's mangled name
+// does not include its return type.
 
 /// Writes the row of a partner.
 PICTURA_HD inline void write_partner(const AgentBox& box, float speed_mps, const RowFrame& frame, float* row_out) {
@@ -51,7 +52,7 @@ PICTURA_HD inline void write_partner(const AgentBox& box, float speed_mps, const
   row_out[7] = speed_mps * per(kScaleSpeed_mps);
 }
 
-/// Writes the row of a piece, and a zero behind it.
+/// Writes the row of a piece, followed by a zero.
 PICTURA_HD inline void write_piece(const ObservedPiece& piece, const RowFrame& frame, float* row_and_zero_out) {
   store8(frame.to_local(load8(&piece.middle_m.x)) * set8(per(kScalePosition_m), per(kScalePosition_m),
                                                          per(kScaleHeight_m), per(kScaleHalfPiece_m), 1, 1, 1, 1),
@@ -62,7 +63,7 @@ static_assert(kLaneFeatures == 7 && kBoundaryFeatures == 7 && kWallFeatures == 7
 /// Writes the rows of `count` pieces into a set of `capacity` rows.
 PICTURA_HD inline void write_pieces(Span<const ObservedPiece> pieces, const int32_t* chosen, int count, int capacity,
                                     const RowFrame& frame, float* rows_out) {
-  // The zero behind a row lies where the next one begins; only the set's last row has none behind it.
+  // The zero after a row falls on the start of the next row; only the set's last row has no room for it.
   const int num_followed = min_of(count, capacity - 1);
   for (int i = 0; i < num_followed; ++i, rows_out += kLaneFeatures) {
     write_piece(pieces[chosen[i]], frame, rows_out);
@@ -79,7 +80,7 @@ struct LocalEnds {
   Vec3 left_m, right_m;
 };
 
-/// `frame` is RowFrame::of_two_places().
+/// Returns the ends of a stop line; `frame` is RowFrame::of_two_places().
 PICTURA_HD inline LocalEnds ends_of(const StopLine& line, const RowFrame& frame) {
   float ends[8];
   store8(frame.to_local(permute<0, 1, 2, 6, 3, 4, 5, 7>(load8(&line.left_m.x))), ends);

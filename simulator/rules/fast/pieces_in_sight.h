@@ -1,4 +1,4 @@
-// is_in_sight() of eight pieces at a time.
+// Test is_in_sight() for eight pieces at a time.
 #pragma once
 
 #include "pictura/common/portable/float8.h"
@@ -7,11 +7,11 @@
 
 namespace pictura {
 
-/// How many items find_pieces_in_sight() may write beyond the capacity.
+/// Number of items that find_pieces_in_sight() may write beyond the capacity.
 constexpr int kFoundBeyond = 8;
 
-/// Which of the pieces listed are in sight: the first of them, at least `capacity` if there are so many. found_out has
-/// room for kFoundBeyond more.
+/// Writes the listed pieces that are in sight, in list order, and returns their number. Stops once at least `capacity`
+/// are found. found_out must have room for kFoundBeyond more.
 PICTURA_HD inline int find_pieces_in_sight(Span<const Vec2> middles, Span<const int32_t> items, const EgoFrame& frame,
                                            int capacity, int32_t* found_out) {
   const Float8 minus_origin_x = -frame.origin_m.x, minus_origin_y = -frame.origin_m.y;
