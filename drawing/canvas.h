@@ -13,7 +13,7 @@
 
 namespace pictura {
 
-/// 0xRRGGBB.
+/// Colour from 0xRRGGBB.
 constexpr Rgb hex(uint32_t rrggbb) {
   return rgb8(static_cast<int>(rrggbb >> 16) & 255, static_cast<int>(rrggbb >> 8) & 255,
               static_cast<int>(rrggbb) & 255);
@@ -31,9 +31,9 @@ struct TextStyle {
 /// An opaque drawing surface, an image or an SVG document; user space is pixels until the matrix is changed.
 class Canvas {
  public:
-  /// An image filled with one colour. Throws Error when the surface cannot be created.
+  /// Creates an image filled with one colour. Throws Error when the surface cannot be created.
   Canvas(int width_px, int height_px, Rgb background);
-  /// An SVG document, which `name` stands for in messages; complete after svg().
+  /// Creates an SVG document that svg() completes; `name` is its name in messages.
   Canvas(const std::string& name, int width_px, int height_px, Rgb background);
 
   int width_px() const { return width_px_; }
@@ -41,18 +41,19 @@ class Canvas {
   cairo_t* context() const { return context_.get(); }
   cairo_surface_t* surface() const { return surface_.get(); }
 
-  /// From now on ^C ends the drawing: set_color(), which every shape begins with, throws Interrupted with this message.
+  /// Makes ^C end the drawing from now on: set_color(), with which every shape begins, throws Interrupted with this
+  /// message.
   void stop_when_interrupted(const std::string& message) { work_.emplace(message); }
 
   void set_color(Rgb color, double alpha = 1);
   void fill_rectangle(double x, double y, double width, double height, Rgb color, double alpha = 1);
-  /// A rectangle with round corners, as a path.
+  /// Appends a rectangle with round corners to the path.
   void round_rectangle_path(double x, double y, double width, double height, double radius);
-  /// Text whose baseline is at y, turned by `angle_rad` counter-clockwise. Returns its advance in pixels.
+  /// Draws text with its baseline at y, rotated by `angle_rad` counter-clockwise. Returns its advance in pixels.
   double text(double x, double y, const std::string& words, const TextStyle& style, double angle_rad = 0);
   double text_width(const std::string& words, const TextStyle& style) const;
 
-  /// The image. Throws Error with Cairo's reason if any call since the constructor failed.
+  /// Returns the image. Throws Error with Cairo's reason if any call since the constructor failed.
   RgbImage image() const;
   /// Ends the SVG document and returns it. Throws Error as image() does.
   const std::string& svg();
@@ -63,14 +64,14 @@ class Canvas {
     void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
   };
   Canvas(std::unique_ptr<std::string> svg, const std::string& name, int width_px, int height_px, Rgb background);
-  // By reference: whoever makes the surface reads the pointer in the same call, in no order.
+  // svg is a reference, because the expression that creates `surface` also reads the pointer, in unspecified order.
   Canvas(cairo_surface_t* surface, std::unique_ptr<std::string>&& svg, const std::string& name, int width_px,
          int height_px, Rgb background);
   void check(cairo_status_t status) const;
   void select_font(const TextStyle& style) const;
 
-  std::string name_;                  // in messages
-  std::unique_ptr<std::string> svg_;  // where Cairo writes the document to, at an address that stays
+  std::string name_;                  // name in messages
+  std::unique_ptr<std::string> svg_;  // Cairo's output for the document, at a stable address
   std::optional<InterruptibleWork> work_;
   int width_px_, height_px_;
   std::unique_ptr<cairo_surface_t, Free> surface_;

@@ -1,4 +1,4 @@
-// A film of one world: from above, with one agent's cameras beneath.
+// Film of one world: from above, with one agent's cameras below.
 #pragma once
 
 #include <memory>
@@ -12,28 +12,28 @@
 namespace pictura {
 
 struct FilmOptions {
-  int agent = 0;        // that it follows
-  float width_m = 150;  // that it shows from above around the agent; 0: the whole map
-  /// What the images of a trained policy are drawn with; without it, the paper's cameras are shown.
+  int agent = 0;        // agent that the film follows
+  float width_m = 150;  // width of the view from above around the agent; 0: the whole map
+  /// Settings of a trained policy's images; by default, the paper's cameras are shown.
   std::optional<RendererConfig> trained_view;
   int num_threads = 0;  // 0: all
 };
 
-/// Settings for pictures of a policy's cameras in a film: each as wide as the film's columns, and the least width of
-/// lines in proportion, so that a line takes the part of the picture that it takes in the policy's image.
+/// Settings for the pictures of a policy's cameras in a film. Each picture is as wide as the film's columns. The
+/// minimum width of lines is scaled so that a line takes the same share of the picture as of the policy's image.
 RendererConfig film_view(const RendererConfig& trained_view);
 
-/// The cameras of a rig in the order in which a film shows them: from left to right, then those that look back.
+/// Order of a rig's cameras in a film: from left to right, then cameras that face backwards.
 std::vector<int> film_order(const Rig& rig);
 
 class Film {
  public:
-  /// Opens the file; its format is that of its ending, .mp4 or .gif. Throws Error naming the path.
+  /// Opens the file; its ending selects the format, .mp4 or .gif. Throws Error naming the path.
   Film(const std::string& path, const Simulator& simulator, const FilmOptions& options);
   ~Film();
-  /// Adds the simulator's present state.
+  /// Adds the simulator's current state.
   void add_frame(Simulator& simulator);
-  /// Completes the file; without it, nothing is left.
+  /// Completes the file; without this call, no file remains.
   void close();
 
  private:

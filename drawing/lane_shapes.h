@@ -1,4 +1,4 @@
-// Lanes from above as shapes, without a canvas: their outlines, and the order in which they cover each other.
+// Shapes of lanes from above, without a canvas: their outlines, and the order in which they cover each other.
 #pragma once
 
 #include <vector>
@@ -7,11 +7,11 @@
 
 namespace pictura {
 
-/// Indices of all lanes, those below first: higher storeys cover lower ones, so that bridges are drawn above the road
-/// that they cross, and on a storey driving lanes cover what they cross.
+/// Returns the indices of all lanes, bottom first. Higher levels cover lower levels, so that bridges are drawn above
+/// the road that they cross. Within a level, driving lanes cover the lanes that they cross.
 std::vector<int32_t> lanes_in_drawing_order(const RoadMap& map);
 
-/// The ring around a lane: its left border in the direction of travel, then its right border backwards.
+/// Returns the ring around a lane: its left border in the direction of travel, then its right border backwards.
 std::vector<Vec2> outline_of(const RoadMap& map, const Lane& lane);
 
 }  // namespace pictura

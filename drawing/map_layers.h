@@ -1,5 +1,5 @@
-// The still parts of a map from above, painted onto a canvas: shared by the picture of a map and by films of a world.
-// Private to the drawing library.
+// Static parts of a map from above on a canvas, for pictures of maps and for films of worlds. Private to the drawing
+// library.
 #pragma once
 
 #include <vector>
@@ -16,8 +16,8 @@ constexpr Rgb kRoadEdgeInk = hex(0xC8312F);
 constexpr Rgb kStopLineInk = hex(0xFFFFFF);
 constexpr Rgb kParkingSpaceInk = hex(0xC9D2DE);
 
-/// Bounding box of a map's lanes, edges, markings and parking spaces, beyond which little else of it lies. Throws Error
-/// when there is nothing.
+/// Bounding box of a map's lanes, edges, markings and parking spaces, which contain nearly everything else. Throws
+/// Error when the map has none of these.
 Aabb2 bounds_of(const RoadMap& map);
 
 /// Colour of a lane's surface from above.
@@ -26,10 +26,10 @@ Rgb lane_color(LaneType type);
 /// Colour of a painted line from above.
 Rgb paint_color(MarkColor color);
 
-/// Colours of a junction's phases, for stop lines and heads without a known state.
+/// Colour of a junction's phase, for stop lines and heads without a known state.
 Rgb phase_color(int phase);
 
-/// Draws on a canvas in the map's metres: its top left pixel shows left_top_m, north is up. The destructor restores the
+/// Drawing in a map's metres on a canvas: its top left pixel is at left_top_m, north is up. The destructor restores the
 /// canvas's units.
 class GroundPen {
  public:
@@ -41,7 +41,7 @@ class GroundPen {
   Canvas& canvas() { return canvas_; }
   cairo_t* context() { return canvas_.context(); }
   double px_per_m() const { return px_per_m_; }
-  /// The larger of a size in metres and one in pixels, in metres.
+  /// Returns the larger of a size in metres and a size in pixels, in metres.
   double at_least(double metres, double min_px) const;
   /// Whether the bounding box touches the canvas.
   bool is_visible(const Aabb2& box) const;
@@ -51,7 +51,7 @@ class GroundPen {
   void line_to(const Eigen::Vector2d& p) { cairo_line_to(context(), p.x(), p.y()); }
   void line(const Eigen::Vector2d& a, const Eigen::Vector2d& b, double width_m, Rgb color, double alpha = 1);
   void disk(const Eigen::Vector2d& center, double radius_m, Rgb color, double alpha = 1);
-  /// Text at a position, sized in pixels at any scale.
+  /// Draws text at a position, sized in pixels at any scale.
   void label(const Eigen::Vector2d& position, const std::string& words, const TextStyle& style);
 
  private:
@@ -66,7 +66,7 @@ class MapLayers {
  public:
   explicit MapLayers(const RoadMap& map);
 
-  /// The top left pixel of the canvas shows left_top_m; layers outside the canvas are skipped.
+  /// Paints all layers with left_top_m at the top left pixel of the canvas; parts outside the canvas are skipped.
   void paint(Canvas& canvas, const Eigen::Vector2d& left_top_m, double px_per_m) const;
 
  private:
@@ -82,7 +82,7 @@ class MapLayers {
   std::vector<Aabb2> marking_boxes_;     // [markings]
 };
 
-/// A light's stop line and head: the line in `color`, the head as a disk with a pointer towards its traffic.
+/// Paints a light's stop line in `color`, and its head as a disk with a pointer towards its traffic.
 void paint_light(Canvas& canvas, const TrafficLight& light, const Eigen::Vector2d& left_top_m, double px_per_m,
                  Rgb color);
 

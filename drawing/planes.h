@@ -9,12 +9,12 @@ namespace pictura {
 
 enum class Plane { depth, class_id, instance_id };
 
-/// "depth", "class" or "instance"; throws UsageError for others.
+/// Returns the plane named "depth", "class" or "instance". Throws UsageError for other names.
 Plane plane_by_name(const std::string& name);
 
-/// A plane of one image, black where nothing is. Depth: grey 255 x (1 - depth / 120 m), at least 1. Class: the colour
-/// of the object's kind in docs/explanation/image.md (vehicles: their right side's). Instance: a hue per agent, black
-/// elsewhere.
+/// Draws a plane of one image, black at pixels without a surface. Depth: grey 255 x (1 - depth / 120 m), at least 1.
+/// Class: the colour of the object's kind in docs/explanation/image.md (for vehicles, of the right side). Instance: a
+/// hue per agent, black elsewhere.
 RgbImage plane_picture(const HostImages& images, int view, int camera, Plane plane);
 
 }  // namespace pictura

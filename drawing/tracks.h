@@ -1,4 +1,4 @@
-// Recorded road users from above: their ways, and their boxes at one step. Private to the drawing library.
+// Recorded road users from above: their paths, and their boxes at one step. Private to the drawing library.
 #pragma once
 
 #include "pictura/drawing/map_layers.h"
@@ -8,13 +8,13 @@ namespace pictura {
 
 constexpr Rgb kSdcInk = hex(0x0B6E4F), kUnknownTrackInk = hex(0x6B7178);
 
-/// Colour of a track of that type.
+/// Colour of a track of this type.
 Rgb track_color(TrackType type);
 
-/// Every track as a line through its valid states, broken where there are gaps, and the stop lines of recorded lights.
+/// Paints every track as a line through its valid states, interrupted at gaps, and the stop lines of recorded lights.
 void paint_ways(const Scenario& scenario, Canvas& canvas, const Eigen::Vector2d& left_top_m, double px_per_m);
 
-/// The boxes of all tracks that are valid at a step of the scenario.
+/// Paints the boxes of all tracks that are valid at a step of the scenario.
 void paint_boxes(const Scenario& scenario, int32_t step, Canvas& canvas, const Eigen::Vector2d& left_top_m,
                  double px_per_m);
 
