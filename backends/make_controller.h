@@ -1,4 +1,4 @@
-// Controllers by name, for the memory that a simulator works in.
+// Controllers by name, for the memory of a simulator.
 #pragma once
 
 #include <memory>
@@ -10,10 +10,10 @@
 
 namespace pictura {
 
-/// "random" (uniform actions, keyed by seed, world, agent and step), "idle" (no jerk), "lane" (the lane keeper), and in
-/// recorded scenes "log", "inverse" and "idm"; see host_controllers.h. "lane" and "idm" drive on the host whatever the
-/// simulator's memory, and say so in their name(). The controller drives this simulator alone, which must outlive it.
-/// Throws UsageError listing the known names.
+/// Makes a controller: "random" (uniform actions, keyed by seed, world, agent and step), "idle" (no jerk), "lane" (the
+/// lane keeper), and in recorded scenes "log", "inverse" and "idm"; see host_controllers.h. "lane" and "idm" run on the
+/// host for any memory of the simulator, and their name() says so. The controller is for this simulator alone, which
+/// must outlive it. Throws UsageError listing the known names.
 std::unique_ptr<Controller> make_controller(const std::string& name, Simulator& simulator, uint64_t seed);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// What a learner needs besides what its policy does, for the memory of a device.
+// Device-specific parts of a learner besides its policy.
 #pragma once
 
 #include <functional>
@@ -11,12 +11,13 @@
 
 namespace pictura {
 
-/// Throws Error where the device is a CUDA device that there is not.
+/// Makes the executor of a learner. Throws Error where the device is a CUDA device that does not exist.
 std::unique_ptr<LearnerExecutor> make_learner_executor(Device device);
 std::unique_ptr<SceneHistory> make_scene_history(Device device, const SceneHistorySize& size);
 
-/// What `work` puts on this stream, which must not be the legacy one, as a graph. Nothing is done before it is
-/// launched. Throws what `work` throws; Error for the host, and where the work allocates or waits.
+/// Captures the work that `work` puts on this stream, which must not be the legacy stream, as a graph. Nothing is
+/// executed before the graph is launched. Throws the exceptions of `work`, and Error for the host and for work that
+/// allocates or waits.
 std::unique_ptr<DeviceGraph> capture_graph(Device device, Stream stream, const std::function<void()>& work);
 
 }  // namespace pictura

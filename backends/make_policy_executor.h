@@ -1,4 +1,4 @@
-// What a policy needs besides its network's weights, for the memory of a device.
+// Device-specific parts of a policy besides its network's weights.
 #pragma once
 
 #include <memory>
@@ -10,17 +10,17 @@
 
 namespace pictura {
 
-/// Empty where this build and this machine have a CUDA device, else why not.
+/// Empty where this build and this machine have a CUDA device, else the reason why not.
 std::string why_no_cuda_device();
 
-/// What a device is called by its maker, as "NVIDIA H100 80GB HBM3"; "host" for the host. Throws Error where there is
-/// no such device.
+/// Product name of a device, such as "NVIDIA H100 80GB HBM3"; "host" for the host. Throws Error for a device that does
+/// not exist.
 std::string product_name(Device device);
 
-/// Throws Error where the device is a CUDA device that there is not.
+/// Makes the executor of a policy. Throws Error where the device is a CUDA device that does not exist.
 std::unique_ptr<PolicyExecutor> make_policy_executor(Device device);
 
-/// Throws Error for the host, where there are none.
+/// Makes the passes of a network. Throws Error for the host, which has none.
 std::unique_ptr<NetworkPasses> make_network_passes(Device device);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Renderers by name: the one file that knows every backend.
+// Renderers by name. This file alone knows every renderer backend.
 #pragma once
 
 #include <memory>
@@ -10,15 +10,15 @@
 
 namespace pictura {
 
-/// "cpu", "cuda", "gl" (one of the next two: EGL where it gives a context, else OSMesa), "gl:egl", "gl:osmesa", "null"
-/// (draws black: for running the rest without a renderer), or "auto": cuda where config.device is a CUDA device and one
-/// is found, else cpu; `choice_out`, if given, receives what was chosen and why, and where the kernels of `cuda` come
-/// from. Where config.device is the host, `cuda` copies scenes to the device and images back. Throws UsageError listing
-/// the known names; Error when the backend cannot run here.
+/// Makes a renderer by name: "cpu", "cuda", "gl" ("gl:egl" where EGL gives a context, else "gl:osmesa"), "gl:egl",
+/// "gl:osmesa", "null" (draws black images, to run everything else without a renderer), or "auto". `auto` is `cuda`
+/// where config.device is a CUDA device and such a device is found, else `cpu`. `choice_out`, if given, gets the choice
+/// with its reason, and the source of the kernels of `cuda`. Where config.device is the host, `cuda` copies scenes to
+/// the device and images back. Throws UsageError listing the known names, and Error when the backend cannot run here.
 std::unique_ptr<Renderer> make_renderer(const std::string& name, const RendererConfig& config,
                                         std::string* choice_out = nullptr);
 
-/// Names that this build knows, in the order that messages list them.
+/// Returns the names that this build knows, in the order of messages.
 std::vector<std::string> renderer_names();
 
 }  // namespace pictura

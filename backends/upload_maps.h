@@ -1,4 +1,4 @@
-// From compiled maps to the renderers that draw scenes on them.
+// Upload of compiled maps to the renderers that draw scenes on them.
 #pragma once
 
 #include "pictura/common/renderer.h"
@@ -6,8 +6,8 @@
 
 namespace pictura {
 
-/// Uploads maps to these handles [maps]; or, where there are none, to 0, 1, ..., by which a simulator that is made of
-/// them names them.
+/// Uploads maps to these handles [maps]; without handles, to 0, 1, ..., the handles of a simulator that is made of
+/// these maps.
 inline void upload_maps(const CompiledMaps& maps, Span<const GeometryHandle> handles, Renderer* renderer_out,
                         Stream stream = {}) {
   for (std::size_t i = 0; i < maps.size(); ++i) {
@@ -15,7 +15,7 @@ inline void upload_maps(const CompiledMaps& maps, Span<const GeometryHandle> han
   }
 }
 
-/// Uploads the simulator's maps to the handles that its scene names them by.
+/// Uploads the simulator's maps to the handles that its scene uses.
 inline void upload_maps(const Simulator& simulator, Renderer* renderer_out, Stream stream = {}) {
   upload_maps(simulator.maps(), simulator.handles(), renderer_out, stream);
 }
