@@ -1,6 +1,6 @@
-// Draws one image: sets up the faces of all primitives that may be visible, rasterizes them into fragments, and
-// composites each pixel. The rules are those of common/raster, shared with the kernels; only the traversal and the
-// memory, reused from image to image, are here.
+// Drawing of one image: sets up the faces of all primitives that may be visible, rasterizes them into fragments, and
+// composites each pixel. The rules are those of common/raster, shared with the kernels. This class adds only the
+// traversal and the memory, which is reused from image to image.
 #pragma once
 
 #include <functional>
@@ -22,13 +22,13 @@ struct ImageRequest {
   float line_floor_px = 0;
   bool debug_palette = false;
   bool culls_occluded = true;    // drop faces behind the solids that cover most of the image
-  const Crowd* crowd = nullptr;  // of the view's world; null: every box is tested
+  const Crowd* crowd = nullptr;  // crowd of the view's world; null: every box is tested
 };
 
 /// Outputs of one image.
 struct ImageTarget {
   PixelFormat format = PixelFormat::u8;
-  void* color = nullptr;  // of one image
+  void* color = nullptr;  // memory of one image
   float* depth_m = nullptr;
   uint8_t* class_id = nullptr;
   uint16_t* instance_id = nullptr;
@@ -37,19 +37,19 @@ struct ImageTarget {
   ImageEffect effect;
 };
 
-/// Draws images one after another. An object serves one thread.
+/// Draws images in sequence. An object serves one thread.
 class ImageDrawer {
  public:
   /// Sets up the faces of an image.
   void prepare(const ImageRequest& request);
-  /// The occluders of the prepared image.
+  /// Returns the occluders of the prepared image.
   const Occluders& occluders() const { return setting_.occluders; }
   /// Draws the prepared image.
   void draw(const ImageTarget& target);
-  /// Adds an agent's visible weight in the prepared image, among all others and alone.
+  /// Adds an agent's visible weights in the prepared image, among all other agents and alone.
   void accumulate_visibility(int32_t agent, VisibilitySum* sum_inout);
-  /// Calls visit(y * width + x, coverage, colour) for each fragment of each pixel of the prepared image, front to back:
-  /// for measuring other ways of compositing.
+  /// Calls visit(y * width + x, coverage, colour) for each fragment of each pixel of the prepared image, front to back.
+  /// For measurements of other compositing methods.
   void visit_fragments(const std::function<void(int, const PixelCoverage&, Rgb)>& visit);
 
  private:
@@ -127,14 +127,14 @@ class ImageDrawer {
   std::vector<OccludingFace> occluding_;
   EdgePool edges_;
   std::vector<ScreenFace> faces_;
-  std::vector<int32_t> found_;           // boxes, or light heads, that may be visible
-  std::vector<int32_t> strips_;          // that may be visible
-  std::vector<float> occluder_bounds_;   // [pixels of the rows] the largest occluder_bound()
-  std::vector<int32_t> first_fragment_;  // [pixels of the rows] the first of each list
+  std::vector<int32_t> found_;           // boxes or light heads that may be visible
+  std::vector<int32_t> strips_;          // strips that may be visible
+  std::vector<float> occluder_bounds_;   // [pixels of the rows] maximum occluder_bound()
+  std::vector<int32_t> first_fragment_;  // [pixels of the rows] first fragment of each list
   std::vector<PixelFragment> fragments_;
   std::vector<PixelFragment> collected_;
   std::vector<uint64_t> visible_;                  // of the collected fragments
-  std::vector<std::size_t> pixel_ends_;            // of each pixel's in those collected
+  std::vector<std::size_t> pixel_ends_;            // end of each pixel's fragments among the collected fragments
   std::vector<PixelAccumulator::Weight> weights_;  // of one pixel
 };
 

@@ -1,4 +1,4 @@
-// The rules of common/raster/coverage.h for eight rows or pixels at once.
+// Rules of common/raster/coverage.h for eight rows or pixels at once.
 #pragma once
 
 #include <bit>
@@ -8,7 +8,7 @@
 
 namespace pictura {
 
-/// row_span() of the rows y to y + 7.
+/// Version of row_span() for the rows y to y + 7.
 struct alignas(32) RowSpansX8 {
   int32_t begin[kLanes], end[kLanes], full_begin[kLanes], full_end[kLanes];
 };
@@ -56,7 +56,7 @@ inline RowSpansX8 row_spans_x8(const PolygonEdge* edges, int count, const PixelB
   return spans;
 }
 
-/// Calls visit(lane, coverage) for each of the first num_pixels of eight pixels of which pixel_coverage() is not 0.
+/// Calls visit(lane, coverage) for each of the first num_pixels of eight pixels with a nonzero pixel_coverage().
 #if defined(__AVX2__)
 template <typename Visit>
 inline void coverage_x8(const PolygonEdge* edges, int count, float min_area, const int32_t* x, const int32_t* y,

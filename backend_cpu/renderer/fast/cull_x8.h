@@ -1,5 +1,5 @@
-// Culling of eight pieces of a map at once: the rules of common/raster/cull.h, with the balls around the pieces stored
-// in the order of a grid's items.
+// Culling of eight pieces of a map at once: the rules of common/raster/cull.h, with the bounding balls of the pieces in
+// the order of a grid's items.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@ inline Vec3x8 to_camera(const PinholeCamera& camera, const Vec3x8& world_m) {
   return {along(camera.right), along(camera.down), along(camera.forward)};
 }
 
-/// sphere_in_frustum() of eight spheres.
+/// Version of sphere_in_frustum() for eight spheres.
 inline Mask8 sphere_in_frustum(const Frustum& f, const Vec3x8& center, Float8 radius_m) {
   const Mask8 in_range = (center.z + radius_m > kNear_m) & (center.z - radius_m < kVisibleRange_m);
   const Mask8 in_width = ((center.x - f.x_low * center.z) * f.x_low_scale > -radius_m) &
@@ -28,14 +28,14 @@ inline Mask8 sphere_in_frustum(const Frustum& f, const Vec3x8& center, Float8 ra
   return in_range & in_width & in_height;
 }
 
-/// The balls around the items of a grid.
+/// Bounding balls of the items of a grid.
 class BallGrid {
  public:
   struct Ball {
     Vec3 middle_m;
     float radius_m = 0;
   };
-  /// ball_of(item), and box_of(item), by which the item was put into the grid.
+  /// ball_of(item) is the item's ball, and box_of(item) the box by which the item was put into the grid.
   template <typename BallOf, typename BoxOf>
   BallGrid(const GridView& grid, BallOf&& ball_of, BoxOf&& box_of) : grid_(grid) {
     const std::size_t padded = grid.items.size() + kLanes;
@@ -59,12 +59,12 @@ class BallGrid {
   }
 
   /// Calls visit(item) for each item that for_each_item() visits in a box on the ground and whose ball is in the
-  /// frustum, in its order.
+  /// frustum, in the same order.
   template <typename Visit>
   void visit_visible(const PinholeCamera& camera, const Frustum& f, const Aabb2& query_box, Visit&& visit) const {
     const CellRange cells = cells_of(grid_, query_box);
     for (int y = cells.y_begin; y < cells.y_end; ++y) {
-      // An item is visited in its first column and row of those that the box touches.
+      // An item is visited in the first column and the first row that it has in common with the box.
       const int32_t first_column_end = begin(cells.x_begin + 1, y), row_end = begin(cells.x_end, y);
       const int row_starts = y == cells.y_begin ? kStartsRow : 0;
       for (int32_t i = begin(cells.x_begin, y); i < row_end; i += kLanes) {
@@ -82,7 +82,7 @@ class BallGrid {
 
  private:
   static constexpr int kStartsColumn = 1, kStartsRow = 2;
-  // The first item of a cell; x of num_x: of the next row.
+  // Index of the first item of a cell; x = num_x means the next row.
   int32_t begin(int x, int y) const {
     return grid_
         .begin[static_cast<std::size_t>(y) * static_cast<std::size_t>(grid_.num_x) + static_cast<std::size_t>(x)];
@@ -91,10 +91,10 @@ class BallGrid {
   GridView grid_;
   // Centres and radii of the grid's items, padded by one vector.
   std::vector<float> x_m_, y_m_, z_m_, radius_m_;
-  std::vector<uint8_t> starts_;  // whether the item's box begins in this cell's column and row
+  std::vector<uint8_t> starts_;  // whether the item's box begins in the column and row of this cell
 };
 
-/// Balls by the cells of their centres, all of which are found that a frustum may show.
+/// Balls by the cells of their centres, for finding all balls that a frustum may contain.
 class CenteredBalls {
  public:
   explicit CenteredBalls(const std::vector<BallGrid::Ball>& balls)
@@ -117,7 +117,7 @@ class CenteredBalls {
   }
 
  private:
-  /// What is farther out than any map belongs to the outermost cells.
+  /// Clamps positions beyond any map to the outermost cells.
   static Vec2 within_bounds(Vec2 p) {
     constexpr float kBound_m = 1e6f;
     return {clamp(p.x, -kBound_m, kBound_m), clamp(p.y, -kBound_m, kBound_m)};
@@ -144,7 +144,7 @@ class CenteredBalls {
   float largest_radius_m_ = 0;
 };
 
-/// The drawn boxes of a world of many agents, by cells.
+/// Drawn boxes of a world with many agents, by cells.
 class Crowd {
  public:
   explicit Crowd(Span<const AgentBox> boxes) : agents_(drawn(boxes)), balls_(balls_of(boxes, agents_)) {}
@@ -172,9 +172,9 @@ class Crowd {
   CenteredBalls balls_;
 };
 
-/// A geometry with the balls around its pieces.
+/// A geometry with the bounding balls of its pieces.
 struct CulledGeometry {
-  /// What the view points to must outlive the object.
+  /// The view's arrays must outlive the object.
   explicit CulledGeometry(const StaticGeometryView& geometry)
       : view(geometry),
         strips(

@@ -17,7 +17,7 @@ struct PairsX8 {
   alignas(32) float y[kLanes];
 };
 
-/// centroid_of() of eight masks that are not 0.
+/// Version of centroid_of() for eight masks, which must not be 0.
 inline Vec2x8 centroid_of_x8(const uint64_t* samples) {
   int32_t count[kLanes], columns[kLanes], rows[kLanes], offsets[kLanes];
   for (int lane = 0; lane < kLanes; ++lane) {
@@ -32,7 +32,7 @@ inline Vec2x8 centroid_of_x8(const uint64_t* samples) {
           (load8_integers(rows) + (load8_integers(offsets) + 0.5f * n) / 8.0f) / (8.0f * n)};
 }
 
-/// What decides the order of eight faces.
+/// Members of eight faces that determine their order.
 struct FacesX8 {
   Float8 inverse_depth_x, inverse_depth_y, inverse_depth_0, inverse_depth_low, inverse_depth_high, plane_distance_m;
   Float8 object_id;  // its bits
@@ -66,8 +66,9 @@ struct FacesX8 {
   }
 };
 
-/// The lanes in which a is in front of b at all shared samples; and those that occlude_pair() must decide, because the
-/// faces are of one primitive or change places there, or because a solid may stand on a strip.
+/// Order of eight pairs. `a_first`: lanes in which a is in front of b at all shared samples. `undecided`: lanes that
+/// occlude_pair() must decide, namely pairs of one primitive, pairs that change places, and solids that may stand on a
+/// strip.
 struct PairOrder {
   unsigned a_first = 0, undecided = 0;
 };

@@ -11,8 +11,8 @@ namespace pictura {
 
 /// Eight strips in the image.
 struct StripsX8 {
-  unsigned visible = 0;   // lanes of those that need no clipping and are large enough and not occluded
-  unsigned crossing = 0;  // lanes of those that must be clipped first
+  unsigned visible = 0;   // lanes of strips that need no clipping, are large enough and not occluded
+  unsigned crossing = 0;  // lanes of strips that must be clipped first
   unsigned clockwise = 0;
   Vec2x8 corner[4];
   Vec2x8 low, high;  // bounds on screen
@@ -32,7 +32,7 @@ struct StripsX8 {
   Rgb color_of(int lane) const { return {color.x[lane], color.y[lane], color.z[lane]}; }
 };
 
-/// widening_of() and Widening::push_px() of eight strips.
+/// Versions of widening_of() and Widening::push_px() for eight strips.
 struct WideningX8 {
   Vec2x8 across;
   float floor_px;
@@ -51,7 +51,7 @@ struct WideningX8 {
   }
 };
 
-/// plane_distance_m() and nearest_standing() of eight planes.
+/// Versions of plane_distance_m() and nearest_standing() for eight planes.
 inline Float8 nearest_standing(const Vec3x8& normal, Float8 offset) {
   constexpr float kMinMagnitude = 1e-30f;
   const Float8 length2 = dot(normal, normal);
@@ -64,7 +64,7 @@ inline Float8 nearest_standing(const Vec3x8& normal, Float8 offset) {
   return select(has_distance & (distance_m > 0.0f), nearest, 1.0f);
 }
 
-/// Occluders::occludes() of eight bounds.
+/// Version of Occluders::occludes() for eight bounds.
 inline Mask8 occludes(const Occluders& occluders, const PinholeCamera& camera, const StripsX8& strips,
                       Float8 inverse_depth_high) {
   const Vec2x8 low{max_no_nan(strips.low.x, 0.0f), max_no_nan(strips.low.y, 0.0f)};

@@ -1,4 +1,4 @@
-// Eight vectors at once, a lane each; arithmetic as that of Vec2 and Vec3 (common/math.h).
+// Eight vectors at once, one per lane, with the arithmetic of Vec2 and Vec3 (common/math.h).
 #pragma once
 
 #include "pictura/common/portable/float8.h"
@@ -6,7 +6,7 @@
 namespace pictura {
 
 constexpr int kLanes = 8;
-/// 0 to 7.
+/// Returns the lane indices 0 to 7.
 inline Float8 lane_numbers() { return set8(0, 1, 2, 3, 4, 5, 6, 7); }
 
 struct Vec2x8 {
