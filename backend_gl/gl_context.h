@@ -1,4 +1,4 @@
-// OpenGL contexts of OSMesa or EGL, without any OpenGL header. Their libraries are loaded when a context is created,
+// OpenGL contexts of OSMesa or EGL, without any OpenGL header. Their libraries are loaded when a context is created and
 // never linked, so that the program starts without them.
 #pragma once
 
@@ -9,7 +9,7 @@
 
 namespace pictura::gl {
 
-/// An OpenGL 4.5 core context, not current in any thread until a CurrentContext makes it so.
+/// An OpenGL 4.5 core context, which is current in a thread only through CurrentContext.
 class Context {
  public:
   virtual ~Context() = default;
@@ -17,21 +17,22 @@ class Context {
   Context(const Context&) = delete;
   Context& operator=(const Context&) = delete;
 
-  /// "gl:osmesa" or "gl:egl".
+  /// Name of the context: "gl:osmesa" or "gl:egl".
   virtual std::string name() const = 0;
   /// Address of an OpenGL function, or null.
   virtual void* entry_point(const char* name) const = 0;
-  /// Makes it current in the calling thread, and saves which context of the same library was.
+  /// Makes the context current in the calling thread, and saves the previous context of the same library.
   virtual void enter() = 0;
   /// Restores the context saved by enter().
   virtual void leave() = 0;
 };
 
-/// Throws Error if libOSMesa or its context is missing.
+/// Makes a context of OSMesa. Throws Error if libOSMesa or its context is missing.
 std::unique_ptr<Context> make_osmesa_context();
 
-/// On a GPU if EGL offers one, else Mesa's software rasterizer, without any window system. Of several GPUs the one with
-/// CUDA's index cuda_device, unless that is -1. Throws Error if libEGL, such a device or its context is missing.
+/// Makes a context without any window system: on a GPU if EGL offers one, else with Mesa's software rasterizer. Among
+/// several GPUs, it uses the one with CUDA's index cuda_device, unless that is -1. Throws Error if libEGL, such a
+/// device or its context is missing.
 std::unique_ptr<Context> make_egl_context(int cuda_device = -1);
 
 /// Makes a context current for its own lifetime.

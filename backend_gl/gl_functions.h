@@ -1,5 +1,5 @@
-// The OpenGL 4.5 entry points that this folder uses, in one table filled from the library of a context: nothing is
-// linked, and one process can use both libraries (OSMesa, EGL).
+// The OpenGL 4.5 entry points that this folder uses, in one table filled from a context's library: nothing is linked,
+// and one process can use both libraries (OSMesa, EGL).
 #pragma once
 
 #define GL_GLEXT_PROTOTYPES
@@ -30,7 +30,7 @@ struct Functions {
   PICTURA_GL_FUNCTIONS(PICTURA_GL_DECLARE)
 #undef PICTURA_GL_DECLARE
 
-  /// Loads every function. Throws Error naming one that the context lacks.
+  /// Loads every function. Throws Error naming a function that the context lacks.
   explicit Functions(const Context& context);
 
   int integer(GLenum name) const {

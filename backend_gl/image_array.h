@@ -13,36 +13,37 @@
 
 namespace pictura::gl {
 
-/// A linked program. Throws Error with the compiler's log.
+/// Compiles and links a program. Throws Error with the compiler's log.
 GLuint make_program(const Functions& gl, std::initializer_list<std::pair<GLenum, std::string>> shaders);
 
 /// Throws Error naming `where` if OpenGL has reported an error.
 void check_errors(const Functions& gl, const std::string& where);
 
-/// The context must be current in all calls, the destructor included.
+/// Images as layers of an array texture. The context must be current in all calls, including the destructor.
 class ImageArray {
  public:
-  /// `renderer` prefixes errors; images are copied to device memory if `interop` is given, else to the host. Throws
-  /// Error if the driver cannot hold one image, or that many samples.
+  /// `renderer` prefixes errors. Images are copied to device memory if `interop` is given, else to the host. Throws
+  /// Error if the driver cannot hold one image with this number of samples.
   ImageArray(const Functions& gl, std::string renderer, const PixelSamples& samples, const CudaInterop* interop,
              int width_px, int height_px);
   ~ImageArray() { release(); }
   ImageArray(const ImageArray&) = delete;
   ImageArray& operator=(const ImageArray&) = delete;
 
-  /// Allocates memory for `images`, or for as many as the driver and a fixed limit allow; returns their number.
+  /// Allocates memory for `images`, limited by the driver and a fixed maximum; returns their number.
   int reserve(int64_t images, PixelFormat format);
   /// Clears all layers and makes them the render target.
   void begin();
   /// Averages the samples of the first `images` layers into the buffer.
   void resolve(int images);
-  /// Appends the copies of consecutive images to `out`, for copy(): three planes each, an image every `stride` values.
+  /// Appends the copies of consecutive images to `out`, for copy(): three planes per image, and `stride` values from
+  /// image to image.
   void plan_copy(int first, int images, void* out, int64_t stride, std::vector<RowCopy>* copies_out) const;
-  /// To the host, returns when the copies are finished; to a device, enqueues them on the stream.
+  /// Copies images. To the host, returns when the copies are finished; to a device, enqueues the copies on the stream.
   void copy(Span<const RowCopy> copies, Stream stream);
 
  private:
-  // Of the current format.
+  // Maximum number of layers in the current format.
   int max_layers() const;
   std::size_t plane_bytes() const;
   GLuint make_texture(GLenum format) const;
@@ -54,7 +55,7 @@ class ImageArray {
   const std::string renderer_;
   const PixelSamples samples_;
   const CudaInterop* interop_;
-  const int width_px_, height_px_;  // of an image
+  const int width_px_, height_px_;  // size of an image
   PixelFormat format_ = PixelFormat::u8;
   int layers_ = 0;
   GLuint color_ = 0, depth_ = 0, framebuffer_ = 0, output_ = 0, resolve_program_ = 0;

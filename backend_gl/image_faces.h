@@ -1,5 +1,5 @@
-// The faces of one image, of all that its camera may show, by the shared rules of shape, colour and width, in camera
-// coordinates. OpenGL projects, clips and decides visibility.
+// Faces of one image, in camera coordinates: all that its camera may show, by the shared rules of shape, colour and
+// width. OpenGL projects, clips and decides visibility.
 #pragma once
 
 #include <utility>
@@ -9,14 +9,14 @@
 
 namespace pictura::gl {
 
-/// Bounds on the ratio of a strip corner's depth to that of its compared plane there: practically infinitely far,
-/// beyond the plane's horizon, and as near as the oracle allows.
+/// Bounds on the ratio of a strip corner's depth to that of its compared plane there. The minimum is practically
+/// infinite distance, beyond the plane's horizon; the maximum is the oracle's limit of nearness.
 constexpr float kMinInverseDepth = 1e-4f, kMaxInverseDepth = kWidenedDepth;
 
 /// One instance of the draw call: a flat quadrilateral, in camera coordinates.
 struct FaceInstance {
   Vec3 corner[4];  // in order around it
-  // The plane compared_plane . p = 1, whose depth is tested; 0: the face's own depth.
+  // Plane compared_plane . p = 1, whose depth is tested; 0: the face's own depth.
   Vec3 compared_plane;
   Rgb color;
   int32_t layer = 0;  // of the image array

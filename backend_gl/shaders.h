@@ -1,11 +1,12 @@
-// The two programs of the pipeline: faces to samples, and samples to the callers' planar images.
+// The two programs of the pipeline: from faces to samples, and from samples to the callers' planar images.
 #pragma once
 
 namespace pictura::gl {
 
-/// Hardware rounds corners to 1/n of a texel (GL_SUBPIXEL_BITS) but keeps their depths: a face's plane then tilts, near
-/// the horizon by more than the distance between strips of one level. So corners are rounded here, and their depths are
-/// computed at the rounded positions: strips of one plane have the same depths for any corners, except for rounding.
+/// Vertex shader of faces. Hardware rounds corners to 1/n of a texel (GL_SUBPIXEL_BITS) but keeps their depths. This
+/// tilts a face's plane, near the horizon by more than the distance between strips of one level. So corners are rounded
+/// here, and their depths are computed at the rounded positions: except for rounding, strips of one plane have the same
+/// depths for any corners.
 constexpr const char* kFaceVertexShader = R"(#version 450 core
 #extension GL_ARB_shader_viewport_layer_array : require
 layout(location = 0) in vec3 corner0;  // camera coordinates
@@ -45,8 +46,8 @@ out vec4 color;
 void main() { color = vec4(face_color, 1.0); }
 )";
 
-/// Requires MULTISAMPLE and PACKED, defined before it as 0 or 1. An invocation writes one word of each colour plane,
-/// four bytes (PACKED) or one float.
+/// Compute shader that averages samples. Requires MULTISAMPLE and PACKED, defined before it as 0 or 1. An invocation
+/// writes one word of each colour plane: four bytes (PACKED) or one float.
 constexpr const char* kResolveShader = R"(
 #if MULTISAMPLE
 uniform sampler2DMSArray drawn;

@@ -1,5 +1,5 @@
-// Interoperability of this backend and CUDA on one GPU: scenes are read from device memory, images are copied to device
-// memory without passing through the host. No CUDA type appears here; interop.cpp is built only with CUDA.
+// Interoperability of this backend and CUDA on one GPU: scenes are read from device memory, and images are copied to
+// device memory without passing through the host. No CUDA type appears here; interop.cpp is built only with CUDA.
 #pragma once
 
 #include <memory>
@@ -11,7 +11,7 @@ namespace pictura::gl {
 
 /// A copy of rows of bytes from a buffer to memory.
 struct RowCopy {
-  std::size_t from = 0, from_pitch = 0;  // offset in the buffer, and from row to row
+  std::size_t from = 0, from_pitch = 0;  // offset in the buffer, and distance between rows
   std::byte* to = nullptr;
   std::size_t to_pitch = 0;
   std::size_t row_bytes = 0, rows = 0;
@@ -21,8 +21,8 @@ struct RowCopy {
 class CudaBuffer {
  public:
   virtual ~CudaBuffer() = default;
-  /// Enqueues the copies to device memory on the stream, ordered after all earlier and before all later OpenGL
-  /// commands. The buffer's context must be current.
+  /// Enqueues copies to device memory on the stream, after all earlier and before all later OpenGL commands. The
+  /// buffer's context must be current.
   virtual void copy(Span<const RowCopy> copies, Stream stream) = 0;
 };
 
@@ -43,18 +43,19 @@ struct HostScene {
 class CudaInterop {
  public:
   virtual ~CudaInterop() = default;
-  /// The CUDA device that all calls work on; callers need not make it current.
+  /// CUDA device of all calls; callers need not make it current.
   virtual Device device() const = 0;
   /// Waits for the work on a stream.
   virtual void synchronize(Stream stream) const = 0;
   /// Registers a buffer object of the current context.
   virtual std::unique_ptr<CudaBuffer> share(unsigned int buffer) const = 0;
-  /// Waits for the stream and copies what is in device memory.
+  /// Waits for the stream, then copies a scene and its views from device memory to the host.
   virtual void copy_to_host(const SceneBatch& scene, const ViewBatch& views, Stream stream,
                             HostScene* scene_out) const = 0;
 };
 
-/// Throws Error if the CUDA device cannot be used. Defined only in builds with CUDA.
+/// Makes the interoperability with a CUDA device. Throws Error if the device cannot be used. Defined only in builds
+/// with CUDA.
 std::unique_ptr<CudaInterop> make_cuda_interop(Device device);
 
 }  // namespace pictura::gl
