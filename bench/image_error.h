@@ -1,4 +1,4 @@
-// Differences of images from the oracle's, value by value, and the tolerance for kernels.
+// Differences of images from the oracle's images, value by value, and the tolerance for kernels.
 #pragma once
 
 #include <cstddef>
@@ -7,28 +7,29 @@
 
 namespace pictura {
 
-/// Channel values are in [0, 1].
+/// Errors of images. Channel values are in [0, 1].
 struct ImageError {
   int64_t values = 0, differing = 0;
-  int64_t beyond = 0;  // off by more than kKernelError
+  int64_t beyond = 0;  // errors above kKernelError
   double worst = 0;
-  // Pixels with planes, and those whose planes show another surface.
+  // Pixels with planes, and pixels whose planes have another surface.
   int64_t plane_pixels = 0, differing_plane_pixels = 0;
 
   void add(const ImageError& other);
-  /// The tolerance of the CUDA renderer (bench/truth/tolerances.h).
+  /// Whether the errors are within the tolerance of the CUDA renderer (bench/truth/tolerances.h).
   bool is_within_tolerance() const;
 };
 
-/// The error of one view's image of one camera, and of its planes if it has them; both of one format, size and order.
+/// Compares one view's image of one camera, and its planes if present; both images must have the same format, size and
+/// order.
 ImageError compare_image(const CameraImages& actual, const CameraImages& expected, PixelFormat format, int view,
                          ChannelOrder order = ChannelOrder::planar, int patch_px = kDefaultPatch_px);
 
-/// Fills images before they are drawn, so that unwritten values are found: far from any colour as a float or a half,
-/// and no valid depth, class or instance.
+/// Byte that fills images before drawing, so that unwritten values are found: far from any colour as a float or a half,
+/// and not a valid depth, class or instance.
 constexpr int kUnwrittenByte = 0x7F;
 
-/// Calls visit(first byte, bytes from one row to the next, bytes of a row, rows) for all memory of colours and planes.
+/// Calls visit(first byte, bytes between rows, bytes of a row, rows) for all memory of colours and planes.
 template <typename Visit>
 void visit_memory(const ImageBatch& images, Visit&& visit) {
   const auto views = static_cast<std::size_t>(images.num_views);

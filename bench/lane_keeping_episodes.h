@@ -1,4 +1,4 @@
-// Whole episodes driven by the lane-keeping controller, which show that a map can be driven.
+// Whole episodes driven by the lane-keeping controller, which demonstrate that a map is drivable.
 #pragma once
 
 #include <memory>
@@ -8,7 +8,7 @@
 
 namespace pictura {
 
-/// What became of a lane-keeping agent.
+/// Outcome of a lane-keeping agent's episode.
 struct DrivenEpisode {
   int goals = 0;  // last waypoints passed within 2 m
   int halt_reason = kEventNone;
@@ -17,9 +17,9 @@ struct DrivenEpisode {
   Vec2 end_m;
 };
 
-/// Drives for `steps` steps, or until an infraction, in so many worlds on the map, so many agents in each among parked
-/// cars, from the first episode of config.seed on. The share of cyclists is config.cyclist_fraction; the rest is as in
-/// evaluation: waypoints of 2 m, lights with fixed timing, no multipliers.
+/// Drives for `steps` steps, or until an infraction, in num_worlds worlds on the map with drivers_each agents among
+/// parked cars, from the first episode of config.seed on. The share of cyclists is config.cyclist_fraction. Everything
+/// else is as in evaluation: waypoints of 2 m, lights with fixed timing, no multipliers.
 std::vector<DrivenEpisode> drive_lane_keeping_episodes(const std::shared_ptr<const RoadMap>& map,
                                                        SimulatorConfig config, int num_worlds, int drivers_each,
                                                        int steps);

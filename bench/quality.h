@@ -1,5 +1,5 @@
-// Errors of images against the truth, the ray caster of bench/truth/image_truth.h: of the CPU renderer and of simpler
-// methods. Used by `pictura bench quality` and by tests; not installed.
+// Errors of images against the truth (the ray caster of bench/truth/image_truth.h), for the CPU renderer and for
+// simpler methods. Used by `pictura bench quality` and by tests; not installed.
 #pragma once
 
 #include <limits>
@@ -16,23 +16,23 @@ struct SnapshotOptions {
   std::string map = "procedural:1";
   int agents = 120;
   uint64_t seed = 0;
-  int steps = 30;  // of random actions
+  int steps = 30;  // number of random actions
   int views = 8;
   bool walls = true;
   int num_threads = 0;  // 0: all
 };
 
 /// Drives a world with random actions; its views are an even selection of the spawned agents. One agent in ten is a
-/// cyclist, one a pedestrian. Throws Error if the map cannot be read or no agent can be spawned.
+/// cyclist, and one in ten is a pedestrian. Throws Error if the map cannot be read or no agent can be spawned.
 Snapshot drive_snapshot(const SnapshotOptions& options);
 
 /// Error against the truth, pooled over the images that are not blank.
 struct Quality {
   PooledError one_sample;                                           // a z-buffer, at the pixel's centre
-  PooledError grid_2x2;                                             // ... with 2x2 supersampling
+  PooledError grid_2x2;                                             // one sample with 2x2 supersampling
   PooledError area;                                                 // exact coverage as alpha, front to back
   PooledError oracle;                                               // the CPU renderer
-  PooledError oracle_bytes;                                         // ... rounded to bytes
+  PooledError oracle_bytes;                                         // the CPU renderer, rounded to bytes
   double worst_image_db = std::numeric_limits<double>::infinity();  // of the oracle
   int images = 0;
 
@@ -46,9 +46,9 @@ Quality measure_quality(const StaticGeometry& geometry, const SceneBatch& scene,
 /// Error of the CPU renderer against the truth in one random scene.
 PooledError measure_random_scene(RandomKind kind, uint64_t seed);
 
-/// Writes one picture with a row for each snapshot: of its first view's first camera the crop with the largest error
-/// of the simpler methods, in the truth, the oracle, area coverage, 2x2 samples and one sample, enlarged without
-/// smoothing.
+/// Writes one picture with a row for each snapshot. The row shows a crop of the first camera of its first view, where
+/// the simpler methods have the largest error: the truth, the oracle, area coverage, 2x2 samples and one sample,
+/// enlarged without smoothing.
 void write_quality_figure(const std::string& path, Span<const Snapshot> snapshots, const RendererConfig& config);
 
 }  // namespace pictura

@@ -1,5 +1,5 @@
-// Times renderers on scenes in the memory that they draw from, and compares their images with the oracle's, before and
-// after.
+// Timing of renderers on scenes in their own memory, with comparisons of their images with the oracle's images before
+// and after.
 #pragma once
 
 #include <memory>
@@ -14,34 +14,34 @@ namespace pictura {
 
 struct RenderCase {
   std::string backend = "cpu";
-  RendererConfig config;  // config.device: where scenes, views and images lie
-  int num_views = 0;      // the first views of the driven worlds
+  RendererConfig config;  // config.device: device of scenes, views and images
+  int num_views = 0;      // number of views of the driven worlds, from the first
   PixelFormat format = PixelFormat::u8;
   Planes planes = Planes::none;
   ChannelOrder order = ChannelOrder::planar;
-  int patch_px = kDefaultPatch_px;  // side of the patches, where the order is of patches
+  int patch_px = kDefaultPatch_px;  // side of the patches, where the order is patches
   int checked_views = 8;            // compared with the oracle, before and after timing; 0: none
   int repeats = 7;                  // 0: no timing
-  double repeat_s = 1.0;            // approximate duration of the calls of a repeat
+  double repeat_s = 1.0;            // approximate duration of a repeat
   bool measures_memory = false;
 };
 
 struct RenderMeasurement {
   std::string choice;           // as reported by make_renderer()
   std::vector<double> call_ms;  // one per repeat: the mean of its calls
-  ImageError error;             // of the checked views against the oracle, before and after
-  // With measures_memory, device memory after the maps are uploaded, and the peak, both without scene, views and
+  ImageError error;             // errors of the checked views against the oracle, before and after timing
+  // With measures_memory: device memory after the upload of the maps, and its peak, both without scene, views and
   // images.
   double up_front_bytes = 0, max_bytes = 0, image_bytes = 0;
 };
 
-/// Host memory for the images of so many views of the case.
+/// Allocates host memory for the images of num_views views of the case.
 HostImages images_of(const RenderCase& render_case, int num_views);
 
-/// Throws Error if `cuda` is out of tolerance, or a backend cannot run here.
+/// Measures a case. Throws Error if `cuda` is out of tolerance, or a backend cannot run here.
 RenderMeasurement measure_render(const DrivenWorlds& worlds, const RenderCase& render_case);
 
-/// Views and memory for their images in one memory space.
+/// Views and their images in one memory space.
 class RenderTarget {
  public:
   virtual ~RenderTarget() = default;
@@ -49,12 +49,12 @@ class RenderTarget {
   virtual void fill_unwritten() = 0;
   /// Mean milliseconds of a number of consecutive calls; returns when all are finished.
   virtual double draw(Renderer* renderer, int calls) = 0;
-  /// The images, of at least num_views views.
+  /// Returns the images of at least num_views views.
   virtual const HostImages& images(int num_views) = 0;
 };
 std::unique_ptr<RenderTarget> make_host_target(const DrivenWorlds& worlds, const RenderCase& render_case);
 
-/// The first CUDA device and its driver; empty if there is none.
+/// Names of the first CUDA device and its driver; empty if there is none.
 std::string cuda_device_name();
 std::string cuda_driver_name();
 

@@ -1,4 +1,4 @@
-// The rendering benchmark on a CUDA device.
+// Rendering benchmark on a CUDA device.
 #pragma once
 
 #include <atomic>
@@ -10,10 +10,11 @@
 
 namespace pictura {
 
-/// Times with stream events: the device's time, including waits for the host between launches.
+/// Makes a target on the device that measures with stream events: the device's time, including waits for the host
+/// between launches.
 std::unique_ptr<RenderTarget> make_device_target(const DrivenWorlds& worlds, const RenderCase& render_case);
 
-/// Device memory used since construction, by any process: a thread polls cudaMemGetInfo.
+/// Device memory that any process has allocated since construction; a thread polls cudaMemGetInfo.
 class DeviceMemoryMeter {
  public:
   DeviceMemoryMeter();
@@ -22,7 +23,7 @@ class DeviceMemoryMeter {
   DeviceMemoryMeter& operator=(const DeviceMemoryMeter&) = delete;
 
   double used_bytes() const;
-  /// The peak, including the current use. Throws Error if polling failed.
+  /// Returns the peak, including the current use. Throws Error if polling failed.
   double max_bytes() const;
 
  private:

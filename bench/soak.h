@@ -1,5 +1,5 @@
-// A long comparison of a renderer with the oracle, over scenes, views, rigs and settings drawn from a seed: of colours
-// (u8, f16 and f32, planar), planes and visibility.
+// Long-running comparison of a renderer with the oracle, over scenes, views, rigs and settings drawn from a seed: of
+// colours (u8, f16 and f32, planar), planes and visibility.
 #pragma once
 
 #include <functional>
@@ -15,8 +15,8 @@ namespace pictura {
 struct SoakOptions {
   std::vector<std::string> maps;
   int agents = 120, parked_cars = 32;  // maxima of a scene's world
-  int views = 16;                      // of each scene
-  int64_t first_scene = 0;             // scenes are numbered from 0; each depends only on its number and the seed
+  int views = 16;                      // per scene
+  int64_t first_scene = 0;             // scenes are numbered from 0 and depend only on their number and the seed
   int64_t max_scenes = 0;              // 0: limited by time only
   double max_seconds = 480;
   uint64_t seed = 0;
@@ -43,17 +43,18 @@ struct SoakResult {
   double seconds = 0;
   ImageError error;  // over all images
   int64_t images_out_of_tolerance = 0, differing_answers = 0;
-  // The first hundred of each.
+  // The first hundred faults of each kind.
   std::vector<SoakFault> faults;
   std::vector<VisibilityFault> visibility_faults;
   int64_t first_faulty_scene = -1;
 };
 
-/// Creates the renderer to compare, once for each scene, for host memory; may report how it was chosen.
+/// Function that makes the renderer to compare, once per scene, for host memory; may report how it was chosen.
 using MakeRenderer = std::function<std::unique_ptr<Renderer>(const RendererConfig&, std::string* choice_out)>;
 
-/// Calls on_scene(result so far) after each scene. Throws Error naming the scene if creating a renderer or drawing
-/// fails, as for gl, which supports no planes, halves or visibility; UsageError as make throws it.
+/// Compares scene by scene, and calls on_scene(result so far) after each scene. Throws Error naming the scene if making
+/// a renderer or drawing fails, as for gl, which supports no planes, halves or visibility; passes on the UsageError of
+/// `make`.
 SoakResult soak(const SoakOptions& options, const MakeRenderer& make,
                 const std::function<void(const SoakResult&)>& on_scene);
 

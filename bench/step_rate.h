@@ -1,4 +1,4 @@
-// How fast a simulator steps, on any executor: random actions lie where it reads them, and nothing but steps is timed.
+// Step rate of a simulator on any executor: random actions are in its memory beforehand, and only steps are timed.
 #pragma once
 
 #include <memory>
@@ -8,7 +8,7 @@
 
 namespace pictura {
 
-/// One timed run of steps, waited for at its end.
+/// One timed run of steps, including the wait for its end.
 struct StepTiming {
   int64_t steps = 0;
   double elapsed_s = 0;
@@ -16,7 +16,7 @@ struct StepTiming {
   int64_t slot_steps = 0;
 };
 
-/// Steps one simulator with uniform random actions, which are drawn and uploaded beforehand, and taken in turn.
+/// Steps one simulator with uniform random actions, which are drawn and uploaded beforehand and then used in turn.
 class StepBench {
  public:
   StepBench(Simulator* simulator, uint64_t seed);
@@ -24,9 +24,10 @@ class StepBench {
   StepBench(const StepBench&) = delete;
   StepBench& operator=(const StepBench&) = delete;
 
-  /// Takes `steps` steps and waits for them.
+  /// Takes `steps` steps and waits for their end.
   StepTiming run(int64_t steps);
-  /// Takes steps for at least `duration_s`; waits after every `steps_between_looks`, since a look at the clock has to.
+  /// Takes steps for at least `duration_s`. Waits after every `steps_between_looks` steps, because reading the clock
+  /// requires it.
   StepTiming run_for(double duration_s, int64_t steps_between_looks);
 
  private:

@@ -1,5 +1,5 @@
-// What happens in the worlds of a map over many episodes: who is there and who is refused, what a random policy does
-// wrong, and how far a lane-keeping controller gets. Used by `pictura bench worlds` and by nothing that is installed.
+// Statistics of the worlds of a map over many episodes: spawned and refused agents, the infractions of a random policy,
+// and the progress of a lane-keeping controller. Used by `pictura bench worlds`; not installed.
 #pragma once
 
 #include <functional>
@@ -12,8 +12,8 @@
 namespace pictura {
 
 struct WorldStatisticsOptions {
-  int episodes = 100;  // each the first one of a world of its own
-  int agents = 120;    // in each world of the random policy; the lane-keeping agent is alone among parked cars
+  int episodes = 100;  // each the first episode of its own world
+  int agents = 120;    // per world of the random policy; the lane-keeping agent is alone among parked cars
   uint64_t seed = 0;
   int num_threads = 0;  // 0: all
   std::function<void(const std::string& phase)> on_progress;
@@ -25,9 +25,9 @@ struct EpisodeValues {
   std::vector<double> values;
 };
 
-/// In the default world, at the training timing of lights: agents by class, refusals by reason, goals that cannot be
-/// reached, and the events of a uniformly random policy until the episode ends. In evaluation's lights: what the
-/// lane-keeping controller reaches in as many steps as an episode has at most.
+/// Measures a map. In the default world, with the training timing of lights: agents by class, refusals by reason,
+/// unreachable goals, and the events of a uniformly random policy until the episode ends. With evaluation's lights: the
+/// results of the lane-keeping controller within the maximum length of an episode.
 std::vector<EpisodeValues> measure_worlds(const std::shared_ptr<const RoadMap>& map,
                                           const WorldStatisticsOptions& options);
 

@@ -1,4 +1,4 @@
-// Shared by `pictura bench train` and `pictura bench breakdown`: updates of a configuration and what each of them cost.
+// Shared parts of `pictura bench train` and `pictura bench breakdown`: updates of a configuration and their costs.
 #pragma once
 
 #include <string>
@@ -13,29 +13,30 @@ namespace pictura {
 struct TrainingCase {
   std::string config_path;
   std::vector<std::string> overrides;
-  std::string init_from;  // a checkpoint, or empty
+  std::string init_from;  // path of a checkpoint, or empty
   int warm_up = 1, updates = 3;
-  bool profiles_kernels = false;  // in one update more
+  bool profiles_kernels = false;  // in one additional update
 };
 
 struct TrainingMeasurement {
   std::vector<UpdateCost> updates;  // after the warm-up
-  UpdateCost profiled;              // the update in which kernels were timed, and their times
+  UpdateCost profiled;              // the update with timed kernels; their times follow
   std::vector<KernelTime> kernels;
   TrainReport report;
 };
 
 /// Trains in a temporary folder. The learning rate stays constant, so that no schedule ends. Throws Error where an
-/// update took no agent-step or no minibatch, or where, before its parameters change, the policy gives actions other
-/// probabilities than in the rollout: then it was not shown what the agents saw. Throws what train() throws.
+/// update took no agent-step or no minibatch. Throws Error where the policy, before its parameters change, gives
+/// actions other probabilities than in the rollout, because it then did not get the agents' observations. Throws the
+/// exceptions of train().
 TrainingMeasurement measure_training(const TrainingCase& training_case);
 
-/// Wall time of an update, and what of it is in no phase.
+/// Wall time of an update, and its part outside all phases.
 double wall_s(const UpdateCost& cost);
 double other_s(const UpdateCost& cost);
 inline double phase_s(const UpdateCost& cost, Phase phase) { return cost.phases_s[static_cast<size_t>(phase)]; }
 
-/// One value of each update.
+/// Returns one value per update.
 template <typename Value>
 BenchResult result_of(const TrainingMeasurement& measurement, const std::string& name, const std::string& unit,
                       const Value& value) {
@@ -44,7 +45,7 @@ BenchResult result_of(const TrainingMeasurement& measurement, const std::string&
   return result;
 }
 
-/// Device and driver of a training run; backend names what simulated, drew and learnt.
+/// Returns the device and driver of a training run; `backend` names the simulator, the renderer and the learner.
 BenchContext training_context(const std::string& workload, const TrainReport& report);
 
 }  // namespace pictura

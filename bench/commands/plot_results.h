@@ -1,5 +1,5 @@
-// Shared by benchmarks of rates: options of measurement and report, and charts of earlier results: of their JSON
-// output, and of files of scripts/gpu_check, which contain several of those.
+// Shared parts of benchmarks of rates: options of measurement and report, and charts of earlier results. Charts read
+// JSON output, and files of scripts/gpu_check, which contain several outputs.
 #pragma once
 
 #include <string>
@@ -18,9 +18,9 @@ struct PlotArguments {
 };
 /// Adds the options --plot, which `description` documents, and --figure.
 void add_plot_options(CLI::App* command, const std::string& description, PlotArguments* arguments);
-/// Whether both were given; throws UsageError if only one was.
+/// Whether both options were given. Throws UsageError if only one was given.
 bool wants_plot(const PlotArguments& arguments);
-/// Draws a chart of pictura.plot from the results, with further arguments of its function.
+/// Draws a chart of pictura.plot from the results; `request` has further arguments of its function.
 void draw_results(const std::string& chart, const PlotArguments& arguments, Json request = Json::object());
 
 struct RateArguments {
@@ -31,7 +31,7 @@ struct RateArguments {
 };
 /// Adds the options --repeats, --repeat-seconds and --json.
 void add_repeat_options(CLI::App* command, RateArguments* arguments);
-/// Adds these and --plot and --figure.
+/// Adds the options of add_repeat_options(), --plot and --figure.
 void add_rate_options(CLI::App* command, RateArguments* arguments);
 
 }  // namespace pictura

@@ -1,5 +1,5 @@
 // Synthetic scenes for tests and benchmarks of renderers: streets with lane marks, edges, crosswalks, cars, people,
-// walls and lights, random from a seed, with disjoint footprints.
+// walls and lights, random by seed, with disjoint footprints.
 #pragma once
 
 #include <string>
@@ -9,11 +9,11 @@
 
 namespace pictura {
 
-/// Appends the outline of a ring or line as strips of that kind.
+/// Appends the outline of a ring or line as strips of this kind.
 void add_polyline(StaticGeometry* geometry, std::vector<Vec3> points_m, float width_m, StripKind kind);
 
 /// A town-like scene: a grid of streets 60 m apart, crosswalks and lights at crossings, walls along blocks, and
-/// `num_agents` agents on the streets, none touching another.
+/// `num_agents` agents on the streets, without contact.
 struct Snapshot {
   StaticGeometry geometry;
   SceneOwner scene;  // one world with handle 0
@@ -21,12 +21,12 @@ struct Snapshot {
 };
 Snapshot make_synthetic_town(uint64_t seed, int num_agents);
 
-/// A town of strips and walls with a crowd of 900 people, seen from above and along it: far more than fits into the
-/// kernels' shared memory.
+/// Makes a town of strips and walls with a crowd of 900 people, seen from above and along it: far more than the
+/// kernels' shared memory can hold.
 Snapshot make_crowd();
 
-/// Four worlds on two towns: the second town, the first without agents, the first and, without lights, the second
-/// again. One view of the empty world, three of each other, which alternately hide each other's vehicles.
+/// Four worlds on two towns: the second town, the first without agents, the first, and the second again without lights.
+/// The empty world has one view, and each other world has three, which alternately hide the vehicles of the others.
 struct SyntheticWorlds {
   std::vector<StaticGeometry> maps;
   SceneOwner scene;
@@ -34,30 +34,30 @@ struct SyntheticWorlds {
 };
 SyntheticWorlds make_synthetic_worlds();
 
-/// A bridge across the view, with marks and cars on it, above a road with marks and cars: seen from the road, from the
-/// bridge, and from above both.
+/// Makes a bridge across the view, with marks and cars on it, above a road with marks and cars: seen from the road,
+/// from the bridge, and from above.
 Snapshot make_bridge();
 
-/// A road that climbs by 12 %, with marks, a stop line, a bridge over it, walls along it, lights, and upright agents on
-/// it: seen up the hill, down from it, and across it from the bridge.
+/// Makes a road that climbs by 12 %, with marks, a stop line, a bridge over it, walls along it, lights, and upright
+/// agents on it: seen uphill, downhill, and across from the bridge.
 Snapshot make_hill();
 
-/// Cars that have driven into others, in front of a wall that one of them has driven into; seen from both sides.
+/// Makes cars that have driven into others, in front of a wall that one car has driven into; seen from both sides.
 Snapshot make_crash();
 
-/// One camera at the origin of the ego frame, 1.5 m up, looking ahead, with round numbers.
+/// Returns one camera at the origin of the ego frame, 1.5 m up, facing ahead, with round numbers.
 Rig simple_rig(int width_px = 100, int height_px = 100, float focal_px = 50);
 
-/// The first camera of the paper's rig alone.
+/// Returns the first camera of the paper's rig alone.
 Rig front_rig(int width_px = 96, int height_px = 54);
 
-/// Four cameras of 97x55, 1x1 and 40x130 pixels.
+/// Returns four cameras of 97x55, 1x1 and 40x130 pixels.
 Rig mixed_rig();
 
-/// Eight cameras of eight sizes, pitched and rolled.
+/// Returns eight cameras of eight sizes, pitched and rolled.
 Rig eight_camera_rig();
 
-/// Difficult scenes, each with a rig: hills, bridges, solids that intersect, odd sizes, one pixel.
+/// Difficult scenes, each with a rig: hills, bridges, intersecting solids, odd sizes, one pixel.
 struct HardScene {
   std::string name;
   Snapshot town;
@@ -65,7 +65,7 @@ struct HardScene {
 };
 std::vector<HardScene> hard_scenes();
 
-/// All images of a batch, one camera after the other: colours as floats, and planes if requested.
+/// All images of a batch, camera by camera: colours as floats, and planes if requested.
 struct Outputs {
   std::vector<float> color;
   std::vector<float> depth_m;

@@ -1,5 +1,5 @@
-// Random small scenes in which two surfaces are nearly equally far, or a rule of drawing has an exception: one kind for
-// each such rule. `pictura bench quality --random` and tests measure the oracle on them.
+// Random small scenes in which two surfaces have nearly the same depth, or a drawing rule has an exception: one kind of
+// scene per rule. `pictura bench quality --random` and tests measure the oracle on these scenes.
 #pragma once
 
 #include <iterator>
@@ -14,7 +14,7 @@ enum class RandomKind {
   crashed_boxes,       // boxes driven into each other, with faces in one plane
   intersecting_walls,  // walls that cross each other, partly behind boxes
   wide_strips,         // strips widened by 2 to 8 px up to the horizon and beyond
-  walls_on_strips,     // walls whose foot is up to 40 cm below the strips that they stand on
+  walls_on_strips,     // walls whose lower edge is up to 40 cm below the strips that they stand on
   level_edges,         // level edges of walls and boxes, one close above the other
 };
 constexpr const char* kRandomKindNames[] = {
@@ -22,12 +22,12 @@ constexpr const char* kRandomKindNames[] = {
     "strips wider than 2 px",       "walls on strips",    "level edges"};
 constexpr int kNumRandomKinds = static_cast<int>(std::size(kRandomKindNames));
 
-/// A scene with one view, and how it is drawn: by one camera of the paper's size and focal length in the view's origin.
+/// A scene with one view and its configuration: one camera of the paper's size and focal length at the view's origin.
 struct RandomScene {
   Snapshot town;
   RendererConfig config;
 };
-/// Depends on its arguments alone.
+/// Makes a random scene that depends only on the arguments.
 RandomScene make_random_scene(RandomKind kind, uint64_t seed);
 
 }  // namespace pictura
