@@ -1,5 +1,5 @@
-// The kernels that the learner's host side starts, a thread an element. All are put on a stream and nothing waits;
-// errors are left to cudaGetLastError().
+// Kernels that the learner's host side launches, one thread per element. All launches are asynchronous on a stream;
+// callers check errors by cudaGetLastError().
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -20,8 +20,8 @@ void launch_count_advantages(Span<const float> advantages, Span<const uint8_t> v
                              cudaStream_t stream);
 void launch_permute(const Permutation& permutation, Span<const int64_t> items, int64_t* items_out, cudaStream_t stream);
 
-/// Those of [0, count) that are asked, or kept, in ascending order, and how many. Where `scratch` is null they only
-/// say how many bytes of it they need.
+/// The selected (asked or kept) indices in [0, count), in ascending order, and their number. Where `scratch` is null,
+/// the functions only return the required scratch bytes.
 struct KeptTransitions {
   Span<const float> advantages;
   Span<const uint8_t> valid;

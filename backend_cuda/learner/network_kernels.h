@@ -1,5 +1,5 @@
-// The kernels of network_passes.h, which says what they compute. All are put on a stream and nothing waits; errors are
-// left to cudaGetLastError().
+// Kernels of network_passes.h, which documents their results. All launches are asynchronous on a stream; callers check
+// errors by cudaGetLastError().
 #pragma once
 
 #include <cuda_runtime_api.h>

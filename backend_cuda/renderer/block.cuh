@@ -1,4 +1,4 @@
-// The state that the threads of a block share while they draw an image, and warp collectives that balance uneven work.
+// State that the threads of a block share while they draw an image, and warp collectives that balance uneven work.
 // Warps run independently and synchronize only between phases.
 #pragma once
 
@@ -9,7 +9,7 @@ namespace pictura::cuda {
 constexpr int kWarpSize = 32, kMaxWarps = 8;
 constexpr unsigned kAllLanes = 0xFFFFFFFFu;
 
-/// A view and its world's ranges, for culling and face set-up.
+/// A view and its world's index ranges, for culling and face set-up.
 struct ViewState {
   View view;
   const DeviceGeometry* geometry;
@@ -31,12 +31,12 @@ struct Part {
   }
 };
 
-/// The order in which a tile is drawn whose fragments do not fit at once: vertical bands from left to right, each in
-/// parts from top to bottom.
+/// Drawing order of a tile whose fragments do not fit at once: vertical bands from left to right, each in parts from
+/// top to bottom.
 struct PartPlan {
   int band_begin, band_px;  // of the current band
   int wide_px, rows;        // maximum size of a part
-  Part part;                // the next one
+  Part part;                // next part
 };
 
 /// Storage of a WarpQueue.
@@ -50,10 +50,10 @@ struct WarpState {
   uint8_t owners[kWarpSize];
 };
 
-/// Always in shared memory, also where the rest of the block's memory is global.
+/// Shared state of a block. Always in shared memory, even where the rest of the block's memory is global.
 struct BlockState {
-  PreparedImage current;   // the image that is drawn
-  PreparedImage upcoming;  // the next one
+  PreparedImage current;   // image that is being drawn
+  PreparedImage upcoming;  // next image
   Scratch scratch;         // of this block
   ScreenFace* faces;       // of the current image
   PolygonEdge* edges;      // of all images in the pool
@@ -76,7 +76,7 @@ __device__ inline int lane_index() { return static_cast<int>(threadIdx.x) % kWar
 __device__ inline int warp_index() { return static_cast<int>(threadIdx.x) / kWarpSize; }
 __device__ inline unsigned lanes_below() { return (1u << lane_index()) - 1; }
 
-// Synchronizes the block. Without __syncwarp() a diverged warp would arrive at the barrier twice.
+// Synchronizes the block. Without __syncwarp(), a diverged warp would arrive at the barrier twice.
 __device__ inline void sync_block() {
   __syncwarp();
   __syncthreads();
@@ -89,12 +89,12 @@ __device__ inline int warp_next(int32_t* counter) {
   return __shfl_sync(kAllLanes, next, 0);
 }
 
-// Only the first fault is kept, until the host has thrown it.
+// Records a fault. Only the first fault is kept, until the host has thrown it.
 __device__ inline void note_fault(const DrawTask& task, int32_t index, FaultKind kind) {
   atomicCAS(task.fault, kNoFault, word_of({kind, index}));
 }
 
-// Sets the state of a view. False, with a fault reported, if it names something that does not exist.
+// Sets the state of a view. Returns false and records a fault if the view refers to something that does not exist.
 __device__ inline bool set_view(ViewState* state, const DrawTask& task, int32_t view_index) {
   auto fault = [&](FaultKind kind) {
     note_fault(task, view_index, kind);
@@ -131,14 +131,14 @@ __device__ inline int warp_inclusive_sum(int value) {
   return value;
 }
 
-// Allocates for a whole warp from a counter with one atomic addition and returns the warp's first index in all lanes.
+// Allocates for a whole warp from a counter, with one atomic addition, and returns the warp's first index in all lanes.
 // end: inclusive prefix sum of the lanes' counts.
 __device__ inline int32_t warp_allocate(int32_t* counter, int end) {
   int32_t first = 0;
   if (lane_index() == kWarpSize - 1) first = atomicAdd(counter, end);
   return __shfl_sync(kAllLanes, first, kWarpSize - 1);
 }
-// Allocates one index for each lane where `wanted` is true, and returns it.
+// Allocates and returns one index for each lane where `wanted` is true.
 __device__ inline int32_t warp_allocate_one(int32_t* counter, bool wanted) {
   const unsigned wanting = __ballot_sync(kAllLanes, wanted);
   int32_t first = 0;
@@ -146,8 +146,8 @@ __device__ inline int32_t warp_allocate_one(int32_t* counter, bool wanted) {
   return __shfl_sync(kAllLanes, first, 0) + __popc(wanting & lanes_below());
 }
 
-// The items of all lanes of a warp are numbered consecutively, those of a lane from `begin` on. Returns the rank, among
-// lanes with items, of the lane that owns item `first + lane_index()`.
+// Returns the rank, among lanes with items, of the lane that owns item `first + lane_index()`. The items of all lanes
+// of a warp are numbered consecutively; those of a lane start at `begin`.
 __device__ inline int owner_rank(int first, int begin, bool has_some) {
   const bool starts_here = has_some && begin >= first && begin < first + kWarpSize;
   const unsigned starts = __reduce_or_sync(kAllLanes, starts_here ? 1u << (begin - first) : 0u);
@@ -155,14 +155,14 @@ __device__ inline int owner_rank(int first, int begin, bool has_some) {
   return before + __popc(starts & (lanes_below() << 1 | 1u)) - 1;
 }
 
-// Load balancing: each lane has `count` items, with inclusive prefix sum `end`. All lanes call visit(item, owner, k)
-// together, for 32 items at a time: the item's number in the warp, the lane that owns it (-1: past the last item), and
-// its index among that lane's items.
+// Balances load: each lane has `count` items, with inclusive prefix sum `end`. All lanes call visit(item, owner, k)
+// together, for 32 items at a time: the item's index in the warp, the lane that owns the item (-1: past the last item),
+// and the index among that lane's items.
 template <typename Visit>
 __device__ inline void warp_expand(WarpState* warp, int count, int end, Visit&& visit) {
   const int lane = lane_index(), begin = end - count;
   const int total = __shfl_sync(kAllLanes, end, kWarpSize - 1);
-  // Lanes that have items, compacted.
+  // Lanes with items, compacted.
   const unsigned owning = __ballot_sync(kAllLanes, count > 0);
   if (count > 0) warp->owners[__popc(owning & lanes_below())] = static_cast<uint8_t>(lane);
   __syncwarp();
@@ -176,16 +176,16 @@ __device__ inline void warp_expand(WarpState* warp, int count, int end, Visit&& 
   }
 }
 
-// Neighbouring entries of a list tend to be expensive together, so lanes take entries a stride apart: in a pass a lane
-// takes entry lane * passes + pass. Every warp has equally many passes.
+// Number of passes over a list. Neighbouring entries tend to be expensive together, so lanes take entries a stride
+// apart: in each pass a lane takes entry lane * passes + pass. Every warp has equally many passes.
 template <int kThreads>
 __device__ inline int passes_of(int count) {
   const unsigned rounds = static_cast<unsigned>(count + kThreads - 1) / kThreads;
   return static_cast<int>(rounds) * (kThreads / kWarpSize);
 }
 
-// Compacts work within a warp: lanes push pairs; while is_ready(), take() hands one pair to every lane. At the end
-// take() also hands out fewer than 32, then is_valid tells which lanes have one.
+// Compacts work within a warp: lanes push pairs; while is_ready(), take() gives one pair to every lane. At the end,
+// take() also gives out fewer than 32 pairs, and is_valid marks the lanes with a pair.
 class WarpQueue {
  public:
   __device__ explicit WarpQueue(WarpQueueStorage* storage) : storage_(storage) {}
@@ -222,7 +222,8 @@ class WarpQueue {
   int count_ = 0;
 };
 
-// Sum over the threads of a block, through an array with one element per thread. All threads of the block.
+// Sums over the threads of a block, through an array with one element per thread. Collective over all threads of the
+// block.
 __device__ inline int64_t block_sum(int64_t* of_thread, int64_t value) {
   sync_block();
   of_thread[threadIdx.x] = value;

@@ -1,6 +1,7 @@
 // Clipping of faces that cross the frustum, and set-up of lights, which have many corners. A lane clips a face of four
-// corners, and all lanes make the edges; a light, or a face with too many corners for a lane, is handled by a whole
-// warp, a lane per corner. Results equal those of clip_face and make_screen_face bit for bit: sums are in their order.
+// corners, and all lanes make the edges. A whole warp handles a light, or a face with too many corners for a lane, with
+// one lane per corner. Results equal those of clip_face and make_screen_face bit for bit, because sums have the same
+// order.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/draw_memory.cuh"
@@ -12,22 +13,22 @@ namespace pictura::cuda {
 
 static_assert(kMaxPolygonCorners <= kWarpSize);
 
-/// Maximum number of corners of a lane's face; a face cut by all five planes may have nine.
+/// Maximum number of corners of a lane's face. A face cut by all five planes may have nine.
 constexpr int kLaneCorners = 8;
 
 /// Shared memory of a warp that clips.
 struct ClipShared {
-  Quad quad;  // of one lane, read by all
-  // Corners: a column per lane, or the first row for the whole warp. Two more rows: a cut and a kept corner may be
-  // written past the last before the count is checked.
+  Quad quad;  // of one lane, read by all lanes
+  // Corners: one column per lane, or the first row for the whole warp. Two additional rows, since a cut and a kept
+  // corner may be written past the last before the count is checked.
   static constexpr int kRows = kLaneCorners + 2;
   float x[kRows][kWarpSize], y[kRows][kWarpSize], z[kRows][kWarpSize];
   uint16_t edges[kLaneCorners * kWarpSize];  // see LaneEdge
 };
 
-/// An edge of a lane's face, in 16 bits.
+/// An edge of a lane's face, packed into 16 bits.
 struct LaneEdge {
-  int lane, from, to;  // the face's lane, and the rows of the edge's corners
+  int lane, from, to;  // lane of the face, and rows of the edge's corners
   bool is_clockwise;   // of the face
   __device__ uint16_t packed() const {
     return static_cast<uint16_t>(lane | from << 5 | to << 9 | (is_clockwise ? 1 << 13 : 0));
@@ -39,7 +40,7 @@ struct LaneEdge {
 };
 static_assert(kWarpSize <= 32 && kLaneCorners <= 16);
 
-/// The corners of one lane's face.
+/// Corners of one lane's face.
 class LaneCorners {
  public:
   __device__ explicit LaneCorners(ClipShared* storage) : storage_(storage) {}
@@ -56,7 +57,8 @@ class LaneCorners {
   ClipShared* storage_;
 };
 
-// Stores a value in words of 16 bytes: with words of 4, each store of a warp would touch parts of many memory segments.
+// Stores a value in words of 16 bytes: with words of 4 bytes, each store of a warp would touch parts of many memory
+// segments.
 template <typename Value>
 __device__ void store_words(Value* to, const Value& value) {
   static_assert(sizeof(Value) % sizeof(uint4) == 0 && alignof(Value) >= sizeof(uint4));
@@ -66,7 +68,7 @@ __device__ void store_words(Value* to, const Value& value) {
   for (int i = 0; i < kWords; ++i) reinterpret_cast<uint4*>(to)[i] = words[i];
 }
 
-// Copies a value, a lane per word of 16 bytes.
+// Copies a value, one lane per word of 16 bytes.
 template <typename Value>
 __device__ void copy_words(Value* to, const Value& from) {
   constexpr int kWords = sizeof(Value) / sizeof(uint4);
@@ -86,7 +88,7 @@ __device__ void copy_words_async(Value* to, const Value& from) {
   }
 }
 
-/// A face whose corners are spread over the lanes, one each; the rest is the same in all lanes.
+/// A face whose corners are distributed over the lanes, one each; the other members are the same in all lanes.
 struct WarpFace {
   Vec3 corner;  // of lanes below count
   int count = 0;
@@ -107,7 +109,7 @@ __device__ inline float sum_in_order(float value) {
   return sum;
 }
 
-// Minimum and maximum over the lanes' values, by integers that sort like the floats.
+// Integers that sort like the floats with these bits; used for minimum and maximum over the lanes' values.
 __device__ inline int32_t sortable_bits(int32_t bits) { return bits ^ (bits >> 31 & 0x7FFFFFFF); }
 __device__ inline float warp_min(float value) {
   return __int_as_float(sortable_bits(__reduce_min_sync(kAllLanes, sortable_bits(__float_as_int(value)))));
@@ -130,7 +132,7 @@ __device__ inline WarpFace broadcast_quad(const PinholeCamera& camera, ClipShare
   return face;
 }
 
-// The disk of a lit head; no corners if it has faded to black.
+// Makes the disk of a lit head; without corners if it has faded to black.
 __device__ inline WarpFace make_light(const FaceSetupContext& context, int32_t index) {
   const LightHead head = context.heads[index];
   const PinholeCamera& camera = context.setting.camera;
@@ -140,8 +142,8 @@ __device__ inline WarpFace make_light(const FaceSetupContext& context, int32_t i
           light_ref(index)};
 }
 
-// clip_face of a lane's face of `count` corners, in place: at most one corner past the last one read is written.
-// Returns the number of corners, or kTooManyCorners if they do not fit or the face is not quite convex.
+// Clips a lane's face of `count` corners in place, as clip_face does: at most one corner past the last read corner is
+// written. Returns the number of corners, or kTooManyCorners if they do not fit or the face is not exactly convex.
 constexpr int kTooManyCorners = -1;
 __device__ inline int clip(const Frustum& f, unsigned crossed, int count, LaneCorners corners) {
   if (crossed == kOutside) return 0;
@@ -199,7 +201,7 @@ __device__ inline unsigned project_in_place(const PinholeCamera& camera, LaneCor
   return fabsf(twice_area) < kMinTwiceArea_px2 ? 0 : edges;
 }
 
-// clip_face of a face whose corners are spread over the lanes.
+// Clips a face whose corners are distributed over the lanes, as clip_face does.
 __device__ inline void clip(const Frustum& f, ClipShared* storage, WarpFace* face_inout) {
   const int lane = lane_index();
   Vec3 corner = face_inout->corner;
@@ -218,7 +220,7 @@ __device__ inline void clip(const Frustum& f, ClipShared* storage, WarpFace* fac
     const bool is_cut = lane < count && (previous_inside >= 0.0f) != (inside >= 0.0f);
     const unsigned cuts = __ballot_sync(kAllLanes, is_cut), staying = __ballot_sync(kAllLanes, stays);
     const int index = __popc(cuts & lanes_below()) + __popc(staying & lanes_below());
-    // Only a face that is not quite convex could exceed the maximum; the excess corners are dropped.
+    // Only a face that is not exactly convex can exceed the maximum; the excess corners are dropped.
     const bool fits = index + 2 <= kMaxPolygonCorners;
     auto keep = [&](int at, Vec3 p) {
       storage->x[0][at] = p.x;
@@ -238,7 +240,8 @@ __device__ inline void clip(const Frustum& f, ClipShared* storage, WarpFace* fac
   face_inout->count = count;
 }
 
-// make_screen_face of a clipped face whose corners are spread over the lanes, with edges from edge_begin on.
+// Makes the screen face of a clipped face whose corners are distributed over the lanes, as make_screen_face does, with
+// edges from edge_begin on.
 __device__ inline bool make_screen_face(const FaceSetupContext& context, const WarpFace& face, int32_t edge_begin,
                                         ScreenFace* face_out) {
   const PinholeCamera& camera = context.setting.camera;

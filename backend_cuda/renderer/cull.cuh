@@ -1,5 +1,5 @@
-// Culling: a warp tests the rows of the map's grid, one lane per row, then the bounding spheres of the pieces in them,
-// one lane per piece. The entries that may be visible are stored in batches of warp size.
+// Culling: a warp tests the rows of the map's grid, one lane per row, then the bounding spheres of the pieces in these
+// rows, one lane per piece. Entries that may be visible are stored in batches of warp size.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/draw_memory.cuh"
@@ -9,7 +9,7 @@ namespace pictura::cuda {
 
 constexpr uint32_t kNoEntry = ~0u;
 
-/// A side of the frustum's outline on the ground plane, from its end of lower y to that of higher y.
+/// A side of the frustum's outline on the ground plane, from the end of lower y to that of higher y.
 struct alignas(16) OutlineSide {
   Vec2 a, b;
   float dx_dy;  // 0 for sides of constant y
@@ -20,24 +20,24 @@ constexpr int kOutlineSides = 8;
 /// Shared memory of a warp that culls.
 struct CullShared {
   OutlineSide sides[kOutlineSides];
-  // Of strips and of walls, in the order of pieces_of.
+  // Arrays of strips and of walls, in the order of pieces_of.
   const Ball* balls[2];
   const int32_t* items[2];
   int32_t offsets[kWarpSize];  // of non-empty rows, see cull_pieces
 };
 static_assert(FaceBatch::kEntries == kWarpSize);
 
-/// The entries of an image. All lanes of a warp call its functions together; several warps may share a list.
+/// Entries of an image. All lanes of a warp call the functions together; several warps may share a list.
 class EntryList {
  public:
-  /// count: in shared memory; it counts all entries pushed, also those beyond max_entries, which are dropped.
+  /// count: in shared memory; counts all pushed entries, including those beyond max_entries, which are dropped.
   __device__ EntryList(uint32_t* entries, int32_t max_entries, int32_t* count)
       : entries_(entries), max_entries_(max_entries), count_(count) {}
   __device__ void push(bool wanted, uint32_t entry) {
     const int32_t index = warp_allocate_one(count_, wanted);
     if (wanted) set(index, entry);
   }
-  /// Pushes an entry for each set bit of `faces`, the faces of an agent.
+  /// Pushes an entry for each set bit of `faces`, which are faces of an agent.
   __device__ void push_faces(unsigned faces, uint32_t object_id) {
     const int count = __popc(faces), end = warp_inclusive_sum(count);
     int32_t index = warp_allocate(count_, end) + end - count;
@@ -46,7 +46,7 @@ class EntryList {
       set(index++, face_entry(object_id, __ffs(static_cast<int>(faces)) - 1));
     }
   }
-  /// Pads the last batch, once all warps have pushed.
+  /// Pads the last batch, after all warps have pushed.
   __device__ void finish() {
     const int32_t count = *count_, end = FaceBatch::count_of(count) * FaceBatch::kEntries;
     if (count + lane_index() < end) set(count + lane_index(), kNoEntry);
@@ -61,24 +61,25 @@ class EntryList {
   int32_t* count_;
 };
 
-// The strips (0) or the walls (1) of a map.
+// Returns the strips (0) or the walls (1) of a map.
 __device__ inline const PieceGrid& pieces_of(const DeviceGeometry& geometry, int of_walls) {
   return of_walls != 0 ? geometry.walls : geometry.strips;
 }
 
-// The row or column of a distance from the grid's origin. Bounding spheres exceed their pieces by more than rounding
-// errors.
+// Returns the row or column at a distance from the grid's origin. Bounding spheres exceed their pieces by more than
+// rounding errors.
 __device__ inline int cell_at(float distance_m, float cells_per_m, int count) {
   return clamp(static_cast<int>(floorf(distance_m * cells_per_m)), 0, count - 1);
 }
 
-// The rows of the grids, of strips and of walls, that the outline may touch.
+// Rows of the grids of strips and of walls that the outline may touch.
 struct GridRows {
   int begin[2], count[2];
 };
 
-// Sets the outline: the four edges from the eye to the far corners, and the four between neighbouring corners. On the
-// ground they contain all sides of the convex hull. All lanes of the warp, one per side, for strips and for walls.
+// Sets the outline: the four edges from the eye to the far corners, and the four edges between neighbouring corners. On
+// the ground these contain all sides of the convex hull. Collective over all lanes of the warp, one lane per side, for
+// strips and for walls.
 __device__ inline GridRows set_outline(CullShared* storage, const ImageSetting& setting,
                                        const DeviceGeometry& geometry) {
   const int side = lane_index() % kOutlineSides, of_walls = lane_index() / kOutlineSides & 1;
@@ -114,7 +115,7 @@ __device__ inline GridRows set_outline(CullShared* storage, const ImageSetting& 
   return rows;
 }
 
-// The contiguous range of pieces of a row that the outline may touch.
+// Contiguous range of pieces of a row that the outline may touch.
 struct PieceRange {
   int begin = 0, count = 0;
 };
@@ -123,7 +124,7 @@ __device__ inline PieceRange pieces_of_row(const PieceGrid& pieces, const Outlin
   const float radius_m = pieces.largest_radius_m;
   const float y_low = grid.origin_m.y + grid.cell_m * static_cast<float>(row) - radius_m;
   const float y_high = y_low + grid.cell_m + 2.0f * radius_m;
-  // The x range of the outline's convex hull within [y_low, y_high].
+  // x range of the outline's convex hull within [y_low, y_high].
   float x_low = 1e30f, x_high = -1e30f;
   PICTURA_NO_UNROLL
   for (int i = 0; i < kOutlineSides; ++i) {
@@ -143,7 +144,7 @@ __device__ inline PieceRange pieces_of_row(const PieceGrid& pieces, const Outlin
   return {begin, row_cells[cell_at(x_high + radius_m - grid.origin_m.x, cells_per_m, grid.num_x) + 1] - begin};
 }
 
-// Lists the strips and walls that may be visible. Each warp of the block takes its share of the candidates.
+// Lists the strips and walls that may be visible. Each warp of the block processes its share of the candidates.
 __device__ inline void cull_pieces(BlockState* state, CullShared* storage, EntryList* list) {
   const PinholeCamera& camera = state->context.setting.camera;
   const Frustum& frustum = state->context.setting.frustum;
@@ -159,8 +160,8 @@ __device__ inline void cull_pieces(BlockState* state, CullShared* storage, Entry
       range = pieces_of_row(pieces_of(geometry, of_walls), storage->sides,
                             of_walls != 0 ? row - rows.count[0] + rows.begin[1] : row + rows.begin[0]);
     }
-    // The pieces of all rows are numbered consecutively, those of strips first. For each non-empty row, the offset from
-    // that number to the piece's index in the grid.
+    // The pieces of all rows are numbered consecutively, strips first. The offset of a non-empty row is the difference
+    // between a piece's index in the grid and this number.
     const bool has_some = range.count > 0;
     const int end = warp_inclusive_sum(range.count), begin = end - range.count;
     const int total = __shfl_sync(kAllLanes, end, kWarpSize - 1);
@@ -182,7 +183,8 @@ __device__ inline void cull_pieces(BlockState* state, CullShared* storage, Entry
     int item = warp_index() * kWarpSize;
     Candidate next;
     if (item < total) next = candidate_of(item);
-    // Software prefetch: load the next candidates before testing these. Past the end, the last one is loaded again.
+    // Software prefetch: the next candidates are loaded before the current ones are tested. Past the end, the last is
+    // loaded again.
     PICTURA_NO_UNROLL
     while (item < total) {
       const Candidate candidate = next;
@@ -197,7 +199,7 @@ __device__ inline void cull_pieces(BlockState* state, CullShared* storage, Entry
   }
 }
 
-// Lists the front-facing faces of agents that may be visible. Each warp of the block takes its share.
+// Lists the front-facing faces of agents that may be visible. Each warp of the block processes its share.
 __device__ inline void cull_agents(const BlockState& state, const DrawTask& task, EntryList* list) {
   const ViewState& view = state.view;
   const ImageSetting& setting = state.context.setting;
@@ -216,7 +218,7 @@ __device__ inline void cull_agents(const BlockState& state, const DrawTask& task
   }
 }
 
-// Lists the light heads whose state is known, that face the camera and may be visible.
+// Lists the light heads with a known state that face the camera and may be visible.
 __device__ inline void cull_lights(const BlockState& state, EntryList* list) {
   const ImageSetting& setting = state.context.setting;
   const Span<const LightHead> heads = state.view.geometry->pieces.heads;
@@ -236,7 +238,7 @@ __device__ inline void cull_lights(const BlockState& state, EntryList* list) {
   }
 }
 
-// Lists everything that may be visible in an image. Each warp of the block takes its share.
+// Lists everything that may be visible in an image. Each warp of the block processes its share.
 __device__ inline void cull(BlockState* state, const DrawTask& task, CullShared* storage, EntryList* list) {
   cull_agents(*state, task, list);
   cull_lights(*state, list);

@@ -1,5 +1,5 @@
-// The memory layout of a block: in shared memory, or in global memory for blocks that draw what does not fit into it.
-// Any function of a kernel can get it.
+// Memory layout of a block: in shared memory, or in global memory for blocks whose data does not fit there. Any
+// function of a kernel can obtain it.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/block.cuh"
@@ -7,33 +7,33 @@
 
 namespace pictura::cuda {
 
-// Blocks of face set-up: one warp each, as many as an SM holds.
+// Blocks of face set-up: one warp each, as many as an SM can hold.
 constexpr int kSetupThreads = 32, kCullBlocksPerProcessor = 32, kFaceSetupBlocksPerProcessor = 32,
               kClipBlocksPerProcessor = 24;
-// Blocks that draw, a tile at a time. A tile with more fragments than this is drawn in parts.
+// Blocks that draw one tile at a time. A tile with more fragments is drawn in parts.
 constexpr int kDrawThreads = 256, kDrawBlocksPerProcessor = 4;
 constexpr int kDrawPixels = kTileWidth_px * kTileHeight_px, kDrawFragments = 1152;
-// Few images are deferred, usually no image.
+// Few images are deferred, usually none.
 constexpr int kDeferredBlocksPerProcessor = 2;
 // Blocks of the last launch.
 constexpr int kLargeThreads = 128, kLargePixels = kTileWidth_px * 512, kLargeFragments = 1 << 16;
 
-// Bits of a 32-bit pixel word that hold a face, and how many faces they can tell apart.
+// Bits of a 32-bit pixel word that hold a face, and the number of faces that they distinguish.
 constexpr int kMarkedFaceBits = 11, kMaxMarkedFaces = (1 << kMarkedFaceBits) - 1;
 
-/// The arrays that drawing uses, and its number of threads. Index: an index of a face, a pixel or a fragment, 16 bits
-/// where they suffice. Word: two indices.
+/// Arrays of drawing, and its number of threads. Index: an index of a face, a pixel or a fragment; 16 bits where they
+/// suffice. Word: two indices.
 template <typename Index_, typename Word_, int kThreads_>
 struct DrawMemory {
   using Index = Index_;
   using Word = Word_;
   static constexpr int kThreads = kThreads_;
   static constexpr int kHalf = 4 * sizeof(Word);
-  /// Value of a word's lower half that means no face or no pixel.
+  /// Value of a word's lower half without a face or pixel.
   static constexpr Word kNone = (Word{1} << kHalf) - 1;
   /// Flag in a candidate's lower half: the face covers the pixel fully.
   static constexpr Word kCoversFully = Word{1} << (kHalf - 1);
-  /// The pixel in the lower half of a candidate.
+  /// Returns the pixel in the lower half of a candidate.
   __device__ static int pixel_of(uint32_t coded_pixel) {
     return static_cast<int>(coded_pixel & ~static_cast<uint32_t>(kCoversFully));
   }
@@ -41,7 +41,7 @@ struct DrawMemory {
 
   BlockState* state;
   const ScreenFace* faces;   // of the image
-  const PolygonEdge* edges;  // that the faces' edge_begin indexes
+  const PolygonEdge* edges;  // indexed by the faces' edge_begin
   Word* pixels;              // [max_pixels] of the current part, see PixelWord
   Word* rows;                // [max_rows] of faces: face in the upper half, row of the part in the lower
   Word* candidates;          // [max_candidates] possible fragments: face, pixel
@@ -49,8 +49,8 @@ struct DrawMemory {
   uint32_t *samples_low, *samples_high, *visible_low, *visible_high;  // [max_fragments]
   float* area;                                                        // [max_fragments]
   Index *face, *pixel, *next;  // [max_fragments] next: in the pixel's list, or kNone
-  Index* kind;                 // [max_fragments] of the weight; shares memory with `pixel`
-  Index* composited;           // [max_fragments] pixels that must be composited
+  Index* kind;                 // [max_fragments] kind of the weight; shares memory with `pixel`
+  Index* composited;           // [max_fragments] pixels to be composited
   int32_t max_pixels, max_rows, max_candidates, max_fragments;
 
   __device__ uint64_t samples(int fragment) const {
@@ -60,8 +60,8 @@ struct DrawMemory {
   __device__ uint64_t visible(int fragment) const {
     return static_cast<uint64_t>(visible_high[fragment]) << 32 | visible_low[fragment];
   }
-  // After compute_weights the four words of a fragment's sample masks hold its contribution to the pixel; after
-  // compositing those of a list's first fragment hold the pixel's colour, as floats or as bytes.
+  // After compute_weights, the four words of a fragment's sample masks hold its contribution to the pixel. After
+  // compositing, the words of a list's first fragment hold the pixel's colour, as floats or as bytes.
   __device__ void set_part(int fragment, const PixelAccumulator::Part& part) const {
     samples_low[fragment] = static_cast<uint32_t>(part.area);
     samples_high[fragment] = static_cast<uint32_t>(part.r);
@@ -85,7 +85,7 @@ struct DrawMemory {
   }
 };
 
-// Lays out arrays one after another, aligned to 16 bytes.
+// Places arrays in sequence, aligned to 16 bytes.
 struct Layout {
   unsigned char* bytes;
   size_t used = 0;
@@ -96,8 +96,8 @@ struct Layout {
   }
 };
 
-// Lays out the arrays of drawing from `bytes` on, and returns the size in bytes. Rows share memory with the samples,
-// which are written later; candidates share memory with the visible samples and the list of composited pixels.
+// Places the arrays of drawing from `bytes` on, and returns their size in bytes. Rows share memory with the samples,
+// which are written later. Candidates share memory with the visible samples and the list of composited pixels.
 template <typename Memory>
 __host__ __device__ size_t lay_out(Memory* memory, int max_pixels, int max_fragments, unsigned char* bytes) {
   memory->max_pixels = max_pixels;
@@ -120,12 +120,12 @@ __host__ __device__ size_t lay_out(Memory* memory, int max_pixels, int max_fragm
   memory->rows = reinterpret_cast<Word*>(bytes + rows_begin);
   memory->max_rows = static_cast<int32_t>((candidates_begin - rows_begin) / sizeof(Word));
   memory->candidates = reinterpret_cast<Word*>(bytes + candidates_begin);
-  // Most candidates become fragments, so more would exceed max_fragments anyway.
+  // Most candidates become fragments, so a larger list would exceed max_fragments anyway.
   memory->max_candidates = max_fragments + max_fragments / 2;
   return layout.used;
 }
 
-// A block's state ends with the states of its warps; only as many as it has are allocated.
+// Size of a block's state. The state ends with the states of its warps, of which only the existing ones are allocated.
 __host__ __device__ constexpr size_t state_bytes(int threads) {
   return (sizeof(BlockState) - static_cast<size_t>(kMaxWarps - threads / kWarpSize) * sizeof(WarpState) + 15) / 16 * 16;
 }
@@ -133,7 +133,7 @@ __host__ __device__ constexpr size_t state_bytes(int threads) {
 extern __shared__ __align__(16) unsigned char block_memory[];
 __device__ inline BlockState* block_state() { return reinterpret_cast<BlockState*>(block_memory); }
 
-/// In shared memory, at addresses known at compile time.
+/// Drawing memory in shared memory, at addresses known at compile time.
 struct SmallDrawMemory : DrawMemory<uint16_t, uint32_t, kDrawThreads> {
   __host__ __device__ size_t place(unsigned char* bytes) { return lay_out(this, kDrawPixels, kDrawFragments, bytes); }
   __device__ static SmallDrawMemory current() {
@@ -148,7 +148,7 @@ struct SmallDrawMemory : DrawMemory<uint16_t, uint32_t, kDrawThreads> {
 static_assert(kMaxEntries <= kMaxMarkedFaces);
 static_assert(kMaxMarkedFaces < 0xFFFF && kDrawFragments < 0xFFFF && kDrawPixels < 0x7FFF);
 
-// In global memory. The arrays of drawing share memory with the lists of face set-up.
+// Drawing memory in global memory. The arrays of drawing share memory with the lists of face set-up.
 __host__ __device__ inline size_t lay_out(SetupLists* lists, const Scratch& sizes, unsigned char* bytes) {
   lists->max_entries = FaceBatch::count_of(sizes.max_faces) * FaceBatch::kEntries;
   lists->max_clipped = sizes.max_faces;
@@ -176,7 +176,7 @@ __host__ __device__ inline size_t large_bytes(const Scratch& sizes) {
   return ((to_set_up > to_draw ? to_set_up : to_draw) + 15) / 16 * 16;
 }
 
-// Sets the block's slice of a launch's scratch memory. All threads of the block.
+// Sets the block's slice of a launch's scratch memory. Collective over all threads of the block.
 __device__ inline void take_scratch(const Scratch& scratch) {
   if (threadIdx.x == 0) {
     Scratch own = scratch;

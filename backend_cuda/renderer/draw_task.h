@@ -1,4 +1,4 @@
-// The kernels' arguments from those of a call, and maps sorted for culling: what does not depend on device memory.
+// Device-independent preparation: the kernels' arguments from those of a call, and maps sorted for culling.
 #pragma once
 
 #include <string>
@@ -10,31 +10,31 @@
 
 namespace pictura::cuda {
 
-/// Pieces of one kind, sorted by the grid cell of their centre, in host memory.
+/// Pieces of one kind, sorted by the grid cells of their centres, in host memory.
 class SortedPieces {
  public:
   explicit SortedPieces(const std::vector<Strip>& strips);
   explicit SortedPieces(const std::vector<WallFace>& walls);
-  /// Points into this object.
+  /// Returns a view into this object.
   PieceGrid view() const { return {grid_.view(), balls_, largest_radius_m_}; }
 
  private:
   void sort(std::vector<Ball> balls);
   Grid grid_;
-  std::vector<Ball> balls_;  // as the grid's items
+  std::vector<Ball> balls_;  // in the order of the grid's items
   float largest_radius_m_ = 0;
 };
 
-/// All of a task but the pointers to the renderer's own memory: geometries, pool, counters, lists of images and fault.
-/// `images` may be null.
+/// Makes a task except for the pointers to the renderer's own memory: geometries, pool, counters, lists of images and
+/// fault. `images` may be null.
 DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeCamera>& cameras,
                         const SceneBatch& scene, const ViewBatch& views, const ImageBatch* images);
 
-/// Sizes of the scratch memory of a block of the last launch: for all primitives of a world with so many agents on a
-/// map of so many pieces, light heads among them.
+/// Returns the sizes of a block's scratch memory in the last launch. They suffice for all primitives of a world with
+/// `agents` agents on a map with `pieces` pieces, of which `heads` are light heads.
 Scratch large_sizes(int pieces, int heads, std::size_t agents);
 
-/// The text of a fault, which must not be `none`.
+/// Returns the text of a fault, which must not be `none`.
 std::string message_of(const Fault& fault);
 
 }  // namespace pictura::cuda

@@ -1,6 +1,6 @@
-// Face set-up: from entries to faces on screen. Nearly all faces have four corners and need no clipping: one lane sets
-// up one of those. The others are listed and clipped in batches. Faces and edges are allocated with atomic counters, so
-// no warp waits for another.
+// Face set-up: from entries to faces on screen. Nearly all faces have four corners and need no clipping; one lane sets
+// up one such face. Other faces are listed and clipped in batches. Faces and edges are allocated with atomic counters,
+// so that warps do not wait for each other.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/clip.cuh"
@@ -11,7 +11,7 @@
 namespace pictura::cuda {
 
 /// Values that a lane loads or stores, as words of 16 bytes. One word of padding avoids bank conflicts: there are none
-/// when each lane writes a word of its own row, and at most two-way ones when lanes read rows together.
+/// when each lane writes a word of its own row, and at most two-way conflicts when lanes read rows together.
 template <typename Value, int kValues = 1>
 struct LaneRow {
   static constexpr int kWords = kValues * sizeof(Value) / sizeof(uint4), kRowsAtOnce = kWarpSize / kWords;
@@ -23,29 +23,30 @@ using StripRow = LaneRow<Strip>;
 using EdgeRow = LaneRow<PolygonEdge, 4>;
 using FaceRow = LaneRow<ScreenFace>;
 
-/// Shared memory of a warp that sets up faces: strips, then the faces' edges, then the faces.
+/// Shared memory of a warp that sets up faces: strips, then the edges of faces, then the faces.
 union FaceShared {
   StripRow strips[kWarpSize];
   EdgeRow edges[kWarpSize];
   FaceRow faces[kWarpSize];
 };
 
-/// Shared memory of a warp that runs all stages, one after the other.
+/// Shared memory of a warp that runs all stages in sequence.
 union GeometryShared {
   CullShared cull;
   FaceShared faces;
   ClipShared clip;
 };
 
-/// Shared memory of a block of pictura_setup_faces. With the 1 KiB that each block reserves, 32 of them leave 28 KiB of
-/// L1 cache on an SM that has 256 KiB for both; that is enough because little of what they read is read again.
+/// Shared memory of a block of pictura_setup_faces. With the 1 KiB that each block reserves, 32 blocks leave 28 KiB of
+/// L1 cache on an SM with 256 KiB for both. This is enough, because little of the data is read twice.
 struct FaceSetupState {
   FaceSetupContext contexts[2];  // of this batch and the next, alternating
   FaceShared storage;
 };
 __device__ inline FaceSetupState* face_setup_state() { return reinterpret_cast<FaceSetupState*>(block_memory); }
 
-// Bytes of shared memory of a block that culls, and of a block that runs all stages; then a warp's part of the latter.
+// Bytes of shared memory of a block that culls, and of a block that runs all stages; then a warp's part of the shared
+// memory of a block that runs all stages.
 __host__ __device__ constexpr size_t cull_bytes() { return state_bytes(kSetupThreads) + sizeof(CullShared); }
 __host__ __device__ constexpr size_t setup_bytes(int threads) {
   return state_bytes(threads) + static_cast<size_t>(threads / kWarpSize) * sizeof(GeometryShared);
@@ -54,13 +55,13 @@ __device__ inline GeometryShared* geometry_shared() {
   return reinterpret_cast<GeometryShared*>(block_memory + state_bytes(num_threads())) + warp_index();
 }
 
-// Loads the strips among the lanes' entries, four lanes per strip and eight strips at once: if each lane loaded its
-// own, every sector would be requested several times. All lanes of the warp.
+// Loads the strips among the lanes' entries, with four lanes per strip and eight strips at once: if each lane loaded
+// its own strip, every sector would be requested several times. Collective over all lanes of the warp.
 __device__ inline void load_strips(const FaceSetupContext& context, uint32_t entry, StripRow* rows_out) {
   const bool is_strip = kind_of(entry) == kStripKind;
   const unsigned strips = __ballot_sync(kAllLanes, is_strip);
   if (strips == 0) return;
-  // Lanes without a strip load another lane's.
+  // Lanes without a strip load the strip of another lane.
   const uint32_t of_another = __shfl_sync(kAllLanes, entry, __ffs(static_cast<int>(strips)) - 1);
   const uint32_t index = (is_strip ? entry : of_another) & kFaceIndexMask;
   constexpr int kWords = StripRow::kWords, kRowsAtOnce = StripRow::kRowsAtOnce;
@@ -74,7 +75,8 @@ __device__ inline void load_strips(const FaceSetupContext& context, uint32_t ent
   __syncwarp();
 }
 
-// The face of an entry that is not a light; false if it has faded to black. strip_of(index) returns a strip.
+// Makes the face of an entry that is not a light; returns false if it has faded to black. strip_of(index) must return a
+// strip.
 template <typename StripOf>
 __device__ bool make_quad(const FaceSetupContext& context, uint32_t entry, Quad* quad_out, StripOf&& strip_of) {
   const ImageSetting& setting = context.setting;
@@ -99,20 +101,20 @@ __device__ bool make_quad(const FaceSetupContext& context, uint32_t entry, Quad*
   return quad_to_camera(world, setting.camera, &quad_out->in_camera);
 }
 
-// Stores the faces of those lanes with at >= 0. Every image has capacity for all of its faces.
+// Stores the faces of lanes with at >= 0. Every image has capacity for all of its faces.
 __device__ inline void store_face(const FaceSetupContext& context, const ScreenFace& face, PrimitiveRef primitive,
                                   int32_t edge_begin, int32_t at) {
   if (at >= 0) store_words(context.faces + at, complete_face(face, primitive, edge_begin));
 }
 
-// Stores the first `count` rows contiguously, the warp 512 bytes at a time: if each lane stored its own row, memory
-// transactions would be half empty.
+// Stores the first `count` rows contiguously, with 512 bytes per warp at a time: if each lane stored its own row,
+// memory transactions would be half empty.
 template <typename Row>
 __device__ void store_rows(uint4* to, Row* rows, int count) {
   constexpr int kWords = Row::kWords, kRowsAtOnce = Row::kRowsAtOnce;
   const int row = lane_index() / kWords, word = lane_index() % kWords, left = count - row;
   uint4* const own = to + lane_index();
-  // Read four before storing any, so that their latencies overlap.
+  // Four words are read before the first is stored, so that their latencies overlap.
   constexpr int kAtOnce = 4;
   for (int first = 0; first < kWords; first += kAtOnce) {
     uint4 words[kAtOnce];
@@ -123,8 +125,8 @@ __device__ void store_rows(uint4* to, Row* rows, int count) {
   }
 }
 
-// Sets up the faces of a batch of the image, one entry per lane, and lists those that need clipping. All lanes of the
-// warp.
+// Sets up the faces of a batch of the image, one entry per lane, and lists those that need clipping. Collective over
+// all lanes of the warp.
 __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* storage, const SetupLists& lists,
                                   SetupCounts* counts, uint32_t entry, int32_t image) {
   const bool is_light = entry != kNoEntry && kind_of(entry) == kLightKind, is_quad = entry != kNoEntry && !is_light;
@@ -134,7 +136,7 @@ __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* s
   }
   const unsigned quads = __ballot_sync(kAllLanes, is_quad);
   if (quads == 0) return;
-  // Lanes without a face compute another lane's, which is not stored, so the warp does not diverge.
+  // Lanes without a face compute the face of another lane without storing it, so the warp does not diverge.
   const uint32_t of_another = __shfl_sync(kAllLanes, entry, __ffs(static_cast<int>(quads)) - 1);
   const PinholeCamera& camera = context.setting.camera;
   Quad quad;
@@ -168,7 +170,7 @@ __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* s
   __syncwarp();
   const int32_t at = __shfl_sync(kAllLanes, taken, 0), clipped_at = __shfl_sync(kAllLanes, taken, 1);
   if (is_clipped) lists.clipped[clipped_at + __popc(clipped & lanes_below())] = {entry, image};
-  // The index of a face's edges follows from its own.
+  // The index of a face's edges follows from the face's index.
   const int32_t edge_begin = context.edge_begin + 4 * at;
   store_rows(reinterpret_cast<uint4*>(context.edges + edge_begin), storage->edges, count);
   __syncwarp();
@@ -179,7 +181,8 @@ __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* s
   store_rows(reinterpret_cast<uint4*>(context.faces + at), storage->faces, count);
 }
 
-// Sets up a face whose corners are spread over the lanes. False if its edges do not fit. All lanes of the warp.
+// Sets up a face whose corners are distributed over the lanes. Returns false if its edges do not fit. Collective over
+// all lanes of the warp.
 __device__ inline bool make_warp_face(const FaceSetupContext& context, ClipShared* storage, WarpFace warp_face) {
   clip(context.setting.frustum, storage, &warp_face);
   if (warp_face.count == 0) return true;
@@ -194,9 +197,9 @@ __device__ inline bool make_warp_face(const FaceSetupContext& context, ClipShare
   return true;
 }
 
-// Clips the faces of lanes with is_active and sets them up, except for those that need more corners than a lane can
-// hold: of those *quad_out is set and has_too_many_corners_out is true. False in lanes whose edges do not fit. All
-// lanes of the warp.
+// Clips the faces of lanes with is_active and sets them up, except for faces with too many corners for a lane: for
+// these, *quad_out is set and has_too_many_corners_out is true. Returns false in lanes whose edges do not fit.
+// Collective over all lanes of the warp.
 __device__ inline bool clip_quads(const FaceSetupContext* contexts, ClipShared* storage, bool is_active,
                                   ClippedPrimitive primitive, Quad* quad_out, bool* has_too_many_corners_out) {
   const FaceSetupContext& context = contexts[primitive.image];
@@ -247,8 +250,8 @@ __device__ inline bool clip_quads(const FaceSetupContext* contexts, ClipShared* 
   return fits;
 }
 
-// Clips the primitives of lanes with is_active and sets up their faces; primitive.image indexes contexts. Either all
-// are lights or none is. False in lanes whose edges do not fit. All lanes of the warp.
+// Clips the primitives of lanes with is_active and sets up their faces; primitive.image indexes contexts. Either all or
+// none are lights. Returns false in lanes whose edges do not fit. Collective over all lanes of the warp.
 __device__ inline bool clip_primitives(const FaceSetupContext* contexts, ClipShared* storage, bool is_active,
                                        bool are_lights, ClippedPrimitive primitive) {
   Quad quad;
@@ -282,8 +285,8 @@ __device__ inline ClippedItem clipped_item(const SetupLists& lists, const SetupC
           lists.clipped[are_lights ? lists.max_clipped - 1 - item : min_of(quad, listed.clipped - 1)]};
 }
 
-// Sets the context of an image except for its outputs; false, with a fault reported, if its view names something that
-// does not exist. One thread.
+// Sets the context of an image except for its outputs. Returns false and records a fault if its view refers to
+// something that does not exist. For one thread.
 __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_t view, int32_t camera) {
   if (!set_view(&state->view, task, view)) return false;
   FaceSetupContext* context = &state->context;
@@ -309,13 +312,13 @@ __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_
   return true;
 }
 
-// Selects, of the solid faces that are offered, those with the largest area as occluders. Lane i holds the entry and
-// area of occluder i; the occluder itself is in the context's setting.
+// Selects the offered solid faces with the largest area as occluders. Lane i holds the entry and area of occluder i;
+// the occluder itself is in the context's setting.
 class BestOccluders {
  public:
   __device__ explicit BestOccluders(FaceSetupContext* context) : context_(context) {}
 
-  /// Each lane with is_active offers the face of an entry. All lanes of the warp.
+  /// Offers the entry's face of each lane with is_active. Collective over all lanes of the warp.
   __device__ void offer(bool is_active, uint32_t entry) {
     const ImageSetting& setting = context_->setting;
     const FaceSetupContext* context = context_;
@@ -333,7 +336,7 @@ class BestOccluders {
     }
   }
 
-  /// Number of occluders selected. All lanes of the warp.
+  /// Number of selected occluders. Collective over all lanes of the warp.
   __device__ int count() const { return __popc(__ballot_sync(kAllLanes, kept_area_bits_ != 0)); }
 
  private:
@@ -343,7 +346,7 @@ class BestOccluders {
     ScreenQuad on_screen;
     bool is_clockwise = false;
   };
-  // Whether the lane's offered face, and the one it holds, are among the best.
+  // Whether the lane's offered face and the face that it holds are among the best.
   struct Chosen {
     bool own = false, kept = false;
   };
@@ -369,7 +372,7 @@ class BestOccluders {
     return chosen;
   }
 
-  // The chosen offers replace those that drop out. Returns the slot of the lane's own.
+  // Replaces dropped faces by the chosen offers. Returns the slot of the lane's own offer.
   __device__ int insert(const Offered& own, Chosen chosen) {
     unsigned slots = ~__ballot_sync(kAllLanes, chosen.kept) & ((1u << Occluders::kMaxCount) - 1);
     int slot = 0;
@@ -392,7 +395,7 @@ class BestOccluders {
   int kept_area_bits_ = 0;
 };
 
-// Finds the occluders among the solids of a list. All lanes of one warp.
+// Finds the occluders among the solids of a list. Collective over all lanes of one warp.
 __device__ inline void find_occluders(FaceSetupContext* context, const uint32_t* entries, int32_t count) {
   auto is_candidate = [&](uint32_t entry) {
     const PinholeCamera& camera = context->setting.camera;
@@ -420,12 +423,12 @@ __device__ inline void find_occluders(FaceSetupContext* context, const uint32_t*
   __syncwarp();
 }
 
-// The description of an image for drawing.
+// Returns the description of an image for drawing.
 __device__ inline PreparedImage image_of(const BlockState& state, int32_t face_begin, int32_t face_count) {
   return {state.view.geometry, state.context.agents, face_begin, face_count};
 }
 
-/// Memory in which a block sets up an image of its own.
+/// Memory in which a block sets up an image by itself.
 struct SetupTarget {
   ScreenFace* faces;
   PolygonEdge* edges;
@@ -433,15 +436,15 @@ struct SetupTarget {
   SetupLists lists;
 };
 
-// The block's scratch memory, whose lists have capacity for a whole world.
+// Returns the block's scratch memory, whose lists have capacity for a whole world.
 __device__ inline SetupTarget setup_target_of(const Scratch& scratch) {
   SetupTarget target{scratch.faces, scratch.edges, 0, 4 * scratch.max_faces, scratch.max_edges, {}};
   lay_out(&target.lists, scratch, scratch.bytes);
   return target;
 }
 
-// Culls, sets up and clips the faces of an image in the block's own memory. False if they do not fit, or if the view
-// names something that does not exist. All threads of the block.
+// Culls, sets up and clips the faces of an image in the block's own memory. Returns false if they do not fit, or if the
+// view refers to something that does not exist. Collective over all threads of the block.
 __device__ inline bool prepare_image(const DrawTask& task, int32_t view, int32_t camera, const SetupTarget& target,
                                      bool culls_occluded) {
   BlockState* state = block_state();

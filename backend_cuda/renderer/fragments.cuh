@@ -1,5 +1,5 @@
-// From the faces of an image to fragments. Rows of faces find, for each pixel, the face that covers it fully with the
-// largest occluder bound, and list the pixels that faces cover partly; those that may be visible become fragments, one
+// From the faces of an image to fragments. For each pixel, rows of faces find the fully covering face with the largest
+// occluder bound, and list the pixels that faces cover partly. Listed pixels that may be visible become fragments, one
 // thread each, in a linked list per pixel.
 #pragma once
 
@@ -10,14 +10,14 @@
 
 namespace pictura::cuda {
 
-// The tile at (x, y) of the given size, clipped to an image of that width whose rows end at y_end.
+// Returns the tile at (x, y) of the given size, clipped to an image of this width whose rows end at y_end.
 __device__ inline Part tile_at(int x, int y, int columns, int rows, int width_px, int y_end) {
   return {x, min_of(x + columns, width_px), y, min_of(y + rows, y_end)};
 }
 
-/// The word of a pixel. While full faces are found, it holds the largest occluder bound in the upper bits, which sort
-/// as the bound does, and the index of its face plus 1 in the lower bits. From the pixel's first fragment on, the upper
-/// bits hold the first fragment of its list, and the sign bit is set. 0: no face and no fragment.
+/// Word of a pixel. While full faces are searched, the upper bits hold the largest occluder bound, in an order of bits
+/// that sorts as the bound does; the lower bits hold the index of its face plus 1. From the pixel's first fragment on,
+/// the upper bits hold the first fragment of its list, and the sign bit is set. 0: no face and no fragment.
 template <typename Word>
 struct PixelWord {
   static constexpr int kFaceBits = sizeof(Word) == 4 ? kMarkedFaceBits : 32;
@@ -38,13 +38,13 @@ struct PixelWord {
   }
 };
 
-// The face that covers the pixel fully, with the largest occluder bound; kNone if there is no such face, or if it is in
-// the pixel's fragment list.
+// Returns the fully covering face of the pixel with the largest occluder bound. kNone if there is no such face, or if
+// it is in the pixel's fragment list.
 template <typename Memory>
 __device__ typename Memory::Word full_of_word(typename Memory::Word word) {
   return ((word & PixelWord<typename Memory::Word>::kFace) - 1) & Memory::kNone;
 }
-// The first fragment of the pixel's list; kNone if the list is empty.
+// Returns the first fragment of the pixel's list; kNone if the list is empty.
 template <typename Memory>
 __device__ typename Memory::Word first_of_word(typename Memory::Word word) {
   using Pixel = PixelWord<typename Memory::Word>;
@@ -59,7 +59,8 @@ __device__ typename Memory::Word first_of(const Memory& memory, int pixel) {
   return first_of_word<Memory>(memory.pixels[pixel]);
 }
 
-// Lists the rows of faces in a part. Rows beyond max_rows are counted but not stored. All threads of the block.
+// Lists the rows of faces in a part. Rows beyond max_rows are counted but not stored. Collective over all threads of
+// the block.
 template <typename Memory>
 __device__ void list_rows(const Memory& memory, int num_faces, const Part& part) {
   using Word = typename Memory::Word;
@@ -95,8 +96,8 @@ __device__ void list_candidate(const Memory& memory, int index, int face, int pi
                              (covers_fully ? Memory::kCoversFully : Word{0});
 }
 
-// Marks a pixel that a face covers fully, unless its current face has a larger occluder bound. Returns the face of the
-// two with the lower bound if it may still be visible in front of the other, else -1.
+// Marks a pixel that a face covers fully, unless its current face has a larger occluder bound. Of these two faces,
+// returns that with the lower bound if it may still be visible in front of the other, else -1.
 template <typename Memory>
 __device__ int mark_pixel(const Memory& memory, int face, int x, int y, int pixel) {
   using Word = typename Memory::Word;
@@ -110,7 +111,7 @@ __device__ int mark_pixel(const Memory& memory, int face, int x, int y, int pixe
   return passes_occluder_bound(memory.faces[farther], bound, x, y) ? farther : -1;
 }
 
-// A row of a face within a tile: four columns relative to the tile, a byte each, so that one shuffle hands them to
+// A row of a face within a tile: four columns relative to the tile, one byte each, so that one shuffle passes them to
 // another lane.
 static_assert(kTileWidth_px <= 255);
 struct TileSpan {
@@ -128,13 +129,13 @@ struct TileSpan {
   __device__ int full_end() const { return static_cast<int>(bytes >> 16 & 0xFF); }
   __device__ int end() const { return static_cast<int>(bytes >> 24); }
   __device__ int num_full() const { return full_end() - full_begin(); }
-  /// Column k of those that are partly covered: they lie on both sides of the fully covered ones.
+  /// Returns the k-th partly covered column; partly covered columns lie on both sides of the fully covered ones.
   __device__ int partial(int k) const { return begin() + k + (begin() + k < full_begin() ? 0 : num_full()); }
 };
 
-// For each pixel of a part, marks the fully covering face with the largest occluder bound, and lists the partly covered
-// pixels. Neighbouring rows often belong to one large face, so they are spread over the passes. All threads of the
-// block.
+// Marks, for each pixel of a part, the fully covering face with the largest occluder bound, and lists the partly
+// covered pixels. Neighbouring rows often belong to one large face, so they are spread over the passes. Collective over
+// all threads of the block.
 template <typename Memory>
 __device__ void mark_and_list(const Memory& memory, const Part& part) {
   using Word = typename Memory::Word;
@@ -153,7 +154,7 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
       span = TileSpan(row_span(memory.edges + face.edge_begin, face.edge_count, face.box, y), part);
     }
     const int full = span.num_full(), partial = span.end() - span.begin() - full;
-    // Both prefix sums at once: neither reaches 2^16.
+    // Both prefix sums in one word: neither reaches 2^16.
     const int ends = warp_inclusive_sum(full | partial << 16), full_end = ends & 0xFFFF, partial_end = ends >> 16;
     struct SharedRow {
       int face, y;
@@ -183,7 +184,7 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
   }
 }
 
-// Whether a fragment is the only one of its pixel and there is no full face.
+// Whether a fragment is the only fragment of its pixel and the pixel has no full face.
 template <typename Memory>
 __device__ bool is_alone(const Memory& memory, int fragment, int pixel) {
   using Word = typename Memory::Word;
@@ -191,7 +192,7 @@ __device__ bool is_alone(const Memory& memory, int fragment, int pixel) {
          memory.next[fragment] == static_cast<typename Memory::Index>(Memory::kNone);
 }
 
-// Stores a fragment at the front of its pixel's list. No other thread changes the pixel's full face meanwhile.
+// Stores a fragment at the front of its pixel's list. No other thread may change the pixel's full face meanwhile.
 template <typename Memory>
 __device__ void store_fragment(const Memory& memory, int fragment, uint32_t face, int pixel, uint64_t samples,
                                float area) {
@@ -207,7 +208,7 @@ __device__ void store_fragment(const Memory& memory, int fragment, uint32_t face
   memory.next[fragment] = static_cast<Index>(first_of_word<Memory>(before));
 }
 
-// Makes a fragment of each lane's candidate unless its coverage is empty.
+// Makes a fragment from each lane's candidate unless its coverage is empty.
 template <typename Memory>
 __device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, const Part& part) {
   const int pixel = Memory::pixel_of(candidate.b);
@@ -224,8 +225,8 @@ __device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, c
   store_fragment(memory, fragment, candidate.a, pixel, coverage.samples, coverage.area);
 }
 
-// Makes fragments of those candidates that pass their pixel's occluder bound. Warps queue them until every lane has
-// one. All threads of the block.
+// Makes fragments from the candidates that pass their pixel's occluder bound. Warps queue them until every lane has
+// one. Collective over all threads of the block.
 template <typename Memory>
 __device__ void make_fragments(const Memory& memory, const Part& part) {
   WarpQueue queue(&memory.state->warps[warp_index()].queue);
@@ -252,7 +253,7 @@ __device__ void make_fragments(const Memory& memory, const Part& part) {
   }
 }
 
-// Whether, of the fragments of a list from `at` on, one is as wanted(coverage) says.
+// Whether wanted(coverage) holds for any fragment of a list from `at` on.
 template <typename Memory, typename Wanted>
 __device__ bool any_fragment(const Memory& memory, typename Memory::Word at, Wanted&& wanted) {
   PICTURA_NO_UNROLL
@@ -262,10 +263,10 @@ __device__ bool any_fragment(const Memory& memory, typename Memory::Word at, Wan
   return false;
 }
 
-// Initially all effective samples of a fragment are visible. A fragment that covers its pixel fully may intersect the
-// pixel's full face, which then becomes a fragment too. Lists the pixels that must be composited: those with fragments
-// that are not alone. Notes whether any pixel may have to be divided: several fragments cover it fully, and another,
-// not a sliver, partly. Hardly any has such fragments.
+// Makes all effective samples of a fragment visible initially. A fragment that covers its pixel fully may intersect the
+// pixel's full face, which then becomes a fragment too. Lists the pixels to be composited: those with fragments that
+// are not alone. Records whether any pixel may have to be divided because several fragments cover it fully and another,
+// not a sliver, partly. Hardly any pixel has such fragments.
 template <typename Memory>
 __device__ void finish_fragments(const Memory& memory, int count) {
   using Index = typename Memory::Index;
@@ -278,7 +279,7 @@ __device__ void finish_fragments(const Memory& memory, int count) {
   PICTURA_NO_UNROLL
   for (int first = warp_index() * kWarpSize; first < count; first += Memory::kThreads) {
     const int i = first + lane_index();
-    // Each pixel is listed by the last fragment of its list.
+    // The last fragment of a pixel's list adds the pixel.
     const bool is_listed =
         i < count && memory.next[i] == static_cast<Index>(Memory::kNone) && !is_alone(memory, i, memory.pixel[i]);
     const int32_t index = warp_allocate_one(&memory.state->num_composited, is_listed);
@@ -291,8 +292,8 @@ __device__ void finish_fragments(const Memory& memory, int count) {
     auto is_full = [](const PixelCoverage& coverage) { return coverage.is_full(); };
     auto hides = [](const PixelCoverage& coverage) { return !coverage.is_full() && coverage.samples != 0; };
     const Word first_of_list = first_of_word<Memory>(before);
-    // Of several full fragments the first of the list finds the others behind it. Where the list begins with a face
-    // that another thread has added, that thread decides: the list may not be linked yet.
+    // Among several full fragments, the first of the list finds the others behind it. Where the list begins with a face
+    // that another thread has added, that thread decides, because the list may not be linked yet.
     if ((full != Memory::kNone || any_fragment(memory, Word{memory.next[i]}, is_full)) &&
         first_of_list < static_cast<Word>(count) && any_fragment(memory, first_of_list, hides)) {
       atomicOr(&memory.state->divides, 1);

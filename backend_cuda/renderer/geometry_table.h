@@ -1,4 +1,4 @@
-// The maps of a renderer in device memory, and the table by handle that kernels read.
+// Maps of a renderer in device memory, and the table by handle that kernels read.
 #pragma once
 
 #include <memory>
@@ -11,24 +11,24 @@
 
 namespace pictura::cuda {
 
-/// All calls are made with its device current, and handles are checked before. Memory of maps that were replaced or
-/// released is kept until the stream has passed that point, and then reused.
+/// Table of maps. All calls need its device as the current device, and handles that were checked before. Memory of
+/// replaced or released maps is kept until the stream has passed that point, and is then reused.
 class GeometryTable {
  public:
   /// Copies an empty table to the device on the default stream.
   GeometryTable() { grow(kMinEntries, nullptr); }
 
-  /// Writes a map and its entry. Waits for the stream, so that the host's memory is free and nothing reads what was
-  /// replaced.
+  /// Writes a map and its entry. Waits for the stream, so that the host's memory is free and the replaced map is no
+  /// longer read.
   void upload(GeometryHandle handle, const StaticGeometry& geometry, cudaStream_t stream);
   /// Empties an entry, on the stream.
   void release(GeometryHandle handle, cudaStream_t stream);
 
   const DeviceGeometry* entries() const { return table_.data(); }
   int32_t num_entries() const { return static_cast<int32_t>(maps_.size()); }
-  /// How often the table has moved.
+  /// Number of times that the table has moved.
   uint64_t generation() const { return generation_; }
-  /// The largest numbers of pieces of a map that is held, and of light heads among them.
+  /// Maximum numbers of pieces and of light heads over all held maps.
   int max_pieces() const { return max_pieces_; }
   int max_heads() const { return max_heads_; }
 
@@ -43,7 +43,7 @@ class GeometryTable {
   struct DestroyEvent {
     void operator()(cudaEvent_t event) const { cudaEventDestroy(event); }
   };
-  /// Memory that the device has done with once the event has passed.
+  /// Memory that is unused by the device after the event.
   struct Retired {
     DeviceBuffer<std::byte> memory;
     std::unique_ptr<std::remove_pointer_t<cudaEvent_t>, DestroyEvent> event;
@@ -51,15 +51,15 @@ class GeometryTable {
   };
 
   void grow(std::size_t entries, cudaStream_t stream);
-  /// Swaps a map with that of an entry on the host.
+  /// Swaps a map with the map of an entry, on the host.
   void swap_map(std::size_t index, Map* map_inout);
   void retire(DeviceBuffer<std::byte> memory, cudaStream_t stream);
   DeviceBuffer<std::byte> allocate(std::size_t bytes);
 
-  std::vector<Map> maps_;  // [handle], as many as the table has entries
+  std::vector<Map> maps_;  // [handle], as many as entries of the table
   DeviceBuffer<DeviceGeometry> table_;
   std::vector<Retired> retired_;
-  int max_pieces_ = 0, max_heads_ = 0;  // asked for in every call that draws, of up to kNumGeometryHandles maps
+  int max_pieces_ = 0, max_heads_ = 0;  // cached for drawing calls: there are up to kNumGeometryHandles maps
   uint64_t generation_ = 0;
 };
 

@@ -1,5 +1,5 @@
-// Lists of images: those to be drawn from the pool, most expensive first; those deferred until the pool is free; those
-// that overflow into the last launch. Allocates an image's memory in the pool.
+// Lists of images: those drawn from the pool, most expensive first; those deferred until the pool is free; those that
+// overflow into the last launch. Allocates an image's memory in the pool.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/face_setup.cuh"
@@ -12,8 +12,8 @@ __device__ inline int32_t view_of(const DrawTask& task, int32_t image) {
 }
 __device__ inline int32_t camera_of(const DrawTask& task, int32_t image) { return image % num_cameras(task); }
 
-// The number of the launch's views that are drawn: those within the caller's count. A count outside [0, max_views] is a
-// fault.
+// Returns the number of the launch's views that are drawn: those within the caller's count. A count outside [0,
+// max_views] is a fault.
 __device__ inline int32_t num_drawn_views(const DrawTask& task) {
   if (task.view_count == nullptr) return task.num_views;
   const int32_t count = *task.view_count, drawn = clamp(count, 0, task.max_views);
@@ -31,7 +31,7 @@ __device__ inline void defer(const DrawTask& task, int32_t image) {
   task.deferred_images[atomicAdd(&task.counters->deferred, 1)] = image;
 }
 
-// The images of a cost bucket that are drawn from the pool.
+// Returns the images of a cost bucket that are drawn from the pool.
 __device__ inline int32_t* images_of_bucket(const DrawTask& task, int bucket) {
   return task.drawn_images + static_cast<int64_t>(bucket) * task.num_views * num_cameras(task);
 }
@@ -39,11 +39,11 @@ __device__ inline void list_drawn(const DrawTask& task, int32_t image, int32_t l
   const int bucket = min_of(listed / kFacesPerCostBucket, kNumCostBuckets - 1);
   images_of_bucket(task, bucket)[atomicAdd(&task.counters->cost_buckets[bucket], 1)] = image;
 }
-// Iterates over them, the most expensive bucket first.
+// Iterates over the images of all buckets, the most expensive bucket first.
 class DrawOrder {
  public:
   __device__ explicit DrawOrder(const DrawTask& task) : task_(task) {}
-  /// The image with the given number, which must not decrease from call to call; -1 after the last.
+  /// Returns the image with this number, which must not decrease from call to call; -1 after the last.
   __device__ int32_t image_of(int32_t turn) {
     const int32_t* cost_buckets = task_.counters->cost_buckets;
     PICTURA_NO_UNROLL
@@ -61,8 +61,8 @@ class DrawOrder {
   int32_t begin_ = 0;  // number of the bucket's first image
 };
 
-// Allocates the faces of an image with `listed` entries, and lists it to be drawn. Returns its first batch, or -1 if it
-// was deferred or overflowed. One thread.
+// Allocates the faces of an image with `listed` entries, and lists the image for drawing. Returns its first batch, or
+// -1 if the image was deferred or overflowed. For one thread.
 __device__ inline int32_t allocate_faces(const DrawTask& task, int32_t image, int32_t listed) {
   BlockState* state = block_state();
   FaceSetupContext* context = &state->context;
@@ -91,7 +91,7 @@ __device__ inline int32_t allocate_faces(const DrawTask& task, int32_t image, in
   return first_batch;
 }
 
-// The entries of an image.
+// Returns the entries of an image.
 __device__ inline uint32_t* entries_of(const SetupLists& lists, int32_t image) {
   return lists.entries + static_cast<int64_t>(image) * lists.max_entries;
 }

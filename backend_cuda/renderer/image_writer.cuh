@@ -1,5 +1,5 @@
-// Writes pixels as bytes, halves, floats or bfloat16s, one plane per channel or as patches, several neighbours per
-// store; or not at all.
+// Writers of pixels as bytes, halves, floats or bfloat16s, in one plane per channel or as patches, several neighbours
+// per store; and a writer that writes nothing.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/fragments.cuh"
@@ -16,9 +16,9 @@ struct ImageWriter {
   void* images;
   int64_t first, plane;  // in elements: the image's offset, and the stride of planes
   int width_px, height_px;
-  int patch_px;  // side of the patches, where the order is of patches
+  int patch_px;  // side of the patches, where the order is patches
 
-  /// Stores the colour of a pixel with a fragment list at the first of its fragments.
+  /// Stores the colour of a pixel with a fragment list in the first of its fragments.
   template <typename Memory>
   __device__ void store_color(const Memory& memory, int fragment, Rgb color) const {
     if (has_bytes()) {
@@ -48,12 +48,12 @@ struct ImageWriter {
   struct alignas(kPixelsPerWrite * sizeof(Value)) PixelVector {
     Value value[kPixelsPerWrite];
   };
-  // So many neighbouring pixels from (x, y) on.
+  // A number of neighbouring pixels from (x, y) on.
   struct Place {
     int x, y, count;
   };
-  // Where a place lies in patches. Constant divisors are several times as fast as patch_px, and all threads take one
-  // branch.
+  // Returns the index of a place in patches. Constant divisors are several times as fast as patch_px, and all threads
+  // take one branch.
   __device__ int64_t place_in_patch(const Place& place) const {
     switch (patch_px) {
       case 8: return place_in_patches(8, width_px, 0, place.x, place.y);
@@ -63,8 +63,8 @@ struct ImageWriter {
     }
   }
 
-  // Calls change(effect, i) for each pixel, where the image has an effect: what reaches beyond the image stays black.
-  // The effect is in shared memory, since no register is to spare.
+  // Calls change(effect, i) for each pixel, where the image has an effect; values beyond the image stay black. The
+  // effect is in shared memory, because no registers are left.
   template <typename Change>
   __device__ void for_each_shown(const Place& place, Change&& change) const {
     if constexpr (kRandomizesCameras) {
@@ -81,7 +81,7 @@ struct ImageWriter {
   template <typename Memory, typename Value, typename ValueOf>
   __device__ void write_bytes(const Memory& memory, Value* all, const Place& place, const typename Memory::Word* words,
                               ValueOf&& value_of) const {
-    // Many warps write only black.
+    // Skips the lookups for black words: many warps write only black.
     uint32_t bytes[kPixelsPerWrite] = {};
     typename Memory::Word some = 0;
     for (int i = 0; i < kPixelsPerWrite; ++i) some |= words[i];
@@ -116,7 +116,7 @@ struct ImageWriter {
     });
   }
 
-  // value_of(i, channel) is a channel of the i-th pixel.
+  // Stores all channels; value_of(i, channel) is a channel of the i-th pixel.
   template <typename Value, typename ValueOf>
   __device__ void store_channels(Value* image, const Place& place, ValueOf&& value_of) const {
     auto store_each = [&](Value* to, int64_t step, int count) {
@@ -127,7 +127,7 @@ struct ImageWriter {
         store(to, count, values);
       }
     };
-    // Planes have a loop of their own: without it, each store asks whether a patch ends there.
+    // Planes have a separate path: otherwise each store would test whether a patch ends there.
     if (order != ChannelOrder::patches) {
       store_each(image + static_cast<int64_t>(place.y) * width_px + place.x, plane, place.count);
       return;
@@ -140,8 +140,8 @@ struct ImageWriter {
     if (is_right || place.y + 1 == height_px) blacken_beyond(image, place, width_px, height_px, patch_px);
   }
 
-  // Blackens what the patch of such pixels has beyond the image, to their right and below them. Not inlined: few
-  // threads need it, and all would keep its registers.
+  // Blackens the part of these pixels' patch that lies beyond the image, to the right and below. Not inlined: few
+  // threads need it, and all would reserve its registers.
   template <typename Value>
   __device__ __noinline__ static void blacken_beyond(Value* image, Place place, int width_px, int height_px,
                                                      int patch_px) {
@@ -152,7 +152,7 @@ struct ImageWriter {
     for (int channel = 0; channel < 3; ++channel, to += patch_px * patch_px) {
       PICTURA_NO_UNROLL
       for (int row = 0; row < rows; ++row) {
-        // The pixels themselves are written, up to the next multiple of kPixelsPerWrite.
+        // The pixels themselves are already written, up to the next multiple of kPixelsPerWrite.
         PICTURA_NO_UNROLL
         for (int x = row == 0 ? kPixelsPerWrite - place.x % kPixelsPerWrite : 0; x < columns; x += kPixelsPerWrite) {
           store(to + row * patch_px + x, min_of(columns - x, kPixelsPerWrite), PixelVector<Value>{});
@@ -161,7 +161,7 @@ struct ImageWriter {
     }
   }
 
-  // One vector store if all pixels are written and the address is aligned.
+  // Stores pixels with one vector store if all are written and the address is aligned.
   template <typename Value>
   __device__ static void store(Value* to, int count, const PixelVector<Value>& values) {
     if (count == kPixelsPerWrite && reinterpret_cast<uintptr_t>(to) % sizeof(values) == 0) {
@@ -174,7 +174,7 @@ struct ImageWriter {
   }
 };
 
-/// Writes nothing.
+/// Writer that writes nothing.
 struct NoImage {
   template <typename Memory>
   __device__ void store_color(const Memory&, int, Rgb) const {}

@@ -1,6 +1,7 @@
-// The arguments of the drawing kernels. Three launches (cull, set up, clip) prepare the faces of all images in a pool,
-// the next draws them, a block per tile. One more draws the images that did not fit into the pool, a block per image.
-// What exceeds a block's memory goes to a last launch of few blocks, whose memory holds all of a world.
+// Arguments of the drawing kernels. Three launches (cull, set up, clip) prepare the faces of all images in a pool. The
+// next launch draws these images, one block per tile. A further launch draws the images that did not fit into the pool,
+// one block per image. Images that exceed a block's memory go to a last launch of few blocks, each with memory for a
+// whole world.
 #pragma once
 
 #include "pictura/common/patches.h"
@@ -9,17 +10,17 @@
 
 namespace pictura::cuda {
 
-/// Images are drawn in order of decreasing cost, sorted into buckets by the number of entries, so that the last tiles
-/// to be drawn are cheap.
+/// Buckets of images by number of entries: images are drawn in order of decreasing cost, so that the last tiles are
+/// cheap.
 constexpr int kNumCostBuckets = 16, kFacesPerCostBucket = 64;
 
-/// Neighbouring pixels of a row that a thread writes with one store.
+/// Number of neighbouring pixels of a row that a thread writes with one store.
 constexpr int kPixelsPerWrite = 4;
 
-/// Maximum tile size. Tiles are higher than wide because distant primitives are concentrated along the horizon; they
-/// are narrower where there are few images, so that blocks end at about the same time.
+/// Maximum tile size. Tiles are higher than wide because distant primitives are concentrated along the horizon. They
+/// are narrower when there are few images, so that blocks end at about the same time.
 constexpr int kTileWidth_px = 48, kNarrowTile_px = 32, kTileHeight_px = 54;
-/// The tiles of an image: equally wide, except for the last column.
+/// Tiles of an image: equally wide, except for the last column.
 struct TileGrid {
   int tile_width_px = 0, across = 0, down = 0;
   PICTURA_HD constexpr int count() const { return across * down; }
@@ -38,10 +39,10 @@ struct CameraPlanes {
   PICTURA_HD bool are_wanted() const { return depth_m || class_id || instance_id; }
 };
 
-/// A camera of the rig, what is derived from it, and its outputs; strides as in CameraImages.
+/// A camera of the rig with derived values and its outputs; strides as in CameraImages.
 struct CameraSlot {
   PinholeCamera camera;  // in the ego frame
-  Frustum frustum;       // in camera coordinates, so independent of the pose; not of a randomized focal length
+  Frustum frustum;       // in camera coordinates, so independent of the pose, but not of a randomized focal length
   TileGrid tiles;        // see choose_tiles
   void* color = nullptr;
   int64_t view_stride = 0;
@@ -54,8 +55,8 @@ struct alignas(16) Ball {
   float radius_m = 0;
 };
 
-/// All pieces of one kind of a map, each only in the cell of its sphere's centre: no query visits one twice, and the
-/// pieces of neighbouring cells in a row are contiguous.
+/// All pieces of one kind of a map, each only in the cell of its sphere's centre: queries visit each piece once, and
+/// the pieces of neighbouring cells in a row are contiguous.
 struct PieceGrid {
   GridView cells;
   Span<const Ball> balls;  // in the order of cells.items
@@ -66,7 +67,7 @@ struct PieceGrid {
 struct DeviceGeometry {
   StaticGeometryView pieces;  // without its grids
   PieceGrid strips, walls;
-  /// False for a handle that holds no map.
+  /// Returns false for a handle without a map.
   PICTURA_HD constexpr bool is_held() const { return pieces.num_signals >= 0; }
 };
 inline DeviceGeometry empty_entry() {
@@ -75,7 +76,7 @@ inline DeviceGeometry empty_entry() {
   return entry;
 }
 
-/// A fault of a view or a query: written by the kernels, thrown by the host at the next call. One word, so that it is
+/// A fault of a view or a query: the kernels write it, and the host throws it at the next call. One word, so that it is
 /// read and written atomically.
 enum class FaultKind : uint32_t {
   none,
@@ -90,7 +91,7 @@ enum class FaultKind : uint32_t {
 };
 struct Fault {
   FaultKind kind = FaultKind::none;
-  int32_t index = 0;  // of the view or the query, or the number of views
+  int32_t index = 0;  // index of the view or the query, or the number of views
 };
 using FaultWord = unsigned long long;
 constexpr FaultWord kNoFault = 0;
@@ -104,14 +105,14 @@ PICTURA_HD constexpr Fault fault_of(FaultWord word) {
 /// Face count of an image that is not in the pool; so low that increments by other warps leave it negative.
 constexpr int32_t kNotPrepared = -(1 << 30);
 
-/// An image that is ready to be drawn: its faces in the pool, and what the order of strips and solids needs. Copied as
-/// words, so it has no padding.
+/// An image that is ready to be drawn: its faces in the pool, and the data for the order of strips and solids. Copied
+/// as words, so it has no padding.
 struct PreparedImage {
   const DeviceGeometry* geometry = nullptr;
-  const AgentBox* agents = nullptr;        // of its world
-  int32_t face_begin = 0, face_count = 0;  // face_count: or kNotPrepared
+  const AgentBox* agents = nullptr;        // agents of its world
+  int32_t face_begin = 0, face_count = 0;  // face_count may be kNotPrepared
   int32_t has_overflowed = 0;              // 1: exceeded a block's memory while it was drawn
-  int32_t filler = 0;                      // up to whole words
+  int32_t filler = 0;                      // pads to whole words
 };
 static_assert(sizeof(PreparedImage) == 2 * sizeof(void*) + 4 * sizeof(int32_t));
 
@@ -123,19 +124,19 @@ struct alignas(16) Quad {
 };
 
 /// Inputs and outputs of the face set-up of one image. Each entry has space for a face and, at the matching index, for
-/// four edges; edges of clipped faces go to a range that images may share.
+/// four edges. Edges of clipped faces go to a range that images may share.
 struct alignas(16) FaceSetupContext {
   ImageSetting setting;
   const Strip* strips = nullptr;
   const WallFace* walls = nullptr;
   const LightHead* heads = nullptr;
-  const AgentBox* agents = nullptr;  // of its world; lights likewise
+  const AgentBox* agents = nullptr;  // agents and lights of its world
   const LightState* lights = nullptr;
   ScreenFace* faces = nullptr;
   PolygonEdge* edges = nullptr;
   int32_t* num_faces = nullptr;    // written so far
   int32_t* num_clipped = nullptr;  // edges of clipped faces; may exceed their range
-  int32_t edge_begin = 0;          // four for each face
+  int32_t edge_begin = 0;          // four per face
   int32_t clipped_begin = 0, clipped_end = 0;
 };
 
@@ -145,7 +146,7 @@ constexpr int kMaxEntries = 1536;
 /// Entries of an image (backend_cuda/renderer/cull.cuh) whose faces a warp sets up at once, one per lane.
 struct FaceBatch {
   static constexpr int kEntries = 32;
-  /// Batches of so many entries; the last may be partly filled.
+  /// Returns the number of batches of this number of entries; the last batch may be partly filled.
   PICTURA_HD static constexpr int32_t count_of(int32_t entries) { return (entries + kEntries - 1) / kEntries; }
   int32_t image, first_entry;
 };
@@ -155,9 +156,9 @@ struct ClippedPrimitive {
   int32_t image;
 };
 
-/// Lists that each stage of face set-up leaves to the next. Both have capacity for every visible entry.
+/// Lists from each stage of face set-up to the next. Both have capacity for every visible entry.
 struct SetupLists {
-  uint32_t* entries = nullptr;          // [max_entries] for each image, padded to whole batches
+  uint32_t* entries = nullptr;          // [max_entries] per image, padded to whole batches
   ClippedPrimitive* clipped = nullptr;  // faces of four corners from the front, lights from the back
   int32_t max_entries = 0, max_clipped = 0;
 };
@@ -166,18 +167,18 @@ struct SetupCounts {
   int32_t clipped = 0, lights = 0;
 };
 
-/// Faces of many images, and the intermediate results of their set-up.
+/// Faces of many images, and intermediate results of their set-up.
 struct FacePool {
   ScreenFace* faces = nullptr;
   PolygonEdge* edges = nullptr;
   PreparedImage* images = nullptr;       // [images]
   FaceSetupContext* contexts = nullptr;  // [images]
-  FaceBatch* batches = nullptr;          // enough for max_faces in so many images
+  FaceBatch* batches = nullptr;          // enough for max_faces in this number of images
   SetupLists lists;
-  int32_t max_faces = 0, max_edges = 0;  // edges: four for each face, the rest for clipped faces
+  int32_t max_faces = 0, max_edges = 0;  // edges: four per face, the rest for clipped faces
 };
 
-/// How many of at most max_blocks blocks can each set up an image in the pool's memory. At least one fits.
+/// Returns how many of at most max_blocks blocks can each set up an image in the pool's memory; at least one.
 PICTURA_HD inline int setup_blocks(const FacePool& pool, int max_blocks) {
   return min_of(pool.max_faces / kMaxEntries, max_blocks);
 }
@@ -190,25 +191,25 @@ struct Scratch {
   int32_t blocks = 0, max_faces = 0, max_edges = 0;
 };
 
-/// Counters that the launches of a batch share; all 0 before the first, and reset by the last block.
+/// Counters shared by the launches of a batch; all 0 before the first launch, and reset by the last block.
 struct DrawCounters {
   int32_t next_culled = 0, next_clipped = 0, next_drawn = 0;  // next_drawn counts tiles
   SetupCounts listed;
   int32_t faces = 0, batches = 0, clipped_edges = 0;  // allocated from the pool
-  int32_t cost_buckets[kNumCostBuckets] = {};         // images drawn from the pool, by bucket
-  int32_t deferred = 0;                               // images that did not fit into the pool
-  int32_t overflow = 0;                               // images left to the last launch
+  int32_t cost_buckets[kNumCostBuckets] = {};         // number of images drawn from the pool, by bucket
+  int32_t deferred = 0;                               // number of images that did not fit into the pool
+  int32_t overflow = 0;                               // number of images left to the last launch
   int32_t finished_blocks = 0;                        // of the last launch
 };
 
 struct DrawTask {
   SceneBatch scene;                     // in device memory, like all pointers below
   const View* views = nullptr;          // [max_views]
-  const int32_t* view_count = nullptr;  // how many of them are drawn; null: all
+  const int32_t* view_count = nullptr;  // number of drawn views; null: all
   int32_t max_views = 0;
-  int32_t first_view = 0;  // views [first_view, first_view + num_views) are drawn by this launch
+  int32_t first_view = 0;  // this launch draws views [first_view, first_view + num_views)
   int32_t num_views = 0, num_cameras = 0;
-  int32_t max_tiles = 0;  // of any image
+  int32_t max_tiles = 0;  // maximum over all images
   const DeviceGeometry* geometries = nullptr;
   int32_t num_geometries = 0;
   float line_floor_px = 0;
@@ -227,7 +228,7 @@ struct DrawTask {
   CameraSlot cameras[kMaxCameras];
 };
 
-/// Chooses the tile size, given the number of blocks that draw.
+/// Chooses the tile size from the number of drawing blocks.
 PICTURA_HD inline void choose_tiles(DrawTask* task, int blocks) {
   // Wide tiles keep all threads busy; but with few tiles per block, blocks that end early would be idle.
   constexpr int kTilesOfBlock = 12;

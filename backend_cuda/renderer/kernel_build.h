@@ -8,7 +8,7 @@
 
 namespace pictura::cuda {
 
-/// The target of a compilation. Kernels get it as PICTURA_RIG_CAMERAS, PICTURA_RIG_WIDTH_PX, PICTURA_RIG_HEIGHT_PX and
+/// Target of a compilation. Kernels receive it as PICTURA_RIG_CAMERAS, PICTURA_RIG_WIDTH_PX, PICTURA_RIG_HEIGHT_PX and
 /// PICTURA_RANDOMIZES_CAMERAS.
 struct KernelTarget {
   int compute_capability = 0;       // 10 * major + minor
@@ -23,14 +23,15 @@ struct KernelCode {
   bool cached = false;       // read from the cache
 };
 
-/// Empty if NVRTC can be opened, else the reason. $PICTURA_NVRTC names the library to open, or is `off`.
+/// Returns an empty text if NVRTC can be opened, else the reason. $PICTURA_NVRTC is the path of the library to open, or
+/// `off`.
 std::string nvrtc_unavailable();
 
 /// Compiles a program, or reads the cached code of an earlier call with the same sources, target and version of NVRTC,
-/// unless that file is damaged. Throws Error with the compiler's messages, or if NVRTC cannot be opened.
+/// unless the cached file is damaged. Throws Error with the compiler's messages, or if NVRTC cannot be opened.
 KernelCode build_kernels(const KernelProgram& program, const KernelTarget& target);
 
-/// The file in which build_kernels() caches the code. Empty if nothing is cached.
+/// Returns the file in which build_kernels() caches the code. Empty if caching is off.
 std::string kernel_cache_path(const KernelProgram& program, const KernelTarget& target);
 
 }  // namespace pictura::cuda

@@ -1,4 +1,4 @@
-// The renderer's kernels on a device: those built for its rig by NVRTC, or those built ahead of time.
+// The renderer's kernels on a device: built for its rig by NVRTC, or built ahead of time.
 #pragma once
 
 #include <memory>
@@ -10,15 +10,15 @@
 
 namespace pictura::cuda {
 
-/// Owns the loaded code of its kernels.
+/// Owner of the loaded code of kernels.
 class KernelLibrary {
  public:
-  /// Builds the kernels for a configuration's rig and CUDA device, which must be the current one; without NVRTC, uses
-  /// those compiled into this program. Throws Error if those do not run on the device.
+  /// Builds the kernels for a configuration's rig and CUDA device, which must be the current device. Without NVRTC,
+  /// uses the kernels compiled into this program. Throws Error if these do not run on the device.
   explicit KernelLibrary(const RendererConfig& config);
 
   const KernelSet& kernels() const { return kernels_; }
-  /// Their origin, for messages.
+  /// Origin of the kernels, for messages.
   const std::string& origin() const { return origin_; }
 
  private:

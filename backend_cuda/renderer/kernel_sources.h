@@ -1,4 +1,4 @@
-// The sources that kernels are compiled from at run time: part of the library, so that an installed copy needs no
+// Sources of kernels that are compiled at run time. They are part of the library, so that an installed copy needs no
 // source tree. cmake/EmbedSources.cmake generates their definitions.
 #pragma once
 
@@ -15,13 +15,13 @@ struct KernelSource {
 
 struct KernelProgram {
   const char* text;
-  Span<const KernelSource> headers;  // all that it includes, directly or indirectly
+  Span<const KernelSource> headers;  // all headers that it includes, directly or indirectly
 };
 
-/// The renderer's kernels.
+/// Returns the program of the renderer's kernels.
 KernelProgram renderer_program();
 
-/// The kernels, in the order in which they are launched.
+/// Kernels in the order of their launches.
 enum Kernel { kCull, kSetupFaces, kClip, kDraw, kDrawDeferred, kDrawOverflow, kVisibility, kNumKernels };
 constexpr std::array<const char*, kNumKernels> kKernelNames{
     "pictura_cull",          "pictura_setup_faces",   "pictura_clip",      "pictura_draw",

@@ -1,5 +1,5 @@
-// The drawing kernels. Compiled ahead of time by backend_cuda/renderer/launch.cu, and at run time from a copy of this
-// file and of all that it includes.
+// The drawing kernels. backend_cuda/renderer/launch.cu compiles them ahead of time; at run time they are compiled from
+// a copy of this file and of all files that it includes.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/face_setup.cuh"
@@ -12,7 +12,7 @@
 
 namespace pictura::cuda {
 
-// Draws a part of the image state->current. False if it does not fit into the block's memory.
+// Draws a part of the image state->current. Returns false if it does not fit into the block's memory.
 template <typename Memory>
 __device__ bool draw_image_part(const Memory& memory, const DrawTask& task, int32_t view, int32_t camera,
                                 const Part& part) {
@@ -76,15 +76,15 @@ extern "C" __global__ void __launch_bounds__(kSetupThreads, kCullBlocksPerProces
   }
 }
 
-// Sets up the faces that need no clipping, a warp per batch of entries, and lists those that do.
+// Sets up the faces that need no clipping, one warp per batch of entries, and lists the faces that need it.
 extern "C" __global__ void __launch_bounds__(kSetupThreads, kFaceSetupBlocksPerProcessor)
     pictura_setup_faces(const __grid_constant__ DrawTask task) {
   wait_for_earlier_launch();
   FaceSetupState* state = face_setup_state();
   DrawCounters* counters = task.counters;
   const int32_t num_batches = counters->batches, num_blocks = static_cast<int32_t>(gridDim.x);
-  // Batches take about equal time, so each block takes every num_blocks-th. While the warp sets up one, it loads the
-  // entries and the context of the next, and the descriptor of the one after.
+  // Batches take about equal time, so each block takes every num_blocks-th batch. While the warp sets up one batch, it
+  // loads the entries and the context of the next, and the descriptor of the one after.
   auto i = static_cast<int32_t>(blockIdx.x);
   auto batch_at = [&](int32_t at) { return at < num_batches ? task.pool.batches[at] : FaceBatch{}; };
   FaceBatch next = batch_at(i), after = batch_at(i + num_blocks);
@@ -118,7 +118,8 @@ extern "C" __global__ void __launch_bounds__(kSetupThreads, kClipBlocksPerProces
   ClipShared* storage = &geometry_shared()->clip;
   DrawCounters* counters = task.counters;
   const SetupCounts listed = counters->listed;
-  // A warp takes no more faces than spread the work over all warps: each is a long chain of dependent instructions.
+  // A warp takes only as many faces as spread the work over all warps, because each face is a long chain of dependent
+  // instructions.
   const auto num_blocks = static_cast<int32_t>(gridDim.x);
   const int batch = clamp((listed.clipped + num_blocks - 1) / num_blocks, 1, kWarpSize);
   PICTURA_NO_UNROLL
@@ -133,7 +134,7 @@ extern "C" __global__ void __launch_bounds__(kSetupThreads, kClipBlocksPerProces
   }
 }
 
-// A tile of a camera's images; empty below the last row.
+// Returns a tile of a camera's images; empty below the last row.
 __device__ inline Part tile_of(const CameraSlot& slot, int32_t tile) {
   const TileGrid& tiles = slot.tiles;
   const int height = height_px(slot.camera);
@@ -147,8 +148,8 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
   BlockState* state = block_state();
   int32_t* const counter = &task.counters->next_drawn;
   // While the block draws a tile, one thread of the last warp, which has the fewest faces to process, fetches the
-  // number of the tile after next and prefetches the next tile and its image (into shared memory: the thread has no
-  // registers to spare).
+  // number of the tile after next. It prefetches the next tile and its image into shared memory, because the thread has
+  // no registers left.
   DrawOrder order(task);
   int32_t next_image = -1, after = 0;
   auto take_next = [&] {
@@ -193,8 +194,8 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
   }
 }
 
-// Sets up the faces of an image and draws it, all in one block. False if it does not fit, or if its view is invalid.
-// All threads of the block.
+// Sets up the faces of an image and draws it, in one block. Returns false if it does not fit, or if its view is
+// invalid. Collective over all threads of the block.
 template <typename Memory>
 __device__ bool prepare_and_draw(const DrawTask& task, int32_t image, const SetupTarget& target) {
   const int32_t view = view_of(task, image), camera = camera_of(task, image);
@@ -211,7 +212,7 @@ __host__ __device__ inline size_t deferred_bytes() {
   return to_set_up > to_draw ? to_set_up : to_draw;
 }
 
-// Draws the images that did not fit into the pool, an image per block at a time; it reuses the pool's memory.
+// Draws the images that did not fit into the pool, one image per block at a time, in the pool's memory.
 extern "C" __global__ void __launch_bounds__(kDrawThreads, kDeferredBlocksPerProcessor)
     pictura_draw_deferred(const __grid_constant__ DrawTask task) {
   wait_for_earlier_launch();
@@ -269,8 +270,8 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
     if (!is_view) fault(q, FaultKind::bad_query);
     PICTURA_NO_UNROLL
     for (int32_t camera = 0; is_view && view < num_drawn && camera < num_cameras(task.draw); ++camera) {
-      // Occluded faces count when the agent is drawn alone, so occlusion culling is off. set_view reports faults of the
-      // view.
+      // Occlusion culling is off, since occluded faces count when the agent is drawn alone. set_view reports faults of
+      // the view.
       if (!prepare_image(task.draw, view, camera, setup_target_of(state->scratch), false)) {
         if (state->usable != 0) fault(view, FaultKind::capacity_exceeded);
         continue;

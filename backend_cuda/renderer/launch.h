@@ -1,5 +1,5 @@
-// The drawing kernels as the host sees them: their handles, their memory, and their launches, which are put on a stream
-// and do not wait.
+// Host interface of the drawing kernels: their handles, their memory, and their launches, which are asynchronous on a
+// stream.
 #pragma once
 
 #include <array>
@@ -12,19 +12,19 @@
 
 namespace pictura::cuda {
 
-/// The kernels' handles: symbols of this program, or cudaKernel_t of code that was loaded.
+/// Handles of the kernels: symbols of this program, or cudaKernel_t of loaded code.
 struct KernelSet {
   std::array<const void*, kNumKernels> handle{};
-  bool may_begin_early = false;  // whether a launch may begin while the one before it ends
+  bool may_begin_early = false;  // whether a launch may begin before the previous launch has ended
 };
 
-/// The kernels that were compiled with this program, for any rig.
+/// Returns the kernels that were compiled with this program, for any rig.
 KernelSet ahead_of_time_kernels();
-/// Must be called once before the first launch: loads the kernels and sets their attributes. Fails where they do not
-/// run on the device.
+/// Loads the kernels and sets their attributes. Must be called once before the first launch. Fails where the kernels do
+/// not run on the device.
 cudaError_t prepare_kernels(KernelSet* kernels);
 
-/// Bytes that a block of the last launch needs besides faces and edges.
+/// Returns the bytes that a block of the last launch needs besides faces and edges.
 std::size_t large_block_bytes(const Scratch& large);
 
 /// Draws all images, in six launches.

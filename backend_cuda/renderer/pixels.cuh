@@ -12,7 +12,7 @@ __device__ __noinline__ inline bool stands(uint32_t solid, uint32_t strip) {
   return stands_on(extent_of(solid, pieces, image.agents), extent_of(strip, pieces, image.agents));
 }
 
-// Removes samples from those of a fragment that are visible.
+// Removes samples from a fragment's visible samples.
 template <typename Memory>
 __device__ void clear_visible_samples(const Memory& memory, uint32_t fragment, uint64_t samples) {
   const auto low = static_cast<uint32_t>(samples), high = static_cast<uint32_t>(samples >> 32);
@@ -20,7 +20,7 @@ __device__ void clear_visible_samples(const Memory& memory, uint32_t fragment, u
   if (high != 0) atomicAnd(&memory.visible_high[fragment], ~high);
 }
 
-// Resolves the occlusion of a pair of fragments; pair.b may be kNone, for the pixel's full face.
+// Resolves the occlusion of a pair of fragments; pair.b is kNone for the pixel's full face.
 template <typename Memory>
 __device__ __noinline__ void resolve_pairs(WarpQueue::Pair pair, Part part) {
   if (!pair.is_valid) return;
@@ -37,16 +37,16 @@ __device__ __noinline__ void resolve_pairs(WarpQueue::Pair pair, Part part) {
   if (!with_full) clear_visible_samples(memory, pair.b, occluded.of_b);
 }
 
-// Resolves occlusion between all pairs of fragments of a pixel, its full face included, except for pairs that can no
-// longer occlude each other. A lane walks the rest of the list behind a fragment, one step at a time, and takes the
-// next fragment at its end; fragments with the longest lists, those made last, come first. Pairs that overlap are
-// queued until every lane of the warp has one.
+// Resolves occlusion between all pairs of fragments of a pixel, including its full face, except for pairs that can no
+// longer occlude each other. A lane walks the rest of the list after a fragment, one step at a time, and takes the next
+// fragment at its end. Fragments with the longest lists, which were made last, come first. Overlapping pairs are queued
+// until every lane of the warp has one.
 template <typename Memory>
 __device__ void resolve_occlusion(const Memory& memory, const Part& part, int count) {
   WarpQueue pairs(&memory.state->warps[warp_index()].queue);
-  int begin = 0, used = kWarpSize;  // the warp's block of fragments, and how many are taken
+  int begin = 0, used = kWarpSize;  // the warp's block of fragments, and the number that are taken
   int fragment = 0;
-  uint32_t other = Memory::kNone;  // the next of the list
+  uint32_t other = Memory::kNone;  // the next fragment of the list
   bool is_before_full = false;     // the pair with the full face comes first
   uint64_t samples = 0;
   PICTURA_NO_UNROLL
@@ -82,8 +82,8 @@ __device__ void resolve_occlusion(const Memory& memory, const Part& part, int co
   if (!pairs.is_empty()) resolve_pairs<Memory>(pairs.take(), part);
 }
 
-// Divides what is left of the pixels that several fragments cover fully. Of those fragments the first of the pixel's
-// list does it.
+// Divides the remainders of pixels that several fragments cover fully. The first such fragment of the pixel's list
+// performs the division.
 template <typename Memory>
 __device__ __noinline__ void divide_remainders(int count) {
   const Memory memory = Memory::current();
@@ -106,14 +106,14 @@ __device__ __noinline__ void divide_remainders(int count) {
   }
 }
 
-/// Ignores fragments' weights.
+/// Visitor that ignores fragments' weights.
 struct NoVisit {
   static constexpr bool kWanted = false;
   __device__ void operator()(const ScreenFace&, float) const {}
 };
 
-// Computes the fragments' weights. A fragment that is alone in its pixel gives the pixel's colour at once; for the
-// others the contribution and the kind of weight overwrite the samples and the pixel index.
+// Computes the fragments' weights. A fragment that is alone in its pixel gives the pixel's colour at once. For other
+// fragments, the contribution and the kind of weight overwrite the samples and the pixel index.
 template <typename Memory, typename Visit, typename Write>
 __device__ void compute_weights(const Memory& memory, int count, const Visit& visit, const Write& write) {
   PICTURA_NO_UNROLL
@@ -147,7 +147,7 @@ __device__ void composite_pixels(const Memory& memory, const Visit& visit, const
         take(static_cast<int>(i), static_cast<PixelAccumulator::Kind>(memory.kind[i]));
       }
     };
-    // Only a face that also covers the pixel fully can occlude the full face, and then the full face is a fragment too.
+    // Only another fully covering face can occlude the full face, and then the full face is a fragment too.
     const PixelAccumulator::Weight of_full = PixelAccumulator::weight_of({1.0f, kAllSamples}, kAllSamples);
     PixelAccumulator sum;
     if (full != Memory::kNone) sum.add(of_full, memory.faces[full].color);
@@ -195,8 +195,8 @@ __device__ void reset_counts(const Memory& memory) {
   state->num_rows = state->num_candidates = state->num_fragments = state->num_added = state->divides = 0;
   state->num_composited = state->next_fragments = 0;
 }
-// Clears the pixels and counters. Before a block's first part, and after a part that did not fit. All threads of the
-// block.
+// Clears the pixels and counters, before a block's first part and after a part that did not fit. Collective over all
+// threads of the block.
 template <typename Memory>
 __device__ void reset_part(const Memory& memory) {
   sync_block();
@@ -206,8 +206,8 @@ __device__ void reset_part(const Memory& memory) {
   sync_block();
 }
 
-// Makes the fragments of the listed rows and composites their pixels. False if they do not fit into memory. All threads
-// of the block.
+// Makes the fragments of the listed rows and composites their pixels. Returns false if they do not fit into memory.
+// Collective over all threads of the block.
 template <typename Memory, typename Visit, typename Write>
 __device__ bool draw_rows(const Memory& memory, const Part& part, const Visit& visit, const Write& write) {
   BlockState* state = memory.state;
@@ -236,14 +236,14 @@ __device__ bool draw_rows(const Memory& memory, const Part& part, const Visit& v
   return true;
 }
 
-// Draws the faces into one part and clears the memory for the next. False, and nothing cleared, if it does not fit. All
-// threads of the block; the caller synchronizes before the next part.
+// Draws the faces into one part and clears the memory for the next. Returns false, without clearing, if the part does
+// not fit. Collective over all threads of the block; the caller synchronizes before the next part.
 template <typename Memory, typename Visit, typename Write>
 __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part, const Visit& visit,
                           const Write& write) {
   list_rows(memory, num_faces, part);
   sync_block();
-  // Without rows the counters are 0 already; other threads may still read num_rows.
+  // Without rows, the counters are already 0; other threads may still read num_rows.
   if (memory.state->num_rows != 0) {
     if (!draw_rows(memory, part, visit, write)) return false;
     reset_counts(memory);
@@ -252,9 +252,9 @@ __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part,
   return true;
 }
 
-// Plans the next part of a tile, after one that was drawn or did not fit. Parts become narrower first, because distant
-// primitives are concentrated along the horizon, then lower. False if a single pixel does not fit. All threads of the
-// block.
+// Plans the next part of a tile, after a part that was drawn or did not fit. Parts first become narrower, because
+// distant primitives are concentrated along the horizon, and then lower. Returns false if a single pixel does not fit.
+// Collective over all threads of the block.
 template <typename Memory>
 __device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn) {
   constexpr int kNarrowPart_px = 2 * kPixelsPerWrite;
@@ -286,7 +286,7 @@ __device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn
     } else if (rows > 1) {
       plan.rows = half_of(rows);
     } else {
-      // It begins at a multiple of its width, so that the pixels that a thread writes lie in one patch
+      // A part begins at a multiple of its width, so that the pixels that a thread writes lie in one patch
       // (common/patches.h).
       plan.wide_px = columns > kPixelsPerWrite ? kPixelsPerWrite : columns > 2 ? 2 : 1;
     }
@@ -303,8 +303,8 @@ __device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn
 
 // Draws the faces into a part of an image, in smaller parts if it does not fit. Calls visit(face, weight) for each
 // fragment, write.store_color(memory, fragment, colour) for each pixel with fragments, and write.pixels(memory, x, y,
-// count, words) for neighbouring pixels. False if a single pixel does not fit. All threads of the block; the caller
-// synchronizes before the next call.
+// count, words) for neighbouring pixels. Returns false if a single pixel does not fit. Collective over all threads of
+// the block; the caller synchronizes before the next call.
 template <typename Memory, typename Visit, typename Write>
 __device__ bool draw_faces(const Memory& memory, int num_faces, const Part& whole, const Visit& visit,
                            const Write& write) {
@@ -318,8 +318,7 @@ __device__ bool draw_faces(const Memory& memory, int num_faces, const Part& whol
   }
 }
 
-// Calls draw(memory, tile) for tiles of an image, as high as the memory allows, one after the other, until one returns
-// false.
+// Calls draw(memory, tile) for tiles of an image in sequence, as high as the memory allows, until a call returns false.
 template <typename Memory, typename Draw>
 __device__ bool for_each_tile(const Memory& memory, int width_px, int y_begin, int y_end, const Draw& draw) {
   const int max_rows = memory.max_pixels / kTileWidth_px;

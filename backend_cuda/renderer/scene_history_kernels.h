@@ -1,4 +1,4 @@
-// The kernels of scene histories. They are put on a stream; errors are left to cudaGetLastError().
+// Kernels of scene histories. Launches are asynchronous on a stream; callers check errors by cudaGetLastError().
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -7,7 +7,7 @@
 
 namespace pictura::cuda {
 
-/// first[i] = from[i] + added.
+/// Computes first[i] = from[i] + added.
 void launch_shift(Span<const int32_t> from, int32_t added, int32_t* first, cudaStream_t stream);
 void launch_gather(const HistoryViews& history, Span<const int64_t> rows, View* views_out, cudaStream_t stream);
 

@@ -1,4 +1,4 @@
-// The renderer's scratch memory (all but images, scenes and maps): sizes and owners. Buffer is DeviceBuffer, or
+// The renderer's scratch memory (all except images, scenes and maps): sizes and owners. Buffer is DeviceBuffer, or
 // std::vector where kernels are emulated.
 #pragma once
 
@@ -10,14 +10,14 @@ namespace pictura::cuda {
 /// drawn when the pool is free again. Four edges belong to each face; the rest, of which a third is used, is for
 /// clipped faces.
 constexpr std::size_t kPoolFaces = 200, kPoolEdges = 928;
-/// Additional images' worth of capacity, for batches of few images that may all have many faces.
+/// Additional capacity in images, for batches of few images that may all have many faces.
 constexpr std::size_t kMinPoolImages = 4 * kMaxEntries / kPoolFaces + 1;
 static_assert(kMinPoolImages * kPoolFaces >= kMaxEntries, "a deferred image fits into the pool");
 
 /// Capacities of a pool.
 struct PoolSizes {
   std::size_t images, faces, edges;
-  /// Enough for all faces; the last batch of each image may be partly filled.
+  /// Enough batches for all faces; the last batch of each image may be partly filled.
   constexpr std::size_t batches() const { return faces / FaceBatch::kEntries + images; }
   constexpr std::size_t entries() const { return images * kMaxEntries; }
   constexpr std::size_t listed_images() const { return (2 + kNumCostBuckets) * images; }
@@ -31,13 +31,13 @@ constexpr PoolSizes pool_sizes(std::size_t images) {
   const std::size_t num_allocations = images + kMinPoolImages;
   return {images, num_allocations * kPoolFaces, num_allocations * kPoolEdges};
 }
-/// Bytes of a pool per image and without images. Their sum is never too small, and too large by at most the bytes of a
+/// Bytes of a pool per image, and without images. Their sum is sufficient, and too large by at most the bytes of a
 /// batch.
 constexpr std::size_t kPoolImageBytes =
     (pool_sizes(FaceBatch::kEntries).bytes() - pool_sizes(0).bytes()) / FaceBatch::kEntries;
 constexpr std::size_t kMinPoolBytes = pool_sizes(0).bytes() + sizeof(FaceBatch);
 
-/// Owns the pool: the faces of many images and the intermediate results of their set-up.
+/// Owner of the pool: the faces of many images and the intermediate results of their set-up.
 template <template <typename> class Buffer>
 class PoolBuffers {
  public:
@@ -51,7 +51,7 @@ class PoolBuffers {
         entries_(sizes.entries()),
         clipped_(sizes.faces),
         lists_(sizes.listed_images()) {}
-  /// Points a task to the pool and to the lists of images.
+  /// Sets a task's pointers to the pool and to the lists of images.
   void serve(DrawTask* task_out) {
     task_out->pool = {faces_.data(),
                       edges_.data(),
@@ -77,7 +77,7 @@ class PoolBuffers {
   Buffer<int32_t> lists_;
 };
 
-/// Owns the memory of the blocks of the last launch.
+/// Owner of the memory of the blocks of the last launch.
 template <template <typename> class Buffer>
 class LargeBuffers {
  public:

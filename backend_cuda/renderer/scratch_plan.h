@@ -1,28 +1,28 @@
-// How the CUDA renderer divides its scratch memory: all but images, scenes and maps.
+// Division of the CUDA renderer's scratch memory (all except images, scenes and maps).
 #pragma once
 
 #include <cstddef>
 
 namespace pictura::cuda {
 
-/// The amounts that give the best speed.
+/// Amounts for the best speed.
 struct ScratchNeeds {
-  int large_blocks = 1;  // of the last launch
+  int large_blocks = 1;  // blocks of the last launch
   std::size_t large_block_bytes = 0;
-  std::size_t views = 1, view_bytes = 0;  // of the batch, and the bytes of each
-  std::size_t pool_bytes = 0;             // of the pool, for any number of views
+  std::size_t views = 1, view_bytes = 0;  // views of the batch, and bytes per view
+  std::size_t pool_bytes = 0;             // bytes of the pool for any number of views
 };
 
-/// The amounts that fit.
+/// Amounts that fit.
 struct ScratchPlan {
   int large_blocks = 0;
-  std::size_t views = 0;  // drawn at once; larger batches are drawn in parts
+  std::size_t views = 0;  // views drawn at once; larger batches are drawn in parts
 };
 
 std::size_t bytes_of(const ScratchPlan& plan, const ScratchNeeds& needs);
 
-/// As much of the needs as fits into max_bytes, at least one view and one block: first views, then blocks of the last
-/// launch, which has little work. Throws Error, naming the minimum in bytes, if one of each does not fit.
+/// Plans as much of the needs as fits into max_bytes, at least one view and one block: first views, then blocks of the
+/// last launch, which has little work. Throws Error with the minimum in bytes if one of each does not fit.
 ScratchPlan plan_scratch(const ScratchNeeds& needs, std::size_t max_bytes);
 
 }  // namespace pictura::cuda

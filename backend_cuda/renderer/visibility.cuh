@@ -1,4 +1,4 @@
-// The visible weight of an agent in an image, among all others and alone (see VisibilitySum).
+// Visible weight of an agent in an image, among all other agents and alone (see VisibilitySum).
 #pragma once
 
 #include "pictura/backend_cuda/renderer/face_setup.cuh"
@@ -7,7 +7,7 @@
 
 namespace pictura::cuda {
 
-/// Sums the weights of an agent's fragments.
+/// Visitor that sums the weights of an agent's fragments.
 struct AccumulateVisibility {
   static constexpr bool kWanted = true;
   uint32_t object_id;
@@ -21,7 +21,7 @@ struct RowRange {
   int y_begin, y_end;
 };
 
-// The rows of the prepared image that a primitive may touch. Every thread finds them on its own.
+// Returns the rows of the prepared image that a primitive may touch. Every thread computes them by itself.
 __device__ inline RowRange rows_of(const BlockState& state, uint32_t object_id) {
   RowRange rows{state.context.setting.camera.height_px, 0};
   PICTURA_NO_UNROLL
@@ -34,8 +34,9 @@ __device__ inline RowRange rows_of(const BlockState& state, uint32_t object_id) 
   return rows;
 }
 
-// Adds the weights of a primitive's fragments in the prepared image, among all others and then alone, to a sum per
-// thread. False if the image does not fit into the block's memory. All threads of the block.
+// Adds the weights of a primitive's fragments in the prepared image, among all other primitives and then alone, to a
+// sum per thread. Returns false if the image does not fit into the block's memory. Collective over all threads of the
+// block.
 __device__ inline bool accumulate_visibility(BlockState* state, uint32_t object_id, VisibilitySum* sum_inout) {
   const RowRange rows = rows_of(*state, object_id);
   const int num_faces = state->num_faces;

@@ -1,5 +1,5 @@
-// What the simulator keeps in device memory. Every array is as long as the simulator's capacity, so that other worlds
-// within it need no allocation; copies are put on a stream.
+// The simulator's device memory. Every array has the length of the simulator's capacity, so that other worlds within it
+// need no allocation. Copies are asynchronous on a stream.
 #pragma once
 
 #include <algorithm>
@@ -13,20 +13,20 @@
 
 namespace pictura {
 
-/// From the host, whose memory may be reused on return.
+/// Copies from the host, whose memory may be reused on return.
 template <typename T>
 void put(const std::vector<T>& host, const DeviceBuffer<T>& device, cudaStream_t stream) {
   if (host.empty()) return;
   PICTURA_CUDA(cudaMemcpyAsync(device.data(), host.data(), host.size() * sizeof(T), cudaMemcpyHostToDevice, stream));
 }
-/// To the host, as many as fit; they are there once the stream has been waited for.
+/// Copies to the host, as many elements as fit; they are valid after the stream has been waited for.
 template <typename T>
 void get(const DeviceBuffer<T>& device, std::vector<T>* host_out, cudaStream_t stream) {
   if (host_out->empty()) return;
   PICTURA_CUDA(
       cudaMemcpyAsync(host_out->data(), device.data(), host_out->size() * sizeof(T), cudaMemcpyDeviceToHost, stream));
 }
-/// Within the device, as many as both hold.
+/// Copies within the device, as many elements as both hold.
 template <typename T>
 void copy(const DeviceBuffer<T>& from, const DeviceBuffer<T>& to, cudaStream_t stream) {
   const size_t count = std::min(from.size(), to.size());
@@ -34,7 +34,7 @@ void copy(const DeviceBuffer<T>& from, const DeviceBuffer<T>& to, cudaStream_t s
   PICTURA_CUDA(cudaMemcpyAsync(to.data(), from.data(), count * sizeof(T), cudaMemcpyDeviceToDevice, stream));
 }
 
-/// The agents' fields, by their names.
+/// Agents' fields, by their names.
 struct DeviceAgents {
 #define X(name, type, per_agent, first, comment) DeviceBuffer<type> name;
   PICTURA_AGENT_FIELDS(X)
@@ -67,7 +67,7 @@ struct DeviceAgents {
   }
 };
 
-/// The state, by the names of SimulatorState.
+/// State of the simulator, by the names of SimulatorState.
 struct DeviceState {
   DeviceAgents agents;
   DeviceBuffer<AgentBox> boxes, boxes_before;
@@ -101,20 +101,21 @@ struct DeviceState {
     agents.get_to(&host_out->agents, stream);
     SimulatorState::visit_arrays(*this, *host_out, [stream](const auto& from, auto& to) { get(from, &to, stream); });
   }
-  /// As much as both hold: a copy is as long as its worlds need, the simulator's own state as its capacity.
+  /// Copies as many elements as both hold: a snapshot has the size of its worlds, the simulator's own state that of its
+  /// capacity.
   void copy_to(const DeviceState& other, cudaStream_t stream) const {
     agents.copy_to(other.agents, stream);
     SimulatorState::visit_arrays(*this, other, [stream](const auto& from, const auto& to) { copy(from, to, stream); });
   }
 };
 
-/// The rules' arrays of several maps, in one piece of memory.
+/// Arrays of the rules of several maps, in one piece of memory.
 class DeviceMaps {
  public:
   DeviceMaps() = default;
   DeviceMaps(size_t num_maps, size_t num_bytes) : memory_(num_bytes), views_(num_maps) {}
 
-  /// Copies the maps that are not there yet. Those before that are no longer needed stay while there is memory for all.
+  /// Copies the maps that are not loaded yet. Unused maps stay while there is memory for all.
   void load(const CompiledMaps& maps, cudaStream_t stream) {
     size_t missing = 0, missing_bytes = 0;
     for (const auto& map : maps) {
@@ -130,7 +131,7 @@ class DeviceMaps {
       if (find(map) == maps_.size()) append(map, stream);
     }
   }
-  /// In device memory, of a map that has been loaded.
+  /// Returns the view, in device memory, of a map that has been loaded.
   const MapView& view(const std::shared_ptr<const CompiledMap>& map) const { return views_.data()[find(map)]; }
 
  private:
@@ -159,7 +160,7 @@ class DeviceMaps {
   size_t used_bytes_ = 0;
 };
 
-/// The arrays of SimulatorSetup.
+/// Arrays of SimulatorSetup.
 struct DeviceSetup {
   DeviceBuffer<int32_t> slot_begin, box_begin, light_begin, world_of_slot, agent_of_slot;
   DeviceBuffer<uint32_t> global_world;
@@ -209,7 +210,7 @@ struct DeviceResults {
     PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
   }
-  /// Zeros, since of a set's rows only those up to its last count are zeroed later.
+  /// Sets all rows to zero, because later only a set's rows up to its last count are zeroed.
   void clear(cudaStream_t stream) const {
     const auto clear_one = [stream](const auto& buffer) {
       if (buffer.size() == 0) return;
@@ -237,12 +238,12 @@ struct DeviceResults {
   }
 };
 
-/// What the phases need besides state and results.
+/// Memory of the phases besides state and results.
 struct DeviceScratch {
   DeviceBuffer<RuleOptions> options;
   DeviceBuffer<WorldView> worlds, next_worlds;
   DeviceBuffer<cuda::WorldScratch> of_worlds;
-  DeviceBuffer<int32_t> cell_begin, cell_items;  // each world's one cell: {0, boxes}; and 0, 1, 2, ...
+  DeviceBuffer<int32_t> cell_begin, cell_items;  // the single cell of each world: {0, boxes}; and 0, 1, 2, ...
   DeviceBuffer<Vec2> cell_centers;
   DeviceBuffer<AgentBox> try_boxes;
   DeviceBuffer<uint32_t> free_tries;
@@ -250,7 +251,7 @@ struct DeviceScratch {
   DeviceBuffer<int32_t> chain_first, chain_next, crowd_begin, crowd_items;
   DeviceBuffer<uint8_t> began, prepares;
   DeviceBuffer<int32_t> rejected_slot, first_element, wrong_element;
-  // The part of the state that an episode begins with, for the next one.
+  // Initial state of the next episode.
   DeviceAgents next_agents;
   DeviceBuffer<AgentBox> next_boxes;
   DeviceBuffer<LightPlan> next_light_plans;
@@ -287,11 +288,11 @@ struct DeviceScratch {
         next_spawned(num_worlds) {}
 };
 
-/// A stream that runs in parallel to the caller's, and the events that order them.
+/// A stream that runs in parallel to the caller's stream, and the events that order both.
 class SideStream {
  public:
   SideStream() {
-    // Of a higher priority: what is put there is little, and everybody waits for its end.
+    // Higher priority, because the stream has little work and all other work waits for its end.
     int lowest = 0, highest = 0;
     PICTURA_CUDA(cudaDeviceGetStreamPriorityRange(&lowest, &highest));
     cudaStream_t side = nullptr;

@@ -1,4 +1,4 @@
-// The kernels that the simulator's host side starts. All are put on a stream and nothing waits; errors are left to
+// Kernels that the simulator's host side launches. All launches are asynchronous on a stream; callers check errors by
 // cudaGetLastError().
 #pragma once
 
@@ -9,13 +9,13 @@
 
 namespace pictura::cuda {
 
-/// The caller's stream, and a second one for what may overlap, ordered by the events; a graph captures both.
+/// The caller's stream, and a second stream for work that may overlap, ordered by the events; a graph captures both.
 struct StepStreams {
   cudaStream_t main = nullptr, side = nullptr;
   cudaEvent_t forked = nullptr, joined = nullptr;
 };
 
-/// In the worlds that `mask` [worlds] names, or in all where it is null.
+/// Launches the phases of a reset, in the worlds of `mask` [worlds], or in all worlds where it is null.
 void launch_reset(const PhaseArrays& arrays, const uint8_t* mask, uint64_t seed, const StepStreams& streams);
 void launch_edit(const PhaseArrays& arrays, const StateEdit& edit, const StepStreams& streams);
 void launch_queries(const PhaseArrays& arrays, const ObservationQueries& asked, const StepStreams& streams);
@@ -23,7 +23,8 @@ void launch_restored(const PhaseArrays& arrays, const StepStreams& streams);
 void launch_step(const PhaseArrays& arrays, const int32_t* actions, const StepStreams& streams);
 void launch_step(const PhaseArrays& arrays, const Command* commands, const StepStreams& streams);
 
-/// Commands by a rule of simulator/rules/control.h: of the slots that `mask` [slots] names, or of all where it is null.
+/// Launches commands by a rule of simulator/rules/control.h, for the slots of `mask` [slots], or for all slots where it
+/// is null.
 template <typename Rule>
 void launch_commands(const Rule& rule, int32_t num_slots, const uint8_t* mask, Command* commands_out,
                      cudaStream_t stream);

@@ -1,4 +1,4 @@
-// Phases that write what agents observe.
+// Phases that write the observations of agents.
 #pragma once
 
 #include "pictura/backend_cuda/simulator/phase_arrays.h"
@@ -7,14 +7,14 @@
 
 namespace pictura::cuda {
 
-/// Writes what agents observe, a group of threads an observation.
+/// Writes observations of agents, one group of threads per observation.
 class ObservationWriter {
  public:
-  /// Floats that the rows of any set need in the memory of a group.
+  /// Number of floats that the rows of any set need in the memory of a group.
   static constexpr int kStaging = max_of(max_of(max_of(kMaxLanes, kMaxBoundaries), kMaxWalls) * kLaneFeatures,
                                          max_of(kMaxPartners* kPartnerFeatures, kMaxControls* kControlFeatures));
 
-  /// observe_set() of every set, to that row of `out`.
+  /// Writes observe_set() of every set to this row of `out`.
   template <typename ThreadGroup, typename Observation>
   PICTURA_HD static void write_sets(const ThreadGroup& group, const WorldView& world, int agent,
                                     const Observation& observation, const ObservationView& out, int row, Hides hidden) {
@@ -25,7 +25,7 @@ class ObservationWriter {
   }
 
  private:
-  /// The rows are put together in the group's own memory, so that they are written whole and in order.
+  /// Assembles the rows in the group's own memory, so that they are written whole and in order.
   template <typename ThreadGroup, typename Observation>
   PICTURA_HD static void write_set(const ThreadGroup& group, const WorldView& world, int agent, EntitySet set,
                                    const SetRows& out, const Observation& observation, Hides hidden) {
@@ -34,7 +34,7 @@ class ObservationWriter {
     int count = 0;
     if (observes_set(world, agent, set, hidden)) {
       const EgoFrame frame = ego_frame(world.agents, slot);
-      const NearPlace place = near_place(world, slot);  // kept from set to set, it would be spilled
+      const NearPlace place = near_place(world, slot);  // recomputed per set, because keeping it would spill registers
       if (set == EntitySet::partners) {
         count = observation.observe_partners(world, agent, frame, rows, group);
       } else if (set == EntitySet::controls) {
@@ -50,7 +50,7 @@ class ObservationWriter {
     group.sync();
   }
 
-  /// observe_pieces() by several pieces a thread at a time, whose loads overlap.
+  /// Version of observe_pieces() with several pieces per thread at a time, whose loads overlap.
   template <typename ThreadGroup>
   PICTURA_HD static int collect_pieces(const ThreadGroup& group, const PieceList& near, const EgoFrame& frame,
                                        int capacity, float* rows) {
@@ -79,7 +79,7 @@ class ObservationWriter {
   }
 };
 
-/// Writes a slot's view and observation.
+/// Phase that writes a slot's view and observation.
 struct WriteObservation {
   PhaseArrays arrays;
   static constexpr int kStaging = ObservationWriter::kStaging;

@@ -7,32 +7,33 @@
 
 namespace pictura::cuda {
 
-/// How many threads share an agent: about as many as there are lane segments, barriers and boxes to test.
+/// Number of threads that share an agent: about the number of lane segments, barriers and boxes to test.
 constexpr int kThreadsPerAgent = 8, kWarp = 32;
 
-/// One world's memory for spawning.
+/// A world's memory for spawning.
 struct WorldScratch {
-  AgentBox* try_boxes = nullptr;   // [boxes, kSpawnTries] of the free ones
-  uint32_t* free_tries = nullptr;  // [boxes] which of the known tries are free of all that stands, as bits
-  int32_t* known_tries = nullptr;  // [boxes] how many have been looked at
+  AgentBox* try_boxes = nullptr;   // [boxes, kSpawnTries] boxes of the free tries
+  uint32_t* free_tries = nullptr;  // [boxes] bits of the known tries that are clear of all placed boxes
+  int32_t* known_tries = nullptr;  // [boxes] number of evaluated tries
   int32_t* chosen_try = nullptr;   // [boxes] -1: none
   int32_t* next_try = nullptr;     // [boxes]
-  BoxChains standing;              // the boxes that have a place
+  BoxChains standing;              // boxes that have a place
   // Writable box_cells of a crowd; null: the world has one cell.
   int32_t *cell_begin = nullptr, *cell_items = nullptr;
 };
 
-/// What no step has as its lowest slot with an action out of range. All its bytes are equal, for memset.
+/// Slot that marks "no slot with an action out of range". All its bytes are equal, for memset.
 constexpr int32_t kNoSlot = 0x7F7F7F7F;
 
-/// Everything that the phases read and write, in one memory.
+/// All memory that the phases read and write, in one memory space.
 struct PhaseArrays {
   WorldView* worlds = nullptr;             // [num_worlds] box_cells: see one_cell() and is_crowd()
   WorldView* next_worlds = nullptr;        // [num_worlds] the same worlds, over memory for their next episode
   const WorldScratch* scratch = nullptr;   // [num_worlds]
   const int32_t* world_of_slot = nullptr;  // [num_slots]
   int32_t num_worlds = 0, num_slots = 0;
-  // Agents of all worlds, which the views hold too: from there a kernel would read them again after each store.
+  // Agents of all worlds. The views also contain these pointers, but a kernel would read them from there again after
+  // each store.
   AgentStateView agents{}, next_agents{};
   // State, as in SimulatorState.
   uint64_t* seed = nullptr;
@@ -47,18 +48,18 @@ struct PhaseArrays {
   uint8_t* driver = nullptr;
   ObservationView observations;
   uint8_t entity_sets = 0;
-  uint8_t has_lives = 0;   // some map has roads that end
-  uint8_t has_crowds = 0;  // some world is a crowd
+  uint8_t has_lives = 0;   // whether some map has roads that end
+  uint8_t has_crowds = 0;  // whether some world is a crowd
   // Between phases and steps.
-  uint8_t* began = nullptr;          // [num_worlds] an episode began in the last step: the one after it is to be made
-  uint8_t* prepares = nullptr;       // [num_worlds] it is made in the present step
-  int32_t* next_spawned = nullptr;   // [num_worlds] in the next episode
-  int32_t* rejected_slot = nullptr;  // the lowest one with a command out of range, or kNoSlot
-  int64_t* rejected_command = nullptr;  // the first since the host looked, or kNothingRejected
-  int32_t* first_element = nullptr;     // [num_slots] the first element of an edit that names each, or kNoSlot
-  int32_t* wrong_element = nullptr;     // the first element of the edit, or query, with a fault, or kNoSlot
-  int64_t* wrong_edit = nullptr;        // what the first since the host looked is, or kNothingWrong
-  int64_t* wrong_query = nullptr;       // likewise, or kNoQueryFault
+  uint8_t* began = nullptr;          // [num_worlds] an episode began in the last step: the next episode is to be made
+  uint8_t* prepares = nullptr;       // [num_worlds] whether that episode is made in the current step
+  int32_t* next_spawned = nullptr;   // [num_worlds] number of agents in the next episode
+  int32_t* rejected_slot = nullptr;  // lowest slot with a command out of range, or kNoSlot
+  int64_t* rejected_command = nullptr;  // first rejected command since the host checked, or kNothingRejected
+  int32_t* first_element = nullptr;     // [num_slots] first element of an edit for the slot, or kNoSlot
+  int32_t* wrong_element = nullptr;     // first element of the edit or the queries with a fault, or kNoSlot
+  int64_t* wrong_edit = nullptr;        // first fault of an edit since the host checked, or kNothingWrong
+  int64_t* wrong_query = nullptr;       // first fault of a query since the host checked, or kNoQueryFault
 
   PICTURA_HD WorldView world(int w) const {
     WorldView world = worlds[w];
@@ -77,20 +78,20 @@ struct PhaseArrays {
 /// Whether a world has so many boxes that they are sorted into cells.
 PICTURA_HD constexpr bool is_crowd(int num_boxes) { return num_boxes > 512; }
 
-/// A world's boxes as one cell, unless they are a crowd: a warp tests all of them sooner than they could be sorted.
+/// A world's boxes as one cell, unless they are a crowd: a warp tests all boxes faster than they could be sorted.
 PICTURA_HD inline GridView one_cell(Span<const int32_t> begin, Span<const int32_t> items) {
   constexpr float kWhole_m = 1e9f;
   return {{}, kWhole_m, 1, 1, begin, items};
 }
 
-/// A crowd's boxes in cells, of which there are no more than boxes.
+/// A crowd's boxes in cells, at most as many cells as boxes.
 PICTURA_HD inline GridView crowd_cells(GridView cells, const int32_t* begin, Span<const int32_t> items) {
   cells.begin = {begin, static_cast<size_t>(cells.num_x * cells.num_y) + 1};
   cells.items = items;
   return cells;
 }
 
-/// The centre of a box for one cell: a box that is not drawn is far from everything.
+/// Centre of a box in one cell: boxes that are not drawn are far from everything.
 PICTURA_HD inline Vec2 center_of(const AgentBox& box) {
   constexpr float kNowhere_m = 1e9f;
   return box.drawn ? box.center_m.xy() : Vec2{kNowhere_m, kNowhere_m};

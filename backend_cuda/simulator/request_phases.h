@@ -1,4 +1,4 @@
-// Phases of what a host asks between steps: edits of the state, queries of observations, commands of controllers.
+// Phases of the host's requests between steps: edits of the state, queries of observations, commands of controllers.
 #pragma once
 
 #include "pictura/backend_cuda/simulator/reset_phases.h"
@@ -6,7 +6,7 @@
 
 namespace pictura::cuda {
 
-/// Notes which element of an edit names a slot first.
+/// Phase that records the first element of an edit for each slot.
 struct MarkEdit {
   PhaseArrays arrays;
   StateEdit edit;
@@ -26,7 +26,7 @@ PICTURA_HD inline int64_t find_fault(const PhaseArrays& arrays, const Observatio
 }
 static_assert(kNoQueryFault == kNothingWrong);
 
-/// Finds the first element with a fault of an edit, or of queries.
+/// Phase that finds the first element with a fault in an edit or in queries.
 template <typename Request>
 struct CheckRequest {
   PhaseArrays arrays;
@@ -38,7 +38,7 @@ struct CheckRequest {
   }
 };
 
-/// Puts the agents of an edit without faults into their worlds.
+/// Phase that writes the agents of an edit without faults into their worlds.
 struct ApplyEdit {
   CheckRequest<StateEdit> check;
   template <typename Atomics>
@@ -68,7 +68,7 @@ void launch_edit(const Launch& launch, const PhaseArrays& arrays, const StateEdi
   launch_write_observations(launch, arrays);
 }
 
-/// Keeps what is wrong with the first query that has a fault until the host looks.
+/// Phase that keeps the fault of the first faulty query until the host checks.
 struct LatchQueryFault {
   CheckRequest<ObservationQueries> check;
   template <typename Atomics>
@@ -78,7 +78,7 @@ struct LatchQueryFault {
   }
 };
 
-/// answer_query(), unless there is a fault in any.
+/// Phase that runs answer_query(), unless any query has a fault.
 struct AnswerQueries {
   PhaseArrays arrays;
   ObservationQueries asked;
@@ -108,7 +108,7 @@ void launch_queries(const Launch& launch, const PhaseArrays& arrays, const Obser
   launch.template groups<kWarp>(count, AnswerQueries{arrays, asked});
 }
 
-/// Writes what a controller's rule tells a slot, where the mask has it.
+/// Phase that writes the commands of a controller's rule to the slots of the mask.
 template <typename Rule>
 struct WriteCommands {
   Rule rule;

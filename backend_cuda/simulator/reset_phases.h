@@ -1,4 +1,4 @@
-// Phases that begin episodes: the first of a seed, and each next one while the one before it goes on.
+// Phases that begin episodes: the first of a seed, and each next episode while the previous one continues.
 #pragma once
 
 #include "pictura/backend_cuda/simulator/observation_phases.h"
@@ -6,20 +6,20 @@
 
 namespace pictura::cuda {
 
-/// How many boxes of a world look for a place at once.
+/// Number of boxes of a world that choose a place at the same time.
 constexpr int kTurn = 128;
 
-/// What a team's threads share.
+/// Memory shared by a team's threads.
 struct TeamMemory {
   int32_t lowest_changed;
 };
 
-/// Finds for each of `count` boxes, which are the world's from first_box on, the first of its tries that the map
-/// permits and that is clear of the boxes before it and of those that stand already, to which they are added: what
-/// placing them one after the other would find. As many as the team has groups for choose at once, given what the
-/// others chose last, until nobody changes: then everybody's choice agrees with the choices before it, which only the
-/// sequential result does. Every round fixes at least the lowest one that changed. Choices of an earlier turn do not
-/// change.
+/// Chooses a try for each of `count` boxes, which are the world's boxes from first_box on, and adds the placed boxes to
+/// the standing ones. The chosen try is the first that the map permits and that is clear of the boxes before it and of
+/// the standing boxes: the result of placing the boxes sequentially. As many boxes as the team has groups choose at the
+/// same time, given the last choices of the others, until no choice changes. Then every choice agrees with the choices
+/// before it, which holds only for the sequential result. Every round fixes at least the lowest changed box. Choices of
+/// an earlier turn do not change.
 ///   box_of_try(i, try), permits(group, i, try, box)
 template <typename Team, typename BoxOfTry, typename Permits>
 PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const WorldScratch& scratch, int first_box,
@@ -32,7 +32,7 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
   int32_t* chosen_try = scratch.chosen_try + first_box;
   int32_t* next_try = scratch.next_try + first_box;
   int32_t& lowest_changed = team.memory().lowest_changed;
-  // The first tries of few boxes are looked at together.
+  // The first tries of few boxes are evaluated together.
   const int first_tries = clamp(kTurn / max_of(count, 1), 2, kSpawnTries);
   team.for_each(count, [&](int i) {
     boxes[i].drawn = 0;
@@ -40,14 +40,14 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
     known_tries[i] = 0;
     chosen_try[i] = -1;
   });
-  // Whether what stood before this turn, and the map, leave a try free.
+  // Whether the map and the boxes that stood before this turn leave a try free.
   const auto look_at = [&](const auto& group, int i, int t) {
     const AgentBox box = box_of_try(i, t);
     const bool is_free = is_clear(world, box, scratch.standing, group) && permits(group, i, t, box);
     if (is_free && group.rank() == 0) try_boxes[i * kSpawnTries + t] = box;
     return is_free;
   };
-  // Looks at a box's tries until one is free of what stands and of what the boxes of this turn chose.
+  // Evaluates a box's tries until one is clear of the standing boxes and of the choices of this turn.
   const auto choose = [&](const auto& group, int turn_begin, int i) {
     uint32_t free = free_tries[i];
     int known = known_tries[i], chosen = -1;
@@ -105,7 +105,7 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
   add_to_standing(max_of(turn_begin, 0), count);
 }
 
-/// Begins the episode that `world` says; counts who found a place.
+/// Begins the episode of `world` and counts the agents that found a place.
 template <typename Team>
 PICTURA_HD void begin_episode(const Team& team, const WorldView& world, const WorldScratch& scratch,
                               int32_t* spawned_out) {
@@ -136,7 +136,7 @@ PICTURA_HD void begin_episode(const Team& team, const WorldView& world, const Wo
   });
 }
 
-/// Begins episode 0 of `seed` in the worlds of the mask [worlds], or in all where it is null.
+/// Phase that begins episode 0 of `seed` in the worlds of the mask [worlds], or in all worlds where it is null.
 struct BeginFirstEpisode {
   PhaseArrays arrays;
   const uint8_t* mask;
@@ -158,7 +158,7 @@ struct BeginFirstEpisode {
   }
 };
 
-/// Says where the boxes of a world stand.
+/// Phase that writes the centres of a world's boxes.
 struct PlaceCenters {
   PhaseArrays arrays;
   template <typename ThreadGroup>
@@ -170,8 +170,8 @@ struct PlaceCenters {
   }
 };
 
-/// Sorts the boxes of crowds into their cells, by counting: of all of them, or of those whose boxes the end of a step
-/// has changed. Within a cell they come in any order, on which no rule depends.
+/// Phase that sorts the boxes of crowds into their cells, by counting: in all crowds, or in those whose boxes changed
+/// at the end of a step. The order within a cell is arbitrary, and rules do not depend on it.
 struct SortBoxes {
   PhaseArrays arrays;
   bool ends_step = false;
@@ -192,7 +192,7 @@ struct SortBoxes {
     };
     team.for_each(num_cells, [&](int cell) { begin[cell] = 0; });
     for_each_drawn([&](int, Vec2, int32_t* count) { team.add(count, 1); });
-    // From the number of each to its end.
+    // Converts the number of items of each cell to the end of its range.
     team.template for_each_by_groups<kWarp>(1, [&](const auto& group, int) {
       const int share = (num_cells + group.size() - 1) / group.size();
       const int first = min_of(group.rank() * share, num_cells), end = min_of(first + share, num_cells);
@@ -219,8 +219,8 @@ void launch_sort_boxes(const Launch& launch, const PhaseArrays& arrays, bool end
   if (arrays.has_crowds) launch.teams(arrays.num_worlds, SortBoxes{arrays, ends_step});
 }
 
-/// Makes a world's next episode, as early as its memory is free and long before it is needed: a start depends on
-/// nothing that steps change.
+/// Phase that makes a world's next episode as soon as its memory is free and long before the episode is needed, since a
+/// start does not depend on steps.
 struct PrepareEpisode {
   PhaseArrays arrays;
   template <typename Team>
@@ -230,7 +230,7 @@ struct PrepareEpisode {
   }
 };
 
-/// Episode 0 of `seed` in the worlds of the mask, or in all where it is null.
+/// Launches episode 0 of `seed` in the worlds of the mask, or in all worlds where it is null.
 template <typename Launch>
 void launch_reset(const Launch& launch, const PhaseArrays& arrays, const uint8_t* mask, uint64_t seed) {
   launch.teams(arrays.num_worlds, BeginFirstEpisode{arrays, mask, seed});
@@ -239,7 +239,7 @@ void launch_reset(const Launch& launch, const PhaseArrays& arrays, const uint8_t
   launch_write_observations(launch, arrays);
 }
 
-/// Tells the worlds which episode of which seed a state that was put there is in.
+/// Phase that sets the worlds' episode and seed from a restored state.
 struct TakeEpisode {
   PhaseArrays arrays;
   template <typename Atomics>
@@ -250,7 +250,7 @@ struct TakeEpisode {
   }
 };
 
-/// Shows a state that was put there.
+/// Launches the phases that publish a restored state.
 template <typename Launch>
 void launch_restored(const Launch& launch, const PhaseArrays& arrays) {
   const auto num_slots = static_cast<size_t>(arrays.num_slots);

@@ -6,7 +6,7 @@
 
 namespace pictura::cuda {
 
-/// Finds the lowest slot whose command is out of range. Commands are actions or Commands, here and in what follows.
+/// Phase that finds the lowest slot with a command out of range. Commands are actions or Commands, here and below.
 template <typename CommandType>
 struct CheckCommands {
   PhaseArrays arrays;
@@ -14,13 +14,13 @@ struct CheckCommands {
   template <typename Atomics>
   PICTURA_HD void operator()(const Atomics& atomics, int slot) const {
     const WorldView world = arrays.world(arrays.world_of_slot[slot]);
-    if (slot == world.first_slot) arrays.began[world.index] = 0;  // arrays.prepares says it now
+    if (slot == world.first_slot) arrays.began[world.index] = 0;  // now in arrays.prepares
     if (arrays.episode_over[world.index] || accepts(world, slot - world.first_slot, commands[slot])) return;
     atomics.lower(arrays.rejected_slot, slot);
   }
 };
 
-/// Moves an agent, or takes it into the episode that was prepared.
+/// Phase that moves an agent, or starts it in the prepared episode.
 template <typename CommandType>
 struct Advance {
   PhaseArrays arrays;
@@ -46,7 +46,7 @@ struct Advance {
   }
 };
 
-/// Collisions, reward and halt of an agent.
+/// Phase for collisions, reward and halt of an agent.
 struct ApplyRewardAndHalt {
   PhaseArrays arrays;
   template <typename ThreadGroup>
@@ -61,8 +61,8 @@ struct ApplyRewardAndHalt {
   }
 };
 
-/// Counts a world's step, moves its lights on, and says whether its episode is over; or ends the move into its next
-/// episode.
+/// Phase that counts a world's step, advances its lights, and determines whether its episode is over; or that completes
+/// the move into its next episode.
 template <typename CommandType>
 struct FinishStep {
   PhaseArrays arrays;
@@ -100,7 +100,7 @@ struct FinishStep {
     *arrays.rejected_command = rejected_command(*arrays.rejected_slot, commands[*arrays.rejected_slot]);
   }
 
-  /// What belongs to no agent.
+  /// Takes the parts of the next episode that belong to no agent.
   template <typename ThreadGroup>
   PICTURA_HD void take_next(const ThreadGroup& group, int w) const {
     const WorldView world = arrays.world(w), next = arrays.next_world(w);
@@ -114,13 +114,12 @@ struct FinishStep {
     }
   }
 
-  /// Returns whether the episode is over.
+  /// Counts a step, and returns whether the episode is over.
   template <typename ThreadGroup>
   PICTURA_HD bool count(const ThreadGroup& group, int w, SimulatorTotals* totals_out) const {
     const WorldView world = arrays.world(w);
     const int steps = arrays.episode_step[w] + 1;
-    constexpr int kParts =
-        kTotalsBins / ThreadGroup::kSize;  // of the totals' bins, that one thread of the group sums up
+    constexpr int kParts = kTotalsBins / ThreadGroup::kSize;  // number of bins that one thread of the group sums up
     SimulatorTotals parts[kParts];
     const auto for_each_agent = [&](const auto& body) {
       for (int part = 0; part < kParts; ++part) {
@@ -143,7 +142,7 @@ struct FinishStep {
     return ends;
   }
 
-  /// Counts in any order; sums in that of the totals' bins, see simulator/totals.h.
+  /// Adds counts in any order, and sums in the order of the totals' bins, see simulator/totals.h.
   template <typename ThreadGroup, int kParts>
   PICTURA_HD static void add_up(const ThreadGroup& group, SimulatorTotals (&parts)[kParts], SimulatorTotals* sum_out) {
     const auto skip = [](auto&, auto) {};
@@ -162,7 +161,7 @@ struct FinishStep {
   }
 };
 
-/// Lets waiting agents into a world of roads that end, after a step that did not end its episode.
+/// Phase that makes waiting agents enter a world with roads that end, after a step that did not end its episode.
 struct EnterWaiting {
   PhaseArrays arrays;
   template <typename ThreadGroup>
