@@ -107,8 +107,8 @@ Rig load_rig(const std::string& path) {
 
 CameraAxes camera_axes(const Camera& camera) {
   using Eigen::AngleAxisd, Eigen::Vector3d;
-  // Columns right, down and forward, in a frame with x forward, y left and z up. Turned axis by axis: by a quaternion,
-  // what is level would be level but for rounding.
+  // Columns right, down and forward, in a frame with x forward, y left and z up. Rotated axis by axis: with a
+  // quaternion, level directions would be level only up to rounding.
   Eigen::Matrix3d axes;
   axes << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   axes = AngleAxisd(camera.roll_rad, Vector3d::UnitX()).toRotationMatrix() * axes;

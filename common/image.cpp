@@ -92,7 +92,7 @@ CameraImages camera_images(const ImageLayout& layout, int camera, void* first) {
   CameraImages images;
   images.width_px = its.size.width_px;
   images.height_px = its.size.height_px;
-  if (first != nullptr) {  // of no views there may be no memory
+  if (first != nullptr) {  // without views there may be no memory
     images.data = static_cast<std::byte*>(first) + its.offset * static_cast<int64_t>(bytes_per_value(layout.format));
   }
   images.view_stride = its.view_stride;
@@ -150,7 +150,8 @@ std::vector<uint8_t> HostImages::interleaved(int view, int camera_index) const {
 
 namespace {
 
-// What libpng's callbacks reach. They are C: they report by longjmp, and nothing may be thrown through them.
+// State that libpng's callbacks can reach. They are C functions: they report errors by longjmp, and exceptions must not
+// pass through them.
 struct PngOutput {
   std::string bytes, complaint;
 };
@@ -178,7 +179,7 @@ void keep_png_complaint(png_structp png, png_const_charp message) {
 
 void ignore_png_warning(png_structp, png_const_charp) {}
 
-// A PNG that is compressed row by row.
+// Encoder of a PNG, row by row.
 class PngEncoder {
  public:
   PngEncoder()
@@ -207,7 +208,7 @@ class PngEncoder {
     png_write_end(png_, info_);
     return true;
   }
-  /// What was encoded since the last call.
+  /// Returns the bytes that were encoded since the last call.
   std::string take() { return std::exchange(output_.bytes, {}); }
   const std::string& complaint() const { return output_.complaint; }
 

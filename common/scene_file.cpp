@@ -43,11 +43,11 @@ AgentBox read_agent(TomlFields* row) {
   return box;
 }
 
-// The pieces of a line that are painted, as polylines: dashes of dash_m with gap_m between them, from the line's start.
+// Returns the painted pieces of a line as polylines: dashes of dash_m with gap_m between them, from the line's start.
 std::vector<std::vector<Vec3>> dashes_of(const std::vector<Vec3>& points_m, float dash_m, float gap_m) {
   std::vector<std::vector<Vec3>> dashes;
   bool painted = true;
-  float left_m = dash_m;  // of the present dash or gap
+  float left_m = dash_m;  // of the current dash or gap
   std::vector<Vec3> dash{points_m[0]};
   auto close = [&] {
     if (painted && dash.size() >= 2) dashes.push_back(dash);
@@ -71,7 +71,7 @@ std::vector<std::vector<Vec3>> dashes_of(const std::vector<Vec3>& points_m, floa
   return dashes;
 }
 
-// A line parallel to the one that the strips form, mitred as they are.
+// Returns a line parallel to the line of the strips, mitred like them.
 std::vector<Strip> moved_aside(std::vector<Strip> strips, float left_m) {
   auto move = [&](Vec3* point, Vec2 side) { *point = *point + Vec3{left_m * side.x, left_m * side.y, 0}; };
   for (Strip& strip : strips) {

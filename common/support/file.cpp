@@ -28,7 +28,7 @@ bool is_same_version(const struct stat& a, const struct stat& b) {
 
 constexpr std::size_t kChunk_bytes = std::size_t{1} << 16;
 
-/// A file open for reading. Opening a FIFO does not wait for its writer: reading does, and can be interrupted.
+/// A file open for reading. Opening a FIFO does not wait for its writer; reading does, and can be interrupted.
 class InputFile {
  public:
   explicit InputFile(const std::string& path)
@@ -40,19 +40,19 @@ class InputFile {
     PICTURA_CHECK(!S_ISDIR(opened_.st_mode), "{}: expected a file, got a folder", path_);
   }
 
-  /// Whether its size is known beforehand: pipes and the like have none.
+  /// Whether the size of the file is known in advance; pipes and similar files have none.
   bool is_regular() const { return S_ISREG(opened_.st_mode); }
   std::size_t size_bytes() const { return static_cast<std::size_t>(opened_.st_size); }
 
   /// Throws Error unless the bytes read are the whole file, unchanged since it was opened.
   void check_unchanged(std::size_t bytes_read) const {
     if (!is_regular()) return;
-    // Files of the kernel's own have no size, and bytes all the same.
+    // The kernel's own files report size 0 but contain bytes.
     const bool is_whole = opened_.st_size == 0 || bytes_read == size_bytes();
     PICTURA_CHECK(is_whole && is_same_version(opened_, status()), "{}: changed while it was read", path_);
   }
 
-  /// Appends the next bytes, at most `count`; returns how many there were, 0 at the end.
+  /// Appends the next bytes, at most `count`; returns their number, 0 at the end.
   std::size_t append_to(std::string* bytes, std::size_t count) const {
     const std::size_t before = bytes->size();
     bytes->resize(before + count);
@@ -74,7 +74,7 @@ class InputFile {
     return result;
   }
 
-  // Until there are bytes or nobody is left to write them; at once for regular files.
+  // Waits until there are bytes or no writer is left; returns at once for regular files.
   void wait_for_bytes() const {
     constexpr int kPoll_ms = 100;
     pollfd slot{.fd = file_.get(), .events = POLLIN, .revents = 0};
@@ -168,7 +168,7 @@ void make_output_folder(const std::string& path) {
                 making   ? making.message()
                 : asking ? asking.message()
                          : "it is a file");
-  // Ask by trying: permission bits say nothing of read-only mounts, and a superuser passes access().
+  // Tests by writing: permission bits do not show read-only mounts, and a superuser passes access().
   try {
     const OutputFile probe((fs::path(path) / ".probe").string());
   } catch (const Error& error) {

@@ -17,10 +17,10 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// After each name in a list: no name of a file has it.
+// Terminator of each name in a list; file names cannot contain it.
 constexpr char kEnd = '\0';
 
-// Names in lists of a folder that came from elsewhere may lead out of it.
+// Whether a name is a plain file name. Names in lists of a folder from elsewhere may lead out of the folder.
 bool is_plain(const std::string& name) { return !name.empty() && fs::path(name).filename() == name; }
 
 }  // namespace
@@ -42,7 +42,7 @@ std::string FilledFolder::file(const std::string& name) {
   PICTURA_CHECK(!fs::is_symlink(path, ignored), "{}: expected a file or nothing, got a link", path);
   written_.insert(name);
   if (!listed_.insert(name).second) return path;
-  // Before there is the file, so that the next call knows it wherever this one ends.
+  // Listed before the file exists, so that the next call knows the file wherever this call ends.
   const std::string line = name + kEnd;
   const bool is_listed = ::write(list_file_.get(), line.data(), line.size()) == static_cast<ssize_t>(line.size());
   PICTURA_CHECK(is_listed, "{}: cannot be written: {}", list_, std::strerror(errno));

@@ -13,7 +13,7 @@ namespace pictura {
 
 namespace {
 
-// What the holder wrote; empty for a moment after it took the lock.
+// Returns the text that the holder wrote; the file is empty for a moment after the lock is taken.
 std::string holder_of(int fd) {
   char text[32] = {};
   const ssize_t size = ::pread(fd, text, sizeof text - 1, 0);
@@ -23,7 +23,7 @@ std::string holder_of(int fd) {
 }  // namespace
 
 FolderLock::FolderLock(const std::string& folder)
-    // A link, in a folder that came from elsewhere, would have this write into a file anywhere.
+    // No links: in a folder from elsewhere, a link would redirect this write to any file.
     : fd_(::open((folder + "/lock").c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0666)) {
   PICTURA_CHECK(fd_ >= 0 || errno != ELOOP, "{}/lock: expected a file, got a link", folder);
   PICTURA_CHECK(fd_ >= 0, "{}/lock: cannot be opened: {}", folder, std::strerror(errno));

@@ -10,7 +10,7 @@
 namespace pictura {
 
 namespace {
-// The process-wide variables of the library: a signal handler can reach nothing else.
+// Process-wide variables of the library, because a signal handler cannot reach other state.
 volatile std::sig_atomic_t first_signal = 0;
 volatile std::time_t first_came_ms = 0;
 
@@ -26,8 +26,8 @@ extern "C" void on_interrupt(int signal) {
     first_signal = signal;
     return;
   }
-  // One request may come twice: timeout(1) signals its child and then the child's group, and a terminal that hangs up
-  // is told of by the shell and by the kernel.
+  // One request may arrive twice: timeout(1) signals its child and then the child's group, and both the shell and the
+  // kernel report a terminal that hangs up.
   constexpr std::time_t kSameRequest_ms = 100;
   if (signal != SIGHUP && now_ms() - first_came_ms > kSameRequest_ms) _exit(128 + signal);
 }
@@ -41,7 +41,7 @@ void catch_interrupts() {
 
 void take_interrupt(int signal) {
   if (first_signal) return;
-  first_came_ms = now_ms();  // this process may be told as well a moment later: the same request
+  first_came_ms = now_ms();  // the same request may also reach this process a moment later
   first_signal = signal;
 }
 

@@ -26,7 +26,7 @@ bool take(std::string_view* text, std::string_view any_of) {
   return true;
 }
 
-// A decimal number as it is written: digits * 10^exponent.
+// A parsed decimal number: digits * 10^exponent.
 struct Decimal {
   bool negative = false;
   std::string digits;  // without leading zeros; empty for 0
@@ -44,7 +44,7 @@ std::optional<Decimal> parse_decimal(std::string_view text) {
     const bool is_negative = text.starts_with('-');
     take(&text, "+-");
     const std::string_view exponent = take_digits(&text);
-    constexpr std::size_t kMaxDigits = 6;  // what has more fits into no number
+    constexpr std::size_t kMaxDigits = 6;  // larger exponents fit no number
     if (exponent.empty() || exponent.size() > kMaxDigits) return std::nullopt;
     std::from_chars(exponent.data(), exponent.data() + exponent.size(), result.exponent);
     if (is_negative) result.exponent = -result.exponent;
@@ -56,7 +56,7 @@ std::optional<Decimal> parse_decimal(std::string_view text) {
   return result;
 }
 
-// The magnitude of a whole number.
+// Returns the magnitude of an integer.
 std::optional<uint64_t> magnitude_of(Decimal decimal) {
   if (decimal.digits.empty()) return 0;
   for (; decimal.exponent < 0; ++decimal.exponent) {
@@ -81,7 +81,7 @@ std::optional<double> parse_number(std::string_view text) {
   take(&text, "+");
   double value = 0;
   const auto parsed = std::from_chars(text.data(), text.data() + text.size(), value);
-  // What lies between 0 and the smallest double is out of range for from_chars.
+  // Values between 0 and the smallest double are out of range for from_chars.
   if (parsed.ec != std::errc() || !std::isfinite(value)) return std::nullopt;
   return value;
 }

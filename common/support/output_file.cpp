@@ -36,13 +36,13 @@ std::string folder_of(const std::string& path) {
   return folder.empty() ? "." : folder;
 }
 
-// Whether links of the folder are of the kernel's making: they name an open file, which need not have that name.
+// Whether the links of the folder are made by the kernel: they refer to an open file, which need not have that name.
 bool is_in_proc(const std::string& folder) {
   struct statfs status{};
   return ::statfs(folder.c_str(), &status) == 0 && status.f_type == PROC_SUPER_MAGIC;
 }
 
-// The name that a chain of links ends with, whether or not there is a file, or the first that lies in /proc.
+// Returns the path at the end of a chain of links, existing or not, or the first path within /proc.
 std::string without_links(const std::string& path) {
   constexpr int kMaxLinks = 40;
   fs::path target(path);
@@ -56,7 +56,7 @@ std::string without_links(const std::string& path) {
   return target.string();
 }
 
-// The descriptor of this process that a name without links stands for: 3 for /proc/self/fd/3.
+// Returns the descriptor of this process that a path without links refers to: 3 for /proc/self/fd/3.
 std::optional<int> descriptor_named(const std::string& target) {
   const std::optional<uint64_t> number = parse_unsigned(fs::path(target).filename().string());
   std::error_code error;
@@ -67,7 +67,7 @@ std::optional<int> descriptor_named(const std::string& target) {
 constexpr std::string_view kHiddenBeginning = ".pictura-", kHiddenEnding = ".tmp";
 constexpr size_t kHiddenDigits = 16;
 
-// A name for a hidden file of the folder, which must be taken as one that is new (O_EXCL, linkat).
+// Returns a name for a hidden file of the folder. The file must be created as a new one (O_EXCL, linkat).
 std::string new_hidden_name(const std::string& folder) {
   std::random_device random;
   return fmt::format("{}/{}{:08x}{:08x}{}", folder, kHiddenBeginning, random(), random(), kHiddenEnding);
@@ -99,8 +99,8 @@ void write_all(int fd, std::string_view bytes, const std::string& path) {
   }
 }
 
-// Opens what is written through. A descriptor of this process goes on where it is. A FIFO has no writers before it has
-// a reader, which a person may start later.
+// Opens a target that is written through. A descriptor of this process keeps its position. A FIFO accepts writers only
+// after a reader has opened it, which a person may do later.
 int open_through(const std::string& target, const std::string& path) {
   if (const std::optional<int> own = descriptor_named(target)) {
     const int fd = ::fcntl(*own, F_DUPFD_CLOEXEC, 0);
@@ -132,7 +132,7 @@ void Descriptor::reset(int fd) {
 
 OutputFile::OutputFile(const std::string& path, Staging staging) : path_(path) {
   PICTURA_CHECK(!path.empty(), "expected the name of a file to write, got an empty one");
-  // The system's calls would end the name there.
+  // System calls would end the name at the zero byte.
   PICTURA_CHECK(path.find('\0') == std::string::npos, "{}: expected the name of a file, got one with a zero byte in it",
                 path.substr(0, path.find('\0')));
   struct stat status{};
@@ -141,7 +141,7 @@ OutputFile::OutputFile(const std::string& path, Staging staging) : path_(path) {
   target_ = without_links(path);
   is_through_ = exists && (!S_ISREG(status.st_mode) || is_in_proc(folder_of(target_)));
   if (exists && !is_through_) {
-    // A superuser passes faccessat().
+    // A superuser passes faccessat(), so mode bits are checked too.
     const bool is_read_only = (status.st_mode & (S_IWUSR | S_IWGRP | S_IWOTH)) == 0 ||
                               ::faccessat(AT_FDCWD, target_.c_str(), W_OK, AT_EACCESS) != 0;
     PICTURA_CHECK(!is_read_only, "{}: cannot be written: it is read-only", path);
@@ -156,7 +156,7 @@ OutputFile::~OutputFile() {
   if (!temporary_.empty()) ::unlink(temporary_.c_str());
 }
 
-// What a device will take waits with the temporary files, for want of a folder of its own.
+// Bytes for a device are staged with the temporary files, because a device has no folder of its own.
 std::string OutputFile::staging_folder() const {
   if (!is_through_) return folder_of(target_);
   std::error_code error;
@@ -168,7 +168,7 @@ std::string OutputFile::staging_folder() const {
 
 void OutputFile::stage_unnamed() {
 #ifdef O_TMPFILE
-  constexpr const char* kNames = "/proc/self/fd";  // by which replace() finds it again
+  constexpr const char* kNames = "/proc/self/fd";  // path by which replace() finds the file again
   if (::access(kNames, X_OK) != 0) return;
   staged_.reset(::open(staging_folder().c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0666));
   if (staged_.get() >= 0) ::flock(staged_.get(), LOCK_EX | LOCK_NB);
@@ -181,7 +181,7 @@ void OutputFile::stage_named() {
     const Descriptor file(::open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
     if (file.get() < 0 && errno == EEXIST) continue;
     if (file.get() < 0) fail_to_write(path_);
-    // Another writer may have taken it for an abandoned one before it was locked.
+    // Another writer may have removed the file as abandoned before it was locked.
     ::flock(file.get(), LOCK_EX | LOCK_NB);
     struct stat status{};
     if (::fstat(file.get(), &status) != 0 || status.st_nlink == 0) continue;
@@ -209,20 +209,20 @@ void OutputFile::pour() {
 
 void OutputFile::replace() {
   if (replaced_) {
-    // Owners can be passed on by a superuser alone, and groups by their members.
+    // Only a superuser can pass on owners, and only members can pass on groups.
     [[maybe_unused]] const int ignored = ::fchown(staged_.get(), replaced_->st_uid, replaced_->st_gid);
     constexpr mode_t kPermissions = S_IRWXU | S_IRWXG | S_IRWXO;
     struct stat staged{};
     if (::fstat(staged_.get(), &staged) != 0) fail_to_write(path_);
-    // File systems without modes, on which all are the same, refuse the call.
+    // File systems without modes, where all modes are equal, refuse the call.
     const bool differs = ((staged.st_mode ^ replaced_->st_mode) & kPermissions) != 0;
     if (differs && ::fchmod(staged_.get(), replaced_->st_mode & kPermissions) != 0) fail_to_write(path_);
   }
-  // On disk before the rename, so that a crash never leaves an empty file under the final name.
+  // Synced before the rename, so that a crash never leaves an empty file under the final name.
   if (::fsync(staged_.get()) != 0) fail_to_write(path_);
   if (temporary_.empty()) {
-    // A link takes no name that there is already, a rename takes no file without a name: so from none to a hidden one
-    // to the final one.
+    // A link cannot replace an existing name, and a rename cannot move a file without a name. So the file first gets a
+    // hidden name and then the final name.
     const std::string unnamed = fmt::format("/proc/self/fd/{}", staged_.get());
     while (temporary_.empty()) {
       const std::string name = new_hidden_name(folder_of(target_));

@@ -14,8 +14,9 @@ namespace pictura {
 
 namespace {
 
-// How long a thread looks for its next loop, or for the end of the others, before it sleeps: longer than the gaps
-// between the loops of a step, and far below a scheduler's time slice, which a thread that spins takes from others.
+// Time for which a thread polls for its next loop, or for the end of the others, before it sleeps. It is longer than
+// the gaps between the loops of a step, and far below a scheduler's time slice, which a spinning thread takes from
+// others.
 constexpr std::chrono::microseconds kSpinTime{50};
 
 void pause_briefly() {
@@ -38,7 +39,7 @@ void wait_while_equal(const std::atomic<std::uint32_t>& word, std::uint32_t valu
   word.wait(value, std::memory_order_acquire);
 }
 
-/// The threads that one thread has for its loops.
+/// Worker threads of one thread, for its loops.
 class Team {
  public:
   Team() = default;
@@ -63,15 +64,15 @@ class Team {
       for (std::size_t i = 0; i < helpers; ++i) num_loops_.notify_one();
     }
     call(body, 0);
-    // No more may begin.
+    // No further threads may begin.
     std::uint32_t state = state_.fetch_and(kPlace - 1, std::memory_order_acq_rel) & (kPlace - 1);
     for (; state != 0; state = state_.load(std::memory_order_acquire)) wait_while_equal(state_, state);
   }
 
  private:
-  static constexpr std::uint32_t kPlace = 1 << 16;  // above numbers of threads at work
+  static constexpr std::uint32_t kPlace = 1 << 16;  // above the number of working threads
 
-  // Returns how many of `wanted` there are, because a system may have no more.
+  // Returns how many of `wanted` threads exist, because a system may have no more.
   std::size_t add_threads(std::size_t wanted) {
     try {
       while (threads_.size() < wanted) threads_.emplace_back([this] { work(); });
@@ -82,7 +83,7 @@ class Team {
 
   void work();
 
-  // Takes a place in the loop that is open, if one is, and returns its number, else 0.
+  // Takes a place in the open loop, if any, and returns its number, else 0.
   int join_loop() {
     std::uint32_t state = state_.load(std::memory_order_acquire);
     while (state >= kPlace) {
@@ -96,8 +97,8 @@ class Team {
   std::vector<std::thread> threads_;
   std::atomic<bool> is_ending_ = false;
   std::atomic<std::uint32_t> num_loops_ = 0;  // so far; threads without work sleep on it
-  std::atomic<std::uint32_t> state_ = 0;      // kPlace for every free place in the loop, 1 for every thread at work
-  // The call of the present loop and its argument, which are set while no thread is at work.
+  std::atomic<std::uint32_t> state_ = 0;      // kPlace per free place in the loop, 1 per working thread
+  // Call of the current loop and its argument, which are set while no thread is working.
   void (*call_)(void*, int) = nullptr;
   void* body_ = nullptr;
 };
@@ -120,7 +121,7 @@ void Team::work() {
 }
 
 Team& team_of_this_thread() {
-  // The threads do not exist in a forked process, which leaves them and starts its own.
+  // A forked process has no worker threads: it abandons the team and starts its own.
   static const int at_fork = pthread_atfork(nullptr, nullptr, [] { static_cast<void>(own_team.release()); });
   static_cast<void>(at_fork);
   if (!own_team) own_team = std::make_unique<Team>();

@@ -23,7 +23,7 @@ std::optional<int64_t> whole_number(const toml::node& node) {
   if (node.is_integer()) return node.as_integer()->get();
   if (!node.is_floating_point()) return std::nullopt;
   const double number = node.as_floating_point()->get();
-  constexpr double kExact = 9007199254740992;  // beyond, a double stands for several
+  constexpr double kExact = 9007199254740992;  // above, a double represents several integers
   if (!(std::abs(number) <= kExact) || number != std::floor(number)) return std::nullopt;
   return static_cast<int64_t>(number);
 }
@@ -31,7 +31,7 @@ std::optional<int64_t> whole_number(const toml::node& node) {
 std::string shown(const toml::node& node) {
   std::ostringstream value;
   node.visit([&](const auto& its) { value << its; });
-  // Tables have many lines, and texts with line breaks are written in three quotes.
+  // Tables have many lines, and texts with line breaks are printed in triple quotes.
   std::string text = node.is_table() ? "a table" : value.str();
   if (node.is_string()) text = fmt::format("'{}'", *node.value<std::string>());
   constexpr std::size_t kMostShown = 60;
