@@ -12,21 +12,21 @@ namespace pictura {
 namespace {
 
 constexpr float kEyeHeight_m = 1.5f;  // above the road, like the cameras
-// The box of the crossing vehicle: a CARLA car.
+// Box of the crossing vehicle: a CARLA car.
 constexpr float kCarLength_m = 4.5f, kCarWidth_m = 2.0f, kCarHeight_m = 1.5f;
 
-/// A path through a junction, with the lanes that lead to it.
+/// A path through a junction, including the lanes that lead to it.
 struct Path {
-  int32_t approach = -1;     // the lane before the junction
+  int32_t approach = -1;     // lane before the junction
   int32_t road = -1;         // of the approach lane
-  std::vector<Vec3> points;  // starting far enough before the junction, if the lanes do
+  std::vector<Vec3> points;  // from far enough before the junction, if the lanes extend that far
   std::vector<float> s_m;    // [points] arc length, 0 at the start of the junction
-  size_t first_inside = 0;   // the point at arc length 0
+  size_t first_inside = 0;   // index of the point at arc length 0
 };
 
 bool is_driven(const Lane& lane) { return is_drivable(lane.type) && lane.type != LaneType::parking; }
 
-/// The first predecessor of `lane`, or -1.
+/// Returns the first predecessor of `lane`, or -1.
 int32_t predecessor_of(const RoadMap& map, const Lane& lane) {
   const Span<const int32_t> before = map.links(lane.predecessors);
   return before.empty() ? -1 : before[0];
@@ -40,7 +40,7 @@ void prepend(const RoadMap& map, const Lane& lane, std::vector<Vec3>* points_ino
   points_inout->insert(points_inout->begin(), points.begin(), points.end());
 }
 
-/// The path that begins with this junction lane, if its predecessor is outside the junction.
+/// Returns the path that begins with this junction lane, if its predecessor is outside the junction.
 std::optional<Path> path_through(const RoadMap& map, const Lane& first, float lead_m) {
   const int32_t approach = predecessor_of(map, first);
   if (approach < 0 || map.lanes[approach].junction == first.junction) return std::nullopt;
@@ -48,7 +48,7 @@ std::optional<Path> path_through(const RoadMap& map, const Lane& first, float le
   path.approach = approach;
   path.road = map.lanes[approach].source_road;
   for (const LanePoint& point : map.points_of(first)) path.points.push_back(point.position_m);
-  // Later sections of the connecting road.
+  // Adds later sections of the connecting road.
   constexpr int kMaxLanes = 16;
   const Lane* lane = &first;
   for (int i = 0; i < kMaxLanes; ++i) {
@@ -93,7 +93,7 @@ struct PathPose {
   Vec2 forward;
 };
 
-/// Nothing if the path begins after s_m.
+/// Returns the pose at s_m; nothing if the path begins after s_m.
 std::optional<PathPose> pose_at(const Path& path, float s_m) {
   if (s_m < path.s_m.front()) return std::nullopt;
   const auto after = std::upper_bound(path.s_m.begin() + 1, path.s_m.end() - 1, s_m);
@@ -113,7 +113,7 @@ AgentBox car_at(const PathPose& pose) {
           .height_m = kCarHeight_m};
 }
 
-/// Calls f(own path, other path, whether the other's car is hidden) for ordered pairs of crossing paths.
+/// Calls f(own path, other path, whether the other car is hidden) for ordered pairs of crossing paths.
 template <typename F>
 void visit_crossings(const RoadMap& map, Span<const WallFace> walls, float distance_m, const F& f) {
   std::vector<std::vector<Path>> of_junction(map.junctions.size());

@@ -17,7 +17,7 @@ LaneGroups group_lanes(const RoadMap& map) {
 
 void find_endless_lanes(RoadMap* map_inout) {
   RoadMap& map = *map_inout;
-  // A group without successor groups is a dead end; dead ends are removed repeatedly, since this may leave their
+  // A group without successor groups is a dead end. Dead ends are removed repeatedly, since each removal may leave
   // predecessors without successors.
   const LaneGroups groups = group_lanes(map);
   const std::vector<std::size_t>& group = groups.of_lane;

@@ -14,7 +14,7 @@ namespace pictura {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-// Positions this close along a lane are equal but for rounding.
+// Positions this close along a lane are equal up to rounding.
 constexpr double kSamePosition_m = 1e-3;
 
 std::size_t at(int32_t index) { return static_cast<std::size_t>(index); }
@@ -52,7 +52,7 @@ double LaneGraph::distance_to_end_m(int32_t node, double begin_fraction) const {
   return (node < num_lanes() ? 1 : 1 - begin_fraction) * length_m_[at(lane_of(node))];
 }
 
-// Dijkstra (A note on two problems in connexion with graphs, 1959).
+// Dijkstra's algorithm (A note on two problems in connexion with graphs, 1959).
 LaneGraph::Search LaneGraph::search(LanePosition from) const {
   check(from);
   Search result;
@@ -164,7 +164,7 @@ LaneComponents LaneGraph::components() const {
         lowest_before = std::min(lowest_before, lowest[at(lane)]);
       }
       if (lowest[at(lane)] != order[at(lane)]) continue;
-      // The root of its component: all lanes visited since that have no component belong to it.
+      // The root of its component: the component consists of all lanes that were visited since and have no component.
       int32_t member = kUnvisited;
       do {
         member = unassigned.back();

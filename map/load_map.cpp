@@ -22,14 +22,14 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kExtension = ".xodr";
-// Bytes for each crossing of a procedural town with streets of default length, in a file as large as CARLA's.
+// File size per crossing of a procedural town with streets of default length, compared with CARLA's files.
 constexpr double kFileBytesPerCrossing = 80e3;
-constexpr double kCrossingsPerMotorway = 12;  // that weigh as much as it does; one more for each block along it
+constexpr double kCrossingsPerMotorway = 12;  // a motorway's weight in crossings, plus one for each block along it
 constexpr std::size_t kMaxFile_bytes = std::size_t{1} << 29;
 
 std::vector<fs::path> town_folders() { return {fs::path(map_folder()), fs::path(map_folder()) / "carla"}; }
 
-/// The file of a name that is not procedural. Throws UsageError when there is none.
+/// Returns the file of a name that is not procedural. Throws UsageError if there is none.
 std::string file_path_of(const std::string& name) {
   std::error_code error;
   if (is_map_file(name)) return name;
@@ -66,7 +66,7 @@ RoadMap load_file(const std::string& path, const OpenDriveOptions& options, cons
   try {
     if (const std::optional<std::string> cached = read_cached(cache_path)) {
       RoadMap map = decode_map(*cached, key, cache_path);
-      map.name = fs::path(path).stem().string();  // another link may have named the file that was cached
+      map.name = fs::path(path).stem().string();  // the cached file may come from another link's name
       report->cached = true;
       return map;
     }
@@ -155,7 +155,7 @@ int64_t map_file_bytes(const std::string& name) {
   }
   std::error_code error;
   const std::uintmax_t bytes = fs::file_size(file_path_of(original), error);
-  return error ? 0 : static_cast<int64_t>(bytes);  // a file that cannot be read is refused when it is loaded
+  return error ? 0 : static_cast<int64_t>(bytes);  // an unreadable file is refused when it is loaded
 }
 
 MapText map_text(const std::string& name) {

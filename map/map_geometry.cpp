@@ -17,7 +17,7 @@ constexpr float kRoadEdgeWidth_m = 0.15f;
 constexpr float kCrosswalkWidth_m = 0.3f;  // of the outline of a crosswalk
 constexpr float kStopLineWidth_m = 0.4f;
 constexpr float kSameStopLine_m = 8.0f;
-// Buildings of 1 to 4 pieces (about 8 m each), mostly separated by gaps of 1 or 2.
+// Buildings have 1 to 4 pieces (about 8 m each) and are mostly separated by gaps of 1 or 2 pieces.
 constexpr int kMaxBuildingPieces = 4, kMaxGapPieces = 2;
 constexpr float kTerracedFraction = 0.3f;
 constexpr float kMinWall_m = 3.0f, kMaxWall_m = 12.0f;
@@ -36,7 +36,7 @@ Rgb mark_color(MarkColor color) {
   return kWhiteMarkColor;
 }
 
-/// Whether a light has this stop line: painted ones may lie some metres inside the junction.
+/// Whether a light has this stop line: painted lines may lie some metres inside the junction.
 bool has_light(const RoadMap& map, const PaintedStopLine& line) {
   const Vec3 middle = (line.a_m + line.b_m) * 0.5f;
   return std::any_of(map.lights.begin(), map.lights.end(), [&](const TrafficLight& light) {
@@ -61,7 +61,7 @@ void append_road_edges(const std::vector<RoadEdge>& edges, std::vector<Strip>* s
   flush();
 }
 
-/// Height of the road of the light's lanes where they pass `at_m`, or of its stop line if they are nowhere nearer.
+/// Height of the road of the light's lanes where they pass `at_m`, or of its stop line if no lane is nearer.
 float road_height_m(const RoadMap& map, const TrafficLight& light, Vec2 at_m) {
   Vec3 nearest = (light.stop_a_m + light.stop_b_m) * 0.5f;
   const auto apart_m = [at_m](Vec3 p) { return length(p.xy() - at_m); };
@@ -164,7 +164,7 @@ std::vector<WallFace> make_walls(const RoadMap& map, const MapGeometryOptions& o
   float height_m = 0;
   for (const BuildingLine& line : map.building_lines) {
     if (remaining_pieces == 0) {
-      // The next building or gap, and its length in pieces of building line.
+      // Next building or gap, and its length in pieces of building line.
       RandomStream random({.seed = options.wall_seed, .episode = num_draws++, .purpose = Purpose::walls});
       is_building = !is_building || random.uniform() < kTerracedFraction;
       remaining_pieces = 1 + random.below(is_building ? kMaxBuildingPieces : kMaxGapPieces);

@@ -40,7 +40,7 @@ void divide(std::array<double, N>* shares, double total) {
   for (double& share : *shares) share = total > 0 ? share / total : 0;
 }
 
-/// Driving lanes beside a lane in its direction, itself among them.
+/// Number of driving lanes beside a lane in its direction, including the lane.
 int lanes_abreast(const RoadMap& map, const Lane& lane) {
   int count = 1;
   for (int32_t Lane::* side : {&Lane::left_neighbor, &Lane::right_neighbor}) {

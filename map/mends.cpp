@@ -12,7 +12,7 @@ struct Text {
   const char *fault, *action;
 };
 
-/// An empty text for numbers that are no kind.
+/// Returns the texts of a kind; empty for invalid kinds.
 Text text_of(MendKind kind) {
   switch (kind) {
     case MendKind::record_order: return {"records out of order", "sorted by their stations"};

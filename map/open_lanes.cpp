@@ -21,7 +21,7 @@ LaneMouth mouth_of(const RoadMap& map, int32_t lane, bool at_start) {
   return {lane, end.position_m, {std::cos(end.heading_rad), std::sin(end.heading_rad)}, 0.5f * end.width_m};
 }
 
-/// The starts of all driving and ramp lanes, by their x.
+/// Starts of all driving and ramp lanes, sorted by x.
 class LaneStarts {
  public:
   explicit LaneStarts(const RoadMap& map) {
@@ -53,8 +53,8 @@ class LaneStarts {
   std::vector<Start> starts_;
 };
 
-/// Lanes between which agents change lanes, and which begin and end together, as one node of a graph without cycles:
-/// groups from which routes go on for ever are left out.
+/// Ways of groups of lanes. Lanes that agents can change between, and that begin and end together, form one node of an
+/// acyclic graph. Groups on which endless routes start are excluded.
 class GroupWays {
  public:
   GroupWays(const RoadMap& map, const LaneGroups& groups) : way_after_m_(map.lanes.size(), INFINITY) {
@@ -93,12 +93,11 @@ class GroupWays {
   float after_m(std::size_t group) const { return way_after_m_[group]; }
 
  private:
-  std::vector<float> way_after_m_;  // [lanes] of the groups that they name
+  std::vector<float> way_after_m_;  // [lanes] of the groups, by their leftmost lane
 };
 
-/// The parts of an edge beside a mouth, of which each at least kMinEdge_m long is appended. The edge across a mouth
-/// goes through its middle, but not always at right angles to the lane: where lanes get wider, their middle lines are
-/// askew.
+/// Appends the parts of an edge beside a mouth that are at least kMinEdge_m long. The edge across a mouth goes through
+/// its middle, but not always at right angles to the lane: where lanes widen, their centre lines are oblique.
 void append_parts_beside(const RoadEdge& edge, const LaneMouth& mouth, std::vector<RoadEdge>* parts_out) {
   constexpr float kOff_m = 0.1f, kBeyond_m = 0.05f, kMinEdge_m = 0.01f, kMaxAlong = 0.7f;
   const Vec2 a = edge.a_m.xy() - mouth.middle_m.xy(), edge_m = (edge.b_m - edge.a_m).xy();
@@ -106,7 +105,7 @@ void append_parts_beside(const RoadEdge& edge, const LaneMouth& mouth, std::vect
   const Vec2 way = edge_m * (1 / length_m);
   const bool is_across = std::fabs(dot(way, mouth.direction)) < kMaxAlong && std::fabs(cross(way, a)) < kOff_m;
   const bool is_level = std::fabs(edge.a_m.z - mouth.middle_m.z) < kSameRoadLevel_m;
-  // Along the edge: the mouth is between begin_m and end_m.
+  // Positions along the edge: the mouth is between begin_m and end_m.
   const float reach_m = mouth.half_width_m + kBeyond_m, begin_m = -dot(a, way) - reach_m, end_m = begin_m + 2 * reach_m;
   if (!is_across || !is_level || end_m < 0 || begin_m > length_m) {
     parts_out->push_back(edge);

@@ -14,11 +14,11 @@ namespace pictura {
 
 namespace {
 
-// Points closer than this coincide: ends that meet, and duplicate paint. Of the line ends in CARLA's towns that have a
+// Maximum distance of coincident points: ends that meet, and duplicate paint. Of the line ends in CARLA's towns with a
 // continuation within 1 cm, 99 % have it within 1 mm.
 constexpr float kCoincident_m = 1e-3f;
-// A duplicate may deviate sideways and beyond the ends by kCoincident_m each, and joining may move points by as much;
-// thinning gets the rest of the tolerance.
+// Tolerance of thinning. A duplicate may deviate sideways and beyond the ends by kCoincident_m each, and joining may
+// move points by the same amount; thinning gets the rest of kPaintTolerance_m.
 constexpr float kThinningTolerance_m = kPaintTolerance_m - 3 * kCoincident_m;
 constexpr float kMaxBend = 0.25f;                // sine of the angle between lines that continue each other
 constexpr float kMaxChord_m = 10 * kMaxPiece_m;  // bounds the time of thinning; chords are drawn in equal pieces
@@ -48,7 +48,7 @@ std::vector<PaintedLine> lines_of_markings(const RoadMap& map) {
   return lines;
 }
 
-/// Line segments in a grid, to test whether they cover a given segment.
+/// Line segments in a grid, for tests whether they cover a given segment.
 class PieceIndex {
  public:
   struct Piece {
@@ -69,8 +69,8 @@ class PieceIndex {
 
   const std::vector<Piece>& pieces() const { return pieces_; }
 
-  /// Whether lines cover the straight segment from a to b along all its length, each within tolerance_m(line); lines
-  /// with negative tolerance are ignored. max_m is the largest tolerance; gaps up to max_m are ignored.
+  /// Whether lines cover the whole straight segment from a to b, each within tolerance_m(line); lines with negative
+  /// tolerance are ignored. max_m is the largest tolerance; gaps up to max_m are ignored.
   template <typename Tolerance>
   bool is_covered(Vec3 a_m, Vec3 b_m, float max_m, const Tolerance& tolerance_m) const {
     const float length_m = length(b_m - a_m);
@@ -101,8 +101,8 @@ class PieceIndex {
     float begin_m = 0, end_m = 0;
   };
 
-  /// The part of a segment alongside a piece, if that part of the piece is within tolerance at both its ends; else
-  /// empty.
+  /// Returns the part of a segment alongside a piece, if that part of the piece is within tolerance at both its ends;
+  /// else empty.
   static Interval covered_interval(const Segment& segment, const Piece& piece, float tolerance_m) {
     const float a_m = dot(piece.a_m - segment.begin_m, segment.along),
                 b_m = dot(piece.b_m - segment.begin_m, segment.along);
@@ -167,7 +167,8 @@ class LineJoiner {
     match();
   }
 
-  /// In the order of their first lines, since among overlapping lane marks the lower index is in front.
+  /// Joins all lines. The result is in the order of their first lines, since among overlapping lane marks the lower
+  /// index is in front.
   std::vector<PaintedLine> join() {
     std::vector<PaintedLine> joined;
     for (std::size_t line = 0; line < lines_.size(); ++line) {
@@ -184,7 +185,7 @@ class LineJoiner {
     return end % 2 == 0 ? points.front() : points.back();
   }
 
-  /// The unit vector in plan that points out of the line at this end.
+  /// Unit vector in plan that points out of the line at this end.
   Vec2 outward(std::size_t end) const {
     const std::vector<Vec3>& points = lines_[end / 2].points_m;
     const Vec3 before = end % 2 == 0 ? points[1] : points[points.size() - 2];
@@ -195,7 +196,7 @@ class LineJoiner {
   /// Pairs coincident ends, the straightest pair first: at a fork only one branch is joined.
   void match() {
     struct Pair {
-      float bend = 0, gap_m = 0;  // sine of the angle between the lines; how far apart they end
+      float bend = 0, gap_m = 0;  // sine of the angle between the lines; distance between their ends
       std::size_t a = 0, b = 0;
     };
     std::vector<Aabb2> boxes;
@@ -223,7 +224,7 @@ class LineJoiner {
     }
   }
 
-  /// The end where the chain of this line begins; rings begin with the line itself.
+  /// Returns the end where the chain of this line begins; rings begin with the line itself.
   std::size_t chain_begin(std::size_t line) const {
     std::size_t end = 2 * line;
     while (partners_[end] != kNone) {
@@ -233,7 +234,7 @@ class LineJoiner {
     return end;
   }
 
-  /// The joined line that begins with this end.
+  /// Returns the joined line that begins with this end.
   PaintedLine join_chain(std::size_t begin) {
     const PaintedLine& first = lines_[begin / 2];
     PaintedLine joined{.width_m = first.width_m, .color = first.color};
@@ -254,7 +255,7 @@ class LineJoiner {
   std::vector<bool> is_joined_;
 };
 
-/// Removes points within kThinningTolerance_m of the chords between the remaining ones.
+/// Removes points within kThinningTolerance_m of the chords between the remaining points.
 void thin(PaintedLine* line) {
   std::vector<CurvePoint> points;
   for (const Vec3 point : line->points_m) points.push_back({0, Eigen::Vector3d{point.x, point.y, point.z}, 0});

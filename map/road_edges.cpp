@@ -10,16 +10,16 @@ namespace pictura {
 
 namespace {
 
-constexpr double kMaxGap_m = 0.05;               // gaps between two bands up to this width count as closed
-constexpr double kSharedBorder_m = 0.004;        // borders closer than this count as shared
+constexpr double kMaxGap_m = 0.05;               // maximum width of gaps between two bands that count as closed
+constexpr double kSharedBorder_m = 0.004;        // maximum distance of borders that count as shared
 constexpr double kSampleStep_m = 0.5;            // sampling step along borders
-constexpr double kBisectionTolerance_m = 0.002;  // bisection tolerance of the points where an outline begins and ends
+constexpr double kBisectionTolerance_m = 0.002;  // tolerance of the bisection for the ends of an outline
 constexpr double kMaxJoinGap_m = 0.06;           // maximum distance of outline ends that are joined
 constexpr double kMinOutline_m = 0.3;
 constexpr double kSamePoint_m = 1e-3;
-constexpr double kOwnReach_m = 1.0;  // at bends neighbouring quads of a band overlap a little
+constexpr double kOwnReach_m = 1.0;  // at bends, neighbouring quads of a band overlap slightly
 
-/// A point on an outline and the band whose border it lies on.
+/// A point on an outline and the band of its border.
 struct OutlinePoint {
   Eigen::Vector3d position_m;
   int32_t band = 0;
@@ -27,7 +27,8 @@ struct OutlinePoint {
 
 Eigen::Vector3d lerp(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double u) { return a + u * (b - a); }
 
-/// Traverses the four sides of each band clockwise, surface to the right, and collects the parts on the outline.
+/// Traverses the four sides of each band clockwise, with the surface to the right, and collects the parts on the
+/// outline.
 class Tracer {
  public:
   Tracer(const std::vector<SurfaceBand>& bands, const Surface& surface) : bands_(bands), surface_(surface) {}
@@ -51,8 +52,8 @@ class Tracer {
   }
 
  private:
-  /// The segment of a border between two neighbouring points. In a turn tighter than the band is wide it may run back:
-  /// there the surface lies on its other side.
+  /// Traces the segment of a border between two neighbouring points. In a turn tighter than the band's width, the
+  /// segment may run backwards; the surface is then on its other side.
   void trace_border(const std::vector<Eigen::Vector3d>& border, std::size_t from, std::size_t to,
                     const SurfaceBand& sides) {
     const std::size_t quad = std::min(from, to);
@@ -69,14 +70,14 @@ class Tracer {
     finish_run();
   }
 
-  /// One straight segment of a band's side.
+  /// Traces one straight segment of a band's side.
   void trace_side(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool is_skipped) {
     const double length_m = plan_distance_m(a, b);
     if (is_skipped) finish_run();
     if (is_skipped || length_m < 1e-9) return;
     const Eigen::Vector2d outward{-(b.y() - a.y()) / length_m, (b.x() - a.x()) / length_m};
     const int steps = std::max(1, static_cast<int>(std::ceil(length_m / kSampleStep_m)));
-    // Stay off the ends, where the adjacent segment decides.
+    // The ends are excluded, because the adjacent segment decides there.
     const double margin = std::min(0.25, 1e-4 / length_m);
     double previous = margin;
     bool was_edge = is_outline(lerp(a, b, previous), outward, band_);
@@ -103,10 +104,10 @@ class Tracer {
     if (was_edge) append(b);
   }
 
-  /// Whether no other band covers the point just outside `p` on the border of `band`, the band itself does not fold
-  /// over it, and no band of a lower index emits the same shared border. Bands that share a border within
-  /// kSharedBorder_m may each extend slightly beyond the other, so the test recurses to check that the lower band
-  /// really emits it: one of them always does.
+  /// Whether no other band covers the point just outside `p` on the border of `band`, the band does not fold over the
+  /// point, and no band of lower index emits the same shared border. Bands that share a border within kSharedBorder_m
+  /// may each extend slightly beyond the other. So the test recurses to check that the lower band really emits the
+  /// border; one of the bands always does.
   bool is_outline(const Eigen::Vector3d& p, const Eigen::Vector2d& outward, int32_t band) {
     surface_.find_near(p.head<2>(), p.z(), &near_);
     for (const double distance_m : {kSharedBorder_m, kMaxGap_m}) {
@@ -116,7 +117,7 @@ class Tracer {
     return is_outline_near(p, outward, band, 0);
   }
 
-  /// The same for a place at most depth times kSharedBorder_m from where near_ was found.
+  /// Variant for a place at most depth times kSharedBorder_m from the place of near_.
   bool is_outline_near(const Eigen::Vector3d& p, const Eigen::Vector2d& outward, int32_t band, int depth) const {
     constexpr int kMaxDepth = static_cast<int>((Surface::kNear_m - kMaxGap_m) / kSharedBorder_m) - 1;
     const Surface::Candidates& near = depth <= kMaxDepth ? near_ : none_;
@@ -157,10 +158,10 @@ class Tracer {
   const std::vector<SurfaceBand>& bands_;
   const Surface& surface_;
   int32_t band_ = 0;
-  std::size_t quad_ = 0;             // of the band, beside the present segment
-  double reach_m_ = kOwnReach_m;     // of that quad's neighbours, which do not count as a fold
+  std::size_t quad_ = 0;             // index in the band of the quad beside the current segment
+  double reach_m_ = kOwnReach_m;     // reach of that quad's neighbours, which do not count as a fold
   std::vector<bool> is_narrow_;      // [points of a side]
-  Surface::Candidates near_, none_;  // about the place in question; none, so that quads are looked up anew
+  Surface::Candidates near_, none_;  // quads near the current place; empty, so that quads are looked up again
   std::vector<OutlinePoint> run_;
   std::vector<std::vector<OutlinePoint>> runs_;
 };
@@ -276,7 +277,7 @@ std::vector<RoadEdge> outline_of(const std::vector<SurfaceBand>& bands, double c
     const std::vector<std::size_t> indices = thin_polyline(points, chord_error_m, kMaxPiece_m);
     for (std::size_t i = 1; i < indices.size(); ++i) {
       const Eigen::Vector3d &a = points[indices[i - 1]].position_m, &b = points[indices[i]].position_m;
-      if (plan_distance_m(a, b) < kSamePoint_m) continue;  // out by less than the tolerance, and back
+      if (plan_distance_m(a, b) < kSamePoint_m) continue;  // a deviation below the tolerance, and back
       edges.push_back({to_vec3(a), to_vec3(b)});
       if (bands_out) bands_out->push_back(bands_of_points[indices[i - 1]]);
     }

@@ -42,7 +42,7 @@ void check_number(const char* what, std::size_t item, const char* field, float v
                 low, high, value);
 }
 
-/// Every lane listed in `range` of lane i must list lane i in its `mirror`.
+/// Checks that every lane listed in `range` of lane i lists lane i in its `mirror`.
 void check_mutual(const RoadMap& map, IndexRange Lane::* range, IndexRange Lane::* mirror, const char* field) {
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {
     for (const int32_t other : map.links(map.lanes[i].*range)) {
@@ -159,7 +159,7 @@ void validate_lights(const RoadMap& map) {
   }
 }
 
-/// Every element has a source, or none has, as in a map that was not read from text.
+/// Checks that either every element has a source or none has, as in a map that was not read from text.
 void validate_provenance(const RoadMap& map) {
   const auto check = [&](const char* what, const std::vector<SourceElement>& sources, std::size_t count) {
     PICTURA_CHECK(sources.empty() || sources.size() == count, "provenance: expected the sources of {} {}s, got {}",

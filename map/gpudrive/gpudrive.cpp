@@ -16,14 +16,14 @@ namespace {
 
 using Json = nlohmann::json;
 
-// WOMD's, from which the files are made; they do not say either.
+// Values of WOMD, from which the files are made; the files do not contain them.
 constexpr double kStep_s = 0.1;
 constexpr int32_t kHistorySteps = 10;
 constexpr int32_t kMaxId = 1'000'000'000;
 constexpr std::size_t kMaxLightStates = 8'000'000;
 
-/// The text with null in place of NaN and Infinity, which Python writes outside of JSON: where a number is needed, null
-/// is refused, and what is not valid is not looked at.
+/// Returns the text with null in place of NaN and Infinity, which Python writes although they are not JSON. Where a
+/// number is required, null is refused; invalid states are not read.
 std::string with_null_for_nan(std::string_view text) {
   std::string out;
   out.reserve(text.size());
@@ -67,7 +67,7 @@ double number_of(const Json& object, const char* field) { return number_in(membe
 
 int64_t integer_in(const Json& value, const char* field) {
   if (!value.is_number_integer()) fail_field(field, "expected a whole number, got {}", value.type_name());
-  // Beyond int64_t a number would come out as another one.
+  // Beyond int64_t, a number would be converted to another number.
   const bool is_too_large = value.is_number_unsigned() && value.get<uint64_t>() > static_cast<uint64_t>(kMaxId);
   const int64_t number = is_too_large ? 0 : value.get<int64_t>();
   if (is_too_large || number < -kMaxId || number > kMaxId) {
@@ -91,12 +91,12 @@ std::string text_of(const Json& object, const char* field) {
   return text;
 }
 
-/// Flat geometry has no z.
+/// Reads a point; flat geometry has no z.
 Eigen::Vector3d point_of(const Json& object) {
   return {number_of(object, "x"), number_of(object, "y"), object.contains("z") ? number_of(object, "z") : 0.0};
 }
 
-/// A center has no z in flat geometry: it is half of the height above the ground.
+/// Reads a centre. In flat geometry it has no z and is half of the height above the ground.
 Eigen::Vector3d center_of(const Json& position, double height_m) {
   Eigen::Vector3d center = point_of(position);
   if (!position.contains("z")) center.z() = 0.5 * height_m;
@@ -109,7 +109,7 @@ bool flag_in(const Json& value) {
   fail_field("", "expected true or false, got {}", value.is_number() ? value.dump() : value.type_name());
 }
 
-/// Older files have no heights.
+/// Returns the height of an object; older files have no heights.
 double height_of(const Json& object, TrackType type, const std::string& place, LoggedScene* scene) {
   constexpr double kVehicleHeight_m = 1.6, kPersonHeight_m = 1.7;
   if (object.contains("height")) return number_of(object, "height");
@@ -169,11 +169,11 @@ void read_object(const Json& object, std::size_t index, LoggedScene* scene) {
   }
 }
 
-// Lanes 0 to 3, lines 5 to 13, edges 14 to 16, and one number each for the rest.
+// Numbers of kinds: lanes 0 to 3, lines 5 to 13, edges 14 to 16, and one number each for the others.
 constexpr int64_t kSurfaceLane = 2, kLastLane = 3, kFirstLine = 5, kLastLine = 13, kLastEdge = 16, kStopSign = 17,
                   kCrosswalk = 18, kSpeedBump = 19, kDriveway = 20;
 
-/// The number of a road's kind. Older files only name it.
+/// Returns the number of a road's kind; older files contain only its name.
 int64_t kind_of_road(const Json& road) {
   if (!road.is_object() || road.contains("map_element_id")) return integer_of(road, "map_element_id");
   static const std::map<std::string, int64_t> kKinds{
@@ -185,7 +185,7 @@ int64_t kind_of_road(const Json& road) {
 
 void read_road(const Json& road, std::size_t index, LoggedScene* scene) {
   const int64_t type = kind_of_road(road);
-  // Running numbers of some writers repeat; the place in the file does not.
+  // Running numbers of some writers repeat; the index in the file does not.
   const auto id = static_cast<int64_t>(index);
   const Json& geometry = array_of(road, "geometry");
   LoggedPoints points;
@@ -220,7 +220,7 @@ RecordedLightState light_state(const std::string& text) {
   fail_field("", "expected a state such as stop, caution, go or unknown, got '{}'", text);
 }
 
-/// `lane_ids`: the place in the file of each lane, by its id as text.
+/// Reads a light. `lane_ids`: index in the file of each lane, by its id as text.
 void read_light(const std::string& lane, const Json& light, const std::map<std::string, int64_t>& lane_ids,
                 LoggedScene* scene) {
   const Json& states = array_of(light, "state");
@@ -258,7 +258,7 @@ void read_light(const std::string& lane, const Json& light, const std::map<std::
   scene->lights.push_back(std::move(logged));
 }
 
-/// A list has an element a light, which names its lane.
+/// Returns the lane of a light in a list, where each light contains its lane.
 std::string lane_of_light(const Json& light) {
   for (const char* field : {"lane", "lane_id", "id"}) {
     if (!light.is_object() || !light.contains(field)) continue;
@@ -293,8 +293,8 @@ void read_lights(const Json& lights, const Json& roads, LoggedScene* scene) {
   }
 }
 
-/// Turns headings in degrees, which older files have, into radians. They are degrees if those of moving objects then
-/// fit their motion better, or, unless they fit it worse, if any is larger than a whole turn in radians.
+/// Converts headings in degrees, which older files have, to radians. Headings are degrees if those of moving objects
+/// then fit their motion better, or, unless they fit it worse, if any heading exceeds a whole turn in radians.
 void convert_degrees(LoggedScene* scene) {
   constexpr double kMoving_mps = 0.5, kLargest_rad = 6.3, kRadians = std::numbers::pi / 180;
   double fit = 0, fit_of_degrees = 0;  // sums of the cosines between heading and motion
@@ -322,7 +322,7 @@ void convert_degrees(LoggedScene* scene) {
 
 void read_metadata(const Json& metadata, LoggedScene* scene) {
   const auto tracks = static_cast<int64_t>(scene->tracks.size());
-  // Indices are of the recording's tracks, of which the file may lack some.
+  // Indices refer to the recording's tracks, some of which the file may lack.
   const auto is_track = [&](int64_t index, const char* what) {
     if (index >= 0 && index < tracks) return true;
     scene->note("indices of the recording's tracks that are no object of the file left out", what);
@@ -330,7 +330,7 @@ void read_metadata(const Json& metadata, LoggedScene* scene) {
   };
   if (metadata.contains("sdc_track_index")) {
     const int64_t index = integer_of(metadata, "sdc_track_index");
-    // An object that says so itself is it.
+    // An object that is marked as the self-driving car takes precedence.
     if (scene->sdc_track < 0 && is_track(index, "sdc_track_index")) scene->sdc_track = static_cast<int32_t>(index);
   }
   if (metadata.contains("objects_of_interest")) {
@@ -366,7 +366,7 @@ LoggedScene parse_scene(std::string_view text, const std::string& source) {
     try {
       json = parse_json<Json>(with_null_for_nan(text));
     } catch (const Json::exception& error) {
-      // Of the library: "[json.exception.parse_error.101] parse error at line 1, column 2: ..."
+      // The library's messages look like "[json.exception.parse_error.101] parse error at line 1, column 2: ..."
       std::string reason = error.what();
       reason.erase(0, reason.find(']') == std::string::npos ? 0 : reason.find(']') + 2);
       fail_field("", "expected JSON, got a {}", reason);

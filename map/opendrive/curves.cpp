@@ -9,9 +9,10 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Stations are clamped this far inside a section, so that cubics that begin at its ends are taken from its own side.
+// Margin inside a section to which stations are clamped, so that cubics that begin at its ends are evaluated on the
+// section's own side.
 constexpr double kSectionMargin_m = 1e-5;
-// Spirals are integrated in panels that turn by at most this; five Gauss points are then exact to rounding.
+// Maximum turn of an integration panel of a spiral; five Gauss points are then exact up to rounding.
 constexpr double kPanelTurn_rad = 0.5;
 
 struct GaussPoint {
@@ -23,7 +24,7 @@ constexpr GaussPoint kGauss[5] = {{0.046910077030668004, 0.11846344252809454},
                                   {0.76923465505284155, 0.23931433524968324},
                                   {0.95308992296933200, 0.11846344252809454}};
 
-/// The last element of `items` whose s is at most `s`, or the first one.
+/// Returns the last element of `items` whose s is at most `s`, or the first element.
 template <typename Item>
 const Item& last_item_at(const std::vector<Item>& items, double s) {
   const auto after =
@@ -31,13 +32,13 @@ const Item& last_item_at(const std::vector<Item>& items, double s) {
   return after == items.begin() ? items.front() : *(after - 1);
 }
 
-/// `s` clamped to just inside the section: offsets and widths may jump where sections meet.
+/// Clamps `s` to just inside the section, because offsets and widths may jump where sections meet.
 double clamp_inside(const FileSection& section, double s) {
   const double margin = std::min(kSectionMargin_m, 0.5 * (section.end - section.s));
   return std::clamp(s, section.s + margin, section.end - margin);
 }
 
-/// The t of a lane's outer border; `inner` is that of its inner one.
+/// Returns t of a lane's outer border; `inner` is t of its inner border.
 double beyond_lane(const FileLane& lane, double ds, double sign, double inner) {
   if (lane.border.cubics.empty()) {
     const double width = lane.width.value(ds);
@@ -64,7 +65,8 @@ double length_between(const PlaneCubic& cubic, double from, double to) {
   return sum * (to - from);
 }
 
-/// The p at the given fraction of the curve's length: Newton's method within one interval of the arc-length table.
+/// Returns the p at the given fraction of the curve's length, by Newton's method within one interval of the arc-length
+/// table.
 double parameter_at(const PlaneCubic& cubic, double fraction) {
   const auto& lengths = cubic.arc_length;
   const double target = std::clamp(fraction, 0.0, 1.0) * lengths.back();
@@ -83,10 +85,10 @@ double parameter_at(const PlaneCubic& cubic, double fraction) {
   return p;
 }
 
-/// A point in the frame of the piece's start.
+/// Converts a point in the frame of the piece's start to file coordinates.
 Eigen::Vector2d in_file(const GeometryPiece& piece, const Eigen::Vector2d& p) {
   const double c = std::cos(piece.heading), s = std::sin(piece.heading);
-  // Added from left to right: maps keep their bits.
+  // Added from left to right, so that the bits of maps do not change.
   return Eigen::Vector2d{piece.x, piece.y} + p.x() * Eigen::Vector2d{c, s} + p.y() * Eigen::Vector2d{-s, c};
 }
 
@@ -115,7 +117,7 @@ bool has_banking(const FileRoad& road) {
            road.right_crossfall.cubics.empty() && road.shape.empty());
 }
 
-/// `t`, clamped to the inner border of the first `level` lane on that side.
+/// Returns `t`, clamped to the inner border of the first `level` lane on that side.
 double banked_t(const FileRoad& road, double s, double t) {
   const FileSection& section = last_item_at(road.sections, s);
   for (const FileLane& lane : t > 0 ? section.left : section.right) {
@@ -126,13 +128,13 @@ double banked_t(const FileRoad& road, double s, double t) {
   return t;
 }
 
-/// The change of heading of a spiral from its start to ds.
+/// Change of heading of a spiral from its start to ds.
 double spiral_turn(const GeometryPiece& piece, double ds) {
   const double rate = (piece.end_curvature - piece.start_curvature) / piece.length;
   return ds * (piece.start_curvature + 0.5 * rate * ds);
 }
 
-/// The displacement between two positions on a spiral within one panel, in the frame of the spiral's start.
+/// Displacement between two positions on a spiral within one panel, in the frame of the spiral's start.
 Eigen::Vector2d spiral_step(const GeometryPiece& piece, double from, double to) {
   Eigen::Vector2d sum{0, 0};
   for (const GaussPoint& gauss : kGauss) {
@@ -147,7 +149,7 @@ Pose pose_on(const GeometryPiece& piece, double ds, LastDirection* last) {
   const double k0 = piece.start_curvature;
   const double rate = (piece.end_curvature - k0) / piece.length;
   if (rate == 0) {
-    // The heading of an arc's chord is the mean of the end headings.
+    // The heading of an arc's chord is the mean of the headings at its ends.
     const double half_turn = 0.5 * k0 * ds;
     const double chord = ds * sinc(half_turn);
     return {Eigen::Vector2d{piece.x, piece.y} + chord * last->of(piece.heading + half_turn), piece.heading + k0 * ds,
@@ -161,7 +163,7 @@ Pose pose_on(const GeometryPiece& piece, double ds, LastDirection* last) {
   return {in_file(piece, in_frame), piece.heading + spiral_turn(piece, ds), k0 + rate * ds};
 }
 
-/// The shift of a deformed road at s, and its first two derivatives by s.
+/// Shift of a deformed road at s, and its first two derivatives by s.
 struct Shift {
   Eigen::Vector2d value_m{0, 0}, slope{0, 0}, bend{0, 0};
 };
@@ -222,7 +224,7 @@ struct Bounds {
   double low = 0, high = 0, slope = 0, bend = 0;  // of the value; of the magnitudes of its two derivatives
 };
 
-/// From its Bernstein coefficients, which bound a polynomial.
+/// Computes bounds from Bernstein coefficients, which bound a polynomial.
 Bounds bounds_between(const Profile& profile, double begin, double end) {
   if (profile.cubics.empty()) return {};
   const Cubic& cubic = last_item_at(profile.cubics, 0.5 * (begin + end));
@@ -241,18 +243,18 @@ Bounds bounds_between(const Profile& profile, double begin, double end) {
   return bounds;
 }
 
-/// A bound of the second derivative of points on a lane, borders included, or `beyond_m` beside them, between two
-/// breaks. With the curvature k of the reference line and the lateral position t it is that of c + t n: k't + 2kt'
-/// along, and k(1 - kt) + t'' across.
+/// Upper bound, between two breaks, of the second derivative of points on a lane, including its borders or points
+/// `beyond_m` outside them. With the curvature k of the reference line and the lateral position t, it is the derivative
+/// of c + t n: k't + 2kt' along, and k(1 - kt) + t'' across.
 double bend_between(const FileRoad& road, const FileSection& section, int lane, double beyond_m, double begin,
                     double end) {
   constexpr double kUnknown = std::numeric_limits<double>::infinity();
-  constexpr double kZero_m = -1e-9;  // widths below zero count as zero, with a kink
+  constexpr double kZero_m = -1e-9;  // negative widths count as zero, which makes a kink
   const GeometryPiece& piece = last_item_at(road.geometry, 0.5 * (begin + end));
   if (piece.cubic || road.deformation || end <= begin) return kUnknown;
   const Bounds offset = bounds_between(road.lane_offset, begin, end);
   double near = 0, far = 0, slope = offset.slope,
-         bend = offset.bend;  // distances of the lane's borders from the center
+         bend = offset.bend;  // distances of the lane's borders from the centre
   const std::vector<FileLane>& side = lane > 0 ? section.left : section.right;
   for (std::size_t i = 0; i < static_cast<std::size_t>(std::abs(lane)); ++i) {
     if (!side[i].border.cubics.empty()) return kUnknown;
@@ -271,7 +273,7 @@ double bend_between(const FileRoad& road, const FileSection& section, int lane, 
     for (const double t : {t_low, t_high}) across = std::max(across, std::abs(curvature * (1 - curvature * t)));
   }
   const double change = std::abs(piece.end_curvature - piece.start_curvature) / piece.length;
-  // Of a spiral, k(1 - kt) may be largest in between.
+  // For a spiral, k(1 - kt) may be largest in between.
   if (change > 0) across = k * (1 + k * std::max(std::abs(t_low), std::abs(t_high)));
   return change * std::max(std::abs(t_low), std::abs(t_high)) + 2 * k * slope + across + bend +
          bounds_between(road.elevation, begin, end).bend;
@@ -348,7 +350,7 @@ const Station& StationCache::at(const FileRoad& road, double s) {
     road_ = &road;
     stations_.assign(std::size_t{1} << kLogSize, {.s = std::numeric_limits<double>::quiet_NaN()});
   }
-  constexpr std::uint64_t kMultiplier = 0x9e3779b97f4a7c15;  // Fibonacci hashing
+  constexpr std::uint64_t kMultiplier = 0x9e3779b97f4a7c15;  // multiplier of Fibonacci hashing
   Station& station = stations_[(std::bit_cast<std::uint64_t>(s) * kMultiplier) >> (64 - kLogSize)];
   if (station.s != s) station = station_at(road, s, &direction_);
   return station;

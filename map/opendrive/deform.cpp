@@ -13,10 +13,10 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Reference lines of linked roads that are further apart do not belong together.
+// Maximum distance of the reference lines of linked roads that belong together.
 constexpr double kMaxLinkOffset_m = 40.0;
 
-/// Ends of roads, numbered 2 * road + (0: start, 1: end), in groups of linked ones.
+/// Ends of roads, numbered 2 * road + (0: start, 1: end), in groups of linked ends.
 class LinkedEnds {
  public:
   explicit LinkedEnds(const Network& network) : network_(network), parent_(2 * network.roads.size()) {
@@ -35,7 +35,7 @@ class LinkedEnds {
 
   std::size_t size() const { return parent_.size(); }
 
-  /// One of the ends that are linked with `end`: the same for all of them.
+  /// Returns the representative of the ends that are linked with `end`.
   std::size_t group_of(std::size_t end) {
     while (parent_[end] != end) end = parent_[end] = parent_[parent_[end]];
     return end;
@@ -67,9 +67,9 @@ class ShiftSolver {
     }
   }
 
-  /// [ends]
+  /// Returns the shifts [ends].
   std::vector<Eigen::Vector2d> solve() {
-    // Roads outside junctions keep the shift that they begin with, however short they are, and their neighbours follow.
+    // Roads outside junctions keep their first shift, however short they are, and their neighbours follow.
     for (std::size_t road = 0; road < network_.roads.size(); ++road) {
       if (is_in_junction(2 * road)) continue;
       for (const std::size_t end : {2 * road, 2 * road + 1}) set_shift(end, Eigen::Vector2d::Zero());
@@ -81,7 +81,7 @@ class ShiftSolver {
         }
       }
     }
-    // What is left are ends of roads between junctions' own roads: the first of a group stays.
+    // The remaining ends are of roads between junctions' own roads: the first of a group stays.
     for (std::size_t end = 0; end < ends_.size(); ++end) take_members(end);
     std::vector<Eigen::Vector2d> all;
     for (std::size_t end = 0; end < ends_.size(); ++end) {
@@ -93,7 +93,7 @@ class ShiftSolver {
  private:
   bool is_in_junction(std::size_t end) const { return !network_.roads[end / 2].junction.empty(); }
 
-  /// Sets the shift of an end, and of the road's other end if that has none, unless the end has one.
+  /// Sets the shift of an end, and of the road's other end if that has none. Does nothing if the end has a shift.
   void set_shift(std::size_t end, const Eigen::Vector2d& shift_m) {
     for (const std::size_t each : {end, end ^ 1}) {
       if (shifts_[each]) return;
@@ -102,14 +102,14 @@ class ShiftSolver {
     }
   }
 
-  /// The group of an end, which becomes its anchor, the first time that it is asked for; nothing later.
+  /// Returns the group of an end on the first request, and makes the end its anchor; returns nothing later.
   std::vector<std::size_t> take_members(std::size_t end) {
     const std::size_t group = ends_.group_of(end);
     anchors_.try_emplace(group, end);
     return std::exchange(members_[group], {});
   }
 
-  /// The shift by which `end` keeps its distance to the left of `anchor`, in metres.
+  /// Returns the shift by which `end` keeps its distance in metres to the left of `anchor`.
   Eigen::Vector2d shift_beside(std::size_t anchor, std::size_t end) const {
     const Pose& pose = poses_[anchor];
     const Eigen::Vector2d along{std::cos(pose.heading), std::sin(pose.heading)}, left{-along.y(), along.x()};
@@ -123,11 +123,11 @@ class ShiftSolver {
   const Eigen::Matrix2d plan_;
   const Network& network_;
   LinkedEnds ends_;
-  std::vector<std::vector<std::size_t>> members_;         // [ends], of groups by the end that names them
+  std::vector<std::vector<std::size_t>> members_;         // [ends] groups, by their representative
   std::vector<std::optional<Eigen::Vector2d>> shifts_;    // [ends]
   std::unordered_map<std::size_t, std::size_t> anchors_;  // by group
-  std::vector<Pose> poses_;                               // [ends], of the network before
-  std::vector<std::size_t> reached_;                      // ends whose groups have yet to follow them
+  std::vector<Pose> poses_;                               // [ends] in the network before the deformation
+  std::vector<std::size_t> reached_;                      // ends whose groups still have to follow them
 };
 
 }  // namespace

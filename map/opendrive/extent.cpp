@@ -9,11 +9,11 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Widths down to minus this count as 0: the rounding that writers leave where a lane tapers off.
+// Tolerance of negative widths, which count as 0: writers round where a lane tapers off.
 constexpr double kWidthTolerance_m = 0.01;
 constexpr double kMaxWidth_m = 500;
 constexpr double kMaxBanking_rad = 1.4;
-// Between stations everything is a cubic of s, which is bounded within a small factor by its values at five points.
+// Between stations all quantities are cubics of s, which their values at five points bound within a small factor.
 constexpr int kProbes = 4;
 
 template <typename Probe>
@@ -23,7 +23,7 @@ void at_probes(const std::vector<double>& stations, Probe&& probe) {
   }
 }
 
-/// Below zero widths count as zero, which is noted once a lane.
+/// Checks widths. Negative widths count as zero, which is recorded once per lane.
 void check_widths(const FileRoad& road, const FileSection& section, const FileLane& lane, Faults* faults) {
   bool is_noted = false;
   at_probes(formula_changes(road, section, lane.id, section.s, section.end), [&](double s) {

@@ -1,4 +1,4 @@
-// Builds lanes from sections: centre lines in the direction of travel, and neighbours.
+// Construction of lanes from sections: centre lines in the direction of travel, and neighbours.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -9,7 +9,7 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Float coordinates have a resolution of 8 mm within this distance of the origin.
+// Maximum distance from the origin; within it, float coordinates have a resolution of 8 mm.
 constexpr double kMaxMapRadius_m = 1e5;
 
 Lane make_lane(Build* build, const FileRoad& road, const FileSection& section, const FileLane& lane) {
@@ -40,7 +40,7 @@ Lane make_lane(Build* build, const FileRoad& road, const FileSection& section, c
   return result;
 }
 
-/// Adjacent route lanes with the same direction of travel become neighbours.
+/// Makes adjacent route lanes with the same direction of travel neighbours.
 void join_neighbors(Build* build, const FileRoad& road, const FileSection& section, const SectionLanes& indices) {
   std::vector<Lane>& lanes = build->map->lanes;
   auto join = [&](const FileLane& left, const FileLane& right) {

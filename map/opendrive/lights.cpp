@@ -28,7 +28,7 @@ std::unordered_set<std::string> controlled_signals(const Network& network) {
   return signals;
 }
 
-/// Whether a signal at s applies to a driving lane, and no such lane leads to a junction on its road.
+/// Whether a signal at s applies to a driving lane, and no lane to which it applies leads to a junction on its road.
 template <typename Signal>
 bool is_away_from_junctions(const FileRoad& road, const Signal& signal) {
   if (!road.junction.empty()) return false;
@@ -45,14 +45,14 @@ bool is_away_from_junctions(const FileRoad& road, const Signal& signal) {
   return has_lane;
 }
 
-/// The station of a stop line, and where its heads keep it.
+/// Station of a head, and the place of its stop line.
 struct Head {
   double s = 0;
   Orientation orientation = Orientation::either;
   std::optional<double>* stop_s = nullptr;
 };
 
-/// Gives each head the line of the first of those that traffic meets within 20 m.
+/// Sets the line of each head to that of the first head among those that traffic meets within 20 m.
 void find_lines(bool forward, std::vector<Head>* heads) {
   std::sort(heads->begin(), heads->end(),
             [forward](const Head& a, const Head& b) { return forward ? a.s < b.s : a.s > b.s; });
@@ -79,7 +79,7 @@ bool applies_to(const FileLane& lane, const FileRoad& road, Orientation orientat
 
 void split_at_lights(Network* network) {
   const std::unordered_set<std::string> controlled = controlled_signals(*network);
-  std::unordered_set<std::string> lights, referenced;  // of those that no controller controls
+  std::unordered_set<std::string> lights, referenced;  // of lights without a controller
   for (const FileRoad& road : network->roads) {
     for (const FileSignal& signal : road.signals) {
       if (signal.type == kLightType && !controlled.contains(signal.id)) lights.insert(signal.id);

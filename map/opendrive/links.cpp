@@ -1,4 +1,4 @@
-// Lane links: from lanes' own links, across the links of their roads, and from junctions' connections.
+// Links of lanes: from lanes' own links, across the links of their roads, and from junctions' connections.
 #include <algorithm>
 #include <set>
 
@@ -10,11 +10,11 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Lanes whose ends are further apart are not linked, whatever the file says (Town03 links two neighbouring lanes to the
-// same next one).
+// Maximum gap between linked lanes, whatever the file contains (Town03 links two neighbouring lanes to the same next
+// lane).
 constexpr float kMaxLinkGap_m = 1.0f;
 
-/// One end of a lane, in terms of s of its road.
+/// One end of a lane, by s of its road.
 struct LaneEnd {
   int road = 0, section = 0, id = 0;
   ContactPoint end = ContactPoint::start;
@@ -37,7 +37,7 @@ class Linker {
 
   int road_named(const std::string& id) const { return build_.network.road_index.at(id); }
 
-  /// The end of lane `id` at one end of a road.
+  /// Returns the end of lane `id` at one end of a road.
   LaneEnd end_of_road(int road, ContactPoint contact, int id) const {
     const int section = contact == ContactPoint::start ? 0 : static_cast<int>(road_of(road).sections.size()) - 1;
     return {road, section, id, contact};
@@ -45,7 +45,7 @@ class Linker {
 
   const FileLane* file_lane(const LaneEnd& end) const { return road_of(end.road).sections[end.section].lane(end.id); }
 
-  /// Whether the lane is there; if not, the link to it is mended: left out.
+  /// Whether the lane exists; if not, the link to it is repaired by omission.
   bool exists(const LaneEnd& end, const SourceLocation& where) const {
     if (file_lane(end)) return true;
     where.mend(build_.faults, MendKind::missing_lane, "is linked to lane {} of road {}, which does not exist there",
@@ -94,8 +94,8 @@ class Linker {
     }
   }
 
-  /// Links two lanes that meet, in the order in which traffic passes them. Links that traffic cannot follow are left
-  /// out and counted, those between sidewalks and the like left out alone.
+  /// Links two lanes that meet, in the order in which traffic passes them. Links that traffic cannot follow are omitted
+  /// and counted; links between sidewalks and similar lanes are omitted without being counted.
   void add(const LaneEnd& a, const LaneEnd& b, const SourceLocation& where) {
     const int32_t lane_a = lane_at(a), lane_b = lane_at(b);
     if (lane_a < 0 || lane_b < 0) return;

@@ -10,7 +10,8 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Ends of roads closer than this touch: links are mended by it, never taken away where a file agrees with itself.
+// Maximum distance of touching road ends. It is used to repair links, never to remove links on which a file is
+// consistent.
 constexpr double kTouch_m = 1.0;
 
 const char* name_of(ContactPoint end) { return end == ContactPoint::start ? "start" : "end"; }
@@ -27,13 +28,13 @@ RoadLink* link_at(FileRoad* road, ContactPoint end) {
   return end == ContactPoint::start ? &road->predecessor : &road->successor;
 }
 
-/// Removes a road's link but for its location, by which lanes know that there was one.
+/// Removes a road's link except for its location, by which lanes know that a link existed.
 void leave_out(RoadLink* link) {
   link->kind = RoadLink::Kind::none;
   link->id.clear();
 }
 
-/// Where the lanes of a road begin or end: its reference line, moved by the lane offset.
+/// Position where the lanes of a road begin or end: its reference line, moved by the lane offset.
 Eigen::Vector3d position_of(const FileRoad& road, ContactPoint end) {
   const FileSection& section = end == ContactPoint::start ? road.sections.front() : road.sections.back();
   const double s = end == ContactPoint::start ? 0 : road.length;
@@ -44,7 +45,7 @@ double distance_m(const FileRoad& a, ContactPoint end_a, const FileRoad& b, Cont
   return (position_of(a, end_a) - position_of(b, end_b)).norm();
 }
 
-/// The end of `b` that touches an end of `a`; `contact` if both do or neither does.
+/// Returns the end of `b` that touches an end of `a`; `contact` if both ends or neither end touch it.
 ContactPoint touching_end(const FileRoad& a, ContactPoint end, const FileRoad& b, ContactPoint contact) {
   const bool touches = distance_m(a, end, b, contact) <= kTouch_m;
   return !touches && distance_m(a, end, b, other_end(contact)) <= kTouch_m ? other_end(contact) : contact;
@@ -77,7 +78,7 @@ class LinkMender {
     return found == network_.road_index.end() ? nullptr : &network_.roads[found->second];
   }
 
-  /// What a road's link names exists, and its contact point is the end that lies there.
+  /// Checks that the target of a road's link exists and that the contact point is the end that lies there.
   void check_target(FileRoad* road, ContactPoint end) {
     RoadLink* const link = link_at(road, end);
     if (link->kind == RoadLink::Kind::junction && !network_.junction_index.contains(link->id)) {
@@ -105,7 +106,8 @@ class LinkMender {
     }
   }
 
-  /// A link between two roads is returned. Where the other road's end names a third road, geometry decides.
+  /// Checks that a link between two roads is mutual. Where the other road's end refers to a third road, geometry
+  /// decides.
   void check_return(FileRoad* road, ContactPoint end) {
     RoadLink* const link = link_at(road, end);
     if (link->kind != RoadLink::Kind::road) return;
@@ -133,7 +135,7 @@ class LinkMender {
   }
 
   /// Finds both ends of a connection: by the connecting road's link, else by the incoming road's link to the junction,
-  /// else by geometry. False where the roads do not meet, which is mended: the connection is left out.
+  /// else by geometry. Returns false where the roads do not meet; this is repaired by omitting the connection.
   bool find_ends(const FileJunction& junction, Connection* connection) {
     const FileRoad* const incoming = road_named(connection->incoming_road);
     const FileRoad* const connecting = road_named(connection->connecting_road);
@@ -175,7 +177,7 @@ class LinkMender {
   }
 
   void note_wrong_end(const Connection& connection) {
-    if (!connection.has_contact) return;  // noted already
+    if (!connection.has_contact) return;  // already recorded
     connection.where.mend(
         faults_, MendKind::wrong_end, "attribute contactPoint: expected {}, which is linked to road {}, got {}",
         name_of(other_end(connection.contact)), connection.incoming_road, name_of(connection.contact));

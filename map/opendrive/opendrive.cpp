@@ -16,8 +16,8 @@ namespace pictura {
 
 namespace {
 
-/// Bounds the import time of small files and the memory of large ones: CARLA's towns need 0.2 samples per byte,
-/// procedural ones 0.7, of which the largest has 35 MB, and a straight road of 100 km half a million.
+/// Budget that bounds the import time of small files and the memory of large ones. CARLA's towns need 0.2 samples per
+/// byte, procedural towns 0.7, of which the largest has 35 MB. A straight road of 100 km needs half a million samples.
 SampleBudget budget_for(std::size_t text_bytes, const std::string& source, const InterruptibleWork& work) {
   constexpr std::int64_t kBaseSamples = 500'000, kSamplesPerByte = 10, kMaxSamples = 60'000'000;
   return {std::min(kMaxSamples, kBaseSamples + kSamplesPerByte * static_cast<std::int64_t>(text_bytes)), source, work};
@@ -34,11 +34,11 @@ void check_plan(const PlanMap& plan) {
       plan.xx, plan.xy, plan.yx, plan.yy);
 }
 
-/// Faults of the network as a whole do not name the file.
+/// Imports a network. Faults of the network as a whole do not contain the file's name.
 RoadMap import_network(std::string_view text, const std::string& source, const OpenDriveOptions& options,
                        const ImportProgress& progress) {
   const InterruptibleWork work(fmt::format("{}: interrupted while it was imported", source));
-  // Shares as large networks have them.
+  // Shares of the work, measured on large networks.
   const auto begin = [&](const char* stage, double done) {
     work.check();
     if (progress) progress(stage, done);
@@ -55,7 +55,7 @@ RoadMap import_network(std::string_view text, const std::string& source, const O
   if (options.plan == PlanMap{}) {
     map.geo_reference = network.geo_reference;
   } else {
-    opendrive::deform(options.plan, &network);  // a copy lies nowhere on Earth
+    opendrive::deform(options.plan, &network);  // a copy has no place on Earth
   }
   opendrive::Build build{network, options, &faults, &map, budget_for(text.size(), source, work), {}, {}, {}};
   begin("lanes", 0.1);

@@ -12,16 +12,16 @@ namespace {
 constexpr double kDefaultMarkWidth_m = 0.125, kBoldMarkWidth_m = 0.25;
 constexpr double kStopLineWidth_m = 0.4, kMinStopLine_m = 0.1, kMinParking_m = 0.1;
 constexpr double kMinMarkLength_m = 0.05;
-// Dashes of 3 m with gaps of 9 m: the North American pattern, which CARLA's towns imitate.
+// Dashes of 3 m with gaps of 9 m: the North American pattern, as in CARLA's towns.
 constexpr double kDash_m = 3.0, kDashPeriod_m = 12.0;
 // Botts' dots: 4 inches wide, one every 48 inches.
 constexpr double kDot_m = 0.1016, kDotPeriod_m = 1.2192;
 
-// Corners closer than this are merged.
+// Distance within which corners are merged.
 constexpr float kSamePoint_m = 1e-3f;
 
-/// One stripe of a mark, `left` metres from the border. Dashes begin at origin + i * period along the road; with `once`
-/// there is only i = 0.
+/// One stripe of a mark, `left` metres from the border. Dashes begin at origin + i * period along the road; with
+/// `once`, only i = 0 exists.
 struct Stripe {
   double left = 0;
   double width = 0;
@@ -31,8 +31,8 @@ struct Stripe {
   bool once = false;
 };
 
-/// The stripes of a mark's type. The two stripes of a double line are one width apart; the first word of the type names
-/// the stripe nearer to the center lane, which is on the left on the right side of the road.
+/// Returns the stripes of a mark's type. The two stripes of a double line are one width apart. The first word of the
+/// type is the stripe nearer to the centre lane, which is on the left on the right side of the road.
 std::vector<Stripe> stripes_of_type(const RoadMark& mark, int lane_id) {
   const double width = mark.width > 0 ? mark.width : mark.bold ? kBoldMarkWidth_m : kDefaultMarkWidth_m;
   const double inner = lane_id > 0 ? -width : width;
@@ -54,7 +54,7 @@ std::vector<Stripe> stripes_of_type(const RoadMark& mark, int lane_id) {
   return {};
 }
 
-/// Lines listed in the mark replace the pattern of its type. `begin` is the mark's s.
+/// Returns the stripes of a mark. Lines listed in the mark replace the pattern of its type. `begin` is the mark's s.
 std::vector<Stripe> stripes_of(const RoadMark& mark, int lane_id, double begin) {
   if (mark.type == "none") return {};
   if (mark.lines.empty() && mark.explicit_lines.empty()) return stripes_of_type(mark, lane_id);
@@ -91,7 +91,7 @@ class MarkPainter {
       }
       const double last = stripe.once ? 0 : std::floor((end - stripe.origin) / stripe.period);
       for (double i = stripe.once ? 0 : std::floor((begin - stripe.origin) / stripe.period); i <= last; ++i) {
-        build_.budget.count_sample();  // also for dashes that are too short to be painted
+        build_.budget.count_sample();  // including dashes that are too short to be painted
         const double dash_begin = stripe.origin + i * stripe.period;
         add(mark, stripe, std::max(dash_begin, begin), std::min(dash_begin + stripe.dash, end));
       }
@@ -112,12 +112,12 @@ class MarkPainter {
         sample_curve(breaks, build_.options.chord_error_m, kMaxPiece_m, &build_.budget, [&](double s) {
           const double t = border_at(road_, section_, lane_.id, s).t + stripe.left + mark.sway.value(s - mark_begin);
           Eigen::Vector3d p = point_at(road_, s, t, &build_.stations);
-          // On a raised lane the mark is at the height of the lane's outer border.
+          // On a raised lane, the mark has the height of the lane's outer border.
           if (!lane_.inner_height.cubics.empty())
             p.z() = point_on_lane(road_, section_, lane_, s, 1, &build_.stations).z();
           return CurvePoint{s, p, 0};
         });
-    // On the inner side of a bend tighter than its offset a mark would run back, and cross itself.
+    // On the inner side of a bend tighter than its offset, a mark would run backwards and cross itself.
     std::size_t begin = 0;
     for (std::size_t i = 1; i < points.size(); ++i) {
       if (!runs_back(points[i - 1], points[i])) continue;
@@ -139,7 +139,7 @@ class MarkPainter {
     mark.where.mend(build_.faults, MendKind::self_crossing_mark, "at s {:.3f} it runs against the road", s);
   }
 
-  /// The points in [begin, end), if they make a line.
+  /// Adds the points in [begin, end) if they form a line.
   void add_marking(const RoadMark& mark, const Stripe& stripe, const std::vector<CurvePoint>& points, std::size_t begin,
                    std::size_t end) {
     if (end - begin < 2) return;
@@ -158,10 +158,10 @@ class MarkPainter {
   const FileRoad& road_;
   const FileSection& section_;
   const FileLane& lane_;
-  bool is_noted_ = false;  // whether the mark is known to cross itself
+  bool is_noted_ = false;  // whether the self-crossing of the mark is recorded
 };
 
-/// The corners of an object: its outline, or its bounding box.
+/// Returns the corners of an object: its outline, or its bounding box.
 std::vector<Vec3> corners_of(Build* build, const FileRoad& road, const FileObject& object) {
   std::vector<FileObject::Corner> corners = object.outline;
   if (corners.empty()) {
@@ -205,7 +205,7 @@ void add_crosswalk(Build* build, std::size_t road, const FileObject& object) {
   map.provenance.crosswalks.push_back(source_of(road, object.where));
 }
 
-/// The stop line runs along the longer extent of the corners, centred in the shorter one, which is its width.
+/// Adds a stop line along the longer extent of the corners, centred in the shorter extent, which is its width.
 void add_stop_line(Build* build, std::size_t road, const FileObject& object) {
   constexpr std::size_t kMaxCorners = 64;
   const std::vector<Vec3> corners = corners_of(build, build->network.roads[road], object);
@@ -224,7 +224,7 @@ void add_stop_line(Build* build, std::size_t road, const FileObject& object) {
                              "expected a stop line at least {} m long, got {}", kMinStopLine_m, length(along));
   }
   if (corners.size() >= 4) {
-    // The longest extent of a box is its diagonal; use its longest side.
+    // The longest extent of a box is its diagonal, so its longest side is used.
     along = {};
     for (std::size_t i = 0; i < corners.size(); ++i) {
       const Vec2 side = (corners[(i + 1) % corners.size()] - corners[i]).xy();
@@ -250,7 +250,7 @@ void add_stop_line(Build* build, std::size_t road, const FileObject& object) {
   build->map->provenance.stop_lines.push_back(source_of(road, object.where));
 }
 
-/// Metres of a deformed road for each metre in a direction, as an angle from the road's heading.
+/// Metres of a deformed road per metre in a direction, given as an angle from the road's heading.
 double stretch_towards(const Pose& pose, double angle) {
   return std::hypot(pose.stretch * std::cos(angle), std::sin(angle));
 }
@@ -269,7 +269,7 @@ void add_parking_space(Build* build, std::size_t road_index, const FileObject& o
                              "expected a parking space with a length and a width of at least {} m, got {} and {}",
                              kMinParking_m, length_m, width_m);
   }
-  // Rows of spaces keep their number: along the road each becomes as much longer or shorter as the road.
+  // Rows keep their number of spaces: along the road, each space stretches with the road.
   if (road.deformation) {
     length_m *= stretch_towards(pose, object.heading);
     width_m *= stretch_towards(pose, object.heading + 0.5 * std::numbers::pi);
@@ -279,7 +279,7 @@ void add_parking_space(Build* build, std::size_t road_index, const FileObject& o
     std::swap(width_m, length_m);
     heading += 0.5 * std::numbers::pi;
   }
-  // Of the two headings take that of the traffic on this side of the road.
+  // Of the two headings, that of the traffic on this side of the road is used.
   const bool forward = travels_forward(road, object.t > 0 ? 1 : -1);
   const double traffic = pose.heading + (forward ? 0.0 : std::numbers::pi);
   if (std::cos(heading - traffic) < 0) heading += std::numbers::pi;

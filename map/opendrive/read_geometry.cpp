@@ -1,4 +1,4 @@
-// Reads reference lines: <geometry> in plan, elevation and banking.
+// Reader of reference lines: <geometry> in plan, elevation and banking.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -16,24 +16,24 @@ namespace pictura::opendrive {
 namespace {
 
 constexpr double kMaxCoordinate_m = 1e8, kMaxHeading_rad = 1e3;
-constexpr double kMaxTurn_rad = 100.0;    // of one geometry: 16 turns, enough for a helix
+constexpr double kMaxTurn_rad = 100.0;    // per geometry: 16 turns, enough for a helix
 constexpr double kMaxGap_m = 0.1;         // between two geometries of a reference line, and of its length
 constexpr double kMaxLengthError = 0.01;  // relative error of a <paramPoly3>'s length, in addition to kMaxGap_m
-constexpr double kMaxJump_m = 5.0;        // larger gaps have no one meaning
-constexpr double kMaxStep_m = 0.5;        // of the elevation: more is a wall to cars
-constexpr std::size_t kMaxJumps = 1000;   // of a road: bounds the time to spread them
-// The heading of a geometry shorter than kStationTolerance_m means nothing where the line turns by more.
+constexpr double kMaxJump_m = 5.0;        // larger gaps have no single meaning
+constexpr double kMaxStep_m = 0.5;        // of the elevation: larger steps are walls to cars
+constexpr std::size_t kMaxJumps = 1000;   // per road: bounds the time of smoothing
+// Maximum turn at a geometry shorter than kStationTolerance_m; beyond it, the heading of the geometry has no meaning.
 constexpr double kMaxKink_rad = 0.2;
-// A length that is off by at most this much, or by this share, is cut or extended to fit.
+// Maximum error of a length, absolute or as a share, that is repaired by cutting or extending.
 constexpr double kMaxCut_m = 0.5, kMaxCutShare = 0.01;
 
 bool can_cut(double error_m, double length_m) {
   return std::abs(error_m) <= std::max(kMaxCut_m, kMaxCutShare * length_m);
 }
 
-/// A <geometry> and what was read from it.
+/// A <geometry> and its parsed contents.
 struct Geometry {
-  double s = 0;  // as the file states it
+  double s = 0;  // as in the file
   Element element;
   GeometryPiece piece;
 };
@@ -47,7 +47,7 @@ std::array<double, 4> coefficients(const Element& element, const char* suffix) {
   return result;
 }
 
-/// v is a cubic of u; u ends where the arc length equals the length of the piece.
+/// Reads a cubic v of u; u ends where the arc length equals the length of the piece.
 PlaneCubic read_poly3(const Element& element, double length) {
   PlaneCubic cubic{.u = {0, 1, 0, 0}, .v = coefficients(element, "")};
   double low = 0, high = length;
@@ -119,8 +119,9 @@ double distance_m(const GeometryPiece& before, const GeometryPiece& piece) {
   return (Eigen::Vector2d{piece.x, piece.y} - pose_on(before, before.length).position_m).norm();
 }
 
-/// Makes a geometry begin at the s where the one before it ends: the one before is cut or extended by a little, or, by
-/// more, where its end is then no further away. Otherwise the geometry is moved along s: returns by how much.
+/// Joins the stations of a geometry and the previous one. The previous geometry is cut or extended if the error is
+/// small, or if its end is then no further away. Otherwise the geometry is moved along s. Returns the distance of this
+/// move.
 double join_stations(const Geometry& geometry, GeometryPiece* before, GeometryPiece* piece) {
   const double end = before->s + before->length, error = piece->s - end;
   if (std::abs(error) <= kStationTolerance_m) return 0;
@@ -141,7 +142,7 @@ double join_stations(const Geometry& geometry, GeometryPiece* before, GeometryPi
   return -error;
 }
 
-/// Where a geometry does not begin where the one before it ends.
+/// Returns the jump where a geometry does not begin at the end of the previous one.
 std::optional<Jump> jump_between(const Geometry& geometry, std::size_t index, const FileRoad& road) {
   const GeometryPiece& before = road.geometry[index - 1];
   const double gap_m = distance_m(before, road.geometry[index]);
@@ -159,12 +160,13 @@ std::optional<Jump> jump_between(const Geometry& geometry, std::size_t index, co
   return Jump{.piece = index, .shift_m = Eigen::Vector2d{road.geometry[index].x, road.geometry[index].y} - end};
 }
 
-/// By how much the line turns from the end of a geometry to the start of the next one.
+/// Angle between the end of a geometry and the start of the next one.
 double turn_between(const GeometryPiece& piece, const GeometryPiece& next) {
   return std::abs(std::remainder(next.heading - pose_on(piece, piece.length).heading, 2 * std::numbers::pi));
 }
 
-/// Leaves out geometries of next to no length that head elsewhere than the next one, or the one before the last.
+/// Drops geometries of nearly no length whose heading differs from that of the next one or, for the last, of the
+/// previous one.
 void drop_kinks(std::vector<Geometry>* geometries) {
   std::vector<Geometry> kept;
   for (std::size_t i = 0; i < geometries->size(); ++i) {
@@ -186,9 +188,9 @@ void drop_kinks(std::vector<Geometry>* geometries) {
   *geometries = std::move(kept);
 }
 
-/// Joins the geometries: together they are the road, whatever length it states.
+/// Joins the geometries, which together are the road, whatever length the file gives for it.
 void join_geometry(const std::vector<Geometry>& geometries, FileRoad* road) {
-  double moved = 0;  // stations by the geometries before
+  double moved = 0;  // sum of the moves so far
   for (const Geometry& geometry : geometries) {
     GeometryPiece piece = geometry.piece;
     piece.s += moved;
@@ -219,7 +221,7 @@ void join_geometry(const std::vector<Geometry>& geometries, FileRoad* road) {
   if (!jumps.empty()) spread_jumps(jumps, road);
 }
 
-/// Elevation: cubics of s that join, as far as the file describes the road.
+/// Reads the elevation: cubics of s that join, up to the end of the file's description.
 void read_elevation(const Element& profile, double described, FileRoad* road) {
   road->elevation = read_profile(profile, "elevation", "s", road->length);
   const std::vector<Cubic>& cubics = road->elevation.cubics;
@@ -236,7 +238,7 @@ void read_elevation(const Element& profile, double described, FileRoad* road) {
   if (!jumps.empty()) spread_height_jumps(jumps, road);
 }
 
-/// A straight road from where the first geometry begins.
+/// Makes a straight road from the start of the first geometry.
 GeometryPiece straight_piece(const Element& plan_view, double length) {
   GeometryPiece piece = {};
   const Element first = plan_view.required_child("geometry");
@@ -252,7 +254,7 @@ bool is_zero(const Profile& profile) {
                      [](const Cubic& c) { return c.a == 0 && c.b == 0 && c.c == 0 && c.d == 0; });
 }
 
-/// Cubics of t at stations s: one cross-section per s.
+/// Reads cubics of t at stations s: one cross-section per s.
 std::vector<CrossSection> read_shape(const Element& lateral, double road_length) {
   struct Shape {
     double s = 0;
@@ -282,7 +284,7 @@ std::vector<CrossSection> read_shape(const Element& lateral, double road_length)
   return sections;
 }
 
-/// Superelevation, crossfall (1.4) and shape. Profiles that are zero everywhere, as most are, are dropped.
+/// Reads superelevation, crossfall (1.4) and shape. Profiles that are zero everywhere, as most are, are dropped.
 void read_banking(const Element& lateral, FileRoad* road) {
   if (!lateral) return;
   if (const Element strips = lateral.child("crossSectionSurface")) {

@@ -1,11 +1,12 @@
-// Reads how roads are connected: links, junctions, and the controllers of traffic lights.
+// Reader of the connections of roads: links, junctions, and the controllers of traffic lights.
 #include "pictura/map/opendrive/read_parts.h"
 
 namespace pictura::opendrive {
 
 namespace {
 
-/// Sets the end that a link or connection names. A missing or unknown one is noted and found by mend_links().
+/// Sets the end to which a link or connection refers. A missing or unknown end is recorded, and mend_links() determines
+/// it.
 template <typename Link>
 void read_contact(const Element& element, Link* link) {
   const std::string text = element.text("contactPoint", "");
@@ -68,7 +69,7 @@ FileJunction read_junction(const Element& element) {
   const std::string type = element.text("type", "default");
   junction.is_direct = type == "direct";
   if (type != "default" && !junction.is_direct) {
-    // Kept without connections, since roads refer to it.
+    // Kept without connections, since roads refer to the junction.
     element.mend(MendKind::unsupported_junction,
                  "attribute type: '{}' junctions are not supported; expected default or direct", type);
     return junction;

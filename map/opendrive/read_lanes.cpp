@@ -1,4 +1,4 @@
-// Reads lane sections: lanes with their widths, links and road marks.
+// Reader of lane sections: lanes with their widths, links and road marks.
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -11,11 +11,12 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Shorter sections, which editors leave behind when snapping, are removed: no lane can be built from them.
+// Minimum length of a section. Editors leave shorter sections behind when snapping; these are removed, because lanes
+// cannot be built from them.
 constexpr double kMinSection_m = 1e-3;
 constexpr double kMaxLaneWidth_m = 1e3, kMaxLaneHeight_m = 100;
 constexpr int kMaxLanesPerSide = 64;
-constexpr double kMaxLateSection_m = 0.5;  // by which the first section may be late and is mended
+constexpr double kMaxLateSection_m = 0.5;  // maximum start of the first section that is repaired
 
 LaneType lane_type(const Element& element, const std::string& name) {
   static const std::unordered_map<std::string_view, LaneType> kTypes = {
@@ -58,7 +59,7 @@ LaneType lane_type(const Element& element, const std::string& name) {
   return LaneType::other;
 }
 
-/// Records of constants, each from its sOffset on: calls read(element, s) in the order of the file.
+/// Visits records of constants, each valid from its sOffset on: calls read(element, s) in the order of the file.
 template <typename Read>
 void each_record(const Element& lane, const char* name, double section_length, Read&& read) {
   lane.each(name, [&](const Element& element) {
@@ -99,7 +100,7 @@ LaneDirection read_direction(const Element& element) {
   return LaneDirection::standard;
 }
 
-/// A center lane has no surface of any type; a lane without a type is a special one.
+/// Reads a lane's type. A centre lane has no surface of any type; a lane without a type is a special lane.
 void read_type(const Element& element, bool is_center, FileLane* lane) {
   lane->type_name = element.text("type", is_center ? "none" : "special1");
   if (!element.has("type")) element.mend(MendKind::missing_lane_type, "attribute type is missing");
@@ -163,7 +164,7 @@ FileLane read_center_lane(const Element& element, double section_length) {
   return lane;
 }
 
-/// Inserts lanes without surface for the ids that are left out between the sorted lanes of a side.
+/// Inserts lanes without surface for missing ids between the sorted lanes of a side.
 void fill_gaps(int sign, std::vector<FileLane>* lanes) {
   std::vector<FileLane> filled;
   for (FileLane& lane : *lanes) {
@@ -205,7 +206,7 @@ void read_side(const Element& section, const char* side, int sign, double sectio
   if (std::abs(before) != static_cast<int>(lanes_out->size())) fill_gaps(sign, lanes_out);
 }
 
-/// The <laneSection> elements and where they begin on the road, sorted. One beyond the end is moved there, so that it
+/// The <laneSection> elements and their starts on the road, sorted. A section beyond the end is moved there, so that it
 /// has no length and read_lanes() bridges it.
 struct SectionElement {
   double s = 0;
@@ -273,7 +274,7 @@ void read_lanes(const Element& road_element, Faults* faults, FileRoad* road) {
     const FileSection& section = road->sections[i];
     const double length = section.end - section.s;
     if (road->sections.size() == 1 || length >= kMinSection_m) continue;
-    if (section.s < road->length) {  // sections beyond the end are noted
+    if (section.s < road->length) {  // sections beyond the end are already recorded
       section.where.mend(faults, MendKind::short_section, "is {} m long; expected at least {}", length, kMinSection_m);
     }
     bridge_section(i, road);

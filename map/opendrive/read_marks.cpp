@@ -1,4 +1,4 @@
-// Reads road marks: type, colour, width, and explicitly listed lines.
+// Reader of road marks: type, colour, width, and explicitly listed lines.
 #include <cmath>
 #include <unordered_map>
 #include <unordered_set>
@@ -46,7 +46,7 @@ void check_type(const Element& element, const std::string& type) {
   }
 }
 
-/// Appends the line of `element`. Lines of no length without gaps are continuous, as several writers mean them.
+/// Appends the line of `element`. Lines without length and gaps are continuous, as several writers intend.
 void read_line(const Element& element, bool is_explicit, std::vector<MarkLine>* lines_out) {
   MarkLine line;
   line.length = element.number_or_zero_in("length", 0, kMaxRoadLength_m);

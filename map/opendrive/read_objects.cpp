@@ -1,4 +1,4 @@
-// Reads objects (crosswalks, parking spaces, stop lines), signals and signal references.
+// Reader of objects (crosswalks, parking spaces, stop lines), signals and signal references.
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -10,9 +10,9 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Objects may lie this far before the start or after the end of their road.
+// Maximum distance of objects before the start or after the end of their road.
 constexpr double kMaxOverhang_m = 10;
-// Smaller distances mean one continuous object.
+// Minimum repeat distance; smaller distances mean one continuous object.
 constexpr double kMinRepeat_m = 0.1;
 constexpr std::size_t kMaxCopies = 10'000;
 constexpr std::size_t kMaxCopiedCorners = 1'000'000;
@@ -24,8 +24,8 @@ bool contains_word(std::string text, std::string_view word) {
   return text.find(word) != std::string::npos;
 }
 
-/// The kinds that RoadMap stores; nothing for all others. OpenDRIVE has no type for stop lines: they are road marks of
-/// the subtype signalLines, or objects with that name.
+/// Returns the kinds that RoadMap stores, and nothing for other kinds. OpenDRIVE has no type for stop lines: they are
+/// road marks of the subtype signalLines, or objects with that name.
 std::optional<FileObject::Kind> kind_of(const Element& element) {
   const std::string type = element.text("type", "none");
   if (type == "crosswalk") return FileObject::Kind::crosswalk;
@@ -38,7 +38,7 @@ std::optional<FileObject::Kind> kind_of(const Element& element) {
   return std::nullopt;
 }
 
-/// Whether an object or signal lies beside its road; if not, it is mended: left out.
+/// Whether an object or signal lies beside its road; if not, it is repaired by omission.
 bool is_near_road(const Element& element, double road_length) {
   const double low_s = -kMaxOverhang_m, high_s = road_length + kMaxOverhang_m;
   const double s = element.number("s"), t = element.number_or_zero("t");
@@ -62,7 +62,7 @@ double read_height(const Element& element, const char* attribute) {
   return element.number_in(attribute, -kMaxHeight_m, kMaxHeight_m, 0);
 }
 
-/// The outer one of an object's outlines; the others are holes or parts of it.
+/// Returns the outer outline of an object's outlines; the others are holes or parts of it.
 Element outer_outline(const Element& element) {
   Element outline = element.child("outline");
   if (const Element outlines = element.child("outlines"); !outline && outlines) {
@@ -73,7 +73,7 @@ Element outer_outline(const Element& element) {
   return outline;
 }
 
-/// Nothing where a corner lies far from the road.
+/// Reads an outline; nothing where a corner lies far from the road.
 std::optional<std::vector<FileObject::Corner>> read_outline(const Element& element, double road_length) {
   std::vector<FileObject::Corner> corners;
   bool is_near = true;
@@ -90,7 +90,7 @@ std::optional<std::vector<FileObject::Corner>> read_outline(const Element& eleme
   return corners;
 }
 
-/// Nothing where the object lies far from its road.
+/// Reads an object; nothing where it lies far from its road.
 std::optional<FileObject> read_object(const Element& element, FileObject::Kind kind, double road_length) {
   FileObject object;
   object.where = element.where();
@@ -110,7 +110,7 @@ std::optional<FileObject> read_object(const Element& element, FileObject::Kind k
   return object;
 }
 
-/// Whether the copies that a <repeat> asks for can be made; if not, that is mended: the object stands once.
+/// Whether the copies of a <repeat> can be made; if not, this is repaired by placing the object once.
 bool can_repeat(const Element& repeat, const FileObject& object) {
   const double distance = repeat.number_in("distance", 0, kMaxRoadLength_m);
   if (distance < kMinRepeat_m) {
@@ -126,7 +126,7 @@ bool can_repeat(const Element& repeat, const FileObject& object) {
   return true;
 }
 
-/// The object itself, or its copies along each <repeat> element, with linearly interpolated attributes.
+/// Returns the object itself, or its copies along each <repeat> element, with linearly interpolated attributes.
 std::vector<FileObject> repeated(const Element& element, const FileObject& object, double road_length) {
   std::vector<FileObject> copies;
   element.each("repeat", [&](const Element& repeat) {

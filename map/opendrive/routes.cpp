@@ -1,4 +1,4 @@
-// Derives inherited speed limits from the lane graph.
+// Derivation of inherited speed limits from the lane graph.
 #include <map>
 
 #include "pictura/map/opendrive/build.h"

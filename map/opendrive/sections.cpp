@@ -9,9 +9,9 @@ namespace pictura::opendrive {
 namespace {
 
 constexpr double kMinSplitSection_m = 0.5;
-constexpr double kSameStation_m = 1e-6;  // what writers round
+constexpr double kSameStation_m = 1e-6;  // rounding of writers
 
-/// The same cubic as one that begins at s.
+/// Returns the same cubic with its start at s.
 Cubic moved_to(double s, const Cubic& cubic) {
   const double ds = s - cubic.s;
   return {.s = s,
@@ -35,7 +35,7 @@ FileLane continue_lane(const FileLane& lane, double ds) {
   return rest;
 }
 
-/// The stations of speed limit changes, sorted.
+/// Returns the stations of speed limit changes, sorted.
 std::vector<double> speed_changes(const FileRoad& road, const FileSection& section) {
   std::vector<double> changes;
   auto add_all = [&](const Profile& limits, double offset) {
@@ -53,11 +53,11 @@ std::vector<double> speed_changes(const FileRoad& road, const FileSection& secti
   return changes;
 }
 
-/// Connects the links of a section's lanes through the lanes of one beside it, which is removed.
+/// Connects the links of a section's lanes through the lanes of an adjacent section, which is removed.
 void link_across(const FileSection& removed, std::vector<int> FileLane::* links, FileSection* section) {
   for (std::vector<FileLane>* side : {&section->left, &section->right}) {
     for (FileLane& lane : *side) {
-      // Each once: links given twice would double with every section that is removed.
+      // Targets are unique: repeated links would double with every removed section.
       std::vector<int> targets;
       for (const int id : lane.*links) {
         const FileLane* through = removed.lane(id);
@@ -71,7 +71,7 @@ void link_across(const FileSection& removed, std::vector<int> FileLane::* links,
   }
 }
 
-/// Ends a profile's records within [begin, end): the last of them goes on from `end`, if anything does.
+/// Removes a profile's records within [begin, end); the last of them continues from `end` if the profile does.
 void cut_out(double begin, double end, bool goes_on, Profile* profile) {
   std::vector<Cubic>& cubics = profile->cubics;
   const auto from = [&](double s) {
@@ -103,7 +103,7 @@ void bridge_section(std::size_t index, FileRoad* road) {
   std::vector<FileSection>& sections = road->sections;
   const FileSection removed = std::move(sections[index]);
   const bool goes_on = index + 1 < sections.size();
-  // What is offset in the section alone would shift the ends of those beside it.
+  // An offset within the section alone would shift the ends of adjacent sections.
   cut_out(removed.s, removed.end, goes_on, &road->lane_offset);
   if (index > 0) {
     link_across(removed, &FileLane::successors, &sections[index - 1]);

@@ -1,6 +1,6 @@
-// Builds junctions, traffic lights and signs. A light names lanes of a connecting road, or of the road that leads to
-// the junction; the rest follows from the lane graph: the stop line is where the junction's lanes begin, their
-// predecessors are the incoming lanes, and the light faces those.
+// Construction of junctions, traffic lights and signs. A light refers to lanes of a connecting road, or of the road
+// that leads to the junction. The lane graph gives the rest: the stop line is at the start of the junction's lanes,
+// their predecessors are the incoming lanes, and the light faces these.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -15,9 +15,10 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Height of a head above the foot of its post; the file does not give it. Posts beyond the junction carry a mast arm.
+// Height of a head above the foot of its post, which the file does not contain. Posts beyond the junction have a mast
+// arm.
 constexpr double kNearHeadHeight_m = 3.5, kFarHeadHeight_m = 5.5;
-// A head further beyond the stop line than this is on the far side.
+// Distance beyond the stop line from which a head is on the far side.
 constexpr float kFarHead_m = 5.0f;
 constexpr float kMinStopLine_m = 0.1f;
 
@@ -26,12 +27,12 @@ struct PlacedSignal {
   const FileSignal* signal = nullptr;
 };
 
-/// The junction of a signal and its green phase.
+/// Junction of a signal and its green phase.
 struct Phase {
   int32_t junction = -1, phase = 0;
 };
 
-/// The lanes that one signal controls on one approach road, ascending.
+/// Lanes that one signal controls on one approach road, ascending.
 struct Approach {
   std::vector<int32_t> incoming, connecting;
 };
@@ -85,12 +86,12 @@ class SignalBuilder {
   }
 
  private:
-  /// By the index of the approach road, and whether its traffic runs along s.
+  /// Approaches by the index of the approach road and by whether its traffic runs along s.
   using Approaches = std::map<std::pair<int32_t, bool>, Approach>;
 
-  /// An approach that no controller controls: the heads there share one line.
+  /// An approach without a controller: all heads there share one line.
   struct UncontrolledLine {
-    std::size_t signal_index = 0;  // of its first head
+    std::size_t signal_index = 0;  // of the first head
     Approach approach;
   };
 
@@ -106,7 +107,7 @@ class SignalBuilder {
     }
   }
 
-  /// Controllers by id, with only those of their signals that exist.
+  /// Returns controllers by id, with only their existing signals.
   std::unordered_map<std::string, FileController> valid_controllers() {
     std::unordered_map<std::string, FileController> controllers;
     for (const FileController& controller : build_.network.controllers) {
@@ -125,7 +126,8 @@ class SignalBuilder {
     return controllers;
   }
 
-  /// A phase is the rank of a sequence number among those of a junction's controllers that control a light.
+  /// Finds phases: the phase of a light is the rank of its sequence number among the sequence numbers of its junction's
+  /// controllers of lights.
   void find_phases() {
     const std::unordered_map<std::string, FileController> controllers = valid_controllers();
     for (std::size_t j = 0; j < build_.network.junctions.size(); ++j) {
@@ -157,12 +159,12 @@ class SignalBuilder {
     return map_.lane_points[static_cast<std::size_t>(lane(index).points.end) - 1];
   }
 
-  /// Adds the lanes at s of a road to which a signal applies: those of its validity, else all of its orientation. Those
-  /// that meet at the stop line of a light away from junctions are an approach.
+  /// Adds the lanes at s of a road to which a signal applies: the lanes of its validity, else all lanes of its
+  /// orientation. Lanes that meet at the stop line of a light away from junctions form an approach.
   template <typename Signal>
   void collect(std::size_t signal_index, std::size_t road, const Signal& signal) {
     const FileRoad& file_road = build_.network.roads[road];
-    // References are often placed mid-road; use the lane ids of the section there.
+    // References are often placed mid-road, so the lane ids of the section there are used.
     const FileSection& section = section_at(file_road, signal.stop_s.value_or(signal.s));
     const SectionLanes& lanes = build_.lanes[road][&section - file_road.sections.data()];
     for (const std::vector<FileLane>* side : {&section.left, &section.right}) {
@@ -190,7 +192,7 @@ class SignalBuilder {
     }
   }
 
-  /// This lane and the chain of its predecessors (or successors) on the same road, nearest first.
+  /// Returns this lane and the chain of its predecessors (or successors) on the same road, nearest first.
   std::vector<int32_t> along_road(int32_t from, IndexRange Lane::* onward) const {
     std::vector<int32_t> chain{from};
     for (bool more = true; more;) {
@@ -206,8 +208,9 @@ class SignalBuilder {
     return chain;
   }
 
-  /// A lane of a junction is followed back to its start: its drivable predecessors are the incoming lanes. A lane that
-  /// leads to a junction is followed to its end: its last piece is the incoming lane.
+  /// Finds the approaches of a lane. A junction's lane is followed back to its start, where its drivable predecessors
+  /// are the incoming lanes. A lane that leads to a junction is followed to its end, where its last piece is the
+  /// incoming lane.
   void find_approaches(int32_t start, Approaches* approaches) const {
     if (lane(start).in_junction) {
       const std::vector<int32_t> connecting = along_road(start, &Lane::predecessors);
@@ -232,12 +235,12 @@ class SignalBuilder {
     approach.connecting.insert(approach.connecting.end(), connecting.begin(), connecting.end());
   }
 
-  /// The junction of an approach, or -1.
+  /// Returns the junction of an approach, or -1.
   int32_t junction_of(const Approach& approach) const {
     return approach.connecting.empty() ? -1 : lane(approach.connecting.front()).junction;
   }
 
-  /// Adds a head to the lines of its approaches. Where controllers rule the junction it is none of theirs: left out.
+  /// Adds a head to the lines of its approaches. In a junction with controllers, a head without one is omitted.
   void add_uncontrolled(std::size_t signal_index, const Approaches& approaches) {
     const FileSignal& signal = *placed_signals_[signal_index].signal;
     if (const char* const junction = ruled_junction(approaches)) {
@@ -247,7 +250,7 @@ class SignalBuilder {
     signal.where.mend(build_.faults, MendKind::uncontrolled_light, "no controller of a junction controls it");
     for (const auto& [way, approach] : approaches) {
       const int32_t junction_index = junction_of(approach);
-      // On a road lines are told apart by their lanes.
+      // On roads, lines are distinguished by their lanes.
       const int32_t first = junction_index < 0 ? approach.incoming.front() : -1;
       const auto [line, is_new] = uncontrolled_.try_emplace({junction_index, way, first});
       if (is_new) line->second.signal_index = signal_index;
@@ -257,7 +260,7 @@ class SignalBuilder {
     }
   }
 
-  /// The name of a junction of the approaches whose lights controllers control; null if there is none.
+  /// Returns the name of a junction of the approaches whose lights have controllers; null if there is none.
   const char* ruled_junction(const Approaches& approaches) const {
     for (const auto& [way, approach] : approaches) {
       const int32_t junction = junction_of(approach);
@@ -267,11 +270,11 @@ class SignalBuilder {
     return nullptr;
   }
 
-  /// Adds a light for each line that no controller controls. Those of a junction whose headings are alike, or opposite,
-  /// have one phase; a line away from junctions is alone.
+  /// Adds a light for each line without a controller. Lines of one junction with equal or opposite headings share a
+  /// phase; a line away from junctions is alone.
   void add_uncontrolled_lights() {
     constexpr double kSameAxis_rad = 0.25 * std::numbers::pi;
-    std::map<int32_t, std::vector<double>> headings;  // [junction] of the first line of each phase
+    std::map<int32_t, std::vector<double>> headings;  // [junction] heading of the first line of each phase
     for (auto& [key, line] : uncontrolled_) {
       Phase phase{std::get<0>(key), 0};
       if (phase.junction >= 0) {
@@ -301,7 +304,7 @@ class SignalBuilder {
     const FileSignal& signal = *placed_signals_[signal_index].signal;
     Sign sign{.name = signal.id, .type = signal.type, .subtype = signal.subtype, .country = signal.country};
     sign.position_m = build_.to_map(position_of(signal_index));
-    // Use the heading of the lanes it applies to, since orientations set by editors are unreliable.
+    // The heading of the lanes to which it applies is used, since orientations set by editors are unreliable.
     double heading = pose_at(build_.network.roads[placed_signals_[signal_index].road], signal.s).heading;
     if (signal.orientation == Orientation::against) heading += std::numbers::pi;
     if (!signal_lanes_[signal_index].empty()) {
@@ -333,8 +336,8 @@ class SignalBuilder {
     light.junction = phase.junction;
     light.phase = phase.phase;
 
-    // The stop line spans the ends of the incoming lanes, from the left border of the leftmost to the right border of
-    // the rightmost.
+    // The stop line spans the ends of the incoming lanes, from the left border of the leftmost lane to the right border
+    // of the rightmost lane.
     float left_m = -1e30f, right_m = 1e30f;
     const LanePoint reference = end_of(approach->incoming.front());
     const SinCos direction = sincos_of(reference.heading_rad);
@@ -382,10 +385,10 @@ class SignalBuilder {
   RoadMap& map_;
   std::vector<PlacedSignal> placed_signals_;
   std::unordered_map<std::string, std::size_t> index_by_id_;
-  std::vector<std::vector<int32_t>> signal_lanes_;  // [signals] lanes to which each applies
+  std::vector<std::vector<int32_t>> signal_lanes_;  // [signals] lanes to which the signal applies
   std::unordered_map<std::string, Phase> phases_;
   std::map<std::size_t, Approaches> lone_approaches_;  // [signals] away from junctions
-  // By junction, approach and, away from junctions, the first lane.
+  // Key: junction, approach and, away from junctions, the first lane.
   std::map<std::tuple<int32_t, std::pair<int32_t, bool>, int32_t>, UncontrolledLine> uncontrolled_;
 };
 

@@ -10,11 +10,12 @@ namespace pictura::opendrive {
 namespace {
 
 constexpr double kMinSpan_m = 10, kSpanPerJump = 10;
-// A smoothstep is 1.5 times as steep as its chord: over this many times the jump it turns by less than 0.2 rad.
+// Minimum span per jump: a smoothstep is 1.5 times as steep as its chord, so over this span it turns by less than 0.2
+// rad.
 constexpr double kMinSpanPerJump = 7.5;
-constexpr double kMaxCubic_m = 1;  // length of the cubics that replace a moved line: within 0.1 mm of it
+constexpr double kMaxCubic_m = 1;  // length of the cubics that replace a moved line, to within 0.1 mm
 
-/// The stretch of s over which a jump is spread.
+/// Range of s over which a jump is spread.
 struct Stretch {
   double begin = 0, end = 0;
 };
@@ -34,7 +35,7 @@ struct Knot {
   Eigen::Vector2d position_m, slope;
 };
 
-/// The cubic between two knots that are `length` apart in s.
+/// Cubic between two knots that are `length` apart in s.
 GeometryPiece cubic_between(const Knot& a, const Knot& b, double s, double length) {
   GeometryPiece piece;
   piece.s = s;
@@ -112,11 +113,11 @@ class JumpSpreader {
 
   FileRoad& road_;
   std::vector<Spread> spreads_;
-  std::vector<const Spread*> active_;  // those that touch the present geometry
+  std::vector<const Spread*> active_;  // stretches that touch the current geometry
   std::vector<GeometryPiece> moved_;
 };
 
-/// The cubic that goes on as `cubic` does, from station s.
+/// Returns the continuation of `cubic` from station s.
 Cubic continued(const Cubic& cubic, double s) {
   const double ds = s - cubic.s;
   return {.s = s,
@@ -126,7 +127,7 @@ Cubic continued(const Cubic& cubic, double s) {
           .d = cubic.d};
 }
 
-/// A smoothstep from 0 to `rise` over the stretch.
+/// Smoothstep from 0 to `rise` over the stretch.
 Cubic smoothstep(const Stretch& stretch, double rise) {
   const double span = stretch.end - stretch.begin;
   return {.s = stretch.begin, .c = 3 * rise / (span * span), .d = -2 * rise / (span * span * span)};

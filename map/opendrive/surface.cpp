@@ -1,5 +1,5 @@
-// The lane surfaces of an OpenDRIVE network as bands: road edges are the outline of the drivable ones, and building
-// lines run on free ground.
+// Lane surfaces of an OpenDRIVE network as bands: road edges are the outline of the drivable lanes, and building lines
+// run on free ground.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,17 +12,17 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Road edges need a surface much more precise than what is drawn.
+// Road edges need a much more precise surface than the drawn one.
 constexpr double kEdgeBandChordError_m = 0.001;
 // Building lines keep a clearance from the surface, so less precision is enough.
 constexpr double kLotBandChordError_m = 0.05;
 constexpr double kBandPiece_m = 5.0;
 
-constexpr double kSetback_m = 1.0;    // of a building from the outermost lane
-constexpr double kLotDepth_m = 6.0;   // free ground that a building needs behind its line
-constexpr double kClearance_m = 0.5;  // from any surface, also beyond the ends of a building line
+constexpr double kSetback_m = 1.0;    // distance of a building from the outermost lane
+constexpr double kLotDepth_m = 6.0;   // depth of free ground behind a building's line
+constexpr double kClearance_m = 0.5;  // from any surface, including beyond the ends of a building line
 constexpr double kProbeStep_m = 1.0;
-constexpr double kBuildingPiece_m = 8.0;  // of a building line
+constexpr double kBuildingPiece_m = 8.0;  // length of a piece of a building line
 constexpr double kAnyLevel_m = 1e9;
 
 SurfaceBand lane_band(Build* build, const FileRoad& road, const FileSection& section, const FileLane& lane,
@@ -31,7 +31,7 @@ SurfaceBand lane_band(Build* build, const FileRoad& road, const FileSection& sec
   auto border = [&](double outer_fraction, double s) {
     return build->from_origin(point_on_lane(road, section, lane, s, outer_fraction, &build->stations));
   };
-  // Both borders are sampled at the same stations, the union of those that either needs.
+  // Both borders are sampled at the same stations, the union of the stations of both.
   const CurveBreaks breaks = breaks_of(road, section, lane.id, section.s, section.end);
   std::array<std::vector<CurvePoint>, 2> sampled;
   std::vector<double> stations;
@@ -59,7 +59,7 @@ SurfaceBand lane_band(Build* build, const FileRoad& road, const FileSection& sec
   return band;
 }
 
-/// One band for each selected lane of the map; `roads_out`, unless null, gets the road of each.
+/// Makes one band per selected lane of the map; `roads_out`, unless null, gets the road of each band.
 template <typename IsSelected>
 std::vector<SurfaceBand> lane_bands(Build* build, double chord_error_m, std::vector<int32_t>* roads_out,
                                     IsSelected&& is_selected) {
@@ -76,7 +76,7 @@ std::vector<SurfaceBand> lane_bands(Build* build, double chord_error_m, std::vec
   return bands;
 }
 
-/// The id of the outermost lane with a surface, or 0.
+/// Returns the id of the outermost lane with a surface, or 0.
 int outermost_lane(const std::vector<FileLane>& side) {
   for (std::size_t i = side.size(); i-- > 0;) {
     if (!side[i].is_void) return side[i].id;
@@ -84,7 +84,7 @@ int outermost_lane(const std::vector<FileLane>& side) {
   return 0;
 }
 
-/// Whether the ground for a building along a-b is free: no surface on, near or closely behind it. The road is on the
+/// Whether the ground for a building along a-b is free: no surface on, near or closely behind it. The road is to the
 /// right of a-b.
 bool is_free(const Surface& surface, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   const double length_m = plan_distance_m(a, b);
@@ -143,12 +143,12 @@ void build_building_lines(Build* build) {
         const double step = (section.end - section.s) / pieces;
         for (int i = 0; i < pieces; ++i) {
           build->budget.count_sample();
-          // Directed so that the road is on the right.
+          // Directed so that the road is to the right.
           const double low = section.s + i * step, high = i + 1 == pieces ? section.end : section.s + (i + 1) * step;
           const Eigen::Vector3d a = at(sign > 0 ? low : high), b = at(sign > 0 ? high : low);
           const double length_m = plan_distance_m(a, b);
           if (length_m < 2 * kClearance_m || length_m > kMaxPiece_m || !is_free(surface, a, b)) continue;
-          // On the inside of a bend tighter than the offset the line reverses direction.
+          // On the inside of a bend tighter than the offset, the line reverses direction.
           const double heading = pose_at(road, 0.5 * (low + high)).heading;
           const Eigen::Vector2d forward{std::cos(heading), std::sin(heading)};
           if (sign * (b - a).head<2>().dot(forward) < 0.5 * length_m) continue;

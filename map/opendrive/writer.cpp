@@ -16,7 +16,7 @@ namespace pictura::opendrive {
 
 namespace {
 
-/// The value of an attribute. fmt prints the shortest digits that read back as the same double.
+/// Value of an attribute. fmt prints the shortest digits that read back as the same double.
 class Value {
  public:
   Value(const std::string& text) : text_(text) {}
@@ -162,7 +162,7 @@ void add_speed(pugi::xml_node parent, double limit_mps, const double* station = 
   }
 }
 
-/// `successors` are those of the whole <lane>, which may continue in later sections.
+/// Adds a lane; `successors` are those of the whole <lane>, which may continue in later sections.
 void add_lane(pugi::xml_node side, const FileLane& lane, const std::vector<int>& successors) {
   pugi::xml_node node =
       add(side, "lane", {{"id", lane.id}, {"type", lane.type_name}, {"level", lane.is_level ? "true" : "false"}});
@@ -187,7 +187,7 @@ void add_lane(pugi::xml_node side, const FileLane& lane, const std::vector<int>&
 
 bool is_continued(const std::vector<FileLane>& side) { return !side.empty() && side.front().is_continued; }
 
-/// The successors of a lane that continues in single-sided sections are those of its last part.
+/// Returns the successors of a lane; if it continues in single-sided sections, those of its last part.
 std::vector<int> successors_of(const FileRoad& road, std::size_t section, const FileLane& lane) {
   while (section + 1 < road.sections.size()) {
     const FileLane* next = road.sections[section + 1].lane(lane.id);
@@ -286,7 +286,7 @@ void add_signals(pugi::xml_node road_node, const FileRoad& road) {
   }
 }
 
-/// Assigns object ids: their own, unless empty or already used in the file (copies of a <repeat>).
+/// Assigns object ids: the object's own id, unless it is empty or already used in the file (copies of a <repeat>).
 class ObjectIds {
  public:
   explicit ObjectIds(const Network& network) {
@@ -356,7 +356,7 @@ void add_controller(pugi::xml_node root, const FileController& controller) {
   for (const std::string& signal : controller.signals) add(node, "control", {{"signalId", signal}});
 }
 
-/// Minor revision: 4 (OpenDRIVE 1.4), or 8 (1.8) if the network uses newer features.
+/// Returns the minor revision: 4 (OpenDRIVE 1.4), or 8 (1.8) if the network uses newer features.
 int minor_revision(const Network& network) {
   const auto is_new = [](const FileLane& lane) {
     return lane.direction != LaneDirection::standard || lane.predecessors.size() > 1 || lane.successors.size() > 1;

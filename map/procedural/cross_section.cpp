@@ -12,7 +12,7 @@ using opendrive::Profile;
 constexpr double kSlipTaper_m = 14;
 constexpr double kMarkWidth_m = 0.12;
 
-/// A smooth step (cubic) from one width to another over `length_m`, starting at s.
+/// Smooth step (cubic) from one width to another over `length_m`, starting at s.
 Cubic step(double s, double from_m, double to_m, double length_m) {
   const double rise = to_m - from_m;
   return {s, from_m, 0, 3 * rise / (length_m * length_m), -2 * rise / (length_m * length_m * length_m)};
@@ -73,7 +73,7 @@ opendrive::RoadMark make_mark(const char* type) {
   return mark;
 }
 
-/// The mark on a lane's outer border.
+/// Returns the mark on a lane's outer border.
 opendrive::RoadMark outer_mark(const Side& side, int rank, const SectionStyle& style) {
   const LaneKind kind = side.kind_at(rank);
   if (kind == LaneKind::shoulder) return make_mark("curb");

@@ -1,14 +1,15 @@
-// Junctions of three to five arms: one connecting road per movement, corners with sidewalks, crosswalks.
+// Construction of junctions of three to five arms: one connecting road per movement, corners with sidewalks,
+// crosswalks.
 #include "pictura/map/procedural/town_builder.h"
 
 namespace pictura::town {
 
 namespace {
 
-constexpr double kMaxTurnRadius_m = 14;  // of the left border of turns other than right turns
-// Lanes that turn across the junction are this much wider half-way, so that no sliver is left between adjacent lanes.
+constexpr double kMaxTurnRadius_m = 14;  // of the left border of all turns except right turns
+// Additional width half-way of lanes that turn across the junction, so that no sliver remains between adjacent lanes.
 constexpr double kTurningExtra_m = 0.5;
-constexpr double kCrosswalkBegin_m = 0.6, kCrosswalkEnd_m = 3.4;  // beyond the stop line
+constexpr double kCrosswalkBegin_m = 0.6, kCrosswalkEnd_m = 3.4;  // distance beyond the stop line
 
 }  // namespace
 
@@ -50,7 +51,7 @@ int TownBuilder::build_movement(const Node& node, const Movement& movement, open
                    .has_median = has_median,
                    .has_shoulder = has_corner,
                    .has_sidewalk = has_corner && in.has_sidewalks && out.has_sidewalks};
-  // The lanes of a motorway are marked at its forks too.
+  // Lanes of a motorway are marked at its forks too.
   SectionStyle style(in.lane_width_m);
   style.in_junction = !is_fork;
   style.one_way = true;

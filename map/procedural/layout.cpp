@@ -1,4 +1,4 @@
-// Chooses the crossings, streets and features of a town.
+// Selection of the crossings, streets and features of a town.
 #include "pictura/map/procedural/layout.h"
 
 #include <cmath>
@@ -8,7 +8,8 @@ namespace pictura::town {
 
 namespace {
 
-// Block lengths vary by this fraction of their mean, node positions by this much in each coordinate.
+// Usual lane width; variation of block lengths as a fraction of their mean; and variation of node positions in each
+// coordinate.
 constexpr double kUsualLaneWidth_m = 3.5;
 constexpr double kSpacingSpread = 0.12, kJitter_m = 3.5;
 
@@ -93,10 +94,10 @@ void Layout::plan_streets() {
   }
 }
 
-/// Avenues: the border, and whole rows and columns inside it.
+/// Chooses avenues: the border, and whole rows and columns inside it.
 void Layout::choose_avenues() {
   has_ring_road_ = draw(kRingRoad, 0).uniform() < static_cast<float>(options_.ring_road) && options_.max_lanes > 1;
-  // An avenue ends at the border, where half of its lanes turn left and half right.
+  // An avenue ends at the border, where half of its lanes turn left and half turn right.
   const auto lanes_of = [&](int line) {
     const int max_lanes = static_cast<int>(has_ring_road_ ? options_.max_lanes : std::min(options_.max_lanes, 2.0));
     return 2 + draw(kAvenueLanes, line).below(max_lanes - 1);
@@ -120,7 +121,7 @@ void Layout::choose_avenues() {
   }
 }
 
-/// Chooses inner nodes, those on avenues first, no two adjacent, so that each ramp can use a whole street.
+/// Chooses inner nodes without adjacent pairs, those on avenues first, so that each ramp can use a whole street.
 void Layout::choose_overpasses() {
   std::vector<int> inner;
   for (int n = 0; n < static_cast<int>(nodes_.size()); ++n) {
@@ -192,7 +193,7 @@ void Layout::add_diagonals() {
     is_cut = has_diagonal[node] = has_diagonal[to] = 1;
     return true;
   };
-  // Around a single block traffic would circle without a choice, in either direction.
+  // Around a single block, traffic would circle without a choice, in either direction.
   if (nodes_.size() == 4) {
     add_street(0, 3, 1);
     return;
@@ -210,8 +211,8 @@ void Layout::add_diagonals() {
 
 /// Whether the remaining streets connect all nodes; an overpass connects its streets only in pairs.
 bool Layout::is_connected() const {
-  // Union-find over two halves per node: of an overpass the eastward and the northward street; of other nodes only the
-  // first is used.
+  // Union-find over two halves per node: for an overpass, the eastward and the northward street; other nodes use only
+  // the first half.
   std::vector<int> parent(2 * nodes_.size());
   std::iota(parent.begin(), parent.end(), 0);
   const auto root = [&](int i) {
@@ -231,7 +232,8 @@ bool Layout::is_connected() const {
   return true;
 }
 
-/// Whether a street may be removed: neither end becomes a dead end, and both keep what their kind of node needs.
+/// Whether a street may be removed: neither end becomes a dead end, and both ends keep the streets that their kind of
+/// node needs.
 bool Layout::is_removable(int s) const {
   const Street& street = streets_[s];
   if (street.kind != StreetKind::street || street.direction % 2 == 1) return false;

@@ -1,4 +1,4 @@
-// The curves of streets: the headings of arms, the extent of junctions, and the curves between their mouths.
+// Curves of streets: the headings of arms, the extent of junctions, and the curves between the mouths of streets.
 #include "pictura/map/procedural/layout.h"
 #include "pictura/map/procedural/movements.h"
 #include "pictura/map/procedural/roundabout_shape.h"
@@ -11,17 +11,17 @@ constexpr double degrees(double angle) { return angle * kPi_rad / 180; }
 
 // Minimum angles between arms: at nodes with grid streets only, between opposite arms, and at nodes with a diagonal.
 constexpr double kMinGap_rad = degrees(72), kMinOppositeGap_rad = degrees(150), kMinFiveArmGap_rad = degrees(62);
-// Neighbouring arms at a larger angle meet without a corner.
+// Angle from which neighbouring arms meet without a corner.
 constexpr double kFlatGap_rad = degrees(140);
 constexpr double kMinMouth_m = 9, kMinBendMouth_m = 10;
 constexpr double kOverpassMargin_m = 2;
 // Radii of the inner edge of a bend.
 constexpr double kBendRadius_m = 10, kMotorwayBendRadius_m = 90;
-// Distances of a fork's mouths from its node: before the ramps, and where they have left the motorway.
+// Distances of a fork's mouths from its node: before the ramps, and after they have left the motorway.
 constexpr double kForkBefore_m = 10, kForkBeyond_m = 40;
 constexpr double kSlipRadius_m = 16;
-// Minimum lengths between the mouths of streets with a slip lane and of those that one leads into; and the minimum
-// radius of the former: on the inside of a sharper curve the lane would open abruptly.
+// Minimum lengths between the mouths of streets with a slip lane and of streets that a slip lane leads into; and the
+// minimum radius of streets with a slip lane: on the inside of a sharper curve, the lane would open abruptly.
 constexpr double kMinSlipStreet_m = 42, kMinSlipExit_m = 25, kMinSlipStreetRadius_m = 60;
 
 double side_width_m(const Street& street) {
@@ -47,7 +47,7 @@ void Layout::set_headings() {
   for (int s = 0; s < static_cast<int>(streets_.size()); ++s) {
     const Node &from = nodes_[streets_[s].from], &to = nodes_[streets_[s].to];
     const Eigen::Vector2d apart = to.position_m - from.position_m;
-    // A ramp runs along its motorway at both ends, in the direction that is one of the grid's.
+    // A ramp runs along its motorway at both ends, in its direction that is one of the grid's.
     const int along = streets_[s].direction % 2 == 0 ? streets_[s].direction : opposite(streets_[s].end_direction);
     const double heading =
         streets_[s].kind == StreetKind::ramp ? degrees(45.0 * along) : std::atan2(apart.y(), apart.x());
@@ -61,7 +61,7 @@ void Layout::set_headings() {
   }
 }
 
-/// Rotates the arms of a node with a diagonal apart until every two have the minimum angle.
+/// Rotates the arms of a node with a diagonal apart until each pair has the minimum angle.
 void Layout::spread_arms(Node* node) {
   const int count = node->degree();
   const double min_gap = std::min(kMinFiveArmGap_rad, 0.97 * 2 * kPi_rad / count);
@@ -104,7 +104,7 @@ void Layout::curve_streets() {
     const double straight = streets_[s].leave;
     RandomStream stream = draw(kCurveShape, s);
     double angle = (stream.below(2) ? 1 : -1) * static_cast<double>(stream.uniform(0.16f, 0.4f));
-    constexpr float kArcShare = 0.6f;  // the rest are S-curves
+    constexpr float kArcShare = 0.6f;  // share of arcs among arcs and S-curves
     const double arrive_sign = stream.uniform() < kArcShare ? -1 : 1;
     for (;; angle *= 0.7) {
       if (std::abs(angle) < 0.05) angle = 0;
@@ -117,7 +117,7 @@ void Layout::curve_streets() {
   }
 }
 
-/// Distance from the node to the end of an arm: as far as the corners with its two neighbours need.
+/// Distance from the node to the end of an arm: as far as the corners with its two neighbours require.
 double Layout::mouth_distance_m(const Node& node, int index) const {
   const Arm& arm = node.arm(index);
   const Street& street = streets_[arm.street];
@@ -150,8 +150,8 @@ double Layout::mouth_distance_m(const Node& node, int index) const {
     const Arm& right = side > 0 ? arm : node.arm(index - 1);
     const double gap = wrap_to_2pi(left.heading - right.heading);
     if (gap > kFlatGap_rad) continue;
-    // Traffic arriving on the right arm turns right into the left one. Its path begins on the left border of the
-    // outermost lane of the one and ends on that of the other.
+    // Traffic that arrives on the right arm turns right into the left arm. Its path begins on the left border of the
+    // outermost lane of the right arm and ends on that of the left arm.
     const Street &in = streets_[right.street], &out = streets_[left.street];
     const double in_offset = lane_offset_m(in, in.lanes - (has_slip(right) ? 0 : 1));
     const double out_offset = lane_offset_m(out, out.lanes - 1);
@@ -174,7 +174,7 @@ Curve Layout::curve_of(const Street& street) const {
                offset_right(moved_forward({to.position_m, street.arrive}, -mouth(street.to)), street.end_offset_m));
 }
 
-/// Chooses right turns at lights, where both streets are long enough for the larger corner.
+/// Chooses right turns at lights where both streets are long enough for the larger corner.
 void Layout::choose_slip_lanes() {
   struct Turn {
     int node, arm;
@@ -187,7 +187,7 @@ void Layout::choose_slip_lanes() {
         std::any_of(node.arms.begin(), node.arms.end(), [](const Arm& arm) { return arm.direction % 2 == 1; });
     if (!node.is_crossing() || !node.has_lights || has_diagonal || has_ramps(n)) continue;
     for (int i = 0; i < node.degree(); ++i) {
-      // A stem needs its lanes for both directions, and a street that narrows its outermost lane for right turns.
+      // A stem needs its lanes for both directions, and a street that narrows needs its outermost lane for right turns.
       const int straight = straight_on(node, i), lanes = streets_[node.arm(i).street].lanes;
       if (lanes > (straight < 0 ? 1 : streets_[node.arm(straight).street].lanes)) continue;
       if (wrap_to_2pi(node.arm(i + 1).heading - node.arm(i).heading) > degrees(115)) continue;

@@ -14,10 +14,10 @@ constexpr int kSweeps = 2000;
 }  // namespace
 
 void Layout::set_heights() {
-  // The sum of three waves, between 0 and hills_m.
+  // Sum of three waves, between 0 and hills_m.
   constexpr int kWaves = 3;
   struct Wave {
-    Eigen::Vector2d number{0, 0};  // radians a metre along both axes
+    Eigen::Vector2d number{0, 0};  // radians per metre along both axes
     double phase = 0;
   } waves[kWaves];
   for (int i = 0; i < kWaves; ++i) {
@@ -31,8 +31,8 @@ void Layout::set_heights() {
     for (const Wave& wave : waves) sum += std::sin(wave.number.dot(node.position_m) + wave.phase);
     node.z = node.upper_z = options_.hills_m * 0.5 * (1 + sum / kWaves);
   }
-  // Relaxation: repeatedly moves the ends of every street that is too steep towards each other, and the streets of
-  // overpasses apart, until all constraints hold.
+  // Relaxation: repeatedly moves the ends of too steep streets towards each other, and the streets of overpasses apart,
+  // until all constraints hold.
   const auto height = [&](int n, const Street& street) -> double& {
     const bool is_upper =
         nodes_[n].kind == NodeKind::overpass && (street.direction % 4 == 2) == nodes_[n].upper_runs_north;

@@ -1,4 +1,4 @@
-// A motorway around the town: its interchanges, ramps and bends.
+// Motorway around the town: its interchanges, ramps and bends.
 #include <algorithm>
 #include <array>
 
@@ -12,11 +12,11 @@ constexpr double kMotorwayDistance_m = 110;  // from the outermost crossings
 constexpr double kTerminal_m = 45;           // from the motorway to the crossings where its ramps end
 constexpr double kFork_m = 150;              // from the overpass to the forks
 constexpr double kReach_m = 275;             // from the overpass to the bends: a fork, and half of the bend
-constexpr double kGore_m = 1.5;              // between the motorway and a ramp that has left it
+constexpr double kGore_m = 1.5;              // between the motorway and a ramp after it has left the motorway
 
 Eigen::Vector2d unit(int direction) { return Eigen::Vector2d(kStepX[direction], kStepY[direction]); }
 
-/// The direction of the inner carriageway on that side of the town: clockwise, for traffic keeps right.
+/// Direction of the inner carriageway on this side of the town: clockwise, because traffic keeps right.
 constexpr int along(int side) { return (side + 6) % kNumDirections; }
 
 }  // namespace
@@ -36,7 +36,8 @@ void Layout::add_ramp(int from, int to, int direction, int end_direction, int th
   (nodes_[from].kind == NodeKind::fork ? ramp.start_offset_m : ramp.end_offset_m) = offset_m;
 }
 
-/// A diamond: a connector from the town under the motorway, a crossing of it with the ramps of each carriageway.
+/// Adds a diamond interchange: a connector from the town under the motorway, which crosses the ramps of each
+/// carriageway.
 Interchange Layout::add_interchange(int border_node, int side, double motorway_m, int through_lanes) {
   const int forward = along(side), back = opposite(forward);
   const Eigen::Vector2d origin = nodes_[border_node].position_m;
@@ -48,7 +49,7 @@ Interchange Layout::add_interchange(int border_node, int side, double motorway_m
   nodes_[added.overpass].kind = NodeKind::overpass;
   nodes_[added.overpass].upper_runs_north = forward % 4 == 2;
 
-  int town_lanes = 1;  // of the street that the connector continues
+  int town_lanes = 1;  // lanes of the street that the connector continues
   for (const int street : streets_at(border_node)) {
     if (streets_[street].direction % 4 == side % 4) town_lanes = streets_[street].lanes;
   }
@@ -60,7 +61,7 @@ Interchange Layout::add_interchange(int border_node, int side, double motorway_m
   connect(border_node, inner, std::min(town_lanes, 2));
   connect(inner, added.overpass, 1);
   connect(added.overpass, outer, 1);
-  // At forks ramps have the odd directions next to the motorway's.
+  // At forks, ramps have the odd directions next to the motorway's.
   const auto turned = [](int direction, int steps) { return (direction + steps) % kNumDirections; };
   add_ramp(added.entry_fork, inner, turned(forward, 7), back, through_lanes);
   add_ramp(inner, added.exit_fork, forward, turned(back, 1), through_lanes);
@@ -69,7 +70,7 @@ Interchange Layout::add_interchange(int border_node, int side, double motorway_m
   return added;
 }
 
-/// Interchanges are on opposite sides of the town, each behind a crossing that is no corner of the grid.
+/// Adds interchanges on opposite sides of the town, each behind a crossing that is not a corner of the grid.
 void Layout::add_motorway() {
   if (draw(kMotorway, 0).uniform() >= static_cast<float>(options_.motorway)) return;
   constexpr std::array<int, 4> kSides{6, 4, 2, 0};  // clockwise from the south
@@ -101,12 +102,12 @@ void Layout::add_motorway() {
     }
   }
 
-  std::array<int, 4> corners{};  // corner k ends side k
+  std::array<int, 4> corners{};  // corner k is the end of side k
   for (std::size_t k = 0; k < 4; ++k) {
     const std::size_t next = (k + 1) % 4;
     corners[k] = add_node(motorway_m[k] * unit(kSides[k]) + motorway_m[next] * unit(kSides[next]));
   }
-  const int through_lanes = 2 + draw(kMotorway, 6).below(2);  // each way at interchanges; one more between them
+  const int through_lanes = 2 + draw(kMotorway, 6).below(2);  // per direction at interchanges; one more between them
   const auto build = [&](int from, int to, int side, int lanes) {
     Street& street = add_street(from, to, along(side));
     street.kind = StreetKind::motorway;

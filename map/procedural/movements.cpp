@@ -4,7 +4,7 @@ namespace pictura::town {
 
 namespace {
 
-/// The movements of traffic that arrives on one arm.
+/// Movements of traffic that arrives on one arm.
 class Approach {
  public:
   Approach(const Layout& layout, const Node& node, int arm)
@@ -28,7 +28,7 @@ class Approach {
 
  private:
   int lanes_of(int arm) const { return layout_.streets()[node_.arm(arm).street].lanes; }
-  /// The arm of an exit: exit 1 is on the right, degree - 1 on the left.
+  /// Returns the arm of an exit: exit 1 is on the right, degree - 1 on the left.
   int arm_at(int exit) const { return (arm_ + exit) % node_.degree(); }
   bool may_leave(int arm) const { return node_.arm(arm).has_departures; }
   void add(int to, int first_in, int first_out, int lanes) {
@@ -38,8 +38,8 @@ class Approach {
   /// Whether no traffic goes straight on into this arm, so that only turns use its lanes.
   bool is_stem(int arm) const { return straight_on(node_, arm) < 0; }
 
-  /// All lanes go straight on, the innermost also turns left and the outermost right. Paths do not cross; a turn into a
-  /// stem may take any lane on its side of the stem.
+  /// Sends all lanes straight on; the innermost also turns left and the outermost right. Paths do not cross; a turn
+  /// into a stem may use any lane on its side of the stem.
   void go_straight(int straight) {
     add(straight, 0, 0, std::min(in_, lanes_of(straight)));
     bool is_left = false;
@@ -58,7 +58,7 @@ class Approach {
     }
   }
 
-  /// From the stem of a T, or an arm between two others: the lanes split into left and right turns.
+  /// Splits the lanes into left and right turns, on the stem of a T or an arm between two others.
   void split_left_and_right() {
     const int left = arm_at(node_.degree() - 1), right = arm_at(1);
     const int to_left = std::min(lanes_of(left), num_left(in_));
@@ -73,7 +73,7 @@ class Approach {
     add(right, in_ - to_right, lanes_of(right) - to_right, to_right);
   }
 
-  /// The motorway's lanes that both sides have go on; where there is one more, it becomes the ramp on its right. A ramp
+  /// Continues the motorway's lanes that both sides have. An additional lane becomes the ramp on its right. A ramp
   /// becomes the outermost lane of the arm on its right.
   void pass_fork(int straight) {
     const int right = arm_at(1);

@@ -1,5 +1,5 @@
-// Roundabouts: a one-way circle in pieces, and at each arm a junction of three connecting roads: along the circle, exit
-// and entry.
+// Construction of roundabouts: a one-way circle in pieces, and at each arm a junction of three connecting roads: along
+// the circle, exit and entry.
 #include "pictura/map/procedural/roundabout_shape.h"
 #include "pictura/map/procedural/town_builder.h"
 
@@ -7,7 +7,7 @@ namespace pictura::town {
 
 namespace {
 
-/// A pose on a circle around the node, in the direction of traffic.
+/// Returns a pose on a circle around the node, in the direction of traffic.
 Pose on_circle(const Node& node, double radius_m, double angle) {
   return {node.position_m + radius_m * direction_of(angle), angle + 0.5 * kPi_rad};
 }
@@ -34,7 +34,7 @@ void TownBuilder::build_roundabout(const Node& node) {
   SectionStyle inside = on_the_circle;
   inside.in_junction = true;
 
-  std::vector<int> pieces;  // of the circle, each after the arm of the same index
+  std::vector<int> pieces;  // pieces of the circle, each after the arm of the same index
   for (int i = 0; i < count; ++i) {
     pieces.push_back(add_road(
         circle_piece(node, radius, entry_angle(i), wrap_to_2pi(exit_angle((i + 1) % count) - entry_angle(i))), node.z,

@@ -1,4 +1,4 @@
-// Traffic lights: one for every approach of a crossing, each with its own controller and phase.
+// Traffic lights of a town: one for every approach of a crossing, each with its own controller and phase.
 #include <cmath>
 #include <limits>
 
@@ -10,7 +10,7 @@ namespace pictura::town {
 namespace {
 
 constexpr double kPostSetback_m = 0.8;  // distance of a post from the kerb
-// Near-side heads: on a post beyond the stop line, or on a mast arm over the lanes, high enough for traffic below.
+// Near-side heads are on a post beyond the stop line, or on a mast arm over the lanes, high enough for traffic below.
 constexpr double kNearPost_m = 3, kNearArm_m = 4, kArmRise_m = 2;
 
 struct SignalPosition {
@@ -24,7 +24,7 @@ double behind_kerb_m(const Street& street) {
 
 SignalPosition position_at(const Pose& pose, double z_offset_m = 0) { return {pose.position_m, z_offset_m}; }
 
-/// Just beyond the stop line: next to a single lane, above several.
+/// Returns the position just beyond the stop line: beside a single lane, above several lanes.
 SignalPosition near_side(const Pose& arriving, const Street& street, bool has_slip) {
   if (street.lanes == 1 && !has_slip) {
     return position_at(moved_forward(offset_right(arriving, behind_kerb_m(street)), kNearPost_m));
@@ -33,7 +33,8 @@ SignalPosition near_side(const Pose& arriving, const Street& street, bool has_sl
   return position_at(moved_forward(offset_right(arriving, middle_m), kNearArm_m), kArmRise_m);
 }
 
-/// Beyond the junction, between the arms on both sides of the direction of travel, behind the kerbs of both.
+/// Returns the position beyond the junction, between the arms on both sides of the direction of travel, behind both
+/// kerbs.
 SignalPosition far_side_between(const Layout& layout, const Node& node, int arm) {
   const double forward = node.arm(arm).heading + kPi_rad;
   double nearest = 0.5 * kPi_rad;

@@ -1,4 +1,4 @@
-// Builds streets and bends, and links the lanes of roads.
+// Construction of streets and bends, and of the links between lanes of roads.
 #include "pictura/map/procedural/town_builder.h"
 
 #include <fmt/format.h>
@@ -9,7 +9,7 @@ namespace pictura::town {
 
 namespace {
 
-constexpr double kMinParking_m = 30;  // of a section with parking bays
+constexpr double kMinParking_m = 30;  // minimum length of a section with parking bays
 constexpr double kSlipSection_m = 32, kMaxSlipFraction = 0.48;
 constexpr double kSpaceLength_m = 6, kParkedLength_m = 5, kParkedWidth_m = 2;
 
@@ -110,7 +110,7 @@ void TownBuilder::build_street(int index) {
   sides_at({added, false}) = {parts.back().left, parts.back().right};
 }
 
-/// A road from one arm to another without a junction: a bend, or one of the streets of an overpass.
+/// Builds a road from one arm to another without a junction: a bend, or one of the streets of an overpass.
 void TownBuilder::build_bend(const Node& node, const Arm& from, const Arm& to, double height_m) {
   const StreetKind kind = street_of(from).kind;
   const Side side{.driving = street_of(from).lanes,

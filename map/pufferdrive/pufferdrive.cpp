@@ -15,12 +15,12 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "the files are little-endian");
 
-// Counts beyond these are no scene's: the next layout is tried.
+// Maximum counts of a scene; beyond them, the next layout is tried.
 constexpr int32_t kMaxTracks = kMaxScenarioTracks, kMaxRoads = 1'000'000, kMaxPoints = 1'000'000, kMaxLinks = 10'000;
-constexpr int32_t kMaxGraphLanes = 30'000;  // the matrix has its square
-constexpr int32_t kHistorySteps = 10;       // of WOMD, from which the files are made; they do not say it
+constexpr int32_t kMaxGraphLanes = 30'000;  // the matrix has the square of this size
+constexpr int32_t kHistorySteps = 10;       // of WOMD, from which the files are made; the files do not contain it
 
-/// Reads numbers one after the other. Throws FieldError at the end of the bytes.
+/// Reads numbers in sequence. Throws FieldError at the end of the bytes.
 class Cursor {
  public:
   explicit Cursor(std::string_view bytes) : rest_(bytes) {}
@@ -61,7 +61,7 @@ class Cursor {
   std::string_view rest_;
 };
 
-/// A text that fills its field with zeros.
+/// Returns a text that is padded with zeros.
 std::string text_of(const char* field, std::string_view bytes) {
   std::string text(bytes.substr(0, bytes.find('\0')));
   for (const char letter : text) {
@@ -114,7 +114,7 @@ void add_feature(LoggedScene* scene, int32_t id, LoggedPoints points, bool is_ed
 
 // v1 and v2 ----------------------------------------------------------------------------------------------------------
 
-/// Vehicles, pedestrians and cyclists are 1 to 3 in all layouts.
+/// Converts a type: vehicles, pedestrians and cyclists are 1 to 3 in all layouts.
 TrackType track_type(int32_t type) {
   if (type < 1 || type > 3) fail_field("type", "expected 1 (vehicle), 2 (pedestrian) or 3 (cyclist), got {}", type);
   return static_cast<TrackType>(type);
@@ -161,10 +161,10 @@ void read_old_road(Cursor* cursor, bool has_ids, int32_t index, LoggedScene* sce
   if (has_ids) cursor->integer("scenario_id");
   const int32_t type = cursor->integer("type");
   if (type < lane || type > driveway) fail_field("type", "expected 4 to 10, got {}", type);
-  if (has_ids) cursor->integer("id");  // not unique in files of other sources; its place is
+  if (has_ids) cursor->integer("id");  // not unique in files of other sources; the index is
   const int32_t count = cursor->count("n", kMaxPoints);
   LoggedPoints points = read_points(cursor, count);
-  // Of agents: width, length, height, goal and mark_as_expert; here without a meaning.
+  // Fields of agents (width, length, height, goal and mark_as_expert), which have no meaning here.
   for (int i = 0; i < 6; ++i) cursor->number("width");
   cursor->integer("mark_as_expert");
   switch (type) {
@@ -201,7 +201,7 @@ void read_old(Cursor* cursor, bool is_v2, bool has_name, LoggedScene* scene) {
     within("roads", static_cast<std::size_t>(i), [&] { read_old_road(cursor, is_v2, i, scene); });
   }
   cursor->expect_end();
-  // The index is that of the recording's tracks, of which the file may lack some.
+  // The index refers to the recording's tracks, some of which the file may lack.
   if (scene->sdc_track >= agents || scene->sdc_track < -1) {
     scene->note("indices of the recording's tracks that are no track of the file left out", "sdc_track_index");
     scene->sdc_track = -1;
@@ -385,7 +385,7 @@ void read_new(Cursor* cursor, LoggedScene* scene) {
     if (id < 0 || id >= agents) fail_field("tracks_to_predict", "expected an id in [0, {}), got {}", agents, id);
     scene->predictions.emplace_back(static_cast<int32_t>(id), 0);
   }
-  // The links of scripts that write none are all empty; ends that meet say more.
+  // Scripts that write no links leave them all empty; meeting ends are then more informative.
   scene->has_links = false;
   for (const LoggedLane& lane : scene->lanes) {
     scene->has_links = scene->has_links || !lane.entries.empty() || !lane.exits.empty();

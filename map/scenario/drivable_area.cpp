@@ -9,8 +9,8 @@ namespace pictura {
 namespace {
 
 constexpr float kEdgeCell_m = 10.0f;
-constexpr float kMeet_m = 0.01f;   // ends of pieces of one polyline
-constexpr float kClosed_m = 1.0f;  // polylines whose ends are this near are rings
+constexpr float kMeet_m = 0.01f;   // maximum distance between the ends of consecutive pieces of a polyline
+constexpr float kClosed_m = 1.0f;  // polylines whose ends are this near form rings
 constexpr float kMoving_mps = 0.5f;
 
 Aabb2 box_of(Vec2 a, Vec2 b, float margin_m) {
@@ -24,7 +24,7 @@ SideEdges side_edges_of(const RoadMap& map) {
   SideEdges sides;
   std::vector<SideEdge>& edges = sides.edges;
   std::vector<Aabb2> boxes;
-  std::size_t first = 0;  // of the polyline
+  std::size_t first = 0;  // first piece of the polyline
   const auto finish = [&](std::size_t end) {
     if (end - first > 1 && length((edges[end - 1].b_m - edges[first].a_m).xy()) <= kClosed_m) {
       edges[end - 1].next = static_cast<int32_t>(first);
@@ -60,7 +60,7 @@ bool DrivableArea::touches_edge(const GroundBox& box) const {
     if (touches) return;
     const SideEdge& edge = sides_.edges[index];
     const Vec2 a = (edge.a_m - box.center_m).xy(), way = (edge.b_m - edge.a_m).xy();
-    // The part of the edge that is between both pairs of sides.
+    // Part of the edge that is between both pairs of sides.
     float begin = 0, end = 1;
     for (const auto& [axis, half] : {std::pair{forward, half_length}, std::pair{left, half_width}}) {
       const float at = dot(a, axis), rate = dot(way, axis);

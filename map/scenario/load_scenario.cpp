@@ -20,7 +20,7 @@ namespace pictura {
 
 namespace fs = std::filesystem;
 
-/// What is slow to find of a TFRecord file's records.
+/// Ids of a TFRecord file's records, which are slow to find.
 struct ShardIds {
   std::vector<std::string> of_records;
 };
@@ -39,7 +39,7 @@ SceneFormat format_of(std::string_view path) {
   if (name.ends_with(".json")) return SceneFormat::gpudrive;
   if (name.ends_with(".bin")) return SceneFormat::pufferdrive;
   if (name.ends_with(kSceneFileEnding)) return SceneFormat::own;
-  // Shards of the dataset are called NAME.tfrecord-00000-of-00150; GPUDrive's names of JSON files begin with tfrecord.
+  // Shards of the dataset are named NAME.tfrecord-00000-of-00150; GPUDrive's names of JSON files begin with tfrecord.
   if (name.find(kShard) != std::string::npos) return SceneFormat::womd;
   return SceneFormat::none;
 }
@@ -48,7 +48,7 @@ struct SceneName {
   std::string path, selector;
 };
 
-/// Names with # are files' names where there is such a file.
+/// Splits a name at #. Names of existing files may contain #.
 SceneName split(std::string_view name) {
   std::error_code error;
   const std::size_t mark = name.rfind('#');
@@ -68,13 +68,13 @@ ShardIds scan_ids(const womd::ByteSource& file, const std::vector<womd::RecordPl
     try {
       id = womd::scan_scenario_id(file, place);
     } catch (const FieldError&) {
-      // Reading the record says what is wrong with it.
+      // Reading the record reports its fault.
     }
   }
   return ids;
 }
 
-/// The ids of a shard's records, cached for as long as these have the same lengths and checksums.
+/// Returns the ids of a shard's records, cached while the records have the same lengths and checksums.
 ShardIds find_ids(const std::string& path, const womd::ByteSource& file,
                   const std::vector<womd::RecordPlace>& records) {
   const std::string folder = cache_folder("scenes");
@@ -93,7 +93,7 @@ ShardIds find_ids(const std::string& path, const womd::ByteSource& file,
       if (ids.of_records.size() == records.size()) return ids;
     }
   } catch (const Error&) {
-    // Stale or damaged: made again.
+    // Stale or damaged files are replaced.
   }
   ShardIds ids = scan_ids(file, records);
   try_to_cache(cached, encode_cached(key, [&](FieldWriter* writer) { writer->put(ids); }));
@@ -126,7 +126,7 @@ LoggedScene parse(std::string_view bytes, const std::string& name) {
              kShard);
 }
 
-/// The bytes of the scene's record or file.
+/// Returns the bytes of the scene's record or file.
 std::string read_scene(const SceneRef& scene) {
   if (scene.record >= 0) {
     const womd::FileBytes file(scene.file);
@@ -194,7 +194,7 @@ SceneRef find_scene(const std::string& name) {
   if (const std::optional<uint64_t> number = parse_unsigned(wanted.selector)) {
     if (*number < index.scenes.size()) return index.scenes[*number];
   }
-  // What follows the last whole record may have been the one that was asked for.
+  // The data after the last whole record may have been the requested record.
   fail_usage("{}: expected #0 to #{} or the id of one of its scenes, got #{}{}", wanted.path, index.scenes.size() - 1,
              wanted.selector, index.faults.empty() ? "" : fmt::format(" ({})", index.faults.front()));
 }
@@ -203,7 +203,7 @@ Scenario load_scenario(const SceneRef& scene, SceneReport* report_out) {
   SceneReport unused;
   SceneReport& report = report_out ? *report_out : unused;
   report = {};
-  // What we wrote ourselves is as quickly read as the cache.
+  // Native files are as fast to read as the cache.
   if (format_of(scene.file) == SceneFormat::own) return parse_scene_file(read_file(scene.file), scene.file);
   const std::string bytes = read_scene(scene), folder = cache_folder("scenes");
   if (folder.empty()) return import_scene(scene, bytes);

@@ -17,10 +17,10 @@ namespace pictura::conversion {
 
 namespace {
 
-constexpr double kLaneWidth_m = 3.5, kBikeLaneWidth_m = 1.8;        // where nothing is known
-constexpr double kMinHalfWidth_m = 0.5, kMaxHalfWidth_m = 5.0;      // a border farther away is another lane's
-constexpr int32_t kWidthStride = 5;                                 // points of a lane from one measurement to the next
-constexpr double kMeetingEnds_m = 0.1, kMeetingHeading_rad = 1.05;  // ends of lanes that continue each other
+constexpr double kLaneWidth_m = 3.5, kBikeLaneWidth_m = 1.8;        // defaults for unknown widths
+constexpr double kMinHalfWidth_m = 0.5, kMaxHalfWidth_m = 5.0;      // a border farther away belongs to another lane
+constexpr int32_t kWidthStride = 5;                                 // points of a lane between measurements
+constexpr double kMeetingEnds_m = 0.1, kMeetingHeading_rad = 1.05;  // limits for ends of lanes that continue each other
 constexpr double kWideGap_m = 1.0;
 constexpr float kMeetingLevel_m = 1.0f;
 constexpr float kSharedEnd_m = 0.05f;
@@ -38,7 +38,7 @@ double distance_to(const Eigen::Vector2d& p, const LoggedPoints& line) {
   return best;
 }
 
-/// Measures widths from the borders that lanes name.
+/// Measures widths from the borders to which lanes refer.
 class WidthRuler {
  public:
   explicit WidthRuler(Conversion* conversion) : conversion_(conversion) {
@@ -46,7 +46,7 @@ class WidthRuler {
     for (const LoggedEdge& edge : conversion->scene.edges) features_.emplace(edge.id, &edge.points);
   }
 
-  /// The width at every point of a lane; nothing where no border is known.
+  /// Returns the width at every point of a lane; nothing if no border is known.
   std::optional<std::vector<double>> measure(const LoggedLane& lane) {
     if (!lane.widths_m.empty()) return lane.widths_m;
     std::map<std::size_t, double> left, right;  // half widths by point
@@ -83,7 +83,7 @@ class WidthRuler {
     }
   }
 
-  /// Linear between known points, constant beyond them.
+  /// Interpolates linearly between known points; constant beyond them.
   static std::vector<double> filled(const std::map<std::size_t, double>& known, std::size_t count) {
     std::vector<double> widths(count);
     auto next = known.begin();
@@ -110,8 +110,8 @@ double mean_of(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
-/// Gives lanes without borders the mean width of neighbours, else the widths of the lanes before and after, else a
-/// constant.
+/// Sets the widths of lanes without borders: the mean width of neighbours, else the widths of the lanes before and
+/// after, else a constant.
 void complete_widths(Conversion* conversion, std::vector<std::optional<std::vector<double>>>* widths_inout) {
   const LoggedScene& scene = conversion->scene;
   std::unordered_map<int64_t, const std::vector<double>*> measured;
@@ -181,7 +181,7 @@ void append_points(const std::vector<CurvePoint>& points, RoadMap* map, Lane* la
     if (i > 0) s_m += plan_distance_m(points[i - 1].position_m, points[i].position_m);
     double heading = heading_of(i);
     if (i > 0 && i + 1 < points.size()) {
-      // Between the directions of the chords that meet here.
+      // Mean direction of the chords that meet here.
       heading = heading_of(i - 1) + 0.5 * std::remainder(heading - heading_of(i - 1), 2 * std::numbers::pi);
     }
     map->lane_points.push_back({to_vec3(points[i].position_m),
@@ -200,7 +200,7 @@ const LanePoint& end_of(const RoadMap& map, int32_t lane) {
 
 using Links = std::set<std::pair<int32_t, int32_t>>;
 
-/// The links that the file states, from either side.
+/// Returns the links that the file contains, from either side.
 Links stated_links(Conversion* conversion) {
   LoggedScene& scene = conversion->scene;
   const RoadMap& map = conversion->out->map;
@@ -236,7 +236,7 @@ Links stated_links(Conversion* conversion) {
   return links;
 }
 
-/// Links between lanes of which one ends where the other starts, in about its direction.
+/// Returns links between lanes where one ends at the start of the other, in about the same direction.
 Links meeting_links(Conversion* conversion) {
   const RoadMap& map = conversion->out->map;
   std::vector<Aabb2> starts;
@@ -281,7 +281,7 @@ void set_links(const Links& links, RoadMap* map) {
   }
 }
 
-/// The neighbour beside which the lane runs longest, or -1.
+/// Returns the neighbour beside which the lane runs longest, or -1.
 int32_t longest_neighbor(Conversion* conversion, const std::vector<LoggedNeighbor>& neighbors, int32_t own) {
   std::map<int32_t, int64_t> lengths;
   conversion->count_work(10 * neighbors.size());
@@ -297,7 +297,7 @@ int32_t longest_neighbor(Conversion* conversion, const std::vector<LoggedNeighbo
   return best;
 }
 
-/// Neighbours that name each other.
+/// Sets neighbours that refer to each other.
 void set_neighbors(Conversion* conversion) {
   RoadMap& map = conversion->out->map;
   std::vector<int32_t> left(map.lanes.size()), right(map.lanes.size());
@@ -322,7 +322,7 @@ void set_neighbors(Conversion* conversion) {
   }
 }
 
-/// Lanes of no stated type take that of the lanes that they are linked with, where all agree.
+/// Sets the type of lanes without a stated type to that of the linked lanes, where these agree.
 void infer_types(RoadMap* map) {
   std::vector<LaneType> types;
   for (const Lane& lane : map->lanes) {
@@ -405,7 +405,7 @@ void find_junctions(Conversion* conversion) {
   for (const auto& [a, b] : crossings) {
     for (const int32_t lane : {a, b}) map.lanes[lane].in_junction = true;
   }
-  // Lanes that cross are of one junction.
+  // Lanes that cross belong to one junction.
   std::vector<int32_t> group(map.lanes.size());
   std::iota(group.begin(), group.end(), 0);
   const auto first_of = [&](int32_t lane) {
@@ -422,7 +422,7 @@ void find_junctions(Conversion* conversion) {
     group[std::max(a, b)] = std::min(a, b);
   };
   for (const auto& [a, b] : crossings) join(a, b);
-  // So are those that fork or merge.
+  // Lanes that fork or merge do too.
   for (const Lane& lane : map.lanes) {
     for (const IndexRange range : {lane.successors, lane.predecessors}) {
       int32_t before = -1;

@@ -1,4 +1,4 @@
-// What is drawn of a scenario's map besides lanes: road edges, marks, crosswalks and signs; then its counts.
+// Drawn parts of a scenario's map besides lanes: road edges, marks, crosswalks and signs; then its counts.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -15,12 +15,13 @@ namespace {
 constexpr float kMarkWidth_m = 0.15f;
 constexpr double kDash_m = 3.0, kDashPeriod_m = 12.0;
 constexpr double kStripeOffset_m = 0.15;  // of the two stripes of a double line from its middle
-/// Edges are dense; longer pieces are gaps of the recording, which are kept unless they cross a lane.
+/// Minimum length of gaps. Edges are dense; longer pieces are gaps of the recording, which are kept unless they cross a
+/// lane.
 constexpr double kJump_m = 2.0;
 constexpr float kNearLane_m = 6.0f;
 constexpr int kFewestVotes = 20;
 constexpr float kNearSign_m = 10.0f;
-constexpr double kCell_m = 10.0;  // of segments_of()'s grid
+constexpr double kCell_m = 10.0;  // cell size of segments_of()'s grid
 
 bool is_driven(const Lane& lane) { return lane.type == LaneType::driving; }
 bool is_any(const Lane&) { return true; }
@@ -32,7 +33,7 @@ struct NearLane {
   Vec2 to_point, direction;
 };
 
-/// The nearest lane segment within reach, on the level of p.
+/// Returns the nearest lane segment within reach, on the level of p.
 NearLane nearest_lane(Conversion* conversion, const LaneSegments& lanes, Vec3 p, float reach_m) {
   NearLane best;
   visit_items(lanes.grid.view(), box_around(p, reach_m), [&](std::size_t item) {
@@ -48,7 +49,7 @@ NearLane nearest_lane(Conversion* conversion, const LaneSegments& lanes, Vec3 p,
   return best;
 }
 
-/// Whether most edges near lanes have the lane on their right, against what is usual.
+/// Whether most edges near lanes have the lane on their right, contrary to the convention.
 bool are_reversed(Conversion* conversion, const LaneSegments& lanes,
                   const std::vector<std::vector<CurvePoint>>& lines) {
   int left = 0, right = 0;
@@ -67,7 +68,7 @@ bool are_reversed(Conversion* conversion, const LaneSegments& lanes,
 
 bool crosses_a_lane(Conversion* conversion, const LaneSegments& lanes, Vec3 a, Vec3 b) {
   const Aabb2 box{{min_of(a.x, b.x), min_of(a.y, b.y)}, {max_of(a.x, b.x), max_of(a.y, b.y)}};
-  // Long pieces pass many cells.
+  // Long pieces pass through many cells.
   const double cells = ((box.high.x - box.low.x) / kCell_m + 1) * ((box.high.y - box.low.y) / kCell_m + 1);
   conversion->count_work(static_cast<std::size_t>(cells));
   bool crosses = false;
@@ -82,7 +83,7 @@ bool crosses_a_lane(Conversion* conversion, const LaneSegments& lanes, Vec3 a, V
 void append_marking(Conversion* conversion, std::vector<CurvePoint> points, MarkColor color, bool broken) {
   RoadMap* map = &conversion->out->map;
   if (conversion->scene.is_stated) {
-    // So that the stripe or dash can be stated as a line.
+    // Rounded so that the stripe or dash can be stated as a line.
     for (CurvePoint& point : points) point.position_m = conversion->rounded(point.position_m);
     points = cut_into_pieces(conversion, points, "a stripe or dash");
   }
@@ -94,7 +95,7 @@ void append_marking(Conversion* conversion, std::vector<CurvePoint> points, Mark
   map->markings.push_back(marking);
 }
 
-/// The line moved to its left in plan; corners are mitred, sharp ones at most to twice the offset.
+/// Returns the line moved to its left in plan; corners are mitred, sharp corners by at most twice the offset.
 std::vector<CurvePoint> moved_left(const std::vector<CurvePoint>& line, double offset_m) {
   std::vector<CurvePoint> moved = line;
   const auto normal_of = [&](std::size_t i) {
@@ -112,7 +113,7 @@ std::vector<CurvePoint> moved_left(const std::vector<CurvePoint>& line, double o
   return moved;
 }
 
-/// The part of a line between two lengths along it.
+/// Returns the part of a line between two lengths along it.
 std::vector<CurvePoint> part_of(const std::vector<CurvePoint>& line, double begin_m, double end_m) {
   std::vector<CurvePoint> part;
   double s_m = 0;
@@ -130,7 +131,7 @@ std::vector<CurvePoint> part_of(const std::vector<CurvePoint>& line, double begi
   return part;
 }
 
-/// Dashes in the middle of the line; a short line is one dash.
+/// Appends dashes in the middle of the line; a short line is one dash.
 void append_dashes(Conversion* conversion, const std::vector<CurvePoint>& line, MarkColor color) {
   double length_m = 0;
   for (std::size_t i = 1; i < line.size(); ++i) {
@@ -174,7 +175,7 @@ void make_edges(Conversion* conversion) {
     }
     finish();
   }
-  // Our edges have the road on their right.
+  // Edges of a RoadMap have the road on their right.
   bool is_reversed = are_reversed(conversion, lanes, lines);
   if (is_reversed && scene.is_stated) {
     scene.note("edges with lanes on their right, though the road is stated to be on their left", "the first edge");
@@ -222,7 +223,7 @@ void make_markings(Conversion* conversion) {
         append_dashes(conversion, right(), MarkColor::yellow);
         break;
       case LoggedLineType::passing_double_yellow:
-        // The format does not say on which side passing is allowed.
+        // The format does not contain the side on which passing is allowed.
         solid(left(), MarkColor::yellow);
         append_dashes(conversion, right(), MarkColor::yellow);
         break;

@@ -1,4 +1,4 @@
-// The stages' order, and the parts that all stages share; then tracks and lights.
+// Order of the stages, and their shared parts; then tracks and lights.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -15,9 +15,9 @@ namespace conversion {
 namespace {
 
 constexpr float kSegmentCell_m = 10.0f;
-// Stop points this near, of lanes that start in about one direction, are one light's.
+// Stop points this near, of lanes that start in about one direction, belong to one light.
 constexpr double kSameStopPoint_m = 0.5, kSameHeading_rad = 0.5;
-constexpr double kStatedPiece_m = 9.99;  // instead of kMaxPiece_m
+constexpr double kStatedPiece_m = 9.99;  // used instead of kMaxPiece_m
 
 float wrapped(double heading_rad) { return static_cast<float>(std::remainder(heading_rad, 2 * std::numbers::pi)); }
 
@@ -71,12 +71,12 @@ std::vector<CurvePoint> resampled(Conversion* conversion, const LoggedPoints& po
   if (line.size() < 2) return {};
   if (scene.tolerance_m > 0) {
     std::vector<CurvePoint> thinned;
-    // Thinning tests each point against the others of its piece, of which a straight one has some twenty.
+    // Thinning tests each point against the others of its piece; a straight piece has some twenty.
     conversion->count_work(line.size() * 20);
     for (const std::size_t index : thin_polyline(line, scene.tolerance_m, kMaxPiece_m)) thinned.push_back(line[index]);
     line = std::move(thinned);
   }
-  // The ends of what was left out may be duplicates.
+  // The ends of omitted parts may be duplicates.
   if (scene.is_stated) line = cut_into_pieces(conversion, line, what);
   return line;
 }
@@ -173,7 +173,7 @@ void make_tracks(Conversion* conversion) {
       }
       Eigen::Vector3d p = conversion->rounded(conversion->from_origin(state.center_m));
       check_radius(*conversion, fmt::format("{}: step {}", place, step), p);
-      // Recorded sizes vary along a track: the foot is below the centre by half of the height at that step.
+      // Recorded sizes vary along a track: the bottom face is below the centre by half of the height at that step.
       if (!scene.is_stated) p.z() -= 0.5 * (state.height_m > 0 ? state.height_m : last->height_m);
       out.states.push_back({to_vec3(p),
                             wrapped(state.heading_rad),
@@ -208,15 +208,15 @@ void make_tracks(Conversion* conversion) {
 
 namespace {
 
-// One light, or several whose lines coincide and that always show the same.
+// One light, or several lights whose lines coincide and that always have the same state.
 struct FoundLight {
   std::vector<int32_t> lanes;
   const LoggedLight* light;
-  double heading_rad;  // of the traffic that it stops
-  LanePoint start;     // of its widest lane
+  double heading_rad;  // heading of the controlled traffic
+  LanePoint start;     // start of its widest lane
 };
 
-// Those of a light's lanes that it may hold.
+// Returns the lanes of a light that it may control.
 std::vector<int32_t> held_lanes(const LoggedLight& light, Conversion* conversion) {
   LoggedScene& scene = conversion->scene;
   std::vector<int32_t> lanes;
@@ -234,7 +234,7 @@ std::vector<int32_t> held_lanes(const LoggedLight& light, Conversion* conversion
 }
 
 FoundLight find_light(const RoadMap& map, const LoggedLight& light, std::vector<int32_t> lanes) {
-  // The mean direction in which traffic comes to the line: of the lanes before, else of the lane itself.
+  // Mean direction of traffic at the line: of the preceding lanes, else of the lane itself.
   Eigen::Vector2d direction(0, 0);
   const auto add_heading = [&direction](double heading) {
     direction += Eigen::Vector2d(std::cos(heading), std::sin(heading));
@@ -260,7 +260,7 @@ bool are_one(const FoundLight& a, const FoundLight& b) {
          std::abs(std::remainder(a.heading_rad - b.heading_rad, 2 * std::numbers::pi)) < kSameHeading_rad;
 }
 
-// Its line, from left to right, without its lanes.
+// Returns the light with its line from left to right, without its lanes.
 RecordedLight recorded_light(const FoundLight& found, const Conversion& conversion) {
   RecordedLight recorded;
   recorded.stop_heading_rad = wrapped(found.heading_rad);

@@ -1,4 +1,4 @@
-// The inverse of make_scenario(): a scenario as a scene that a program could have stated.
+// Inverse of make_scenario(): a scenario as a scene that a program could have stated.
 #include <algorithm>
 #include <charconv>
 #include <numbers>
@@ -11,7 +11,7 @@ namespace pictura {
 
 namespace {
 
-constexpr std::string_view kStopSign = "206";  // in OpenDRIVE's catalogue
+constexpr std::string_view kStopSign = "206";  // code in OpenDRIVE's catalogue
 
 class Statement {
  public:
@@ -85,7 +85,7 @@ class Statement {
         state.valid = valid[step] != 0;
         if (!state.valid) continue;
         state.center_m = in_file(states[step].position_m);
-        // The float next to pi is beyond it, and would be wrapped.
+        // The float next to pi exceeds pi and would be wrapped.
         state.heading_rad = std::clamp(double{states[step].heading_rad}, -std::numbers::pi, std::numbers::pi);
         state.velocity_x_mps = double{states[step].velocity_mps.x};
         state.velocity_y_mps = double{states[step].velocity_mps.y};
@@ -138,7 +138,7 @@ class Statement {
     }
   }
 
-  /// Joins the pieces that follow each other; ours have the road on their right.
+  /// Joins consecutive pieces; edges of a RoadMap have the road on their right.
   void state_edges() {
     for (std::size_t i = 0; i < map_.road_edges.size(); ++i) {
       const RoadEdge& edge = map_.road_edges[i];

@@ -45,13 +45,13 @@ class Decoder {
         case 11:
           within("tracks_to_predict", scene_.predictions.size(), [&] { decode_prediction(fields.bytes()); });
           break;
-        default: break;  // lidar and camera tokens, and what later versions add
+        default: break;  // lidar and camera tokens, and fields of later versions
       }
     }
     finish();
   }
 
-  /// A scenario_id, which may be any printable text of some length.
+  /// Returns a scenario_id, which may be any printable text of limited length.
   static std::string checked_id(std::string_view bytes) {
     constexpr std::size_t kMaxId = 256;
     if (bytes.size() > kMaxId) fail_field("", "expected at most {} bytes, got {}", kMaxId, bytes.size());
@@ -115,7 +115,7 @@ class Decoder {
         default: break;
       }
     }
-    if (!state.valid) return;  // carries remains of an estimate at most
+    if (!state.valid) return;  // contains at most remains of an estimate
     checked_number("center_x", state.center_m.x());
     checked_number("center_y", state.center_m.y());
     checked_number("center_z", state.center_m.z());
@@ -186,7 +186,7 @@ class Decoder {
   }
 
   void decode_feature(std::string_view bytes) {
-    // The id may come after the part that it names; of several parts the last one counts.
+    // The id may come after the part to which it belongs; of several parts, the last counts.
     int64_t id = 0;
     uint32_t kind = 0;
     std::string_view part;
@@ -342,7 +342,7 @@ class Decoder {
     }
   }
 
-  /// What several fields decide together.
+  /// Checks and sets values that depend on several fields.
   void finish() {
     if (timestamps_.empty()) fail_field("timestamps_seconds", "expected at least one, got none");
     scene_.num_steps = static_cast<int32_t>(timestamps_.size());
@@ -396,7 +396,7 @@ class Decoder {
   int32_t sdc_index_ = 0;
 };
 
-/// The scenario_id of a record that may be faulty elsewhere, for messages; empty where none is found.
+/// Returns the scenario_id of a record that may be faulty elsewhere, for messages; empty if none is found.
 std::string id_in(std::string_view payload) {
   std::string id;
   try {
@@ -405,7 +405,7 @@ std::string id_in(std::string_view payload) {
       if (fields.field() == 5) id = Decoder::checked_id(fields.bytes());
     }
   } catch (const FieldError&) {
-    // Of what ends the message early, the caller knows already.
+    // The caller already knows the fault that ends the message early.
   }
   return id;
 }
