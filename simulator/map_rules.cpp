@@ -21,14 +21,14 @@
 namespace pictura {
 namespace {
 
-/// Observed pieces follow curves within this distance, so that junctions do not fill the observation with short pieces.
+/// Tolerance of observed pieces along curves, so that junctions do not fill the observation with short pieces.
 constexpr float kObservedChordError_m = 0.25f;
 constexpr float kNearCell_m = 10.0f;
-constexpr float kCellRadius_m = 0.5f * 1.41421356f * kNearCell_m + 0.1f;  // half a diagonal, and room for rounding
+constexpr float kCellRadius_m = 0.5f * 1.41421356f * kNearCell_m + 0.1f;  // half a diagonal, plus room for rounding
 constexpr float kLookupCell_m = 5.0f;
-/// On open maps waypoints lie this far before the end of the way.
+/// Distance of waypoints from the end of the way on open maps.
 constexpr float kRouteEndMargin_m = 5.0f;
-/// Agents stay this close to drivable lanes; cells farther out list nothing to observe.
+/// Maximum distance of agents from drivable lanes; cells farther out list nothing to observe.
 constexpr float kObserverReach_m = 15.0f;
 
 Aabb2 box_of_segment(Vec2 a, Vec2 b, float reach_m) {
@@ -43,11 +43,11 @@ float distance_to_segment(Vec2 p, Vec2 a, Vec2 b) {
   return length(p - a - way * t);
 }
 
-/// How observed pieces are cut out of polylines.
+/// Rules for cutting observed pieces out of polylines.
 struct PieceRule {
-  float chord_error_m;  // points that lie so near to a straight line are left out of it
-  float longest_m;      // what is longer is cut evenly
-  bool joins_all;       // lines of any length are made, and then cut; else lines end where a piece must
+  float chord_error_m;  // points within this distance of a straight line are omitted
+  float longest_m;      // longer pieces are cut evenly
+  bool joins_all;       // lines of any length are made and then cut; otherwise lines end where a piece must
 };
 
 PieceRule piece_rule(float observed_span_m) {
@@ -56,7 +56,7 @@ PieceRule piece_rule(float observed_span_m) {
   return {kObservedChordError_m, kMaxPiece_m, false};
 }
 
-/// Cuts a polyline into observed pieces of that extent.
+/// Cuts a polyline into observed pieces with this extent.
 void append_pieces(const std::vector<Vec3>& points, float extent, const PieceRule& rule,
                    std::vector<ObservedPiece>* pieces_out) {
   for (size_t begin = 0; begin + 1 < points.size();) {
@@ -82,9 +82,9 @@ void append_pieces(const std::vector<Vec3>& points, float extent, const PieceRul
   }
 }
 
-/// `open` is null on maps with endless roads and recorded scenes.
+/// Adds lanes. `open` is null on maps with endless roads and on recorded scenes.
 void add_lanes(const RoadMap& map, const PieceRule& rule, const OpenLanes* open, MapRules* out) {
-  bool starts_in_junctions = open != nullptr;  // where agents can start nowhere else
+  bool starts_in_junctions = open != nullptr;  // true if agents can start nowhere else
   for (size_t index = 0; index < map.lanes.size() && starts_in_junctions; ++index) {
     starts_in_junctions = map.lanes[index].in_junction || !is_open(map, *open, index);
   }
@@ -157,7 +157,8 @@ void add_lanes(const RoadMap& map, const PieceRule& rule, const OpenLanes* open,
   }
 }
 
-/// Exits, and entries with their turns: entries within kSharedTurn_m of each other share one, also by way of others.
+/// Adds exits, and entries with their turns: entries within kSharedTurn_m of each other, directly or transitively,
+/// share a turn.
 void add_mouths(const OpenLanes& open, MapRules* out) {
   constexpr float kSharedTurn_m = 5.0f;
   for (const LaneMouth& exit : open.exits) {
@@ -186,7 +187,7 @@ void add_barriers(const RoadMap& map, Span<const WallFace> walls, const PieceRul
   };
   for (const RoadEdge& edge : map.road_edges) {
     out->edges.push_back({edge.a_m.xy(), edge.b_m.xy(), 0.5f * (edge.a_m.z + edge.b_m.z)});
-    // Consecutive edges that share a point make one line.
+    // Consecutive edges with a common point form one line.
     if (line.empty() || line.back().x != edge.a_m.x || line.back().y != edge.a_m.y) {
       finish_line();
       line.push_back(edge.a_m);
@@ -228,10 +229,10 @@ Grid cells_of(const std::vector<Item>& items, ToBox&& to_box) {
   return Grid(boxes, kLookupCell_m);
 }
 
-/// The spot outside the kerb nearest to p, if that is within reach_m. Right-hand traffic: the kerb is to the right of
-/// the cars next to it, and a road edge has the road on its own right, so the cars point against it.
+/// Adds the spot outside the kerb nearest to p, if it is within reach_m. Under right-hand traffic, the kerb is to the
+/// right of the cars beside it. A road edge has the road on its own right, so the cars point against the edge.
 void add_kerb_spot(Vec3 p, float reach_m, MapRules* out) {
-  const Barrier* nearest = nullptr;  // the first of equally near ones
+  const Barrier* nearest = nullptr;  // the first among equally near barriers
   float best_m = reach_m;
   visit_items(out->edge_cells.view(), box_of_segment(p.xy(), p.xy(), reach_m), [&](size_t item) {
     const Barrier& edge = out->edges[item];
@@ -251,8 +252,8 @@ void add_kerb_spot(Vec3 p, float reach_m, MapRules* out) {
   out->parking_spots.push_back({{at.x, at.y, p.z}, std::atan2(-along.y, -along.x), left_normal(along)});
 }
 
-/// Parking spaces, and outside junctions a spot every few metres of parking lanes and of the kerbs along shoulders and
-/// sidewalks.
+/// Adds parking spaces and, outside junctions, a spot every few metres of parking lanes and of the kerbs along
+/// shoulders and sidewalks.
 void add_parking_spots(const RoadMap& map, MapRules* out) {
   constexpr float kSpacing_m = 7.0f;
   for (const ParkingSpace& space : map.parking_spaces) {
@@ -279,7 +280,7 @@ void add_parking_spots(const RoadMap& map, MapRules* out) {
   }
 }
 
-/// Takes the record, and with it how large and how fast anything on the map can be.
+/// Stores the record, and the maximum size and speed of its agents.
 void add_record(MapRecord record, MapRules* out) {
   constexpr float kRoom = 1.0f + 1e-6f;  // so that rounding leaves the largest box within the radius
   out->max_box_radius_m = kMaxBoxRadius_m;
@@ -295,7 +296,7 @@ void add_record(MapRecord record, MapRules* out) {
   out->record = std::move(record);
 }
 
-/// What lies within range of a cell's centre, nearest first.
+/// Items within range of a cell's centre, nearest first.
 struct Neighbors {
   std::vector<int32_t> items;
   std::vector<float> distance_m;
@@ -304,15 +305,15 @@ struct Neighbors {
   size_t size() const { return items.size(); }
 };
 
-/// Of the points, those that `cells` has within range of a place; of two that are equally far, the lower number first.
-/// `keys` is memory for that.
+/// Finds the points in `cells` within range of a place, nearest first; of two equally far points, the lower index is
+/// first. `keys` is scratch memory.
 void find_neighbors(const std::vector<Vec2>& points, const GridView& cells, Vec2 center, float range_m,
                     std::vector<uint64_t>* keys, Neighbors* out) {
   keys->clear();
   const Vec2 reach{range_m, range_m};
   visit_items(cells, {center - reach, center + reach}, [&](size_t item) {
     const float distance = length(points[item] - center);
-    // Floats that are not negative are ordered as their bits are: one number to compare, which is much faster.
+    // Nonnegative floats have the order of their bits, so that one integer comparison suffices, which is much faster.
     if (distance <= range_m) keys->push_back(uint64_t{std::bit_cast<uint32_t>(distance)} << 32 | item);
   });
   std::sort(keys->begin(), keys->end());
@@ -330,9 +331,9 @@ void find_neighbors(const std::vector<Vec2>& points, const GridView& cells, Vec2
   }
 }
 
-/// For every cell that an observer may stand in, the items whose points lie within range of its centre, nearest first,
-/// go through `append(neighbors, &lists)`, which appends lists_per_cell lists. Throws Error naming the map when
-/// they would take more than a gigabyte: so they also fit their 32-bit ends.
+/// Makes lists for every cell that may contain an observer. The items whose points lie within range of the cell's
+/// centre, nearest first, are passed to `append(neighbors, &lists)`, which appends lists_per_cell lists. Throws Error
+/// naming the map when the lists would take more than a gigabyte, which also ensures that they fit their 32-bit ends.
 template <typename Append>
 CellLists lists_by_distance(const MapRules& map, const std::string& map_name, const std::vector<Vec2>& points,
                             float range_m, int lists_per_cell, Append&& append) {
@@ -367,7 +368,7 @@ CellLists lists_by_distance(const MapRules& map, const std::string& map_name, co
                                                 static_cast<float>(cell / static_cast<size_t>(lists.num_x)) + 0.5f} *
                                                kNearCell_m;
       find_neighbors(points, point_cells, center, range_m, &keys, &found);
-      // Before they are made, since one cell may need all of them.
+      // Checked before they are made, since one cell may need all of them.
       PICTURA_CHECK(lists.items.size() + found.size() * static_cast<size_t>(lists_per_cell) <= kMaxItems,
                     "map {}: expected lists of what is near of at most {} entries in all, got more: too much lies "
                     "within {} m of ({}, {})",
@@ -382,13 +383,13 @@ CellLists lists_by_distance(const MapRules& map, const std::string& map_name, co
 
 void end_list(CellLists* lists_inout) { lists_inout->begin.push_back(static_cast<int32_t>(lists_inout->items.size())); }
 
-/// Which neighbours, none farther than the far corner of what is in sight, may be in the sight of somebody in the cell
-/// who heads between two directions, `right` and, less than half a turn counter-clockwise of it, `left`: 1, or 0; never
-/// wrong about one that is. Most of what compiling a map takes, so without angles and branches: conditions are integers
-/// since compilers do several at once only then.
+/// Determines the neighbours that an observer in the cell may see with a heading between two directions: `right` and,
+/// less than half a turn counter-clockwise of it, `left`. The result is 1 or 0, and never 0 for a visible neighbour.
+/// Neighbours must not be farther than the far corner of the visible range. This takes most of the time of compiling a
+/// map, so it uses neither angles nor branches. Conditions are integers because compilers vectorize only these.
 void find_seen(const Neighbors& neighbors, Vec2 right, Vec2 left, std::vector<int32_t>* seen_out) {
   constexpr float most_behind_m = kRoadBehind_m + kCellRadius_m, most_aside_m = kRoadAside_m + kCellRadius_m;
-  // A piece behind comes into the window sideways too, as the heading turns away from it: keep what is that close.
+  // A piece behind also enters the window sideways as the heading turns away from it, so pieces this close are kept.
   const float close_m = std::sqrt(square(most_behind_m) + square(most_aside_m));
   const size_t count = neighbors.size();
   seen_out->resize(count);
@@ -398,8 +399,8 @@ void find_seen(const Neighbors& neighbors, Vec2 right, Vec2 left, std::vector<in
     const float x_m = xs[i], y_m = ys[i], distance_m = distances[i];
     const float along_right_m = x_m * right.x + y_m * right.y, along_left_m = x_m * left.x + y_m * left.y;
     const float left_of_right_m = right.x * y_m - right.y * x_m, right_of_left_m = left.y * x_m - left.x * y_m;
-    // From the heading that turns most towards it. How far ahead it is there says nothing: as the heading turns away,
-    // a piece beyond the window's end comes into the far corner.
+    // Lateral distance at the heading nearest to the direction of the piece. The distance ahead at that heading is
+    // irrelevant: as the heading turns away, a piece beyond the window's end enters the far corner.
     const float ahead_m = along_right_m > along_left_m ? along_right_m : along_left_m;
     const float aside_m = std::fabs(along_right_m > along_left_m ? left_of_right_m : right_of_left_m);
     const int32_t is_between = int32_t{left_of_right_m >= 0} & int32_t{right_of_left_m >= 0};
@@ -409,7 +410,7 @@ void find_seen(const Neighbors& neighbors, Vec2 right, Vec2 left, std::vector<in
   }
 }
 
-/// Where a sector of headings begins, as cell_and_sector_at() counts them; see Place.
+/// First direction of a sector of headings, in the order of cell_and_sector_at(); see Place.
 Vec2 sector_begin(int sector) {
   const float heading_rad = -kPi + static_cast<float>(sector) * (kTwoPi / kSectors);
   return {std::cos(heading_rad), std::sin(heading_rad)};
@@ -428,7 +429,7 @@ CellLists lists_of_pieces(const MapRules& map, const std::string& map_name, cons
                            [&seen](const Neighbors& neighbors, CellLists* lists) {
                              for (int sector = 0; sector < kSectors; ++sector) {
                                find_seen(neighbors, sector_begin(sector), sector_begin(sector + 1), &seen);
-                               // Each is written, and the next one over it where it is not seen.
+                               // Each neighbour is written, and the next one overwrites it if it is not visible.
                                size_t end = lists->items.size();
                                lists->items.resize(end + neighbors.size());
                                for (size_t i = 0; i < neighbors.size(); ++i) {
@@ -441,8 +442,8 @@ CellLists lists_of_pieces(const MapRules& map, const std::string& map_name, cons
                            });
 }
 
-/// How far beyond an end of a stop line the road's lanes of oncoming traffic reach: as far as the line holds anybody,
-/// but not past lanes that lead its own way, which other lines hold, or none.
+/// Distance beyond an end of a stop line that is covered by lanes of oncoming traffic: as far as the line controls
+/// traffic, but not past lanes in its own direction, which other lines or none control.
 float oncoming_beyond_m(const MapView& map, const StopLine& line, Vec2 outward) {
   constexpr float kStep_m = 0.25f;
   float beyond_m = 0;
@@ -463,8 +464,8 @@ float oncoming_beyond_m(const MapView& map, const StopLine& line, Vec2 outward) 
   return beyond_m;
 }
 
-/// Whatever can be among the nearest kMaxControls from anywhere in the cell: as far from its centre as the last of them
-/// and a cell's diagonal.
+/// Makes lists of all stop lines that can be among the nearest kMaxControls from anywhere in a cell: up to the distance
+/// of the last of these from the cell's centre plus the cell's diagonal.
 CellLists lists_of_stop_lines(const MapRules& map, const std::string& map_name) {
   std::vector<Vec2> middles;
   for (const StopLine& line : map.stop_lines) middles.push_back(line.middle_m.xy());

@@ -10,7 +10,7 @@
 namespace pictura {
 namespace {
 
-/// What is neither pedestrian nor cyclist is met as vehicles are.
+/// Returns the class of a track; tracks other than pedestrians and cyclists are treated as vehicles.
 AgentClass class_of(TrackType type) {
   switch (type) {
     case TrackType::pedestrian: return AgentClass::pedestrian;
@@ -19,7 +19,7 @@ AgentClass class_of(TrackType type) {
   }
 }
 
-/// A recorded box's centre as the reference point of its class.
+/// Converts a recorded box's centre to the reference point of its class.
 RecordedState recorded_state(const RecordedTrack& track, const TrackState& state) {
   const SinCos heading = sincos_of(state.heading_rad);
   const float ahead_m = reference_to_center(class_of(track.type), track.length_m);
@@ -29,7 +29,7 @@ RecordedState recorded_state(const RecordedTrack& track, const TrackState& state
           1};
 }
 
-/// The state of a track at a step at which it is valid.
+/// Returns the state of a track at a step at which it is valid.
 RecordedState recorded_state(const Scenario& scenario, size_t track, size_t step) {
   const size_t at = track * static_cast<size_t>(scenario.num_steps) + step;
   if (scenario.driven.empty()) return recorded_state(scenario.tracks[track], scenario.states[at]);
@@ -38,7 +38,7 @@ RecordedState recorded_state(const Scenario& scenario, size_t track, size_t step
 }
 
 MapRecord record_of(const Scenario& scenario, int32_t start_step) {
-  constexpr float kMaxRecordedRadius_m = 25.0f;  // every barrier so near to a box is looked at
+  constexpr float kMaxRecordedRadius_m = 25.0f;  // all barriers this near to a box are tested
   MapRecord record{.num_steps = scenario.num_steps - start_step, .dt_s = scenario.dt_s};
   for (size_t i = 0; i < scenario.tracks.size(); ++i) {
     const RecordedTrack& track = scenario.tracks[i];
@@ -56,7 +56,7 @@ MapRecord record_of(const Scenario& scenario, int32_t start_step) {
   return record;
 }
 
-/// Who stops at a flashing red light may drive on: it is no red one.
+/// Converts a recorded light state. A flashing red light is not red, because traffic may proceed after stopping.
 LightState light_state(RecordedLightState state) {
   switch (state) {
     case RecordedLightState::stop:
@@ -83,7 +83,7 @@ std::vector<LightState> light_states_of(const Scenario& scenario, int32_t start_
   return states;
 }
 
-/// The scene's road with its lights.
+/// Returns the scene's road with its lights.
 std::shared_ptr<const RoadMap> lit_road(const Scenario& scenario) {
   PICTURA_CHECK(scenario.map.lights.empty(), "scene {}: expected a map without lights of its own beside recorded ones",
                 scenario.id);
@@ -103,7 +103,7 @@ std::shared_ptr<const RoadMap> lit_road(const Scenario& scenario) {
   return road;
 }
 
-/// What one word names; see tracks_named().
+/// Returns the tracks that one word selects; see tracks_named().
 std::vector<uint8_t> tracks_of_word(const Scenario& scenario, const std::string& word) {
   std::vector<uint8_t> mask(scenario.tracks.size());
   const auto choose = [&](auto&& is_chosen) {
@@ -139,7 +139,7 @@ std::vector<uint8_t> tracks_of_word(const Scenario& scenario, const std::string&
   return mask;
 }
 
-/// Calls visit(word, mask of those that it names) for each.
+/// Calls visit(word, mask of the selected tracks) for each word.
 template <typename Visit>
 void visit_words(const Scenario& scenario, const std::string& words, Visit&& visit) {
   for (size_t begin = 0; begin <= words.size();) {
@@ -176,7 +176,7 @@ std::shared_ptr<const CompiledMap> compile_scenario(std::shared_ptr<const Scenar
 }
 
 SimulatorConfig scene_config(const Scenario& scenario, int32_t start_step, SimulatorConfig config) {
-  config.dt_s = std::min(scenario.dt_s, kMaxStep_s);  // WOMD's steps are a little longer
+  config.dt_s = std::min(scenario.dt_s, kMaxStep_s);  // WOMD's steps are slightly longer
   config.episode_steps = std::max(1, scenario.num_steps - 1 - start_step);
   config.reset_inactive_fraction = 2;
   config.parked_cars = 0;

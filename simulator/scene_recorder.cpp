@@ -28,7 +28,7 @@ RecordedLightState recorded_light(LightState state) {
   }
 }
 
-/// The lights of a map become recorded ones: in worlds of recorded scenes none runs by itself.
+/// Converts the lights of a map to recorded lights, because in worlds of recorded scenes lights have no cycles.
 void move_lights(Scenario* scenario) {
   RoadMap& map = scenario->map;
   for (const TrafficLight& light : map.lights) {
@@ -41,7 +41,7 @@ void move_lights(Scenario* scenario) {
   map.facts.traffic_lights = map.facts.stop_lines = map.facts.signal_junctions = 0;
 }
 
-/// Those of a recording from a step on; after its end they show nothing.
+/// Copies a recording's lights from a step on; after its end they have no state.
 void copy_lights(const Scenario& from, int32_t start_step, Scenario* to) {
   to->lights = from.lights;
   to->light_lanes = from.light_lanes;
@@ -133,11 +133,11 @@ Scenario SceneRecorder::scenario(std::string id, int self_agent) const {
   scenario.dt_s = simulator_.config().dt_s;
   scenario.num_steps = num_steps_;
   scenario.current_step = std::min(10, num_steps_ - 1);
-  const Scenario* const recorded = map.scenario.get();  // what it was the replay of
-  scenario.map = recorded ? recorded->map : *map.road;  // recorded lights are no part of it
+  const Scenario* const recorded = map.scenario.get();  // scene that the world replays
+  scenario.map = recorded ? recorded->map : *map.road;  // recorded lights are not part of it
   if (recorded && self_agent < 0) self_agent = recorded->sdc_track;
   const auto steps = static_cast<size_t>(num_steps_);
-  std::vector<std::pair<size_t, size_t>> lives;  // of each box, the first ones before the others
+  std::vector<std::pair<size_t, size_t>> lives;  // of each box, first lives before later ones
   for (size_t i = 0; i < bodies_.size(); ++i) lives.emplace_back(i, 0);
   for (size_t i = 0; i < bodies_.size(); ++i) {
     for (size_t life = 1; life < bodies_[i].size(); ++life) lives.emplace_back(i, life);

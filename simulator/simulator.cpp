@@ -7,8 +7,8 @@
 namespace pictura {
 namespace {
 
-/// Throws Error unless an array of observe() has [queries, rows, features] values, or none where `is_observed` is
-/// false, and begins where a device can write four of them at once.
+/// Throws Error unless an array of observe() has [queries, rows, features] values (none where `is_observed` is false)
+/// and begins where a device can write four values at once.
 template <typename T>
 void check_observed(std::string_view name, Span<T> values, bool is_observed, size_t num_queries, int rows, int features,
                     Device device) {

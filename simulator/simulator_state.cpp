@@ -22,10 +22,10 @@ struct SavedHeader {
   std::array<char, 8> magic{'P', 'I', 'C', 'S', 'T', 'A', 'T', 'E'};
   uint32_t version = 5;
   uint32_t byte_order = 0x01020304;
-  uint64_t num_fingerprints = 0;  // that follow: what saver and restorer must have in common
+  uint64_t num_fingerprints = 0;  // number of following fingerprints, which saver and restorer must share
 };
 
-/// What a saved state must have in common with the simulator that restores it, by the names that a mismatch is told by.
+/// A property that a saved state and the restoring simulator must share, by its name in messages about a mismatch.
 struct Fingerprint {
   std::string name;
   uint64_t value = 0;
@@ -38,8 +38,8 @@ std::vector<Fingerprint> fingerprints(const SimulatorSetup& setup) {
     add_values(&hash, values...);
     prints.push_back({std::move(name), hash.value()});
   };
-  // Rules of which one choice is the usual one count where they are another: states of the usual rules, those of
-  // earlier versions among them, carry no mark of them.
+  // Rules with a usual choice count only where the choice differs: states with the usual rules, including states of
+  // earlier versions, carry no mark.
   const auto add_unusual = [&prints](bool is_unusual, const auto& value) {
     if (!is_unusual) return;
     Hash64 hash;
@@ -62,7 +62,7 @@ std::vector<Fingerprint> fingerprints(const SimulatorSetup& setup) {
     add_values(&conditioning, range.low, range.high, range.mixture);
   }
   prints.push_back({"conditioning or dynamics (reset_at_standstill)", conditioning.value()});
-  // Two flags: the second is that of a rule of earlier versions, which is no more.
+  // Two flags: the second belongs to a rule of earlier versions that no longer exists.
   add_unusual(config.dynamics.reset_at_standstill, std::array{true, false});
   for (const WorldSpec& world : setup.worlds) add_values(&worlds, world.map, world.num_agents, world.global_world);
   prints.push_back({"worlds", worlds.value()});
@@ -74,7 +74,7 @@ std::vector<Fingerprint> fingerprints(const SimulatorSetup& setup) {
   return prints;
 }
 
-/// Throws Error naming the field unless every value can be stepped on: indices exist and numbers are finite.
+/// Throws Error naming the field unless every value can be simulated: indices exist and numbers are finite.
 void check_restored(const SimulatorSetup& setup, const SimulatorState& state, const AgentStateView& agents) {
   constexpr float kMaxCoordinate_m = kMaxCommanded_m;
   for (size_t w = 0; w < setup.worlds.size(); ++w) {
@@ -94,7 +94,7 @@ void check_restored(const SimulatorSetup& setup, const SimulatorState& state, co
       for (auto i = static_cast<size_t>(setup.box_begin[w]); i < static_cast<size_t>(setup.box_begin[w + 1]); ++i) {
         const AgentBox& box = (*boxes)[i];
         const Vec3 at = box.center_m;
-        // Comparisons are false for what is not a number.
+        // Comparisons are false for NaN.
         PICTURA_CHECK(std::fabs(at.x) <= kMaxCoordinate_m && std::fabs(at.y) <= kMaxCoordinate_m &&
                           std::fabs(at.z) <= kMaxCoordinate_m && std::fabs(box.cos_heading) <= 1.001f &&
                           std::fabs(box.sin_heading) <= 1.001f && box.length_m >= 0 && box.width_m >= 0 &&
@@ -186,7 +186,7 @@ SimulatorTotals SimulatorState::totals() const {
 
 void SimulatorState::copy_worlds(const SimulatorSetup& setup, int world, const SimulatorState& from,
                                  const SimulatorSetup& from_setup, int from_world, int count) {
-  // Arrays have `per` elements for each of what begins[world] counts.
+  // Arrays have `per` elements for each item that begins[world] counts.
   const auto copy = [&](auto& to_array, const auto& from_array, const std::vector<int32_t>& begins,
                         const std::vector<int32_t>& from_begins, int per) {
     const auto first = from_array.begin() + int64_t{from_begins[from_world]} * per,

@@ -28,12 +28,12 @@ bool is_passable(const MapView& map, const WalkPiece& piece) {
   return true;
 }
 
-/// Which places of the walkways can be reached from which, along passable pieces.
+/// Reachability between places of the walkways, along passable pieces.
 class WalkGraph {
  public:
   explicit WalkGraph(const MapView& map) : map_(map), network_(map.walk_leave_begin.size(), -1) {
     for (const WalkPiece& piece : map.walk_pieces) passable_.push_back(is_passable(map, piece));
-    // Every piece has one back, so that networks are found by spreading from node to node.
+    // Every piece has an opposite piece, so that networks are found by spreading from node to node.
     for (size_t node = 0; node + 1 < map.walk_leave_begin.size(); ++node) {
       if (network_[node] < 0) spread(static_cast<int32_t>(node));
     }
@@ -69,7 +69,7 @@ class WalkGraph {
 
 bool road_leads(const WorldView& world, const LaneGraph& graph, RoutePoint from, RoutePoint to) {
   const auto route = graph.route(lane_place(world.map, graph, from), lane_place(world.map, graph, to));
-  // The gap itself, but for what neighbours differ in length.
+  // The gap itself, except for the different lengths of neighbours.
   return route && route->length_m <= 2 * kMaxWaypointGap_m;
 }
 

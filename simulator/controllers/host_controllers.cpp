@@ -45,7 +45,7 @@ class RandomController final : public Controller {
   uint64_t seed_;
 };
 
-/// Tells every slot the same, by a rule without settings; `name` is a literal.
+/// Gives every slot the same command, by a rule without settings; `name` is a literal.
 template <typename Rule>
 class RuleController final : public Controller {
  public:

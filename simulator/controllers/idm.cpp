@@ -23,7 +23,7 @@ FollowedPath path_of(const MapRecord& record, size_t agent) {
   return path;
 }
 
-/// Of the drivable lanes that follow one, that which turns least; -1 where there is none.
+/// Returns the drivable lane after a lane that turns least; -1 if there is none.
 int32_t straightest_after(const MapView& map, int32_t lane_index) {
   const MapLane& lane = map.lanes[lane_index];
   const int32_t count = lane.num_successors > 0 ? lane.num_successors : lane.num_all_successors;
@@ -42,7 +42,7 @@ int32_t straightest_after(const MapView& map, int32_t lane_index) {
   return best;
 }
 
-/// The place on the lane's centre line that is nearest to p, and how far that is.
+/// Returns the place on the lane's centre line nearest to p, and its distance.
 RoutePoint nearest_on_lane(const MapView& map, int32_t lane_index, Vec2 p, float* apart_m_out) {
   const MapLane& lane = map.lanes[lane_index];
   RoutePoint nearest{lane_index, 0};
@@ -57,16 +57,16 @@ RoutePoint nearest_on_lane(const MapView& map, int32_t lane_index, Vec2 p, float
   return nearest;
 }
 
-/// The lane of the point, or, where that has no successors, the nearest lane beside it that has some.
+/// Returns the lane of the point or, if it has no successors, the nearest lane beside it that has some.
 int32_t lane_to_follow(const MapView& map, RoutePoint at) {
   return map.lanes[at.lane].num_all_successors > 0 ? at.lane : through_lane(map, at).lane;
 }
 
-/// Moves a point to the place nearest to p on the lane to follow. Returns the way along that lane on which a path from
-/// p comes to its centre line: before the end of the point's own lane, if that is left. Without room for that the point
-/// moves along its own lane to where the front is before its end, and there is no way.
+/// Moves a point to the place nearest to p on the lane to follow. Returns the distance along that lane over which a
+/// path from p reaches its centre line: before the end of the point's own lane, if the path leaves it. Without room for
+/// that, the point moves along its own lane until the front is before its end, and nothing is returned.
 std::optional<float> merge(const MapView& map, Vec2 p, float front_m, RoutePoint* at_inout) {
-  constexpr float kMinMerge_m = 6, kMergePerMetre = 4;  // for one metre beside the centre line
+  constexpr float kMinMerge_m = 6, kMergePerMetre = 4;  // per metre of distance from the centre line
   constexpr float kBeforeEnd_m = 0.5f;
   float aside_m = 0;
   RoutePoint& at = *at_inout;
@@ -194,7 +194,7 @@ void IdmController::act(const SimulatorArrays& input, Span<const uint8_t> mask, 
   }
 }
 
-/// Where the agent is on its path, which is made anew along lanes where it was put elsewhere or the path runs out.
+/// Returns the agent's place on its path. A path along lanes is rebuilt where the agent was moved or the path runs out.
 float IdmController::place_on_path(const SimulatorArrays& input, size_t slot) {
   constexpr float kAstray_m = 1, kLeast_m = 60;
   const auto world = static_cast<size_t>(input.slots.world_of_slot[slot]);
@@ -202,7 +202,7 @@ float IdmController::place_on_path(const SimulatorArrays& input, size_t slot) {
   const Vec3 here{input.state.x_m[slot], input.state.y_m[slot], input.state.z_m[slot]};
   const bool begins = input.episode_step[world] == 0 || input.state.life[slot] != life_[slot];
   life_[slot] = input.state.life[slot];
-  // Nobody goes back on the path but who begins anew.
+  // Progress along the path is monotonic except at an episode start.
   float s_m = path.points_m.empty() ? 0.0f : path.nearest_m(here.xy(), begins ? 0.0f : progress_m_[slot]);
   const auto serves = [&] {
     return length((path.at(s_m).position_m - here).xy()) <= kAstray_m &&
@@ -249,7 +249,7 @@ IdmController::Front IdmController::box_ahead(const SimulatorArrays& input, size
   return {};
 }
 
-/// How far the bumper is from the first line along the path that holds it up; infinite: there is none.
+/// Distance from the bumper to the first line along the path that stops the agent; infinite if there is none.
 float IdmController::closed_line_ahead_m(const SimulatorArrays& input, size_t slot, float s_m) const {
   constexpr float kLook_m = 45;
   const FollowedPath& path = paths_[slot];

@@ -14,17 +14,17 @@
 namespace pictura {
 namespace {
 
-/// A sequence of actions: its last one, and the sequence before it in the beam of the step before.
+/// A sequence of actions: its last action, and its predecessor in the beam of the previous step.
 struct Sequence {
   Motion motion;
-  double cost = 0;           // of its steps
-  double foreseen_cost = 0;  // with those of coming back to the record
+  double cost = 0;           // of all steps
+  double foreseen_cost = 0;  // including the cost of returning to the record
   float error_m = 0;
   int32_t action = 0;
   int32_t before = -1;
 };
 
-/// Of sequences that lead to about the same motion the cheapest is kept, so that a beam holds different ones.
+/// Key of similarity: of sequences that lead to about the same motion, the cheapest is kept, so that a beam is diverse.
 auto likeness(const Motion& motion) {
   const auto rounded = [](float value, float unit) { return static_cast<int32_t>(std::lround(value / unit)); };
   return std::tuple(rounded(motion.x_m, 0.02f), rounded(motion.y_m, 0.02f), rounded(motion.heading_rad, 0.01f),
@@ -41,14 +41,14 @@ double cost_of(const Motion& motion, const RecordedState& wanted, float* error_m
          kAccelWeight * (squared(motion.accel_long_mps2) + squared(motion.accel_lat_mps2));
 }
 
-/// A recorded state, with the velocity and acceleration of the places around it.
+/// A recorded state, with the velocity and acceleration of the surrounding places.
 struct Target {
   RecordedState state;
   Vec2 velocity_mps, accel_mps2;
 };
 
 Target target_at(Span<const RecordedState> run, size_t i, float dt_s) {
-  constexpr size_t kVelocitySteps = 3, kAccelSteps = 6, kMinAccelSteps = 3;  // to both sides: records are rough
+  constexpr size_t kVelocitySteps = 3, kAccelSteps = 6, kMinAccelSteps = 3;  // to both sides, because records are rough
   const auto place = [&](size_t step) { return run[step].position_m.xy(); };
   const size_t room = std::min(i, run.size() - 1 - i);
   Target target{.state = run[i]};
@@ -65,9 +65,9 @@ Target target_at(Span<const RecordedState> run, size_t i, float dt_s) {
   return target;
 }
 
-/// The cost of coming back to the record from the errors of place, velocity and acceleration: the least integral of
-/// squared distances over time, in steps, of a point whose jerk is controlled and whose bandwidth is kBandwidth.
-/// Without it a beam of near-sighted sequences swings about the record, the more the longer the vehicle.
+/// Cost of returning to the record from the errors of place, velocity and acceleration: the minimum integral of squared
+/// distances over time, in steps, of a point with controlled jerk and bandwidth kBandwidth. Without this cost, a beam
+/// of short-sighted sequences oscillates about the record, more for longer vehicles.
 double cost_of_return(const Motion& motion, const Target& target, float dt_s) {
   constexpr double kBandwidth_radps = 2;
   constexpr double s1 = 1 / kBandwidth_radps, s2 = s1 * s1, s3 = s2 * s1, s4 = s3 * s1, s5 = s4 * s1;
@@ -82,7 +82,7 @@ double cost_of_return(const Motion& motion, const Target& target, float dt_s) {
          static_cast<double>(dt_s);
 }
 
-/// The beam of the step after, by all actions.
+/// Returns the beam of the next step, over all actions.
 std::vector<Sequence> next_beam(const std::vector<Sequence>& beam, const Target& target,
                                 const DynamicsParameters& parameters, const ClassLimits& limits, float dt_s) {
   std::map<decltype(likeness(Motion{})), Sequence> best;
@@ -106,7 +106,7 @@ std::vector<Sequence> next_beam(const std::vector<Sequence>& beam, const Target&
   return all;
 }
 
-/// Writes the actions of an unbroken run of states; those are `out`'s elements from `first` on.
+/// Writes the actions of an unbroken run of states to the elements of `out` from `first` on.
 void follow_run(Span<const RecordedState> run, const RecordedAgent& agent, const DynamicsRules& rules, float dt_s,
                 size_t first, InverseActions* out) {
   DynamicsParameters parameters;

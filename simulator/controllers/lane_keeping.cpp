@@ -14,10 +14,10 @@ namespace pictura {
 namespace {
 
 constexpr float kWayOn_m = 80;   // beyond the last waypoint
-constexpr float kMissed_m = 10;  // a waypoint so far behind has been missed
+constexpr float kMissed_m = 10;  // a waypoint this far behind has been missed
 constexpr float kStanding_mps = 0.1f;
 
-/// The first of `boxes` that touches `other`, or how many there are.
+/// Returns the index of the first box that touches `other`, or the number of boxes.
 size_t first_touching(const std::vector<AgentBox>& boxes, const AgentBox& other) {
   const auto touches = [&other](const AgentBox& box) {
     const Vec2 apart = (box.center_m - other.center_m).xy();
@@ -38,7 +38,7 @@ LaneKeepingAgent::LaneKeepingAgent(const WorldView& world, int agent, const Lane
       path_(world.map, graph, start_place(world, agent)),
       max_search_nodes_(world.map.is_open ? kMaxSearchNodesOfOpen : kMaxSearchNodes),
       search_nodes_(search_nodes) {
-  waypoints_.back() = points().front().at;  // where the first chain starts
+  waypoints_.back() = points().front().at;  // start of the first chain
 }
 
 int32_t LaneKeepingAgent::act() {
@@ -70,9 +70,9 @@ int32_t LaneKeepingAgent::act() {
   return action;
 }
 
-/// Returns whether what it then does keeps it on the road. Nothing is planned while pursuing the path will do. A plan
-/// is followed for half of it at least. An agent that halts searches where it then stands, each time with twice as many
-/// nodes; a search that has tried everything there was the last.
+/// Updates the plan, and returns whether the resulting action keeps the agent on the road. No plan is made while
+/// pursuing the path suffices. At least half of a plan is followed. A halted agent searches from its place, each time
+/// with twice as many nodes, until a search has tried everything there.
 bool LaneKeepingAgent::renew_plan(const Motion& now) {
   if (stays_on_road(now, action_of(Driving::pursues, now, place_), Driving::pursues)) {
     drop_plan();
@@ -102,7 +102,7 @@ void LaneKeepingAgent::drop_plan() {
   next_planned_ = 0;
 }
 
-/// Goes on to the waypoints of a new chain, or back to one that was missed.
+/// Continues to the waypoints of a new chain, or back to a missed waypoint.
 void LaneKeepingAgent::follow_goals() {
   const int32_t chain = world_.agents.goal_chains[slot_] - 1;
   PICTURA_CHECK(chain <= chain_ + 1, "lane keeping: expected a look at every chain, got {} after {}", chain, chain_);
@@ -117,21 +117,21 @@ void LaneKeepingAgent::follow_goals() {
   }
 }
 
-/// From the end of the path through the waypoints that are left, and on.
+/// Extends the path from its end through the remaining waypoints, and beyond.
 void LaneKeepingAgent::plan() {
   for (auto i = static_cast<size_t>(world_.agents.next_waypoint[slot_]); i < kNumWaypoints; ++i) {
     const bool gets_there = path_.go_to(waypoints_[i]);
     for (size_t goal = i; goal < kNumWaypoints; ++goal) goals_[goal] = points().size() - 1;
     if (!gets_there) break;
   }
-  // It does not know yet which way to go then, and must be able to turn.
+  // The way after the last waypoint is unknown, and the agent must be able to turn there.
   constexpr float kTurn_m = 20, kTurning_mps = 3;
   const bool may_turn = path_.forks_within(kTurn_m);
   path_.go_on(kWayOn_m);
   path_.limit_speeds(goals_.back(), may_turn ? kTurning_mps : INFINITY);
 }
 
-/// Where a turn cannot be taken, the straightest way on, if that is clear, and only then to the waypoints.
+/// Plans the straightest way on where a turn cannot be taken, if that way is clear, and then to the waypoints.
 DrivingPlan LaneKeepingAgent::plan_elsewhere(DrivingPlan plan) {
   constexpr float kPassed_m = 20;
   LanePath other = path_;
@@ -149,7 +149,7 @@ size_t LaneKeepingAgent::ahead(size_t from, float distance_m) const {
   return std::min(from + static_cast<size_t>(distance_m / LanePath::kSpacing_m), points().size() - 1);
 }
 
-/// Moves its place along the path to where it is nearest to the rear axle.
+/// Moves the agent's place along the path to the point nearest to the rear axle.
 void LaneKeepingAgent::find_place() {
   constexpr float kReach_m = 3;
   const Motion now = agent_.now();
@@ -179,7 +179,8 @@ int32_t LaneKeepingAgent::pursuing_action(const Motion& now, size_t place, float
   int32_t best = straight;
   float least = INFINITY;
   for (const int32_t side : {-1, 0, 1}) {
-    // An acceleration that changes its sign stops at zero for a step, so that steering shows in the second one alone.
+    // An acceleration that changes its sign stops at zero for one step, so that steering takes effect only in the
+    // second step.
     const Motion next = agent_.after(agent_.after(now, straight + side), straight + side);
     const float off = std::fabs(next.steer_rad - wanted_rad);
     if (off >= least) continue;
@@ -194,8 +195,8 @@ int32_t LaneKeepingAgent::action_of(Driving how, const Motion& now, size_t place
   return pursuing_action(now, place, how == Driving::pursues ? points()[place].speed_mps : 0);
 }
 
-/// Whether that action, and then driving so, keeps it on the road by a margin until it has come so far, stands after
-/// braking, or is out by an exit.
+/// Whether this action, followed by driving in this way, keeps the agent on the road by a margin until it has covered
+/// the horizon, stands after braking, or has left through an exit.
 bool LaneKeepingAgent::stays_on_road(Motion now, int32_t action, Driving how) const {
   constexpr float kHorizon_m = 20;
   const float margin_m = how == Driving::pursues ? 0.1f : 0.02f;
@@ -213,24 +214,24 @@ bool LaneKeepingAgent::stays_on_road(Motion now, int32_t action, Driving how) co
   return true;
 }
 
-/// Whether it can still stop on the road after that action.
+/// Whether the agent can still stop on the road after this action.
 bool LaneKeepingAgent::can_stop_after(const Motion& now, int32_t action) const {
   return stays_on_road(now, action, Driving::brakes) || stays_on_road(now, action, Driving::brakes_straight);
 }
 
-/// Stops it on the road, if it can.
+/// Returns an action that stops the agent on the road, if possible.
 int32_t LaneKeepingAgent::braking_action(const Motion& now) const {
   const int32_t action = action_of(Driving::brakes, now, place_);
   if (stays_on_road(now, action, Driving::brakes)) return action;
   const int32_t straight = action_of(Driving::brakes_straight, now, place_);
   if (stays_on_road(now, straight, Driving::brakes_straight)) return straight;
-  // Jerks are too coarse to stop at zero: what stands creeps by millimetres a second, until it must turn back.
+  // Jerks are too coarse to stop at zero: a standing agent creeps by millimetres per second, until it must reverse.
   constexpr float kBack_mps = 0.5f;
   return std::fabs(now.speed_mps) < kStanding_mps ? agent_.speed_action(now, std::copysign(kBack_mps, -now.speed_mps))
                                                   : action;
 }
 
-/// The speed from which it can stop before the next closed line.
+/// Speed from which the agent can stop before the next closed line.
 float LaneKeepingAgent::speed_before_light(const Motion& now) {
   constexpr float kMargin_m = 2.0f;
   const float gap_m = to_closed_line(now) - kMargin_m;
@@ -238,9 +239,9 @@ float LaneKeepingAgent::speed_before_light(const Motion& now) {
   return std::sqrt(2 * 1.5f * std::max(gap_m, 0.0f));
 }
 
-/// From the bumper along the route to the next line that is red, or yellow and can still be stopped at; 1000 where none
-/// is near. Points of the path are too coarse to say whether the bumper is past a line that it stands at: its own place
-/// does.
+/// Distance from the bumper along the route to the next line that is red, or yellow with enough distance to stop; 1000
+/// if none is near. Points of the path are too coarse to tell whether the bumper is past a line at which it stands, so
+/// the agent's own place is used there.
 float LaneKeepingAgent::to_closed_line(const Motion& now) const {
   constexpr float kLook_m = 45, kAt_m = 1;
   const Vec2 here = points()[place_].position_m.xy();
@@ -273,11 +274,11 @@ float LaneKeepingAgent::to_closed_line(const Motion& now) const {
   return 1000;
 }
 
-/// The speed from which it can stop before it would touch another agent on its path, now or, if it gives way to that,
-/// where that will soon be.
+/// Speed from which the agent can stop before it would touch another agent on its path: at the current place of the
+/// other agent or, where the other agent has priority, at its expected place.
 float LaneKeepingAgent::speed_behind_others() const {
   constexpr float kLook_m = 40, kMargin_m = 0.4f, kGap_m = 2;
-  // Others may halt where they are at any time, then it brakes hard.
+  // Other agents may halt at any time; the agent then brakes hard.
   constexpr float kBraking_mps2 = 1.5f, kHardBraking_mps2 = 3;
   constexpr float kForesight_s = 4, kStep_s = 0.5f;
   const Motion now = agent_.now();
@@ -313,13 +314,13 @@ float LaneKeepingAgent::speed_behind_others() const {
   return max_mps;
 }
 
-/// Those with lower numbers do, unless they go the same way.
+/// Whether the other agent has priority: agents with lower indices do, unless they go the same way.
 bool LaneKeepingAgent::has_way(int other) const {
   const float turned = wrap_angle(world_.agents.heading_rad[world_.first_slot + other] - agent_.now().heading_rad);
   return other < self_ && std::fabs(turned) > 0.5f;
 }
 
-/// Whether its path is, or soon will be, on its way from one lane to another.
+/// Whether the agent's path is, or soon will be, between two lanes.
 bool LaneKeepingAgent::is_changing_lane() const {
   constexpr float kSoon_m = 20, kAside_m = 0.3f;
   for (size_t i = place_; i <= ahead(place_, kSoon_m); ++i) {
@@ -328,7 +329,7 @@ bool LaneKeepingAgent::is_changing_lane() const {
   return false;
 }
 
-/// Whether another one is behind it and on its own lane.
+/// Whether the other agent is behind this one and on its lane.
 bool LaneKeepingAgent::follows(const AgentBox& other) const {
   const Motion now = agent_.now();
   const SinCos heading = sincos_of(now.heading_rad);
@@ -357,7 +358,7 @@ void LaneKeepingController::act(const SimulatorArrays& input, Span<const uint8_t
                   input.episode_index[w], input.episode_step[w]);
     if (views_[w]->map.is_open) begin_lives(w);
   }
-  // Agents look at the state and write nothing but their own commands.
+  // Agents read the state and write only their own commands.
   parallel_for(setup_->config.num_threads, static_cast<int64_t>(episode_.size()), [&](int64_t world) {
     const auto w = static_cast<size_t>(world);
     const auto end = static_cast<size_t>(setup_->slot_begin[w + 1]);
@@ -371,7 +372,7 @@ void LaneKeepingController::act(const SimulatorArrays& input, Span<const uint8_t
 }
 
 void LaneKeepingController::begin_episode(const SimulatorArrays& input, size_t world) {
-  // Over the simulator's agents, boxes and lights, which nothing here writes.
+  // The view refers to the simulator's agents, boxes and lights, which are only read here.
   const auto map = static_cast<size_t>(setup_->worlds[world].map);
   WorldView& view =
       views_[world].emplace(setup_->view(static_cast<int>(world), setup_->map_views[map], setup_->options));
@@ -387,7 +388,7 @@ void LaneKeepingController::begin_episode(const SimulatorArrays& input, size_t w
   episode_[world] = input.episode_index[world];
 }
 
-/// Takes charge of agents that have begun a life since the last look.
+/// Creates the drivers of agents whose life has begun since the last call.
 void LaneKeepingController::begin_lives(size_t world) {
   const WorldView& view = *views_[world];
   const LaneGraph& graph = *graphs_[setup_->worlds[world].map];

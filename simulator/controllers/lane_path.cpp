@@ -57,7 +57,7 @@ bool LanePath::go_to(RoutePoint to) {
   return false;
 }
 
-/// The lanes there, if a route leads there, with every change as early as lanes lie side by side.
+/// Returns the lanes to a place, if a route leads there, with every change as early as lanes lie side by side.
 std::optional<std::vector<int32_t>> LanePath::route_to(RoutePoint to) const {
   const auto route = graph_->route(lane_place(map_, *graph_, at_), lane_place(map_, *graph_, to));
   if (!route) return std::nullopt;
@@ -77,9 +77,9 @@ std::optional<std::vector<int32_t>> LanePath::route_to(RoutePoint to) const {
   return lanes;
 }
 
-/// False, and goes no further, where there is too little length for a lane change that need not be made.
+/// Follows a route. Returns false, and stops there, where the length is too short for an optional lane change.
 bool LanePath::follow_route(const std::vector<int32_t>& lanes, RoutePoint to) {
-  constexpr float kMinChange_m = 12;  // for one change
+  constexpr float kMinChange_m = 12;  // per change
   for (size_t i = 1; i < lanes.size(); ++i) {
     if (!is_change(at_.lane, lanes[i])) {
       follow(lane(at_.lane).length_m);
@@ -114,18 +114,18 @@ void LanePath::go_on(float distance_m) {
   }
 }
 
-/// Those from which a route goes on for ever.
+/// Returns the successors on which endless routes start.
 Span<const int32_t> LanePath::successors_of(int32_t index) const {
   return map_.successors.subspan(lane(index).first_successor, lane(index).num_successors);
 }
 
-/// Between the ends of a lane.
+/// Turn between the ends of a lane.
 float LanePath::turn_of(int32_t index) const {
   return std::fabs(wrap_angle(pose_on_lane(map_, index, lane(index).length_m).heading_rad -
                               pose_on_lane(map_, index, 0).heading_rad));
 }
 
-/// The successor from which the way to `to` is shortest; -1 where none leads there.
+/// Returns the successor with the shortest way to `to`; -1 if no way leads there.
 int32_t LanePath::best_successor(RoutePoint to) const {
   int32_t best = -1;
   double least = INFINITY;
@@ -138,7 +138,7 @@ int32_t LanePath::best_successor(RoutePoint to) const {
   return best;
 }
 
-/// Begins to move to a neighbouring lane, within length_m where that can be driven.
+/// Begins a change to a neighbouring lane, within length_m where that is drivable.
 void LanePath::change_to(int32_t to, float length_m) {
   constexpr float kMin_m = 8, kPerMetreAside = 7;
   const Vec2 here = end().position_m.xy();
@@ -188,7 +188,7 @@ bool LanePath::forks_within(float distance_m) const {
 void LanePath::limit_speeds(size_t slow, float slow_mps) {
   constexpr float kFastest_mps = 8, kShareOfLimit = 0.8f;
   constexpr float kSideways_mps2 = 1.5f, kBraking_mps2 = 1.0f;
-  constexpr size_t kWindow = 4;  // points over which a curve is measured
+  constexpr size_t kWindow = 4;  // number of points over which a curve is measured
   for (size_t i = points_.size(); i-- > 0;) {
     PathPoint& point = points_[i];
     const size_t behind = i - std::min(i, kWindow / 2), ahead = std::min(i + kWindow / 2, points_.size() - 1);
