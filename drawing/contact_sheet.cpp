@@ -15,7 +15,7 @@ namespace {
 constexpr int kImageGap_px = 6, kCameraNames_px = 30, kViewNames_px = 64;
 constexpr int kPanelWidth_px = 480, kPanelColumns = 3;
 constexpr int kWantedWidth_px = 1600;
-// Of a page, beside what its first camera or its first row takes: Cairo draws 32,767 px a side at most.
+// Limits of a page besides its first camera or first row: Cairo draws at most 32,767 px per side.
 constexpr int kMaxPageWidth_px = 16384, kMaxPageHeight_px = 8192;
 constexpr Rgb kSheetColor = hex(0x24272C), kSheetLabelColor = hex(0xD8DCE2);
 const TextStyle kViewStyle{.size_px = 15, .align = Align::right, .color = kSheetLabelColor};
@@ -42,16 +42,17 @@ struct SheetRow {
   int view, first_camera, end_camera;
 };
 
-// Rows and sizes of all pages; a rig too wide for one row continues in the next.
+// Rows and sizes of all pages; a rig too wide for one row continues in the next row.
 struct SheetLayout {
   int enlargement = 1, left_px = kViewNames_px, row_px = 0, width_px = 0;
   std::vector<SheetRow> rows;
 
-  /// Whether camera names stand above it: where a page begins, and where the cameras are others than in the row above.
+  /// Whether camera names are above a row: at the start of a page, and where the cameras differ from those of the row
+  /// above.
   bool has_names(const SheetRow* row, const SheetRow* first) const {
     return row == first || row->first_camera != row[-1].first_camera;
   }
-  /// The rows of each page, one at least.
+  /// Returns the rows of each page, at least one.
   std::vector<Span<const SheetRow>> pages() const {
     std::vector<Span<const SheetRow>> result;
     for (const SheetRow *first = rows.data(), *const last = first + rows.size(); first != last;) {

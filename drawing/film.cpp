@@ -21,7 +21,7 @@ namespace {
 constexpr int kColumns = 4, kCameraWidth_px = 250, kCameraHeight_px = 140, kCameraGap_px = 8;
 constexpr int kTopWidth_px = kColumns * kCameraWidth_px + (kColumns - 1) * kCameraGap_px, kTopHeight_px = 512;
 constexpr uint8_t kGapGrey = 40;
-constexpr double kFramesPerSecond = 20;  // twice the pace of the world
+constexpr double kFramesPerSecond = 20;  // twice real time
 
 RendererConfig view_of(const FilmOptions& options) {
   RendererConfig view{.rig = paper_rig(kCameraWidth_px, kCameraHeight_px)};
@@ -30,7 +30,7 @@ RendererConfig view_of(const FilmOptions& options) {
   return view;
 }
 
-// The tallest picture of a camera, with its caption.
+// Height of the tallest picture of a camera, including its caption.
 int row_height_px(const HostImages& images, const Rig& rig) {
   int height_px = 0;
   for (size_t camera = 0; camera < rig.cameras.size(); ++camera) {
@@ -43,7 +43,7 @@ int row_height_px(const HostImages& images, const Rig& rig) {
 
 RendererConfig film_view(const RendererConfig& trained_view) {
   RendererConfig view = trained_view;
-  view.samples = {};  // films are drawn with exact coverage
+  view.samples = {};  // films have exact coverage
   float line_scale = std::numeric_limits<float>::infinity();
   for (Camera& camera : view.rig.cameras) {
     const float scale = static_cast<float>(kCameraWidth_px) / static_cast<float>(camera.width_px);
@@ -94,7 +94,7 @@ struct Film::Parts {
   std::unique_ptr<Renderer> renderer;
   std::vector<int> order;  // of the cameras
   HostImages images;
-  int row_px;  // height of a row of cameras and of the gap above it
+  int row_px;  // height of a row of cameras, including the gap above it
   RgbImage frame;
   VideoWriter video;
 };

@@ -10,13 +10,13 @@ namespace pictura {
 
 namespace {
 
-/// The point half a width to the left (side 1) or to the right (-1).
+/// Point half a width to the left (side 1) or to the right (-1).
 Vec2 border(const LanePoint& point, double side) {
   const Eigen::Isometry2d pose = pose_in_plan(in_plan(point.position_m), point.heading_rad);
   return rounded(pose * Eigen::Vector2d{0, side * 0.5 * point.width_m});
 }
 
-/// Later layers cover earlier ones.
+/// Drawing layer of a lane type; later layers cover earlier ones.
 int layer_of(LaneType type) {
   switch (type) {
     case LaneType::sidewalk: return 0;

@@ -13,10 +13,10 @@ using Eigen::Vector2d;
 
 namespace {
 
-// Minimum scales of arrows, names and lane numbers, in pixels a metre.
+// Minimum scales of arrows, names and lane numbers, in pixels per metre.
 constexpr double kArrowScale = 1.5, kNameScale = 5, kNumberScale = 9;
 
-/// The pose on a lane's centre line s metres from its start.
+/// Pose on a lane's centre line s metres from its start.
 Isometry2d pose_at(Span<const LanePoint> points, double s_m) {
   size_t i = 1;
   while (i + 1 < points.size() && points[i].s_m < s_m) ++i;
@@ -26,7 +26,7 @@ Isometry2d pose_at(Span<const LanePoint> points, double s_m) {
   return pose_in_plan(a + share * (b - a), before.heading_rad);
 }
 
-/// Chevrons along the lane, at a spacing that suits the scale.
+/// Paints chevrons along the lane, at a spacing that suits the scale.
 void paint_arrows(GroundPen& pen, const RoadMap& map, const Lane& lane) {
   const double spacing_m = pen.at_least(12, 70), size_m = pen.at_least(0.7, 2.5);
   const auto count = static_cast<int>(std::max(1.0, lane.length_m / spacing_m));
@@ -52,7 +52,7 @@ void paint_lane_number(GroundPen& pen, const RoadMap& map, size_t index) {
             {.size_px = 9, .align = Align::center, .color = on_dark ? hex(0xE6E9ED) : hex(0x5A6068)});
 }
 
-/// The line, shaded on the side of its buildings.
+/// Paints the line, shaded on the side of its buildings.
 void paint_building_line(GroundPen& pen, const BuildingLine& line) {
   const Vector2d a = in_plan(line.a_m), b = in_plan(line.b_m), along = b - a;
   if (along.isZero(0) || !pen.is_visible(0.5 * (a + b), along.norm())) return;
@@ -62,7 +62,7 @@ void paint_building_line(GroundPen& pen, const BuildingLine& line) {
   pen.line(a, b, pen.at_least(0.2, 1), kBuildingLineInk);
 }
 
-/// The angle within which the head is visible, and a line to its stop line.
+/// Paints the angle within which the head is visible, and a line to its stop line.
 void paint_light_angle(GroundPen& pen, const TrafficLight& light) {
   const float half_angle = MapGeometryOptions{}.light_half_angle_rad;
   const double radius_m = pen.at_least(6, 14);
@@ -84,7 +84,7 @@ void paint_light_angle(GroundPen& pen, const TrafficLight& light) {
   cairo_set_dash(pen.context(), nullptr, 0, 0);
 }
 
-/// A diamond with a tail towards the traffic that the sign addresses.
+/// Paints a diamond with a tail towards the traffic to which the sign applies.
 void paint_sign(GroundPen& pen, const Sign& sign) {
   const Vector2d position = in_plan(sign.position_m);
   const double radius_m = pen.at_least(0.7, 3);
@@ -99,7 +99,7 @@ void paint_sign(GroundPen& pen, const Sign& sign) {
   cairo_stroke(pen.context());
 }
 
-/// On the back of the light or sign, where nothing else of it is drawn.
+/// Paints a name behind the light or sign, where no other part of it is drawn.
 void paint_name(GroundPen& pen, const Vector2d& position, const Vector2d& facing, const std::string& name, Rgb color) {
   if (!pen.is_visible(position, 1)) return;
   const Vector2d behind = position - 11 / pen.px_per_m() * facing;

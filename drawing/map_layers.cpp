@@ -192,8 +192,8 @@ void MapLayers::paint_parking_spaces(GroundPen& pen) const {
   }
 }
 
-/// Bars across the longest side's direction, along all of the outline, whose sides recordings divide, and clipped to
-/// it.
+/// Paints bars across the direction of the longest side, along the whole outline, whose sides recordings may divide,
+/// and clipped to the outline.
 void MapLayers::paint_crosswalk(GroundPen& pen, const Crosswalk& crosswalk) const {
   cairo_t* context = pen.context();
   const int32_t count = crosswalk.outline.size();
@@ -210,7 +210,7 @@ void MapLayers::paint_crosswalk(GroundPen& pen, const Crosswalk& crosswalk) cons
       along = side / longest;
     }
   }
-  double reach = 0, low = 0, high = 0;  // of corners from the centre: how far, and how far back and ahead along it
+  double reach = 0, low = 0, high = 0;  // of corners from the centre: distance, and range along the bars' direction
   for (int32_t i = 0; i < count; ++i) {
     const Vector2d from_center = corner(i) - center;
     reach = std::max(reach, from_center.norm());

@@ -52,7 +52,7 @@ void add_tracks(const Scenario& scenario, std::vector<LegendEntry>* entries_out)
   }
 }
 
-/// An entry for each kind of element that the map has, and for each kind of track of the scenario, if there is one.
+/// Returns an entry for each kind of element of the map, and for each kind of track of the scenario, if given.
 std::vector<LegendEntry> legend_of(const RoadMap& map, const Scenario* scenario) {
   std::vector<LegendEntry> entries;
   for (int i = 0; i <= static_cast<int>(LaneType::other); ++i) {
@@ -155,7 +155,7 @@ class Legend {
   std::vector<Placed> placed_;
 };
 
-/// The picture's layout: sizes in pixels, the map below a band for its name and legend.
+/// Layout of the picture: sizes in pixels, and the map below a band for its name and legend.
 struct Layout {
   Metrics m;
   Legend legend;
@@ -193,11 +193,11 @@ Layout layout_of(const RoadMap& map, const MapPictureOptions& options) {
                 size_px);
   const Aabb2 shown = shown_part(map, options);
   const Metrics m{size_px / 1600.0};
-  const double margin = m.px(28), strip = m.px(36);  // the strip below is the scale bar's
+  const double margin = m.px(28), strip = m.px(36);  // the strip below contains the scale bar
   const double width_m = std::max(1.0f, shown.high.x - shown.low.x),
                height_m = std::max(1.0f, shown.high.y - shown.low.y);
-  // The longer side of the whole picture, band included, is size_px; a narrow map is still wide enough for its title.
-  // The band's height depends on the width, and the width on the band's height: a wider picture needs no more rows.
+  // The longer side of the whole picture, including the band, is size_px; a narrow map is still wide enough for its
+  // title. The band's height and the width depend on each other: a wider picture needs at most as many rows.
   const auto width_at = [&](double px_per_m) {
     return std::clamp(static_cast<int>(std::ceil(width_m * px_per_m + 2 * margin)), size_px * 3 / 5, size_px);
   };
@@ -223,7 +223,7 @@ Layout layout_of(const RoadMap& map, const MapPictureOptions& options) {
 
 void draw_scale_bar(Canvas& canvas, const Layout& layout) {
   const Metrics& m = layout.m;
-  // The longest round length of at most a fifth of the width.
+  // Longest round length of at most a fifth of the width.
   const double max_m = 0.2 * canvas.width_px() / layout.px_per_m;
   const double power = std::pow(10.0, std::floor(std::log10(max_m)));
   const double length_m = max_m >= 5 * power ? 5 * power : (max_m >= 2 * power ? 2 * power : power);
@@ -249,7 +249,7 @@ std::vector<Coordinate> round_coordinates(double low_m, double high_m) {
   return coordinates;
 }
 
-/// The file's coordinates along the upper and the left side, for --box and --at.
+/// Draws the file's coordinates along the upper and the left side, for --box and --at.
 void draw_coordinates(Canvas& canvas, const Layout& layout, const RoadMap& map) {
   const Metrics& m = layout.m;
   const double left_m = layout.left_top_m.x() + map.origin_m[0], top_m = layout.left_top_m.y() + map.origin_m[1];

@@ -10,7 +10,7 @@ namespace pictura {
 
 namespace {
 
-// By class of docs/explanation/image.md, from 0 (nothing).
+// Colours by class of docs/explanation/image.md, from 0 (nothing).
 constexpr Rgb kClassColors[] = {{},
                                 agent_color(AgentClass::vehicle, BoxFace::right),
                                 agent_color(AgentClass::cyclist, BoxFace::front),
@@ -22,7 +22,7 @@ constexpr Rgb kClassColors[] = {{},
                                 kCrosswalkColor,
                                 kStopLineColor};
 
-// Consecutive numbers get distant hues: steps of the golden ratio around the circle.
+// Gives consecutive numbers distant hues: steps of the golden ratio around the circle.
 Rgb hue_of(int instance) {
   const float hue = 6 * std::fmod(0.61803399f * static_cast<float>(instance), 1.0f);
   auto channel = [&](float shift) {
@@ -32,7 +32,7 @@ Rgb hue_of(int instance) {
   return {channel(0), channel(4), channel(2)};
 }
 
-// Darker with range, but never black, which means nothing.
+// Grey that darkens with range, but never black, which means no surface.
 Rgb grey_of(float depth_m) {
   const float value = clamp(1.0f - depth_m / kVisibleRange_m, 1.0f / 255, 1.0f);
   return {value, value, value};

@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Where ffmpeg finds the film that it writes.
+// Descriptor at which ffmpeg finds its output file.
 constexpr int kFilmInChild = 3;
 
 std::string last_line(std::FILE* file) {
@@ -73,7 +73,7 @@ struct VideoWriter::Impl {
     return status;
   }
 
-  /// Throws with ffmpeg's last line.
+  /// Throws Error with ffmpeg's last line.
   [[noreturn]] void fail_with_message(int status) {
     const std::string said = last_line(messages.get());
     const std::string how = WIFSIGNALED(status) ? fmt::format("ended by signal {}", WTERMSIG(status))
@@ -155,7 +155,7 @@ VideoWriter::VideoWriter(const std::string& path, int width_px, int height_px, d
                              "-filter_complex",
                              "split[a][b];[a]palettegen[p];[b][p]paletteuse=dither=bayer:bayer_scale=4", "-f", "gif"};
   arguments.insert(arguments.end(), format.begin(), format.end());
-  // A file that may have no name yet, and that ffmpeg can read again to move its index to the front.
+  // A path by descriptor: the file may have no name yet, and ffmpeg can read it again to move its index to the front.
   arguments.push_back(fmt::format("file:/proc/self/fd/{}", kFilmInChild));
   impl_->start(std::move(arguments));
 }

@@ -19,10 +19,10 @@ using Eigen::Vector2d;
 namespace {
 
 constexpr int kTile_px = 512;
-constexpr size_t kMaxTiles = 160;  // 160 MiB, beside those of one picture
+constexpr size_t kMaxTiles = 160;  // 160 MiB, besides the tiles of one picture
 constexpr Rgb kHaloColor = hex(0xFFE45C);
 
-/// Whole pixels from the origin of the map to the top left corner of the picture.
+/// Whole pixels from the map's origin to the top left corner of the picture.
 struct Corner {
   int x = 0, y = 0;
 };
@@ -40,7 +40,7 @@ Rgb mixed(Rgb a, Rgb b, float share_of_b) {
   return {a.r + (b.r - a.r) * share_of_b, a.g + (b.g - a.g) * share_of_b, a.b + (b.b - a.b) * share_of_b};
 }
 
-/// The colours of the back (body) and the front (mark) in camera images; parked and halted agents fade to grey.
+/// Colours of the back (body) and the front (mark) in camera images; parked and halted agents fade to grey.
 struct AgentColors {
   Rgb body, mark;
 };
@@ -60,7 +60,7 @@ void paint_agent(Canvas& canvas, const AgentBox& agent, AgentStatus status, cons
   const AgentColors colors = colors_of(agent.agent_class, status);
   cairo_save(context);
   cairo_translate(context, center_px.x(), center_px.y());
-  // The y axis of pixels points down: a counter-clockwise heading is clockwise here.
+  // The y axis of pixels points down, so a counter-clockwise heading is clockwise here.
   cairo_rotate(context, -std::atan2(agent.sin_heading, agent.cos_heading));
   cairo_rectangle(context, -0.5 * length, -0.5 * width, length, width);
   canvas.set_color(colors.body);
@@ -81,7 +81,7 @@ void paint_wall(GroundPen& pen, const WallFace& wall) {
   pen.line(in_plan(wall.a_m), in_plan(wall.b_m), pen.at_least(0.5, 1.5), hex(0x7A6552));
 }
 
-/// The reasons to halt, in the order of the legend; a ring shows the first that applies.
+/// Reasons to halt, in the order of the legend; a ring has the colour of the first that applies.
 struct HaltReason {
   int events;
   const char* name;
@@ -137,7 +137,7 @@ void paint_mark(Canvas& canvas, const WorldMark& mark, const Vector2d& center_px
   canvas.text(center_px.x() + 8, center_px.y() - 6, mark.label, {.size_px = 15, .bold = true, .color = hex(0x14161A)});
 }
 
-/// The number of active agents, and of halted ones by reason.
+/// Paints the number of active agents, and of halted agents by reason.
 void paint_legend(Canvas& canvas, const WorldFrame& frame) {
   struct Row {
     std::string label;
@@ -178,7 +178,7 @@ Rgb lamp_color(LightState state) {
   return state == LightState::off || state == LightState::unknown ? hex(0x4A4F57) : light_color(state);
 }
 
-// The agent in the middle of its circle, and its way along its waypoints, of which the next one is the largest.
+// Paints the agent at the centre of its circle, and its way along its waypoints, of which the next is the largest.
 void paint_highlight(Canvas& canvas, const Vector2d& position, double length_px,
                      const std::vector<Vector2d>& waypoints) {
   cairo_t* const context = canvas.context();
