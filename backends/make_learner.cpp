@@ -5,7 +5,7 @@
 
 namespace pictura {
 
-// Each executor's one public symbol; declared here so that nothing else sees them.
+// The only public symbol of each executor, declared here so that other files cannot see it.
 std::unique_ptr<LearnerExecutor> make_cpu_learner_executor();
 #ifdef PICTURA_HAS_CUDA
 std::unique_ptr<LearnerExecutor> make_cuda_learner_executor(Device device);

@@ -8,13 +8,13 @@
 
 namespace pictura {
 
-// Each backend's one public symbol; declared here so that no other file can call them.
+// The only public symbol of each backend, declared here so that other files cannot call it.
 std::unique_ptr<Renderer> make_cpu_renderer(const RendererConfig& config);
 #ifdef PICTURA_HAS_CUDA
-/// *origin_out receives where the kernels come from.
+/// *origin_out gets the origin of the kernels.
 std::unique_ptr<Renderer> make_cuda_renderer(const RendererConfig& config, std::string* origin_out);
 std::unique_ptr<Renderer> make_cuda_renderer_for_host(const RendererConfig& config, std::string* origin_out);
-/// Empty where a CUDA device can be used, else why not.
+/// Empty where a CUDA device is usable, else the reason why not.
 std::string cuda_unavailable();
 #endif
 
@@ -25,7 +25,7 @@ std::unique_ptr<Renderer> make_gl_renderer(const std::string& name, const Render
 
 namespace {
 
-// Draws black: for running everything but a renderer.
+// Renderer that draws black, to run everything else without a renderer.
 class NullRenderer final : public Renderer {
  public:
   explicit NullRenderer(const RendererConfig& config) : config_(check_config("null", config)) {}

@@ -5,11 +5,11 @@
 
 namespace pictura {
 
-// Each executor's one public symbol; declared here so that nothing else sees them.
+// The only public symbol of each executor, declared here so that other files cannot see it.
 std::unique_ptr<Simulator> make_cpu_simulator(SimulatorSetup setup);
 #ifdef PICTURA_HAS_CUDA
 std::unique_ptr<Simulator> make_cuda_simulator(SimulatorSetup setup);
-/// Empty where a CUDA device can be used, else why not.
+/// Empty where a CUDA device is usable, else the reason why not.
 std::string cuda_unavailable();
 #endif
 
