@@ -1,4 +1,4 @@
-// The learner's rules on the host: plain loops.
+// Rules of the learner on the host, as plain loops.
 #include <algorithm>
 #include <memory>
 #include <vector>
@@ -41,7 +41,7 @@ class LearnerExecutorCpu final : public LearnerExecutor {
 
   void compute_advantages(const TransitionArrays& transitions, float gamma, float gae_lambda,
                           Span<float> advantages_out, Stream) override {
-    // Steps are walked backwards and slots forwards: the inner loop runs over consecutive memory.
+    // Steps are iterated backwards and slots forwards, so that the inner loop runs over consecutive memory.
     std::vector<GaeTail> tails;
     for (int64_t slot = 0; slot < transitions.num_slots; ++slot) tails.push_back(transitions.tail(slot));
     for (int64_t step = transitions.num_steps - 1; step >= 0; --step) {

@@ -136,8 +136,8 @@ bool ImageDrawer::stands(uint32_t solid, uint32_t strip) const {
   return stands_on(extent_of(solid, pieces, agents), extent_of(strip, pieces, agents));
 }
 
-// Calls visit(y, row, spans, lane) for each row of a face within `rows`; `row` is the index of its first pixel, and the
-// row's span is that of a lane of `spans`.
+// Calls visit(y, row, spans, lane) for each row of a face within `rows`. `row` is the index of its first pixel, and the
+// row's span is in lane `lane` of `spans`.
 template <typename Visit>
 void ImageDrawer::visit_spans(const ScreenFace& face, RowRange rows, Visit&& visit) const {
   const int width = setting_.camera.width_px;
@@ -155,7 +155,7 @@ void ImageDrawer::find_occluder_bounds(FaceRange faces, RowRange rows) {
   occluder_bounds_.assign((rows.y_end - rows.y_begin) * setting_.camera.width_px + kLanes, 0.0f);
   for (int32_t f = faces.begin; f < faces.end; ++f) {
     const ScreenFace& face = faces_[f];
-    if (is_strip(face)) continue;  // has no bound
+    if (is_strip(face)) continue;  // strips have no bound
     visit_spans(face, rows, [&](int y, int row, const RowSpansX8& spans, int lane) {
       const int x_end = spans.full_end[lane];
       for (int x = spans.full_begin[lane]; x < x_end; x += kLanes) {
@@ -170,7 +170,7 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
   find_occluder_bounds(faces, rows);
   first_fragment_.assign((rows.y_end - rows.y_begin) * setting_.camera.width_px, -1);
   int32_t num_fragments = 0;
-  // Pixels that a face covers partly, as far as is known before their coverage is.
+  // Pixels that a face may cover partly, before their coverage is computed.
   struct {
     int32_t x[2 * kLanes] = {}, y[2 * kLanes] = {};
     int count = 0;
@@ -193,7 +193,7 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
     };
     visit_spans(face, rows, [&](int y, int row, const RowSpansX8& spans, int lane) {
       for (int x = spans.begin[lane]; x < spans.end[lane]; x += kLanes) {
-        // The pixels of a step and those that are partial from before.
+        // Room for the pixels of a step and the earlier partial pixels.
         if (static_cast<std::size_t>(num_fragments) + 2 * kLanes > fragments_.size()) {
           fragments_.resize(2 * fragments_.size() + 2 * kLanes);
         }
@@ -215,12 +215,12 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
   }
 }
 
-// Appends the fragments of a pixel's list to those collected.
+// Appends the fragments of a pixel's list to the collected fragments.
 void ImageDrawer::collect_fragments(int32_t first) {
   for (int32_t i = first; i >= 0; i = fragments_[i].next) collected_.push_back(fragments_[i]);
 }
 
-// Collects the fragments of the pixels that have several, pixel after pixel, and finds their visible samples.
+// Collects the fragments of the pixels that have several, pixel by pixel, and finds their visible samples.
 void ImageDrawer::resolve_occlusion(RowRange rows) {
   collected_.clear();
   visible_.clear();
@@ -263,7 +263,7 @@ void ImageDrawer::resolve_occlusion(RowRange rows) {
       for (std::size_t i = begin; i < end; ++i) {
         const PixelCoverage a = collected_[i].coverage;
         for (std::size_t j = i + 1; j < end; ++j) {
-          // Without a branch, which would be mispredicted: a pair that shares nothing is overwritten by the next.
+          // Without a branch, which would be mispredicted: the next pair overwrites a pair that shares nothing.
           const uint64_t shared = shared_samples(a, collected_[j].coverage);
           pair[num_pairs] = {i, j};
           pairs.shared[num_pairs] = shared;
@@ -319,7 +319,7 @@ void ImageDrawer::draw(const ImageTarget& target) {
   const int width = setting_.camera.width_px, height = setting_.camera.height_px;
   const int band_rows = max_of(1, min_of(height, kBandPixels / width));
   const bool in_patches = target.order == ChannelOrder::patches;
-  // From one channel of a pixel to the next.
+  // Distance between channels of a pixel.
   const int64_t step = in_patches ? place_in_patches(target.patch_px, width, 1, 0, 0) : int64_t{width} * height;
   const bool has_bytes = target.format == PixelFormat::u8 || target.format == PixelFormat::bf16;
   // Colours of byte formats are rounded first, since kernels store them as bytes.
@@ -327,7 +327,7 @@ void ImageDrawer::draw(const ImageTarget& target) {
     return target.effect.of(has_bytes ? rgb_of_bytes(to_bytes(color)) : color, x, y);
   };
   auto draw_as = [&](auto* out, auto&& value_of) {
-    // What reaches beyond the image.
+    // Blackens the parts of patches beyond the image.
     if (in_patches) std::fill_n(out, image_values({width, height}, target.order, target.patch_px), 0);
     for (int y_begin = 0; y_begin < height; y_begin += band_rows) {
       const RowRange rows{y_begin, min_of(height, y_begin + band_rows)};
@@ -358,8 +358,8 @@ void ImageDrawer::draw(const ImageTarget& target) {
   if (target.depth_m || target.class_id || target.instance_id) draw_planes(target);
 }
 
-// Orders the collected fragments of a pixel front to back: next is the nearest one that no remaining one occludes; in a
-// cycle, the nearest.
+// Orders the collected fragments of a pixel front to back: the next is the nearest fragment that no remaining fragment
+// occludes; in a cycle, the nearest.
 void ImageDrawer::order_pixel(int x, int y) {
   auto at_centroid = [&](const PixelFragment& fragment) {
     return make_fragment(faces_[fragment.face], fragment.face, fragment.coverage, x, y);

@@ -1,4 +1,4 @@
-// The CPU renderer, which is the reference of all others (the oracle): checks its input, places the cameras, and
+// The CPU renderer, which is the reference (oracle) of all other renderers: checks its input, places the cameras, and
 // distributes images over threads.
 #include <cstddef>
 #include <memory>
@@ -85,7 +85,7 @@ class CpuRenderer final : public Renderer {
  private:
   int num_threads() const { return static_cast<int>(drawers_.size()); }
 
-  // Sorts the boxes of worlds in which a look at all of them, in every image, would take longer.
+  // Sorts the boxes of worlds in which testing all boxes in every image would take longer.
   void sort_crowds(const SceneBatch& scene, Span<const View> views) {
     constexpr int32_t kMinBoxes = 256, kMinViews = 16;
     std::vector<int32_t> num_views(scene.geometry.size());

@@ -17,7 +17,7 @@
 namespace pictura {
 namespace {
 
-/// Sorts the boxes that stand anywhere into their cells, by counting; within a cell in ascending order.
+/// Sorts the boxes with a place into their cells, by counting; in ascending order within a cell.
 void sort_into_cells(const WorldView& world, CellLists* cells_inout) {
   std::vector<int32_t>& begin = cells_inout->begin;
   const GridView cells = cells_inout->view();
@@ -211,7 +211,7 @@ class SimulatorCpu final : public Simulator {
     return arrays_.results;
   }
 
-  /// Before anything changes, so that a refused step leaves the state as it was.
+  /// Checks commands before anything changes, so that a refused step leaves the state unchanged.
   template <typename CommandType>
   void check_commands(Span<const CommandType> commands) {
     for (int w = 0; w < worlds_.setup.num_worlds(); ++w) {
@@ -238,7 +238,7 @@ class SimulatorCpu final : public Simulator {
     worlds_.state.episode_over[index] = 0;
     const WorldView world = worlds_.world(w);
     for (int light = 0; light < static_cast<int>(world.map.stop_lines.size()); ++light) begin_light(world, light);
-    // The cells hold chains until all boxes stand.
+    // The cells hold chains until all boxes are placed.
     CellLists& cells = worlds_.box_cells[index];
     const BoxChains standing{cells.view(), cells.begin.data(), cells.items.data()};
     std::fill(cells.begin.begin(), cells.begin.end(), -1);
@@ -256,7 +256,7 @@ class SimulatorCpu final : public Simulator {
                      }));
       add(world.num_agents + car);
     }
-    // All choose before any is placed, since who is placed takes the height of its road.
+    // All agents choose before any is placed, since a placed agent takes the height of its road.
     for (int agent = 0; agent < world.num_agents; ++agent) {
       draw_agent(world, agent);
       const int chosen = first_try(has_places(world, agent), [&](int i) {
@@ -278,7 +278,7 @@ class SimulatorCpu final : public Simulator {
     sort_into_cells(world, &worlds_.box_cells[index]);
   }
 
-  /// The first try that succeeds; -1: none, or nothing to try.
+  /// Returns the first try that succeeds; -1 if none succeeds or there are no places.
   template <typename Succeeds>
   static int first_try(bool has_places, Succeeds&& succeeds) {
     for (int i = 0; has_places && i < kSpawnTries; ++i) {
@@ -324,7 +324,7 @@ class SimulatorCpu final : public Simulator {
     worlds_.state.world_totals[index].add(sum);
   }
 
-  /// Writes what the world's agents observe and where their cameras stand.
+  /// Writes the observations of the world's agents and the views of their cameras.
   void show(int w) {
     const WorldView world = worlds_.world(w);
     const ObservationView observations = results_.observation_view();
@@ -339,7 +339,7 @@ class SimulatorCpu final : public Simulator {
   SimulatorCapacity capacity_;
   WorldsToken worlds_token_;
   HostResults results_;
-  std::vector<int32_t> chosen_try_;  // [slots] while an episode begins
+  std::vector<int32_t> chosen_try_;  // [slots] used while an episode begins
   SimulatorTotals totals_;
 };
 
