@@ -1,4 +1,4 @@
-// OpenGL by EGL without a window system: NVIDIA's or another vendor's driver on a GPU, else Mesa's surfaceless
+// OpenGL through EGL without a window system: the driver of NVIDIA or another vendor on a GPU, else Mesa's surfaceless
 // platform.
 #include <string_view>
 #include <vector>
@@ -17,7 +17,7 @@ namespace {
 
 constexpr const char* kName = "gl:egl";
 
-/// The entry points of libEGL.
+/// Entry points of libEGL.
 class Egl {
   SharedLibrary library_{kName, "libEGL.so.1", "Debian package libegl1"};
   template <typename Function>
@@ -75,7 +75,7 @@ bool is_gpu(const Egl& egl, EGLDeviceEXT device) {
   return !has(egl.query_device_string(device, EGL_EXTENSIONS), "EGL_MESA_device_software");
 }
 
-// The display is shared by the whole process, so it is never terminated.
+// Opens the display, which the whole process shares, so that it is never terminated.
 EGLDisplay open_display(const Egl& egl, int cuda_device) {
   auto initialized = [&](EGLenum platform, void* native) {
     const EGLDisplay display = egl.get_platform_display(platform, native, nullptr);

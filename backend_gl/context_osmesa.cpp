@@ -1,4 +1,4 @@
-// OpenGL by Mesa's off-screen interface: a software rasterizer in the calling process, no display and no device.
+// OpenGL through Mesa's off-screen interface: a software rasterizer in the calling process, without display and device.
 #include <GL/osmesa.h>
 
 #include "pictura/backend_gl/gl_context.h"

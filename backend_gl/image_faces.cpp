@@ -8,15 +8,15 @@ namespace pictura::gl {
 
 namespace {
 
-// Strips of one level are nearly coplanar, and rank decides which is in front. Each is therefore depth-tested with an
-// offset away from the camera that grows with its rank: seen from above by up to kMaxPush_m, several times the distance
-// between strips of one level and little compared with that between two levels of road. Seen from below, objects on a
-// strip are behind it or in its plane, and must be behind: there strips come nearer, by one to two times kMaxPushShare
-// of the distance of their planes.
+// Maximum depth offsets of strips. Strips of one level are nearly coplanar, and rank decides which is in front. So each
+// strip is depth-tested with an offset away from the camera that grows with its rank. Seen from above, the offset is up
+// to kMaxPush_m: several times the distance between strips of one level, and small compared with the distance between
+// two levels of road. Seen from below, objects on a strip are behind it or in its plane, and must be behind. So there
+// strips move nearer, by one to two times kMaxPushShare of the distance of their planes.
 constexpr float kMaxPush_m = 4 * kSameLevel_m, kMaxPushShare = 0.01f;
 
-// The plane whose depth is tested for a strip of rank `order`, 0 to 1, among those of the image. Below the camera it is
-// lowered by the depth that solids on it may dip into it, so that they are in front.
+// Returns the plane whose depth is tested for a strip of rank `order`, 0 to 1, among those of the image. Below the
+// camera, the plane is lowered by the depth to which solids on it may extend through it, so that these are in front.
 Vec3 compared_plane(const FacePlane& plane, const PinholeCamera& camera, float order) {
   const Vec3 up{camera.right.z, camera.down.z, camera.forward.z};
   const float above = dot(plane.normal, up);  // also the scale of the offset: above * height of the plane
@@ -32,7 +32,7 @@ void ImageFaces::build(const ImageSetting& setting, const StaticGeometryView& ge
                        const View& view, int32_t layer) {
   faces_.clear();
   strips_.clear();
-  // A convex polygon as a fan of quadrilaterals; with an odd number of corners the last one is a triangle.
+  // A convex polygon as a fan of quadrilaterals; with an odd number of corners, the last is a triangle.
   auto add = [&](const Vec3* corners, int count, Vec3 compared, Rgb color) {
     for (int i = 1; i + 1 < count; i += 2) {
       faces_.push_back(

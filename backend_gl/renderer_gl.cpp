@@ -1,5 +1,5 @@
 // The graphics-pipeline baseline. Faces are built on the host by the shared rules and drawn as instances into array
-// textures, one layer per image; OpenGL projects, clips, and decides visibility by depth.
+// textures, one layer per image. OpenGL projects, clips, and decides visibility by depth.
 #include <algorithm>
 #include <cstring>
 
@@ -58,7 +58,7 @@ class GlRenderer final : public Renderer {
     drawn_by_ = reinterpret_cast<const char*>(gl_->GetString(GL_RENDERER));
     PICTURA_CHECK(has_extension(*gl_, kLayerExtension), "renderer {}: {} lacks {}", name_, drawn_by_, kLayerExtension);
     make_pipeline();
-    groups_ = make_groups();  // last: if it throws, its objects are destroyed while the context is current
+    groups_ = make_groups();  // last, so that if it throws, its objects are destroyed while the context is current
   }
   ~GlRenderer() override {
     const gl::CurrentContext current(context_.get());
@@ -68,7 +68,7 @@ class GlRenderer final : public Renderer {
   Device device() const override { return memory_; }
   const RendererConfig& config() const override { return config_; }
   bool draws_all_formats() const override { return false; }
-  /// The driver's name of the device.
+  /// Returns the driver's name of the device.
   const std::string& drawn_by() const { return drawn_by_; }
 
   void upload(GeometryHandle handle, const StaticGeometry& geometry, Stream) override {
@@ -134,7 +134,7 @@ class GlRenderer final : public Renderer {
     attribute(4, 3, offsetof(FaceInstance, compared_plane));
     attribute(5, 3, offsetof(FaceInstance, color));
     attribute(6, 0, offsetof(FaceInstance, layer));
-    // Depth is inverse: 1 at the near plane, 0 infinitely far, so that single precision suffices at every range.
+    // Depth is inverse: 1 at the near plane, 0 at infinity, so that single precision suffices at every range.
     gl_->ClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
     gl_->Enable(GL_DEPTH_TEST);
     gl_->DepthFunc(GL_GREATER);
@@ -177,7 +177,7 @@ class GlRenderer final : public Renderer {
     gl::check_errors(*gl_, fmt::format("renderer {}: drawing", name_));
   }
 
-  // Images [begin, end) of a group, which fit its array.
+  // Draws images [begin, end) of a group, which fit its array.
   void draw_images(const SizeGroup& group, int64_t begin, int64_t end, const SceneBatch& scene, Span<const View> views,
                    const ImageBatch& images_out, Stream stream) {
     const auto num_views = static_cast<int64_t>(views.size());
@@ -196,7 +196,7 @@ class GlRenderer final : public Renderer {
     for (int64_t image = begin; image < end;) {
       const std::size_t index = group.cameras[image / num_views];
       const int64_t view = image % num_views;
-      // Views of one camera are drawn together where they have one projection.
+      // Views of one camera are drawn together where they have the same projection.
       const int64_t last = config_.randomization.moves_cameras() ? image + 1 : std::min(end, image + num_views - view);
       const auto layer = static_cast<std::size_t>(image - begin), end_layer = static_cast<std::size_t>(last - begin);
       project_by(camera_of(index, views[view]));
@@ -214,7 +214,7 @@ class GlRenderer final : public Renderer {
     group.array->copy(copies_planned_, stream);
   }
 
-  // A camera of the rig as a view's agent has it, in the ego frame.
+  // Returns a camera of the rig, in the ego frame, as randomized for a view's agent.
   PinholeCamera camera_of(std::size_t index, const View& view) const {
     return randomized_camera(cameras_[index], config_.randomization, view.key, static_cast<int>(index));
   }
@@ -226,7 +226,7 @@ class GlRenderer final : public Renderer {
                         *geometries_.find(handle), scene, view, layer);
   }
 
-  // Uploads the faces of the first `count` images, one after the other, to the instance buffer.
+  // Uploads the faces of the first `count` images consecutively to the instance buffer.
   void upload_faces(std::size_t count) {
     first_face_.resize(count + 1);
     first_face_[0] = 0;
@@ -243,7 +243,8 @@ class GlRenderer final : public Renderer {
     gl_->UnmapNamedBuffer(instances_);
   }
 
-  // From camera coordinates to -1 .. 1 across the image, whose first row is the lowest of the texture.
+  // Sets the projection from camera coordinates to -1 .. 1 across the image, whose first row is the lowest of the
+  // texture.
   void project_by(const PinholeCamera& camera) {
     const float width = static_cast<float>(camera.width_px), height = static_cast<float>(camera.height_px);
     gl_->ProgramUniform4f(program_, projection_, 2.0f * camera.focal_x_px / width, 2.0f * camera.focal_y_px / height,
@@ -254,18 +255,18 @@ class GlRenderer final : public Renderer {
   RendererConfig config_;
   std::vector<PinholeCamera> cameras_;  // in the ego frame
   std::unique_ptr<gl::Context> context_;
-  std::unique_ptr<gl::CudaInterop> interop_;  // if scenes and images are in device memory
-  Device memory_;                             // of scenes and images
+  std::unique_ptr<gl::CudaInterop> interop_;  // set if scenes and images are in device memory
+  Device memory_;                             // device of scenes and images
   std::string name_, drawn_by_;
   std::unique_ptr<gl::Functions> gl_;
   std::vector<SizeGroup> groups_;
   GLuint program_ = 0, instances_ = 0, vertex_array_ = 0;
   GLint projection_ = -1, positions_ = -1;
-  float positions_per_px_ = 0;  // of the driver's grid of corner positions, along each axis
+  float positions_per_px_ = 0;  // resolution of the driver's grid of corner positions, along each axis
   HostGeometries geometries_;
   gl::HostScene host_scene_;
   std::vector<gl::ImageFaces> faces_;    // one per layer
-  std::vector<std::size_t> first_face_;  // [layers + 1] in the buffer
+  std::vector<std::size_t> first_face_;  // [layers + 1] first face of each layer in the buffer
   std::vector<gl::RowCopy> copies_planned_;
 };
 

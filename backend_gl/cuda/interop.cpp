@@ -85,7 +85,7 @@ class RuntimeInterop final : public CudaInterop {
 }  // namespace
 
 std::unique_ptr<CudaInterop> make_cuda_interop(Device device) {
-  const DeviceGuard guard(device);  // throws if there is no such device
+  const DeviceGuard guard(device);  // throws if the device does not exist
   return std::make_unique<RuntimeInterop>(device);
 }
 
