@@ -17,14 +17,14 @@ class CudaGraph final : public DeviceGraph {
  public:
   CudaGraph(Device device, cudaStream_t stream, const std::function<void()>& work) : device_(device) {
     const DeviceGuard guard(device_);
-    // What allocates or waits meanwhile in this thread is an error. Other threads, as NCCL's, may do so.
+    // Allocations and waits of this thread during the capture are errors. Other threads, such as NCCL's, may do so.
     PICTURA_CUDA(cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal));
     cudaGraph_t graph = nullptr;
     try {
       work();
     } catch (...) {
       cudaStreamEndCapture(stream, &graph);
-      cudaGetLastError();  // what the work has thrown says more
+      cudaGetLastError();  // the exception of the work is more informative
       if (graph) cudaGraphDestroy(graph);
       throw;
     }

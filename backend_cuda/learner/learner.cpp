@@ -1,4 +1,4 @@
-// The learner's rules on a CUDA device: launches, and the counts that the host needs.
+// Rules of the learner on a CUDA device: launches, and the counts that the host needs.
 #include <memory>
 #include <string>
 
@@ -18,7 +18,7 @@ cudaStream_t handle_of(Stream stream) { return static_cast<cudaStream_t>(stream.
 
 class LearnerExecutorCuda final : public LearnerExecutor {
  public:
-  /// On the current device.
+  /// Constructs the executor for the current device.
   LearnerExecutorCuda() : device_(current_device()) {}
   Device device() const override { return device_; }
 
@@ -88,7 +88,7 @@ class LearnerExecutorCuda final : public LearnerExecutor {
   }
 
   Device device_;
-  DeviceBuffer<uint8_t> scratch_;  // grows to what the largest selection needed
+  DeviceBuffer<uint8_t> scratch_;  // grows to the size of the largest selection
   MappedValue<int64_t> count_;
 };
 

@@ -1,4 +1,4 @@
-// A network's passes on a CUDA device: launches.
+// Passes of a network on a CUDA device: launches.
 #include <memory>
 
 #include "pictura/backend_cuda/learner/network_kernels.h"

@@ -1,4 +1,4 @@
-// A network's passes over its activations on a CUDA device: vectors of 16 bytes, sums in fp32 and in a fixed order.
+// Passes of a network over its activations on a CUDA device: vectors of 16 bytes, and sums in fp32 in a fixed order.
 #include <type_traits>
 
 #include <cuda_bf16.h>
@@ -22,7 +22,7 @@ __device__ T from_float(float x) {
     return __float2bfloat16(x);
 }
 
-/// kSize neighbouring elements, loaded and stored as one.
+/// kSize neighbouring elements, loaded and stored together.
 template <typename T, int kSize>
 struct alignas(sizeof(T) * kSize) Vector {
   T values[kSize];
@@ -42,7 +42,8 @@ __global__ void __launch_bounds__(kThreads)
   reinterpret_cast<Vector*>(out)[i] = v;
 }
 
-// A thread has a vector's channels of every so many rows; the sums of a block's threads are added in shared memory.
+// A thread processes a vector's channels of rows at a fixed stride; the sums of a block's threads are added in shared
+// memory.
 template <typename T>
 __global__ void __launch_bounds__(kThreads)
     bias_gelu_backward(int64_t rows, int channels, const T* x, const float* bias, const T* grad_out, T* grad_x_out,
@@ -90,7 +91,7 @@ __device__ float warp_sum(float x) {
   return x;
 }
 
-/// A row as a warp holds it: lane l has channels 2 (l + 32 k) and the next, for k < kPairs.
+/// A row in the registers of a warp: lane l has channels 2 (l + 32 k) and the next, for k < kPairs.
 template <int kPairs>
 struct WarpRow {
   static constexpr int kChannels = 2 * kWarp * kPairs;
@@ -126,7 +127,7 @@ struct WarpRow {
   }
 };
 
-/// Makes the row's mean 0 and its variance 1; returns 1 / its deviation.
+/// Normalizes the row to mean 0 and variance 1; returns 1 / its standard deviation.
 template <int kPairs>
 __device__ float normalize(WarpRow<kPairs>* row_inout) {
   WarpRow<kPairs>& row = *row_inout;
@@ -139,7 +140,7 @@ __device__ float normalize(WarpRow<kPairs>* row_inout) {
   return inverse_deviation;
 }
 
-/// The gradient of a row from that of what normalize() made of it.
+/// Computes the gradient of a row from that of its normalize() result.
 template <int kPairs>
 __device__ void normalize_backward(const WarpRow<kPairs>& normalized, float inverse_deviation,
                                    WarpRow<kPairs>* grad_inout) {
@@ -150,7 +151,7 @@ __device__ void normalize_backward(const WarpRow<kPairs>& normalized, float inve
   grad.each([&](int k, float g) { return (g - mean - normalized.values[k] * product_mean) * inverse_deviation; });
 }
 
-/// Loads x + bias and normalizes it; returns 1 / its deviation.
+/// Loads x + bias and normalizes it; returns 1 / its standard deviation.
 template <typename T, int kPairs>
 __device__ float load_biased_normalized(const T* x, const WarpRow<kPairs>& bias, WarpRow<kPairs>* row_out) {
   row_out->load(x);
@@ -170,7 +171,7 @@ __global__ void __launch_bounds__(kThreads) bias_norm_gelu(int64_t rows, const T
   values.store(out + row * kChannels);
 }
 
-// A warp has every num_sums-th row.
+// A warp processes every num_sums-th row.
 template <typename T, int kPairs>
 __global__ void __launch_bounds__(kThreads)
     bias_norm_gelu_backward(int64_t rows, int64_t num_sums, const T* x, const float* bias, const T* grad_out,
@@ -192,7 +193,7 @@ __global__ void __launch_bounds__(kThreads)
   sums.store(sums_out + warp * kChannels);
 }
 
-/// Loads x + position and normalizes it; returns 1 / its deviation.
+/// Loads x + position and normalizes it; returns 1 / its standard deviation.
 template <typename T, int kPairs>
 __device__ float load_normalized(const T* x, const T* position, WarpRow<kPairs>* row_out) {
   WarpRow<kPairs>& row = *row_out;
@@ -200,7 +201,7 @@ __device__ float load_normalized(const T* x, const T* position, WarpRow<kPairs>*
   if (position) {
     WarpRow<kPairs> added;
     added.load(position);
-    // Rounded as the sum is that ATen stores.
+    // Rounded like the sum that ATen stores.
     row.each([&](int k, float v) { return to_float(from_float<T>(v + added.values[k])); });
   }
   return normalize(row_out);
@@ -220,7 +221,7 @@ __global__ void __launch_bounds__(kThreads)
   values.store(out + row * kChannels);
 }
 
-// A warp has the rows of one position, every so many repetitions of the period.
+// A warp processes the rows of one position, at a fixed stride of repetitions of the period.
 template <typename T, int kPairs>
 __global__ void __launch_bounds__(kThreads)
     norm_backward(int64_t rows, const T* x, const T* position, int64_t period, int64_t num_sums, const float* weight,
@@ -243,14 +244,14 @@ __global__ void __launch_bounds__(kThreads)
     position_sums.each([&](int k, float sum) { return sum + grad.values[k]; });
     grad.store(grad_x_out + row * kChannels);
   }
-  // Warp number = (sum, position), since the stride is a multiple of the period.
+  // Warp index = (sum, position), since the stride is a multiple of the period.
   float* const sums = sums_out + warp * 3 * kChannels;
   position_sums.store(sums);
   weight_sums.store(sums + kChannels);
   bias_sums.store(sums + 2 * kChannels);
 }
 
-// A thread writes a number. A block has whole rows, so that none is divided by in 64 bits.
+// A thread writes one number. A block has whole rows, which avoids 64-bit division.
 template <typename T>
 __global__ void __launch_bounds__(kThreads)
     row_features(RowSize size, int width, int rows_a_block, const float* rows, T* out) {
@@ -263,8 +264,8 @@ __global__ void __launch_bounds__(kThreads)
   out[row * width + column] = from_float<T>(value);
 }
 
-// The row of a patch, of which `count` pixels lie in the image; the others are black. Read at once where whole patches
-// lie side by side, so that rows begin at multiples of their size.
+// Loads the row of a patch. `count` of its pixels lie in the image, and the others are black. Loads a row at once where
+// whole patches lie side by side, so that rows begin at multiples of their size.
 template <int kPatch>
 __device__ void load_patch_row(const uint8_t* from, int count, bool is_aligned, uint8_t (&pixels_out)[kPatch]) {
   struct alignas(kPatch == 3 ? 1 : kPatch) Row {
@@ -281,7 +282,7 @@ __device__ void load_patch_row(const uint8_t* from, int count, bool is_aligned, 
   for (int x = 0; x < kPatch; ++x) pixels_out[x] = row.pixels[x];
 }
 
-// A thread writes all channels of a position. Its numbers fit into 32 bits but for the offset of the image.
+// A thread writes all channels of a position. Its indices fit into 32 bits, except for the offset of the image.
 template <typename T, int kPatch>
 __global__ void __launch_bounds__(kThreads) patches(PatchSize size, int num_positions, const uint8_t* images, T* out) {
   constexpr int kWidth = 16 / sizeof(T), kChannels = static_cast<int>(PatchSize::channels_of(kPatch));
@@ -312,8 +313,8 @@ __global__ void __launch_bounds__(kThreads) patches(PatchSize size, int num_posi
   for (int i = 0; i < kChannels / kWidth; ++i) its_out[i] = reinterpret_cast<const Part*>(values)[i];
 }
 
-// A thread has a pair of columns of a matrix [tokens, columns]; neighbouring threads read neighbouring memory. What is
-// read twice comes from the cache.
+// A thread processes a pair of columns of a matrix [tokens, columns]; neighbouring threads read neighbouring memory.
+// The second read comes from the cache.
 template <typename T>
 __global__ void __launch_bounds__(kThreads)
     token_softmax(int64_t num_pairs, int tokens, int columns, const T* scores, T* out) {
@@ -324,7 +325,7 @@ __global__ void __launch_bounds__(kThreads)
   const int64_t first = i / pairs_a_row * tokens * pairs_a_row + i % pairs_a_row;
   const Pair* const its_scores = reinterpret_cast<const Pair*>(scores) + first;
   Pair* const its_out = reinterpret_cast<Pair*>(out) + first;
-  // The largest so far, and the sum of the exponentials of what is below it.
+  // Maximum so far, and the sum of the exponentials of values relative to it.
   float largest[2] = {-INFINITY, -INFINITY}, sums[2] = {0, 0};
   for (int t = 0; t < tokens; ++t) {
     const Pair pair = its_scores[t * pairs_a_row];
@@ -345,7 +346,7 @@ __global__ void __launch_bounds__(kThreads)
   }
 }
 
-// grad_scores = out * (grad_out - sum over tokens of out * grad_out)
+// Computes grad_scores = out * (grad_out - sum over tokens of out * grad_out).
 template <typename T>
 __global__ void __launch_bounds__(kThreads)
     token_softmax_backward(int64_t num_pairs, int tokens, int columns, const T* out, const T* grad_out,
@@ -380,7 +381,7 @@ void launch(int64_t num_threads, cudaStream_t stream, Kernel kernel, const Argum
   kernel<<<static_cast<unsigned>((num_threads + kThreads - 1) / kThreads), kThreads, 0, stream>>>(arguments...);
 }
 
-/// f(T{}) with the C++ type of an element type.
+/// Calls f(T{}) with the C++ type of an element type.
 template <typename F>
 void with_type(ActivationType type, F&& f) {
   if (type == ActivationType::f32)
@@ -389,7 +390,7 @@ void with_type(ActivationType type, F&& f) {
     f(__nv_bfloat16{});
 }
 
-/// f of an integral constant n for rows of 64 n channels.
+/// Calls f with an integral constant n for rows of 64 n channels.
 template <typename F>
 void with_pairs(int64_t channels, F&& f) {
   switch (channels) {
@@ -403,7 +404,7 @@ void with_pairs(int64_t channels, F&& f) {
   }
 }
 
-/// f of an integral constant, the side of a patch; nothing for sides that PatchSize::takes() refuses.
+/// Calls f with an integral constant, the side of a patch; does nothing for sides that PatchSize::takes() refuses.
 template <typename F>
 void with_patch(int64_t patch_px, F&& f) {
   switch (patch_px) {
@@ -499,7 +500,7 @@ void launch_row_features(const RowSize& size, const float* rows, ActivationType 
 void launch_patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, cudaStream_t stream) {
   const int64_t num_images = size.views * size.cameras, num_positions = size.rows() * size.columns();
   if (num_images == 0) return;
-  // Images along the side that may be long.
+  // Images are along the grid axis with the larger limit.
   const dim3 blocks(static_cast<unsigned>(num_images),
                     static_cast<unsigned>((num_positions + kThreads - 1) / kThreads));
   with_type(type, [&](auto element) {

@@ -1,5 +1,5 @@
-// Sets of members through an MLP to their largest embeddings, and the way back, on tensor cores: what ATen keeps in
-// memory for each member stays in registers. bf16 products, sums in fp32 and in a fixed order.
+// Encoding of sets of members by an MLP to the largest embeddings of each set, and its backward pass, on tensor cores.
+// Values per member that ATen keeps in memory stay in registers. Products are in bf16, sums in fp32 in a fixed order.
 #include <cuda_bf16.h>
 
 #include "pictura/backend_cuda/learner/activation.cuh"
@@ -12,15 +12,16 @@ namespace {
 using Half = __nv_bfloat16;
 
 constexpr int kWarps = 4, kThreads = kWarps * kWarp;
-constexpr int kTile = 16;  // members that a warp takes at once
+constexpr int kTile = 16;  // number of members that a warp processes at once
 constexpr int kChannels = SetSize::kChannels, kInputs = SetSize::kMostWidth;
 constexpr int kColumnTiles = kChannels / 8;
-// Strides of rows in shared memory, such that the rows that a warp reads at once lie in different banks.
+// Strides of rows in shared memory, such that the rows that a warp reads together lie in different banks.
 constexpr int kInputStride = kInputs + 8, kChannelStride = kChannels + 8;
 
 __device__ int lane() { return static_cast<int>(threadIdx.x) % kWarp; }
 __device__ int warp() { return static_cast<int>(threadIdx.x) / kWarp; }
-// Where a lane's numbers lie in the fragments of a product: rows kRow and kRow + 8, columns kColumn and the next.
+// Place of a lane's numbers in the fragments of a product: rows fragment_row() and the row 8 below, columns
+// fragment_column() and the next.
 __device__ int fragment_row() { return lane() / 4; }
 __device__ int fragment_column() { return lane() % 4 * 2; }
 
@@ -30,15 +31,15 @@ __device__ uint32_t pack(float low, float high) {
 }
 __device__ uint32_t pair_at(const Half* numbers) { return *reinterpret_cast<const uint32_t*>(numbers); }
 
-/// 16 rows of 16 numbers, the left side of a product.
+/// 16 rows of 16 numbers: the left operand of a product.
 struct LeftTile {
   uint32_t pairs[4];
 };
-/// 16 rows of kChannels sums, 8 columns at a time: of each the lane's two rows' two columns.
+/// 16 rows of kChannels sums, 8 columns at a time. Per 8 columns, a lane holds two columns of two rows.
 struct Sums {
   float values[kColumnTiles][4] = {};
 
-  /// f(row of the lane's two, column tile, column of the lane's two, value&)
+  /// Calls f(row of the lane's two, column tile, column of the lane's two, value&) for each value.
   template <typename F>
   __device__ void each(F&& f) {
 #pragma unroll
@@ -49,8 +50,8 @@ struct Sums {
   }
 };
 
-/// sums += left * right, where `low` are the right side's rows 2 (lane % 4) and the next in column lane / 4, and `high`
-/// those 8 below.
+/// Computes sums += left * right. `low` holds rows 2 (lane % 4) and the next of the right operand in column lane / 4,
+/// and `high` the rows 8 below.
 __device__ void multiply_add(const LeftTile& left, uint32_t low, uint32_t high, float (&sums)[4]) {
   asm volatile(
       "mma.sync.aligned.m16n8k16.row.col.f32.bf16.bf16.f32 {%0, %1, %2, %3}, {%4, %5, %6, %7}, {%8, %9}, {%0, %1, %2, "
@@ -59,19 +60,19 @@ __device__ void multiply_add(const LeftTile& left, uint32_t low, uint32_t high, 
       : "r"(left.pairs[0]), "r"(left.pairs[1]), "r"(left.pairs[2]), "r"(left.pairs[3]), "r"(low), "r"(high));
 }
 
-/// Rows of shared memory as the left side: columns [column, column + 16) of 16 rows.
+/// Loads a left operand from shared memory: columns [column, column + 16) of 16 rows.
 __device__ LeftTile left_tile(const Half* rows, int stride, int column) {
   const Half* const first = rows + fragment_row() * stride + column + fragment_column();
   return {{pair_at(first), pair_at(first + 8 * stride), pair_at(first + 8), pair_at(first + 8 * stride + 8)}};
 }
 
-/// Sums as the left side: their columns [16 k, 16 k + 16).
+/// Converts sums to a left operand: their columns [16 k, 16 k + 16).
 __device__ LeftTile left_tile(const Sums& sums, int k) {
   const auto &first = sums.values[2 * k], &second = sums.values[2 * k + 1];
   return {{pack(first[0], first[1]), pack(first[2], first[3]), pack(second[0], second[1]), pack(second[2], second[3])}};
 }
 
-/// Adds the product of a left side with the transpose of kChannels rows in shared memory, columns [column, column +
+/// Adds the product of a left operand and the transpose of kChannels rows in shared memory, columns [column, column +
 /// 16).
 __device__ void multiply_add_rows(const LeftTile& left, const Half* rows, int stride, int column, Sums* sums) {
 #pragma unroll
@@ -81,7 +82,7 @@ __device__ void multiply_add_rows(const LeftTile& left, const Half* rows, int st
   }
 }
 
-/// Four blocks of 8 x 8 numbers, transposed: a lane gives the address of a row of the block lane / 8.
+/// Loads four blocks of 8 x 8 numbers, transposed: a lane provides the address of a row of block lane / 8.
 __device__ void load_transposed(const Half* row, uint32_t (&blocks_out)[4]) {
   const auto address = static_cast<uint32_t>(__cvta_generic_to_shared(row));
   asm volatile("ldmatrix.sync.aligned.m8n8.x4.trans.shared.b16 {%0, %1, %2, %3}, [%4];"
@@ -89,14 +90,14 @@ __device__ void load_transposed(const Half* row, uint32_t (&blocks_out)[4]) {
                : "r"(address));
 }
 
-/// The transpose of 16 rows of shared memory as the left side: their columns [column, column + 16).
+/// Loads the transpose of 16 rows of shared memory as a left operand: their columns [column, column + 16).
 __device__ LeftTile transposed_left_tile(const Half* rows, int stride, int column) {
   LeftTile left;
   load_transposed(rows + (lane() % 8 + lane() / 16 * 8) * stride + column + lane() / 8 % 2 * 8, left.pairs);
   return left;
 }
 
-/// Adds the product of a left side with 16 rows of shared memory, 8 * kTiles columns of them.
+/// Adds the product of a left operand and 16 rows of shared memory, over 8 * kTiles columns.
 template <int kTiles>
 __device__ void multiply_add_columns(const LeftTile& left, const Half* rows, int stride, float (&sums)[kTiles][4]) {
   static_assert(kTiles % 2 == 0);
@@ -109,7 +110,7 @@ __device__ void multiply_add_columns(const LeftTile& left, const Half* rows, int
   }
 }
 
-/// Sum over the four lanes that share a row of fragments, or over the eight that share a column.
+/// Sums over the four lanes that share a row of fragments, or over the eight lanes that share a column.
 __device__ float row_sum(float x) {
   x += __shfl_xor_sync(0xffffffffu, x, 1);
   return x + __shfl_xor_sync(0xffffffffu, x, 2);
@@ -120,7 +121,7 @@ __device__ float column_sum(float x) {
   return x;
 }
 
-/// Makes the mean of each row 0 and its variance 1; sets 1 / the deviations of the lane's two rows.
+/// Normalizes each row to mean 0 and variance 1; sets 1 / the standard deviations of the lane's two rows.
 __device__ void normalize(Sums* rows_inout, float (&inverse_deviations_out)[2]) {
   float means[2] = {}, variances[2] = {};
   rows_inout->each([&](int row, int, int, float& v) { means[row] += v; });
@@ -137,7 +138,7 @@ __device__ void normalize(Sums* rows_inout, float (&inverse_deviations_out)[2]) 
   rows_inout->each([&](int row, int, int, float& v) { v *= inverse_deviations_out[row]; });
 }
 
-/// The gradient of rows from that of what normalize() made of them.
+/// Computes the gradient of rows from that of their normalize() result.
 __device__ void normalize_backward(const Sums& normalized, const float (&inverse_deviations)[2], Sums* grads_inout) {
   float means[2] = {}, product_means[2] = {};
   grads_inout->each([&](int row, int n, int column, float& g) {
@@ -154,7 +155,8 @@ __device__ void normalize_backward(const Sums& normalized, const float (&inverse
   });
 }
 
-/// Copies a matrix of parameters, [rows, columns] or transposed, into shared memory; all threads of the block.
+/// Copies a matrix of parameters, [rows, columns] or transposed, into shared memory. Collective over all threads of the
+/// block.
 __device__ void load_weights(const float* weights, int rows, int columns, bool is_transposed, int stride, Half* out) {
   for (int i = static_cast<int>(threadIdx.x); i < rows * columns; i += kThreads) {
     const int row = i / columns, column = i % columns;
@@ -162,14 +164,14 @@ __device__ void load_weights(const float* weights, int rows, int columns, bool i
   }
 }
 
-/// What a warp's members read: numbers and features of each, columns that there are not are 0.
+/// Inputs of a warp's members: numbers and features of each; missing columns are 0.
 struct Inputs {
   alignas(16) Half rows[kTile][kInputStride];
 
   __device__ void clear() {
     for (int i = lane(); i < kTile * kInputStride; i += kWarp) rows[i / kInputStride][i % kInputStride] = Half{};
   }
-  /// The members number(0), ..., number(count - 1) of a set, below them zeros.
+  /// Loads members number(0), ..., number(count - 1) of a set, and zeros in the rows below.
   template <typename Number>
   __device__ void load(const SetSize& size, const float* members, int count, const Number& number) {
     const RowSize& row_size = size.members;
@@ -187,7 +189,7 @@ struct Inputs {
   }
 };
 
-/// The first layer in shared memory.
+/// First layer, in shared memory.
 struct HiddenLayer {
   alignas(16) Half weight[kChannels][kInputStride];
   float bias[kChannels];
@@ -202,7 +204,7 @@ struct HiddenLayer {
     for (int i = static_cast<int>(threadIdx.x); i < kChannels; i += kThreads) bias[i] = parameters.hidden_bias[i];
   }
 
-  /// What goes into the activation; normalized, where there is a norm.
+  /// Computes the input of the activation, normalized if there is a norm.
   __device__ Sums apply(const Inputs& inputs, bool has_norm, float (&inverse_deviations_out)[2]) const {
     Sums sums;
 #pragma unroll
@@ -215,7 +217,7 @@ struct HiddenLayer {
   }
 };
 
-/// The largest value so far in each of the columns of a lane, and the member that has it: of equal ones the first.
+/// Maximum so far in each of the columns of a lane, and its member; among equal values, the first member.
 struct Largest {
   float values[kColumnTiles][2];
   int members[kColumnTiles][2];
@@ -230,14 +232,14 @@ struct Largest {
   __device__ void take(int n, int column, float value, int member) {
     float& largest = values[n][column];
     int& its_member = members[n][column];
-    // NaN is taken and kept: a network that fails must be seen to.
+    // NaN is taken and kept, so that a failing network is detected.
     const bool is_larger = value > largest || (value != value && largest == largest);
     if (is_larger || (value == largest && member < its_member) || its_member == SetSize::kNoMember) {
       largest = value;
       its_member = member;
     }
   }
-  /// Over the lanes that share a column.
+  /// Reduces over the lanes that share a column.
   __device__ void reduce() {
 #pragma unroll
     for (int i = 0; i < 2 * kColumnTiles; ++i) {
@@ -251,7 +253,7 @@ struct Largest {
   }
 };
 
-// A warp has every so many sets.
+// A warp processes sets at a fixed stride.
 __global__ void __launch_bounds__(kThreads)
     largest_embedding(SetSize size, const float* members, const int32_t* counts, SetParameters<const float> parameters,
                       Half* out, uint8_t* which_out) {
@@ -283,7 +285,7 @@ __global__ void __launch_bounds__(kThreads)
         const int member = first + fragment_row() + 8 * row;
         if (member < count) largest.take(n, column, v, member);
       });
-      __syncwarp();  // the inputs are read
+      __syncwarp();  // all lanes have read the inputs
     }
     largest.reduce();
 #pragma unroll
@@ -301,11 +303,12 @@ __global__ void __launch_bounds__(kThreads)
   }
 }
 
-/// The members of a set that are the largest somewhere, in ascending order: each has a place among these.
+/// Members of a set that have the maximum of some channel, in ascending order: each has a place in this list.
 struct Chosen {
   uint8_t members[kChannels];
 
-  /// Finds them from those of the lane's two channels, and the places of these, -1 without one. Returns how many.
+  /// Finds the chosen members from the members of the lane's two channels. places_out: the places of the two channels'
+  /// members, -1 without one. Returns the number of chosen members.
   __device__ int find(const uint8_t (&which)[2], int most, int (&places_out)[2]) {
     int count = 0;
     places_out[0] = places_out[1] = -1;
@@ -334,14 +337,15 @@ struct Chosen {
   }
 };
 
-/// What a warp's chosen members leave for the sums over rows.
+/// Data of a warp's chosen members for the sums over rows.
 struct BackwardTile {
   Inputs inputs;
   alignas(16) Half activations[kTile][kChannelStride], grads[kTile][kChannelStride],
       hidden_grads[kTile][kChannelStride];
   Chosen chosen;
 
-  /// The gradients of the embeddings of the members with places [first, first + kTile): a channel's belongs to one.
+  /// Writes the gradients of the embeddings of members with places [first, first + kTile): each channel belongs to one
+  /// member.
   __device__ void scatter(int first, const int (&places)[2], const Half (&its_grads)[2]) {
     for (int i = lane(); i < kTile * kChannelStride / 2; i += kWarp) reinterpret_cast<uint32_t*>(grads[0])[i] = 0;
     __syncwarp();
@@ -365,8 +369,8 @@ __device__ void store(const Sums& sums, Half* rows) {
   }
 }
 
-// A warp has a set, of which it computes the chosen members, a tile at a time; then each warp of the block adds its
-// quarter of the rows of both weights' gradients, of all warps' tiles.
+// A warp processes a set: it computes the chosen members, one tile at a time. Then each warp of the block adds its
+// quarter of the rows of both weights' gradients, from the tiles of all warps.
 __global__ void __launch_bounds__(kThreads)
     largest_embedding_backward(SetSize size, const float* members, SetParameters<const float> parameters,
                                const uint8_t* which, const Half* grad_out, SetParameters<float> sums_out) {
@@ -435,7 +439,7 @@ __global__ void __launch_bounds__(kThreads)
       }
       __syncthreads();
     }
-    __syncthreads();  // the numbers of tiles are read
+    __syncthreads();  // all threads have read the tiles
   }
 
   const int width = static_cast<int>(size.members.width());
@@ -452,7 +456,7 @@ __global__ void __launch_bounds__(kThreads)
       }
     }
   }
-  // Sums of each warp, [warp, channel], in the place of the tiles, which are read.
+  // Sums per warp, [warp, channel], in the memory of the tiles, which are no longer needed.
   float* const shared = reinterpret_cast<float*>(tiles);
   float *const hidden_bias = shared, *const bias = shared + kWarps * kChannels;
 #pragma unroll
@@ -482,7 +486,7 @@ void launch_largest_embedding(const SetSize& size, const float* members, const i
                               const SetParameters<const float>& parameters, void* out, uint8_t* which_out,
                               cudaStream_t stream) {
   if (size.sets() == 0) return;
-  // A block loads the weights once, so there are no more blocks than work at once.
+  // A block loads the weights once, so there are only as many blocks as run at the same time.
   constexpr int64_t kMostBlocks = 132 * 4;
   const int64_t blocks = std::min((size.sets() + kWarps - 1) / kWarps, kMostBlocks);
   largest_embedding<<<static_cast<unsigned>(blocks), kThreads, 0, stream>>>(size, members, counts, parameters,

@@ -22,7 +22,7 @@ SortedPieces::SortedPieces(const std::vector<WallFace>& walls) {
 
 void SortedPieces::sort(std::vector<Ball> balls) {
   constexpr float kCell_m = 16.0f;
-  // Larger than the rounding errors of the searched ranges.
+  // Exceeds the rounding errors of the searched ranges.
   constexpr float kLeeway_m = 0.1f;
   std::vector<Aabb2> middles;
   for (const Ball& ball : balls) {
@@ -82,8 +82,8 @@ std::string message_of(const Fault& fault) {
 }
 
 Scratch large_sizes(int pieces, int heads, std::size_t agents) {
-  // A camera sees up to three faces of an agent and one of everything else; faces of four corners have at most nine
-  // edges when clipped.
+  // A camera sees up to three faces of an agent and one of every other primitive; faces of four corners have at most
+  // nine edges after clipping.
   Scratch sizes;
   sizes.max_faces = std::max(1, pieces + 3 * static_cast<int>(std::min<std::size_t>(agents, kMaxBoxesPerWorld)));
   sizes.max_edges = (4 + 9) * sizes.max_faces + kMaxPolygonCorners * heads;

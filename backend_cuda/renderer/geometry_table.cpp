@@ -9,11 +9,11 @@ namespace pictura::cuda {
 
 namespace {
 
-// Maps of about the same size use each other's memory.
+// Step of sizes: maps of about the same size reuse each other's memory.
 constexpr std::size_t kSizeStep_bytes = 64 << 10;
 constexpr std::size_t kAlignment_bytes = 256;
 
-/// Elements of a map's memory.
+/// Range of elements in a map's memory.
 template <typename T>
 struct Slice {
   std::size_t offset_bytes = 0, size = 0;
@@ -30,7 +30,7 @@ Slice<T> append(Span<const T> values, std::vector<std::byte>* bytes_inout) {
   return slice;
 }
 
-/// A kind of pieces, and where its arrays are.
+/// A kind of pieces, and the places of its arrays.
 struct PackedPieces {
   PieceGrid host;
   Slice<int32_t> begin, items;
@@ -55,7 +55,7 @@ struct PackedPieces {
 bool GeometryTable::Retired::has_passed() const {
   const cudaError_t status = cudaEventQuery(event.get());
   if (status == cudaErrorNotReady) {
-    cudaGetLastError();  // no error that a later call should report
+    cudaGetLastError();  // clears a status that is not an error
     return false;
   }
   check_cuda(status, "cudaEventQuery");
@@ -96,7 +96,7 @@ void GeometryTable::upload(GeometryHandle handle, const StaticGeometry& geometry
 void GeometryTable::release(GeometryHandle handle, cudaStream_t stream) {
   const auto index = static_cast<std::size_t>(handle);
   if (index >= maps_.size() || !maps_[index].entry.is_held()) return;
-  // An entry of set bits is empty, see is_held().
+  // An entry with all bits set is empty, see is_held().
   PICTURA_CUDA(cudaMemsetAsync(table_.data() + index, 0xFF, sizeof(DeviceGeometry), stream));
   Map released;
   swap_map(index, &released);
@@ -110,7 +110,7 @@ void GeometryTable::swap_map(std::size_t index, Map* map_inout) {
     if (here < *max_inout && gone < *max_inout) return;
     *max_inout = here;
     if (here >= gone) return;
-    // A largest one is gone: only now all are looked at.
+    // Only where the maximum was removed, all maps are searched.
     for (const Map& map : maps_) *max_inout = std::max(*max_inout, map.*count);
   };
   update(&Map::pieces, &max_pieces_);
@@ -126,8 +126,8 @@ void GeometryTable::grow(std::size_t entries, cudaStream_t stream) {
   PICTURA_CUDA(
       cudaMemcpyAsync(table.data(), host.data(), entries * sizeof(DeviceGeometry), cudaMemcpyHostToDevice, stream));
   PICTURA_CUDA(cudaStreamSynchronize(stream));
-  maps_.resize(entries);      // here, where it cannot fail: a failure before leaves both as they were
-  table_ = std::move(table);  // the old one is freed: nothing on the stream reads it any more
+  maps_.resize(entries);      // resized here, where failure is impossible: earlier failures leave both unchanged
+  table_ = std::move(table);  // frees the old table, which no work on the stream reads any more
   ++generation_;
 }
 
@@ -156,7 +156,7 @@ DeviceBuffer<std::byte> GeometryTable::allocate(std::size_t bytes) {
     retired_.erase(best);
     return memory;
   }
-  // No more is kept for later than is in use. Freeing may wait for the device, as allocating may.
+  // At most as much memory as is in use is retained. Freeing may wait for the device, as allocation may.
   if (retired_bytes > held_bytes) std::erase_if(retired_, [](const Retired& each) { return each.has_passed(); });
   return DeviceBuffer<std::byte>(bytes);
 }

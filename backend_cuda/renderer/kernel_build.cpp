@@ -19,8 +19,8 @@ namespace {
 
 constexpr std::size_t kMaxCode_bytes = std::size_t{64} << 20;
 
-// Opens NVRTC: the library that PICTURA_NVRTC names, else the one of the toolkit's major version on the loader's path,
-// else the one in the folder that this program was built with.
+// Opens NVRTC: the library at PICTURA_NVRTC, else the library of the toolkit's major version on the loader's path, else
+// the library in the folder that this program was built with.
 SharedLibrary open_nvrtc() {
   constexpr const char* kSource = "CUDA toolkit, or Python package nvidia-cuda-nvrtc";
   const char* chosen = std::getenv("PICTURA_NVRTC");
@@ -39,7 +39,7 @@ SharedLibrary open_nvrtc() {
   }
 }
 
-// The functions of NVRTC that are used.
+// The used functions of NVRTC.
 struct Nvrtc {
   SharedLibrary library = open_nvrtc();
 #define PICTURA_NVRTC_FUNCTION(name) decltype(&::name) name = function<decltype(&::name)>(#name)
@@ -69,7 +69,7 @@ struct Nvrtc {
   }
 };
 
-// The inputs of a compilation, except for the sources.
+// Inputs of a compilation, except for the sources.
 struct Compilation {
   std::string architecture;
   bool is_cubin = true;
@@ -94,7 +94,7 @@ Compilation compilation_for(const Nvrtc& nvrtc, const KernelProgram& program, co
   compilation.architecture = fmt::format("{}_{}", compilation.is_cubin ? "sm" : "compute", nearest);
   compilation.options = {"--gpu-architecture=" + compilation.architecture,
                          "--std=c++20",
-                         "--fmad=false",     // no contraction: bits agree with the CPU
+                         "--fmad=false",     // no contraction, so that bits equal the CPU's
                          "-default-device",  // lambdas in kernels are device functions, as with nvcc
                          fmt::format("-DPICTURA_RIG_CAMERAS={}", target.num_cameras),
                          fmt::format("-DPICTURA_RIG_WIDTH_PX={}", target.width_px),
@@ -144,12 +144,12 @@ std::string cache_path_of(const Compilation& compilation) {
   return fmt::format("{}/{}-{:016x}.kernels", folder, compilation.architecture, compilation.key);
 }
 
-// The first line of a cached file: the key of its inputs, and the size and hash of its code.
+// Returns the first line of a cached file: the key of its inputs, and the size and hash of its code.
 std::string header_of(uint64_t key, std::string_view code) {
   return fmt::format("pictura kernels 1 {:016x} {} {:016x}\n", key, code.size(), hash_of(code));
 }
 
-// The code in a cached file, or an empty string if it is missing, damaged or foreign.
+// Returns the code in a cached file, or an empty text if the file is missing, damaged or foreign.
 std::string kept_code(const std::string& path, uint64_t key) {
   std::error_code error;
   if (path.empty() || !std::filesystem::exists(path, error)) return "";

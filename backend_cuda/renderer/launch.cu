@@ -1,4 +1,4 @@
-// The drawing kernels compiled ahead of time, and the launches of these or of kernels compiled at run time.
+// The drawing kernels compiled ahead of time, and the launches of these kernels or of kernels compiled at run time.
 #include <utility>
 
 #include "pictura/backend_cuda/renderer/kernels.cuh"
@@ -13,7 +13,7 @@ struct LaunchShape {
   std::size_t shared_bytes;
 };
 
-// The stream of launches, and whether a launch may begin while the one before it ends.
+// Stream of launches, and whether a launch may begin before the previous launch has ended.
 struct LaunchPlace {
   cudaStream_t stream;
   bool may_begin_early;
@@ -49,13 +49,14 @@ KernelSet ahead_of_time_kernels() {
 }
 
 cudaError_t prepare_kernels(KernelSet* kernels) {
-  // Of all kernels: code that is only loaded by its first launch would be loaded while a graph is captured.
+  // All kernels are queried, because code that is loaded at its first launch would be loaded during the capture of a
+  // graph.
   cudaFuncAttributes attributes{};
   for (const void* kernel : kernels->handle) {
     const cudaError_t status = cudaFuncGetAttributes(&attributes, kernel);
     if (status != cudaSuccess) return status;
   }
-  // Kernels of compute capability 9.0 or newer wait for the launch before theirs, see wait_for_earlier_launch.
+  // Kernels of compute capability 9.0 or newer wait for the previous launch, see wait_for_earlier_launch.
   kernels->may_begin_early = attributes.ptxVersion >= 90;
   const cudaError_t allowed = allow_shared(kernels->handle[kDraw], draw_bytes());
   return allowed != cudaSuccess ? allowed : allow_shared(kernels->handle[kDrawDeferred], deferred_bytes());

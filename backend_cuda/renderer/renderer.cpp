@@ -1,5 +1,5 @@
-// The CUDA renderer's host side: checks, maps, scratch memory and launches. Scenes, views, queries and images lie in
-// device memory; calls that draw neither allocate nor wait once their sizes have been reserved.
+// Host side of the CUDA renderer: checks, maps, scratch memory and launches. Scenes, views, queries and images lie in
+// device memory. Drawing calls neither allocate nor wait once their sizes have been reserved.
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -22,13 +22,13 @@ std::string cuda_unavailable();
 
 namespace {
 
-// Blocks of the last launch.
+// Number of blocks of the last launch.
 constexpr int kLargeBlocks = 8;
-// Upper bound on the views that are drawn at once: enough that the end of a launch, when few blocks still work, takes a
-// negligible share of it.
+// Maximum number of views that are drawn at once: large enough that the end of a launch, when few blocks still work,
+// takes a negligible share.
 constexpr std::size_t kViewsAtOnce = 2048;
 
-// Scratch memory, and the sizes of the largest calls that it serves.
+// Scratch memory, and the sizes of the largest calls for which it suffices.
 struct ScratchMemory {
   std::size_t agents = 0, views = 0;
   int pieces = 0, heads = 0;
@@ -39,7 +39,7 @@ struct ScratchMemory {
 
 class CudaRenderer final : public Renderer {
  public:
-  /// Its device is the current one.
+  /// Constructs the renderer for the current device.
   CudaRenderer(const RendererConfig& config, std::string* origin_out)
       : config_(check_config("cuda", config)), cameras_(pinhole_cameras(config.rig)), library_(config) {
     PICTURA_CUDA(cudaDeviceGetAttribute(&processors_, cudaDevAttrMultiProcessorCount, config.device.index));
@@ -58,7 +58,7 @@ class CudaRenderer final : public Renderer {
     check_handle(name(), handle);
     check_geometry(name(), geometry);
     geometries_.upload(handle, geometry, static_cast<cudaStream_t>(stream.handle));
-    // The next call allocates more; graphs that were captured before have too little for this map.
+    // The next call allocates more; previously captured graphs have too little memory for this map.
     if (geometries_.max_pieces() > scratch_.pieces || geometries_.max_heads() > scratch_.heads) ++scratch_generation_;
   }
   void release(GeometryHandle handle, Stream stream) override {
@@ -82,12 +82,12 @@ class CudaRenderer final : public Renderer {
     const auto on_stream = static_cast<cudaStream_t>(stream.handle);
     clear_counters(on_stream);
     if (views.size() == 0) return;
-    // In as few parts as the scratch memory allows, of equal size.
+    // Draws in as few parts as the scratch memory allows, of equal size.
     const std::size_t max_views = scratch_.plan.views, parts = (views.size() + max_views - 1) / max_views;
     const auto views_at_once = static_cast<int32_t>((views.size() + parts - 1) / parts);
     for (int32_t left = task.num_views; left > 0; left -= task.num_views, task.first_view += task.num_views) {
       task.num_views = std::min(left, views_at_once);
-      counters_are_clear_ = false;  // where a launch fails
+      counters_are_clear_ = false;  // stays so if a launch fails
       PICTURA_CUDA(cuda::launch_draw(library_.kernels(), task, scratch_.large.view(), processors_, on_stream));
       counters_are_clear_ = true;
     }
@@ -112,7 +112,7 @@ class CudaRenderer final : public Renderer {
   }
 
  private:
-  // Checks what the host can see of a call.
+  // Checks everything that the host can see of a call.
   void check_call(const SceneBatch& scene) {
     throw_fault();
     check_device(name(), "scene", device(), scene.device);
@@ -136,16 +136,16 @@ class CudaRenderer final : public Renderer {
     return task;
   }
 
-  // Counters are 0 before each call; the last launch leaves them so, unless one before it failed.
+  // Counters are 0 before each call. The last launch resets them, unless an earlier launch failed.
   void clear_counters(cudaStream_t stream) {
     if (counters_are_clear_) return;
     PICTURA_CUDA(cudaMemsetAsync(counters_.data(), 0, sizeof(cuda::DrawCounters), stream));
     counters_are_clear_ = true;
   }
 
-  // Allocates for as many views as the bound allows, and in the last launch for all primitives that a world can hold,
-  // so that nothing is cut off. Does nothing where an earlier call needed as much. Where it throws for want of memory,
-  // the next call allocates anew.
+  // Allocates for as many views as the bound allows, and in the last launch for all primitives of a world, so that
+  // nothing is cut off. Does nothing where an earlier call needed as much. If it throws for lack of memory, the next
+  // call allocates again.
   void ensure_capacity(std::size_t agents, std::size_t views) {
     agents = std::max(scratch_.agents, std::min(agents, static_cast<std::size_t>(kMaxBoxesPerWorld)));
     views = std::max({scratch_.views, std::size_t{1}, std::min(views, kViewsAtOnce)});
@@ -163,7 +163,7 @@ class CudaRenderer final : public Renderer {
                             .pool_bytes = cuda::kMinPoolBytes},
                            config_.max_scratch_bytes);
     large.blocks = plan.large_blocks;
-    // Freed before it is replaced, so that the two are never allocated at once.
+    // Freed before it is replaced, so that old and new memory are never allocated at the same time.
     scratch_ = ScratchMemory();
     ++scratch_generation_;
     ScratchMemory larger{agents, views, pieces, heads, plan, {}, {}};
@@ -197,7 +197,7 @@ std::string cuda_unavailable() {
   int devices = 0;
   const cudaError_t status = cudaGetDeviceCount(&devices);
   if (status != cudaSuccess) {
-    cudaGetLastError();  // the error is ours to report, not the next call's
+    cudaGetLastError();  // clears the error, which is reported here
     int driver = 0;
     const bool has_driver = cudaDriverGetVersion(&driver) == cudaSuccess && driver > 0;
     return has_driver ? cudaGetErrorString(status) : "no CUDA device: no NVIDIA driver was found";

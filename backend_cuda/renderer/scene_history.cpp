@@ -15,7 +15,7 @@ namespace {
 
 class CudaSceneHistory final : public SceneHistory {
  public:
-  /// On the current device.
+  /// Constructs the history on the current device.
   explicit CudaSceneHistory(const SceneHistorySize& s) : SceneHistory(s), device_(current_device()), arrays_(s) {}
 
   Device device() const override { return device_; }

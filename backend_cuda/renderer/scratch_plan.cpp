@@ -8,7 +8,7 @@ namespace pictura::cuda {
 
 namespace {
 
-// Returns how many of `wanted` fit into *left_inout bytes, and subtracts them.
+// Returns how many of `wanted` items fit into *left_inout bytes, and subtracts their size.
 std::size_t take(std::size_t wanted, std::size_t bytes_each, std::size_t* left_inout) {
   const std::size_t taken = bytes_each == 0 ? wanted : std::min(wanted, *left_inout / bytes_each);
   *left_inout -= taken * bytes_each;

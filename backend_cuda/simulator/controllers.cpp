@@ -1,5 +1,5 @@
-// Controllers in device memory: the rules of simulator/rules/control.h, a thread a slot; and those that drive on the
-// host.
+// Controllers in device memory: the rules of simulator/rules/control.h, one thread per slot; and controllers that run
+// on the host.
 #include <memory>
 #include <string>
 #include <type_traits>
@@ -42,7 +42,7 @@ class CudaRandomController final : public Controller {
   uint64_t seed_;
 };
 
-/// Tells every slot the same, by a rule without settings; `name` is a literal.
+/// Gives every slot the same command, by a rule without settings; `name` is a literal.
 template <typename Rule>
 class CudaRuleController final : public Controller {
  public:
@@ -88,7 +88,7 @@ void read(Span<T> device, std::vector<std::remove_const_t<T>>* host_out, cudaStr
       cudaMemcpyAsync(host_out->data(), device.data(), device.size() * sizeof(T), cudaMemcpyDeviceToHost, stream));
 }
 
-/// Lets one that drives on the host do so: copies what it looks at there and its commands back, in every step.
+/// Runs a controller on the host: in every step, copies its inputs to the host and its commands back.
 class CudaHostController final : public Controller {
  public:
   CudaHostController(const Simulator& simulator, std::unique_ptr<Controller> on_host)
@@ -134,7 +134,8 @@ class CudaHostController final : public Controller {
  private:
   Device device_;
   SimulatorSetup setup_;
-  // Copies, at addresses that last as long as this does: the lane keeper's agents look at them.
+  // Copies at addresses that stay valid for the lifetime of this object, because the lane keeper's agents refer to
+  // them.
   AgentState agents_;
   std::vector<AgentBox> boxes_;
   std::vector<LightState> lights_;

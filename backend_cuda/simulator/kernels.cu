@@ -1,5 +1,5 @@
-// How the simulator's phases are started on a device: a thread or a group of threads per item, or a block per world.
-// Kernels of a stream follow one another, which is the barrier between phases.
+// Launches of the simulator's phases on a device: one thread or group of threads per item, or one block per world.
+// Kernels of a stream run in sequence, which is the barrier between phases.
 #include <type_traits>
 
 #include "pictura/backend_cuda/simulator/kernels.h"
@@ -12,23 +12,23 @@ constexpr int kTeamThreads =
     kTurn * kThreadsPerAgent;  // a world's start is one long chain of work: as wide as its loops
 
 struct DeviceAtomics {
-  /// Returns the value before.
+  /// Returns the previous value.
   __device__ int32_t add(int32_t* value, int32_t change) const { return atomicAdd(value, change); }
-  /// Likewise.
+  /// Returns the previous value.
   __device__ int32_t exchange(int32_t* value, int32_t other) const { return atomicExch(value, other); }
   __device__ void set_bits(uint32_t* value, uint32_t bits) const { atomicOr(value, bits); }
   __device__ void lower(int32_t* value, int32_t bound) const { atomicMin(value, bound); }
 };
 
-/// The nearest of the items offered by a warp's threads: the thread of rank k holds the k-th, as squared distance and
-/// item.
+/// The nearest of the items offered by a warp's threads: the thread of rank k holds the k-th nearest, as squared
+/// distance and item.
 template <int capacity>
 class NearestOfWarp {
   static_assert(capacity <= kWarp);
 
  public:
   __device__ int count() const { return min(capacity, __popc(__ballot_sync(~0u, key_ != kNone))); }
-  /// at: the caller's own rank.
+  /// at: must be the caller's own rank.
   __device__ int32_t item(int) const { return static_cast<int32_t>(key_); }
   __device__ void offer(bool is_one, float distance2, int32_t item) {
     const uint64_t offered = is_one ? uint64_t{__float_as_uint(distance2)} << 32 | static_cast<uint32_t>(item) : kNone;
@@ -47,7 +47,7 @@ class NearestOfWarp {
   uint64_t key_ = kNone;
 };
 
-/// Some consecutive threads of a warp; the rest of it are other groups.
+/// Consecutive threads of a warp; other threads of the warp form other groups.
 template <int kGroup>
 struct DeviceThreadGroup {
   static constexpr int kSize = kGroup;
@@ -74,13 +74,13 @@ struct DeviceThreadGroup {
   }
   template <typename T>
   __device__ T of_lowest(float score, int index, const T& value) const {
-    // Bits of floats that are not negative are ordered as the floats are.
+    // The bits of nonnegative floats have the order of the floats.
     const uint32_t lowest = __reduce_min_sync(mask(), __float_as_uint(score));
     const bool is_lowest = __float_as_uint(score) == lowest;
     const int first_index = __reduce_min_sync(mask(), is_lowest ? index : INT_MAX);
     return from(__ffs(static_cast<int>(ballot(is_lowest && index == first_index))) - 1, value);
   }
-  /// A value that no kernel changes, in loads of 16 bytes.
+  /// Reads a value that no kernel changes, in loads of 16 bytes.
   template <typename T>
   __device__ T read(const T& value) const {
     static_assert(std::is_trivially_copyable_v<T> && alignof(T) % sizeof(float4) == 0);
@@ -91,9 +91,9 @@ struct DeviceThreadGroup {
     memcpy(&result, words, sizeof(T));
     return result;
   }
-  /// Memory for the phase's kStaging floats.
+  /// Returns memory for the phase's kStaging floats.
   __device__ float* staging() const { return rows; }
-  /// Writes the first `filled` of staging(), then zeros up to `end` or a little beyond, but not beyond `capacity`.
+  /// Writes the first `filled` values of staging(), then zeros up to at least `end`, but not beyond `capacity`.
   __device__ void write(const float* values, int filled, int end, int capacity, float* out) const {
     if (capacity % 4 != 0) {
       for (int i = rank(); i < end; i += kSize) out[i] = i < filled ? values[i] : 0.0f;
@@ -113,17 +113,17 @@ struct DeviceThreadGroup {
   __device__ static unsigned mask() { return (~0u >> (kWarp - kSize)) << first(); }
 };
 
-/// The threads of a block.
+/// Threads of a block.
 struct DeviceTeam : DeviceAtomics {
   TeamMemory* shared;
   __device__ TeamMemory& memory() const { return *shared; }
-  /// body(i) for all i in [0, count); then everybody waits for everybody.
+  /// Calls body(i) for all i in [0, count), then synchronizes all threads.
   template <typename Body>
   __device__ void for_each(int count, const Body& body) const {
     for (int i = static_cast<int>(threadIdx.x); i < count; i += kTeamThreads) body(i);
     __syncthreads();
   }
-  /// body(group, i) likewise.
+  /// Calls body(group, i) for all i in [0, count), then synchronizes all threads.
   template <int kGroup, typename Body>
   __device__ void for_each_by_groups(int count, const Body& body) const {
     for (int i = static_cast<int>(threadIdx.x) / kGroup; i < count; i += kTeamThreads / kGroup) {
@@ -139,7 +139,7 @@ __global__ void __launch_bounds__(kThreads) run_threads(int32_t count, Phase pha
   if (item < count) phase(DeviceAtomics{}, static_cast<int32_t>(item));
 }
 
-// Blocks that fit a processor at once: fewer registers than the compiler would take hide more of the waiting.
+// Blocks per processor: with fewer registers than the compiler would choose, more waiting is hidden.
 constexpr int kGroupBlocks = 5, kObserveBlocks = 16;
 
 template <int kGroup, typename Phase>
@@ -148,7 +148,8 @@ __global__ void __launch_bounds__(kThreads, kGroupBlocks) run_groups(int32_t cou
   if (item < count) phase(DeviceThreadGroup<kGroup>{}, static_cast<int32_t>(item));
 }
 
-/// Groups with memory of their own. Small blocks, since the last of its warps holds a block's place.
+/// Block size of groups with memory of their own. Blocks are small, since a block keeps its place until its last warp
+/// ends.
 constexpr int kObserveThreads = 64;
 template <typename Phase>
 __global__ void __launch_bounds__(kObserveThreads, kObserveBlocks) run_staged_groups(int32_t count, Phase phase) {
@@ -170,7 +171,7 @@ __global__ void __launch_bounds__(kTeamThreads) run_teams(int32_t count, Phase p
   }
 }
 
-/// Errors stay with the runtime until the caller reads the last one.
+/// Launcher of phases. Errors stay with the runtime until the caller reads the last one.
 struct DeviceLaunch {
   StepStreams streams;
 
@@ -197,12 +198,12 @@ struct DeviceLaunch {
   }
   template <typename Phase>
   void teams(int32_t count, const Phase& phase) const {
-    // Not a block for each world: one of this size waits for a whole processor, even if it has nothing to do.
+    // Not one block per world: a block of this size waits for a whole processor, even without work.
     constexpr int32_t kMaxTeams = 128;
     run_teams<<<static_cast<unsigned>(min(count, kMaxTeams)), kTeamThreads, 0, streams.main>>>(count, phase);
   }
-  /// Both in parallel: what `side` starts on the launch that it is given, and what `main` starts on this one. What
-  /// follows waits for both.
+  /// Runs both in parallel: the launches of `side` on its own stream, and those of `main` on this one. Later launches
+  /// wait for both.
   template <typename Side, typename Main>
   void fork_join(const Side& side, const Main& main) const {
     cudaEventRecord(streams.forked, streams.main);

@@ -1,5 +1,5 @@
-// The simulator in device memory: SimulatorSetup checks and describes it on the host, kernels step the state. Steps,
-// and going back to a snapshot, neither wait nor allocate; what copies to or from the host waits for its stream.
+// The simulator in device memory: SimulatorSetup checks and describes it on the host, and kernels step the state. Steps
+// and restores of snapshots neither wait nor allocate; copies to or from the host wait for their stream.
 #include "pictura/simulator/simulator.h"
 
 #include <memory>
@@ -39,7 +39,7 @@ class SimulatorCuda final : public Simulator {
     *wrong_query_->host() = kNoQueryFault;
     allocate(setup_.needs());
     begin(nullptr);
-    PICTURA_CUDA(cudaDeviceSynchronize());  // so that it can be used on any stream
+    PICTURA_CUDA(cudaDeviceSynchronize());  // so that any stream can be used
   }
 
   void set_worlds(CompiledMaps maps, std::vector<GeometryHandle> handles, std::vector<WorldSpec> worlds, uint64_t seed,
@@ -142,14 +142,14 @@ class SimulatorCuda final : public Simulator {
     PICTURA_CUDA(cudaGetLastError());
   }
 
-  /// Memory for this capacity and no less than before; whatever was there is lost.
+  /// Allocates for this capacity and at least the previous one; the previous contents are lost.
   void grow(const SimulatorCapacity& capacity) {
     PICTURA_CUDA(cudaDeviceSynchronize());
     allocate(capacity_.joined(capacity));
     ++generation_;
   }
   void allocate(const SimulatorCapacity& capacity) {
-    // First freed, so that old and new need not fit together.
+    // Freed first, so that old and new memory need not fit together.
     state_ = {};
     results_ = {};
     scratch_ = {};
@@ -166,7 +166,7 @@ class SimulatorCuda final : public Simulator {
     capacity_ = capacity;
   }
 
-  /// The setup's worlds from their first episodes on.
+  /// Starts the setup's worlds at their first episodes.
   void begin(cudaStream_t stream) {
     worlds_token_ = new_worlds_token();
     host_.resize(setup_);
@@ -216,7 +216,7 @@ class SimulatorCuda final : public Simulator {
                            .sums = {results_.sums.data(), num_slots}}};
   }
 
-  /// The host's state to the device.
+  /// Copies the host's state to the device.
   void put_state(cudaStream_t stream) {
     state_.put_from(host_, stream);
     show_restored(stream);
@@ -226,7 +226,7 @@ class SimulatorCuda final : public Simulator {
     PICTURA_CUDA(cudaGetLastError());
   }
 
-  /// The state to the host, once the stream has done its work.
+  /// Copies the state to the host after the work of the stream.
   void download(Stream stream) const {
     const DeviceGuard guard(device_);
     state_.get_to(&host_, handle_of(stream));
@@ -253,7 +253,7 @@ class SimulatorCuda final : public Simulator {
       fail("step: in an earlier call: {}", rejection_text(*rejected));
     }
   }
-  /// What a device has latched since the last call, if anything.
+  /// Returns and clears the fault that the device has latched since the last call, if any.
   static std::optional<int64_t> take(MappedValue<int64_t>* latched) {
     static_assert(kNothingRejected == kNothingWrong && kNoQueryFault == kNothingWrong);
     const int64_t fault = *latched->host();
@@ -277,7 +277,7 @@ class SimulatorCuda final : public Simulator {
     put(std::vector<RuleOptions>{setup_.options}, scratch_.options, stream);
   }
 
-  /// The worlds as the rules see them, over device memory.
+  /// Uploads the worlds' views for the rules, over device memory.
   void put_worlds(cudaStream_t stream) {
     std::vector<WorldView> worlds, next_worlds;
     std::vector<cuda::WorldScratch> of_worlds;
@@ -361,14 +361,14 @@ class SimulatorCuda final : public Simulator {
   SimulatorSetup setup_;
   SimulatorCapacity capacity_;
   WorldsToken worlds_token_;
-  mutable SimulatorState host_;  // the state only once it has been copied there
+  mutable SimulatorState host_;  // the state, only after it has been copied there
   mutable SimulatorTotals totals_;
   DeviceMaps maps_;
   DeviceSetup tables_;
   DeviceState state_;
   DeviceResults results_;
   DeviceScratch scratch_;
-  bool has_crowds_ = false;  // some world is one
+  bool has_crowds_ = false;  // whether some world is a crowd
   std::unique_ptr<SideStream> side_;
   std::unique_ptr<MappedValue<int64_t>> rejected_command_, wrong_edit_, wrong_query_;
 };
