@@ -23,7 +23,7 @@ namespace pictura {
 
 namespace {
 
-// Different random choices that calls take in turn, so that none finds its data in caches.
+// Number of random choices that calls use in turn, so that no call finds its data in caches.
 constexpr std::size_t kChoices = 8;
 
 // Elements in the memory of a device.
@@ -73,7 +73,7 @@ class Elements {
 #endif
 };
 
-// Waits for the device's work.
+// Copies elements to the host after the device's work.
 template <typename T>
 std::vector<T> to_host(Span<const T> from, Device device) {
   std::vector<T> result(from.size());
@@ -87,7 +87,7 @@ std::vector<T> to_host(Span<const T> from, Device device) {
   return result;
 }
 
-// Images of so many views, u8.
+// Images of a number of views, u8.
 class Images {
  public:
   Images(const Rig& rig, int num_views, Device device)
@@ -104,7 +104,7 @@ class Images {
   const ImageBatch& batch() const { return batch_; }
   void fill_unwritten() { bytes_.fill(kUnwrittenByte); }
   std::vector<uint8_t> to_host() { return pictura::to_host(bytes_.span(), batch_.device); }
-  /// The bytes of one view, camera by camera, out of those of all.
+  /// Returns the bytes of one view, camera by camera, from the bytes of all views.
   std::vector<uint8_t> view_of(const std::vector<uint8_t>& all, int64_t view) const {
     std::vector<uint8_t> result;
     for (const CameraLayout& camera : layout_.cameras) {
@@ -121,7 +121,7 @@ class Images {
   ImageBatch batch_;
 };
 
-// An image as it was drawn at its step.
+// An image drawn at its step.
 struct SeenView {
   int64_t row = 0;
   std::vector<uint8_t> pixels;
@@ -176,7 +176,7 @@ class HistoryBench {
       }
       first_of_last_step_ = before;
       PICTURA_CHECK(present_rows_.size() > before, "bench history: no agent found a place in step {}", step);
-      // Spread over all steps.
+      // Checked images are spread over all steps.
       for (; int64_t{kept} * case_.num_steps < int64_t{step + 1} * case_.checked_images; ++kept) {
         const int64_t row = draw(before);
         Elements<View> view(device_, std::vector<View>{views_[static_cast<std::size_t>(row) % num_slots()]});
@@ -188,7 +188,7 @@ class HistoryBench {
     }
   }
 
-  // One of the rows [first, all) of agents that are there.
+  // Draws one of the rows [first, all) of present agents.
   int64_t draw(std::size_t first) { return present_rows_[first + random_() % (present_rows_.size() - first)]; }
 
   void choose() {
@@ -204,7 +204,7 @@ class HistoryBench {
     }
   }
 
-  // Draws the kept views out of the history, in reverse order.
+  // Draws the kept views from the history, in reverse order.
   void compare() {
     if (seen_.empty()) return;
     std::vector<int64_t> rows;
@@ -233,7 +233,8 @@ class HistoryBench {
     renderer_->render(history_->scene(), Span<const View>(views.data(), views.size()), images);
   }
 
-  // Mean milliseconds of calls, which take the random choices in turn. Waits, so that it can time by the host's clock.
+  // Returns mean milliseconds of calls, which use the random choices in turn. Waits, so that the host's clock can be
+  // used.
   template <typename Call>
   double time_of(int calls, const Call& call) {
     renderer_->check();
@@ -271,7 +272,7 @@ class HistoryBench {
   std::unique_ptr<Simulator> simulator_;
   std::unique_ptr<Renderer> renderer_;
   std::unique_ptr<SceneHistory> history_;
-  std::vector<int64_t> present_rows_;  // of agents that are not absent, at every step
+  std::vector<int64_t> present_rows_;  // rows of present agents at every step
   std::size_t first_of_last_step_ = 0;
   std::vector<View> views_;  // of the last step, on the host
   std::vector<SeenView> seen_;

@@ -17,7 +17,7 @@ constexpr double kRounding = 1e-6;
 
 double half_to_number(uint16_t half) {
   const int exponent = half >> 10 & 31, mantissa = half & 1023;
-  if (exponent == 31) return std::numeric_limits<double>::quiet_NaN();  // infinity is treated alike
+  if (exponent == 31) return std::numeric_limits<double>::quiet_NaN();  // infinity is treated as NaN
   const double size = exponent > 0 ? std::ldexp(1024 + mantissa, exponent - 25) : std::ldexp(mantissa, -24);
   return half >> 15 ? -size : size;
 }

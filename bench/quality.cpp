@@ -48,7 +48,7 @@ struct MethodImages {
   std::vector<float> one_sample, grid_2x2, area, oracle;
 };
 
-// Exact coverage as alpha: each face covers its area's share of the remaining pixel.
+// Composites exact coverage as alpha: each face covers its area's share of the remaining pixel.
 std::vector<float> composite_areas(ImageDrawer* drawer, std::size_t pixels) {
   std::vector<float> rgb(3 * pixels), left(pixels, 1.0f);
   drawer->visit_fragments([&](int pixel, const PixelCoverage& coverage, Rgb color) {
@@ -62,7 +62,7 @@ std::vector<float> composite_areas(ImageDrawer* drawer, std::size_t pixels) {
   return rgb;
 }
 
-// The oracle's faces of one image, ready to be drawn.
+// Returns a drawer with the oracle's faces of one image, ready to draw.
 ImageDrawer prepared_drawer(const CulledGeometry& pieces, const SceneBatch& scene, const View& view,
                             const Camera& camera, float line_floor_px) {
   Rig rig;
@@ -134,7 +134,7 @@ namespace {
 
 constexpr int kCropWidth_px = 32, kCropHeight_px = 18, kZoom = 8, kGap_px = 4;
 
-// Top left corner of the crop with the largest error of area coverage and 2x2 samples.
+// Returns the top left corner of the crop with the largest error of area coverage and 2x2 samples.
 std::pair<int, int> worst_crop(const MethodImages& drawn, int width, int height) {
   const int crop_width = std::min(kCropWidth_px, width), crop_height = std::min(kCropHeight_px, height);
   std::pair<int, int> worst{0, 0};

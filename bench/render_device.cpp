@@ -108,7 +108,7 @@ double DeviceMemoryMeter::max_bytes() const {
 std::string cuda_device_name() {
   cudaDeviceProp properties{};
   if (cudaGetDeviceProperties(&properties, 0) == cudaSuccess) return properties.name;
-  cudaGetLastError();  // the next call's is its own
+  cudaGetLastError();  // clears the error for the next call
   return "";
 }
 
@@ -116,7 +116,7 @@ std::string cuda_driver_name() {
   int version = 0;
   if (cudaDriverGetVersion(&version) != cudaSuccess || version == 0) return "";
   std::string text = fmt::format("CUDA {}.{}", version / 1000, version % 1000 / 10);
-  // "NVRM version: NVIDIA UNIX x86_64 Kernel Module  580.95.05  ..."
+  // The first line is "NVRM version: NVIDIA UNIX x86_64 Kernel Module  580.95.05  ..."
   std::ifstream in("/proc/driver/nvidia/version");
   std::string line, word;
   std::getline(in, line);

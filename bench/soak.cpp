@@ -20,7 +20,7 @@ namespace pictura {
 namespace {
 
 constexpr std::size_t kMaxFaults = 100;
-constexpr int kQueries = 32;          // of visibility, in each scene
+constexpr int kQueries = 32;          // visibility queries per scene
 constexpr int kMaxHiddenAgents = 64;  // in a view's list
 
 // Random parts of a scene, each with its own stream.
@@ -35,7 +35,7 @@ RandomStream random_of(const SoakOptions& options, int64_t scene, Draw what) {
                        .purpose = Purpose::soak});
 }
 
-// Few rigs, because kernels are compiled for each: the paper's, and three with cameras of random sizes.
+// Draws few rigs, because kernels are compiled for each: the paper's rig, and three with cameras of random sizes.
 std::vector<Rig> draw_rigs(const SoakOptions& options) {
   std::vector<Rig> rigs{paper_rig()};
   RandomStream random = random_of(options, 0, Draw::rigs);
@@ -68,7 +68,7 @@ Settings draw_settings(const SoakOptions& options, int64_t scene, const std::vec
   const PixelFormat formats[] = {PixelFormat::u8, PixelFormat::f16, PixelFormat::f32};
   settings.format = formats[random.below(3)];
   settings.planes = random.below(2) > 0 ? Planes::all : Planes::none;
-  // Kernels of a rig randomize cameras or do not.
+  // Kernels of a rig either randomize cameras or do not.
   if (rig % 2 > 0) {
     settings.config.randomization = scaled(kFullCameraSeverity, static_cast<double>(random.uniform(0, 2)));
     settings.config.randomization.seed = random.bits();
@@ -76,14 +76,14 @@ Settings draw_settings(const SoakOptions& options, int64_t scene, const std::vec
   return settings;
 }
 
-// The views of a scene, and the list of agents; each view hides a range of it.
+// Views of a scene, and the list of agents of which each view hides a range.
 struct ViewsOfScene {
   std::vector<View> views;
   std::vector<int32_t> hidden_agents;
 };
 
-// A world of one of the maps, simulated anew for each scene. The scene's number selects map and steps, so that a scene
-// can be repeated without those before it.
+// A world of one of the maps, simulated separately for each scene. The scene's number selects map and steps, so that a
+// scene can be repeated without the scenes before it.
 class Scenes {
  public:
   explicit Scenes(const SoakOptions& options) : options_(options) {
@@ -107,7 +107,7 @@ class Scenes {
     step_randomly(simulator_.get(), config.seed, 1 + random.below(30));
   }
 
-  // Views of agents, half of them moved and turned at random; some hide more agents than their own.
+  // Returns views of agents, half of them moved and turned at random; some views hide agents besides their own.
   ViewsOfScene views(int64_t scene) const {
     RandomStream random = random_of(options_, scene, Draw::views);
     const Span<const View> of_agents = simulator_->views();
@@ -128,7 +128,7 @@ class Scenes {
     return result;
   }
 
-  // Refers to the views' list of hidden agents.
+  // Returns the scene with the views' list of hidden agents.
   SceneBatch batch(const ViewsOfScene& views) const {
     SceneBatch batch = simulator_->scene();
     batch.hidden_agents = views.hidden_agents;
@@ -160,7 +160,7 @@ class Scenes {
 
   SoakOptions options_;
   std::vector<std::shared_ptr<const RoadMap>> maps_;
-  std::array<CompiledMaps, 2> compiled_;  // without walls, and with
+  std::array<CompiledMaps, 2> compiled_;  // without and with walls
   std::unique_ptr<Simulator> simulator_;
 };
 

@@ -31,7 +31,7 @@ struct StepBench::Actions {
 #ifdef PICTURA_HAS_CUDA
   std::vector<DeviceBuffer<int32_t>> device;
 #endif
-  std::vector<Array> sets;  // where the simulator reads them
+  std::vector<Array> sets;  // in the simulator's memory
 };
 
 StepBench::StepBench(Simulator* simulator, uint64_t seed)

@@ -18,7 +18,7 @@ namespace pictura {
 
 namespace {
 
-/// Quantities in the order in which they were first counted.
+/// Quantities in the order of their first count.
 class Counts {
  public:
   explicit Counts(int episodes) : episodes_(static_cast<size_t>(episodes)) {}
@@ -35,7 +35,7 @@ class Counts {
   std::vector<EpisodeValues> all_;
 };
 
-/// Who was placed, who was not and why, and which goals are out of reach.
+/// Counts placed agents, unplaced agents by reason, and unreachable goals.
 void count_population(HostWorlds& worlds, const LaneGraph& graph, Counts* counts_inout) {
   constexpr const char* kClasses[kNumAgentClasses] = {"vehicles", "cyclists", "pedestrians"};
   static_assert(static_cast<int>(AgentClass::cyclist) == 1 && static_cast<int>(AgentClass::pedestrian) == 2);

@@ -1,5 +1,5 @@
-// `pictura bench history`: rates of drawing random agents of random steps out of a scene history, against rates of
-// drawing agents of the present scene.
+// `pictura bench history`: rates of drawing random agents of random steps from a scene history, compared with rates of
+// drawing agents of the current scene.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 

@@ -1,4 +1,4 @@
-// `pictura bench quality`: PSNR of images against the truth, a ray caster with 1,024 samples a pixel, at the paper's
+// `pictura bench quality`: PSNR of images against the truth, a ray caster with 1,024 samples per pixel, at the paper's
 // five sizes: of the oracle, of a z-buffer with one sample and 2x2 samples, and of exact coverage used as alpha.
 #include <algorithm>
 
@@ -40,7 +40,7 @@ std::vector<Snapshot> drive_all(const QualityArguments& arguments, ProgressLine*
   return snapshots;
 }
 
-// PSNR of each of the random scenes of each kind.
+// Measures the PSNR of each random scene of each kind.
 void run_random(const QualityArguments& arguments) {
   ProgressLine progress;
   std::vector<BenchResult> results;
@@ -50,7 +50,7 @@ void run_random(const QualityArguments& arguments) {
     parallel_for(resolve_num_threads(arguments.world.num_threads), arguments.random, [&](int64_t i) {
       throw_if_interrupted();
       const auto seed = arguments.world.seed + static_cast<uint64_t>(i);
-      // Infinite where nothing is in the image.
+      // Limit for empty images, whose PSNR is infinite.
       constexpr double kMost_db = 99;
       psnr_db[i] = std::min(measure_random_scene(static_cast<RandomKind>(kind), seed).psnr_db(), kMost_db);
     });

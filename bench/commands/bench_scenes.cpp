@@ -1,4 +1,5 @@
-// `pictura bench scenes`: how many recorded scenes a minute a protocol evaluates, with the loading of scenes.
+// `pictura bench scenes`: number of recorded scenes per minute that a protocol evaluates, including the loading of
+// scenes.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -42,7 +43,7 @@ void run_scenes(const ScenesArguments& arguments) {
   for (const std::string& rule : arguments.rules) set_scene_rule(rule, &options.protocol);
   ProgressLine progress;
   progress.update("warming up");
-  measured(options);  // scenes are in the cache afterwards, and kernels compiled
+  measured(options);  // fills the cache of scenes and compiles kernels
   const std::vector<std::string> names = options.scenes;
   for (int copy = 1; copy < arguments.copies; ++copy) {
     options.scenes.insert(options.scenes.end(), names.begin(), names.end());

@@ -1,5 +1,5 @@
-// `pictura bench simulate`: how fast executors step worlds, by backend, number of worlds and agents in each, with and
-// without entity sets; and what an agent-step costs, as a figure.
+// `pictura bench simulate`: step rates of executors, by backend, number of worlds and agents per world, with and
+// without entity sets; and the cost of an agent-step, as a figure.
 #include <algorithm>
 
 #include <fmt/format.h>
@@ -23,7 +23,7 @@ namespace pictura {
 namespace {
 
 struct SimulateArguments {
-  // Vehicles alone, as the peers that rates are compared with; what a world of all classes costs is an option.
+  // Vehicles alone, as in the simulators with which rates are compared; options set the shares of other classes.
   WorldOptions world = bench_world(/*num_threads=*/1, /*share=*/0, /*parked_cars=*/0);
   std::vector<std::string> maps, backends = {"cpu"};
   int num_worlds = 0, slots = 0;
@@ -49,7 +49,7 @@ SimulateCase equal_worlds(int num_worlds, int agents, int num_maps) {
   return result;
 }
 
-// What the sweeps hold fixed.
+// Values that sweeps hold fixed.
 constexpr int kSweptWorlds = 64, kSweptAgents = 60;
 
 std::vector<SimulateCase> simulate_cases_of(const SimulateArguments& arguments) {
@@ -76,7 +76,7 @@ std::vector<SimulateCase> simulate_cases_of(const SimulateArguments& arguments) 
   return cases;
 }
 
-/// Takes some steps of both. Throws Error unless the CPU's simulator comes to the same state, to the bit.
+/// Takes some steps of both simulators. Throws Error unless the CPU's simulator reaches the same state, bit for bit.
 void check_against_oracle(const SimulatorConfig& config, const CompiledMaps& maps, const std::vector<WorldSpec>& worlds,
                           Simulator* simulator, StepBench* bench) {
   constexpr int64_t kSteps = 16;

@@ -1,5 +1,5 @@
 // `pictura bench train`: whole updates of a configuration: rates, shares, seconds by phase, device memory; and figures
-// of rates on several GPUs, as scripts/gpu_ranks measures them.
+// of rates on several GPUs, as measured by scripts/gpu_ranks.
 #include <fmt/format.h>
 
 #include "pictura/bench/commands/bench.h"
@@ -20,8 +20,8 @@ struct TrainArguments {
   PlotArguments plot;
 };
 
-// Of the profiled update: the time of all kernels and copies, what of the wall time none of them ran in, and the
-// longest kernels. They run one after the other, on one stream.
+// Adds the kernels of the profiled update: the time of all kernels and copies, the wall time without any of them, and
+// the longest kernels. Kernels run in sequence, on one stream.
 void add_kernels(const TrainingMeasurement& measurement, std::vector<BenchResult>* results_inout) {
   double all_s = 0;
   int64_t launches = 0;

@@ -1,5 +1,5 @@
-// `pictura bench worlds`: distributions over many episodes of each map: agents by class, refusals by reason, goals that
-// cannot be reached, what a random policy does wrong, and what a driver reaches who keeps its lane.
+// `pictura bench worlds`: distributions over many episodes of each map: agents by class, refusals by reason,
+// unreachable goals, infractions of a random policy, and results of the lane keeper.
 #include <fmt/format.h>
 
 #include "pictura/bench/commands/bench.h"

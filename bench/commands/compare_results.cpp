@@ -14,7 +14,7 @@ namespace pictura {
 
 namespace {
 
-/// 1: greater is better; -1: smaller is; 0: neither.
+/// Direction of improvement of a unit: 1 if greater is better, -1 if smaller is better, 0 for neither.
 int direction_of(const std::string& unit) {
   if (unit.ends_with("_per_s")) return 1;
   return unit == "s" || unit == "ms" || unit == "GB" || unit == "GiB" ? -1 : 0;
@@ -37,7 +37,7 @@ bool is_row(const Json& row) {
                              [&row](const char* key) { return row.value(key, Json()).is_number(); });
 }
 
-/// Counts by kind, as "2 worse, 1 better, 4 within the spread".
+/// Formats counts by kind, such as "2 worse, 1 better, 4 within the spread".
 std::string totals_of(const std::vector<Comparison>& comparisons) {
   std::string text;
   for (const Change change : {Change::worse, Change::better, Change::within_spread}) {

@@ -14,7 +14,8 @@ namespace pictura {
 
 namespace {
 
-// Arithmetic in bf16 stays a hundred times below; other images or observations are far above.
+// Bound on the initial KL divergence: bf16 arithmetic stays a hundred times below it; other images or observations are
+// far above it.
 constexpr double kMaxFirstKl = 0.01;
 
 // A folder that is removed with all its files.

@@ -18,7 +18,7 @@ constexpr float kBlock_m = 60.0f;
 constexpr int kBlocks = 5;
 constexpr float kHalfRoad_m = 7.0f;
 
-// Whether the bounding circles are disjoint; conservative, and enough for disjoint footprints.
+// Whether the bounding circles are disjoint, which is sufficient for disjoint footprints.
 bool apart(const AgentBox& a, const AgentBox& b) {
   auto radius = [](const AgentBox& box) { return 0.5f * length(Vec2{box.length_m, box.width_m}); };
   return length(a.center_m.xy() - b.center_m.xy()) > radius(a) + radius(b) + 0.1f;

@@ -22,13 +22,13 @@ Vector3d point(Vec3 v) { return {v.x, v.y, v.z}; }
 
 constexpr double kFar = std::numeric_limits<double>::infinity();
 
-// A parallelogram or disk in camera coordinates: a solid's face.
+// A parallelogram or disk in camera coordinates: a face of a solid.
 struct Facet {
-  Vector3d origin, u, v;  // corner and sides; of a disk, centre and two radii
+  Vector3d origin, u, v;  // corner and sides; for a disk, centre and two radii
   bool is_disk = false;
   Rgb color;
   int solid = 0;  // index into Tracer::solids
-  // Depth of the hit along the ray (x, y, 1), or kFar.
+  // Returns the depth of the hit along the ray (x, y, 1), or kFar.
   double hit(const Vector3d& ray) const {
     const Vector3d normal = u.cross(v);
     const double along = normal.dot(ray);
@@ -60,16 +60,16 @@ struct Solid {
 
 // A strip as drawn: the cone of directions through its sides and ends, and the strip's plane.
 struct PaintedStrip {
-  // Inwards; 0 where it is not bounded.
+  // Inward normals; 0 where the strip is not bounded.
   Vector3d edge_normal[4] = {Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero()};
-  bool crosses_near = false;          // the near plane: where it is drawn, each ray decides
+  bool crosses_near = false;          // whether it crosses the near plane; then its extent is decided per ray
   Vector3d plane = Vector3d::Zero();  // unit normal
   double offset = 0;
-  double nearest_m = 0, farthest_m = 0;  // depths of its corners
+  double nearest_m = 0, farthest_m = 0;  // minimum and maximum depth of its corners
   uint32_t rank = 0;
   uint8_t class_id = 0;
   Rgb color;
-  bool from_below = false;   // the eye is below its plane
+  bool from_below = false;   // whether the eye is below its plane
   std::vector<int> carries;  // indices of the solids on it
   bool carries_solid_of(const Facet& facet) const {
     return std::find(carries.begin(), carries.end(), facet.solid) != carries.end();
@@ -79,11 +79,11 @@ struct PaintedStrip {
       if (normal.dot(ray) < 0) return false;
     }
     if (!crosses_near) return true;
-    // Beyond the horizon, where only widening reaches, the plane is behind the eye.
+    // Beyond the horizon, which only widening reaches, the plane is behind the eye.
     const double of_plane = offset / plane.dot(ray);
     return of_plane >= kNear_m || of_plane <= 0;
   }
-  // Depth of its plane, within half and twice the depths of its corners; the largest beyond the horizon.
+  // Returns the depth of its plane, within half and twice the depths of its corners; the maximum beyond the horizon.
   double depth(const Vector3d& ray) const {
     const double of_plane = offset / plane.dot(ray);
     const double highest = farthest_m * kWidenedDepth;
@@ -98,7 +98,7 @@ struct Tracer {
   std::vector<PaintedStrip> strips;
 };
 
-// The rays through a rectangle of the image.
+// Rays through a rectangle of the image.
 struct Cone {
   Vector3d corner[4], middle;
   double middle2 = 0, spread = 0;
@@ -116,7 +116,7 @@ struct Cone {
     const double reach = facet.radius() + spread * (std::abs(along) + facet.radius());
     return off.squaredNorm() <= reach * reach;
   }
-  // Whether no edge of the strip has all of the cone on its outer side.
+  // Whether no edge of the strip has the whole cone on its outer side.
   bool may_intersect(const PaintedStrip& strip) const {
     return std::none_of(std::begin(strip.edge_normal), std::end(strip.edge_normal), [&](const Vector3d& normal) {
       return std::all_of(std::begin(corner), std::end(corner),
@@ -219,8 +219,8 @@ void add_light(Tracer* tracer, const Eye& eye, const LightHead& head, LightState
                             static_cast<int>(tracer->solids.size()) - 1});
 }
 
-// Whether two convex outlines overlap on the ground: to part them along the normal of any side, one would have to move
-// by more than a millimetre.
+// Whether two convex outlines overlap on the ground: to separate them along the normal of any side, a displacement of
+// more than a millimetre is needed.
 bool overlap_on_ground(const std::vector<Vector3d>& a, const std::vector<Vector3d>& b) {
   auto separates = [&](const Vector3d& normal) {
     double low_a = kFar, high_a = -kFar, low_b = kFar, high_b = -kFar;
@@ -244,8 +244,8 @@ double height_above(const std::vector<Vector3d>& outline, const Vector3d& p) {
   return normal.dot(p - outline[0]) / normal.z();
 }
 
-// Solids whose footprint overlaps the strip and whose footprint's centre is at most kStanding_m above or below the
-// strip's plane.
+// Returns the solids whose footprint overlaps the strip and whose footprint's centre is at most kStanding_m above or
+// below the strip's plane.
 std::vector<int> solids_on(const Tracer& tracer, const std::vector<Vector3d>& outline) {
   std::vector<int> standing;
   for (std::size_t i = 0; i < tracer.solids.size(); ++i) {
@@ -257,15 +257,16 @@ std::vector<int> solids_on(const Tracer& tracer, const std::vector<Vector3d>& ou
   return standing;
 }
 
-// Where the side of a strip between two corners, one of them before the near plane, crosses that.
+// Returns the point where the side of a strip between two corners, one of them before the near plane, crosses that
+// plane.
 Vector3d at_near_plane(const Vector3d& a, const Vector3d& b) {
   return a + (b - a) * ((kNear_m - a.z()) / (b.z() - a.z()));
 }
 
-// Moves the corners of a strip apart until its width on screen, across its centre line, is floor_px at each end that is
-// in front of the near plane. Depths do not change. Corners: left and right of one end, right and left of the other.
+// Moves the corners of a strip apart to a width on screen, across its centre line, of floor_px at each end in front of
+// the near plane. Depths do not change. Corners: left and right of one end, right and left of the other.
 void widen(const Camera& camera, double floor_px, Vector3d* corners) {
-  // The normal of the plane through the eye and the centre line, which is a line on screen with this normal.
+  // Normal of the plane through the eye and the centre line, which on screen is a line with this normal.
   const Vector3d through_eye = (corners[0] + corners[1]).cross(corners[2] + corners[3]);
   const Eigen::Array2d focal_px{camera.focal_x_px, camera.focal_y_px};
   Eigen::Vector2d across = through_eye.head<2>().array() / focal_px;
@@ -306,13 +307,13 @@ void add_strip(Tracer* tracer, const Eye& eye, const Camera& camera, const Cone&
   painted.crosses_near = nearest->z() < kNear_m;
   painted.nearest_m = std::max(nearest->z(), double{kNear_m});
   painted.farthest_m = farthest->z();
-  // A strip that the eye sees edge on faces it with the sides that widening gives it.
+  // A strip that the eye sees edge-on faces it with the sides that widening gives it.
   const Vector3d* const facing = painted.crosses_near ? corners : widened;
   const double side = (facing[2] - facing[0]).cross(facing[3] - facing[1]).dot(facing[0]) > 0 ? 1 : -1;
   for (int i = 0; i < 4; ++i) {
     const int next = (i + 1) % 4;
     Vector3d from = widened[i], to = widened[next];
-    // A side that crosses the near plane leads from there to the widened end; one that is before it bounds nothing.
+    // A side that crosses the near plane runs from there to the widened end; a side before the plane bounds nothing.
     if (from.z() < kNear_m && to.z() < kNear_m) continue;
     if (from.z() < kNear_m || to.z() < kNear_m) {
       (from.z() < kNear_m ? from : to) = at_near_plane(corners[i], corners[next]);
@@ -361,7 +362,7 @@ struct Surface {
 
 bool are_equal(double depth, double other) { return std::abs(depth - other) < kEqualDepth * std::min(depth, other); }
 
-// The nearest solid; of equally near ones the first.
+// Returns the nearest solid; among equally near solids, the first.
 Surface first_solid(const Candidates& candidates, const Vector3d& ray) {
   Surface front;
   bool is_tie = false;
@@ -382,8 +383,9 @@ Surface first_solid(const Candidates& candidates, const Vector3d& ray) {
   return front;
 }
 
-// The nearest surface: the solid or strip of least depth, but of strips whose planes are within kSameLevel_m of each
-// other there the one of lowest rank, and a strip is behind the solids on it seen from above, before them from below.
+// Returns the nearest surface: the solid or strip of minimum depth, with two exceptions. Of strips whose planes are
+// within kSameLevel_m of each other there, the strip of lowest rank is in front. A strip is behind the solids on it
+// seen from above, and in front of them seen from below.
 Surface first_hit(const Candidates& candidates, const Vector3d& ray) {
   Surface front = first_solid(candidates, ray);
   struct Candidate {
@@ -476,7 +478,7 @@ class ImageSampler {
   Tracer tracer_;
 };
 
-// Offsets of a pixel's samples from its corner.
+// Returns the offsets of a pixel's samples from its corner.
 std::vector<std::pair<double, double>> sample_offsets(TruthSamples samples) {
   if (samples == TruthSamples::center) return {{0.5, 0.5}};
   if (samples == TruthSamples::grid_2x2) return {{0.25, 0.25}, {0.75, 0.25}, {0.25, 0.75}, {0.75, 0.75}};

@@ -6,8 +6,8 @@ namespace pictura {
 
 namespace {
 
-// A scene under construction, and its random numbers. Numbers are drawn one a statement or within braces: compilers
-// evaluate arguments in different orders, and a seed must give one scene.
+// A scene under construction, and its random numbers. Numbers are drawn one per statement or within braces, because
+// compilers evaluate arguments in different orders, and a seed must always give the same scene.
 class Maker {
  public:
   explicit Maker(uint64_t seed) : random_(seed) {}
@@ -57,7 +57,7 @@ class Maker {
 RandomScene make_near_plane(Maker m) {
   const float slope = m.one_in(3) ? m.between(-0.1f, 0.1f) : 0.0f;
   auto road = [slope](float x, float y) { return Vec3{x, y, slope * x}; };
-  // Strips are level across: on a slope, wide ones would not be on one level.
+  // Strips are level across: on a slope, wide strips would not be on one level.
   auto width_m = [&] { return slope == 0 ? m.one_of({0.1f, 0.3f, 0.8f, 2.0f}) : m.one_of({0.1f, 0.3f}); };
   for (int i = 0; i < 6; ++i) {
     const float heading = m.between(0, kPi), ahead_m = m.between(0.3f, 6), behind_m = m.between(0.3f, 6);
@@ -66,7 +66,7 @@ RandomScene make_near_plane(Maker m) {
     m.add_line(road(middle.x - along.x * behind_m, middle.y - along.y * behind_m),
                road(middle.x + along.x * ahead_m, middle.y + along.y * ahead_m), width_m(), kind);
   }
-  // On a slope, beyond the strips: a box on one of them and two of several planes may be in a cycle.
+  // On a slope, beyond the strips: a box on one strip and two strips of several planes may form a cycle.
   const float box_heading = m.between(0, kTwoPi), left_m = m.between(-2, 2),
               ahead_m = m.between(3, 9) + (slope == 0 ? 0.0f : 8.0f);
   m.add_box(road(ahead_m, left_m), box_heading, {4.2f, 1.8f, 1.5f});
@@ -78,7 +78,7 @@ RandomScene make_near_plane(Maker m) {
 RandomScene make_bridge_from_below(Maker m) {
   const float slope = m.one_in(3) ? m.between(-0.1f, 0.1f) : 0.0f, height_m = m.between(2.5f, 6);
   const float turn = m.between(-1.6f, 1.6f);
-  // Along the bridge and to its left; it begins ahead of the eye.
+  // Returns a point along the bridge and to its left; the bridge begins ahead of the eye.
   auto deck = [&](float along, float left) {
     return Vec3{7 + along * cos_of(turn) - left * sin_of(turn), along * sin_of(turn) + left * cos_of(turn),
                 height_m + slope * along};
@@ -135,8 +135,8 @@ RandomScene make_intersecting_walls(Maker m) {
   return m.finish({0, 0, 1.5f}, m.between(-0.4f, 0.4f), 0, 0.35f);
 }
 
-// Without solids: of a strip and a solid that intersect within a pixel one is in front in all of it
-// (docs/explanation/image.md).
+// Makes a scene without solids: of a strip and a solid that intersect within a pixel, one is in front in the whole
+// pixel (docs/explanation/image.md).
 RandomScene make_wide_strips(Maker m) {
   for (int i = 0; i < 7; ++i) {
     const float x = m.between(3, 70), y = m.between(-12, 12), turn = m.between(0, kPi);
@@ -154,7 +154,7 @@ RandomScene make_walls_on_strips(Maker m) {
     const Vec3 along{-4 * sin_of(turn), 4 * cos_of(turn), 0}, foot{x, m.between(-5, 5), -depth_m};
     m.add_wall(foot - along, foot + along, depth_m + m.between(0.5f, 3));
   }
-  // Side by side: where two strips overlap and a wall stands on one of them, the three may be in a cycle.
+  // Side by side: where two strips overlap and a wall stands on one of them, the three may form a cycle.
   const float turn = m.between(-0.8f, 0.8f);
   const Vec3 along{12 * cos_of(turn), 12 * sin_of(turn), 0};
   for (int i = 0; i < 6; ++i) {
