@@ -37,13 +37,13 @@ TEST(Rig, ThePapersRigHasItsFieldOfView) {
 
 TEST(Camera, AxesFollowYawAndPitch) {
   Camera camera;
-  camera.yaw_rad = kHalfPi;  // looks left
+  camera.yaw_rad = kHalfPi;  // faces left
   CameraAxes axes = camera_axes(camera);
   EXPECT_NEAR(axes.forward.y, 1, 1e-6);
   EXPECT_NEAR(axes.right.x, 1, 1e-6);
   EXPECT_NEAR(axes.down.z, -1, 1e-6);
   camera.yaw_rad = 0;
-  camera.pitch_rad = 0.1f;  // looks up
+  camera.pitch_rad = 0.1f;  // faces up
   axes = camera_axes(camera);
   EXPECT_NEAR(axes.forward.z, std::sin(0.1), 1e-6);
   EXPECT_NEAR(axes.down.x, std::sin(0.1), 1e-6);

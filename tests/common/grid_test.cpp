@@ -52,7 +52,7 @@ TEST(Grid, RejectsWhatCannotBeIndexed) {
   const std::vector<Aabb2> huge{{{0, 0}, {1e7f, 1e7f}}};
   EXPECT_THROW(Grid(huge, 1.0f), Error);
   EXPECT_THROW(Grid(huge, 0.0f), Error);
-  // More entries than an int32 counts, of few enough cells.
+  // More entries than an int32 can count, in sufficiently few cells.
   const std::vector<Aabb2> many(100, {{0, 0}, {8000, 8000}});
   EXPECT_THAT(test::message_of([&] { Grid(many, 1.0f); }), ::testing::HasSubstr("100 items over 8000 x 8000 m"));
 }

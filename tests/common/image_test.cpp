@@ -1,4 +1,4 @@
-// Where images lie in memory, and the host's memory for them.
+// Places of images in memory, and host memory for images.
 #include "pictura/common/image.h"
 
 #include <algorithm>
@@ -46,7 +46,7 @@ TEST(ImageLayout, InterleavedChannelsAreNextToEachOther) {
   EXPECT_EQ(camera.row_stride, 3 * 8);
 }
 
-// 54 rows in patches of 12 px make five rows of patches, as 18 rows in patches of 4 px do.
+// 54 rows in patches of 12 px make five rows of patches, like 18 rows in patches of 4 px.
 TEST(ImageLayout, PatchesPutPixelsByHand) {
   static_assert(patches_along(12, 54) == 5 && patches_along(4, 18) == 5 && patches_along(12, 96) == 8);
   static_assert(patch_values(8) == 192 && patch_values(12) == 432 && patch_values(16) == 768);

@@ -48,7 +48,7 @@ TEST(Rng, StreamsOfDifferentKeysDiffer) {
 TEST(Rng, KeysBeyondTheirFieldsAreFaults) {
   EXPECT_TRUE((RandomKey{.agent = 4095, .purpose = Purpose::soak}.is_in_range()));
   EXPECT_FALSE((RandomKey{.agent = 4096}.is_in_range()));
-  // Such a key would draw what agent 0 draws.
+  // Such a key would have the draws of agent 0.
   EXPECT_DEBUG_DEATH(RandomStream({.agent = 4096}), "is_in_range");
 }
 

@@ -1,4 +1,4 @@
-// Scene histories on the host: what is put is shifted and comes back, and looks as it did at its step.
+// Scene histories on the host: scenes that are put come back shifted, with the same images as at their step.
 #include "pictura/common/scene_history.h"
 
 #include <algorithm>
@@ -32,8 +32,8 @@ const Snapshot& town_of(int map) {
   return towns[map];
 }
 
-/// Four worlds on two maps, of which one has no agents and another no lights. From step to step their order changes,
-/// and so do poses and lights; how many there are of each does not.
+/// Four worlds on two maps, one without agents and another without lights. From step to step, their order, poses and
+/// lights change; the number of each stays the same.
 Step make_step(int step) {
   struct World {
     int map;
@@ -78,7 +78,7 @@ SceneHistorySize size_of_steps(int num_steps = kSteps) {
   return {num_steps, kWorlds, kAgents, lights_of_step(), kViews};
 }
 
-/// A history with the first steps.
+/// Returns a history with the first steps.
 std::unique_ptr<SceneHistory> history_of(int steps) {
   std::unique_ptr<SceneHistory> history = make_host_scene_history(size_of_steps());
   for (int step = 0; step < steps; ++step) {
@@ -100,7 +100,7 @@ std::vector<int64_t> all_rows(int steps) {
   return rows;
 }
 
-/// The images of these views in one call, a vector for each view.
+/// Returns the images of these views in one call, a vector for each view.
 std::vector<std::vector<uint8_t>> draw(const SceneBatch& scene, const std::vector<View>& views) {
   const Rig rig = paper_rig(48, 27);
   const auto renderer = make_renderer("cpu", {.rig = rig});
@@ -125,7 +125,7 @@ bool same_bytes(Span<const T> actual, const T* expected) {
   return std::memcmp(actual.data(), expected, actual.size() * sizeof(T)) == 0;
 }
 
-/// What the history holds is what these steps show, with everything after the first shifted.
+/// Checks that the history holds these steps, with everything after the first step shifted.
 void expect_holds(const SceneHistory& history, const std::vector<Step>& steps) {
   const SceneBatch scene = history.scene();
   ASSERT_EQ(scene.geometry.size(), steps.size() * kWorlds);
@@ -186,7 +186,7 @@ TEST(SceneHistory, AStepThatIsPutAgainReplacesTheOneBeforeAndNoOther) {
 
 TEST(SceneHistory, ImagesOfAnyViewsOfAnyStepsAreThoseOfTheirOwnSteps) {
   const std::unique_ptr<SceneHistory> history = history_of(kSteps);
-  // Every view of every step, in an order that mixes them (7 and 30 have no common divisor), and some again.
+  // Every view of every step, in a mixed order (7 and 30 have no common divisor), and some views twice.
   std::vector<int64_t> rows = all_rows(kSteps);
   for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = static_cast<int64_t>((7 * i + 4) % rows.size());
   rows.insert(rows.end(), {3, 3, 29, 11});
@@ -257,7 +257,7 @@ TEST(SceneHistory, ScenesOfAnotherDeviceOrSizeAreRefusedByName) {
   views.pop_back();
   EXPECT_EQ(message_of([&] { history->put(1, step.scene.batch(), views); }),
             "scene history: views: expected 10 of a step, got 9");
-  // Nothing of what was refused was kept.
+  // Refused steps leave nothing in the history.
   expect_holds(*history, {make_step(0)});
 }
 

@@ -1,4 +1,4 @@
-// Polylines into mitred strips, and renderers by name.
+// Conversion of polylines to mitred strips, and renderers by name.
 #include "pictura/common/scene.h"
 
 #include <algorithm>
@@ -86,7 +86,7 @@ TEST(Renderers, NullDrawsBlack) {
   const std::vector<View> views(2);
   renderer->render({}, views, images.batch());
   for (const uint8_t byte : images.bytes()) ASSERT_EQ(byte, 0);
-  // ... in the images of the views that are counted.
+  // ... in the images of the counted views.
   std::fill(images.bytes().begin(), images.bytes().end(), uint8_t{7});
   const int32_t count = 1;
   renderer->render({}, {views, &count}, images.batch());

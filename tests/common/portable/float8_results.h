@@ -1,4 +1,4 @@
-// What the operations on Float8 give, for the form of it that the including file is compiled for.
+// Results of the operations on Float8, for the form of Float8 for which the including file is compiled.
 #pragma once
 
 #include <cstring>
@@ -14,7 +14,7 @@ struct Float8Inputs {
   uint32_t mask;
 };
 
-/// As results_of(), compiled for the form in memory.
+/// Variant of results_of(), compiled for the form in memory.
 std::vector<uint32_t> results_in_memory(const Float8Inputs& in);
 
 namespace {
@@ -61,7 +61,7 @@ std::vector<uint32_t> results_of(const Float8Inputs& in) {
   for (const Float8& of : of_indices) add(of);
   for (const Float8& of : of_fours) add(of);
 
-  // What is behind those chosen is left open.
+  // Elements behind the chosen ones are unspecified.
   int32_t stored[8], chosen[8], numbers[8];
   const int num_chosen = __builtin_popcount(in.mask);
   store8_integers(a, stored);

@@ -1,4 +1,4 @@
-// The two forms of Float8 against each other: equal to the bit.
+// Comparison of the two forms of Float8: equal bit for bit.
 #include <random>
 
 #include <gtest/gtest.h>

@@ -161,7 +161,7 @@ TEST(Coverage, HoldsForSteepAndLevelEdges) {
 }
 
 TEST(Coverage, SamplesToTheSideOfAnUprightEdgeAreCountedTo64ths) {
-  // Lines of 8 columns alone would count them to eighths of the pixel.
+  // Eight columns of lines alone would quantize the count to eighths of the pixel.
   for (const float lean : {0.0f, 0.02f, -0.02f}) {
     for (int step = 0; step <= 200; ++step) {
       const float x = 1 + static_cast<float>(step) / 200;
@@ -207,7 +207,7 @@ TEST(Coverage, BothDirectionsOfAnEdgeAreOppositesWhereverItLies) {
   std::uniform_real_distribution<float> unit(0, 1);
   int split = 0;
   for (int round = 0; round < 20000; ++round) {
-    // Through the pixel or past it, in any direction; every other one almost level or upright.
+    // Through the pixel or past it, in any direction; every other line is almost level or upright.
     const float exponent = round % 4 < 2 ? 0.0f : -9 * unit(random);
     const Vec2 lean = Vec2{std::pow(10.0f, exponent), 1} * (800 * unit(random)),
                way = round % 2 ? lean : Vec2{lean.y, -lean.x};
@@ -244,7 +244,7 @@ TEST(Coverage, RowSpansAgreeWithPixels) {
   }
 }
 
-// The composited colour of fragments, each with its coverage, visible samples and colour.
+// A fragment for the composited colour, with its coverage, visible samples and colour.
 struct TestFragment {
   PixelCoverage coverage;
   uint64_t visible;
@@ -272,7 +272,7 @@ TEST(Coverage, TwoFacesOfOneThirdAndTwoThirdsFillAPixel) {
 }
 
 TEST(Coverage, AFullFragmentGetsTheRemainderOfTheOthers) {
-  // In front a quarter of the area, although 20 of 64 samples; behind it a partly occluded fragment, weighted by
+  // In front, a quarter of the area although 20 of 64 samples; behind it, a partly occluded fragment, weighted by
   // samples; then a wall.
   const uint64_t front = (1ull << 20) - 1, middle = (1ull << 40) - 1;
   const Rgb color = color_of({{{0.25f, front}, front, {1, 0, 0}},

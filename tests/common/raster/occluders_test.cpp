@@ -1,5 +1,5 @@
-// Occluders: which faces they occlude, which walls of a scene are chosen, and that towns look the same with and without
-// occlusion culling.
+// Occluders: the faces that they occlude, the walls of a scene that are chosen, and equality of towns drawn with and
+// without occlusion culling.
 #include <algorithm>
 #include <cmath>
 
@@ -17,7 +17,7 @@
 namespace pictura {
 namespace {
 
-/// A camera at (0, 0, 1.5) that looks along x: 96x54 pixels of 1/48 of a radian in the middle.
+/// A camera at (0, 0, 1.5) that faces along x: 96x54 pixels of 1/48 of a radian in the middle.
 ImageSetting setting_ahead() {
   Camera camera = paper_rig().cameras[0];
   camera.position_m = {0, 0, 1.5f};
@@ -32,7 +32,7 @@ ImageSetting setting_ahead() {
 
 WallFace wall_between(Vec3 a_m, Vec3 b_m, float height_m = 6) { return {a_m, b_m, height_m}; }
 
-/// The same with a wall as its occluder, where it can be one.
+/// A setting_ahead() with a wall as its occluder, where the wall can be one.
 ImageSetting setting_with(const WallFace& wall) {
   ImageSetting setting = setting_ahead();
   CameraQuad face;
@@ -73,8 +73,8 @@ TEST(Occluders, OccludeWhatIsBehindThemInDepthAndOnScreen) {
 }
 
 TEST(Occluders, OccludeAStripFromBelowOnlyWhereTheyCannotStandOnIt) {
-  // A wall at 20 m and level strips behind it, 3 m above the eye, so that what stands on one is at most three times
-  // nearer; and, below the eye, one that is hidden anywhere.
+  // A wall at 20 m and level strips behind it. Three are 3 m above the eye, so that solids on them are at most three
+  // times nearer; one, below the eye, is hidden in any case.
   const ImageSetting setting = setting_with(wall_between({20, -6, 0}, {20, 6, 0}));
   for (const auto& [distance_m, z_m, is_visible] :
        {std::tuple{30.0f, 4.5f, true}, {58.0f, 4.5f, true}, {62.0f, 4.5f, false}, {30.0f, 0.0f, false}}) {

@@ -1,4 +1,4 @@
-// The rule of randomized cameras: what is drawn, for whom and when, and how a camera is mounted by it.
+// The rule of randomized cameras: the draws, their keys, and the mounting of a camera by them.
 #include "pictura/common/raster/randomize_camera.h"
 
 #include <cmath>
@@ -20,7 +20,7 @@ void expect_near(Vec3 actual, Vec3 expected) {
 }
 
 TEST(RandomizedCamera, IsTurnedByTheAnglesOfARig) {
-  // Turned from no pose, a camera has the axes of a rig's camera with these angles.
+  // Rotated from no pose, a camera has the axes of a rig's camera with these angles.
   const Camera straight{.width_px = 8, .height_px = 8, .focal_x_px = 4, .focal_y_px = 4};
   Camera turned = straight;
   turned.yaw_rad = 0.3f;
@@ -102,7 +102,7 @@ TEST(RandomizedCamera, AMountingLastsForAnEpisodeOfAnAgentsCamera) {
   EXPECT_NE(yaw_of(kKey, 0, 2), yaw_of(kKey, 0));
 }
 
-// So runs with several severities differ in nothing else.
+// Runs with different severities therefore differ in nothing else.
 TEST(RandomizedCamera, HalfTheSeverityIsHalfOfTheSameDraws) {
   const CameraMounting whole = draw_mounting(kFullCameraSeverity, kKey, 3),
                        half = draw_mounting(scaled(kFullCameraSeverity, 0.5), kKey, 3);
@@ -163,7 +163,7 @@ TEST(RandomizedCamera, BrightnessScalesBytes) {
   EXPECT_EQ(effect.of_bytes(0x1080FFu, 0, 0), 0x20FFFFu);
 }
 
-// A run is named by its seed: what it draws must not change.
+// A seed identifies a run, so its draws must not change.
 TEST(RandomizedCamera, DrawsAreThoseOfEarlierVersions) {
   const CameraMounting mounting = draw_mounting(kFullCameraSeverity, kKey, 1);
   EXPECT_EQ(mounting.yaw_rad, 0.09573058f);

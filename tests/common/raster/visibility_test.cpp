@@ -1,5 +1,5 @@
-// The shared visibility rules against brute force: which of two faces is in front, and which samples of a pixel's
-// fragments are visible.
+// The shared visibility rules against brute force: the front face of two, and the visible samples of a pixel's
+// fragments.
 #include <algorithm>
 #include <bit>
 #include <random>
@@ -16,7 +16,7 @@ namespace {
 
 using Extents = std::vector<std::pair<uint32_t, Extent>>;
 
-// A camera at eye_m that looks along x: sets up faces of primitives and compares their order.
+// A camera at eye_m that faces along x: sets up faces of primitives and compares their order.
 class TestView {
  public:
   // Faces of a primitive.
@@ -44,7 +44,7 @@ class TestView {
     return keep(strip_ref(strip, index), extent_of(strip),
                 [&](auto&& emit) { strip_faces(strip, setting_.camera, setting_.line_floor_px, emit); });
   }
-  // Calls visit(face of a, face of b, point) for a grid of points of the image that both cover.
+  // Calls visit(face of a, face of b, point) for a grid of points of the image that both faces cover.
   template <typename Visit>
   void for_each_overlap(const Faces& a, const Faces& b, Visit&& visit) const {
     for (const ScreenFace& of_a : a) {
@@ -189,7 +189,7 @@ TEST(Order, StripsOfOneLevelGoByRankAndOthersByDepth) {
     EXPECT_EQ(view.order(view.set_up(mark, 7), view.set_up(mark, 4)), 1);
   }
   for (const float height_m : {-0.5f, 0.5f}) {
-    // On different levels: the camera is above both, so the upper one is in front.
+    // On different levels: the camera is above both, so the upper strip is in front.
     const Strip stop = strip_between({8, 4, height_m}, {20, -4, height_m}, StripKind::stop_line, 3.0f);
     TestView view({0, 0, 3});
     EXPECT_EQ(view.order(view.set_up(mark), view.set_up(stop)), height_m < 0 ? -1 : 1) << height_m;
@@ -203,10 +203,10 @@ TEST(Order, WhatStandsOnAStripIsInFrontOfItEvenWhereItDipsIn) {
   TestView view({0, 0, 1});
   EXPECT_EQ(view.order(view.set_up(mark), view.set_up(car)), 1);
   EXPECT_EQ(view.order(view.set_up(car), view.set_up(mark)), -1);
-  // From below the road, the mark is in front of the car, even where the car reaches below it.
+  // From below the road, the mark is in front of the car, even where the car extends below it.
   TestView from_below({0, 0, -4}, 0.15f);
   EXPECT_EQ(from_below.order(from_below.set_up(mark), from_below.set_up(car)), -1);
-  // The same car beyond the end of the strip does not stand on it, and neither does one on a road 2 m below.
+  // The same car beyond the end of the strip does not stand on it, and neither does a car on a road 2 m below.
   EXPECT_TRUE(stands_on(extent_of(car), extent_of(mark)));
   AgentBox beyond = car;
   beyond.center_m.x = 23;
@@ -278,7 +278,7 @@ TEST(Order, StripsInFrontOfAWallOrBehindIt) {
 
 TEST(Order, AWallStandsOnTheStripsThatItCrosses) {
   const Strip mark = strip_between({5, 0, 0}, {15, 0, 0});
-  // Its foot is 0.3 m below the road, along, across and oblique to the mark.
+  // The wall's lower edge is 0.3 m below the road, along, across and oblique to the mark.
   for (const Vec3 reach : {Vec3{3, 0, 0}, Vec3{0, 3, 0}, Vec3{2, -3, 0}}) {
     const Vec3 middle{10, 0, -0.3f};
     const WallFace wall{middle - reach, middle + reach, 2, {1, 1, 1}};
@@ -294,7 +294,7 @@ TEST(Order, AWallStandsOnTheStripsThatItCrosses) {
 }
 
 TEST(Order, StripsOfOneLevelAreOrderedByRankBeyondTheirHorizonToo) {
-  // Drawn 8 px wide, they reach above the horizon; the edge is nearer.
+  // Drawn 8 px wide, the strips extend above the horizon; the edge is nearer.
   const Strip edge = strip_between({20, 6, 0}, {20, -6, 0}, StripKind::road_edge),
               stop = strip_between({45, 6, 0}, {45, -6, 0}, StripKind::stop_line);
   TestView view({0, 0, 0.3f}, 0, 8);
@@ -302,8 +302,8 @@ TEST(Order, StripsOfOneLevelAreOrderedByRankBeyondTheirHorizonToo) {
 }
 
 TEST(Order, AStripDrawnWiderThanItIsStaysAtItsDepth) {
-  // Its plane almost contains the eye: in that plane, half of its width on screen would be much nearer, and half beyond
-  // the horizon.
+  // The strip's plane almost contains the eye: in that plane, half of the strip's width on screen would be much nearer,
+  // and half beyond the horizon.
   const Strip strip = strip_between({40, -4, 0.9995f}, {45, 4, 0.9985f});
   for (const float wall_at_m : {15.0f, 110.0f}) {
     WallFace wall;
@@ -343,7 +343,7 @@ TEST(Order, SolidsThatIntersectShareSamplesByWhichIsNearer) {
   auto never = [](uint32_t, uint32_t) { return false; };
   int split = 0, tied = 0;
   for (int round = 0; round < 2000; ++round) {
-    // Every second pair is nearly in one plane, so that it is equally near in much of the pixel.
+    // Every second pair is nearly in one plane, so that both faces are equally near in much of the pixel.
     const float tilt = round % 2 ? 1.0f : 2e-3f;
     auto plane = [&](uint32_t object_id) {
       const float inverse_depth = 0.1f + 0.02f * tilt * unit(random);
@@ -413,7 +413,7 @@ TEST(Order, VisibleSamplesDoNotDependOnTheOrderOfFragments) {
   std::mt19937_64 random(5);
   std::uniform_real_distribution<float> unit(0, 1);
   for (int round = 0; round < 500; ++round) {
-    // Planes in one pixel; randomly tilted ones intersect, and strips among them may occlude each other in a cycle.
+    // Planes in one pixel; randomly tilted planes intersect, and strips among them may occlude each other in a cycle.
     const float tilt = round % 2 ? 0.1f : 0.0f;
     const bool with_strips = round % 4 == 3;
     std::vector<ScreenFace> faces(2 + random() % 6);

@@ -1,4 +1,4 @@
-// What filling a folder again does to the files that are there.
+// Effects of filling a folder again on existing files.
 #include "pictura/common/support/filled_folder.h"
 
 #include <algorithm>

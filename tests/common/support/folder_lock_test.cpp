@@ -1,4 +1,4 @@
-// A folder that one process holds at a time.
+// Exclusive access to a folder for one process.
 #include "pictura/common/support/folder_lock.h"
 
 #include <csignal>

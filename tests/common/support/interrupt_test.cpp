@@ -1,4 +1,4 @@
-// Signals that ask a process to end: kept once, and not taken for a second request a moment later.
+// Signals that end a process: recorded once, and not taken for a second request a moment later.
 #include "pictura/common/support/interrupt.h"
 
 #include <csignal>
@@ -35,7 +35,7 @@ TEST_F(Interrupts, TheFirstSignalIsKept) {
   EXPECT_FALSE(interrupted());
 }
 
-// Of several processes that work together each is told by the others and, a moment later, itself.
+// Of several cooperating processes, each gets the signal from the others and, a moment later, itself.
 TEST_F(Interrupts, ASignalThatAnotherProcessHasToldOfIsTheSameRequest) {
   take_interrupt(SIGTERM);
   std::raise(SIGTERM);

@@ -1,4 +1,4 @@
-// How deep JSON from outside may be nested.
+// Nesting depth of JSON from outside.
 #include "pictura/common/support/json.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ TEST(Json, IsReadUpToItsDepth) {
   EXPECT_THROW(parse_json(nested(kMaxJsonDepth + 1)), Json::parse_error);
   EXPECT_THROW(parse_json("{\"a\": " + nested(1'000'000)), Json::parse_error);
   EXPECT_TRUE(parse_json(nested(1'000'000), /*allow_exceptions=*/false).is_discarded());
-  // Side by side is no depth, and in a text brackets are letters.
+  // Adjacent values add no depth, and brackets within a text are characters.
   EXPECT_EQ(parse_json("[" + nested(60) + "," + nested(60) + "]").size(), 2u);
   const std::string brackets(200, '[');
   EXPECT_EQ(first_too_deep("[\"" + brackets + "\"]"), std::string_view::npos);

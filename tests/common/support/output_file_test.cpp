@@ -1,5 +1,4 @@
-// What output files do to the files, links, folders and devices that are there already, and what a killed writer
-// leaves.
+// Effects of output files on existing files, links, folders and devices, and the remains of a killed writer.
 #include "pictura/common/support/output_file.h"
 
 #include <csignal>

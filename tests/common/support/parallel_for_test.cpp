@@ -1,5 +1,5 @@
-// parallel_for visits every item once and rethrows the lowest item's exception, in as many threads as it needs, which
-// sleep when they have no work.
+// parallel_for visits every item once, rethrows the lowest item's exception, and uses as many threads as it needs,
+// which sleep when idle.
 #include "pictura/common/support/parallel_for.h"
 
 #include <atomic>
@@ -103,13 +103,13 @@ TEST(ParallelFor, SleepsBetweenLoops) {
   static constexpr std::chrono::milliseconds kGap{2};
   const double begin_s = cpu_s();
   for (int loop = 0; loop < kLoops; ++loop) {
-    // The first thread makes the others wait at the end, too.
+    // The first thread makes the others wait at the end as well.
     parallel_for(3, 3, [](std::int64_t i) {
       if (i == 0) std::this_thread::sleep_for(kGap);
     });
     std::this_thread::sleep_for(kGap);
   }
-  const double gaps_s = 2e-3 * 2 * kLoops;  // of each of three threads
+  const double gaps_s = 2e-3 * 2 * kLoops;  // per thread, of three threads
   EXPECT_LT(cpu_s() - begin_s, gaps_s / 4);
 }
 

@@ -1,4 +1,4 @@
-// Which known word is nearest to a misspelt one.
+// The known word nearest to a misspelt word.
 #include "pictura/common/support/suggestion.h"
 
 #include <gtest/gtest.h>
