@@ -10,8 +10,8 @@
 namespace pictura {
 namespace {
 
-/// Two one-way roads of one lane that cross at the origin, eastwards and northwards. The junction extends 10 m from
-/// there; the lanes before it begin at 50 m, in two pieces.
+/// Two one-way roads of one lane that cross at the origin, eastwards and northwards. The junction extends 10 m from the
+/// origin; the lanes before it begin at 50 m, in two pieces.
 struct Crossing {
   Crossing() {
     map.junctions = {{"1", 0}};
@@ -69,7 +69,7 @@ TEST(BlindApproaches, AWallInTheCornerHidesCrossingTraffic) {
   // The car's front right corner, (1, -27.75), is visible past a building that is 14.17 m from the centre lines.
   expect_count(count_blind_approaches(map, corner(14.1f)), 2, 2, 2, 2);
   expect_count(count_blind_approaches(map, corner(14.3f)), 2, 0, 2, 0);
-  // Closer to the junction the building no longer blocks the line between the two.
+  // Closer to the junction, the building no longer blocks the line between eye and car.
   expect_count(count_blind_approaches(map, corner(12), 20), 2, 2, 2, 2);
   expect_count(count_blind_approaches(map, corner(12), 10), 2, 0, 2, 0);
 }
@@ -78,7 +78,7 @@ TEST(BlindApproaches, WallsHideOnlyOnTheirLevelAndInTheirDirection) {
   const RoadMap map = Crossing().map;
   expect_count(count_blind_approaches(map, corner(6, -20)), 2, 0, 2, 0);
   expect_count(count_blind_approaches(map, corner(6, 0, 0.5f)), 2, 0, 2, 0);  // lower than the line of sight
-  // A short wall close to the eye at (-30, 0) hides the other car; from (0, -30) the car at (-30, 0) is visible next to
+  // A short wall close to the eye at (-30, 0) hides the other car; from (0, -30), the car at (-30, 0) is visible beside
   // it.
   const std::vector<WallFace> short_wall{{{-28, -1.2f, 0}, {-24, -7.5f, 0}, 4}};
   expect_count(count_blind_approaches(map, short_wall), 2, 1, 2, 1);

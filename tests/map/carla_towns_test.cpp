@@ -1,4 +1,4 @@
-// CARLA's eight towns: counts known from their files, and properties that any map made from them must have.
+// CARLA's eight towns: counts known from their files, and properties of any map made from them.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -29,7 +29,7 @@ struct TownFacts {
   int painted_stop_lines, painted_near_lights, stop_signs, yield_signs;
 };
 
-// Counted in the files, without this importer. Town10HD has two more signals of the light type, without references.
+// Counted in the files without this importer. Town10HD has two more signals of the light type, without references.
 const TownFacts kTowns[] = {
     {"Town01", 122, 96, 12, 6.4, 1.4, 0, 0, 36, 12, {{3, 12}}, 36, 0, 0, 0, 0, 0, 0},
     {"Town02", 84, 64, 8, 2.9, 0.8, 0, 0, 24, 8, {{3, 8}}, 24, 0, 0, 0, 0, 0, 0},
@@ -165,7 +165,7 @@ TEST_P(CarlaTowns, ACarOnItsLaneTouchesNoRoadEdge) {
   EXPECT_EQ(driven.touching, 0);
 }
 
-/// The drivable surface, rebuilt as quads between the map's own lane points, to compare the edges with.
+/// The drivable surface, rebuilt as quads between the map's own lane points, for comparison with the edges.
 class DrivableSurface {
  public:
   explicit DrivableSurface(const RoadMap& map) {
@@ -251,10 +251,10 @@ TEST_P(CarlaTowns, EdgesAreExactlyWhereTheDrivableSurfaceEnds) {
     };
     wrong_side += !surface.covers(left_of_middle(-0.06f)) || surface.covers(left_of_middle(0.06f)) ? 1 : 0;
   }
-  // Diverging lanes leave a narrow gap; in Town06 some gaps are narrower than the probes' distance.
+  // Diverging lanes leave a narrow gap; in Town06, some gaps are narrower than the probes' distance.
   EXPECT_LE(wrong_side, static_cast<int>(map_->road_edges.size()) / 500) << "of " << map_->road_edges.size();
 
-  // Where nothing is drivable beyond a lane's border there is an edge; where the surface continues no edge crosses.
+  // A lane's border has an edge where nothing beyond it is drivable, and none where the surface continues.
   int borders = 0, missing = 0, across = 0;
   for (const Lane& border_lane : map_->lanes) {
     if (!is_drivable(border_lane.type)) continue;

@@ -1,4 +1,4 @@
-// A car driven along the middle of every lane of a map, and where it touches road edges.
+// A car driven along the middle of every lane of a map, and the places where it touches road edges.
 #pragma once
 
 #include <algorithm>
@@ -23,8 +23,8 @@ class EdgeGrid {
     grid_ = Grid(boxes, 10.0f);
   }
 
-  /// Whether `test(edge)` holds for an edge at about the height of `p` within a square of half-size `radius_m` around
-  /// it.
+  /// Whether `test(edge)` holds for an edge at about the height of `p`, within a square of half-size `radius_m` around
+  /// `p`.
   template <typename Test>
   bool any_near(Vec3 p, float radius_m, Test&& test) const {
     const GridView grid = grid_.view();
@@ -71,7 +71,7 @@ struct DrivenLanes {
   int poses = 0, touching = 0;
 };
 
-/// Puts a car of 4.5 x 2 m at every half metre of every driving lane.
+/// Places a car of 4.5 x 2 m at every half metre of every driving lane.
 inline DrivenLanes drive_lanes(const RoadMap& map) {
   const EdgeGrid edges(map);
   DrivenLanes driven;

@@ -148,8 +148,8 @@ RoadMap random_map(std::mt19937* random) {
   return map;
 }
 
-/// Least costs between positions at the given fractions of all lanes by Floyd and Warshall, with lane changes allowed
-/// at each of them. Node index: fraction_index * lanes + lane; the first fraction is 0.
+/// Minimum costs between positions at the given fractions of all lanes, by the Floyd-Warshall algorithm, with lane
+/// changes allowed at each position. Node index: fraction_index * lanes + lane; the first fraction is 0.
 std::vector<std::vector<double>> all_distances(const RoadMap& map, const std::vector<double>& fractions,
                                                double change_cost_m) {
   const std::size_t lanes = map.lanes.size(), nodes = fractions.size() * lanes;

@@ -1,5 +1,5 @@
 // A file as large as CARLA's largest towns: 23 MB, several hundred kilometres of lanes. Import, cache and memory stay
-// within their limits, in processor time, since other programs share the machine.
+// within their limits, measured in processor time, since other programs share the machine.
 #include <ctime>
 #include <string>
 
@@ -18,7 +18,7 @@ namespace pictura {
 namespace {
 
 constexpr double kCached_s = 0.5, kMemory_gb = 1.5;
-constexpr double kImport_s = 10;  // the aim is 5 (`pictura bench map`): half of that is for what shares the machine
+constexpr double kImport_s = 10;  // the aim is 5 (`pictura bench map`); the margin is for other programs
 constexpr std::size_t kFile_bytes = PICTURA_IS_SANITIZED ? 3'000'000 : 23'000'000;
 
 double processor_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
@@ -29,7 +29,7 @@ double peak_memory_gb() {
   return 1024e-9 * static_cast<double>(usage.ru_maxrss);
 }
 
-/// The town again and again side by side, each with ids of its own, until the file is large enough.
+/// Repeats the town side by side, with distinct ids for each copy, until the file is large enough.
 std::string tiled(const std::string& text, std::size_t bytes, int* tiles_out) {
   pugi::xml_document document;
   document.load_string(text.c_str());
@@ -89,7 +89,7 @@ TEST(LargeMap, ImportCacheAndMemoryStayWithinTheirLimits) {
   fmt::print("{} tiles, {:.0f} km of driving lanes: {:.2f} s, from the cache {:.2f} s, {:.2f} GB\n", tiles,
              map->facts.driving_lane_km, import_s, cached_s, peak_memory_gb());
   EXPECT_EQ(first_difference(*map, *again), "");
-  // Each tile is the town.
+  // Each tile equals the town.
   EXPECT_EQ(map->lanes.size(), static_cast<std::size_t>(tiles) * one.lanes.size());
   EXPECT_EQ(map->lane_links.size(), static_cast<std::size_t>(tiles) * one.lane_links.size());
   EXPECT_EQ(map->lights.size(), static_cast<std::size_t>(tiles) * one.lights.size());

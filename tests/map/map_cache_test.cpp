@@ -1,4 +1,4 @@
-// The map cache: maps are restored bit by bit, any other file is rejected with its reason, and load_map() then imports
+// The map cache: maps are restored bit for bit, any other file is rejected with its reason, and load_map() then imports
 // the source.
 #include "pictura/map/map_cache.h"
 
@@ -332,7 +332,7 @@ TEST_F(MapCacheFolder, MendsAreCachedWithTheMap) {
     ASSERT_EQ(map->mends.size(), 1u);
     EXPECT_THAT(message_of(map->mends[0], report.source), HasSubstr("small.xodr:5: road 0: <successor>"));
   }
-  // A mended map in the cache is none for strict reading.
+  // Strict reading does not use a repaired map from the cache.
   EXPECT_THROW(outcome({.strict = true}), Error);
   write_source(text);
   EXPECT_EQ(outcome({.strict = true}), "imported");

@@ -99,7 +99,7 @@ bool is_straight(const RoadMap& map, const Lane& lane) {
   return true;
 }
 
-/// Each of CARLA's towns and procedural ones, and copies of each.
+/// Each of CARLA's towns and of procedural towns, and copies of each.
 class Copies : public ::testing::TestWithParam<const char*> {
  protected:
   static constexpr int kCopies = 3;
@@ -152,7 +152,7 @@ TEST_P(Copies, KeepConnectionsWidthsHeightsAndLimits) {
         EXPECT_LT(std::abs(wrap_angle(begin_of(*map, other).heading_rad - end_of(*map, lane).heading_rad)), 0.1);
       }
       if (lane.left_neighbor < 0) continue;
-      // What widths are on the ground: neighbours' middles are half of both widths apart.
+      // Widths on the ground: the centre lines of neighbours are half of both widths apart.
       const LanePoint &own = end_of(*map, lane), &next_to = end_of(*map, map->lanes[lane.left_neighbor]);
       largest_width_error_m = std::max(largest_width_error_m, std::abs(length(own.position_m - next_to.position_m) -
                                                                        0.5 * (own.width_m + next_to.width_m)));
@@ -183,7 +183,7 @@ TEST_P(Copies, StretchStraightLanesAsThePlanDoes) {
   }
 }
 
-/// Where the tightest turns of a town have shrunk, the straight sides of a car that follows them may touch an edge.
+/// Where the tightest turns of a town have shrunk, the straight sides of a car on them may touch an edge.
 TEST_P(Copies, CanBeDrivenNearlyWithoutTouchingRoadEdges) {
   for (int number = 1; number <= kCopies; ++number) {
     const test::DrivenLanes driven = test::drive_lanes(*copy(number));

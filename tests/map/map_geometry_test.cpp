@@ -154,9 +154,8 @@ bool cross_each_other(Vec2 a, Vec2 b, Vec2 c, Vec2 d) {
   return side(a, b, c) != side(a, b, d) && side(c, d, a) != side(c, d, b);
 }
 
-/// Up to 60 m, as long as the street bends by less than 15 degrees: beyond that a building next to it may block the
-/// view.
-/// Parking lanes swing where they open, so the view along them is not that along the street.
+/// Up to 60 m, as long as the street bends by less than 15 degrees: beyond that, a building beside it may block the
+/// view. Parking lanes swing where they open, so the view along them differs from that along the street.
 TEST_P(Walls, DoNotBlockTheViewAlongStreets) {
   constexpr float kViewDistance_m = 60, kBend_rad = 15 * kPi / 180;
   const std::vector<WallFace> walls = make_walls(*map_, {});

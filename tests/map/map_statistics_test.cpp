@@ -1,4 +1,4 @@
-// What a map's roads are like, of small maps made by hand.
+// Statistics of small hand-made maps.
 #include "pictura/map/map_statistics.h"
 
 #include <gmock/gmock.h>

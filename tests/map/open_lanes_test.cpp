@@ -1,4 +1,4 @@
-// Roads that end: where traffic leaves and enters, and that no road edge is in its way.
+// Roads that end: places where traffic leaves and enters, without road edges in its way.
 #include "pictura/map/open_lanes.h"
 
 #include <cmath>
@@ -19,7 +19,7 @@ using ::testing::HasSubstr;
 
 RoadMap map_of(const std::string& text) { return parse_opendrive(text, "open.xodr"); }
 
-/// Edges that cross a line a little beyond, or before, the mouth.
+/// Number of edges that cross a line slightly beyond, or before, the mouth.
 int edges_across(const RoadMap& map, const LaneMouth& mouth) {
   int count = 0;
   for (const RoadEdge& edge : map.road_edges) {
@@ -43,7 +43,7 @@ TEST(OpenLanes, AStreetIsAnExitAndAnEntryAtEitherEnd) {
   ASSERT_EQ(open.exits.size(), 2u);
   ASSERT_EQ(open.entries.size(), 2u);
   expect_no_edges_across(map, open);
-  // Kerbs along both sides are all that is left.
+  // Only the kerbs along both sides remain.
   double length_m = 0;
   for (const RoadEdge& edge : map.road_edges) {
     EXPECT_NEAR(std::fabs(edge.a_m.y), 3.5, 1e-3);
@@ -57,7 +57,7 @@ TEST(OpenLanes, AStreetIsAnExitAndAnEntryAtEitherEnd) {
   EXPECT_EQ(use.unreachable, 0);
 }
 
-/// The middle lines of its lanes are up to .2 rad askew to the ends of the road.
+/// The centre lines of the lanes are up to 0.2 rad oblique to the ends of the road.
 TEST(OpenLanes, NoEdgeCrossesTheEndsOfLanesThatGetWider) {
   for (const double slope : {-0.05, 0.1, 0.2}) {
     const std::string width =

@@ -58,7 +58,7 @@ inline std::string open_crossing(double arm_m = 60) {
   return file_of(roads + R"(<junction id="9" name="">)" + connections + "</junction>\n");
 }
 
-/// A one-way road along x of two lanes and an on-ramp beside them that ends after 100 m of 250.
+/// A one-way road along x of two lanes, with an on-ramp beside them that ends after 100 of 250 m.
 inline std::string open_ramp() {
   const auto section = [](double s, const std::string& lanes) {
     return fmt::format(
@@ -72,7 +72,7 @@ inline std::string open_ramp() {
   return file_of(road.text());
 }
 
-/// Two straight roads of one lane along x whose ends touch, and which no link joins.
+/// Two straight roads of one lane along x whose ends touch without a link.
 inline std::string unlinked_roads() {
   RoadText first, second;
   first.right = second.right = lane_of(-1, "driving", 3.5);

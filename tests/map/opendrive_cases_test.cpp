@@ -1,4 +1,4 @@
-// Small files of the kinds that other tools write, and the table of them in docs/reference/map_cases.md.
+// Small files of the kinds that other tools write, and their table in docs/reference/map_cases.md.
 #include <string>
 #include <vector>
 
@@ -15,7 +15,7 @@ namespace {
 
 struct MapCase {
   std::string name;  // of the file, without .xodr
-  std::string kind;  // what it has
+  std::string kind;  // contents of the file
 };
 
 const std::vector<MapCase> kCases{

@@ -1,5 +1,5 @@
-// Small files that each break one of ASAM's rules for OpenDRIVE, and the table of what the importer makes of them in
-// docs/reference/opendrive_conformance.md. A rule's id names the version of the standard since which it holds.
+// Small files that each break one of ASAM's rules for OpenDRIVE, and the table of the importer's results in
+// docs/reference/opendrive_conformance.md. A rule's id contains the version of the standard in which it was introduced.
 #include <string>
 #include <vector>
 
@@ -22,7 +22,7 @@ using test::RoadText;
 
 struct BrokenRule {
   std::string id;    // without "asam.net:xodr:"
-  std::string file;  // what it is
+  std::string file;  // kind of the file
   std::string text;
 };
 
@@ -75,7 +75,7 @@ std::string width_to_zero(int id, const std::string& link) {
       link);
 }
 
-/// Road 1 leads to road 2, to which road 3 leads as well.
+/// Road 1 leads to road 2, and so does road 3.
 std::string merge_without_junction() {
   RoadText first = one_lane(), second = one_lane(), third = one_lane();
   const char* const to_second = R"(<successor elementType="road" elementId="2" contactPoint="start"/>)";
@@ -150,7 +150,7 @@ std::vector<BrokenRule> broken_rules() {
   };
 }
 
-/// What the importer makes of a file, in a cell of the table.
+/// Result of importing a file, as a cell of the table.
 std::string made_of(const std::string& text) {
   try {
     const RoadMap map = parse_opendrive(text, "FILE");

@@ -26,7 +26,7 @@ using test::RoadText;
 /// Length of the parabola v = u^2 / 100 from 0 to u.
 double parabola_length(double u) { return 0.5 * u * std::sqrt(1 + u * u / 2500) + 25 * std::asinh(u / 50); }
 
-/// A road along that parabola to u = 60, its one lane centred on the reference line.
+/// A road along that parabola to u = 60, with a single lane centred on the reference line.
 RoadText parabola(const std::string& cubic) {
   RoadText road;
   road.length = parabola_length(60);
@@ -126,7 +126,7 @@ TEST(OpenDriveCurves, ABorderInsideThePreviousOneCoincidesWithIt) {
   section.end = 20;
   section.right.resize(2);
   section.right[0].border = linear_profile(-3, -0.1);
-  section.right[1].border = linear_profile(-4, 0.02);  // crosses the first one at s = 8.33
+  section.right[1].border = linear_profile(-4, 0.02);  // crosses the first border at s = 8.33
   expect_border(border_at(road, section, -2, 5), -3.9, 0.02);
   expect_border(border_at(road, section, -2, 15), -4.5, -0.1);
 }
@@ -161,7 +161,7 @@ TEST(OpenDriveBanking, SuperelevationRotatesTheRoadAboutItsReferenceLine) {
   const double c = std::cos(0.1), s = std::sin(0.1);
   expect_at(map, first_of(map, -1), 0, -2 * c, -2 * s);
   expect_at(map, first_of(map, -2), 0, -5 * c, -5 * s);
-  // The left lane runs the other way: its last point is at s = 0.
+  // The left lane has the opposite direction: its last point is at s = 0.
   const Span<const LanePoint> left = map.points_of(lane_named(map, "1", 0, 1));
   expect_at(map, left[left.size() - 1].position_m, 0, 2 * c, 2 * s);
 }

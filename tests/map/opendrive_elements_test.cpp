@@ -1,6 +1,6 @@
-// What the importer does with each element of OpenDRIVE 1.4 to 1.8, found by reading a file with it and one without it,
-// and the table of that in docs/reference/opendrive_conformance.md. Which versions have an element is what their
-// schemas say.
+// Effects of each element of OpenDRIVE 1.4 to 1.8 in the importer, found by reading a file with and a file without the
+// element, and their table in docs/reference/opendrive_conformance.md. The versions of an element are those of the standard's
+// schemas.
 #include <optional>
 #include <set>
 #include <string>
@@ -28,8 +28,8 @@ struct Element {
 
 const std::string kAll = "1.4-1.8";
 
-// The file into which elements are put: @NAME@ marks where. Road 1 leads through junction 7, on road 2, to road 3; road
-// 9 lies apart. What is put there has no line breaks, so that nothing else is on another line.
+// The file into which elements are inserted, at marks @NAME@. Road 1 leads through junction 7, on road 2, to road 3;
+// road 9 lies apart. Inserted text has no line breaks, so that the lines of all other elements stay the same.
 const std::string kFile = R"(<?xml version="1.0"?>
 <OpenDRIVE>
 <header revMajor="1" revMinor="8">@header@</header>@root@
@@ -79,7 +79,7 @@ const std::string kFile = R"(<?xml version="1.0"?>
 </OpenDRIVE>
 )";
 
-/// A file with `text` at a mark of it and nothing at the others.
+/// Returns a file with `text` at one mark and nothing at the others.
 std::string filled(std::string file, const std::string& mark = "", const std::string& text = "") {
   for (size_t begin = 0; (begin = file.find('@')) != std::string::npos;) {
     const size_t end = file.find('@', begin + 1);
@@ -88,20 +88,20 @@ std::string filled(std::string file, const std::string& mark = "", const std::st
   return file;
 }
 
-/// An element put at a mark, there into `around`, where that has a @.
+/// An element inserted at a mark, within `around` at its @.
 Element put(const std::string& path, const std::string& versions, const std::string& mark, const std::string& text,
             const std::string& around = "@") {
   return {path, versions, filled(kFile, mark, replaced(around, "@", text)),
           filled(kFile, mark, replaced(around, "@", ""))};
 }
 
-/// What the file has from `begin` to `end`, against the file without that.
+/// The part of the file from `begin` to `end`, compared with the file without it.
 Element had(const std::string& path, const std::string& begin, const std::string& end = "") {
   const size_t from = kFile.find(begin), to = end.empty() ? from + begin.size() : kFile.find(end, from) + end.size();
   return {path, kAll, filled(kFile), filled(kFile.substr(0, from) + kFile.substr(to))};
 }
 
-/// A curve instead of road 9's straight line, or that instead of a curve.
+/// A curve in place of road 9's straight line, or in place of another curve.
 Element drawn(const std::string& path, const std::string& curve, const std::string& instead = "<line/>") {
   const auto with = [](const std::string& element) {
     const std::string before = R"(y="200" hdg="0" length="50">)";
@@ -248,7 +248,7 @@ std::string contents_of(RoadMap map) {
   return encode_map(map, {});
 }
 
-/// The kinds of faults of one map that another has not, and what is done about them.
+/// Kinds of faults of one map that another lacks, and their repairs.
 std::string mends_beyond(const RoadMap& map, const RoadMap& other) {
   std::set<MendKind> known;
   for (const Mend& mend : other.mends) known.insert(mend.kind);
@@ -260,7 +260,7 @@ std::string mends_beyond(const RoadMap& map, const RoadMap& other) {
   return text;
 }
 
-/// What the importer does with an element, in a cell of the table.
+/// Effect of an element in the importer, as a cell of the table.
 std::string done_with(const Element& element) {
   std::optional<RoadMap> with, without;
   try {

@@ -1,4 +1,4 @@
-// Malformed OpenDRIVE files give an Error that names source, line, road and element: in strict reading, all of them.
+// Malformed OpenDRIVE files give an Error with source, line, road and element: in strict reading, for all faults.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -154,7 +154,7 @@ TEST(OpenDriveErrors, ContradictoryRoadLinksAreRejected) {
   a.link += link("successor", "2", "start");
   EXPECT_THAT(message_of(file_of(a.text() + b.text())),
               HasSubstr("bad.xodr:5: road 1: <predecessor>: the end of road 1 is linked to the start of road 2"));
-  // Road 1 continues into 2, which names 3 as its predecessor.
+  // Road 1 continues into 2, whose predecessor in the file is 3.
   a.link = link("successor", "2", "start");
   b.link = link("predecessor", "3", "end");
   EXPECT_THAT(message_of(file_of(a.text() + b.text() + c.text())),
@@ -244,14 +244,14 @@ TEST(OpenDriveErrors, WhatSmallFilesRepeatIsBounded) {
                        R"(<line length="{}" space="{}" tOffset="0" sOffset="0"/></type></roadMark>)",
                        offset, length, space);
   };
-  // A number to which adding one changes nothing.
+  // A number that does not change when one is added.
   road.right = lane_of(-1, "driving", 3, mark("-1e17", 0.04, 0.06));
   EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("attribute sOffset: expected a number in"));
   // Dashes that are too short to be painted.
   road.right = lane_of(-1, "driving", 3, mark("0", 0.001, 0.049));
   EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("its curves need more than the"));
 
-  // Sections without length, with every link given twice: links would double with each.
+  // Sections without length, with every link given twice: links would double with each section.
   RoadText sections;
   for (int i = 0; i < 60; ++i) {
     sections.sections +=

@@ -22,8 +22,8 @@ using test::parse;
 using test::RoadText;
 using test::three_roads;
 
-/// A road of two lanes of 4 m along x to 100, and a way back at its end: a half circle of that radius on the outside of
-/// its lane, after straight pieces as long as the file says.
+/// A road of two lanes of 4 m along x to 100, and a way back at its end: a half circle of this radius on the outside of
+/// its lane, after straight pieces of the given length.
 std::string turnaround(double radius, double straight) {
   RoadText street, way;
   street.link = R"(<successor elementType="junction" elementId="9"/>)";
@@ -52,7 +52,7 @@ TEST(OpenDriveGeometry, WhereALaneFoldsOverItselfThereIsNoRoadEdge) {
       for (const RoadEdge& edge : map.road_edges) {
         const double x = 0.5 * (edge.a_m.x + edge.b_m.x) + map.origin_m[0];
         const double y = 0.5 * (edge.a_m.y + edge.b_m.y) + map.origin_m[1];
-        // The ground of the way: within its reference line.
+        // Ground enclosed by the way's reference line.
         const double beyond = std::max(x - 100 - straight, 0.0);
         EXPECT_FALSE(x > 100.1 && std::hypot(beyond, y) < radius - 0.1)
             << "radius " << radius << ", straight " << straight << ": an edge at (" << x << ", " << y << ")";
@@ -175,7 +175,7 @@ TEST(OpenDriveLanes, SectionsAreLinkedAndNeighboursAreAdjacent) {
   EXPECT_EQ(a2.left_neighbor, index_of(map, a1));
   EXPECT_EQ(a1.left_neighbor, -1);
   EXPECT_EQ(a2.right_neighbor, -1);  // a shoulder
-  // On the left side traffic runs from the second section into the first, and the outer lane is on its right.
+  // On the left side, traffic runs from the second section into the first, and the outer lane is on its right.
   const Lane &left_a = lane_named(map, "1", 0, 1), &left_b = lane_named(map, "1", 1, 2);
   EXPECT_EQ(list(map, left_b.successors), std::vector<int32_t>{index_of(map, left_a)});
   EXPECT_EQ(left_b.left_neighbor, index_of(map, lane_named(map, "1", 1, 1)));

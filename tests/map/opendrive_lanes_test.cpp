@@ -68,7 +68,7 @@ TEST(OpenDriveLanes, OneSidedSectionsContinueTheOtherSide) {
                   linked(1, R"(<link><predecessor id="1"/></link>)") + "</left><center/><right>" +
                   linked(-1, R"(<link><predecessor id="-1"/></link>)") + "</right></laneSection>";
   const RoadMap map = parse(road.text());
-  // Four lanes of the left side and the right side's two, the first of which is split at 30.
+  // Four lanes of the left side and two of the right side, the first of which is split at 30.
   EXPECT_EQ(map.facts.lanes, 6);
   EXPECT_EQ(map.lanes.size(), 7u);
   int32_t at = index_of(map, lane_named(map, "1", 0, -1));
@@ -202,8 +202,8 @@ TEST(OpenDriveProvenance, EveryElementHasItsRoadAndLine) {
   expect_from(from.building_lines, map.building_lines.size(), 0, 0);
 }
 
-/// A bend with two lanes each way, parking and a sign, that leads through a junction with a light into a straight road;
-/// or its mirror image about the x axis, with left-hand traffic.
+/// A bend with two lanes per direction, parking and a sign, which leads through a junction with a light into a straight
+/// road; or its mirror image about the x axis, with left-hand traffic.
 std::string bend(bool mirrored) {
   const int m = mirrored ? -1 : 1;
   auto side = [&](int road) {

@@ -1,5 +1,5 @@
-// Faults that have one sensible meaning: each is mended and noted by default, and refused by strict reading with file,
-// line, owner and element.
+// Faults that have one sensible meaning: each is repaired and recorded by default, and refused by strict reading with
+// file, line, owner and element.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -37,8 +37,8 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
 
-/// Imports a file whose faults are all of one kind, but for links that are missing since they were left out. Strict
-/// reading must refuse the file with the message of a mend.
+/// Imports a file whose faults are all of one kind, apart from missing links that follow from omissions. Strict reading
+/// must refuse the file with the message of a repair.
 RoadMap mended(const std::string& contents, MendKind kind, std::size_t count = 1) {
   const std::string text = file_of(contents);
   RoadMap map = parse_opendrive(text, "bad.xodr");
@@ -56,7 +56,7 @@ RoadMap mended(const std::string& contents, MendKind kind, std::size_t count = 1
   return map;
 }
 
-/// The message of the only mend.
+/// Returns the message of the only repair.
 std::string said(const RoadMap& map) { return map.mends.empty() ? "" : message_of(map.mends.front(), "bad.xodr"); }
 
 RoadText straight(const std::string& right = lane_of(-1, "driving", 3)) {
@@ -65,14 +65,14 @@ RoadText straight(const std::string& right = lane_of(-1, "driving", 3)) {
   return road;
 }
 
-/// The map of a road as it should be, without mends.
+/// Returns the map of a valid road, without repairs.
 RoadMap sound(const std::string& contents) {
   RoadMap map = parse_opendrive(file_of(contents), "bad.xodr", {.strict = true});
   EXPECT_THAT(map.mends, IsEmpty());
   return map;
 }
 
-/// Where two maps differ, sources apart.
+/// Returns the difference of two maps, apart from sources.
 std::string difference(RoadMap a, RoadMap b) {
   for (RoadMap* map : {&a, &b}) {
     map->mends.clear();
@@ -279,7 +279,7 @@ TEST(OpenDriveMends, RoadsWithoutADrawnLengthHaveNone) {
 }
 
 TEST(OpenDriveMends, SectionsOfNoLengthLeaveTheLaneOffset) {
-  // In the last 20 um the lane is the second beside a center line 3.5 m further to the left.
+  // In the last 20 um, the lane is the second beside a centre line 3.5 m further to the left.
   const auto section = [](double s, const std::string& lanes) {
     return fmt::format("<laneSection s=\"{}\"><center/><right>{}</right></laneSection>", s, lanes);
   };
@@ -312,7 +312,7 @@ TEST(OpenDriveMends, SectionsOfNoLengthLeaveTheLaneOffset) {
     test::expect_at(map, first_point(map, lane).position_m, 0, -41.75);
     test::expect_at(map, last_point(map, lane).position_m, 0, 41.75);
   }
-  // An offset that goes on beyond the section does so from its end.
+  // An offset that continues beyond the section does so from the section's end.
   const RoadMap shifted =
       in_sections(fmt::format(fmt::runtime(offset), 0, 0) + fmt::format(fmt::runtime(offset), 50, 0.5),
                   section(0, lane_to(-1, -1)) + section(50, lane_to(-1, -1)) + section(50.0005, lane_to(-1, -1)));
@@ -350,7 +350,7 @@ TEST(OpenDriveMends, TheRoadIsWhatItsGeometrySays) {
 }
 
 TEST(OpenDriveMends, ProfilesAreHeldBeyondTheStatedLength) {
-  // The lane tapers off, and the road climbs, within the 20 m that the road states.
+  // The lane tapers off, and the road climbs, within the 20 m that the file gives as its length.
   RoadText road = straight(lane_with(width(0, 4, -0.1)));
   road.length = 20;
   road.geometry = line_at(0, 0, 0, 0, 100);
@@ -359,7 +359,7 @@ TEST(OpenDriveMends, ProfilesAreHeldBeyondTheStatedLength) {
   const RoadMap map = mended(road.text(), MendKind::line_length);
   EXPECT_FLOAT_EQ(last_point(map, map.lanes[0]).width_m, 2);
   test::expect_at(map, last_point(map, map.lanes[0]).position_m, 100, 1, 2);
-  // What the file describes further on counts.
+  // Records further along count.
   road.elevation += R"(<elevation s="60" a="7" b="0" c="0" d="0"/>)";
   EXPECT_NEAR(mended(road.text(), MendKind::line_length).facts.z_max_m, 7, 1e-6);
 }
@@ -435,7 +435,7 @@ TEST(OpenDriveMends, JumpsOfTheElevationAreSpreadOverTheRoad) {
   EXPECT_TRUE(parse_opendrive(file_of(road.text()), "low.xodr").mends.empty());
 }
 
-/// Some writers begin a road with a geometry of no length that heads elsewhere.
+/// Some writers begin a road with a geometry of no length with another heading.
 TEST(OpenDriveMends, GeometriesOfNextToNoLengthTurnNothing) {
   constexpr double kNorth = 1.5707963267948966;
   for (const std::string& geometry : {line_at(0, 0, 0, 0, 1e-9) + line_at(1e-9, 1e-9, 0, kNorth, 100),
@@ -465,10 +465,10 @@ TEST(OpenDriveMends, GeometriesFollowEachOther) {
   RoadText road = straight();
   road.geometry = line_at(0, 0, 0, 0, 50) + line_at(50.3, 50.3, 0, 0, 49.7);
   EXPECT_FLOAT_EQ(mended(road.text(), MendKind::geometry_station).lanes[0].length_m, 100);
-  // The line before ends where the next one begins if it is as long as the station says.
+  // The previous line ends where the next begins if its length is that of the station.
   road.geometry = line_at(0, 0, 0, 0, 50) + line_at(53, 53, 0, 0, 47);
   EXPECT_FLOAT_EQ(mended(road.text(), MendKind::geometry_station).lanes[0].length_m, 100);
-  // Lengths fit, stations do not: all later ones move. Or they are out of order.
+  // Lengths fit but stations do not: all later stations move. Or stations are out of order.
   const auto expect_straight = [](const RoadMap& map) {
     test::expect_at(map, first_point(map, map.lanes[0]).position_m, 0, -1.5);
     test::expect_at(map, last_point(map, map.lanes[0]).position_m, 100, -1.5);
@@ -484,7 +484,7 @@ TEST(OpenDriveMends, GeometriesFollowEachOther) {
   expect_straight(mended(road.text(), MendKind::record_order));
 }
 
-// Names.
+// Names of elements.
 
 TEST(OpenDriveMends, LanesWithoutATypeHaveOne) {
   const RoadMap center = mended(ring_with("",
@@ -667,7 +667,7 @@ std::string link_to(const char* end, const std::string& road, const std::string&
                      contact.empty() ? "" : fmt::format(" contactPoint=\"{}\"", contact));
 }
 
-/// Roads 1 and 2, which meet at x = 100, with links as given.
+/// Roads 1 and 2, which meet at x = 100, with the given links.
 std::string two_roads(const std::string& link_1, const std::string& link_2, const std::string& lane_link = "-1") {
   RoadText a = straight(lane_of(-1, "driving", 3, "<link><successor id=\"" + lane_link + "\"/></link>")),
            b = straight();
@@ -761,7 +761,7 @@ TEST(OpenDriveMends, LinksThatAreReturnedElsewhereAreKeptWhereTheEndsTouch) {
 TEST(OpenDriveMends, ConnectionsFindTheirEnds) {
   const std::string good = test::three_roads();
   ASSERT_EQ(num_links(sound(good)), 4);
-  // The connecting road begins at the incoming one; the file names its end.
+  // The connecting road begins at the incoming road; the file refers to its end.
   const RoadMap wrong =
       mended(replaced(good, "connectingRoad=\"2\" contactPoint=\"start\"", "connectingRoad=\"2\" contactPoint=\"end\""),
              MendKind::wrong_end);
@@ -783,7 +783,7 @@ TEST(OpenDriveMends, ConnectionsFindTheirEnds) {
   EXPECT_EQ(num_links(mended(far.text() + test::three_roads("", fmt::format(fmt::runtime(more), "5", "2")),
                              MendKind::unconnected_road)),
             4);
-  // One that touches it without a link.
+  // A road that touches the junction without a link.
   far.geometry = line_at(0, 0, 0, 0, 100);
   mended(far.text() + test::three_roads("", fmt::format(fmt::runtime(more), "5", "2")), MendKind::one_sided_link);
 }
@@ -812,7 +812,7 @@ TEST(OpenDriveMends, MarksThatRunBackAreCut) {
   ASSERT_EQ(map.markings.size(), 2u) << "before and after";
 }
 
-// What is said.
+// Messages about repairs.
 
 TEST(OpenDriveMends, MendsAreGroupedWithTheMostFrequentFirst) {
   RoadText road = straight();
@@ -858,7 +858,7 @@ TEST(OpenDriveMends, FaultsWithoutAMeaningAreRefused) {
 }
 
 TEST(OpenDriveMends, DamagedFilesGiveAValidMapOrAnError) {
-  // parse_opendrive validates its result; anything but a map or an Error ends the test.
+  // parse_opendrive validates its result; anything other than a map or an Error ends the test.
   const std::string valid_text = file_of(test::three_roads());
   std::mt19937 random(7);
   const std::string alphabet = "0123456789-.e\"<>/= abcxyz";

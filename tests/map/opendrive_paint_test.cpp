@@ -20,7 +20,7 @@ using test::line_at;
 using test::parse;
 using test::RoadText;
 
-/// The map of a straight road of 100 m with these marks on its center lane.
+/// The map of a straight road of 100 m with these marks on its centre lane.
 RoadMap marked(const std::string& marks) {
   RoadText road;
   road.center_mark = marks;
@@ -69,7 +69,7 @@ TEST(OpenDrivePaint, MarksHaveTheirPatternsColoursAndWidths) {
     EXPECT_TRUE(broken.markings[i].broken);
   }
 
-  // The first word of a center line's type is its left stripe, one width from the centre.
+  // The first word of a centre line's type is its left stripe, one width from the centre.
   const RoadMap both = marks(R"(type="solid broken" color="white" width="0.1")");
   ASSERT_EQ(both.markings.size(), 10u);
   for (const Marking& marking : both.markings) {

@@ -1,4 +1,4 @@
-// Lights and signs: the lanes they control, stop lines, and positions of heads.
+// Lights and signs: the lanes that they control, stop lines, and positions of heads.
 #include <cmath>
 #include <numbers>
 #include <string>
@@ -42,7 +42,7 @@ TEST(OpenDriveLights, StopLineHeadPhaseAndLanesFollowFromTheReferences) {
                                   R"(<controller id="91" sequence="1"><control signalId="51"/></controller>)";
   const RoadMap map =
       parse(three_roads(signals, R"(<controller id="90" type="0"/><controller id="91" type="0"/>)") + controllers);
-  ASSERT_EQ(map.lights.size(), 1u);  // 51 controls no lane
+  ASSERT_EQ(map.lights.size(), 1u);  // light 51 controls no lane
   const TrafficLight& light = map.lights[0];
   EXPECT_EQ(light.name, "50");
   EXPECT_EQ(light.junction, 0);
@@ -92,7 +92,7 @@ TEST(OpenDriveLights, WithoutValidityTheyControlTheLanesOfTheirOrientation) {
   EXPECT_EQ(lights_with("-").size(), 0u);
 }
 
-/// What was said about the lights of a map.
+/// Kinds of the repairs of a map.
 std::vector<MendKind> kinds_of(const RoadMap& map) {
   std::vector<MendKind> kinds;
   for (const Mend& mend : map.mends) kinds.push_back(mend.kind);
@@ -123,10 +123,10 @@ TEST(OpenDriveLights, OneOnARoadStandsAloneAtItsStation) {
   ASSERT_EQ(lanes_of(map, alone).size(), 2u);
   EXPECT_NEAR(map.lanes[lanes_of(map, alone)[0]].length_m, 41.75 * angle, 0.01);
   for (const Lane& lane : map.lanes) EXPECT_TRUE(lane.is_endless);
-  // Heads on both sides, and beyond, have one line; the next line has its own light.
+  // Heads on both sides and beyond share one line; the next line has its own light.
   EXPECT_EQ(ring_of(light("7", 60, -5) + light("8", 60.2, 2) + light("9", 75, -5)).lights.size(), 1u);
   EXPECT_EQ(ring_of(light("7", 60, -5) + light("8", 100, -5)).lights.size(), 2u);
-  // At an end of its road the line is there.
+  // At an end of its road, the line is at that end.
   EXPECT_EQ(ring_of(light("7", 0.1, -5)).lights.size(), 1u);
   EXPECT_EQ(ring_of(light("7", 40 * std::numbers::pi, -5)).lights.size(), 1u);
   const RoadMap nothing = ring_of(light("7", 100, -5, "-"));
@@ -141,7 +141,7 @@ TEST(OpenDriveLights, OneForBothDirectionsHasALineForEach) {
   road.rest = "<signals>" + light("7", 50, -5, "none") + "</signals>";
   const RoadMap map = parse(road.text());
   ASSERT_EQ(map.lights.size(), 2u);
-  expect_at(map, map.lights[0].stop_a_m, 50, 0);  // against s first
+  expect_at(map, map.lights[0].stop_a_m, 50, 0);  // first the light against s
   expect_at(map, map.lights[0].stop_b_m, 50, 3);
   expect_at(map, map.lights[1].stop_a_m, 50, 0);
   expect_at(map, map.lights[1].stop_b_m, 50, -3);
@@ -155,7 +155,7 @@ TEST(OpenDriveLights, OneOfLanesWithoutWidthDoesNotStand) {
   EXPECT_EQ(map.lights.size(), 0u);
 }
 
-/// A junction at the origin which roads w, e and s lead to, each with a light and a way straight on.
+/// A junction at the origin to which roads w, e and s lead, each with a light and a way straight on.
 std::string crossing(const std::string& more_on_w, const std::string& junction_more = "") {
   std::string roads, connections;
   for (const auto& [name, heading] :
@@ -226,7 +226,7 @@ TEST(OpenDriveSigns, ApplyToTheLanesThatTheyNameAndFaceTheirTraffic) {
   expect_at(map, map.signs[0].position_m, 90, -5, 2);
   EXPECT_EQ(lanes_of(map, map.signs[0]), std::vector<int32_t>{right});
   EXPECT_NEAR(map.signs[0].heading_rad, 0, 1e-5);
-  // Its orientation is wrong; the heading is that of its lane.
+  // The orientation of the sign is wrong; its heading is that of its lane.
   EXPECT_EQ(lanes_of(map, map.signs[1]), std::vector<int32_t>{left});
   EXPECT_NEAR(std::abs(map.signs[1].heading_rad), M_PI, 1e-5);
   EXPECT_EQ(map.signs[2].subtype, "50");

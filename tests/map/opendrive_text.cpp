@@ -103,7 +103,7 @@ class RuleChecker {
       expect(seen.insert(node.attribute(attribute).value()).second, fmt::format("{} {} twice", what, attribute));
     }
   }
-  /// Stations ascend from 0 within [0, length].
+  /// Checks that stations ascend from 0 within [0, length].
   void ascends(const pugi::xml_node& parent, const char* name, const char* station, double length) {
     double before = -1;
     for (const pugi::xml_node& node : parent.children(name)) {
@@ -164,7 +164,7 @@ class RuleChecker {
     }
   }
 
-  /// Links of adjacent sections must be mutual.
+  /// Checks that links of adjacent sections are mutual.
   void check_section_links(const pugi::xml_node& before, const pugi::xml_node& after) {
     const auto agree = [&](const pugi::xml_node& from, const pugi::xml_node& to, const char* on, const char* back) {
       for (const pugi::xml_node& lane : lanes_of(from)) {

@@ -26,8 +26,8 @@ class OpenDriveText {
   std::unordered_map<std::string, pugi::xml_node> roads_;
 };
 
-/// The violated rules of OpenDRIVE 1.4: required attributes, ascending stations, lane ids counted from the center,
-/// unique ids, links with a target that are mutual, and junction connections that agree with their roads.
+/// Returns the violated rules of OpenDRIVE 1.4: required attributes, ascending stations, lane ids counted from the
+/// centre, unique ids, links with a target that are mutual, and junction connections that agree with their roads.
 std::vector<std::string> violated_rules(const OpenDriveText& text);
 
 struct Pose {
@@ -37,16 +37,16 @@ struct Pose {
 /// The pose on a line or an arc, `ds` from its start.
 Pose on_geometry(const pugi::xml_node& geometry, double ds);
 
-/// The borders of a lane at an end of its road, the heading of +s there, the height, and the grade along +s.
+/// Borders of a lane at an end of its road, with the heading of +s, the height, and the grade along +s.
 struct LaneEnd {
   double inner_x = 0, inner_y = 0, outer_x = 0, outer_y = 0, heading = 0, z = 0, grade = 0;
 };
 LaneEnd lane_end(const pugi::xml_node& road, int lane, bool at_start);
 
-/// The lane with that id in the first or last section of a road; an empty node if there is none.
+/// Returns the lane with this id in the first or last section of a road; an empty node if there is none.
 pugi::xml_node lane_at(const pugi::xml_node& road, int lane, bool at_start);
 
-/// All lanes of a section, from left to right, without the center.
+/// Returns all lanes of a section, from left to right, without the centre lane.
 std::vector<pugi::xml_node> lanes_of(const pugi::xml_node& section);
 
 inline bool is(const pugi::xml_node& node, const char* attribute, const char* value) {

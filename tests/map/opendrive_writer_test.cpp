@@ -19,12 +19,13 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-/// Exports twice: the second export changes no byte, and the map of the export is the map of the original.
+/// Exports twice: the second export changes no byte, and its map equals the original's.
 void check_round_trip(const std::string& text, const std::string& name) {
   const std::string once = export_opendrive(text, name);
   ASSERT_EQ(export_opendrive(once, name), once);
   RoadMap original = parse_opendrive(text, name), exported = parse_opendrive(once, name);
-  // Line numbers differ in the export, and it lacks sections shorter than a millimetre, which the reader removes.
+  // Line numbers differ in the export, which also lacks sections shorter than a millimetre, because the reader removes
+  // them.
   for (RoadMap* map : {&original, &exported}) {
     map->provenance = {};
     std::erase_if(map->mends, [](const Mend& mend) { return mend.kind == MendKind::short_section; });
@@ -145,7 +146,7 @@ TEST(OpenDriveExport, KeepsEverythingInANetwork) {
                                "sequence=\"2\""}) {
     EXPECT_THAT(text, HasSubstr(expected));
   }
-  EXPECT_THAT(text, Not(HasSubstr("<offset")));  // the reader has applied it
+  EXPECT_THAT(text, Not(HasSubstr("<offset")));  // the reader has applied the offset
 }
 
 class CarlaExport : public testing::TestWithParam<const char*> {};

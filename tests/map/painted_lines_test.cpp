@@ -1,5 +1,4 @@
-// Painted lines as they are drawn: which lines are joined, duplicate paint, and agreement with the markings of whole
-// towns.
+// Painted lines as they are drawn: joined lines, duplicate paint, and agreement with the markings of whole towns.
 #include "pictura/map/painted_lines.h"
 
 #include <algorithm>
@@ -131,7 +130,7 @@ TEST(PaintedLines, AtForksTheStraightestPairIsJoined) {
   } while (std::next_permutation(order.begin(), order.end()));
 }
 
-/// Among overlapping lane marks the one with the lower index is in front.
+/// Among overlapping lane marks, the mark with the lower index is in front.
 TEST(PaintedLines, KeepTheOrderOfTheirFirstMarkings) {
   const PaintedLine across{{{15, -5, 0}, {15, 5, 0}}, 0.12f, MarkColor::yellow};
   const PaintedLine along{{{0, 0.05f, 0}, {10, 0.05f, 0}}, 0.12f, MarkColor::blue};
@@ -145,7 +144,7 @@ TEST(PaintedLines, KeepTheOrderOfTheirFirstMarkings) {
   EXPECT_EQ(lines[2].color, MarkColor::blue);
 }
 
-/// A ring of three arcs, one of them reversed, whose ends do not meet exactly; and one of a single marking.
+/// A ring of three arcs, one of them reversed, whose ends do not meet exactly; and a ring of a single marking.
 TEST(PaintedLines, ARingIsMitredAllRound) {
   constexpr int kCorners = 30;
   Points ring;

@@ -53,7 +53,7 @@ Vec3 offset_left(const LanePoint& pose, float left_m) {
   return {pose.position_m.x + left.x, pose.position_m.y + left.y, pose.position_m.z};
 }
 
-/// All lanes as bands, with queries of which of them cover a point.
+/// All lanes as bands, with queries for the lanes that cover a point.
 class LaneSurface {
  public:
   LaneSurface(const RoadMap& map, double level_m) : surface_(bands_of(map), level_m) {}
@@ -96,7 +96,7 @@ class Edges {
     grid_ = Grid(boxes, 5.0f);
   }
 
-  /// Whether an edge at that height crosses the segment.
+  /// Whether an edge at this height crosses the segment.
   bool cross(Vec3 a, Vec3 b) const {
     const GridView grid = grid_.view();
     for (int iy = grid.cell_y(min_of(a.y, b.y)); iy <= grid.cell_y(max_of(a.y, b.y)); ++iy) {
@@ -140,7 +140,7 @@ class Town {
   const LanePoint& first(const Lane& of) const { return map_.points_of(of)[0]; }
   const LanePoint& last(const Lane& of) const { return map_.points_of(of)[map_.points_of(of).size() - 1]; }
 
-  /// Every driving lane leads to every other and is endless.
+  /// Checks that every driving lane leads to all others and is endless.
   void check_network() {
     const LaneComponents components = LaneGraph(map_).components();
     std::set<int32_t> found;
@@ -159,7 +159,7 @@ class Town {
     }
   }
 
-  /// A car of 4.5 x 2 m in the middle of its lane touches no road edge, and the lane's ends are open.
+  /// Checks that a car of 4.5 x 2 m in the middle of its lane touches no road edge, and that the lane's ends are open.
   void check_driving() {
     for (const Lane& driven_lane : map_.lanes) {
       if (driven_lane.type != LaneType::driving && driven_lane.type != LaneType::ramp) continue;
@@ -185,7 +185,7 @@ class Town {
     }
   }
 
-  /// Lanes of different roads do not overlap, unless at different heights or in the same junction.
+  /// Checks that lanes of different roads do not overlap, except at different heights or in one junction.
   void check_overlaps() {
     constexpr float kInset_m = 0.1f;
     for (const Lane& own : map_.lanes) {
@@ -205,7 +205,7 @@ class Town {
     }
   }
 
-  /// Lights stop their lanes at the junction mouth and are visible from there and from further back.
+  /// Checks that lights stop their lanes at the junction's mouth and are visible from there and from further back.
   void check_lights() {
     const float min_cosine = std::cos(MapGeometryOptions().light_half_angle_rad);
     for (std::size_t i = 0; i < map_.lights.size(); ++i) {
@@ -236,7 +236,7 @@ class Town {
     }
   }
 
-  /// No two paths that are green at the same time cross.
+  /// Checks that paths with simultaneous green lights do not cross.
   void check_phases() {
     std::map<std::pair<int32_t, int32_t>, std::set<int32_t>> greens;
     for (const TrafficLight& light : map_.lights) {
@@ -262,7 +262,8 @@ class Town {
     }
   }
 
-  /// Crosswalks are in junctions, parking spaces on parking lanes only, building lines clear of all lanes.
+  /// Checks that crosswalks are in junctions, parking spaces only on parking lanes, and building lines clear of all
+  /// lanes.
   void check_objects() {
     for (const Crosswalk& crosswalk : map_.crosswalks) {
       std::array<Vec3, 4> corners;
@@ -270,7 +271,7 @@ class Town {
       for (std::size_t k = 0; k < 4; ++k) {
         corners[k] = map_.outline_points[static_cast<std::size_t>(crosswalk.outline.begin) + k];
       }
-      // It crosses the junction's lanes, possibly with an island between them.
+      // A crosswalk crosses the junction's lanes, possibly with an island between them.
       constexpr int kSteps = 20;
       int on_lanes = 0;
       for (int k = 0; k <= kSteps; ++k) {
@@ -325,7 +326,7 @@ bool expect_valid(const TownOptions& options) {
   return !testing::Test::HasFailure();
 }
 
-/// The number of seeds: PICTURA_TOWN_SEEDS, or fifty.
+/// Number of seeds: PICTURA_TOWN_SEEDS, or fifty.
 uint64_t num_seeds() {
   const char* const requested = std::getenv("PICTURA_TOWN_SEEDS");
   return requested ? std::strtoull(requested, nullptr, 10) : 50;
@@ -370,7 +371,7 @@ TEST(ProceduralTownMap, CitiesAreValid) {
   }
 }
 
-// One, for it takes long: half a minute of a core.
+// A single town, because it takes half a minute of a core.
 TEST(ProceduralTownMap, TheLargestTownIsRead) {
   const std::string text = procedural_town(test::options_of(0, kMaxTownBlocks, kMaxTownBlocks));
   EXPECT_GT(parse_opendrive(text, "largest").lanes.size(), 10'000u);

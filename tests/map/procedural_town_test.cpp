@@ -24,7 +24,7 @@ using test::violated_rules;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-/// Options at their defaults, all at their minimum, all at their maximum, and each one at either end.
+/// Options at their defaults, all at their minimum, all at their maximum, and each option at either end.
 std::vector<TownOptions> extremes(uint64_t seed) {
   std::vector<TownOptions> all{test::options_of(seed, 3, 3)};
   TownOptions all_low = all[0], all_high = all[0];
@@ -70,7 +70,7 @@ TEST(ProceduralTownText, FollowsTheRulesOfOpenDrive) {
 
 double angle_between(double a, double b) { return std::abs(std::remainder(a - b, 2 * M_PI)); }
 
-/// Linked lanes meet: same borders, height, heading and grade.
+/// Checks that linked lanes meet: same borders, height, heading and grade.
 void check_lane_links(const OpenDriveText& town, const pugi::xml_node& road, bool at_start, int* links) {
   const char* const direction = at_start ? "predecessor" : "successor";
   const pugi::xml_node joint = road.child("link").child(direction);

@@ -49,7 +49,7 @@ TEST(RoadEdges, ABandIsOnTheRightOfItsOutline) {
 }
 
 TEST(RoadEdges, NeighboursShareNoEdge) {
-  // Side by side, end to end, and one twice.
+  // Side by side, end to end, and one band twice.
   EXPECT_NEAR(total_length(outline({band_of(0, 2, 0, 40, 4), band_of(0, -2, 0, 40, 4)})), 96, 0.05);
   EXPECT_NEAR(total_length(outline({band_of(0, 2, 0, 40, 4), band_of(40, -2, M_PI, 40, 4)})), 96, 0.05);
   EXPECT_NEAR(total_length(outline({band_of(0, 0, 0, 20, 4), band_of(20, 0, 0, 20, 4)})), 88, 0.05);

@@ -1,5 +1,5 @@
-// GPUDrive's JSON and PufferDrive's binary layouts: our own writers' files are read as the scene that they were written
-// from, as far as the format goes; faults are named by file and field.
+// GPUDrive's JSON and PufferDrive's binary layouts: files of our own writers are read as the scene from which they were
+// written, as far as the format allows; faults are reported with file and field.
 #include <cmath>
 #include <functional>
 
@@ -26,7 +26,7 @@ constexpr PufferLayout kLayouts[] = {PufferLayout::v1, PufferLayout::v2, PufferL
 Scenario read_json(const std::string& text) { return parse_scenario_file(text, "scene.json"); }
 Scenario read_binary(const std::string& bytes) { return parse_scenario_file(bytes, "scene.bin"); }
 
-/// How far two scenarios' states are apart at most, in the coordinates of their files.
+/// Maximum distance between two scenarios' states, in the coordinates of their files.
 double largest_distance(const Scenario& a, const Scenario& b) {
   double largest = 0;
   for (std::size_t i = 0; i < a.states.size(); ++i) {
@@ -41,7 +41,7 @@ double largest_distance(const Scenario& a, const Scenario& b) {
   return largest;
 }
 
-/// The links as pairs of lanes, which both scenes list in one order.
+/// Links as pairs of lanes, which both scenes list in the same order.
 std::vector<std::vector<int32_t>> successors_of(const RoadMap& map) {
   std::vector<std::vector<int32_t>> all;
   for (const Lane& lane : map.lanes) {
@@ -111,11 +111,12 @@ TEST(GpuDrive, FaultsAreNamed) {
   EXPECT_THAT(message_of([] { read_json(std::string(200'000, '[')); }), HasSubstr("scene.json: expected JSON"));
 }
 
-/// Scenes as earlier versions of GPUDrive and other writers made them: two vehicles on a road of two lanes, 91 steps.
+/// Scenes like those of earlier versions of GPUDrive and of other writers: two vehicles on a road of two lanes, 91
+/// steps.
 struct OldScene {
   bool has_z = false, has_ids = false, has_degrees = false;
   std::string height, more, lights = "{}";
-  std::string invalid = R"({"x":0.0001,"y":0.0001})";  // the position while the second vehicle is not there
+  std::string invalid = R"({"x":0.0001,"y":0.0001})";  // position while the second vehicle is absent
   int32_t first_step = 0;                              // of the second vehicle
 
   std::string list(const std::function<std::string(int)>& of_step, int count = 91) const {
@@ -180,7 +181,7 @@ TEST(GpuDrive, FlatFilesWithoutIdsAndWithDegreesAreRead) {
 
 TEST(GpuDrive, HeadingsAreDegreesOnlyIfTheyFit) {
   EXPECT_NEAR(std::abs(read_json(OldScene{}.text()).states[91].heading_rad), M_PI, 1e-6);
-  // A whole turn more is no degrees where the motion fits radians; without a motion it is.
+  // Headings that exceed a whole turn are not degrees where the motion fits radians; without a motion, they are.
   std::string text = OldScene{}.text();
   const auto replace_all = [&](const std::string& from, const std::string& to) {
     for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size()) {
@@ -300,7 +301,7 @@ TEST(SceneFiles, TypesOfFilesAreToldByName) {
       message_of([] { parse_scenario_file("", "scene.txt"); }),
       HasSubstr(
           "scene.txt: expected a scene: FILE.json, FILE.bin, FILE.scenario or a file with .tfrecord in its name"));
-  // A file of another format is refused by the format that its name says.
+  // A file of another format is refused by the format of its ending.
   const LoggedScene fixture = test::make_fixture({.num_steps = 2});
   EXPECT_THAT(message_of([&] { read_binary(test::write_gpudrive(fixture)); }),
               HasSubstr("scene.bin: expected a Puffer"));

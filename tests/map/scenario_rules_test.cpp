@@ -1,4 +1,4 @@
-// The rules by which a scenario is made of a recording, each where it decides: docs/reference/scenario.md lists them.
+// Rules of conversion from a recording to a scenario, each where it decides; docs/reference/scenario.md lists them.
 #include <cmath>
 #include <filesystem>
 #include <numbers>
@@ -62,21 +62,21 @@ TEST(LaneRules, WidthsComeFromBordersThenNeighborsThenAConstant) {
   LoggedScene scene = small_scene();
   const auto width = [&] { return make_scenario(scene).map.lane_points[0].width_m; };
   EXPECT_FLOAT_EQ(width(), 3.5f);
-  // One side known: twice that. Both: their sum.
+  // One known side counts twice; two known sides are summed.
   scene.lines.push_back({.id = 8, .points = line_at(1.5)});
   scene.lanes[0].left_boundaries = {{0, 40, 8}};
   EXPECT_FLOAT_EQ(width(), 3.0f);
   scene.edges.push_back({.id = 9, .points = line_at(-2)});
   scene.lanes[0].right_boundaries = {{0, 40, 9}};
   EXPECT_FLOAT_EQ(width(), 3.5f);
-  // A border that is too far away is another lane's.
+  // A border that is too far away belongs to another lane.
   scene.edges[0].points = line_at(-7);
   EXPECT_FLOAT_EQ(width(), 3.0f);
-  // Without own borders: the neighbour's.
+  // Without borders of its own: the neighbour's width.
   scene.lanes.insert(scene.lanes.begin(), lane_at(2, -3));
   scene.lanes[0].left_neighbors = {{0, 40, 1}};
   EXPECT_FLOAT_EQ(width(), 3.0f);
-  // Without a neighbour: that of the lanes before and after.
+  // Without a neighbour: the width of the lanes before and after.
   scene.lanes[0].left_neighbors.clear();
   scene.lanes[0].exits = {1};
   EXPECT_FLOAT_EQ(width(), 3.0f);
@@ -84,7 +84,7 @@ TEST(LaneRules, WidthsComeFromBordersThenNeighborsThenAConstant) {
   EXPECT_FLOAT_EQ(width(), 3.5f);
   scene.lanes[0].type = LoggedLaneType::bike;
   EXPECT_FLOAT_EQ(width(), 1.8f);
-  // What the border's range leaves out is interpolated.
+  // Points outside the border's range are interpolated.
   scene.lanes.erase(scene.lanes.begin());
   scene.lanes[0].left_boundaries = {{0, 0, 8}, {40, 40, 8}};
   scene.lines[0].points = {{0, 1, 0}, {20, 2, 0}};
@@ -97,7 +97,7 @@ TEST(LaneRules, FaultyLanesAndLinksAreMendedAndCounted) {
   LoggedScene scene = small_scene();
   scene.lanes.push_back(lane_at(2, 0, 20, 40));
   scene.lanes.push_back({.id = 3, .type = LoggedLaneType::surface, .points = {{1, 1, 0}}});
-  // Stated the wrong way round: lane 2 begins where lane 1 ends.
+  // Stated in reverse: lane 2 begins where lane 1 ends.
   scene.lanes[1].exits = {1, 77, 2};
   scene.lanes[0].points.insert(scene.lanes[0].points.begin() + 3, scene.lanes[0].points[3]);
   const Scenario scenario = make_scenario(scene);
@@ -135,7 +135,7 @@ TEST(LaneRules, NeighborsAreMutualAndTheLongest) {
   EXPECT_EQ(scenario.map.lanes[0].left_neighbor, 1);
   EXPECT_EQ(scenario.map.lanes[1].right_neighbor, 0);
   EXPECT_EQ(scenario.map.lanes[2].right_neighbor, -1);
-  // A ring has no leftmost lane, so one of its links is left out.
+  // A ring has no leftmost lane, so one of its links is omitted.
   scene.lanes[0].left_neighbors = {{0, 40, 2}};
   scene.lanes[1].left_neighbors = {{0, 40, 1}};
   scene.lanes[0].right_neighbors = {{0, 40, 2}};
@@ -164,7 +164,7 @@ TEST(EdgeRules, EdgesAreTurnedToHaveTheRoadOnTheirRight) {
   ASSERT_EQ(scenario.map.road_edges.size(), 2u);
   EXPECT_GT(scenario.map.road_edges[0].a_m.x, scenario.map.road_edges[0].b_m.x);
   EXPECT_EQ(count_of(scenario, "road on their right"), 0);
-  // A file whose edges have it on the other side, as most of them say.
+  // A file whose edges have the road on the other side, according to most of them.
   scene.edges.clear();
   for (int i = 0; i < 20; ++i) scene.edges.push_back({.id = 10 + i, .points = line_at(2.0 + 0.01 * i)});
   scenario = make_scenario(scene);
@@ -174,7 +174,7 @@ TEST(EdgeRules, EdgesAreTurnedToHaveTheRoadOnTheirRight) {
 
 TEST(EdgeRules, GapsStayClosedUnlessTheyCrossALane) {
   LoggedScene scene = small_scene();
-  // Along the lane's right side, then a jump of 8 m along it, then one across.
+  // Along the lane's right side, then a jump of 8 m along it, then a jump across.
   scene.edges.push_back({.id = 9, .points = {{0, -2, 0}, {1, -2, 0}, {9, -2, 0}, {9, 4, 0}, {10, 4, 0}}});
   const Scenario scenario = make_scenario(scene);
   EXPECT_EQ(count_of(scenario, "gaps of edges across lanes"), 1);
@@ -211,7 +211,7 @@ TEST(PaintRules, StripesAndDashes) {
 TEST(LightRules, LanesOfOneStopPointThatShowTheSameAreOneLight) {
   const LoggedScene fixture = test::make_fixture();
   const Scenario scenario = make_scenario(fixture);
-  // Arm 0's right turn has an arrow of its own; arm 2's two lanes always show the same.
+  // Arm 0's right turn has its own arrow; arm 2's two lanes always have the same state.
   ASSERT_EQ(scenario.lights.size(), 3u);
   EXPECT_EQ(scenario.lights[1].lanes.size(), 2);
   const RecordedLight& light = scenario.lights[0];
@@ -269,7 +269,7 @@ TEST(DrivableArea, SidesAtEdgesAndCorners) {
   EXPECT_TRUE(area.side_of({5, 0, 0}).is_on_road);
   EXPECT_TRUE(area.side_of({9.9f, 9.9f, 0}).is_on_road);
   EXPECT_FALSE(area.side_of({10.1f, 0, 0}).is_on_road);
-  // Beyond corners, where one of the two edges' own sides would be wrong.
+  // Beyond corners, where the side of one of the two edges alone would be wrong.
   EXPECT_FALSE(area.side_of({11, 10.5f, 0}).is_on_road);
   EXPECT_FALSE(area.side_of({10.5f, 11, 0}).is_on_road);
   EXPECT_FALSE(area.side_of({1.9f, 0, 0}).is_on_road);
@@ -285,7 +285,7 @@ TEST(DrivableArea, BoxesTouchEdgesOnTheirLevel) {
   EXPECT_TRUE(area.touches_edge({{8.5f, 0, 0}, 0, 4, 2}));
   EXPECT_FALSE(area.touches_edge({{8.5f, 0, 0}, kPi / 2, 4, 2}));
   EXPECT_FALSE(area.touches_edge({{8.5f, 0, 5}, 0, 4, 2}));
-  // A small edge inside of a large box.
+  // A small edge inside a large box.
   RoadMap map;
   map.road_edges.push_back({{0, 0, 0}, {0.1f, 0, 0}});
   EXPECT_TRUE(DrivableArea(map).touches_edge({{0.5f, 0.2f, 0}, 1, 4, 2}));
@@ -297,7 +297,7 @@ TEST(DrivableArea, TheFixturesTrafficStaysOnItsRoad) {
   EXPECT_GT(driving.vehicle_steps, 300);
   EXPECT_EQ(driving.touching, 0);
   EXPECT_EQ(driving.off_road, 0);
-  // Moved by 3 m to the side, it does not.
+  // Moved by 3 m to the side, traffic does not agree with the edges.
   LoggedScene moved = test::make_fixture();
   for (LoggedTrack& track : moved.tracks) {
     for (LoggedState& state : track.states) state.center_m.y() += 3;
@@ -377,7 +377,7 @@ TEST(SceneCache, OtherBytesOfTheSameSizeAndTimeAreAnotherScene) {
   EXPECT_EQ(load_scenario(shard + "#fixture00000002").id, "fixture00000002");
 }
 
-/// What is made of the scene that a scenario states, and nothing must be said of it again.
+/// Converts the scene that a scenario states; the conversion must add no notes.
 Scenario stated_again(const Scenario& scenario) {
   Scenario again = make_scenario(state_scene(scenario));
   again.notes.clear();
@@ -391,7 +391,7 @@ TEST(StatedScenes, WhatAProgramStatesIsTakenAsItIs) {
   scene.lanes.push_back(lane_at(2, 0, 40, 20));
   scene.lanes.push_back(lane_at(3, 0, 40, 60));
   scene.lanes[2].type = LoggedLaneType::undefined;
-  // The other way round, and over a gap; the type of lane 3 is not known.
+  // Reversed, and over a gap; the type of lane 3 is unknown.
   scene.lanes[1].exits = {1};
   scene.lanes[0].exits = {3};
   // The road on the right, and a gap of 10 m across the first lane.
@@ -423,7 +423,7 @@ TEST(StatedScenes, ComeBackToTheBit) {
   EXPECT_GT(second.lights.size(), 0u);
 }
 
-// Pieces, dashes and duplicates are near their limits all over a winding map far from its origin.
+// Pieces, dashes and duplicates are near their limits everywhere on a winding map far from its origin.
 TEST(StatedScenes, ComeBackToTheBitFromAnyPlace) {
   for (const double away_m : {0.0, 3000.0, 9000.0}) {
     LoggedScene scene = small_scene();
@@ -459,7 +459,7 @@ TEST(StatedScenes, RecordingsComeBackWithTheirTracksLinksAndLights) {
   Scenario recorded = make_scenario(test::make_fixture());
   Scenario stated = stated_again(recorded);
   EXPECT_EQ(first_difference(stated_again(stated), stated), "");
-  // Directions of lines are computed of points that are rounded now.
+  // Directions of lines are computed from points that are now rounded.
   ASSERT_EQ(stated.lights.size(), recorded.lights.size());
   for (std::size_t i = 0; i < stated.lights.size(); ++i) {
     EXPECT_NEAR(stated.lights[i].stop_heading_rad, recorded.lights[i].stop_heading_rad, 1e-4);

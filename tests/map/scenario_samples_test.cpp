@@ -1,5 +1,5 @@
-// Scenes of others, where they are at hand: what docs/research/maps.md and the formats' own pages say of them is
-// read.
+// Scenes of other projects, where available: everything that docs/research/maps.md and the formats' own pages
+// document about them is read.
 #include <cstdlib>
 #include <filesystem>
 #include <string>
@@ -21,7 +21,7 @@ namespace {
                << " is missing: its format is read by tests " \
                   "of our own fixtures alone"
 
-/// Logged moving vehicles hardly touch edges and are on the road.
+/// Checks that logged moving vehicles hardly touch edges and are on the road.
 void expect_on_road(const Scenario& scenario, double most_off_road = 0.02) {
   const LoggedDriving driving = logged_driving(scenario);
   const auto steps = static_cast<double>(driving.vehicle_steps);
@@ -72,7 +72,7 @@ TEST(SceneSamples, PufferDriveV1) {
   EXPECT_EQ(scenario.format, "pufferdrive v1");
   EXPECT_EQ(scenario.tracks.size(), 64u);
   EXPECT_EQ(scenario.map.lanes.size(), 17u);
-  // Track 37 is a car that stands 17 m beside the road, and whose recorded place wanders by more than 2 m.
+  // Track 37 is a car that stands 17 m beside the road and whose recorded position drifts by more than 2 m.
   expect_on_road(scenario, 0.07);
 }
 

@@ -1,5 +1,5 @@
-// WOMD records: our own writer's are read whole in any order of fields, and whatever is wrong with bytes, fields or
-// files is named by file, record and field.
+// WOMD records: records of our own writer are read completely in any order of fields; faults of bytes, fields or files
+// are reported with file, record and field.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -32,20 +32,20 @@ Scenario read_womd(const std::string& payload) {
   return make_scenario(womd::parse_scenario(payload, "shard: record 0"));
 }
 
-/// What a WOMD record can say of the fixture.
+/// Fixture with the data that a WOMD record can hold.
 LoggedScene womd_fixture(const test::FixtureOptions& options = {}) {
   LoggedScene scene = test::make_fixture(options);
   for (LoggedTrack& track : scene.tracks) track.control = RecordedControl::unstated;
   return scene;
 }
 
-/// Empty where it is read.
+/// Returns the reason of a refusal; empty if the payload is read.
 std::string reason_of(const std::string& payload) {
   const std::string message = message_of([&] { read_womd(payload); });
   return message == test::kNoError ? "" : message;
 }
 
-/// The reason for which a record of an edited fixture is refused.
+/// Returns the reason for which a record of an edited fixture is refused.
 std::string reason_of(const std::function<void(LoggedScene*)>& edit) {
   LoggedScene scene = test::make_fixture({.num_steps = 12});
   edit(&scene);
@@ -58,7 +58,7 @@ TEST(Crc32c, HasTheKnownValues) {
   EXPECT_EQ(crc32c(""), 0u);
   EXPECT_EQ(crc32c(std::string(32, '\0')), 0x8A9136AAu);  // RFC 3720, B.4
   EXPECT_EQ(crc32c(std::string(32, '\xFF')), 0x62A8AB43u);
-  // By tables, as the compiler computes it, and by the processor's instruction, where it has one.
+  // Both ways: by tables, as the compiler computes it, and by the processor's instruction, where it exists.
   constexpr std::string_view kText = "a text of some length, long enough for both ways";
   constexpr uint32_t kByTables = crc32c(kText);
   EXPECT_EQ(crc32c(std::string(kText)), kByTables);
@@ -93,7 +93,7 @@ TEST(Womd, SceneHasWhatTheFixtureSays) {
   EXPECT_EQ(facts.pedestrians, 3);
   EXPECT_EQ(facts.cyclists, 1);
   EXPECT_EQ(facts.tracks_with_gaps, 1);
-  // A place of the first track in the file's coordinates: 16 m east of the crossing, at the ground.
+  // A position of the first track in the file's coordinates: 16 m east of the crossing, on the ground.
   const Vec3 start = scenario.states_of(0)[0].position_m;
   EXPECT_NEAR(double{start.x} + scenario.map.origin_m[0], -7887.25 + 16, 1e-3);
   EXPECT_NEAR(double{start.y} + scenario.map.origin_m[1], 6796.5 + 1.75, 1e-3);
@@ -119,7 +119,7 @@ TEST(Womd, TruncatedRecordsAreRefusedAtEveryLength) {
       ASSERT_THAT(reason, HasSubstr("shard: record 0")) << length;
     }
   }
-  // Only the ends of fields at the top leave a message, and only the last of them all that is needed.
+  // Only the ends of top-level fields leave a message, and only the last of them leaves all required fields.
   EXPECT_GT(refused, static_cast<int>(payload.size() / 7) - 10);
 }
 
@@ -155,7 +155,7 @@ TEST(Womd, TracksHaveAStateForEveryTimestamp) {
   const std::string longer = test::write_womd(test::make_fixture({.num_steps = 5}));
   womd::WireReader fields(longer);
   std::string cut;
-  // Leaves the first timestamp out: tag and value of nine bytes.
+  // Omits the first timestamp: tag and value of nine bytes.
   cut = longer.substr(9);
   ASSERT_TRUE(fields.next());
   ASSERT_EQ(fields.field(), 1u);
@@ -285,7 +285,7 @@ TEST(SceneNames, FoldersWithoutScenesAndBadScenesAreNamed) {
   EXPECT_THAT(message_of([&] { load_scenario(index.scenes[1]); }),
               AllOf(HasSubstr("damaged.tfrecord: record 0: expected the checksum"), HasSubstr(" of its ")));
   EXPECT_EQ(message_of([&] { load_scenario(index.scenes[2]); }), test::kNoError);
-  // A shard of nothing else says it once.
+  // A shard without valid records reports this once.
   const std::string junk = folder / "junk.tfrecord";
   EXPECT_THAT(message_of([&] { find_scene(junk); }), ::testing::StartsWith(junk + ": record 0: expected"));
 }

@@ -94,8 +94,8 @@ inline std::string three_roads(const std::string& rest_of_2 = "", const std::str
          junction_more + "</junction>\n";
 }
 
-/// A ring of 40 m radius around the origin: two half circles with one lane each, and between the second and the first
-/// the road 3, of which the text is given; without a text the half circles meet.
+/// A ring of 40 m radius around the origin: two half circles with one lane each and, between the second and the first,
+/// road 3 with the given text. Without a text, the half circles meet.
 inline std::string ring_with(const std::string& road_3 = "", const std::function<void(RoadText*)>& change = {}) {
   RoadText half;
   half.length = 40 * std::numbers::pi;
@@ -119,7 +119,7 @@ inline std::string ring_with(const std::string& road_3 = "", const std::function
   return first.text() + second.text() + road_3;
 }
 
-/// The text with the first `from` in it as `to`.
+/// Returns the text with its first `from` replaced by `to`.
 inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
   const std::size_t at = text.find(from);
   if (at == std::string::npos) throw std::runtime_error("nothing to replace: " + from);
