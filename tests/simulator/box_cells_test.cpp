@@ -1,4 +1,4 @@
-// What rules find through cells of boxes, against a look at every box: crowded worlds, with boxes on the borders of
+// Rules' results through cells of boxes, against a scan of all boxes: crowded worlds, with boxes on the borders of
 // cells, on top of each other, outside the map, and as long as the map's longest.
 #include <cmath>
 #include <utility>
@@ -12,7 +12,7 @@
 namespace pictura {
 namespace {
 
-/// Vehicles about a stadium and beyond what its cells cover.
+/// Vehicles around a stadium and beyond the area that its cells cover.
 class Crowd : public testing::Stage {
  public:
   Crowd(int num_agents, uint32_t seed)
@@ -31,7 +31,7 @@ class Crowd : public testing::Stage {
     sort_boxes();
   }
 
-  /// A place anywhere, on the border of a cell, at the place of another agent, or far outside.
+  /// Draws a place anywhere, on the border of a cell, at the place of another agent, or far outside.
   Vec2 draw_place() {
     const GridView cells = worlds.box_cells[0].view();
     const float width_m = cells.cell_m * static_cast<float>(cells.num_x);
@@ -112,7 +112,7 @@ TEST(BoxChains, HaveTheBoxesThatBlockAPlace) {
     Crowd crowd(size, 5);
     const WorldView world = crowd.world();
     for (const int side : {1, 3, 11, 40}) {
-      // Cells that cover a part of the map, as many as those of a box or a lane, and more.
+      // Cells that cover a part of the map, as many as for a box or a lane, and more.
       std::vector<int32_t> first(static_cast<size_t>(side * side), -1), next(static_cast<size_t>(size), -1);
       const BoxChains chains{
           {{0, -20}, 400.0f / static_cast<float>(side), side, side, {}, {}}, first.data(), next.data()};

@@ -25,7 +25,7 @@ bool contains(const OrientedBox& box, Vec2 p) {
   return std::abs(dot(d, box.forward)) <= box.half_length_m && std::abs(cross(box.forward, d)) <= box.half_width_m;
 }
 
-/// Whether a dense grid of points of `a` (its rim included) has one in `b`.
+/// Whether a point of a dense grid over `a` (its rim included) lies in `b`.
 bool overlap_by_points(const OrientedBox& a, const OrientedBox& b) {
   constexpr int kPoints = 80;
   for (int i = 0; i <= kPoints; ++i) {
@@ -46,7 +46,7 @@ TEST(Collision, OverlapAgreesWithPoints) {
         footprint(make_box(0, 0, random.uniform(-3, 3), random.uniform(1, 6), random.uniform(0.5f, 2)));
     OrientedBox b = footprint(make_box(random.uniform(-5, 5), random.uniform(-4, 4), random.uniform(-3, 3),
                                        random.uniform(1, 6), random.uniform(0.5f, 2)));
-    // Points miss overlaps thinner than their spacing: those are left out.
+    // Points miss overlaps thinner than their spacing: such overlaps are excluded.
     OrientedBox smaller = b, larger = b;
     smaller.half_length_m -= 0.1f;
     smaller.half_width_m -= 0.1f;
@@ -66,12 +66,12 @@ TEST(Collision, OverlapAgreesWithPoints) {
 }
 
 TEST(Collision, NothingTunnelsHeadOn) {
-  // Two cyclists, 1.6 x 0.5 m, pass through each other within one step: 2 m of way each.
+  // Two cyclists, 1.6 x 0.5 m, pass through each other within one step: each travels 2 m.
   const AgentBox a_from = make_box(0, 0, 0, 1.6f, 0.5f), a_to = make_box(2, 0, 0, 1.6f, 0.5f);
   const AgentBox b_from = make_box(2, 0.2f, kPi, 1.6f, 0.5f), b_to = make_box(0, 0.2f, kPi, 1.6f, 0.5f);
   EXPECT_FALSE(overlap(footprint(a_to), footprint(b_to)));
   EXPECT_TRUE(collide(a_from, a_to, b_from, b_to));
-  // A pedestrian crosses a lane's line of travel at the wrong instant: hit on the way, free at both ends.
+  // A pedestrian stands on a car's path: hit between the poses, free at both of them.
   const AgentBox walker = make_box(3.2f, 0, 0, 0.4f, 0.4f);
   EXPECT_TRUE(collide(make_box(0, 0), make_box(2, 0), walker, walker));
   EXPECT_FALSE(
@@ -79,7 +79,7 @@ TEST(Collision, NothingTunnelsHeadOn) {
 }
 
 TEST(Collision, SweptAt20MetresPerSecondAcrossAThinBox) {
-  // A car at 20 m/s crosses a thin standing box sideways: before and after it does not touch.
+  // A car at 20 m/s crosses a thin standing box sideways: no contact before or after the step.
   const AgentBox thin = make_box(0, 0, 0, 0.4f, 0.4f);
   const AgentBox from = make_box(0, -1.21f, kHalfPi, 1.6f, 0.5f), to = make_box(0, 1.21f, kHalfPi, 1.6f, 0.5f);
   EXPECT_FALSE(overlap(footprint(thin), footprint(from)));
@@ -119,17 +119,17 @@ TEST(Collision, FaultIsJudgedByTheRearPlaneBeforeTheStep) {
   // From the side into the middle, and from the side behind the bumper.
   EXPECT_TRUE(at_fault(own, 5, make_box(-1, 3.1f, -kHalfPi)));
   EXPECT_FALSE(at_fault(own, 5, make_box(-2.5f, 3.1f, -kHalfPi)));
-  // Who backs into the tail comes from behind too.
+  // Reversing into the other's rear counts as coming from behind too.
   EXPECT_FALSE(at_fault(own, 5, make_box(-4.1f, 0, kPi)));
-  // All that holds in any direction.
+  // The rules are the same in every direction.
   EXPECT_FALSE(at_fault(
       make_box(7, 3, 2), 5,
       make_box(7 - 2.9f * cos_of(2) - 1.2f * sin_of(2), 3 - 2.9f * sin_of(2) + 1.2f * cos_of(2), 2, 1.7f, 0.6f)));
 }
 
 TEST(Collision, ARearEndAtSpeedIsTheRammersFaultAlone) {
-  // Bumpers 0.1 m apart, 1.5 m aside: the rammer ends 1.4 m inside the other, its centre beside the bumper rather than
-  // behind it.
+  // Bumpers 0.1 m apart, 1.5 m aside: the rammer ends 1.4 m inside the other box. The other's centre is then beside
+  // the rammer's bumper rather than behind it.
   testing::Stage stage(testing::stadium(200, 2), 2);
   stage.put(0, {50, 0.5f}, 0, 20);
   stage.put(1, {54.1f, 2}, 0, 5);
@@ -149,9 +149,9 @@ TEST(Collision, ACyclistAtTheRearCornerIsAtFaultAlone) {
   EXPECT_EQ(stage.events(1), kEventCollision);
 }
 
-/// A straight road with something at x = 100, and a car that comes at 20 m/s: 2 m a step, from anywhere in between.
+/// A straight road with an obstacle at x = 100, and a car at 20 m/s: 2 m a step, from any start in between.
 struct At20MetresPerSecond : ::testing::Test {
-  /// The first event that the car meets on the way from x = 80 to x = 110, or none.
+  /// Returns the first event that the car meets on the way from x = 80 to x = 110, or kEventNone.
   int meets(testing::Stage* stage, float phase_m) {
     stage->put(0, {80 + phase_m, 0}, 0, 20);
     for (int i = 0; i < 15; ++i) {
@@ -216,7 +216,7 @@ TEST(Collision, BothHaltAndOnlyTheRammerIsAtFault) {
   EXPECT_EQ(stage.worlds.state.agents.speed_mps[0], 0);
   EXPECT_NEAR(rewards[0], -3, 0.01);
   EXPECT_NEAR(rewards[1], -0.5, 0.01);
-  // Halted agents stay in the way and earn nothing more.
+  // Halted agents stay in the way and earn no further rewards.
   stage.put(2, {46.5f, 0}, 0, 10);
   const std::vector<float> later = stage.step();
   EXPECT_EQ(later[0], 0);

@@ -1,4 +1,4 @@
-// Simulators on the CPU for tests, and steps of them.
+// CPU simulators for tests, and functions that step them.
 #pragma once
 
 #include <memory>
@@ -15,7 +15,7 @@ inline std::unique_ptr<Simulator> make(const SimulatorConfig& config, std::share
   return make_simulator("cpu", config, {std::move(map)}, std::move(worlds));
 }
 
-/// Steps with mixed_actions() of `first_step` and those after it.
+/// Takes `steps` steps with mixed_actions(), numbered from `first_step`.
 inline void run(Simulator* simulator, int steps, uint32_t first_step = 0) {
   for (int i = 0; i < steps; ++i) {
     simulator->step(mixed_actions(simulator->num_slots(), first_step + static_cast<uint32_t>(i)));

@@ -1,4 +1,4 @@
-// The loop in which simulators are driven: what it calls, in which order, and what ends it.
+// The loop that drives simulators: its calls, their order, and what ends the loop.
 #include "pictura/simulator/drive_steps.h"
 
 #include <cctype>

@@ -11,7 +11,7 @@ namespace {
 const ClassLimits kVehicle = class_limits(AgentClass::vehicle);
 
 TEST(Dynamics, FollowsTheReferenceTrajectory) {
-  // Computed in double by the public reference implementation: wheelbase 2.7 m, start at 5 m/s.
+  // Values computed in double by the public reference implementation: wheelbase 2.7 m, start at 5 m/s.
   struct Row {
     int step;
     float x, y, heading, v, a_long, a_lat, steer;
@@ -71,12 +71,12 @@ TEST(Dynamics, ResetAtStandstillEndsTheAccelerationWhereTheSpeedChangesItsSign) 
   EXPECT_EQ(m.accel_lat_mps2, 0.0f);
   EXPECT_FLOAT_EQ(m.jerk_long_mps3, 50.0f);  // from -5 to 0 m/s2 in 0.1 s
   EXPECT_NEAR(m.x_m, 0.5 * 0.1 * 0.1, 1e-6);
-  m = move(m, {}, resets, kVehicle, 0.1f);  // and it stays where it stands
+  m = move(m, {}, resets, kVehicle, 0.1f);  // the agent stays in place
   EXPECT_EQ(m.speed_mps, 0.0f);
-  m = move(m, {-4, 0}, resets, kVehicle, 0.1f);  // until it reverses: 0.5 x 0.4 m/s2 x 0.1 s
+  m = move(m, {-4, 0}, resets, kVehicle, 0.1f);  // then reverses: 0.5 x 0.4 m/s2 x 0.1 s
   EXPECT_FLOAT_EQ(m.speed_mps, -0.02f);
   EXPECT_FLOAT_EQ(m.accel_long_mps2, -0.4f);
-  // Forwards from reverse: -0.02 + 0.5 x (2.5 + 2.5) x 0.1 > 0.
+  // Going forwards from reverse: -0.02 + 0.5 x (2.5 + 2.5) x 0.1 > 0.
   m.accel_long_mps2 = 2.5f;
   m = move(m, {}, resets, kVehicle, 0.1f);
   EXPECT_EQ(m.speed_mps, 0.0f);

@@ -46,12 +46,12 @@ TEST(Goal, LanesChangeWithAQuarterOfTheWaypoints) {
     changes += next.lane / 4 != at.lane / 4;
     at = next;
   }
-  // Of the two sides that a change may go to only one has a lane.
+  // Only one of the two sides that a lane change may go to has a lane.
   EXPECT_NEAR(changes / double{kWaypoints}, 0.125, 0.02);
 }
 
 TEST(Goal, RoutesLeaveALaneThatEndsForTheNearestThatGoesOn) {
-  // Of the three lanes of the southern straight only the innermost goes on.
+  // Only the innermost of the southern straight's three lanes goes on.
   auto map = testing::stadium(200, 3);
   for (const size_t lane : {0u, 4u}) map->lanes[lane].successors = {};
   const MapRules rules = make_map_rules(*map, {});
@@ -106,7 +106,7 @@ struct GoalChain : ::testing::Test {
     agents.goal_lane[0] = 0;
     agents.goal_lane_s_m[0] = x_m[2];
   }
-  /// Steps until an event bit comes; returns x of the rear axle then.
+  /// Steps until an event includes `bit`; returns x of the rear axle then.
   float drive_until(int bit) {
     for (int i = 0; i < 200; ++i) {
       reward = stage.step()[0];
@@ -150,9 +150,9 @@ TEST_F(GoalChain, AWideRadiusDoesNotHideTheGoalFromTheMetric) {
   stage.set(0, Conditioning::delta_goal_m, 12);
   drive_until(kEventWaypoint);
   drive_until(kEventWaypoint);
-  EXPECT_NEAR(drive_until(kEventGoal), 109, 0.01);  // paid 12 m ahead: the chain is renewed
+  EXPECT_NEAR(drive_until(kEventGoal), 109, 0.01);  // paid 12 m ahead: the waypoints are renewed
   EXPECT_EQ(stage.worlds.state.agents.goals_reached[0], 0);
-  EXPECT_NEAR(drive_until(kEventMetricGoal), 119, 0.01);  // counted when it gets there
+  EXPECT_NEAR(drive_until(kEventMetricGoal), 119, 0.01);  // counted when the agent arrives
   EXPECT_EQ(stage.worlds.state.agents.goals_reached[0], 1);
   EXPECT_EQ(stage.worlds.state.agents.goal_open[0], 0);
 }

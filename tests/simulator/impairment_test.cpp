@@ -1,4 +1,4 @@
-// Impaired agents: how many there are, when it shows, and what they miss, do and count for.
+// Impaired agents: their number, when impairments are active, what the agents miss and do, and how they are counted.
 #include "pictura/simulator/rules/impairment.h"
 
 #include <algorithm>
@@ -33,7 +33,7 @@ Impairment impairment_of_slot(const Simulator& simulator, int slot) {
                          static_cast<uint32_t>(simulator.episode_index()[world]));
 }
 
-/// The impairment of a slot's agent if it shows now.
+/// Returns the impairment of a slot's agent if it is active now.
 Impairment shown_of_slot(const Simulator& simulator, int slot) {
   const SlotTable& slots = simulator.slots();
   const int32_t world = slots.world_of_slot[slot];
@@ -105,9 +105,9 @@ TEST(Impairment, HidesRoadUsersOrLightsFromListsAndImagesAndNothingElse) {
   const auto impaired = testing::make(config, map, worlds);
   config.others = {};
   const auto plain = testing::make(config, map, worlds);
-  std::array<int, 4> missed{};  // by impairment: sets that the others see
+  std::array<int, 4> missed{};  // by impairment: sets that unimpaired agents observe
   for (uint32_t step = 0; step < 150; ++step) {
-    // What they see has no effect here: the actions are the same.
+    // The other observations have no effect here, because the actions are the same.
     ASSERT_TRUE(testing::same_bits(impaired->scene().agents, plain->scene().agents)) << step;
     for (int slot = 0; slot < plain->num_slots(); ++slot) {
       const Impairment shown = shown_of_slot(*impaired, slot);
@@ -155,7 +155,7 @@ TEST(Impairment, PhantomBrakingEndsAtRestAndNeverTurnsBack) {
         ++rested;
       } else {
         EXPECT_GE(before * after, 0) << slot;
-        // It brakes once what it had of acceleration is gone.
+        // The agent brakes once its acceleration has ended.
         const bool brakes = before * accel_mps2[slot] < 0;
         EXPECT_LE(std::abs(after), brakes ? std::abs(before) : 20) << slot;
         braked += brakes;

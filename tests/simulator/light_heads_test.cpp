@@ -1,4 +1,4 @@
-// Where light heads stand, and how many of them cameras see from their stop lines, in every town.
+// Positions of light heads, and shares of heads that cameras see from their stop lines, in every town.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -38,7 +38,8 @@ struct PlaceInLane {
   float heading_rad = 0;
 };
 
-/// The pose in the lane's middle so far before its end, or on the lanes before it; nothing where these are shorter.
+/// Returns the pose in the lane's middle at that distance before its end, or on preceding lanes; nothing where the
+/// lanes are shorter.
 std::optional<PlaceInLane> pose_before_end(const RoadMap& map, int32_t lane, float distance_m) {
   constexpr int kMaxLanes = 8;
   for (int i = 0; i < kMaxLanes; ++i) {
@@ -59,7 +60,7 @@ std::optional<PlaceInLane> pose_before_end(const RoadMap& map, int32_t lane, flo
   return std::nullopt;
 }
 
-/// Whether a camera draws the centre of the head, and none of the walls stands between the two.
+/// Returns whether a camera draws the head's centre, and no wall is between them.
 bool is_seen(const PinholeCamera& camera, const LightHead& head, const LineOfSight& walls) {
   LightDisk disk;
   if (!light_is_visible(head, LightState::red, camera.position_m)) return false;
@@ -78,8 +79,8 @@ bool is_seen(const PinholeCamera& camera, const LightHead& head, const LineOfSig
   return !walls.is_hidden(camera.position_m, disk_box);
 }
 
-/// Shares of pairs of an incoming lane and its light of which some camera of the default rig sees the head, with the
-/// front bumper kBeforeLine_m before the stop line: the smaller share of the shortest and the longest vehicle.
+/// Shares of pairs of an incoming lane and its light where some camera of the default rig sees the head, with the
+/// front bumper kBeforeLine_m before the stop line. `seen` is the smaller share of the shortest and longest vehicle.
 struct Shares {
   std::array<float, kBeforeLine_m.size()> seen{};
   int pairs = 0;
@@ -145,10 +146,11 @@ TEST_P(LightHeadsOf, AreSeenFromTheirLineIfTheyAreToBeVisible) {
   ASSERT_GE(visible.pairs, static_cast<int>(map_->lights.size()));
   for (size_t d = 0; d < kBeforeLine_m.size(); ++d) {
     EXPECT_GE(visible.seen[d], 0.97f) << kBeforeLine_m[d];
-    // A wall of Town07 hides one of 18 from 6 m: a head that stays, 9 m beside its lane and 12 m beyond its line.
+    // A wall of Town07 hides 1 of 18 heads from 6 m: a head that the rule leaves in place, 9 m beside its lane and 12 m
+    // beyond its line.
     EXPECT_GE(past_walls.seen[d], 0.94f) << kBeforeLine_m[d];
   }
-  // What the rule is for, and that the measure tells.
+  // The purpose of the rule, and proof that the measure detects it.
   if (map_->name == "Town01" || map_->name == "Town02") {
     EXPECT_LT(mapped.seen[0], 0.1f);
   }
@@ -175,7 +177,8 @@ TEST_P(LightHeadsOf, MoveAlongTheTrafficOrNotAtAll) {
 }
 
 TEST(LightHeads, StandAboveTheRoadOfTheirLanes) {
-  // A lane that climbs by 1 in 10, its line at 50 m, its head 4 m before the line, 3 m to the right of its middle.
+  // A lane that climbs by 1 in 10. Its line is at 50 m; its head is 4 m before the line, 3 m to the right of its
+  // middle.
   RoadMap map;
   Lane lane;
   lane.points = {0, 2};

@@ -1,4 +1,4 @@
-// The nearest of many items, against sorting them all.
+// The nearest of many items, compared with sorting all items.
 #include "pictura/simulator/rules/fast/nearest.h"
 
 #include <algorithm>
@@ -21,7 +21,7 @@ TEST(NearestOfOneThread, IsTheBeginningOfTheSortedOnesWhateverTheirNumber) {
     std::vector<std::pair<float, int32_t>> sorted;
     const int32_t except = num_items / 2;
     for (int i = 0; i < num_items; ++i) {
-      // On a coarse lattice, so that many are equally near; items come in descending order.
+      // Places lie on a coarse lattice, so that many are equally near. Items come in descending order.
       places.push_back({std::floor(random.uniform(-5, 5)), std::floor(random.uniform(-5, 5))});
       items.push_back(num_items - 1 - i);
       const float distance2 = dot(places.back(), places.back());

@@ -1,4 +1,4 @@
-// Simulator::observe: observations of what is not there.
+// Simulator::observe: observations with boxes hidden or inserted.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -21,7 +21,7 @@ namespace {
 using testing::AnswerMemory;
 using testing::observation_of;
 
-/// A simulator whose agents have driven, halted and left, and some of which find no place.
+/// Makes a simulator whose agents have driven, halted and left. Some agents find no place.
 std::unique_ptr<Simulator> busy(SimulatorConfig config) {
   config.pedestrian_fraction = config.cyclist_fraction = 0.2f;
   config.parked_cars = 20;
@@ -36,7 +36,7 @@ std::unique_ptr<Simulator> busy(SimulatorConfig config) {
   return simulator;
 }
 
-/// Cars in two rows, each a little farther from the first one, at x = 20 m.
+/// Makes cars in two rows, each a little farther from the first car, which is at x = 20 m.
 std::unique_ptr<Simulator> queue_of(int num_cars, float gap_m, SimulatorConfig config = testing::cars()) {
   auto simulator = make_simulator("cpu", config, {testing::stadium(300, 2)}, {{0, num_cars, 0}});
   std::vector<int32_t> slots;
@@ -126,7 +126,7 @@ TEST(ObservationQueries, HidingIsTheObservationOfAWorldWithoutThatAgent) {
 TEST(ObservationQueries, TheSeventeenthComesInUnlessThereIsAGap) {
   const auto simulator = queue_of(20, 4);
   const ObservationView before = observation_of(simulator->observations(), 0);
-  // Its partners are 1 to 16; the third of them is gone.
+  // Partners of slot 0 are 1 to 16; the third is hidden.
   const std::vector<int32_t> hidden{box_of_slot(simulator.get(), 3)};
   const std::vector<ObservationQuery> queries{{.hidden_end = 1}, {.hidden_end = 1, .leaves_gaps = 1}};
   AnswerMemory answers(2, simulator->config());
@@ -203,7 +203,7 @@ TEST(ObservationQueries, APhantomAheadIsTheFirstPartner) {
   }
 }
 
-/// Who is shown, found by sorting all that are there.
+/// Expected rows of answers, found by sorting all boxes that are present.
 TEST(ObservationQueries, ShowTheNearestOfAnyHiddenAndInserted) {
   const auto simulator = busy({});
   const testing::RandomQueries drawn(simulator.get(), 600, 1);

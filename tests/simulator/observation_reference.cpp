@@ -12,13 +12,13 @@ constexpr double kDistance_m = 120, kMapHeight_m = 10, kHalfLength_m = 5;
 constexpr double kRange_m = 100, kBehind_m = 20, kAhead_m = 120, kAside_m = 30;
 constexpr float kCell_m = 10, kLaneReach_m = 15;
 
-/// The ego frame: origin at the reference point, x forward, y left, z up.
+/// The ego frame. Its origin is the reference point; x forward, y left, z up.
 struct Frame {
   double x_m, y_m, z_m, cosine, sine;
 
   double forward(double x, double y) const { return x * cosine + y * sine; }
   double left(double x, double y) const { return y * cosine - x * sine; }
-  /// Scaled coordinates of a point.
+  /// Returns the scaled coordinates of a point.
   std::vector<double> point(const Vec3& at) const {
     const double x = at.x - x_m, y = at.y - y_m;
     return {forward(x, y) / kDistance_m, left(x, y) / kDistance_m, (at.z - z_m) / kMapHeight_m};
@@ -51,7 +51,7 @@ ReferenceRow control(const Frame& ego, const TrafficLight& light, LightState sta
   return row;
 }
 
-/// Calls visit(box) with the box around each piece of a drivable lane, 15 m larger on all sides.
+/// Calls visit(box) with the box around each piece of a drivable lane, enlarged by 15 m on all sides.
 template <typename Visit>
 void visit_lane_surroundings(const RoadMap& map, const Visit& visit) {
   for (const Lane& lane : map.lanes) {
@@ -64,11 +64,11 @@ void visit_lane_surroundings(const RoadMap& map, const Visit& visit) {
   }
 }
 
-/// The cell of 10 m that the ego stands in. Cells fill the box around all surroundings of lanes, counted from its low
-/// corner; an ego beyond them has the nearest one.
+/// The 10 m cell of the ego. Cells fill the box around all surroundings of lanes, counted from its low corner; an ego
+/// beyond the cells has the nearest cell.
 struct Cell {
   Vec2 center_m;
-  bool is_near_lane = false;  // it reaches the surroundings of a lane
+  bool is_near_lane = false;  // whether the cell reaches the surroundings of a lane
   bool holds_ego = false;
 };
 
@@ -109,7 +109,7 @@ std::vector<ReferenceRow> rows_of(const std::vector<ObservedPiece>& pieces, cons
   return rows;
 }
 
-/// A quantity scaled by the paper's training range; constants read 0.
+/// Returns a quantity scaled by the paper's training range; constants read 0.
 double scaled(double value, const ConditioningRange& range) {
   if (range.low == range.high) return 0;
   return std::clamp(2 * (value - range.low) / (double{range.high} - range.low) - 1, -2.0, 1.0);

@@ -1,6 +1,6 @@
-// The observation written a second time, from docs/reference/observation.md: one number after the other, in double,
-// over all boxes, lines and pieces of a world. It shares no code with the simulator's rules, which both executors run,
-// so that a comparison of executors cannot show a fault in them.
+// A second implementation of the observation, from docs/reference/observation.md: number by number, in double, over
+// all boxes, lines and pieces of a world. It shares no code with the simulator's rules. Both executors run these rules,
+// so a comparison of executors cannot reveal a fault in the rules.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace pictura::testing {
 
-/// What a row of an entity set may show. `inside_m` is how far inside the set's range it is; negative: outside.
+/// A possible row of an entity set. `inside_m` is its distance inside the set's range; negative: outside.
 struct ReferenceRow {
   double distance_m = 0, inside_m = 0;
   std::vector<double> features;
@@ -18,12 +18,12 @@ struct ReferenceRow {
 
 struct ReferenceObservation {
   std::vector<double> ego, conditioning, waypoints;
-  std::array<std::vector<ReferenceRow>, kNumEntitySets> sets;  // of all rows, inside or outside
-  bool is_near_lane = false;                                   // else lanes, boundaries, controls and walls are empty
-  bool is_within_cells = false;                                // else some of these may be missing
+  std::array<std::vector<ReferenceRow>, kNumEntitySets> sets;  // all rows, inside or outside
+  bool is_near_lane = false;     // otherwise lanes, boundaries, controls and walls are empty
+  bool is_within_cells = false;  // otherwise some of these rows may be missing
 };
 
-/// What the agent of a slot observes in the present state, which is on the host. Its status is not looked at.
+/// Returns the observation of a slot's agent in the present state, which is on the host. Ignores the agent's status.
 ReferenceObservation reference_observation(Simulator& simulator, int slot);
 
 }  // namespace pictura::testing

@@ -1,5 +1,5 @@
-// Every number that agents observe, in random worlds of all maps, against observation_reference.h; and the pieces that
-// both read, against the road map that they are cut from.
+// Every observed number, in random worlds of all maps, compared with observation_reference.h. Also the pieces that
+// both implementations read, compared with the road map that they are cut from.
 #include "pictura/tests/simulator/observation_reference.h"
 
 #include <algorithm>
@@ -21,16 +21,16 @@
 namespace pictura::testing {
 namespace {
 
-/// Allowed difference of scaled numbers. The simulator computes in float, where a difference of coordinates, a
-/// direction and a product each lose up to 1e-7 of themselves.
+/// Allowed difference of scaled numbers. The simulator computes in float: a difference of coordinates, a direction
+/// and a product each have a relative error of up to 1e-7.
 constexpr double kTolerance = 2e-6;
-/// Tolerance of distances: rows this close to the border of a range may be observed or not, and rows whose distances
-/// differ by less may come in either order, since the document leaves the order of equal distances open.
+/// Tolerance of distances. Rows this close to the border of a range may be observed or not. Rows whose distances
+/// differ by less may come in either order, since the document does not specify the order of equal distances.
 constexpr double kTie_m = 1e-3;
 
 bool is_near(float observed, double expected) { return std::abs(observed - expected) <= kTolerance; }
 
-/// The first number that differs by more than the tolerance; empty if none does.
+/// Returns the first number that differs by more than the tolerance; empty if none does.
 std::string difference(const char* name, Span<const float> observed, const std::vector<double>& expected) {
   if (observed.size() != expected.size()) return fmt::format("{} has {} numbers", name, observed.size());
   for (size_t i = 0; i < expected.size(); ++i) {
@@ -41,8 +41,8 @@ std::string difference(const char* name, Span<const float> observed, const std::
   return "";
 }
 
-/// The first fault of a set: a row without a counterpart in the reference, a wrong choice or order of rows, padding
-/// that is not zero; empty if there is none. Unless `is_whole`, rows may be missing.
+/// Returns a set's first fault: a row without a counterpart in the reference, a wrong choice or order of rows, or
+/// nonzero padding. Empty if there is none. Rows may be missing unless `is_whole`.
 std::string difference_of_set(const char* name, Span<const float> observed, int max_rows, int count,
                               const std::vector<ReferenceRow>& reference, bool is_whole) {
   if (count < 0 || count > max_rows) return fmt::format("{} has {} rows", name, count);
@@ -75,14 +75,14 @@ std::string difference_of_set(const char* name, Span<const float> observed, int 
   return is_padded ? "" : fmt::format("{} is not padded with zeros", name);
 }
 
-/// Counts of what was compared, by which tests make sure that they met it.
+/// Counts of compared cases. Tests use them to check that the cases occurred.
 struct Compared {
   int observations = 0, last_ones = 0, zeros = 0, without_lane = 0, far_from_lanes = 0, beyond_cells = 0;
   std::array<int, 3> of_class{};
   std::array<int, kNumEntitySets> filled{}, full{};
 };
 
-/// Compares the observations of all slots with the reference. `ended` [slots]: not 0 where an infraction ended the
+/// Compares the observations of all slots with the reference. `ended` [slots]: nonzero where an infraction ended the
 /// agent's episode in the last step.
 void compare(Simulator& simulator, Span<const uint8_t> ended, Compared* compared) {
   const ObservationView all = simulator.observations();
@@ -131,8 +131,8 @@ void compare(Simulator& simulator, Span<const uint8_t> ended, Compared* compared
   }
 }
 
-/// Drives worlds by mixed actions and edits them every few steps. Compares before and after each edit, and one step
-/// later, in which many agents end.
+/// Drives worlds by mixed actions and edits them every few steps. Compares before and after each edit, and once more
+/// one step later, when many agents end.
 void drive_and_compare(Simulator& simulator, int steps, Compared* compared) {
   constexpr int kEvery = 5;
   std::vector<uint8_t> ended(static_cast<size_t>(simulator.num_slots()));
@@ -146,7 +146,7 @@ void drive_and_compare(Simulator& simulator, int steps, Compared* compared) {
     if (step % kEvery != 0) continue;
     const RandomEdit edit(state, simulator.num_slots(), static_cast<uint32_t>(step));
     simulator.set_state(edit.slots(), edit.fields());
-    compare(simulator, ended, compared);  // edits keep the step's events, and with them last observations
+    compare(simulator, ended, compared);  // edits keep the step's events and thus the last observations
   }
 }
 
@@ -262,14 +262,14 @@ struct Lines {
   std::vector<double> extents;
 };
 
-/// How far pieces may be from their line, how long they may be, and whether they end at points of it alone.
+/// Limits of pieces: their distance from the line, their length, and whether they end only at the line's points.
 struct PieceLimits {
   double chord_error_m, longest_m;
   bool ends_at_points;
 };
 constexpr PieceLimits kTrainingPieces{0.25, 10, true}, kEvenPieces{0.02, 5, false};
 
-/// The maximum distance of points [begin, end] of a line from the chord between the first and the last of them.
+/// Returns the maximum distance of points [begin, end] of a line from the chord between the first and last points.
 double furthest_aside_m(const std::vector<Vec3>& points, size_t begin, size_t end) {
   const Vec2 first = points[begin].xy(), way = points[end].xy() - first;
   double furthest_m = 0;
@@ -281,14 +281,15 @@ double furthest_aside_m(const std::vector<Vec3>& points, size_t begin, size_t en
   return furthest_m;
 }
 
-/// The first fault of pieces that should follow these lines, each from its start to its end; empty if there is none.
+/// Returns the first fault of pieces that should follow `lines`, each from its start to its end; empty if there is
+/// none.
 std::string fault_of_pieces(const std::vector<ObservedPiece>& pieces, const Lines& lines, const PieceLimits& limits) {
   constexpr double kRounding_m = 5e-4;
   size_t next = 0;
   for (size_t line = 0; line < lines.points.size(); ++line) {
     const std::vector<Vec3>& points = lines.points[line];
     for (size_t begin = 0, end = 0; begin + 1 < points.size(); begin = end) {
-      // Pieces of one chord, up to the point at which the last one ends.
+      // Pieces of one chord, up to the line's point at which the last piece ends.
       const size_t first = next;
       for (end = begin; end == begin; ++next) {
         if (next == pieces.size()) return fmt::format("line {} lacks pieces", line);
@@ -323,7 +324,7 @@ std::string fault_of_pieces(const std::vector<ObservedPiece>& pieces, const Line
   return next == pieces.size() ? "" : fmt::format("{} pieces too many", pieces.size() - next);
 }
 
-/// Centre lines of driving, bidirectional and ramp lanes, and the maximum width of each lane.
+/// Returns centre lines of driving, bidirectional and ramp lanes, and the maximum width of each lane.
 Lines lane_lines(const RoadMap& map) {
   Lines lines;
   for (const Lane& lane : map.lanes) {
@@ -339,7 +340,7 @@ Lines lane_lines(const RoadMap& map) {
   return lines;
 }
 
-/// Road edges, consecutive ones joined where they share a point.
+/// Returns road edges. Consecutive edges that share a point are joined.
 Lines boundary_lines(const RoadMap& map) {
   Lines lines;
   for (const RoadEdge& edge : map.road_edges) {
@@ -393,7 +394,7 @@ TEST(ObservationReference, HoldsInRecordedScenes) {
   }
 }
 
-/// A known limit: from cells that no lane comes near, lanes and edges in range are not observed.
+/// A known limit: in cells that no lane comes near, agents do not observe lanes and edges in range.
 TEST(ObservationReference, NothingOnTheMapIsObservedFarFromLanes) {
   const auto simulator = make(cars({.num_threads = 1}), ring_road(60), {{0, 2, 0}});
   const std::vector<int32_t> slots{0, 1};

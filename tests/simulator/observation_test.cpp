@@ -1,4 +1,4 @@
-// Every slot of the observation, recomputed by hand on a straight road.
+// Every number of the observation, recomputed by hand on a straight road.
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@ namespace {
 
 struct Observation : ::testing::Test {
   Observation() : stage(make_map(), 20, testing::cars({.wall_observations = true})) {
-    // The ego heads east at (100, 0.5); 18 others stand ahead of it on the left lane; the last one is far away.
+    // The ego heads east at (100, 0.5); 18 other agents stand ahead of it on the left lane; agent 19 is far away.
     stage.put(0, {100, 0.5f}, 0.1f, 6);
     for (int i = 1; i <= 18; ++i) stage.put(i, {105.0f + 5 * static_cast<float>(i), 4}, kPi, 2);
     stage.put(19, {0, 40}, kPi, 2);
@@ -28,7 +28,7 @@ struct Observation : ::testing::Test {
     return map;
   }
   void look() { observe(stage.world(), 0, 1, true, stage.results.observation_view()); }
-  /// A point in the ego frame.
+  /// Returns a point in the ego frame.
   static Vec2 local(float x, float y) {
     const float c = std::cos(0.1f), s = std::sin(0.1f);
     return {(x - 100) * c + (y - 0.5f) * s, -(x - 100) * s + (y - 0.5f) * c};
@@ -183,7 +183,7 @@ TEST_F(Observation, ConditioningIsScaledByThePapersRanges) {
 }
 
 TEST_F(Observation, EveryCoefficientHasThePapersRange) {
-  // The paper's table, in the order of conditioning.h; what is fixed reads 0.
+  // The paper's table, in the order of conditioning.h; fixed coefficients read 0.
   const float lows[kNumConditioning] = {2,     0, 0,       0, 0, 0,    2.5e-4f, 0,       2.5e-4f,
                                         -0.5f, 0, 2.5e-4f, 0, 0, 0.8f, 0.8f,    2 / 3.0f};
   const float highs[kNumConditioning] = {12,   20, 3,       3, 1, 0.1f,  2.5e-2f, 1,   7.5e-3f,
@@ -199,7 +199,7 @@ TEST_F(Observation, EveryCoefficientHasThePapersRange) {
       EXPECT_NEAR(out.conditioning[i], is_fixed ? 0 : 2 * share - 1, 1e-5) << kConditioningNames[i];
     }
   }
-  // A pedestrian's goal radius is below the range, and not to be mistaken for a vehicle's of 2 m.
+  // A pedestrian's goal radius is below the range, and must differ from a vehicle's radius of 2 m.
   stage.set(0, Conditioning::delta_goal_m, 0.5f);
   look();
   EXPECT_NEAR(stage.results.observation_view().conditioning[0], -1.3, 1e-6);
@@ -208,7 +208,8 @@ TEST_F(Observation, EveryCoefficientHasThePapersRange) {
   EXPECT_EQ(stage.results.observation_view().conditioning[0], -2);
 }
 
-/// What is listed must be what is in sight: checked against all pieces of the map, from many places and headings.
+/// Expects that listed pieces are exactly the pieces in sight: compared with all pieces of the map, from many places
+/// and headings.
 TEST_F(Observation, LanesBoundariesAndWallsAreAllThatIsInSight) {
   RandomStream random({.seed = 5, .purpose = Purpose::town});
   const MapRules& map = stage.worlds.setup.maps[0]->rules;
@@ -250,7 +251,7 @@ TEST_F(Observation, LanesBoundariesAndWallsAreAllThatIsInSight) {
   }
 }
 
-/// Far corners of what is in sight are reached from the cell's edges and the sector's ends only.
+/// Only places at the cell's edges and headings at the sector's ends see the far corners of the range.
 TEST(ObservedLists, HoldWhateverIsInSight) {
   const auto map = compile_map(load_map("procedural:3"));
   const MapRules& rules = map->rules;
@@ -287,7 +288,7 @@ TEST_F(Observation, PiecesAreAtMostTenMetresLong) {
     }
     return total;
   };
-  // Two straights of 200 m and two half circles, of radius 20 m and 16 m; edges 2 m aside of either.
+  // Two straights of 200 m and two half circles, of radius 20 m and 16 m; edges are 2 m beside either.
   const double lanes_m = 4 * 200 + kTwoPi * (20 + 16), edges_m = 4 * 200 + kTwoPi * (22 + 14);
   EXPECT_NEAR(total_of(map.lane_pieces), lanes_m, 0.01 * lanes_m);
   EXPECT_NEAR(total_of(map.boundary_pieces), edges_m, 0.01 * edges_m);
@@ -307,7 +308,7 @@ TEST_F(Observation, PiecesOfTheStraightRoad) {
     ASSERT_NE(row, nullptr);
     for (int i = 0; i < kLaneFeatures; ++i) EXPECT_NEAR(row[i], expected[i], 1e-5) << i;
   };
-  // From x = 110 to 120: both lanes, 4 m wide, and the edges, which have the road to their right.
+  // Pieces from x = 110 to 120: both lanes, 4 m wide, and the edges, which have the road to their right.
   expect_row(out.lanes, local(115, 0), -0.1f, 4 / 5.0f);
   expect_row(out.lanes, local(115, 4), -0.1f, 4 / 5.0f);
   expect_row(out.boundaries, local(115, 6), -0.1f, 0);
@@ -321,7 +322,7 @@ TEST_F(Observation, WallsAreTheirPiecesWithTheirHeights) {
   ASSERT_GT(walls.size(), 2u);
   ASSERT_EQ(walls[0].a_m.x, 120);
   ASSERT_EQ(walls[0].b_m.x, 108);
-  // The first stands from x = 120 to 108, 9 m south: two pieces of 6 m, which point west, the road to their right.
+  // The first wall stands from x = 120 to 108, 9 m south: two pieces of 6 m that point west, the road to their right.
   int found = 0;
   for (const float x : {117.0f, 111.0f}) {
     const Vec2 at = local(x, -9);
@@ -365,7 +366,7 @@ TEST_F(Observation, HaltedAndAbsentAgentsObserveNothingButTheyAreSeen) {
   observe(stage.world(), 1, 2, true, out);
   for (size_t i = 0; i < kEgoFeatures; ++i) EXPECT_EQ(out.ego[kEgoFeatures + i], 0);
   for (size_t i = 0; i < kMaxLanes * kLaneFeatures; ++i) EXPECT_EQ(out.lanes[kMaxLanes * kLaneFeatures + i], 0);
-  agents.events[1] = kEventCollision;  // the step in which it halted: its last observation
+  agents.events[1] = kEventCollision;  // the step in which the agent halted: its last observation
   observe(stage.world(), 1, 2, true, out);
   EXPECT_NE(out.ego[kEgoFeatures + 1], 0);
 }

@@ -1,4 +1,4 @@
-// Worlds on roads that end: agents start on open lanes, leave where these end, and enter again.
+// Worlds on roads that end: agents start on open lanes, leave where the lanes end, and enter again.
 #include "pictura/tests/map/open_roads.h"
 
 #include <cmath>
@@ -48,7 +48,7 @@ TEST(OpenRoads, TheLaneKeeperDrivesOffAndOthersEnter) {
   struct Case {
     const char* name;
     std::string text;
-    int agents;  // few at the crossing, where more than that block each other
+    int agents;  // few at the crossing, where more agents block each other
   };
   for (const auto& [name, text, agents] :
        {Case{"street", test::open_street(), 12}, Case{"crossing", test::open_crossing(), 4},
@@ -71,8 +71,8 @@ TEST(OpenRoads, TheLaneKeeperDrivesOffAndOthersEnter) {
   }
 }
 
-/// No car gets round the end of this road, which turns by 2.5 rad within 5 cm. Those that stopped there crept over the
-/// edge, by millimetres a second.
+/// Cars cannot get round the end of this road, which turns by 2.5 rad within 5 cm. Cars that stopped there once crept
+/// over the edge, by millimetres a second.
 TEST(OpenRoads, WhatCannotGoOnStands) {
   test::RoadText road;
   road.length = 24.1;
@@ -83,7 +83,7 @@ TEST(OpenRoads, WhatCannotGoOnStands) {
   for (const uint64_t seed : {0, 7}) {
     const auto simulator = make({.seed = seed, .num_threads = 1}, map_of(test::file_of(road.text())), {{0, 3, 0}});
     LaneKeepingController controller(*simulator);
-    constexpr size_t kOfTenMs = 2'000;  // nodes of searches, at 1 to 4 us
+    constexpr size_t kOfTenMs = 2'000;  // nodes of searches, at 1 to 4 us each
     drive(simulator.get(), &controller, 900, [&](const StepResult&) {
       for (size_t slot = 0; slot < 3; ++slot) {
         const LaneKeepingAgent* agent = controller.agent(slot);
@@ -103,7 +103,7 @@ TEST(OpenRoads, EveryControllerDrives) {
   }
 }
 
-/// A step in which an agent leaves is its own and truncated, and the slot's next step is nobody's.
+/// Expects that the step in which an agent leaves is valid and truncated, and that the slot's next step is invalid.
 TEST(OpenRoads, LeavingIsTruncatedAndNextStepsAreNobodys) {
   const auto simulator =
       make(testing::cars({.num_threads = 1, .reset_inactive_fraction = 2}), map_of(test::open_street()), {{0, 8, 0}});
@@ -134,7 +134,7 @@ TEST(OpenRoads, LeavingIsTruncatedAndNextStepsAreNobodys) {
   EXPECT_GT(left, 10);
 }
 
-/// By positions alone: 2 m + 2 s v behind the next box on the lane, one agent a step and entry.
+/// Rules of entering by positions alone: 2 m + 2 s v behind the next box on the lane, one agent a step and entry.
 TEST(OpenRoads, AgentsEnterInsideWithRoomAhead) {
   const auto map = map_of(test::open_street());
   const auto simulator = make(testing::cars({.num_threads = 1, .reset_inactive_fraction = 2}), map, {{0, 24, 0}});
@@ -203,7 +203,7 @@ TEST(OpenRoads, WaypointsEndFiveMetresBeforeTheExit) {
   }
 }
 
-/// The road under a bumper is several metres higher or lower there than under the rear axle.
+/// The road under a bumper is several metres higher or lower than under the rear axle.
 TEST(OpenRoads, AgentsLeaveSteepRoads) {
   for (const double slope : {-1.0, -0.7, 0.7, 1.0}) {
     test::RoadText road;

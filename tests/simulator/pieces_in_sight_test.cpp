@@ -1,4 +1,4 @@
-// Pieces in sight found eight at a time, against looking at one after the other.
+// Pieces in sight found eight at a time, compared with testing one after the other.
 #include "pictura/simulator/rules/fast/pieces_in_sight.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Edits of a simulator's agents, drawn by number: moves along and aside, onto others, other speeds, goals and status.
+// Edits of a simulator's agents, drawn by number: moves along and aside, moves onto others, speeds, goals and status.
 #pragma once
 
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace pictura::testing {
 
-/// Of about a third of the agents of a state on the host, none of which it can refuse.
+/// Edit of about a third of the agents of a state on the host. The simulator can reject no part of it.
 class RandomEdit {
  public:
   RandomEdit(const AgentStateView& state, int num_slots, uint32_t number) {

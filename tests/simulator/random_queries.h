@@ -1,4 +1,4 @@
-// Observation queries drawn by number, and memory for their answers that holds anything.
+// Observation queries drawn by number, and memory with arbitrary contents for their answers.
 #pragma once
 
 #include <algorithm>
@@ -11,8 +11,8 @@
 
 namespace pictura::testing {
 
-/// Queries of all kinds with their lists, of a simulator on the host: of any slots, with none to many of their worlds'
-/// boxes hidden, and none to a few inserted about them.
+/// Queries of all kinds with their lists, for a simulator on the host. They are for any slots, hide none to many of
+/// their worlds' boxes, and insert none to a few boxes nearby.
 struct RandomQueries {
   RandomQueries(Simulator* simulator, int count, uint32_t number) {
     const SceneBatch& scene = simulator->scene();
@@ -50,7 +50,7 @@ struct RandomQueries {
   std::vector<InsertedBox> inserted;
 };
 
-/// Arrays of a caller, of `count` observations.
+/// The caller's arrays for `count` observations.
 class AnswerMemory {
  public:
   AnswerMemory(size_t count, const SimulatorConfig& config)
@@ -67,7 +67,7 @@ class AnswerMemory {
   HostResults memory_;
 };
 
-/// One observation of many.
+/// Returns one observation of an array of observations.
 inline ObservationView observation_of(const ObservationView& all, size_t row) {
   ObservationView one;
 #define X(name, type, rows, features, part, comment) \

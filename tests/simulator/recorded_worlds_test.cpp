@@ -1,4 +1,4 @@
-// Worlds of recorded scenes: agents that follow their records, and who takes over from them.
+// Worlds of recorded scenes: agents that follow their records, and controllers that take over from records.
 #include <filesystem>
 
 #include <gmock/gmock.h>
@@ -39,7 +39,7 @@ const std::vector<Command>& recorded(const Simulator& simulator) {
 
 AgentStatus status_of(Simulator& simulator, int slot) { return simulator.state().status[slot]; }
 
-/// Expects every agent to be where the recording has it at this step, or nowhere.
+/// Expects every agent to be where the recording has it at this step, or absent.
 void expect_as_recorded(Simulator& simulator, const Scenario& scene, int32_t step) {
   const Span<const AgentBox> boxes = simulator.scene().agents;
   for (int32_t track = 0; track < static_cast<int32_t>(scene.tracks.size()); ++track) {
@@ -55,7 +55,7 @@ void expect_as_recorded(Simulator& simulator, const Scenario& scene, int32_t ste
     if (!is_there) continue;
     const TrackState& state = scene.states_of(track)[at];
     ASSERT_LT(length((box.center_m - state.position_m).xy()), 1e-3f);
-    ASSERT_LT(std::abs(box.center_m.z - state.position_m.z), 1);  // on the road, where it is near one
+    ASSERT_LT(std::abs(box.center_m.z - state.position_m.z), 1);  // on the road, where the record is near a road
     ASSERT_LT(std::abs(wrap_angle(simulator.state().heading_rad[track] - state.heading_rad)), 1e-5f);
     ASSERT_EQ(simulator.state().events[track], kEventNone);
   }
@@ -107,7 +107,7 @@ std::unique_ptr<Simulator> lit_world_of(const std::shared_ptr<const Scenario>& s
   return make_simulator("cpu", config, CompiledMaps{map}, {scene_world(*map)});
 }
 
-/// The crossing, all of whose lights always show one state.
+/// Returns the crossing with one constant state of all lights.
 std::shared_ptr<const Scenario> crossing_with(RecordedLightState state) {
   Scenario scene = *crossing(kNobodyInTheWay);
   std::fill(scene.light_states.begin(), scene.light_states.end(), state);
@@ -155,7 +155,7 @@ TEST(RecordedWorlds, RedRecordedLightsHoldWhoDrives) {
   EXPECT_EQ(crosses(*lit_world_of(crossing_with(RecordedLightState::go))), 0);
   EXPECT_EQ(crosses(*lit_world_of(crossing_with(RecordedLightState::none))), 0);
   EXPECT_EQ(crosses(*world_of(crossing_with(RecordedLightState::stop))), 0);
-  // Who is recorded is held by nothing.
+  // Lights do not hold agents that follow records.
   const auto replay = lit_world_of(crossing_with(RecordedLightState::stop));
   for (int step = 0; step < 60; ++step) replay->step(recorded(*replay));
   EXPECT_EQ(replay->totals().red_light, 0);
@@ -182,7 +182,7 @@ TEST(RecordedWorlds, StandStillAfterTheEndOfTheRecord) {
   }
 }
 
-/// The first track that moves and is there from step 0 to `last`.
+/// Returns the first track that moves and is valid from step 0 to `last`.
 int32_t mover(const Scenario& scene, size_t last) {
   for (int32_t track = 0; track < static_cast<int32_t>(scene.tracks.size()); ++track) {
     const Span<const uint8_t> valid = scene.valid_of(track);
@@ -207,14 +207,14 @@ TEST(RecordedWorlds, AnActionTakesOverFromWhatTheRecordImplies) {
     const StepResult result = simulator->step(commands);
     EXPECT_EQ(result.valid[self], 1);
     EXPECT_EQ(status_of(*simulator, self), AgentStatus::active) << int{simulator->state().halt_reason[self]};
-    // It goes on straight at the recorded speed.
+    // The agent goes on straight at the recorded speed.
     const TrackState& from = scene->states_of(self)[taken_at];
     const float speed_mps = length(from.velocity_mps);
     const AgentBox& box = simulator->scene().agents[self];
     EXPECT_NEAR(simulator->state().speed_mps[self], speed_mps, 1e-3);
     EXPECT_NEAR(length((box.center_m - from.position_m).xy()), speed_mps * 0.1f, 1e-3);
     EXPECT_EQ(simulator->totals().agent_steps, 1);
-    // Everybody else goes on as recorded, and it can be given back.
+    // All other agents go on as recorded. The agent can return to its record.
     simulator->step(recorded(*simulator));
     expect_as_recorded(*simulator, *scene, taken_at + 2);
   }
@@ -224,7 +224,7 @@ TEST(RecordedWorlds, DriversCollideWithTheRecordedAndHalt) {
   const auto scene = crossing();
   const int32_t self = mover(*scene, 40);
   const auto simulator = world_of(scene);
-  // Onto another that is there.
+  // Place the agent onto another that is present.
   int32_t other = 0;
   while (other == self || !scene->valid_of(other)[1]) ++other;
   std::vector<Command> commands = recorded(*simulator);
@@ -240,7 +240,7 @@ TEST(RecordedWorlds, DriversCollideWithTheRecordedAndHalt) {
   EXPECT_EQ(status_of(*simulator, self), AgentStatus::halted);
   EXPECT_EQ(status_of(*simulator, other), AgentStatus::recorded);
   EXPECT_EQ(simulator->totals().collisions, 1);
-  // The halted stay where they are, whoever commands them.
+  // Halted agents stay where they are, whichever controller commands them.
   const AgentBox before = simulator->scene().agents[self];
   simulator->step(recorded(*simulator));
   EXPECT_EQ(status_of(*simulator, self), AgentStatus::halted);
@@ -273,7 +273,7 @@ TEST(RecordedWorlds, TheGoalIsTheEndOfTheRecordAndPassedOnce) {
   EXPECT_EQ(simulator->totals().waypoints_reached, 1);
 }
 
-/// The scene's world under other rules of how agents end, with everybody else as recorded.
+/// Returns the scene's world under other rules of how agents end, with all other agents as recorded.
 std::unique_ptr<Simulator> world_with(const std::shared_ptr<const Scenario>& scene, AfterInfraction after,
                                       bool leave_at_goal) {
   SimulatorConfig config;
@@ -309,7 +309,7 @@ TEST(RecordedWorlds, WhoArrivesLeavesAndNobodyMeetsIt) {
   EXPECT_EQ(simulator->state().goals_reached[self], 1);
   EXPECT_EQ(simulator->scene().agents[slot].drawn, 1) << "all see where it arrived";
   const std::vector<uint8_t> saved = simulator->save();
-  // Another comes to the same place, and meets nobody; what the one that left is told means nothing.
+  // Another agent comes to the same place without a collision. The world ignores commands to the agent that left.
   commands[other] = place(*scene, other, goal);
   commands[slot] = {};
   result = simulator->step(commands);
@@ -317,7 +317,7 @@ TEST(RecordedWorlds, WhoArrivesLeavesAndNobodyMeetsIt) {
   EXPECT_EQ(simulator->scene().agents[slot].drawn, 0);
   EXPECT_EQ(simulator->totals().collisions, 0);
   EXPECT_EQ(simulator->totals().goals_reached, 1);
-  // The same from a saved state; but not under other rules.
+  // The steps from a saved state are the same. Worlds under other rules reject the state.
   const uint64_t hash = simulator->state_hash();
   simulator->restore(saved);
   simulator->step(commands);
@@ -445,7 +445,7 @@ void expect_inverse_actions_to_follow_the_record(const DynamicsRules& rules) {
   for (int32_t step = 1; step <= 40; ++step) {
     control.act(simulator->arrays(), {}, commands);
     simulator->step(commands);
-    // The dynamics do what was foreseen, and that is near.
+    // The dynamics follow the predicted states, which are near the record.
     const TrackState& there = scene->states_of(self)[step];
     const float error_m = length((simulator->scene().agents[self].center_m - there.position_m).xy());
     const size_t at = first + static_cast<size_t>(step) - 1;
@@ -461,11 +461,11 @@ TEST(RecordedWorlds, InverseActionsFollowTheRecord) {
   expect_inverse_actions_to_follow_the_record({.reset_at_standstill = true});
 }
 
-/// The largest distance to its record of a bus that turns left by a quarter on an arc of that radius.
+/// Returns the maximum distance to its record of a bus that makes a quarter turn to the left on an arc of `radius_m`.
 float largest_error_of_bus(float length_m, float radius_m, float first_speed_mps) {
   Scenario scene = *crossing({.num_steps = 160});
   const int32_t self = mover(scene, 40);
-  const float steps_m = 6;  // over which the curvature grows and ends
+  const float steps_m = 6;  // distance over which the curvature grows and ends
   scene.tracks[self].length_m = length_m;
   float s = 0, x = 0, y = 0, heading = 0, speed = first_speed_mps;
   for (int32_t step = 0; step < scene.num_steps; ++step) {
@@ -529,7 +529,7 @@ TEST(RecordedWorlds, IdmFollowsThePathAndStopsBehindOthers) {
       }
       simulator->step(commands);
       fastest_mps = std::max(fastest_mps, simulator->state().speed_mps[self]);
-      // Never off its path.
+      // The bus never leaves its path.
       const TrackState& start = scene->states_of(self)[0];
       const Vec2 along{std::cos(start.heading_rad), std::sin(start.heading_rad)};
       const Vec3 center_m = simulator->scene().agents[self].center_m;
@@ -555,8 +555,8 @@ TEST(RecordedWorlds, IdmFollowsLanesWhereItIsTold) {
   EXPECT_EQ(idm->name(), "idm_lanes");
   std::vector<uint8_t> driven(scene->tracks.size());
   driven[self] = 1;
-  constexpr int32_t kTakeover = 15, kMerged = 45;  // it begins in the middle of the record
-  constexpr int32_t kNearsEnd = 80;                // of its lane, where it stops
+  constexpr int32_t kTakeover = 15, kMerged = 45;  // the takeover is in the middle of the record
+  constexpr int32_t kNearsEnd = 80;                // near the end of its lane, where the agent stops
   float driven_m = 0;
   for (int32_t step = 1; step < scene->num_steps; ++step) {
     std::vector<Command> commands = recorded(*simulator);
@@ -566,7 +566,8 @@ TEST(RecordedWorlds, IdmFollowsLanesWhereItIsTold) {
     simulator->step(commands);
     if (step <= kTakeover) continue;
     driven_m += 0.1f * state.speed_mps[self];
-    // From the speed of the record it nears the lane's limit, from above or below, and its centre line.
+    // The agent's speed approaches the lane's limit from the recorded speed, above or below the limit. The agent also
+    // approaches the lane's centre line.
     if (step > kTakeover + 1 && step < kNearsEnd && before_mps < state.speed_limit_mps[self]) {
       EXPECT_GE(state.speed_mps[self], before_mps - 0.01f) << step;
     }

@@ -75,7 +75,7 @@ TEST_F(RewardTest, LaneCenterMeasuresFromTheBias) {
   c(Conditioning::lane_center) = 0.005f;
   c(Conditioning::center_bias_m) = -0.5f;
   EXPECT_NEAR(terms().lane_center, -0.005 * 0.1 * (1.2 - 0.05 * std::exp(-0.7)), 1e-9);
-  facts.fit.angle_rad = 2;  // cosine below 0.5: only the exponential is left
+  facts.fit.angle_rad = 2;  // cosine below 0.5: only the exponential term remains
   EXPECT_NEAR(terms().lane_center, 0.005 * 0.1 * 0.05 * std::exp(-0.7), 1e-9);
 }
 

@@ -24,14 +24,14 @@ TEST(Road, FitsTheLaneUnderIt) {
 
 TEST(Road, KeepsItsLaneNearTheBorder) {
   const MapRules map = make_map_rules(*testing::stadium(200, 2), {});
-  // 2.1 m is nearer to lane 4 by 0.2 m, which scores 0.035: less than the 0.05 for leaving.
+  // At y = 2.1 m lane 4 is nearer by 0.2 m, which scores 0.035: less than the 0.05 for leaving a lane.
   EXPECT_EQ(fit_lane(map.view(), {55, 2.1f}, 0, 0, 0).lane, 0);
   EXPECT_EQ(fit_lane(map.view(), {55, 2.1f}, 0, 0, 4).lane, 4);
   EXPECT_EQ(fit_lane(map.view(), {55, 2.3f}, 0, 0, 0).lane, 4);
 }
 
 TEST(Road, PrefersTheLaneThatPointsItsWay) {
-  // Two opposite lanes at y = 0 and y = 40 of a stadium are far apart; on a ring, heading decides nothing.
+  // On a stadium two opposite lanes, at y = 0 and y = 40, are far apart. On a ring, heading decides nothing.
   const MapRules map = make_map_rules(*testing::ring_road(30), {});
   const LaneFit fit = fit_lane(map.view(), {0, -31}, 0, 0, -1);
   EXPECT_NEAR(fit.offset_m, -1, 0.02);
@@ -64,7 +64,7 @@ TEST(Road, PosesFollowTheArcLength) {
 
 TEST(Road, OffRoadWhenTheBoxTouchesAnEdge) {
   testing::Stage stage(testing::stadium(200, 1), 2);
-  // Half a width of 1 m: the edge at y = -2 is touched from y = -1 on.
+  // Half of the width is 1 m, so the agent touches the edge at y = -2 from y = -1 on.
   stage.put(0, {50, -0.98f}, 0, 5);
   stage.put(1, {100, -1.02f}, 0, 5);
   stage.set(1, Conditioning::off_road, 1.5f);

@@ -1,5 +1,5 @@
-// Worlds that leave their simulator: divided among several they together do, and save, what one simulator of all worlds
-// does, and single ones go on in others.
+// Worlds that leave their simulator. Divided among several simulators, they together step and save as one simulator of
+// all worlds; single worlds go on in other simulators.
 #include "pictura/simulator/saved_worlds.h"
 
 #include <gmock/gmock.h>
@@ -44,7 +44,7 @@ TEST(PartsOfWorlds, HaveOneWorldAtLeast) {
   EXPECT_THAT(test::message_of([&] { worlds_of_part(all, 0, 5); }), HasSubstr("4 worlds cannot be divided over 5"));
 }
 
-// Two maps with traffic lights and parked cars, worlds of several sizes, short episodes: all that a state is made of.
+// Two maps with traffic lights and parked cars, worlds of several sizes, short episodes: everything in a state.
 TEST(PartsOfWorlds, StepAndSaveAsOneSimulatorDoes) {
   SimulatorConfig config;
   config.seed = 5;
@@ -80,7 +80,7 @@ TEST(PartsOfWorlds, StepAndSaveAsOneSimulatorDoes) {
   const std::vector<uint8_t> joined = join_saved_states(*part, all, saved);
   EXPECT_EQ(joined, whole->save());
 
-  // And back, to another number of parts, which go on as the whole does.
+  // The joined state is divided into another number of parts, which go on as the whole does.
   step(whole.get(), 40, 60);
   std::vector<std::vector<uint8_t>> later;
   for (int i = 0; i < 2; ++i) {
@@ -96,13 +96,13 @@ TEST(PartsOfWorlds, StepAndSaveAsOneSimulatorDoes) {
   EXPECT_THAT(test::message_of([&] { part_of_saved_state(*whole, others, joined, 0, 1); }), HasSubstr("worlds"));
 }
 
-// Two worlds of different moments and in another order, where walls are off and no entities are observed.
+// Two worlds of different moments in another order, without walls and entity observations.
 TEST(KeptWorlds, GoOnInAnotherSimulator) {
   SimulatorConfig config{.seed = 5, .num_threads = 1, .episode_steps = 100, .reset_inactive_fraction = 2};
   const std::vector<std::shared_ptr<const RoadMap>> maps{load_map("procedural"), load_map("procedural:7")};
   const std::vector<WorldSpec> all{{0, 9, 4}, {1, 12, 5}, {0, 7, 6}};
   const auto whole = make_simulator("cpu", config, maps, all);
-  // All speed up straight ahead: who leaves the road halts before it comes to a wall.
+  // All agents speed up straight ahead: agents that leave the road halt before they reach a wall.
   const auto step = [](Simulator* simulator, int count) {
     const std::vector<int32_t> actions(static_cast<size_t>(simulator->num_slots()), 3 * kNumLatActions + 1);
     for (int i = 0; i < count; ++i) simulator->step(actions);
@@ -130,7 +130,7 @@ TEST(KeptWorlds, GoOnInAnotherSimulator) {
 #undef X
   };
   for (int agent = 0; agent < 7; ++agent) expect_same(9 + 12 + agent, agent);
-  step(other.get(), 10);  // to step 40, as the whole is
+  step(other.get(), 10);  // to step 40, where the whole is
   for (int agent = 0; agent < 12; ++agent) expect_same(9 + agent, 7 + agent);
 
   EXPECT_THAT(test::message_of([&] { saved_state_of(*other, {late[0].get(), early[0].get()}); }),

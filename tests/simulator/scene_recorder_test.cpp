@@ -1,4 +1,4 @@
-// Simulated runs saved as recorded scenes, and replayed.
+// Simulated runs saved as recorded scenes and replayed.
 #include "pictura/simulator/scene_recorder.h"
 
 #include <gmock/gmock.h>
@@ -37,7 +37,7 @@ Span<const AgentBox> boxes_of(Simulator& simulator, size_t world) {
   return scene.agents.subspan(begin, static_cast<size_t>(scene.world_begin[world + 1]) - begin);
 }
 
-/// Drives the second world, and keeps its boxes at each step.
+/// Drives the second world and records its boxes at each step.
 Scenario drive(Simulator& simulator, std::vector<std::vector<AgentBox>>* boxes_out) {
   SceneRecorder recorder(simulator, 1);
   const auto keep = [&] {
@@ -112,13 +112,13 @@ TEST(SceneRecorder, WhatWasDrivenIsSavedLoadedAndReplayed) {
       if (!was.drawn) continue;
       ++compared;
       moved += step > 0 && length(was.center_m - boxes[step - 1][box_index].center_m) > 0.1f;
-      if (box_index < 20) {  // who drove, to the bit
+      if (box_index < 20) {  // agents that drove: equal bits
         ASSERT_EQ(was.center_m.x, is.center_m.x);
         ASSERT_EQ(was.center_m.y, is.center_m.y);
         ASSERT_EQ(was.center_m.z, is.center_m.z);
         ASSERT_EQ(was.cos_heading, is.cos_heading);
         ASSERT_EQ(was.sin_heading, is.sin_heading);
-      } else {  // parked cars, whose heights are found anew at their reference points
+      } else {  // parked cars, whose heights are recomputed at their reference points
         ASSERT_LT(length((was.center_m - is.center_m).xy()), 1e-4f);
         ASSERT_LT(std::abs(was.center_m.z - is.center_m.z), 0.2f);
         ASSERT_LT(std::abs(was.cos_heading - is.cos_heading) + std::abs(was.sin_heading - is.sin_heading), 1e-6f);
@@ -156,7 +156,7 @@ TEST(SceneRecorder, AReplayedRecordingIsTheRecording) {
   const auto scene = test::crossing();
   const SimulatorConfig config = scene_config(*scene, 5, {.num_threads = 1});
   MapOptions options = map_options(config);
-  options.recorded_lights = true;  // change nothing in what is saved
+  options.recorded_lights = true;  // has no effect on saved scenes
   const auto map = compile_scenario(scene, options, 5);
   const auto simulator = make_simulator("cpu", config, CompiledMaps{map}, {scene_world(*map)});
   const auto log = make_controller("log", *simulator, 0);
@@ -222,7 +222,7 @@ TEST(SceneFile, DamagedAndForeignFilesAreRefusedByName) {
   flipped[bytes.size() / 2] ^= 1;
   EXPECT_THAT(message(flipped), HasSubstr("checksum"));
   std::string other = bytes;
-  other[16] ^= 1;  // of the layout's hash
+  other[16] ^= 1;  // in the layout's hash
   EXPECT_THAT(message(other), HasSubstr("written by another version of pictura"));
   EXPECT_THAT(message_of<UsageError>([&] { write_scene_file(folder.path() + "/x.json", *test::crossing()); }),
               HasSubstr("expected a file *.scenario"));

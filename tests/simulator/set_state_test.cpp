@@ -148,7 +148,7 @@ TEST(SetState, OntoAnotherIsACollisionOfTheNextStep) {
   EXPECT_EQ(result.terminated[0], 1);
   EXPECT_EQ(result.terminated[1], 1);
   EXPECT_EQ(simulator->totals().collisions, 2);
-  // And back to life.
+  // Agents can become active again.
   const std::vector<float> apart{50, 90};
   const std::vector<uint8_t> active{0, 0};
   simulator->set_state(both, std::vector<NamedArray>{named("x_m", apart), named("status", active)});

@@ -23,7 +23,7 @@ StopLine line_of_phase(int phase, int num_phases) {
 }
 
 TEST(Signal, FixedTimingSharesTheCycleAmongPhases) {
-  // Three phases of 10 + 3 + 2 s: in 90 s each is green for 20 s, yellow for 6 s and red for the rest.
+  // Three phases of 10 + 3 + 2 s: in 90 s each is green for 20 s, yellow for 6 s and red otherwise.
   std::vector<LightPlan> plans;
   for (int phase = 0; phase < 3; ++phase) {
     plans.push_back(draw_light_plan(line_of_phase(phase, 3), phase, LightCycles::phases, true, 0.1f, 7, 0, 0));
@@ -69,7 +69,7 @@ TEST(Signal, TrainingTimingIsDrawnPerJunctionAndEpisode) {
   EXPECT_NEAR(lights_off / double{kEpisodes}, 0.8 * 2 * 0.2 * 0.8, 0.04);
 }
 
-/// The plans of two lights of one junction and of different phases, in an episode of independent cycles.
+/// Returns plans of two lights of one junction in different phases, in an episode of independent cycles.
 std::array<LightPlan, 2> independent_pair(bool fixed, uint32_t episode) {
   std::array<LightPlan, 2> plans;
   for (int light = 0; light < 2; ++light) {
@@ -79,7 +79,7 @@ std::array<LightPlan, 2> independent_pair(bool fixed, uint32_t episode) {
   return plans;
 }
 
-/// Pearson's correlation of two samples of one length.
+/// Returns Pearson's correlation of two samples of equal length.
 double correlation(const std::vector<double>& a, const std::vector<double>& b) {
   const auto n = static_cast<double>(a.size());
   const double mean_a = std::accumulate(a.begin(), a.end(), 0.0) / n;
@@ -104,7 +104,7 @@ TEST(Signal, IndependentLightsOfAJunctionShareNoDraw) {
       const LightPlan& plan = plans[light];
       EXPECT_EQ(plan.num_phases, 1);
       EXPECT_EQ(plan.phase, 0);
-      // Lights are off as where phases take turns.
+      // Lights are off in the same episodes as where phases take turns.
       const LightPlan in_turns =
           draw_light_plan(line_of_phase(int(light), 2), int(light), LightCycles::phases, false, 0.1f, 7, 0, episode);
       EXPECT_EQ(plan.is_off, in_turns.is_off);
@@ -162,11 +162,11 @@ TEST(Signal, IndependentLightsOfAnEvaluationAreRedForTwoOfFifteenSeconds) {
     EXPECT_EQ(counts[LightState::yellow], 30);
     EXPECT_EQ(counts[LightState::red], 20);
   }
-  // Independent lights are red together in the product of their shares.
+  // Independent lights are red together with the product of their shares.
   EXPECT_NEAR(both_red / double{kEpisodes * kCycle}, (2.0 / 15) * (2.0 / 15), 0.004);
 }
 
-/// A straight of two lanes at y = 0 and y = 4; at x = 100 a line holds the right one (lane 0), and only it.
+/// A straight of two lanes at y = 0 and y = 4. A line at x = 100 holds only the right lane (lane 0).
 struct RedLight : ::testing::Test {
   RedLight() : stage(make_map(), 1) {}
   static std::shared_ptr<const RoadMap> make_map() {
@@ -174,7 +174,7 @@ struct RedLight : ::testing::Test {
     testing::add_light(map.get(), 100, 4, 1, {0});
     return map;
   }
-  /// Puts the front bumper at x_m: 4 m long, so 3.2 m ahead of the rear axle.
+  /// Puts the front bumper at x_m. The agent is 4 m long, so the bumper is 3.2 m ahead of the rear axle.
   void put_bumper(float x_m, float y_m, float heading_rad, float speed_mps) {
     const Vec2 forward{std::cos(heading_rad), std::sin(heading_rad)};
     stage.put(0, Vec2{x_m, y_m} - forward * 3.2f, heading_rad, speed_mps);
@@ -207,14 +207,14 @@ TEST_F(RedLight, OtherColoursAreNone) {
 TEST_F(RedLight, StoppingBeforeTheLineIsNone) {
   put_bumper(98.5f, 0, 0, 10);
   EXPECT_EQ(step_with(LightState::red), kEventNone);
-  EXPECT_EQ(step_with(LightState::red), kEventRedLight);  // but half a metre later it is over
+  EXPECT_EQ(step_with(LightState::red), kEventRedLight);  // half a metre later the bumper is past the line
 }
 
 TEST_F(RedLight, StandingOnALineThatTurnsRedIsNone) {
   put_bumper(101, 0, 0, 0);
   EXPECT_EQ(step_with(LightState::yellow), kEventNone);
   EXPECT_EQ(step_with(LightState::red), kEventNone);
-  put_bumper(101, 0, 0, 8);  // and driving on from there neither
+  put_bumper(101, 0, 0, 8);  // driving on from past the line is no event either
   EXPECT_EQ(step_with(LightState::red), kEventNone);
   EXPECT_EQ(step_with(LightState::red), kEventNone);
 }
@@ -222,7 +222,7 @@ TEST_F(RedLight, StandingOnALineThatTurnsRedIsNone) {
 TEST_F(RedLight, TheOtherWayIsNone) {
   put_bumper(100.5f, 0, kPi, 10);
   EXPECT_EQ(step_with(LightState::red), kEventNone);
-  put_bumper(100, 2.3f, 1.0f, 10);  // 57 degrees across
+  put_bumper(100, 2.3f, 1.0f, 10);  // crosses at 57 degrees
   EXPECT_EQ(step_with(LightState::red), kEventNone);
 }
 
@@ -232,8 +232,8 @@ TEST_F(RedLight, TheNextLaneIsNone) {
 }
 
 TEST_F(RedLight, ChangingIntoTheLanePastTheLineIsAnEvent) {
-  // From the free lane, its bumper 3 m past the line, it turns into the held one: associated with it once its rear axle
-  // is nearer to that one by more than the hysteresis.
+  // From the free lane, with its bumper 3 m past the line, the agent turns into the held lane. It is associated with
+  // the held lane once its rear axle is nearer to it by more than the hysteresis.
   put_bumper(103, 0.8f, -0.3f, 5);
   stage.worlds.state.agents.lane[0] = 4;
   EXPECT_EQ(step_with(LightState::red), kEventRedLight);
@@ -257,18 +257,18 @@ TEST_F(RedLight, ChangingIntoTheLaneFarPastTheLineIsNone) {
 }
 
 TEST_F(RedLight, TurningRightIntoTheHeldLaneIsNone) {
-  // From the left across the road into the held lane, past the line: still 60 degrees off its direction.
+  // From the left across the road into the held lane, past the line: still 60 degrees off the lane's direction.
   put_bumper(103, 0.3f, -1.05f, 5);
   stage.worlds.state.agents.lane[0] = 4;
   EXPECT_EQ(step_with(LightState::red), kEventNone);
-  // And before the line, well aligned.
+  // A turn before the line, well aligned, is none either.
   put_bumper(97, 0.3f, -0.5f, 3);
   stage.worlds.state.agents.lane[0] = 4;
   EXPECT_EQ(step_with(LightState::red), kEventNone);
 }
 
-/// A straight in three: to x = 100 (lane 0), 2 m that the light holds (lane 4), and onwards behind the stop line at
-/// x = 102 (lane 5, held too).
+/// A straight in three lanes: to x = 100 (lane 0), 2 m that the light holds (lane 4), and onwards behind the stop line
+/// at x = 102 (lane 5, held too).
 std::shared_ptr<const RoadMap> short_section(bool is_endless) {
   auto map = testing::stadium(200, 1);
   const auto append = [&map](std::vector<float> x_m, int32_t next) {
@@ -295,19 +295,19 @@ std::shared_ptr<const RoadMap> short_section(bool is_endless) {
 TEST(RedLightSection, DrivingOnToTheNextLaneIsNone) {
   for (const bool is_endless : {true, false}) {
     testing::Stage stage(short_section(is_endless), 1);
-    stage.put(0, {99.8f, 0}, 0, 10);  // its bumper is a metre past the line: it crossed on yellow
+    stage.put(0, {99.8f, 0}, 0, 10);  // the bumper is a metre past the line: it crossed on yellow
     ASSERT_EQ(stage.worlds.state.agents.lane[0], 0);
     stage.worlds.state.lights[0] = LightState::red;
     stage.step();
     EXPECT_EQ(stage.worlds.state.agents.lane[0], 4);
     EXPECT_EQ(stage.events(0), kEventNone);
-    // So fast that the short lane is left out.
+    // The agent is so fast that it skips the short lane.
     stage.put(0, {100.2f, 0}, 0, 20);
     stage.worlds.state.agents.lane[0] = 0;
     stage.step();
     EXPECT_EQ(stage.worlds.state.agents.lane[0], 5);
     EXPECT_EQ(stage.events(0), kEventNone);
-    // But the bumper's crossing is an event whatever the lanes.
+    // The bumper's crossing is an event whatever the lanes.
     stage.put(0, {98.3f, 0}, 0, 10);
     stage.step();
     EXPECT_EQ(stage.events(0), kEventRedLight);
@@ -327,8 +327,8 @@ TEST(RedLightSection, LaneChangesAreWhatNoRouteDoes) {
   EXPECT_TRUE(is_lane_change(side_by_side.view(), 4, 1));
 }
 
-/// A straight of one lane at y = 0, held at x = 100, and beside it one for oncoming traffic at y = 4; between them a
-/// strip of `median_m`.
+/// A straight of one lane at y = 0, held at x = 100. Beside it is a lane for oncoming traffic at y = 4, beyond a strip
+/// of `median_m`.
 std::shared_ptr<const RoadMap> two_way_road(float median_m) {
   auto map = testing::stadium(200, 1);
   Lane lane = map->lanes[0];
@@ -355,9 +355,9 @@ TEST(RedLightOnATwoWayRoad, DrivingRoundItOnTheOncomingLaneIsAnEvent) {
       EXPECT_EQ(events({99.5f, y_m + aside_m}, 0, LightState::red), kEventRedLight) << y_m + aside_m;
       EXPECT_EQ(events({99.5f, y_m + aside_m}, 0.5f, LightState::red), kEventRedLight);
       EXPECT_EQ(events({99.5f, y_m + aside_m}, 0, LightState::green), kEventNone);
-      EXPECT_EQ(events({100.5f, y_m + aside_m}, kPi, LightState::red), kEventNone);  // who comes the other way
+      EXPECT_EQ(events({100.5f, y_m + aside_m}, kPi, LightState::red), kEventNone);  // oncoming traffic
     }
-    EXPECT_EQ(events({99.5f, -2.8f}, 0, LightState::red), kEventNone);  // to the right there is no such lane
+    EXPECT_EQ(events({99.5f, -2.8f}, 0, LightState::red), kEventNone);  // no oncoming lane to the right
   }
 }
 

@@ -1,4 +1,4 @@
-// The simulator as its users see it: worlds, spawning, episodes, determinism, saving, bad input.
+// The simulator's public behaviour: worlds, spawning, episodes, determinism, saving, bad input.
 #include "pictura/simulator/simulator.h"
 
 #include <array>
@@ -67,7 +67,7 @@ TEST(Simulator, RefusesWhatCannotBeAskedFor) {
   EXPECT_THROW(make_simulator("cpu", {}, CompiledMaps{}, {{0, 1, 0}}), UsageError);
   EXPECT_THROW(make({.dt_s = 0}, map, {{0, 1, 0}}), UsageError);
   EXPECT_THROW(make({.dt_s = NAN}, map, {{0, 1, 0}}), UsageError);
-  EXPECT_THROW(make({.dt_s = 0.11f}, map, {{0, 1, 0}}), UsageError);  // cars would jump over what is in their way
+  EXPECT_THROW(make({.dt_s = 0.11f}, map, {{0, 1, 0}}), UsageError);  // cars would jump over obstacles
   EXPECT_THROW(make({.episode_steps = 0}, map, {{0, 1, 0}}), UsageError);
   EXPECT_THROW(make({.pedestrian_fraction = 0.6f, .cyclist_fraction = 0.6f}, map, {{0, 1, 0}}), UsageError);
   SimulatorConfig config;
@@ -91,13 +91,13 @@ TEST(Simulator, RefusesMoreThanFitsBeforeItAllocates) {
   const auto refuse = [&worlds_of](const SimulatorConfig& config, std::shared_ptr<const RoadMap> map, int worlds) {
     return test::message_of<UsageError>([&] { make(config, std::move(map), worlds_of(worlds)); });
   };
-  // 4,194,304 agents alone with 4,096 parked cars each: 1.7e10 boxes.
+  // 4,194,304 single agents with 4,096 parked cars each: 1.7e10 boxes.
   EXPECT_THAT(refuse({.parked_cars = 4096}, testing::ring_road(40), kMaxSlots), HasSubstr("got 17184063488 ("));
   // 5,000 lights in each of 4,000 worlds.
   auto lit = testing::ring_road(40);
   for (int i = 0; i < 5000; ++i) testing::add_light(lit.get(), 0, 4, 1, {0});
   EXPECT_THAT(refuse(testing::cars(), lit, 4000), HasSubstr("lights in all, got 20000000 ("));
-  // A road of 5 km, with its own cells in each of 500,000 worlds.
+  // A road of 5 km, with separate cells in each of 500,000 worlds.
   EXPECT_THAT(refuse(testing::cars(), testing::stadium(5000, 1), 500'000), HasSubstr("cells of 25 m in all"));
 }
 
@@ -136,7 +136,7 @@ TEST(Simulator, RefusesActionsThatAreNotTheArrayThatItExpects) {
 }
 
 TEST(Simulator, SpawnsWithoutOverlapAndCountsRefusals) {
-  // A ring of 251 m holds some forty cars with half a metre of clearance; 200 are asked for.
+  // A ring of 251 m holds about forty cars with half a metre of clearance; 200 are requested.
   const auto simulator = make(testing::cars(), testing::ring_road(40), {{0, 200, 0}});
   const SpawnReport report = simulator->spawn_report();
   EXPECT_EQ(report.asked, 200);
@@ -157,7 +157,7 @@ TEST(Simulator, SpawnsWithoutOverlapAndCountsRefusals) {
     EXPECT_LE(a.length_m, 5.5f);
     EXPECT_GE(a.width_m, 1.6f);
     EXPECT_LE(a.width_m, 2.2f);
-    // On the ring, along it.
+    // Cars are on the ring, along it.
     EXPECT_NEAR(length(a.center_m.xy()), 40, 0.2);
     EXPECT_NEAR(a.center_m.x * a.cos_heading + a.center_m.y * a.sin_heading, 0, 2);
     for (size_t j = 0; j < i; ++j) {
@@ -167,9 +167,9 @@ TEST(Simulator, SpawnsWithoutOverlapAndCountsRefusals) {
     }
   }
   EXPECT_EQ(drawn, report.spawned);
-  // Absent agents' views can be drawn with the others'.
+  // Views of absent agents can be drawn with the other views.
   EXPECT_NO_THROW(check_views("cpu", scene, simulator->views()));
-  // Refusals do not stop the others; they are never valid.
+  // Refused spawns do not stop the other agents; the refused agents are never valid.
   const StepResult result = simulator->step(std::vector<int32_t>(200, kCoast));
   for (size_t i = 0; i < 200; ++i) EXPECT_EQ(result.valid[i], scene.agents[i].drawn);
 }
@@ -217,7 +217,7 @@ TEST(Simulator, EpisodesEndInTimeAndResetInTheNextStep) {
     EXPECT_EQ(simulator->episode_over()[0], step == 5);
   }
   EXPECT_EQ(simulator->episode_step()[0], 5);
-  EXPECT_EQ(simulator->state().x_m[0], first_x_m);                         // nobody moved: still the old episode
+  EXPECT_EQ(simulator->state().x_m[0], first_x_m);  // agents have not moved: still the old episode
   const StepResult result = simulator->step(std::vector<int32_t>(3, -7));  // ignored
   for (size_t i = 0; i < 3; ++i) {
     EXPECT_EQ(result.valid[i], 0);
@@ -257,7 +257,7 @@ TEST(Simulator, AWorldHolds4096Agents) {
 }
 
 TEST(Simulator, InfractionsTerminateAndTooManyOfThemEndTheEpisode) {
-  // Full throttle straight on leaves the ring; the fourth of ten to halt ends the episode.
+  // Full throttle straight on leaves the ring; the episode ends when the fourth of ten agents halts.
   const auto simulator = make(testing::cars(), testing::ring_road(40), {{0, 10, 0}});
   std::vector<int32_t> actions(10, 3 * kNumLatActions + 1);
   std::vector<uint8_t> halted(10, 0);
@@ -361,7 +361,7 @@ TEST(Simulator, SaveAndRestoreContinueIdentically) {
   equal();
 }
 
-/// The same bits in all that users see.
+/// Expects equal bits in all public outputs.
 void expect_equal(Simulator* a, Simulator* b) {
   EXPECT_EQ(a->save(), b->save());
   EXPECT_EQ(testing::first_difference(a->observations(), b->observations()), "");
@@ -471,7 +471,7 @@ TEST(Simulator, ASnapshotIsTheStateThatWas) {
   EXPECT_THROW(simulator->restore(*snapshot), Error);
 }
 
-/// The steps of the first and of the second episode of each world of one agent, under no jerk.
+/// Returns the steps of the first and second episodes of each one-agent world, under no jerk.
 std::array<std::vector<int32_t>, 2> episode_lengths(Simulator* simulator, int episode_steps) {
   const auto num_worlds = simulator->worlds().size();
   std::array<std::vector<int32_t>, 2> lengths{std::vector<int32_t>(num_worlds), std::vector<int32_t>(num_worlds)};
@@ -483,7 +483,7 @@ std::array<std::vector<int32_t>, 2> episode_lengths(Simulator* simulator, int ep
       if (!simulator->episode_over()[w]) continue;
       lengths[simulator->episode_index()[w]][w] = simulator->episode_step()[w];
       const bool drives = simulator->state().status[w] == AgentStatus::active;
-      EXPECT_EQ(result.truncated[w], drives) << w;  // agents that still drive at the end bootstrap
+      EXPECT_EQ(result.truncated[w], drives) << w;  // values of agents that still drive at the end bootstrap
       truncated += drives;
     }
   }
@@ -494,7 +494,7 @@ std::array<std::vector<int32_t>, 2> episode_lengths(Simulator* simulator, int ep
 TEST(Simulator, StaggeredWorldsEndTheirFirstEpisodesAtDifferentTimes) {
   constexpr int kSteps = 100, kWorlds = 200, kMinSteps = 64;
   SimulatorConfig config = testing::cars({.seed = 3, .episode_steps = kSteps, .reset_inactive_fraction = 2});
-  std::vector<WorldSpec> worlds;  // of one agent each, so that slots are worlds
+  std::vector<WorldSpec> worlds;  // worlds of one agent each, so that slots are worlds
   for (uint32_t w = 0; w < kWorlds; ++w) worlds.push_back({0, 1, w});
   const auto plain = make(config, testing::ring_road(40), worlds);
   for (const std::vector<int32_t>& whole : episode_lengths(plain.get(), kSteps)) {
@@ -508,9 +508,9 @@ TEST(Simulator, StaggeredWorldsEndTheirFirstEpisodesAtDifferentTimes) {
   EXPECT_THAT(second, ::testing::Each(kSteps));
   // The mean of 200 draws of U{64, ..., 100} is 82 +- 0.75.
   EXPECT_NEAR(std::accumulate(first.begin(), first.end(), 0.0) / kWorlds, 82, 3);
-  EXPECT_GE(std::set<int32_t>(first.begin(), first.end()).size(), 30u);  // of 37
+  EXPECT_GE(std::set<int32_t>(first.begin(), first.end()).size(), 30u);  // of 37 possible lengths
 
-  // Another seed has other lengths, and a reset to it those of a new simulator.
+  // Another seed gives other lengths; a reset to that seed gives the lengths of a new simulator.
   config.seed = 4;
   const auto other = make(config, testing::ring_road(40), worlds);
   const std::vector<uint8_t> all(kWorlds, 1);
@@ -568,7 +568,7 @@ TEST(Simulator, RestoreSaysWhatDiffers) {
   SimulatorConfig config;
   config.conditioning[3].high = 2;
   EXPECT_THAT(difference(config, make_map()), HasSubstr("conditioning"));
-  // A map with as many of everything, but one of them edited.
+  // Maps with equal counts of everything, but one element edited.
   const std::vector<std::function<void(RoadMap*)>> edits{
       [](RoadMap* map) { map->lane_points[5].position_m.z += 0.5f; },
       [](RoadMap* map) { map->lanes[2].speed_limit_mps = 11; },
@@ -654,7 +654,7 @@ TEST(Simulator, ObservationsAreNamedArraysOfOneList) {
   const std::vector<NamedArray> arrays = observation_arrays(all->observations(), 8, all->device());
   size_t expected = 0;
   for (const ObservationArray& listed : kObservationArrays) {
-    // Nothing is there of walls on a map without any.
+    // The array `walls` is absent on a map without walls.
     if (listed.name == "walls" && all->observations().walls.empty()) continue;
     ASSERT_LT(expected, arrays.size());
     const NamedArray& named = arrays[expected++];
@@ -687,7 +687,7 @@ TEST(Simulator, TotalsAreSubtractedFieldByField) {
 constexpr int32_t kFullThrottle = 3 * kNumLatActions + 1;
 
 TEST(Simulator, TotalsHaveEachRewardTermOfLiveAgents) {
-  // On straights all pass waypoints, in the first curve all leave the road.
+  // All agents pass waypoints on straights and leave the road in the first curve.
   SimulatorConfig config = testing::cars({.walls = false});
   const auto fix = [&config](Conditioning which, float value) {
     config.conditioning[static_cast<int>(which)] = {value, value, false};
@@ -728,7 +728,7 @@ TEST(Simulator, TotalsSayWhenAgentsBeganToMoveAndWhoPassedAWaypoint) {
   const auto simulator = make(testing::cars({.episode_steps = 60}), testing::stadium(400, 2), {{0, 10, 0}});
   const AgentStateView state = simulator->state();
   std::vector<int32_t> actions(10, kCoast);
-  // Agent i of the first half rests for 3 i steps; the others stay where they are.
+  // Agent i of the first half rests for 3 i steps; the other half stays in place.
   std::vector<int> first_motion(10, 0);
   for (int step = 1; step <= 60; ++step) {
     for (int i = 0; i < 5; ++i) actions[i] = step > 3 * i ? kFullThrottle : kCoast;
@@ -753,7 +753,7 @@ TEST(Simulator, TotalsSayWhenAgentsBeganToMoveAndWhoPassedAWaypoint) {
   ASSERT_GT(passed, 0);
   EXPECT_EQ(first.finished_passed_waypoint, passed);
 
-  // In the next episode nobody moves.
+  // In the next episode no agent moves.
   for (int step = 0; step <= 60; ++step) simulator->step(std::vector<int32_t>(10, kCoast));
   const SimulatorTotals& both = simulator->totals();
   EXPECT_EQ(both.finished_agent_episodes, 20);
@@ -803,7 +803,7 @@ TEST(Simulator, CyclistsAreSmallerAndSlower) {
 
 TEST(Simulator, ParkedCarsStandOffTheRoadAndInTheWay) {
   auto map = testing::ring_road(40);
-  // A sidewalk outside the outer edge, at 42 m: cars of 1.6 to 2.2 m stand 0.2 m from it.
+  // A sidewalk outside the outer edge, at 42 m: cars of 1.6 to 2.2 m stand 0.2 m from the sidewalk.
   Lane sidewalk;
   sidewalk.type = LaneType::sidewalk;
   sidewalk.points.begin = static_cast<int32_t>(map->lane_points.size());
@@ -826,7 +826,7 @@ TEST(Simulator, ParkedCarsStandOffTheRoadAndInTheWay) {
     const AgentBox& box = scene.agents[i];
     EXPECT_EQ(box.palette, 2);
     EXPECT_NEAR(length(box.center_m.xy()), 42.2f + 0.5f * box.width_m, 0.1);
-    // As the counter-clockwise traffic.
+    // Parked cars head in the direction of the counter-clockwise traffic.
     EXPECT_GT(box.center_m.x * box.sin_heading - box.center_m.y * box.cos_heading, 40);
   }
   const AgentBox first = scene.agents[4];
@@ -834,7 +834,7 @@ TEST(Simulator, ParkedCarsStandOffTheRoadAndInTheWay) {
   run(simulator.get(), 10);
   EXPECT_EQ(scene.agents[4].center_m.x, first.center_m.x);
   run(simulator.get(), 30, 10);
-  EXPECT_NE(scene.agents[4].center_m.x, first.center_m.x);  // another episode
+  EXPECT_NE(scene.agents[4].center_m.x, first.center_m.x);  // a new episode
   simulator->reset();
   EXPECT_EQ(simulator->state_hash(), hash);
 }
@@ -859,7 +859,7 @@ TEST(Simulator, NobodySpawnsAcrossAStopLine) {
 
 TEST(Simulator, AWorldWithNobodyEndsAfterOneStep) {
   SimulatorConfig config = testing::cars();
-  config.pedestrian_fraction = 1;  // and there is no walkway
+  config.pedestrian_fraction = 1;  // the map has no walkway
   const auto simulator = make(config, testing::ring_road(40), {{0, 5, 0}});
   EXPECT_EQ(simulator->spawn_report().refused_no_place, 5);
   const std::vector<int32_t> actions(5, kCoast);
@@ -872,7 +872,7 @@ TEST(Simulator, AWorldWithNobodyEndsAfterOneStep) {
   EXPECT_EQ(simulator->totals().agent_steps, 0);
 }
 
-/// On a real town: long enough for every event to happen, the counts must fit together.
+/// A real town: in a run long enough for every event to happen, the counts must be consistent.
 TEST(Simulator, Town01HoldsTogether) {
   const char* data = std::getenv("PICTURA_DATA");
   if (!data) GTEST_SKIP() << "PICTURA_DATA names no folder of maps";
@@ -881,7 +881,7 @@ TEST(Simulator, Town01HoldsTogether) {
   for (const int threads : {1, 2, 3}) {
     const auto simulator = make({.num_threads = threads}, map, {{0, 60, 0}, {0, 60, 1}});
     EXPECT_EQ(simulator->spawn_report().refused, 0);
-    // Nobody spawns in an infraction: a step without moving is no event.
+    // Agents never spawn in an infraction: a step without moving has no events.
     simulator->step(std::vector<int32_t>(120, kCoast));
     EXPECT_EQ(simulator->totals().collisions + simulator->totals().off_road + simulator->totals().red_light, 0);
     run(simulator.get(), 300);

@@ -14,7 +14,7 @@ Stage::Stage(std::shared_ptr<const RoadMap> map, int num_agents, const Simulator
       set(agent, static_cast<Conditioning>(c), c < kNumRewardConditioning ? kPaperConditioning[c].low : 1.0f);
     }
     worlds.state.boxes[i] = worlds.state.boxes_before[i] = box_of(worlds.state.agents.view(), agent);
-    // Out of everybody's way until a test sets other ones.
+    // Waypoints are out of all agents' way until a test sets others.
     for (size_t k = 0; k < kNumWaypoints; ++k) worlds.state.agents.waypoint_x_m[i * kNumWaypoints + k] = 1e6f;
   }
   for (LightState& light : worlds.state.lights) light = LightState::green;
@@ -40,7 +40,7 @@ void Stage::put(int agent, Vec2 position_m, float heading_rad, float speed_mps) 
 }
 
 void Stage::sort_boxes() {
-  // Everybody into one list per cell, by brute force.
+  // Put all boxes into one list per cell, by brute force.
   CellLists& cells = worlds.box_cells[0];
   const GridView view = cells.view();
   cells.items.clear();

@@ -1,4 +1,4 @@
-// A world whose agents a test puts where it wants them, stepped phase by phase through the rules.
+// A world whose agents a test places, stepped phase by phase through the rules.
 #pragma once
 
 #include <memory>
@@ -15,14 +15,14 @@ constexpr int32_t kCoast = 2 * kNumLatActions + 1;  // no jerk
 
 class Stage {
  public:
-  /// num_agents vehicles of 4 x 2 m, absent until they are put somewhere; all conditioning at `low` of the paper's
-  /// ranges but for the dynamics multipliers, which are 1; lights green.
+  /// Makes num_agents vehicles of 4 x 2 m, absent until put() places them. All conditioning is `low` of the paper's
+  /// ranges except the dynamics multipliers, which are 1. Lights are green.
   Stage(std::shared_ptr<const RoadMap> map, int num_agents, const SimulatorConfig& config = cars());
 
-  /// Puts the rear axle there and finds the lane.
+  /// Puts the rear axle at `position_m` and finds the lane.
   void put(int agent, Vec2 position_m, float heading_rad, float speed_mps);
   void set(int agent, Conditioning which, float value);
-  /// The same action for everybody. Returns the rewards.
+  /// Steps all agents with the same action. Returns the rewards.
   std::vector<float> step(int32_t action = kCoast);
   int events(int agent) const { return worlds.state.agents.events[agent]; }
   WorldView world() { return worlds.world(0); }

@@ -81,7 +81,7 @@ std::shared_ptr<RoadMap> ring_road(float radius_m) {
     const float begin = kHalfPi * static_cast<float>(quarter);
     const Arc middle = make_arc({}, radius_m, begin, begin + kHalfPi);
     add_lane(map.get(), middle.points, middle.headings);
-    // Drivable to the right of an edge: the outer one runs against the traffic.
+    // The road is to the right of an edge, so the outer edge runs against the traffic.
     const Arc outer = make_arc({}, radius_m + 0.5f * kLaneWidth_m, begin, begin + kHalfPi);
     add_edges(map.get(), make_arc({}, radius_m - 0.5f * kLaneWidth_m, begin, begin + kHalfPi).points);
     add_edges(map.get(), {outer.points.rbegin(), outer.points.rend()});

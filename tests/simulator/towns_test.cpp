@@ -1,4 +1,4 @@
-// What must hold in every town: everybody is accounted for, parked cars leave the lanes free, and goals can be reached.
+// Properties of every town: all agents are accounted for, parked cars leave the lanes free, and goals can be reached.
 #include <cmath>
 
 #include <fmt/format.h>
@@ -23,7 +23,7 @@ SimulatorConfig whole_world() {
   return config;
 }
 
-/// A world at the start of its first episode, as the rules see it.
+/// Returns a world at the start of its first episode, as the rules see it.
 std::unique_ptr<HostWorlds> first_step(const SimulatorConfig& config, std::shared_ptr<const RoadMap> map, int agents) {
   const auto simulator = make_simulator("cpu", config, {std::move(map)}, {{0, agents, 0}});
   auto worlds = std::make_unique<HostWorlds>(SimulatorSetup(config, simulator->maps(), {}, simulator->worlds()));
@@ -31,7 +31,7 @@ std::unique_ptr<HostWorlds> first_step(const SimulatorConfig& config, std::share
   return worlds;
 }
 
-/// The eight CARLA towns where they are, and procedural ones everywhere.
+/// Returns the eight CARLA towns where they are installed, and procedural towns everywhere.
 std::vector<std::string> all_towns() {
   std::vector<std::string> towns = known_towns();
   for (const char* town : {"procedural:1", "procedural:2", "city:1", "city:2"}) towns.emplace_back(town);
@@ -61,7 +61,7 @@ TEST(Towns, AccountForEveryAgentThatIsAskedFor) {
   }
 }
 
-/// Points all over a box.
+/// Returns points all over a box.
 std::vector<Vec2> points_of(const AgentBox& box) {
   const OrientedBox print = footprint(box);
   std::vector<Vec2> points;
@@ -110,7 +110,7 @@ TEST(Towns, EveryGoalCanBeReached) {
     const auto map = load_map(town);
     const auto worlds = first_step(whole_world(), map, 150);
     const WorldView world = worlds->world(0);
-    // What is drawn again is what the agents were given.
+    // The redrawn waypoints are the agents' waypoints.
     for (int agent = 0; agent < 150; ++agent) {
       if (!is_active(world, agent)) continue;
       const auto places = goal_places(world, agent, 0, start_place(world, agent));
@@ -128,7 +128,7 @@ TEST(Towns, EveryGoalCanBeReached) {
   }
 }
 
-/// The count above must be able to find what is cut off.
+/// Checks that the count above detects unreachable goals.
 TEST(Towns, GoalsBeyondAWallCannotBeReached) {
   const auto map = testing::stadium(200, 1);
   for (const float y_m : {-5.0f, -8.0f}) {
@@ -144,7 +144,7 @@ TEST(Towns, GoalsBeyondAWallCannotBeReached) {
     return on_walkways.unreachable;
   };
   EXPECT_EQ(unreachable(), 0);
-  // A wall across one of the two; the first piece of a building line always stands.
+  // A wall across one of the two sidewalks; the first piece of a building line always stands.
   map->building_lines = {{{100, -9, 0}, {100, -7, 0}}};
   EXPECT_GT(unreachable(), 0);
 }

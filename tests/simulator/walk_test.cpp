@@ -1,4 +1,4 @@
-// Pedestrians: the walkways that a map gives them, where they stand and go, and what counts for them.
+// Pedestrians: the walkways that a map gives them, where they stand and go, and their events.
 #include <chrono>
 #include <cmath>
 #include <set>
@@ -37,7 +37,7 @@ MapRules world_map(const RoadMap& map) { return make_map_rules(map, {}); }
 
 float total_m(const Walkways& walkways) { return walkways.end_m.empty() ? 0 : walkways.end_m.back(); }
 
-/// Sets of pieces between which one can walk.
+/// Returns the number of sets of pieces that are connected for walking.
 int networks(const Walkways& walkways) {
   std::vector<int> mark(walkways.pieces.size(), -1);
   int count = 0;
@@ -103,7 +103,7 @@ TEST(Walkways, CrosswalksLeadOverTheRoad) {
 
 TEST(Walkways, LeaveOutWhatLiesOnTheRoadAndWhatLeadsNowhere) {
   auto map = street();
-  // Over the road and on to a stub of 30 m: neither is there to walk on.
+  // Sidewalks over the road and onto a stub of 30 m: neither is a walkway.
   testing::add_side_lane(map.get(), LaneType::sidewalk, straight({20, -1}, {20, 1}, 1));
   testing::add_side_lane(map.get(), LaneType::sidewalk, straight({20, 10}, {20, 40}, 3));
   EXPECT_NEAR(total_m(world_map(*map).walkways), 2 * 400, 1);
@@ -124,7 +124,8 @@ TEST(Walkways, StrollsHaveTheirLengthAndTurnBackAtDeadEnds) {
   for (uint32_t i = 0; i < 200; ++i) {
     RandomStream random({.seed = 1, .agent = i, .purpose = Purpose::goals});
     const RoutePoint from{static_cast<int32_t>(i % view.walk_pieces.size()), 0.5f};
-    // Shorter than the way to the far end and back: the way from A to B is the distance, or mirrored at one end.
+    // The distance is shorter than the way to the far end and back. So the way from A to B is the distance, or is
+    // mirrored at one end.
     const float distance_m = random.uniform(20, 60);
     const RoutePoint to = stroll(view, from, distance_m, &random);
     const LanePose a = pose_on_walk(view, from.lane, from.s_m), b = pose_on_walk(view, to.lane, to.s_m);

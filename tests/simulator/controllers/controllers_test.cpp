@@ -24,7 +24,7 @@ Command absence() {
   return command;
 }
 
-/// The agent's own pose, moved.
+/// Returns a command that moves the agent from its own pose.
 Command moved(const AgentStateView& state, int slot, float ahead_m, float speed_mps) {
   Command command;
   command.kind = CommandKind::kinematic_state;
@@ -53,7 +53,7 @@ TEST(Controller, RandomActionsAreKeyedByWorldAgentAndStep) {
   EXPECT_GT(simulator->totals().episodes, 0) << "steps go on over episodes";
 }
 
-// Slots 0 and 4,096 drew alike as long as actions were keyed by slot.
+// Random actions differ between slots. Slots 0 and 4,096 once drew alike, when actions were keyed by slot.
 TEST(Controller, RandomActionsOfManySlotsDiffer) {
   const auto simulator =
       make(testing::cars({.vector_observations = false}), testing::stadium(1500, 2), {{0, 4090, 0}, {0, 100, 1}});
@@ -118,7 +118,7 @@ TEST(Controller, LaneKeepingNeedsTheEpisodesFirstStep) {
   const auto simulator = make(testing::cars({.episode_steps = 20}), testing::stadium(200, 2), {{0, 3, 0}});
   const auto controller = make_controller("lane", *simulator, 0);
   std::vector<Command> commands(3);
-  for (int step = 0; step < 50; ++step) {  // over two ends of episodes
+  for (int step = 0; step < 50; ++step) {  // passes the ends of two episodes
     controller->act(simulator->arrays(), {}, commands);
     simulator->step(commands);
   }
@@ -195,13 +195,13 @@ TEST(Commands, TheAbsentLeaveTheirEpisode) {
   EXPECT_EQ(result.valid[1], 0);
   EXPECT_EQ(result.terminated[1] + result.truncated[1], 0);
   EXPECT_EQ(simulator->totals().agent_steps, 2);
-  // Where it was, another may stand; and commands to it mean nothing.
+  // Another agent may stand at the removed agent's place. Commands to the absent agent have no effect.
   commands[0] = moved(simulator->state(), 1, 0, 0);
   commands[1].kind = static_cast<CommandKind>(9);
   result = simulator->step(commands);
   EXPECT_EQ(simulator->state().events[0] & kEventCollision, 0);
   EXPECT_EQ(result.valid[1], 0);
-  // A saved state holds them.
+  // A saved state holds absent agents.
   const auto other = make(testing::cars({.reset_inactive_fraction = 2}), testing::stadium(200, 2), {{0, 3, 0}});
   EXPECT_NO_THROW(other->restore(simulator->save()));
   simulator->reset();

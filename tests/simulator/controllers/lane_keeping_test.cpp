@@ -1,5 +1,5 @@
-// The lane-keeping controller, and in every town: keeping one's lane and stopping at red lights causes no infraction,
-// and reaches goals.
+// The lane-keeping controller, also in every town: keeping the lane and stopping at red lights cause no
+// infractions, and agents reach their goals.
 #include "pictura/simulator/controllers/lane_keeping.h"
 
 #include <fmt/format.h>
@@ -23,7 +23,7 @@ std::vector<std::string> towns_to_drive() {
   return towns;
 }
 
-/// Nothing may halt an agent, and it seldom leaves the middle of the lane.
+/// Expects that nothing halts an agent, and that it seldom leaves the middle of its lane.
 void expect_lane_keeping(const std::vector<std::string>& towns, float cyclist_fraction, int drivers, int drivers_each,
                          int steps) {
   for (const std::string& town : towns) {
@@ -69,9 +69,9 @@ TEST(LaneKeeping, OfACarKeepsItsLaneAndStopsAtRedLightsInTwentyCities) {
 
 TEST(LaneKeeping, OfThreeTouchesNoOtherInEveryTown) { expect_lane_keeping(towns_to_drive(), 0.2f, 48, 3, 600); }
 
-/// As many as in evaluation's medium density. Of these 1,080 agents 277 halted as long as they relied on the one ahead
-/// to brake and did not look beside them before changing lanes; now 10: five pairs where one changes lanes in a bend,
-/// of which it expects others to go on straight. None leaves the road.
+/// As many agents as in the evaluation's medium density. 277 of these 1,080 agents halted when agents relied on the
+/// agent ahead to brake and did not look beside them before lane changes. Now 10 halt: five pairs where one agent
+/// changes lanes in a bend and predicts that others go straight on. None leaves the road.
 TEST(LaneKeeping, OfATownFullOfTrafficSeldomCollides) {
   std::vector<std::string> towns = known_towns();
   towns.emplace_back("procedural");
@@ -98,7 +98,7 @@ std::string section_of(double s, const std::string& lanes) {
       R"(<laneSection s="{}"><center><lane id="0" type="none"/></center><right>{}</right></laneSection>)", s, lanes);
 }
 
-/// Half of a ring that roads 1 and 2 make, of lanes to the right of a circle of that radius about the origin.
+/// Half of a ring made by roads 1 and 2, with lanes to the right of a circle of `radius_m` around the origin.
 RoadText half_ring(const std::string& id, double radius_m, const std::string& lanes) {
   const bool is_first = id == "1";
   RoadText road;
@@ -117,8 +117,8 @@ constexpr const char* kOnward1 = R"(<link><predecessor id="-1"/><successor id="-
 constexpr const char* kOnward2 = R"(<link><predecessor id="-2"/><successor id="-2"/></link>)";
 constexpr const char* kOnward3 = R"(<link><predecessor id="-3"/><successor id="-3"/></link>)";
 
-/// A road of sections of 11 m, too short for a lane change, that leads into a ring of two lanes. A waypoint on it that
-/// was missed cannot be reached again.
+/// A road of 11 m long sections, too short for a lane change, that leads into a ring of two lanes. A missed waypoint on
+/// the road cannot be reached again.
 std::string short_sections_into_a_ring() {
   const std::string both = test::lane_of(-1, "driving", 3.5, kOnward1) + test::lane_of(-2, "driving", 3.5, kOnward2);
   RoadText entry;
@@ -130,7 +130,7 @@ std::string short_sections_into_a_ring() {
   return test::file_of(half_ring("1", 40, both).text() + half_ring("2", 40, both).text() + entry.text());
 }
 
-/// A ring of which one half has three lanes, two of which end with it.
+/// A ring with three lanes in one half, two of which end with that half.
 std::string through_lane_two_changes_away() {
   const std::string through = test::lane_of(-3, "driving", 3.5, kOnward3);
   const auto with = [&](const char* type) {
@@ -139,7 +139,7 @@ std::string through_lane_two_changes_away() {
   return test::file_of(half_ring("1", 75, with("driving")).text() + half_ring("2", 75, with("none")).text());
 }
 
-/// A street of 100 m along x with a lane of that width each way, and at both ends a way back, whose middle turns within
+/// A street of 100 m along x with a lane of `lane_m` each way. Both ends have a turnaround whose middle turns within
 /// 4 m.
 std::string turnarounds(double lane_m) {
   RoadText street;
@@ -200,7 +200,7 @@ TEST(LaneKeeping, StaysOnTheRoadWhereWideLanesTurn) {
   }
 }
 
-/// The cars in front stop, and those behind them.
+/// The front cars stop, and the cars behind them stop too.
 TEST(LaneKeeping, InAQueueBeforeATurnStaysOnTheRoad) {
   float distance_m = 0;
   for (const DrivenEpisode& driven : drive_turnarounds(8, 0.2f, 1, 8)) {
@@ -230,7 +230,7 @@ TEST(LaneKeeping, ReachesAThroughLaneTwoChangesAway) {
     for (const DrivenEpisode& driven :
          drive_lane_keeping_episodes(map, {.seed = seed, .num_threads = 1, .cyclist_fraction = 0.1f}, 4, 1, 600)) {
       goals += driven.goals;
-      // One starts too near to the end of its lane to turn.
+      // One agent starts too near the end of its lane to turn.
       EXPECT_EQ(driven.halt_reason, kEventNone) << seed << " at " << driven.end_m.x << ' ' << driven.end_m.y;
     }
   }
@@ -251,7 +251,7 @@ TEST(Idm, StaysOnTheRoadWhereTheThroughLaneIsTwoChangesAway) {
   EXPECT_GT(simulator->totals().distance_m, 3 * 2000);
 }
 
-/// Paths advance evenly, and in the direction that they say.
+/// Expects that paths advance evenly, and in the direction of their headings.
 void expect_smooth(const std::vector<PathPoint>& points) {
   for (size_t i = 1; i < points.size(); ++i) {
     const Vec2 way = (points[i].position_m - points[i - 1].position_m).xy();
@@ -267,7 +267,7 @@ TEST(LanePath, DrawsALaneChangeOutOverTheRoomThereIs) {
   testing::Stage stage(map, 1);
   const LaneGraph graph(*map);
   const MapView view = stage.world().map;
-  // From the outer lane, at y = 0, to the inner one, at y = 4.
+  // A change from the outer lane, at y = 0, to the inner lane, at y = 4.
   for (const float room_m : {14.0f, 20.0f, 60.0f}) {
     LanePath path(view, graph, {0, 50});
     ASSERT_TRUE(path.go_to({4, 50 + room_m}));
@@ -306,7 +306,7 @@ TEST(LanePath, SlowsDownBeforeCurves) {
   EXPECT_LE(points[slow].speed_mps, 3);
   for (size_t i = 0; i + 1 < points.size(); ++i) {
     EXPECT_LE(square(points[i].speed_mps) - square(points[i + 1].speed_mps), 2 * 1.0f * LanePath::kSpacing_m + 0.01f);
-    // Half circles of 20 m at 1.5 m/s^2.
+    // Speed on half circles of radius 20 m at 1.5 m/s^2.
     if (points[i].at.lane == 1 && std::fabs(points[i].at.s_m - 10 * kPi) < 10 * kPi - 2) {
       EXPECT_NEAR(points[i].speed_mps, std::sqrt(30.0f), 0.2f);
     }
@@ -337,7 +337,7 @@ struct LongCarOnARing {
 };
 
 TEST(SteeringSearch, FindsTheWayRoundThatTheMiddleOfTheLaneIsNot) {
-  // From 4.5 to 8.5 m: the axle's circle is to be between 5.6 and 6.17 m, where the lane's middle is at 6.5 m.
+  // The road runs from 4.5 to 8.5 m. The axle's circle must be between 5.6 and 6.17 m; the lane's middle is at 6.5 m.
   LongCarOnARing car(6.5f, 6);
   const DrivenAgent agent(car.stage.world(), 0);
   Motion middle = agent.now();
@@ -386,7 +386,7 @@ TEST(SteeringSearch, EndsAtAnExit) {
 }
 
 TEST(SteeringSearch, SaysHowFarItGetsWhereNoCarCan) {
-  // From 3.4 to 7.4 m: the front corner of the tightest circle is 7.83 m from the centre.
+  // The road runs from 3.4 to 7.4 m. On the tightest circle the front corner is 7.83 m from the centre.
   LongCarOnARing car(5.4f, 4.6f);
   const DrivenAgent agent(car.stage.world(), 0);
   size_t nodes_left = 500'000;
