@@ -1,4 +1,4 @@
-// Pictures and videos for people: single pixels, sizes and files.
+// Pictures and videos for viewers: single pixels, sizes and files.
 #include "pictura/drawing/drawing.h"
 
 #include <algorithm>
@@ -53,7 +53,7 @@ Pixel at(const RgbImage& image, int x, int y) {
 }
 Pixel at(const RgbImage& image, Vec2 p) { return at(image, static_cast<int>(p.x), static_cast<int>(p.y)); }
 
-/// The largest difference of a channel.
+/// Returns the maximum difference of a channel.
 int distance(Pixel a, Pixel b) { return std::max({std::abs(a.r - b.r), std::abs(a.g - b.g), std::abs(a.b - b.b)}); }
 
 int count(const RgbImage& image, Pixel wanted) {
@@ -64,7 +64,7 @@ int count(const RgbImage& image, Pixel wanted) {
   return found;
 }
 
-// From the palette: a vehicle's back and front, and a cyclist's back.
+// Colours of the palette: a vehicle's back and front, and a cyclist's back.
 constexpr Pixel kVehicleBody{76, 201, 240}, kVehicleMark{247, 37, 133}, kCyclistBody{251, 133, 0};
 constexpr Pixel kGround{238, 240, 232};
 
@@ -183,7 +183,7 @@ TEST(WorldPainter, RingsShowHaltReasonsAndTheLegendCountsThem) {
   EXPECT_EQ(ring(2), kGround);
   EXPECT_LT(distance(ring(3), off_road), 20);
   EXPECT_EQ(count(image, wall), 100) << "in the legend alone, a square of 10 px";
-  // Other counts change the legend; its digits are in the bottom left corner.
+  // Other counts change the legend, whose digits are in the bottom left corner.
   reasons[1] = kEventCollision;
   const RgbImage more = painter.draw(frame, camera);
   int different = 0;
@@ -221,7 +221,7 @@ TEST(WorldPainter, LinesLeadToGoals) {
 }
 
 TEST(WorldPainter, MovingTheCameraOnlyShiftsThePicture) {
-  // 8 px a metre, so that 16 m are 128 px and the cached tiles are cropped differently.
+  // At 8 px a metre 16 m are 128 px, so the cached tiles are cropped differently.
   WorldPainter painter(town(), 640, 480), fresh(town(), 640, 480);
   const Vec2 middle = town().points_of(town().lanes[0])[0].position_m.xy();
   const RgbImage a = painter.draw({}, painter.around(middle, 80));
@@ -233,7 +233,7 @@ TEST(WorldPainter, MovingTheCameraOnlyShiftsThePicture) {
   EXPECT_EQ(different, 0);
   EXPECT_GT(static_cast<int>(a.rgb.size()) / 3 - count(a, kGround), 5000);  // not an empty picture
   EXPECT_EQ(fresh.draw({}, fresh.around(middle + Vec2{16, 0}, 80)).rgb, b.rgb);
-  // Another scale, and back.
+  // Draw at another scale, then at the first one again.
   painter.draw({}, painter.whole_map());
   EXPECT_EQ(painter.draw({}, painter.around(middle, 80)).rgb, a.rgb);
 }
@@ -361,7 +361,7 @@ class StillSimulator final : public Simulator {
   std::vector<AgentBox> agents_;
   std::vector<int32_t> world_begin_, light_begin_;
   std::vector<LightState> lights_;
-  // Only slot 2 has waypoints, and has passed the first.
+  // Only slot 2 has waypoints, and it has passed the first.
   std::vector<AgentStatus> status_{AgentStatus::active, AgentStatus::active, AgentStatus::active, AgentStatus::halted};
   std::vector<uint8_t> halt_reason_{0, 0, 0, kEventWall};
   std::vector<int32_t> next_waypoint_{0, 0, 1, 0};
@@ -375,15 +375,15 @@ TEST(DrawWorld, ShowsTheAgentsOfOneWorldAndFollowsOne) {
   const RgbImage image = draw_world(painter, simulator, 1, 0, 40);
   EXPECT_EQ(at(image, 200 + 15, 150), kVehicleBody);  // slot 0 of world 1 drives west
   EXPECT_EQ(at(image, 200 - 12, 150), kVehicleMark);
-  EXPECT_EQ(at(image, 185, 50), kGround);        // of world 0
+  EXPECT_EQ(at(image, 185, 50), kGround);        // an agent of world 0
   EXPECT_NE(at(image, 385, 150), kVehicleBody);  // halted
   EXPECT_NE(at(image, 385, 150), kGround);
   const Pixel parked = at(image, 185, 250);
   EXPECT_NE(parked, kVehicleBody);
   EXPECT_NE(parked, kGround);
   const Pixel halo{255, 228, 92};
-  EXPECT_EQ(at(image, 250, 150), halo);  // the waypoint ahead
-  EXPECT_EQ(at(image, 250, 100), halo);  // the one after it
+  EXPECT_EQ(at(image, 250, 150), halo);  // the next waypoint
+  EXPECT_EQ(at(image, 250, 100), halo);  // the waypoint after the next one
   EXPECT_EQ(at(image, 250, 200), kGround) << "a passed waypoint is not drawn";
   EXPECT_EQ(count(draw_world(painter, simulator, 0), halo), 0);
   EXPECT_THAT(test::message_of([&] { draw_world(painter, simulator, 2); }), HasSubstr("[0, 2), got 2"));
@@ -412,11 +412,11 @@ RoadMap one_road() {
   return parse_opendrive(test::file_of(road.text()), "one_road");
 }
 
-/// A picture of the 80 m x 30 m around the middle of one_road(), and the pixels of its points.
+/// A picture of the 80 m x 30 m around the middle of one_road(), and the pixels of the road's points.
 struct Closeup {
   explicit Closeup(const RoadMap& road_map)
       : map(road_map), image(draw_map(map, {.size_px = 800, .box = FileBox{1010, 485, 1090, 515}})) {}
-  /// The layout of draw_map: margins of 28 px and a strip of 36 px below, at half of its 1600 px.
+  /// Reads a pixel by the layout of draw_map(): margins of 28 px and a strip of 36 px below, at half of its 1600 px.
   Pixel at_m(float x_m, float y_m) const {
     constexpr float kPxPerM = (800 - 28) / 80.0f;
     return at(image,
@@ -459,7 +459,7 @@ TEST(DrawMap, HeadsShowTheirDirectionAndAngle) {
   const Pixel phase{255, 122, 26};
   EXPECT_EQ(closeup.at_m(60, 8), phase) << "the head";
   EXPECT_EQ(closeup.at_m(60, -2), phase) << "its stop line";
-  const auto around = [&](float angle_deg) {  // from the direction that it faces
+  const auto around = [&](float angle_deg) {  // from the direction that the light faces
     const float angle_rad = kPi + angle_deg * kPi / 180;
     return closeup.at_m(60 + 4 * std::cos(angle_rad), 8 + 4 * std::sin(angle_rad));
   };
@@ -496,7 +496,7 @@ TEST(DrawMap, ParkingSpacesBesideTheRoadAreInThePicture) {
   const int of_the_road_px = height_px();
   road.rest =
       R"(<objects><object id="1" type="parkingSpace" s="50" t="-20" zOffset="0" hdg="0" length="5" width="2.5"/></objects>)";
-  const double px_per_m = 8;  // at least: 100 m on 800 px, but for margins
+  const double px_per_m = 8;  // at least: 100 m on 800 px, less margins
   EXPECT_GT(height_px(), of_the_road_px + 0.8 * 17 * px_per_m);
 }
 
@@ -552,7 +552,7 @@ TEST(ContactSheet, EnlargesEveryPixelWithoutSmoothing) {
     }
   }
   EXPECT_EQ(at(sheet, x0 + 3, y0 + 3), (Pixel{255, 0, 0}));
-  // The rest of that image is black around it: 5 pixels to the left, 2 to the right, 3 above, 2 below.
+  // The rest of that image is black around the pixel: 5 pixels to the left, 2 to the right, 3 above, 2 below.
   EXPECT_EQ(at(sheet, x0 - 1, y0), (Pixel{0, 0, 0}));
   EXPECT_EQ(at(sheet, x0 - 5 * 4, y0 - 3 * 4), (Pixel{0, 0, 0}));
   EXPECT_NE(at(sheet, x0 - 5 * 4 - 1, y0), (Pixel{0, 0, 0}));
@@ -567,7 +567,7 @@ TEST(ContactSheet, GoesOnOnFurtherPagesAndRowsWhereThereIsNoRoom) {
   std::vector<std::string> names;
   for (int view = 0; view < 80; ++view) names.push_back(std::to_string(view));
   HostImages images(rig, 80);
-  // The first pixel of the first and the last view.
+  // Set the first pixel of the first and the last view.
   for (const int view : {0, 79}) {
     static_cast<uint8_t*>(images.camera(0).data)[view * images.camera(0).view_stride] = 255;
   }
@@ -595,7 +595,7 @@ TEST(Interrupts, EndDrawingsButNotThoseThatBeginAfterwards) {
   EXPECT_EXIT(
       {
         catch_interrupts();
-        // Seconds of work, which the signal finds begun.
+        // Encoding takes seconds, so the signal arrives during the work.
         const std::vector<uint8_t> rgb(size_t{3} * 12000 * 12000);
         std::thread soon([] {
           std::this_thread::sleep_for(std::chrono::milliseconds(300));
@@ -765,7 +765,7 @@ TEST(Video, ReportsThatFfmpegIsMissing) {
   EXPECT_EQ(folder.num_entries(), 0u);
 }
 
-// Puts a program that is called ffmpeg, of these lines, into a folder.
+// Writes a program named ffmpeg with these lines into a folder.
 void write_ffmpeg(const ScratchFolder& programs, const std::string& lines) {
   std::ofstream(programs / "ffmpeg") << "#!/bin/sh\n" << lines;
   fs::permissions(programs / "ffmpeg", fs::perms::owner_all);
@@ -792,7 +792,7 @@ TEST(Video, ReportsFfmpegsLastLine) {
   const std::string file = folder / "film.mp4";
   const std::string message = test::message_of([&] {
     VideoWriter video(file, 640, 480, 10);
-    // More than any socket buffers, so that the writer must handle the closed end.
+    // More frames than any socket buffers, so that the writer must handle the closed end.
     for (int i = 0; i < 30; ++i) video.add(solid(640, 480, {0, 0, 0}));
     video.finish();
   });
