@@ -1,5 +1,5 @@
-// What must not change an image: moving or mirroring the whole world, dividing lines, adding hidden agents, the number
-// of threads and the order of the input.
+// Changes that leave an image unchanged: moving or mirroring the whole world, dividing lines, adding hidden agents, the
+// number of threads and the order of the input.
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -10,7 +10,7 @@
 namespace pictura {
 namespace {
 
-// Area of the convex hull of some points, by A. Andrew's monotone chain.
+// Returns the area of the points' convex hull, by A. Andrew's monotone chain.
 double hull_area(std::vector<Vec2> points) {
   std::sort(points.begin(), points.end(), [](Vec2 a, Vec2 b) { return a.x < b.x || (a.x == b.x && a.y < b.y); });
   std::vector<Vec2> hull;
@@ -55,13 +55,12 @@ TEST(Invariance, AWallInFrontHidesAnAgentToTheLastBit) {
   const RendererConfig config{.rig = paper_rig(97, 55), .num_threads = 1};
   EXPECT_EQ(draw(geometry, scene_of({near, hidden}), views, config).rgb,
             draw(geometry, scene_of({near}), views, config).rgb);
-  // Without the wall it is visible.
+  // Without the wall the hidden agent is visible.
   const StaticGeometry open = no_geometry();
   EXPECT_NE(draw(open, scene_of({near, hidden}), views, config).rgb, draw(open, scene_of({near}), views, config).rgb);
 }
 
-/// Far cars behind a wall of many pieces: slivers of them lie in pixels that pieces fill, alone or two of them
-/// together.
+/// Far cars behind a wall of many pieces: slivers of the cars lie in pixels that one piece or two pieces together fill.
 TEST(Invariance, WhatIsHiddenBehindPiecesOfAWallLeavesNoSliver) {
   std::vector<AgentBox> hidden;
   for (int i = 0; i < 40; ++i) {
@@ -87,7 +86,7 @@ TEST(Invariance, WhatIsHiddenBehindPiecesOfAWallLeavesNoSliver) {
     geometry.build_grids();
     const std::vector<float> with = draw(geometry, scene_of(hidden), views, config).rgb,
                              without = draw(geometry, scene_of({}), views, config).rgb;
-    // The front camera sees nothing but the wall.
+    // The front camera sees only the wall.
     for (std::size_t k = 0; k < std::size_t{3} * 32 * 18; ++k) {
       ASSERT_NEAR(with[k], without[k], kRounding) << i << ", " << k;
     }
@@ -120,7 +119,7 @@ void expect_close(const std::vector<float>& a, const std::vector<float>& b) {
 
 constexpr SinCos kNoTurn{.sin = 0, .cos = 1};
 
-// The town moved by a rotation about z, a shift, or a mirroring of y.
+// Returns the town moved by a rotation about z, a shift, or a mirroring of y.
 Snapshot moved(const Snapshot& town, SinCos turn, Vec3 shift_m, bool mirror) {
   auto direction = [&](Vec2 v) {
     if (mirror) v.y = -v.y;
@@ -173,7 +172,7 @@ TEST(Invariance, MovingTheWorldChangesNothing) {
 }
 
 TEST(Invariance, AQuarterTurnOfTheWorldChangesNoBit) {
-  // Exact, as it only swaps coordinates and their signs.
+  // The turn is exact, because it only swaps coordinates and their signs.
   Snapshot town = make_synthetic_town(4, 80);
   town.views.resize(6);
   const RendererConfig config{.rig = paper_rig(), .num_threads = 1};
@@ -215,14 +214,14 @@ TEST(Invariance, ImagesDoNotDependOnTheOrderOfTheInput) {
   std::shuffle(town.scene.agents.begin(), town.scene.agents.end(), random);
   std::shuffle(town.geometry.walls.begin(), town.geometry.walls.end(), random);
   std::shuffle(town.geometry.heads.begin(), town.geometry.heads.end(), random);
-  // The index orders strips of one kind, so those keep their order; only the order of kinds changes.
+  // The index orders strips of one kind. So these strips keep their order; only the order of kinds changes.
   std::stable_sort(town.geometry.strips.begin(), town.geometry.strips.end(),
                    [](const Strip& a, const Strip& b) { return a.kind > b.kind; });
   town.geometry.build_grids();
   EXPECT_EQ(draw(town.geometry, town.scene, town.views, config).rgb, before);
 }
 
-// Covered area in pixels, of a scene in which everything has one colour.
+// Returns the covered area in pixels, in a scene where everything has one colour.
 double covered_px(const Drawn& image, float color) {
   double sum = 0;
   for (int y = 0; y < image.height_px; ++y) {
@@ -232,7 +231,7 @@ double covered_px(const Drawn& image, float color) {
 }
 
 TEST(Invariance, TheFacesOfABoxSumToItsSilhouette) {
-  // Coverage is the share of a pixel that does not show the green wall behind, less the box's own green.
+  // Coverage is the share of a pixel that does not show the green wall behind the box, less the box's own green.
   StaticGeometry geometry;
   WallFace wall;
   wall.a_m = {30, -90, -30};
@@ -248,7 +247,7 @@ TEST(Invariance, TheFacesOfABoxSumToItsSilhouette) {
     const Drawn with = draw(geometry, scene_of({box}), {make_view({}, 0)}, {.rig = simple_rig(), .num_threads = 1});
     const Drawn alone =
         draw(no_geometry(), scene_of({box}), {make_view({}, 0)}, {.rig = simple_rig(), .num_threads = 1});
-    // The silhouette: hull of the projected corners.
+    // The silhouette is the hull of the projected corners.
     std::vector<Vec2> corners;
     for (int corner = 0; corner < 8; ++corner) {
       const Vec2 ahead{box.cos_heading, box.sin_heading};
@@ -268,7 +267,7 @@ TEST(Invariance, TheFacesOfABoxSumToItsSilhouette) {
 }
 
 TEST(Invariance, TwoPiecesOfALineCoverWhatTheWholeLineDoes) {
-  // Each piece has one brightness, so the line is across the view, at one depth.
+  // Each piece has one brightness, so the line lies across the view, at one depth.
   for (const float tilt : {0.0f, 0.05f}) {
     const Vec3 a{20, 8, 0}, b{20, -6, tilt * 14};
     StaticGeometry whole, halves;

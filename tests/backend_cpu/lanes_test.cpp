@@ -1,4 +1,4 @@
-// The rules for eight at once against those for one: equal to the bit.
+// Rules for eight lanes at once compared with rules for one lane: equal to the bit.
 #include <bit>
 #include <cmath>
 #include <random>
@@ -22,7 +22,7 @@ namespace {
 
 uint32_t bits_of(float x) { return std::bit_cast<uint32_t>(x); }
 
-// A quad, now and then with level or upright sides, of any winding that make_edges() gives it.
+// Returns a quad, sometimes with level or upright sides, of any winding that make_edges() accepts.
 std::vector<PolygonEdge> random_quad(std::mt19937& random) {
   std::uniform_real_distribution<float> unit(0, 1);
   const Vec2 center{2 + 12 * unit(random), 2 + 12 * unit(random)}, half{6 * unit(random), 4 * unit(random)};
@@ -133,7 +133,7 @@ TEST(Lanes, VisitThePiecesThatMayBeVisible) {
   const Snapshot snapshot = drive_snapshot({.map = "procedural:1", .views = 8});
   const StaticGeometryView pieces = snapshot.geometry.view();
   const CulledGeometry culled(pieces);
-  // Compares the items visited, and returns their number.
+  // Compares the visited items and returns their number.
   auto compare = [](const BallGrid& balls, const GridView& grid, const auto& items, const PinholeCamera& camera) {
     const Frustum frustum = make_frustum(camera);
     std::vector<int32_t> expected, actual;
@@ -155,7 +155,7 @@ TEST(Lanes, VisitThePiecesThatMayBeVisible) {
   EXPECT_GT(walls, 100u);
 }
 
-// A place near the middle, on the border of a cell, or anywhere between there and far outside any map.
+// Draws a place near the middle, on the border of a cell, or anywhere from there to far outside any map.
 Vec3 draw_place(RandomStream* random_inout) {
   const float kind = random_inout->uniform();
   const float reach_m = kind < 0.6f ? 150.0f : kind < 0.95f ? 600.0f : kind < 0.98f ? 1e5f : 1e8f;
@@ -211,7 +211,7 @@ TEST(Lanes, FindTheBoxesAndHeadsThatMayBeVisible) {
   EXPECT_GT(heads_seen, 10000u);
 }
 
-// An upright face before the camera that fills the middle of its image.
+// Returns an upright face before the camera that fills the middle of its image.
 Occluder occluder_before(const ImageSetting& setting) {
   CameraQuad face{{{-4, -2, 12}, {4, -2, 12}, {4, 2, 12}, {-4, 2, 12}}, {}, {}};
   face.plane = quad_plane(face.corner);
@@ -221,7 +221,7 @@ Occluder occluder_before(const ImageSetting& setting) {
   return make_occluder(setting.camera, setting.frustum, face.plane, quad, is_clockwise);
 }
 
-// Bits of what a strip is drawn by.
+// Returns the bits of a strip's drawing inputs.
 std::vector<uint32_t> bits_of_strip(const ScreenQuad& quad, const FacePlane& plane, Rgb color, bool is_clockwise) {
   std::vector<uint32_t> bits;
   for (const Vec2 corner : quad.corner) bits.insert(bits.end(), {bits_of(corner.x), bits_of(corner.y)});

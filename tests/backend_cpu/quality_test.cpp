@@ -1,4 +1,4 @@
-// The oracle against the truth.
+// The oracle compared with the truth.
 #include "pictura/bench/quality.h"
 
 #include <fmt/format.h>
@@ -37,7 +37,7 @@ TEST(Quality, OddSizesAndMixedRigsToo) {
   EXPECT_GE(measure_quality(town.geometry, town.scene.batch(), town.views, config).oracle.psnr_db(), kMinOraclePsnr_db);
 }
 
-// A bright wall across the view, 20 m ahead.
+// Returns a bright wall across the view, 20 m ahead.
 StaticGeometry bright_wall() {
   StaticGeometry geometry;
   WallFace wall;
@@ -68,7 +68,7 @@ TEST(Quality, FacesOfACuboidDoNotLeakTheWallBehindThem) {
 }
 
 TEST(Quality, AgentsAcrossTheNearPlane) {
-  // Next to the camera and partly behind it; its side face crosses the near plane.
+  // A vehicle next to the camera and partly behind it; its side face crosses the near plane.
   const Quality quality =
       measure_boxes(bright_wall(), {make_box(AgentClass::vehicle, {2.0f, 1.2f, 0}, 0.2f, {4.5f, 1.9f, 1.7f})});
   EXPECT_GE(quality.oracle.psnr_db(), kMinOraclePsnr_db);
@@ -81,7 +81,7 @@ TEST(Quality, AWallThroughTheImageAndCarsOnBothSides) {
   wall.b_m = {90, -4, 0};
   wall.height_m = 2.5f;
   geometry.walls.push_back(wall);
-  // Another wall on a slope, behind the cars to the left.
+  // A second wall on a slope, behind the cars to the left.
   wall.a_m = {15, 14, -1};
   wall.b_m = {60, 20, 4};
   geometry.walls.push_back(wall);

@@ -1,5 +1,5 @@
-// The oracle against the truth in random scenes of each kind of bench/truth/random_scenes.h. A few seeds of each: two
-// hundred are drawn by `pictura bench quality --random 200`.
+// The oracle compared with the truth in random scenes of each kind of bench/truth/random_scenes.h, for a few seeds.
+// `pictura bench quality --random 200` draws two hundred.
 #include "pictura/bench/truth/random_scenes.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ class RandomScenes : public testing::TestWithParam<int> {};
 INSTANTIATE_TEST_SUITE_P(All, RandomScenes, testing::Range(0, kNumRandomKinds));
 
 TEST_P(RandomScenes, AreWithinThePromisedError) {
-  // Besides the first ones, those that showed a fault in one of the kinds.
+  // The first seeds, and seeds that revealed a fault in one of the kinds.
   for (const uint64_t seed : {0, 1, 2, 3, 4, 7, 54, 104, 109, 118, 142, 189, 191, 197}) {
     const PooledError error = measure_random_scene(static_cast<RandomKind>(GetParam()), seed);
     EXPECT_GE(error.psnr_db(), kMinOraclePsnr_db) << kRandomKindNames[GetParam()] << ", seed " << seed;

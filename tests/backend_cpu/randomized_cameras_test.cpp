@@ -1,5 +1,5 @@
-// Images of randomized cameras: each is the image of a rig that is mounted so, with the effect on its colours, however
-// and whenever it is drawn.
+// Images of randomized cameras: each equals the image of a rig mounted with the same changes, with the effect on its
+// colours, in any order and at any time of drawing.
 #include <algorithm>
 #include <cstring>
 
@@ -73,10 +73,10 @@ TEST(RandomizedImages, TurnAsTheirAnglesSay) {
                              expected = drawn(town, town.views, randomized({}, expected_rig));
   int far_off = 0;
   for (std::size_t i = 0; i < image.size(); ++i) far_off += std::abs(int{image[i]} - int{expected[i]}) > 2;
-  EXPECT_LT(far_off, 20);  // of 15,552
+  EXPECT_LT(far_off, 20);  // of 15,552 values
 }
 
-// Minibatches and films draw again what was drawn before: other views, in another order, from a history.
+// Minibatches and films redraw earlier views from a history: other views, in another order.
 TEST(RandomizedImages, AreDrawnAgainFromAHistory) {
   const Snapshot town = town_with_views(4);
   const std::size_t agents = town.scene.agents.size(), lights = town.scene.light_states.size();
@@ -104,7 +104,7 @@ TEST(RandomizedImages, AreDrawnAgainFromAHistory) {
 TEST(RandomizedImages, HaveTheEffectOfTheirPixels) {
   const Snapshot town = town_with_views(1);
   const CameraRandomization ranges{.seed = 4, .brightness_share = 0.5, .noise_share = 0.2};
-  const Rig rig = front_rig(13, 7);  // patches reach beyond it
+  const Rig rig = front_rig(13, 7);  // patches extend beyond this image
   const ImageEffect effect = image_effect(ranges, town.views[0].key, 0);
   const std::vector<uint8_t> plain = drawn(town, town.views, randomized({}, rig)),
                              seen = drawn(town, town.views, randomized(ranges, rig)),
@@ -126,7 +126,7 @@ TEST(RandomizedImages, HaveTheEffectOfTheirPixels) {
       }
     }
   }
-  // Beyond the image patches are black.
+  // Patches are black beyond the image.
   EXPECT_EQ(patches.size() - static_cast<std::size_t>(std::ranges::count(patches, uint8_t{0})), lit);
 }
 

@@ -1,4 +1,4 @@
-// The CPU renderer's images by hand computation: rules, sizes, planes, visibility, and errors.
+// The CPU renderer's images, computed by hand: rules, sizes, planes, visibility, and errors.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -22,8 +22,8 @@ namespace {
 using testing::HasSubstr;
 
 TEST(CpuRenderer, DrawsABoxAtHandComputedPixels) {
-  // The back of a car 10 m ahead: 2 m wide, 1 m high. At 50 px/m/m: x from 50 - 5 to 50 + 5, y from 50 + 50 * 0.5/10
-  // (roof, 1 m up) to 50 + 50 * 1.5/10 (ground): 52.5 to 57.5.
+  // The back of a car 10 m ahead: 2 m wide, 1 m high, at 50 px/m/m. Columns 50 - 5 to 50 + 5. The roof, 1 m up, is at
+  // row 50 + 50 * 0.5/10 = 52.5; the ground is at row 50 + 50 * 1.5/10 = 57.5.
   const SceneOwner scene = scene_of({make_box(AgentClass::vehicle, {12, 0, 0}, 0, {4, 2, 1})});
   const Drawn image = draw(no_geometry(), scene, {make_view({}, 0)}, {.rig = simple_rig(), .num_threads = 1});
   const Rgb back = rgb8(76, 201, 240) * (1 - 10.0f / 120), top = rgb8(58, 12, 163) * (1 - 12.0f / 120);
@@ -33,7 +33,7 @@ TEST(CpuRenderer, DrawsABoxAtHandComputedPixels) {
   expect_color(image.at(44, 55), {});
   expect_color(image.at(55, 55), {});
   expect_color(image.at(50, 57), back * 0.5f);
-  // Row 52: the roof reaches from 50 + 25/14 = 51.79 to 52.5, the back covers the lower half.
+  // Row 52: the roof reaches from 50 + 25/14 = 51.79 to 52.5; the back covers the lower half.
   expect_color(image.at(50, 52), {0.5f * (top.r + back.r), 0.5f * (top.g + back.g), 0.5f * (top.b + back.b)});
   const float roof_part = 52 - (50 + 25.0f / 14);
   expect_color(image.at(50, 51), top * roof_part);
@@ -74,7 +74,7 @@ TEST(CpuRenderer, FadesToBlackAtTheVisibleRange) {
   }
 }
 
-// A mark 0.3 m wide along x, from 5 to 115 m ahead, 2 m to the left.
+// Returns a mark 0.3 m wide along x, from 5 to 115 m ahead, 2 m to the left.
 StaticGeometry long_mark() {
   StaticGeometry geometry;
   add_polyline(&geometry, {{5, 2, 0}, {115, 2, 0}}, 0.3f, StripKind::lane_mark);
@@ -82,7 +82,7 @@ StaticGeometry long_mark() {
   return geometry;
 }
 
-// Width of the mark in a row: the sum of its coverage.
+// Returns the mark's width in a row: the sum of its coverage.
 double row_coverage(const Drawn& image, int y) {
   double sum = 0;
   for (int x = 0; x < image.width_px; ++x) sum += image.at(x, y).r;
@@ -90,12 +90,12 @@ double row_coverage(const Drawn& image, int y) {
 }
 
 TEST(CpuRenderer, StripsTaperWithDepth) {
-  // Without a floor, a row shows the strip 0.3 * f / depth wide, faded by its depth.
+  // Without a floor, a row shows the strip with a width of 0.3 * f / depth, faded by its depth.
   const Drawn image = draw(long_mark(), scene_of({}), {make_view({}, 0)},
                            {.rig = simple_rig(200, 200, 100), .num_threads = 1, .line_floor_px = 0});
   for (const int y : {108, 112, 118}) {
     const double depth = 100 * 1.5 / (y + 0.5 - 100);
-    // Brightness is that of a piece of 10 m, so of a depth at most 5 m off.
+    // Brightness is that of a piece of 10 m, so its depth is at most 5 m off.
     const double expected = 0.3 * 100 / depth * kWhiteMarkColor.r;
     EXPECT_NEAR(row_coverage(image, y), expected * (1 - depth / 120), expected * 6.0 / 120) << y;
   }
@@ -123,15 +123,16 @@ TEST(CpuRenderer, TheFloorIsMeasuredAcrossTheStripOnScreen) {
 }
 
 TEST(CpuRenderer, StripsAreClippedWhereTheyCrossTheNearPlaneNotTheirCentreLines) {
-  // An eye 3 cm above a mark 2 m wide that passes it at 45 degrees: its centre line crosses the near plane 1.1 m to the
-  // left. Straight ahead the mark reaches from behind the near plane, 15 px below the centre, to 0.41 m ahead.
+  // An eye 3 cm above a mark 2 m wide that passes the eye at 45 degrees. The mark's centre line crosses the near plane
+  // 1.1 m to the left. Straight ahead the mark reaches from behind the near plane, 15 px below the centre, to 0.41 m
+  // ahead.
   StaticGeometry geometry;
   add_polyline(&geometry, {{-2, -1, 0}, {2, 3, 0}}, 2.0f, StripKind::stop_line);
   geometry.build_grids();
   for (const float floor_px : {0.0f, 0.35f}) {
     const Drawn image = draw(geometry, scene_of({}), {make_view({0, 0, -1.47f}, 0)},
                              {.rig = simple_rig(), .num_threads = 1, .line_floor_px = floor_px});
-    // Its two corners ahead are 2.71 and 1.29 m away.
+    // The mark's two corners ahead are 2.71 and 1.29 m away.
     const Rgb color = kStopLineColor * (1 - 1.0f / 120);
     for (const int y : {54, 60, 64}) expect_color(image.at(50, y), color, 1e-4f);
     expect_color(image.at(50, 52), {});
@@ -140,8 +141,9 @@ TEST(CpuRenderer, StripsAreClippedWhereTheyCrossTheNearPlaneNotTheirCentreLines)
 }
 
 TEST(CpuRenderer, WideningAnEndFarAwayLeavesAStripAsItIsWhereItCrossesTheNearPlane) {
-  // An eye 3 cm above a mark that passes it at 38 degrees, looking down. Its end ahead is widened by 0.4 px on either
-  // side, 4 m away; moved as a whole, its sides would be lifted by half of the eye's height near the camera.
+  // An eye 3 cm above a mark that passes the eye at 38 degrees, looking down. The mark's end ahead, 4 m away, is
+  // widened by 0.4 px on either side. If the mark moved as a whole, its sides near the camera would rise by half of the
+  // eye's height.
   StaticGeometry geometry;
   add_polyline(&geometry, {{-3, -2.6f, 0}, {4.4f, 3.2f, 0}}, 0.3f, StripKind::stop_line);
   geometry.build_grids();
@@ -196,7 +198,7 @@ TEST(CpuRenderer, FacesInOnePlaneLookTheSameInAMirroredScene) {
 }
 
 TEST(CpuRenderer, AMarkIsInFrontOfTheCarOnItWhenSeenFromBelow) {
-  // On a bridge 4 m above the eye; the car's underside and the mark are in one plane.
+  // The mark is on a bridge 4 m above the eye; the car's underside and the mark are in one plane.
   StaticGeometry geometry;
   add_polyline(&geometry, {{2, 0, 4}, {30, 0, 4}}, 0.8f, StripKind::stop_line);
   geometry.build_grids();
@@ -233,7 +235,7 @@ TEST(CpuRenderer, LightsShowTheirStateOnlyToTheFront) {
   expect_color(center(LightState::off, {40, 0, 0}, kPi), {});
   EXPECT_GT(center(LightState::red, {10.5f, 16, 0}, atan2_of(-16, 9.5f)).r, 0.5f);     // 59 degrees off
   EXPECT_EQ(center(LightState::red, {11.0f, 16.5f, 0}, atan2_of(-16.5f, 9)).r, 0.0f);  // 61 degrees off
-  // Area of the disk: a circle of 0.5 m at 20 m is 3.75 px in radius.
+  // The disk's area: a circle of 0.5 m at 20 m is 3.75 px in radius.
   SceneOwner scene;
   scene.light_states = {LightState::off, LightState::red};
   scene.end_world(0);
@@ -315,7 +317,7 @@ TEST(CpuRenderer, DrawsSizesFromOnePixelAndRigsOfMixedSizes) {
   HostImages images(rig, 3);
   for (uint8_t& byte : images.bytes()) byte = 0xAA;
   renderer->render(town.scene.batch(), town.views, images.batch());
-  // The same cameras alone give the same images.
+  // Single cameras give the same images.
   for (int k = 0; k < 4; ++k) {
     Rig alone;
     alone.cameras = {rig.cameras[k]};
@@ -347,7 +349,7 @@ TEST(CpuRenderer, LargeImagesAreDrawnInBandsWithoutSeams) {
   }
 }
 
-// Value of an IEEE half.
+// Returns the value of an IEEE half.
 float from_half(uint16_t bits) {
   const int exponent = bits >> 10, mantissa = bits & 1023;
   return exponent == 0 ? std::ldexp(static_cast<float>(mantissa), -24)
@@ -426,7 +428,7 @@ TEST(CpuRenderer, PlanesHoldDepthClassAndInstance) {
 }
 
 TEST(CpuRenderer, VisibilityIsTheVisibleShare) {
-  // A pillar of 1 m in front of the right half of a car's back; the same car next to it; one outside the image.
+  // A pillar of 1 m in front of the right half of a car's back; the same car next to it; a car outside the image.
   StaticGeometry geometry;
   WallFace wall;
   wall.a_m = {10, 0, 0};
@@ -547,7 +549,7 @@ TEST_F(CpuRendererErrors, QueriesAndGeometryAndConfig) {
   const std::vector<VisibilityQuery> queries{{0, 7}};
   std::vector<float> visibility(1);
   EXPECT_THROW(renderer_->visibility(scene_.batch(), views_, queries, visibility), Error);
-  // An agent of another world.
+  // The agent is in another world.
   scene_.agents.push_back(scene_.agents[0]);
   scene_.end_world(0);
   const std::vector<VisibilityQuery> of_another{{0, 1}};

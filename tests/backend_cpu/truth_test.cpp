@@ -1,5 +1,5 @@
-// The oracle against the truth, other than colours of towns: planes, visibility, the floor on widths, and difficult
-// scenes.
+// The oracle compared with the truth in everything but colours of towns: planes, visibility, the floor on widths, and
+// difficult scenes.
 #include <algorithm>
 #include <cmath>
 
@@ -26,7 +26,7 @@ TEST(Truth, HillsAndBridges) {
 TEST(Truth, OddSizesDownToOnePixelAndEightCamerasOfEightSizes) {
   const Snapshot town = make_hill();
   EXPECT_GE(quality_of(town, paper_rig(97, 55)).oracle.psnr_db(), kMinOraclePsnr_db);
-  // All objects share the one pixel.
+  // All objects share the single pixel.
   EXPECT_LE(quality_of(town, paper_rig(1, 1)).oracle.max_error(), kWorstOracleError);
   EXPECT_GE(quality_of(town, eight_camera_rig()).oracle.psnr_db(), kMinOraclePsnr_db);
 }
@@ -54,7 +54,7 @@ TruePlanes planes_of(const StaticGeometry& geometry, const SceneOwner& scene, co
   return planes;
 }
 
-// Pixels whose centres show another surface in the oracle than in the truth.
+// Counts of pixels whose centres show another surface in the oracle than in the truth.
 struct PlaneDifference {
   std::size_t pixels = 0, classes = 0, instances = 0, depths = 0;
 };
@@ -92,14 +92,14 @@ TEST(Truth, PlanesShowTheSameSurfaces) {
 }
 
 TEST(Truth, NoSolidIsInFrontOfTheWrongOne) {
-  // Disjoint footprints: every pixel centre that is not on an edge must show the truth's solid.
+  // Footprints are disjoint: every pixel centre that is not on an edge must show the truth's solid.
   for (const uint64_t seed : {21, 22, 23}) {
     Snapshot town = make_synthetic_town(seed, 150);
     town.geometry.strips.clear();
     town.geometry.build_grids();
     town.views.resize(12);
     const PlaneDifference difference = compare_planes(town, paper_rig(192, 108).cameras[0]);
-    // Rounding moves an edge over a centre once in a million pixels or so.
+    // Rounding moves an edge over a centre about once in a million pixels.
     EXPECT_LE(difference.instances, 1u) << seed;
     EXPECT_LE(difference.classes, 1u) << seed;
   }
@@ -144,7 +144,7 @@ TEST(Truth, VisibilityAgrees) {
   EXPECT_GT(partly, 5);
 }
 
-// An image drawn `factor` times larger, averaged down.
+// Returns an image drawn `factor` times larger, averaged down.
 std::vector<float> drawn_down(const Snapshot& town, Camera camera, int factor, float line_floor_px) {
   const int width = camera.width_px, height = camera.height_px;
   camera.width_px *= factor;
