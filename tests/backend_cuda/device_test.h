@@ -1,5 +1,5 @@
-// The fixture of tests that need a CUDA device, and what they capture work with. Without a device they are skipped,
-// unless PICTURA_REQUIRE_GPU=1 says that there must be one.
+// The fixture of tests that need a CUDA device, and helpers that capture work. Without a device the tests are skipped,
+// or fail with PICTURA_REQUIRE_GPU=1.
 #pragma once
 
 #include <cstdlib>
@@ -28,7 +28,7 @@ class DeviceTest : public testing::Test {
   }
 };
 
-/// A stream that waits for no other.
+/// A stream that does not wait for other streams.
 struct OwnStream {
   cudaStream_t stream = nullptr;
   OwnStream() { PICTURA_CUDA(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking)); }
@@ -37,7 +37,7 @@ struct OwnStream {
   OwnStream& operator=(const OwnStream&) = delete;
 };
 
-/// What work puts on a stream, as a graph: captures refuse every call that allocates or waits.
+/// A graph of the work that is put on a stream. Captures reject every call that allocates or waits.
 struct CapturedGraph {
   cudaGraph_t graph = nullptr;
   cudaGraphExec_t executable = nullptr;
@@ -55,7 +55,7 @@ struct CapturedGraph {
   CapturedGraph& operator=(const CapturedGraph&) = delete;
 };
 
-/// While it lives, allocations and device-wide waits of this thread are errors: CUDA forbids them during a capture.
+/// Makes this thread's allocations and device-wide waits errors while it exists: CUDA forbids them during a capture.
 class ForbidAllocations {
  public:
   ForbidAllocations() {

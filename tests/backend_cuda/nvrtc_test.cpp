@@ -1,4 +1,4 @@
-// Headers of rules, scene and raster compile without a standard library, on machines that have no GPU.
+// Shared headers (rules, scene, raster) compiled without a standard library, on machines without a GPU.
 #include <algorithm>
 #include <filesystem>
 #include <string>
@@ -12,7 +12,7 @@
 namespace pictura {
 namespace {
 
-// Compiler messages, or empty where the source compiles to code for the architecture.
+// Returns the compiler's messages; empty where the source compiles to code for the architecture.
 std::string compile(const std::string& source, const std::string& architecture) {
   nvrtcProgram program = nullptr;
   if (nvrtcCreateProgram(&program, source.c_str(), "test.cu", 0, nullptr, nullptr) != NVRTC_SUCCESS)
@@ -31,14 +31,14 @@ std::string compile(const std::string& source, const std::string& architecture) 
   return code_bytes > 0 ? "" : "no code";
 }
 
-// Names of the headers that both devices read, as they are included.
+// Returns the names of headers that both devices read, as they are included.
 std::vector<std::string> shared_headers() {
   std::vector<std::string> headers;
   for (const char* name : {"color", "device", "grid_view", "math", "rng", "scene_types", "span"}) {
     headers.push_back(std::string("pictura/common/") + name + ".h");
   }
   const std::filesystem::path root = PICTURA_TEST_INCLUDE_DIR "/pictura";
-  // These are for hosts: they speak of errors and vectors.
+  // These headers are for hosts: they use errors and vectors.
   const std::vector<std::string> host_headers{"pictura/common/raster/check.h",
                                               "pictura/common/raster/host_geometries.h"};
   for (const char* folder : {"common/portable", "common/raster", "simulator/rules"}) {

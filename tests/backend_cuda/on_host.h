@@ -1,4 +1,4 @@
-// Device memory as tests look at it.
+// Copies of device memory for tests.
 #pragma once
 
 #include <type_traits>
@@ -10,7 +10,7 @@
 
 namespace pictura::test {
 
-/// Of device memory, once the device has written it.
+/// Returns a copy of device memory, once the device has written it.
 template <typename T>
 std::vector<std::remove_const_t<T>> on_host(Span<T> device) {
   std::vector<std::remove_const_t<T>> host(device.size());
@@ -21,7 +21,7 @@ std::vector<std::remove_const_t<T>> on_host(Span<T> device) {
   return host;
 }
 
-/// Whether host and device memory hold the same bits.
+/// Returns whether host and device memory hold the same bits.
 template <typename T>
 bool same(Span<T> host, Span<T> device) {
   const auto copy = on_host(device);

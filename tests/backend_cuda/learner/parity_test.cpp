@@ -1,6 +1,5 @@
-// What a learner does besides its network, on a device: the host's bits, for the rules over rollouts and for the scenes
-// that a rollout keeps. Without a device these tests are skipped, unless PICTURA_REQUIRE_GPU=1 says that there must be
-// one.
+// The learner's work other than its network, on a device: bits equal to the host's, for the rules over rollouts and for
+// the scenes that a rollout records. Without a device these tests are skipped, or fail with PICTURA_REQUIRE_GPU=1.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -51,7 +50,7 @@ bool same_bits(const std::vector<T>& host, const DeviceBuffer<T>& device) {
   return test::same(Span<const T>(host), device.span());
 }
 
-/// The same worlds, simulated on the host and on the device.
+/// Equal worlds, simulated on the host and on the device.
 struct Worlds {
   std::unique_ptr<Simulator> cpu, cuda;
 
@@ -69,11 +68,11 @@ struct Worlds {
     cuda->step(Array(copy.data(), {kSlots}, cuda->device()), stream);
     cuda->check(stream);
   }
-  /// By mixed actions, until `steps` steps have been done in all.
+  /// Drives the worlds by mixed actions until `steps` steps have been done in total.
   void drive_to(uint32_t steps, Stream stream = {}) {
     for (; done_ < steps; ++done_) step(testing::mixed_actions(kSlots, done_), stream);
   }
-  /// Takes all agents out of their episodes.
+  /// Removes all agents from their episodes.
   void remove_all() {
     const std::vector<Command> commands(kSlots, Command{.kind = CommandKind::absent});
     const DeviceBuffer<Command> copy = on_device(commands);
@@ -86,9 +85,9 @@ struct Worlds {
   uint32_t done_ = 0;
 };
 
-/// Episodes last, so that more and more agents have halted.
+/// Returns a configuration whose episodes never end, so that more and more agents have halted.
 SimulatorConfig one_episode() { return {.reset_inactive_fraction = 2.0f}; }
-/// Episodes end after 20 steps, and earlier where many agents have halted.
+/// Returns a configuration whose episodes end after 20 steps, or earlier where many agents have halted.
 SimulatorConfig short_episodes() { return {.episode_steps = 20}; }
 
 struct Executors {
@@ -115,7 +114,7 @@ std::vector<int64_t> random_items(size_t size, std::mt19937_64* random) {
   return items;
 }
 
-/// Of `rows` agents; for every fifth one all actions are equally likely, so that several are the most likely.
+/// Returns log probabilities of `rows` agents. In every fifth row all actions are equal, so several are the maximum.
 std::vector<float> random_log_probs(size_t rows, std::mt19937_64* random) {
   std::vector<float> result = random_numbers(rows * kNumActions, random);
   for (size_t row = 0; row < rows; ++row) {
@@ -128,7 +127,7 @@ std::vector<float> random_log_probs(size_t rows, std::mt19937_64* random) {
   return result;
 }
 
-/// What the host selects, once the device has been seen to select the same.
+/// Returns the host's selection, after checking that the device's is the same.
 template <typename Select>
 std::vector<int64_t> same_selection(size_t room, const Executors& executors, const Select& select) {
   std::vector<int64_t> selected(room, -1);
@@ -189,7 +188,7 @@ TEST_F(CudaLearnerTest, ChoosesTheActionsOfSomeSlots) {
   for (const uint32_t steps : {0u, 1u, 13u, 47u}) {
     SCOPED_TRACE(steps);
     worlds.drive_to(steps);
-    // In any order, and not all.
+    // Select slots in random order, and not all of them.
     std::vector<int64_t> slots = same_active(worlds, executors, random_flags(kSlots, 0.7, &random));
     std::shuffle(slots.begin(), slots.end(), random);
     const std::vector<float> log_probs = random_log_probs(slots.size(), &random);
@@ -236,7 +235,7 @@ TEST_F(CudaLearnerTest, WritesTheCommandsThatTheMaskHas) {
   }
 }
 
-/// A rollout's transitions on both, without any sense.
+/// Random transitions of a rollout on the host and the device.
 struct Transitions {
   std::vector<float> rewards, values;
   std::vector<uint8_t> terminated, truncated, valid, decides;
@@ -364,7 +363,7 @@ TEST_F(CudaLearnerTest, SelectingAllocatesNothingAfterTheFirstCallOfASize) {
                                           stream);
   };
   const int64_t all = select(kMany), some = select(1000), active = select_asked();
-  // Selecting waits for its count, so that a capture could not show this.
+  // Selecting waits for its count, so that a capture could not detect this.
   const int64_t allocations = device_allocations;
   EXPECT_EQ(select(kMany), all);
   EXPECT_EQ(select(1000), some);
@@ -372,7 +371,7 @@ TEST_F(CudaLearnerTest, SelectingAllocatesNothingAfterTheFirstCallOfASize) {
   EXPECT_EQ(device_allocations, allocations);
 }
 
-// Captures refuse every call that allocates or waits; replayed, the work reads what the simulator shows then.
+// Captures reject every call that allocates or waits. Replayed work reads the simulator's state at the replay.
 TEST_F(CudaLearnerTest, AllButSelectingIsCapturedIntoAGraph) {
   std::mt19937_64 random(8);
   const Executors executors;
@@ -444,7 +443,7 @@ TEST_F(CudaLearnerTest, ADeviceThatThereIsNotIsRefused) {
   EXPECT_GT(make_learner_executor(kDevice)->memory_bytes(), int64_t{1} << 30);
 }
 
-/// The scenes of some steps on both, with memory for more steps.
+/// Scenes of some steps on the host and the device, with memory for more steps.
 struct Histories {
   std::unique_ptr<SceneHistory> host, device;
 
@@ -469,7 +468,7 @@ struct Histories {
   }
 };
 
-/// The views of some rows, on both.
+/// Views of some rows on the host and the device.
 struct GatheredViews {
   std::vector<View> host;
   DeviceBuffer<View> device;
@@ -502,7 +501,7 @@ TEST_F(CudaSceneHistoryTest, HoldsAndGathersWhatTheHostsDoes) {
   worlds.drive_to(60);
   histories.put(2, worlds);
   histories.expect_same_scene();
-  // With rows of the step that was not put, and of none.
+  // Include rows of the step that was not put, and rows of no step.
   std::vector<int64_t> rows = random_rows(5000, kSteps * kSlots, &random);
   rows.insert(rows.end(), {-1, (kSteps - 1) * kSlots - 1, (kSteps - 1) * kSlots, kSteps * kSlots, int64_t{1} << 40});
   const GatheredViews views(histories, rows);
@@ -512,7 +511,7 @@ TEST_F(CudaSceneHistoryTest, HoldsAndGathersWhatTheHostsDoes) {
   EXPECT_LT(num_nowhere, 1200);
 }
 
-/// A renderer with the maps of a simulator, and memory for the images of a call.
+/// A renderer with a simulator's maps, and memory for the images of a call.
 struct Canvas {
   std::unique_ptr<Renderer> renderer;
   HostImages images;
@@ -522,7 +521,7 @@ struct Canvas {
         images(paper_rig(), static_cast<int>(num_views), PixelFormat::f32) {
     upload_maps(simulator, renderer.get());
   }
-  /// Whatever is found wrong, the images are what was drawn.
+  /// Draws on the device. The images are the drawn ones even where errors are reported.
   void draw_on_device(const SceneBatch& scene, Span<const View> views) {
     DeviceImages device_images;
     const ImageBatch batch = device_images.like(images.batch());

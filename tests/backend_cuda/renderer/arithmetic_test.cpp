@@ -1,4 +1,4 @@
-// The arithmetic of a device that its compiler does not vouch for.
+// Device arithmetic that the compiler does not guarantee.
 #include "pictura/common/cuda/check.h"
 #include "pictura/common/cuda/device_buffer.h"
 #include "pictura/tests/backend_cuda/device_test.h"

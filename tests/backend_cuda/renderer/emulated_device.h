@@ -1,7 +1,7 @@
-// Emulates a device on the host, to run the source of kernels without a GPU: the parts of CUDA that they use, and
-// blocks whose threads are fibers. Threads of a warp, and warps, run in a random order given by a seed, each up to the
-// next collective operation; lanes of a warp that wait for different operations are an error. Races between two
-// collective operations are not detected. Include before the kernels, in one source file.
+// Emulates a device on the host, to run the source of kernels without a GPU. It provides the parts of CUDA that kernels
+// use, and blocks whose threads are fibers. Threads of a warp, and warps, run in a random order given by a seed. Each
+// runs up to the next collective operation. Lanes of a warp that wait for different operations are an error. Races
+// between two collective operations are not detected. Include before the kernels, in one source file.
 #pragma once
 
 #include <algorithm>
@@ -131,7 +131,7 @@ class Block {
       for (const std::size_t warp : order) {
         const Step step = threads_[warp * kLanes].waits_for;
         if (step != Step::warp && !(step == Step::block && at_barrier)) continue;
-        // A random number of steps, so that some warps run far ahead.
+        // Run a random number of steps, so that some warps run far ahead.
         for (int steps = 1 << (random_() % 8); steps > 0; --steps) {
           run_warp(warp);
           moved = true;

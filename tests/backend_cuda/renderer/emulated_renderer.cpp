@@ -8,9 +8,9 @@
 #include "pictura/backend_cuda/renderer/scratch_buffers.h"
 #include "pictura/common/error.h"
 #include "pictura/common/raster/check.h"
-// Last, because it redefines CUDA's keywords.
+// Include this last, because it redefines CUDA's keywords.
 #include "pictura/tests/backend_cuda/renderer/emulated_device.h"
-// The kernels are renamed, because the same program contains those compiled ahead of time.
+// The kernels are renamed, because the same program contains the kernels compiled ahead of time.
 #define pictura_cull emulated_cull
 #define pictura_setup_faces emulated_setup_faces
 #define pictura_clip emulated_clip
@@ -41,7 +41,7 @@ struct EmulatedRenderer::Map {
   explicit Map(const StaticGeometry& map) : geometry(map), strips(geometry.strips), walls(geometry.walls) {}
 };
 
-// What a CUDA renderer has in device memory.
+// Contents of a CUDA renderer's device memory.
 struct EmulatedRenderer::Setup {
   cuda::DrawTask task;
   cuda::DrawCounters counters;

@@ -32,7 +32,8 @@ class EmulatedRenderer final : public Renderer {
   void poll() override;
   void check(Stream stream = {}) override;
 
-  /// Images of the last call that were left to the last launch, and that did not fit into the pool.
+  /// Numbers of images of the last call that were left to the last launch (overflow), and that did not fit into the
+  /// pool (deferred).
   int overflow() const { return overflow_; }
   int deferred() const { return deferred_; }
 

@@ -1,4 +1,4 @@
-// The drawing kernels, run thread by thread on the host, against the oracle: all values are equal, for any order of
+// Drawing kernels, run thread by thread on the host, compared with the oracle: all values are equal, for any order of
 // threads. So broken kernels are found without a GPU.
 #include <algorithm>
 #include <functional>
@@ -106,7 +106,7 @@ TEST(EmulatedKernels, DrawBlackWhereNothingIsVisible) {
   expect_oracles(&renderer, town, Planes::all);
 }
 
-// Errors that host callers get from checks, device callers get from the kernels. Images of such views are black.
+// Kernels report the errors that checks report to host callers. Images of such views are black.
 TEST(EmulatedKernels, ReportInvalidViews) {
   const SyntheticWorlds valid = make_synthetic_worlds();
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
@@ -140,7 +140,7 @@ TEST(EmulatedKernels, ReportInvalidViews) {
   for (const Case& each : cases) {
     SyntheticWorlds worlds = valid;
     worlds.views.resize(2);
-    worlds.views[0] = valid.views[3];  // of the empty world, so that its image is valid in all cases
+    worlds.views[0] = valid.views[3];  // a view of the empty world, so that its image is valid in all cases
     each.corrupt(&worlds);
     RendererConfig config = config_of(rig);
     config.randomization.noise_share = 0.1;
@@ -160,7 +160,7 @@ TEST(EmulatedKernels, ReportInvalidQueries) {
   const RendererConfig config = config_of(paper_rig(16, 9));
   EmulatedRenderer renderer(config, 16);
   upload_geometries(worlds.maps, &renderer);
-  // The first view is of the first world, whose agents are first.
+  // The first view is in the first world, whose agents are first.
   const int32_t of_another_world = worlds.scene.world_begin[2];
   for (const VisibilityQuery bad :
        {VisibilityQuery{10, 0}, VisibilityQuery{-1, 0}, VisibilityQuery{0, -1}, VisibilityQuery{0, of_another_world}}) {
@@ -185,12 +185,12 @@ void expect_some_deferred(uint64_t seed, const EmulatedRenderer::Pool& pool) {
 }
 
 TEST(EmulatedKernels, DeferWhatDoesNotFitIntoThePool) { expect_some_deferred(7, {.faces = 192}); }
-// This is found after some of an image's faces have been set up.
+// The overflow is found after some of an image's faces have been set up.
 TEST(EmulatedKernels, DeferWhenClippedEdgesDoNotFit) { expect_some_deferred(8, {.clipped_edges = 70}); }
 
 TEST(EmulatedKernels, ClipLightsOnAllSides) {
-  // A spiral of light heads around a camera, starting nearer than its near plane; they face the camera and overlap each
-  // other's disks and all borders of the image. The batch contains nothing else.
+  // A spiral of light heads around a camera, starting nearer than its near plane. The heads face the camera and overlap
+  // each other's disks and all borders of the image. The batch contains no other objects.
   Snapshot town;
   for (int i = 0; i < 300; ++i) {
     const float angle = 0.4f * static_cast<float>(i), range_m = 0.05f + 0.02f * static_cast<float>(i);
@@ -251,7 +251,7 @@ TEST(EmulatedKernels, WriteTheOraclesFormatsAndOrders) {
   emulated.upload(0, town.geometry);
   oracle->upload(0, town.geometry);
   for (const PixelFormat format : {PixelFormat::u8, PixelFormat::f16, PixelFormat::bf16}) {
-    // 0: planar.
+    // Zero means planar images.
     for (const int patch_px : {0, 4, 8, 12, 16}) {
       const ChannelOrder order = patch_px == 0 ? ChannelOrder::planar : ChannelOrder::patches;
       HostImages result(config.rig, 1, format, Planes::none, order, patch_px),
@@ -297,14 +297,14 @@ TEST(EmulatedKernels, RandomizeCamerasOfImagesDrawnInParts) {
 }
 
 TEST(EmulatedKernels, DrawTooManyFragmentsInParts) {
-  // More than fits at once: tiles are drawn in parts, and images are left to the last launch.
+  // More fragments than fit at once: tiles are drawn in parts, and images are left to the last launch.
   const Rig rig = front_rig();
   EmulatedRenderer renderer(config_of(rig), 4);
   expect_oracles(&renderer, make_crowd(), Planes::all);
   EXPECT_GT(renderer.overflow(), 0);
 }
 
-// Parts are as narrow as one pixel; patches have some beyond the image at its right and below.
+// Parts are as narrow as one pixel. Patches extend beyond the image at its right and bottom.
 TEST(EmulatedKernels, DrawPartsIntoPatches) {
   const RendererConfig config = config_of(front_rig(30, 21));
   Snapshot crowd = make_crowd();
@@ -324,7 +324,7 @@ TEST(EmulatedKernels, DrawPartsIntoPatches) {
   EXPECT_GT(emulated.overflow(), 0);
 }
 
-// The last launch draws images in tiles as high as its memory allows.
+// The last launch draws images in tiles as high as its memory permits.
 TEST(EmulatedKernels, DrawImagesHigherThanTheLastLaunchDrawsAtOnce) {
   const Rig rig = front_rig(24, 600);
   EmulatedRenderer renderer(config_of(rig), 17);
@@ -334,7 +334,7 @@ TEST(EmulatedKernels, DrawImagesHigherThanTheLastLaunchDrawsAtOnce) {
   EXPECT_GT(renderer.overflow(), 0);
 }
 
-// Each image has one face more than fills its batches, so the number of batches is the maximum.
+// Each image has one face more than full batches, so the number of batches is the maximum.
 TEST(EmulatedKernels, HaveCapacityForTheBatchesOfManyEqualImages) {
   Snapshot town;
   for (int i = 0; i < 225; ++i) {
@@ -351,7 +351,7 @@ TEST(EmulatedKernels, HaveCapacityForTheBatchesOfManyEqualImages) {
 }
 
 TEST(EmulatedKernels, DrawPlanesOfMoreRowsThanFit) {
-  // Walls one behind the other, each covering all rows of a tile.
+  // Walls stand one behind the other, each covering all rows of a tile.
   Snapshot town;
   for (int i = 0; i < 100; ++i) {
     const float x = 4.0f + 0.25f * static_cast<float>(i);

@@ -1,6 +1,6 @@
-// The kernels follow the oracle's rules in the oracle's arithmetic, and what they sum is in whole units: so they are
-// held to every bit of its images, not to the tolerance that other backends get. Equal to the oracle, they are also
-// equal to themselves, in whatever order threads come.
+// The kernels follow the oracle's rules in the oracle's arithmetic, and their sums are in whole units. So tests require
+// the oracle's exact bits, rather than the tolerance of other backends. Images equal to the oracle's are also equal to
+// each other, in any order of threads.
 #pragma once
 
 #include <cmath>

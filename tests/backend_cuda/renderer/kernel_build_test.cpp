@@ -1,5 +1,5 @@
-// Kernels built at run time, on machines that have no GPU: the code that a device would load, for every architecture
-// that we name, and what is kept of it on disk.
+// Kernels built at run time, on machines without a GPU: the code that a device would load, for every named
+// architecture, and its cache on disk.
 #include "pictura/backend_cuda/renderer/kernel_build.h"
 
 #include <filesystem>
@@ -30,7 +30,7 @@ using testing::StartsWith;
 
 constexpr KernelTarget kPaperRig{90, 4, 96, 54};
 
-// Small enough to be compiled often; the renderer's kernels take seconds.
+// A program small enough to be compiled often; the renderer's kernels take seconds.
 constexpr cuda::KernelSource kHeader{"pictura/size.cuh", "constexpr int kSize = PICTURA_RIG_WIDTH_PX;"};
 constexpr cuda::KernelProgram kSmall{
     "#include \"pictura/size.cuh\"\n"
@@ -51,7 +51,7 @@ TEST_P(KernelArchitecture, KernelsCompileToCode) {
   EXPECT_THAT(code.bytes, StartsWith("\x7f"
                                      "ELF"));
   for (const std::string kernel : cuda::kKernelNames) {
-    EXPECT_THAT(code.bytes, HasSubstr(".text." + kernel + '\0'));  // whole: some begin as others do
+    EXPECT_THAT(code.bytes, HasSubstr(".text." + kernel + '\0'));  // whole: some names begin as others do
   }
   EXPECT_FALSE(code.cached);
 }
@@ -147,7 +147,7 @@ TEST_F(KernelCache, IsNotNeeded) {
   EXPECT_FALSE(build_kernels(kSmall, kPaperRig).cached);
 }
 
-// What a machine without a GPU says.
+// Errors and notes on a machine without a GPU.
 TEST(NoDevice, CudaIsRefusedAndAutoDrawsOnTheCpuSayingWhy) {
   const std::string why = cuda_unavailable();
   if (why.empty()) GTEST_SKIP() << "this machine has a CUDA device";

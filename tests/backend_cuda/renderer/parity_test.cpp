@@ -1,5 +1,5 @@
-// The CUDA renderer against the oracle, on a device. Without one these tests are skipped, unless PICTURA_REQUIRE_GPU=1
-// says that there must be one.
+// The CUDA renderer compared with the oracle, on a device. Without a device these tests are skipped, or fail with
+// PICTURA_REQUIRE_GPU=1.
 #include <algorithm>
 
 #include <gmock/gmock.h>
@@ -69,7 +69,7 @@ TEST_F(CudaRendererTest, RandomizedCamerasDoToo) {
   }
 }
 
-// The paper's sizes, and one that a screen shows; each has kernels of its own to build.
+// Sizes of the paper, and one screen-sized image; each builds its own kernels.
 class CudaRendererSizes : public CudaRendererTest, public testing::WithParamInterface<int> {};
 TEST_P(CudaRendererSizes, DoToo) {
   Snapshot town = make_synthetic_town(6, 80);
@@ -94,7 +94,7 @@ INSTANTIATE_TEST_SUITE_P(All, CudaHardScenes, testing::ValuesIn(hard_scenes()),
 TEST_P(CudaHardScenes, LookLikeTheOracle) { expect_parity(GetParam().town, {.rig = GetParam().rig}); }
 TEST_P(CudaHardScenes, AreSeenAsMuch) { expect_parity_of_visibility(GetParam().town, {.rig = GetParam().rig}); }
 
-// Their pictures are compared by golden_test, in bytes; here values and planes.
+// Values and planes of golden scenes; golden_test compares their pictures in bytes.
 class CudaGoldenScenes : public CudaRendererTest, public testing::WithParamInterface<std::string> {};
 INSTANTIATE_TEST_SUITE_P(All, CudaGoldenScenes, testing::ValuesIn(golden_names(".toml")),
                          [](const auto& scene) { return scene.param; });
@@ -128,11 +128,11 @@ TEST_F(CudaRendererTest, FaultsOfTheDeviceAreThrownByTheNextCall) {
   }
   EXPECT_NO_THROW(renderer->render(scene.batch(), good.span(), images));
   EXPECT_NO_THROW(renderer->check());
-  // ... or when it is asked for.
+  // An error is also reported when the caller asks for it.
   EXPECT_NO_THROW(renderer->render(scene.batch(), views.span(), images));
   EXPECT_THROW(renderer->check(), Error);
   EXPECT_NO_THROW(renderer->check());
-  // What the host can see is refused at once.
+  // Errors that the host can detect are reported at once.
   EXPECT_THROW(renderer->render(town.scene.batch(), good.span(), images), Error);
   EXPECT_THROW(renderer->render(scene.batch(), good.span(), shape.batch()), Error);
 }
@@ -159,7 +159,7 @@ TEST_F(CudaRendererTest, WrongDevicesAreRefusedByName) {
   EXPECT_THAT(test::message_of([&] { make_renderer("cuda", config); }), HasSubstr("renderer cuda: device: expected"));
 }
 
-// Callers need not make the renderer's device current, and find theirs as it was.
+// Callers need not make the renderer's device current; the call restores the current device.
 TEST_F(CudaRendererTest, DrawsOnItsDeviceWhateverTheCurrentOneIs) {
   int devices = 0;
   PICTURA_CUDA(cudaGetDeviceCount(&devices));
@@ -208,7 +208,7 @@ TEST_F(CudaRendererTest, DrawsAsManyViewsAsItsCountSays) {
   test::expect_counted_queries(make_for_host);
 }
 
-// What lies on the host is checked there, before the device sees it.
+// Host data is checked on the host, before the device reads it.
 TEST_F(CudaRendererTest, HostCallersLearnAtOnceWhatIsWrong) {
   Snapshot town = make_synthetic_town(5, 5);
   const RendererConfig config{.rig = paper_rig(8, 8)};

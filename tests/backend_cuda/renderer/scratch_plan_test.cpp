@@ -1,4 +1,4 @@
-// How the CUDA renderer divides a bound on its memory.
+// Division of the CUDA renderer's memory limit.
 #include "pictura/backend_cuda/renderer/scratch_plan.h"
 
 #include <algorithm>
@@ -75,7 +75,7 @@ TEST(Pool, TakesWhatItIsReckonedToTake) {
 TEST(Pool, HasCapacityForEveryBatch) {
   for (const std::size_t images : {1, 2, 7, 100}) {
     const PoolSizes sizes = pool_sizes(images);
-    // If all images have equally many entries, as many images as fit.
+    // If all images have equally many entries, as many images as fit are drawn.
     for (std::size_t listed = 1; listed <= kMaxEntries; ++listed) {
       const std::size_t drawn = std::min(images, sizes.faces / listed);
       const auto batches = static_cast<std::size_t>(FaceBatch::count_of(static_cast<int32_t>(listed)));

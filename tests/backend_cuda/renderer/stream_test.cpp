@@ -1,5 +1,5 @@
-// The CUDA renderer in a training loop, on a device: formats, what it writes and what it leaves alone, streams, graphs,
-// allocations, and a bound on its memory.
+// The CUDA renderer in a training loop, on a device: formats, written and untouched memory, streams, graphs,
+// allocations, and the memory limit.
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -30,7 +30,7 @@ using testing::StartsWith;
 
 class CudaStreamTest : public test::DeviceTest {};
 
-// A scene in device memory, and a renderer for callers there.
+// A scene in device memory, and a renderer for callers with device memory.
 struct Stage {
   Snapshot town;
   RendererConfig config;
@@ -52,7 +52,7 @@ struct Stage {
   HostImages host_images(PixelFormat format = PixelFormat::u8, Planes planes = Planes::none) const {
     return {config.rig, static_cast<int>(views.size()), format, planes};
   }
-  // What the renderer draws.
+  // Returns the images that the renderer draws.
   HostImages draw(PixelFormat format = PixelFormat::u8, Stream stream = {}) {
     HostImages host = host_images(format);
     renderer->render(scene.batch(), views, images.like(host.batch()), stream);
@@ -191,7 +191,7 @@ TEST_F(CudaStreamTest, RunsOnTheCallersStreamWithoutWaitingOrAllocating) {
   PICTURA_CUDA(cudaStreamDestroy(stream));
 }
 
-// The least bound under which the stage's scene can be drawn, as the renderer itself tells it.
+// Returns the minimum limit under which the stage's scene can be drawn, from the renderer's error messages.
 std::size_t min_scratch_bytes(int agents, std::size_t num_views, RendererConfig config) {
   auto told = [](const std::function<void()>& work) -> std::size_t {
     const std::string message = test::message_of(work), marker = "max_scratch_bytes: expected at least ";
@@ -205,10 +205,10 @@ std::size_t min_scratch_bytes(int agents, std::size_t num_views, RendererConfig 
   return told([&] { Stage(agents, num_views, config).draw(); });
 }
 
-// Captures refuse every call that allocates or waits.
+// Captures reject every call that allocates or waits.
 TEST_F(CudaStreamTest, IsCapturedIntoAGraph) {
   RendererConfig config{.rig = paper_rig()};
-  config.max_scratch_bytes = min_scratch_bytes(60, 7, config) + 40;  // a view at a time
+  config.max_scratch_bytes = min_scratch_bytes(60, 7, config) + 40;  // one view at a time
   Stage stage(60, 7, config);
   const std::vector<uint8_t> first = bytes_of(stage.draw());
   HostImages host = stage.host_images();
@@ -222,7 +222,7 @@ TEST_F(CudaStreamTest, IsCapturedIntoAGraph) {
   PICTURA_CUDA(cudaStreamEndCapture(stream, &graph));
   std::size_t nodes = 0;
   PICTURA_CUDA(cudaGraphGetNodes(graph, nullptr, &nodes));
-  EXPECT_EQ(nodes, 42u);  // for each view six launches
+  EXPECT_EQ(nodes, 42u);  // six launches for each view
   PICTURA_CUDA(cudaGraphInstantiate(&executable, graph, 0));
 
   auto replay = [&] {
@@ -236,7 +236,7 @@ TEST_F(CudaStreamTest, IsCapturedIntoAGraph) {
     return bytes_of(host);
   };
   EXPECT_EQ(replay(), first);
-  // The graph reads the scene anew: everybody takes a step forward.
+  // The graph reads the scene again, after all agents have moved forward.
   for (AgentBox& box : stage.town.scene.agents) {
     box.center_m.x += 2 * box.cos_heading;
     box.center_m.y += 2 * box.sin_heading;
@@ -275,7 +275,7 @@ TEST_F(CudaStreamTest, ACaptureAfterReserveNeedsNoCallBefore) {
   stage.images.copy_to_host(host.batch());
   PICTURA_CUDA(cudaDeviceSynchronize());
   EXPECT_EQ(bytes_of(host), expected);
-  // Within the sizes nothing moves; beyond them graphs become stale.
+  // Below the reserved sizes nothing moves; above them graphs become stale.
   stage.renderer->reserve(3, boxes / 2);
   EXPECT_EQ(stage.renderer->generation(), generation);
   stage.renderer->reserve(8, boxes);
@@ -317,10 +317,10 @@ TEST_F(CudaStreamTest, PollsWithoutWaitingAndChecksItsStreamAlone) {
   EXPECT_TRUE(busy.was_released());
 }
 
-// A captured graph, which cannot ask the host, draws as many views as the device says when it is replayed.
+// A captured graph cannot ask the host. It draws the number of views that the device holds at the replay.
 TEST_F(CudaStreamTest, TheNumberOfViewsIsReadOnTheDevice) {
   RendererConfig tight{.rig = paper_rig(24, 14)};
-  tight.max_scratch_bytes = min_scratch_bytes(30, 5, tight) + 40;  // a view at a time
+  tight.max_scratch_bytes = min_scratch_bytes(30, 5, tight) + 40;  // one view at a time
   for (const RendererConfig& config : {RendererConfig{.rig = paper_rig(24, 14)}, tight}) {
     Stage stage(30, 5, config);
     const std::vector<uint8_t> all = bytes_of(stage.draw());
@@ -354,7 +354,7 @@ TEST_F(CudaStreamTest, TheNumberOfViewsIsReadOnTheDevice) {
       EXPECT_TRUE(std::equal(bytes.begin(), border, all.begin()));
       EXPECT_TRUE(std::all_of(border, bytes.end(), [](uint8_t byte) { return byte == 0x5A; }));
     }
-    // Queries of views that are not drawn are answered with NaN.
+    // Queries of views that are not drawn return NaN.
     DeviceCopy<VisibilityQuery> query_copy;
     std::vector<VisibilityQuery> host_queries;
     for (int32_t agent = 0; agent < 30; ++agent) host_queries.insert(host_queries.end(), {{1, agent}, {3, agent}});
@@ -392,7 +392,7 @@ TEST_F(CudaStreamTest, MapsAreReplacedWithoutWaitingForTheDevice) {
     stage.renderer->upload(1, other, stream);
   };
   replace();
-  replace();  // all memory that it needs at a time is there now
+  replace();  // all memory that it needs at a time is allocated now
   stage.renderer->reserve(4, static_cast<int>(stage.town.scene.agents.size()));
   const uint64_t generation = stage.renderer->generation();
   Blocker busy(busy_stream.stream);
@@ -403,7 +403,7 @@ TEST_F(CudaStreamTest, MapsAreReplacedWithoutWaitingForTheDevice) {
   EXPECT_TRUE(busy.was_released());
   EXPECT_EQ(stage.renderer->generation(), generation);
 
-  // A captured graph draws the map that the handle holds when it is replayed.
+  // A captured graph draws the map that the handle holds at the replay.
   HostImages host = stage.host_images();
   const ImageBatch batch = stage.images.like(host.batch());
   PICTURA_CUDA(cudaDeviceSynchronize());
@@ -432,7 +432,7 @@ TEST_F(CudaStreamTest, DrawsTheSameInPartsUnderATightBound) {
   tight.max_scratch_bytes = min_scratch_bytes(60, 7, config) + 40;
   Stage parts(60, 7, tight);
   EXPECT_EQ(bytes_of(parts.draw()), bytes_of(whole.draw()));
-  // A fault names the view of the batch, not of its part.
+  // A fault states the view's index in the batch, not in its part.
   parts.town.views[5].world = 9;
   parts.views = parts.view_copy.assign(Span<const View>(parts.town.views), nullptr);
   parts.draw();

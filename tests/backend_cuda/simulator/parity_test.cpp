@@ -1,5 +1,5 @@
-// The CUDA simulator against the CPU's, on a device: the same bits. Without a device these tests are skipped, unless
-// PICTURA_REQUIRE_GPU=1 says that there must be one.
+// The CUDA simulator compared with the CPU's, on a device: the same bits. Without a device these tests are skipped, or
+// fail with PICTURA_REQUIRE_GPU=1.
 #include <algorithm>
 
 #include <gmock/gmock.h>
@@ -33,7 +33,7 @@ using Maps = std::vector<std::shared_ptr<const RoadMap>>;
 
 class CudaSimulatorTest : public test::DeviceTest {};
 
-/// Of actions in the memory of a simulator.
+/// Returns an array of actions in a simulator's memory.
 Array array_of(const DeviceBuffer<int32_t>& actions, const Simulator& simulator) {
   return {actions.data(), {simulator.num_slots()}, simulator.device()};
 }
@@ -60,7 +60,7 @@ class DeviceEdit {
   std::vector<NamedArray> fields_;
 };
 
-/// A device observation's copy.
+/// A device observation's copy on the host.
 struct HostObservation {
 #define X(name, type, rows, features, part, comment) std::vector<type> name;
   PICTURA_OBSERVATION_ARRAYS(X)
@@ -89,7 +89,7 @@ void expect_same_view(Simulator* cpu, Simulator* cuda, int step) {
   ASSERT_TRUE(same(cpu->episode_step(), cuda->episode_step()) && same(cpu->episode_index(), cuda->episode_index()));
 }
 
-/// What a device's steps return, kept in device memory so that no step waits for the host.
+/// Results of a device's steps, stored in device memory so that no step waits for the host.
 class StepLog {
  public:
   StepLog(int steps, int num_slots)
@@ -115,7 +115,7 @@ class StepLog {
     host_valid_ = on_host(valid_.span());
     host_sums_ = on_host(sums_.span());
   }
-  /// On the host, but for refusals, which are state.
+  /// Returns a step's result on the host. Refused spawns are excluded because they are state.
   StepResult of_step(int step) const {
     const auto part = [&](const auto& log) {
       return Span(log.data() + static_cast<size_t>(step) * num_slots_, num_slots_);
@@ -139,8 +139,8 @@ class StepLog {
   std::vector<StepSums> host_sums_;
 };
 
-/// Steps both with the same actions and compares what every step returns. The device runs ahead: with a wait for each
-/// step, tests that share a device take turns at it thousands of times.
+/// Steps both simulators with the same actions and compares the results of all steps. The device runs ahead: with a
+/// wait for each step, tests that share a device would take turns at it thousands of times.
 void step_same(Simulator* cpu, Simulator* cuda, int steps, uint32_t first_step) {
   const int slots = cpu->num_slots();
   std::vector<int32_t> actions;
@@ -164,7 +164,7 @@ void step_same(Simulator* cpu, Simulator* cuda, int steps, uint32_t first_step) 
   }
 }
 
-/// Steps both; results are compared at every step, all that users see every `look_every` steps.
+/// Steps both simulators. Compares results at every step, and all public outputs every `look_every` steps.
 void run_same(Simulator* cpu, Simulator* cuda, int steps, int look_every, uint32_t first_step = 0) {
   expect_same_view(cpu, cuda, 0);
   for (int done = 0; done < steps && !::testing::Test::HasFatalFailure();) {
@@ -293,7 +293,7 @@ TEST_F(CudaSimulatorTest, CrowdsUpToTheLargestWorld) {
   expect_parity(config, {load_map("procedural:1")}, {{0, kMaxAgentsPerWorld, 0}, {0, 1000, 1}, {0, 1, 2}}, 45, 5);
 }
 
-/// Drives recorded scenes, of which a fifth at a time is taken over by random actions.
+/// Drives recorded scenes. Random actions control a fifth of the agents at a time.
 void expect_same_records(AfterInfraction after_infraction, bool leave_at_goal) {
   const auto scene = test::crossing({.num_vehicles = 40, .num_pedestrians = 10});
   SimulatorConfig config = scene_config(*scene);
@@ -634,7 +634,7 @@ TEST_F(CudaSimulatorTest, IsDrivenByTheLaneKeeperOnTheHost) {
   const auto cpu_controller = make_controller("lane", *cpu, 0), cuda_controller = make_controller("lane", *cuda, 0);
   EXPECT_EQ(cpu_controller->name(), "lane");
   EXPECT_EQ(cuda_controller->name(), "lane, on the host");
-  // The others' commands stay.
+  // Commands of the other agents are unchanged.
   std::vector<uint8_t> mask(200, 1);
   mask[7] = 0;
   const DeviceBuffer<uint8_t> device_mask{Span<const uint8_t>(mask)};

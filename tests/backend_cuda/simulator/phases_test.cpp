@@ -1,4 +1,4 @@
-// The CUDA executor's phases, run on the host in random orders, against the CPU executor: the same bits everywhere.
+// The CUDA executor's phases, run on the host in random orders, compared with the CPU executor: the same bits.
 #include <cstring>
 
 #include <gmock/gmock.h>
@@ -20,8 +20,8 @@
 namespace pictura {
 namespace {
 
-/// Steps both with the same actions, or commands of all kinds, and compares everything that their users see. In worlds
-/// of recorded scenes most commands of all kinds are to follow the record.
+/// Steps both executors with the same actions, or commands of all kinds, and compares all public outputs. In worlds of
+/// recorded scenes most commands of all kinds follow the record.
 void expect_same(const SimulatorConfig& config, const CompiledMaps& maps, const std::vector<WorldSpec>& worlds,
                  int steps, unsigned shuffle_seed, bool by_commands = false) {
   const auto cpu = make_simulator("cpu", config, maps, worlds);
@@ -138,7 +138,7 @@ TEST(Phases, ImpairAgents) {
 }
 
 TEST(Phases, PlaceCrowdsAsOneAfterTheOtherWould) {
-  // A ring of 251 m takes some forty cars: almost every choice depends on the ones before it.
+  // A ring of 251 m holds about forty cars: almost every choice depends on earlier choices.
   const SimulatorConfig config = testing::cars({.episode_steps = 3});
   expect_same(config, {testing::ring_road(40)}, {{0, 300, 0}, {0, 37, 1}, {0, 1, 2}}, 12, 3);
 }
@@ -163,7 +163,7 @@ TEST(Phases, LetCrowdsEnter) {
 
 TEST(Phases, BeginWorldsThatNobodyFindsAPlaceIn) {
   SimulatorConfig config = testing::cars({.episode_steps = 30});
-  config.pedestrian_fraction = 0.9f;  // and there is no walkway
+  config.pedestrian_fraction = 0.9f;  // the map has no walkway
   expect_same(config, {testing::ring_road(40)}, {{0, 2, 0}, {0, 1, 1}, {0, 1, 2}, {0, 30, 3}}, 40, 7);
 }
 
@@ -179,7 +179,7 @@ TEST(Phases, TakeCommandsOfAllKinds) {
 TEST(Phases, FollowRecords) {
   const auto scene = test::crossing({.num_steps = 40, .num_pedestrians = 6});
   SimulatorConfig config = scene_config(*scene);
-  config.episode_steps = 50;  // longer than the record, and several times
+  config.episode_steps = 50;  // several episodes, each longer than the record
   MapOptions lit = map_options(config);
   lit.recorded_lights = true;
   const CompiledMaps maps{compile_scenario(scene, map_options(config)), compile_scenario(scene, lit, 20),
@@ -187,7 +187,7 @@ TEST(Phases, FollowRecords) {
   const std::vector<WorldSpec> worlds{
       scene_world(*maps[0], 0, 0), scene_world(*maps[1], 1, 1), {2, 20, 2}, scene_world(*maps[0], 0, 3)};
   expect_same(config, maps, worlds, 160, 9, /*by_commands=*/true);
-  expect_same(config, maps, worlds, 60, 10);  // actions alone take everybody over
+  expect_same(config, maps, worlds, 60, 10);  // actions alone take over all agents
 }
 
 TEST(Phases, EndAgentsAsTheRulesSay) {
@@ -237,7 +237,7 @@ TEST(Phases, RefuseACommandOutOfRangeAndChangeNothing) {
   EXPECT_NE(executor.save(), before);
 }
 
-/// Everything that users see.
+/// Compares all public outputs.
 void expect_same_view(Simulator* cpu, testing::ShuffledExecutor* other) {
   ASSERT_EQ(cpu->save(), other->save());
   ASSERT_EQ(testing::first_difference(cpu->observations(), other->results.observation_view()), "");

@@ -1,5 +1,6 @@
-// The CUDA executor's phases on a host: every loop over threads runs in a random order, so that what a device may do in
-// any order must not matter. What it cannot show are two threads in the middle of one phase, and warps of many lanes.
+// The CUDA executor's phases on a host. Every loop over threads runs in a random order, because results must not depend
+// on an order that the device is free to choose. Two threads in the middle of one phase, and warps of many lanes, are
+// not tested.
 #pragma once
 
 #include <algorithm>
