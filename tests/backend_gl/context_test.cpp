@@ -31,7 +31,7 @@ TEST(GlContext, AMissingFunctionIsNamed) {
   }
 }
 
-// A renderer that draws while another context is current restores that one.
+// A renderer that draws while another context is current restores that context.
 template <typename Context>
 void expect_left_current(gl::Context* outer, const char* file, const char* package, const char* get_current,
                          const std::string& backend) {

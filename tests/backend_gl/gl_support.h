@@ -1,4 +1,4 @@
-// Shared by the tests of backend_gl/: drawing in float.
+// Drawing in float for the tests of backend_gl/.
 #pragma once
 
 #include <cstring>
@@ -14,7 +14,7 @@
 
 namespace pictura {
 
-/// Images of all views, in float, in the order of HostImages.
+/// Returns images of all views in float, in the order of HostImages.
 inline std::vector<float> draw(const std::string& backend, const StaticGeometry& geometry, const SceneOwner& scene,
                                const std::vector<View>& views, const RendererConfig& config) {
   const auto renderer = make_renderer(backend, config);

@@ -26,7 +26,7 @@ class GlInterop : public testing::Test {
   }
 };
 
-// Every byte of a camera's images in device memory, `stride` bytes from view to view, 0xA5 where unwritten.
+// All bytes of a camera's images in device memory, `stride` bytes from view to view, 0xA5 where unwritten.
 struct DeviceImages {
   DeviceBuffer<uint8_t> bytes;
   CameraImages camera;

@@ -1,4 +1,4 @@
-// The OpenGL baseline against the oracle, within the tolerances of its samples, and its interface.
+// The OpenGL baseline compared with the oracle, within the tolerances of its samples, and its interface.
 #include <algorithm>
 #include <functional>
 #include <thread>
@@ -106,7 +106,7 @@ TEST_P(GlRenderer, AnySizeAndMixedRigs) {
   config.rig.cameras[1].pitch_rad = -0.2f;
   config.rig.cameras[1].roll_rad = 0.3f;
   config.rig.cameras[2] = paper_rig(1, 1).cameras[2];
-  config.rig.cameras[3].focal_x_px *= 0.5f;  // the first one's size with another projection
+  config.rig.cameras[3].focal_x_px *= 0.5f;  // the first camera's size with another projection
   config.rig.cameras[3].center_y_px += 7.25f;
   config.samples.grid = 8;
   RendererConfig exact = config;
@@ -127,7 +127,7 @@ TEST_P(GlRenderer, RoadsOnTwoLevels) {
 }
 
 TEST_P(GlRenderer, BoxesThatDipIntoARoadAreInFrontOfItsStrips) {
-  // As upright boxes do on slopes. The strip under the car extends towards the camera.
+  // Upright boxes dip into roads on slopes. The strip under the car extends towards the camera.
   StaticGeometry geometry;
   add_polyline(&geometry, {{2, 0.3f, 0}, {12, 0.3f, 0}}, 0.8f, StripKind::lane_mark);
   geometry.build_grids();
@@ -141,8 +141,8 @@ TEST_P(GlRenderer, BoxesThatDipIntoARoadAreInFrontOfItsStrips) {
             kMinGlPsnr8x8_db);
 }
 
-// Number of pixels of a patch of road that do not show the topmost strip, where the first `count` of five strips cover
-// it, 2 to 10 m ahead at height z. The image shows `others` further strips elsewhere.
+// Returns the number of pixels of a patch of road that do not show the topmost strip. The first `count` of five strips
+// cover the patch, 2 to 10 m ahead at height z. The image shows `others` further strips elsewhere.
 int wrong_pixels(const std::string& backend, int count, float z, int others) {
   const StripKind kinds[] = {StripKind::road_edge, StripKind::lane_mark, StripKind::lane_mark, StripKind::crosswalk,
                              StripKind::stop_line};
@@ -167,7 +167,7 @@ int wrong_pixels(const std::string& backend, int count, float z, int others) {
     for (int x = 45; x < 55; ++x) {
       const auto pixel = static_cast<std::size_t>(100 * y + x);
       const float r = image[pixel], g = image[pixel + 10000], b = image[pixel + 20000];
-      // Compared by hue, because pieces fade with distance.
+      // Colours are compared by hue, because pieces fade with distance.
       wrong += r == 0 || std::abs(r * top.g - g * top.r) > 1e-3f || std::abs(b * top.g - g * top.b) > 1e-3f;
     }
   }
@@ -175,8 +175,8 @@ int wrong_pixels(const std::string& backend, int count, float z, int others) {
 }
 
 TEST_P(GlRenderer, StripsOfOneLevelAreOrderedByKindThenIndex) {
-  // At heights with different rounding, the last two above the camera; the more strips an image shows, the smaller
-  // their depth offsets.
+  // Strips are at heights with different rounding, the last two above the camera. The more strips an image shows, the
+  // smaller their depth offsets.
   for (const int others : {0, 2000}) {
     for (const float z : {0.0f, 0.1f, -0.3f, 1.0f / 3, 3.0f, 3.1f}) {
       for (int count = 1; count <= 5; ++count) {
@@ -236,7 +236,7 @@ TEST_P(GlRenderer, BytesAreTheRoundedColors) {
     renderer->upload(0, town.geometry);
     const std::vector<uint8_t> bytes = draw_bytes(renderer.get(), town, town.views);
     ASSERT_EQ(bytes.size(), colors.size());
-    // Samples are rounded before averaging, and the mean afterwards; drivers round to within 0.6 of a step.
+    // Samples are rounded before averaging, and the mean is rounded afterwards; drivers round to within 0.6 of a step.
     const float most = samples.grid > 1 ? 1.1f : 0.6f;
     for (std::size_t i = 0; i < bytes.size(); ++i) {
       ASSERT_NEAR(bytes[i], 255 * colors[i], most + 1e-3f) << "value " << i;
@@ -254,7 +254,7 @@ TEST_P(GlRenderer, RenderersAreIndependent) {
   const auto expected = alone(GetParam(), town, {}), expected_other = alone(GetParam(), other_town, {.grid = 2});
   const auto first = make_renderer(GetParam(), {.num_threads = 1});
   const auto second = make_renderer(GetParam(), {.num_threads = 1, .samples = {.grid = 2}});
-  // From another library, if installed.
+  // A renderer of another library, if it is installed.
   const std::string other = std::string(GetParam()) == "gl:egl" ? "gl:osmesa" : "gl:egl";
   const auto third = missing(other).empty() ? make_renderer(other, {.num_threads = 1}) : nullptr;
   first->upload(0, town.geometry);
@@ -275,7 +275,7 @@ TEST_P(GlRenderer, CanBeUsedByOneThreadAfterAnother) {
   std::vector<uint8_t> there;
   std::thread([&] { there = draw_bytes(renderer.get(), town, town.views); }).join();
   EXPECT_EQ(there, here);
-  // A smaller batch, and then the first one again, in memory that has grown.
+  // A smaller batch, and then the first batch again, in memory that has grown.
   const std::vector<View> fewer(town.views.begin(), town.views.begin() + 1);
   const std::vector<uint8_t> first = draw_bytes(renderer.get(), town, fewer);
   EXPECT_TRUE(std::equal(first.begin(), first.end(), here.begin()));
