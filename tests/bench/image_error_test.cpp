@@ -1,4 +1,4 @@
-// Differences that the comparison with the oracle detects, and those within tolerance.
+// Differences that the comparison with the oracle detects, and differences within tolerance.
 #include "pictura/bench/image_error.h"
 
 #include <cmath>
@@ -14,7 +14,7 @@ namespace {
 
 const Rig kRig = front_rig(8, 8);
 
-// The error of two black images, of which one has other first bytes.
+// Returns the error of two black images whose first values differ.
 template <typename Value>
 ImageError error_with(PixelFormat format, Value first_value) {
   HostImages actual(kRig, 1, format);
