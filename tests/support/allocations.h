@@ -1,9 +1,9 @@
-// Counts the allocations of a thread. Linking allocations.cpp replaces a binary's operator new.
+// Counter of a thread's allocations. Linking allocations.cpp replaces a binary's operator new.
 #pragma once
 
 namespace pictura::test {
 
-/// Allocations of the calling thread so far.
+/// Returns the number of the calling thread's allocations so far.
 long allocations();
 
 }  // namespace pictura::test

@@ -1,4 +1,4 @@
-// Error messages, for tests that check them.
+// Error messages for tests that check them.
 #pragma once
 
 #include <string>
@@ -8,10 +8,10 @@
 
 namespace pictura::test {
 
-/// Returned by message_of() if nothing is thrown.
+/// Result of message_of() if nothing is thrown.
 constexpr const char* kNoError = "no error";
 
-/// The message of the error of type Expected that `work` throws.
+/// Returns the message of the error of type Expected that `work` throws.
 template <typename Expected = Error, typename Work>
 std::string message_of(Work&& work) {
   try {

@@ -1,4 +1,4 @@
-// Skipping tests on machines that lack a renderer's library.
+// Skips tests on machines that lack a renderer's library.
 #pragma once
 
 #include <cstdlib>
@@ -11,7 +11,7 @@
 
 namespace pictura {
 
-/// Why a renderer cannot run here, or an empty string. The test fails if PICTURA_REQUIRE_GL names the renderer.
+/// Returns why a renderer cannot run here, or an empty string. The test fails if PICTURA_REQUIRE_GL names the renderer.
 inline std::string missing(const std::string& backend) {
   try {
     make_renderer(backend, {});

@@ -12,7 +12,7 @@
 
 namespace pictura::test {
 
-/// What a test of a map lacks; empty if the map exists.
+/// Returns what a test of a map lacks; empty if the map exists.
 inline std::string missing(const std::string& map) {
   const std::vector<std::string> towns = known_towns();
   const std::string town(parse_map_copy(map).map);
@@ -20,7 +20,7 @@ inline std::string missing(const std::string& map) {
   return is_there ? "" : "needs " + town + ".xodr; set PICTURA_DATA";
 }
 
-/// Names tests by their map.
+/// Returns a test's name from its map.
 inline std::string map_name(const ::testing::TestParamInfo<const char*>& map) {
   std::string name = map.param;
   for (const char mark : {':', '#'}) std::replace(name.begin(), name.end(), mark, '_');

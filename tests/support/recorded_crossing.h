@@ -1,4 +1,4 @@
-// The synthetic scene of scene_fixture.h as readers hand it out.
+// The synthetic scene of scene_fixture.h as a Scenario.
 #pragma once
 
 #include <memory>

@@ -1,4 +1,4 @@
-// What every renderer for callers in host memory promises, whatever draws: tests of the backends call these.
+// Guarantees of all renderers for callers in host memory. Tests of the backends call these functions.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +22,7 @@ namespace pictura::test {
 /// Makes renderers of one kind with a rig.
 using MakeForRig = std::function<std::unique_ptr<Renderer>(const Rig& rig)>;
 
-/// The bytes of a town's images, with its map in the handle that its world names.
+/// Returns the bytes of a town's images, with its map in the handle that its world names.
 inline std::vector<uint8_t> draw_town(Renderer* renderer, const SceneOwner& scene, const std::vector<View>& views) {
   HostImages images(renderer->config().rig, static_cast<int>(views.size()));
   std::ranges::fill(images.bytes(), uint8_t{0xA5});
@@ -31,7 +31,8 @@ inline std::vector<uint8_t> draw_town(Renderer* renderer, const SceneOwner& scen
   return {images.bytes().begin(), images.bytes().end()};
 }
 
-/// Handles are the caller's choice; maps are replaced and released under them; one scene serves several renderers.
+/// Expects that callers choose handles, that maps under them are replaced and released, and that renderers share a
+/// scene.
 inline void expect_maps_by_handle(const MakeForRig& make) {
   const Rig rig = front_rig(32, 18);
   Snapshot town = make_synthetic_town(1, 20);
@@ -49,21 +50,21 @@ inline void expect_maps_by_handle(const MakeForRig& make) {
   const std::vector<uint8_t> expected_other = draw_town(only_other.get(), named(3), town.views);
   ASSERT_NE(expected, expected_other);
 
-  // Far apart, in any order.
+  // Handles far apart, in any order.
   constexpr GeometryHandle kLast = kNumGeometryHandles - 1;
   second->upload(kLast, other.geometry);
   second->upload(7, town.geometry);
   EXPECT_EQ(draw_town(second.get(), named(7), town.views), expected);
   EXPECT_EQ(draw_town(second.get(), named(kLast), town.views), expected_other);
-  // One scene for several renderers.
+  // One scene serves several renderers.
   first->upload(7, town.geometry);
   const SceneOwner shared = named(7);
   EXPECT_EQ(draw_town(first.get(), shared, town.views), draw_town(second.get(), shared, town.views));
-  // Replaced.
+  // A replaced map.
   second->upload(7, other.geometry);
   EXPECT_EQ(draw_town(second.get(), shared, town.views), expected_other);
   EXPECT_EQ(draw_town(first.get(), shared, town.views), expected);
-  // Released; others are not touched.
+  // A released map; other maps are unchanged.
   second->release(7);
   second->release(7);
   for (const GeometryHandle empty : {7, 8, kNumGeometryHandles, -1}) {
@@ -76,7 +77,7 @@ inline void expect_maps_by_handle(const MakeForRig& make) {
   EXPECT_EQ(draw_town(second.get(), shared, town.views), expected);
 }
 
-/// Handles that no map can have are refused by name.
+/// Expects that an error names each handle that no map can have.
 inline void expect_refused_handles(const MakeForRig& make) {
   const auto renderer = make(front_rig(8, 8));
   const StaticGeometry geometry = make_synthetic_town(1, 1).geometry;
@@ -87,7 +88,7 @@ inline void expect_refused_handles(const MakeForRig& make) {
   }
 }
 
-/// The bytes of planar images in the patches of another layout, black beyond the images.
+/// Returns the bytes of planar images in the patches of another layout, black beyond the images.
 inline std::vector<uint8_t> as_patches(const HostImages& planar, const ImageLayout& layout) {
   const std::size_t size = bytes_per_value(layout.format);
   std::vector<uint8_t> result(layout.bytes());
@@ -111,7 +112,8 @@ inline std::vector<uint8_t> as_patches(const HostImages& planar, const ImageLayo
   return result;
 }
 
-/// Images as patches of any side, and bytes as bfloat16s, hold what planar ones hold, and black beyond the image.
+/// Expects images in patches of any size, and bytes as bfloat16s, to hold the planar values, and black beyond the
+/// image.
 inline void expect_patches(const MakeForRig& make) {
   Rig rig = paper_rig(33, 19);  // neither side is a multiple of a patch's
   rig.cameras[1] = paper_rig(32, 18).cameras[1];
@@ -145,7 +147,7 @@ inline void expect_patches(const MakeForRig& make) {
   }
 }
 
-/// Renderers draw planar images, some patches, and refuse others by name.
+/// Expects renderers to draw planar images and some patches, and to name the others in an error.
 inline void expect_refused_order(const MakeForRig& make) {
   const Rig rig = front_rig(8, 8);
   HostImages images(rig, 1);
@@ -170,8 +172,8 @@ inline void expect_refused_order(const MakeForRig& make) {
               testing::HasSubstr("images: expected the format u8 or f32, got bf16"));
 }
 
-/// Drawing a compacted list with its count equals drawing exactly those views; the images of others are not written,
-/// and what lies beyond the count is not read.
+/// Expects that drawing a compacted list with its count equals drawing exactly those views. Images of other views are
+/// not written, and views beyond the count are not read.
 inline void expect_counted_views(const MakeForRig& make) {
   const Rig rig = paper_rig(24, 14);
   Snapshot town = make_synthetic_town(1, 20);
@@ -204,7 +206,7 @@ inline void expect_counted_views(const MakeForRig& make) {
   }
 }
 
-/// ... and so do queries; of a view beyond the count the answer is NaN.
+/// Expects queries to obey the count too; the answer for a view beyond the count is NaN.
 inline void expect_counted_queries(const MakeForRig& make) {
   Snapshot town = make_synthetic_town(1, 20);
   town.views.resize(2);

@@ -22,7 +22,7 @@ constexpr double kCenterX_m = -7887.25, kCenterY_m = 6796.5, kGround_m = -186.0;
 constexpr double kArm_m = 12, kHalfLane_m = 1.75, kSpacing_m = 0.5;
 constexpr double kPi64 = std::numbers::pi;
 
-/// A point of the crossing, turned by `arm` quarters.
+/// Returns a point of the crossing, turned by `arm` quarters.
 Vector3d place(double x, double y, int arm, double z = 0) {
   const double c = std::array{1.0, 0.0, -1.0, 0.0}[arm], s = std::array{0.0, 1.0, 0.0, -1.0}[arm];
   return {kCenterX_m + c * x - s * y, kCenterY_m + s * x + c * y, kGround_m + z};
@@ -35,7 +35,7 @@ LoggedPoints line(Vector3d a, Vector3d b, double spacing_m = kSpacing_m) {
   return points;
 }
 
-/// Ids of the four arms' features; arm k has its approach from direction k.
+/// Ids of the four arms' features. Arm k has its approach from direction k.
 int64_t approach_id(int arm) { return 100 + arm; }
 int64_t exit_id(int arm) { return 110 + arm; }
 int64_t straight_id(int arm) { return 120 + arm; }
@@ -47,7 +47,7 @@ void add_roads(const FixtureOptions& options, LoggedScene* scene) {
   const double far_m = kArm_m + kSpacing_m * (options.lane_points - 1);
   const int32_t last = options.lane_points - 1;
   for (int arm = 0; arm < 4; ++arm) {
-    // Right-hand traffic: at arm 0 (east) traffic comes in along y = +1.75 towards -x.
+    // Traffic drives on the right: at arm 0 (east) it enters along y = +1.75 towards -x.
     LoggedLane in{.id = approach_id(arm), .type = LoggedLaneType::surface, .speed_limit_mps = 25 * 0.44704};
     in.points = line(place(far_m, kHalfLane_m, arm), place(kArm_m, kHalfLane_m, arm));
     in.exits = {straight_id(arm), right_id(arm)};
@@ -61,7 +61,7 @@ void add_roads(const FixtureOptions& options, LoggedScene* scene) {
     straight.points = line(place(kArm_m, kHalfLane_m, arm), place(-kArm_m, kHalfLane_m, arm));
     straight.entries = {approach_id(arm)};
     straight.exits = {exit_id((arm + 2) % 4)};
-    // From arm 0 to the right: towards +y, out of arm 1.
+    // The right turn of arm 0: towards +y, out of arm 1.
     LoggedLane right{.id = right_id(arm), .type = LoggedLaneType::surface, .interpolating = true};
     const double radius_m = kArm_m - kHalfLane_m;
     for (int i = 0; i <= 40; ++i) {
@@ -70,7 +70,7 @@ void add_roads(const FixtureOptions& options, LoggedScene* scene) {
     }
     right.entries = {approach_id(arm)};
     right.exits = {exit_id((arm + 1) % 4)};
-    // Neighbouring arms agree on shared ends to the last bit.
+    // Shared ends of neighbouring arms are equal to the last bit.
     right.points.front() = in.points.back();
     straight.points.front() = in.points.back();
     scene->lanes.insert(scene->lanes.end(), {in, out, straight, right});
@@ -108,7 +108,7 @@ void add_roads(const FixtureOptions& options, LoggedScene* scene) {
 }
 
 void add_lights(LoggedScene* scene) {
-  // In the order of lane ids, in which formats list them.
+  // Formats list lights in the order of lane ids.
   for (const int64_t lane : {straight_id(0), straight_id(2), right_id(0), right_id(2)}) {
     LoggedLight light{.lanes = {lane}};
     for (int step = 0; step < scene->num_steps; ++step) {
@@ -127,7 +127,7 @@ void add_tracks(const FixtureOptions& options, LoggedScene* scene) {
     return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
   };
   const int count = options.num_vehicles + options.num_pedestrians + options.num_cyclists;
-  // On long lanes nobody starts in another's place.
+  // On long lanes all agents start at distinct places.
   constexpr double kApart_m = 8;
   const int places = std::max(4, static_cast<int>(kSpacing_m * (options.lane_points - 1) / kApart_m) - 1);
   for (int i = 0; i < count; ++i) {
@@ -149,7 +149,7 @@ void add_tracks(const FixtureOptions& options, LoggedScene* scene) {
                  side_m = track.type == TrackType::pedestrian ? 6 : kHalfLane_m;
     for (int step = 0; step < options.num_steps; ++step) {
       LoggedState state;
-      // The last track has gaps; invalid states still carry a centre.
+      // The last track has gaps; invalid states still have a centre.
       state.valid = i + 1 < count || options.num_steps <= 5 || (step > 4 && step % 30 < 25);
       const double x = start_m - speed_mps * 0.1 * step;
       state.center_m = place(x, side_m, arm, 0.5 * height_m);
@@ -175,7 +175,7 @@ void add_tracks(const FixtureOptions& options, LoggedScene* scene) {
 
 // WOMD ---------------------------------------------------------------------------------------------------------------
 
-/// A protobuf message whose fields are laid out at the end, in the style's order.
+/// A protobuf message whose fields are written at the end, in the style's order.
 class Message {
  public:
   explicit Message(const WomdStyle& style) : style_(style) {}
@@ -236,8 +236,8 @@ class Message {
   std::vector<Field> fields_;
 };
 
-/// Writes the scene's fields through a visitor that knows both their names and their numbers: one description for the
-/// binary message and for protobuf's JSON.
+/// Writes the scene's fields through a visitor that gets both their names and numbers: one description for the binary
+/// message and for protobuf's JSON.
 struct Visitor {
   std::function<void(int, const char*, int64_t)> integer;
   std::function<void(int, const char*, double)> number64;
@@ -407,7 +407,7 @@ std::string joined(const std::vector<std::string>& parts, const char* around) {
   return fmt::format("{}{}{}", around[0], fmt::join(parts, ","), around[1]);
 }
 
-/// As JSON says it; a whole number keeps its point, without which -0 would lose its sign.
+/// Returns a number as JSON text. A whole number keeps its point, because -0 would lose its sign without it.
 template <typename T>
 std::string number_text(T value, const char* format) {
   std::string text = fmt::format(fmt::runtime(format), value);
@@ -415,7 +415,7 @@ std::string number_text(T value, const char* format) {
   return text;
 }
 
-/// Repeated messages of one name are collected, since features come in several lists.
+/// Repeated messages of one name are collected, because features come in several lists.
 struct JsonObject {
   std::vector<std::string> members;
   std::map<std::string, std::vector<std::string>> lists;
@@ -550,7 +550,7 @@ std::string write_old(const LoggedScene& scene, bool has_ids, bool has_name) {
 
 std::string write_new(const LoggedScene& scene) {
   Bytes out;
-  // Ids are places in the file.
+  // Ids are positions in the file.
   std::map<int64_t, int64_t> lane_index;
   for (std::size_t i = 0; i < scene.lanes.size(); ++i) lane_index[scene.lanes[i].id] = static_cast<int64_t>(i);
   const auto roads = scene.lanes.size() + scene.lines.size() + scene.edges.size() + scene.crosswalks.size();

@@ -1,4 +1,4 @@
-// For tests from outside:
+// Commands for tests outside this program:
 //   scene_fixture write FOLDER    writes the fixture in every format, and its WOMD record as protobuf's JSON
 //   scene_fixture compare A B     prints where two scenes differ; exits with 1 if they do
 //   scene_fixture many FILE N     writes a shard of N scenes as large as WOMD's
@@ -28,7 +28,7 @@ void write_all(const std::string& folder) {
   }
 }
 
-/// 100 tracks, 20,000 points of the map, four lights: about 1 MB a record.
+/// Writes scenes of 100 tracks, 20,000 points of the map and four lights: about 1 MB a record.
 void write_many(const std::string& file, int count) {
   std::vector<std::string> records;
   for (int i = 0; i < count; ++i) {

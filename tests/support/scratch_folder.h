@@ -33,7 +33,7 @@ class ScratchFolder {
 
   std::string path() const { return path_.string(); }
   std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-  /// Files and folders in it.
+  /// Returns the number of files and folders in the folder.
   size_t num_entries() const {
     return static_cast<size_t>(
         std::distance(std::filesystem::directory_iterator(path_), std::filesystem::directory_iterator()));
