@@ -30,7 +30,7 @@ PictureSize size_of(const SceneFile& scene) {
   return size;
 }
 
-// Calls visit(image, index of a channel value in it, index of that value in the picture) for all values.
+// Calls visit(image, index of a channel value in the image, index of that value in the picture) for all values.
 template <typename Visit>
 void visit_values(const SceneFile& scene, Visit&& visit) {
   const PictureSize size = size_of(scene);
@@ -134,7 +134,7 @@ PooledError error_of(const Drawing& actual, const Drawing& expected) {
 }
 
 std::string complaint(const PooledError& error, const ImageTolerance& tolerance) {
-  // Rounding of floats converted from bytes.
+  // Rounding error of floats converted from bytes.
   const double rounding = 1e-4 / 255;
   if (error.max_error() > tolerance.worst + rounding) {
     return fmt::format("worst value {:.2f}/255 off, expected at most {:.2f}/255", 255 * error.max_error(),

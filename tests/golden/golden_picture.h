@@ -16,25 +16,25 @@ using Drawing = std::vector<std::vector<float>>;
 /// Draws with a backend that uses host memory, in bytes or in floats.
 Drawing draw_scene(Renderer* renderer, const SceneFile& scene, PixelFormat format);
 
-/// The truth's images of the scene.
+/// Returns the truth's images of the scene.
 Drawing trace_scene(const SceneFile& scene);
 
-/// Rows of views, columns of cameras, grey in the gaps.
+/// Returns a picture with rows of views and columns of cameras, grey in the gaps.
 RgbImage to_picture(const SceneFile& scene, const Drawing& drawing);
 
-/// The images of a picture made by to_picture(). Throws Error if its size does not match the scene.
+/// Returns the images of a picture made by to_picture(). Throws Error if its size does not match the scene.
 Drawing from_picture(const SceneFile& scene, const RgbImage& picture);
 
-/// |a - b| times eight.
+/// Returns |a - b| times eight.
 Drawing difference(const Drawing& a, const Drawing& b);
 
-/// Every pixel as a square of 4 x 4.
+/// Returns the picture with every pixel as a square of 4 x 4.
 RgbImage enlarged(const RgbImage& picture);
 
 /// Pools the error over all images.
 PooledError error_of(const Drawing& actual, const Drawing& expected);
 
-/// Why the error exceeds the tolerance, or empty.
+/// Returns why the error exceeds the tolerance, or an empty string.
 std::string complaint(const PooledError& error, const ImageTolerance& tolerance);
 
 }  // namespace pictura

@@ -1,5 +1,5 @@
-// Golden images: each scene of this folder, drawn by a backend, against its PNG by the oracle; and the oracle against
-// the truth.
+// Golden images: each scene of this folder, drawn by a backend, compared with its PNG by the oracle; and the oracle
+// compared with the truth.
 //   golden_test [--backend NAME] [--out DIR] [GoogleTest's options]
 //   golden_test --update     redraws the pictures with the oracle
 // A failure writes DIR/SCENE_{expected,actual,difference}.png, enlarged, the difference with eightfold contrast.
@@ -48,7 +48,7 @@ const ImageTolerance& tolerance_of(const std::string& backend, const std::string
   fail_usage("--backend {}: no tolerance for it in bench/truth/tolerances.h", backend);
 }
 
-/// A renderer for the scene with the backend of the command line, or null and the reason. Null is a failure if
+/// Returns a renderer for the scene with the backend of the command line, or null and the reason. Null is a failure if
 /// PICTURA_REQUIRE_GPU=1 or PICTURA_REQUIRE_GL requires the backend.
 std::unique_ptr<Renderer> backend_for(const SceneFile& scene, std::string* why_not_out) {
   RendererConfig config = scene.config;
@@ -119,8 +119,8 @@ TEST_P(Golden, LooksLikeTheTruth) {
 
 TEST(GoldenFolder, EveryPictureHasItsScene) { EXPECT_EQ(golden_names(".png"), golden_names(".toml")); }
 
-// Possible faults of a renderer, put into the scene that the oracle draws. Each must exceed every tolerance against the
-// correct picture; a tolerance that accepts one is too wide.
+// Possible faults of a renderer, seeded in the scene that the oracle draws. Each fault must exceed every tolerance
+// against the correct picture; a tolerance that accepts a fault is too wide.
 struct Fault {
   const char *what, *scene;
   std::function<void(SceneFile*)> seed;
