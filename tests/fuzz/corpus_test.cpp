@@ -27,7 +27,7 @@ std::vector<fs::path> corpus(const std::string& folder) {
   return files;
 }
 
-/// CPU time, since other programs share the machine.
+/// Returns CPU time, since other programs share the machine.
 template <typename Fuzz>
 double seconds_of(Fuzz fuzz) {
   const std::clock_t begin = std::clock();
@@ -46,7 +46,7 @@ std::string mutated(std::string bytes, std::mt19937* random) {
       case 2: bytes.insert(below(bytes.size()), bytes.substr(at, length)); break;
       case 3: bytes.resize(at); break;
       default: {
-        // Change a digit: most of the content is numbers.
+        // Change a digit, because most of the content is numbers.
         const size_t digit = bytes.find_first_of("0123456789", at);
         if (digit != std::string::npos) bytes[digit] = "0123456789-.e"[below(13)];
       }

@@ -33,7 +33,7 @@ void exercise(const Scenario& scenario) {
   }
 }
 
-/// What a scenario states must give the same scenario again and again.
+/// Checks that a scene made from a scenario gives the same scenario again and again.
 void exercise_statement(const Scenario& scenario) {
   Scenario stated = make_scenario(state_scene(scenario));
   stated.notes.clear();
@@ -60,7 +60,7 @@ std::string_view sound_fields() {
   return fields;
 }
 
-/// Reads bytes as a file of fields; see fuzz_scene_cache(). `encode` puts its header before fields.
+/// Reads bytes as a file of fields; see fuzz_scene_cache(). `encode` writes its header before the fields.
 bool fuzz_fields(std::string_view bytes, const Encode& encode,
                  const std::function<Scenario(std::string_view)>& decode) {
   if (bytes.empty()) return false;

@@ -10,7 +10,7 @@
 namespace pictura {
 namespace {
 
-/// Seeds of WOMD payloads are called so whatever their style.
+/// Returns the file name of a seed: seeds of WOMD payloads have one name, whatever their style.
 std::string read_as(const std::string& seed) { return seed.substr(0, seed.find(' ')); }
 
 TEST(FuzzScenes, EverySeedIsAScene) {
@@ -35,7 +35,7 @@ TEST(FuzzScenes, MutatedSeedsAreScenesOrErrors) {
       (test::fuzz_scene(changed, read_as(name)) ? scenes : errors)++;
     }
     EXPECT_GT(errors, 5) << name;
-    // Every change of a record is found by its checksum.
+    // Checksums detect every change of a record.
     if (name.ends_with(".tfrecord")) {
       EXPECT_LT(scenes, 3);
     } else {

@@ -1,5 +1,5 @@
-// libFuzzer target: any bytes as a recorded scene of the format that PICTURA_FUZZ_NAME, a file's name, says. Where
-// $PICTURA_FUZZ_SEEDS names a folder, small scenes of that format are written into it first, to begin with:
+// libFuzzer target: any bytes as a recorded scene. PICTURA_FUZZ_NAME, a file's name, selects the format. Where
+// $PICTURA_FUZZ_SEEDS names a folder, small scenes of that format are first written into the folder as first inputs:
 //   PICTURA_FUZZ_SEEDS=seeds build/fuzz/tests/fuzz/gpudrive_fuzzer NEW seeds
 #include <cstdint>
 #include <cstdlib>
