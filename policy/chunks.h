@@ -1,6 +1,6 @@
-// How a batch is cut into the chunks that go through the network one after the other. All chunks of a batch have one
-// size, and on a device few sizes come at all: what libraries choose and build for a size (cuDNN's plans, CUDA graphs)
-// is then made once, however many agents are active.
+// Splits a batch into chunks that pass through the network one after the other. All chunks of a batch have the same
+// size. On a device few sizes occur at all, so that what libraries select and build for a size (cuDNN's plans, CUDA
+// graphs) is built once, however many agents are active.
 #pragma once
 
 #include <algorithm>
@@ -9,17 +9,17 @@
 
 namespace pictura {
 
-/// On a device sizes of chunks are multiples of this, where the largest that is allowed is larger.
+/// Granularity of chunk sizes on a device: sizes are multiples of this number, unless the maximum size is smaller.
 constexpr int64_t kChunkGranule = 256;
 
-/// How large the chunks of a batch are: equal parts of it of at most `most`; or all `most`, so that arithmetic that
-/// depends on a chunk's size does not depend on the batch's.
+/// Sizes of the chunks of a batch: equal parts of at most `most` rows. With `are_full` every chunk has `most` rows, so
+/// that arithmetic that depends on the chunk size does not depend on the batch size.
 struct ChunkSizes {
   int64_t most = 1;
   bool are_full = false;
 };
 
-/// Of each chunk of a batch of `count`.
+/// Returns the size of each chunk of a batch of `count` rows.
 inline int64_t chunk_size(int64_t count, const ChunkSizes& sizes, bool on_device) {
   const int64_t most = sizes.most;
   if (sizes.are_full) return most;
@@ -28,14 +28,14 @@ inline int64_t chunk_size(int64_t count, const ChunkSizes& sizes, bool on_device
   return std::min(most, (equal + granule - 1) / granule * granule);
 }
 
-/// Some rows of a batch, which begin there at `begin`. Of `rows`, i64 [size of chunks], those past the first `count`
-/// fill it up: they repeat the batch's first row, and what is computed for them must not count.
+/// Consecutive rows of a batch from row `begin` on. Only the first `count` of `rows`, i64 [chunk size], belong to the
+/// chunk. The rest are padding: they repeat the batch's first row, and their results must be discarded.
 struct Chunk {
   at::Tensor rows;
   int64_t begin = 0, count = 0;
 
   int64_t size() const { return rows.size(0); }
-  /// Numbers of the batch, those of the chunk followed by zeros.
+  /// Returns the chunk's numbers of a batch array, padded with zeros.
   at::Tensor take(const at::Tensor& of_batch) const {
     return at::constant_pad_nd(of_batch.narrow(0, begin, count), {0, size() - count});
   }

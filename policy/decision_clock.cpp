@@ -6,7 +6,7 @@ namespace pictura {
 
 namespace {
 
-// What each slot's world has: [slots].
+// Values of each slot's world: [slots].
 template <typename T>
 at::Tensor of_slots(const SimulatorArrays& input, Span<const T> of_worlds) {
   const auto num_slots = static_cast<int64_t>(input.slots.world_of_slot.size());

@@ -13,8 +13,8 @@ namespace pictura {
 
 namespace {
 
-// The policy for images of another size: patches and line floor grow as the images do, and the first convolution is
-// spread.
+// Returns the policy for images of another size: patches and line floor grow with the images, and the first convolution
+// is spread.
 SavedPolicy resized_policy(const SavedPolicy& policy, ImageSize size) {
   const Config& config = policy.config;
   if (!config.reads_images()) fail_usage("{}: size: its policy reads no images", policy.path);
@@ -33,7 +33,7 @@ SavedPolicy resized_policy(const SavedPolicy& policy, ImageSize size) {
   }
   SavedPolicy result = policy;
   result.config.policy.patch_px *= factor;
-  // Rounded to what would be written by hand: .35 times 3 is 1.05, not 1.0499999999999998.
+  // Rounded to the value that a person would write: .35 times 3 is 1.05, not 1.0499999999999998.
   result.config.render.line_floor_px = std::round(1e6 * factor * config.render.line_floor_px) / 1e6;
   if (result.config.policy.patch_px > kMaxPatch_px || result.config.render.line_floor_px > kMaxLineFloor_px) {
     fail_usage("{}: size: expected patches of at most {} px and lines of at most {} px, got {} and {} for {}x{}",
@@ -42,7 +42,7 @@ SavedPolicy resized_policy(const SavedPolicy& policy, ImageSize size) {
   }
   result.config.render.width_px = size.width_px;
   result.config.render.height_px = size.height_px;
-  result.config.render.schedule.clear();  // of the run at the old size
+  result.config.render.schedule.clear();  // belongs to the run at the old size
   result.rig = paper_rig(size.width_px, size.height_px);
   const auto first = std::find_if(result.parameters.begin(), result.parameters.end(),
                                   [](const NamedTensor& parameter) { return parameter.name == kFirstConvolution; });

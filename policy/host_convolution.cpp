@@ -22,13 +22,13 @@ PICTURA_INLINE typename VectorOf<kFloats>::Type& vector_at(float* from) {
 
 constexpr int kChannelMultiple = 8;
 
-// What outputs read of an array: each the `run` numbers of `kernel` rows, which are row_step apart.
+// Inputs of outputs in an array: each output reads `run` numbers in each of `kernel` rows, which are row_step apart.
 struct Windows {
-  const int64_t* begins;  // of the first rows
+  const int64_t* begins;  // of the windows' first rows
   int64_t count, kernel, run, row_step;
 };
 
-// Outputs [window, window + kWindows) of all channels.
+// Computes outputs [window, window + kWindows) of all channels.
 template <int kFloats, int kVectors, int kWindows>
 PICTURA_INLINE void some_outputs(const Windows& windows, int64_t window, const float* padded, const float* weight,
                                  float* out) {
@@ -61,7 +61,7 @@ PICTURA_INLINE void all_outputs(const Windows& windows, const float* padded, con
   for (; window < windows.count; ++window) some_outputs<kFloats, kVectors, 1>(windows, window, padded, weight, out);
 }
 
-// Of taps [tap, tap + kTaps) of row k of the kernel.
+// Computes weight gradients of taps [tap, tap + kTaps) of row k of the kernel.
 template <int kFloats, int kVectors, int kTaps>
 PICTURA_INLINE void some_weight_gradients(const Windows& windows, int64_t k, int64_t tap, const float* padded,
                                           const float* grad, float* weight_grad) {
@@ -101,7 +101,8 @@ PICTURA_INLINE void all_weight_gradients(const Windows& windows, const float* pa
   }
 }
 
-// Of what windows [window, window + kWindows) read at taps [tap, tap + kVectors * kFloats) of row k of the kernel.
+// Computes gradients of the inputs that windows [window, window + kWindows) read at taps [tap, tap + kVectors *
+// kFloats) of row k of the kernel.
 template <int kFloats, int kVectors, int kWindows>
 PICTURA_INLINE void some_image_gradients(const Windows& windows, int64_t window, int64_t k, int64_t tap,
                                          int64_t outputs, const float* grad, const float* weight, float* padded_grad) {
@@ -123,7 +124,7 @@ PICTURA_INLINE void some_image_gradients(const Windows& windows, int64_t window,
   }
 }
 
-// Of what windows [window, window + kWindows) read.
+// Computes gradients of all inputs that windows [window, window + kWindows) read.
 template <int kFloats, int kWindows>
 PICTURA_INLINE void image_gradients_of(const Windows& windows, int64_t window, int64_t outputs, const float* grad,
                                        const float* weight, float* padded_grad) {
@@ -142,7 +143,7 @@ PICTURA_INLINE void image_gradients_of(const Windows& windows, int64_t window, i
 template <int kFloats>
 PICTURA_INLINE void all_image_gradients(const Windows& windows, int64_t outputs, const float* grad, const float* weight,
                                         float* padded_grad) {
-  // Whatever the vectors, windows are taken by as many: sums are in one order.
+  // The number of windows at a time does not depend on the vector width, so that sums have one order.
   constexpr int kWindows = 4;
   int64_t window = 0;
   for (; window + kWindows <= windows.count; window += kWindows) {
@@ -155,8 +156,8 @@ PICTURA_INLINE void all_image_gradients(const Windows& windows, int64_t outputs,
 
 enum class Pass { outputs, weight_gradient, image_gradient };
 
-// One of the three, from two arrays: windows and weight, windows and gradient, gradient and weight. By vectors of
-// sixteen, or of eight, whose registers are half as many.
+// Runs one of the three passes, from two arrays: windows and weight, windows and gradient, or gradient and weight. Uses
+// vectors of sixteen, or of eight with half as many in registers.
 template <bool kIsWide>
 PICTURA_INLINE void run(Pass pass, const Windows& windows, int64_t outputs, const float* a, const float* b,
                         float* out) {
@@ -180,7 +181,7 @@ PICTURA_WIDE void run_wide(Pass pass, const Windows& windows, int64_t outputs, c
   run<true>(pass, windows, outputs, a, b, out);
 }
 
-// Of the first n images.
+// Runs a pass over the first n images.
 void run(bool is_wide, Pass pass, const ConvolutionSize& size, const std::vector<int64_t>& begins, int64_t n,
          int64_t outputs, const float* a, const float* b, float* out) {
   const Windows windows{begins.data(), n * size.pixels(), size.kernel, size.kernel * size.channels,

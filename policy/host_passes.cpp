@@ -1,4 +1,4 @@
-// Inner loops run over channels, which are neighbours in memory, so that compilers make vectors of them.
+// Inner loops run over channels, which are adjacent in memory, so that compilers vectorise them.
 #include "pictura/policy/host_passes.h"
 
 #include <algorithm>
@@ -13,8 +13,8 @@ namespace pictura::host {
 
 namespace {
 
-// exp(x) for x <= 0, within 2e-7 of it. That of common/math.h, whose bits devices share, multiplies by 2^n in a loop;
-// here 2^n is written as an exponent, which vectors can.
+// Computes exp(x) for x <= 0, within 2e-7. The function of common/math.h, whose bits devices share, multiplies by 2^n
+// in a loop; here 2^n is written as an exponent, which vectorises.
 PICTURA_INLINE float exp_of_negative(float x) {
   x = x < -87.0f ? -87.0f : x;  // NaN stays
   // The sum's last bits are the whole number; the difference rounds to it.
@@ -33,8 +33,8 @@ struct Normal {
   float cumulative, density;  // without its factor 1 / sqrt(2 pi)
 };
 
-// The standard normal distribution at x, by the error function's approximation 7.1.26 of Abramowitz and Stegun, which
-// is within 1.5e-7 and whose exponential is the density's.
+// Standard normal distribution at x, by approximation 7.1.26 of the error function in Abramowitz and Stegun. It is
+// within 1.5e-7, and its exponential is that of the density.
 PICTURA_INLINE Normal normal_at(float x) {
   const float size = x < 0 ? -x : x;
   const float t = 1.0f / (1.0f + 0.3275911f * 0.70710678f * size);
@@ -46,8 +46,8 @@ PICTURA_INLINE Normal normal_at(float x) {
 
 constexpr float kDensityFactor = 0.39894228f;
 
-// Rows of few channels are taken several at a time, since loops over short rows cost more than what they do: as rows of
-// kRowNumbers, the last of which may be shorter.
+// Rows of few channels are processed several at a time, since loops over short rows cost more than their work. They are
+// processed as rows of kRowNumbers, the last of which may be shorter.
 constexpr int64_t kRowNumbers = 64;
 
 int64_t channels_at_once(int64_t channels) {
@@ -175,8 +175,8 @@ void bias_norm_backward(const float* normalized, const float* inverse_deviations
 
 namespace {
 
-// Calls f(taps, pixels, count) for each run of numbers that an output's taps share with a row of an image: `taps` is
-// where they begin in the taps of all images, `pixels` in the images, or -1 for a run of padding.
+// Calls f(taps, pixels, count) for each run of numbers that an output's taps share with a row of an image. `taps` is
+// the run's offset in the taps of all images, `pixels` its offset in the images, or -1 for a run of padding.
 template <typename F>
 void for_each_run(const ConvolutionSize& size, int64_t n, const F& f) {
   const int64_t channels = size.channels, of_image = size.height * size.width * channels,
@@ -226,7 +226,8 @@ namespace {
 
 constexpr int64_t kColors = 3;
 
-// `planes`: the three colors of an image. Patches that lie in it wholly have bounds which the compiler knows.
+// Writes the patches of an image. `planes`: the image's three colors. The compiler knows the loop bounds of patches
+// that lie wholly in the image.
 template <int64_t kPatch>
 void patches_of_image(const uint8_t* planes, int64_t height, int64_t width, float* out) {
   for (int64_t top = 0; top < height; top += kPatch) {
@@ -284,7 +285,7 @@ void largest_members(const float* members, const int32_t* counts, int64_t sets, 
     for (int32_t member = 0; member < count; ++member, members += channels) {
 #pragma omp simd
       for (int64_t c = 0; c < channels; ++c) {
-        // NaN is taken and kept: a network that fails must be seen to.
+        // NaN is selected and kept, so that a failing network is noticed.
         const bool is_larger = (members[c] > largest_out[c]) | (members[c] != members[c]);
         largest_out[c] = is_larger ? members[c] : largest_out[c];
         which_out[c] = is_larger ? member : which_out[c];
@@ -296,7 +297,7 @@ void largest_members(const float* members, const int32_t* counts, int64_t sets, 
 void largest_members_backward(const float* grad, const int32_t* which, int64_t sets, int64_t channels, int64_t hidden,
                               const float* weight, const float* activations, float* activations_grad_inout,
                               float* weight_grad_inout) {
-  // By turns, so that one of the two matrices is in the first-level cache.
+  // The two matrices are updated in turn, so that one of them is in the first-level cache.
   const auto add_all = [&](const auto& add) {
     for (int64_t i = 0; i < sets * channels; ++i) {
       if (which[i] >= 0) add(grad[i], i % channels, int64_t{which[i]});

@@ -16,13 +16,13 @@ namespace pictura {
 
 namespace {
 
-constexpr const char* kDescription = "pictura_backbone.json";  // in the program's file
+constexpr const char* kDescription = "pictura_backbone.json";  // entry in the program's file
 constexpr const char* kBackboneFormat = "pictura backbone 1";
 
-// The first line of what torch throws, which goes on with its own stack.
+// Returns the first line of a torch error, which continues with its own stack.
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
 
-// Of what a program throws, whose stack comes first.
+// Returns the last line of a program's error, which begins with its stack.
 std::string last_line(std::string text) {
   text.erase(text.find_last_not_of(" \n") + 1);
   return text.substr(text.rfind('\n') + 1);
@@ -34,7 +34,7 @@ struct ImageBackbone::Parts {
   std::string path, hash;
   torch::jit::Module program;
   int64_t patch_px = 0, channels = 0;
-  int64_t width_px = 0, height_px = 0;  // the one size that it takes; 0: any that patches divide
+  int64_t width_px = 0, height_px = 0;  // the one size that it supports; 0: any that patches divide
   at::ScalarType type = at::kFloat;
   bool frozen = true;
   std::vector<NamedTensor> parameters;
@@ -111,12 +111,12 @@ void ImageBackbone::check_images(const Rig& rig) const {
 }
 
 at::Tensor ImageBackbone::forward(const at::Tensor& images) const {
-  // Some devices have images with more channels, which are 0.
+  // Devices may pad images with further channels, which are 0.
   const at::Tensor pixels = image_patches(images, /*patch_px=*/1, parts_->type).narrow(1, 0, 3) / 255.0;
   const int64_t height = pixels.size(2), width = pixels.size(3), patch = parts_->patch_px;
   const at::Tensor whole =
       at::constant_pad_nd(pixels, {0, parts_->filled_up(width) - width, 0, parts_->filled_up(height) - height});
-  // Torch's optimizer of programs specialises them for what it saw in earlier calls: equal calls would not be equal.
+  // Torch's optimizer of programs specialises them for the inputs of earlier calls: equal calls would not be equal.
   const torch::jit::GraphOptimizerEnabledGuard no_optimizer(false);
   const bool needs_grad = at::GradMode::is_enabled() && !parts_->frozen;
   const at::AutoGradMode grad(needs_grad);

@@ -31,12 +31,12 @@ ActivationType activation_type_of(at::ScalarType type) {
   return type == at::kBFloat16 ? ActivationType::bf16 : ActivationType::f32;
 }
 
-// Of a tensor whose last dimension are the channels.
+// Size of a tensor whose last dimension is the channels.
 ActivationSize size_of(const at::Tensor& x) {
   return {activation_type_of(x.scalar_type()), x.numel() / x.size(-1), x.size(-1)};
 }
 
-/// Passes hold no state: each call has its own, so that threads of autograd share none.
+/// Creates the passes of a device. Passes hold no state; each call has its own, so that autograd's threads share none.
 std::unique_ptr<NetworkPasses> passes_on(at::Device device) {
   return make_network_passes({MemorySpace::cuda, device.index()});
 }
@@ -45,10 +45,10 @@ Stream stream_on(at::Device device) { return current_stream({MemorySpace::cuda, 
 
 const float* floats_of(const at::Tensor& parameter) { return parameter.const_data_ptr<float>(); }
 
-/// The gradient that arrives, laid out as x is.
+/// Returns the incoming gradient in the type of x, contiguous.
 at::Tensor arranged(const at::Tensor& grad, const at::Tensor& x) { return grad.to(x.scalar_type()).contiguous(); }
 
-// x: [..., channels] without gaps. With kHasNorm x + bias is normalized before the GELU.
+// GELU of x + bias on a device. x: [..., channels], contiguous. With kHasNorm x + bias is normalized before the GELU.
 template <bool kHasNorm>
 struct BiasGelu : Function<BiasGelu<kHasNorm>> {
   static at::Tensor forward(AutogradContext* context, const at::Tensor& x, const at::Tensor& bias) {
@@ -74,7 +74,7 @@ struct BiasGelu : Function<BiasGelu<kHasNorm>> {
   }
 };
 
-// x: [..., channels] without gaps; position: [period, channels] of x's type, or undefined.
+// Layer norm on a device. x: [..., channels], contiguous; position: [period, channels] of x's type, or undefined.
 struct Norm : Function<Norm> {
   static at::Tensor forward(AutogradContext* context, const at::Tensor& x, const std::optional<at::Tensor>& added,
                             const at::Tensor& weight, const at::Tensor& bias) {
@@ -110,7 +110,7 @@ struct Norm : Function<Norm> {
   static int64_t period_of(const at::Tensor& position) { return position.defined() ? position.size(0) : 1; }
 };
 
-// scores: [matrices, tokens, columns] without gaps.
+// Softmax over tokens on a device. scores: [matrices, tokens, columns], contiguous.
 struct TokenSoftmax : Function<TokenSoftmax> {
   static at::Tensor forward(AutogradContext* context, const at::Tensor& scores) {
     at::Tensor out = at::empty_like(scores);
@@ -139,19 +139,19 @@ RowSize row_size(const at::Tensor& rows, const RowFeatures& features, bool keeps
   return {rows.numel() / rows.size(-1), rows.size(-1), features, keeps_rows};
 }
 
-// Whether the host's own passes (host_passes.h) take it: those are fp32, which layers in bf16 are not.
+// Whether the host's own passes (host_passes.h) support x. They are fp32, unlike layers in bf16.
 bool is_on_host(const at::Tensor& x) {
   return x.is_cpu() && x.scalar_type() == at::kFloat && !at::autocast::is_autocast_enabled(at::kCPU);
 }
 
-// Whether a gradient will be asked of what these make.
+// Whether the results of these inputs need gradients.
 bool keeps_gradients(std::initializer_list<at::Tensor> inputs) {
   return at::GradMode::is_enabled() &&
          std::any_of(inputs.begin(), inputs.end(), [](const at::Tensor& t) { return t.requires_grad(); });
 }
 
-// Work on [0, count) in blocks of at most `block`, in as many parts as torch has threads. What parts add up is summed
-// in their order, so sums depend on the number of threads alone.
+// Divides [0, count) into blocks of at most `block`, in as many parts as torch has threads. Sums of parts are added in
+// the order of parts, so they depend on the number of threads alone.
 class Blocks {
  public:
   Blocks(int64_t count, int64_t block)
@@ -161,10 +161,10 @@ class Blocks {
         parts_(std::min<int64_t>(blocks_, at::get_num_threads())) {}
 
   int64_t parts() const { return parts_; }
-  /// The largest block.
+  /// Size of the largest block.
   int64_t most() const { return std::min(block_, count_); }
 
-  /// Calls make(part), once a part, for a function that is called with (begin, end) of each of its blocks.
+  /// Calls make(part) once per part. It returns a function that is called with (begin, end) of each block of the part.
   template <typename Make>
   void run(const Make& make) const {
     at::parallel_for(0, parts_, 1, [&](int64_t first, int64_t last) {
@@ -185,7 +185,7 @@ class Blocks {
 const float* read(const at::Tensor& t, int64_t row = 0) { return t.const_data_ptr<float>() + row * t.stride(0); }
 float* write(const at::Tensor& t, int64_t row = 0) { return t.mutable_data_ptr<float>() + row * t.stride(0); }
 
-// Sets out, and slope where it is defined, see host::bias_gelu. All [..., channels] without gaps.
+// Sets out, and slope if it is defined, see host::bias_gelu(). All are [..., channels] and contiguous.
 void add_bias_gelu(const at::Tensor& x, const at::Tensor& bias, const at::Tensor& out, const at::Tensor& slope) {
   const int64_t channels = bias.size(0), rows = x.numel() / channels;
   const float* const from = read(x);
@@ -199,7 +199,7 @@ void add_bias_gelu(const at::Tensor& x, const at::Tensor& bias, const at::Tensor
   });
 }
 
-// GELU of x + bias, [..., channels] without gaps, where nothing else reads x, in whose memory the derivative is kept.
+// GELU of x + bias, [..., channels], contiguous. Nothing else may read x, whose memory stores the derivative.
 struct HostBiasGelu : Function<HostBiasGelu> {
   static at::Tensor forward(AutogradContext* context, const at::Tensor& x, const at::Tensor& bias) {
     at::Tensor out = at::empty_like(x), slope = x.detach();
@@ -235,8 +235,8 @@ host::ConvolutionSize convolution_size(const at::Tensor& x, const at::Tensor& we
   return {x.size(1), x.size(2), x.size(3), weight.size(2), stride};
 }
 
-// Computes a convolution with its GELU by Pass::compute(), and keeps what the way back needs: images, weight, and the
-// slopes of the GELUs.
+// Computes a convolution with its GELU by Pass::compute(), and saves what the backward pass needs: images, weight, and
+// the slopes of the GELUs.
 template <typename Pass>
 at::Tensor forward_with_slopes(AutogradContext* context, const at::Tensor& x, const at::Tensor& weight,
                                const at::Tensor& bias, int64_t stride) {
@@ -247,7 +247,7 @@ at::Tensor forward_with_slopes(AutogradContext* context, const at::Tensor& x, co
   return out;
 }
 
-// A convolution of few outputs by host::DirectConvolution, a block of images at a time. Shapes as HostConvolution's.
+// Convolution of few outputs by host::DirectConvolution, one block of images at a time. Shapes as in HostConvolution.
 struct HostDirectConvolution : Function<HostDirectConvolution> {
   static bool takes(const at::Tensor& x, const at::Tensor& weight) {
     return host::DirectConvolution::takes(weight.size(0)) &&
@@ -313,10 +313,10 @@ struct HostDirectConvolution : Function<HostDirectConvolution> {
   }
 };
 
-// A convolution as products of what its outputs read with the weights, a block of images at a time: for few channels
-// two to four times as fast as oneDNN's on the way back.
+// Convolution as matrix products of the outputs' taps with the weights, one block of images at a time. For few channels
+// its backward pass is two to four times as fast as oneDNN's.
 struct HostConvolution : Function<HostConvolution> {
-  /// Fewer outputs make products of which a vector unit is mostly idle.
+  /// With fewer outputs, the products leave most of a vector unit idle.
   static constexpr int64_t kLeastOutputs = 16;
 
   HostConvolution(const at::Tensor& x, const at::Tensor& w, int64_t stride)
@@ -337,15 +337,15 @@ struct HostConvolution : Function<HostConvolution> {
   at::Tensor of_images(const at::Tensor& rows, int64_t begin, int64_t end) const {
     return rows.narrow(0, begin * size.pixels(), (end - begin) * size.pixels());
   }
-  /// What the outputs of images [begin, end) read, in `memory` where it is not the images themselves.
+  /// Returns the taps of the outputs of images [begin, end), in `memory` unless they are the images themselves.
   at::Tensor taps(const at::Tensor& x, const at::Tensor& memory, int64_t begin, int64_t end) const {
     if (reads_pixels()) return of_images(x.view({-1, size.channels}), begin, end);
     host::unfold(size, read(x, begin), end - begin, write(memory));
     return memory.narrow(0, 0, (end - begin) * size.pixels());
   }
 
-  /// x: [n, height, width, channels]. Returns [n, rows, columns, outputs]; sets the derivatives of the GELUs, of the
-  /// same shape, where `slope_out` is not null.
+  /// Computes the outputs, [n, rows, columns, outputs], of x: [n, height, width, channels]. Sets the derivatives of the
+  /// GELUs, of the same shape, if `slope_out` is not null.
   static at::Tensor compute(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias, int64_t stride,
                             at::Tensor* slope_out) {
     const HostConvolution c(x, weight, stride);
@@ -400,12 +400,12 @@ struct HostConvolution : Function<HostConvolution> {
   }
 };
 
-// Sets of members in blocks, each member through a layer with GELU, normalized before it or not, and one without; of
-// each set the largest in each channel. That channel's gradient goes to that member alone, so the way back knows these
-// alone: a few of a set.
+// Largest embeddings of sets, computed in blocks of sets. Each member passes through a layer with GELU, normalized
+// before the GELU or not, and a layer without. Each channel's gradient goes to its largest member alone, so the
+// backward pass reads only the largest members: a few per set.
 struct HostSets : Function<HostSets> {
-  /// Returns {the largest, [sets, channels]; the members that there are with their features, [all, width];
-  /// which member of its set is the largest, i32 [sets, channels]}.
+  /// Returns {the largest, [sets, channels]; the present members with their features, [all, width]; the index in its
+  /// set of the largest member, i32 [sets, channels]}.
   static variable_list compute(const at::Tensor& members, const at::Tensor& counts, const RowFeatures& features,
                                bool has_norm, const at::Tensor& hidden_weight, const at::Tensor& hidden_bias,
                                const at::Tensor& weight, const at::Tensor& bias) {
@@ -436,7 +436,7 @@ struct HostSets : Function<HostSets> {
                               which.mutable_data_ptr<int32_t>() + begin * channels);
       };
     });
-    // Adding it to all members would change no order.
+    // The bias is added last, since it does not change which member is the largest.
     return {largest + bias.detach() * counts.gt(0).unsqueeze(1), rows, which};
   }
 
@@ -457,19 +457,19 @@ struct HostSets : Function<HostSets> {
     const int64_t sets = which.size(0), channels = which.size(1), hidden = hidden_weight.size(0);
     const bool has_norm = context->saved_data["has_norm"].toBool();
     const std::vector<int64_t> begins = begins_of(counts);
-    // Of a set most members are the largest nowhere: there are a few rows of slopes, activations and their gradients.
+    // Most members of a set are the largest in no channel, so slopes, activations and their gradients have few rows.
     const Blocks blocks(sets, host::kBlockNumbers / (16 * hidden));
     const auto options = weight.options();
     const at::Tensor hidden_weight_sums = at::zeros({blocks.parts(), hidden, rows.size(1)}, options),
                      hidden_bias_sums = at::zeros({blocks.parts(), hidden}, options),
-                     gelu_bias_sums = at::zeros({blocks.parts(), hidden}, options),  // of zeros: not asked for
+                     gelu_bias_sums = at::zeros({blocks.parts(), hidden}, options),  // zeros, without gradients
         weight_sums = at::zeros({blocks.parts(), channels, hidden}, options);
     const at::Tensor hidden_transposed = hidden_weight.t(), gelu_bias = gelu_bias_of(hidden_bias, has_norm);
     blocks.run([&](int64_t part) {
       return [&, part, numbers = std::vector<int32_t>(), places = std::vector<int32_t>(),
               chosen = std::vector<int64_t>(),
               hidden_weight_sum = hidden_weight_sums[part]](int64_t begin, int64_t end) mutable {
-        // The members that are the largest somewhere, and where each channel's is among them.
+        // Members that are the largest in some channel, and each channel's index among these members.
         chosen.clear();
         places.clear();
         const int32_t* its_which = which.const_data_ptr<int32_t>() + begin * channels;
@@ -525,11 +525,11 @@ struct HostSets : Function<HostSets> {
   }
 
  private:
-  // What the GELU adds: the norm before it has added the bias already.
+  // Returns the bias that the GELU adds: zeros with a norm, which has already added it.
   static at::Tensor gelu_bias_of(const at::Tensor& hidden_bias, bool has_norm) {
     return has_norm ? at::zeros_like(hidden_bias) : hidden_bias;
   }
-  // Where the members of each set begin among those of all, and how many there are.
+  // Returns the offset of each set's members among all members, and the total number.
   static std::vector<int64_t> begins_of(const at::Tensor& counts) {
     std::vector<int64_t> begins{0};
     const int32_t* const its_counts = counts.const_data_ptr<int32_t>();
@@ -544,10 +544,11 @@ bool is_bf16_on_device(const at::Tensor& x) {
          at::autocast::get_autocast_dtype(at::kCUDA) == at::kBFloat16;
 }
 
-// As HostSets, in one pass each way on a device. The way back computes anew what it needs of the members that are the
-// largest somewhere.
+// Largest embeddings of sets on a device, in one pass each way; see HostSets. The backward pass recomputes what it
+// needs of the members that are the largest in some channel.
 struct DeviceSets : Function<DeviceSets> {
-  /// Sets which member is the largest, u8 [sets, channels], where `which_out` is not null.
+  /// Computes the largest embeddings. Sets the index of the largest member, u8 [sets, channels], if `which_out` is not
+  /// null.
   static at::Tensor compute(const at::Tensor& members, const at::Tensor& counts, const SetSize& size,
                             const at::Tensor& hidden_weight, const at::Tensor& hidden_bias, const at::Tensor& weight,
                             const at::Tensor& bias, at::Tensor* which_out) {
@@ -567,7 +568,7 @@ struct DeviceSets : Function<DeviceSets> {
                             const at::Tensor& weight, const at::Tensor& bias) {
     at::Tensor which;
     const at::Tensor out = compute(members, counts, size, hidden_weight, hidden_bias, weight, bias, &which);
-    // A context keeps tensors: the size is kept as its bytes.
+    // A context holds tensors only, so the size is stored as bytes.
     const at::Tensor size_bytes = at::empty({sizeof(SetSize)}, at::kByte);
     std::memcpy(size_bytes.mutable_data_ptr(), &size, sizeof(SetSize));
     context->save_for_backward({members, which, hidden_weight, hidden_bias, weight, bias, size_bytes});
@@ -600,7 +601,7 @@ struct DeviceSets : Function<DeviceSets> {
   }
 };
 
-// [views, cameras, 3, ...] -> [cameras * views, 3, ...]
+// Reorders [views, cameras, 3, ...] -> [cameras * views, 3, ...].
 at::Tensor by_camera(const at::Tensor& images) { return images.transpose(0, 1).flatten(0, 1); }
 
 at::Tensor host_patches(const at::Tensor& images, int64_t patch_px) {
@@ -624,7 +625,8 @@ at::Tensor space_to_depth(const at::Tensor& images, int64_t patch_px) {
   if (patch_px == 1) return images;
   const int64_t channels = images.size(1), height = images.size(2), width = images.size(3);
   const int64_t rows = (height + patch_px - 1) / patch_px, columns = (width + patch_px - 1) / patch_px;
-  // [n, c, rows, patch, columns, patch] -> [n, rows, columns, c, patch, patch]: in memory, channels last.
+  // [n, c, rows, patch, columns, patch] -> [n, rows, columns, c, patch, patch], then channels first with channels last
+  // in memory.
   return at::constant_pad_nd(images, {0, columns * patch_px - width, 0, rows * patch_px - height})
       .view({-1, channels, rows, patch_px, columns, patch_px})
       .permute({0, 2, 4, 1, 3, 5})
@@ -641,7 +643,7 @@ at::Tensor linear_gelu(const at::Tensor& x, const at::Tensor& weight, const at::
 }
 
 at::Tensor normalize(const at::Tensor& x) {
-  // Autocast would convert to fp32 and back, two passes more each way. Sums are fp32 without it, too.
+  // Autocast would convert to fp32 and back, two more passes each way. Sums are fp32 without autocast, too.
   const c10::impl::ExcludeDispatchKeyGuard no_autocast(c10::autocast_dispatch_keyset);
   return at::layer_norm(x, {x.size(-1)});
 }

@@ -1,4 +1,4 @@
-// Sizes of the policy that its layers and the estimate of their memory share.
+// Sizes that the policy's layers share with the estimate of their memory.
 #pragma once
 
 #include <string_view>
@@ -10,10 +10,10 @@
 
 namespace pictura {
 
-/// Of its own state: beside images without the two auxiliary slots, which come last.
+/// Number of ego features. Policies that read images lack the two auxiliary slots, which come last.
 constexpr int num_ego_features(bool sees_images) { return sees_images ? kEgoFeatures - 2 : kEgoFeatures; }
 
-/// Features that are read of each row of an array of the observation, by its name: of a set, or of the waypoints.
+/// Features to compute for each row of the named observation array: an entity set, or the waypoints.
 inline RowFeatures row_features_of(const PolicySection& policy, std::string_view array) {
   const int points = array == "controls" ? 2 : 1;  // a stop line has two ends
   const bool is_segment = array == "lanes" || array == "boundaries" || array == "walls";
@@ -22,7 +22,7 @@ inline RowFeatures row_features_of(const PolicySection& policy, std::string_view
           .position_unit_m = kScalePosition_m};
 }
 
-/// Sines and cosines of a pixel's position in the image, so that attention knows where a token is whatever the image's
+/// Number of sines and cosines of a pixel's position in the image, which tell attention where a token is at any image
 /// size.
 constexpr int kPositionFeatures = 8;
 

@@ -8,7 +8,7 @@ namespace pictura {
 
 namespace {
 
-// An array of the view as a tensor of that shape. Throws Error naming the array where it has another size.
+// Returns an array of the view as a tensor of a given shape. Throws Error naming the array if it has another size.
 template <typename T>
 at::Tensor checked_tensor(const char* name, Span<T> array, Device device, at::IntArrayRef shape) {
   PICTURA_CHECK(array.size() == static_cast<size_t>(c10::multiply_integers(shape)),
@@ -85,7 +85,7 @@ std::vector<ImageBlock> allocate_images(const Rig& rig, std::vector<int64_t> bat
 
 namespace {
 
-// Images of one camera after the other.
+// Allocates patches of images, camera after camera.
 std::vector<ImageBlock> allocate_patches(const ImageLayout& layout, Device device) {
   std::vector<ImageBlock> blocks;
   for (const BlockLayout& block : layout.blocks) {
@@ -110,7 +110,7 @@ std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> vi
   const ImageLayout layout = image_layout(rig, num_views, format, order, as_patches ? patch_px : kDefaultPatch_px);
   std::vector<ImageBlock> blocks =
       as_patches ? allocate_patches(layout, renderer->device()) : allocate_images(rig, {num_views}, renderer->device());
-  // Each block is a tensor of its own, whose strides say where an image of a view and a camera begins.
+  // Each block is a separate tensor; its strides give the start of an image of a view and a camera.
   std::vector<CameraImages> cameras;
   std::vector<int64_t> num_placed(blocks.size());
   for (const CameraLayout& camera : layout.cameras) {

@@ -1,4 +1,4 @@
-// What a policy sees, as tensors: the simulator's arrays, and images.
+// Inputs of a policy as tensors: the simulator's arrays, and images.
 #pragma once
 
 #include <memory>
@@ -14,15 +14,15 @@
 
 namespace pictura {
 
-/// The images of the cameras that share one size: u8 [batch, cameras of this size, 3, height, width]; or bf16 [batch,
-/// cameras, rows, columns, values of a patch], the patches of common/patches.h, in memory [cameras, batch, ...].
+/// Images of the cameras that share one size: u8 [batch, cameras of this size, 3, height, width], or bf16 [batch,
+/// cameras, rows, columns, values of a patch], the patches of common/patches.h, stored as [cameras, batch, ...].
 struct ImageBlock {
   at::Tensor pixels;
   std::vector<int64_t> cameras;  // their indices in the rig
 };
 
-/// What a batch of agents sees: the arrays of simulator/observation.h by name, and images. Tensors that the policy does
-/// not read are undefined; sets are [batch, rows, features], all others [batch, rows * features].
+/// Observations of a batch of agents: the arrays of simulator/observation.h by name, and images. Tensors that the
+/// policy does not read are undefined. Entity sets are [batch, rows, features], all others [batch, rows * features].
 struct Observation {
 #define X(name, type, rows, features, part, comment) at::Tensor name;
   PICTURA_OBSERVATION_ARRAYS(X)
@@ -42,7 +42,7 @@ struct Observation {
   }
 };
 
-/// Its tensors in the order of kObservationArrays.
+/// Tensors of an Observation in the order of kObservationArrays.
 inline constexpr at::Tensor Observation::* kObservationTensors[] = {
 #define X(name, type, rows, features, part, comment) &Observation::name,
     PICTURA_OBSERVATION_ARRAYS(X)
@@ -53,7 +53,7 @@ inline constexpr at::Tensor Observation::* kObservationTensors[] = {
 constexpr bool is_set(const ObservationArray& array) {
   return array.part != ObservationPart::own && array.type == ElementType::f32;
 }
-/// The number in EntitySet of kObservationArrays[array_index], for arrays that are sets.
+/// Index in EntitySet of kObservationArrays[array_index], for arrays that are sets.
 constexpr int entity_set_of(size_t array_index) {
   int set = 0;
   for (size_t i = 0; i < array_index; ++i) set += is_set(kObservationArrays[i]);
@@ -64,30 +64,31 @@ static_assert(entity_set_of(std::size(kObservationArrays)) == kNumEntitySets, "t
 /// Uninitialised storage for the arrays that this configuration's policy reads, [rows, slots, ...].
 Observation allocate_observations(const Config& config, int64_t rows, int64_t slots, Device device);
 
-/// One row of storage whose tensors are [rows, ...].
+/// Returns one row of storage whose tensors are [rows, ...].
 Observation row_of(const Observation& rows, int64_t row);
 
-/// Copies arrays that lie on `device` to the defined tensors, [slots, ...], which lie there too. Throws Error naming an
-/// array of another size.
+/// Copies arrays in the memory of `device` to the defined tensors of `out`, [slots, ...], in the same memory. Throws
+/// Error naming an array of another size.
 void copy_arrays(const ObservationView& view, Device device, const Observation& out);
 
-/// Some agents' part of arrays that lie on `device`: those that this configuration's policy reads. indices: i64 [n], in
-/// [0, batch). Throws Error naming an array that is not one of `batch` agents.
+/// Selects agents from the arrays that this configuration's policy reads, in the memory of `device`. indices: i64 [n],
+/// in [0, batch). Throws Error naming an array that does not hold `batch` agents.
 Observation select_arrays(const Config& config, const ObservationView& view, Device device, int64_t batch,
                           const at::Tensor& indices);
-/// Writes zeros to the auxiliary slots of vectors (see simulator/observation.h), as a world without them has.
+/// Zeroes the auxiliary slots of vectors (see simulator/observation.h), as in a world without them.
 void hide_auxiliary(Observation* observation_inout);
 
-/// Uninitialised memory for images of a rig, [batch..., cameras of one size, 3, height, width].
+/// Allocates uninitialised memory for images of a rig, [batch..., cameras of one size, 3, height, width].
 std::vector<ImageBlock> allocate_images(const Rig& rig, std::vector<int64_t> batch, Device device);
 
-/// The images of these views, [views, ...], in the renderer's memory: as patches of `patch_px` where that is not 0 and
-/// the renderer draws them, else planar.
+/// Draws the images of these views, [views, ...], in the renderer's memory: as patches of `patch_px` if it is not 0 and
+/// the renderer supports them, else planar.
 std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> views, Renderer* renderer,
                                     int patch_px = 0);
 
-/// The slots whose agents are active and that the mask [slots] has (empty: all), i64 [n], in ascending order.
-/// with_left: also those of agents that left a road that ends in the last step, whose last observation has a value.
+/// Returns the slots, i64 [n] in ascending order, of active agents that the mask [slots] selects (empty: all). With
+/// `with_left` also the slots of agents that left a road that ends in the last step, since their last observation has a
+/// value.
 at::Tensor active_slots(const SimulatorArrays& input, Span<const uint8_t> mask, bool with_left,
                         PolicyExecutor* executor);
 
@@ -95,7 +96,7 @@ at::Tensor active_slots(const SimulatorArrays& input, Span<const uint8_t> mask, 
 class SelectedViews {
  public:
   SelectedViews(int64_t size, Device device);
-  /// Those of `views` that `indices`, i64 [n], name.
+  /// Selects the entries of `views` at `indices`, i64 [n].
   SelectedViews(Span<const View> views, Device device, const at::Tensor& indices);
   Span<View> views() const;
 

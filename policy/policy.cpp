@@ -19,13 +19,14 @@
 
 namespace pictura {
 
-/// Draws parameters in the order of the calls and keeps them by name.
+/// Draws parameters in the order of the calls and stores them by name.
 class ParameterMaker {
  public:
   ParameterMaker(uint64_t seed, const at::TensorOptions& options, std::vector<NamedTensor>* parameters_out)
       : seed_(seed), options_(options), parameters_(parameters_out) {}
 
-  /// Normal with standard deviation gain / sqrt(fan_in), fan_in being all dimensions but the first.
+  /// Draws a normal parameter with standard deviation gain / sqrt(fan_in), where fan_in is the product of all
+  /// dimensions but the first.
   at::Tensor normal(const std::string& name, at::IntArrayRef shape, double gain) {
     const at::Tensor drawn = at::empty(shape, at::kFloat);
     const double deviation = gain / std::sqrt(static_cast<double>(drawn.numel() / shape[0]));
@@ -53,9 +54,9 @@ class ParameterMaker {
     return parameter;
   }
 
-  /// Of the type and on the device of all others.
+  /// Type and device of all parameters.
   const at::TensorOptions& options() const { return options_; }
-  /// Keeps parameters that are not drawn.
+  /// Adds parameters that are not drawn.
   void adopt(const std::vector<NamedTensor>& parameters) {
     parameters_->insert(parameters_->end(), parameters.begin(), parameters.end());
   }
@@ -63,7 +64,7 @@ class ParameterMaker {
   PolicyNetwork::Linear linear(const std::string& name, int64_t in, int64_t out, double gain) {
     return {normal(name + ".weight", {out, in}, gain), constant(name + ".bias", {out}, 0)};
   }
-  /// The paper's per-group encoder, a 2-layer MLP.
+  /// Creates the paper's per-group encoder, a 2-layer MLP.
   PolicyNetwork::GroupEncoder group(const std::string& name, int64_t in, const PolicySection& config) {
     const int64_t width = config.embedding_width;
     return {linear(name + ".hidden", in, width, std::numbers::sqrt2), linear(name + ".out", width, width, 1.0),
@@ -72,7 +73,7 @@ class ParameterMaker {
 
  private:
   uint64_t seed_;
-  at::TensorOptions options_;  // type and device of what is kept
+  at::TensorOptions options_;  // type and device of parameters
   std::vector<NamedTensor>* parameters_;
 };
 
@@ -103,10 +104,10 @@ at::Tensor masked_max(const at::Tensor& members, const at::Tensor& counts) {
   return largest.masked_fill((counts == 0).unsqueeze(1), 0);
 }
 
-/// The entity sets of simulator/observation.h, each through its own MLP and a masked max over its members.
+/// Encodes the entity sets of simulator/observation.h, each through its own MLP and a masked maximum over its members.
 class VectorEncoder final : public SceneEncoder {
  public:
-  /// Members with features are converted to `input_type`.
+  /// Creates the encoder. Members with features are converted to `input_type`.
   VectorEncoder(const PolicySection& config, bool reads_walls, at::ScalarType input_type, ParameterMaker* make)
       : embedding_width_(config.embedding_width), input_type_(input_type) {
     for (size_t i = 0; i < std::size(kObservationArrays); ++i) {
@@ -141,7 +142,7 @@ class VectorEncoder final : public SceneEncoder {
   struct Group {
     PolicyNetwork::GroupEncoder encoder;
     at::Tensor Observation::* members;
-    int64_t set;  // its column of set_counts
+    int64_t set;  // column in set_counts
     RowFeatures features;
   };
   int64_t embedding_width_;
@@ -149,12 +150,12 @@ class VectorEncoder final : public SceneEncoder {
   std::vector<Group> groups_;
 };
 
-/// A convolutional stack or a pretrained program, shared by all cameras; per camera, learned queries that cross-attend
-/// over its feature map and are averaged; all cameras concatenated and projected to the width of the
+/// Encodes images by a convolutional stack or a pretrained program, shared by all cameras. Per camera, learned queries
+/// cross-attend over its feature map and are averaged. All cameras are concatenated and projected to the width of the
 /// four sets that they replace.
 class PerspectiveEncoder final : public SceneEncoder {
  public:
-  /// Images are converted to `image_type`.
+  /// Creates the encoder. Images are converted to `image_type`.
   PerspectiveEncoder(const PolicySection& config, int num_cameras, at::ScalarType image_type, ParameterMaker* make)
       : config_(config),
         num_cameras_(num_cameras),
@@ -234,23 +235,23 @@ class PerspectiveEncoder final : public SceneEncoder {
     return backbone;
   }
 
-  // Side of the patches that the first convolution takes: policy.patch_px, or more after it was spread.
+  // Side of the patches that the first convolution reads: policy.patch_px, or more after it was spread.
   int patch_px() const { return patch_side_px(convolutions_[0].weight.size(1)); }
 
-  // [cameras * batch, width, rows, columns], channels last in memory. images: as an ImageBlock has them.
+  // Returns feature maps [cameras * batch, width, rows, columns], channels last in memory. images: as in ImageBlock.
   at::Tensor convolve(const at::Tensor& images) const {
     const bool are_patches = images.scalar_type() != at::kByte;
     at::Tensor x = are_patches ? images.transpose(0, 1).flatten(0, 1).permute({0, 3, 1, 2})
                                : image_patches(images, patch_px(), image_type_);
     for (size_t i = 0; i < convolutions_.size(); ++i) {
-      // Pixels are 0 to 255. Scaling a few weights is cheaper than scaling them.
+      // Pixels are 0 to 255. Scaling the few weights is cheaper than scaling the pixels.
       const at::Tensor weight = i == 0 ? convolutions_[i].weight / 255.0 : convolutions_[i].weight;
       x = convolve_gelu(x, weight, convolutions_[i].bias, config_.conv_strides[i]);
     }
     return x;
   }
 
-  // The features of a block's cameras, [cameras, batch, width]. The mean over queries comes before the MLP's last
+  // Returns the features of a block's cameras, [cameras, batch, width]. The mean over queries precedes the MLP's last
   // layer, which is linear: a product with one row instead of num_queries.
   at::Tensor pool(const ImageBlock& block) const {
     const int64_t batch = block.pixels.size(0), cameras = block.pixels.size(1);
@@ -268,11 +269,11 @@ class PerspectiveEncoder final : public SceneEncoder {
     return pooled.mean(2) + apply(mlp_out_, hidden.mean(2));
   }
 
-  // Attention of each camera's queries [cameras, queries, width] over the tokens of its images [cameras * batch,
-  // tokens, width]; [cameras * batch, queries, width]. Queries are parameters, the same for all images: so keys and
-  // values need not be computed for each token. What a query asks of its keys is asked of the tokens, q (W t) = (q W)
-  // t; values and output are one product with the weighted sums of tokens. A bias of keys adds the same to all scores
-  // of a query, which softmax does not see, and the bias of values is in the sum once, since weights add up to 1.
+  // Computes attention of each camera's queries [cameras, queries, width] over the tokens of its images [cameras *
+  // batch, tokens, width]; returns [cameras * batch, queries, width]. Queries are parameters, equal for all images, so
+  // keys and values need not be computed for each token. Scores are computed directly from tokens, q (W t) = (q W) t;
+  // values and output are one product with the weighted sums of tokens. A key bias would add the same number to all
+  // scores of a query, which softmax ignores. The value bias is in the sum once, since weights add up to 1.
   at::Tensor attend(const at::Tensor& queries, const at::Tensor& tokens) const {
     const int64_t cameras = queries.size(0), heads = config_.attention_heads, head_width = width_ / heads;
     const at::Tensor key = key_.unflatten(0, {heads, head_width});
@@ -293,7 +294,7 @@ class PerspectiveEncoder final : public SceneEncoder {
   const at::ScalarType image_type_;
   const std::unique_ptr<ImageBackbone> backbone_;  // null: the convolutions
   const int64_t width_;
-  std::vector<PolicyNetwork::Linear> convolutions_;  // weights [out, in, kernel, kernel]
+  std::vector<PolicyNetwork::Linear> convolutions_;  // weights are [out, in, kernel, kernel]
   at::Tensor queries_, key_;
   Norm token_norm_, query_norm_, mlp_norm_;
   PolicyNetwork::Linear position_, query_, value_, out_, mlp_hidden_, mlp_out_, project_;
@@ -321,14 +322,14 @@ PolicyNetwork::PolicyNetwork(const PolicySection& config, int num_cameras, uint6
   for (int i = 0; i < config.backbone_layers; ++i) {
     backbone_.push_back(make.linear(fmt::format("backbone.{}", i), i == 0 ? in : inside, inside, std::numbers::sqrt2));
   }
-  // A small actor head: every action is about as likely as any other at first.
+  // The actor head is small, so that all actions are about equally likely at first.
   actor_ = make.linear("actor", inside, kNumActions, 0.01);
   critic_ = make.linear("critic", inside, 1, 1.0);
 }
 
 at::Tensor PolicyNetwork::run_trunk(at::Tensor x) const {
   for (size_t i = 0; i < backbone_.size(); ++i) {
-    // The first layer's input is of another width, and made of what encoders give.
+    // The first layer has an input of another width, which comes from the encoders.
     const bool is_first = i == 0;
     const at::Tensor y = apply_gelu(backbone_[i], layer_norm_ && !is_first ? normalize(x) : x);
     x = residual_ && !is_first ? x + y : y;

@@ -1,6 +1,6 @@
-// The two policies of the paper (appendix, table of the policy architecture): one trunk with actor and critic, behind
-// either encoders of four entity sets, or five with walls, or one image branch as wide as four. Plain tensors and
-// functions, no torch modules.
+// The paper's two policies (appendix, table of the policy architecture): one trunk with actor and critic, behind either
+// encoders of four entity sets (five with walls) or one image branch as wide as four. Plain tensors and functions, no
+// torch modules.
 #pragma once
 
 #include <functional>
@@ -17,31 +17,31 @@
 
 namespace pictura {
 
-/// A parameter by the name under which it is saved.
+/// Parameter with the name under which it is saved.
 struct NamedTensor {
   std::string name;
   at::Tensor value;
 };
 
-/// 16 hexadecimal digits over the parameters' bytes, in their order.
+/// Hash of the parameters' bytes in their order: 16 hexadecimal digits.
 std::string hash_of_parameters(const std::vector<NamedTensor>& parameters);
 
 class ImageBackbone;
 
-/// Turns what is around an agent into one embedding.
+/// Encodes the surroundings of an agent into one embedding.
 class SceneEncoder {
  public:
   virtual ~SceneEncoder() = default;
   virtual at::Tensor forward(const Observation& observation) const = 0;
-  /// Of the embedding.
+  /// Width of the embedding.
   virtual int64_t width() const = 0;
-  /// The program in the place of its convolutions, or null.
+  /// Program in place of the convolutions, or null.
   virtual const ImageBackbone* image_backbone() const { return nullptr; }
   /// See Policy::drawn_patch_px.
   virtual int drawn_patch_px() const { return 0; }
 };
 
-/// What learning asks of a policy.
+/// Interface of policies for learning.
 class Policy {
  public:
   Policy() = default;
@@ -57,26 +57,26 @@ class Policy {
 
   const std::vector<NamedTensor>& parameters() const { return parameters_; }
   int64_t num_parameters() const;
-  /// Of parameters(), as hash_of_parameters says.
+  /// Hash of parameters(), see hash_of_parameters().
   std::string hash() const;
-  /// Of the file of policy.backbone; empty where that is "conv" and for vector policies.
+  /// Hash of the file of policy.backbone; empty if policy.backbone is "conv", and for vector policies.
   virtual std::string backbone_hash() const { return ""; }
-  /// Throws Error naming camera and file where the program of policy.backbone does not take such images.
+  /// Throws Error naming camera and file if the program of policy.backbone does not support these images.
   virtual void check_images(const Rig& /*rig*/) const {}
-  /// Side of the patches as which it also reads images (ImageBlock), 0: it reads planar images alone. Its first
-  /// convolution takes such patches, so that nothing is left to do between drawing and that.
+  /// Side in px of the patches in which the policy can read images (ImageBlock); 0 if it reads planar images only. The
+  /// first convolution reads such patches directly, so that no conversion follows drawing.
   virtual int drawn_patch_px() const { return 0; }
 
  protected:
   std::vector<NamedTensor> parameters_;
 };
 
-/// The paper's.
+/// The paper's actor-critic network.
 class PolicyNetwork final : public Policy {
  public:
-  /// Parameters are drawn from (seed, index of the parameter, index of the element) alone, but for those of a program
-  /// (policy.backbone), which begin as they are in its file. With `reads_walls` the
-  /// vector policy has a fifth set. The host has bf16 too, slowly, but no tf32: there it is fp32.
+  /// Draws parameters from (seed, index of the parameter, index of the element) alone, except those of a program
+  /// (policy.backbone), which start from its file. With `reads_walls` the vector policy has a fifth set. The host
+  /// supports bf16, slowly, but not tf32, which it computes in fp32.
   PolicyNetwork(const PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type = at::kFloat,
                 bool reads_walls = false, Device device = {}, Precision precision = Precision::fp32);
 
@@ -89,7 +89,7 @@ class PolicyNetwork final : public Policy {
   std::unique_ptr<SceneEncoder> scene_;
   at::ScalarType type_;
   Precision precision_;
-  int64_t ego_features_;  // the image branch comes without the auxiliary slots
+  int64_t ego_features_;  // the image branch lacks the auxiliary slots
   RowFeatures waypoint_features_;
 
   struct Linear {
@@ -111,24 +111,24 @@ class PolicyNetwork final : public Policy {
   friend class PerspectiveEncoder;
 };
 
-/// The policy of a configuration, for cameras of this rig. The host computes in fp32. Throws Error naming the file
-/// where policy.backbone names one that cannot serve.
+/// Creates the policy of a configuration, for the cameras of a rig. The host computes in fp32. Throws Error naming the
+/// file if the program of policy.backbone cannot be used.
 std::unique_ptr<const Policy> make_policy(const Config& config, const Rig& rig, Device device);
 
-/// Multiplies the logits by a factor, in the parameters of the layer they come from.
+/// Multiplies the logits by a factor, by scaling the parameters of their layer.
 void scale_logits(const Policy& policy, double factor);
 
 /// Policy outputs for a whole batch without gradients: logits and log-probabilities [batch, actions], values [batch].
 struct Decision {
   at::Tensor logits, log_probs, value;
 
-  /// Whether all logits and values are finite numbers: bool, where they are.
+  /// Whether all logits and values are finite: a bool tensor in their memory.
   at::Tensor are_finite() const;
-  /// The same. Waits for the device.
+  /// Whether all logits and values are finite. Waits for the device.
   bool is_finite() const { return are_finite().item<bool>(); }
 };
-/// For the agents in some rows, i64 [batch], a chunk at a time: act(rows) gives what the policy makes of those of a
-/// chunk, which need not outlast the next call.
+/// Runs the policy for the agents of `rows`, i64 [batch], chunk by chunk. act(rows) returns the policy's output for a
+/// chunk's rows; the output need not outlast the next call.
 Decision decide(const at::Tensor& rows, const ChunkSizes& chunks,
                 const std::function<Policy::Output(const at::Tensor& rows)>& act);
 

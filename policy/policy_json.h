@@ -1,4 +1,5 @@
-// What headers of checkpoints and of safetensors say of a policy, in JSON. Only for the files that read and write them.
+// Description of a policy in the headers of checkpoints and safetensors, in JSON. Only for the files that read and
+// write these formats.
 #pragma once
 
 #include <string>
@@ -9,13 +10,14 @@
 
 namespace pictura {
 
-/// What the numbers that a policy reads and gives mean: the shapes of its arrays. It cannot drive where these differ.
+/// Shapes of the policy's input and output arrays, which define what its numbers mean. A policy cannot drive if they
+/// differ.
 nlohmann::ordered_json schema_to_json(const Config& config);
-/// Throws Error naming the file and the entry in which the saved schema is not that of a policy of `config` today.
+/// Throws Error naming the file and the entry in which the saved schema differs from the current schema of `config`.
 void check_schema(const nlohmann::ordered_json& saved, const Config& config, const std::string& path);
 
 nlohmann::ordered_json rig_to_json(const Rig& rig);
-/// Throws nlohmann::json::exception or Error where these are no cameras.
+/// Throws nlohmann::json::exception or Error if the JSON does not describe cameras.
 Rig rig_from_json(const nlohmann::ordered_json& cameras);
 
 }  // namespace pictura

@@ -8,7 +8,7 @@
 namespace pictura {
 
 void set_float32_products(Precision precision) {
-  // One by one: what is set for all does not change convolutions, which have TF32 by default.
+  // Set per operation: the setting for all operations does not change convolutions, which use TF32 by default.
   for (const at::Float32Op operation : {at::Float32Op::CONV, at::Float32Op::MATMUL}) {
     at::globalContext().setFloat32Precision(
         at::Float32Backend::CUDA, operation,
@@ -28,7 +28,8 @@ void set_reproducible(bool reproducible) {
   }
   at::Context& context = at::globalContext();
   context.setDeterministicAlgorithms(reproducible, /*warn_only=*/false);
-  // Else torch fills all new memory, so that whoever reads what was never written reads the same. Nothing here does.
+  // With this setting torch fills all new memory, so that reads of unwritten memory are deterministic. No code here
+  // reads unwritten memory.
   context.setDeterministicFillUninitializedMemory(false);
   context.setDeterministicCuDNN(reproducible);
 }

@@ -6,13 +6,14 @@ namespace pictura {
 
 namespace {
 
-// Pairs of metres [..., 2] as four numbers that tell them apart near and far.
+// Converts pairs of metres [..., 2] to four numbers that resolve near and far positions.
 at::Tensor near_and_far(const at::Tensor& pairs_m) {
   const at::Tensor size_m = pairs_m.abs();
   return at::cat({pairs_m / (size_m + double{kNearPoint_m}), pairs_m / (size_m + double{kFarPoint_m})}, -1);
 }
 
-// The agent's places [..., 2] in metres relative to segments: along each from its middle, and to the left of its line.
+// Returns the agent's positions [..., 2] in metres relative to segments: along each segment from its middle, and to the
+// left of its line.
 at::Tensor beside_segments(const at::Tensor& rows, double unit_m) {
   const at::Tensor from_middle_m = rows.narrow(-1, 0, 2) * -unit_m, direction = rows.narrow(-1, SegmentColumn::kCos, 2),
                    to_left = at::stack({-direction.select(-1, 1), direction.select(-1, 0)}, -1);

@@ -51,13 +51,14 @@ std::string safetensors(const std::vector<NamedTensor>& tensors, WeightType weig
         {"dtype", stored.name}, {"shape", tensor.value.sizes().vec()}, {"data_offsets", {begin, data.size()}}};
   }
   std::string text = json_text(header);
-  text.append((8 - text.size() % 8) % 8, ' ');  // data begin on a multiple of eight bytes
+  text.append((8 - text.size() % 8) % 8, ' ');  // data begin at a multiple of eight bytes
   const uint64_t length = text.size();
   std::string file(reinterpret_cast<const char*>(&length), sizeof length);
   return file + text + data;
 }
 
-// Of the whole file with zeros for the digits of `hash`, which its metadata have; empty where they do not stand there.
+// Returns the hash of the whole file with zeros for the digits of `hash`, which its metadata hold; empty if the
+// metadata do not hold that hash.
 std::string hash_of_file(std::string file, const std::string& hash) {
   const std::string key = R"("hash":")";
   const size_t place = file.find(key + hash);
@@ -133,7 +134,7 @@ SavedPolicy parse_safetensors(const std::string& file, const std::string& path) 
 
 std::string read_policy_file(const std::string& path) {
   return read_file(path, size_t{1} << 36, [&path](std::string_view first) {
-    // Safetensors begin with the length of their header, which is JSON.
+    // Safetensors begin with the length of their JSON header.
     uint64_t length = 0;
     const bool is_long = first.size() > sizeof length;
     if (is_long) std::memcpy(&length, first.data(), sizeof length);

@@ -59,13 +59,13 @@ Config with_seed(Config config, uint64_t seed) {
   return config;
 }
 
-// With cameras that are mounted as in the rig, whatever they were in training.
+// Returns the configuration with cameras mounted as in the rig, even if they were randomized in training.
 Config as_mounted(Config config) {
   config.render.randomization = {};
   return config;
 }
 
-// The cameras that the options ask for, else those of training. No weight depends on sizes or poses.
+// Returns the rig of the options, else the rig of training. No weight depends on sizes or poses.
 Rig chosen_rig(const SavedPolicy& saved, const SessionOptions& options) {
   std::optional<Rig> named = named_rig(options);
   if (!named) return saved.rig;
@@ -124,7 +124,7 @@ struct PolicySession::Parts {
         executor(make_policy_executor(device)),
         policy(its_policy) {}
 
-  /// For the agents of a batch that `indices`, i64 [n], name.
+  /// Runs the policy for the agents of a batch at `indices`, i64 [n].
   Decision decide(const PolicyInput& input, int64_t batch, const at::Tensor& indices, Renderer* renderer) const {
     at::set_num_threads(resolve_num_threads(config.run.num_threads));
     set_float32_products(config.train.precision);
@@ -150,7 +150,7 @@ struct PolicySession::Parts {
   const Rig rig;
   const double camera_severity = 0;
   const std::unique_ptr<PolicyExecutor> executor;
-  const std::unique_ptr<const Policy> own_policy;  // null where it is another's
+  const std::unique_ptr<const Policy> own_policy;  // null if another object owns the policy
   const Policy& policy;
 
  private:
@@ -179,7 +179,7 @@ struct PolicySession::Parts {
   }
 };
 
-/// A policy for one simulator.
+/// Controller of one simulator.
 class SessionController final : public PolicyController {
  public:
   SessionController(const PolicySession::Parts* parts, Renderer* renderer, const ActionChoice& choice,

@@ -1,4 +1,4 @@
-// How a saved policy is opened: what computes, its cameras, and what differs from its training.
+// Options for opening a saved policy: where it computes, its cameras, and differences from its training.
 #pragma once
 
 #include <iterator>
@@ -15,24 +15,25 @@ namespace pictura {
 struct SessionOptions {
   int num_threads = 0;            // of torch and renderers; 0: all
   std::string device = "auto";    // as run.device of a configuration
-  std::string simulator = "cpu";  // as simulator.backend: of the simulators that it drives in
-  std::string renderer, samples;  // as render.backend and render.samples; empty: as the policy was trained
-  // Cameras other than those of training, as many: a rig file, or the paper's at another size (0: as trained).
+  std::string simulator = "cpu";  // as simulator.backend; for the simulators that it drives in
+  std::string renderer, samples;  // as render.backend and render.samples; empty: as in training
+  // Cameras that replace those of training, in the same number: a rig file, or the paper's cameras at another size (0:
+  // as trained).
   std::string rig;
   int width_px = 0, height_px = 0;
-  std::string backbone;  // where the program of policy.backbone lies now; empty: where it did
-  // Of [evaluate.conditioning], in place of the policy's own: "name=value".
+  std::string backbone;  // path of the program of policy.backbone; empty: the path in its configuration
+  // Values that replace those of the policy's [evaluate.conditioning]: "name=value".
   std::vector<std::string> conditioning;
-  bool adds_walls = false;     // its worlds have walls, also where it was trained without
-  bool average = false;        // drives with the average of weights that a checkpoint holds
-  double camera_severity = 0;  // its cameras are randomized by kFullCameraSeverity times this
+  bool adds_walls = false;     // adds walls to its worlds, even if it was trained without them
+  bool average = false;        // drives with the weight average that a checkpoint holds
+  double camera_severity = 0;  // factor of kFullCameraSeverity by which its cameras are randomized
   int decision_steps = 0;      // steps for which an action is held; 0: as in training (policy.decision_steps)
-  // Lights of its worlds; without a value those that the policy was trained with.
+  // Lights of its worlds; without a value those of the policy's training.
   std::optional<LightCycles> light_cycles;
   std::optional<LightHeads> light_heads;
 };
 
-/// Visits the options of how a policy is opened.
+/// Visits the options for opening a policy.
 template <typename Visitor>
 void visit_options(SessionOptions& options, Visitor&& v) {
   v.value({"num_threads"}, options.num_threads);

@@ -1,4 +1,4 @@
-// Arrays of structs between the host and the device where a network computes: torch knows no structs, so bytes go over.
+// Copies arrays of structs between the host and the network's device. Torch has no structs, so bytes are copied.
 #pragma once
 
 #include <type_traits>
@@ -21,7 +21,7 @@ std::vector<T> host_copy_of_structs(Span<const T> array, Device device) {
   return copy;
 }
 
-/// A copy of the host's values in the memory of `device`, where those on the host are needed no more.
+/// Copy of host values in the memory of `device`. The host values may be freed afterwards.
 template <typename T>
 class DeviceCopy {
  public:

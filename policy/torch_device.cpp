@@ -12,8 +12,8 @@ namespace pictura {
 
 namespace {
 
-// Empty where torch can compute on CUDA devices, else why not. Its CUDA library is opened here rather than linked, so
-// that programs start on machines without it.
+// Returns the reason why torch cannot compute on CUDA devices; empty if it can. Opens torch's CUDA library here instead
+// of linking it, so that programs start on machines without it.
 std::string why_torch_has_no_cuda() {
   static const void* const library = dlopen("libtorch_cuda.so", RTLD_NOW | RTLD_GLOBAL | RTLD_NODELETE);
   if (!library) return "this torch has no CUDA (libtorch_cuda.so cannot be opened): install a torch with CUDA";
@@ -31,8 +31,8 @@ std::string why_not_on_cuda() {
 Device open_learning_device(const Config& config, int local_rank) {
   const std::string &wanted = config.run.device, &simulator = config.simulator.backend,
                     &renderer = config.render.backend;
-  // Before anything is computed, wherever that will be: torch looks for its CUDA library once, and a process that
-  // learns on the host may do so on a device later.
+  // Called before anything is computed, even on the host: torch looks for its CUDA library once, and a process that
+  // learns on the host may use a device later.
   const std::string why_not = why_not_on_cuda();
   const bool draws_on_host =
       config.reads_images() && (renderer == "cpu" || renderer == "null" || renderer == "gl:osmesa");
@@ -55,7 +55,7 @@ Device open_learning_device(const Config& config, int local_rank) {
   PICTURA_CHECK(why_not.empty(), "{}: {}", wanted == "auto" ? "simulator.backend: \"cuda\"" : "run.device: " + wanted,
                 why_not);
   const int count = at::detail::getCUDAHooks().deviceCount();
-  // A launcher may have left each process only its own.
+  // A launcher may expose a single device to each process.
   Device device{MemorySpace::cuda, count == 1 ? 0 : local_rank};
   if (const size_t colon = wanted.find(':'); colon != std::string::npos) {
     device.index = std::stoi(wanted.substr(colon + 1));
@@ -68,7 +68,7 @@ Device open_learning_device(const Config& config, int local_rank) {
 
 namespace {
 
-// Torch's allocator of a device, or null where it has not been used.
+// Returns torch's allocator of a device, or null if it has not been used.
 at::DeviceAllocator* allocator_of(Device device) {
   if (device.is_host()) return nullptr;
   at::DeviceAllocator* const allocator = at::getDeviceAllocator(torch_device(device).type());
@@ -125,7 +125,7 @@ void OwnStream::run(const std::function<void()>& work) const {
   try {
     work();
   } catch (...) {
-    stream_.synchronize();  // tensors that whoever catches it reads are complete
+    stream_.synchronize();  // completes the tensors for code that catches the exception
     throw;
   }
   stream_.synchronize();

@@ -1,16 +1,17 @@
-// Vectors of sixteen floats on processors that have them (AVX-512), for programs that run on those without, too.
+// Vectors of sixteen floats on processors with AVX-512, for programs that also run on processors without it.
 #pragma once
 
 #if defined(__x86_64__) && defined(__GNUC__)
 #define PICTURA_HAS_WIDE_VECTORS 1
-/// Of a function that is called only where has_wide_vectors() says so; what it inlines is compiled as it is.
+/// Attribute of a function that is called only if has_wide_vectors() is true. Functions that it inlines are compiled
+/// alike.
 #define PICTURA_WIDE [[gnu::target("avx512f,avx512bw,avx512dq,avx512vl,fma")]]
 #else
 #define PICTURA_HAS_WIDE_VECTORS 0
 #define PICTURA_WIDE
 #endif
 
-/// Of a function whose code is for the processor of the function that calls it.
+/// Attribute of a function that is compiled for the processor of its caller.
 #define PICTURA_INLINE [[gnu::always_inline]] inline
 
 namespace pictura::host {

@@ -1,4 +1,4 @@
-// How an action is chosen from the log-probabilities of one agent: the most likely one, or a draw. Draws are keyed by
+// Chooses an action from the log-probabilities of one agent: the most likely action, or a draw. Draws are keyed by
 // (seed, global world, agent, episode, step), so they depend on no order and no device.
 #pragma once
 
@@ -8,7 +8,7 @@
 
 namespace pictura {
 
-/// The first of the most likely actions. log_probs: [num_actions].
+/// Returns the first of the most likely actions. log_probs: [num_actions].
 PICTURA_HD inline int32_t most_likely_action(const float* log_probs, int num_actions) {
   int32_t best = 0;
   for (int i = 1; i < num_actions; ++i) {
@@ -17,7 +17,7 @@ PICTURA_HD inline int32_t most_likely_action(const float* log_probs, int num_act
   return best;
 }
 
-/// The first action at which the cumulative probability exceeds `uniform` in [0, 1).
+/// Returns the first action at which the cumulative probability exceeds `uniform` in [0, 1).
 PICTURA_HD inline int32_t draw_action(const float* log_probs, int num_actions, float uniform) {
   double cumulative = 0;
   for (int i = 0; i + 1 < num_actions; ++i) {
@@ -27,7 +27,7 @@ PICTURA_HD inline int32_t draw_action(const float* log_probs, int num_actions, f
   return num_actions - 1;
 }
 
-/// Whose action is drawn, and when.
+/// Key of an action's draw: the agent and the time.
 struct ActionKey {
   uint64_t seed;
   uint32_t global_world, agent, episode, step;  // agent: its number in its world
@@ -43,10 +43,10 @@ PICTURA_HD inline int32_t draw_action(const float* log_probs, int num_actions, c
   return draw_action(log_probs, num_actions, stream.uniform());
 }
 
-/// How actions are chosen from their log-probabilities.
+/// Rule by which actions are chosen from their log-probabilities.
 struct ActionChoice {
-  bool argmax = false;  // the most likely one; else a draw
-  uint64_t seed = 0;    // of the draws
+  bool argmax = false;  // the most likely action; else a draw
+  uint64_t seed = 0;    // seed of the draws
 };
 
 /// Chooses the action of the agent in a slot, for both devices.
@@ -58,7 +58,7 @@ struct ActionRule {
   ActionRule(const SimulatorArrays& input, const ActionChoice& its_choice)
       : slots(input.slots), episode_index(input.episode_index), episode_step(input.episode_step), choice(its_choice) {}
 
-  /// log_probs: [kNumActions].
+  /// Returns the action of the agent in `slot`. log_probs: [kNumActions].
   PICTURA_HD int32_t operator()(int64_t slot, const float* log_probs) const {
     if (choice.argmax) return most_likely_action(log_probs, kNumActions);
     const auto world = static_cast<size_t>(slots.world_of_slot[slot]);
@@ -68,7 +68,7 @@ struct ActionRule {
   }
 };
 
-/// The command of an action, for the slots that a mask has.
+/// Writes the command of an action, for slots that the mask selects.
 PICTURA_HD inline void write_command(const int32_t* actions, Span<const uint8_t> mask, int64_t slot,
                                      Command* commands_out) {
   if (!mask.empty() && !mask[slot]) return;
@@ -76,11 +76,11 @@ PICTURA_HD inline void write_command(const int32_t* actions, Span<const uint8_t>
   commands_out[slot].action = actions[slot];
 }
 
-/// The slots whose agents are drawn, encoded and commanded.
+/// Slots whose agents are drawn, encoded and commanded.
 struct AskedSlots {
   const AgentStatus* status;
-  Span<const uint8_t> mask;  // [slots] others are left out; empty: none are
-  const uint8_t* left;       // [slots] those that have just left a road that ends are asked too; null: they are not
+  Span<const uint8_t> mask;  // [slots] excludes slots with 0; empty: excludes none
+  const uint8_t* left;       // [slots] includes agents that have just left a road that ends; null: includes none
 
   PICTURA_HD bool operator()(int64_t slot) const {
     const bool is_asked = takes_actions(status[slot]) || (left != nullptr && left[slot] != 0);

@@ -1,5 +1,5 @@
-// What a network does to its activations between matrix products, each in one pass over memory where ATen takes
-// several. For CUDA devices: the host's are in policy/host_passes.h.
+// Passes of a network over its activations between matrix products, each in one pass over memory where ATen takes
+// several. For CUDA devices; policy/host_passes.h has the host's.
 #pragma once
 
 #include <algorithm>
@@ -12,43 +12,43 @@ namespace pictura {
 
 enum class ActivationType : uint8_t { f32, bf16 };
 
-/// Activations of `rows` positions without gaps; `type` is that of all arrays of a call but parameters and their
-/// gradients, which are f32. The memory begins at a multiple of 16 bytes.
+/// Size of contiguous activations of `rows` positions. `type` is the type of all arrays of a call except parameters and
+/// their gradients, which are f32. The memory begins at a multiple of 16 bytes.
 struct ActivationSize {
   ActivationType type = ActivationType::f32;
   int64_t rows = 0, channels = 0;
 };
 
-/// How images become what the first convolution reads: a patch of patch_px^2 pixels, rounded up with black, becomes one
-/// position whose channel (c * patch_px + y) * patch_px + x is color c of pixel (x, y) of the patch; channels beyond
-/// those of the image are 0. From u8 [views, cameras, 3, height_px, width_px] to
-/// [cameras, views, rows, columns, channels], the colors from 0 to 255.
+/// Conversion of images to the input of the first convolution. A patch of patch_px^2 pixels, padded with black, becomes
+/// one position. Its channel (c * patch_px + y) * patch_px + x is color c of pixel (x, y) of the patch; further
+/// channels are 0. From u8 [views, cameras, 3, height_px, width_px] to [cameras, views, rows, columns, channels],
+/// colors from 0 to 255.
 struct PatchSize {
   int64_t views = 0, cameras = 0, height_px = 0, width_px = 0, patch_px = 1;
   static constexpr bool takes(int64_t patch_px) { return patch_px >= 1 && patch_px <= 4; }
-  /// Of a position: whole vectors of 8, which matrix units want.
+  /// Channels of a position: rounded up to whole vectors of 8, as matrix units need them.
   PICTURA_HD static constexpr int64_t channels_of(int64_t patch_px) { return (3 * patch_px * patch_px + 7) / 8 * 8; }
   PICTURA_HD int64_t rows() const { return (height_px + patch_px - 1) / patch_px; }
   PICTURA_HD int64_t columns() const { return (width_px + patch_px - 1) / patch_px; }
 };
 
-/// Where a segment's row (docs/reference/observation.md) holds what features are made of, after the x and y of its
+/// Columns of a segment's row (docs/reference/observation.md) from which features are computed, besides x and y of its
 /// middle.
 struct SegmentColumn {
-  static constexpr int kCos = 4, kSin = 5;  // of its direction
+  static constexpr int kCos = 4, kSin = 5;  // of the segment's direction
 };
 
-/// Features that are read of a row beside its numbers (see policy/row_features.h): those of each of the `points`
-/// pairs (x, y) that the row begins with, and where the row is a segment, those of the agent's place beside it.
+/// Features to compute from a row (see policy/row_features.h): those of each of the `points` pairs (x, y) at the row's
+/// begin and, if the row is a segment, those of the agent's position relative to it.
 struct RowFeatures {
   int points = 0;
   bool of_segment = false;
-  float position_unit_m = 1;  // of x and y
+  float position_unit_m = 1;  // unit of x and y
   static constexpr int kOfPoint = 6, kOfSegment = 4;
   PICTURA_HD constexpr int count() const { return points * kOfPoint + (of_segment ? kOfSegment : 0); }
 };
 
-/// Rows of f32 without gaps that become their features, each behind the row itself where keeps_rows says so.
+/// Contiguous f32 rows that are converted to their features. With keeps_rows the row itself comes first.
 struct RowSize {
   int64_t rows = 0, columns = 0;
   RowFeatures features;
@@ -58,17 +58,17 @@ struct RowSize {
   static constexpr int64_t kMostWidth = 256;
 };
 
-/// What is added to what lengths are divided by (see policy/row_features.h).
+/// Offsets of the denominators of features (see policy/row_features.h).
 constexpr float kNearPoint_m = 4.0f, kFarPoint_m = 20.0f, kPointDirection_m = 1.0f;
 
-/// A feature of a point in metres. The first four are of x and y alone.
+/// Feature of a point in metres. The first four features use x or y alone.
 PICTURA_HD inline float point_feature(Vec2 point_m, int feature) {
   const float its_m = feature % 2 == 0 ? point_m.x : point_m.y;
   if (feature >= 4) return its_m / (length(point_m) + kPointDirection_m);
   return its_m / (fabsf(its_m) + (feature < 2 ? kNearPoint_m : kFarPoint_m));
 }
 
-/// The agent's place relative to the segment of a row, in metres: x along the segment from its middle, y to the left of
+/// Agent's position relative to the segment of a row, in metres: x along the segment from its middle, y to the left of
 /// its line.
 PICTURA_HD inline Vec2 beside_segment(const RowFeatures& features, const float* row) {
   const Vec2 from_middle_m = Vec2{} - Vec2{row[0], row[1]} * features.position_unit_m,
@@ -76,7 +76,7 @@ PICTURA_HD inline Vec2 beside_segment(const RowFeatures& features, const float* 
   return {dot(from_middle_m, direction), cross(direction, from_middle_m)};
 }
 
-/// One of the features of a row.
+/// Feature of a row by its index.
 PICTURA_HD inline float row_feature(const RowFeatures& features, const float* row, int feature) {
   const int of_points = features.points * RowFeatures::kOfPoint;
   if (feature >= of_points) return point_feature(beside_segment(features, row), feature - of_points);
@@ -84,12 +84,12 @@ PICTURA_HD inline float row_feature(const RowFeatures& features, const float* ro
   return point_feature(Vec2{xy[0], xy[1]} * features.position_unit_m, feature % RowFeatures::kOfPoint);
 }
 
-/// Sets of members, each read by a linear layer, GELU, and a second linear layer, both of kChannels outputs. With
-/// has_norm the first layer's outputs are normalized before the GELU.
+/// Size of sets of members, each encoded by a linear layer, GELU, and a second linear layer, both of kChannels outputs.
+/// With has_norm the first layer's outputs are normalized before the GELU.
 struct SetSize {
-  RowSize members;  // of all sets, `most` of each, whether there are as many or not; keeps_rows is set
+  RowSize members;  // of all sets, `most` a set including absent members; keeps_rows is set
   int64_t most = 0;
-  int64_t counts_stride = 1;  // from the number of members of a set to that of the next
+  int64_t counts_stride = 1;  // elements from one set's member count to the next set's
   bool has_norm = false;
   static constexpr int kChannels = 64, kMostWidth = 32, kMostMembers = 254, kNoMember = 255;
   PICTURA_HD int64_t sets() const { return members.rows / most; }
@@ -97,24 +97,25 @@ struct SetSize {
     return channels == kChannels && hidden_channels == kChannels && width <= kMostWidth && most >= 1 &&
            most <= kMostMembers;
   }
-  /// How many partial sums there are of a gradient.
+  /// Number of partial sums of a gradient.
   static constexpr int64_t kSums = 264;
 };
 
-/// What belongs to each parameter of a set's layers: hidden_weight [kChannels, members.width()], weight [kChannels,
-/// kChannels], biases [kChannels].
+/// Parameters of a set's layers, or arrays of their shapes: hidden_weight [kChannels, members.width()], weight
+/// [kChannels, kChannels], biases [kChannels].
 template <typename Number>
 struct SetParameters {
   Number *hidden_weight, *hidden_bias, *weight, *bias;
 };
 
-/// Matrices [matrices, tokens, columns] of scores; `columns` is even.
+/// Size of score matrices [matrices, tokens, columns]; `columns` is even.
 struct TokenSize {
   ActivationType type = ActivationType::f32;
   int64_t matrices = 0, tokens = 0, columns = 0;
 };
 
-/// Holds no state. Work is put on the stream, all memory is the device's. Sums over rows are in a fixed order.
+/// Interface of the passes. Stateless; work is enqueued on the stream, and all memory is the device's. Sums over rows
+/// are in a fixed order.
 class NetworkPasses {
  public:
   NetworkPasses() = default;
@@ -122,33 +123,34 @@ class NetworkPasses {
   NetworkPasses(const NetworkPasses&) = delete;
   NetworkPasses& operator=(const NetworkPasses&) = delete;
 
-  /// Whether bias_gelu() takes rows of so many channels, and norm() and bias_norm_gelu().
+  /// Whether bias_gelu(), and norm() and bias_norm_gelu(), support rows of this number of channels.
   static constexpr bool gelu_takes(int64_t channels) { return channels % 8 == 0 && channels <= 1024; }
   static constexpr bool norm_takes(int64_t channels) {
     return channels % 64 == 0 && channels <= 512 && channels != 320 && channels != 448;
   }
 
-  /// out = GELU(x + bias), by the error function. bias: [channels].
+  /// Computes out = GELU(x + bias), by the error function. bias: [channels].
   virtual void bias_gelu(const ActivationSize& size, const void* x, const float* bias, void* out, Stream stream) = 0;
-  /// The gradients of x and, as partial sums [kBiasSums, channels], of the bias.
+  /// Computes the gradients of x and, as partial sums [kBiasSums, channels], of the bias.
   virtual void bias_gelu_backward(const ActivationSize& size, const void* x, const float* bias, const void* grad_out,
                                   void* grad_x_out, float* grad_bias_sums_out, Stream stream) = 0;
   static constexpr int64_t kBiasSums = 528;
 
-  /// out = GELU(layer norm of x + bias), whose norm is over channels and has no parameters and an epsilon of 1e-5.
+  /// Computes out = GELU(layer norm of x + bias). The norm is over channels, without parameters, with an epsilon of
+  /// 1e-5.
   virtual void bias_norm_gelu(const ActivationSize& size, const void* x, const float* bias, void* out,
                               Stream stream) = 0;
-  /// The gradients of x and, as partial sums [num_norm_sums(rows, 1), channels], of the bias.
+  /// Computes the gradients of x and, as partial sums [num_norm_sums(rows, 1), channels], of the bias.
   virtual void bias_norm_gelu_backward(const ActivationSize& size, const void* x, const float* bias,
                                        const void* grad_out, void* grad_x_out, float* grad_bias_sums_out,
                                        Stream stream) = 0;
 
-  /// out = layer norm of x + position, over channels, with an epsilon of 1e-5. weight, bias: [channels]; position
-  /// [period, channels] is that of row r in r % period, null for none (then period is 1).
+  /// Computes out = layer norm of x + position, over channels, with an epsilon of 1e-5. weight, bias: [channels].
+  /// position: [period, channels], read at r % period for row r; null for none (then period is 1).
   virtual void norm(const ActivationSize& size, const void* x, const void* position, int64_t period,
                     const float* weight, const float* bias, void* out, Stream stream) = 0;
-  /// The gradients of x and, as partial sums [num_norm_sums(rows, period), period, 3, channels], of position, weight
-  /// and bias.
+  /// Computes the gradients of x and, as partial sums [num_norm_sums(rows, period), period, 3, channels], of position,
+  /// weight and bias.
   virtual void norm_backward(const ActivationSize& size, const void* x, const void* position, int64_t period,
                              const float* weight, const void* grad_out, void* grad_x_out, float* sums_out,
                              Stream stream) = 0;
@@ -156,24 +158,24 @@ class NetworkPasses {
     return std::clamp<int64_t>((8448 + period - 1) / period, 1, std::max<int64_t>(1, rows / period));
   }
 
-  /// out: [rows, width()], at most kMostWidth wide.
+  /// Computes features of rows. out: [rows, width()], at most kMostWidth wide.
   virtual void row_features(const RowSize& size, const float* rows, ActivationType type, void* out, Stream stream) = 0;
 
   virtual void patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, Stream stream) = 0;
 
-  /// The largest value of each channel over the members of each set, bf16 [sets, kChannels], 0 for an empty set, and
-  /// which member has it, [sets, kChannels], the first of equal ones, kNoMember in an empty set; null where it is not
-  /// asked for. members: f32; counts: as size.counts_stride says. Products are in bf16.
+  /// Computes the largest value of each channel over the members of each set, bf16 [sets, kChannels], 0 for an empty
+  /// set. which_out: index of the member with that value, [sets, kChannels], the first of equal ones, kNoMember in an
+  /// empty set; null if not needed. members: f32; counts: spaced by size.counts_stride. Products are in bf16.
   virtual void largest_embedding(const SetSize& size, const float* members, const int32_t* counts,
                                  const SetParameters<const float>& parameters, void* out, uint8_t* which_out,
                                  Stream stream) = 0;
-  /// The gradients of the parameters as partial sums [kSums, ...], from that of `out`, bf16.
+  /// Computes the parameter gradients as partial sums [kSums, ...], from the gradient of `out`, bf16.
   virtual void largest_embedding_backward(const SetSize& size, const float* members,
                                           const SetParameters<const float>& parameters, const uint8_t* which,
                                           const void* grad_out, const SetParameters<float>& sums_out,
                                           Stream stream) = 0;
 
-  /// out = softmax over tokens; and the gradient of scores by way of `out`.
+  /// Computes out = softmax over tokens. The backward pass computes the gradient of scores from `out`.
   virtual void token_softmax(const TokenSize& size, const void* scores, void* out, Stream stream) = 0;
   virtual void token_softmax_backward(const TokenSize& size, const void* out, const void* grad_out,
                                       void* grad_scores_out, Stream stream) = 0;
