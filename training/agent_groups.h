@@ -1,5 +1,5 @@
-// Actions and advantages of a rollout's agents, apart for those at rest and those that move: an agent that has learnt
-// to stand still looks like one that has learnt to drive safely, unless the two are told apart.
+// Actions and advantages of a rollout's agents, separately for agents at rest and agents that move. Without the
+// separation an agent that has learnt to stand still looks like an agent that has learnt to drive safely.
 #pragma once
 
 #include <array>
@@ -22,7 +22,7 @@ struct AgentGroups {
   AgentGroup rest, moving;
 };
 
-/// Groups the agents of a rollout with advantages, of all ranks, under a filter that keeps |advantages| of at least
+/// Groups the agents of all ranks' rollouts with advantages, under a filter that keeps |advantages| of at least
 /// adv_threshold. A group without agents has NaN.
 AgentGroups group_agents(const Rollout& rollout, double adv_threshold, Communicator* communicator = alone());
 

@@ -50,7 +50,7 @@ Checkpoint parse_checkpoint(const std::string& bytes, const std::string& path) {
     result.distance_m = counters.at("distance_m");
     result.adam_steps = counters.at("adam_steps");
     result.filter_average = counters.at("filter_average");
-    // A run saved without it continues exactly; only its averages start again.
+    // A checkpoint without this entry also resumes exactly; only the averages restart.
     for (const ordered_json& json : header.value("recent", ordered_json::array())) {
       result.recent.push_back({json.at("finished"), json.at("finished_return")});
     }

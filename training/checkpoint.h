@@ -1,4 +1,4 @@
-// Checkpoint: one file (policy/checkpoint_file.h) from which training goes on exactly and a policy can be loaded.
+// Checkpoint: one file (policy/checkpoint_file.h) from which training continues exactly and a policy can be loaded.
 #pragma once
 
 #include <map>
@@ -17,25 +17,25 @@ struct RecentUpdate {
 struct Checkpoint : SavedPolicy {
   double distance_m = 0;  // driven by all agents
   int64_t adam_steps = 0;
-  double filter_average = -1;  // of AdvantageFilter
+  double filter_average = -1;  // average of AdvantageFilter
   std::vector<RecentUpdate> recent;
-  std::map<std::string, double> longest_update_s;          // see Run
+  std::map<std::string, double> longest_update_s;          // see Run::longest_update_s
   std::vector<NamedTensor> first_moments, second_moments;  // see Optimizer
   std::vector<NamedTensor> average;                        // WeightAverage::values; empty for runs without one
-  int64_t averaged_updates = 0;                            // in it
+  int64_t averaged_updates = 0;                            // updates in the average
   std::vector<uint8_t> simulator;                          // Simulator::save(), at the start of update `update`
 };
 
-/// Writes the file under another name and renames it to path. Throws Error naming the path.
+/// Writes the file to a temporary file and renames it to `path`. Throws Error naming the path.
 void write_checkpoint(const std::string& path, const Checkpoint& checkpoint);
 
-/// Throws Error naming the file when it is no checkpoint, truncated, damaged, of another version or byte order, or of
-/// another observation schema (naming the entry that differs).
+/// Reads a checkpoint. Throws Error naming the file if it is not a checkpoint, is truncated or damaged, or has another
+/// version, byte order or observation schema (naming the entry that differs).
 Checkpoint read_checkpoint(const std::string& path);
-/// Checkpoint in the bytes of such a file.
+/// Parses the bytes of a checkpoint file. Errors as for read_checkpoint().
 Checkpoint parse_checkpoint(const std::string& bytes, const std::string& path);
 
-/// First camera and property in which two rigs differ, with both values; empty where they are equal.
+/// First camera and property in which two rigs differ, with both values; empty if they are equal.
 std::string first_difference(const Rig& saved, const Rig& now);
 
 }  // namespace pictura

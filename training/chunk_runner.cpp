@@ -22,7 +22,7 @@ void ChunkRunner::clear() {
   graphs_->release_memory();
 }
 
-// Graphs know addresses, so they are given other numbers there; calls take tensors as they are.
+// Graphs hold addresses, so values are copied there; without graphs tensors are assigned.
 void ChunkRunner::set(at::Tensor* to, const at::Tensor& value) const {
   if (!graphs_->are_used() || !value.defined())
     *to = value;
@@ -52,7 +52,7 @@ ChunkRunner::Work& ChunkRunner::observe(const at::Tensor& rows) {
   set(&work.chunk.rows, rows);
   const PhaseTimer::Scope timed(observations_.draws_when_gathered() ? timer_ : nullptr, Phase::render);
   const Mode mode = work.observe.next_mode(*graphs_, observations_.are_complete());
-  if (mode != Mode::launch) work.observation = {};  // before there is another
+  if (mode != Mode::launch) work.observation = {};  // freed before the next observation is allocated
   work.observe.run(mode, graphs_,
                    [&] { work.observation = observations_.gather(work.chunk.rows, policy_.drawn_patch_px()); });
   return work;
@@ -75,7 +75,7 @@ Policy::Output ChunkRunner::forward_no_grad(const at::Tensor& rows) {
 }
 
 void ChunkRunner::set_targets(const Targets& targets) {
-  // Graphs of losses with a teacher are others than those without one.
+  // Losses with a teacher need other graphs than losses without one.
   if (targets.teacher_log_probs.defined() != targets_.teacher_log_probs.defined()) clear();
   set(&targets_.actions, targets.actions);
   set(&targets_.old_log_probs, targets.old_log_probs);
@@ -90,13 +90,13 @@ at::Tensor ChunkRunner::add_gradients(const Minibatch& minibatch, int64_t forwar
     const Minibatch chunk = minibatch.part(of_rows);
     Work& work = observe(chunk.rows);
     set(&work.chunk.advantages, chunk.advantages);
-    // A product with 1 changes no bit, so one graph serves full chunks and those that are filled up.
+    // A product with 1 changes no bit, so one graph serves full and padded chunks.
     set(&work.chunk.shares,
         chunk.shares.defined() || !graphs_->are_used() ? chunk.shares : at::ones_like(chunk.advantages));
     if (!work.weight.defined()) work.weight = at::empty({}, stats_.options());
     work.weight.fill_(static_cast<double>(of_rows.count) / static_cast<double>(minibatch.global_size));
 
-    // Both halves are done one way: graphs keep nothing from which calls could go on backwards.
+    // Both passes use the same mode: graphs keep no autograd state from which a backward pass could run call by call.
     const Mode mode = work.learn.next_mode(*graphs_, work.observe.is_captured());
     if (mode == Mode::capture) graphs_->make_room();
     {

@@ -1,5 +1,5 @@
-// A policy at work on chunks of a rollout's rows: what they see, what the policy makes of that, and the gradients of
-// its losses. With CUDA graphs a chunk takes some ten launches instead of some hundreds, and gives the same bits.
+// Runs a policy on chunks of a rollout's rows: gathers observations, evaluates the policy, and computes the gradients
+// of losses. With CUDA graphs a chunk takes tens of launches instead of hundreds, and gives the same bits.
 #pragma once
 
 #include <functional>
@@ -28,8 +28,8 @@ struct Losses {
   at::Tensor stats;                   // stacked() statistics, without gradients
 };
 
-/// Computes the losses of a chunk from what the policy made of it. Work with graphs calls it only while they are
-/// captured, so it must do the same whenever it is called.
+/// Computes the losses of a chunk from the policy's output. With graphs it is called only during capture, so every call
+/// must do the same work.
 using LossFunction =
     std::function<Losses(const Policy::Output& output, const Targets& targets, const Minibatch& chunk)>;
 
@@ -39,27 +39,28 @@ class ChunkRunner {
   ChunkRunner(const Policy& policy, const RolloutObservations& observations, PhaseTimer* timer = nullptr,
               Graphs* graphs = nullptr);
 
-  /// What the policy makes of rows, i64 [n], in a rollout, without gradients: Phase::forward. Valid until the next
-  /// call.
+  /// Returns the policy's output for rows, i64 [n], of a rollout, without gradients: Phase::forward. Valid until the
+  /// next call.
   Policy::Output act(const at::Tensor& rows);
 
-  /// Forward pass of the update's arithmetic without gradients, call by call: Phase::learn.
+  /// Returns the policy's output in the update's arithmetic, without gradients and without graphs: Phase::learn.
   Policy::Output forward_no_grad(const at::Tensor& rows);
 
   /// Sets the targets of the losses that follow.
   void set_targets(const Targets& targets);
   /// Adds the gradient of this rank's part of a minibatch's loss to those of the parameters, which must be defined, in
   /// chunks of at most forward_chunk rows: Phase::learn and Phase::backward. Returns the statistics of that part, f64
-  /// [kNumLossStats] with 0 for the gradient's norm, which stay until the next call.
+  /// [kNumLossStats] with 0 for the gradient norm, which remain valid until the next call.
   at::Tensor add_gradients(const Minibatch& minibatch, int64_t forward_chunk, const LossFunction& loss);
-  /// Losses of one chunk, from which gradients can be taken, call by call: Phase::diagnose.
+  /// Losses of one chunk, from which gradients can be computed, without graphs: Phase::diagnose.
   Losses losses(const Minibatch& chunk, const LossFunction& loss);
 
-  /// Discards all graphs. Must be called where the observations' images move, as with another renderer.
+  /// Discards all graphs. Must be called if the observations' images move, as with another renderer.
   void clear();
 
  private:
-  // Work on chunks of one size. Tensors that graphs read have one address: they are copied to.
+  // Graphs and tensors for chunks of one size. Tensors that graphs read have a fixed address: values are copied to
+  // them.
   struct Work {
     RepeatedWork observe, act, learn, backward;
     Minibatch chunk;
@@ -69,7 +70,7 @@ class ChunkRunner {
     Losses losses;
     int64_t last_use = 0;
   };
-  // Beyond so many sizes the graphs of the least recently used one are discarded.
+  // Maximum number of sizes with graphs. Beyond it the graphs of the least recently used size are discarded.
   static constexpr size_t kMaxSizes = 8;
 
   Work& work_of(int64_t size);
@@ -83,7 +84,7 @@ class ChunkRunner {
   Graphs* const graphs_;
   uint64_t generation_ = 0;  // RolloutObservations::generation() of the graphs
   int64_t num_uses_ = 0;
-  std::map<int64_t, Work> works_;  // by size; without graphs one of any size
+  std::map<int64_t, Work> works_;  // by size; without graphs a single entry for all sizes
   Targets targets_;
   at::Tensor stats_;  // sums over the chunks of a minibatch
 };

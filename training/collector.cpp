@@ -8,18 +8,17 @@ namespace pictura {
 
 namespace {
 
-// The slots that are drawn and encoded where these are active: all, where halted ones are to cost as much.
+// Returns the slots to draw and encode: the active slots, or all slots if halted agents are to cost the same.
 at::Tensor seen_slots(const Run& run, const at::Tensor& active) {
   return run.config.train.halted_slots == HaltedSlots::skip ? active
                                                             : at::arange(run.rollout.num_slots(), active.options());
 }
 
-// Decision of the policy for some active slots at a step that has been recorded.
+// Returns the policy's decision for active slots at a recorded step.
 Decision decide(Run* run, int64_t step, const at::Tensor& active) {
   const TrainSection& config = run->config.train;
   const at::Tensor rows = run->rollout.rows_of(step, seen_slots(*run, active));
-  // In chunks of another size products may be rounded otherwise. Full ones have one, over however many ranks the agents
-  // are divided.
+  // Products may be rounded differently in chunks of another size. Full chunks have one size, for any number of ranks.
   const ChunkSizes chunks{config.forward_chunk, config.reproducible};
   Decision decision = decide(rows, chunks, [run](const at::Tensor& some) { return run->chunks.act(some); });
   if (rows.size(0) > active.size(0)) {
@@ -48,13 +47,12 @@ bool Collector::collect_on_stream() {
   Simulator& simulator = *run_.simulator;
   const Stream stream = current_stream(run_.device);
   rollout.values.zero_();
-  // Latched on a device, so that no step waits for it.
+  // Latched on a device, so that no step waits.
   at::Tensor are_finite = at::ones({}, rollout.values.options().dtype(at::kBool));
   for (int64_t step = 0; step < rollout.num_steps(); ++step) {
     if (run_.communicator->size() == 1 && interrupted()) return false;
     run_.communicator->step();
 
-    // Act.
     const at::Tensor slots = record(step);
     const Decision decision = decide(&run_, step, slots);
     are_finite.logical_and_(decision.are_finite());
@@ -69,7 +67,7 @@ bool Collector::collect_on_stream() {
 
     simulate(step);
   }
-  // The value of what is seen last, from which the last transitions bootstrap.
+  // Value of the last observation, from which the last transitions bootstrap.
   const at::Tensor slots = record(rollout.num_steps());
   const Decision last = decide(&run_, rollout.num_steps(), slots);
   rollout.values.select(0, rollout.num_steps()).index_copy_(0, slots, last.value);
@@ -87,7 +85,7 @@ at::Tensor Collector::record(int64_t step) {
   const Span<const uint8_t> mask = own.defined() ? span_of<const uint8_t>(own) : Span<const uint8_t>();
   const at::Tensor slots = clock_.deciding(input, active_slots(input, mask, true, run_.executor.get()), step,
                                            run_.simulator->episode_over());
-  // The slots whose images are kept differ from rollout to rollout, so no graph can record them.
+  // Slots with kept images differ between rollouts, so no graph can record them.
   if (observations.keep_images())
     observations.record(step, seen_slots(run_, slots));
   else

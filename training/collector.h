@@ -1,4 +1,4 @@
-// Collecting a rollout from the policy's own driving.
+// Collects a rollout from the policy's own driving.
 #pragma once
 
 #include <vector>
@@ -10,22 +10,23 @@ namespace pictura {
 
 class Collector {
  public:
-  /// The run must outlive it.
+  /// Creates a collector of a run, which must outlive it.
   explicit Collector(Run* run);
 
-  /// Fills the run's rollout, but for advantages; false when ^C came. Several ranks hear of it after the update.
+  /// Fills the run's rollout, except advantages. Returns false after an interrupt (^C); with several ranks the
+  /// interrupt takes effect after the update.
   bool collect();
 
-  /// Graphs of steps that have been launched so far.
+  /// Graph launches of all steps so far.
   int64_t num_graph_launches() const { return graphs_.num_launches(); }
 
  private:
   bool collect_on_stream();
-  // Records what the simulator shows as what is seen at a step. Returns the slots of the agents that decide.
+  // Records the simulator's observations of a step. Returns the slots of the agents that decide.
   at::Tensor record(int64_t step);
-  // Repeats the actions of the step before for agents that do not decide.
+  // Repeats the previous step's actions of agents that do not decide.
   void hold_actions(int64_t step, const at::Tensor& deciding);
-  // Records what the teacher would do at a step, as long as it weighs anything.
+  // Records the teacher's log-probabilities at a step while its weight is not 0.
   void ask_teacher(int64_t step, const at::Tensor& slots);
   void simulate(int64_t step);
 

@@ -18,7 +18,7 @@ class EventFile {
  public:
   /// Opens folder/events.out.tfevents.<time>.<process>. Throws Error naming the path.
   explicit EventFile(const std::string& folder);
-  /// Appends one event and flushes. Throws Error when the disk is full.
+  /// Appends one event and flushes. Throws Error if the disk is full.
   void write(int64_t step, const Scalars& scalars);
 
  private:

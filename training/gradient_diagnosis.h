@@ -1,4 +1,4 @@
-// Diagnosis of an update's gradient: how much of it each loss makes.
+// Diagnosis of an update's gradient: the share of each loss.
 #pragma once
 
 #include "pictura/training/chunk_runner.h"
@@ -12,12 +12,12 @@ struct GradientNorms {
   double policy = 0, value = 0, entropy = 0;
 };
 
-/// Measures the gradients of the single losses, for the log alone, on the first transitions of an update: so few that a
-/// way there and three back are at most 3 % of the update's work.
+/// Measures the gradients of single losses, for the log alone, on the first transitions of an update. They are so few
+/// that one forward and three backward passes are at most 3 % of the update's work.
 class GradientDiagnosis {
  public:
-  /// Measures on the first of these minibatches, which has its advantages. The parameters' gradients are 0 before and
-  /// after. Nothing waits for the device.
+  /// Measures on the first of these minibatches, whose advantages are set. The parameters' gradients are 0 before and
+  /// after. Does not wait for the device.
   void measure(const Minibatch& first, const Minibatches& minibatches, const LossFunction& loss,
                const TrainSection& config, const Learner& learner);
   /// Norms of all ranks. Waits for the device.

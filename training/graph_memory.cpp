@@ -1,5 +1,5 @@
-// The memory of captured graphs: a private pool of torch's allocator, reached through virtual functions alone, since
-// torch's CUDA library is not linked.
+// Memory of captured graphs: a private pool of torch's allocator, reached through virtual functions only, since torch's
+// CUDA library is not linked.
 #include "pictura/training/repeated_work.h"
 
 #ifdef PICTURA_TORCH_HAS_CUDA
@@ -20,7 +20,7 @@ c10::cuda::CUDACachingAllocator::CUDAAllocator* torch_allocator() {
   return static_cast<c10::cuda::CUDACachingAllocator::CUDAAllocator*>(c10::getDeviceAllocator(c10::kCUDA));
 }
 
-// Torch counts its own pools up from 1.
+// Ids far above torch's own, which count up from 1.
 uint64_t new_id() {
   static std::atomic<uint64_t> next{uint64_t{1} << 62};
   return next++;
@@ -51,7 +51,7 @@ void GraphMemory::release() {
   for (; uses_ > 0; --uses_) {
     torch_allocator()->releasePool(static_cast<c10::DeviceIndex>(device_.index), pool_of(id_));
   }
-  // Renderers and simulators allocate past torch.
+  // Returned to the device, since renderers and simulators allocate outside torch.
   torch_allocator()->emptyCache(pool_of(id_));
   id_ = 0;
 }
@@ -60,7 +60,7 @@ GraphMemory::~GraphMemory() {
   try {
     release();
   } catch (const std::exception&) {
-    // The device is lost: the next call that waits for it throws.
+    // A device failure is thrown by the next call that waits for the device.
   }
 }
 #else

@@ -9,7 +9,7 @@ namespace pictura {
 
 void keep_freed_memory() {
 #ifdef __GLIBC__
-  mallopt(M_MMAP_MAX, 0);  // no threshold that glibc takes is above 32 MB
+  mallopt(M_MMAP_MAX, 0);  // glibc accepts no threshold above 32 MB
   mallopt(M_TRIM_THRESHOLD, INT_MAX);
   mallopt(M_TOP_PAD, 64 << 20);
 #endif

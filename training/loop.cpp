@@ -1,4 +1,4 @@
-// The training loop: collect a rollout, improve the policy on it, count, log and keep.
+// Training loop: collect a rollout, improve the policy, count, log and save.
 #include "pictura/training/loop.h"
 
 #include <algorithm>
@@ -32,7 +32,7 @@ namespace pictura {
 
 namespace {
 
-// Loop of updates until there is nothing more to do, no time left, or a request to end.
+// Loop of updates until the run is complete, out of time, or interrupted.
 class TrainingLoop {
  public:
   /// The arguments must outlive it.
@@ -78,7 +78,8 @@ class TrainingLoop {
     return !is_out_of_time_;
   }
 
-  // Drives through a rollout. False after ^C within it: then the run is as at its start, from which resuming is exact.
+  // Collects a rollout. Returns false after an interrupt; the run's state is then that of the rollout's start, from
+  // which resuming is exact.
   bool collect(UpdateRecord* record) {
     const std::unique_ptr<StateSnapshot> before = run_.simulator->snapshot();
     const SimulatorTotals totals_before = run_.simulator->totals();
@@ -96,13 +97,13 @@ class TrainingLoop {
     return true;
   }
 
-  // Improves the policy on the rollout. What stops it for a number that is not finite is kept for study.
+  // Improves the policy on the rollout. Saves the minibatch of an update that fails with a number that is not finite.
   void improve(UpdateRecord* record) {
     const Stopwatch watch;
     try {
       record->stats = run_.improve();
     } catch (const NotFinite& error) {
-      run_.communicator->step();  // throws where a rank is lost, which leaves numbers that mean nothing
+      run_.communicator->step();  // throws if a rank is lost, whose numbers are meaningless
       if (!run_.communicator->is_first()) throw;
       const std::string path = keeper_.path("failed_minibatch.safetensors");
       write_safetensors(path, error.minibatch, to_toml(run_.config));
@@ -133,7 +134,8 @@ class TrainingLoop {
     time_.expect_growth(std::max(1.0, static_cast<double>(run_.image_size().pixels()) / pixels));
   }
 
-  // One that there is no time for, or that was interrupted, is made when the run goes on. All ranks make the same one.
+  // Evaluates if an evaluation is due. An evaluation that was interrupted, or for which there is no time, is made when
+  // the run resumes. All ranks evaluate at the same update.
   void evaluate_if_due() {
     if (!any_rank(evaluation_.is_due() && log_.lacks_evaluation(run_.update), run_.communicator)) return;
     is_out_of_time_ = time_.is_too_short_for(RunWork::evaluation);
@@ -146,7 +148,7 @@ class TrainingLoop {
   }
 
   void keep(int64_t agent_steps_of_update) {
-    // The milestone first: a run that goes on from a checkpoint of after it makes it no more.
+    // The milestone is saved first: a run that resumes from a later checkpoint would not save it.
     const std::string milestone = milestone_name(run_.agent_steps - agent_steps_of_update, run_.agent_steps,
                                                  run_.config.train.milestone_agent_steps);
     if (!milestone.empty()) keeper_.save_as(milestone, run_, log_.recent());
@@ -165,7 +167,7 @@ class TrainingLoop {
   double agent_steps_per_s_ = 0;
 };
 
-// Sets what torch has once for a whole process.
+// Sets torch's process-wide settings.
 void set_up_torch(const Config& config, Device device) {
   if (device.is_host()) keep_freed_memory();
   at::set_num_threads(resolve_num_threads(config.run.num_threads));
@@ -185,7 +187,7 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
   const Device device = open_learning_device(config, options.launch.local_rank);
   check_memory(config, device, available_bytes(device), ranks->size());
   check_map_memory(config, device, available_bytes(device), available_bytes(Device{}), ranks->size());
-  // A rollout step or a minibatch of the paper's size takes minutes of a few cores.
+  // A rollout step or a minibatch of the paper's size takes minutes on a few cores.
   constexpr double kHostNoProgress_s = 900;
   if (device.is_host()) ranks->set_no_progress_s(kHostNoProgress_s);
   const std::unique_ptr<Communicator> communicator = make_communicator(ranks, device);

@@ -1,19 +1,19 @@
-// Statistics of an update's losses by name: as tensors where they are computed, as numbers where they are logged.
+// Statistics of an update's losses by name: tensors during computation, numbers in logs.
 #pragma once
 
 #include <ATen/ATen.h>
 
 namespace pictura {
 
-/// Statistics of a minibatch, or their means over several; docs/reference/run_folder.md defines them.
+/// Statistics of a minibatch, or their means over several minibatches; docs/reference/run_folder.md defines them.
 template <typename Number>
 struct LossStatsOf {
   Number policy_loss{}, value_loss{};
-  Number teacher_kl{};  // from the teacher's actions, unweighted
+  Number teacher_kl{};  // from the teacher's actions, without its weight
   Number entropy{}, approx_kl{}, clip_fraction{}, abs_log_ratio{};
   Number grad_norm{};  // before clipping
 
-  /// Calls f(name, statistic) for those of the action distribution, which are logged of single epochs, too.
+  /// Calls f(name, statistic) for the statistics of the action distribution, which are also logged per epoch.
   template <typename Stats, typename F>
   static void visit_actions(Stats& stats, const F& f) {
     f("entropy", stats.entropy);
@@ -21,7 +21,7 @@ struct LossStatsOf {
     f("clip_fraction", stats.clip_fraction);
     f("abs_log_ratio", stats.abs_log_ratio);
   }
-  /// Calls f(name, statistic) for those that a forward pass gives: all but the gradient's norm.
+  /// Calls f(name, statistic) for the statistics of a forward pass: all but the gradient norm.
   template <typename Stats, typename F>
   static void visit_losses(Stats& stats, const F& f) {
     f("policy_loss", stats.policy_loss);
@@ -29,7 +29,7 @@ struct LossStatsOf {
     f("teacher_kl", stats.teacher_kl);
     visit_actions(stats, f);
   }
-  /// Calls f(name, statistic) for all.
+  /// Calls f(name, statistic) for all statistics.
   template <typename Stats, typename F>
   static void visit(Stats& stats, const F& f) {
     visit_losses(stats, f);
@@ -56,7 +56,7 @@ inline LossTensors elements_of(const at::Tensor& row) {
   return elements;
 }
 
-/// Numbers of such a row, which lies on the host.
+/// Numbers of a row of all statistics, which lies on the host.
 inline LossStats numbers_of(const at::Tensor& row) {
   LossStats numbers;
   const double* next = row.const_data_ptr<double>();

@@ -28,7 +28,7 @@ double observation_bytes(const Config& config) {
   return bytes;
 }
 
-// Bytes of an agent's images at the largest size that the run will draw.
+// Bytes of an agent's images at the largest size of the run's schedule.
 double image_bytes(const Config& config) {
   const auto bytes_at = [&config](int64_t agent_steps) {
     return static_cast<double>(image_layout(rig_of(config, agent_steps), 1, PixelFormat::u8).bytes());
@@ -38,15 +38,15 @@ double image_bytes(const Config& config) {
   return largest;
 }
 
-// State and its snapshot, box, view and what a step needs, without observations: 690 were measured on the host.
+// Bytes of state and its snapshot, box, view and temporaries of a step, without observations: 690 were measured on the
+// host.
 constexpr double kSimulatorBytesPerBox = 700;
 
 // Bytes of a transition: the scalars of a rollout (values, actions, log-probabilities, rewards, advantages, three
-// flags), and those that an update makes of them (returns, actions and five lists of rows as i64).
+// flags), and those of an update (returns, actions and five lists of rows as i64).
 constexpr double kTransitionBytes = 5 * 4 + 3 + 4 + 6 * 8;
 
-// Bytes of a map for each byte of its file: above what was measured of CARLA's towns, of procedural ones, and of
-// copies.
+// Bytes of a map per byte of its file: above the measured values of CARLA's towns, procedural towns, and copies.
 constexpr double kHostBytesPerFileByte = 17, kDeviceBytesPerFileByte = 11;
 
 double kept_image_bytes(const Config& config, double agents) {
@@ -65,7 +65,7 @@ double estimated_bytes(const Config& config, bool keeps_images) {
   const double agents = section.num_slots, steps = config.train.num_steps;
   const double worlds = 2 * agents / (section.min_agents + section.max_agents),
                boxes = agents + worlds * section.parked_cars;
-  // The simulator has observations of its own, the rollout those of one step more than it takes.
+  // The simulator has its own observations; the rollout has those of one step more than it takes.
   double bytes =
       boxes * kSimulatorBytesPerBox + agents * (observation_bytes(config) * (steps + 2) + kTransitionBytes * steps);
   if (!config.train.teacher.empty()) bytes += agents * steps * kNumActions * sizeof(float);
@@ -78,17 +78,18 @@ double estimated_bytes(const Config& config, bool keeps_images) {
 
 namespace {
 
-// Adds up the layers of a network.
+// Sums the sizes of a network's layers.
 class LayerSum {
  public:
-  /// A linear layer, or a convolution, of `rows` rows of `in` numbers to `out`: of its results so many copies are kept
-  /// for the way back, two where an activation follows.
+  /// Adds a linear layer, or a convolution, of `rows` rows of `in` numbers to `out` numbers. `kept`: copies of its
+  /// results that the backward pass needs, two if an activation follows.
   void add(double rows, double in, double out, double kept, double kernel_area = 1) {
     parameters_ += (in * kernel_area + 1) * out;
     add_values(rows * out, kept);
     largest_ = std::max(largest_, rows * (in + out));
   }
-  /// Where a norm is a pass of its own, what goes into the activation is kept beside the first layer's results.
+  /// Adds a two-layer group. If the norm is a separate pass, the activation's input is kept beside the first layer's
+  /// results.
   void add_group(double rows, double in, double width, bool keeps_norm, double kept = 1) {
     add(rows, in, width, keeps_norm ? 3 : 2);
     add(rows, width, width, kept);
@@ -97,7 +98,7 @@ class LayerSum {
   void add_values(double count, double kept) { kept_ += kept * count; }
 
   double parameters() const { return parameters_; }
-  /// Numbers of a transition: what is kept of all layers, and the gradients at the largest.
+  /// Numbers of a transition: what all layers keep, and the gradients at the largest layer.
   double values() const { return kept_ + 2 * largest_; }
 
  private:
@@ -114,7 +115,7 @@ void add_entity_sets(const Config& config, Device device, LayerSum* sum) {
                              SetSize::takes(config.policy.embedding_width, config.policy.embedding_width,
                                             static_cast<int64_t>(features), array.rows));
     if (is_one_pass) {
-      // Kept are the features of members, and which members are the largest: see largest_embedding().
+      // The features of members and the indices of the largest members are kept: see largest_embedding().
       sum->add_parameters((features + 1) * width + (width + 1) * width);
       sum->add_values(array.rows * features, 1);
       sum->add_values(width, 1);
@@ -126,7 +127,7 @@ void add_entity_sets(const Config& config, Device device, LayerSum* sum) {
   }
 }
 
-// Images of the size that the rig of these agent-steps has.
+// Adds the image branch at the image size of this rig.
 void add_images(const Config& config, const Rig& rig, LayerSum* sum) {
   const PolicySection& policy = config.policy;
   const double cameras = static_cast<double>(rig.cameras.size()), queries = policy.num_queries;

@@ -5,46 +5,47 @@
 
 namespace pictura {
 
-/// Whether rollouts of so many agents keep the images that a policy sees, rather than drawing them again: as
-/// train.images says; with auto on the host, where drawing costs more than memory, and on a device where they take at
-/// most two fifths of its `memory_bytes`.
+/// Whether rollouts of this number of agents keep the policy's images instead of drawing them again, as train.images
+/// specifies. With "auto" images are kept on the host, where drawing costs more than memory, and on a device if they
+/// take at most two fifths of its `memory_bytes`.
 bool keeps_images(const Config& config, int num_agents, Device device, int64_t memory_bytes);
 
-/// Images that a rollout of num_steps keeps of an agent that is active all the time: where an action is held, none.
+/// Number of images that a rollout of num_steps keeps of an agent that is always active: none at steps where its action
+/// is held.
 constexpr int64_t num_kept_images(int64_t num_steps, int decision_steps) { return num_steps / decision_steps + 1; }
 
-/// Estimated bytes of simulator, rollout and update for all agents of a configuration: what grows with
+/// Estimated bytes of simulator, rollout and update for all agents of a configuration. Counts what grows with
 /// simulator.num_slots, so neither maps nor the network.
 double estimated_bytes(const Config& config, bool keeps_images);
 
-/// Size of a configuration's network. A program (policy.backbone) is not counted.
+/// Size of a configuration's network. A backbone program (policy.backbone) is not counted.
 struct NetworkSize {
   double parameters = 0;
   /// Bytes of each parameter, its gradient and its moments.
   static constexpr double kBytesPerParameter = 20;
-  /// Estimated bytes of a transition on its way forward and back, with the largest images of render.schedule.
+  /// Estimated bytes of a transition in a forward and backward pass, with the largest images of render.schedule.
   double transition_bytes = 0;
-  /// Bytes with so many transitions at once.
+  /// Bytes with this number of transitions at once.
   double bytes(double transitions) const { return kBytesPerParameter * parameters + transition_bytes * transitions; }
 };
 NetworkSize network_size(const Config& config, Device device);
 
-/// Throws Error naming the settings that decide, and what would fit, where the estimates exceed `memory_bytes` of the
-/// device: for the network with a chunk of train.forward_chunk, and for it and the agents; with several ranks, for each
-/// one's part.
+/// Throws Error naming the responsible settings, and what would fit, if the estimates exceed `memory_bytes` of the
+/// device: for the network with a chunk of train.forward_chunk, and for the network and the agents. With several ranks
+/// the estimate is for each rank's part.
 void check_memory(const Config& config, Device device, int64_t memory_bytes, int num_ranks = 1);
 
 /// Estimated bytes of maps.
 struct MapMemory {
-  double host = 0;    // as they are loaded, with what rules and renderers read
-  double device = 0;  // what rules and renderers read of them, on a device
+  double host = 0;    // maps as loaded, with the data for rules and renderers
+  double device = 0;  // data for rules and renderers, on a device
 };
-/// Estimate of the memory of these maps, as training_maps() names them, from the sizes of their files and towns; seldom
-/// less than they take. Throws as map_file_bytes() does.
+/// Estimates the memory of these maps, named as by training_maps(), from the sizes of their files and towns. The
+/// estimate is rarely too small. Throws as map_file_bytes() does.
 MapMemory estimated_map_memory(const std::vector<std::string>& names);
 
-/// Throws Error saying how many maps would fit where those of a run do not: neither beside the agents and the network
-/// in `memory_bytes` of the device, nor, of a device that is not the host, in `host_memory_bytes`.
+/// Throws Error naming how many maps would fit if a run's maps do not fit: beside the agents and the network in
+/// `memory_bytes` of the device, or, if the device is not the host, in `host_memory_bytes`.
 void check_map_memory(const Config& config, Device device, int64_t memory_bytes, int64_t host_memory_bytes,
                       int num_ranks = 1);
 

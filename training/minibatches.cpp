@@ -24,7 +24,7 @@ Minibatch Minibatch::part(const Chunk& chunk) const {
 Minibatches::Minibatches(const at::Tensor& rows, const Rollout& rollout, int64_t max_size, LearnerExecutor* executor,
                          Communicator* communicator)
     : executor_(executor) {
-  // Over all ranks they are numbered by step, then by slot, of which each rank has consecutive ones.
+  // Transitions of all ranks are numbered by step, then by slot; each rank has consecutive slots.
   const int64_t num_steps = rollout.num_steps(), num_slots = rollout.num_slots();
   const at::Tensor begins = at::searchsorted(rows, at::arange(num_steps + 1, rows.options()) * num_slots);
   const at::Tensor counts = at::zeros({num_steps, communicator->size()}, rows.options());

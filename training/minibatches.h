@@ -1,4 +1,4 @@
-// Minibatches of an update's transitions, which several ranks share.
+// Minibatches of an update's transitions, shared by all ranks.
 #pragma once
 
 #include "pictura/policy/chunks.h"
@@ -7,27 +7,27 @@
 
 namespace pictura {
 
-/// This rank's transitions of a minibatch, or some of them.
+/// This rank's transitions of a minibatch, or of a part of it.
 struct Minibatch {
-  at::Tensor rows;          // i64 [n], of the rollout
-  int64_t global_size = 0;  // transitions of the minibatch, of all ranks
-  at::Tensor advantages;    // [n], as the losses take them
-  at::Tensor shares;        // [n], what each row counts in means; undefined where each counts as one
+  at::Tensor rows;          // i64 [n], rows of the rollout
+  int64_t global_size = 0;  // transitions of the minibatch over all ranks
+  at::Tensor advantages;    // [n], in the form that the losses read
+  at::Tensor shares;        // [n], weight of each row in means; undefined if all weights are 1
 
-  /// Rows of a chunk of `rows`. Those that fill it up count nothing.
+  /// Returns the rows of a chunk of `rows`. Padding rows have weight 0.
   Minibatch part(const Chunk& chunk) const;
 };
 
-/// Transitions of a rollout in the order of an epoch, cut into minibatches of equal size, to one transition. Order and
-/// minibatches are those that one rank alone would have; of each minibatch a rank takes the transitions that are its
-/// own.
+/// Transitions of a rollout in the order of an epoch, split into minibatches of equal size (within one transition).
+/// Order and minibatches do not depend on the number of ranks; of each minibatch a rank holds its own transitions.
 class Minibatches {
  public:
-  /// rows: i64 [n], this rank's transitions in ascending order. A minibatch has at most max_size of all ranks.
+  /// Creates minibatches of at most max_size transitions over all ranks. rows: i64 [n], this rank's transitions in
+  /// ascending order.
   Minibatches(const at::Tensor& rows, const Rollout& rollout, int64_t max_size, LearnerExecutor* executor,
               Communicator* communicator);
 
-  /// Transitions of all ranks.
+  /// Number of transitions over all ranks.
   int64_t global_size() const { return global_size_; }
   /// Minibatches per epoch.
   int64_t count() const { return count_; }
@@ -36,16 +36,16 @@ class Minibatches {
   void shuffle(uint64_t seed, int64_t update, int64_t epoch);
   /// Minibatch m in the order of the last shuffle(), without advantages.
   Minibatch operator[](int64_t m) const;
-  /// How many of the first `count` transitions of the epoch are this rank's.
+  /// Number of this rank's transitions among the first `count` of the epoch.
   int64_t own_of_first(int64_t count) const;
 
  private:
   LearnerExecutor* const executor_;
   int64_t global_size_ = 0, count_ = 0;
-  at::Tensor own_;     // i64 [global_size_] row of each transition, kOfAnotherRank where it is not this rank's
+  at::Tensor own_;     // i64 [global_size_] row of each transition, or kOfAnotherRank
   at::Tensor rows_;    // this rank's rows in the epoch's order
-  at::Tensor places_;  // of rows_ among all ranks' transitions
-  at::Tensor begins_;  // [count_ + 1] where each minibatch begins in rows_; on the host
+  at::Tensor places_;  // index of each of rows_ among all ranks' transitions
+  at::Tensor begins_;  // [count_ + 1] offset of each minibatch in rows_; on the host
 };
 
 }  // namespace pictura

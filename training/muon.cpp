@@ -50,7 +50,7 @@ WeightRms weight_rms(const std::vector<NamedTensor>& parameters) {
 at::Tensor orthogonalized(const at::Tensor& matrices, at::ScalarType type) {
   const at::Tensor norms = at::linalg_vector_norm(matrices, 2, at::IntArrayRef{1, 2}, /*keepdim=*/true);
   at::Tensor x = (matrices / norms.clamp_min(std::numeric_limits<float>::min())).to(type);
-  // Jordan's quintic: its slope at 0 is steep, and it maps (0, 1] near 1 without settling there.
+  // Jordan's quintic: its slope at 0 is steep, and it maps (0, 1] near 1 without converging there.
   constexpr int kSteps = 5;
   constexpr double kLinear = 3.4445, kCubic = -4.775, kQuintic = 2.0315;
   for (int step = 0; step < kSteps; ++step) {
@@ -74,8 +74,8 @@ Muon::Muon(std::vector<at::Tensor> weights, at::ScalarType type, double weight_d
   index_batches();
 }
 
-// Multiplications of the products, and what launching them takes, in as many: so small matrices share a launch, and
-// large ones are not filled up by much.
+// Multiplications of the products plus the launch overhead in units of multiplications. So small matrices share a
+// launch, and large matrices get little padding.
 double Muon::Batch::cost() const {
   constexpr double kLaunches = 3e8;
   const auto side = static_cast<double>(rows);
@@ -172,7 +172,7 @@ void Muon::take_step() {
   std::vector<at::Tensor> gradients;
   for (const at::Tensor& weight : weights_) gradients.push_back(weight.grad().flatten());
   const at::Tensor gradient = at::cat(gradients), momentum = momentum_.lerp(gradient, 1 - kMomentum);
-  // Chosen, not multiplied by 0, which keeps NaN.
+  // Selected instead of multiplied by 0, which would keep NaN.
   momentum_.copy_(at::where(has_failed, momentum_, momentum));
   const at::Tensor direction = at::constant_pad_nd(gradient.lerp(momentum, kMomentum), {0, 1});  // Nesterov's
   const at::Tensor filled = direction.index_select(0, element_of_place_);

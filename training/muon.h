@@ -1,6 +1,6 @@
 // Muon (Jordan et al., 2024): momentum whose matrices are made orthogonal before each step, for the weights of hidden
-// layers. Scaled as by Liu et al., "Muon is scalable for LLM training" (2025), so that AdamW's rates and decay carry
-// over.
+// layers. Scaled as in Liu et al., "Muon is scalable for LLM training" (2025), so that AdamW's learning rates and
+// weight decay apply unchanged.
 #pragma once
 
 #include <vector>
@@ -10,41 +10,42 @@
 
 namespace pictura {
 
-/// Whether Muon steps a parameter: the weights of hidden layers. Biases, norms, queries, what reads positions or
-/// pixels, and the two heads are AdamW's.
+/// Whether Muon steps a parameter: the weights of hidden layers. AdamW steps biases, norms, queries, layers that read
+/// positions or pixels, and the two heads.
 bool is_stepped_by_muon(const NamedTensor& parameter);
 
 /// Root mean squares of the weights of hidden layers (is_stepped_by_muon), whichever optimizer steps them: over all
-/// weights, and the largest of one matrix. 0 where there are none.
+/// weights, and the maximum over matrices. 0 without such layers.
 struct WeightRms {
   double all = 0, largest = 0;
 };
-/// Waits for the parameters' device.
+/// Root mean squares of these parameters. Waits for their device.
 WeightRms weight_rms(const std::vector<NamedTensor>& parameters);
 
-/// Returns matrices [n, rows, columns] with the singular vectors of those given and singular values near 1 (.7 to 1.2,
+/// Returns matrices [n, rows, columns] with the singular vectors of `matrices` and singular values near 1 (.7 to 1.2,
 /// for values of 1/200 of the Frobenius norm or more), by five Newton-Schulz steps computed in `type`. A zero matrix
 /// stays zero.
 at::Tensor orthogonalized(const at::Tensor& matrices, at::ScalarType type);
 
 class Muon {
  public:
-  /// weights: f32 leaves with gradients, [out, ...], on `device`; each steps as the matrix [out, rest]. type: of the
-  /// products. uses_graphs: steps are launched as one CUDA graph, on a stream that can be captured from.
+  /// Creates the optimizer. weights: f32 leaves with gradients, [out, ...], on `device`; each is stepped as the matrix
+  /// [out, rest]. type: type of the products. uses_graphs: steps are launched as one CUDA graph, on a stream that can
+  /// be captured.
   Muon(std::vector<at::Tensor> weights, at::ScalarType type, double weight_decay, Device device = {},
        bool uses_graphs = false);
 
-  /// One step along the weights' gradients. failed: f32 scalar; where it is not 0, neither weights nor momentum change,
-  /// whatever the gradients are. Waits for no device.
+  /// Takes one step along the weights' gradients. failed: f32 scalar; if it is not 0, neither weights nor momentum
+  /// change, whatever the gradients are. Does not wait for the device.
   void step(double learning_rate, const at::Tensor& failed);
-  /// Discards the captured graph; must be called when gradients come to lie elsewhere.
+  /// Discards the captured graph; must be called if gradients move.
   void forget_addresses();
 
   /// Momentum of weight i, in its shape.
   at::Tensor momentum(size_t i) const { return parts_of(momentum_)[i]; }
 
  private:
-  // Matrices multiplied together: filled up with zeros to one size, and turned where they are taller than wide.
+  // Matrices that are multiplied together: padded with zeros to one size, and transposed if they are taller than wide.
   struct Batch {
     int64_t rows = 0, columns = 0;
     std::vector<size_t> weights;
@@ -53,7 +54,7 @@ class Muon {
   void take_step();
   static std::vector<Batch> make_batches(const std::vector<at::Tensor>& weights);
   void index_batches();
-  // Parts of a vector of all weights' elements, in their shapes.
+  // Splits a vector of all weights' elements into tensors of their shapes.
   std::vector<at::Tensor> parts_of(const at::Tensor& flat) const;
 
   std::vector<at::Tensor> weights_;
@@ -61,10 +62,10 @@ class Muon {
   const double weight_decay_;
   at::Tensor momentum_;  // [elements of all weights]
   std::vector<Batch> batches_;
-  // Where each element of the batches lies in such a vector, whose size stands for filling; and the inverse.
+  // Index of each batch element in such a vector, whose size denotes padding; and the inverse.
   at::Tensor element_of_place_, place_of_element_;
   std::vector<at::Tensor> scales_;  // factor of the step by weight, [weights, 1, 1] of each batch
-  at::Tensor rate_, failed_;        // f32 scalars, of this step
+  at::Tensor rate_, failed_;        // f32 scalars of this step
   Graphs graphs_;
   RepeatedWork step_;
 };

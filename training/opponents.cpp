@@ -10,7 +10,7 @@
 
 namespace pictura {
 
-/// A policy, and what it sees and drives with in the run's simulator.
+/// Policy with its observations, images and controller in the run's simulator.
 struct Opponents::Opponent {
   Config config;
   std::unique_ptr<const Policy> policy;
@@ -21,8 +21,8 @@ struct Opponents::Opponent {
 
 namespace {
 
-// The configuration of an opponent: what it sees and holds its actions for as it was trained, all else the run's, since
-// threads, precision and determinism are settings of the process.
+// Returns an opponent's configuration: observations and decision steps as in its training, everything else from the
+// run, since threads, precision and determinism are settings of the process.
 Config config_of(const SavedPolicy& saved, const Config& run) {
   Config config = saved.config;
   config.run = run.run;

@@ -1,5 +1,5 @@
-// Opponents: saved policies that drive shares of a run's agents, each by the observations that it was trained with.
-// Nothing is learnt from their agents.
+// Opponents: saved policies that drive shares of a run's agents, each from the observations of its training. The
+// learner learns nothing from their agents.
 #pragma once
 
 #include <memory>
@@ -15,23 +15,23 @@ namespace pictura {
 
 class Opponents {
  public:
-  /// Opponents of simulator.others.policies, on `device`, with the precision of the run. Throws Error naming a file
-  /// where it holds no policy, reads slots of the ego vector that the learner must not have, or holds its actions for
-  /// steps that do not divide a rollout.
+  /// Creates the opponents of simulator.others.policies, on `device`, with the precision of the run. Throws Error
+  /// naming a file if it holds no policy, reads slots of the ego vector that the learner must not have, or holds its
+  /// actions for a number of steps that does not divide a rollout.
   Opponents(const Config& config, Device device, Communicator* communicator);
   ~Opponents();
   Opponents(const Opponents&) = delete;
   Opponents& operator=(const Opponents&) = delete;
 
-  /// Adds the arrays that the opponents read to those that a simulator makes.
+  /// Adds the arrays that the opponents read to those that a simulator writes.
   void add_arrays(SimulatorConfig* config_inout) const;
-  /// Prepares to drive in the run's simulator, which must outlive this.
+  /// Prepares to drive in the run's simulator, which must outlive this object.
   void enter(const Simulator& simulator);
 
-  /// Mask of the agents that the learner drives, u8 [slots], as of the simulator's last step.
+  /// Mask of the agents that the learner drives after the simulator's last step, u8 [slots].
   at::Tensor own_slots(const SimulatorArrays& input) const;
-  /// Returns the commands of all agents, [slots]: `own_actions` [slots], and the opponents' own draws in place of them.
-  /// A later call writes to the same memory. On a device waits for how many agents each opponent drives.
+  /// Returns the commands of all agents, [slots]: `own_actions` [slots], replaced by the opponents' draws for their
+  /// agents. A later call overwrites the result. On a device waits for the number of agents of each opponent.
   Span<const Command> commands(const SimulatorArrays& input, Span<const int32_t> own_actions, PolicyExecutor* executor);
 
  private:

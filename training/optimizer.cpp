@@ -42,7 +42,7 @@ void Optimizer::clear_gradients() { gradients_.zero_(); }
 
 at::Tensor Optimizer::gradient_norm() const {
   at::Tensor norm = gradients_.norm();
-  // Weights that move together count as the one weight whose gradient each of them has.
+  // Weights that move together count as one weight, whose gradient each of them has.
   for (size_t i = 0; i < parameters_.size(); ++i) {
     if (rate_factors[i] == 1) continue;
     norm = (norm.square() - (1 - rate_factors[i]) * parameters_[i].value.grad().square().sum()).sqrt();
@@ -75,7 +75,7 @@ void Optimizer::step_adamw(double learning_rate, const at::Tensor& failed) {
   for (const auto& [factor, group] : groups) {
     const std::vector<at::Tensor> counts(group.values.size(),
                                          at::full({}, static_cast<double>(steps), failed.options()));
-    // A weight decays by the product of both rates.
+    // AdamW multiplies the decay by the learning rate, so the factor is divided out of it.
     at::_fused_adamw_(group.values, group.gradients, group.first, group.second, {}, counts, learning_rate * factor,
                       config_.adam_beta1, config_.adam_beta2, config_.weight_decay / factor, config_.adam_eps,
                       /*amsgrad=*/false, /*maximize=*/false, /*grad_scale=*/{}, failed);

@@ -11,7 +11,7 @@ namespace pictura {
 
 PhaseTimer::Scope::Scope(PhaseTimer* timer, Phase phase) : timer_(timer), phase_(phase) {
 #if defined(PICTURA_HAS_NVTX)
-  nvtxRangePushA(kPhaseNames[static_cast<size_t>(phase_)]);  // nothing without a profiler
+  nvtxRangePushA(kPhaseNames[static_cast<size_t>(phase_)]);  // no effect without a profiler
 #endif
   if (timer_ && !timer_->device_.is_host()) begin_ = timer_->record();
 }

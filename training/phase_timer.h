@@ -1,4 +1,4 @@
-// Where the time of an update goes, by named phase: a clock on the host, events on a device, which wait for nothing.
+// Time of an update by phase: a clock on the host, events on a device, which do not wait.
 #pragma once
 
 #include <memory>
@@ -18,7 +18,7 @@ class PhaseTimer {
   explicit PhaseTimer(Device device) : device_(device) {}
 
   /// Scope whose lifetime counts as time of a phase; without a timer nothing is measured. Scopes do not nest. In
-  /// NVIDIA's profilers each is a range of NVTX with the phase's name.
+  /// NVIDIA's profilers each scope is an NVTX range with the phase's name.
   class Scope {
    public:
     Scope(PhaseTimer* timer, Phase phase);

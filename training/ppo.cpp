@@ -1,7 +1,7 @@
-// One update by PPO, to be read from top to bottom as CleanRL's ppo.py: the losses; then PpoUpdate::run() and its steps
+// One PPO update, to be read from top to bottom like CleanRL's ppo.py: the losses; then PpoUpdate::run() and its steps
 // in order, which are advantages, filter, minibatches, gradients, optimizer and statistics. Tensors hold the
-// transitions of this rank; the communicator makes sums those of all ranks. ChunkRunner knows of chunks and CUDA
-// graphs, Minibatches of the order over all ranks.
+// transitions of this rank; the communicator sums over ranks. ChunkRunner handles chunks and CUDA graphs, Minibatches
+// the order over all ranks.
 #include "pictura/training/ppo.h"
 
 #include <algorithm>
@@ -20,9 +20,9 @@ namespace pictura {
 
 namespace {
 
-// Log-probabilities of the actions that were taken at some rows. all_log_probs: [rows, kNumActions].
+// Log-probabilities of the actions taken at these rows. all_log_probs: [rows, kNumActions].
 at::Tensor log_probs_of(const at::Tensor& all_log_probs, const Targets& targets, const at::Tensor& rows) {
-  // A sum of which all but one are 0: the gradient of gather() waits for the host where algorithms are deterministic.
+  // Sum in which all terms but one are 0: the gradient of gather() waits for the host if algorithms are deterministic.
   const at::Tensor actions = targets.actions.index_select(0, rows).unsqueeze(1);
   return all_log_probs.masked_fill(at::arange(all_log_probs.size(1), actions.options()) != actions, 0).sum(1);
 }
@@ -67,12 +67,12 @@ Losses ppo_losses(const Policy::Output& output, const Targets& targets, const Mi
 
 namespace {
 
-// Variance of n numbers, from their sum and that of their squares.
+// Variance of n numbers, from their sum and the sum of their squares.
 double variance_of(double n, double sum, double sum_of_squares) {
   return std::max(0.0, (sum_of_squares - sum * sum / n) / std::max(1.0, n - 1));
 }
 
-// One update: the state that its steps share.
+// One update and the state shared by its steps.
 class PpoUpdate {
  public:
   PpoUpdate(const Learner& learner, Rollout* rollout, const TrainSection& config, const UpdateKey& key)
@@ -102,7 +102,7 @@ class PpoUpdate {
           minibatch_stats = add_gradients(minibatch);
         }
         step(minibatch_stats, epoch);
-        if (num_failed_.is_cpu()) check_finite(&minibatches);  // a device is not waited for
+        if (num_failed_.is_cpu()) check_finite(&minibatches);  // without waiting for a device
       }
     }
     check_finite(&minibatches);
@@ -124,8 +124,8 @@ class PpoUpdate {
     targets_.teacher_weight = at::full({}, key_.teacher_weight, advantages_.options());
   }
 
-  // Rows that are learnt from, i64 [n] in ascending order: those that the filter keeps, or all, of which invalid ones
-  // count nothing.
+  // Rows to learn from, i64 [n] in ascending order: those that the filter keeps, or all rows, with weight 0 for invalid
+  // ones.
   at::Tensor select_rows() {
     const bool by_quantile = config_.adv_filter == FilterThreshold::quantile;
     const float newest = by_quantile ? quantile_of_advantages() : largest_advantage();
@@ -143,15 +143,15 @@ class PpoUpdate {
   }
   bool takes_all() const { return config_.halted_slots == HaltedSlots::draw; }
 
-  // Largest |advantage| of all ranks; not finite where one of them is not. Waits for the device.
+  // Largest |advantage| of all ranks; not finite if any advantage is not finite. Waits for the device.
   float largest_advantage() const {
-    // Not every communicator's maximum knows NaN.
+    // The maximum of some communicators ignores NaN.
     const at::Tensor max = advantages_.abs().max().nan_to_num(std::numeric_limits<double>::infinity());
     learner_.communicator->max(max);
     return max.item<float>();
   }
 
-  // Quantile of the valid |advantages| of all ranks; not finite where one of them is not. Waits for the device.
+  // Quantile of the valid |advantages| of all ranks; not finite if any advantage is not finite. Waits for the device.
   float quantile_of_advantages() const {
     const at::Tensor counts = at::zeros({kNumFilterBins}, advantages_.options().dtype(at::kLong));
     learner_.executor->count_advantages(span_of<const float>(advantages_), span_of<const uint8_t>(valid_),
@@ -163,8 +163,9 @@ class PpoUpdate {
                                       : filter_quantile(of_bins, config_.adv_filter_quantile);
   }
 
-  // Stores the fraction of all ranks' valid transitions that the filter kept, and how much of their returns' variance
-  // the values explain: 1 for a perfect critic, 0 for a constant. False where nothing was kept. Waits for the device.
+  // Stores the fraction of all ranks' valid transitions that the filter kept, and the fraction of their returns'
+  // variance that the values explain: 1 for a perfect critic, 0 for a constant. Returns false if no transition was
+  // kept. Waits for the device.
   bool count_kept(int64_t num_kept) {
     const at::Tensor valid = at::nonzero(valid_).squeeze(1),
                      returns = targets_.returns.index_select(0, valid).to(at::kDouble),
@@ -183,7 +184,7 @@ class PpoUpdate {
     return true;
   }
 
-  // Fills in a minibatch's advantages, normalised over all ranks' transitions, and what its rows count in means.
+  // Sets a minibatch's advantages, normalised over all ranks' transitions, and the weights of its rows in means.
   void normalize_advantages(Minibatch* minibatch) const {
     at::Tensor advantages = advantages_.index_select(0, minibatch->rows);
     const at::Tensor valid =
@@ -201,16 +202,16 @@ class PpoUpdate {
     }
   }
 
-  // Passes a minibatch forward and back, which adds this rank's part of its gradient to those of the parameters.
-  // Returns the minibatch's statistics over all ranks, until the next call.
+  // Runs a minibatch forward and backward, which adds this rank's part of its gradient to those of the parameters.
+  // Returns the minibatch's statistics over all ranks, valid until the next call.
   at::Tensor add_gradients(const Minibatch& minibatch) {
     const at::Tensor minibatch_stats = learner_.runner->add_gradients(minibatch, config_.forward_chunk, loss_);
     learner_.communicator->sum(minibatch_stats);
     return minibatch_stats;
   }
 
-  // Whether the rollout's log-probabilities differ from the learner's by more than rounding, as the first minibatch
-  // shows. Values that are not finite are left to check_finite(). Waits for the device.
+  // Whether the rollout's log-probabilities differ from the learner's by more than rounding in the first minibatch.
+  // Values that are not finite are left to check_finite(). Waits for the device.
   bool must_recompute_log_probs(const at::Tensor& minibatch_stats) {
     const LossStats first = numbers_of(minibatch_stats.cpu());
     const bool differs = first.abs_log_ratio >= kMaxAbsLogRatio || first.clip_fraction >= kMaxClipFraction;
@@ -219,8 +220,8 @@ class PpoUpdate {
     return true;
   }
 
-  // Replaces the log-probabilities of kept transitions by those of the learner's forward pass: in the minibatches and
-  // chunks in which they are learnt from next, so that not even the batch's size differs.
+  // Replaces the log-probabilities of kept transitions by those of the learner's forward pass, in the minibatches and
+  // chunks in which they are learnt from next, so that batch sizes agree too.
   void recompute_log_probs(const Minibatches& minibatches) {
     const at::NoGradGuard no_grad;
     const at::Tensor log_probs = targets_.old_log_probs.clone();
@@ -236,9 +237,9 @@ class PpoUpdate {
     learner_.runner->set_targets(targets_);
   }
 
-  // Steps along the clipped gradient of all ranks. It is summed over the ranks before it is clipped, so every rank
-  // takes the same step, to the bit. Values that are not finite stay in sums_, so no minibatch takes a step after the
-  // first that fails.
+  // Steps along the clipped gradient of all ranks. The gradient is summed over ranks before it is clipped, so every
+  // rank takes the same step, to the bit. Values that are not finite stay in sums_, so no minibatch takes a step after
+  // the first failure.
   void step(const at::Tensor& minibatch_stats, int epoch) {
     const at::NoGradGuard no_grad;
     const PhaseTimer::Scope timed(learner_.timer, Phase::optimize);

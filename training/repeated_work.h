@@ -1,5 +1,5 @@
-// Work of the learner that is repeated over the same memory. On a CUDA device it is captured into a graph, which one
-// call launches: networks of a few thousand agents are so quick that their kernels wait for the host.
+// Repeated work of the learner on the same memory. On a CUDA device it is captured into a graph, which one call
+// launches: networks of a few thousand agents are so fast that their kernels would wait for the host.
 #pragma once
 
 #include <functional>
@@ -10,8 +10,8 @@
 
 namespace pictura {
 
-/// Memory of the tensors that graphs make while they are captured, where no other tensor comes to lie. Graphs share it:
-/// they are launched one after the other, and what has to outlast one is held by a tensor.
+/// Memory of the tensors that are created during graph capture; no other tensor is allocated there. Graphs share the
+/// memory, since they are launched one after the other. Results that must outlast a graph are held by a tensor.
 class GraphMemory {
  public:
   explicit GraphMemory(Device device) : device_(device) {}
@@ -19,35 +19,35 @@ class GraphMemory {
   GraphMemory(const GraphMemory&) = delete;
   GraphMemory& operator=(const GraphMemory&) = delete;
 
-  /// Calls `work`, whose tensors on the stream are allocated there.
+  /// Calls `work`, whose tensors on the stream are allocated in this memory.
   void serve(Stream stream, const std::function<void()>& work);
-  /// Releases what torch keeps for later tensors outside of it, which it cannot do while work is captured.
+  /// Releases torch's cached memory outside of it, which torch cannot do during capture.
   void make_room() const;
-  /// Releases the memory once no tensor lies there any more. No graph may be launched that was captured before.
+  /// Releases the memory once it holds no tensor. Graphs captured before must not be launched any more.
   void release();
 
  private:
   const Device device_;
-  uint64_t id_ = 0;  // torch's, of this memory; 0 before the first use
+  uint64_t id_ = 0;  // torch's id of this memory; 0 before the first use
   int uses_ = 0;
 };
 
-/// Graphs of one device: whether work is captured, and the memory that the graphs share.
+/// Graphs of one device: whether work is captured, and the memory shared by the graphs.
 class Graphs {
  public:
   Graphs(Device device, bool are_used) : device_(device), are_used_(are_used), memory_(device) {}
 
   bool are_used() const { return are_used_; }
-  /// Graph of what `work` puts on torch's current stream, which must be none that waits for others. Throws Error naming
-  /// the key where that cannot be captured; c10::OutOfMemoryError.
+  /// Captures a graph of the work that `work` enqueues on torch's current stream, which must not be a stream that waits
+  /// for others. Throws Error naming the key if the work cannot be captured; c10::OutOfMemoryError.
   std::unique_ptr<DeviceGraph> capture(const std::function<void()>& work);
   void launch(DeviceGraph* graph);
-  /// Must be called before work is captured that takes much memory.
+  /// Frees memory. Must be called before capturing work that needs much memory.
   void make_room() const { memory_.make_room(); }
-  /// Releases the memory of graphs once none is left.
+  /// Releases the memory of graphs once no graph exists.
   void release_memory() { memory_.release(); }
 
-  /// Graphs that have been launched so far.
+  /// Number of graphs launched so far.
   int64_t num_launches() const { return num_launches_; }
 
  private:
@@ -57,14 +57,14 @@ class Graphs {
   int64_t num_launches_ = 0;
 };
 
-/// Piece of work that is done call by call the first time, which loads and chooses all that it needs, captured the
+/// Work that is executed call by call the first time, which loads and selects everything that it needs, is captured the
 /// second time, and launched as a graph from then on.
 class RepeatedWork {
  public:
   enum class Mode { calls, capture, launch };
-  /// How the work is done next. `is_settled`: the memory that it works on will be the same from now on.
+  /// Mode of the next execution. `is_settled`: the work's memory will not move from now on.
   Mode next_mode(const Graphs& graphs, bool is_settled);
-  /// Does the work. Work that is captured or launched must wait for nothing, and do the same whenever it is done.
+  /// Executes the work. Captured or launched work must not wait, and must do the same in every execution.
   void run(Mode mode, Graphs* graphs, const std::function<void()>& work);
   void run(Graphs* graphs, const std::function<void()>& work) { run(next_mode(*graphs, true), graphs, work); }
 

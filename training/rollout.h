@@ -1,4 +1,5 @@
-// Rollout: what all slots of a simulator saw, did and got, as tensors on the device that learns; time first.
+// Rollout: observations, actions and results of all slots of a simulator, as tensors on the learning device; time
+// first.
 #pragma once
 
 #include "pictura/common/scene_history.h"
@@ -10,39 +11,40 @@
 namespace pictura {
 
 /// Observations of all slots at each step. Images of agents that decide are kept, or drawn again from the scenes
-/// whenever they are read: those of the paper's rollout would take 163 GB, its scenes 0.25 GB.
+/// whenever they are read: the images of the paper's rollout would take 163 GB, its scenes 0.25 GB.
 class RolloutObservations {
  public:
-  /// Allocates train.num_steps + 1 steps of this simulator, which must outlive it, as must the renderer and the timer
-  /// (for images that are kept). Policies without images need no renderer. training/memory.h estimates the memory.
+  /// Allocates train.num_steps + 1 steps of this simulator. The simulator must outlive the object, as must the renderer
+  /// and the timer (for images that are kept). Policies without images need no renderer. training/memory.h estimates
+  /// the memory.
   RolloutObservations(const Config& config, Simulator* simulator, Renderer* renderer, PhaseTimer* timer);
   /// Observations without images: arrays [num_steps + 1, slots, ...].
   explicit RolloutObservations(Observation arrays) : arrays_(std::move(arrays)) {}
 
-  /// Draws with another renderer from now on, whose rig has as many cameras. Kept images are lost.
+  /// Draws with another renderer from now on, whose rig has the same number of cameras. Kept images are lost.
   void set_renderer(Renderer* renderer);
 
-  /// Records what the simulator shows now as the observations of `step`. slots: i64 [n], those whose images are kept.
-  /// The first time steps are recorded in order.
+  /// Records the simulator's present observations as those of `step`. slots: i64 [n], the slots whose images are kept.
+  /// The first rollout must record its steps in order.
   void record(int64_t step, const at::Tensor& slots);
 
-  /// Observations of rows, i64 [batch] of step * slots + slot, of agents that were active at those steps. Images that
-  /// are drawn for it are as draw_images() draws them.
+  /// Gathers the observations of rows, i64 [batch] of step * slots + slot, of agents that were active at those steps.
+  /// Images that are drawn here are drawn as by draw_images().
   Observation gather(const at::Tensor& rows, int patch_px = 0) const;
 
-  /// Whether images are kept as they are seen.
+  /// Whether images are kept when they are drawn.
   bool keep_images() const { return kept_images_ != nullptr; }
   /// Whether gather() draws images.
   bool draws_when_gathered() const { return scenes_ != nullptr; }
-  /// Whether every step has been recorded: then gather() always works on the same memory, and so does record() where no
+  /// Whether every step has been recorded. From then on gather() works on the same memory, and so does record() if no
   /// images are kept, until generation() changes.
   bool are_complete() const { return are_complete_; }
-  /// How often the renderer's memory or that of kept images has moved.
+  /// Number of times that the renderer's memory or that of kept images has moved.
   uint64_t generation() const {
     return (renderer_ ? renderer_->generation() : 0) + (kept_images_ ? kept_images_->generation() : 0);
   }
 
-  /// All but images.
+  /// Observations without images.
   const Observation& arrays() const { return arrays_; }
 
  private:
@@ -55,17 +57,17 @@ class RolloutObservations {
   bool are_complete_ = false;
   int decision_steps_ = 1;
   std::unique_ptr<KeptImages> kept_images_;
-  std::unique_ptr<SceneHistory> scenes_;  // where images are drawn again
+  std::unique_ptr<SceneHistory> scenes_;  // source of images that are drawn again; else null
 };
 
 struct Rollout {
   RolloutObservations observations;         // num_steps + 1 steps; the last is seen after the last action
   at::Tensor values;                        // f32 [num_steps + 1, num_slots]; 0 for agents that were not active
-  at::Tensor actions;                       // i32 [num_steps, num_slots], as all below
+  at::Tensor actions;                       // i32 [num_steps, num_slots], as everything below
   at::Tensor log_probs;                     // f32, of the chosen actions
   at::Tensor rewards;                       // f32
   at::Tensor terminated, truncated, valid;  // u8, as StepResult defines them
-  at::Tensor decides;                       // u8, 0 where an action is held; undefined where none is
+  at::Tensor decides;                       // u8, 0 where an action is held; undefined if no action is ever held
   at::Tensor advantages;                    // f32, see rules/gae.h
   at::Tensor teacher_log_probs;             // f32 [num_steps, num_slots, kNumActions]; undefined without a teacher
 
@@ -73,13 +75,13 @@ struct Rollout {
   int64_t num_steps() const { return actions.size(0); }
   int64_t num_slots() const { return actions.size(1); }
 
-  /// The steps that are learned from, u8 [num_steps, num_slots]: valid ones at which the agent decided.
+  /// Steps to learn from, u8 [num_steps, num_slots]: valid steps at which the agent decided.
   at::Tensor decisions() const { return decides.defined() ? valid * decides : valid; }
-  /// The row of each of these slots, i64 [n], at a step.
+  /// Rows of these slots, i64 [n], at a step.
   at::Tensor rows_of(int64_t step, const at::Tensor& slots) const { return slots + step * num_slots(); }
   /// Actions of one step, [num_slots], to be filled in.
   Span<int32_t> actions_at(int64_t step);
-  /// Records the results of a step, which lie in the memory of `device`.
+  /// Records the results of a step, in the memory of `device`.
   void set_result(int64_t step, const StepResult& result, Device device);
   /// Fills `advantages` from rewards, values and flags.
   void compute_advantages(double gamma, double gae_lambda, LearnerExecutor* executor);

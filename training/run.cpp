@@ -48,7 +48,8 @@ std::unique_ptr<Renderer> make_training_renderer(const Config& config, const Rig
   return renderer;
 }
 
-// A program in the place of the convolutions may do what no graph can hold; what OpenGL draws is none of CUDA's work.
+// Whether work is captured into graphs. A backbone program may do work that graphs cannot hold, and OpenGL's drawing is
+// not CUDA work.
 bool uses_graphs(const Config& config, Device device, const Renderer* renderer) {
   return config.train.graphs == "auto" && !device.is_host() && (!renderer || renderer->name() == "cuda") &&
          config.policy.backbone == "conv";
@@ -155,7 +156,7 @@ std::string Run::update_image_size() {
   const bool has_other_patches = patches_of(before) != patches_of(in_force);
   if (size_of(before) == size_of(in_force) && !has_other_patches) return "";
   rig = rig_of(config, agent_steps);
-  renderer.reset();  // its memory goes before another's comes
+  renderer.reset();  // its memory is freed before the next renderer's is allocated
   renderer = make_training_renderer(in_force, rig, *simulator);
   rollout.observations.set_renderer(renderer.get());
   chunks.clear();
@@ -191,7 +192,8 @@ void Run::begin_with(const SavedPolicy& other) {
       !config.reads_images() || !other.config.reads_images() || other.rig.cameras.size() == rig.cameras.size(),
       "{}: its policy sees through {} cameras, expected {}, as {} has", other.path, other.rig.cameras.size(),
       rig.cameras.size(), config.render.rig.empty() ? "the paper's rig" : config.render.rig);
-  // Settings that add no parameters would go unseen, and shapes of parameters would not say why they differ.
+  // Checked here, since settings without parameters would go unnoticed, and differing shapes would not name the
+  // setting.
   for (const auto& [key, got, expected] :
        {std::tuple{"policy.segment_features", other.config.policy.segment_features, config.policy.segment_features},
         std::tuple{"policy.layer_norm", other.config.policy.layer_norm, config.policy.layer_norm},
@@ -249,7 +251,7 @@ std::string Run::restore(const Checkpoint& saved) {
 
 void Run::check_ranks_agree() const {
   if (communicator->size() == 1) return;
-  // A sum of each parameter's bits is least and largest on every rank alike where all are equal.
+  // Compares a sum of each parameter's bits: if all ranks are equal, its minimum and maximum over ranks agree.
   std::vector<at::Tensor> sums;
   for (const NamedTensor& parameter : policy->parameters()) {
     sums.push_back(parameter.value.detach().view(at::kInt).sum(at::kLong));

@@ -7,7 +7,7 @@
 namespace pictura {
 
 RunEvaluation::RunEvaluation(const Run& run) : run_(run) {
-  // Copies come after the maps themselves.
+  // Copies follow the maps themselves.
   const CompiledMaps& maps = run.simulator->maps();
   worlds_.maps.assign(maps.begin(), maps.begin() + static_cast<ptrdiff_t>(run.config.simulator.maps.size()));
 }
@@ -27,7 +27,7 @@ std::optional<EvaluationRecord> RunEvaluation::evaluate() {
   options.steps = config.train.evaluate_steps;
   options.num_threads = config.run.num_threads;
   options.simulator = run_.simulator->name();
-  // Both simulators name the maps 0, 1, ..., so this one's scenes are drawn with the maps that training uploaded.
+  // Both simulators name the maps 0, 1, ..., so the training maps that were uploaded serve these scenes too.
   worlds_.renderer = run_.renderer.get();
   PolicySession session(config, run_.rig, run_.device, *run_.policy);
   std::unique_ptr<Renderer> as_mounted;

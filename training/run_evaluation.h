@@ -1,6 +1,6 @@
-// The small evaluation that a run makes of itself: the protocol of evaluation/ in a few worlds on the maps of training,
-// with the run's own renderer, or, where that randomizes cameras, with one that does not. It shares no state with
-// training, which goes on as if there had been none.
+// Small evaluation within a run: the protocol of evaluation/ in a few worlds on the training maps. It draws with the
+// run's own renderer, or with a separate renderer if the run's renderer randomizes cameras. It shares no state with
+// training, which continues as if there had been no evaluation.
 #pragma once
 
 #include <optional>
@@ -13,19 +13,19 @@ namespace pictura {
 
 class RunEvaluation {
  public:
-  /// Evaluation of a run, which must outlive it.
+  /// Creates the evaluation of a run, which must outlive it.
   explicit RunEvaluation(const Run& run);
 
-  /// Whether an evaluation is due after as many updates as the run has done.
+  /// Whether an evaluation is due after the run's completed updates.
   bool is_due() const;
-  /// Evaluates in train.evaluate_scenarios worlds of train.evaluate_agents agents for train.evaluate_steps steps: what
-  /// `pictura evaluate --scenarios --agents --steps` measures of the checkpoint, and with --average where the run has
-  /// an average of weights. Nothing when ^C came.
+  /// Evaluates in train.evaluate_scenarios worlds of train.evaluate_agents agents for train.evaluate_steps steps. The
+  /// result equals that of `pictura evaluate --scenarios --agents --steps` on the checkpoint, and with --average if the
+  /// run averages weights. Empty after an interrupt.
   std::optional<EvaluationRecord> evaluate();
 
  private:
   const Run& run_;
-  EvaluationWorlds worlds_;  // kept from one evaluation to the next
+  EvaluationWorlds worlds_;  // reused by later evaluations
 };
 
 }  // namespace pictura

@@ -22,7 +22,7 @@ std::vector<std::string> run_files(const std::string& folder) {
   std::vector<std::string> names;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
     std::string name = entry.path().filename().string();
-    // A killed process leaves temporary ones.
+    // A killed process leaves temporary files.
     if (!std::regex_match(name, kNames) && !is_temporary_name(name)) continue;
     PICTURA_CHECK(!entry.is_symlink(), "{}/{}: expected a run's own file, got a link", folder, name);
     if (entry.is_regular_file()) names.push_back(std::move(name));
@@ -43,7 +43,7 @@ void save_checkpoint(const std::string& folder, int64_t num_kept,
     if (fs::exists(path(age - 1))) fs::rename(path(age - 1), path(age));
   }
   if (num_kept > 1 && fs::exists(path(0))) {
-    // checkpoint.ckpt has its name until the next one takes it.
+    // checkpoint.ckpt keeps its name until the next checkpoint replaces it.
     fs::remove(path(1));
     std::error_code no_links;
     fs::create_hard_link(path(0), path(1), no_links);

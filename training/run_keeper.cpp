@@ -49,7 +49,7 @@ std::vector<RecentUpdate> RunKeeper::begin(Run* run) {
     }
     if (!old_files_.empty()) {
       folder_ = path(".pictura-new-run");
-      fs::remove_all(folder_);  // of a run that ended before its first checkpoint
+      fs::remove_all(folder_);  // left by a run that ended before its first checkpoint
       make_output_folder(folder_);
     }
     run->simulator->reset();
@@ -67,7 +67,7 @@ bool RunKeeper::is_due(const Run& run) const {
 }
 
 void RunKeeper::save(const Run& run, const std::vector<RecentUpdate>& recent) {
-  // A second time it would be the same, in the place of an older one.
+  // A second save would write the same file in place of an older one.
   if (run.update == saved_update_) return;
   const auto write = [&](const Checkpoint& checkpoint) {
     save_checkpoint(folder_, run.config.train.keep_checkpoints,
@@ -79,7 +79,7 @@ void RunKeeper::save(const Run& run, const std::vector<RecentUpdate>& recent) {
   since_saved_.restart();
 }
 
-// Files that are open for writing stay so.
+// Replaces the files of the old run. Files that are open for writing stay open.
 void RunKeeper::overwrite_old_run() {
   for (const std::string& name : old_files_) fs::remove(fs::path(options_.out_folder) / name);
   for (const std::string& name : run_files(folder_)) fs::rename(path(name), fs::path(options_.out_folder) / name);

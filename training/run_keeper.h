@@ -1,4 +1,4 @@
-// Folder of a training run, which is its own while it runs, and holds its checkpoints and weights.
+// Folder of a training run, which the run owns while it is active, and which holds its checkpoints and weights.
 #pragma once
 
 #include <functional>
@@ -14,29 +14,30 @@
 
 namespace pictura {
 
-/// Keeper of a run's folder. Rank 0 alone reads and writes; its functions are collective, since a checkpoint has
-/// something of each rank.
+/// Keeper of a run's folder. Rank 0 alone reads and writes. The functions are collective, since a checkpoint contains a
+/// part of each rank.
 class RunKeeper {
  public:
-  /// Takes the folder for this process. Throws Error naming it where another run is at work in it, where one lies that
-  /// options.old_run does not speak of, and where a file of a run is a link. What is given must outlive this.
+  /// Claims the folder for this process. Throws Error naming the folder if another run is active in it, or if it holds
+  /// a run and options.old_run is `refuse`. Throws Error naming a run's file that is a link. The arguments must outlive
+  /// the object.
   RunKeeper(const TrainOptions& options, Ranks* ranks, Communicator* communicator);
 
-  /// Begins the run as the options say: from its last checkpoint, from the weights of another run, or anew, when the
-  /// untrained policy is kept too. A run that is overwritten stays until the first save(). Returns what the mean return
-  /// of its last updates is made of.
+  /// Starts the run as the options specify: from its last checkpoint, from the weights of another run, or from new
+  /// weights, when the untrained policy is saved too. A run that is overwritten stays until the first save(). Returns
+  /// the recent updates for the mean return.
   std::vector<RecentUpdate> begin(Run* run);
 
-  /// Whether the configuration asks for a checkpoint after the update that the run has just made.
+  /// Whether the configuration asks for a checkpoint after the run's last update.
   bool is_due(const Run& run) const;
-  /// Saves the run as checkpoint.ckpt and keeps older ones, unless it is saved already.
+  /// Saves the run as checkpoint.ckpt and keeps older checkpoints, unless this update is saved already.
   void save(const Run& run, const std::vector<RecentUpdate>& recent);
-  /// Saves the run under another name in the folder, which later saves leave alone.
+  /// Saves the run under another name in the folder, which later saves do not touch.
   void save_as(const std::string& name, const Run& run, const std::vector<RecentUpdate>& recent) const;
-  /// Writes the weights as policy.safetensors, and their average, where there is one, as policy_average.safetensors.
+  /// Writes the weights as policy.safetensors, and their average, if there is one, as policy_average.safetensors.
   void write_weights(const Run& run) const;
 
-  /// Where the run's files are: options.out_folder, or, until the first checkpoint of a run that overwrites another, a
+  /// Folder of the run's files: options.out_folder or, until the first checkpoint of a run that overwrites another, a
   /// folder in it.
   const std::string& folder() const { return folder_; }
   std::string path(const std::string& name) const { return folder_ + "/" + name; }

@@ -14,7 +14,7 @@ namespace pictura {
 
 namespace {
 
-// The mean return is taken over this many updates.
+// Number of updates of the mean return.
 constexpr size_t kRecentUpdates = 10;
 
 Scalars scalars_of(const Config& config, const TrainProgress& progress, const UpdateRecord& record) {
@@ -68,7 +68,7 @@ Scalars scalars_of(const Config& config, const TrainProgress& progress, const Up
   for (size_t i = 0; i < kNumPhases; ++i) {
     scalars.emplace_back(fmt::format("time/{}_s", kPhaseNames[i]), record.phases_s[i]);
   }
-  // Means over agents whose episode ended; NaN where there are none.
+  // Means over agents whose episode ended; NaN without such agents.
   const auto finished = static_cast<double>(totals.finished_agent_episodes),
              moved = static_cast<double>(totals.finished_moved);
   scalars.emplace_back("agents/first_motion_s", totals.finished_first_motion_s / moved);
@@ -113,7 +113,7 @@ std::vector<std::string_view> whole_lines(std::string_view text) {
   return lines;
 }
 
-// Whether a line is that many numbers, the first of an update that is done.
+// Whether a line consists of num_columns numbers, the first of which is a completed update.
 bool is_row(std::string_view line, size_t num_columns, int64_t updates_done) {
   std::istringstream cells{std::string(line)};
   size_t columns = 0;
@@ -198,7 +198,7 @@ TrainProgress RunLog::add(int64_t update, int64_t agent_steps, const UpdateRecor
   progress.recent_agent_steps_per_s =
       static_cast<double>(agent_steps - minute_.front().agent_steps) / (minute_.back().s - minute_.front().s);
   progress.episode_return = episode_return();
-  // To the last update, or to the end of the schedule, whichever comes first.
+  // ETA of the last update, or of the end of the schedule, whichever comes first.
   const auto done = static_cast<double>(update - first_update_),
              steps_done = static_cast<double>(agent_steps - first_agent_steps_);
   progress.eta_s = elapsed_s / done * static_cast<double>(config_.train.updates - update);

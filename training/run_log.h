@@ -1,5 +1,5 @@
-// Log of a run: after each update a row of progress.csv, a TensorBoard event and the progress line's numbers; after
-// each evaluation a row of evaluation.csv and an event.
+// Log of a run: after each update a row of progress.csv, a TensorBoard event and the numbers of the progress line;
+// after each evaluation a row of evaluation.csv and an event.
 #pragma once
 
 #include <deque>
@@ -16,16 +16,16 @@
 
 namespace pictura {
 
-/// CSV file of a run with a row for an update. Of an older file's rows it keeps those that are whole and of updates
-/// that are done: a process may have been killed, or a disk full, within one. A file with other columns is renamed to
+/// CSV file of a run with a row per update. Keeps rows of an existing file that are complete and belong to completed
+/// updates, since a process may have been killed, or a disk full, within a row. A file with other columns is renamed to
 /// PATH.1 (or the next free number), with a notice.
 class ProgressCsv {
  public:
   ProgressCsv(const std::string& path, const Scalars& columns, int64_t updates_done,
               const std::function<void(const std::string&)>& on_notice);
-  /// Appends a row and flushes. Throws Error naming the path when the disk is full.
+  /// Appends a row and flushes. Throws Error naming the path if the disk is full.
   void write(int64_t update, const Scalars& scalars);
-  /// Update of the last row; 0 where there is none.
+  /// Update of the last row; 0 without rows.
   int64_t last_update() const { return last_update_; }
 
  private:
@@ -39,33 +39,33 @@ struct UpdateRecord {
   SimulatorTotals totals;  // counted in its rollout
   UpdateStats stats;
   AgentGroups agents;
-  double rollout_s = 0, update_s = 0;  // wall time of collecting, and of improving
-  PhaseSeconds phases_s{};             // in both
+  double rollout_s = 0, update_s = 0;  // wall time of the rollout, and of the update
+  PhaseSeconds phases_s{};             // of both
   ImageSize image_size;                // of the first camera; 0 without images
 };
 
 /// Results of an evaluation within a run.
 struct EvaluationRecord {
   EvaluateRow row;
-  std::optional<EvaluateRow> average_row;  // of the average of weights, for runs that have one
+  std::optional<EvaluateRow> average_row;  // with averaged weights, for runs that average them
   double seconds = 0;                      // wall time
   ImageSize image_size;                    // of the first camera; 0 without images
 };
 
 class RunLog {
  public:
-  /// Opens the files of a run that has done `updates_done` updates and `agent_steps` in them; with an empty folder it
-  /// writes none. Throws Error naming the path.
+  /// Opens the files of a run with `updates_done` completed updates and `agent_steps` agent-steps in them; with an
+  /// empty folder it writes no files. Throws Error naming the path.
   RunLog(const std::string& folder, const Config& config, int64_t updates_done, int64_t agent_steps,
          const std::vector<RecentUpdate>& recent, const std::function<void(const std::string&)>& on_notice);
 
-  /// Writes the row and the event of an update, after which the run has done `update` updates and `agent_steps`. Gives
-  /// notice of the first one whose log-probabilities were computed again.
+  /// Writes the row and the event of an update, after which the run has `update` updates and `agent_steps` agent-steps.
+  /// Sends a notice for the first update whose log-probabilities were recomputed.
   TrainProgress add(int64_t update, int64_t agent_steps, const UpdateRecord& record);
 
-  /// Writes the row and the event of an evaluation after `update` updates. Its time counts in no rate.
+  /// Writes the row and the event of an evaluation after `update` updates. Rates do not count its time.
   void add_evaluation(int64_t update, int64_t agent_steps, const EvaluationRecord& record);
-  /// Whether evaluation.csv lacks a row after `update` updates; false where there is no such file.
+  /// Whether evaluation.csv lacks a row after `update` updates; false without such a file.
   bool lacks_evaluation(int64_t update) const { return evaluation_csv_ && evaluation_csv_->last_update() != update; }
   /// Wall time of this process's evaluations.
   double evaluation_s() const { return evaluation_s_; }
@@ -82,10 +82,10 @@ class RunLog {
   bool has_said_rejected_ = false;
   std::optional<EventFile> events_;
   std::optional<ProgressCsv> csv_;
-  std::optional<ProgressCsv> evaluation_csv_;  // where the run evaluates
+  std::optional<ProgressCsv> evaluation_csv_;  // only if the run evaluates
   double evaluation_s_ = 0;
   std::deque<RecentUpdate> recent_;
-  // What was done at a time of the run, without evaluations.
+  // Agent-steps at a time of the run, evaluations excluded.
   struct Moment {
     double s;
     int64_t agent_steps;

@@ -20,7 +20,7 @@ std::string RunTime::key(RunWork work) const {
 }
 
 bool RunTime::is_too_short_for(RunWork work) const {
-  // A fifth more, for what takes longer than the longest before, and for saving.
+  // 20 % longer than the longest so far, to allow for longer updates and for saving.
   const auto longest = run_.longest_update_s.find(key(work));
   const double expected_s = longest == run_.longest_update_s.end() ? 0 : 1.2 * longest->second;
   return any_rank(minutes_ > 0 && expected_s > left_s(), run_.communicator);
@@ -29,7 +29,7 @@ bool RunTime::is_too_short_for(RunWork work) const {
 void RunTime::add(RunWork work, double seconds) {
   double& longest_s = run_.longest_update_s[key(work)];
   if (work == RunWork::update) {
-    // An earlier process's longest holds until this one has made an update.
+    // The longest update of an earlier process counts until this process has completed one.
     longest_s = own_longest_update_s_ = std::max(own_longest_update_s_, seconds);
   } else {
     longest_s = std::max(longest_s, seconds);

@@ -1,5 +1,5 @@
-// Time of a run: how long its updates and evaluations take on this machine, and whether one more ends within the time
-// that the run was given.
+// Time of a run: durations of its updates and evaluations on this machine, and whether another one ends within the
+// run's time limit.
 #pragma once
 
 #include <string>
@@ -14,18 +14,19 @@ enum class RunWork { update, evaluation };
 
 class RunTime {
  public:
-  /// `minutes` of wall time since `start`, 0: without end. What work takes is kept with the run, which must outlive
-  /// this (Run::longest_update_s), so that it is known from its first update on where it was on such a machine before.
+  /// Limits the run to `minutes` of wall time since `start`; 0: no limit. Durations are stored with the run, which must
+  /// outlive this object (Run::longest_update_s). So they are known from the first update on if the run used such a
+  /// machine before.
   RunTime(double minutes, const Stopwatch& start, Run* run);
 
-  /// Whether more of the work, as long as the longest before, would end too late on some rank. Collective: every rank
-  /// must call it.
+  /// Whether another piece of the work, as long as the longest so far, would exceed the limit on any rank. Collective:
+  /// every rank must call it.
   bool is_too_short_for(RunWork work) const;
-  /// Records how long work took.
+  /// Records the duration of work.
   void add(RunWork work, double seconds);
-  /// Expects work to take so many times as long, until it is measured anew.
+  /// Scales the expected duration of work by `times`, until it is measured again.
   void expect_growth(double times);
-  /// Limits progress->eta_s to the time that is left.
+  /// Limits progress->eta_s to the remaining time.
   void bound(TrainProgress* progress) const;
 
  private:

@@ -1,5 +1,5 @@
-// Teacher: a saved policy that another one learns to imitate while it drives. For agents that the learner drives it
-// gives its own actions' probabilities, from the observations that it was trained with.
+// Teacher: a saved policy that the learner imitates while the learner drives. It gives its own action probabilities for
+// the learner's agents, from the observations of its training.
 #pragma once
 
 #include <memory>
@@ -11,15 +11,15 @@ namespace pictura {
 
 class Teacher {
  public:
-  /// Teacher for a learner of `config`, on `device`. Throws Error naming the teacher's file where it reads images, or
-  /// slots of the ego vector that the learner must not have.
+  /// Creates the teacher of a learner of `config`, on `device`. Throws Error naming the teacher's file if it reads
+  /// images, or slots of the ego vector that the learner must not have.
   Teacher(const SavedPolicy& saved, const Config& config, Device device);
 
-  /// Adds the arrays that the teacher reads to those that a simulator makes.
+  /// Adds the arrays that the teacher reads to those that a simulator writes.
   void add_arrays(SimulatorConfig* config_inout) const;
 
-  /// Log-probabilities of all actions for the agents of some slots, i64 [n], of what the simulator shows now: f32
-  /// [n, kNumActions], without gradients.
+  /// Log-probabilities of all actions for the agents of these slots, i64 [n], from the simulator's present
+  /// observations: f32 [n, kNumActions], without gradients.
   at::Tensor log_probs(const SimulatorArrays& input, const at::Tensor& slots) const;
 
  private:

@@ -1,4 +1,4 @@
-// The worlds of a training run and the maps that they are on.
+// Worlds of a training run and their maps.
 #pragma once
 
 #include <string>
@@ -9,11 +9,11 @@
 
 namespace pictura {
 
-/// The worlds that fill simulator.num_slots, of all ranks; training_maps() has the map of each.
+/// Draws the worlds that fill simulator.num_slots, over all ranks; training_maps() has the map of each.
 std::vector<WorldSpec> draw_training_worlds(const Config& config);
 
-/// The maps of those worlds, as load_maps() takes them: simulator.maps, then their copies (simulator.map_copies),
-/// without the copies that no world is on.
+/// Maps of those worlds, as load_maps() takes them: simulator.maps, then their copies (simulator.map_copies), without
+/// copies that no world uses.
 std::vector<std::string> training_maps(const Config& config);
 
 }  // namespace pictura

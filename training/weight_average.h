@@ -10,15 +10,15 @@ namespace pictura {
 /// equal averages, to the bit.
 class WeightAverage {
  public:
-  /// Average that begins with the policy's parameters as they are. The policy must outlive it; half_life_updates > 0.
+  /// Starts the average at the policy's current parameters. The policy must outlive it; half_life_updates > 0.
   WeightAverage(const Policy& policy, double half_life_updates);
 
-  /// Begins again with the policy's parameters, with no update averaged.
+  /// Restarts at the policy's parameters, with no update averaged.
   void restart();
   /// Adds the parameters after an update: average += w (parameters - average), with w = max(1 / n, 1 - 2^(-1 /
-  /// half_life_updates)) for the n-th one. So the first replaces what the average began with, the mean of all updates
-  /// follows, and the exponential average once its window is full: initial weights, which are noise, never count.
-  /// Nothing waits for the device.
+  /// half_life_updates)) for the n-th update. So the first update replaces the initial average, the mean of all updates
+  /// follows, and the exponential average once its window is full. Initial weights, which are noise, never count. Does
+  /// not wait for the device.
   void update();
 
   std::vector<NamedTensor> values;  // f32, in the order of the policy's parameters
@@ -29,10 +29,10 @@ class WeightAverage {
   double weight_;
 };
 
-/// Replaces a policy's parameters in place for as long as it lives, and restores them then, to the bit.
+/// Scope that replaces a policy's parameters in place, and restores them at its end, to the bit.
 class ReplacedWeights {
  public:
-  /// `values` are in the order of the policy's parameters.
+  /// Replaces the parameters by `values`, in the order of the policy's parameters.
   ReplacedWeights(const Policy& policy, const std::vector<NamedTensor>& values);
   ~ReplacedWeights();
   ReplacedWeights(const ReplacedWeights&) = delete;

@@ -1,4 +1,4 @@
-// Agreement of a run's ranks on their settings, on the files that they begin with, and on when to end.
+// Agreement of a run's ranks on settings, initial files, and interrupts.
 #pragma once
 
 #include <string>
@@ -8,17 +8,17 @@
 
 namespace pictura {
 
-/// Throws Error on every rank, naming the key, where two ranks' settings differ. `manner`: what else must be equal, as
-/// a text.
+/// Throws Error on every rank, naming the key, if two ranks' settings differ. `manner`: further settings that must be
+/// equal, as text.
 void check_equal_settings(const Config& config, const std::string& manner, Ranks* ranks);
 
-/// Whether `is_so` holds on any rank.
+/// Whether `is_so` is true on any rank.
 bool any_rank(bool is_so, Communicator* communicator);
 
-/// Whether ^C or the like came to any rank. If so, this rank counts as interrupted too (common/support/interrupt.h).
+/// Whether any rank was interrupted. If so, this rank counts as interrupted too (common/support/interrupt.h).
 bool any_rank_interrupted(Communicator* communicator);
 
-/// Bytes of a checkpoint or of weights, which the first rank alone reads.
+/// Bytes of a checkpoint or of weights, read by the first rank only.
 std::string file_of_first(const std::string& path, Communicator* communicator);
 
 }  // namespace pictura

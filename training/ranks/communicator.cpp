@@ -58,7 +58,7 @@ std::string Communicator::from_first(const std::string& bytes) {
 }
 
 SimulatorTotals totals_of_all(SimulatorTotals own, Communicator* communicator) {
-  // Counts are far below 2^53.
+  // Counts are far below 2^53, so sums of doubles are exact.
   std::vector<double> values;
   const auto put = [&values](const auto& value, const auto&) { values.push_back(static_cast<double>(value)); };
   SimulatorTotals::visit(own, own, put, put);

@@ -1,4 +1,4 @@
-// The communicator of ranks that learn on hosts: torch's Gloo, where its headers were there when this was built.
+// Communicator of ranks that learn on hosts: torch's Gloo, if its headers were found at build time.
 #include "pictura/common/error.h"
 #include "pictura/training/ranks/communicator.h"
 #include "pictura/training/ranks/ranks.h"
@@ -32,8 +32,8 @@ class GlooCommunicator final : public Communicator {
     }
   }
   ~GlooCommunicator() override {
-    // The group's threads wait for the lost rank, and its destructor would wait for them: it is left to the end of the
-    // process.
+    // The group's threads wait for the lost rank, and its destructor would wait for the threads. So the group is
+    // released at the end of the process.
     if (has_failed_) static_cast<void>(group_.release());
   }
 
@@ -52,7 +52,7 @@ class GlooCommunicator final : public Communicator {
   }
 
  private:
-  // Who is lost is found out by Ranks, sooner.
+  // Ranks detects a lost rank sooner than a timeout would.
   static constexpr std::chrono::hours kForever{24 * 365};
 
   void all_reduce(const at::Tensor& tensor, c10d::ReduceOp operation) {

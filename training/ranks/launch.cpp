@@ -15,7 +15,7 @@ std::optional<std::string> variable(const char* name) {
   return text && *text ? std::optional<std::string>(text) : std::nullopt;
 }
 
-// Value of a variable that is an integer in [low, high]; `absent` where it is not set.
+// Value of a variable that is an integer in [low, high]; `absent` if it is not set.
 std::optional<int> integer(const char* name, int low, int high, std::optional<int> absent = std::nullopt) {
   const std::optional<std::string> text = variable(name);
   if (!text) return absent;
@@ -28,12 +28,12 @@ std::optional<int> integer(const char* name, int low, int high, std::optional<in
 
 constexpr int kMostRanks = 1 << 16;
 
-// The names under which a launcher tells a process its place.
+// Names of the variables in which a launcher passes a process its place.
 struct Names {
   const char *rank, *size, *local_rank;
 };
 constexpr Names kTorchrun{"RANK", "WORLD_SIZE", "LOCAL_RANK"};
-// srun alone sets the number of tasks of a step: a batch script is not one of several processes.
+// Only srun sets the number of tasks of a step: a batch script is not one of several processes.
 constexpr Names kSlurm{"SLURM_PROCID", "SLURM_STEP_NUM_TASKS", "SLURM_LOCALID"};
 
 Launch place_by(const Names& names) {

@@ -1,5 +1,5 @@
-// The communicator of ranks that learn on CUDA devices: NCCL, in the library that torch's CUDA library brings along.
-// It is opened here, and its few functions are declared here, so that programs start and are built without it.
+// Communicator of ranks that learn on CUDA devices: NCCL, from the library that comes with torch's CUDA library. The
+// library is opened here, and its few functions are declared here, so that programs build and start without NCCL.
 #include <atomic>
 
 #include <c10/core/DeviceGuard.h>
@@ -33,7 +33,7 @@ struct Nccl {
   NcclResult (*broadcast)(const void*, void*, size_t count, NcclType, int root, NcclComm, void* stream);
 
   Nccl() {
-    // Torch's CUDA library, which is open where this is called, has opened it from its own folder.
+    // Torch's CUDA library is open at this point, and has opened NCCL from its own folder.
     static constexpr const char* kFile = "libnccl.so.2";
     void* const library = dlopen(kFile, RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
     PICTURA_CHECK(library, "several GPUs need NCCL: {} cannot be opened: {}", kFile, dlerror());
@@ -71,7 +71,7 @@ class NcclCommunicator final : public Communicator {
     std::copy(first.begin(), first.end(), id.bytes);
     const c10::DeviceGuard guard(device_);
     check(nccl_.comm_init_rank(&comm_, size(), id, rank()), "ncclCommInitRank");
-    // Kernels that wait for a lost rank end, and so does what waits for them.
+    // Aborting ends kernels that wait for a lost rank, and so the calls that wait for these kernels.
     ranks_->on_lost([this] {
       if (!is_aborted_.exchange(true)) nccl_.comm_abort(comm_);
     });
@@ -101,7 +101,7 @@ class NcclCommunicator final : public Communicator {
     });
   }
 
-  // Runs an operation on a tensor. One that lies on the host goes over the device, and is waited for.
+  // Runs an operation on a tensor. A host tensor is copied to the device, and the call waits for its result.
   template <typename Operation>
   void run(const at::Tensor& tensor, const char* name, const Operation& operation) {
     ranks_->step();

@@ -21,7 +21,7 @@ using std::chrono::milliseconds;
 constexpr milliseconds kBetweenBeats{500};
 // Time limit of one request to the store, once all ranks have met there.
 constexpr milliseconds kStoreTimeout{20000};
-constexpr milliseconds kFarewell{5000};  // for the others to leave before the store does
+constexpr milliseconds kFarewell{5000};  // for the others to leave before the store closes
 
 milliseconds milliseconds_of(double seconds) { return milliseconds(static_cast<int64_t>(1000 * seconds)); }
 
@@ -110,12 +110,12 @@ Ranks::~Ranks() {
   changed_.notify_all();
   watcher_.join();
   if (rank() != 0 || launch_.is_served) return;
-  // The others lose the store with this process.
+  // Waits for the other ranks, which lose the store with this process.
   try {
     const Clock::time_point end = Clock::now() + kFarewell;
     while (store_->add("left", 0) < size() && Clock::now() < end) std::this_thread::sleep_for(milliseconds(20));
   } catch (const c10::Error&) {
-    // It is gone already, which is no matter any more.
+    // The store is gone already, which no longer matters.
   }
 }
 
@@ -139,12 +139,12 @@ void Ranks::find_lost() const {
 }
 
 void Ranks::announce(const std::string& why) noexcept {
-  // Where one is lost the store may be, and the others know.
+  // If a rank is lost, the store may be lost too, and the others know.
   if (size() == 1 || is_lost_) return;
   try {
     store_->compareSet(kFault, "", fmt::format("rank {} ended: {}", rank(), why));
   } catch (const std::exception&) {
-    // Ranks that cannot be reached find out by themselves.
+    // Ranks that cannot be reached detect the loss themselves.
   }
 }
 
@@ -181,16 +181,16 @@ void Ranks::lose(const std::string& why) {
 
 namespace {
 
-// The exchange of beats through the store. A request to a store whose process was stopped never returns, so it has a
-// thread of its own, which is left behind then.
+// Exchange of heartbeats through the store. A request to a store whose process was stopped never returns, so the
+// exchange has its own thread, which is then abandoned.
 struct Exchange {
-  std::mutex mutex;  // of all below
+  std::mutex mutex;  // guards all members below
   std::condition_variable changed;
   Beat own;
   bool ends = false, has_ended = false;
   std::vector<std::vector<uint8_t>> values;  // of the last round; empty before the first
   Clock::time_point last_round = Clock::now();
-  std::string error;  // why there are no more rounds
+  std::string error;  // reason why there are no more rounds
 
   void run(c10d::Store* store, const std::string& own_key, const std::vector<std::string>& keys) {
     std::unique_lock lock(mutex);
@@ -228,7 +228,7 @@ class BeatHistory {
  public:
   BeatHistory(int num_ranks, double silent_s) : silent_s_(silent_s), seen_(static_cast<size_t>(num_ranks)) {}
 
-  // Takes the last round's beats, of all ranks, and says why one is lost; empty: none is.
+  // Adds the last round's heartbeats of all ranks. Returns the reason why a rank is lost; empty: no rank is lost.
   std::string add(const std::vector<Beat>& beats, double no_progress_s) {
     bool may_hang = true;
     std::optional<int64_t> least;
@@ -260,12 +260,12 @@ class BeatHistory {
  private:
   struct Seen {
     Beat beat;
-    Clock::time_point changed = Clock::now();  // its number
+    Clock::time_point changed = Clock::now();  // time of the last change of its number
   };
   double silent_s_;
   std::vector<Seen> seen_;
   int64_t least_steps_ = -1;
-  Clock::time_point progressed_ = Clock::now();  // when the least number of steps changed
+  Clock::time_point progressed_ = Clock::now();  // time of the last change of the minimum number of steps
 };
 
 }  // namespace
@@ -277,7 +277,7 @@ void Ranks::watch() {
   const auto exchange = std::make_shared<Exchange>();
   std::thread exchanges(
       [exchange, keys, own_key = keys[rank()], store = watch_store_] { exchange->run(store.get(), own_key, keys); });
-  // Why a rank is lost, as far as is known.
+  // Returns the reason why a rank is lost, as far as it is known; empty: no rank is lost.
   const auto look = [&]() -> std::string {
     std::vector<std::vector<uint8_t>> values;
     {

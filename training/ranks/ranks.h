@@ -1,5 +1,5 @@
-// Ranks: the processes of a training run. They meet in a key-value store, where each writes that it is alive and goes
-// on, and finds out which others ended or hang. What they compute together goes through a Communicator.
+// Ranks: the processes of a training run. They meet in a key-value store, in which each rank writes heartbeats and
+// progress, and finds other ranks that ended or hang. Joint computations use a Communicator.
 #pragma once
 
 #include <atomic>
@@ -17,7 +17,7 @@
 
 namespace pictura {
 
-/// Another rank ended or hangs, or cannot be reached.
+/// Error of a rank that ended, hangs, or cannot be reached.
 class RankLost : public Error {
  public:
   using Error::Error;
@@ -25,17 +25,17 @@ class RankLost : public Error {
 
 /// Time limits for other ranks.
 struct Patience {
-  double join_s = 300;        // until all are there
+  double join_s = 300;        // until all ranks have joined
   double silent_s = 20;       // without a heartbeat: the process was killed or stopped, or its host is gone
-  double no_progress_s = 45;  // with heartbeats, but without a step: it hangs; Ranks::set_no_progress_s
+  double no_progress_s = 45;  // with heartbeats, but without a step: the rank hangs; see Ranks::set_no_progress_s()
 };
 
 class Ranks {
  public:
-  /// Waits until all ranks have joined. Throws Error naming address and port where they cannot meet, the ranks that did
-  /// not come, and a rank that two processes claim.
+  /// Waits until all ranks have joined. Throws Error naming address and port if they cannot meet, the ranks that did
+  /// not join, and a rank that two processes claim.
   explicit Ranks(const Launch& launch, const Patience& patience = {});
-  /// Waits a moment for the other ranks where they meet at this process.
+  /// Waits briefly for the other ranks if this process hosts the store.
   ~Ranks();
   Ranks(const Ranks&) = delete;
   Ranks& operator=(const Ranks&) = delete;
@@ -44,21 +44,21 @@ class Ranks {
   int rank() const { return launch_.rank; }
   int size() const { return launch_.size; }
 
-  /// Counts a step of this process, of which all ranks take equally many. Throws RankLost, naming the rank, where
-  /// another one is lost.
+  /// Counts a step of this process. All ranks must take equally many. Throws RankLost, naming the rank, if a rank is
+  /// lost.
   void step();
-  /// Throws RankLost as step() does, without a step.
+  /// Throws RankLost as step() does, without counting a step.
   void check() const;
-  /// Waits until the loss of a rank is found, after an operation with the others has failed, and throws RankLost.
-  /// Returns where no rank is lost.
+  /// Waits until a lost rank is identified, after a collective operation has failed, and throws RankLost. Returns if no
+  /// rank is lost.
   void find_lost() const;
-  /// Announces to the other ranks why this process ends. The first announcement counts.
+  /// Announces the reason why this process ends to the other ranks. The first announcement counts.
   void announce(const std::string& why) noexcept;
 
-  /// Sets the time without a step after which a rank is taken for one that hangs, where steps may take longer.
+  /// Sets the time without a step after which a rank is considered to hang. For runs with long steps.
   void set_no_progress_s(double seconds) { no_progress_s_ = seconds; }
 
-  /// Scope in which this process takes no step for long, and is not taken for one that hangs.
+  /// Scope in which this process takes no step for long without being considered to hang.
   class LongWork {
    public:
     explicit LongWork(Ranks* ranks) : ranks_(ranks) { ++ranks_->busy_; }
@@ -70,13 +70,13 @@ class Ranks {
     Ranks* ranks_;
   };
 
-  /// Every rank's text under a key that is used once, in order of ranks. Collective: every rank must call it.
+  /// Every rank's text under a key that is used once, in the order of ranks. Collective: every rank must call it.
   std::vector<std::string> texts(const std::string& key, const std::string& own);
 
-  /// Store for process groups; null where there is one rank alone.
+  /// Store for process groups; null with a single rank.
   const c10::intrusive_ptr<c10d::Store>& store() const { return store_; }
-  /// Sets what is called from another thread when a rank is lost, so that calls that wait for it end. One at a time;
-  /// empty: none.
+  /// Sets the function that is called from another thread when a rank is lost, so that waiting calls end. One function
+  /// at a time; empty: none.
   void on_lost(std::function<void()> abort);
 
  private:
@@ -86,7 +86,7 @@ class Ranks {
 
   const Launch launch_;
   const Patience patience_;
-  c10::intrusive_ptr<c10d::Store> store_, watch_store_;  // the latter for the thread alone
+  c10::intrusive_ptr<c10d::Store> store_, watch_store_;  // watch_store_ is used by the watching thread only
   std::atomic<double> no_progress_s_;
   std::atomic<int64_t> steps_ = 0;
   std::atomic<int> busy_ = 0;

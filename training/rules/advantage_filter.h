@@ -1,6 +1,5 @@
-// Advantage filter (paper, appendix, optimization; after Gigaflow): transitions are learnt from whose advantage is not
-// small against an exponential average over rollouts, of their largest |advantage| or of a quantile of their
-// |advantages|.
+// Advantage filter (paper, appendix, optimization; after Gigaflow): keeps transitions whose advantage is not small
+// against an exponential average over rollouts, of their largest |advantage| or of a quantile of their |advantages|.
 #pragma once
 
 #include <algorithm>
@@ -11,8 +10,8 @@
 
 namespace pictura {
 
-/// Average after a rollout whose largest |advantage|, or quantile, is `newest`. A negative average stands for no
-/// rollout before.
+/// Average after a rollout whose largest |advantage|, or quantile, is `newest`. A negative average means that there was
+/// no rollout before.
 PICTURA_HD inline double filter_average(double average, float newest, double ema) {
   return average < 0 ? static_cast<double>(newest) : ema * static_cast<double>(newest) + (1 - ema) * average;
 }
@@ -26,9 +25,8 @@ PICTURA_HD inline bool filter_keeps(float advantage, bool is_valid, float thresh
   return is_valid && (advantage < 0 ? -advantage : advantage) >= threshold;
 }
 
-/// Bins in which |advantages| are counted for a quantile: by the upper half of their bits, so that each power of two
-/// has 128 of equal width. The last bin is of what is not finite. Counts are whole numbers, so ranks add theirs up
-/// exactly.
+/// Bins in which |advantages| are counted for a quantile, by the upper half of their bits: each power of two has 128
+/// bins of equal width. The last bin counts values that are not finite. Counts are integers, so ranks sum them exactly.
 constexpr int kNotFiniteBin = 0x7f80;
 constexpr int kNumFilterBins = kNotFiniteBin + 1;
 
@@ -40,8 +38,8 @@ PICTURA_HD inline int filter_bin(float advantage) {
 /// Smallest |advantage| of a bin.
 inline float filter_bin_begin(int bin) { return __builtin_bit_cast(float, static_cast<uint32_t>(bin) << 16); }
 
-/// Quantile of the |advantages| that were counted in finite bins, `share` of which lie below it, if each bin's are
-/// spread evenly over it; 0 where there are none.
+/// Quantile of the |advantages| that were counted in finite bins: `share` of them lie below it, if values are spread
+/// evenly over each bin; 0 without any.
 inline float filter_quantile(Span<const int64_t> counts, double share) {
   int64_t all = 0;
   for (int bin = 0; bin < kNotFiniteBin; ++bin) all += counts[bin];

@@ -1,11 +1,11 @@
-// Graphs of work on a CUDA device, which are launched whole instead of call by call.
+// Graphs of work on a CUDA device, launched as a whole instead of call by call.
 #pragma once
 
 #include "pictura/common/device.h"
 
 namespace pictura {
 
-/// CUDA graph of what some calls put on a stream, with the addresses and arguments that they had then.
+/// CUDA graph of the work that calls enqueued on a stream, with their addresses and arguments at capture.
 class DeviceGraph {
  public:
   DeviceGraph() = default;
@@ -13,7 +13,7 @@ class DeviceGraph {
   DeviceGraph(const DeviceGraph&) = delete;
   DeviceGraph& operator=(const DeviceGraph&) = delete;
 
-  /// Launches the graph on a stream. Throws Error where the device cannot.
+  /// Launches the graph on a stream. Throws Error if the device fails.
   virtual void launch(Stream stream) = 0;
 };
 

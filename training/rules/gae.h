@@ -6,26 +6,28 @@
 
 namespace pictura {
 
-/// Step of one agent. A step that is
-///   terminated  does not bootstrap;
-///   truncated   bootstraps from the value of the next row, which is the final observation's: the world is reset by the
-///               next call, whose transition is not valid; nothing flows back over the end of an episode;
-///   not valid   (its agent had halted, or its world was being reset) gets 0 and ends what comes before it;
-///   no decision continues the action of the step before: it gets 0, and its reward is part of that decision's return.
+/// Step of one agent.
+/// - A terminated step does not bootstrap.
+/// - A truncated step bootstraps from the value of the next row, which belongs to the final observation. The next call
+///   resets the world, and its transition is not valid. No advantage crosses the end of an episode.
+/// - An invalid step (its agent had halted, or its world was being reset) gets 0 and ends the recursion of earlier
+///   steps.
+/// - A step without a decision continues the previous step's action. It gets 0, and its reward is part of that
+///   decision's return.
 struct GaeTransition {
   float reward, value, next_value;
   bool is_terminated, is_truncated, is_valid, is_decision;
 };
 
-/// Tail of a slot after a step: the discounted rewards up to the next decision with the value there, and the discounted
+/// Tail of a slot after a step: the discounted rewards up to the next decision plus the value there, and the discounted
 /// advantage of that decision.
 struct GaeTail {
   float value = 0, advantage = 0;
 };
 
-/// Returns the advantage of a step's decision, 0 where there is none, given the tail after the step; sets that to the
-/// tail after the step before. Discounts by gamma each step, by gae_lambda each decision: an action held for k
-/// steps returns the sum of gamma^i r_i and bootstraps with gamma^k.
+/// Returns the advantage of a step's decision, 0 if there is none, given the tail after the step; sets the tail to the
+/// tail after the previous step. Discounts by gamma each step, by gae_lambda each decision: an action held for k steps
+/// returns the sum of gamma^i r_i and bootstraps with gamma^k.
 PICTURA_HD inline float gae_advantage(const GaeTransition& transition, float gamma, float gae_lambda,
                                       GaeTail* tail_inout) {
   const bool goes_on = !transition.is_terminated && !transition.is_truncated;
@@ -46,11 +48,11 @@ PICTURA_HD inline float gae_advantage(const GaeTransition& transition, float gam
   return advantage;
 }
 
-/// Arrays of a rollout, [steps, slots] each, but for `values`, which has one step more.
+/// Arrays of a rollout, [steps, slots] each, except `values`, which has one more step.
 struct TransitionArrays {
   Span<const float> rewards, values;
   Span<const uint8_t> terminated, truncated, valid;
-  Span<const uint8_t> decides;  // or empty: every step is a decision
+  Span<const uint8_t> decides;  // empty: every step is a decision
   int64_t num_steps = 0, num_slots = 0;
 
   PICTURA_HD GaeTransition at(int64_t step, int64_t slot) const {

@@ -1,5 +1,5 @@
-// Executor of a learner's work besides its network: the rules of this folder over whole rollouts. Those for the host
-// and for CUDA devices give the same bits.
+// Executor of a learner's work outside its network: the rules of this folder over whole rollouts. The executors for the
+// host and for CUDA devices give the same bits.
 #pragma once
 
 #include "pictura/policy/rules/policy_executor.h"
@@ -19,10 +19,10 @@ class LearnerExecutor : public PolicyExecutor {
   virtual void count_advantages(Span<const float> advantages, Span<const uint8_t> valid, Span<int64_t> counts_inout,
                                 Stream stream = {}) = 0;
   /// Writes the transitions that the advantage filter keeps, in ascending order, see advantage_filter.h. kept_out has
-  /// room for all. Returns their number.
+  /// room for all transitions. Returns their number.
   virtual int64_t select_kept(Span<const float> advantages, Span<const uint8_t> valid, float threshold,
                               Span<int64_t> kept_out, Stream stream = {}) = 0;
-  /// items_out[i] = items[permutation(i)].
+  /// Permutes items: items_out[i] = items[permutation(i)].
   virtual void permute(const Permutation& permutation, Span<const int64_t> items, Span<int64_t> items_out,
                        Stream stream = {}) = 0;
 };

@@ -1,13 +1,13 @@
-// Order of an epoch's transitions: a permutation that is computed one element at a time, so that any number of threads,
-// devices or ranks can each take their part of it.
+// Order of an epoch's transitions: a permutation computed one element at a time, so that any number of threads, devices
+// or ranks can each compute their part.
 #pragma once
 
 #include "pictura/common/rng.h"
 
 namespace pictura {
 
-/// Permutation of [0, size): a Feistel network (Luby and Rackoff, 1988) over the next even number of bits, whose
-/// rounds draw from Philox, walked until it lands below size.
+/// Permutation of [0, size): a Feistel network (Luby and Rackoff, 1988) over the next even number of bits, whose rounds
+/// draw from Philox, repeated until the result is below size.
 struct Permutation {
   uint64_t seed = 0;
   uint32_t update = 0, epoch = 0;
@@ -22,7 +22,7 @@ struct Permutation {
     while ((int64_t{1} << (2 * half_bits)) < size) ++half_bits;
   }
 
-  /// Place of element i, in [0, size). Fewer than four steps are walked on average.
+  /// Permuted position of element i, in [0, size). Takes fewer than four repetitions on average.
   PICTURA_HD int64_t operator()(int64_t i) const {
     auto element = static_cast<uint64_t>(i);
     do element = encrypted(element);
