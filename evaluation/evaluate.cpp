@@ -31,14 +31,14 @@ DensityOf density_of(Density density) {
   return {kDensityNames[index], kDensityAgents[index]};
 }
 
-// Worlds that are simulated together: on a device all 200 of the paper's densities, which keep it busy. Images take no
-// part in it: they are drawn for train.forward_chunk agents at a time.
+// Number of worlds simulated together: on a device all 200 of the paper's densities, which saturate it. Images do not
+// matter: they are drawn for train.forward_chunk agents at a time.
 int worlds_per_batch(Device device, int agents_per_world) {
   const int max_agents = device.is_host() ? 4096 : 32768;
   return std::max(1, max_agents / agents_per_world);
 }
 
-// The agents' fields that are counted, on the host; all others are empty.
+// Copies the agents' fields that are counted to the host; all others are empty.
 AgentState counted_state(Simulator& simulator) {
   const AgentStateView state = simulator.state();
   AgentState host(0);
@@ -59,7 +59,7 @@ AgentState counted_state(Simulator& simulator) {
   return host;
 }
 
-// Of a life that is over, or that the last step cuts off.
+// Adds a life that has ended, or that the last step cuts off.
 void add_life(const AgentStateView& state, int64_t slot, ScenarioCounts* counts) {
   const AgentStatus status = state.status[slot];
   if (state.agent_class[slot] != AgentClass::vehicle) return;
@@ -81,7 +81,7 @@ void add_life(const AgentStateView& state, int64_t slot, ScenarioCounts* counts)
   counts->returns += static_cast<double>(state.episode_return[slot]);
 }
 
-// Of a slot after the last step. Lives of those that left have been counted.
+// Adds a slot after the last step. Lives of agents that left have been counted.
 void add_slot(const AgentStateView& state, int64_t slot, ScenarioCounts* counts) {
   const AgentStatus status = state.status[slot];
   const bool waits = status == AgentStatus::waiting;
@@ -92,7 +92,7 @@ void add_slot(const AgentStateView& state, int64_t slot, ScenarioCounts* counts)
   if (has_body(status)) add_life(state, slot, counts);
 }
 
-// How grave the worst infraction of a vehicle's episode is; 0: it has none, or is no vehicle.
+// Gravity of the worst infraction of a vehicle's episode; 0: no infraction, or no vehicle.
 int gravity(const AgentStateView& state, int slot) {
   if (state.agent_class[slot] != AgentClass::vehicle) return 0;
   const uint8_t events = state.episode_events[slot];
@@ -117,7 +117,7 @@ bool has_lives(const Simulator& simulator) {
   return std::any_of(maps.begin(), maps.end(), [](const auto& map) { return map->rules.is_open; });
 }
 
-// Whether an agent will yet enter, or may.
+// Whether an agent is still waiting to enter.
 bool is_awaited(Simulator& simulator) {
   if (!has_lives(simulator)) return false;
   const Span<const AgentStatus> status(simulator.state().status, static_cast<size_t>(simulator.num_slots()));
@@ -144,7 +144,7 @@ void check(const EvaluateOptions& options) {
   }
 }
 
-// Of so many scenarios from `first` of the options' ones on, which take the maps in turn.
+// Worlds of `count` scenarios from index `first` of the options' scenarios on, which cycle through the maps.
 std::vector<WorldSpec> worlds_of(const EvaluateOptions& options, size_t num_maps, int agents, int first, int count) {
   std::vector<WorldSpec> worlds;
   for (int i = first; i < std::min(first + count, options.scenarios); ++i) {
@@ -156,8 +156,8 @@ std::vector<WorldSpec> worlds_of(const EvaluateOptions& options, size_t num_maps
 }
 
 // Drives the simulator's worlds from the start of their episodes to the last step, or until no agent is active or waits
-// to enter, since halted ones stay as they are. False: it was interrupted. Calls on_steps with the steps that are done,
-// now and then, and on_left(state, slot) for each agent that left a road that ends.
+// to enter, since halted agents remain halted. Returns false if it was interrupted. Calls on_steps occasionally with
+// the number of completed steps, and on_left(state, slot) for each agent that left a road that ends.
 template <typename OnSteps, typename OnLeft>
 bool drive_to_the_end(const Driving& driving, const EvaluateOptions& options, Simulator* simulator,
                       const OnSteps& on_steps, const OnLeft& on_left, StandingObserver* standing,
@@ -201,7 +201,7 @@ EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& op
     densities.push_back({"custom", options.agents_per_world});
   else
     for (const Density density : options.densities) densities.push_back(density_of(density));
-  double work = 0, done = 0;  // in agents times steps
+  double work = 0, done = 0;  // agents times steps
   for (const DensityOf& density : densities) work += double(density.agents) * options.scenarios * options.steps;
 
   EvaluationClock clock(options.on_progress);
@@ -243,7 +243,7 @@ EvaluateReport evaluate(const EvaluatedDriver& driver, const EvaluateOptions& op
       if (!drive_to_the_end(driving, options, simulator.get(), on_steps, on_left, &standing, &report.agent_steps)) {
         report.interrupted = true;
         for (DensityResult& result : results) {
-          result.scenarios.resize(static_cast<size_t>(first));  // those of the batches before are finished
+          result.scenarios.resize(static_cast<size_t>(first));  // scenarios of completed batches
         }
         break;
       }

@@ -18,26 +18,27 @@ enum class Density { light, medium, dense };
 
 constexpr std::array<const char*, 3> kDensityNames{"light", "medium", "dense"};
 constexpr std::array<int, 3> kDensityAgents{60, 120, 150};
-/// Throws UsageError listing the names.
+/// Returns the density of this name. Throws UsageError listing the names.
 Density density_named(const std::string& name);
 
-/// Worlds of training are numbered from 0 and are never as many.
+/// Global number of the first evaluation world. Training numbers its worlds from 0 and never reaches this number.
 constexpr uint32_t kFirstEvaluationWorld = 0x80000000u;
 
-/// Watches the worlds of an evaluation as they are driven; the simulator is the same object for each batch of worlds.
+/// Observes the worlds of an evaluation while they are driven; the simulator is the same object for each batch of
+/// worlds.
 class EvaluationObserver : public StepObserver {
  public:
-  /// Worlds at the start of their episode.
+  /// Called at the start of the worlds' episodes.
   virtual void begin(Simulator& simulator) = 0;
-  /// All of these worlds are counted. Not called where an interrupt ends them.
+  /// Called when all of these worlds are counted; not called if an interrupt ends them.
   virtual void end() {}
 };
 
 struct EvaluateOptions : DriverOptions {
-  std::vector<std::string> maps;  // as load_map takes them; the paper's eight towns
+  std::vector<std::string> maps;  // as load_map() takes them; the paper's eight towns
   std::vector<Density> densities{Density::light, Density::medium, Density::dense};
-  int agents_per_world = 0;         // > 0: instead of the densities' own numbers
-  std::vector<std::string> others;  // who else drives, as other_drivers() reads them; see evaluation/mixed_traffic.h
+  int agents_per_world = 0;         // > 0: replaces the densities' numbers
+  std::vector<std::string> others;  // other drivers, as other_drivers() reads them; see evaluation/mixed_traffic.h
   int first_scenario = 0, scenarios = 200, steps = 3000;
   std::function<void(double done_fraction, double eta_s)> on_progress;
   EvaluationObserver* observer = nullptr;
@@ -60,36 +61,38 @@ void visit_options(EvaluateOptions& options, Visitor&& v) {
 }
 
 struct EvaluateReport {
-  // Counts of the finished densities, in the order of options.densities; for each density first the evaluated driver's,
-  // then the others'.
+  // Counts of the completed densities, in the order of options.densities; for each density first those of the evaluated
+  // driver, then those of the others.
   EvaluationResults results;
-  std::vector<EvaluateRow> rows;  // of each
-  bool interrupted = false;       // ^C came (common/support/interrupt.h) before the last one was
-  // Without the making of maps and renderer, and 0 where parts were merged. Agent-steps are of active agents of all
-  // classes.
+  std::vector<EvaluateRow> rows;  // row of each result
+  bool interrupted = false;  // an interrupt (common/support/interrupt.h) came before the last density was completed
+  // Wall time without loading maps and creating the renderer, and agent-steps of active agents of all classes; 0 for
+  // merged parts.
   double seconds = 0;
   int64_t agent_steps = 0;
 };
 
-/// What evaluations in the same worlds share.
+/// State shared by evaluations in the same worlds.
 struct EvaluationWorlds {
-  CompiledMaps maps;                     // of EvaluateOptions::maps, compiled with those options of the session's world
-  Renderer* renderer = nullptr;          // of the session's images, with the maps as 0, 1, ...; null without images
-  std::unique_ptr<Simulator> simulator;  // made by the first of them
-  std::string maps_hash;                 // as EvaluationSetting's; computed by the first of them
+  CompiledMaps maps;             // EvaluateOptions::maps, compiled with the map options of the session's world
+  Renderer* renderer = nullptr;  // renderer of the session's images, with the maps as 0, 1, ...; null without images
+  std::unique_ptr<Simulator> simulator;  // created by the first evaluation
+  std::string maps_hash;                 // as EvaluationSetting::maps_hash; computed by the first evaluation
 };
 
-/// The options' maps as a world of that configuration needs them.
+/// Compiles the options' maps for a world of that configuration.
 CompiledMaps compile_maps_of(const EvaluateOptions& options, const SimulatorConfig& world);
 
-/// Scenario k is on map k modulo the number of maps and draws its random numbers as world kFirstEvaluationWorld + k, so
-/// that it repeats no world of training whatever the seeds. Throws Error naming file and key for bad input.
+/// Evaluates a driver. Scenario k is on map k modulo the number of maps, and draws its random numbers as world
+/// kFirstEvaluationWorld + k, so that it repeats no training world at any seed. Throws Error naming file and key for
+/// bad input.
 EvaluateReport evaluate(const EvaluateOptions& options);
-/// The same of a session's policy, whose own device, renderer and cameras it keeps.
+/// Evaluates a session's policy, with the session's own device, renderer and cameras.
 EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options);
-/// One of several in the same worlds, with an equal number of steps.
+/// Evaluates a session's policy in shared worlds. All evaluations in the same worlds must have an equal number of
+/// steps.
 EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options, EvaluationWorlds* worlds);
-/// The same of options.controller.
+/// Evaluates options.controller in shared worlds.
 EvaluateReport evaluate(const EvaluateOptions& options, EvaluationWorlds* worlds);
 
 }  // namespace pictura

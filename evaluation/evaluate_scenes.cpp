@@ -31,7 +31,7 @@ namespace pictura {
 
 namespace {
 
-// Worlds that are simulated together: on a device as many as keep it busy.
+// Number of worlds simulated together: on a device enough to saturate it.
 int scenes_at_once(const SceneEvaluateOptions& options, Device device) {
   if (options.scenes_at_once > 0) return options.scenes_at_once;
   return device.is_host() ? 16 : 256;
@@ -44,8 +44,8 @@ std::string name_of(const SceneRef& scene) {
 /// Scenes that are simulated together.
 struct LoadedScenes {
   CompiledMaps maps;
-  std::vector<int> numbers;  // [maps] of each among all scenes
-  // What is left out.
+  std::vector<int> numbers;  // [maps] number of each among all scenes
+  // Scenes that are left out:
   std::vector<std::string> faults;
   int without_drivers = 0;
 };
@@ -85,14 +85,14 @@ Array array_of(const DeviceCopy<T>& copy, const Dims& shape, Device device) {
   return Array(copy.span().data(), shape, device);
 }
 
-/// Where a box of the map's is, in the coordinates of the scene's file; its centre is rise_m above its foot.
+/// State of a box of the map in the coordinates of the scene's file; its centre is rise_m above the box's.
 SimulatedState simulated_state(const RoadMap& map, const AgentBox& box, float rise_m) {
   const std::array<double, 3> center_m = file_position_m(map.origin_m, box.center_m + Vec3{0, 0, rise_m});
   return {static_cast<float>(center_m[0]), static_cast<float>(center_m[1]), static_cast<float>(center_m[2]),
           std::atan2(box.sin_heading, box.cos_heading)};
 }
 
-/// One rollout of a batch of scenes at one density, from the start to the end.
+/// One rollout of a batch of scenes at one density, from start to end.
 class BatchDrive {
  public:
   BatchDrive(const LoadedScenes& batch, const SceneProtocol& protocol, double density, int rollout, uint64_t seed,
@@ -122,14 +122,15 @@ class BatchDrive {
     status_ = status();
   }
 
-  /// From now on, keeps where everybody is who is there at the start.
+  /// Records the poses of all agents present at the start, from now on.
   void keep_places() {
     kept_slots_ = slots_where([&](size_t slot) {
       const CompiledMap& map = map_of(slot);
       return map.scenario->valid_of(track_of_slot_[slot])[map.start_step] != 0;
     });
     places_.resize(kept_slots_.size() * static_cast<size_t>(protocol_.steps));
-    // Boxes stand on the road of the map, recorded ones near it: none rises or falls at the start.
+    // Boxes stand on the road of the map, recorded boxes near it. A constant offset per agent keeps boxes from rising
+    // or falling at the start.
     const std::vector<AgentBox> boxes = host_copy_of_structs(simulator_.scene().agents, device());
     for (const int32_t kept : kept_slots_) {
       const auto slot = static_cast<size_t>(kept);
@@ -140,7 +141,7 @@ class BatchDrive {
     note_places(0);
   }
 
-  /// Adds to each scene of the batch where everybody was.
+  /// Adds the recorded poses to each scene of the batch.
   void add_rollout(std::vector<SceneRollouts>* scenes_inout) const {
     scenes_inout->resize(batch_.maps.size());
     for (size_t world = 0; world < batch_.maps.size(); ++world) {
@@ -162,8 +163,8 @@ class BatchDrive {
     }
   }
 
-  /// Drives all steps, or, unless places are kept, until nobody drives any more; false: ^C came before. on_step(steps
-  /// done).
+  /// Drives all steps, or, unless poses are recorded, until no agent drives any more; false after an interrupt. Calls
+  /// on_step(completed steps).
   template <typename OnStep>
   bool run(Controller* driver, const OnStep& on_step) {
     const std::unique_ptr<Controller> log = pictura::make_controller("log", simulator_, 0);
@@ -178,7 +179,7 @@ class BatchDrive {
           return last_steps_[slot] == step && !is_driven(slot, step) && status_[slot] == AgentStatus::recorded;
         }));
       }
-      // Who drives changes where somebody appears, or vanishes.
+      // The drivers change when an agent appears or vanishes.
       std::vector<uint8_t> drives = mask_where([&](size_t slot) { return is_driven(slot, step); });
       std::vector<uint8_t> follows = mask_where([&](size_t slot) { return is_replayed(slot, step); });
       if (!driven_mask || drives != driven || follows != replayed) {
@@ -199,7 +200,7 @@ class BatchDrive {
     return !drive_steps(simulator_, commands, protocol_.steps, act, {}, after_step).is_interrupted;
   }
 
-  /// [scenes] of the batch, its driven road users in the order of tracks.
+  /// Results of the driven road users in the order of tracks, by scene of the batch.
   std::vector<std::vector<SceneAgent>> results() const {
     const AgentStateView state = simulator_.state();
     const auto num_slots = static_cast<size_t>(simulator_.num_slots());
@@ -208,7 +209,7 @@ class BatchDrive {
     const std::vector<float> distance_m = host_copy(Span<const float>(state.distance_m, num_slots), device());
     std::vector<std::vector<SceneAgent>> scenes(batch_.maps.size());
     for (size_t slot = 0; slot < num_slots; ++slot) {
-      // Who was to be taken over later, and for whom the episode ended before, has not driven.
+      // An agent whose episode ended before its takeover has not driven.
       if (roles_[slot] != SceneRole::driven || driven_steps_[slot] == 0) continue;
       const Scenario& scene = *map_of(slot).scenario;
       const RecordedTrack& track = scene.tracks[track_of_slot_[slot]];
@@ -248,7 +249,7 @@ class BatchDrive {
     if (roles_[slot] == SceneRole::removed || is_driven(slot, step)) return false;
     return protocol_.record_end == RecordEnd::stand || step < last_steps_[slot];
   }
-  /// Whether anybody drives in this step, or will later.
+  /// Whether an agent drives in this step, or will drive later.
   bool has_open(int step) const {
     for (size_t slot = 0; slot < roles_.size(); ++slot) {
       if (roles_[slot] != SceneRole::driven) continue;
@@ -276,7 +277,7 @@ class BatchDrive {
     return host_copy(Span<const AgentStatus>(simulator_.state().status, roles_.size()), device());
   }
 
-  /// These are absent from now on, unless they are told to follow the recording.
+  /// Removes agents, which remain absent unless they are commanded to follow the recording.
   void take_out(const std::vector<int32_t>& slots) {
     if (slots.empty()) return;
     const DeviceCopy<int32_t> chosen(slots, device());
@@ -309,7 +310,7 @@ class BatchDrive {
     simulator_.set_state(array_of(chosen, shape, device()), fields);
   }
 
-  /// Of the step that led to this one of the episode.
+  /// Measures the step that led to episode step `step`.
   void measure(int step) {
     const std::vector<AgentStatus> before = std::exchange(status_, status());
     std::vector<AgentBox> boxes;
@@ -318,7 +319,7 @@ class BatchDrive {
       if (!takes_actions(before[slot])) continue;
       ++driven_steps_[slot];
       if (step > last_steps_[slot]) continue;
-      // Only as long as anybody is measured is anything copied.
+      // Boxes are copied only if an agent is measured.
       if (boxes.empty()) boxes = host_copy_of_structs(simulator_.scene().agents, device());
       const CompiledMap& map = map_of(slot);
       const std::optional<float> apart_m =
@@ -331,7 +332,7 @@ class BatchDrive {
     }
   }
 
-  /// After a step of the episode, and of the first one also before it: who is not there is where it was.
+  /// Records poses after a step of the episode, and before the first step; absent agents keep their last pose.
   void note_places(int step) {
     const std::vector<AgentBox> boxes = host_copy_of_structs(simulator_.scene().agents, device());
     const auto steps = static_cast<size_t>(protocol_.steps), at = static_cast<size_t>(step);
@@ -350,20 +351,20 @@ class BatchDrive {
   double density_;
   int rollout_;
   Simulator& simulator_;
-  std::vector<SceneRole> roles_;         // [slots], as the following
-  std::vector<int32_t> takeover_steps_;  // of the episode
+  std::vector<SceneRole> roles_;         // [slots], as the members below
+  std::vector<int32_t> takeover_steps_;  // episode step
   std::vector<int32_t> world_of_slot_, track_of_slot_;
-  std::vector<int32_t> last_steps_;  // of the episode, that the recording has
+  std::vector<int32_t> last_steps_;  // last recorded episode step
   std::vector<AgentStatus> status_;  // after the last step
   std::vector<Displacement> displacements_;
   std::vector<int32_t> driven_steps_;
-  std::vector<int32_t> kept_slots_;     // whose places are kept
-  std::vector<float> rises_m_;          // [kept_slots] from the foot of the box to the centre of the recorded one
+  std::vector<int32_t> kept_slots_;     // slots whose poses are recorded
+  std::vector<float> rises_m_;          // [kept_slots] height of the recorded box's centre above the box's
   std::vector<SimulatedState> places_;  // [kept_slots * steps]
 };
 
-/// Of one rollout of a batch whose numbers are among the scenes from first_scene on. No two rollouts of any scene have
-/// the same number, by which draws differ.
+/// Worlds of one rollout of a batch whose numbers count from first_scene on. All rollouts of all scenes have different
+/// world numbers, which key the draws.
 std::vector<WorldSpec> worlds_of(const LoadedScenes& batch, int first_scene, int rollout, int num_rollouts) {
   std::vector<WorldSpec> worlds;
   for (size_t i = 0; i < batch.maps.size(); ++i) {
@@ -374,7 +375,7 @@ std::vector<WorldSpec> worlds_of(const LoadedScenes& batch, int first_scene, int
   return worlds;
 }
 
-/// Of the names and bytes of their files, wherever these lie.
+/// Hash of the names and bytes of the scenes' files, independent of their location.
 std::string hash_of(const std::vector<SceneRef>& scenes, int num_threads) {
   std::vector<std::string> files;
   for (const SceneRef& scene : scenes) {
@@ -390,8 +391,8 @@ std::string hash_of(const std::vector<SceneRef>& scenes, int num_threads) {
   return hash.hex();
 }
 
-/// The scenes that the options name, and what of them is no scene. `hash_out` receives the hash of all, where it is
-/// asked for.
+/// Finds the scenes of the options, and the parts that are no scenes. Writes the hash of all scenes to `hash_out` if
+/// requested.
 SceneIndex find_all(const SceneEvaluateOptions& options, std::string* hash_out) {
   if (options.scenes.empty()) fail_usage("evaluate: expected scenes, got none");
   SceneIndex all;
@@ -410,7 +411,7 @@ SceneIndex find_all(const SceneEvaluateOptions& options, std::string* hash_out) 
   return all;
 }
 
-/// Adds those of a batch's scene, of [drives][scenes][driven], to the counts of each density.
+/// Adds the agents of a batch's scene, [drives][scenes][driven], to the counts of each density.
 void count_agents(const std::vector<std::vector<std::vector<SceneAgent>>>& agents, size_t scene,
                   const SceneEvaluateOptions& options, SceneResults* results) {
   const auto num_rollouts = static_cast<size_t>(options.protocol.rollouts);
@@ -457,7 +458,7 @@ SceneEvaluation evaluate_scenes(const EvaluatedDriver& driver, Renderer* rendere
     const LoadedScenes batch = load_batch(index.scenes, first, end, protocol, map_options, options.num_threads);
     if (renderer && !batch.maps.empty()) upload_maps(batch.maps, {}, renderer);
     std::vector<std::vector<std::vector<SceneAgent>>> agents;  // [drives][scenes][driven]
-    std::vector<SceneRollouts> rollouts;                       // [scenes], where they are asked for
+    std::vector<SceneRollouts> rollouts;                       // [scenes], if requested
     for (int i = 0; i < num_drives && !batch.maps.empty() && !evaluation.interrupted; ++i) {
       const int rollout = i % protocol.rollouts;
       const std::vector<WorldSpec> worlds = worlds_of(batch, options.first_scene, rollout, protocol.rollouts);

@@ -1,4 +1,4 @@
-// Who is evaluated, in whatever worlds: a saved policy or a controller, and where it computes. Without torch headers.
+// Driver under evaluation, in any worlds: a saved policy or a controller, and its device. Has no torch headers.
 #pragma once
 
 #include <functional>
@@ -16,13 +16,13 @@ class PolicyController;
 class PolicySession;
 class Renderer;
 
-/// Who drives: a policy, and how it is opened, or a controller.
+/// Options of a driver: a policy and how it is opened, or a controller.
 struct DriverOptions : SessionOptions {
   DriverOptions() { simulator = "auto"; }
 
   std::string checkpoint;
-  // A controller of make_controller, "lane" for one, that drives instead of the checkpoint's policy, in its world, or
-  // in the paper's if there is no checkpoint.
+  // Name of a controller of make_controller(), for instance "lane", that drives instead of the checkpoint's policy. It
+  // drives in the policy's world, or in the paper's world without a checkpoint.
   std::string controller;
   // Makes the controller of that name where a program brings its own. It drives on the host and reads vectors. Where
   // the options name cameras (rig, or width_px and height_px), it reads their images, too: drawn by the renderer, which
@@ -32,7 +32,7 @@ struct DriverOptions : SessionOptions {
   uint64_t seed = 1;
 };
 
-/// Visits the options of a driver, but for its name.
+/// Visits the options of a driver except its name.
 template <typename Visitor>
 void visit_options(DriverOptions& options, Visitor&& v) {
   v.value({"argmax"}, options.argmax);
@@ -40,33 +40,33 @@ void visit_options(DriverOptions& options, Visitor&& v) {
   visit_options(static_cast<SessionOptions&>(options), v);
 }
 
-/// What drives the agents of a batch of worlds, and how many it drove when it last acted.
+/// Controller of the agents in a batch of worlds, and the number of agents that it drove in its last act().
 struct Driving {
   std::unique_ptr<Controller> controller;
   std::function<int64_t()> num_driven;
 };
 
-/// How many agents of all worlds are active.
+/// Number of active agents in all worlds.
 int64_t count_active(Simulator& simulator);
-/// A session's policy in a simulator, by argmax and seed of the options. Where the simulator fills auxiliary slots, a
-/// policy that was trained without them gets zeros, as in training.
+/// Creates a controller of a session's policy in a simulator, with argmax and seed of the options. If the simulator
+/// fills auxiliary slots, a policy that was trained without them gets zeros, as in training.
 std::unique_ptr<PolicyController> policy_controller(PolicySession& session, Renderer* renderer,
                                                     const DriverOptions& options, const Simulator& simulator);
 
-/// What it drives with lives as long as session, renderer and options do.
+/// Driver under evaluation. Its `drive` needs the session, renderer and options that it was created from.
 struct EvaluatedDriver {
   SimulatorConfig world;      // the paper's evaluation: fixed conditioning and lights, no early end
-  EvaluationSetting setting;  // what of it is the driver's
+  EvaluationSetting setting;  // the driver's part of the setting
   Device device;
   std::function<Driving(Simulator&)> drive;
 };
 
-/// What of an evaluation's setting is the session's: policy, precision, device and images.
+/// A session's part of an evaluation's setting: policy, precision, device and images.
 EvaluationSetting setting_of(const PolicySession& session);
 
-/// A session's policy, in episodes of so many steps.
+/// Creates the driver of a session's policy, for episodes of `steps` steps.
 EvaluatedDriver policy_driver(PolicySession* session, Renderer* renderer, const DriverOptions& options, int steps);
-/// options.controller, which needs no policy.
+/// Creates the driver of options.controller, which needs no policy.
 EvaluatedDriver controller_driver(const DriverOptions& options, int steps);
 
 }  // namespace pictura

@@ -19,14 +19,14 @@ namespace pictura {
 namespace {
 
 constexpr float kLaneChange_s = 3, kMergeAhead_m = 30;
-constexpr float kCurveRadius_m = 50;       // of a curve: at most
-constexpr float kJunctionTurn_rad = 0.5f;  // a junction's lane that turns less goes straight on
+constexpr float kCurveRadius_m = 50;       // maximum radius of a curve
+constexpr float kJunctionTurn_rad = 0.5f;  // a junction's lane that turns less is straight
 constexpr float kJustRed_s = 1, kFarHead_m = 10;
 
-// The place on a lane's centre line that is nearest to a position.
+// Point on a lane's centre line nearest to a position.
 struct LanePlace {
-  float s_m = 0;       // from the lane's start
-  float radius_m = 0;  // of the line there, over 10 m to both sides
+  float s_m = 0;       // distance from the lane's start
+  float radius_m = 0;  // radius of the line there, over 10 m to both sides
 };
 
 LanePlace place_on(const RoadMap& map, const Lane& lane, Vec2 position_m) {
@@ -65,7 +65,7 @@ Contact contact_of(const AgentBox& own, const AgentBox& other) {
   constexpr float kCos45 = 0.70710678f;
   if (same <= -kCos45) return Contact::head_on;
   if (same < kCos45) return Contact::crossing;
-  // One behind the other along its direction, but for what they overlap by in rounding.
+  // One vehicle is behind the other along its direction, up to an overlap by rounding.
   constexpr float kTouching_m = 0.2f;
   const float along = std::fabs(dot((other.center_m - own.center_m).xy(), other_forward));
   const float reach = 0.5f * other.length_m + half_extent(footprint(own), other_forward);
@@ -117,12 +117,12 @@ struct InfractionObserver::Frame : WorldArrays {
   }
 };
 
-// One world's step: what was before it and what is after it. Agents, boxes and lights are the world's own.
+// Step of one world: arrays before and after it. Agents, boxes and lights are the world's own.
 struct InfractionObserver::WorldStep {
   const WorldSpec& spec;
   const RoadMap& map;
   const std::vector<StopLine>& stop_lines;  // of the map's lights
-  const std::vector<LightHead>& heads;      // likewise
+  const std::vector<LightHead>& heads;      // of the map's lights
   const Frame &before, &after;
   size_t first_slot, num_agents, first_box, num_boxes, first_light;
 
@@ -139,7 +139,7 @@ struct InfractionObserver::WorldStep {
         num_boxes(after.num_boxes(world)),
         first_light(after.first_light(world)) {}
 
-  // Whether the agent is in a neighbour of the lane that it was in.
+  // Whether the agent has moved to a neighbouring lane.
   bool has_changed_lane(size_t slot) const {
     const int32_t from = before.lane[slot], to = after.lane[slot];
     if (from < 0 || to < 0 || from == to) return false;
@@ -158,7 +158,7 @@ struct InfractionObserver::WorldStep {
     out->before_merge = is_before_merge(map, on, place.s_m);
   }
 
-  // The nearest of those that it collided with.
+  // Describes the nearest of the boxes that the agent collided with.
   void describe_partner(size_t agent, Infraction* out) const {
     const AgentBox &own = before.boxes[first_box + agent], &own_after = after.boxes[first_box + agent];
     float least_m = std::numeric_limits<float>::infinity();
@@ -182,7 +182,7 @@ struct InfractionObserver::WorldStep {
     }
   }
 
-  // The red light whose stop line is nearest to the agent's bumper; -1: none is red.
+  // Returns the red light whose stop line is nearest to the agent's bumper; -1: no light is red.
   int32_t nearest_red_light(size_t agent) const {
     const Vec2 bumper = front_bumper(before.boxes[first_box + agent]);
     float least_m = std::numeric_limits<float>::infinity();

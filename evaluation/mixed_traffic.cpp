@@ -75,7 +75,7 @@ std::vector<OtherDriver> other_drivers(const std::vector<std::string>& texts) {
   return others;
 }
 
-/// A policy and what it sees with, or neither for a controller and where impaired.
+/// Policy with its session and renderer; neither for a controller or an impairment.
 struct MixedTraffic::Other {
   OtherDriver driver;
   std::unique_ptr<PolicySession> session;
@@ -168,7 +168,7 @@ std::vector<uint8_t> MixedTraffic::driver_of_slots(Simulator& simulator) const {
 Driving MixedTraffic::share(Driving own, Simulator& simulator, const std::vector<uint8_t>& driver_of_slot) const {
   if (others_.empty()) return own;
   std::vector<Driver> drivers;
-  // Driver 0 drives its impaired selves too.
+  // Driver 0 also drives impaired agents.
   const auto is_impaired = [this](size_t driver) {
     return driver > 0 && others_[driver - 1]->driver.impairment != Impairment::none;
   };

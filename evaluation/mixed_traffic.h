@@ -15,26 +15,26 @@ namespace pictura {
 /// Names of impairments, in the order of Impairment: the keys of [simulator.others].
 std::vector<std::string> impairment_names();
 
-/// A driver beside the evaluated one: a policy, a controller, or the evaluated policy itself while impaired.
+/// Driver besides the evaluated driver: a policy, a controller, or the evaluated policy itself while impaired.
 struct OtherDriver {
-  std::string name;                          // a saved policy's file, one of town_controller_names(), or an impairment
-  double share = 0;                          // of vehicles; of all agents where impaired
-  Impairment impairment = Impairment::none;  // by its name
+  std::string name;  // a saved policy's file, a name of town_controller_names(), or an impairment
+  double share = 0;  // of vehicles; of all agents for an impairment
+  Impairment impairment = Impairment::none;  // impairment of this name
 };
 constexpr size_t kMaxOtherDrivers = 8;
 
-/// Parses texts like "lane=0.25", "models/vector.safetensors=0.5" or "blind=0.05". Throws UsageError naming a text that
-/// has another form, or a share that is not above 0; also if the shares sum to 1 or more, an impairment is given twice,
-/// or there are more than kMaxOtherDrivers.
+/// Parses texts like "lane=0.25", "models/vector.safetensors=0.5" or "blind=0.05". Throws UsageError naming a text of
+/// another form, or a share that is not above 0; also if the shares sum to 1 or more, an impairment is given twice, or
+/// there are more than kMaxOtherDrivers.
 std::vector<OtherDriver> other_drivers(const std::vector<std::string>& texts);
 
-/// Assigns the vehicles of an evaluation's worlds to drivers. Driver 0 is the evaluated one; the others follow in their
-/// order.
+/// Assigns the vehicles of an evaluation's worlds to drivers. Driver 0 is the evaluated driver; the others follow in
+/// their order.
 class MixedTraffic {
  public:
-  /// Opens the others on `device`, with argmax and seed of the options. Renderers of those that see images hold the
-  /// maps under the handles 0, 1, ... Conditioning is the world's. Throws UsageError for impairments of what a
-  /// controller does not look at.
+  /// Opens the others on `device`, with argmax and seed of the options. Renderers of policies with images hold the maps
+  /// under the handles 0, 1, ... Conditioning is the world's. Throws UsageError for impairments of an input that a
+  /// controller does not read.
   MixedTraffic(const std::vector<OtherDriver>& others, const DriverOptions& options, Device device,
                const CompiledMaps& maps);
   ~MixedTraffic();
@@ -42,18 +42,18 @@ class MixedTraffic {
   MixedTraffic& operator=(const MixedTraffic&) = delete;
 
   size_t num_drivers() const;
-  /// The driver's name; empty for driver 0.
+  /// Name of the driver; empty for driver 0.
   std::string name(size_t driver) const;
-  /// The others in an evaluation's setting: a policy's hash or a controller's name, and its share.
+  /// Entries of the others in an evaluation's setting: a policy's hash or a controller's name, and its share.
   std::vector<std::string> setting() const;
-  /// The world with every array that some driver reads, and with impaired agents.
+  /// Returns the world with every array that a driver reads, and with impaired agents.
   SimulatorConfig adapted(SimulatorConfig world) const;
 
-  /// The driver of each slot, [slots], drawn from seed, global world and agent: first of impaired agents, of any class,
-  /// then of the other vehicles. Driver 0 has all pedestrians and cyclists that are not impaired.
+  /// Driver of each slot, [slots], drawn from seed, global world and agent: first of impaired agents, of any class,
+  /// then of the other vehicles. Driver 0 drives all pedestrians and cyclists that are not impaired.
   std::vector<uint8_t> driver_of_slots(Simulator& simulator) const;
-  /// Combines `own`, driver 0, with the others for a simulator at the start of its episodes. This must outlive the
-  /// result.
+  /// Combines `own`, driver 0, with the others for a simulator at the start of its episodes. This object must outlive
+  /// the result.
   Driving share(Driving own, Simulator& simulator, const std::vector<uint8_t>& driver_of_slot) const;
 
  private:
@@ -61,7 +61,7 @@ class MixedTraffic {
   size_t impaired_driver(Impairment impairment) const;
   size_t drawn_driver(uint32_t global_world, uint32_t agent) const;
 
-  DriverOptions options_;  // of whom is evaluated; others take argmax and seed
+  DriverOptions options_;  // of the evaluated driver; the others use its argmax and seed
   std::vector<std::unique_ptr<Other>> others_;
 };
 

@@ -1,4 +1,4 @@
-// How much of an evaluation is done, and how long the rest takes. Without torch headers.
+// Progress of an evaluation: the completed fraction and the remaining time. Has no torch headers.
 #pragma once
 
 #include <functional>
@@ -9,11 +9,11 @@ namespace pictura {
 
 class EvaluationClock {
  public:
-  /// on_progress(done fraction, seconds to come) may be empty.
+  /// Creates a clock. on_progress(completed fraction, remaining seconds) may be empty.
   explicit EvaluationClock(const std::function<void(double, double)>& on_progress) : on_progress_(on_progress) {}
 
-  /// Calls it from the second call on: the first step compiles and tunes, so that how long it takes tells nothing of
-  /// the others.
+  /// Reports progress from the second call on: the first step compiles and tunes, so its duration does not predict the
+  /// others.
   void update(double fraction) {
     if (!on_progress_) return;
     if (first_s_ < 0) {

@@ -25,7 +25,7 @@ constexpr const char* kLaterCounts[] = {"asked",        "spawned",         "ente
 
 constexpr Estimate kUnknown{std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()};
 
-// Returns a scenario's counts as format 1 has them.
+// Returns a scenario's counts in format 1.
 Json as_format_1(Json json) {
   json["infractions"] = json.at("at_fault_infraction");
   for (const char* name : kCountsOfFormat2) json.erase(name);
@@ -33,7 +33,7 @@ Json as_format_1(Json json) {
   return json;
 }
 
-// Returns a scenario's counts of format 1 with the keys of format 2; 0 for what was not counted.
+// Converts a scenario's counts of format 1 to the keys of format 2; 0 for missing counts.
 Json from_format_1(Json json) {
   for (const char* name : kCountsOfFormat2) json[name] = 0;
   json["at_fault_infraction"] = json.at("infractions");
@@ -50,7 +50,7 @@ struct Part {
   const std::string* name;
 };
 
-// Of one density.
+// Merges the parts of one density.
 DensityResult joined(std::vector<Part> parts) {
   std::sort(parts.begin(), parts.end(),
             [](const Part& a, const Part& b) { return a.result->first_scenario < b.result->first_scenario; });
@@ -224,7 +224,7 @@ EvaluationResults read_results(const std::string& path) {
     for (const Json& density : json.at("densities")) {
       DensityResult result;
       density.at("density").get_to(result.density);
-      result.driver = density.value("driver", "");  // files of earlier versions lack it
+      result.driver = density.value("driver", "");  // absent in files of earlier versions
       density.at("agents_per_world").get_to(result.agents_per_world);
       density.at("first_scenario").get_to(result.first_scenario);
       for (const Json& counts : density.at("scenarios")) {

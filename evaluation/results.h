@@ -1,5 +1,5 @@
-// What evaluated vehicles did, by scenario; the paper's metrics over them; and the file by which parts of an evaluation
-// are merged. Without torch headers.
+// Results of evaluated vehicles by scenario, the paper's metrics over them, and the file format from which parts of an
+// evaluation are merged. Has no torch headers.
 #pragma once
 
 #include <array>
@@ -14,45 +14,45 @@
 
 namespace pictura {
 
-// X(type, name in files).
-#define PICTURA_SCENARIO_COUNTS(X)                                                                                     \
-  X(int64_t, vehicles)                                                                                                 \
-  X(int64_t, collision) /* at fault or not */                                                                          \
-  X(int64_t, at_fault)  /* collisions at fault alone */                                                                \
-  X(int64_t, off_road)                                                                                                 \
-  X(int64_t, red_light)                                                                                                \
-  X(int64_t, wall_contact)   /* belongs to neither kind of infraction below */                                         \
-  X(int64_t, any_infraction) /* a collision, off-road or a red light: the paper's (appendix, metric definitions) */    \
-  X(int64_t, at_fault_infraction) /* a collision at fault, off-road or a red light */                                  \
-  X(int64_t, active_at_end)       /* vehicles that have not halted by the last step, or before they left */            \
-  X(int64_t, never_moved)         /* vehicles that stayed at rest (kRest_mps); 0 in files of earlier versions */       \
-  X(int64_t, goals)                                                                                                    \
-  X(int64_t, waypoints)                                                                                                \
-  X(double, distance_m)                                                                                                \
-  X(double, returns)                                                                                                   \
-  X(int64_t, asked) /* as the three below of agents of all classes, see SpawnReport; 0 in files of earlier versions */ \
-  X(int64_t, spawned)                                                                                                  \
-  X(int64_t, entered)                                                                                                  \
+// List of counts: X(type, name in files).
+#define PICTURA_SCENARIO_COUNTS(X)                                                                                  \
+  X(int64_t, vehicles)                                                                                              \
+  X(int64_t, collision) /* at fault or not */                                                                       \
+  X(int64_t, at_fault)  /* collisions at fault only */                                                              \
+  X(int64_t, off_road)                                                                                              \
+  X(int64_t, red_light)                                                                                             \
+  X(int64_t, wall_contact)   /* in neither kind of infraction below */                                              \
+  X(int64_t, any_infraction) /* a collision, off-road or a red light: the paper's (appendix, metric definitions) */ \
+  X(int64_t, at_fault_infraction) /* a collision at fault, off-road or a red light */                               \
+  X(int64_t, active_at_end)       /* vehicles that have not halted by the last step, or before they left */         \
+  X(int64_t, never_moved)         /* vehicles that stayed at rest (kRest_mps); 0 in files of earlier versions */    \
+  X(int64_t, goals)                                                                                                 \
+  X(int64_t, waypoints)                                                                                             \
+  X(double, distance_m)                                                                                             \
+  X(double, returns)                                                                                                \
+  X(int64_t, asked) /* these four: agents of all classes, see SpawnReport; 0 in files of earlier versions */        \
+  X(int64_t, spawned)                                                                                               \
+  X(int64_t, entered)                                                                                               \
   X(int64_t, left)
 
-// Likewise. Waits at red lights are from a step in which the bumper is at most 5 m before the line, at rest
-// (kRest_mps), to the light's change or the vehicle's.
+// List of standing counts: X(type, name in files). A wait at a red light lasts from a step in which the bumper is at
+// most 5 m before the line, at rest (kRest_mps), until the light changes or no longer applies to the vehicle.
 #define PICTURA_STANDING_COUNTS(X)                                               \
   X(int64_t, driven_steps)    /* of active vehicles */                           \
-  X(int64_t, reversing_steps) /* of those, backwards, not at rest (kRest_mps) */ \
+  X(int64_t, reversing_steps) /* of these: backwards, not at rest (kRest_mps) */ \
   X(int64_t, red_waits)                                                          \
   X(double, red_wait_moved_m) /* forwards or backwards */                        \
-  X(int64_t, stuck_at_end)    /* active in the last step, and not 5 m on for 60 s */
+  X(int64_t, stuck_at_end)    /* active in the last step, with less than 5 m of progress in 60 s */
 
-/// How the vehicles of one scenario stand and go backwards. 0 in files of earlier versions.
+/// Counts of how the vehicles of one scenario stand and reverse. 0 in files of earlier versions.
 struct StandingCounts {
 #define X(type, name) type name = 0;
   PICTURA_STANDING_COUNTS(X)
 #undef X
 };
 
-/// Counts over the vehicles of one scenario; on roads that end, over their lives, each of which counts as a vehicle. An
-/// event counts once a vehicle, however often it happens.
+/// Counts over the vehicles of one scenario. On roads that end they are counted over lives, each of which counts as a
+/// vehicle. An event counts once per vehicle, however often it happens.
 struct ScenarioCounts {
 #define X(type, name) type name = 0;
   PICTURA_SCENARIO_COUNTS(X)
@@ -71,24 +71,24 @@ struct ScenarioCounts {
   }
 };
 
-/// The scenarios first, first + 1, ... of one density.
+/// Results of the scenarios first_scenario, first_scenario + 1, ... of one density.
 struct DensityResult {
   std::string density;
   int agents_per_world = 0;
   int first_scenario = 0;
   std::vector<ScenarioCounts> scenarios;
-  std::string driver;  // whose vehicles: one of EvaluateOptions::others; empty: the evaluated driver's
-  // The agent with the gravest infraction of each scenario: a collision at fault, else off-road, else a red light; else
-  // agent 0. Not in files.
+  std::string driver;  // driver of the vehicles: one of EvaluateOptions::others; empty: the evaluated driver
+  // Agent with the gravest infraction of each scenario: a collision at fault, else off-road, else a red light; agent 0
+  // if there is none. Not in files.
   std::vector<int> worst_agents;
 };
 
-/// What decides an evaluation's numbers. Parts are merged where all of it is the same.
+/// Setting that determines an evaluation's numbers. Parts can be merged if all of it is equal.
 struct EvaluationSetting {
-  std::string policy_hash;  // of the weights; a controller's name
+  std::string policy_hash;  // hash of the weights; a controller's name
   std::vector<std::string> maps;
-  // Of the maps' roads, of the bytes of recorded scenes' files, and of the poses and lenses of all cameras. Empty in
-  // files of earlier versions, and where nobody asked for it.
+  // Hashes of the maps' roads (of the bytes of recorded scenes' files), and of the poses and lenses of all cameras.
+  // Empty in files of earlier versions, and if they were not requested.
   std::string maps_hash, cameras_hash;
   std::map<std::string, std::string> config;  // see keys_of_evaluation(); empty in files of earlier versions
   int steps = 0;
@@ -96,35 +96,37 @@ struct EvaluationSetting {
   uint64_t seed = 0;
   std::string precision, device;                        // of the network; "cpu" or "cuda"
   std::string renderer, samples;                        // empty for policies without images
-  std::vector<std::string> image_sizes;                 // "96x54", of each camera
-  std::string light_heads = "as_mapped";                // see map/map_geometry.h; files without it have this one
+  std::vector<std::string> image_sizes;                 // "96x54", one per camera
+  std::string light_heads = "as_mapped";                // see map/map_geometry.h; default of files without it
   std::array<double, kNumConditioning> conditioning{};  // of every agent, in the order of simulator/conditioning.h
   LightCycles light_cycles = LightCycles::phases;
-  std::vector<std::string> others;  // who else drives, see MixedTraffic::setting()
-  double camera_severity = 0;       // of randomized cameras (SessionOptions)
+  std::vector<std::string> others;  // other drivers, see MixedTraffic::setting()
+  double camera_severity = 0;       // severity of randomized cameras (SessionOptions)
   friend bool operator==(const EvaluationSetting&, const EvaluationSetting&) = default;
 };
 
 struct EvaluationResults {
   EvaluationSetting setting;
-  /// False for files of format 1, which lack collision, wall_contact and any_infraction.
+  /// Whether all counts are present; false for files of format 1, which lack collision, wall_contact and
+  /// any_infraction.
   bool counts_all_collisions = true;
   std::vector<DensityResult> densities;
 };
 
-/// A ratio of sums over scenarios. 95 % of such intervals, value +- half_width_95, hold the ratio over all scenarios
+/// Ratio of sums over scenarios. 95 % of such intervals, value +- half_width_95, contain the ratio over all scenarios
 /// that could be drawn, by the linearised variance between scenarios; infinite for one scenario.
 struct Estimate {
   double value = 0, half_width_95 = 0;
 };
 
-/// What a scenario adds to the sums of a ratio.
+/// One scenario's terms of a ratio's sums.
 struct RatioTerm {
   double part = 0, whole = 0;
 };
-/// Infinite where there is nothing to divide by. A mean of one number a scenario is the ratio with wholes of 1.
+/// Estimates the ratio of the sums; infinite if the divisor is 0. A mean of one number per scenario is the ratio with
+/// wholes of 1.
 Estimate estimate_ratio(const std::vector<RatioTerm>& scenarios);
-/// Of the parts and wholes of what was counted in each scenario.
+/// Estimates the ratio of part_of(counts) and whole_of(counts) over scenarios.
 template <typename Counts, typename Part, typename Whole>
 Estimate estimate_ratio(const std::vector<Counts>& scenarios, const Part& part_of, const Whole& whole_of) {
   std::vector<RatioTerm> terms;
@@ -134,42 +136,42 @@ Estimate estimate_ratio(const std::vector<Counts>& scenarios, const Part& part_o
   return estimate_ratio(terms);
 }
 
-/// The paper's five metrics (appendix, metric definitions) over the vehicles of one density, and more. Metrics of what
-/// was not counted are NaN.
+/// The paper's five metrics (appendix, metric definitions) over the vehicles of one density, and further metrics.
+/// Metrics that were not counted are NaN.
 struct EvaluateRow {
-  std::string density, driver;  // as DensityResult's
+  std::string density, driver;  // as in DensityResult
   int scenarios = 0, steps = 0;
-  int64_t vehicle_episodes = 0, infractions = 0;  // the second: vehicles with any_infraction
+  int64_t vehicle_episodes = 0, infractions = 0;  // infractions: vehicles with any_infraction
   Estimate at_fault_collision_rate, off_road_rate, red_light_rate, goals_per_vehicle;
-  Estimate km_per_infraction;  // over vehicles with any_infraction; infinite when there was none
+  Estimate km_per_infraction;  // over vehicles with any_infraction; infinite without any
   double km_driven = 0;
   Estimate km_per_vehicle, waypoints_per_vehicle, return_per_vehicle;
   Estimate active_at_end_share, never_moved_share;
   Estimate collision_rate, wall_contact_rate;
-  Estimate km_per_at_fault_infraction;  // over vehicles with at_fault_infraction; infinite when there was none
-  // Per km, since lives on roads that end are short.
+  Estimate km_per_at_fault_infraction;  // over vehicles with at_fault_infraction; infinite without any
+  // Rates per km, since lives on roads that end are short.
   Estimate at_fault_collisions_per_km, off_road_per_km, red_lights_per_km, goals_per_km;
   int64_t asked = 0, spawned = 0, entered = 0, left = 0;
-  // See StandingCounts: of the time that vehicles drive; of a wait; of vehicles. The second is NaN without any wait.
+  // See StandingCounts: fraction of driving time; mean per wait, NaN without waits; fraction of vehicles.
   Estimate reversing_share, red_wait_moved_m, stuck_at_end_share;
   int64_t red_waits = 0;
 };
 
-/// Its metrics with the names that they have in files.
+/// Metrics of a row with their names in files.
 std::vector<std::pair<std::string, Estimate>> metrics_of(const EvaluateRow& row);
 
 EvaluateRow row_of(const DensityResult& result, int steps);
 /// Returns one row a density, in the order of the results.
 std::vector<EvaluateRow> rows_of(const EvaluationResults& results);
 
-/// Joins the parts of each density, which must be of one setting and together scenarios without gap or overlap. The
-/// result counts all collisions where every part does. Throws Error naming the parts, by the names given, and what
-/// differs.
+/// Merges parts, which must have the same setting, and whose scenarios must be contiguous and disjoint for each
+/// density. The result counts all collisions if every part does. Throws Error naming the parts, by the names given, and
+/// the difference.
 EvaluationResults merge(const std::vector<EvaluationResults>& parts, const std::vector<std::string>& names);
 
-/// Writes the results as one JSON object, exactly: of format 2, or of format 1 where not all collisions are counted.
+/// Writes the results as one JSON object without loss: in format 2, or in format 1 if not all collisions are counted.
 void write_results(const std::string& path, const EvaluationResults& results);
-/// Reads files of both formats. Throws Error naming the file and what it lacks.
+/// Reads files of both formats. Throws Error naming the file and what is missing.
 EvaluationResults read_results(const std::string& path);
 
 }  // namespace pictura

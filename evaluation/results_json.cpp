@@ -59,7 +59,7 @@ EvaluationSetting setting_from(const Json& json) {
   for (size_t i = 0; i < kNumConditioning; ++i) {
     json.at("conditioning").at(kConditioningNames[i]).get_to(s.conditioning[i]);
   }
-  // Results of versions that knew one kind of cycles do not name it.
+  // Files of versions with one kind of light cycles do not name it.
   s.light_cycles = light_cycles_named(json.value("light_cycles", name_of(LightCycles::phases)));
   return s;
 }

@@ -1,4 +1,4 @@
-// What the files by which parts of evaluations are merged have in common.
+// Common parts of the files from which parts of evaluations are merged.
 #pragma once
 
 #include <functional>
@@ -13,7 +13,7 @@ namespace pictura {
 Json to_json(const EvaluationSetting& setting);
 EvaluationSetting setting_from(const Json& json);
 
-/// A ScenarioCounts' or a SceneCounts' counts by their names.
+/// Counts of a ScenarioCounts or SceneCounts by name.
 template <typename Counts>
 Json counts_json(const Counts& counts) {
   Json json;
@@ -27,15 +27,15 @@ Counts counts_from(const Json& json) {
   return counts;
 }
 
-/// Throws Error naming the first key whose values differ in two parts' objects, and the parts. Keys of objects in them
-/// are named as "rules.box_scale"; `within` is what stands before all keys.
+/// Throws Error naming the first key whose values differ between two parts' objects, and the parts. Keys of nested
+/// objects are written as "rules.box_scale"; `within` is the prefix of all keys.
 void check_same(const Json& first, const std::string& first_name, const Json& other, const std::string& other_name,
                 const std::string& within = "");
 
-/// A file's JSON. Throws Error naming the file unless it is that of one of these formats, the first being the present
-/// one.
+/// Reads a file's JSON. Throws Error naming the file unless it has one of these formats, the first of which is the
+/// current format.
 Json read_results_json(const std::string& path, const std::vector<std::string>& formats);
-/// Calls parse, and throws Error naming the file where that misses a value of the JSON, or throws one.
+/// Calls parse(), and throws Error naming the file if parse() misses a JSON value or throws a JSON exception.
 void parse_results(const std::string& path, const std::function<void()>& parse);
 
 }  // namespace pictura

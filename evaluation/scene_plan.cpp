@@ -21,7 +21,7 @@ const RecordedState& state_of(const CompiledMap& map, size_t track, int32_t step
   return record.states[track * static_cast<size_t>(record.num_steps) + static_cast<size_t>(step)];
 }
 
-/// The first step of the episode at which the track is there; -1: none.
+/// First episode step at which the track is present; -1: none.
 int32_t first_step(const CompiledMap& map, size_t track) {
   for (int32_t step = 0; step < map.rules.record.num_steps; ++step) {
     if (state_of(map, track, step).is_there) return step;
@@ -29,7 +29,7 @@ int32_t first_step(const CompiledMap& map, size_t track) {
   return -1;
 }
 
-/// Whether the box cannot start a drive: it touches an edge, is off the road, or touches another's that stays.
+/// Whether the box cannot start a drive: it touches an edge, is off the road, or touches another box that stays.
 bool overlaps(const MapView& map, Span<const AgentBox> boxes, const std::vector<SceneRole>& roles, size_t track) {
   const AgentBox& box = boxes[track];
   if (!fits_map(map, box)) return true;
@@ -40,7 +40,7 @@ bool overlaps(const MapView& map, Span<const AgentBox> boxes, const std::vector<
   return false;
 }
 
-/// [tracks] the step at which each would be taken over, were it not for overlaps and thinning; -1: never.
+/// Episode step at which each track would be taken over, ignoring overlaps and thinning, [tracks]; -1: never.
 std::vector<int32_t> takeovers(const CompiledMap& map, const SceneProtocol& protocol) {
   const Scenario& scene = *map.scenario;
   const std::vector<uint8_t> named = tracks_named(scene, protocol.control);
@@ -105,7 +105,7 @@ ScenePlan plan_scene(const CompiledMap& map, Span<const AgentBox> boxes, const S
                              (protocol.late == Late::absent && !boxes[track].drawn);
     if (thinned[track] || is_left_out) plan.roles[track] = SceneRole::removed;
   }
-  // The self-driving car first, so that a bound on their number never leaves it out.
+  // The self-driving car comes first, so that a maximum number of driven road users never excludes it.
   std::vector<size_t> order(num_tracks);
   std::iota(order.begin(), order.end(), size_t{0});
   if (scene.sdc_track >= 0) {

@@ -1,5 +1,5 @@
-// Who does what when a recorded scene is evaluated: which road users are driven, which follow the recording, and which
-// are taken out of it. Without torch headers.
+// Roles in the evaluation of a recorded scene: road users that are driven, that follow the recording, and that are
+// removed. Has no torch headers.
 #pragma once
 
 #include <vector>
@@ -9,31 +9,31 @@
 
 namespace pictura {
 
-/// A scene as a protocol has it: with boxes of its scale. Throws Error where its time step is not 0.1 s.
+/// Adapts a scene to a protocol: scales its boxes. Throws Error if its time step is not 0.1 s.
 std::shared_ptr<const Scenario> protocol_scene(Scenario scenario, const SceneProtocol& protocol);
 
-/// [tracks] 1 for those that thinning takes out: of the road users besides the self-driving car round((1 - density) n),
-/// by a draw of seed and scenario id. Those of a density are among those of every lower one.
+/// Selects the tracks that thinning removes, [tracks]: of the n road users besides the self-driving car round((1 -
+/// density) n), by a draw of seed and scenario id. Tracks removed at a density are also removed at every lower density.
 std::vector<uint8_t> thinned_out(const Scenario& scenario, double density, uint64_t seed);
 
 enum class SceneRole : uint8_t { removed, replayed, driven };
 
 struct ScenePlan {
   std::vector<SceneRole> roles;         // [tracks]
-  std::vector<int32_t> takeover_steps;  // [tracks] of the episode, at which a driven one is there
+  std::vector<int32_t> takeover_steps;  // [tracks] episode step at which a driven track appears
 };
 
-/// Whether the scene has anybody to drive, whatever the density and who overlaps. Where it has not, all vehicles are
-/// parked, or none is there.
+/// Whether the scene has a road user to drive, ignoring density and overlaps. If not, all vehicles are parked, or there
+/// is none.
 bool has_drivers(const CompiledMap& map, const SceneProtocol& protocol);
 
-/// The roles in a world of the map, compiled from protocol.start_step on. boxes [tracks]: those of its scene at the
-/// start of the episode.
+/// Plans the roles in a world of the map, compiled from protocol.start_step on. boxes [tracks]: boxes of its scene at
+/// the start of the episode.
 ScenePlan plan_scene(const CompiledMap& map, Span<const AgentBox> boxes, const SceneProtocol& protocol, double density,
                      uint64_t seed);
 
-/// Waypoints::path: of a driven track the places on its recorded path at a third and two thirds of the way from its
-/// takeover to its goal, and the goal.
+/// Waypoints of Waypoints::path: points of a driven track's recorded path at one and two thirds of the distance from
+/// its takeover to its goal, and the goal.
 std::vector<Vec3> path_waypoints(const CompiledMap& map, int32_t track, int32_t takeover_step);
 
 }  // namespace pictura

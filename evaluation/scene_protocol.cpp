@@ -18,14 +18,14 @@ constexpr std::array<const char*, 2> kOverlappingWords{"replay", "drive"}, kOthe
 constexpr std::array<const char*, 3> kLateWords{"replay", "drive", "absent"},
     kInfractionWords{"halt", "leave", "drive_on"};
 
-/// One that may be chosen otherwise: how it is described, read and written.
+/// Rule that can be changed: its description, parser and writer.
 struct Rule {
   SceneRule about;
   void (*set)(const std::string& name, const std::string& value, SceneProtocol* out);
   std::string (*text)(const SceneProtocol& protocol);
 };
 
-/// Of an enumeration, or a bool, by its words.
+/// Creates the rule of an enumeration, or of a bool, by its words.
 template <auto kMember, const auto& kWords>
 constexpr Rule word_rule(const char* name, const char* values, const char* what) {
   return {{name, values, what},
@@ -80,7 +80,7 @@ constexpr std::array kRules{
 std::vector<SceneProtocol> make_protocols() {
   const SceneProtocol paper;
 
-  // Emerge-Lab/gpudrive: moving vehicles that are no experts, at most 64; who collides or arrives is removed.
+  // Emerge-Lab/gpudrive: moving vehicles that are not experts, at most 64; agents that collide or arrive are removed.
   SceneProtocol gpudrive = paper;
   gpudrive.name = "gpudrive";
   gpudrive.steps = 91;
@@ -91,7 +91,7 @@ std::vector<SceneProtocol> make_protocols() {
   gpudrive.max_driven = 64;
   gpudrive.after_infraction = AfterInfraction::leave;
 
-  // PufferDrive 2.0: smaller boxes; who is at its goal is background.
+  // PufferDrive 2.0: smaller boxes; agents at their goal become background.
   SceneProtocol puffer2 = paper;
   puffer2.name = "pufferdrive2";
   puffer2.steps = 91;
@@ -99,7 +99,7 @@ std::vector<SceneProtocol> make_protocols() {
   puffer2.box_scale = 0.7f;
   puffer2.replay_experts = true;
 
-  // PufferDrive 3.0, womd_multi: whole boxes; who arrives keeps driving.
+  // PufferDrive 3.0, womd_multi: full-size boxes; agents that arrive keep driving.
   SceneProtocol puffer3 = puffer2;
   puffer3.name = "pufferdrive3";
   puffer3.box_scale = 1;
@@ -117,7 +117,7 @@ std::vector<SceneProtocol> make_protocols() {
   waymax.after_infraction = AfterInfraction::drive_on;
   waymax.leave_at_goal = false;
 
-  // The Waymo sim-agents challenge: everybody who is there at the start, whatever happens, 32 times.
+  // The Waymo sim-agents challenge: all road users present at the start, regardless of events, 32 times.
   SceneProtocol simagents = waymax;
   simagents.name = "simagents";
   simagents.control = "all";

@@ -1,5 +1,5 @@
-// What evaluated vehicles did in recorded scenes: by road user, by scene, and the figures over all of them; and the
-// file by which parts of an evaluation are merged. Without torch headers.
+// Results of evaluated vehicles in recorded scenes: by road user, by scene, and over all scenes; and the file format
+// from which parts of an evaluation are merged. Has no torch headers.
 #pragma once
 
 #include <cstdint>
@@ -13,20 +13,21 @@
 
 namespace pictura {
 
-// X(type, name in files).
+// List of counts: X(type, name in files).
 #define PICTURA_SCENE_COUNTS(X)                                      \
   X(int64_t, vehicles)                                               \
   X(int64_t, at_fault)                                               \
   X(int64_t, collision)                                              \
   X(int64_t, off_road)                                               \
-  X(int64_t, goals)         /* that arrived */                       \
-  X(int64_t, infractions)   /* that were at fault or off the road */ \
-  X(int64_t, measured)      /* whose displacement is known */        \
-  X(double, displacement_m) /* sum of their means */                 \
+  X(int64_t, goals)         /* vehicles that arrived */              \
+  X(int64_t, infractions)   /* vehicles at fault or off the road */  \
+  X(int64_t, measured)      /* vehicles with a known displacement */ \
+  X(double, displacement_m) /* sum of their mean displacements */    \
   X(double, distance_m)                                              \
   X(int64_t, driven_steps) /* of all driven road users */
 
-/// Of the driven vehicles of all rollouts of one scene at one density. Those with an event had it once or more.
+/// Counts over the driven vehicles of all rollouts of one scene at one density. A vehicle counts once per event,
+/// however often the event happens.
 struct SceneCounts {
 #define X(type, name) type name = 0;
   PICTURA_SCENE_COUNTS(X)
@@ -41,14 +42,14 @@ struct SceneCounts {
   }
 };
 
-/// What an evaluation counted in the scenes first_scene, first_scene + 1, ... of all that its setting names.
+/// Counts of an evaluation in the scenes first_scene, first_scene + 1, ... of all scenes of its setting.
 struct SceneResults {
-  EvaluationSetting setting;  // its maps are where the scenes are
+  EvaluationSetting setting;  // its maps are the locations of the scenes
   SceneProtocol protocol;
-  std::vector<std::string> unread;  // files, and ends of files, that are no scenes, of all; and why
+  std::vector<std::string> unread;  // files, and ends of files, that are no scenes, over all scenes, with reasons
   int first_scene = 0, num_scenes = 0;
-  int without_drivers = 0;          // left out: nobody whom the protocol would drive, since all are parked or not there
-  std::vector<std::string> faults;  // left out: scenes that cannot be read or simulated, and why
+  int without_drivers = 0;          // scenes left out without a road user to drive, since all are parked or absent
+  std::vector<std::string> faults;  // scenes left out because they cannot be read or simulated, with reasons
   std::vector<std::vector<SceneCounts>> counts;  // [densities][scored scenes]
 
   int scored() const { return counts.empty() ? 0 : static_cast<int>(counts.front().size()); }
@@ -62,45 +63,47 @@ struct SceneAgent {
   int rollout = 0;
   int64_t track_id = 0;
   TrackType type = TrackType::unset;
-  int32_t takeover_step = 0;  // of the episode
+  int32_t takeover_step = 0;  // episode step
   int32_t driven_steps = 0;
-  int events = 0;  // of its episode: bits of Event
+  int events = 0;  // events of its episode: bits of Event
   bool arrived = false;
   float distance_m = 0;
-  // From the recording, over the steps that it has while the agent drives, and at the last of them; NaN without one.
+  // Distance from the recording: mean over its recorded steps while the agent drives, and at the last of them; NaN
+  // without such steps.
   float mean_displacement_m = std::numeric_limits<float>::quiet_NaN(), final_displacement_m = mean_displacement_m;
 };
 
-/// Adds a road user to what its scene counts, if it is a vehicle.
+/// Adds a road user to its scene's counts, if it is a vehicle.
 void add(const SceneAgent& agent, bool is_vehicle, SceneCounts* counts_inout);
 
-/// The figures of one density over vehicle episodes; intervals are over scenes.
+/// Results of one density over vehicle episodes; intervals are over scenes.
 struct SceneRow {
   double density = 1;
   int scenes = 0;
   int64_t vehicle_episodes = 0;
   double km_driven = 0;
   Estimate at_fault_collision_rate, off_road_rate, goal_rate;
-  Estimate collision_rate;       // of any fault
-  Estimate mean_displacement_m;  // of vehicles, each with its mean
+  Estimate collision_rate;       // at fault or not
+  Estimate mean_displacement_m;  // mean over vehicles of each vehicle's mean
 };
 SceneRow row_of(double density, const std::vector<SceneCounts>& scenes);
-/// By the densities of the protocol; none where no scene was scored.
+/// Returns a row for each density of the protocol; empty if no scene was scored.
 std::vector<SceneRow> rows_of(const SceneResults& results);
-/// Its metrics with the names that they have in files.
+/// Metrics of a row with their names in files.
 std::vector<std::pair<std::string, Estimate>> metrics_of(const SceneRow& row);
 
-/// Joins parts, which must be of one setting and protocol and together scenes without gap or overlap. Throws Error
-/// naming the parts, by the names given, and what differs.
+/// Merges parts, which must have the same setting and protocol, and whose scenes must be contiguous and disjoint.
+/// Throws Error naming the parts, by the names given, and the difference.
 SceneResults merge(const std::vector<SceneResults>& parts, const std::vector<std::string>& names);
 
-/// As one JSON object, exactly. read_scene_results throws Error naming the file and what it lacks.
+/// Writes and reads one JSON object without loss. read_scene_results() throws Error naming the file and what is
+/// missing.
 void write_results(const std::string& path, const SceneResults& results);
 SceneResults read_scene_results(const std::string& path);
-/// Whether the file says that it is of scenes, rather than of towns or nothing of the kind.
+/// Whether the file declares results of scenes, rather than of towns or anything else.
 bool has_scene_results(const std::string& path);
 
-/// A line of a CSV file each, with its newline; the first names the columns.
+/// Lines of a CSV file, each with its newline; the first line names the columns.
 std::string scene_agents_csv_head();
 std::string csv_line(const SceneAgent& agent);
 

@@ -14,14 +14,14 @@ namespace {
 
 constexpr int kChallengeStart = 10, kChallengeSteps = 80, kChallengeRollouts = 32;
 
-// Numbers of fields, and the values of enumerations.
+// Field numbers and enumeration values of the schema.
 enum class Submission : uint8_t { scenario_rollouts = 1, submission_type = 2 };
 enum class Rollouts : uint8_t { scenario_id = 1, joint_scenes = 2 };
 enum class JointScene : uint8_t { simulated_trajectories = 1 };
 enum class Trajectory : uint8_t { center_x = 2, center_y = 3, center_z = 4, heading = 5, object_id = 6 };
 constexpr uint64_t kSimAgentsSubmission = 1;
 
-/// A packed field of one member of all states.
+/// Appends a packed field of one member of all states.
 void append_floats(Trajectory field, Span<const SimulatedState> states, float SimulatedState::* member,
                    std::string* out) {
   std::vector<float> numbers;

@@ -1,5 +1,5 @@
-// Rollouts of recorded scenes in the shape that the Waymo Open Sim Agents Challenge asks for, and their file. Nothing
-// here scores them. Without torch headers.
+// Rollouts of recorded scenes in the format of the Waymo Open Sim Agents Challenge, and their file. Scoring is not
+// included. Has no torch headers.
 #pragma once
 
 #include <cstdint>
@@ -11,14 +11,14 @@
 
 namespace pictura {
 
-/// The centre of a road user's box, in the coordinates of the scene's file.
+/// Centre of a road user's box, in the coordinates of the scene's file.
 struct SimulatedState {
   float x_m = 0, y_m = 0, z_m = 0;
   float heading_rad = 0;  // in [-pi, pi], from x towards y
 };
 
-/// One scene: of every road user that the recording has at the protocol's start, where it was after each step of each
-/// rollout. Who left, or whom the recording lost, stays where it was last.
+/// Rollouts of one scene: the state of every road user that is present at the protocol's start after each step of each
+/// rollout. A road user that left, or that the recording lost, keeps its last state.
 struct SceneRollouts {
   std::string scenario_id;
   int steps = 0;
@@ -26,23 +26,23 @@ struct SceneRollouts {
   std::vector<std::vector<SimulatedState>> rollouts;  // [rollouts][objects * steps]
 };
 
-/// Throws UsageError unless the protocol is what the challenge asks for: 32 rollouts of 80 steps from step 10 on, of
-/// all road users that are there.
+/// Throws UsageError unless the protocol satisfies the challenge: 32 rollouts of 80 steps from step 10 on, of all road
+/// users that are present.
 void check_rollouts(const SceneProtocol& protocol);
 
-/// A scene as a message ScenarioRollouts of the challenge's schema
-/// (waymo_open_dataset/protos/sim_agents_submission.proto, proto2). Throws Error for ids that its int32 has no room
-/// for.
+/// Encodes a scene as a message ScenarioRollouts of the challenge's schema
+/// (waymo_open_dataset/protos/sim_agents_submission.proto, proto2). Throws Error for ids that do not fit into its
+/// int32.
 std::string encoded(const SceneRollouts& scene);
 
-/// A file of one message SimAgentsChallengeSubmission, with its type and scenes and nothing of its authors. Such files
-/// one after the other are such a message too.
+/// File of one message SimAgentsChallengeSubmission, with its type and scenes but without its authors. Concatenated
+/// files also form such a message.
 class RolloutsFile {
  public:
   explicit RolloutsFile(const std::string& path);
-  /// Appends a scene. Throws Error where the message would become longer than 2 GiB, which protobuf does not read.
+  /// Appends a scene. Throws Error if the message would exceed 2 GiB, which protobuf does not read.
   void write(const SceneRollouts& scene);
-  /// Puts the file in place, see OutputFile.
+  /// Moves the file into place, see OutputFile.
   void commit() { file_.commit(); }
 
  private:

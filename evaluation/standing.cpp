@@ -11,12 +11,12 @@ namespace pictura {
 
 namespace {
 
-// Largest distance of a waiting front bumper from its line. Vehicles behind the first are farther away, and may close
+// Maximum distance of a waiting front bumper from its line. Vehicles behind the first are farther away, and may close
 // up.
 constexpr float kWaitReach_m = 5;
 constexpr float kStuckWithin_m = 5, kStuckFor_s = 60;
 
-// The red light at whose line the vehicle is the first, or -1.
+// Returns the red light at whose line the vehicle is first, or -1.
 int32_t red_light_before(const MapView& map, const AgentBox& box, const WorldArrays& now, size_t first_light) {
   const Vec2 bumper = front_bumper(box), forward{box.cos_heading, box.sin_heading};
   const Span<const int32_t> lights = items_at(map.stop_line_cells, bumper);
@@ -63,7 +63,7 @@ void StandingObserver::after_step(const StepResult& /*result*/) {
       ++counts.driven_steps;
       counts.reversing_steps += speed_mps < -kRest_mps;
       Progress& progress = progress_[slot];
-      // Less than before: another life in the slot.
+      // A smaller distance means another life in the slot.
       const float gone_m = distance_m[slot] - progress.distance_m;
       if (gone_m < 0 || gone_m > kStuckWithin_m) progress = {step_, distance_m[slot]};
 

@@ -1,5 +1,4 @@
-// How vehicles stand: whether they wait at red lights without creeping, drive backwards, or stay for good where they
-// are.
+// Standing vehicles: whether they wait at red lights without creeping, reverse, or remain stuck.
 #pragma once
 
 #include <cstdint>
@@ -10,21 +9,21 @@
 
 namespace pictura {
 
-/// Counts StandingCounts of worlds that are driven to their end. On a device it copies what it reads to the host at
-/// every step.
+/// Counts StandingCounts of worlds that are driven to their end. On a device it copies the data that it reads to the
+/// host at every step.
 class StandingObserver final : public StepObserver {
  public:
-  /// The simulator's worlds are at the start of their episodes.
+  /// Creates an observer; the simulator's worlds must be at the start of their episodes.
   explicit StandingObserver(Simulator& simulator);
-  /// Counts vehicles of each driver apart: driver_of_slot [slots] holds their numbers, below num_drivers.
+  /// Counts vehicles of each driver separately: driver_of_slot [slots] holds their numbers, below num_drivers.
   StandingObserver(Simulator& simulator, std::vector<uint8_t> driver_of_slot, size_t num_drivers);
 
   void after_step(const StepResult& result) override;
-  /// Counts of each world, after the last step: of one driver's vehicles.
+  /// Counts of one driver's vehicles in each world, after the last step.
   std::vector<StandingCounts> counts(size_t driver = 0) const;
 
  private:
-  // Where a vehicle was when it had last got on.
+  // Step and distance of a vehicle's last progress.
   struct Progress {
     int step = 0;
     float distance_m = 0;
@@ -32,7 +31,7 @@ class StandingObserver final : public StepObserver {
 
   Simulator& simulator_;
   int step_ = 0;
-  std::vector<int32_t> awaited_light_;               // [slots] of the world; -1: none
+  std::vector<int32_t> awaited_light_;               // [slots] light in its world; -1: none
   std::vector<Progress> progress_;                   // [slots]
   std::vector<uint8_t> driver_of_slot_;              // [slots]
   std::vector<std::vector<StandingCounts>> counts_;  // [drivers][worlds]

@@ -1,4 +1,4 @@
-// A copy on the host of what observers of an evaluation read of its worlds after a step.
+// Host copy of the data that observers of an evaluation read from its worlds after a step.
 #pragma once
 
 #include <cstddef>
@@ -14,8 +14,8 @@ struct WorldArrays {
   std::vector<AgentStatus> status;                          // [slots]
   std::vector<AgentClass> agent_class;                      // [slots]
   std::vector<float> speed_mps;                             // [slots]
-  std::vector<AgentBox> boxes;                              // of agents, then of parked cars, a world after the other
-  std::vector<LightState> lights;                           // of the maps' stop lines, a world after the other
+  std::vector<AgentBox> boxes;                              // of agents, then of parked cars, world after world
+  std::vector<LightState> lights;                           // of the maps' stop lines, world after world
   std::vector<int32_t> slot_begin, box_begin, light_begin;  // [worlds + 1]
 
   explicit WorldArrays(Simulator& simulator)
@@ -28,7 +28,7 @@ struct WorldArrays {
         box_begin(host_copy(simulator.scene().world_begin, simulator.device())),
         light_begin(host_copy(simulator.scene().light_begin, simulator.device())) {}
 
-  /// A copy of a field of the agents' state.
+  /// Copies a field of the agents' state.
   template <typename T>
   static std::vector<T> of_slots(Simulator& simulator, const T* values) {
     return host_copy_of_structs(Span<const T>(values, static_cast<size_t>(simulator.num_slots())), simulator.device());

@@ -14,11 +14,11 @@ namespace pictura {
 
 namespace {
 
-// The progress of driving is its first half.
+// Reports the progress of driving as the first half of the probe's progress.
 CornerOptions with_half_progress(CornerOptions options) {
   if (const auto report = options.worlds.on_progress) {
     options.worlds.on_progress = [report, since_start = Stopwatch()](double done, double eta_s) {
-      report(done / 2, 2 * eta_s + since_start.seconds());  // as if the rest took as long
+      report(done / 2, 2 * eta_s + since_start.seconds());  // assumes that the rest takes as long
     };
   }
   return options;
@@ -51,20 +51,20 @@ class CornerProbe {
   }
 
  private:
-  // A hidden state with its world.
+  // Hidden state with its world.
   struct Found {
     CornerState state;
     CornerScene scene;
   };
 
   void look_for_corners(const ProbeFrame& frame) {
-    // The last states from which a scene goes on for so long.
+    // Later states do not leave enough steps of the scene for a takeover.
     if (frame.step + kTakeoverSteps >= options_.worlds.steps) return;
     KeptScene kept;
     std::vector<View> views;
     std::vector<VisibilityQuery> queries;
     std::vector<Found> hidden;
-    std::vector<size_t> found_in;  // worlds
+    std::vector<size_t> found_in;  // indices of worlds
     for (size_t world = 0; world < frame.worlds.size(); ++world) {
       const auto map = static_cast<size_t>(frame.worlds[world].map);
       bool is_kept = false, is_found = false;
@@ -91,7 +91,7 @@ class CornerProbe {
     }
   }
 
-  // Worlds of the frame, in which policies may take over: some 50 KB each, until pairs are chosen.
+  // Keeps worlds of the frame in which policies may take over: some 50 KB each, until pairs are chosen.
   void keep(const ProbeFrame& frame, const std::vector<size_t>& worlds) {
     if (worlds.empty()) return;
     const std::vector<uint8_t> saved = driven_->save(current_stream(run_.device()));
@@ -108,7 +108,7 @@ class CornerProbe {
     return scene;
   }
 
-  // Whether who is hidden drives into the junction before the takeover ends.
+  // Whether the hidden vehicle enters the junction before the takeover ends.
   bool comes(const CornerState& state) const {
     const auto map = static_cast<size_t>(state.map);
     const int32_t junction = corners_[map].at(state.approach).junction;
@@ -146,7 +146,7 @@ class CornerProbe {
     }
   }
 
-  // A vehicle near the ego other than who is hidden, drawn by the seed; -1: there is none.
+  // Returns a vehicle near the ego other than the hidden one, drawn by the seed; -1: none.
   int32_t another_of(const CornerScene& scene, const CornerState& state) const {
     std::vector<int32_t> others;
     const auto num_agents = static_cast<int32_t>(scenes_.of(state.scene).bodies.size());

@@ -18,7 +18,7 @@ constexpr int kDecelerationSteps = 20;
 constexpr std::array<double, 3> kQuantiles{0.1, 0.5, 0.9};
 constexpr std::array<const char*, 3> kQuantileNames{"reveal_s_p10", "reveal_s_p50", "reveal_s_p90"};
 
-// What is measured of a run or of the difference of two, scene by scene.
+// Sums of a run's measures, or of the differences of two runs, by scene.
 struct MeasureSums {
   SceneMeans distance_m, corner_m, speed_mps, approach_mps, deceleration_mps2;
 

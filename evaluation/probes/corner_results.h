@@ -1,5 +1,5 @@
-// How policies drove towards blind corners: every run, means over pairs of like corners, and the files that hold them.
-// Without torch headers.
+// Results of policies at blind corners: every run, means over pairs of similar corners, and their files. Has no torch
+// headers.
 #pragma once
 
 #include <array>
@@ -14,38 +14,38 @@
 
 namespace pictura {
 
-/// Who is at the corner.
+/// Vehicle at the corner.
 enum class CornerCase : uint8_t {
-  hidden,   // a vehicle comes hidden
-  removed,  // the same state without it: the control
-  empty,    // a like state of another corner where nobody comes
+  hidden,   // a hidden vehicle comes
+  removed,  // the same state without the vehicle: the control
+  empty,    // a similar state at another corner from which no vehicle comes
 };
 constexpr std::array<const char*, 3> kCornerCaseNames{"hidden", "removed", "empty"};
 constexpr size_t kCornerCases = kCornerCaseNames.size();
 constexpr std::array<const char*, 2> kWallNames{"on", "off"};  // in the order of runs
 
-/// Who is not there in CornerCase::removed.
+/// Vehicle that is absent in CornerCase::removed.
 enum class CornerControl : uint8_t {
-  none,       // who comes hidden
-  permuted,   // a control: another vehicle near the ego, drawn for each pair; nobody where there is none
-  untrained,  // a control: who comes hidden, and policies with fresh weights take over in the same states
+  none,       // the hidden vehicle
+  permuted,   // a control: another vehicle near the ego, drawn for each pair; no vehicle if there is none
+  untrained,  // a control: the hidden vehicle, with policies of fresh weights in the same states
 };
 constexpr std::array<const char*, 3> kCornerControlNames{"none", "permuted", "untrained"};
 
-/// A world at a takeover, for pictures: agents, then parked cars.
+/// World at a takeover, for pictures: agents, then parked cars.
 struct CornerScene {
   std::vector<AgentBox> boxes;
   std::vector<AgentStatus> status;  // [boxes]
-  std::vector<Vec2> user_m;         // [kTakeoverSteps + 1] where the hidden vehicle's box is
+  std::vector<Vec2> user_m;         // [kTakeoverSteps + 1] position of the hidden vehicle's box
   int32_t removed = -1;             // agent that is hidden in CornerCase::removed; -1: none
 };
 
 struct CornerResults : ProbeResults {
   CornerSearch search;
   CornerControl control = CornerControl::none;
-  int64_t pairs_asked = 0, hidden_found = 0, empty_found = 0;  // states, before they are matched
+  int64_t pairs_asked = 0, hidden_found = 0, empty_found = 0;  // states before matching
   std::vector<CornerPair> pairs;                               // by scene, step, ego and user of the hidden state
-  std::vector<CornerScene> scenes_of_pairs;                    // [pairs] of the hidden state
+  std::vector<CornerScene> scenes_of_pairs;                    // [pairs] scene of the hidden state
   std::vector<Takeover> takeovers;                             // [pairs, walls on and off, cases, policies]
   CompiledMaps maps;                                           // for pictures
 
@@ -55,55 +55,56 @@ struct CornerResults : ProbeResults {
   }
 };
 
-/// A run at the reveal: where line of sight to the user opens, or to where it would be. At an empty corner it is at
-/// the time at which it is for the same policy in the hidden state of the pair.
+/// Reveal of a run: the time at which the line of sight to the hidden vehicle opens, or to where it would be. At an
+/// empty corner the reveal is at the time of the same policy's reveal in the pair's hidden state.
 struct Reveal {
   int32_t step = 0;
-  std::optional<float> distance_m;  // to the user, between the boxes' centres
-  float corner_m = 0;               // to the corner's entry, by what was driven; negative beyond it
+  std::optional<float> distance_m;  // to the hidden vehicle, between the boxes' centres
+  float corner_m = 0;               // to the corner's entry, by the distance driven; negative beyond it
   float speed_mps = 0;
-  float approach_mps = 0;                  // mean speed up to here
-  std::optional<float> deceleration_mps2;  // of the next 2 s, where the run lasts as long
+  float approach_mps = 0;                  // mean speed before the reveal
+  std::optional<float> deceleration_mps2;  // over the next 2 s, if the run lasts as long
 };
-/// Nothing where the run ends before.
+/// Returns the reveal of a run; empty if the run ends before.
 std::optional<Reveal> reveal_of(const CornerResults& results, size_t pair, bool walls, CornerCase its_case,
                                 size_t policy);
 
-/// The pair at whose reveal policies' speeds differ most, with walls and with who is hidden; else the first.
+/// Pair at whose reveal policies' speeds differ most, with walls and the hidden vehicle; the first pair if no pair has
+/// a reveal for every policy.
 size_t example_of(const CornerResults& results);
 
-/// What is measured of a run at the reveal, by name in files.
+/// Measures of a run at the reveal, by their names in files.
 struct CornerMeasures {
   Estimate distance_m, corner_m, speed_mps, approach_mps, deceleration_mps2;
 };
 
-/// Of one policy's runs of a case; or the differences of two runs of each pair: from another policy's run of the same
-/// state, or from the same policy's run of another case. Estimates are over scenes.
+/// Statistics of one policy's runs of a case; or differences of two runs of each pair: from another policy's run of the
+/// same state, or from the same policy's run of another case. Estimates are over scenes.
 struct CornerRow {
   bool walls = true;
   CornerCase its_case = CornerCase::hidden;
   size_t policy = 0;
   std::optional<size_t> less_policy;
   std::optional<CornerCase> less_case;
-  int64_t revealed = 0;  // runs, or pairs of runs, that reach the reveal
+  int64_t revealed = 0;  // runs, or pairs of runs, with a reveal
   int scenes = 0;
   CornerMeasures at_reveal;
-  // Of runs alone:
-  int64_t ended_early = 0;                               // by an infraction
-  int64_t entered_input = 0;                             // in which the policy read the user
+  // Values of single runs only:
+  int64_t ended_early = 0;                               // runs that an infraction ended
+  int64_t entered_input = 0;                             // runs in which the policy read the hidden vehicle
   std::array<double, 3> reveal_s{};                      // 10th, 50th and 90th percentile
-  std::array<Estimate, kTakeoverSteps + 1> speed_mps{};  // of those that have not ended
-  std::array<int64_t, kTakeoverSteps + 1> driving{};     // how many these are
+  std::array<Estimate, kTakeoverSteps + 1> speed_mps{};  // of runs that have not ended
+  std::array<int64_t, kTakeoverSteps + 1> driving{};     // number of runs that have not ended
 };
 
-/// With walls and without: for each policy its cases, then each of the others less the first policy, then hidden less
-/// removed and hidden less empty.
+/// Returns the rows with walls, then without: for each policy its cases; for each further policy its differences from
+/// the first policy; for each policy hidden minus removed and hidden minus empty.
 std::vector<CornerRow> summarize(const CornerResults& results);
 
-/// A row a run, with a header. Throws Error naming the path.
+/// Writes a row for each run, with a header. Throws Error naming the path.
 void write_corner_cases(const std::string& path, const CornerResults& results);
 
-/// Results and rows as one JSON object's text; `cases_file` names where the cases are, and may be empty.
+/// Results and rows as the text of one JSON object; `cases_file` is the path of the cases, and may be empty.
 std::string corner_summary_json(const CornerResults& results, const std::vector<CornerRow>& rows,
                                 const std::string& cases_file);
 

@@ -17,7 +17,7 @@ Vec3 end_of(const RoadMap& map, int32_t lane) {
   return points[points.size() - 1].position_m;
 }
 
-// A lane into a junction and those that lead to it, the nearest first.
+// Returns a lane into a junction and the lanes that lead to it, the nearest first.
 std::vector<int32_t> lanes_to(const RoadMap& map, int32_t approach) {
   std::vector<int32_t> lanes{approach};
   float length_m = map.lanes[approach].length_m;
@@ -104,7 +104,7 @@ std::vector<CornerState> find_corner_states(const ProbeFrame& frame, size_t worl
 
 std::vector<CornerPair> match_corners(const std::vector<CornerState>& hidden, const std::vector<CornerState>& empty,
                                       int64_t count) {
-  // The first state of each ego and user, by scene.
+  // First state of each ego and user, by scene.
   std::map<int32_t, std::vector<CornerState>> of_scene;
   std::vector<CornerState> ordered = hidden, unused = empty;
   const auto before = [](const CornerState& a, const CornerState& b) { return order_of(a) < order_of(b); };
@@ -124,7 +124,7 @@ std::vector<CornerPair> match_corners(const std::vector<CornerState>& hidden, co
       is_left = true;
       const CornerState& one = states[turn];
       const CornerState* likest = nullptr;
-      float least = 3;  // of the sum of both differences, in parts of what is allowed
+      float least = 3;  // sum of both differences, in units of the tolerances
       for (const CornerState& other : unused) {
         if (other.scene == one.scene && other.ego == one.ego) continue;
         const float apart = std::abs(other.distance_m - one.distance_m) / kSameDistance_m,

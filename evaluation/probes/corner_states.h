@@ -1,5 +1,5 @@
-// States in which an ego nears a blind corner: one from which a vehicle comes that walls hide from it, and ones like it
-// where nobody comes. Without torch headers.
+// States in which an ego approaches a blind corner: states in which a vehicle hidden by walls comes, and similar states
+// in which no vehicle comes. Has no torch headers.
 #pragma once
 
 #include <map>
@@ -13,39 +13,39 @@ namespace pictura {
 
 struct ProbeFrame;
 
-/// A lane into a junction without traffic lights, and lanes whose traffic crosses its own and is hidden from it by
-/// walls (find_blind_crossings()). Where lights stop one of the two, nobody need look out for the other.
+/// Lane into a junction without traffic lights, and lanes whose traffic crosses it and is hidden from it by walls
+/// (find_blind_crossings()). Traffic lights would stop one of the two, so that neither need look out for the other.
 struct BlindCorner {
   int32_t junction = -1;
-  Vec3 entry_m;  // where the lane ends
-  // Lanes of hidden traffic, up to kCornerLead_m before the junction, each with where it enters that.
+  Vec3 entry_m;  // end of the lane
+  // Lanes of hidden traffic, up to kCornerLead_m before the junction, each with its entry into the junction.
   std::map<int32_t, Vec3> lanes;
 };
 constexpr float kCornerLead_m = 60;
-/// By the lanes that lead there, up to kCornerLead_m before the junction.
+/// Blind corners by the lanes that lead to them, up to kCornerLead_m before the junction.
 using BlindCorners = std::map<int32_t, BlindCorner>;
 BlindCorners find_blind_corners(const RoadMap& map, Span<const WallFace> walls);
 
-/// Which states are looked for.
+/// Criteria of the states to find.
 struct CornerSearch {
   float min_distance_m = 8, max_distance_m = 25;  // of the ego's reference point from the corner's entry
-  float min_speed_mps = 2;                        // of the ego, and of who is hidden
-  float user_range_m = 50;                        // who comes is at most so far from where it enters the junction
+  float min_speed_mps = 2;                        // of the ego, and of the hidden vehicle
+  float user_range_m = 50;  // maximum distance of the hidden vehicle from its entry into the junction
 };
 
-/// An ego before a blind corner. Agents are numbered in their world.
+/// State of an ego before a blind corner. Agents are numbered in their world.
 struct CornerState {
-  int32_t scene = 0, map = 0, driver = 0;  // the number of its scenario; indices of its map and of who drove
+  int32_t scene = 0, map = 0, driver = 0;  // number of its scenario; indices of its map and driver
   int32_t step = 0;                        // steps done in the scenario
-  int32_t ego = 0, approach = -1;          // the lane that it is on
-  int32_t user = -1;                       // who comes hidden; -1: nobody comes
-  float distance_m = 0, speed_mps = 0;     // of the ego from the entry
-  View view;                               // of the ego; its indices are those of its frame
+  int32_t ego = 0, approach = -1;          // approach: lane of the ego
+  int32_t user = -1;                       // hidden vehicle; -1: none comes
+  float distance_m = 0, speed_mps = 0;     // distance of the ego from the entry, and its speed
+  View view;                               // view of the ego, with the indices of its frame
 };
 
-/// Of a world of a frame. Somebody comes hidden: of the vehicles that drive on the corner's hidden lanes, in range, the
-/// nearest one whom walls hide from the ego's front camera, `front`. Nobody comes: no vehicle or cyclist is on these
-/// lanes in range, or in the junction.
+/// Finds the states of a world of a frame. A state has a hidden vehicle if walls hide a vehicle that drives on the
+/// corner's hidden lanes, in range, from the ego's front camera, `front`; the nearest one counts. A state is empty if
+/// no vehicle or cyclist is on these lanes in range, or in the junction.
 std::vector<CornerState> find_corner_states(const ProbeFrame& frame, size_t world, const RoadMap& map,
                                             const BlindCorners& corners, const LineOfSight& line_of_sight,
                                             const PinholeCamera& front, const CornerSearch& search);
@@ -53,11 +53,11 @@ std::vector<CornerState> find_corner_states(const ProbeFrame& frame, size_t worl
 struct CornerPair {
   CornerState hidden, empty;
 };
-/// States are alike within so much.
+/// Tolerances within which two states are similar.
 constexpr float kSameDistance_m = 1, kSameSpeed_mps = 0.5f;
-/// At most `count` pairs of like states of different egos or scenes, from all scenes in turn. Of an ego that nears one
-/// user the first state is taken, and of an ego that nears an empty corner one state: the likest. In order of the
-/// hidden states.
+/// Returns at most `count` pairs of similar states of different egos or scenes, from all scenes in turn, in the order
+/// of the hidden states. For an ego that approaches one hidden vehicle the first state is used, and for an ego that
+/// approaches an empty corner one state: the most similar one.
 std::vector<CornerPair> match_corners(const std::vector<CornerState>& hidden, const std::vector<CornerState>& empty,
                                       int64_t count);
 

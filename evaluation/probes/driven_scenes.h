@@ -1,4 +1,4 @@
-// Where all agents of driven scenes were, state by state, so that some can be put there again while another one drives.
+// States of all agents of driven scenes, so that agents can be replayed from a state while another agent drives.
 #pragma once
 
 #include <map>
@@ -8,34 +8,34 @@
 
 namespace pictura {
 
-/// An agent in one state.
+/// State of an agent at one step.
 struct DrivenState {
-  Vec3 position_m;  // of its reference point
+  Vec3 position_m;  // position of its reference point
   float heading_rad = 0, speed_mps = 0;
   int32_t lane = -1;
   AgentStatus status = AgentStatus::absent;
 };
 
-/// A scene up to its last step, or to where all of its agents had halted.
+/// Scene up to its last step, or to the step at which all of its agents had halted.
 struct DrivenScene {
   WorldSpec world;
-  int driver = 0;                   // who drove it
-  std::vector<AgentBox> bodies;     // [agents] as they were at first
-  std::vector<float> ahead_m;       // [agents] how far the box's centre is ahead of the reference point
+  int driver = 0;                   // index of its driver
+  std::vector<AgentBox> bodies;     // [agents] initial boxes
+  std::vector<float> ahead_m;       // [agents] distance of the box's centre ahead of the reference point
   std::vector<DrivenState> states;  // [steps, agents]
 
-  /// After so many steps; beyond the last state it stays as it is.
+  /// Returns an agent's state after `step` steps; the last state for later steps.
   const DrivenState& at(int step, int32_t agent) const;
   AgentBox box_at(int step, int32_t agent) const;
-  /// What puts all agents where they were after so many steps; commands_out: [agents].
+  /// Writes the commands that place all agents in their states after `step` steps; commands_out: [agents].
   void command_places(int step, Command* commands_out) const;
 };
 
 class DrivenScenes {
  public:
-  /// Adds the present states of all worlds.
+  /// Adds the current states of all worlds.
   void add(Simulator& simulator, int driver);
-  /// By the number of its scenario.
+  /// Returns the scene of a scenario number.
   const DrivenScene& of(int32_t scene) const { return scenes_.at(scene); }
 
  private:

@@ -1,4 +1,4 @@
-// Memory of the network's device for what some agents observe.
+// Memory on the network's device for agents' observations.
 #pragma once
 
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace pictura {
 
-/// Of `count` agents, of the parts that a simulator observes.
+/// Observation arrays of `count` agents, for the parts that a simulator observes.
 class ObservationRows {
  public:
   ObservationRows(int64_t count, const SimulatorConfig& config) {

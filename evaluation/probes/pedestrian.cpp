@@ -14,21 +14,21 @@ namespace pictura {
 
 namespace {
 
-// Paths of one world and step that are tried, and how many of them in a call, which changes nothing.
+// Maximum number of paths tried in one world and step, and number of tries in a call, which changes no result.
 constexpr size_t kMaxTries = 48, kTriesAtOnce = 12;
-// Of a path that is tried every so many points are measured first: no part of a used path is shorter.
+// Interval between the points of a tried path that are measured first: no part of a used path is shorter.
 constexpr int kCoarse = 4;
 static_assert(kPathOrigin % kCoarse == 0 && kCoarse * kPathSpacing_m <= min_of(kPathHidden_m, kPathSeen_m));
 constexpr float kMinHiderDistance_m = 5, kSameHeight_m = 0.5f;
-constexpr float kAhead = 0.7f;  // the cosine of the angle between the ego's heading and the hider, at least
+constexpr float kAhead = 0.7f;  // minimum cosine of the angle between the ego's heading and the hider
 
-// A path that may do, of a world of a frame.
+// Candidate path in a world of a frame.
 struct Candidate {
   int32_t ego = 0, hider = 0;
   CrossingPath path;
 };
 
-// What is left to try in a world.
+// Remaining candidates of a world.
 struct Search {
   size_t world = 0;
   int64_t due = 0;
@@ -36,16 +36,16 @@ struct Search {
   size_t next = 0;
 };
 
-// A candidate that is being measured.
+// Candidate that is being measured.
 struct Trial {
   Search* search = nullptr;
   const Candidate* one = nullptr;
   std::vector<bool> is_free{};  // [kPathPoints] whether a pedestrian can stand there
   std::vector<float> shares = std::vector<float>(kPathPoints, std::numeric_limits<float>::quiet_NaN());
-  float share_without_hider = 0;  // of the origin
+  float share_without_hider = 0;  // at the origin
 
-  // By the points that are measured first: whether the hider hides the origin, and the pedestrian is seen after it and
-  // then hidden again.
+  // Whether the path may be used, by the points measured first: the hider hides the origin, and after it the pedestrian
+  // is seen and then hidden again.
   bool may_do() const {
     if (shares[kPathOrigin] != 0 || !(share_without_hider > 0)) return false;
     int i = kPathOrigin;
@@ -75,7 +75,7 @@ class PedestrianProbe {
   }
 
  private:
-  // Looks for paths in all worlds at this step.
+  // Searches all worlds for paths at this step.
   void sample(const ProbeFrame& frame) {
     std::vector<Search> searches;
     for (size_t world = 0; world < frame.worlds.size(); ++world) {
@@ -85,7 +85,7 @@ class PedestrianProbe {
     while (try_some(frame, &searches)) continue;
   }
 
-  // Every way of a pedestrian from behind a vehicle in a world, in an order that is drawn.
+  // Returns all paths of a pedestrian from behind a vehicle in a world, in a random order.
   std::vector<Candidate> candidates_of(const ProbeFrame& frame, size_t world) const {
     std::vector<Candidate> all;
     const WorldSpec& spec = frame.worlds[world];
@@ -119,7 +119,7 @@ class PedestrianProbe {
     return all;
   }
 
-  // Measures the next candidates of each world, and takes those that do. False where there are none.
+  // Measures the next candidates of each world, and adds those that are usable. Returns false if there are none.
   bool try_some(const ProbeFrame& frame, std::vector<Search>* searches) {
     std::vector<Trial> trials;
     for (Search& search : *searches) {
@@ -149,7 +149,7 @@ class PedestrianProbe {
     return Span<const AgentBox>(frame.boxes).subspan(first, end - first);
   }
 
-  // The pedestrian on every stride-th free point, alone; and on the origin, without the hider.
+  // Measures the pedestrian alone on every stride-th free point, and on the origin without the hider.
   void measure(const ProbeFrame& frame, int stride, std::vector<Trial>* trials) {
     KeptScene scene;
     std::vector<View> views;
@@ -193,7 +193,7 @@ class PedestrianProbe {
     const size_t world = trial.search->world;
     const WorldSpec& spec = frame.worlds[world];
     const int32_t scene = frame.scene_of(world);
-    // A state serves an ego once.
+    // A state is used once per ego.
     const bool is_taken = std::any_of(results_.paths.begin(), results_.paths.end(), [&](const PedestrianPath& path) {
       return path.scene == scene && path.step == frame.step && path.ego == one.ego;
     });
@@ -244,7 +244,7 @@ class PedestrianProbe {
     return true;
   }
 
-  // By scene, step, ego and hider, in whatever order they came.
+  // Sorts paths by scene, step, ego and hider, independent of the order in which they were found.
   void sort_paths() {
     const std::vector<size_t> order = sorted_order(results_.paths.size(), [this](size_t i) {
       const PedestrianPath& one = results_.paths[i];

@@ -1,5 +1,5 @@
-// The tracked pedestrian (paper, "Counterfactual probes reveal visual grounding"): what policies make of a pedestrian
-// who comes out from behind a vehicle and is hidden again, in states that stand still. Without torch headers.
+// Tracked pedestrian (paper, "Counterfactual probes reveal visual grounding"): responses of policies to a pedestrian
+// that emerges from behind a vehicle and is hidden again, in frozen states. Has no torch headers.
 #pragma once
 
 #include "pictura/evaluation/probes/pedestrian_results.h"
@@ -10,11 +10,11 @@ namespace pictura {
 class PolicySession;
 
 struct PedestrianOptions : ProbeOptions {
-  int64_t paths = 32;        // in all, as many in each scene; fewer where none are found
-  float hider_range_m = 30;  // vehicles that are farther away hide no path
+  int64_t paths = 32;        // total, equally many in each scene; fewer if fewer are found
+  float hider_range_m = 30;  // maximum distance of a vehicle that hides a path
   float min_speed_mps = 1;   // of the ego, forwards
-  // Of the pedestrian: a child's. Behind the world's vehicles, which are 1.5 m high, its own pedestrians of 1.7 m are
-  // never wholly hidden from cameras above these.
+  // Height of the pedestrian: a child's. Vehicles of the world are 1.5 m high, so they never wholly hide its own
+  // pedestrians of 1.7 m from cameras above them.
   float height_m = 1.2f;
   PedestrianControl control = PedestrianControl::none;
 };
@@ -33,17 +33,17 @@ void visit_options(PedestrianOptions& options, Visitor&& v) {
            options.control, kPedestrianControlNames);
 }
 
-/// Drives evaluation worlds as probe_removal() does, and looks in their states for paths that nobody has drawn by hand:
-/// an active vehicle, the ego; a vehicle or parked car ahead of it, the hider, within hider_range_m; and one of
-/// paths_behind() it, along which a pedestrian is wholly hidden, seen, and wholly hidden again (used_part()), first by
-/// the hider. The pedestrian is put on each point of it, the state is otherwise as it was, and each policy is given
-/// what it reads with and without it: for vectors Simulator::observe, for images a scene with its box. Visibility is
-/// measured, and paths are chosen, in the cameras of the first policy that reads images, or in the paper's. ^C ends it
-/// with the cases that are done. Throws UsageError where scenes cannot be shared equally, Error naming file and key for
-/// bad input.
+/// Drives evaluation worlds as probe_removal() does, and searches their states for paths automatically. A path needs an
+/// active vehicle, the ego; a vehicle or parked car ahead of it within hider_range_m, the hider; and one of
+/// paths_behind() the hider. Along it a pedestrian is wholly hidden, seen, and wholly hidden again (used_part()), first
+/// by the hider.
+/// The pedestrian is placed on each point of the path in the otherwise unchanged state, and each policy gets its input
+/// with and without the pedestrian: for vectors Simulator::observe, for images a scene with its box. Visibility is
+/// measured, and paths are chosen, in the cameras of the first policy that reads images, or in the paper's. An
+/// interrupt ends the probe with the completed cases. Throws UsageError if scenes cannot be shared equally, Error
+/// naming file and key for bad input.
 PedestrianResults probe_pedestrian(const PedestrianOptions& options);
-/// The same of policies that are open, of one device, whose renderers and cameras are kept; options.policies names
-/// them.
+/// Probes open policies of one device, with their renderers and cameras; options.policies names them.
 PedestrianResults probe_pedestrian(const std::vector<PolicySession*>& sessions, const PedestrianOptions& options);
 
 }  // namespace pictura

@@ -14,7 +14,7 @@ namespace pictura {
 
 namespace {
 
-// Some points, of one policy.
+// Sums over points, of one policy.
 struct PointSums {
   ResponseSums responses;
   double visible_share = 0;

@@ -1,5 +1,5 @@
-// What policies made of a pedestrian who walks from behind a vehicle through a frozen state: every place, means along
-// the path, and the files that hold them. Without torch headers.
+// Results of policies for a pedestrian that walks from behind a vehicle through a frozen state: every point, means
+// along the path, and their files. Has no torch headers.
 #pragma once
 
 #include <array>
@@ -13,32 +13,32 @@
 
 namespace pictura {
 
-/// Whether the pedestrian is there.
+/// Presence of the pedestrian.
 enum class PedestrianControl : uint8_t {
   none,
-  nobody,     // a control: nobody is inserted, so that nothing may change
-  untrained,  // a control: it is, and policies with fresh weights answer in the same states
+  nobody,     // a control: no pedestrian is inserted, so no response may change
+  untrained,  // a control: the pedestrian is inserted, and policies of fresh weights respond in the same states
 };
 constexpr std::array<const char*, 3> kPedestrianControlNames{"none", "nobody", "untrained"};
 
-/// A part of a path.
+/// Phase of a path.
 enum class PathPhase : uint8_t { hidden, seen, hidden_again };
 constexpr std::array<const char*, 3> kPathPhaseNames{"hidden", "seen", "hidden again"};
 
-/// A path in a frozen state. Boxes are numbered in their world: agents, then parked cars.
+/// Path in a frozen state. Boxes are numbered in their world: agents, then parked cars.
 struct PedestrianPath {
-  int32_t scene = 0, map = 0, driver = 0;  // the number of its scenario; indices of its map and of who drove
+  int32_t scene = 0, map = 0, driver = 0;  // number of its scenario; indices of its map and driver
   std::array<double, 3> map_origin_m{};    // file coordinates of the map's origin
   int32_t step = 0;                        // steps done in the scenario
-  int32_t ego = 0, hider = 0;              // the hider is the box that the path begins behind
+  int32_t ego = 0, hider = 0;              // the hider is the box behind which the path begins
   float ego_speed_mps = 0, hider_distance_m = 0;
-  int32_t first_point = 0, num_points = 0;   // of PedestrianResults::points
-  int32_t first_seen = 0, hidden_again = 0;  // of these, from the path's first
-  // The state, for pictures.
+  int32_t first_point = 0, num_points = 0;   // range in PedestrianResults::points
+  int32_t first_seen = 0, hidden_again = 0;  // points of this range, counted from the path's first
+  // State for pictures:
   std::vector<AgentBox> boxes;
   std::vector<AgentStatus> status;  // [boxes]
   std::vector<LightState> lights;
-  View view;  // of the ego; its indices are those of a scene of this world alone
+  View view;  // view of the ego, with the indices of a scene of this world alone
 
   PathPhase phase_of(int32_t point) const {
     const int32_t at = point - first_point;
@@ -46,10 +46,10 @@ struct PedestrianPath {
   }
 };
 
-/// The pedestrian at one place of a path: a case.
+/// Pedestrian at one point of a path: a case.
 struct PedestrianPoint {
-  int32_t path = 0;   // index
-  float along_m = 0;  // from the path's first point
+  int32_t path = 0;   // index of the path
+  float along_m = 0;  // distance from the path's first point
   AgentBox pedestrian;
   float distance_m = 0;     // on the ground, from the ego's rear axle
   float visible_share = 0;  // in the ego's cameras: Renderer::visibility
@@ -61,27 +61,27 @@ struct PedestrianResults : ProbeResults {
   PedestrianControl control = PedestrianControl::none;
   std::vector<PedestrianPath> paths;    // by scene, step, ego and hider
   std::vector<PedestrianPoint> points;  // by path, along it
-  CompiledMaps maps;                    // for pictures, like the cameras of the first policy that reads images
+  CompiledMaps maps;                    // for pictures, as are the cameras of the first policy that reads images
   RendererConfig cameras;
 };
 
-/// One policy's responses over all points of a phase, or over those at one offset from where the pedestrian is first
-/// seen.
+/// Responses of one policy over all points of a phase, or over the points at one offset from where the pedestrian is
+/// first seen.
 struct PedestrianRow : ResponseMeans {
   int policy = 0;
   std::optional<PathPhase> phase;
   std::optional<int> offset;      // in points
-  double mean_visible_share = 0;  // of the cases
+  double mean_visible_share = 0;  // mean over the cases
 };
 
-/// For each policy the phases, then the offsets in ascending order.
+/// Returns the rows: for each policy the phases, then the offsets in ascending order.
 std::vector<PedestrianRow> summarize(const PedestrianResults& results);
 
-/// A row a point, with a header: the path and its state, where on it the pedestrian is, and for each policy value,
-/// d_value, p_brake and d_p_brake. Throws Error naming the path.
+/// Writes a row for each point, with a header: the path and its state, the pedestrian's point, and for each policy
+/// value, d_value, p_brake and d_p_brake. Throws Error naming the path.
 void write_pedestrian_cases(const std::string& path, const PedestrianResults& results);
 
-/// Results and rows as one JSON object's text; `cases_file` names where the cases are, and may be empty.
+/// Results and rows as the text of one JSON object; `cases_file` is the path of the cases, and may be empty.
 std::string pedestrian_summary_json(const PedestrianResults& results, const std::vector<PedestrianRow>& rows,
                                     const std::string& cases_file);
 

@@ -1,4 +1,4 @@
-// What the summaries of all probes have in common, as JSON.
+// Common parts of all probes' summaries, as JSON.
 #pragma once
 
 #include "pictura/common/support/json_text.h"
@@ -7,16 +7,16 @@
 
 namespace pictura {
 
-/// Adds how many cases and scenes there are, and the estimates.
+/// Adds the numbers of cases and scenes, and the estimates.
 void add_means(const ResponseMeans& means, Json* json_out);
 
-/// The policies, each with how many of the cases are of scenes that it drove. drivers: [cases].
+/// Policies, each with the number of cases in scenes that it drove. drivers: [cases].
 Json policies_json(const ProbeResults& results, const std::vector<int32_t>& drivers);
 
-/// Adds the worlds, who drove them and how, and how long it took.
+/// Adds the worlds, their drivers and driving mode, and the duration.
 void add_setting(const ProbeResults& results, Json* json_out);
 
-/// A summary: what it begins with, the setting, and to_json(row) of each row.
+/// Text of a summary: `json`, the setting, and to_json(row) of each row.
 template <typename Row, typename ToJson>
 std::string summary_text(const ProbeResults& results, Json json, const std::vector<Row>& rows, const ToJson& to_json) {
   add_setting(results, &json);

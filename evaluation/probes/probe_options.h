@@ -1,4 +1,4 @@
-// What all probes are asked: which worlds, driven and answered by which policies. Without torch headers.
+// Options of all probes: worlds, and the policies that drive and respond in them. Has no torch headers.
 #pragma once
 
 #include <string>
@@ -16,16 +16,16 @@ struct ProbeOptions {
     worlds.steps = 600;  // a minute, in which most agents still drive
   }
 
-  // The worlds and who computes: maps, the first of `densities` or agents_per_world, steps, argmax, seed, devices,
-  // conditioning, progress. `first_scenario` and `scenarios` are the scenes, of which each policy drives as many, one
-  // range after the other; 0: default_probe_scenes(). Who is evaluated is below.
+  // Worlds and devices: maps, the first of `densities` or agents_per_world, steps, argmax, seed, devices, conditioning,
+  // progress. `first_scenario` and `scenarios` are the scenes; each policy drives an equal number of them, one range
+  // after the other; 0: default_probe_scenes(). `policies` are evaluated.
   EvaluateOptions worlds;
   std::vector<std::string> policies;  // checkpoints or safetensors
-  int sample_steps = 10;              // states are sampled every so many steps
-  int batch = 4096;                   // cases in a call, rounded up to whole passes; changes memory and time alone
+  int sample_steps = 10;              // interval between sampled states
+  int batch = 4096;                   // cases in a call, rounded up to whole passes; changes only memory and time
 };
 
-/// Visits the options of all probes beside policies, worlds and devices.
+/// Visits the options of all probes besides policies, worlds and devices.
 template <typename Visitor>
 void visit_options(ProbeOptions& probe, Visitor&& v) {
   EvaluateOptions& worlds = probe.worlds;
@@ -43,11 +43,11 @@ void visit_options(ProbeOptions& probe, Visitor&& v) {
           probe.batch);
 }
 
-/// Cases that go through a network at once, always, with and without whom they are about at the same places of two
-/// passes: equal inputs give equal bits.
+/// Number of cases in every pass through a network. Cases with and without their road user are at the same places of
+/// two passes, so that equal inputs give equal bits.
 constexpr int probe_pass(Device device) { return device.is_host() ? 256 : 2048; }
 
-/// As many scenes as give each policy the same number of them on each map, and each map two or more.
+/// Number of scenes that gives each policy equally many on each map, and each map two or more.
 int default_probe_scenes(size_t num_policies, size_t num_maps);
 
 }  // namespace pictura

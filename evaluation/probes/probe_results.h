@@ -1,5 +1,4 @@
-// What the results of all probes have in common: who was asked in which worlds, what they answered, and means over
-// scenes. Without torch headers.
+// Common parts of all probes' results: policies and worlds, responses, and means over scenes. Has no torch headers.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +10,7 @@
 
 namespace pictura {
 
-/// What a policy makes of a state with a road user, V(o) and P(brake | o), and of that without it, o'.
+/// Response of a policy to a state with a road user, V(o) and P(brake | o), and to the state without the user, o'.
 struct PairedResponse {
   float value = 0, value_without = 0;
   float brake = 0, brake_without = 0;
@@ -22,28 +21,28 @@ struct PairedResponse {
 };
 
 struct ProbedPolicy {
-  std::string name;  // of its file or run; unique
+  std::string name;  // unique name of its file or run
   std::string path, hash;
   bool reads_images = false;
-  std::string untrained_hash;  // of who answered in its place, with fresh weights; empty: it answered itself
+  std::string untrained_hash;  // hash of the fresh weights that respond in its place; empty: the policy itself responds
 
-  /// What figures and tables call who answered.
+  /// Name of the responding policy in figures and tables.
   std::string answers_as() const { return untrained_hash.empty() ? name : "untrained " + name; }
 };
 
 struct ProbeResults {
-  EvaluationSetting setting;  // of the worlds; what of it is a policy's is the first one's
+  EvaluationSetting setting;  // setting of the worlds; its policy-specific parts are the first policy's
   std::string density;
   int agents_per_world = 0;
-  int first_scene = 0, scenes = 0;  // which were driven: an equal share by each policy, in their order
+  int first_scene = 0, scenes = 0;  // driven scenes: an equal share by each policy, in their order
   int sample_steps = 0;
   std::vector<ProbedPolicy> policies;
-  std::string controller;                 // that drove all scenes; empty: the policies did
+  std::string controller;                 // controller that drove all scenes; empty: the policies drove
   std::vector<PairedResponse> responses;  // [cases, policies]
   bool interrupted = false;
   double seconds = 0;
 
-  /// By its index: a controller comes after all policies.
+  /// Name of a driver by its index; a controller comes after all policies.
   const std::string& driver_name(int32_t driver) const {
     const auto index = static_cast<size_t>(driver);
     return index < policies.size() ? policies[index].name : controller;
@@ -52,16 +51,16 @@ struct ProbeResults {
 };
 
 /// Responses of one policy to cases of one kind. Estimates are over scenes: the mean over scenes of the means of their
-/// cases, with its 95 % interval; infinite where there are none.
+/// cases, with its 95 % interval; infinite without scenes.
 struct ResponseMeans {
   int64_t cases = 0;
-  int scenes = 0;  // that have such cases
+  int scenes = 0;  // number of scenes with such cases
   Estimate abs_value_change, abs_brake_change;
   Estimate value_change, brake_change;  // signed
-  Estimate changed_share;               // of the cases: in which value or probability are not the same bits
+  Estimate changed_share;               // share of cases in which value or probability differ in a bit
 };
 
-/// The mean over scenes of the means of what was added for them.
+/// Mean over scenes of the mean of each scene's values.
 class SceneMeans {
  public:
   void add(int32_t scene, double value) {
@@ -81,7 +80,7 @@ class SceneMeans {
   std::map<int32_t, Sum> sums_;
 };
 
-/// Collects responses.
+/// Accumulates responses.
 class ResponseSums {
  public:
   void add(int32_t scene, const PairedResponse& response);
@@ -91,7 +90,7 @@ class ResponseSums {
   SceneMeans abs_value_change_, abs_brake_change_, value_change_, brake_change_, changed_;
 };
 
-/// The order of some items by their keys.
+/// Order of `count` items by their keys.
 template <typename Key>
 std::vector<size_t> sorted_order(size_t count, const Key& key) {
   std::vector<size_t> order(count);
@@ -100,8 +99,8 @@ std::vector<size_t> sorted_order(size_t count, const Key& key) {
   return order;
 }
 
-/// Of a CSV file with a row a case: the header's fields, and a case's, of each policy: value, d_value, p_brake and
-/// d_p_brake. Both begin with a comma.
+/// CSV fields of responses, with a row for each case: names for the header, and values of a case, for each policy:
+/// value, d_value, p_brake and d_p_brake. Both begin with a comma.
 std::string response_header(const ProbeResults& results);
 std::string response_fields(const ProbeResults& results, size_t one);
 

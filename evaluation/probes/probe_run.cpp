@@ -19,7 +19,7 @@ namespace pictura {
 
 namespace {
 
-// The summed probability of the actions of negative longitudinal jerk.
+// Sum of the probabilities of the actions of negative longitudinal jerk.
 float brake_probability(const float* logits) {
   const double largest = *std::max_element(logits, logits + kNumActions);
   double braking = 0, all = 0;
@@ -31,7 +31,7 @@ float brake_probability(const float* logits) {
   return static_cast<float>(braking / all);
 }
 
-// A scene in the memory of a device.
+// Scene in the memory of a device.
 class SceneOnDevice {
  public:
   SceneOnDevice(const KeptScene& scene, Device device)
@@ -53,14 +53,14 @@ class SceneOnDevice {
   SceneBatch scene_;
 };
 
-// What the figure calls a policy: its file, or its run, whose files have the same names in all runs.
+// Name of a policy in figures: its file, or its run, since files have the same names in all runs.
 std::string short_name(const std::string& path) {
   const std::filesystem::path absolute = std::filesystem::absolute(path);
   const std::string stem = absolute.stem().string();
   return stem == "checkpoint" || stem == "policy" ? absolute.parent_path().filename().string() : stem;
 }
 
-// Paths where short names are equal, and numbered where even these are.
+// Short names of policies; paths if short names are equal, and numbered if paths are equal too.
 std::vector<std::string> names_of(const std::vector<std::string>& paths) {
   std::vector<std::string> names;
   for (const std::string& path : paths) names.push_back(short_name(path));
@@ -152,8 +152,8 @@ int64_t CaseQuota::due(int32_t scene, int step) const {
   return (left + times_left - 1) / times_left;
 }
 
-// The worlds as policies of one kind observe them: with or without auxiliary slots. All kinds are stepped by the same
-// commands, so that their states are the same bits.
+// Worlds with the observations of one kind of policies: with or without auxiliary slots. All kinds are stepped by the
+// same commands, so that their states are bit-identical.
 struct ProbeRun::ObservedWorlds {
   const SimulatorConfig config;
   std::unique_ptr<Simulator> simulator;
@@ -168,9 +168,9 @@ struct ProbeRun::ObservedWorlds {
 
 struct ProbeRun::Participant {
   PolicySession* session = nullptr;          // drives
-  std::unique_ptr<PolicySession> untrained;  // answers in its place
-  std::unique_ptr<Renderer> renderer;        // of its images, with the maps
-  ObservedWorlds* worlds = nullptr;          // that it drives in and observes
+  std::unique_ptr<PolicySession> untrained;  // responds in its place
+  std::unique_ptr<Renderer> renderer;        // renderer of its images, with the maps
+  ObservedWorlds* worlds = nullptr;          // worlds that it drives in and observes
 
   PolicySession& answering() const { return untrained ? *untrained : *session; }
 };
@@ -180,7 +180,7 @@ struct ProbeRun::Pending {
   KeptScene scene;
   std::vector<View> views, views_without;
   std::vector<VisibilityQuery> queries;
-  std::vector<size_t> asked;  // whose visibility the queries are
+  std::vector<size_t> asked;  // pairs whose visibility the queries measure
 };
 
 ProbeRun::ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptions& options, ProbeResults* results_out,
@@ -289,7 +289,7 @@ void ProbeRun::for_each_other(const F& f) {
   }
 }
 
-// The worlds that the driver drives, of so many who drive equal shares.
+// Options of the worlds that the driver drives, one of `shares` equal shares.
 EvaluateOptions ProbeRun::share_of_driver(int shares) {
   EvaluateOptions worlds = options_.worlds;
   worlds.densities.resize(1);
@@ -305,7 +305,7 @@ EvaluateOptions ProbeRun::share_of_driver(int shares) {
   return worlds;
 }
 
-// The driver's share of the scenes.
+// Drives the driver's share of the scenes.
 void ProbeRun::drive() {
   const Participant& driver = participants_[driver_];
   EvaluationWorlds shared{maps_, driver.renderer.get(), std::move(driver.worlds->simulator)};
@@ -322,7 +322,7 @@ void ProbeRun::drive() {
   if (driver_ == 0) results_.setting = report.results.setting;
 }
 
-// All scenes by a controller, which reads no observations. What is said of the setting is of the policies.
+// Drives all scenes by a controller, which reads no observations. The setting in the results is that of the policies.
 void ProbeRun::drive_by_controller() {
   EvaluateOptions worlds = share_of_driver(1);
   worlds.device = device_.is_host() ? "cpu" : "cuda";
@@ -355,7 +355,7 @@ void ProbeRun::ask(const ProbeFrame& frame, Span<const ProbePair> pairs) {
   }
 }
 
-// Keeps the states of pairs, and what is observed in them, for respond().
+// Keeps the states of pairs, and their observations, for respond().
 void ProbeRun::add(const ProbeFrame& frame, Span<const ProbePair> pairs) {
   KeptScene& scene = pending_->scene;
   const auto begin = static_cast<int64_t>(pending_->views.size()), count = static_cast<int64_t>(pairs.size());
@@ -363,7 +363,7 @@ void ProbeRun::add(const ProbeFrame& frame, Span<const ProbePair> pairs) {
   std::vector<int32_t> hidden;
   std::vector<InsertedBox> inserted;
   for (size_t first = 0, end = 0; first < pairs.size(); first = end) {
-    // Pairs of one world, whose inserted boxes are all in it, each hidden from the others' views.
+    // Pairs of one world, which contains all of their inserted boxes; each is hidden from the views of the others.
     const size_t world = pairs[first].world;
     std::vector<InsertedBox> its_inserted;
     for (end = first; end < pairs.size() && pairs[end].world == world; ++end) {
@@ -403,7 +403,7 @@ void ProbeRun::add(const ProbeFrame& frame, Span<const ProbePair> pairs) {
   const DeviceCopy<InsertedBox> inserted_boxes(inserted, device_);
   const Stream stream = current_stream(device_);
   for (const auto& [auxiliary, observed] : observed_) {
-    Simulator& simulator = observed->simulator ? *observed->simulator : *driven_;  // which evaluate() has
+    Simulator& simulator = observed->simulator ? *observed->simulator : *driven_;  // evaluate() owns the driving one
     simulator.observe(asked.span(), {}, inserted_boxes.span(), observed->rows.rows(begin, count), stream);
     simulator.observe(asked_without.span(), hidden_boxes.span(), {}, observed->rows_without.rows(begin, count), stream);
   }
@@ -425,7 +425,7 @@ std::vector<float> ProbeRun::visibility(const SceneBatch& scene, const std::vect
   return host_copy(span_of<const float>(visible), device_);
 }
 
-// Puts the pending pairs to all policies.
+// Evaluates the pending pairs with all policies.
 void ProbeRun::respond() {
   const size_t count = pending_->views.size(), num_policies = participants_.size();
   if (count == 0) return;

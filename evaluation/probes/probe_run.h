@@ -1,5 +1,5 @@
-// How all probes are run: scenes driven by policies in equal shares, states of them kept as one scene, and batches of
-// cases put to all policies.
+// Common procedure of all probes: policies drive equal shares of scenes, sampled states are kept as one scene, and
+// batches of cases are evaluated by all policies.
 #pragma once
 
 #include <functional>
@@ -20,11 +20,11 @@
 
 namespace pictura {
 
-/// What is read of the driven worlds, on the host.
+/// Data of the driven worlds at one step, on the host.
 struct ProbeFrame {
   std::vector<WorldSpec> worlds;
-  int step = 0;    // done in them
-  int driver = 0;  // index of the policy that drives; a controller comes after all of them
+  int step = 0;    // completed steps
+  int driver = 0;  // index of the driving policy; a controller comes after all policies
   std::vector<AgentStatus> status;
   std::vector<AgentClass> agent_class;
   std::vector<int32_t> lane;
@@ -37,7 +37,7 @@ struct ProbeFrame {
 
   ProbeFrame(Simulator& simulator, int step, int driver);
 
-  /// The number of a world's scenario.
+  /// Scenario number of a world.
   int32_t scene_of(size_t world) const {
     return static_cast<int32_t>(worlds[world].global_world - kFirstEvaluationWorld);
   }
@@ -50,38 +50,38 @@ struct ProbeFrame {
   }
 };
 
-/// Worlds of frames of any steps as one scene, on the host.
+/// Worlds of frames of any steps in one scene, on the host.
 struct KeptScene {
   std::vector<int32_t> world_begin{0}, light_begin{0}, hidden;
   std::vector<AgentBox> boxes;
   std::vector<GeometryHandle> geometry;
   std::vector<LightState> lights;
 
-  /// Adds a world, with further boxes after its own.
+  /// Adds a world, followed by inserted boxes.
   void add_world(const ProbeFrame& frame, size_t world, Span<const InsertedBox> inserted = {});
-  /// Where boxes of the world that was added last are: those of its frame, and the first that was inserted.
+  /// Indices in the last added world: of a box of its frame, and of the first inserted box.
   int32_t box_of(const ProbeFrame& frame, size_t world, int32_t box_of_frame) const {
     return box_of_frame - frame.box_begin[world] + world_begin[geometry.size() - 1];
   }
   int32_t first_inserted(const ProbeFrame& frame, size_t world) const {
     return box_of(frame, world, frame.box_begin[world + 1]);
   }
-  /// What a slot of that world sees without some of this scene's boxes.
+  /// View of a slot of that world without the given boxes of this scene.
   View view_of(const ProbeFrame& frame, size_t world, int32_t slot, const std::vector<int32_t>& without);
 };
 
-/// An agent of a frame in a state with and without somebody: a box that is hidden in the second, or inserted in the
-/// first, or nobody.
+/// Agent of a frame in a state with and without a box: hidden_box is hidden in the second state, `inserted` is inserted
+/// in the first, or neither.
 struct ProbePair {
   size_t world = 0;
   int32_t slot = 0;
   int32_t hidden_box = -1;
   std::optional<InsertedBox> inserted;
-  int32_t asked_box = -1;  // whose visibility is wanted; -1: nobody's, which is NaN
+  int32_t asked_box = -1;  // box whose visibility is measured; -1: none, which gives NaN
 };
 
-/// How many cases of each scene are still to be drawn: as many in each, spread evenly over its samples for as long as
-/// it has so many.
+/// Number of cases still to be drawn in each scene: equally many in each, spread evenly over its samples while enough
+/// are available.
 class CaseQuota {
  public:
   CaseQuota(int64_t cases, const ProbeOptions& options) : cases_(cases), options_(options) {}
@@ -94,45 +94,46 @@ class CaseQuota {
   std::map<int32_t, int64_t> taken_;
 };
 
-/// What differs between probes.
+/// Differences between probes.
 struct ProbeKind {
-  // A control: policies with fresh weights, drawn from the seed, answer. The others still drive.
+  // Control: policies with fresh weights, drawn from the seed, respond. The trained policies still drive.
   bool untrained = false;
 };
 
 class ProbeRun final : public EvaluationObserver {
  public:
-  /// Opens nothing: the sessions are of one device, `options` names them. Fills in what results say of the setting.
+  /// Creates a run of open sessions of one device; `options` names them. Fills in the setting in the results.
   ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptions& options, ProbeResults* results_out,
            const ProbeKind& kind);
   ~ProbeRun() override;
 
-  /// Sees worlds before every step, and who drives.
+  /// Called with the worlds before every step, and their driver.
   using Watch = std::function<void(Simulator& simulator, int driver)>;
 
-  /// Drives all scenes, each policy its share, or options.worlds.controller all, and hands out their states of every
-  /// sample_steps steps, from the first such on. Then asks what is left, and returns the visibility of whom all pairs
-  /// asked for, in the order of ask(). With `watch` states are looked at alone: nothing is to be asked of them.
+  /// Drives all scenes, each policy its share, or options.worlds.controller all, and passes their states at every
+  /// sample_steps steps to `sample`, from the first sampled step on. Then evaluates the remaining pairs, and returns
+  /// the visibility of all pairs' asked_box, in the order of ask(). With `watch` states are only observed: ask() must
+  /// not be called.
   std::vector<float> run(const std::function<void(const ProbeFrame&)>& sample, const Watch& watch = {});
 
-  /// Of the present frame. Responses are appended to the results in this order.
+  /// Adds pairs of the current frame. Responses are appended to the results in this order.
   void ask(const ProbeFrame& frame, Span<const ProbePair> pairs);
 
-  /// In the cameras of the first policy that reads images, or in the paper's.
+  /// Visibilities in the cameras of the first policy that reads images, or in the paper's.
   std::vector<float> visibility(const KeptScene& scene, const std::vector<View>& views,
                                 const std::vector<VisibilityQuery>& queries);
-  /// The same of a scene in the memory of device().
+  /// Visibilities in a scene in the memory of device().
   std::vector<float> visibility(const SceneBatch& scene, const std::vector<View>& views,
                                 const std::vector<VisibilityQuery>& queries);
-  /// What that policy's images are drawn with.
+  /// Renderer configuration of that policy's images.
   const RendererConfig& cameras() const { return cameras_; }
-  /// The first of them, in the ego's frame.
+  /// First of these cameras, in the ego's frame.
   const PinholeCamera& front_camera() const { return front_camera_; }
   const CompiledMaps& maps() const { return maps_; }
   Renderer& measuring() { return *measuring_; }
   Device device() const { return device_; }
-  /// Of a policy: the session that answers, the renderer of its images, if it reads any, and worlds as it observes
-  /// them.
+  /// Parts of a policy: the session that responds, the renderer of its images (null if it reads none), and worlds with
+  /// its observations.
   PolicySession& session(size_t policy) const;
   Renderer* renderer(size_t policy) const;
   SimulatorConfig world_of(size_t policy) const;
@@ -173,7 +174,7 @@ class ProbeRun final : public EvaluationObserver {
   ProbeResults& results_;
 };
 
-/// Throws UsageError where scenes cannot be shared equally, or there is nothing to sample.
+/// Throws UsageError if scenes cannot be shared equally, or there is nothing to sample.
 void check_probe(const ProbeOptions& options, size_t num_policies);
 
 /// Opens options.policies, and calls `probe` with them.

@@ -11,11 +11,11 @@ namespace pictura {
 
 namespace {
 
-// A case, and where its world and agents are in a frame.
+// Case, with the positions of its world and agents in a frame.
 struct DrawnCase {
   RemovalCase facts;
   size_t world = 0;
-  int32_t slot = 0;  // of the ego
+  int32_t slot = 0;  // slot of the ego
   int32_t user_box = 0, hidden_box = -1;
 };
 
@@ -34,7 +34,7 @@ class RemovalProbe {
   }
 
  private:
-  // Draws cases of this step of all worlds.
+  // Draws cases of this step from all worlds.
   void sample(const ProbeFrame& frame) {
     std::vector<DrawnCase> drawn;
     for (size_t world = 0; world < frame.worlds.size(); ++world) {
@@ -54,7 +54,7 @@ class RemovalProbe {
     run_.ask(frame, pairs);
   }
 
-  // All egos of a world with each of their road users, by ego and user.
+  // Returns all egos of a world with each of their road users, by ego and user.
   std::vector<DrawnCase> pairs_of(const ProbeFrame& frame, size_t world) const {
     const WorldSpec& spec = frame.worlds[world];
     const int32_t first_slot = frame.slot_begin[world], first_box = frame.box_begin[world];
@@ -85,7 +85,7 @@ class RemovalProbe {
     return pairs;
   }
 
-  // Some pairs of a world, none twice, and whom each hides.
+  // Draws distinct pairs of a world, and the agent that each hides.
   void draw(const ProbeFrame& frame, const std::vector<DrawnCase>& pairs, int count,
             std::vector<DrawnCase>* out) const {
     std::vector<int> order(pairs.size());
@@ -121,7 +121,7 @@ class RemovalProbe {
     return others.empty() ? -1 : others[random->below(static_cast<int>(others.size()))];
   }
 
-  // By scene, step, ego and user, in whatever order they came.
+  // Sorts cases by scene, step, ego and user, independent of the order in which they were drawn.
   void sort_cases() {
     const std::vector<size_t> order = sorted_order(results_.cases.size(), [this](size_t i) {
       const RemovalCase& one = results_.cases[i];

@@ -1,5 +1,5 @@
-// Counterfactual removal (paper, "Counterfactual probes reveal visual grounding"): what policies make of a state with
-// and without one of its road users, by how much of that user the ego's cameras could see. Without torch headers.
+// Counterfactual removal (paper, "Counterfactual probes reveal visual grounding"): responses of policies to a state
+// with and without one of its road users, by how much of that user the ego's cameras could see. Has no torch headers.
 #pragma once
 
 #include <vector>
@@ -12,8 +12,8 @@ namespace pictura {
 class PolicySession;
 
 struct RemovalOptions : ProbeOptions {
-  int64_t removals = 88'000;  // in all, as many in each scene; fewer where a scene has not as many
-  float range_m = 50;         // users that are farther away are not hidden
+  int64_t removals = 88'000;  // total, equally many in each scene; fewer if a scene has fewer
+  float range_m = 50;         // maximum distance of the removed users
   RemovalControl control = RemovalControl::none;
 };
 
@@ -29,16 +29,15 @@ void visit_options(RemovalOptions& options, Visitor&& v) {
 }
 
 /// Drives evaluation worlds, those of evaluate() with the same numbers, in the world of the first policy: its
-/// population, walls and conditioning, which are put to all. In states of every `sample_steps` steps, pairs are drawn
-/// of an active vehicle, the ego, and another active or halted agent within range_m, the user, none twice; parked cars
-/// are no users. Each policy is given what it reads of the state, as it is and with the user hidden from this ego: for
-/// vectors Simulator::observe, for images a view that leaves it out. Images are those that each policy was trained
-/// with; occlusion is measured in the cameras of the first that reads images, or in the paper's. ^C ends it with the
-/// cases that are done. Throws UsageError where scenes cannot be shared equally, Error naming file and key for bad
-/// input.
+/// population, walls and conditioning apply to all policies. In the states of every `sample_steps` steps it draws
+/// distinct pairs of an active vehicle, the ego, and another active or halted agent within range_m, the user; parked
+/// cars are no users.
+/// Each policy gets its input of the state, unchanged and with the user hidden from this ego: for vectors
+/// Simulator::observe, for images a view without the user. Images are those of each policy's training; occlusion is
+/// measured in the cameras of the first policy that reads images, or in the paper's. An interrupt ends the probe with
+/// the completed cases. Throws UsageError if scenes cannot be shared equally, Error naming file and key for bad input.
 RemovalResults probe_removal(const RemovalOptions& options);
-/// The same of policies that are open, of one device, whose renderers and cameras are kept; options.policies names
-/// them.
+/// Probes open policies of one device, with their renderers and cameras; options.policies names them.
 RemovalResults probe_removal(const std::vector<PolicySession*>& sessions, const RemovalOptions& options);
 
 }  // namespace pictura

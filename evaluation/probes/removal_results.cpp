@@ -24,7 +24,7 @@ int occlusion_bin(const RemovalCase& one) {
 
 int distance_band(const RemovalCase& one) { return static_cast<int>(one.distance_m / kDistanceBand_m); }
 
-// A group's cases, of one policy.
+// Sums over a group's cases, of one policy.
 struct GroupSums {
   ResponseSums responses;
   double occlusion = 0;
@@ -73,7 +73,7 @@ std::string RemovalGroup::occlusion_name() const {
 std::vector<RemovalRow> summarize(const RemovalResults& results) {
   std::vector<RemovalRow> rows;
   const auto num_bands = static_cast<int>(std::ceil(results.range_m / kDistanceBand_m));
-  constexpr int kBins = RemovalGroup::kOcclusionBins + 2;  // with those that are hidden, and in no frame
+  constexpr int kBins = RemovalGroup::kOcclusionBins + 2;  // with bins for hidden users and users outside frames
   for (size_t policy = 0; policy < results.policies.size(); ++policy) {
     std::vector<GroupSums> all(kBins), by_band(static_cast<size_t>(kBins * num_bands));
     for (size_t i = 0; i < results.cases.size(); ++i) {
@@ -85,7 +85,7 @@ std::vector<RemovalRow> summarize(const RemovalResults& results) {
     }
     for (int band = -1; band < num_bands; ++band) {
       for (int i = 1; i <= kBins; ++i) {
-        const int bin = i % kBins;  // those in no frame come last
+        const int bin = i % kBins;  // users outside frames come last
         const GroupSums& sums = band < 0 ? all[bin] : by_band[band * kBins + bin];
         RemovalGroup group{.occlusion_bin = bin - 1};
         if (band >= 0) group.distance_band = band;

@@ -18,7 +18,7 @@ namespace pictura {
 
 namespace {
 
-// Whether a box is among those that vectors hold of an ego's world.
+// Whether a box is among the partners in an ego's vector observation.
 bool is_partner(Span<const AgentBox> boxes, int32_t box, int32_t ego, Vec2 origin_m) {
   const auto nearest = nearest_boxes(
       static_cast<int>(boxes.size()), [&](int i) -> const AgentBox& { return boxes[i]; },
@@ -31,14 +31,14 @@ bool is_partner(Span<const AgentBox> boxes, int32_t box, int32_t ego, Vec2 origi
 
 }  // namespace
 
-// A simulator with a world for each start.
+// Simulator with a world for each start.
 struct TakeoverWorlds::Worlds {
   std::unique_ptr<Simulator> simulator;
-  std::unique_ptr<StateSnapshot> at_takeover;  // of the starts of the present call
+  std::unique_ptr<StateSnapshot> at_takeover;  // snapshot of the starts of the current call
   std::unique_ptr<ObservationRows> rows;
   int64_t num_rows = 0;
   std::vector<int32_t> first_slots;  // [starts + 1]
-  std::vector<View> views;           // [starts] of the egos in the present state
+  std::vector<View> views;           // [starts] views of the egos in the current state
 };
 
 TakeoverWorlds::TakeoverWorlds(ProbeRun& run, const ProbeOptions& options, const std::vector<LineOfSight>& sights)
@@ -57,7 +57,7 @@ TakeoverWorlds::TakeoverWorlds(ProbeRun& run, const ProbeOptions& options, const
 
 TakeoverWorlds::~TakeoverWorlds() = default;
 
-// Of the maps with walls are those that the run uploaded.
+// Handles of maps with walls are those that the run uploaded.
 std::vector<GeometryHandle> TakeoverWorlds::handles_of(bool walls) const {
   std::vector<GeometryHandle> handles;
   for (size_t i = 0; i < sights_.size(); ++i) {
@@ -92,7 +92,7 @@ bool TakeoverWorlds::run(const std::vector<TakeoverStart>& starts, bool walls,
   return true;
 }
 
-// Worlds that the policy observes, at the takeover.
+// Prepares worlds that the policy observes, at the takeover.
 TakeoverWorlds::Worlds* TakeoverWorlds::prepare(size_t policy, const std::vector<TakeoverStart>& starts, bool walls) {
   SimulatorConfig config = run_.world_of(policy);
   config.walls = walls;
@@ -127,7 +127,7 @@ TakeoverWorlds::Worlds* TakeoverWorlds::prepare(size_t policy, const std::vector
   return worlds.get();
 }
 
-// Takes whoever is removed out of their worlds.
+// Removes the removed agents from their worlds.
 void TakeoverWorlds::remove(Worlds* worlds, const std::vector<TakeoverStart>& starts) {
   std::vector<int32_t> slots;
   for (size_t i = 0; i < starts.size(); ++i) {
@@ -143,7 +143,7 @@ void TakeoverWorlds::remove(Worlds* worlds, const std::vector<TakeoverStart>& st
                                current_stream(device));
 }
 
-// Notes the present state in runs that have not ended; false where all have.
+// Records the current state in runs that have not ended; false if all have ended.
 bool TakeoverWorlds::look(Worlds* worlds, size_t policy, const std::vector<TakeoverStart>& starts, int step,
                           const std::vector<Takeover*>& runs) {
   const Device device = run_.device();

@@ -1,4 +1,5 @@
-// Policies that drive on from a state of a driven scene while all others do what they did in it. Without torch headers.
+// Takeovers: policies drive an ego from a state of a driven scene, while all other agents repeat their motion in it.
+// Has no torch headers.
 #pragma once
 
 #include <array>
@@ -20,43 +21,45 @@ struct ProbeOptions;
 constexpr int kTakeoverSteps = 80;
 constexpr double kTakeoverStep_s = 0.1;
 
-/// Runs that go through a network at once, always, each at its place: equal inputs give equal bits.
+/// Number of runs in every pass through a network, each at its own place: equal inputs give equal bits.
 constexpr int takeover_pass(Device device) { return device.is_host() ? 8 : 256; }
 
 struct TakeoverStart {
   const DrivenScene* scene = nullptr;
-  const KeptWorld* world = nullptr;  // the scene's, in the state in which the policy takes over
-  int32_t step = 0, ego = 0;         // steps done in the scenario when the policy takes over
-  int32_t user = -1;                 // whom the ego cannot see; -1: nobody
-  int32_t removed = -1;              // who is not there; -1: nobody
+  const KeptWorld* world = nullptr;  // the scene's world, in the state in which the policy takes over
+  int32_t step = 0, ego = 0;         // steps done in the scenario at the takeover
+  int32_t user = -1;                 // hidden vehicle; -1: none
+  int32_t removed = -1;              // removed agent; -1: none
 };
 
-/// One run of one policy. What has an index k is after k steps; NaN once the run has ended.
+/// One run of one policy. Element k is the value after k steps; NaN after the end of the run.
 struct Takeover {
-  int32_t steps = 0;     // that the ego drove: kTakeoverSteps, or fewer where an infraction ended the run
-  uint8_t ended_by = 0;  // Event bits of that
-  // The first state in which no wall of the map is between the ego's eye and the user, or where it would be; and the
-  // first in which the user is in what the policy reads: seen by cameras, or among the nearest partners. -1: never.
+  int32_t steps = 0;     // steps that the ego drove: kTakeoverSteps, or fewer if an infraction ended the run
+  uint8_t ended_by = 0;  // Event bits of that infraction
+  // First step at which no wall of the map is between the ego's eye and the user, or where it would be; and first step
+  // at which the user is in the policy's input: seen by cameras, or among the nearest partners. -1: never.
   int32_t sight_step = -1, input_step = -1;
-  float sight_distance_m = std::numeric_limits<float>::quiet_NaN();  // between the boxes' centres, then
-  std::array<float, kTakeoverSteps + 1> speed_mps, x_m, y_m;         // of its reference point
+  float sight_distance_m = std::numeric_limits<float>::quiet_NaN();  // at sight_step, between the boxes' centres
+  std::array<float, kTakeoverSteps + 1> speed_mps, x_m, y_m;         // of the ego's reference point
 
   Takeover() {
     for (auto* of_state : {&speed_mps, &x_m, &y_m}) of_state->fill(std::numeric_limits<float>::quiet_NaN());
   }
 };
 
-/// Runs takeovers in worlds of the probe's maps, with their walls and without them.
+/// Runs takeovers in worlds of the probe's maps, with and without their walls.
 class TakeoverWorlds {
  public:
-  /// After run.run(), which drives the scenes. sights: [maps]. All must outlive it.
+  /// Creates the worlds after run.run(), which drives the scenes. sights: [maps]. The arguments must outlive the
+  /// object.
   TakeoverWorlds(ProbeRun& run, const ProbeOptions& options, const std::vector<LineOfSight>& sights);
   ~TakeoverWorlds();
 
-  /// [starts, policies] Each start is a world of its own that goes on from the state that was kept, without whoever is
-  /// removed: all others are put where they were, and the policy drives the ego by what it reads, the most likely
-  /// action or a draw. Sight is measured by the walls of the maps also where worlds have none. on_progress is told
-  /// which part of it is done, above 0. Returns false on ^C, with nothing to be used.
+  /// Runs all takeovers; takeovers_out: [starts, policies]. Each start is a separate world that continues from the kept
+  /// state, without the removed agent. All other agents are placed as in the scene, and the policy drives the ego from
+  /// its own input, with the most likely action or a draw. Sight is measured with the walls of the maps, even in worlds
+  /// without walls. on_progress receives the completed fraction, above 0. Returns false after an interrupt, when
+  /// takeovers_out must not be used.
   bool run(const std::vector<TakeoverStart>& starts, bool walls, const std::function<void(double)>& on_progress,
            std::vector<Takeover>* takeovers_out);
 
@@ -72,8 +75,8 @@ class TakeoverWorlds {
   ProbeRun& run_;
   const ProbeOptions& options_;
   const std::vector<LineOfSight>& sights_;
-  CompiledMaps open_maps_;  // the same without walls
-  // By walls, and by what is observed: auxiliary slots, entities, walls.
+  CompiledMaps open_maps_;  // maps without walls
+  // Worlds by walls and by observed parts: auxiliary slots, entities, walls.
   std::map<std::array<bool, 4>, std::unique_ptr<Worlds>> worlds_;
 };
 
