@@ -22,7 +22,7 @@ namespace pictura {
 namespace {
 
 #ifdef PICTURA_HAS_TORCH
-/// The observations of one slot.
+/// Returns the observations of one slot.
 ObservationView of_slot(const ObservationView& all, size_t slot) {
   ObservationView one;
 #define X(name, type, rows, features, part, comment) \
@@ -33,7 +33,7 @@ ObservationView of_slot(const ObservationView& all, size_t slot) {
 }
 #endif
 
-/// A word as shells read it.
+/// Quotes a word for shells.
 std::string quoted(const std::string& word) {
   constexpr std::string_view kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-+=.,:/@%";
   if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
@@ -49,7 +49,7 @@ std::string quoted(const std::string& word) {
 }
 
 void say_what_was_written(const std::string& path, const Replay& replay) {
-  std::error_code none;  // of a device
+  std::error_code none;  // set for devices, which have no size
   const auto bytes = std::filesystem::file_size(path, none);
   print_message("{}: {} agents, {} steps{}\n", path, replay.num_agents, replay.num_frames - 1,
                 none ? "" : fmt::format(", {:.2f} MB", static_cast<double>(bytes) / 1e6));

@@ -1,4 +1,4 @@
-// Recording what drives in a world as replays, and what a policy makes of the followed agent.
+// Records a driven world as a replay, with the policy's responses for the followed agent.
 #pragma once
 
 #include <memory>
@@ -16,39 +16,40 @@ class PolicySession;
 struct DrivenWorld;
 
 struct RecordingOptions {
-  std::optional<int> followed;  // nothing: settle_followed() chooses
+  std::optional<int> followed;  // empty: settle_followed() chooses
   bool cameras = false;
 };
 
-/// Follows the world's first agent where nothing was asked for. Throws UsageError unless the world has the followed
-/// one.
+/// Follows the world's first agent if none was requested. Throws UsageError if the world lacks the requested agent.
 void settle_followed(const DrivenWorld& world, RecordingOptions* options_inout);
 
-/// Who drives, and what draws. A controller has no session; without it, cameras are the paper's.
+/// Driver of a recorded world, and the renderer of its images. A controller has no session; its cameras are the
+/// paper's.
 struct RecordedDriver {
-  std::string policy;  // as it was asked for
+  std::string policy;  // as requested
   PolicySession* session = nullptr;
-  Renderer* renderer = nullptr;  // of the session's images
+  Renderer* renderer = nullptr;  // renderer of the session's images
 };
 
-/// What draws the images that its policy sees, else the paper's.
+/// Renderer configuration of the policy's images; the paper's for a controller.
 RendererConfig cameras_of(const RecordedDriver& driver);
-/// What the policy makes of an agent of the only world now; nothing where it is not asked.
+/// The policy's present response for an agent of the only world; empty if the policy does not drive.
 std::optional<ReplayDecision> decision_of_agent(Simulator& simulator, const RecordedDriver& driver, int agent);
-/// This process, its command and who drives.
+/// Origin of a replay: this process, its command and the driver.
 ReplayOrigin origin_of(const RecordedDriver& driver);
 
 /// Records the only world of a simulator in host memory.
 class Recording final : public StepObserver {
  public:
-  /// The simulator and what the driver names must outlive it. Throws UsageError where there is no such agent.
+  /// Creates a recording. The simulator and the driver's objects must outlive it. Throws UsageError if the followed
+  /// agent does not exist.
   Recording(Simulator& simulator, const RecordedDriver& driver, const RecordingOptions& options);
   ~Recording() override;
 
   void before_step(Span<const Command> commands) override;
   void after_step(const StepResult& result) override;
 
-  /// The replay until now, of which nothing more can be recorded.
+  /// Returns the replay so far, and ends the recording.
   Replay finish();
 
  private:
@@ -56,14 +57,14 @@ class Recording final : public StepObserver {
   std::unique_ptr<Parts> parts_;
 };
 
-/// Writes a replay under this name, and what was written on stderr.
+/// Writes a replay to `path`, and reports the file on stderr.
 void write_replay_and_say_so(const std::string& path, const Replay& replay);
 void write_mcap_and_say_so(const std::string& path, const Replay& replay);
 
-/// Removes the pages of a gallery that earlier calls wrote, lists the others, and says so on stderr.
+/// Removes the pages of a gallery that earlier calls wrote, lists the other pages, and reports the gallery on stderr.
 void write_index(FilledFolder* pages);
 
-/// This process's command, as a shell would read it; the program without its folder.
+/// This process's command as a shell would read it, with the program's name without its folder.
 std::string command_line();
 
 }  // namespace pictura

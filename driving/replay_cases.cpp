@@ -13,7 +13,7 @@ namespace {
 
 constexpr const char* kWhyOtherwise = "the policy's numbers differ in their last bits where batches or devices differ";
 
-// Where a case is, and how fast its ego was there.
+// Scene, step and ego of a case, with the ego's speed.
 struct CasePlace {
   int32_t scene = 0, driver = 0, step = 0, ego = 0;
   float ego_speed_mps = 0;
@@ -24,7 +24,7 @@ CasePlace place_of(const PedestrianPath& one) { return {one.scene, one.driver, o
 
 CasePlace place_of(const CornerState& one) { return {one.scene, one.driver, one.step, one.ego, one.speed_mps}; }
 
-// The case that was asked for, of so many; nothing if none was.
+// Returns the requested case; empty if none was requested.
 std::optional<size_t> asked_case(const CaseReplayOptions& options, size_t count) {
   if (count == 0) fail("--replay: the probe found no case");
   if (!options.number) return std::nullopt;
@@ -32,7 +32,7 @@ std::optional<size_t> asked_case(const CaseReplayOptions& options, size_t count)
   return static_cast<size_t>(*options.number);
 }
 
-// That, or the one in which the first policy's value changes most.
+// Returns the requested case, or the case with the largest change in the first policy's value.
 size_t chosen_case(const CaseReplayOptions& options, const ProbeResults& results) {
   const size_t count = results.responses.size() / results.policies.size();
   if (const auto asked = asked_case(options, count)) return *asked;
@@ -71,10 +71,10 @@ std::string about(const CornerState& one, int32_t removed, CornerControl control
                      removed < 0 ? "nobody" : fmt::format("agent {}", removed));
 }
 
-// The scene of a case, to be driven again by whom it was driven.
+// Options that drive a case's scene again, by its driver.
 EvaluateOptions driven_by(const ProbeOptions& probe, const CasePlace& place) {
   EvaluateOptions driven = probe.worlds;
-  // A controller comes after all policies.
+  // A controller's index follows all policies.
   if (driven.controller.empty()) driven.checkpoint = probe.policies[place.driver];
   return driven;
 }
@@ -82,7 +82,7 @@ RecordedScenario scenario_of(const ProbeOptions& probe, const ProbeResults& resu
   return {.number = place.scene, .agents_per_world = results.agents_per_world, .world_of = probe.policies[0]};
 }
 
-// Says where the ego drives at another speed in the replay, whose speeds are rounded to 1 cm/s.
+// Reports an ego whose speed differs in the replay, where speeds are rounded to 1 cm/s.
 void compare_speed(const std::string& path, const Replay& replay, int frame, int ego, float probed_mps) {
   const double speed_mps = 0.01 * replay.at(Track::speed_mps, frame, ego);
   if (std::abs(speed_mps - double{probed_mps}) < 0.0051) return;
@@ -90,7 +90,7 @@ void compare_speed(const std::string& path, const Replay& replay, int frame, int
                 probed_mps, kWhyOtherwise);
 }
 
-// Writes the replay of a case, which is at `frame` of it; `probed` says what the case is about.
+// Writes the replay of a case at frame `frame`; `probed` describes the case.
 void write(const CaseReplayOptions& options, const ProbeResults& results, size_t number, const CasePlace& place,
            int frame, ReplayCase probed, Replay replay) {
   probed.what = fmt::format("case {}: {}", number, probed.what);
@@ -110,7 +110,7 @@ void write(const CaseReplayOptions& options, const ProbeResults& results, size_t
   compare_speed(options.path, replay, frame, place.ego, place.ego_speed_mps);
 }
 
-// Drives the scene again, and writes it.
+// Drives the scene again, and writes its replay.
 void write_scene(const CaseReplayOptions& options, const ProbeOptions& probe, const ProbeResults& results,
                  size_t number, const CasePlace& place, ReplayCase probed) {
   RecordingOptions recording = options.recording;

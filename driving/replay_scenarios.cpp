@@ -39,7 +39,7 @@ class ScenarioRecorder final : public EvaluationObserver {
   std::optional<Recording> recording_;
 };
 
-// Keeps where all agents of the only world were, and the world after so many steps.
+// Keeps the states of all agents of the only world, and the world after `step` steps.
 class ScenarioKeeper final : public EvaluationObserver {
  public:
   explicit ScenarioKeeper(int step) : step_(step) {}
@@ -61,7 +61,7 @@ class ScenarioKeeper final : public EvaluationObserver {
   std::shared_ptr<const KeptWorld> kept_;
 };
 
-// An evaluation of one scenario, on the host.
+// Options of an evaluation of one scenario, on the host.
 EvaluateOptions options_of(const EvaluateOptions& options, const RecordedScenario& scenario) {
   EvaluateOptions one = options;
   one.agents_per_world = scenario.agents_per_world;
@@ -73,7 +73,7 @@ EvaluateOptions options_of(const EvaluateOptions& options, const RecordedScenari
   return one;
 }
 
-// An evaluation in the world of another policy, of which the driver observes what it reads.
+// Evaluates in the world of another policy, with the observations that the driver reads.
 EvaluateReport evaluate_in_world_of(const std::string& path, PolicySession* driver, const EvaluateOptions& options) {
   const SimulatorConfig its = driver->evaluation_world(options.steps);
   SimulatorConfig world = PolicySession(path, options).evaluation_world(options.steps);
@@ -89,13 +89,13 @@ EvaluateReport evaluate_in_world_of(const std::string& path, PolicySession* driv
   return evaluate(driver, options, &worlds);
 }
 
-// The policy that drives; null where a controller does.
+// Opens the policy that drives; null for a controller.
 std::unique_ptr<PolicySession> session_of(const EvaluateOptions& options) {
   if (!options.controller.empty()) return nullptr;
   return std::make_unique<PolicySession>(options.checkpoint, options);
 }
 
-// Drives the scenario, and returns what it counts. session: as session_of() gives it.
+// Drives the scenario, and returns its counts. session: as returned by session_of().
 ScenarioCounts drive(const EvaluateOptions& options, const RecordedScenario& scenario, PolicySession* session) {
   EvaluateOptions one = options;
   if (!session && !scenario.world_of.empty()) one.checkpoint = scenario.world_of;
@@ -106,8 +106,8 @@ ScenarioCounts drive(const EvaluateOptions& options, const RecordedScenario& sce
   return report.results.densities[0].scenarios[0];
 }
 
-// By how a scenario is compared to another: the greater, the worse. Infractions by vehicle, then collisions at fault,
-// then how little was driven.
+// Sort key of scenarios, larger is worse: share of vehicles with infractions, then of collisions at fault, then less
+// distance.
 std::array<double, 3> badness(const ScenarioCounts& counts) {
   const auto vehicles = static_cast<double>(std::max<int64_t>(1, counts.vehicles));
   return {static_cast<double>(counts.at_fault_infraction) / vehicles, static_cast<double>(counts.at_fault) / vehicles,
@@ -119,7 +119,7 @@ const ScenarioCounts& counts_of(const EvaluationResults& results, const Scenario
   return density.scenarios[place.scenario - density.first_scenario];
 }
 
-// Follows the scenario's worst agent where nothing was asked for and the evaluation names it.
+// Follows the scenario's worst agent if no agent was requested and the evaluation names it.
 RecordingOptions following_worst(RecordingOptions recording, const EvaluationResults& results,
                                  const ScenarioPlace& place) {
   const DensityResult& density = results.densities[place.density];
@@ -165,7 +165,7 @@ Replay record_scenario(const EvaluateOptions& options, const RecordedScenario& s
                        const RecordingOptions& recording, ScenarioCounts* counts_out) {
   EvaluateOptions one = options_of(options, scenario);
   const std::unique_ptr<PolicySession> session = session_of(one);
-  // The followed agent's policy is asked with a renderer of its own, which holds the scenario's map.
+  // The followed agent's policy needs its own renderer, which holds the scenario's map.
   std::unique_ptr<Renderer> renderer = session ? session->make_renderer() : nullptr;
   ScenarioRecorder recorder({session ? one.checkpoint : one.controller, session.get(), renderer.get()}, recording);
   one.observer = &recorder;

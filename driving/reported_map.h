@@ -1,4 +1,4 @@
-// Loading of maps with a report on stderr of what was repaired in their files.
+// Loads maps and reports on stderr the repairs of their files.
 #pragma once
 
 #include <memory>
@@ -8,11 +8,11 @@
 
 namespace pictura {
 
-/// load_map(), with one line on stderr where faults of the file were mended.
+/// Calls load_map(), and reports on stderr if faults of the file were repaired.
 std::shared_ptr<const RoadMap> load_reported_map(const std::string& name);
 
-/// A line on stderr for each kind of fault that was mended: how many, what was done, and the first. `source` names the
-/// file.
+/// Prints a line on stderr for each kind of repaired fault: the number, the repair, and the first fault. `source` names
+/// the file.
 void print_mends(const RoadMap& map, const std::string& source);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// A live view of what a program simulates.
+// Live view of a running simulation.
 #pragma once
 
 #include <memory>
@@ -15,13 +15,14 @@ struct ServeOptions {
   std::string host_name;
 };
 
-/// Serves the only world of a simulator in host memory, and says where on stderr. The simulator and what the driver
-/// names must outlive it. Throws UsageError where this build cannot, Error where the port is taken.
+/// Serves the only world of a simulator in host memory, and reports the address on stderr. The simulator and the
+/// driver's objects must outlive the view. Throws UsageError if this build lacks the server, Error if the port is in
+/// use.
 std::unique_ptr<LiveView> serve(const ServeOptions& options, Simulator& simulator, const RecordedDriver& driver,
                                 const RecordingOptions& recording);
 
-/// Waits until the next step is due: for the first page, for whoever has paused it, and for its pace. False once the
-/// process was asked to end.
+/// Waits until the next step is due: for the first page, until no page pauses it, and for its pace. Returns false after
+/// an interrupt.
 bool await_step(LiveView& view);
 
 }  // namespace pictura

@@ -46,7 +46,7 @@ void apply_world_options(const WorldOptions& options, SimulatorConfig* config_in
 
 namespace {
 
-/// [tracks] those that the policy drives: the controlled ones that are there at the start.
+/// Selects the tracks that the policy drives, [tracks]: the controlled ones that are present at the start.
 std::vector<uint8_t> controlled_tracks(const WorldOptions& options, const CompiledMap& map) {
   try {
     return tracks_of(*map.scenario, options.controlled, map.start_step);
@@ -96,7 +96,7 @@ DrivenWorld make_world(const WorldOptions& options, const std::string& policy) {
   }
   apply_world_options(options, &config);
   config.fixed_lights = true;
-  std::vector<uint8_t> controlled;  // of a recorded scene, by other than the record
+  std::vector<uint8_t> controlled;  // tracks of a recorded scene that do not follow the recording
   if (is_scene_name(options.map)) {
     const auto scene = std::make_shared<const Scenario>(load_scenario(options.map));
     config = scene_config(*scene, options.start_step, config);

@@ -1,4 +1,4 @@
-// One world of one map, and the controller that drives in it, by name or from a checkpoint.
+// One world of one map, with its controller, by name or from a checkpoint.
 #pragma once
 
 #include <memory>
@@ -15,27 +15,27 @@
 
 namespace pictura {
 
-/// What all worlds that are driven here share. Threads, lights and simulator of a policy are the world's as well.
+/// Options of all driven worlds. A policy uses the world's threads, lights and simulator too.
 struct WorldOptions : SessionOptions {
   std::string map;
   int agents = 32;
   uint64_t seed = 0;
   bool walls = true;
   bool vector_observations = true;
-  // Where nothing is said, as the policy was trained, or as in the paper.
+  // Populations; without a value as in the policy's training, or as in the paper.
   std::optional<float> pedestrian_fraction, cyclist_fraction;
   std::optional<int> parked_cars;
   OtherShares others{};
-  // Of recorded scenes: which tracks the policy drives, where the recording starts, and whether its lights are there.
-  // An episode is as long as what is left of the recording, or as so many steps.
+  // Options of recorded scenes: the tracks that the policy drives, the start in the recording, and whether its lights
+  // are used. An episode lasts for the rest of the recording, but at least min_episode_steps.
   std::string controlled = "self";
   int start_step = 0;
   bool recorded_lights = false;
   int min_episode_steps = 1;
 };
 
-/// Sets what was given of a simulator's options; a share of pedestrians or cyclists that was not gives way to one that
-/// was. Throws UsageError where both were given and are more than 1.
+/// Sets the given options in a simulator's configuration. A share of pedestrians or cyclists that is not given is
+/// reduced to fit a given one. Throws UsageError if both are given and sum to more than 1.
 void apply_world_options(const WorldOptions& options, SimulatorConfig* config_inout);
 
 /// Whether a policy is the name of a controller that needs no checkpoint.
@@ -43,32 +43,32 @@ bool is_host_controller(const std::string& policy);
 
 class PolicySession;
 
-/// One world and who drives in it.
+/// World with its driver.
 struct DrivenWorld {
   std::unique_ptr<Simulator> simulator;
-  // Of a trained policy: itself and, where it reads images, what draws them and with which settings.
+  // Parts of a trained policy: the session and, if it reads images, their renderer with its settings.
   std::shared_ptr<PolicySession> session;
   std::unique_ptr<Renderer> renderer;
   std::optional<RendererConfig> trained_view;
   std::unique_ptr<Controller> controller;
   std::vector<Command> commands;
-  int first_agent = 0;  // that films and replays follow unless they are told: in recorded scenes the self-driving car
+  int first_agent = 0;  // default agent for films and replays: in recorded scenes the self-driving car
 
-  /// Lets the controller choose the commands of the next step.
+  /// Chooses the commands of the next step by the controller.
   void act() { controller->act(simulator->arrays(), {}, commands); }
-  /// Steps by them, as step_observed().
+  /// Steps by these commands, as step_observed() does.
   StepResult step(const std::vector<StepObserver*>& observers = {}) {
     return step_observed(*simulator, Span<Command>(commands), observers);
   }
 };
 
-/// A world of options.agents agents on the map, at the start of its first episode, with evaluation's light timing.
-/// `policy` drives: a controller of host_controller_names(), or a checkpoint's path (argmax; needs torch). In a
-/// recorded scene it drives the controlled tracks that are there at the start; all others, or with the policy log all,
-/// follow the recording.
-/// Then the world is the one that the policy was trained in, with its walls, population, observations and evaluation's
-/// conditioning, and its images are drawn as they were in training; the options say otherwise. Throws UsageError for a
-/// simulator that does not work in host memory.
+/// Creates a world of options.agents agents on the map, at the start of its first episode, with evaluation's light
+/// timing. `policy` drives: a controller of host_controller_names(), or a checkpoint's path (argmax; needs torch). In a
+/// recorded scene it drives the controlled tracks that are present at the start; all others follow the recording, as do
+/// all tracks with the policy "log".
+/// With a checkpoint the world is that of the policy's training, with its walls, population, observations and
+/// evaluation's conditioning, and its images are drawn as in training, unless the options differ. Throws UsageError for
+/// a simulator that does not use host memory.
 DrivenWorld make_world(const WorldOptions& options, const std::string& policy);
 
 }  // namespace pictura
