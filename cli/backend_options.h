@@ -1,4 +1,4 @@
-// Options that name what computes: simulators, renderers, devices.
+// Options that select simulators, renderers and devices.
 #pragma once
 
 #include <string>
@@ -10,16 +10,16 @@
 
 namespace pictura {
 
-/// Takes these names alone; the complaint lists them.
+/// Validator that accepts only these names; its error lists them.
 CLI::Validator one_of(const std::vector<std::string>& names);
 
-/// Adds --simulator, --renderer (or --backend) and --samples, whose help names `otherwise` as what counts without them.
+/// Adds --simulator, --renderer (or --backend) and --samples, whose help names `otherwise` as the default.
 void add_backend_options(CLI::App* command, const std::string& otherwise, SessionOptions* options_out);
 
-/// Adds --device as well: what a policy runs on.
+/// Adds the options of add_backend_options() and --device, the policy's device.
 void add_policy_backend_options(CLI::App* command, const std::string& otherwise, SessionOptions* options_out);
 
-/// What of these is not empty as overrides of a training configuration.
+/// Returns the non-empty options as overrides of a training configuration.
 std::vector<std::string> overrides_of(const SessionOptions& options);
 
 }  // namespace pictura

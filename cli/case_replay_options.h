@@ -1,4 +1,4 @@
-// Options of probes that replay a case.
+// Options of probes that write a case as a replay.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// The text of bindings/pictura/plot.py, embedded by the build (cmake/EmbedTexts.cmake).
+// Text of bindings/pictura/plot.py, embedded by the build (cmake/EmbedTexts.cmake).
 #pragma once
 
 #include <string_view>

@@ -15,19 +15,19 @@ namespace {
 struct Word {
   std::string text, help;
   bool takes_value = false;
-  std::vector<std::string> values;  // words that its value may be; files are offered beside them
+  std::vector<std::string> values;  // possible values; files are offered beside them
 };
 
-/// One command of the tree: what can follow it.
+/// Command of the tree, with the words that may follow it.
 struct Place {
-  std::string path;  // as "pictura bench render"
+  std::string path;  // for instance "pictura bench render"
   std::vector<Word> commands, options;
-  std::vector<std::string> arguments;  // words that a positional argument may be
+  std::vector<std::string> arguments;  // possible words of a positional argument
 };
 
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
 
-/// The words in the braces of a type's name, as CLI11 writes a set of choices: "TEXT:{u8,f16}".
+/// Words in the braces of a type's name, as CLI11 writes a set of choices: "TEXT:{u8,f16}".
 std::vector<std::string> choices_of(const std::string& type_name) {
   const size_t begin = type_name.find('{'), end = type_name.find('}');
   if (begin == std::string::npos || end == std::string::npos) return {};
@@ -46,7 +46,7 @@ std::vector<std::string> keys_with_sign() {
   return words;
 }
 
-/// Words that the value of an option may be, by the option's name.
+/// Possible values of an option, by the option's name.
 std::vector<std::string> values_of(const CLI::Option& option) {
   if (const std::vector<std::string> choices = choices_of(option.get_type_name()); !choices.empty()) return choices;
   const std::string name = option.get_single_name();
@@ -76,27 +76,27 @@ void add_places(const CLI::App& command, const std::string& path, std::vector<Pl
   for (const CLI::App* child : children) add_places(*child, path + " " + child->get_name(), places_out);
 }
 
-/// A text that the shell takes as it is.
+/// Quotes a text for shells.
 std::string in_quotes(const std::string& text) {
   std::string result = "'";
   for (const char c : text) result += c == '\'' ? std::string("'\\''") : std::string(1, c);
   return result + "'";
 }
-/// The same for fish, which knows \' between quotes.
+/// Quotes a text for fish, which interprets \' between quotes.
 std::string in_fish_quotes(const std::string& text) {
   std::string result = "'";
   for (const char c : text) result += c == '\'' || c == '\\' ? std::string("\\") + c : std::string(1, c);
   return result + "'";
 }
 
-/// `case` patterns of all commands below the program.
+/// Returns the `case` patterns of all commands below the program.
 std::string known_paths(const std::vector<Place>& places) {
   std::string paths;
   for (size_t i = 1; i < places.size(); ++i) paths += (i > 1 ? " | " : "") + in_quotes(places[i].path);
   return paths;
 }
 
-/// `case` items that set `values` to the words that the value of an option may be, by command and option.
+/// Returns the `case` items that set `values` to the possible values of an option, by command and option.
 std::string value_cases(const std::vector<Place>& places) {
   std::map<std::string, std::string> patterns_of_values;
   for (const Place& place : places) {
@@ -150,7 +150,7 @@ complete -o default -F _{0} {0}
 }
 
 std::string zsh_script(const std::string& name, const std::vector<Place>& places) {
-  // A colon ends the word.
+  // A colon separates the word from its help.
   const auto entries = [](const std::vector<Word>& words) {
     std::string list;
     for (const Word& word : words) list += " " + in_quotes(word.text + ":" + word.help);

@@ -1,4 +1,4 @@
-// Scripts by which shells complete the command's words, made from the tree of its subcommands and options.
+// Scripts for shell completion of the command's words, generated from the tree of its subcommands and options.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace pictura {
 
-/// For "bash", "zsh" or "fish". Throws UsageError for another shell.
+/// Returns the script for "bash", "zsh" or "fish". Throws UsageError for another shell.
 std::string completion_script(const CLI::App& app, const std::string& shell);
 
 }  // namespace pictura

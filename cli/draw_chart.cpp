@@ -28,7 +28,7 @@ namespace pictura {
 
 namespace {
 
-constexpr int kStatusWithoutMatplotlib = 3;  // plot.py's
+constexpr int kStatusWithoutMatplotlib = 3;  // exit status of plot.py
 
 std::string python_for_charts() {
   if (const char* const chosen = std::getenv("PICTURA_PYTHON"); chosen && *chosen) return chosen;
@@ -36,7 +36,7 @@ std::string python_for_charts() {
   return !built_with.empty() && ::access(built_with.c_str(), X_OK) == 0 ? built_with : "python3";
 }
 
-/// A file without a name that holds plot.py, at its beginning.
+/// Opens an unnamed file that holds plot.py, at its beginning.
 void open_source(Descriptor* source_out) {
   const std::string_view text = chart_source::plot_py();
   source_out->reset(::memfd_create("plot.py", MFD_CLOEXEC));
@@ -46,7 +46,7 @@ void open_source(Descriptor* source_out) {
                 std::strerror(errno));
 }
 
-/// A Python that runs plot.py; ends with this object.
+/// Python process that runs plot.py; ended by the destructor.
 class Plotter {
  public:
   Plotter(const std::string& python, std::string request) {
@@ -62,14 +62,14 @@ class Plotter {
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_adddup2(&actions, source.get(), STDIN_FILENO);
     posix_spawn_file_actions_adddup2(&actions, child_end.get(), STDERR_FILENO);
-    // In its own process group: ^C in a terminal is this process' to answer.
+    // Runs in its own process group, so that this process handles ^C in a terminal.
     posix_spawnattr_t attributes;
     posix_spawnattr_init(&attributes);
     posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
     posix_spawnattr_setpgroup(&attributes, 0);
     std::string name = python, script = "-", safe_path = "PYTHONSAFEPATH=1";
     char* const arguments[] = {name.data(), script.data(), request.data(), nullptr};
-    // Modules are not looked for in the working directory.
+    // Excludes the working directory from the module search path.
     std::vector<char*> environment{safe_path.data()};
     for (char** variable = environ; *variable; ++variable) environment.push_back(*variable);
     environment.push_back(nullptr);
@@ -91,7 +91,7 @@ class Plotter {
   Plotter(const Plotter&) = delete;
   Plotter& operator=(const Plotter&) = delete;
 
-  /// What it writes to stderr until it ends. Throws Interrupted.
+  /// Returns the process's stderr output until it ends. Throws Interrupted.
   std::string read_messages() {
     std::string messages;
     char buffer[4096];
@@ -113,12 +113,12 @@ class Plotter {
   }
 
  private:
-  const InterruptibleWork work_{"interrupted while a chart was drawn"};  // from before the child runs
+  const InterruptibleWork work_{"interrupted while a chart was drawn"};  // created before the child runs
   pid_t child_ = -1;
   Descriptor messages_;
 };
 
-/// The last line of what Python wrote on stderr, without "error: ".
+/// Returns the last line of Python's stderr output, without "error: ".
 std::string message_in(std::string messages) {
   while (messages.ends_with('\n')) messages.pop_back();
   const size_t line = messages.rfind('\n');

@@ -1,5 +1,5 @@
-// Charts: drawn by bindings/pictura/plot.py with Matplotlib. This program carries that file's text and runs it by a
-// Python.
+// Charts, drawn by bindings/pictura/plot.py with Matplotlib. This program contains that file's text and runs it with a
+// Python interpreter.
 #pragma once
 
 #include <string_view>
@@ -11,18 +11,18 @@
 
 namespace pictura {
 
-/// No Python, or one without Matplotlib; says how to get it, and where the chart's data is.
+/// Error thrown if there is no Python, or no Matplotlib; explains how to install it, and where the chart's data is.
 class NoMatplotlib : public Error {
  public:
   using Error::Error;
 };
 
-/// Has plot.py answer a request: a chart's name ("chart") and arguments, the picture's name ("out") and what to print
-/// ("report"). The Python is that of $PICTURA_PYTHON, else of the virtual environment that this program was built with,
-/// else python3. Throws Error with plot.py's message, NoMatplotlib, or Interrupted at ^C.
+/// Runs plot.py on a request: a chart's name ("chart") and arguments, the name of the picture ("out") and the text to
+/// print ("report"). The interpreter is $PICTURA_PYTHON, else that of the virtual environment that this program was
+/// built with, else python3. Throws Error with plot.py's message, NoMatplotlib, or Interrupted.
 void draw_chart(const Json& request);
 
-/// The colours that plot.py lists under a name, as SERIES_COLORS, for pictures beside charts.
+/// Colours of a list in plot.py, such as SERIES_COLORS, for pictures beside charts.
 std::vector<Rgb> chart_colors(std::string_view name);
 
 }  // namespace pictura

@@ -51,13 +51,13 @@ CLI::Option* add_average_option(CLI::App* command, bool* average_out) {
 std::string interval_text(const Estimate& estimate, int decimals) {
   if (!std::isfinite(estimate.value)) return "-";
   const std::string value = fmt::format("{:.{}f} +- ", estimate.value, decimals);
-  // One scenario gives no interval.
+  // A single scenario has no interval.
   if (!std::isfinite(estimate.half_width_95)) return value + "-";
   return value + fmt::format("{:.{}f}", estimate.half_width_95, decimals);
 }
 
 void EvaluationProgress::update(double done, double eta_s) {
-  // The notice comes when the time is long, as soon as a few seconds tell.
+  // Prints the notice for a long evaluation once a few seconds allow an estimate.
   constexpr double kEstimateAfter_s = 5, kLong_s = 600;
   const double elapsed_s = since_start_.seconds();
   if (!has_estimate_ && elapsed_s >= kEstimateAfter_s) {

@@ -1,4 +1,4 @@
-// Options of commands that drive evaluation worlds: which worlds, and what computes.
+// Options of commands that drive evaluation worlds: worlds and devices.
 #pragma once
 
 #include <chrono>
@@ -13,23 +13,22 @@
 namespace pictura {
 
 /// Adds --map, --agents, --steps, --sampled, --seed, --device, --simulator, --renderer, --samples, --conditioning,
-/// --light-cycles, --light-heads and --threads. The maps are the paper's eight towns unless others are given. Returns
-/// --sampled.
+/// --light-cycles, --light-heads and --threads. The default maps are the paper's eight towns. Returns --sampled.
 CLI::Option* add_evaluation_options(CLI::App* command, EvaluateOptions* options_out);
 
-/// Adds --sampled, which makes *argmax_out false.
+/// Adds --sampled, which sets *argmax_out to false.
 CLI::Option* add_sampled_option(CLI::App* command, bool* argmax_out);
 
-/// Adds --average, which chooses the average of weights that a checkpoint holds.
+/// Adds --average, which selects the average of weights that a checkpoint holds.
 CLI::Option* add_average_option(CLI::App* command, bool* average_out);
 
-/// "0.123 +- 0.045": the estimate and the half width of its interval; "-" for what there is not.
+/// Text of an estimate and the half width of its interval, "0.123 +- 0.045"; "-" for missing values.
 std::string interval_text(const Estimate& estimate, int decimals = 3);
 
-/// Says how far an evaluation is, and once, where it takes long, for how long and what can be done about it.
+/// Reports the progress of an evaluation, and once, if it takes long, its duration and how to shorten it.
 class EvaluationProgress {
  public:
-  /// `finished` is what ^C reports: "the scenarios that are finished".
+  /// `finished` names the result reported after an interrupt: "the scenarios that are finished".
   explicit EvaluationProgress(std::string finished) : finished_(std::move(finished)) {}
   void update(double done, double eta_s);
   void finish() { line_.finish(); }
@@ -41,7 +40,7 @@ class EvaluationProgress {
   bool has_estimate_ = false;
 };
 
-/// What reports of evaluations begin with: who drove, and where it computed.
+/// First keys of evaluation reports: the driver and its devices.
 Json driver_json(const DriverOptions& options, const EvaluationSetting& setting);
 
 }  // namespace pictura

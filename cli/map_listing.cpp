@@ -13,17 +13,17 @@ namespace pictura {
 
 namespace {
 
-/// To the millimetre: floats near their origin hold no more, and digits that mean nothing are hard to read.
+/// Rounds to the millimetre: floats near their origin are not more precise, and meaningless digits are hard to read.
 double rounded(double metres) { return std::round(metres * 1e3) / 1e3; }
 
 class Listing {
  public:
   Listing(const Json& facts, const RoadMap& map) : map_(map), text_(json_text(facts, 2)) {
-    text_.erase(text_.size() - 2);  // the newline and bracket that end it
+    text_.erase(text_.size() - 2);  // removes the final newline and bracket
     text_ += ",\n  \"elements\": {";
   }
 
-  /// One array; describe(i) gives element i, to which its index and source are added.
+  /// Appends an array; describe(i) returns element i, to which its index and source are added.
   void add(const char* kind, size_t count, const std::vector<SourceElement>& sources,
            const std::function<Json(size_t)>& describe) {
     text_ += fmt::format("{}\n    \"{}\": [", text_.back() == '{' ? "" : ",", kind);

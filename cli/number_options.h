@@ -1,5 +1,5 @@
-// Options that take numbers, read by the one parser of numbers (common/support/numbers.h): CLI11's own takes 010 for
-// octal, wraps -1, saturates 2^64, and lets NaN into any range.
+// Options that take numbers, read by the project's single number parser (common/support/numbers.h). CLI11's own parser
+// reads 010 as octal, wraps -1, saturates 2^64, and accepts NaN in any range.
 #pragma once
 
 #include <cstdint>
@@ -14,15 +14,15 @@ namespace pictura {
 
 constexpr uint64_t kMaxCount = std::numeric_limits<int>::max();
 
-/// Takes whole numbers from low to high, both included, in any decimal notation. For Option::transform(): what CLI11
-/// reads afterwards are the plain digits.
+/// Validator that accepts whole numbers from low to high, inclusive, in any decimal notation. For Option::transform():
+/// CLI11 then reads the plain digits.
 CLI::Validator whole_number(uint64_t low, uint64_t high = kMaxCount);
 
-/// Takes finite numbers from low to high, both included. For Option::transform().
+/// Validator that accepts finite numbers from low to high, inclusive. For Option::transform().
 CLI::Validator number(double low, double high);
 
-/// Adds an option that takes numbers from low to high, whole ones for an integer. The help has the default unless there
-/// is none, or one out of range, which stands for nothing given.
+/// Adds an option that takes numbers from low to high, whole numbers for an integer. The help shows the default, unless
+/// there is none or it is out of range, which means that nothing was given.
 template <typename T>
 CLI::Option* add_number_option(CLI::App* command, const std::string& flag, T& value, const std::string& help,
                                double low, double high = kMaxCount) {
@@ -36,10 +36,10 @@ CLI::Option* add_number_option(CLI::App* command, const std::string& flag, T& va
   return option;
 }
 
-/// Adds --seed, any unsigned number of 64 bits.
+/// Adds --seed, any unsigned 64-bit number.
 CLI::Option* add_seed_option(CLI::App* command, uint64_t* seed_out, const std::string& help);
 
-/// Adds --threads: 0, for all, to kMaxThreads.
+/// Adds --threads, from 0 (all) to kMaxThreads.
 CLI::Option* add_threads_option(CLI::App* command, int* num_threads_out);
 
 }  // namespace pictura

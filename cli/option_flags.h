@@ -1,4 +1,4 @@
-// Flags of the options that structs list.
+// Command-line flags of the options that structs list.
 #pragma once
 
 #include <string>
@@ -14,7 +14,7 @@
 
 namespace pictura {
 
-/// A visitor of lists of options that adds their flags to a command.
+/// Visitor of option lists that adds their flags to a command.
 class FlagAdder {
  public:
   explicit FlagAdder(CLI::App* command) : command_(command) {}

@@ -31,7 +31,8 @@ std::string format_count(double value) {
 
 namespace {
 
-/// As much of a line as can be rewritten in place: what wraps stays. All of it where stderr has no width.
+/// Returns the part of a line that can be rewritten in place, since wrapped lines remain; the whole line if stderr has
+/// no width.
 std::string shown(const std::string& line) {
   winsize size{};
   const bool has_width = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1;

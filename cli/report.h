@@ -1,4 +1,4 @@
-// What commands print: results on stdout, as one JSON object for machines, and a progress line with ETA on stderr.
+// Output of commands: results on stdout, as one JSON object for machines, and a progress line with ETA on stderr.
 #pragma once
 
 #include <optional>
@@ -11,23 +11,25 @@
 
 namespace pictura {
 
-/// Prints one object and a newline on stdout.
+/// Prints one object and a newline to stdout.
 void print_json(const Json& object);
 
-/// "1 h 02 min", "3 min 05 s" or "12 s".
+/// Text of a duration: "1 h 02 min", "3 min 05 s" or "12 s".
 std::string format_duration(double seconds);
 
-/// "1.20 M", "34.5 K" or "678".
+/// Text of a count: "1.20 M", "34.5 K" or "678".
 std::string format_count(double value);
 
-/// One line on stderr, on a terminal rewritten in place and cut off at its width, elsewhere printed every ten seconds.
+/// Progress line on stderr. On a terminal it is rewritten in place and cut off at the terminal's width, elsewhere
+/// printed every ten seconds.
 class ProgressLine {
  public:
   ~ProgressLine();
   void update(const std::string& text);
-  /// With the time that is left, when `done` of the work has been done since this line was made.
+  /// Updates the line with the remaining time, when the fraction `done` of the work has been done since the line's
+  /// creation.
   void update(const std::string& text, double done);
-  /// Prints the last text once and for all.
+  /// Prints the last text for good.
   void finish();
 
  private:

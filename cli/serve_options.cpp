@@ -9,7 +9,7 @@ namespace pictura {
 
 namespace {
 
-/// What CLI11 gives for an option without its value, by its version.
+/// Whether a text is what CLI11 passes for an option without a value, in its versions.
 bool is_no_port(const std::string& text) { return text.empty() || text == "true"; }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// `--serve`.
+// The option `--serve`.
 #pragma once
 
 #include <CLI/CLI.hpp>

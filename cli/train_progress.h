@@ -1,4 +1,4 @@
-// What training prints about its progress.
+// Progress output of training.
 #pragma once
 
 #include <string>
@@ -7,10 +7,11 @@
 
 namespace pictura {
 
-/// What a person wants to know first comes first, since a terminal cuts the end off: time left, the last minute's rate,
-/// return, and how the agents drove in the last update. Infractions are collisions at fault, off-roads and red lights.
+/// Text of the progress line, most important numbers first, since a terminal cuts off the end: time left, the last
+/// minute's rate, return, and driving statistics of the last update. Infractions are collisions at fault, off-roads and
+/// red lights.
 std::string progress_text(const TrainProgress& progress);
-/// "simulate 4 %, render 31 %, ..., other 4 %": each phase, and what is in none, of the update's wall time.
+/// Shares of each phase, and of the rest, in the update's wall time: "simulate 4 %, render 31 %, ..., other 4 %".
 std::string phase_shares(const TrainProgress& progress);
 
 }  // namespace pictura

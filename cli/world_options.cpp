@@ -14,7 +14,7 @@ namespace pictura {
 void add_world_options(CLI::App* command, WorldOptions* options_out) {
   add_number_option(command, "--agents", options_out->agents, "Vehicles, cyclists and pedestrians in the world", 1,
                     kMaxAgentsPerWorld);
-  // What a command sets beforehand is its default; else the policy decides, or the simulator.
+  // A value that the command presets is its default; otherwise the policy's training decides, or the simulator.
   const SimulatorConfig simulator;
   auto with_default = [](const char* what, auto preset, auto simulators) {
     return fmt::format("{}; default: {}{}", what, preset.value_or(simulators),
