@@ -1,4 +1,4 @@
-// Settings of cameras, renderers and simulators that a configuration gives.
+// Settings of cameras, renderers and simulators from a configuration.
 #pragma once
 
 #include "pictura/common/camera.h"
@@ -8,25 +8,25 @@
 
 namespace pictura {
 
-/// The configuration in force after `agent_steps`: sizes, policy.patch_px and render.line_floor_px are those of
+/// Returns the configuration in force after `agent_steps`, with sizes, policy.patch_px and render.line_floor_px from
 /// render.schedule.
 Config config_at(const Config& config, int64_t agent_steps);
 
-/// How many times as wide and as high as `from` the size `to` is, where that is one whole number, else 0.
+/// Returns the whole number by which `to` is wider and higher than `from`; 0 if there is none.
 int whole_factor(ImageSize from, ImageSize to);
 
-/// The rig that render describes for a run that has done `agent_steps`.
+/// Returns the rig of the render section for a run after `agent_steps`.
 Rig rig_of(const Config& config, int64_t agent_steps = 0);
 
-/// Settings of the renderer: everything about an image that the policy depends on, with a rig of its run. `device` is
-/// where the network computes.
+/// Returns the settings of the renderer: all image settings that the policy depends on, with a rig of its run. `device`
+/// is the network's device.
 RendererConfig renderer_config(const Config& config, const Rig& rig, Device device = {});
 
-/// Settings of the simulator for training: entity sets only for the vector modality.
+/// Returns the settings of the simulator for training, with entity sets only for the vector modality.
 SimulatorConfig simulator_config(const Config& config, Device device = {});
 
-/// Settings of the simulator for evaluation (paper, appendix, evaluation protocol): episodes of `steps` that nothing
-/// ends early, fixed conditioning, fixed lights.
+/// Returns the settings of the simulator for evaluation (paper, appendix, evaluation protocol): episodes of `steps`
+/// that nothing ends early, fixed conditioning, fixed lights.
 SimulatorConfig evaluation_simulator_config(const Config& config, int steps, Device device = {});
 
 }  // namespace pictura

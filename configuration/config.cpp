@@ -7,7 +7,8 @@
 namespace pictura {
 
 std::array<double, kNumConditioning> EvaluateSection::default_conditioning() {
-  // Safe and eager: full penalties, no bias in the lane, goals within 2 m at any speed, unscaled dynamics.
+  // Conditioning for safe and fast driving: full penalties, no lane bias, goals within 2 m at any speed, unscaled
+  // dynamics.
   std::array<double, kNumConditioning> values{};
   auto set = [&](Conditioning which, double value) { values[static_cast<size_t>(which)] = value; };
   set(Conditioning::delta_goal_m, 2);

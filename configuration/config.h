@@ -1,5 +1,5 @@
-// The one configuration of training and evaluation: what it may say, its defaults (the paper's tables), its reading and
-// its writing. A header a section. docs/reference/configuration.md explains every key; configs/*.toml are examples.
+// The single configuration of training and evaluation: its keys, defaults (the paper's tables), reading and writing.
+// Each section has a header. docs/reference/configuration.md explains every key; configs/*.toml are examples.
 #pragma once
 
 #include <string>
@@ -24,35 +24,35 @@ struct Config {
   TrainSection train;
   EvaluateSection evaluate;
 
-  /// Whether the policy reads such arrays of an observation.
+  /// Whether the policy reads this part of an observation.
   bool reads(ObservationPart part) const;
-  /// Whether it reads images.
+  /// Whether the policy reads images.
   bool reads_images() const { return policy.modality == Modality::perspective; }
 };
 
-/// Reads a TOML text. `overrides` are "section.key=value" and win; "section.key=" unsets what the text says, and
-/// "render.rig=..." its sizes of images. Whole numbers may be written in any decimal notation. run.backend, the old
-/// name of simulator.backend and render.backend, fills in whichever of the two is absent. Throws Error naming
-/// source:line and key for unknown keys, wrong types, values out of range, contradictions, and backends that this build
-/// does not know, whose names it lists.
+/// Reads a TOML text. `overrides` are "section.key=value" and take precedence; "section.key=" removes the text's value,
+/// and "render.rig=..." its image sizes. Whole numbers may be written in any decimal notation. run.backend, the old
+/// name of simulator.backend and render.backend, sets whichever of the two is absent. Throws Error naming source:line
+/// and key for unknown keys, wrong types, values out of range, contradictions, and backends that this build does not
+/// know, whose names it lists.
 Config parse_config(const std::string& text, const std::string& source, const std::vector<std::string>& overrides = {});
 
-/// Reads what a run saved, perhaps with another build: its backends may be any.
+/// Reads a configuration that a run saved, possibly with another build: it may name any backend.
 Config parse_saved_config(const std::string& text, const std::string& source);
 
-/// Reads a file. Paths of rigs, map files, policy.backbone and train.teacher are relative to where they are typed:
-/// those in the file to its folder, those of overrides to the caller's. In the result, all are relative to the
-/// caller's.
+/// Reads a file. Paths of rigs, map files, policy.backbone and train.teacher are relative to their place of definition:
+/// paths in the file to its folder, paths in overrides to the caller's folder. In the result, all are relative to the
+/// caller's folder.
 Config load_config(const std::string& path, const std::vector<std::string>& overrides = {});
 
-/// The configuration with values of [evaluate.conditioning] replaced; each is "name=value". Throws UsageError that
-/// names the option --conditioning.
+/// Returns the configuration with values of [evaluate.conditioning] replaced; each is "name=value". Throws UsageError
+/// that names the option --conditioning.
 Config with_evaluate_conditioning(const Config& config, const std::vector<std::string>& values);
 
-/// Every key with its value, as TOML that parse_config reads back to an equal Config.
+/// Returns every key with its value, as TOML that parse_config() reads back to an equal Config.
 std::string to_toml(const Config& config);
 
-/// Names as in a configuration.
+/// Returns names as in a configuration.
 std::string name_of(Precision precision);
 std::string name_of(OptimizerKind kind);
 

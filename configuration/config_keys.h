@@ -1,5 +1,4 @@
-// What there is to say about a configuration's keys besides their values: for documents, notices and readers in other
-// folders.
+// Descriptions of a configuration's keys besides their values: for documents, notices and readers in other folders.
 #pragma once
 
 #include <string>
@@ -9,18 +8,19 @@
 
 namespace pictura {
 
-/// A key of the configuration, as documents say it.
+/// Key of the configuration, as documented.
 struct ConfigKey {
-  std::string key, default_value, values;  // "train.gamma", "0.999", "0 to 1"
+  std::string key, default_value, values;  // for instance "train.gamma", "0.999", "0 to 1"
 };
 
-/// Every key, in the order of the file that to_toml() writes.
+/// Returns every key, in the order of to_toml().
 std::vector<ConfigKey> config_keys();
 
-/// What of a configuration has no effect though it is no contradiction, a sentence each.
+/// Returns a sentence for each setting of a configuration that has no effect without being a contradiction.
 std::vector<std::string> idle_settings(const Config& config);
 
-/// The configuration with absolute paths of its files (rig, maps, teacher, backbone), for readers in any folder.
+/// Returns the configuration with absolute paths of its files (rig, maps, teacher, backbone), for readers in any
+/// folder.
 Config with_absolute_paths(Config config);
 
 }  // namespace pictura

@@ -14,14 +14,14 @@
 
 namespace pictura {
 
-/// The shortest text that reads back to the same real number, as TOML has it: 0.8f is 0.8, not 0.800000011920929.
+/// Shortest TOML text that reads back to the same real number: 0.8f is 0.8, not 0.800000011920929.
 template <typename Real>
 std::string shortest(Real value) {
   const std::string text = fmt::format("{}", value);
   return text.find_first_of(".en") == std::string::npos ? text + ".0" : text;
 }
 
-/// A visitor of keys that writes them.
+/// Visitor of keys that writes them.
 class ConfigWriter {
  public:
   template <std::integral Int>
@@ -67,7 +67,7 @@ class ConfigWriter {
     line(key, fmt::format("[{}, {}]", value.low, value.high));
   }
 
-  std::string toml;                                     // the whole file
+  std::string toml;                                     // complete file
   std::vector<std::pair<NamedKey, std::string>> lines;  // key, value as written
 
  private:

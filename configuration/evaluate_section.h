@@ -1,4 +1,4 @@
-// [evaluate] of a configuration.
+// Section [evaluate] of a configuration.
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 namespace pictura {
 
 struct EvaluateSection {
-  /// What every agent is conditioned on: [evaluate.conditioning] NAME = value.
+  /// Conditioning of every agent: [evaluate.conditioning] NAME = value.
   std::array<double, kNumConditioning> conditioning = default_conditioning();
   static std::array<double, kNumConditioning> default_conditioning();
 };

@@ -23,10 +23,10 @@ namespace pictura {
 
 namespace {
 
-/// A visitor of keys that reads them from a file and its overrides.
+/// Visitor of keys that reads them from a file and its overrides.
 class Reader {
  public:
-  /// With `any_name`, names of backends are taken as they are.
+  /// Creates a reader. With `any_name`, names of backends are not checked.
   Reader(const toml::table& table, std::string source, const std::set<std::string>& overridden, bool any_name)
       : table_(table), source_(std::move(source)), overridden_(overridden), any_name_(any_name) {}
 
@@ -38,7 +38,7 @@ class Reader {
     }
   }
 
-  /// A key that means nothing once `other` is set, which must have been visited before.
+  /// Reads a key that has no effect if `other` is set; `other` must have been visited before.
   template <typename Int>
   void value_unless(const std::string& other, bool is_set, const std::string& key, Int& its_value, int64_t low,
                     int64_t high) {
@@ -86,7 +86,7 @@ class Reader {
     }
   }
 
-  /// The old name of two keys: fills in whichever is absent.
+  /// Reads the old name of two keys, which sets whichever is absent.
   void old_backend(const std::string& key, std::string& simulator, std::string& renderer) {
     const toml::node* node = find(key);
     if (!node) return;
@@ -97,11 +97,11 @@ class Reader {
     std::string its_name;
     name(key, its_name, renderer_names());
     if (!new_renderer) renderer = its_name;
-    // Renderers that are no simulators went with the simulator `cpu`.
+    // Renderers without a simulator of the same name used the simulator `cpu`.
     if (!new_simulator) simulator = its_name == "cuda" || its_name == "auto" ? its_name : "cpu";
   }
 
-  /// The old measure of the schedule, in updates, each of at most so many agent-steps.
+  /// Reads the old unit of the schedule, in updates of at most agent_steps_per_update each.
   void old_schedule(const std::string& key, int64_t agent_steps_per_update, int64_t& schedule_agent_steps) {
     if (!find(key)) return;
     if (find("train.schedule_agent_steps")) refuse(key, "has no effect together with train.schedule_agent_steps");
@@ -111,7 +111,7 @@ class Reader {
     schedule_agent_steps = updates > kMost / agent_steps_per_update ? kMost : updates * agent_steps_per_update;
   }
 
-  /// A key that is no more: its one value changes nothing.
+  /// Reads a removed key: only the value that changes nothing is valid.
   void removed(const RemovedKey& key) {
     const toml::node* node = find(key.name);
     if (!node) return;
@@ -121,7 +121,7 @@ class Reader {
     refuse(key.name, fmt::format("expected {}, got {}: {}", key.value, value.str(), key.reason));
   }
 
-  /// A list that may be empty where its default is.
+  /// Reads a list that may be empty if its default is empty.
   void texts(const std::string& key, std::vector<std::string>& value) {
     if (const toml::node* node = find(key)) {
       if (value.empty() && node->is_array() && node->as_array()->empty()) return;
@@ -139,7 +139,7 @@ class Reader {
     }
   }
 
-  /// [[agent_steps, width_px, height_px] or [agent_steps, width_px, height_px, patch_px, line_floor_px], ...]
+  /// Reads [[agent_steps, width_px, height_px] or [agent_steps, width_px, height_px, patch_px, line_floor_px], ...].
   void size_changes(const std::string& key, std::vector<RenderSection::SizeChange>& value) {
     const toml::node* node = find(key);
     if (!node) return;
@@ -187,7 +187,7 @@ class Reader {
     }
   }
 
-  /// Throws for the first key of the table that no call read.
+  /// Throws for the first key of the table that no call has read.
   void refuse_unknown(const toml::table& table, const std::string& prefix = "") const {
     for (const auto& [name, node] : table) {
       const std::string key = prefix + std::string(name.str());
@@ -264,7 +264,7 @@ class Reader {
     return *node.as_array();
   }
 
-  // The known key that is nearest, or ends alike, for those who forgot or confused the section.
+  // Suggests the nearest known key, or one that ends alike, for a forgotten or wrong section.
   std::string suggestion_for(const std::string& key) const {
     const std::vector<std::string> known(known_.begin(), known_.end());
     const std::string last = key.substr(key.rfind('.') + 1);
@@ -282,8 +282,8 @@ class Reader {
   std::set<std::string> known_, sections_;
 };
 
-// A value of --set: TOML, but numbers as everywhere in the command; what is no TOML is a string, so that run.device=cpu
-// works.
+// Parses a value of --set as TOML, with numbers as everywhere in the command. A value that is no TOML is a string, so
+// that run.device=cpu works.
 toml::table parse_override(const std::string& value) {
   toml::table parsed;
   const std::optional<int64_t> whole = parse_integer(value);
@@ -304,7 +304,7 @@ toml::table parse_override(const std::string& value) {
   return parsed;
 }
 
-// "train.updates=2" into the table; "train.updates=" takes the key out of it. Returns the key.
+// Applies "train.updates=2" to the table; "train.updates=" removes the key. Returns the key.
 std::string apply_override(const std::string& text, toml::table* table_inout) {
   const size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0) fail_usage("--set {}: expected section.key=value", text);
@@ -327,7 +327,7 @@ std::string apply_override(const std::string& text, toml::table* table_inout) {
   return key;
 }
 
-// A rig has sizes of its own: named by an override, it takes those of the file out.
+// Removes the file's image sizes if an override names a rig, which has its own sizes.
 void drop_sizes_beside_rig(const std::set<std::string>& overridden, toml::table* table_inout) {
   toml::table* const render = table_inout->get_as<toml::table>("render");
   if (!render || !overridden.count("render.rig") || (*render)["rig"].value_or(std::string()).empty()) return;
@@ -478,9 +478,9 @@ Config parse(const std::string& text, const std::string& source, const std::vect
     reader.refuse("simulator.maps", error.what());
   }
   check_contradictions(config, reader);
-  // What a run saves has the sizes that are in force, which the rows of the schedule before do not lead to.
+  // A saved configuration has the sizes in force, which differ from those at the start of the schedule.
   if (!any_name) check_patch_changes(config, reader);
-  // Earlier versions took it without a word, so what they saved may hold it.
+  // Earlier versions accepted such values, so saved configurations may contain them.
   if (!any_name && config.simulator.min_agents > config.simulator.num_slots) {
     reader.refuse("simulator.min_agents", fmt::format("expected at most simulator.num_slots ({}), got {}",
                                                       config.simulator.num_slots, config.simulator.min_agents));

@@ -1,5 +1,5 @@
-// Keys of configurations that earlier versions wrote and that are no more, each with the one value that still has a
-// meaning: what holds without the key.
+// Keys of configurations that earlier versions wrote and that were removed, each with the only value that is still
+// valid: the behaviour without the key.
 #pragma once
 
 #include <array>
@@ -7,7 +7,7 @@
 namespace pictura {
 
 struct RemovedKey {
-  const char *name, *value, *reason;  // the value as TOML and JSON both write it
+  const char *name, *value, *reason;  // value in the form common to TOML and JSON
 };
 
 inline constexpr std::array kRemovedKeys{

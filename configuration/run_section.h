@@ -1,4 +1,4 @@
-// [run] of a configuration.
+// Section [run] of a configuration.
 #pragma once
 
 #include <cstdint>
@@ -7,9 +7,9 @@
 namespace pictura {
 
 struct RunSection {
-  uint64_t seed = 1;            // names the whole run
+  uint64_t seed = 1;            // seed of the whole run
   int num_threads = 0;          // of simulator, renderer and torch; 0: all
-  std::string device = "auto";  // what learns: cpu, cuda, cuda:N or auto
+  std::string device = "auto";  // learning device: cpu, cuda, cuda:N or auto
 };
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// [simulator] of a configuration: the worlds of training.
+// Section [simulator] of a configuration: the training worlds.
 #pragma once
 
 #include <optional>
@@ -9,21 +9,21 @@
 
 namespace pictura {
 
-/// A name and a share, as files and options write it: "lane=0.25".
+/// Name with a share, as files and options write it: "lane=0.25".
 struct NamedShare {
   std::string name;
   double share = 0;
 };
-/// The name, which may hold the sign, and the share of a text; nullopt without a name, or a share above 0.
+/// Parses a text into a name, which may contain "=", and a share; nullopt without a name, or without a share above 0.
 std::optional<NamedShare> parse_share(const std::string& text);
 
-/// The simulator's own settings and which worlds there are. Settings that follow from other sections, seed and device
-/// for two, count for nothing here: simulator_config() sets them.
+/// Simulator settings and the number of worlds. Settings that follow from other sections, such as seed and device, are
+/// ignored here: simulator_config() sets them.
 struct SimulatorSection : SimulatorConfig {
   std::vector<std::string> other_policies;  // "FILE=SHARE", see parse_share()
   std::string backend = "auto";             // cpu, cuda or auto
   std::vector<std::string> maps{"Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07", "Town10HD"};
-  int map_copies = 0;                    // affine copies of each map, beside it
+  int map_copies = 0;                    // affine copies of each map, in addition to it
   int num_slots = 20480;                 // concurrent agents, over all worlds
   int min_agents = 1, max_agents = 120;  // agents per world ~ U{min, max}
 };

@@ -1,4 +1,4 @@
-// The list of keys of the configuration: what reads, writes, compares and describes them walks it.
+// List of the configuration's keys, which readers, writers, comparisons and descriptions visit.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@
 
 namespace pictura {
 
-// Names of choices, in the order of their enums.
+// Names of enumerators, in the order of their enums.
 inline constexpr std::array kModalities{"perspective", "vector"};
 inline constexpr std::array kPrecisions{"fp32", "tf32", "bf16"};
 inline constexpr std::array kSchedules{"constant", "linear", "cosine"};
@@ -28,8 +28,8 @@ inline constexpr const char* kDevices = "cpu, cuda, cuda:N, auto";
 inline constexpr const char* kSizeChangesExpected =
     "a list of [agent_steps, width_px, height_px] or [agent_steps, width_px, height_px, patch_px, line_floor_px]";
 
-// The list of keys, in the order in which they are written. Reader and writer both walk it, so no key can be read and
-// not written. A visitor takes (key, value, range...).
+// Visits the keys in the order in which they are written. Reader and writer visit the same list, so every key that is
+// read is also written. A visitor takes (key, value, range...).
 template <typename AnyConfig, typename Visitor>
 void visit(AnyConfig& c, Visitor&& v) {
   const double inf = std::numeric_limits<double>::infinity();
