@@ -83,7 +83,7 @@ std::string deflate(std::string_view bytes) {
 }
 
 std::string inflate(std::string_view stream, std::size_t size) {
-  // No stream is longer than a thousandth and a few bytes of what it holds.
+  // A zlib stream cannot be shorter than about a thousandth of its content.
   PICTURA_CHECK(size / 1040 <= stream.size(), "expected the zlib stream of {} bytes, got {} bytes", size,
                 stream.size());
   std::string bytes(size, '\0');

@@ -1,4 +1,4 @@
-// The bytes of a replay: whole numbers as differences of varying length, zlib streams, and base64 for text.
+// Encodings of replays: whole numbers as differences of variable length, zlib streams, and base64 for text.
 #pragma once
 
 #include <cstdint>
@@ -10,15 +10,15 @@
 
 namespace pictura {
 
-/// Appends a number in groups of 7 bits, the lowest first; small ones of either sign are short.
+/// Appends a number in groups of 7 bits, lowest group first; small numbers of either sign are short.
 void put_number(int32_t value, std::string* bytes_inout);
 
-/// Reads what put_number wrote. Throws Error where the bytes end, or hold no such number.
+/// Reads the numbers written by put_number(). Throws Error if the bytes end, or hold no such number.
 class NumberReader {
  public:
   explicit NumberReader(std::string_view bytes) : bytes_(bytes) {}
   int32_t next();
-  /// A number that counts things of which each takes at least one byte.
+  /// Reads the number of items, each of which takes at least one byte.
   int32_t next_count();
   bool is_at_end() const { return at_ == bytes_.size(); }
 
@@ -27,16 +27,18 @@ class NumberReader {
   std::size_t at_ = 0;
 };
 
-/// Numbers by the differences of their order, 0 to 2: first, stride apart. The first is one from 0.
+/// Writes and reads numbers as differences of order 0 to 2. The numbers begin at `first`, `stride` apart; the number
+/// before the first counts as 0.
 void put_differences(const int32_t* first, std::size_t count, std::size_t stride, int order, std::string* bytes_inout);
 void read_differences(NumberReader* reader, std::size_t count, std::size_t stride, int order, int32_t* first_out);
 
-/// A zlib stream, and back to exactly `size` bytes. Throws Error where the stream is damaged or of another length.
+/// Compresses bytes to a zlib stream, and back to exactly `size` bytes. Throws Error if the stream is damaged or of
+/// another length.
 std::string deflate(std::string_view bytes);
 std::string inflate(std::string_view stream, std::size_t size);
 
 std::string base64(std::string_view bytes);
-/// Throws Error where the text is not what base64() writes.
+/// Decodes base64. Throws Error if base64() cannot have written the text.
 std::string from_base64(std::string_view text);
 
 }  // namespace pictura

@@ -22,7 +22,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormat = "pictura replay";
-// What the reader looks for; the page's own script finds its elements by the same names.
+// Markers for the reader; the page's own script finds its elements by the same names.
 constexpr std::string_view kHeaderBegin = "<script type=\"application/json\" id=\"replay-header\">";
 constexpr std::string_view kDataBegin = "<script type=\"text/plain\" id=\"replay-data\">";
 constexpr std::string_view kImagesBegin = "<script type=\"text/plain\" id=\"replay-images\">";
@@ -30,7 +30,7 @@ constexpr std::string_view kEnd = "</script>";
 
 size_t size(int32_t count) { return static_cast<size_t>(count); }
 
-// The sections, each as its bytes and back.
+// Writers and readers of the sections:
 
 std::string map_bytes(const std::vector<ReplayShape>& map) {
   std::string bytes;
@@ -69,7 +69,7 @@ std::vector<ReplayShape> map_from(NumberReader reader) {
   return map;
 }
 
-// Points as differences from the point before, of anything.
+// Writes points as differences from the previous point, across all objects.
 class PointWriter {
  public:
   explicit PointWriter(std::string* bytes) : bytes_(bytes) {}
@@ -243,7 +243,7 @@ void conditioning_from(std::string_view bytes, int32_t num_agents, std::vector<R
   }
 }
 
-// Entity after entity, each through all frames: columns of [frames, columns].
+// Writes columns of [frames, columns], entity after entity, each through all frames.
 std::string column_bytes(const int32_t* first, size_t frames, size_t columns, int order) {
   std::string bytes;
   for (size_t column = 0; column < columns; ++column) put_differences(first + column, frames, columns, order, &bytes);
@@ -259,7 +259,7 @@ std::vector<int32_t> columns_from(NumberReader reader, size_t frames, size_t col
 }
 
 constexpr int kLightOrder = 1, kDecisionOrder = 1;
-constexpr int32_t kMaxImage_px = 8192;  // of a side, as of a rig's cameras
+constexpr int32_t kMaxImage_px = 8192;  // maximum side, as of a rig's cameras
 
 struct Section {
   std::string name;
@@ -284,7 +284,7 @@ std::vector<Section> sections_of(const Replay& replay) {
   return sections;
 }
 
-/// The groups, from the first on, that fit into a file.
+/// Returns the first groups that fit into a file.
 Span<const std::string> written_groups(const ReplayImages& images) {
   size_t count = 0, bytes = 0;
   while (count < images.groups.size() && bytes + images.groups[count].size() <= kMaxWrittenImageBytes) {
@@ -353,7 +353,7 @@ ReplayCase case_from(const Json& json, const Replay& replay) {
   return probed;
 }
 
-// X(name): the numbers of a camera.
+// List of the numbers of a camera: X(name).
 #define PICTURA_REPLAY_CAMERA(X) \
   X(width_px)                    \
   X(height_px)                   \
@@ -434,7 +434,7 @@ Json header_of(const Replay& replay, const std::vector<Section>& sections) {
           {"policy", origin.policy},
           {"policy_hash", origin.policy_hash},
           {"light_cycles", origin.light_cycles},
-          {"seed", fmt::format("{}", origin.seed)},  // exact in readers whose numbers are doubles
+          {"seed", fmt::format("{}", origin.seed)},  // as text, since readers' numbers may be doubles
           {"global_world", origin.global_world},
           {"dt_s", origin.dt_s},
           {"agents", replay.num_agents},
@@ -455,7 +455,7 @@ Json header_of(const Replay& replay, const std::vector<Section>& sections) {
           {"images", images}};
 }
 
-// What stands between an element's begin and its end.
+// Returns the text between an element's begin and its end.
 std::string_view element(std::string_view page, std::string_view begin, const char* what) {
   const size_t at = page.find(begin);
   PICTURA_CHECK(at != std::string_view::npos, "expected a page of pictura replay, got a file without {}", what);
@@ -578,7 +578,7 @@ Replay replay_from(std::string_view page) {
   return replay;
 }
 
-// What `read` makes of a page, with faults that name the file.
+// Returns the result of `read` on a page, with errors that name the file.
 template <typename Read>
 auto of_page(const std::string& path, Read&& read) {
   const std::string page = read_file(path);

@@ -23,7 +23,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds kMaxWriteTime{20};
-// A client that is still writing loses the answer where its connection is closed at once.
+// Limits of reading on before closing: a client that is still writing would otherwise lose the answer.
 constexpr std::chrono::seconds kMaxRestTime{1};
 constexpr size_t kMaxRestBytes = size_t{1} << 20;
 
@@ -44,7 +44,7 @@ const char* reason_of(int status) {
   }
 }
 
-// Returns false once the time is over.
+// Waits for events. Returns false when the time is over.
 bool wait_for(int socket, short events, Clock::time_point end) {
   for (;;) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now()).count();
@@ -56,7 +56,7 @@ bool wait_for(int socket, short events, Clock::time_point end) {
   }
 }
 
-/// Appends up to `size` bytes that came. Returns false at the end of the connection or of the time.
+/// Appends up to `size` received bytes. Returns false at the end of the connection or of the time.
 bool read_some(int socket, size_t size, Clock::time_point end, std::string* text) {
   std::array<char, 4096> bytes;
   for (;;) {
@@ -85,7 +85,7 @@ std::string_view without_spaces(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t") - first + 1);
 }
 
-/// Reads the lines before the body.
+/// Parses the lines before the body.
 HttpRequest parse_head(std::string_view head) {
   const auto next_line = [&head] {
     const size_t end = head.find("\r\n");
@@ -127,7 +127,7 @@ size_t body_bytes(const HttpRequest& request) {
   return *bytes;
 }
 
-/// Returns nothing where the connection or the time ends before the request. Throws HttpRefusal.
+/// Reads a request; empty if the connection or the time ends before it is complete. Throws HttpRefusal.
 std::optional<HttpRequest> read_request(int socket) {
   const Clock::time_point end = Clock::now() + kMaxRequestTime;
   constexpr std::string_view kHeadEnd = "\r\n\r\n";
@@ -206,7 +206,7 @@ HttpServer::HttpServer(bool everywhere, int port, int num_threads, std::string f
   };
   listening_ = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   check(listening_ >= 0, "socket");
-  const int yes = 1;  // a port whose last server has just ended
+  const int yes = 1;  // allows a port whose last server has just ended
   setsockopt(listening_, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
   sockaddr_in address{};
   address.sin_family = AF_INET;
@@ -226,7 +226,7 @@ HttpServer::~HttpServer() {
   {
     const std::lock_guard lock(mutex_);
     is_ending_ = true;
-    // Whatever waits for these returns.
+    // Shutting down makes all waiting calls on these sockets return.
     shutdown(listening_, SHUT_RDWR);
     for (const int socket : sockets_) {
       if (socket >= 0) shutdown(socket, SHUT_RDWR);
@@ -248,7 +248,7 @@ void HttpServer::answer_connections(size_t thread) {
       sockets_[thread] = socket;
     }
     if (socket < 0) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));  // until there are descriptors again
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));  // until descriptors are available again
       continue;
     }
     answer_one(socket);

@@ -13,16 +13,16 @@ namespace pictura {
 
 namespace {
 
-// The coder is that of LZMA (Pavlov's specification of 2015) with finer probabilities: carries are kept back in a byte
-// and the 0xFF bytes after it.
+// Coder of LZMA (Pavlov's specification of 2015) with finer probabilities. Carries are held back in a byte and the 0xFF
+// bytes after it.
 
-/// How likely a bit is 0, in 1/32768, and how often it has been seen.
+/// Probability that a bit is 0, in 1/32768, and the number of bits seen.
 struct Chance {
   uint16_t zero = 16384;
   uint8_t seen = 0;
 
   void learn(int bit) {
-    // The mean of the first few, then one that forgets.
+    // Averages the first few bits, then forgets exponentially.
     constexpr uint8_t kShift[] = {1, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 5};
     const int shift = kShift[std::min<int>(seen, 15)];
     if (seen < 15) ++seen;
@@ -67,7 +67,7 @@ class Encoder {
 
   uint64_t low_ = 0;
   uint32_t range_ = 0xFFFFFFFFu;
-  // What a carry may still change: a byte, at first one before all others, and `held_ - 1` bytes 0xFF after it.
+  // Bytes that a carry may still change: a byte, initially one before all others, and `held_ - 1` bytes 0xFF after it.
   uint8_t first_ = 0;
   size_t held_ = 1;
   std::string bytes_;
@@ -76,7 +76,7 @@ class Encoder {
 class Decoder {
  public:
   explicit Decoder(std::string_view bytes) : bytes_(bytes) {
-    for (int i = 0; i < 5; ++i) code_ = code_ << 8 | next();  // the first is 0
+    for (int i = 0; i < 5; ++i) code_ = code_ << 8 | next();  // the first byte is 0
   }
   int bit(Chance* chance, int /*value*/) {
     const uint32_t bound = (range_ >> kChanceBits) * chance->zero;
@@ -103,7 +103,7 @@ class Decoder {
   uint32_t code_ = 0, range_ = 0xFFFFFFFFu;
 };
 
-/// `bits` bits of a number, the highest first, each by what those before it are.
+/// Codes a number of `bits` bits, highest bit first, each conditioned on the previous bits.
 template <typename Coder>
 int code_number(Coder* coder, Chance* tree, int bits, int value) {
   int node = 1;
@@ -116,18 +116,18 @@ struct Pixel {
   bool operator==(const Pixel&) const = default;
   uint8_t highest() const { return std::max({r, g, b}); }
 };
-/// What is known of a pixel that has been coded.
+/// Pixel that has been coded, with its coding.
 struct Coded {
   Pixel pixel;
-  uint8_t how = 0;  // by which candidate; kNew: by none
-  uint8_t hue = 0;  // of which hue; black pixels are of none
+  uint8_t how = 0;  // index of the candidate; kNew: none
+  uint8_t hue = 0;  // index of the hue; black pixels have none
 };
 
-constexpr int kCandidates = 4, kNew = kCandidates;  // left, above, in the frame before, above to the right
+constexpr int kCandidates = 4, kNew = kCandidates;  // left, above, in the previous frame, above to the right
 constexpr int kHueBits = 5, kNoHue = 30, kFree = 31;
 constexpr int kNumHows = kCandidates + 1, kNumHues = 1 << kHueBits;
 
-/// A hue's pixel of this brightness: its highest channel.
+/// Returns a hue's pixel of this brightness, the highest channel.
 Pixel shade(const ReplayHue& hue, int brightness) {
   const int highest = std::max({hue[0], hue[1], hue[2]});
   const auto channel = [&](int value) {
@@ -136,7 +136,7 @@ Pixel shade(const ReplayHue& hue, int brightness) {
   return {channel(hue[0]), channel(hue[1]), channel(hue[2])};
 }
 
-/// Codes pixel after pixel. With an Encoder it writes what it is given, with a Decoder it returns what was written.
+/// Codes pixel after pixel. With an Encoder it writes the given pixel, with a Decoder it returns the decoded pixel.
 template <typename Coder>
 class PixelCoder {
  public:
@@ -172,7 +172,7 @@ class PixelCoder {
   }
 
  private:
-  /// The first hue of which the pixel is but for rounding, else kFree.
+  /// Returns the nearest hue that matches the pixel up to rounding, else kFree.
   int hue_of(Pixel pixel) const {
     int best = kFree, least = 4;
     for (size_t i = 0; i < hues_.size(); ++i) {
@@ -184,7 +184,7 @@ class PixelCoder {
     }
     return best;
   }
-  /// A blend of hues: channels by their high bits before them.
+  /// Codes a blend of hues, each channel conditioned on the high bits of the previous channel.
   Pixel code_free(Pixel pixel) {
     const int r = code_number(&coder_, free_[0][0], 8, pixel.r);
     const int g = code_number(&coder_, free_[1][r >> 4], 8, pixel.g);
@@ -201,12 +201,12 @@ class PixelCoder {
   Chance free_[3][16][256];
 };
 
-/// Codes all frames; next(offset) is the pixel to write at a byte, put(offset, pixel) receives it.
+/// Codes all frames; next(offset) returns the pixel to write at a byte, put(offset, pixel) receives the coded pixel.
 template <typename Coder, typename Next, typename Put>
 void code_frames(const std::vector<ReplayCamera>& cameras, size_t num_frames, PixelCoder<Coder>* coder, Next&& next,
                  Put&& put) {
   const Coded black{.pixel = {}, .how = 0, .hue = kNoHue};
-  std::vector<std::vector<Coded>> images;  // of the frame before, and of this one as far as it is coded
+  std::vector<std::vector<Coded>> images;  // previous frame, overwritten pixel by pixel by the current frame
   for (const ReplayCamera& camera : cameras) {
     images.emplace_back(static_cast<size_t>(camera.width_px) * static_cast<size_t>(camera.height_px), black);
   }
@@ -232,7 +232,7 @@ void code_frames(const std::vector<ReplayCamera>& cameras, size_t num_frames, Pi
 
 namespace {
 
-// Of all frames of a group: the coder itself would make something of any bytes.
+// Checksum over all frames of a group, since the coder decodes any bytes.
 constexpr size_t kChecksumBytes = 4;
 uint32_t checksum(std::string_view frames) {
   const uLong begin = adler32(0, nullptr, 0);

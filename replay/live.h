@@ -1,4 +1,4 @@
-// What pages are told of a world while it runs: its state as messages, and what people ask of it.
+// Messages between a running world and its pages: the world's state, and the requests of viewers.
 #pragma once
 
 #include <memory>
@@ -16,19 +16,19 @@ namespace pictura {
 
 using LiveJson = nlohmann::ordered_json;
 
-/// Follows the only world of a simulator in host memory, and keeps no more than its newest frame.
+/// Follows the only world of a simulator in host memory, and keeps only its newest frame.
 class LiveWorld final : public StepObserver {
  public:
-  /// The simulator must outlive it.
+  /// Creates the follower. The simulator must outlive it.
   LiveWorld(Simulator& simulator, ReplayOrigin origin, const RendererConfig& cameras, bool sends_images);
 
   void before_step(Span<const Command> commands) override { recorder_.before_step(commands); }
   void after_step(const StepResult& result) override;
   void after_reset(Span<const uint8_t> world_mask) override;
 
-  /// All that a page needs to begin at this frame.
+  /// Message with everything that a page needs to begin at this frame.
   LiveJson begin() const;
-  /// The newest frame, to pages that know the one before.
+  /// Message with the newest frame, for pages that know the previous frame.
   LiveJson frame() const;
   LiveJson look(const std::optional<ReplayDecision>& decision, int agent);
 
@@ -36,7 +36,7 @@ class LiveWorld final : public StepObserver {
   int64_t step() const { return step_; }
 
  private:
-  /// After a frame was recorded, of `num_episodes` before.
+  /// Reduces the recording to its newest frame, after which there were `num_episodes` episodes before it.
   void keep_newest(size_t num_episodes);
 
   Recorder recorder_;
@@ -45,21 +45,21 @@ class LiveWorld final : public StepObserver {
   bool begins_episode_ = false;
 };
 
-/// What a page asks; what is absent stays as it is.
+/// Request of a page; absent members change nothing.
 struct LiveRequest {
   std::optional<bool> paused;
-  std::optional<int> steps;  // to take although it is paused
+  std::optional<int> steps;  // steps to take while paused
   std::optional<double> pace;
-  std::optional<int> watched;  // the agent whose images and decisions are sent
-  std::optional<int> driven;   // the agent that the keys drive, or -1
+  std::optional<int> watched;  // agent whose images and decisions are sent
+  std::optional<int> driven;   // agent driven by the keys, or -1
   std::optional<DrivingKeys> keys;
 };
 
 constexpr int kMaxLiveSteps = 1000;
 constexpr double kMinLivePace = 0.05, kMaxLivePace = 64;
 
-/// Reads {"paused": bool, "steps": 1 to kMaxLiveSteps, "pace": number, "watch": agent, "drive": agent or -1,
-/// "keys": ["forward", "backward", "stop", "left", "right"]}. Throws Error saying which member is wrong.
+/// Parses {"paused": bool, "steps": 1 to kMaxLiveSteps, "pace": number, "watch": agent, "drive": agent or -1, "keys":
+/// ["forward", "backward", "stop", "left", "right"]}. Throws Error naming the wrong member.
 LiveRequest parse_live_request(std::string_view text, int num_agents);
 
 }  // namespace pictura

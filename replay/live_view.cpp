@@ -12,10 +12,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::milliseconds kMaxBehind{500};       // later steps are not made up for
-constexpr std::chrono::seconds kKeysHold{1}, kHandsOn{5};  // without word from the page that drives
+constexpr std::chrono::milliseconds kMaxBehind{500};       // steps delayed by more are not caught up
+constexpr std::chrono::seconds kKeysHold{1}, kHandsOn{5};  // without messages from the driving page
 constexpr std::chrono::milliseconds kGoodbye{1000};
-constexpr std::chrono::milliseconds kGlance{50};  // the longest wait of one is_due()
+constexpr std::chrono::milliseconds kGlance{50};  // maximum wait of one is_due()
 
 }  // namespace
 
@@ -59,7 +59,7 @@ struct LiveView::Parts {
     }
   }
 
-  // What pages asked since the last time, and what they have not been told.
+  // Handles pages' requests since the last call, and sends them pending messages.
   void attend() {
     const std::vector<LiveRequest> requests = server.take_requests();
     for (const LiveRequest& asked : requests) apply(asked);

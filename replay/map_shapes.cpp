@@ -27,7 +27,7 @@ ReplayShape rectangle(const ParkingSpace& space) {
   return shape;
 }
 
-/// Pieces that go on where the one before ended are one line.
+/// Appends pieces as lines; a piece that continues the previous piece extends its line.
 template <typename Pieces>
 void append_lines(ShapeKind kind, const Pieces& pieces, std::vector<ReplayShape>* shapes_out) {
   const size_t first = shapes_out->size();

@@ -1,4 +1,4 @@
-// A map as replays hold it: its shapes from above, and what cameras see of it.
+// Map in the form of replays: its shapes from above, and the geometry that cameras see.
 #pragma once
 
 #include <vector>
@@ -8,10 +8,10 @@
 
 namespace pictura {
 
-/// In the order in which they cover each other; lights stand last, in the order of the map.
+/// Returns the shapes in drawing order; lights come last, in the order of the map.
 std::vector<ReplayShape> map_shapes(const CompiledMap& map);
 
-/// What renderers draw of it. Strips that go on where the one before ended are one line.
+/// Returns the geometry that renderers draw. A strip that continues the previous strip extends its line.
 ReplayScenery map_scenery(const StaticGeometry& geometry);
 
 }  // namespace pictura

@@ -8,7 +8,7 @@
 
 namespace pictura {
 
-/// Writes the file, whole or not at all; docs/reference/replay.md lists its topics. Time begins at 0. Throws Error
+/// Writes the file, completely or not at all; docs/reference/replay.md lists its topics. Time begins at 0. Throws Error
 /// naming the path.
 void write_mcap(const std::string& path, const Replay& replay);
 

@@ -26,7 +26,7 @@ enum class Op : uint8_t {
   data_end = 15,
 };
 
-/// Little-endian.
+/// Appends a number in little-endian order.
 template <typename Number>
 void put_fixed(Number value, std::string* bytes_inout) {
   for (size_t i = 0; i < sizeof(Number); ++i) {
@@ -49,7 +49,7 @@ uint32_t crc_of(std::string_view bytes, uint32_t before = 0) {
   return static_cast<uint32_t>(crc32_z(before, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
 }
 
-/// A map from channels to numbers, as its bytes after their count.
+/// Encodes a map from channels to numbers: the size in bytes, then the entries.
 std::string channel_map(const std::map<uint16_t, uint64_t>& values) {
   std::string entries, bytes;
   for (const auto& [channel, value] : values) {
@@ -76,7 +76,7 @@ void McapWriter::put(std::string_view bytes) {
 }
 
 uint16_t McapWriter::add_channel(std::string_view topic, std::string_view schema_name, std::string_view schema) {
-  const uint16_t id = ++num_channels_;  // of the channel and of its schema; 0 is none
+  const uint16_t id = ++num_channels_;  // of the channel and of its schema; 0 is reserved
   std::string content;
   put_fixed(id, &content);
   put_text(schema_name, &content);
@@ -167,13 +167,13 @@ void McapWriter::end_chunk() {
 void McapWriter::finish() {
   end_chunk();
   std::string content;
-  put_fixed(uint32_t{0}, &content);  // no sum over all
+  put_fixed(uint32_t{0}, &content);  // no checksum over all data
   put(record(Op::data_end, content));
   const uint64_t summary_begin = offset_;
   std::string summary = definitions_;
   content.clear();
   put_fixed(num_messages_, &content);
-  put_fixed(num_channels_, &content);  // of schemas
+  put_fixed(num_channels_, &content);  // number of schemas
   put_fixed(uint32_t{num_channels_}, &content);
   put_fixed(uint32_t{0}, &content);  // attachments
   put_fixed(static_cast<uint32_t>(num_metadata_), &content);
@@ -194,10 +194,10 @@ void McapWriter::finish() {
   }
   summary += metadata_indexes_;
   put(summary);
-  // The sum is over the summary and the footer's first fields.
+  // The checksum covers the summary and the footer's first fields.
   content.clear();
   put_fixed(summary_begin, &content);
-  put_fixed(uint64_t{0}, &content);  // no offsets of the summary's parts
+  put_fixed(uint64_t{0}, &content);  // no offsets within the summary
   std::string begin_of_footer(1, static_cast<char>(Op::footer));
   put_fixed(static_cast<uint64_t>(content.size() + sizeof(uint32_t)), &begin_of_footer);
   put_fixed(crc_of(begin_of_footer + content, crc_of(summary)), &content);

@@ -1,4 +1,4 @@
-// The texts of replay/page/, embedded by the build (cmake/EmbedTexts.cmake).
+// Texts of replay/page/, embedded by the build (cmake/EmbedTexts.cmake).
 #pragma once
 
 #include <string_view>

@@ -18,7 +18,7 @@ namespace {
 
 constexpr int32_t kTurn_ddeg = 3600;
 
-/// The same heading, at most half a turn from the one before.
+/// Returns the same heading, at most half a turn from the previous heading.
 int32_t near_heading(int32_t heading_ddeg, int32_t before_ddeg) {
   const int32_t apart = heading_ddeg - before_ddeg;
   const auto turns = static_cast<int32_t>(std::lround(static_cast<double>(apart) / kTurn_ddeg));
@@ -30,26 +30,26 @@ ReplayBody body_of(const AgentBox& box) {
   return {box.agent_class, centimetres(box.length_m), centimetres(box.width_m), centimetres(box.height_m)};
 }
 
-/// A life that began in the middle of an episode.
+/// Life that began in the middle of an episode.
 struct LaterLife {
-  size_t episode = 0;  // among those of the replay
+  size_t episode = 0;  // index among the replay's episodes
   int32_t frame = 0, agent = 0;
   ReplayBody body;
   std::vector<float> conditioning;
 };
 
-/// Makes every later life an agent of its own, after those that are there. Lives are in the order of their frames.
+/// Turns every later life into a separate agent, after the existing agents. Lives are in the order of their frames.
 void split_lives(const std::vector<LaterLife>& lives, Replay* replay_inout) {
   if (lives.empty()) return;
   Replay& replay = *replay_inout;
   const int32_t num_slots = replay.num_agents;
-  std::vector<int32_t> column(lives.size());  // the agent that each life becomes
+  std::vector<int32_t> column(lives.size());  // agent index of each life
   std::vector<int32_t> next(replay.episodes.size(), num_slots);
   for (size_t i = 0; i < lives.size(); ++i) column[i] = next[lives[i].episode]++;
   const int32_t num_agents = *std::max_element(next.begin(), next.end());
   check_replay_room(num_agents, int64_t{replay.num_frames});
 
-  // Of each frame and slot, the agent that its life has become.
+  // Agent of each frame and slot.
   std::vector<int32_t> agent_of(static_cast<size_t>(replay.num_frames) * static_cast<size_t>(num_slots));
   const auto at = [num_slots](int32_t frame, int32_t slot) {
     return static_cast<size_t>(frame) * static_cast<size_t>(num_slots) + static_cast<size_t>(slot);
@@ -123,7 +123,7 @@ std::vector<ReplayCamera> replay_cameras(const Rig& rig) {
 }
 
 AgentCameras::AgentCameras(Simulator& simulator, RendererConfig config) : simulator_(simulator) {
-  config.device = {};   // by the oracle, which draws on the host
+  config.device = {};   // the CPU oracle draws on the host
   config.samples = {};  // with exact coverage
   renderer_ = make_renderer("cpu", config);
   upload_maps(simulator, renderer_.get());
@@ -164,7 +164,7 @@ struct Recorder::Parts {
     replay.images.frames_per_group = kReplayFramesPerGroup;
   }
 
-  // Of the world's random numbers: resets change it.
+  // Updates the seed of the world's random numbers, which resets change.
   void take_seed() { replay.origin.seed = simulator.arrays().seed[world]; }
   size_t slot(int32_t agent) const { return static_cast<size_t>(first_slot + agent); }
   std::vector<int32_t>& track(Track which) { return replay.tracks[static_cast<size_t>(which)]; }
@@ -202,7 +202,7 @@ struct Recorder::Parts {
                            {conditioning, conditioning + kNumConditioning}});
   }
 
-  // Nothing has led to the next frame.
+  // Adds zeros for the step before the next frame, since no step led to it.
   void add_no_step() {
     const auto count = static_cast<size_t>(replay.num_agents);
     const auto add_zeros = [count](std::vector<int32_t>& values) { values.insert(values.end(), count, 0); };
@@ -279,7 +279,7 @@ struct Recorder::Parts {
     decision.reset();
   }
 
-  /// Action and reward of every agent, in the step that has led to the frame that is next.
+  /// Adds action and reward of every agent in the step that led to the next frame.
   void add_step(const StepResult& result) {
     const AgentStateView state = simulator.state();
     for (int32_t agent = 0; agent < replay.num_agents; ++agent) {
@@ -316,11 +316,11 @@ struct Recorder::Parts {
   std::optional<ReplayDecision> decision;  // for the next step
   std::vector<Command> commands;
   int32_t first_slot = 0, first_box = 0, num_boxes = 0, first_light = 0;
-  std::vector<int32_t> chains;  // [agents] the number of the chain that was written last
-  std::vector<int32_t> lives;   // [agents] the life that was written last
+  std::vector<int32_t> chains;  // [agents] number of the last written chain
+  std::vector<int32_t> lives;   // [agents] last written life
   std::vector<LaterLife> later_lives;
   std::unique_ptr<AgentCameras> cameras;
-  std::string group;  // images that wait to be compressed
+  std::string group;  // images that are not yet compressed
   Replay replay;
 };
 
@@ -404,7 +404,7 @@ void Recorder::forget() {
   ReplayEpisode& episode = replay.episodes.back();
   episode.first_frame = 0;
   episode.num_frames = 1;
-  // Of each agent its chain of now.
+  // Current chain of each agent.
   std::vector<const ReplayChain*> last(static_cast<size_t>(replay.num_agents), nullptr);
   for (const ReplayChain& chain : episode.chains) last[chain.agent] = &chain;
   std::vector<ReplayChain> kept;

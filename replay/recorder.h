@@ -16,19 +16,19 @@ namespace pictura {
 
 struct RecorderOptions {
   int world = 0;
-  int followed = -1;          // agent of the world whose decisions and images are kept, or -1
-  RendererConfig cameras;     // of every agent, for whom looks at the replay
-  bool keeps_images = false;  // of the followed agent, drawn by the CPU renderer
+  int followed = -1;          // agent of the world whose decisions and images are recorded, or -1
+  RendererConfig cameras;     // of every agent, for viewers of the replay
+  bool keeps_images = false;  // images of the followed agent, drawn by the CPU renderer
 };
 
-/// Draws what one agent sees, by the CPU renderer.
+/// Draws one agent's images with the CPU renderer.
 class AgentCameras {
  public:
-  /// `config` as a policy's, whatever device and samples it names. The simulator must outlive it.
+  /// Creates a renderer for `config`, a policy's, ignoring its device and samples. The simulator must outlive it.
   AgentCameras(Simulator& simulator, RendererConfig config);
   ~AgentCameras();
 
-  /// [height, width, 3] of each camera, one after the other, of a slot's view now.
+  /// Draws a slot's present view: [height, width, 3] for each camera, one after the other.
   std::string draw(int slot);
 
  private:
@@ -37,47 +37,48 @@ class AgentCameras {
   std::unique_ptr<HostImages> images_;
 };
 
-/// Cameras as replays hold them.
+/// Returns the cameras in the form of replays.
 std::vector<ReplayCamera> replay_cameras(const Rig& rig);
 
-/// What a policy makes of the followed agent's state.
+/// Response of a policy to the followed agent's state.
 struct ReplayDecision {
   std::array<float, kNumActions> probabilities{};
   float value = 0;
 };
-/// From a policy's logits [kNumActions].
+/// Returns the response of a policy's logits [kNumActions].
 ReplayDecision decision_of(Span<const float> logits, float value);
 
-/// A box in a replay's units.
+/// Returns a box in a replay's units.
 ReplayBox replay_box(const AgentBox& box);
 
-/// Throws Error where a replay of so many agents and steps would hold more numbers than one may: at the door, what
-/// Recorder::after_step() throws at last.
+/// Throws Error if a replay of this number of agents and steps would hold too many numbers: an early check for the
+/// error of Recorder::after_step().
 void check_replay_room(int num_agents, int64_t num_steps);
 
-/// Throws UsageError where the simulator does not work in host memory, or has no such world or agent.
+/// Recorder of one world. Throws UsageError if the simulator does not use host memory, or lacks the world or agent.
 class Recorder final : public StepObserver {
  public:
-  /// The state of the simulator, which must outlive the recorder, is the first frame.
+  /// Starts recording; the simulator's present state is the first frame. The simulator must outlive the recorder.
   Recorder(Simulator& simulator, const RecorderOptions& options);
   ~Recorder() override;
 
-  /// What the followed agent's policy makes of its state, for the next step.
+  /// Records the followed agent's response for the next step.
   void decide(const ReplayDecision& decision);
   void before_step(Span<const Command> commands) override;
-  /// Throws Error where the replay would take more memory than it may.
+  /// Throws Error if the replay would exceed its memory limit.
   void after_step(const StepResult& result) override;
-  /// A new episode begins if this recorder's world is among them.
+  /// Begins an episode if this recorder's world is in the mask.
   void after_reset(Span<const uint8_t> world_mask = {}) override;
 
-  /// What was recorded until now, without images that wait to be compressed; its last frame is the simulator's state.
+  /// Recording so far, without images that are not yet compressed; its last frame is the simulator's state.
   const Replay& recorded() const;
-  /// Of `origin`, what the simulator knows (map, seed, world, pace) is filled in.
+  /// Sets the origin, with the simulator's entries (map, seed, world, pace) filled in.
   void set_origin(ReplayOrigin origin);
-  /// Keeps nothing but the last frame, as the first of a replay, and the metrics of all. Not with a followed agent.
+  /// Discards all frames but the last, which becomes the first of a replay; metrics continue. Not with a followed
+  /// agent.
   void forget();
 
-  /// All of it, with this origin. The recorder is spent.
+  /// Returns the complete replay, with this origin. The recorder cannot be used afterwards.
   Replay finish(ReplayOrigin origin);
 
  private:

@@ -1,6 +1,5 @@
-// A replay: what happened in one world over many steps, in whole units (1 cm, 0.1 degree), so that it is written and
-// read without loss. A frame is a state; a step leads from each frame to the next. docs/reference/replay.md describes
-// the file.
+// Replay of one world over many steps, in whole units (1 cm, 0.1 degree), so that it is written and read without loss.
+// A frame is a state; a step leads from each frame to the next. docs/reference/replay.md describes the file.
 #pragma once
 
 #include <array>
@@ -18,15 +17,15 @@
 
 namespace pictura {
 
-/// Of all tracks of a replay together: 120 agents for 24,000 steps, in 256 MB.
+/// Maximum number of values in all tracks of a replay: 120 agents for 24,000 steps, in 256 MB.
 constexpr int64_t kMaxReplayNumbers = int64_t{1} << 26;
 
-/// Of the format; a reader takes no other.
+/// Version of the format; readers accept no other version.
 constexpr int kReplayVersion = 2;
 
-// X(name, unit, order): a quantity of every agent at every frame, as a whole number of units; what is written are its
-// differences of this order from frame to frame. Those of a step belong to the frame that it leads to, and are 0 at the
-// first frame of an episode.
+// List of quantities of every agent at every frame: X(name, unit, order), a whole number of units, stored as
+// differences of this order between frames. Values of a step belong to the frame after the step, and are 0 at the first
+// frame of an episode.
 #define PICTURA_REPLAY_STATE_TRACKS(X) \
   X(x_m, 0.01, 2)                      \
   X(y_m, 0.01, 2)                      \
@@ -40,8 +39,8 @@ constexpr int kReplayVersion = 2;
   X(events, 1, 0)                      \
   X(action, 1, 0)
 
-/// Centre of the box, heading without jumps by a turn, AgentStatus, Event bits, and 1 + action, or 0 where an agent did
-/// nothing of its own.
+/// Tracks: centre of the box, heading without jumps by a turn, AgentStatus, Event bits, and 1 + action, or 0 if an
+/// agent chose no action itself.
 enum class Track : int32_t {
 #define X(name, unit, order) name,
   PICTURA_REPLAY_STATE_TRACKS(X)
@@ -53,7 +52,7 @@ enum class Track : int32_t {
 };
 constexpr size_t kNumTracks = static_cast<size_t>(Track::count);
 
-/// The smallest term of a step is the time penalty, 2.5e-6.
+/// Unit of rewards. The smallest term of a step is the time penalty, 2.5e-6.
 constexpr double kRewardUnit = 1e-7;
 
 struct TrackInfo {
@@ -76,14 +75,14 @@ struct ReplayBody {
   bool operator==(const ReplayBody&) const = default;
 };
 
-/// A road user that stands in its place: a parked car, for the whole episode, or whom a probe inserts.
+/// Stationary road user: a parked car, for the whole episode, or a road user that a probe inserts.
 struct ReplayBox {
   ReplayBody body;
-  int32_t x_cm = 0, y_cm = 0, z_cm = 0, heading_ddeg = 0;  // tenths of a degree
+  int32_t x_cm = 0, y_cm = 0, z_cm = 0, heading_ddeg = 0;  // heading in tenths of a degree
   bool operator==(const ReplayBox&) const = default;
 };
 
-/// The goal chain of an agent from this frame on.
+/// Goal chain of an agent from this frame on.
 struct ReplayChain {
   int32_t frame = 0, agent = 0;
   std::array<int32_t, kNumWaypoints> x_cm{}, y_cm{}, z_cm{};
@@ -91,7 +90,7 @@ struct ReplayChain {
 };
 
 struct ReplayEpisode {
-  int32_t index = 0;  // of the simulator's
+  int32_t index = 0;  // index in the simulator
   int32_t first_frame = 0, num_frames = 0;
   std::vector<ReplayBody> agents;   // [agents]
   std::vector<float> conditioning;  // [agents, kNumConditioning]
@@ -112,7 +111,7 @@ enum class ShapeKind : uint8_t {
 };
 constexpr int kNumShapeKinds = 8;
 
-/// A part of the map from above.
+/// Shape of the map from above.
 struct ReplayShape {
   ShapeKind kind = ShapeKind::lane;
   int32_t detail = 0, width_cm = 0;
@@ -120,12 +119,12 @@ struct ReplayShape {
   bool operator==(const ReplayShape&) const = default;
 };
 
-/// A colour before it fades, [red, green, blue].
+/// Colour before it fades, [red, green, blue].
 using ReplayHue = std::array<uint8_t, 3>;
 using ReplayPoint = std::array<int32_t, 3>;  // x, y, z in cm
 
-/// What cameras see of the map, see docs/explanation/image.md. Lines are painted on the road from point to point, as
-/// append_strips() makes strips of them, and stand in the order of the map's strips.
+/// Geometry of the map that cameras see, see docs/explanation/image.md. Lines are painted on the road from point to
+/// point, as append_strips() converts them to strips, in the order of the map's strips.
 struct ReplayLine {
   StripKind kind = StripKind::lane_mark;
   ReplayHue color{};
@@ -136,11 +135,11 @@ struct ReplayLine {
 struct ReplayWall {
   ReplayHue color{};
   int32_t height_cm = 0;
-  ReplayPoint a_cm{}, b_cm{};  // the ends of its foot
+  ReplayPoint a_cm{}, b_cm{};  // ends of its foot
   bool operator==(const ReplayWall&) const = default;
 };
 struct ReplayHead {
-  int32_t signal = 0;  // of the lights of a frame
+  int32_t signal = 0;  // index in the lights of a frame
   int32_t facing_ddeg = 0, half_angle_ddeg = 0;
   ReplayPoint position_cm{};
   bool operator==(const ReplayHead&) const = default;
@@ -152,12 +151,12 @@ struct ReplayScenery {
   bool operator==(const ReplayScenery&) const = default;
 };
 
-/// What the followed agent's policy made of a frame, in units of kDecisionUnit: the probability of each action, and the
-/// value. All 0 where it was not asked.
+/// Response of the followed agent's policy to a frame, in units of kDecisionUnit: the probability of each action, and
+/// the value. All 0 if the policy was not evaluated.
 constexpr size_t kDecisionValues = kNumActions + 1;
 constexpr double kDecisionUnit = 1e-4;
 
-/// A camera on a body, as Camera has it.
+/// Camera on a body, with the members of Camera.
 struct ReplayCamera {
   std::string name;
   int32_t width_px = 0, height_px = 0;
@@ -166,27 +165,27 @@ struct ReplayCamera {
   bool operator==(const ReplayCamera&) const = default;
 };
 
-/// The followed agent's images of the first frames, compressed as a whole number of groups of frames.
+/// Images of the followed agent in the first frames, compressed in complete groups of frames.
 struct ReplayImages {
   int32_t frames_per_group = 0;
   std::vector<std::string> groups;  // see images.h
   bool operator==(const ReplayImages&) const = default;
 };
 
-/// What the replay is of, for people and galleries.
+/// Origin of a replay, for people and galleries.
 struct ReplayOrigin {
   std::string command, commit, version;
   std::string map, map_hash;
   std::array<double, 3> map_origin_m{};  // file coordinates of the map's (0, 0, 0); zero in files of earlier versions
   std::string policy, policy_hash;
-  std::string light_cycles;  // as light_cycles_text() says; empty in files of versions that do not name them
+  std::string light_cycles;  // text of light_cycles_text(); empty in files of versions without it
   uint64_t seed = 0;
   uint32_t global_world = 0;
   float dt_s = 0.1f;
   bool operator==(const ReplayOrigin&) const = default;
 };
 
-/// Of all that was recorded. Counts of events are of agent-steps.
+/// Metrics over the whole recording. Event counts are in agent-steps.
 struct ReplayMetrics {
   int64_t spawned = 0, agent_steps = 0;
   int64_t collisions = 0, at_fault_collisions = 0, off_road = 0, red_light = 0, wall_contacts = 0;
@@ -194,7 +193,7 @@ struct ReplayMetrics {
   double km_driven = 0, reward = 0;
   bool operator==(const ReplayMetrics&) const = default;
 };
-// X(name): the metrics by name.
+// List of the metrics: X(name).
 #define PICTURA_REPLAY_METRICS(X) \
   X(spawned)                      \
   X(agent_steps)                  \
@@ -208,27 +207,27 @@ struct ReplayMetrics {
   X(km_driven)                    \
   X(reward)
 
-/// What a policy made of a state with a road user, and of the same state without it: the values, and the probabilities
-/// of braking.
+/// Response of a policy to a state with a road user, and to the same state without the user: values and braking
+/// probabilities.
 struct ReplayAnswer {
   std::string policy;
   double value = 0, value_without = 0, brake = 0, brake_without = 0;
   bool operator==(const ReplayAnswer&) const = default;
 };
 
-/// A case of a probe, which this replay leads to: one road user that is removed from a frame, or inserted into it, as
-/// one agent sees it.
+/// Case of a probe at a frame of this replay: one road user that is removed from the frame, or inserted into it, as one
+/// agent observes it.
 struct ReplayCase {
   std::string what;  // a sentence for people
   int32_t frame = 0, ego = 0;
-  int32_t removed = -1;                         // an agent, or -1
-  std::optional<ReplayBox> inserted;            // who stands there in the frame of the case
-  std::vector<std::array<int32_t, 2>> path_cm;  // of whom is inserted: all its places, in their order
-  std::vector<ReplayAnswer> answers;            // of each policy that was asked
+  int32_t removed = -1;                         // agent, or -1
+  std::optional<ReplayBox> inserted;            // road user inserted into the frame of the case
+  std::vector<std::array<int32_t, 2>> path_cm;  // all positions of the inserted road user, in order
+  std::vector<ReplayAnswer> answers;            // of each evaluated policy
   bool operator==(const ReplayCase&) const = default;
 };
 
-/// Where galleries begin to look; frame -1: nowhere.
+/// Moment that galleries show first; frame -1: none.
 struct ReplayMoment {
   int32_t frame = -1, agent = 0;
   bool operator==(const ReplayMoment&) const = default;
@@ -240,23 +239,23 @@ struct Replay {
   ReplayMoment first_infraction;
   std::optional<ReplayCase> probed;
   int32_t num_agents = 0, num_frames = 0, num_lights = 0;
-  int32_t followed = -1;  // the agent whose decisions and images there are, or -1
+  int32_t followed = -1;  // agent with decisions and images, or -1
   std::vector<ReplayShape> map;
   ReplayScenery scenery;
   std::vector<ReplayCamera> cameras;  // of every agent
-  float line_floor_px = 0;            // of their images
+  float line_floor_px = 0;            // line floor of their images
   std::vector<ReplayEpisode> episodes;
   std::array<std::vector<int32_t>, kNumTracks> tracks;  // [frames, agents]
   std::vector<uint8_t> lights;                          // [frames, lights] LightState
   std::vector<int32_t> decisions;                       // [frames, kDecisionValues], or empty
-  ReplayImages images;                                  // without groups where there are none
+  ReplayImages images;                                  // without groups if there are none
   bool operator==(const Replay&) const = default;
 
   int32_t at(Track track, int frame, int agent) const {
     return tracks[static_cast<size_t>(track)]
                  [static_cast<size_t>(frame) * static_cast<size_t>(num_agents) + static_cast<size_t>(agent)];
   }
-  /// The frames, from the first on, of which there are images of the followed agent.
+  /// Number of frames, from the first on, with images of the followed agent.
   int num_pictured_frames() const {
     const auto kept = static_cast<int64_t>(images.groups.size()) * images.frames_per_group;
     return static_cast<int>(kept < num_frames ? kept : num_frames);

@@ -23,7 +23,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr int kTokenBytes = 16;
-constexpr int kThreads = kMaxLivePages + 8;  // for pages that listen, and for all else
+constexpr int kThreads = kMaxLivePages + 8;  // for listening pages, and for all other requests
 constexpr const char* kHeaderFields =
     "Cache-Control: no-store\r\n"
     "Content-Security-Policy: default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src "
@@ -31,7 +31,7 @@ constexpr const char* kHeaderFields =
     "Cross-Origin-Resource-Policy: same-origin\r\n"
     "Referrer-Policy: no-referrer\r\n"
     "X-Content-Type-Options: nosniff\r\n";
-constexpr std::chrono::seconds kHeartbeat{10};  // shows the server that a page has gone
+constexpr std::chrono::seconds kHeartbeat{10};  // reveals to the server that a page has gone
 
 std::string random_token() {
   std::array<unsigned char, kTokenBytes> bytes{};
@@ -43,7 +43,7 @@ std::string random_token() {
   return token;
 }
 
-// In a time that does not tell how much is equal.
+// Compares in a time that does not depend on the number of equal characters.
 bool is_equal(std::string_view a, std::string_view b) {
   if (a.size() != b.size()) return false;
   int difference = 0;
@@ -51,7 +51,7 @@ bool is_equal(std::string_view a, std::string_view b) {
   return difference == 0;
 }
 
-// As browsers send it. Throws UsageError unless it is a name or an address that they could.
+// Returns the host name as browsers send it. Throws UsageError unless browsers could send it as a name or an address.
 std::string host_name_of(std::string name) {
   for (char& c : name) {
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
@@ -70,7 +70,7 @@ Text event_text(std::string_view event, const LiveJson& data) {
   return std::make_shared<const std::string>(fmt::format("event: {}\ndata: {}\n\n", event, json_text(data)));
 }
 
-/// A page that listens.
+/// Page that listens.
 struct Listener {
   std::deque<Text> waiting;
   size_t bytes = 0;
@@ -98,7 +98,7 @@ struct LiveServer::Parts {
     for (const std::string& name : {std::string("127.0.0.1"), std::string("localhost"), host_name}) {
       if (name.empty()) continue;
       hosts.push_back(fmt::format("{}:{}", name, port));
-      if (port == 80) hosts.push_back(name);  // as browsers say it
+      if (port == 80) hosts.push_back(name);  // as browsers write it
     }
   }
 
@@ -133,8 +133,8 @@ struct LiveServer::Parts {
     }
   }
 
-  // Pages of other sites reach the loopback too: by names that they point at it, which Host shows, and by requests of
-  // their own, which Origin shows.
+  // Rejects requests of other sites' pages, which can reach the loopback too: through names that they point at it,
+  // which Host reveals, and through requests of their own, which Origin reveals.
   void check_asker(const HttpRequest& request) const {
     const std::string host(request.value("host"));
     const auto is_served = [&] {
@@ -174,7 +174,7 @@ struct LiveServer::Parts {
     changed.notify_all();
   }
 
-  // Whether the connection goes on.
+  // Writes the next text. Returns whether the connection is still open.
   bool write_next(Listener& listener, HttpAnswer& answer) {
     Text text;
     {
@@ -194,7 +194,7 @@ struct LiveServer::Parts {
   }
 
   void take_request(const HttpRequest& request) {
-    // Forms of other sites cannot send this type without asking first.
+    // Forms of other sites cannot send this type without a preflight request.
     std::string_view type = request.value("content-type");
     type = type.substr(0, type.find_first_of("; "));  // without its character set
     if (type != "application/json") throw HttpRefusal{415, "expected Content-Type: application/json"};
@@ -209,7 +209,7 @@ struct LiveServer::Parts {
     changed.notify_all();
   }
 
-  // With the mutex held.
+  // Queues a text; the mutex must be held.
   static void put(Listener& listener, const Text& text) {
     listener.bytes += text->size();
     listener.waiting.push_back(text);
@@ -229,14 +229,14 @@ struct LiveServer::Parts {
   const std::string token;
   std::string address;
 
-  mutable std::mutex mutex;  // of all that follows
+  mutable std::mutex mutex;  // guards all members below
   std::condition_variable changed;
   std::vector<std::string> hosts;
   std::vector<std::shared_ptr<Listener>> listeners;
   std::vector<LiveRequest> requests;
   bool is_closing = false;
 
-  std::unique_ptr<HttpServer> server;  // ends before what its answers read
+  std::unique_ptr<HttpServer> server;  // destroyed before the data that its answers read
 };
 
 LiveServer::LiveServer(const LiveServerOptions& options) : parts_(std::make_unique<Parts>(options)) {}
@@ -251,7 +251,7 @@ void LiveServer::send(std::string_view event, const std::function<LiveJson()>& m
     const std::lock_guard lock(parts_->mutex);
     if (std::none_of(parts_->listeners.begin(), parts_->listeners.end(), wants)) return;
   }
-  const Text text = event_text(event, message());  // outside of the lock, since it takes its time
+  const Text text = event_text(event, message());  // outside the lock, since it takes time
   {
     const std::lock_guard lock(parts_->mutex);
     for (const auto& listener : parts_->listeners) {

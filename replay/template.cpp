@@ -33,8 +33,8 @@ std::string script_text(const nlohmann::ordered_json& json) {
 }
 
 std::string filled(std::string_view html, const std::vector<std::pair<std::string, std::string>>& values) {
-  // Found in the template, not in a value that has taken another one's place.
-  std::map<size_t, std::pair<size_t, const std::string*>> places;  // by where they begin: length, and what comes there
+  // Names are searched in the template, not in values that have replaced other names.
+  std::map<size_t, std::pair<size_t, const std::string*>> places;  // by begin: length, and replacement
   for (const auto& [name, text] : values) {
     const std::string mark = "{{" + name + "}}";
     const size_t at = html.find(mark);

@@ -1,4 +1,4 @@
-// Pages from templates: {{name}} is replaced by a text.
+// Pages from templates, in which {{name}} is replaced by a text.
 #pragma once
 
 #include <string>
@@ -10,13 +10,13 @@
 
 namespace pictura {
 
-/// Text as HTML shows it.
+/// Escapes a text for HTML.
 std::string html_text(std::string_view text);
 
-/// JSON for a script element, which no text in it can end.
+/// Returns JSON for a script element, which no text in it can end.
 std::string script_text(const nlohmann::ordered_json& json);
 
-/// The template with each {{name}} replaced, which must be in it.
+/// Returns the template with each {{name}} replaced; every name must be in it.
 std::string filled(std::string_view html, const std::vector<std::pair<std::string, std::string>>& values);
 
 }  // namespace pictura
