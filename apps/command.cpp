@@ -19,7 +19,7 @@ namespace {
 
 void complain(const std::string& message) { print_message("error: {}\n", printable(message)); }
 
-/// Does what the words ask for. Returns the exit status.
+/// Runs the command line. Returns the exit status.
 int run(CLI::App& app, int argc, char** argv) {
   try {
     app.parse(argc, argv);
@@ -40,7 +40,7 @@ int run(CLI::App& app, int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     complain("out of memory");
   } catch (const std::exception& error) {
-    // A library's message: the lines after the first say where in its code the error arose.
+    // A library's message: lines after the first give the position in its code.
     std::string message = error.what();
     message.erase(std::min(message.find('\n'), message.size()));
     const bool lacks_memory =
@@ -50,7 +50,7 @@ int run(CLI::App& app, int argc, char** argv) {
   return 1;
 }
 
-/// Ends stdout after a command that ended with `status`. Returns the status of the process.
+/// Closes stdout after a command that ended with `status`. Returns the status of the process.
 int end_output(int status) {
   try {
     close_stdout();
@@ -66,7 +66,7 @@ int end_output(int status) {
 int run_command(int argc, char** argv) {
   open_standard_streams();
   catch_interrupts();
-  // A file that would pass the limit on its size (ulimit -f) is an error of writing instead of a sudden death.
+  // Writing beyond the file size limit (ulimit -f) then gives a write error instead of killing the process.
   std::signal(SIGXFSZ, SIG_IGN);
   CLI::App app{
       "Self-play driving from rendered views: maps, simulation, images, training and evaluation.\n"

@@ -1,6 +1,5 @@
-// The subcommands of `pictura`, one file each. A function here registers its command with CLI11; the command's callback
-// does the work and throws Error, UsageError or Interrupted, which run_command() turns into one line and an exit
-// status.
+// Subcommands of `pictura`, one file each. Each function registers its command with CLI11. The command's callback does
+// the work and throws Error, UsageError or Interrupted, which run_command() converts to one line and an exit status.
 #pragma once
 
 #include <CLI/CLI.hpp>

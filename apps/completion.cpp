@@ -1,4 +1,4 @@
-// `pictura completion`: scripts by which shells complete the command's words.
+// `pictura completion`: scripts for shell completion of the command's words.
 #include "pictura/cli/completion.h"
 
 #include "pictura/apps/commands.h"

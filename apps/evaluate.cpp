@@ -31,14 +31,14 @@ namespace pictura {
 
 namespace {
 
-constexpr int kShownGroups = 6;          // of each kind of infraction
-constexpr double kManyNeverMoved = 0.2;  // of the vehicles
+constexpr int kShownGroups = 6;          // shown of each kind of infraction
+constexpr double kManyNeverMoved = 0.2;  // share of vehicles
 
-// One for each severity of randomized cameras.
+// Reports, one for each severity of randomized cameras.
 using Reports = std::vector<EvaluateReport>;
 
-// A row of the table and its label: the density; of another driver also its name, of a file without folders; the
-// severity where there are several.
+// Row of the table with its label: the density; for another driver also its name, without the folders of a file; the
+// severity if there are several.
 struct LabelledRow {
   std::string label;
   EvaluateRow row;
@@ -69,7 +69,7 @@ Effort effort_of(const Reports& reports) {
   return sum;
 }
 
-// A line of the table: a metric, and its text for each row.
+// Prints a line of the table: a metric, and its text for each row.
 template <typename Text>
 void print_line(const std::vector<LabelledRow>& rows, size_t width, const char* metric, const Text& text_of) {
   std::string line = fmt::format("{:30}", metric);
@@ -77,7 +77,8 @@ void print_line(const std::vector<LabelledRow>& rows, size_t width, const char* 
   print_result("{}\n", line);
 }
 
-// Metrics below each other, so that the table fits a terminal; a column for each density, driver and severity.
+// Prints the metrics below each other, so that the table fits a terminal, with a column for each density, driver and
+// severity.
 void print_table(const Reports& reports) {
   const EvaluationSetting& setting = reports.front().results.setting;
   const std::vector<LabelledRow> rows = labelled(reports);
@@ -187,7 +188,7 @@ Json groups_json(const std::vector<InfractionGroup>& groups) {
   return list;
 }
 
-// "N": the scenarios 0 to N - 1; "A:B": A to B - 1.
+// Parses a range of scenarios. "N": 0 to N - 1; "A:B": A to B - 1.
 void parse_scenarios(const std::string& text, EvaluateOptions* options) {
   const size_t colon = text.find(':');
   const std::string_view all = text;
@@ -200,7 +201,7 @@ void parse_scenarios(const std::string& text, EvaluateOptions* options) {
   options->scenarios = static_cast<int>(*end - *first);
 }
 
-// Who drives in towns, or in recorded scenes.
+// Names of controllers in towns, or in recorded scenes.
 std::vector<std::string> driver_names(bool has_scenes) {
   if (!has_scenes) return town_controller_names();
   std::vector<std::string> names = record_controller_names();
@@ -264,7 +265,7 @@ void evaluate_in_scenes(const CLI::App& command, const EvaluateArguments& argume
                        arguments.out, arguments.json);
 }
 
-// Records the worst scenarios again, where that was asked for.
+// Records the worst scenarios again, if requested.
 void replay_worst(const EvaluateArguments& arguments, const EvaluationResults& results) {
   const EvaluateOptions& evaluation = arguments.evaluation;
   if (!arguments.replay.empty()) {
@@ -275,7 +276,7 @@ void replay_worst(const EvaluateArguments& arguments, const EvaluationResults& r
   }
 }
 
-// Refuses what takes one severity, or none.
+// Rejects options that do not allow several severities, and severities with --merge.
 void check_severities(const CLI::App& command, const EvaluateArguments& arguments) {
   if (!arguments.parts.empty()) refuse_options(command, {"--camera-severity"}, "with --merge");
   if (arguments.severities.size() == 1) return;
@@ -283,7 +284,7 @@ void check_severities(const CLI::App& command, const EvaluateArguments& argument
                  "with several values of --camera-severity");
 }
 
-// An evaluation at each severity, in the same worlds, until one is interrupted.
+// Evaluates at each severity, in the same worlds, until an interrupt.
 Reports evaluate_severities(const std::vector<double>& severities, EvaluateOptions* evaluation) {
   EvaluationProgress progress("the scenarios that are finished");
   const auto count = static_cast<double>(severities.size());
@@ -303,7 +304,7 @@ Reports evaluate_severities(const std::vector<double>& severities, EvaluateOptio
   return reports;
 }
 
-// In towns, or parts of that joined.
+// Evaluates in towns, or merges parts of such evaluations.
 void evaluate_in_towns(const CLI::App& command, EvaluateArguments* arguments) {
   EvaluateOptions& evaluation = arguments->evaluation;
   const bool merges = !arguments->parts.empty(), lists_infractions = !arguments->infractions.empty();

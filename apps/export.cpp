@@ -1,5 +1,4 @@
-// `pictura export`: the weights of a policy without the run that made it, to release them or to read them with other
-// tools.
+// `pictura export`: the weights of a policy without its run, for releases or other tools.
 #include "pictura/apps/commands.h"
 #include "pictura/cli/backend_options.h"
 #include "pictura/cli/evaluation_options.h"

@@ -26,7 +26,7 @@ namespace pictura {
 
 namespace {
 
-constexpr double kQuiet_s = 0.3;  // imports that take less show no progress
+constexpr double kQuiet_s = 0.3;  // faster imports show no progress
 
 struct MapArguments {
   std::string map, png, svg, xodr;
@@ -62,7 +62,7 @@ void add_lane_use(const RoadMap& map, Json* object_out) {
   (*object_out)["unreachable_lanes"] = use.unreachable;
 }
 
-/// With the default walls of simulations.
+/// Adds the counts of blind approaches, with the default walls of simulations.
 void add_blind_approaches(const RoadMap& map, Json* object_out) {
   const std::vector<WallFace> walls = make_walls(map, {});
   const BlindApproaches count = count_blind_approaches(map, walls);
@@ -111,7 +111,7 @@ void print_table(const Json& object) {
   }
 }
 
-/// What was mended: how often, where first, and the message of each.
+/// Repairs by kind: how often, where first, and the message of each.
 Json mends_of(const RoadMap& map, const std::string& source) {
   Json groups = Json::array();
   for (const MendGroup& group : group_mends(map.mends)) {
@@ -125,7 +125,8 @@ Json mends_of(const RoadMap& map, const std::string& source) {
   return groups;
 }
 
-/// A recorded scene: the facts of its map, its tracks and lights, and how its traffic and its edges agree.
+/// Reports on a recorded scene: the facts of its map, its tracks and lights, and the agreement of its traffic with its
+/// edges.
 void run_scene(const MapArguments& arguments) {
   if (!arguments.xodr.empty()) fail_usage("--xodr: {} is a recorded scene, which has no OpenDRIVE", arguments.map);
   SceneReport report;
@@ -195,7 +196,7 @@ void run_map(const CLI::App& command, const MapArguments& arguments) {
   object["statistics"] = statistics_of(*map);
   if (arguments.full) return print_listing(object, *map);
   if (arguments.json) return print_json(object);
-  object.erase("mends");  // said on stderr
+  object.erase("mends");  // reported on stderr
   object.erase("statistics");
   print_table(object);
   for (const std::string& path : {arguments.png, arguments.svg}) {
@@ -207,7 +208,7 @@ void run_map(const CLI::App& command, const MapArguments& arguments) {
 }  // namespace
 
 void add_map_command(CLI::App& app) {
-  constexpr double kFarthest_m = 1e8;  // from the origin of a map projection
+  constexpr double kFarthest_m = 1e8;  // maximum distance from the origin of a map projection
   auto arguments = std::make_shared<MapArguments>();
   CLI::App* command = app.add_subcommand("map", "Print a map's properties, list its elements, draw it from above");
   add_map_or_scene(command, &arguments->map);
@@ -235,7 +236,7 @@ void add_map_command(CLI::App& app) {
       ->check(file_ending(".xodr"));
   command->add_flag("--strict", arguments->strict,
                     "Refuse every fault of the file, also those that are mended and counted by default");
-  command->add_flag("--lenient")->group("");  // of earlier versions: refused with what replaces it
+  command->add_flag("--lenient")->group("");  // option of earlier versions: rejected with a hint to its replacement
   command->add_flag("--json", arguments->json, "Print one JSON object; its mends list every fault that was mended");
   command->add_flag("--full", arguments->full, "With --json: list every element with its position in the file");
   command->footer(

@@ -1,4 +1,4 @@
-// The pictures of `pictura probe pedestrian`.
+// Pictures of `pictura probe pedestrian`.
 #pragma once
 
 #include <functional>
@@ -9,9 +9,9 @@
 
 namespace pictura {
 
-/// Draws path_000.png and so on in a folder: a path from above, coloured by how much of the pedestrian is seen, and the
-/// ego's cameras at five places. `on_path` is called with the number of paths that are drawn. Returns the pages for
-/// pictura.plot, which draws the changes along the path below. Throws Error naming the path.
+/// Draws path_000.png and so on in a folder: a path from above, coloured by the pedestrian's visibility, and the ego's
+/// cameras at five points. `on_path` is called with the number of completed paths. Returns the pages for pictura.plot,
+/// which draws the changes along the path below the pictures. Throws Error naming the path.
 Json draw_pedestrian_paths(const PedestrianResults& results, FilledFolder* folder,
                            const std::function<void(size_t)>& on_path);
 

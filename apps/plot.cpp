@@ -1,4 +1,4 @@
-// `pictura plot`: curves of training runs, of evaluations along trainings, or of evaluations by severity, as one
+// `pictura plot`: curves of training runs, of evaluations during training, or of evaluations by severity, as one
 // picture.
 #include "pictura/apps/commands.h"
 #include "pictura/cli/backend_options.h"

@@ -1,4 +1,4 @@
-// `pictura probe`: what policies make of what their cameras see, and of what they do not.
+// `pictura probe`: responses of policies to what their cameras see, and to what they do not.
 #include <algorithm>
 #include <array>
 #include <filesystem>
@@ -58,7 +58,7 @@ struct ProbeArguments {
   bool json = false;
 };
 
-/// Adds all options of a probe. `files` are those that it writes.
+/// Adds all options of a probe. `files` names the files that it writes.
 template <typename Probe>
 void add_options(CLI::App* command, ProbeArguments<Probe>* arguments, const std::string& case_help,
                  const std::string& files, const std::array<const char*, 3>& examples) {
@@ -75,7 +75,7 @@ void add_options(CLI::App* command, ProbeArguments<Probe>* arguments, const std:
   command->footer(footer(examples));
 }
 
-// Runs a probe with a progress line; makes the folder for its files before.
+// Runs a probe with a progress line, after creating the folder for its files.
 template <typename Results, typename Probe>
 Results run_probe(Results (*ask)(const Probe&), ProbeArguments<Probe>* arguments) {
   make_output_folder(arguments->out);
@@ -88,7 +88,7 @@ Results run_probe(Results (*ask)(const Probe&), ProbeArguments<Probe>* arguments
   return results;
 }
 
-/// With a digit more than evaluations have: changes of values are small.
+/// Text of an estimate with one digit more than in evaluations, since changes of values are small.
 std::string interval_of(const Estimate& estimate) { return interval_text(estimate, 4); }
 
 size_t name_width(const ProbeResults& results) {
@@ -146,18 +146,18 @@ void print_table(const CornerResults& results, const std::vector<CornerRow>& row
       format_duration(results.seconds));
 }
 
-/// Draws the chart of a probe's means as `name`, and those below the pages, or gives notice why not.
+/// Draws the chart of a probe's means as `name`, and the charts below the pages, or prints a notice with the reason.
 void draw_charts(const std::string& name, const Json& pages, FilledFolder* out) {
   const std::string chart = out->file(name);
   try {
     draw_chart({{"chart", "probe_charts"}, {"folder", out->path()}, {"pages", pages}});
   } catch (const NoMatplotlib& error) {
-    std::filesystem::remove(chart);  // an earlier call's
+    std::filesystem::remove(chart);  // from an earlier call
     print_message("notice: {}\n", error.what());
   }
 }
 
-/// Writes summary.json, draws the charts, unless it has no pages (null), and prints the summary or a table.
+/// Writes summary.json, draws the charts unless `pages` is null, and prints the summary or a table.
 template <typename Probe, typename Results, typename Row>
 void report(const ProbeArguments<Probe>& arguments, const std::string& summary, const Results& results,
             const std::vector<Row>& rows, const Json& pages, FilledFolder* out) {

@@ -1,5 +1,5 @@
-// `pictura render`: writes what cameras see, of a scene file, of a world that was driven with random actions, or of a
-// recorded scene.
+// `pictura render`: writes camera images of a scene file, of a world driven with random actions, or of a recorded
+// scene.
 #include <cctype>
 #include <filesystem>
 
@@ -33,14 +33,14 @@ namespace {
 struct RenderArguments {
   WorldOptions world;
   int steps = 50, views = 4;
-  std::string tracks;  // of a recorded scene, whose cameras are drawn
+  std::string tracks;  // tracks of a recorded scene whose cameras are drawn
   std::string size = "96x54", rig, out;
   std::vector<std::string> planes;
   float line_floor_px = RendererConfig{}.line_floor_px;
   bool size_given = false, square_pixels = false, figure = false, json = false;
 };
 
-/// What is drawn, and under which names, whether a world was driven there or a file says so.
+/// Scene to draw, with file names, from a driven world or from a file.
 struct Subject {
   std::vector<StaticGeometry> geometries;  // handles are indices
   SceneBatch scene;
@@ -68,7 +68,7 @@ std::unique_ptr<Renderer> open_renderer(const RenderArguments& arguments, Render
   return renderer;
 }
 
-/// Draws the subject. Returns views per second: the median of five calls after one that warms up.
+/// Draws the subject. Returns views per second: the median of five calls after a warm-up call.
 double draw(const Subject& subject, Renderer* renderer, HostImages* images_out) {
   upload_geometries(subject.geometries, renderer);
   renderer->render(subject.scene, subject.views, images_out->batch());
@@ -83,7 +83,7 @@ double draw(const Subject& subject, Renderer* renderer, HostImages* images_out) 
   return static_cast<double>(subject.views.size()) / seconds[2];
 }
 
-/// Returns the paths of the contact sheets.
+/// Writes the pictures. Returns the paths of the contact sheets.
 std::vector<std::string> write_pictures(const RenderArguments& arguments, const Subject& subject, const Rig& rig,
                                         const HostImages& images, FilledFolder* out) {
   const auto check = [] {
@@ -150,7 +150,7 @@ void render_scene_file(const RenderArguments& arguments) {
                   renderer.get());
 }
 
-/// What a map's worlds are drawn with.
+/// Renderer configuration of a map's worlds.
 RendererConfig config_of(const RenderArguments& arguments) {
   const Pair size = parse_pair("--size", arguments.size, 8192);
   if (!arguments.rig.empty() && arguments.size_given) fail_usage("--size: the rig of --rig has sizes of its own");
@@ -179,11 +179,11 @@ void render_world(const RenderArguments& arguments) {
   draw_and_report(arguments, subject, renderer.get());
 }
 
-/// The tracks of a recorded scene that look, in their order.
+/// Tracks of a recorded scene whose views are drawn, in their order.
 std::vector<uint8_t> looking_tracks(const RenderArguments& arguments, const CompiledMap& map) {
   const Scenario& scenario = *map.scenario;
   if (arguments.tracks.empty() && scenario.sdc_track < 0) {
-    // The file does not say who is the self-driving car.
+    // The file does not mark a self-driving car.
     std::vector<uint8_t> first = tracks_of(scenario, "all", map.start_step);
     std::fill(std::find(first.begin(), first.end(), 1) + 1, first.end(), 0);
     return first;
@@ -214,7 +214,7 @@ void render_recorded_scene(const RenderArguments& arguments) {
   draw_and_report(arguments, subject, renderer.get());
 }
 
-// A scene file says these itself.
+// Rejects options whose values a scene file contains.
 void refuse_world_options(const CLI::App& command) {
   refuse_options(command,
                  {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--light-cycles",

@@ -68,7 +68,7 @@ void print_table(const SceneEvaluation& evaluation) {
                60 * results.scored() / evaluation.seconds);
 }
 
-// Of parts, the time is not known.
+// Prints a report. The duration of merged parts is unknown.
 void print_report(const DriverOptions& options, const SceneEvaluation& evaluation) {
   const SceneResults& results = evaluation.results;
   const SceneProtocol& protocol = results.protocol;

@@ -35,7 +35,7 @@ struct SimulateArguments {
   std::string policy = "random", video, replay, mcap, scene;
   RecordingOptions recording;
   ServeOptions serve;
-  bool endless = false;  // until it is interrupted
+  bool endless = false;  // runs until it is interrupted
   std::optional<int> film_agent;
   float film_width_m = 150;
   bool json = false;
@@ -50,7 +50,7 @@ std::array<int64_t, kNumAgentClasses> spawned_by_class(Simulator& simulator) {
   return counts;
 }
 
-/// How far those who drive are from where the recording has them, over all their steps that it has.
+/// Distance of driven agents from their recorded positions, over all their recorded steps.
 struct Displacement {
   int64_t steps = 0;
   double sum_m = 0, max_m = 0;
@@ -68,7 +68,7 @@ struct Displacement {
   }
 };
 
-// Options that would change nothing.
+// Rejects options that would have no effect.
 void refuse_idle_options(const CLI::App& command, const SimulateArguments& arguments) {
   if (arguments.video.empty()) {
     for (const char* option : {"--film-width", "--film-agent"}) {
@@ -84,7 +84,7 @@ void refuse_idle_options(const CLI::App& command, const SimulateArguments& argum
   refuse_idle_backend_options(command, arguments.policy);
 }
 
-/// How many lives began after the first of a slot, and ended by leaving, on roads that end, over all episodes.
+/// Number of lives after the first of a slot, and of lives that ended by leaving, on roads that end, over all episodes.
 class LifeCounter {
  public:
   void add(const Simulator& simulator) {
@@ -104,7 +104,7 @@ class LifeCounter {
   int64_t entered_ = 0, left_ = 0;
 };
 
-/// Time that steps take, of the simulator alone where it is the last observer.
+/// Duration of steps; of the simulator alone if it is the last observer.
 class StepClock final : public StepObserver {
  public:
   void before_step(Span<const Command>) override { watch_.restart(); }
@@ -116,7 +116,7 @@ class StepClock final : public StepObserver {
   double seconds_ = 0;
 };
 
-/// What is counted over steps for the report.
+/// Counts over steps for the report.
 class StepCounter final : public StepObserver {
  public:
   StepCounter(Simulator& simulator, const Scenario* scene) : simulator_(simulator), scene_(scene) {}
@@ -125,7 +125,7 @@ class StepCounter final : public StepObserver {
     lives.add(simulator_);
   }
 
-  Displacement displacement;  // in a recorded scene
+  Displacement displacement;  // for a recorded scene
   LifeCounter lives;
 
  private:
@@ -134,7 +134,7 @@ class StepCounter final : public StepObserver {
 };
 
 struct SimulationRun {
-  SpawnReport spawned;  // in the first episode, as those of each class
+  SpawnReport spawned;  // in the first episode, as the counts by class
   std::array<int64_t, kNumAgentClasses> of_class{};
   int steps = 0;
   double drive_s = 0, simulate_s = 0;  // without filming, recording and serving; of the simulator alone
@@ -243,7 +243,7 @@ void run_simulate(SimulateArguments arguments) {
   run.drive_s += run.simulate_s;
   line.finish();
   if (live) live->finish();
-  if (film && steps > 0) film->close();  // ^C may come before the first frame
+  if (film && steps > 0) film->close();  // an interrupt may come before the first frame
   if (recording) {
     const Replay replay = recording->finish();
     if (!arguments.replay.empty()) write_replay_and_say_so(arguments.replay, replay);

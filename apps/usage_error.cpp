@@ -11,7 +11,7 @@ namespace pictura {
 
 namespace {
 
-// What subcommands need that builds may lack; asked only about those that this build does not know.
+// Build options that subcommands need; looked up only for subcommands that this build lacks.
 const std::map<std::string, std::string>& needs_of_commands() {
   static const std::map<std::string, std::string> kNeeds = [] {
     std::map<std::string, std::string> needs;
@@ -53,7 +53,7 @@ std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
     name += " " + command->get_name();
   }
   const std::string see = fmt::format("(see {} --help)", name);
-  // Subcommands hand what they do not know to the command above.
+  // Subcommands pass unknown words to the parent command.
   const std::vector<std::string> unknown = app.remaining(/*recurse=*/true);
   if (unknown.empty()) return fmt::format("{} {}", error.what(), see);
   const std::string& word = unknown.front();

@@ -1,4 +1,4 @@
-// What the command says to a command line that it does not understand.
+// Error messages for invalid command lines.
 #pragma once
 
 #include <string>
@@ -7,8 +7,8 @@
 
 namespace pictura {
 
-/// One line about what parse() refused: a word that nobody knows, with the nearest known one or why this build lacks
-/// it, before anything that is missing or wrong besides.
+/// Returns one line about the error of parse(). An unknown word comes before anything missing or wrong, with the
+/// nearest known word or the reason why this build lacks it.
 std::string usage_error(const CLI::App& app, const CLI::ParseError& error);
 
 }  // namespace pictura
