@@ -69,7 +69,7 @@ std::optional<ElementType> element_type_of(DLDataType type) {
   return {};
 }
 
-/// What NumPy calls an element type; it has none for bf16.
+/// NumPy's name of an element type; it has none for bf16.
 std::string numpy_name(const LentArray& lent) {
   if (lent.is_bool) return "bool";
   switch (lent.array.type) {
@@ -86,7 +86,7 @@ std::string numpy_name(const LentArray& lent) {
   return "";
 }
 
-/// NumPy's type; the common ones without a look-up by name.
+/// NumPy's type; common types avoid a look-up by name.
 py::dtype numpy_type(const LentArray& lent) {
   if (lent.is_bool) return py::dtype::of<bool>();
   switch (lent.array.type) {
@@ -103,13 +103,13 @@ std::vector<int64_t> values_of(const Dims& dims) {
   return values;
 }
 
-/// A tensor that lends a LentArray, in one of DLPack's two forms.
+/// Tensor that lends a LentArray, in one of DLPack's two forms.
 template <typename Managed>
 struct Lending {
   Managed managed;
   std::vector<int64_t> shape, strides;
   std::shared_ptr<const void> owner;
-  std::vector<uint8_t> copy;  // the memory, where a copy was asked for
+  std::vector<uint8_t> copy;  // memory, if a copy was requested
 
   static Managed* make(const LentArray& lent, bool copied) {
     auto lending = std::make_unique<Lending>();
@@ -129,7 +129,7 @@ struct Lending {
     tensor.shape = lending->shape.data();
     tensor.strides = lending->strides.data();
     lending->managed.manager_ctx = lending.get();
-    // The owner is C++ memory: no GIL is needed to let go of it.
+    // The owner is C++ memory, so it is released without the GIL.
     lending->managed.deleter = [](Managed* self) { delete static_cast<Lending*>(self->manager_ctx); };
     return &lending.release()->managed;
   }
@@ -151,7 +151,7 @@ struct Lending {
   }
 };
 
-/// Of a capsule whose tensor nobody has taken: frees it.
+/// Frees the tensor of a capsule that no consumer has taken.
 void drop_versioned(PyObject* capsule) {
   if (!PyCapsule_IsValid(capsule, kVersionedName)) return;
   auto* tensor = static_cast<DLManagedTensorVersioned*>(PyCapsule_GetPointer(capsule, kVersionedName));
@@ -170,7 +170,7 @@ void drop_older(PyObject* capsule) {
 
 constexpr const char* kStream = "a stream as int, or None";
 
-/// Makes what a consumer puts on `stream`, in DLPack's numbers, come after what the library has put on the array's.
+/// Orders a consumer's work on `stream`, in DLPack's numbering, after the library's work on the array's stream.
 void order_before(const LentArray& lent, const py::object& stream) {
   if (lent.array.device.is_host()) {
     if (!stream.is_none() && cast_checked<int64_t>(stream, lent.what, kStream) != -1) {
@@ -248,7 +248,7 @@ py::array numpy_of(const py::object& self) {
     strides.push_back(lent.array.strides[i] * static_cast<py::ssize_t>(bytes_of(lent.array.type)));
   }
   py::array view(numpy_type(lent), shape, strides, lent.array.data, self);
-  // As setflags(write=False), which takes as long as all the rest.
+  // Equivalent to setflags(write=False), which takes as long as everything else.
   if (lent.array.is_read_only) {
     py::detail::array_proxy(view.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
   }
@@ -284,12 +284,12 @@ void check_tensor(const DLTensor& tensor, std::string_view what, Array* array_ou
   *array_out = Array(first, *type, shape, device);
   if (!tensor.strides) return;
   for (int i = 0; i < tensor.ndim && shape.count() > 0; ++i) {
-    // A stride along one element means nothing.
+    // The stride along a single element has no meaning.
     if (shape[i] != 1) array_out->strides[i] = tensor.strides[i];
   }
 }
 
-/// The capsule of an object on the host, or, on CUDA, ordered before later work on the stream.
+/// Returns the capsule of an object on the host or, on CUDA, ordered before later work on the stream.
 py::object capsule_of(const py::handle& object, [[maybe_unused]] std::string_view what,
                       [[maybe_unused]] Stream stream) {
   const auto device = py::cast<std::pair<int32_t, int32_t>>(py::tuple(object.attr("__dlpack_device__")()));
@@ -308,7 +308,7 @@ py::object capsule_of(const py::handle& object, [[maybe_unused]] std::string_vie
   } catch (const py::error_already_set& error) {
     if (!error.matches(PyExc_TypeError)) throw;
   }
-  // A lender from before DLPack 1.0.
+  // Lender with an interface older than DLPack 1.0.
   PyDict_DelItemString(arguments.ptr(), "max_version");
   return lend(**arguments);
 }
@@ -341,7 +341,7 @@ BorrowedArray& BorrowedArray::operator=(BorrowedArray&& other) noexcept {
 
 BorrowedArray::~BorrowedArray() {
   if (!versioned_ && !older_ && !keep_) return;
-  // Whoever lends may be an object of Python's.
+  // The lender may be a Python object.
   const py::gil_scoped_acquire gil;
   if (versioned_ && versioned_->deleter) versioned_->deleter(versioned_);
   if (older_ && older_->deleter) older_->deleter(older_);

@@ -1,5 +1,5 @@
-// Arrays between C++ and Python: `pictura.Array`, which lends memory of the library through DLPack and NumPy, and what
-// callers hand in, which is looked at through DLPack and never copied.
+// Arrays between C++ and Python: `pictura.Array`, which lends library memory through DLPack and NumPy, and arrays of
+// callers, which are accessed through DLPack and never copied.
 #pragma once
 
 #include <memory>
@@ -19,19 +19,19 @@ namespace pictura::python {
 
 namespace py = pybind11;
 
-/// Lengths or strides of any rank that Dims has. Throws Error for more.
+/// Returns lengths or strides of any rank that Dims supports. Throws Error for higher ranks.
 Dims dims_of(const std::vector<int64_t>& values);
 
-/// An array that its owner keeps alive: it outlives the simulator or renderer that wrote it.
+/// Array that its owner keeps alive: it outlives the simulator or renderer that wrote it.
 struct LentArray {
   Array array;
   std::shared_ptr<const void> owner;
-  Stream stream;         // that work on it is put on; null: CUDA's legacy default stream
-  bool is_bool = false;  // u8 of 0 and 1
-  std::string what;      // its name in messages
+  Stream stream;         // stream of the work on it; null: CUDA's legacy default stream
+  bool is_bool = false;  // u8 with values 0 and 1
+  std::string what;      // name in messages
 };
 
-/// An array of a caller, at its own address. Holds what lends it.
+/// Array of a caller, at its own address. Holds a reference to the lender.
 class BorrowedArray {
  public:
   BorrowedArray() = default;
@@ -50,15 +50,15 @@ class BorrowedArray {
   dlpack::DLManagedTensor* older_ = nullptr;
 };
 
-/// Looks at an array of the caller: a LentArray or anything that speaks DLPack (NumPy, torch, JAX, CuPy). What a device
-/// still writes to it comes before later work on `stream`. Throws Error naming `what` for other objects, element types
-/// that the library has none of, and devices other than the host and CUDA's. The caller holds the GIL.
+/// Accesses an array of the caller: a LentArray or any object with DLPack (NumPy, torch, JAX, CuPy). Pending writes of
+/// a device are ordered before later work on `stream`. Throws Error naming `what` for other objects, unsupported
+/// element types, and devices other than the host and CUDA's. The caller must hold the GIL.
 BorrowedArray borrow(const py::handle& object, std::string_view what, Stream stream);
 
-/// A NumPy array of structs as the bytes that it is: [count, size] u8 on the host; anything else as borrow().
+/// Borrows a NumPy array of structs as bytes, [count, size] u8 on the host; anything else as borrow() does.
 BorrowedArray borrow_structs(const py::handle& object, std::string_view what, size_t size, Stream stream);
 
-/// A value of Python's. Throws UsageError saying what was expected where it is of another kind.
+/// Converts a Python value. Throws UsageError with the expected kind if the value is of another kind.
 template <typename T>
 T cast_checked(const py::handle& value, std::string_view what, std::string_view expected) {
   try {
@@ -68,7 +68,7 @@ T cast_checked(const py::handle& value, std::string_view what, std::string_view 
   }
 }
 
-/// The name of an object's class, for messages.
+/// Name of an object's class, for messages.
 std::string type_name_of(const py::handle& object);
 
 void bind_arrays(py::module_& module);

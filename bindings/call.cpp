@@ -7,12 +7,12 @@
 namespace pictura::python {
 
 namespace {
-// The process that first needed threads, or CUDA; 0: none yet. A child inherits the numbers of its parent.
+// Process that first needed threads, or CUDA; 0: none yet. A child inherits its parent's numbers.
 struct Processes {
   std::atomic<pid_t> of_threads{0}, of_cuda{0};
 };
 
-// One for all extensions of the package. The caller holds the GIL.
+// Returns the record shared by all extensions of the package. The caller must hold the GIL.
 Processes& processes() {
   static Processes& shared = py::get_or_create_shared_data<Processes>("pictura: processes");
   return shared;
@@ -35,7 +35,7 @@ void check_process(std::string_view what, int num_threads, Device device) {
 }
 
 namespace {
-// Calls f with each class of C++ that a module has, and what pybind11 knows of it.
+// Calls f with each C++ class of a module, and pybind11's type information.
 template <typename F>
 void for_each_class(const py::module_& module, F&& f) {
   for (const auto& [name, value] : py::dict(module.attr("__dict__").attr("copy")())) {

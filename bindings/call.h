@@ -1,5 +1,5 @@
-// How Python calls the library: without the GIL, one thread at a time for each object, and never in a process that was
-// forked from one whose threads or CUDA it would need.
+// Calls of the library from Python: without the GIL, one thread at a time for each object, and never in a process
+// forked from one whose threads or CUDA context it would need.
 #pragma once
 
 #include <atomic>
@@ -23,13 +23,13 @@ namespace pictura::python {
 
 namespace py = pybind11;
 
-/// Throws Error in a child of fork() where the parent had begun threads or used CUDA, and this call needs them: both
-/// are gone in the child, and waiting for them would never end.
+/// Throws Error in a child of fork() if the parent had started threads or used CUDA, and this call needs them: both are
+/// gone in the child, and waiting for them would never end.
 void check_process(std::string_view what, int num_threads, Device device);
 
-/// Lets go of the GIL for as long as it lives. A thread that wants it back while the interpreter ends is ended by
-/// Python before 3.14 through an exception that no destructor may let out: it waits for the end of the process, as
-/// from 3.14 on.
+/// Scope without the GIL. If a thread wants the GIL back while the interpreter ends, Python before 3.14 ends the thread
+/// through an exception, which must not leave a destructor. The thread therefore waits for the end of the process, as
+/// in Python 3.14 and later.
 class WithoutGil {
  public:
   WithoutGil() : state_(PyEval_SaveThread()) {}
@@ -47,18 +47,19 @@ class WithoutGil {
   PyThreadState* state_;
 };
 
-/// Makes methods of a module's classes refuse objects that were made by __new__ alone, which have nothing in C++:
-/// pybind11 would hand them memory that nobody has written. For the end of a module's definition.
+/// Makes methods of a module's classes reject objects that were created by __new__ alone, which have no C++ object:
+/// pybind11 would pass uninitialised memory. Call at the end of a module's definition.
 void refuse_unmade_objects(const py::module_& module);
 
-/// Makes objects of a module's classes pickle by protocol 2 where 0 or 1 is asked for: those copy the part of an object
-/// that belongs to pybind11's own base class, which ends the process. For the end of a module's definition.
+/// Makes objects of a module's classes use pickle protocol 2 if 0 or 1 is requested. The old protocols copy the part of
+/// an object that belongs to pybind11's own base class, which ends the process. Call at the end of a module's
+/// definition.
 void pickle_by_new_protocols(const py::module_& module);
 
-/// Lets one thread at a time into calls of an object.
+/// Guard that admits one thread at a time into calls of an object.
 class Turnstile {
  public:
-  /// In a call for as long as it lives. Throws Error where another thread is in one.
+  /// Scope of a call. Throws Error if another thread is in a call.
   class Pass {
    public:
     Pass(Turnstile* turnstile, std::string_view what) : turnstile_(turnstile) {
@@ -77,13 +78,13 @@ class Turnstile {
   std::atomic<bool> is_taken_{false};
 };
 
-/// Of one object of the library. An object serves one thread at a time.
+/// Calls of one library object, which serves one thread at a time.
 class Calls {
  public:
-  /// num_threads as the library takes it; 0: all.
+  /// num_threads as in the library; 0: all.
   Calls(int num_threads, Device device) : num_threads_(num_threads), device_(device) {}
 
-  /// Runs `work` without the GIL. Throws Error where another thread is in a call of the same object.
+  /// Runs `work` without the GIL. Throws Error if another thread is in a call of the same object.
   template <typename Work>
   auto run(std::string_view what, Work&& work) {
     check_process(what, num_threads_, device_);
@@ -92,7 +93,7 @@ class Calls {
     return std::forward<Work>(work)();
   }
 
-  /// For calls of the same object by others that hold it.
+  /// Guard for other objects that call the same object.
   const std::shared_ptr<Turnstile>& turnstile() const { return turnstile_; }
 
  private:
@@ -101,8 +102,8 @@ class Calls {
   std::shared_ptr<Turnstile> turnstile_ = std::make_shared<Turnstile>();
 };
 
-/// Runs long work in a thread of its own and returns its result; the caller's thread meanwhile answers ^C, and then
-/// raises KeyboardInterrupt while the work, whose result nobody takes, ends in the background. The work must own all
+/// Runs long work in a separate thread and returns its result. Meanwhile the caller's thread handles ^C by raising
+/// KeyboardInterrupt, and the work ends in the background without its result being used. The work must own everything
 /// that it reads.
 template <typename Work>
 auto run_interruptibly(std::string_view what, int num_threads, Device device, Work work) {
@@ -121,8 +122,8 @@ auto run_interruptibly(std::string_view what, int num_threads, Device device, Wo
   return result.get();
 }
 
-/// Runs long work, which checks interrupted() between its steps, in a thread of its own. ^C ends it in order, as it
-/// ends the command, and then raises KeyboardInterrupt. The work may call back into Python.
+/// Runs long work, which checks interrupted() between its steps, in a separate thread. ^C ends the work in an orderly
+/// way, as it ends the command, and then raises KeyboardInterrupt. The work may call back into Python.
 template <typename Work>
 auto run_to_an_orderly_end(std::string_view what, int num_threads, Device device, Work work) {
   check_process(what, num_threads, device);

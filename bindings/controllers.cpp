@@ -1,4 +1,4 @@
-// Controllers in Python: by name, several that share a simulator, and their commands.
+// Controllers in Python: controllers by name, shared controllers, and their commands.
 #include "pictura/backends/make_controller.h"
 #include "pictura/bindings/python_simulator.h"
 #include "pictura/simulator/controllers/shared_control.h"
@@ -7,7 +7,7 @@ namespace pictura::python {
 
 namespace {
 
-/// A controller that others hold as well.
+/// Controller that other objects hold as well.
 class HeldController final : public Controller {
  public:
   explicit HeldController(std::shared_ptr<Controller> held) : held_(std::move(held)) {}
@@ -20,7 +20,7 @@ class HeldController final : public Controller {
   std::shared_ptr<Controller> held_;
 };
 
-/// Controller of several that share a simulator's slots; a mask of None stands for all slots.
+/// Creates a controller of several drivers that share a simulator's slots; a mask of None means all slots.
 ControllerInside shared_controller(const std::vector<std::pair<PyController*, py::object>>& drivers,
                                    const PySimulator& simulator) {
   std::vector<Driver> driving;

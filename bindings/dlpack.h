@@ -1,5 +1,5 @@
-// The binary interface of DLPack 1.0, as far as the bindings speak it: tensors that one library lends another. Structs
-// of the versioned and of the older form; names follow the standard.
+// Binary interface of DLPack 1.0, as far as the bindings use it: tensors that one library lends to another. Structs of
+// the versioned and of the older form; names follow the standard.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +26,7 @@ struct DLTensor {
   int32_t ndim = 0;
   DLDataType dtype;
   int64_t* shape = nullptr;
-  int64_t* strides = nullptr;  // in elements; null: without gaps
+  int64_t* strides = nullptr;  // in elements; null: contiguous
   uint64_t byte_offset = 0;
 };
 

@@ -79,7 +79,7 @@ class FunctionController final : public Controller {
   }
 
   static py::dict observations_of(const SimulatorArrays& input, int slots) {
-    // Copies: the function may keep them.
+    // Copied, since the function may keep the arrays.
     py::dict observations;
     for (const NamedArray& named : observation_arrays(input.observations, slots, input.device)) {
       const Array& array = named.array;

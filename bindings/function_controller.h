@@ -1,4 +1,4 @@
-// A function of Python's that drives: what evaluations take in the place of a controller's name.
+// Python function as a controller, which evaluations accept in place of a controller's name.
 #pragma once
 
 #include <functional>
@@ -15,7 +15,7 @@ namespace pictura::python {
 
 namespace py = pybind11;
 
-/// "function NAME" of a function or of an object's class.
+/// Returns "function NAME" of a function or of an object's class.
 std::string name_of_function(const py::function& function);
 
 /// Makes controllers that call function(observations), NumPy's arrays [slots, ...] by name, for actions int [slots].

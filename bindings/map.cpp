@@ -80,7 +80,7 @@ py::dict arrays_of(const RoadMap& map) {
   return d;
 }
 
-/// One (kind, what was done, message) for each fault.
+/// Returns (kind, action, message) for each repaired fault.
 std::vector<std::tuple<std::string, std::string, std::string>> mends_of(const Map& map) {
   std::vector<std::tuple<std::string, std::string, std::string>> mends;
   for (const Mend& mend : map.road()->mends) {

@@ -30,7 +30,7 @@ void bind_names(py::module_& module) {
   for (const char* name : {"kind", "action"}) command.append(py::make_tuple(name, "<i4"));
   for (const char* name : {"x_m", "y_m", "z_m", "heading_rad", "speed_mps"})
     command.append(py::make_tuple(name, "<f4"));
-  // Fields as NumPy takes them.
+  // Members in NumPy's format.
   const auto dtype_of = [](const py::list& members, size_t size, const char* what) {
     const py::object type = py::module_::import("numpy").attr("dtype")(members);
     PICTURA_CHECK(py::cast<size_t>(type.attr("itemsize")) == size, "{}'s layout", what);

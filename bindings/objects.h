@@ -1,5 +1,5 @@
-// What the parts of the bindings exchange: maps, geometries, scenes, renderers' images and simulators as Python holds
-// them, and what the extension with torch, a library of its own, takes from and gives to the one without.
+// Objects shared by the parts of the bindings: maps, geometries, scenes, renderers' images and simulators in Python,
+// and the objects exchanged with the separate extension that uses torch.
 #pragma once
 
 #include <functional>
@@ -20,19 +20,19 @@
 
 namespace pictura::python {
 
-/// A road map, and what has been compiled of it.
+/// Road map, with its compiled versions.
 class Map {
  public:
-  /// `source` names its file in messages.
+  /// Wraps a map; `source` names its file in messages.
   Map(std::shared_ptr<const RoadMap> road, std::string source) : road_(std::move(road)), source_(std::move(source)) {}
   virtual ~Map() = default;
   const std::shared_ptr<const RoadMap>& road() const { return road_; }
   const std::string& source() const { return source_; }
-  /// Compiles at the first call with these options. The caller holds the GIL.
+  /// Returns the map compiled with these options, compiling it in the first call. The caller must hold the GIL.
   std::shared_ptr<const CompiledMap> compiled(const MapOptions& options);
 
  protected:
-  /// Compiles it; owns all that it reads.
+  /// Returns a function that compiles the map, and that owns everything that it reads.
   virtual std::function<std::shared_ptr<const CompiledMap>()> compilation(const MapOptions& options) const;
 
  private:
@@ -41,10 +41,10 @@ class Map {
   std::vector<std::shared_ptr<const CompiledMap>> compiled_;
 };
 
-/// A recorded scene from one of its steps on: the map of worlds whose agents are its tracks.
+/// Recorded scene from one of its steps on: the map of worlds whose agents are its tracks.
 class RecordedScene final : public Map {
  public:
-  /// Throws UsageError for a step that it does not have.
+  /// Throws UsageError for a step that the scene does not have.
   RecordedScene(std::shared_ptr<const Scenario> scenario, std::string source, int32_t start_step,
                 bool recorded_lights = false);
   const std::shared_ptr<const Scenario>& scenario() const { return scenario_; }
@@ -59,41 +59,41 @@ class RecordedScene final : public Map {
   bool recorded_lights_;
 };
 
-/// What a renderer draws of a map.
+/// Geometry of a map for renderers.
 struct Geometry {
   std::shared_ptr<const StaticGeometry> geometry;
 };
 
-/// What moves: arrays of a caller, or what a simulator shows, as it is at each call.
+/// Moving objects: arrays of a caller, or a simulator's scene at each call.
 struct Scene {
   std::shared_ptr<const void> owner;
   std::function<SceneBatch()> batch;
   Stream stream;
 };
 
-/// What is inside a pictura.Simulator.
+/// Contents of a pictura.Simulator.
 struct SimulatorInside {
   std::shared_ptr<Simulator> simulator;
   /// Runs work without the GIL while no other thread is in a call of the simulator.
   std::function<void(std::string_view what, const std::function<void()>& work)> run;
-  /// Lets a watcher see steps for as long as it lives.
+  /// Adds an observer of steps for as long as the observer lives.
   std::function<void(const std::shared_ptr<StepObserver>&)> watch;
 };
 
-/// What is inside a pictura.Renderer.
+/// Contents of a pictura.Renderer.
 struct RendererInside {
   std::shared_ptr<Renderer> renderer;
   std::shared_ptr<Turnstile> turnstile;
 };
 
-/// What becomes a pictura.Controller.
+/// Contents of a pictura.Controller.
 struct ControllerInside {
   std::shared_ptr<Simulator> of;
   std::shared_ptr<Controller> controller;
 };
 
-/// What is inside a pictura.Simulator or a pictura.Renderer, as `expected` names it. Throws UsageError for other
-/// objects; `what` begins its message.
+/// Returns the contents of a pictura.Simulator or a pictura.Renderer, as `expected` names it. Throws UsageError for
+/// other objects; `what` begins its message.
 template <typename Inside>
 Inside inside_of(const py::handle& object, std::string_view what, std::string_view expected) {
   const py::object inside = py::hasattr(object, "_inside") ? py::object(object.attr("_inside")()) : py::none();
@@ -103,17 +103,17 @@ Inside inside_of(const py::handle& object, std::string_view what, std::string_vi
   return py::cast<Inside>(inside);
 }
 
-/// Throws Error where a device was asked for and the CPU chosen; `choice` says why.
+/// Throws Error if a device was requested and the CPU was chosen; `choice` gives the reason.
 void check_device(std::string_view what, Device wanted, Device given, std::string_view choice);
 
-/// Of a stream's handle as Python has it, an int; None: CUDA's legacy default stream. Throws UsageError for others.
+/// Converts a Python stream handle, an int; None: CUDA's legacy default stream. Throws UsageError for others.
 Stream stream_of(const py::object& handle);
 
-/// Of a map, by name.
+/// Facts of a map, by name.
 py::dict facts_of(const MapFacts& facts);
 
-/// From above, uint8 [height, width, 3]; of a scenario on that map its tracks as well, and their boxes at a step. The
-/// caller holds the GIL.
+/// Draws a map from above, uint8 [height, width, 3]; for a scenario on that map also its tracks, and their boxes at a
+/// step. The caller must hold the GIL.
 py::array_t<uint8_t> draw(const RoadMap& map, int width_px, int height_px, const Scenario* scenario = nullptr,
                           int step = -1);
 

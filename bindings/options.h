@@ -1,5 +1,4 @@
-// Functions of Python whose arguments are options of a struct, which its list, visit_options(options, visitor), has
-// once.
+// Python functions whose arguments are the options of a struct, as listed once by visit_options(options, visitor).
 #pragma once
 
 #include <array>
@@ -26,25 +25,25 @@ namespace pictura::python {
 
 namespace py = pybind11;
 
-/// "cpu", "cuda" or "cuda:1". Throws UsageError for others.
+/// Returns the device of "cpu", "cuda" or "cuda:1". Throws UsageError for others.
 Device device_of(const std::string& name);
 
 using ConditioningRanges = std::array<ConditioningRange, kNumConditioning>;
 
-/// An option of a struct as an argument of a function.
+/// Option of a struct as an argument of a function.
 struct Parameter {
   std::string name;
-  py::object value;      // what it has now
+  py::object value;      // current value
   py::cpp_function set;  // set(value) converts a value and writes it into the struct
 };
 
-/// A visitor of lists that collects their options as parameters, which the options must outlive.
+/// Visitor of option lists that collects options as parameters. The options must outlive the parameters.
 class ParameterVisitor {
  public:
-  /// Messages name `function`.
+  /// `function` is the function's name in messages.
   explicit ParameterVisitor(std::string function) : function_(std::move(function)) {}
 
-  /// Ranges are the simulator's to check.
+  /// Adds a number; the simulator checks its range.
   template <typename T, typename... Range>
   void value(const NamedOption& option, T& value, Range...) {
     add<T>(option, value, [&value](const T& given) { value = given; });
@@ -55,7 +54,7 @@ class ParameterVisitor {
     add<std::string>(option, names[static_cast<int>(value)],
                      [=, &value](const std::string& given) { value = chosen<Enum>(option, given, names); });
   }
-  /// The empty name stands for no value.
+  /// Adds a choice; the empty name means no value.
   template <typename Enum>
   void choice(const NamedOption& option, std::optional<Enum>& value, Span<const char* const> names) {
     add<std::string>(option, value ? names[static_cast<int>(*value)] : "", [=, &value](const std::string& given) {
@@ -72,13 +71,13 @@ class ParameterVisitor {
     });
   }
   void device(const NamedOption& option, Device& value);
-  /// Names of maps, with ranges of seeds expanded.
+  /// Adds names of maps, with ranges of seeds expanded.
   void maps(const NamedOption& option, std::vector<std::string>& names);
-  /// Numbers or (low, high) by name, in place of those that are there.
+  /// Adds numbers or (low, high) by name, which replace the present ones.
   void conditioning(const NamedOption& option, ConditioningRanges& ranges);
-  /// Numbers by name, as "name=value".
+  /// Adds numbers by name, as "name=value".
   void numbers_by_name(const NamedOption& option, std::vector<std::string>& texts);
-  /// A controller's name, or a function of Python's that drives.
+  /// Adds a controller's name, or a Python function that drives.
   template <typename Options>
   void controller(const NamedOption& option, Options& options) {
     using Given = std::variant<std::string, py::function>;
@@ -92,12 +91,12 @@ class ParameterVisitor {
       }
     });
   }
-  /// A function of Python's, or None.
+  /// Adds a Python function, or None.
   template <typename... Arguments>
   void callback(const NamedOption& option, std::function<void(Arguments...)>& value) {
     add<py::object>(option, py::none(), [&value](const py::object& given) {
       if (given.is_none()) return;
-      // Options are copied where the GIL is not held.
+      // Shared, since options are copied without the GIL.
       value = [function = std::make_shared<const py::object>(given)](Arguments... arguments) {
         const py::gil_scoped_acquire gil;
         (*function)(arguments...);
@@ -124,7 +123,7 @@ class ParameterVisitor {
   std::vector<Parameter> parameters_;
 };
 
-/// A signature as pybind11 writes it: "(steps: int = 3) -> str".
+/// Signature as pybind11 writes it: "(steps: int = 3) -> str".
 std::string signature_of(const py::cpp_function& function);
 
 template <typename Options>
@@ -134,19 +133,19 @@ std::vector<Parameter> parameters_of(const std::string& function, Options& optio
   return visitor.parameters();
 }
 
-/// A function of options: the arguments `required` are given by place or by name, all others by name.
+/// Function of options: the arguments `required` are given by position or by name, all others by name.
 struct OptionsFunction {
   std::string name;
   std::vector<std::string> required;
 
-  /// The text of help(): a signature as pybind11 writes it, "(config: str, *, minutes: float = 0.0) -> dict", and
-  /// `doc`. `first` are parameters before the options.
+  /// Text of help(): a signature as pybind11 writes it, "(config: str, *, minutes: float = 0.0) -> dict", and `doc`.
+  /// `first` are parameters before the options.
   template <typename Options>
   std::string help(const std::string& first, const std::string& result, const std::string& doc) const {
     Options defaults;
     return signature(parameters_of(name, defaults), first, result) + "\n\n" + doc;
   }
-  /// Returns what Python calls for function(Options&), which throws TypeError for arguments that do not fit.
+  /// Returns the callable for Python of function(Options&), which throws TypeError for arguments that do not fit.
   template <typename Options, typename Function>
   auto caller(const Function& function) const {
     return [*this, function](const py::args& by_place, const py::kwargs& by_name) {
@@ -172,7 +171,7 @@ void def_with_options(py::module_* module, const OptionsFunction& arguments, con
   module->def(arguments.name.c_str(), arguments.caller<Options>(function), help.c_str());
 }
 
-/// Defines how objects of the class of the function's name are made.
+/// Defines the constructor of the class that has the function's name.
 template <typename Options, typename Class, typename Function>
 void def_init_with_options(Class* its_class, const OptionsFunction& arguments, const Function& make,
                            const std::string& doc) {

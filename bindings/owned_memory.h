@@ -1,4 +1,4 @@
-// Memory of the extension's own, on the host or on a device, that arrays of Python are lent from.
+// Memory owned by the extension, on the host or on a device, which is lent to Python arrays.
 #pragma once
 
 #include <vector>
@@ -14,7 +14,8 @@ namespace pictura::python {
 
 class OwnedMemory {
  public:
-  /// The memory's first byte; what was there before is gone. `what` begins the message of a build that has no CUDA.
+  /// Allocates memory and returns its first byte; previous contents are lost. `what` begins the message of a build
+  /// without CUDA.
   uint8_t* allocate(size_t num_bytes, Device device, [[maybe_unused]] const char* what) {
     if (device.is_host()) {
       on_host_.resize(num_bytes);

@@ -1,4 +1,4 @@
-// Simulators and controllers as Python holds them, with the arrays that it borrows and lends.
+// Simulators and controllers in Python, with the arrays that they borrow and lend.
 #pragma once
 
 #include <algorithm>
@@ -25,12 +25,12 @@
 
 namespace pictura::python {
 
-/// What a step returned, as arrays that the next step writes again.
+/// Results of a step, as arrays that the next step overwrites.
 struct StepArraysOfPython {
   py::object reward, terminated, truncated, valid, refusal, reward_terms, distance_m;
 };
 
-/// A state that a simulator keeps.
+/// State kept by a simulator.
 struct Snapshot {
   std::shared_ptr<Simulator> of;
   std::unique_ptr<StateSnapshot> state;
@@ -38,7 +38,7 @@ struct Snapshot {
 
 class PyController;
 
-/// A simulator, its maps, and what calls of it lend and keep.
+/// Simulator, its maps, and the arrays that its calls lend and keep.
 class PySimulator {
  public:
   PySimulator(const std::string& executor, const SimulatorConfig& config, const std::vector<std::shared_ptr<Map>>& maps,
@@ -60,7 +60,8 @@ class PySimulator {
   const std::string& choice() const { return choice_; }
   const std::vector<std::shared_ptr<Map>>& maps() const { return maps_; }
 
-  /// Within the memory that there is nothing moves; else arrays of before keep that of the simulator of before.
+  /// Replaces the worlds. If the memory suffices, nothing moves; otherwise existing arrays keep the previous
+  /// simulator's memory.
   void set_worlds(const std::vector<std::shared_ptr<Map>>& maps, std::vector<WorldSpec> worlds, uint64_t seed) {
     CompiledMaps next = compiled(maps);
     const SimulatorCapacity needs = capacity_checked(next, worlds);
@@ -75,13 +76,13 @@ class PySimulator {
       config_ = config;
     }
     maps_ = maps;
-    watchers_.clear();  // they saw the worlds before
+    watchers_.clear();  // they observed the previous worlds
     forget_arrays();
   }
 
   void reset(const py::object& world_mask, const std::optional<uint64_t>& seed) {
     const uint64_t its_seed = seed.value_or(simulator_->config().seed);
-    Span<const uint8_t> mask;  // empty: of all
+    Span<const uint8_t> mask;  // empty: all worlds
     if (!world_mask.is_none()) {
       BorrowedArray borrowed = borrow(world_mask, "reset: world_mask", stream_);
       mask = borrowed.array().checked<const uint8_t>(
@@ -243,10 +244,10 @@ class PySimulator {
     return pixels;
   }
 
-  /// Steps by the commands that a controller writes.
+  /// Steps with the commands of a controller.
   void run(PyController& controller, int64_t steps);
 
-  /// Until a moment ago another thread could be in a call: as in any call.
+  /// Runs steps in calls of 50 ms, between which ^C is handled and another thread may call, as between any calls.
   template <typename Work>
   void run_steps(int64_t steps, const Work& step) {
     using Clock = std::chrono::steady_clock;
@@ -262,12 +263,12 @@ class PySimulator {
   }
 
  private:
-  /// What is no set has one row.
+  /// Shape of an observation array; arrays that are no sets have one row.
   static Dims shape_of(int64_t count, int64_t rows, int64_t features) {
     return rows == 1 ? Dims{count, features} : Dims{count, rows, features};
   }
 
-  /// Memory for what so many queries are answered, on a device.
+  /// Memory for the answers to a number of queries, on a device.
   class AnswerMemory {
    public:
     AnswerMemory(int64_t count, const SimulatorConfig& config, Device device) {
@@ -312,7 +313,7 @@ class PySimulator {
     return {reinterpret_cast<const T*>(bytes.data()), static_cast<size_t>(count)};
   }
 
-  /// Arrays of the caller by name, all that this simulator observes.
+  /// Views of the caller's arrays by name, one for every array that this simulator observes.
   ObservationView view_of(const py::dict& arrays, int64_t count, std::vector<BorrowedArray>* borrowed) {
     ObservationView view;
     size_t num_known = 0;
@@ -333,7 +334,7 @@ class PySimulator {
     return view;
   }
 
-  // Those that are gone see nothing more.
+  // Returns the observers that still exist.
   std::vector<std::shared_ptr<StepObserver>> watchers() {
     std::erase_if(watchers_, [](const auto& watcher) { return watcher.expired(); });
     std::vector<std::shared_ptr<StepObserver>> watching;
@@ -350,7 +351,7 @@ class PySimulator {
     for (const int32_t action : indices) commands.push_back({.action = action});
     return watched_step(std::move(commands));
   }
-  /// ^C ends the wait.
+  /// Steps while observers watch; ^C ends the wait for them.
   StepResult watched_step(std::vector<Command> commands) {
     const std::vector<std::shared_ptr<StepObserver>> watching = watchers();
     for (const auto& watcher : watching) {
@@ -395,8 +396,8 @@ class PySimulator {
     result_ = {};
     of_result_ = nullptr;
   }
-  /// On a device the work that reads them may still be to come. What was kept goes last: its end may call Python, which
-  /// may call this object.
+  /// Keeps arrays, since work on a device may still read them. The previous arrays are released last: this may call
+  /// Python, which may call this object.
   void keep(std::vector<BorrowedArray> arrays) { kept_.swap(arrays); }
   void keep(BorrowedArray array) {
     std::vector<BorrowedArray> arrays;
@@ -455,7 +456,7 @@ class PySimulator {
   std::optional<py::dict> observations_, state_;
   py::object result_;
   const float* of_result_ = nullptr;
-  std::vector<BorrowedArray> kept_;  // what the last call was given
+  std::vector<BorrowedArray> kept_;  // arrays passed to the last call
   std::vector<std::weak_ptr<StepObserver>> watchers_;
   std::vector<uint8_t> all_on_host_;
 #ifdef PICTURA_HAS_CUDA
@@ -465,7 +466,7 @@ class PySimulator {
   std::unique_ptr<WorldPainter> painter_;
 };
 
-/// A controller, its simulator, and the commands that it writes, in the simulator's memory.
+/// Controller, its simulator, and the commands that it writes, in the simulator's memory.
 class PyController {
  public:
   explicit PyController(ControllerInside inside)
@@ -488,7 +489,7 @@ class PyController {
 
   std::string name() const { return std::string(inside_.controller->name()); }
   const ControllerInside& inside() const { return inside_; }
-  /// Without the GIL.
+  /// Computes the commands; called without the GIL.
   void act(const PySimulator& simulator) {
     const bool has_same_worlds = std::ranges::equal(of().maps(), maps_) && std::ranges::equal(of().worlds(), worlds_);
     PICTURA_CHECK(simulator.shared() == inside_.of && has_same_worlds,
@@ -496,7 +497,7 @@ class PyController {
     inside_.controller->act(of().arrays(), {}, commands_->span, simulator.stream());
   }
   Span<const Command> commands() const { return commands_->span; }
-  /// A NumPy array of COMMAND_DTYPE, or u8 [slots, bytes of a command] on a device.
+  /// Returns the commands as a NumPy array of COMMAND_DTYPE, or as u8 [slots, bytes of a command] on a device.
   py::object lent_commands(Stream stream) const {
     const auto count = static_cast<int64_t>(commands_->span.size());
     auto* const bytes = reinterpret_cast<uint8_t*>(commands_->span.data());

@@ -106,7 +106,7 @@ ElementType element_of(PixelFormat format) {
   }
 }
 
-/// Images, and planes where asked for, in one piece of memory of a device.
+/// Images, and planes if requested, in one block of a device's memory.
 class Images {
  public:
   Images(const Rig& rig, int64_t num_views, PixelFormat format, bool planes, Device device, Stream stream)
@@ -116,7 +116,7 @@ class Images {
       plane_pixels += static_cast<size_t>(num_views * camera.size.pixels());
     }
     if (!planes) plane_pixels = 0;
-    // Of the largest elements first, so that all are aligned.
+    // Largest elements first, so that all are aligned.
     const size_t depth_bytes = plane_pixels * sizeof(float), instance_bytes = plane_pixels * sizeof(uint16_t);
     const size_t color_bytes = (layout_.bytes() + 7) / 8 * 8;
     uint8_t* at = memory_.allocate(color_bytes + depth_bytes + instance_bytes + plane_pixels, device_, "images");
@@ -181,7 +181,7 @@ class Images {
   std::vector<CameraImages> cameras_;
 };
 
-/// The memory of the views from `first` on.
+/// Memory of the views from `first` on.
 std::vector<CameraImages> images_from(const ImageBatch& batch, int64_t first) {
   std::vector<CameraImages> cameras(batch.cameras.begin(), batch.cameras.end());
   for (CameraImages& camera : cameras) {
@@ -195,7 +195,7 @@ std::vector<CameraImages> images_from(const ImageBatch& batch, int64_t first) {
   return cameras;
 }
 
-/// A renderer and where its work is put.
+/// Renderer with the stream of its work.
 class PyRenderer {
  public:
   PyRenderer(const std::string& name, const RendererConfig& config, Stream stream)
@@ -250,10 +250,10 @@ class PyRenderer {
     PICTURA_CHECK(reinterpret_cast<uintptr_t>(bytes.data()) % alignof(View) == 0, "views: expected aligned memory");
     return {reinterpret_cast<const View*>(bytes.data()), static_cast<size_t>(array.shape[0])};
   }
-  /// On the host a part of the views at a time, between which ^C is answered: images of one view are no other's.
+  /// Draws views; on the host in batches, between which ^C is handled. Images of a view do not depend on other views.
   void draw(const Scene& scene, Span<const View> views, const ImageBatch& batch) {
-    // Before its first pixel an image costs about as much as so many pixels; the sum is about a tenth of a second of
-    // one core.
+    // The set-up of an image costs about as much as kPixelsOfSetup pixels; kPixelsAtATime are about a tenth of a second
+    // on one core.
     constexpr int64_t kPixelsOfSetup = 4096, kPixelsAtATime = int64_t{1} << 22;
     int64_t pixels_per_view = 0;
     for (const Camera& camera : renderer_->config().rig.cameras) {
@@ -284,7 +284,7 @@ class PyRenderer {
     }
   }
 
-  /// Into the caller's images, or into an array of the caller, which is then borrowed, or into new ones.
+  /// Draws into the caller's images, into an array of the caller, which is then borrowed, or into new images.
   py::object draw_into(const Scene& scene, Span<const View> span, const py::object& out, const std::string& dtype,
                        bool planes, BorrowedArray* borrowed_out) {
     if (py::isinstance<Images>(out)) {
@@ -298,7 +298,7 @@ class PyRenderer {
       draw(scene, span, images->batch());
       return py::cast(images);
     }
-    // An array of the caller for a rig of one size.
+    // Array of the caller for a rig with one image size.
     *borrowed_out = borrow(out, "render: out", stream_);
     const Array& array = borrowed_out->array();
     const PixelFormat format = array.type == ElementType::f32    ? PixelFormat::f32
@@ -340,7 +340,7 @@ class PyRenderer {
   std::shared_ptr<Renderer> renderer_;
   Calls calls_;
   Stream stream_;
-  // Of the last call on a device: the work that reads and writes them may still be to come.
+  // Arrays of the last call on a device, whose work may still read and write them.
   BorrowedArray kept_views_, kept_out_;
 };
 

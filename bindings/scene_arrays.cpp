@@ -51,7 +51,7 @@ std::string text_of(const Shape& shape) {
   return "[" + text + "]";
 }
 
-/// The arrays of one dict by their names.
+/// Reader of one dict's arrays by name.
 class ArrayReader {
  public:
   ArrayReader(std::string name, py::dict arrays, const std::vector<std::string>& known)
@@ -68,7 +68,7 @@ class ArrayReader {
   std::string place(const char* key) const { return fmt::format("{}['{}']", name_, key); }
   std::string place(const char* key, py::ssize_t index) const { return fmt::format("{}[{}]", place(key), index); }
 
-  /// Finite, at most `largest` and at least `least`; of rows whose `where` is 0 anything.
+  /// Reads finite numbers in [least, largest]; rows whose `where` is 0 may hold anything.
   Numbers<double> numbers(const char* key, const Shape& shape, double least = -1e9, double largest = 1e9,
                           const uint8_t* where = nullptr) const {
     const Numbers<double> array = read<double>(key, shape, "biuf", "numbers");
@@ -87,7 +87,7 @@ class ArrayReader {
     return read<int64_t>(key, shape, "iu", "integers");
   }
 
-  /// Numbers of names, of which pictura.NAMES lists `count`.
+  /// Reads indices of names, of which pictura.NAMES lists `count`.
   Numbers<int64_t> codes(const char* key, const Shape& shape, int64_t count, const char* names) const {
     const Numbers<int64_t> array = integers(key, shape);
     for (py::ssize_t i = 0; i < array.size(); ++i) {
@@ -110,7 +110,7 @@ class ArrayReader {
     return flags;
   }
 
-  /// Where the elements of each item begin among `total`, and where those of the last one end.
+  /// Reads the offset of each item's elements among `total`, and the end of the last item's.
   Numbers<int64_t> begins(const char* key, py::ssize_t items, py::ssize_t total) const {
     const Numbers<int64_t> array = integers(key, {items == kAnyLength ? kAnyLength : items + 1});
     if (array.size() == 0) fail_usage("{}: expected at least [0], got an empty array", place(key));
@@ -138,7 +138,7 @@ class ArrayReader {
     return lines;
   }
 
-  /// Lists of lanes by their ids, one after the other: KEY, and KEY_begin.
+  /// Reads lists of lanes by id, one after the other: KEY, and KEY_begin.
   std::vector<std::vector<int64_t>> lane_lists(const char* key, py::ssize_t items,
                                                const std::set<int64_t>& lanes) const {
     const Numbers<int64_t> ids = integers(key, {kAnyLength});
@@ -177,7 +177,7 @@ class ArrayReader {
     const bool fits = std::equal(shape.begin(), shape.end(), got.begin(), got.end(),
                                  [](auto wanted, auto length) { return wanted == kAnyLength || wanted == length; });
     if (!fits) fail_usage("{}: expected shape {}, got {}", place(key), text_of(shape), text_of(got));
-    // An empty list is one of floats.
+    // NumPy makes an empty list an array of floats.
     if (given.size() > 0 && kinds.find(given.dtype().kind()) == std::string_view::npos) {
       fail_usage("{}: expected {}, got {}", place(key), expected, py::cast<std::string>(py::str(given.dtype())));
     }
@@ -226,7 +226,7 @@ void read_tracks(const py::dict& given, LoggedScene* scene) {
   }
 }
 
-/// Returns the ids of the lanes.
+/// Reads the lanes. Returns their ids.
 std::set<int64_t> read_lanes(const py::dict& given, LoggedScene* scene) {
   const ArrayReader arrays("lanes", given,
                            {"id", "type", "points", "begin", "speed_limit_mps", "width_m", "in_junction", "entries",
@@ -345,7 +345,7 @@ void read_lights(const py::dict& given, const std::set<int64_t>& lanes, LoggedSc
   }
 }
 
-/// What will be an array: its elements one after the other.
+/// Creates an array from its elements, one after the other.
 template <typename T>
 py::array array_of(const Shape& shape, const std::vector<T>& values) {
   return py::array_t<T>(shape, values.data());

@@ -1,4 +1,4 @@
-// Scenes as dicts of NumPy arrays: what pictura.Scenario.from_arrays() takes and to_arrays() gives.
+// Scenes as dicts of NumPy arrays: arguments of pictura.Scenario.from_arrays() and results of to_arrays().
 #pragma once
 
 #include <optional>
@@ -12,20 +12,20 @@ namespace pictura::python {
 
 namespace py = pybind11;
 
-/// The dicts of from_arrays(), of which those without a value have nothing.
+/// Dicts of from_arrays(); those without a value are absent.
 struct SceneArrays {
   py::dict tracks, lanes;
   std::optional<py::dict> lines, edges, crosswalks, stop_signs, lights;
 };
 
-/// The scene that arrays state: its tracks, its map and its lights. Throws UsageError naming the array, and the element
-/// where there is one, what was expected and what came.
+/// Returns the scene of these arrays: its tracks, its map and its lights. Throws UsageError naming the array, and the
+/// element if there is one, the expected and the actual value.
 LoggedScene scene_from_arrays(const SceneArrays& arrays);
 
-/// The dicts of a stated scene by their names as arguments of from_arrays().
+/// Returns the dicts of a scene by their argument names in from_arrays().
 py::dict to_arrays(const LoggedScene& scene);
 
-/// LINE_TYPES and LIGHT_STATES of the module.
+/// Adds LINE_TYPES and LIGHT_STATES to the module.
 void bind_scene_names(py::module_& module);
 
 }  // namespace pictura::python

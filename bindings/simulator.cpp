@@ -111,7 +111,7 @@ void visit_options(SimulatorArguments& arguments, Visitor&& v) {
   v.value({"stream"}, arguments.stream);
 }
 
-// How one is made, and what it is made of.
+// Defines the constructor, and properties of the construction.
 void define_construction(py::class_<PySimulator>* simulator) {
   def_init_with_options<SimulatorArguments>(
       simulator, {"Simulator", {"maps", "worlds"}},
@@ -133,7 +133,8 @@ Raises pictura.UsageError naming what cannot be simulated, pictura.Error where t
       .def("_inside",
            [](PySimulator& self) {
              py::object inside = py::cast(self.inside());
-             // Not by py::keep_alive<0, 1>: pybind11 3.1 crashes in it where the arguments are of other types.
+             // Called directly instead of py::keep_alive<0, 1>: pybind11 3.1 crashes in it if the arguments are of
+             // other types.
              py::detail::keep_alive_impl(inside, py::cast(&self, py::return_value_policy::reference));
              return inside;
            })
@@ -162,7 +163,7 @@ Raises pictura.UsageError naming what cannot be simulated, pictura.Error where t
           py::doc("The cudaStream_t that work is put on, as int; 0: the legacy default stream."));
 }
 
-// What changes its state, and what its agents would observe.
+// Defines methods that change the state, and queries of observations.
 void define_steps(py::class_<PySimulator>* simulator) {
   (*simulator)
       .def(
@@ -205,7 +206,7 @@ in the simulator's memory. Returns out, arrays by name. Raises pictura.Error nam
 then writes nothing; on CUDA queries are checked as in step().)");
 }
 
-// The arrays of its present state.
+// Defines the arrays of the present state.
 void define_arrays(py::class_<PySimulator>* simulator) {
   (*simulator)
       .def_property_readonly(
@@ -240,7 +241,7 @@ void define_arrays(py::class_<PySimulator>* simulator) {
           py::doc("int32 [slots]: the agent's index in its world."));
 }
 
-// Counts, and copies of the state.
+// Defines counts, and copies of the state.
 void define_totals_and_copies(py::class_<PySimulator>* simulator) {
   (*simulator)
       .def(
@@ -299,7 +300,7 @@ void define_totals_and_copies(py::class_<PySimulator>* simulator) {
           "Waits for the work on the stream; raises pictura.Error for what a device found wrong.");
 }
 
-// A picture, and loops in C++.
+// Defines a picture, and loops in C++.
 void define_drawing_and_loops(py::class_<PySimulator>* simulator) {
   (*simulator)
       .def(
@@ -359,7 +360,7 @@ void bind_simulator(py::module_& module) {
   bind_step_result(module);
   py::class_<Snapshot>(module, "Snapshot", "A state that a simulator keeps in its own memory.");
 
-  // All declared first, so that signatures can name them.
+  // All classes are declared first, so that signatures can name them.
   py::class_<SimulatorInside>(module, "_SimulatorInside");
   py::class_<ControllerInside>(module, "_ControllerInside");
   py::class_<PyController> controller_class(module, "Controller", R"(

@@ -1,5 +1,5 @@
-// The extension module pictura._training: training, evaluation and saved policies, beside the torch that it was built
-// with. What it takes and gives are objects of pictura._pictura.
+// Extension module pictura._training: training, evaluation and saved policies, using the torch that it was built with.
+// It takes and returns objects of pictura._pictura.
 #include <array>
 #include <cmath>
 #include <limits>
@@ -67,7 +67,7 @@ py::dict dict_of(const TrainReport& report) {
   return d;
 }
 
-/// Each metric of an evaluation's row as (value, half of its 95 % interval).
+/// Adds each metric of an evaluation's row as (value, half of its 95 % interval).
 template <typename Row>
 void add_metrics(const Row& row, py::dict* row_out) {
   for (const auto& [name, estimate] : metrics_of(row)) {
@@ -151,7 +151,7 @@ py::dict dict_of(const SceneEvaluation& evaluation, const std::vector<SceneAgent
   return d;
 }
 
-/// The options by which pictura.Simulator makes such a world.
+/// Options with which pictura.Simulator creates such a world.
 py::dict dict_of(SimulatorConfig config) {
   py::dict d;
   for (const Parameter& parameter : parameters_of("", config)) d[parameter.name.c_str()] = parameter.value;
@@ -250,7 +250,7 @@ void visit_options(ProbeArguments<Probe>& arguments, Visitor&& v) {
   v.callback({"on_progress"}, worlds.on_progress);
 }
 
-/// A policy of a checkpoint.
+/// Arguments for opening a policy.
 struct PolicyArguments : DriverOptions {};
 
 template <typename Visitor>
@@ -260,7 +260,7 @@ void visit_options(PolicyArguments& arguments, Visitor&& v) {
   visit_light_options(arguments, v);
 }
 
-/// Throws UsageError where `replay` is no page, or a case was asked for that is none of `count`.
+/// Throws UsageError if `replay` is no page, or if the requested case is not below `count`.
 void check_case_replay(const CaseReplayOptions& replay, int64_t count) {
   const std::string& path = replay.path;
   if (path.empty() && (replay.number || replay.recording.cameras)) {
@@ -271,8 +271,8 @@ void check_case_replay(const CaseReplayOptions& replay, int64_t count) {
   check_case_number(replay, count);
 }
 
-/// Defines a probe, which writes what was asked for and returns its summary. `most` is its largest number of cases,
-/// where that is known before.
+/// Defines a probe, which writes the requested files and returns its summary. `most` is its maximum number of cases, if
+/// it is known in advance.
 template <typename Probe, typename Results, typename Row>
 void def_probe(py::module_* module, const char* name, Results (*ask)(const Probe&),
                void (*write_cases)(const std::string&, const Results&),
@@ -316,7 +316,7 @@ struct Answers {
   }
 };
 
-/// A controller of a session, which it holds together with the renderer: both may be called from other threads.
+/// Controller of a session, which holds session and renderer: both may be called from other threads.
 class SessionController final : public Controller {
  public:
   SessionController(std::shared_ptr<PolicySession> session, std::shared_ptr<Turnstile> of_session,
@@ -631,7 +631,7 @@ the simulator's geometries. Raises pictura.Error where one is missing.)");
 PYBIND11_MODULE(_training, module) {
   using namespace pictura;          // NOLINT
   using namespace pictura::python;  // NOLINT
-  // Types and exceptions are that extension's.
+  // Types and exceptions are defined by that extension.
   py::module_::import("pictura._pictura");
   module.doc() = "Training, evaluation and saved policies, with torch. Use them as names of `pictura`.";
   bind_train(module);
