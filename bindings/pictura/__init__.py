@@ -1,14 +1,14 @@
 """Driving policies that learn by self-play from what a car's cameras see: maps, simulators and renderers for Python.
 
-The library's objects are here; environments are in pictura.envs, policies as torch modules in pictura.torch. train, evaluate,
-the probes and PolicySession need a package that was built beside torch, and load it on first use.
+The package holds the library's objects; environments are in pictura.envs, policies as torch modules in pictura.torch. train,
+evaluate, the probes and PolicySession need a package that was built with torch, and load it on first use.
 """
 
 import os
 from typing import TYPE_CHECKING
 
-# Threads of torch's loops spin while they wait, for milliseconds unless this limits it (apps/limit_spinning.cpp says why).
-# It is read once, when the first of pictura and torch is imported.
+# Waiting threads of torch's loops spin for milliseconds unless this variable limits it; see apps/limit_spinning.cpp for the
+# reason. The variable is read once, when the first of pictura and torch is imported.
 if "OMP_WAIT_POLICY" not in os.environ:
     os.environ.setdefault("GOMP_SPINCOUNT", "2000")
 
@@ -84,16 +84,19 @@ def __getattr__(name: str):
 
 
 def make_vec(maps="procedural:3", num_agents: int = 16, **options):
-    """Gymnasium's vector environment of all agents; see pictura.envs.gymnasium_vector.DriveVectorEnv."""
+    """Returns Gymnasium's vector environment of all agents; see pictura.envs.gymnasium_vector.DriveVectorEnv."""
     from pictura.envs.gymnasium_vector import DriveVectorEnv
 
     return DriveVectorEnv(maps, num_agents, **options)
 
 
 def make_vec_for(policy, maps="procedural:3", num_agents: int = 16, **options):
-    """As make_vec, with the world, cameras and observation that a policy was trained with: its file, or what
-    pictura.torch.load_policy() read. options that are given count instead. A policy of decision_steps n expects its actions to be
-    held for n steps. Needs a package that was built beside torch. Raises pictura.UsageError for a policy of no file."""
+    """Returns make_vec()'s environment with the world, cameras and observation of a policy's training.
+
+    policy: a file, or the result of pictura.torch.load_policy(). options: replace settings of the policy's training. A policy
+    of decision_steps n expects its actions to be held for n steps. Needs a package that was built with torch. Raises
+    pictura.UsageError for a policy without a file.
+    """
     from pictura.envs.gymnasium_vector import DriveVectorEnv
 
     path = policy if isinstance(policy, (str, os.PathLike)) else getattr(policy, "metadata", {}).get("path")

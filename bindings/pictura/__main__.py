@@ -1,4 +1,4 @@
-"""The `pictura` command, as the package brings it along: `python -m pictura`."""
+"""The package's `pictura` command: `python -m pictura`."""
 
 import os
 import pathlib
@@ -8,7 +8,7 @@ from pictura._load_training import wrong_torch
 
 
 def main() -> None:
-    """Becomes the command, with the same arguments."""
+    """Replaces this process by the command, with the same arguments."""
     if wrong := wrong_torch():
         sys.exit(f"error: the pictura command was {wrong}")
     program = pathlib.Path(__file__).parent / "bin" / "pictura"

@@ -1,7 +1,8 @@
-"""Scenes of other libraries' files, by way of pictura.Scenario.from_arrays().
+"""Scenes from files of other libraries, through pictura.Scenario.from_arrays().
 
 load_scenarionet() reads the pickles of ScenarioNet and MetaDrive (sd_*.pkl: Waymo, nuScenes, nuPlan, Argoverse 2). Nothing in a
-pickle is run: it may hold NumPy's arrays and plain values alone. from_py123d() takes scenes of py123d, which it does not import.
+pickle is executed: it may hold only NumPy arrays and plain values. from_py123d() takes scenes of py123d, which it does not
+import.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ _NUMPY = re.compile(r"numpy\.(_?core\.(multiarray|numeric)\.)?(\w+)")
 
 
 def _plain_values(data: bytes) -> Any:
-    """What a pickle of NumPy's arrays and builtins holds; object arrays are lists.
+    """Returns the contents of a pickle of NumPy arrays and builtins; object arrays become lists.
 
-    Its callables are stand-ins that are made anew for every pickle, since a pickle can also change what it names.
+    Its callables are stand-ins that are created for every pickle, since a pickle can also change the objects that it names.
     """
 
     class Type:
@@ -61,7 +62,7 @@ def _plain_values(data: bytes) -> Any:
         "numpy _reconstruct": lambda *_: Array(),
         "numpy _frombuffer": from_buffer,
         "numpy scalar": lambda type_, data: type_.array((), data, "C")[()],
-        # How bytes are written before protocol 3.
+        # Encoding of bytes before protocol 3.
         "_codecs.encode": lambda text, _: text.encode("latin1"),
         "builtins.bytes": lambda: b"",
         "collections.defaultdict": lambda *_: {},
@@ -69,7 +70,8 @@ def _plain_values(data: bytes) -> Any:
         **{f"builtins.{kind.__name__}": kind for kind in (int, float, set)},
     }
 
-    # The one in Python, half as fast: the one in C takes as much memory as a pickle says that it will remember values.
+    # The Python implementation, half as fast as the C implementation, which allocates memory for as many memoized values as a
+    # pickle declares.
     class Unpickler(pickle._Unpickler):
         def find_class(self, module: str, name: str) -> Any:
             whole = f"{module.replace('__builtin__', 'builtins')}.{name}"
@@ -99,13 +101,13 @@ _LANE_TYPES = {
     "LANE_BIKE_LANE": "biking", "LANE_UNKNOWN": "other",
 }  # fmt: skip
 _LIGHTS = {"TRAFFIC_LIGHT_GREEN": "go", "TRAFFIC_LIGHT_RED": "stop", "TRAFFIC_LIGHT_YELLOW": "caution"}
-_OUTLINE = re.compile(r"boundary_\d+")  # how nuScenes' and nuPlan's converters call the outlines of what is drivable
+_OUTLINE = re.compile(r"boundary_\d+")  # names of drivable outlines in nuScenes' and nuPlan's converters
 _MAX_OUTLINE_WORK, _NEAR_M = 100_000_000, 50.0
-_MIN_HALF_WIDTH_M, _MAX_HALF_WIDTH_M = 0.5, 5.0  # as docs/reference/scenario.md says of borders
+_MIN_HALF_WIDTH_M, _MAX_HALF_WIDTH_M = 0.5, 5.0  # as for borders in docs/reference/scenario.md
 
 
 class _Fault(Exception):
-    """What is wrong with a part of a scene: its place, and why."""
+    """Error in a part of a scene: its place, and the reason."""
 
 
 def _entry(mapping: Any, key: str, place: str) -> Any:
@@ -117,7 +119,7 @@ def _entry(mapping: Any, key: str, place: str) -> Any:
 
 
 def _numbers(value: Any, place: str, shape: tuple[int | None, ...]) -> np.ndarray:
-    """Floats of that shape, in which None is any length; a last axis of one is dropped."""
+    """Returns floats of that shape, in which None is any length; a last axis of one is dropped."""
     try:
         array = np.asarray(value, float)
     except (TypeError, ValueError):
@@ -131,7 +133,7 @@ def _numbers(value: Any, place: str, shape: tuple[int | None, ...]) -> np.ndarra
 
 
 def _points(value: Any, place: str, is_flat: bool) -> np.ndarray:
-    """[n, 3] of points with or without a height, which flat maps have no use for."""
+    """Returns points [n, 3], with or without a height; flat maps ignore heights."""
     points = _numbers(value, place, (None, None))
     if points.shape[1] not in (2, 3):
         raise _Fault(f"{place}: expected points of 2 or 3 numbers, got {points.shape[1]}")
@@ -140,14 +142,14 @@ def _points(value: Any, place: str, is_flat: bool) -> np.ndarray:
 
 
 def _numbered(keys: list[Any]) -> dict[str, int]:
-    """Numbers of ids: their own where all are numbers, else their places."""
+    """Returns integers for ids: the ids themselves if all are integers, else their positions."""
     texts = [str(key) for key in keys]
     own = all(re.fullmatch(r"\d{1,18}", text) for text in texts) and len({int(text) for text in texts}) == len(texts)
     return {text: int(text) if own else place for place, text in enumerate(texts)}
 
 
 def _joined(lists: list[Any], kind: type = np.int64, tail: tuple[int, ...] = ()) -> tuple[np.ndarray, np.ndarray]:
-    """Lists one after the other, and where each begins."""
+    """Concatenates lists. Returns the result and the offset of each list."""
     whole = np.concatenate([np.zeros((0, *tail), kind), *(np.asarray(each, kind).reshape(-1, *tail) for each in lists)])
     return whole, np.cumsum([0, *(len(each) for each in lists)])
 
@@ -164,7 +166,7 @@ def _width_m(lane: dict, points: int, place: str) -> np.ndarray:
 
 
 def _width_of_halves(halves_m: np.ndarray) -> np.ndarray:
-    """Of halves [points, 2] on both sides where they can be; 0 throughout where none is."""
+    """Returns widths from plausible half widths [points, 2] on both sides; 0 throughout without plausible values."""
     is_known = (halves_m >= _MIN_HALF_WIDTH_M) & (halves_m <= _MAX_HALF_WIDTH_M)
     sides = is_known.sum(1)
     if not sides.any():
@@ -174,7 +176,7 @@ def _width_of_halves(halves_m: np.ndarray) -> np.ndarray:
 
 
 def _neighbor(neighbors: Any, lanes: dict[str, int], nearest: int) -> int:
-    """The lane beside which it runs longest, or the nearest of ids in their order from left to right; -1: none."""
+    """Returns the lane with the longest common stretch, or the nearest of ids in left-to-right order; -1: none."""
     if not isinstance(neighbors, list) or not neighbors:
         return -1
     if not isinstance(neighbors[0], dict):
@@ -221,7 +223,8 @@ def _is_inside(point: np.ndarray, ring: np.ndarray) -> bool:
 
 
 def _edges_of_outlines(rings: list[np.ndarray]) -> list[np.ndarray]:
-    """Outlines of what is drivable as edges with the road on their left: rings around it run to the left, those of holes to the right."""
+    """Converts outlines of drivable areas to edges with the road on their left: outer rings run counter-clockwise, rings of
+    holes clockwise."""
     if len(rings) * sum(map(len, rings)) > _MAX_OUTLINE_WORK:
         raise _Fault(f"map_features: expected fewer outlines, got {len(rings)} of {sum(map(len, rings))} points")
     edges = []
@@ -234,7 +237,7 @@ def _edges_of_outlines(rings: list[np.ndarray]) -> list[np.ndarray]:
 
 
 def _parts_near(lines: list[np.ndarray], places: np.ndarray) -> list[np.ndarray]:
-    """The parts of lines that lie near a box around the places: outlines are of whole towns."""
+    """Returns the parts of lines near a box around the places, since outlines cover whole towns."""
     low, high = places[:, :2].min(0) - _NEAR_M, places[:, :2].max(0) + _NEAR_M
     parts = []
     for line in lines:
@@ -334,7 +337,8 @@ def _scenarionet_arrays(scene: Any) -> dict[str, Any]:
     metadata = _entry(scene, "metadata", "scenario")
     time_s = _numbers(_entry(metadata, "ts", "metadata"), "metadata['ts']", (None,))
     steps = len(time_s)
-    # Third numbers of a lane's points are headings in nuScenes' maps, and others are flat: only Waymo's frame has heights.
+    # The third number of a lane's point is a heading in nuScenes' maps, and other maps are flat: only Waymo's frame has
+    # heights.
     is_flat = metadata.get("coordinate") != "waymo"
     tracks, places = _tracks_of(_entry(scene, "tracks", "scenario"), steps, is_flat)
     arrays, lanes = _map_of(_entry(scene, "map_features", "scenario"), is_flat)
@@ -350,18 +354,19 @@ def _scenarionet_arrays(scene: Any) -> dict[str, Any]:
 
 
 def load_scenarionet(path: str | os.PathLike[str]) -> pictura.Scenario:
-    """The scene of a pickle of ScenarioNet's or MetaDrive's (sd_*.pkl).
+    """Loads the scene of a ScenarioNet or MetaDrive pickle (sd_*.pkl).
 
-    Kept are road users, lanes with links, neighbours, widths and limits, lines, edges, crosswalks, stop signs and lights; cones, barriers,
-    sidewalks, driveways and speed bumps are not. Ids that are no numbers become places. Maps are flat but in Waymo's frame.
-    Raises pictura.Error naming the file and the part, and where a pickle names anything but NumPy's arrays and builtins.
+    The scene keeps road users, lanes with links, neighbours, widths and limits, lines, edges, crosswalks, stop signs and
+    lights. It drops cones, barriers, sidewalks, driveways and speed bumps. Ids that are not integers are replaced by positions.
+    Maps are flat, except in Waymo's frame. Raises pictura.Error naming the file and the part, also if a pickle names anything
+    but NumPy arrays and builtins.
     """
     path = os.fspath(path)
     if os.path.getsize(path) > _MAX_BYTES:
         raise pictura.Error(f"{path}: expected at most {_MAX_BYTES >> 20} MiB, got {os.path.getsize(path) >> 20}")
     try:
         scene = _plain_values(pathlib.Path(path).read_bytes())
-    except Exception as error:  # whatever the bytes make of the unpickler
+    except Exception as error:  # any error that the bytes cause in the unpickler
         raise pictura.Error(f"{path}: no pickle of a scene: {type(error).__name__}: {error}") from None
     try:
         return pictura.Scenario.from_arrays(**_scenarionet_arrays(scene))
@@ -374,7 +379,7 @@ def load_scenarionet(path: str | os.PathLike[str]) -> pictura.Scenario:
 _123D_LABELS = {
     "EGO": "vehicle", "VEHICLE": "vehicle", "TRAIN": "other", "TWO_WHEELER": "cyclist", "PERSON": "pedestrian", "ANIMAL": "other", "OTHER": "other",
 }  # fmt: skip
-_123D_LANES = {"UNDEFINED": "other", "BIKE_LANE": "biking"}  # others are driven on
+_123D_LANES = {"UNDEFINED": "other", "BIKE_LANE": "biking"}  # all others are driving lanes
 _123D_LINES = {
     "DASHED_WHITE": "broken_single_white", "DOUBLE_DASH_WHITE": "broken_single_white", "SOLID_WHITE": "solid_single_white",
     "DASH_SOLID_WHITE": "solid_single_white", "SOLID_DASH_WHITE": "solid_single_white", "DOUBLE_SOLID_WHITE": "solid_double_white",
@@ -386,7 +391,7 @@ _EDGE_VOTES, _NEAR_LANE_M = 20, 10.0
 
 
 def _distances_m(points: np.ndarray, line: np.ndarray) -> np.ndarray:
-    """In plan, from each point to a polyline."""
+    """Returns the horizontal distance from each point to a polyline."""
     a, way = line[:-1, :2], np.diff(line[:, :2], axis=0)
     from_a = points[:, None, :2] - a
     along = np.clip((from_a * way).sum(2) / np.maximum((way**2).sum(1), 1e-12), 0, 1)
@@ -394,7 +399,7 @@ def _distances_m(points: np.ndarray, line: np.ndarray) -> np.ndarray:
 
 
 def _with_road_on_left(edge: np.ndarray, centres: np.ndarray) -> np.ndarray:
-    """An edge, turned round if most of its pieces have the nearest point of a lane on their right."""
+    """Returns an edge, reversed if for most of its pieces the nearest point of a lane is on their right."""
     pieces = np.unique(np.linspace(0, len(edge) - 2, _EDGE_VOTES).astype(int))
     middle, way = (edge[pieces, :2] + edge[pieces + 1, :2]) / 2, edge[pieces + 1, :2] - edge[pieces, :2]
     to_lanes = centres[None, :, :2] - middle[:, None]
@@ -406,7 +411,7 @@ def _with_road_on_left(edge: np.ndarray, centres: np.ndarray) -> np.ndarray:
 
 
 def _123d_tracks(scene: Any, iterations: range, is_flat: bool, dt_s: float) -> dict[str, Any]:
-    """Tracks, the self-driving car's first."""
+    """Returns the tracks, the self-driving car's first."""
     tokens: dict[str, int] = {}
     kinds: list[str] = []
     states: list[tuple[int, int, list[float]]] = []
@@ -432,7 +437,7 @@ def _123d_tracks(scene: Any, iterations: range, is_flat: bool, dt_s: float) -> d
     for track, step, numbers in states:
         values[track, step] = numbers
     valid = ~np.isnan(values[..., 0])
-    # Where no velocity is stated, from one place to the next, and as before at the end.
+    # Missing velocities are estimated from consecutive positions; the last step repeats the previous estimate.
     moved = np.diff(values[..., :2], axis=1, append=np.nan) / dt_s
     for step in range(len(iterations)):
         known = values[:, step, 4:6]
@@ -512,11 +517,11 @@ def _123d_lights(scene: Any, iterations: range, lanes: dict[str, int]) -> dict[s
 
 
 def from_py123d(scene: Any, *, radius_m: float = 200.0) -> pictura.Scenario:
-    """The scene of a py123d.api.SceneAPI: nuPlan, Argoverse 2, nuScenes, Waymo and others through one interface.
+    """Converts the scene of a py123d.api.SceneAPI: nuPlan, Argoverse 2, nuScenes, Waymo and others through one interface.
 
-    radius_m: of maps that are of whole towns, the part around the self-driving car at the scene's present. Kept are road users, lanes with
-    links, neighbours, limits and the widths between their boundaries, lines, edges, crosswalks, stop signs and lights.
-    Raises pictura.Error naming the scene and the part.
+    radius_m: radius around the self-driving car at the scene's present, within which maps of whole towns are kept. The scene
+    keeps road users, lanes with links, neighbours, limits and the widths between their boundaries, lines, edges, crosswalks,
+    stop signs and lights. Raises pictura.Error naming the scene and the part.
     """
     metadata = scene.get_scene_metadata()
     place = f"{metadata.dataset}: {metadata.initial_uuid}"
@@ -534,7 +539,7 @@ def from_py123d(scene: Any, *, radius_m: float = 200.0) -> pictura.Scenario:
         return [each for found in world.get_map_objects_in_radius(ego.center_2d, radius_m, [layer]).values() for each in found]
 
     try:
-        # The duration is a mean of times that are no exact multiples.
+        # Rounded, since the duration is a mean of times that are no exact multiples.
         is_flat, dt_s = not world.map_has_z, round(float(metadata.iteration_duration_s), 3)
         tracks = _123d_tracks(scene, iterations, is_flat, dt_s)
         sdc_track = tracks.pop("sdc")

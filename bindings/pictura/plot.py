@@ -1,17 +1,17 @@
-"""Charts of trainings, evaluations, probes and benchmarks, from the CSV and JSON files that these write.
+"""Charts of training runs, evaluations, probes and benchmarks, from the CSV and JSON files that these write.
 
     from pictura import plot
     plot.save(plot.run_curves(["runs/a", "runs/b"], x="hours"), "curves.png")
     plot.figure(plot.probe_means("probe_removal/summary.json"))  # a Matplotlib figure, for notebooks
 
-A function that ends in _curves, _rates, _costs, _parts or _means reads files and returns a Chart: the data that is drawn.
-figure() and save() draw it. Only these need Matplotlib; the rest needs Python 3.11 alone, neither NumPy nor pictura's
-extensions. `pictura plot`, `pictura probe` and `pictura bench --plot` carry this file and run it as a program:
+A function whose name ends in _curves, _rates, _costs, _parts or _means reads files and returns a Chart, the data to draw.
+figure() and save() draw a Chart. Only these two need Matplotlib; the rest needs only Python 3.11, neither NumPy nor pictura's
+extensions. `pictura plot`, `pictura probe` and `pictura bench --plot` contain this file and run it as a program:
 
     python -m pictura.plot '{"chart": "run_curves", "runs": ["runs/a"], "out": "curves.png"}'
 
-takes a function's name and arguments as one JSON object, with the picture's name as "out". It exits with 0, with 1 after an
-error, or with 3 without Matplotlib, after writing the chart's data as JSON to the picture's name and ".json".
+The program takes a function's name and arguments as one JSON object, with the picture's name as "out". It exits with 0, with
+1 after an error, or with 3 without Matplotlib, after writing the chart's data as JSON to the picture's name and ".json".
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Okabe and Ito's colours, which colour-blind people tell apart, but for their yellow, which is faint on white.
+# Okabe and Ito's colours, which are distinct for colour-blind readers, without their yellow, which is faint on white.
 SERIES_COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#5A5A5A")
-# Of a share from 0 to 1: hidden, half seen, seen whole.
+# Colours of a share from 0 to 1: hidden, half seen, seen whole.
 SHARE_COLORS = ("#D73027", "#FEE090", "#4575B4")
-_REVEALING = ("#E3E5E8", "#5A6068")  # line of sight opens seldom, often
+_REVEALING = ("#E3E5E8", "#5A6068")  # line of sight opens rarely, often
 
 METRICS = (
     "charts/episode_return",
@@ -51,17 +51,17 @@ METRICS = (
     "driving/off_road_per_1000_steps",
     "driving/red_light_per_1000_steps",
 )
-# Means of consecutive updates beyond this many.
+# Maximum number of points of a run's curve; longer curves show means of consecutive updates.
 MAX_RUN_POINTS = 200
 _NAN = math.nan
 
 
 class PlotError(Exception):
-    """A file or an argument that cannot be drawn; names it."""
+    """Error in a file or an argument, which it names."""
 
 
 class MissingMatplotlib(PlotError):
-    """No picture without Matplotlib."""
+    """Error of a chart that needs Matplotlib, which is missing."""
 
 
 @dataclass
@@ -71,17 +71,17 @@ class Series:
     name: str
     x: list[float] = field(default_factory=list)
     y: list[float] = field(default_factory=list)
-    low: list[float] = field(default_factory=list)  # of a band behind the line: as long, or empty where there is none
+    low: list[float] = field(default_factory=list)  # of a band behind the line: as long as the line, or empty
     high: list[float] = field(default_factory=list)
     dashed: bool = False
 
     def add(self, x: float, y: float | None, low: float | None = None, high: float | None = None) -> None:
-        """Adds a point; None is no number. Points of a series all have a band, where any has."""
+        """Adds a point; None becomes NaN. Either all points of a series have a band, or none has."""
         for values, value in ((self.x, x), (self.y, y), (self.low, low), (self.high, high)):
             values.append(_NAN if value is None else float(value))
 
     def add_estimate(self, x: float, value: float | None, half_width: float | None, least: float = -math.inf) -> None:
-        """Adds a value in its confidence interval, which ends at `least`."""
+        """Adds a value with its confidence interval, whose lower end is at least `least`."""
         has_band = value is not None and half_width is not None
         self.add(x, value, *((max(least, value - half_width), value + half_width) if has_band else ()))
 
@@ -92,7 +92,7 @@ class Panel:
     x_label: str
     y_label: str
     series: list[Series] = field(default_factory=list)
-    x_scale: str = "linear"  # or "log", with ticks where points are
+    x_scale: str = "linear"  # or "log", with ticks at the points
     y_scale: str = "linear"  # or "log"
     starts_at_zero: bool = False  # the y axis
     marks: list[tuple[float, str]] = field(default_factory=list)  # dashed lines across the panel, labelled above it
@@ -104,7 +104,7 @@ class Chart:
     panels: list[Panel]
     columns: int = 3
     panel_size_in: tuple[float, float] = (3.5, 2.7)
-    facts: dict[str, Any] = field(default_factory=dict)  # what a report says of it beside the picture's name
+    facts: dict[str, Any] = field(default_factory=dict)  # facts for a report, besides the picture's name
 
 
 def _finite_or_null(value: float) -> float | None:
@@ -119,7 +119,7 @@ def _need(condition: Any, message: str) -> None:
 def _read_json(path: str) -> Any:
     try:
         return json.loads(pathlib.Path(path).read_text(encoding="utf-8"))
-    except ValueError as error:  # of JSON and of UTF-8
+    except ValueError as error:  # from JSON or UTF-8
         raise PlotError(f"{path}: expected JSON: {error}") from None
 
 
@@ -131,7 +131,7 @@ class _Run:
     folder: str
     path: str
     columns: dict[str, list[float]]
-    settings: Any  # config.toml but for run.seed; the folder where runs are not grouped
+    settings: Any  # config.toml without run.seed; the folder if runs are not grouped
     seed: int = 0
 
     def column(self, name: str) -> list[float]:
@@ -140,7 +140,7 @@ class _Run:
 
 
 def _number(text: str) -> float | None:
-    # float() takes more than what is written: spaces and underscores.
+    # float() accepts texts that are never written: with spaces and underscores.
     try:
         return None if "_" in text or text != text.strip() else float(text)
     except ValueError:
@@ -189,12 +189,12 @@ def _read_run(folder: str, groups_seeds: bool) -> _Run:
 
 
 def _column_of(metric: str, run: _Run) -> str:
-    """The column that a metric names in full, or by what follows its slash."""
+    """Returns the column of a metric, given in full or by the part after the slash."""
     if metric in run.columns:
         return metric
     found = [name for name in run.columns if name.endswith(f"/{metric}")]
     _need(len(found) < 2, f"{run.path}: '{metric}' may be {' or '.join(found)}")
-    return found[0] if found else metric  # column() refuses one that is not there
+    return found[0] if found else metric  # column() raises if there is none
 
 
 def _mean_of_finite(values: Iterable[float]) -> float:
@@ -203,7 +203,7 @@ def _mean_of_finite(values: Iterable[float]) -> float:
 
 
 def _curve_of(run: _Run, x: str, column: str) -> Series:
-    """A run's curve, in at most MAX_RUN_POINTS points."""
+    """Returns a run's curve, with at most MAX_RUN_POINTS points."""
     if x == "hours":
         seconds = zip(run.column("time/rollout_s"), run.column("time/update_s"), strict=True)
         along = [total_s / 3600 for total_s in itertools.accumulate(map(sum, seconds))]
@@ -220,7 +220,7 @@ def _curve_of(run: _Run, x: str, column: str) -> Series:
 
 
 def _height_at(curve: Series, x: float) -> float:
-    """A curve's height between its points; NaN beside one that is not finite."""
+    """Interpolates a curve between its points; NaN beside a point that is not finite."""
     after = next((i for i, at in enumerate(curve.x) if at >= x), len(curve.x) - 1)
     if after == 0 or curve.x[after] == x:
         return curve.y[after]
@@ -229,24 +229,24 @@ def _height_at(curve: Series, x: float) -> float:
 
 
 def _mean_of_curves(curves: list[Series], name: str) -> Series:
-    """The mean of curves where all of them are, and a band from the lowest to the highest."""
+    """Returns the mean of curves where all of them are defined, with a band from the lowest to the highest."""
     low, high = max(curve.x[0] for curve in curves), min(curve.x[-1] for curve in curves)
     _need(low <= high, f"{name}: these runs have no stretch in common; --group none draws them apart")
     last = max(len(curve.x) for curve in curves) - 1
     mean = Series(name)
     for i in range(last + 1):
-        x = high if i == last else low + i / last * (high - low)  # not beyond the end by rounding
+        x = high if i == last else low + i / last * (high - low)  # rounding must not exceed the end
         heights = [_height_at(curve, x) for curve in curves]
         mean.add(x, *((sum(heights) / len(heights), min(heights), max(heights)) if all(map(math.isfinite, heights)) else (None,)))
     return mean
 
 
 def _name_of_group(names: list[str]) -> str:
-    """ "town_*, 3 seeds" of town_a, town_b and town_c."""
+    """Returns "town_*, 3 seeds" for town_a, town_b and town_c."""
     if len(names) == 1:
         return names[0]
     begin = os.path.commonprefix(names)
-    # Beginning and end do not overlap in the shortest name.
+    # Common begin and end must not overlap in the shortest name.
     end = os.path.commonprefix([name[len(begin) :][::-1] for name in names])[::-1]
     return f"{begin}*{end}, {len(names)} seeds"
 
@@ -266,7 +266,7 @@ _UNITS_OF_WHOLE_NAMES = {"episode_return": "sum of rewards", "entropy": "nats", 
 
 
 def _labels_of(column: str) -> tuple[str, str]:
-    """Title and unit of a column: "driving/goals_per_1000_steps" is Goals per 1,000 agent-steps."""
+    """Returns title and unit of a column: "driving/goals_per_1000_steps" is Goals per 1,000 agent-steps."""
     title = column.split("/")[-1]
     suffix = next((suffix for suffix in _UNITS if title.endswith(suffix)), "")
     unit = _UNITS.get(suffix, "")
@@ -277,13 +277,13 @@ def _labels_of(column: str) -> tuple[str, str]:
 
 
 def run_curves(runs: Sequence[str], metrics: Sequence[str] = METRICS, x: str = "agent_steps", group: str = "seeds") -> Chart:
-    """Curves of training runs, a panel a metric, a line a run.
+    """Returns curves of training runs, with a panel for each metric and a line for each run.
 
-    runs: folders that `pictura train` wrote. metrics: columns of progress.csv, or what follows their slash where only one
-    column has it. x: "agent_steps", or "hours" of collecting and improving. group: "seeds" makes one line of runs whose
-    config.toml differ in run.seed alone, their mean over the stretch that all of them cover with a band from the lowest to the
-    highest; "none" draws a line each. A line has MAX_RUN_POINTS points at most, means of as many consecutive updates each.
-    Raises PlotError naming the folder, file or column that is missing, or runs that have no stretch in common.
+    runs: folders that `pictura train` wrote. metrics: columns of progress.csv, or the part after the slash if only one column
+    has it. x: "agent_steps", or "hours" of rollouts and updates. group: "seeds" draws one line for runs whose config.toml
+    differ only in run.seed: their mean over the stretch that all of them cover, with a band from the lowest to the highest;
+    "none" draws a line for each run. A line has at most MAX_RUN_POINTS points, each the mean of equally many consecutive
+    updates. Raises PlotError naming a missing folder, file or column, or runs that have no stretch in common.
     """
     _need(runs and metrics, "run_curves: expected a run and a metric or more")
     read: list[_Run] = []
@@ -295,7 +295,7 @@ def run_curves(runs: Sequence[str], metrics: Sequence[str] = METRICS, x: str = "
     if len(set(names)) < len(names):
         names = [run.folder for run in read]
 
-    members: list[list[int]] = []  # of each line, by run
+    members: list[list[int]] = []  # of each line: indices of its runs
     for i, run in enumerate(read):
         same = next((lines for lines in members if read[lines[0]].settings == run.settings), None)
         if same is None:
@@ -340,7 +340,7 @@ def _columns_for(num_panels: int) -> int:
 # ---- evaluations
 
 
-# Key, title and label; as the columns of the paper's tables.
+# Key, title and label, in the order of the paper's tables.
 _PROTOCOL = (
     ("at_fault_collision_rate", "At-fault collision", "share of vehicles"),
     ("off_road_rate", "Off-road", "share of vehicles"),
@@ -349,15 +349,15 @@ _PROTOCOL = (
     ("km_per_infraction", "Distance per infraction", "distance (km)"),
     ("km_per_at_fault_infraction", "Distance per at-fault infraction", "distance (km)"),
 )
-# Without a panel where no row has it.
+# Metrics without a panel if no row has them.
 _OPTIONAL = ("km_per_infraction", "km_per_at_fault_infraction")
 
 
 def _evaluation_series(line: dict[str, Any], metric: str, x: str) -> Series:
-    """A metric at medium density, in a band from the lowest to the highest of all densities."""
+    """Returns a metric at medium density, with a band from the lowest to the highest of all densities."""
     series = Series(line["name"], dashed=bool(line.get("dashed", False)))
     for point in line["points"]:
-        # None where there is nothing to divide by.
+        # The value is None if its divisor is 0.
         given = {row["density"]: row.get(metric) if metric in _OPTIONAL else row[metric] for row in point["rows"]}
         known = [value for value in given.values() if value is not None] or [None]
         series.add(point["gpu_hours" if x == "hours" else "agent_steps"], given["medium"], min(known), max(known))
@@ -365,9 +365,9 @@ def _evaluation_series(line: dict[str, Any], metric: str, x: str) -> Series:
 
 
 def evaluation_curves(path: str, x: str = "agent_steps") -> Chart:
-    """Metrics of the evaluation protocol along trainings: medium traffic in a band of all densities.
+    """Returns metrics of the evaluation protocol during trainings: medium traffic, with a band over all densities.
 
-    path: what `scripts/reproduce_table --curves` writes. x: "agent_steps", or "hours" of one GPU. Raises PlotError naming the
+    path: output of `scripts/reproduce_table --curves`. x: "agent_steps", or "hours" of one GPU. Raises PlotError naming the
     file, the line and what is missing.
     """
     x_label = "time on one GPU (h)" if x == "hours" else "agent-steps"
@@ -400,9 +400,9 @@ def evaluation_curves(path: str, x: str = "agent_steps") -> Chart:
 
 
 def severity_curves(results: Sequence[str]) -> Chart:
-    """Metrics of the evaluation protocol by the severity of randomized cameras, each in its 95 % interval.
+    """Returns metrics of the evaluation protocol by the severity of randomized cameras, with 95 % intervals.
 
-    results: what `pictura evaluate --camera-severity ... --json` printed: a line for each file and density. Raises PlotError
+    results: outputs of `pictura evaluate --camera-severity ... --json`; each file and density is a line. Raises PlotError
     naming the file and what is missing.
     """
     panels = {metric: Panel(title, "severity", y_label, starts_at_zero=True) for metric, title, y_label in _PROTOCOL}
@@ -432,7 +432,8 @@ _RATE, _SIZE = "agent-steps/s", "width of a 16:9 image (px)"
 
 
 def _read_results(paths: Sequence[str]) -> list[tuple[str, float]]:
-    """Names and values of results: of what `pictura bench --json` printed, and of files of scripts/gpu_check, which hold several."""
+    """Returns names and values of results: outputs of `pictura bench --json`, and files of scripts/gpu_check, which hold
+    several."""
     results: list[tuple[str, float]] = []
     for path in paths:
         content, before = _read_json(path), len(results)
@@ -449,7 +450,7 @@ def _sweep(title: str, x_label: str, y_label: str) -> Panel:
 
 
 def _add_point(panel: Panel, name: str, x: float, y: float) -> None:
-    """Adds a point to the series of that name; points ascend in x, and of several with one x the first is kept."""
+    """Adds a point to the series of that name. Points ascend in x; of several points with the same x the first is kept."""
     series = next((series for series in panel.series if series.name == name), None)
     if series is None:
         series = Series(name)
@@ -462,7 +463,7 @@ def _add_point(panel: Panel, name: str, x: float, y: float) -> None:
 
 
 def render_rates(results: Sequence[str]) -> Chart:
-    """Rates of rendering by size and number of egos, of the sweeps of `pictura bench render`."""
+    """Returns rendering rates by size and number of egos, from the sweeps of `pictura bench render`."""
     egos_fixed, size_fixed = 2048, "96x54"
     by_size = _sweep(f"{egos_fixed:,} egos", _SIZE, _RATE)
     by_egos = _sweep(f"{size_fixed.replace('x', '×')} px", "egos in one call", _RATE)
@@ -480,7 +481,7 @@ def render_rates(results: Sequence[str]) -> Chart:
 
 
 def step_costs(results: Sequence[str]) -> Chart:
-    """What an agent-step costs by agents and worlds, of the sweeps of `pictura bench simulate`."""
+    """Returns the cost of an agent-step by agents and worlds, from the sweeps of `pictura bench simulate`."""
     worlds_fixed, agents_fixed, cost = 64, 60, "time for an agent-step (ns)"
     by_agents = _sweep(f"{worlds_fixed} worlds", "agents in each world", cost)
     by_worlds = _sweep(f"{agents_fixed} agents in each world", "worlds", cost)
@@ -497,7 +498,8 @@ def step_costs(results: Sequence[str]) -> Chart:
 
 
 def rank_rates(results: Sequence[str]) -> Chart:
-    """Rates and efficiencies over GPUs, of files of scripts/gpu_ranks: with the agents of each GPU fixed, and those of all."""
+    """Returns rates and efficiencies by number of GPUs, from files of scripts/gpu_ranks: with a fixed number of agents on each
+    GPU, and with a fixed number in all."""
     cases = {"each": "The same number of agents on each GPU", "in_all": "The same number of agents in all"}
     rates = {case: _sweep(title, "GPUs", _RATE) for case, title in cases.items()}
     efficiencies = {
@@ -524,10 +526,10 @@ def rank_rates(results: Sequence[str]) -> Chart:
 
 
 def breakdown_parts(results: Sequence[str], parts: Sequence[str], paper: dict[str, dict[str, float]]) -> Chart:
-    """Seconds of an update by size, of `pictura bench breakdown`, beside the paper's.
+    """Returns the seconds of an update by size, from `pictura bench breakdown`, beside the paper's.
 
-    parts: the columns of the table, of which the third panel shows those of the first case. paper: the paper's seconds by size,
-    of "total" and of "rendering".
+    parts: columns of the table; the third panel shows those of the first case. paper: the paper's seconds by size, of "total"
+    and of "rendering".
     """
     seconds = "time of an update (s)"
     shown = {"total": _sweep("Whole update", _SIZE, seconds), "rendering": _sweep("Rendering", _SIZE, seconds)}
@@ -558,7 +560,7 @@ _SEEN = "strip: share that is seen, none (red) to all (blue)"
 
 
 def _share_color(share: float) -> str:
-    """Between SHARE_COLORS, linearly."""
+    """Interpolates linearly between SHARE_COLORS."""
     place = min(max(share, 0.0), 1.0) * (len(SHARE_COLORS) - 1)
     below = min(int(place), len(SHARE_COLORS) - 2)
     channels = [[int(color[i : i + 2], 16) for i in (1, 3, 5)] for color in SHARE_COLORS[below : below + 2]]
@@ -566,7 +568,7 @@ def _share_color(share: float) -> str:
 
 
 def _names_of(summary: dict[str, Any]) -> dict[str, str]:
-    """How charts call the policies, by their names in rows: fresh weights answer in the place of some."""
+    """Returns the policies' names in charts by their names in rows: untrained weights respond in place of some policies."""
     return {one["name"]: ("untrained " if one.get("untrained_hash") else "") + one["name"] for one in summary["policy"]}
 
 
@@ -583,7 +585,7 @@ def _removal_means(summary: dict[str, Any]) -> Chart:
                     x = 100 * row["occlusion_mean"]
                 else:
                     continue
-                # No mean of magnitudes is below 0.
+                # Means of magnitudes are never below 0.
                 lines[row["policy"]].add_estimate(x, row[f"abs_{change}"], row[f"abs_{change}_half_width_95"], least=0.0)
             panels.append(
                 Panel(
@@ -602,7 +604,7 @@ def _pedestrian_means(summary: dict[str, Any]) -> Chart:
         lines = {name: Series(shown) for name, shown in _names_of(summary).items()}
         panel = Panel(title, f"distance from where it is first seen (m)\n{_SEEN}", f"mean {label}", list(lines.values()))
         for row in summary["rows"]:
-            # Where most paths have a point: the ends are of few.
+            # Only points that most paths have: the ends belong to few paths.
             if row["from_first_sight_m"] is None or 2 * row["cases"] < summary["paths"]:
                 continue
             lines[row["policy"]].add_estimate(row["from_first_sight_m"], row[change], row[f"{change}_half_width_95"])
@@ -617,7 +619,7 @@ def _with_walls(title: str, walls: bool) -> str:
 
 
 def _reveal_strip(rows: list[dict[str, Any]], num_steps: int) -> list[tuple[float, str]]:
-    """Dark from the first policy's 10th percentile of reveals to the last one's 90th."""
+    """Returns a strip that is dark from the first policy's 10th percentile of reveals to the last policy's 90th."""
     quantiles_s = [(row["reveal_s_p10"], row["reveal_s_p90"]) for row in rows if row["reveal_s_p10"] is not None]
     if not quantiles_s:
         return []
@@ -650,10 +652,10 @@ _PROBES = {"removal": _removal_means, "pedestrian": _pedestrian_means, "corner":
 
 
 def probe_means(summary: str) -> Chart:
-    """The means of a probe with their 95 % intervals, as the paper's figures: summary.json of `pictura probe`.
+    """Returns the means of a probe with their 95 % intervals, like the paper's figures, from summary.json of `pictura probe`.
 
-    Of removal: absolute changes over how occluded the user was, and of wholly hidden users over distance. Of pedestrian: changes
-    from where the pedestrian is first seen, with how much of it is seen as a strip. Of corner: mean speeds since the takeover.
+    For removal: absolute changes by occlusion of the user, and for wholly hidden users by distance. For pedestrian: changes
+    relative to where the pedestrian is first seen, with its visibility as a strip. For corner: mean speeds since the takeover.
     """
     content = _read_json(summary)
     kind = content.get("kind") if isinstance(content, dict) else None
@@ -665,15 +667,15 @@ def probe_means(summary: str) -> Chart:
 
 
 def _read_cases(file_name: str, /, **wanted: str) -> list[dict[str, str]]:
-    """The rows of cases.csv that have these values."""
+    """Returns the rows of cases.csv that have these values."""
     with open(file_name, encoding="utf-8", newline="") as file:
         return [row for row in csv.DictReader(file) if all(row[name] == value for name, value in wanted.items())]
 
 
 def path_curves(folder: str, path: int, marks: Sequence[tuple[float, str]] = ()) -> Chart:
-    """The changes of value and braking along one path of `pictura probe pedestrian`, with how much is seen as a strip.
+    """Returns the changes of value and braking along one path of `pictura probe pedestrian`, with the visibility as a strip.
 
-    marks: places along the path in m, and their letters.
+    marks: positions along the path in m, and their letters.
     """
     names = _names_of(_read_json(f"{folder}/summary.json"))
     rows = _read_cases(f"{folder}/cases.csv", path=str(path))
@@ -687,7 +689,7 @@ def path_curves(folder: str, path: int, marks: Sequence[tuple[float, str]] = ())
 
 
 def takeover_curves(folder: str, pair: int) -> Chart:
-    """The speeds of one pair of `pictura probe corner` towards the hidden vehicle, with walls and without."""
+    """Returns the speeds of one pair of `pictura probe corner` towards the hidden vehicle, with walls and without."""
     names = _names_of(_read_json(f"{folder}/summary.json"))
     panels = []
     for walls in ("on", "off"):
@@ -712,9 +714,9 @@ def takeover_curves(folder: str, pair: int) -> Chart:
 # ---- drawing
 
 _DPI = 150
-_PAGE_DPI = 100  # text as large as in the pictures above
+_PAGE_DPI = 100  # text size as in the pictures above
 _STYLE = {
-    "font.family": "DejaVu Sans",  # which comes with Matplotlib
+    "font.family": "DejaVu Sans",  # font that comes with Matplotlib
     "font.size": 9.5,
     "text.color": "#22262B",
     "axes.titlesize": 10.5,
@@ -751,16 +753,16 @@ def _matplotlib(what: str) -> Any:
 
 
 def _tick_text(value: float, _position: int = 0) -> str:
-    """ "1.5G", "20k", "0.02"."""
+    """Returns a tick's text: "1.5G", "20k", "0.02"."""
     for unit, suffix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
-        # 8192 and 1024 are clearer in full.
+        # 8192 and 1024 are clearer when written in full.
         if abs(value) >= unit * (10 if suffix == "k" else 1) * (1 - 1e-9) and (suffix != "k" or value % 1000 == 0):
             return f"{value / unit:g}{suffix}".replace("-", "\N{MINUS SIGN}")
     return f"{value:g}".replace("-", "\N{MINUS SIGN}")
 
 
 def _apart(values: Iterable[float]) -> list[float]:
-    """As many of these values, in ascending order, as have room for their numbers on a logarithmic axis."""
+    """Returns as many of these values, in ascending order, as have room for their labels on a logarithmic axis."""
     ascending, kept = sorted(values), []
     for value in ascending:
         if not kept or math.log(value / kept[-1]) > math.log(ascending[-1] / ascending[0]) / 8:
@@ -792,7 +794,7 @@ def _set_scale(axes: Axes, panel: Panel) -> None:
 
 
 def _lone_points(series: Series) -> list[int]:
-    """Points between gaps, which no line shows."""
+    """Returns the points between gaps, which a line does not show."""
     shown = [False, *(math.isfinite(x) and math.isfinite(y) for x, y in zip(series.x, series.y, strict=True)), False]
     return [i for i in range(len(series.x)) if shown[i + 1] and not shown[i] and not shown[i + 2]]
 
@@ -866,14 +868,15 @@ def figure(chart: Chart, width_in: float | None = None) -> Figure:
 
 
 def _write(path: str, content: bytes) -> None:
-    """Writes a file beside its target and renames it: no reader sees half of it. What is no regular file is written through."""
+    """Writes a temporary file and renames it, so that no reader sees a partial file. Targets that are no regular files are
+    written directly."""
     if path.startswith(("/dev/", "/proc/")) or (os.path.exists(path) and not os.path.isfile(path)):
         pathlib.Path(path).write_bytes(content)
         return
     target = os.path.realpath(path)
     if os.path.exists(target) and not os.access(target, os.W_OK):
         raise PermissionError(errno.EACCES, "is read-only", path)
-    # Named as temporary files of the command are, which its next call removes where this one was killed.
+    # Named like temporary files of the command, whose next call removes them if this call was killed.
     temporary = os.path.join(os.path.dirname(target), f".pictura-{secrets.token_hex(8)}.tmp")
     try:
         with open(temporary, "xb") as file:
@@ -889,14 +892,14 @@ def _write(path: str, content: bytes) -> None:
 
 
 def save(chart: Chart, path: str) -> None:
-    """Draws a chart into a file: vector graphics where its name ends in .svg, else a PNG.
+    """Draws a chart into a file: vector graphics if its name ends in .svg, else a PNG.
 
     Without Matplotlib it writes the chart's panels to `path` and ".json", and raises MissingMatplotlib. Raises OSError.
     """
     try:
         matplotlib = _matplotlib(path)
     except MissingMatplotlib as missing:
-        # NaN is no JSON.
+        # NaN is not valid JSON.
         panels = json.loads(json.dumps([asdict(panel) for panel in chart.panels]), parse_constant=lambda _: None)
         _write(f"{path}.json", (json.dumps({"panels": panels}, indent=1) + "\n").encode())
         raise MissingMatplotlib(f"{missing}; its data is in {path}.json") from None
@@ -908,7 +911,7 @@ def save(chart: Chart, path: str) -> None:
 
 
 def append_to(picture: str, chart: Chart) -> None:
-    """Draws a chart below a PNG picture, as wide as this. Raises MissingMatplotlib."""
+    """Draws a chart below a PNG picture, with the picture's width. Raises MissingMatplotlib."""
     _matplotlib(picture)
     import numpy as np
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -930,9 +933,9 @@ def append_to(picture: str, chart: Chart) -> None:
 
 
 def probe_charts(folder: str, pages: Sequence[dict[str, Any]] = ()) -> None:
-    """Draws what belongs to a folder of `pictura probe`: KIND.png of its means, and curves below its pictures.
+    """Draws the charts of a folder of `pictura probe`: KIND.png with its means, and curves below its pictures.
 
-    pages: of each picture its file ("picture"), and the arguments of path_curves() or takeover_curves().
+    pages: for each picture its file ("picture"), and the arguments of path_curves() or takeover_curves().
     """
     summary = f"{folder}/summary.json"
     kind = _read_json(summary)["kind"]
@@ -947,7 +950,7 @@ CHARTS = {chart.__name__: chart for chart in (run_curves, evaluation_curves, sev
 
 
 def _answer(request: dict[str, Any]) -> None:
-    """Draws what a request asks for. Its "report" is "json" or "text", for what is printed, or is not there."""
+    """Draws the chart of a request. "report" in the request selects what is printed: "json", "text", or nothing if absent."""
     name, report = request.pop("chart", None), request.pop("report", None)
     if name == "probe_charts":
         return probe_charts(**request)
@@ -964,7 +967,7 @@ def _answer(request: dict[str, Any]) -> None:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Answers a request, the only argument. Returns the exit status."""
+    """Executes the request in the only argument. Returns the exit status."""
     if sys.version_info < (3, 11):
         print(f"error: charts: {sys.executable} is Python {sys.version.split()[0]}: expected 3.11 or later", file=sys.stderr)
         return 3

@@ -1,15 +1,16 @@
-"""Arguments of Simulator.observe(): who is asked, who is hidden, who comes in."""
+"""Arguments of Simulator.observe(): queried slots, hidden boxes, and inserted boxes."""
 
 import numpy as np
 from pictura._pictura import INSERTED_DTYPE, QUERY_DTYPE, Error
 
 
 def make_queries(slots, *, hidden=None, inserted=None, leaves_gaps=False):
-    """Queries for Simulator.observe(), on the CPU, as the tuple (queries, hidden, inserted) of NumPy arrays.
+    """Returns queries for Simulator.observe(), on the CPU, as the tuple (queries, hidden, inserted) of NumPy arrays.
 
-    slots: [n] of int. hidden: who is left out for each, n lists of indices into the scene's boxes, or (indices, begin) with the
-    indices of query i from begin[i] up to begin[i + 1]. inserted: who comes in, likewise, of INSERTED_DTYPE. leaves_gaps: bool,
-    or [n] of bool: whether rows of zeros stay where the hidden ones were. Raises pictura.Error naming what does not fit.
+    slots: [n] of int. hidden: boxes that each query leaves out, as n lists of indices into the scene's boxes, or as (indices,
+    begin) with the indices of query i from begin[i] up to begin[i + 1]. inserted: boxes that each query adds, likewise, of
+    INSERTED_DTYPE. leaves_gaps: bool, or [n] of bool: whether rows of zeros replace hidden boxes. Raises pictura.Error naming
+    the argument that does not fit.
     """
     queries = np.zeros(len(slots), QUERY_DTYPE)
     queries["slot"] = slots
@@ -20,7 +21,7 @@ def make_queries(slots, *, hidden=None, inserted=None, leaves_gaps=False):
 
 
 def _flat(lists, count: int, dtype: np.dtype, name: str):
-    """One list after the other, and where each begins and ends."""
+    """Concatenates lists. Returns the result, and the begin and end of each list."""
     if lists is None:
         return np.zeros(0, dtype), 0, 0
     if isinstance(lists, tuple):

@@ -28,8 +28,8 @@ _STATUS_HALTED, _STATUS_ABSENT = 1, 3
 
 
 def log_map(road: pictura.Map, entity: str = "world/map", recording: Any = None) -> None:
-    """Marks, edges, stop lines, crosswalks and building lines of a map, once for all times. recording: rerun's; the current one
-    without it."""
+    """Logs marks, edges, stop lines, crosswalks and building lines of a map, once for all times. recording: a rerun recording;
+    default: the current one."""
     arrays = road.arrays()
 
     def log(name: str, strips: list[np.ndarray], color: tuple[int, int, int]) -> None:
@@ -46,8 +46,9 @@ def log_map(road: pictura.Map, entity: str = "world/map", recording: Any = None)
 
 
 def log_world(simulator: pictura.Simulator, time_s: float, world: int = 0, entity: str = "world", recording: Any = None) -> None:
-    """The agents of a world of a simulator on the CPU as it is now, as boxes with their speed as an arrow; halted ones are grey. Time
-    is rerun's timeline "simulated", in seconds. Raises pictura.UsageError for a simulator on a device or a world that there is not."""
+    """Logs the agents of a world of a simulator on the CPU in their present state, as boxes with arrows for their speed; halted
+    agents are grey. Time is rerun's timeline "simulated", in seconds. Raises pictura.UsageError for a simulator on a device or
+    a world that does not exist."""
     if simulator.device != "cpu" or not 0 <= world < simulator.num_worlds:
         raise pictura.UsageError(
             f"log_world: expected a world of 0 to {simulator.num_worlds - 1} on cpu, got {world} on {simulator.device}"
@@ -56,7 +57,7 @@ def log_world(simulator: pictura.Simulator, time_s: float, world: int = 0, entit
     slots = np.flatnonzero((simulator.world_of_slot.numpy() == world) & (state["status"] != _STATUS_ABSENT))
     heading = state["heading_rad"][slots]
     size = np.stack([state[f"{name}_m"][slots] for name in ("length", "width", "height")], axis=1)
-    # A state's position is the rear axle's: the boxes of the scene say where bodies are.
+    # A state's position is that of the rear axle; the scene's boxes have the positions of bodies.
     boxes = np.asarray(simulator.scene.boxes).view(pictura.BOX_DTYPE)[:, 0]
     views = np.asarray(simulator.views).view(pictura.VIEW_DTYPE)[:, 0]
     center = boxes["center_m"][views["ego_agent"][slots]]
@@ -77,7 +78,8 @@ def log_world(simulator: pictura.Simulator, time_s: float, world: int = 0, entit
 
 
 def log_images(images: pictura.Images, view: int, rig: pictura.Rig, entity: str = "cameras", recording: Any = None) -> None:
-    """What the cameras of one view show, each under its name. images: uint8 or of 0 to 1, on the CPU, of a rig of one size."""
+    """Logs the images of one view's cameras, each under the camera's name. images: uint8 or from 0 to 1, on the CPU, of a rig
+    of one size."""
     for pixels, camera in zip(images.rgb.numpy()[view], rig.cameras, strict=True):
         rows = np.moveaxis(pixels, 0, -1)
         if rows.dtype != np.uint8:

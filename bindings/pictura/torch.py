@@ -1,4 +1,4 @@
-"""Policies of the library as torch modules. docs/explanation/network.md states the arithmetic.
+"""Policies of the library as torch modules. docs/explanation/network.md defines the arithmetic.
 
 load_policy() reads the weights that training writes (policy.safetensors) or a checkpoint; save_policy() writes them back, so
 that weights trained in Python run in the `pictura` command; export_onnx() writes a policy for ONNX Runtime and others.
@@ -27,12 +27,12 @@ from torch.nn import functional
 import pictura
 from pictura._pictura import _hash64, _removed_keys
 
-_SCALE_POSITION_M = 120.0  # of x and y in observations
+_SCALE_POSITION_M = 120.0  # scale of x and y in observations
 _NUM_ACTIONS = 12
-# The entity sets, as the columns of set_counts: numbers of a row and points that it begins with.
+# Entity sets in the order of set_counts' columns: columns of a row, and number of points at its begin.
 _SETS = {"partners": (8, 1), "lanes": (7, 1), "boundaries": (7, 1), "controls": (7, 2), "walls": (7, 1)}
-_SEGMENTS = {"lanes", "boundaries", "walls"}  # the sets of them
-_ONNX_OPSET = 20  # the first with Gelu
+_SEGMENTS = {"lanes", "boundaries", "walls"}  # sets of segments
+_ONNX_OPSET = 20  # first opset with Gelu
 _MAGIC = b"PICTCKPT"
 _PREAMBLE = "<8sIIQ"
 
@@ -43,14 +43,14 @@ def _near_and_far(pairs_m: Tensor) -> Tensor:
 
 
 def point_features(rows: Tensor, points: int) -> Tensor:
-    """Features [..., 6 points] of the first `points` pairs of rows [..., n], which tell points near the agent apart."""
+    """Features [..., 6 points] of the first `points` pairs of rows [..., n], which resolve points near the agent."""
     xy_m = (rows[..., : 2 * points] * _SCALE_POSITION_M).unflatten(-1, (points, 2))
     return torch.cat([_near_and_far(xy_m), xy_m / (xy_m.norm(dim=-1, keepdim=True) + 1.0)], -1).flatten(-2)
 
 
 def segment_features(rows: Tensor) -> Tensor:
-    """Features [..., 4] of the agent's place beside the segments of rows [..., 7]: along them and to their left."""
-    x_m, y_m = (rows[..., :2] * -_SCALE_POSITION_M).unbind(-1)  # of the agent from the middle
+    """Features [..., 4] of the agent's position relative to the segments of rows [..., 7]: along them and to their left."""
+    x_m, y_m = (rows[..., :2] * -_SCALE_POSITION_M).unbind(-1)  # agent relative to the middle
     cos, sin = rows[..., 4:6].unbind(-1)
     return _near_and_far(torch.stack([x_m * cos + y_m * sin, cos * y_m - sin * x_m], -1))
 
@@ -60,7 +60,7 @@ def _normalize(x: Tensor) -> Tensor:
 
 
 def _refuse_removed(config: Mapping[str, Any]) -> None:
-    """Raises pictura.UsageError where the `policy` table holds a key that is no more with another value than its one."""
+    """Raises pictura.UsageError if the `policy` table holds a removed key with a value other than its only valid one."""
     for key, value, reason in _removed_keys():
         name = key.removeprefix("policy.")
         if name in config and json.dumps(config[name]) != value:
@@ -68,7 +68,7 @@ def _refuse_removed(config: Mapping[str, Any]) -> None:
 
 
 def _as_tensors(array: Any, device: torch.device) -> Any:
-    """A tensor of a tensor or of NumPy's array, or a list of such."""
+    """Converts a tensor, a NumPy array, or a list of these to tensors."""
     return [_as_tensors(each, device) for each in array] if isinstance(array, list) else torch.as_tensor(array, device=device)
 
 
@@ -83,9 +83,9 @@ class _Encoder(nn.Module):
 
 
 class _Attention(nn.Module):
-    """Learned queries of each camera, which ask the tokens of its feature map.
+    """Learned queries of each camera, which attend to the tokens of its feature map.
 
-    Queries are the same for all images, so they ask tokens and not keys, q (W t) = (q W) t, and values are made of weighted
+    Queries are equal for all images, so scores are computed directly from tokens, q (W t) = (q W) t, and values from weighted
     sums of tokens (docs/explanation/network.md): neither keys nor values are computed for each token.
     """
 
@@ -101,7 +101,7 @@ class _Attention(nn.Module):
             self.mlp_norm, self.mlp_hidden, self.mlp_out = nn.LayerNorm(width), nn.Linear(width, mlp), nn.Linear(mlp, width)
 
     def forward(self, maps: Tensor, first: int) -> Tensor:
-        """maps [cameras, batch, width, rows, columns] of cameras from number `first` on; returns [cameras, batch, width]."""
+        """Returns [cameras, batch, width] for maps [cameras, batch, width, rows, columns] of cameras from number `first` on."""
         cameras, rows, columns = maps.shape[0], *maps.shape[-2:]
         y = (torch.arange(rows, device=maps.device) + 0.5) * (math.pi / rows)
         x = (torch.arange(columns, device=maps.device) + 0.5) * (math.pi / columns)
@@ -123,15 +123,15 @@ class _Attention(nn.Module):
 
 
 class Policy(nn.Module):
-    """A policy of either modality: forward(observation) gives logits [batch, 12] and values [batch].
+    """Policy of either modality: forward(observation) returns logits [batch, 12] and values [batch].
 
     observation: float32 tensors by the names of pictura.Simulator.observations, [batch, ...] on the module's device: `ego`,
-    `conditioning` and `waypoints`; for the vector policy the entity sets and `set_counts`; for the perspective one `rgb` uint8
-    [batch, cameras, 3, height, width], or a list of such for cameras of several sizes in the order of the rig.
-    Arrays that are NumPy's become tensors first. config: the `policy` table of a configuration (docs/reference/configuration.md). walls: of
-    the vector policy, whether it reads them. metadata: of a policy that load_policy() read, what its file says beside the weights:
-    `path`, `config` (the whole configuration of its training), `schema`, `rig`, `update` and `agent_steps` among others; else empty.
-    Raises pictura.UsageError where an observation is not what the policy was trained to read.
+    `conditioning` and `waypoints`; for the vector policy the entity sets and `set_counts`; for the perspective policy `rgb`
+    uint8 [batch, cameras, 3, height, width], or a list of these for cameras of several sizes in the order of the rig. NumPy
+    arrays are converted to tensors. config: the `policy` table of a configuration (docs/reference/configuration.md). walls:
+    whether a vector policy reads walls. metadata: contents of the file of a policy that load_policy() read, besides the
+    weights: `path`, `config` (the whole configuration of its training), `schema`, `rig`, `update` and `agent_steps` among
+    others; else empty. Raises pictura.UsageError if an observation differs from those of the policy's training.
     """
 
     def __init__(self, config: Mapping[str, Any], num_cameras: int = 4, walls: bool = False) -> None:
@@ -186,7 +186,7 @@ class Policy(nn.Module):
         return self.actor(x), self.critic(x).squeeze(1)
 
     def act(self, observation: Mapping[str, Any], argmax: bool = True) -> Tensor:
-        """Actions int32 [batch], which pictura.Simulator.step takes; without gradients."""
+        """Returns actions int32 [batch] for pictura.Simulator.step, without gradients."""
         with torch.no_grad():
             logits = self(observation)[0]
             chosen = logits.argmax(1) if argmax else torch.distributions.Categorical(logits=logits).sample()
@@ -194,12 +194,12 @@ class Policy(nn.Module):
 
     @property
     def observation_names(self) -> list[str]:
-        """The arrays of an observation that this policy reads."""
+        """Names of the observation arrays that this policy reads."""
         read = ["rgb"] if self.modality == "perspective" else ["set_counts", *self.sets]
         return ["ego", "conditioning", "waypoints", *read]
 
     def _read(self, observation: Mapping[str, Any]) -> dict[str, Any]:
-        """The arrays that this policy reads, as tensors on its device."""
+        """Returns the arrays that this policy reads, as tensors on its device."""
         names = self.observation_names
         if not isinstance(observation, Mapping):
             raise pictura.UsageError(f"observation: expected a dict with {', '.join(names)}, got {type(observation).__name__}")
@@ -255,24 +255,25 @@ class Policy(nn.Module):
         return self.project(torch.cat(embedded, 1))
 
     def _maps(self, pixels: Tensor) -> Tensor:
-        """Feature maps [cameras, batch, width, rows, columns] of pixels uint8 [batch, cameras, 3, height, width]: the cameras share
-        the convolutions, so they are one batch of them."""
+        """Returns feature maps [cameras, batch, width, rows, columns] of pixels uint8 [batch, cameras, 3, height, width]. The
+        cameras share the convolutions, so they form one batch."""
         patch, x = self.patch_px, pixels.transpose(0, 1)
         right, below = -x.shape[4] % patch, -x.shape[3] % patch
         if right or below:
             x = functional.pad(x, (0, right, 0, below))
         x = x.flatten(0, 1)
-        # Patches are taken of bytes. Channels come last on CUDA, where tensor cores read them so; a CPU is slower then.
+        # Patches are taken before the conversion from bytes. Channels are last on CUDA, as tensor cores read them; on a CPU
+        # this would be slower.
         layout = torch.channels_last if x.is_cuda else torch.contiguous_format
         x = functional.pixel_unshuffle(x, patch).to(self.actor.weight.dtype, memory_format=layout)
         for i, layer in enumerate(self.conv):
-            # Pixels are 0 to 255: the first weight is divided instead of them.
+            # Pixels are 0 to 255; the first weight is divided instead of the pixels.
             weight = layer.weight / 255.0 if i == 0 else layer.weight
             x = functional.gelu(functional.conv2d(x, weight, layer.bias, layer.stride, layer.padding))
         return x.unflatten(0, (pixels.shape[1], -1))
 
 
-_TYPES = {"F32": torch.float32, "BF16": torch.bfloat16, "I64": torch.int64}  # of safetensors
+_TYPES = {"F32": torch.float32, "BF16": torch.bfloat16, "I64": torch.int64}  # types of safetensors
 _NO_HASH = b"0" * 16
 
 
@@ -306,7 +307,7 @@ def _read_safetensors(path: str) -> tuple[dict[str, Any], dict[str, Tensor]]:
 
 
 def _read_checkpoint(path: str) -> tuple[dict[str, Any], bytearray, int]:
-    """Header, the whole file, and where its data begin."""
+    """Returns the header, the whole file, and the offset of its data."""
     data = bytearray(pathlib.Path(path).read_bytes())
     size = struct.calcsize(_PREAMBLE)
     if len(data) < size + 8 or data[:8] != _MAGIC:
@@ -327,7 +328,7 @@ def _policy_of(config_toml: str, tensors: dict[str, Tensor], metadata: Mapping[s
     except (tomllib.TOMLDecodeError, KeyError) as error:
         raise pictura.Error(f"{path}: expected the configuration of its training, with a table 'policy': {error}") from error
     queries = tensors.get("attention.queries")
-    # Without memory of its own: where the system promises more than there is, a broken file's sizes would fill all of it.
+    # Allocates no memory: if the system overcommits memory, the sizes in a broken file could exhaust it.
     with torch.device("meta"):
         policy = Policy(config, 0 if queries is None else len(queries), "walls.hidden.weight" in tensors)
     weights = {name: tensor.to(torch.float32) if tensor.is_floating_point() else tensor for name, tensor in tensors.items()}
@@ -340,7 +341,7 @@ def _policy_of(config_toml: str, tensors: dict[str, Tensor], metadata: Mapping[s
 
 @contextlib.contextmanager
 def _named(path: str) -> Iterator[None]:
-    """Whatever else the numbers of a broken file raise becomes a pictura.Error that names the file."""
+    """Converts any other error that a broken file causes to a pictura.Error that names the file."""
     try:
         yield
     except (pictura.Error, OSError):
@@ -350,11 +351,11 @@ def _named(path: str) -> Iterator[None]:
 
 
 def load_policy(path: str | os.PathLike[str], average: bool = False) -> Policy:
-    """A policy from policy.safetensors or a checkpoint (.ckpt), in fp32 on the CPU.
+    """Returns the policy of policy.safetensors or a checkpoint (.ckpt), in fp32 on the CPU.
 
-    average: with the average of weights that a checkpoint of a run with train.weight_average holds.
+    average: loads the average of weights that a checkpoint of a run with train.weight_average holds.
 
-    Raises pictura.Error naming what is wrong with the file, pictura.UsageError for a backbone that is a program of its own.
+    Raises pictura.Error naming what is wrong with the file, pictura.UsageError for a backbone that is a separate program.
     """
     path = os.fspath(path)
     with _named(path):
@@ -383,10 +384,10 @@ def _load(path: str, average: bool) -> Policy:
 
 
 def save_policy(policy: Policy, path: str | os.PathLike[str], like: str | os.PathLike[str]) -> None:
-    """Writes a policy's weights in the place of those of `like`, a checkpoint (.ckpt) or safetensors of the same architecture;
-    everything else in the file stays, the type of its numbers too, so that the `pictura` command takes it. The file is written
-    whole or not at all.
-    Raises pictura.Error where the architectures differ.
+    """Writes a policy's weights in place of those of `like`, a checkpoint (.ckpt) or safetensors of the same architecture.
+
+    Everything else in the file remains, including the type of its numbers, so that the `pictura` command accepts it. The file
+    is written completely or not at all. Raises pictura.Error if the architectures differ.
     """
     path, like = os.fspath(path), os.fspath(like)
     weights = {name: value.detach().to("cpu", torch.float32).contiguous() for name, value in policy.state_dict().items()}
@@ -424,7 +425,7 @@ def _write_whole(path: str, data: bytes | bytearray) -> None:
 
 
 class _PolicyOfArrays(nn.Module):
-    """A policy whose arguments are the arrays of an observation, one after the other."""
+    """Policy whose arguments are the arrays of an observation, one after the other."""
 
     def __init__(self, policy: Policy, images: list[str]) -> None:
         super().__init__()
@@ -439,7 +440,7 @@ class _PolicyOfArrays(nn.Module):
 
 
 def _example_observation(policy: Policy) -> dict[str, Tensor]:
-    """Two rows of zeros for each array that a policy reads; images of several sizes as rgb_0, rgb_1, ..."""
+    """Returns two rows of zeros for each array that a policy reads; images of several sizes are rgb_0, rgb_1, ..."""
     types = {"f32": torch.float32, "i32": torch.int32}
     known = {name: (types[kind], (rows, numbers) if rows > 1 else (numbers,)) for name, kind, rows, numbers in pictura.OBSERVATION_ARRAYS}
     example = {name: torch.zeros(2, *known[name][1], dtype=known[name][0]) for name in policy.observation_names if name != "rgb"}
@@ -454,12 +455,13 @@ def _example_observation(policy: Policy) -> dict[str, Tensor]:
 
 
 def export_onnx(policy: Policy, path: str | os.PathLike[str]) -> None:
-    """Writes a policy as an ONNX model of opset 20, by torch's exporter, which needs the packages onnx and onnxscript.
+    """Writes a policy as an ONNX model of opset 20, with torch's exporter, which needs the packages onnx and onnxscript.
 
-    Inputs are the arrays of an observation by their names, as forward() reads them, [batch, ...] of any batch; images of cameras of
-    several sizes are rgb_0, rgb_1, ... Outputs are `logits` float32 [batch, 12] and `value` float32 [batch]. The property `pictura`
-    of the model is JSON of what the policy's file says beside its weights, without the path. The file is written whole or not at all.
-    Raises pictura.Error where a package is missing, pictura.UsageError for a policy of images that is of no file.
+    Inputs are the arrays of an observation by name, as forward() reads them, [batch, ...] of any batch; images of cameras of
+    several sizes are rgb_0, rgb_1, ... Outputs are `logits` float32 [batch, 12] and `value` float32 [batch]. The model's
+    property `pictura` holds the policy file's contents besides its weights, without the path, as JSON. The file is written
+    completely or not at all. Raises pictura.Error if a package is missing, pictura.UsageError for an image policy without a
+    file.
     """
     for package in ("onnx", "onnxscript"):
         if importlib.util.find_spec(package) is None:
@@ -469,7 +471,7 @@ def export_onnx(policy: Policy, path: str | os.PathLike[str]) -> None:
     module = _PolicyOfArrays(copy.deepcopy(policy).cpu(), images).eval()
     batch = torch.export.Dim("batch")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the exporter's, of its own code
+        warnings.simplefilter("ignore")  # warnings about the exporter's own code
         program = torch.onnx.export(
             module,
             tuple(example.values()),

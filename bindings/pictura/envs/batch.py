@@ -1,4 +1,4 @@
-"""What all environments share: a simulator, its renderer, and what each slot observes, is told and has done."""
+"""Common base of all environments: a simulator, its renderer, and observations, actions and results of each slot."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import pictura
 
 OBSERVATIONS = ("vector", "flat", "images", "both")
 ACTIONS = ("discrete", "multi_discrete")
-# Of the vector observation, in the order in which "flat" has them.
+# Arrays of the vector observation, in the order of "flat".
 VECTOR_KEYS = ("ego", "partners", "lanes", "boundaries", "controls", "walls", "conditioning", "waypoints")
 NUM_LONGITUDINAL, NUM_LATERAL = 4, 3
 STATUS_ACTIVE = 0
@@ -25,7 +25,7 @@ RENDER_MODES = ["rgb_array", "human"]
 
 
 def load_maps(maps: str | pictura.Map | Sequence[str | pictura.Map]) -> list[pictura.Map]:
-    """Maps by name or as they are, one or several. Raises pictura.UsageError for none."""
+    """Returns maps from one or several names or pictura.Map. Raises pictura.UsageError for none."""
     if isinstance(maps, (str, pictura.Map)):
         maps = [maps]
     if not isinstance(maps, Sequence) or not maps:
@@ -34,7 +34,7 @@ def load_maps(maps: str | pictura.Map | Sequence[str | pictura.Map]) -> list[pic
 
 
 def refuse_unknown(options: Mapping[str, Any], *makers: Callable[..., Any]) -> None:
-    """Raises pictura.UsageError for an option that neither these functions nor simulators have."""
+    """Raises pictura.UsageError for an option of neither these functions nor simulators."""
     signature = (pictura.Simulator.__init__.__doc__ or "").split("->")[0]
     known = set(re.findall(r"(\w+): ", signature)) - {"worlds"}
     known = known.union(*(inspect.signature(maker).parameters for maker in makers)) - {"self", "options"}
@@ -46,13 +46,13 @@ def refuse_unknown(options: Mapping[str, Any], *makers: Callable[..., Any]) -> N
 
 
 class Batch:
-    """A simulator whose slots are agents to be trained, with images where they are observed.
+    """Simulator whose slots are agents to be trained, with images if they are observed.
 
-    maps: names or pictura.Map, taken in turn by the worlds. num_agents: of each world. observation: "vector" (a dict of
-    entity sets), "flat" (the same as one float32 [slots, n]), "images" (uint8 rgb with ego, conditioning and waypoints), or
+    maps: names or pictura.Map, which the worlds use in turn. num_agents: of each world. observation: "vector" (a dict of entity
+    sets), "flat" (the same numbers as one float32 [slots, n]), "images" (uint8 rgb with ego, conditioning and waypoints), or
     "both". actions: "discrete", 12 of them, or "multi_discrete", [longitudinal 4, lateral 3]. array: "numpy", or "torch" for
-    tensors over the simulator's memory, which is all that a CUDA device has. rig: of the images, the paper's by default.
-    Other options are pictura.Simulator's. Raises pictura.UsageError for what there is not.
+    tensors over the simulator's memory; CUDA devices support "torch" only. rig: of the images; default: the paper's. Other
+    options are those of pictura.Simulator. Raises pictura.UsageError for values that do not exist.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class Batch:
             self._action_memory = np.full(self.num_slots, pictura.IDLE_ACTION, np.int32)
 
     def view(self, lent: pictura.Array) -> Any:
-        """A NumPy array or torch tensor over memory of the library."""
+        """Returns a NumPy array or torch tensor over memory of the library."""
         if self.array == "numpy":
             return lent.numpy()
         return self._torch_of(lent)
@@ -133,8 +133,8 @@ class Batch:
     # Observations
 
     def observe(self, copy: bool = True) -> Any:
-        """What every slot observes now: an array or a dict of arrays [slots, ...]; views of the simulator's memory unless
-        copied, but for "flat", which is made anew."""
+        """Returns the present observation of every slot: an array or a dict of arrays [slots, ...]. They are views of the
+        simulator's memory unless copied, except "flat", which is always a copy."""
         if self.observation == "flat":
             rows = [self._own[key].reshape(self.num_slots, -1) for key in self._flat_keys]
             return np.concatenate(rows, axis=1) if self.array == "numpy" else self._torch.cat(rows, dim=1)
@@ -149,7 +149,7 @@ class Batch:
         return {key: self.copied(value) for key, value in seen.items()} if copy else seen
 
     def shapes(self) -> dict[str, tuple[tuple[int, ...], str]] | tuple[tuple[int, ...], str]:
-        """Of one slot's observation: (shape, NumPy's name of the type), by name or for "flat" alone."""
+        """Returns (shape, NumPy's name of the type) of one slot's observation, by name, or a single pair for "flat"."""
         if self.observation == "flat":
             return (sum(int(np.prod(self._own[key].shape[1:])) for key in self._flat_keys),), "float32"
         keys = self._own if self.observation in ("vector", "both") else ("ego", "conditioning", "waypoints")
@@ -164,8 +164,8 @@ class Batch:
     # Actions
 
     def action_indices(self, actions: Any) -> Any:
-        """Actions as a user has them, as int32 [slots] in [0, 12). Raises pictura.Error for other shapes and for numbers that
-        are not integers."""
+        """Converts a user's actions to int32 [slots] in [0, 12). Raises pictura.Error for other shapes and for numbers that are
+        not integers."""
         library = self._torch if self.array == "torch" else np
         if self.array == "torch":
             if not isinstance(actions, library.Tensor):
@@ -184,9 +184,9 @@ class Batch:
             fits = (longitudinal >= 0) & (longitudinal < NUM_LONGITUDINAL) & (lateral >= 0) & (lateral < NUM_LATERAL)
             if self.array == "numpy" and not fits.all():
                 raise pictura.Error("actions: expected [longitudinal in [0, 4), lateral in [0, 3)]")
-            # On a device the simulator finds the -1, without the host waiting here.
+            # On a device the simulator detects the -1, without making the host wait here.
             actions = library.where(fits, longitudinal * NUM_LATERAL + lateral, -1)
-        elif actions.dtype.itemsize > 4:  # what does not fit must not become what does
+        elif actions.dtype.itemsize > 4:  # values out of range must not wrap into the range
             whole = actions.long() if self.array == "torch" else actions.astype(np.int64, copy=False)
             actions = whole.clip(-(2**31), 2**31 - 1)
         self._action_memory[:] = actions
@@ -195,11 +195,11 @@ class Batch:
     # Steps
 
     def reset(self, seed: int | None = None, world_mask: Any = None) -> None:
-        """New episodes in all worlds, or in those of the mask: of `seed`, or of the simulator's own."""
+        """Starts new episodes in all worlds, or in those of the mask, with `seed`, or with the simulator's own."""
         self.simulator.reset(world_mask, seed)
 
     def step(self, actions: Any) -> dict[str, Any]:
-        """One step; returns its results by name, views that the next step overwrites."""
+        """Takes one step. Returns its results by name, as views that the next step overwrites."""
         result = self.simulator.step(self.action_indices(actions))
         return self.results(result)
 
@@ -211,12 +211,12 @@ class Batch:
 
     @property
     def active(self) -> Any:
-        """bool [slots]: who drives now; the others have halted or are absent, and what they are told is ignored."""
+        """bool [slots]: agents that drive now; the others have halted or are absent, and their actions are ignored."""
         return self._state["status"] == STATUS_ACTIVE
 
     def info(self, copy: bool = True) -> dict[str, Any]:
-        """Of every slot after a step, by name; docs/reference/python.md lists them. Views of the simulator's memory unless copied, but for
-        "active"."""
+        """Returns the infos of every slot after a step, by name; docs/reference/python.md lists them. They are views of the
+        simulator's memory unless copied, except "active"."""
         results = self._result_views
         names = ("events", "halt_reason", "goals_reached", "waypoints_reached", "episode_return", "agent_class")
         info = {name: self._state[name] for name in names}
@@ -226,12 +226,12 @@ class Batch:
         return {"active": self.active} | info
 
     def draw(self, world: int = 0, agent: int = 0, width_px: int = 640, height_px: int = 480) -> np.ndarray:
-        """From above around an agent of a world, uint8 [height, width, 3]; on the CPU."""
+        """Draws the surroundings of an agent of a world from above, uint8 [height, width, 3]; on the CPU."""
         return self.simulator.draw(world, agent, width_px=width_px, height_px=height_px)
 
     def show(self, agent: int = 0) -> None:
-        """Opens a page in the browser that shows the only world from now on, and says where on stderr; steps then take real
-        time. On the CPU."""
+        """Opens a page in the browser that shows the only world from now on, and prints its address on stderr; steps then take
+        real time. On the CPU."""
         if self.live is None:
             rig = self.renderer.rig if self.renderer is not None else None
             self.live = pictura.LiveView(self.simulator, follow=agent, rig=rig, wait_for_page=False)
@@ -239,21 +239,21 @@ class Batch:
             webbrowser.open(self.live.address)
 
     def close(self) -> None:
-        """Ends what show() opened."""
+        """Closes the page that show() opened."""
         if self.live is not None:
             self.live.close()
             self.live = None
 
 
 def checked_render_mode(mode: str | None) -> str | None:
-    """Raises pictura.UsageError for what environments of one world cannot do."""
+    """Raises pictura.UsageError for render modes that environments of one world do not support."""
     if mode not in (None, *RENDER_MODES):
         raise pictura.UsageError(f"render_mode: expected None, {' or '.join(map(repr, RENDER_MODES))}, got {mode!r}")
     return mode
 
 
 class OtherDrivers:
-    """Who drives the agents of a world that a user does not: a controller or its name, or a function of observations.
+    """Drivers of the agents that a user does not drive: a controller or its name, or a function of observations.
 
     A function takes the dict of all slots' observations and returns int32 [slots].
     """
@@ -264,7 +264,7 @@ class OtherDrivers:
         self._controller = pictura.Controller(who, batch.simulator, seed) if isinstance(who, str) else who
 
     def step(self, slot: int, action: int) -> dict[str, Any]:
-        """One step in which the agent of `slot` does `action` and the others do what they do."""
+        """Takes one step in which the agent of `slot` does `action` and the others are driven."""
         batch = self._batch
         if self._policy is not None:
             actions = np.array(self._policy(batch.observe(copy=False)), np.int32)

@@ -1,4 +1,4 @@
-"""Gymnasium's environment of one agent among others: gymnasium.make("pictura/Drive-v0")."""
+"""Gymnasium environment of one agent among others: gymnasium.make("pictura/Drive-v0")."""
 
 from __future__ import annotations
 
@@ -14,12 +14,15 @@ from pictura.envs.gymnasium_spaces import action_space, observation_space
 
 
 class DriveEnv(gymnasium.Env):
-    """One vehicle of a world, whose other agents keep their lanes ("lane"), stand ("idle"), act at random ("random"), or
-    follow a policy, a function from the observations of all slots to actions int32 [slots]. render_mode: "rgb_array", from above,
-    or "human", a live page in the browser.
+    """One vehicle of a world.
 
-    An episode ends when the agent's infraction halts it (terminated) or when its world's does (truncated). Other options are
-    pictura.envs.Batch's; it runs on the CPU, by one thread unless num_threads says otherwise, so that processes can be forked.
+    others: the other agents keep their lanes ("lane"), stand ("idle"), act at random ("random"), or follow a policy, a function
+    from the observations of all slots to actions int32 [slots]. render_mode: "rgb_array", from above, or "human", a live page
+    in the browser.
+
+    An episode ends when the agent's infraction halts it (terminated) or when its world's episode ends (truncated). Other
+    options are those of pictura.envs.Batch. The environment runs on the CPU, in one thread unless num_threads is given, so that
+    processes can be forked.
     """
 
     metadata = {"render_modes": RENDER_MODES, "render_fps": 10}
@@ -69,7 +72,7 @@ class DriveEnv(gymnasium.Env):
         self.batch.close()
 
     def _drivers(self) -> np.ndarray:
-        """Slots that may be the one agent of the episode which begins."""
+        """Returns the slots that may be the agent of the new episode."""
         return np.flatnonzero(self.batch.active & (self.batch._state["agent_class"] == 0))
 
     def _observation(self) -> Any:
@@ -83,11 +86,13 @@ class DriveEnv(gymnasium.Env):
 
 
 class LogEnv(DriveEnv):
-    """One road user of a recorded scene from start_step on: the self-driving car, or the first of `control`, words that
-    pictura.Scenario.mask takes. others: as recorded ("log"), or vehicles by the intelligent driver model along their recorded
-    paths ("idm") or along lanes ("idm_lanes"). scene: a name or a pictura.Scenario, whose world it is; its goal is where its record ends.
+    """One road user of a recorded scene from start_step on.
 
-    Before the first action it is as recorded. Other options are DriveEnv's.
+    control: words that pictura.Scenario.mask takes; their first road user is driven, by default the self-driving car. others:
+    as recorded ("log"), or vehicles by the intelligent driver model along their recorded paths ("idm") or along lanes
+    ("idm_lanes"). scene: a name or a pictura.Scenario, whose world it is. The goal is the end of the road user's recording.
+
+    Before the first action the road user is as recorded. Other options are those of DriveEnv.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Spaces of Gymnasium for a Batch."""
+"""Gymnasium spaces of a Batch."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def _box(shape: tuple[int, ...], dtype: str) -> spaces.Box:
 
 
 def observation_space(batch: Batch) -> spaces.Space:
-    """Of one slot."""
+    """Returns the observation space of one slot."""
     shapes = batch.shapes()
     if isinstance(shapes, dict):
         return spaces.Dict({key: _box(*shape) for key, shape in shapes.items()})
@@ -25,7 +25,7 @@ def observation_space(batch: Batch) -> spaces.Space:
 
 
 def action_space(batch: Batch) -> spaces.Space:
-    """Of one slot: Discrete(12), or MultiDiscrete([4, 3])."""
+    """Returns the action space of one slot: Discrete(12), or MultiDiscrete([4, 3])."""
     if batch.actions == "discrete":
         return spaces.Discrete(NUM_LONGITUDINAL * NUM_LATERAL)
     return spaces.MultiDiscrete([NUM_LONGITUDINAL, NUM_LATERAL])

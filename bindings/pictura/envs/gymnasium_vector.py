@@ -1,4 +1,4 @@
-"""Gymnasium's vector environment of all agents: the "environment" axis is the simulator's slots."""
+"""Gymnasium vector environment of all agents: the "environment" axis is the simulator's slots."""
 
 from __future__ import annotations
 
@@ -19,13 +19,15 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
 
     A slot whose agent has halted reports `terminated` once, then reward 0 and info["active"] false until its world resets:
     agents of a world begin together. On roads that end a slot whose agent leaves reports `truncated` with that agent's last
-    observation, and waits, not active, until another one enters. autoreset "next_step": the step after a world's end begins its next episode; its
-    rewards are 0. "same_step": the step that ends it begins it, and info["final_obs"] and info["final_info"] have, for the
-    slots that ended in that step, what was last seen.
+    observation, and waits, not active, until another agent enters.
 
-    num_envs: how many slots there must be; num_agents times num_worlds otherwise. copy: whether what calls return
-    are copies; without, they are views that the next step overwrites. Other options are pictura.envs.Batch's. On CUDA everything is
-    torch tensors in device memory.
+    autoreset: with "next_step" the step after a world's end begins its next episode; its rewards are 0. With "same_step" the
+    step that ends an episode begins the next, and info["final_obs"] and info["final_info"] hold the last observations and infos
+    of the slots that ended in that step.
+
+    num_envs: the required number of slots; default: num_agents times num_worlds. copy: whether calls return copies; otherwise
+    they return views that the next step overwrites. Other options are those of pictura.envs.Batch. On CUDA all arrays are torch
+    tensors in device memory.
     """
 
     def __init__(
@@ -75,7 +77,7 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
             raise gymnasium.error.ResetNeeded("step: expected reset() before the first step")
         batch = self.batch
         results = batch.step(actions)
-        # The reset of the same step writes them again.
+        # Copied, since the reset in the same step overwrites the results.
         copy = self._copy or self._same_step
         returned = (results[key] for key in ("reward", "terminated", "truncated"))
         reward, terminated, truncated = map(batch.copied, returned) if copy else returned
@@ -91,7 +93,7 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
         return batch.observe(self._copy), reward, terminated, truncated, info
 
     def render(self) -> np.ndarray | None:
-        """The first world from above."""
+        """Draws the first world from above."""
         return None if self.render_mode is None else self.batch.draw(0, 0)
 
     def _next_seed(self) -> int:
@@ -104,9 +106,9 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
 
 
 class AgentStatistics(gymnasium.vector.VectorWrapper):
-    """Counts what the agents do, as the simulator's own totals: `statistics`, a dict of numbers since construction.
+    """Counts the agents' events like the simulator's totals: `statistics`, a dict of numbers since construction.
 
-    Steps of halted agents are not counted. Counts equal pictura.Simulator.totals(); sums do but for rounding.
+    Steps of halted agents are not counted. Counts equal those of pictura.Simulator.totals(); sums equal them up to rounding.
     """
 
     def __init__(self, env: DriveVectorEnv) -> None:
@@ -130,5 +132,6 @@ class AgentStatistics(gymnasium.vector.VectorWrapper):
 
 
 def make_vec(maps: Any = "procedural:3", num_agents: int = 16, **options: Any) -> DriveVectorEnv:
-    """A vector environment of all agents: pictura.make_vec("procedural:3", num_agents=16, num_worlds=64, device="cuda")."""
+    """Returns a vector environment of all agents: pictura.make_vec("procedural:3", num_agents=16, num_worlds=64,
+    device="cuda")."""
     return DriveVectorEnv(maps, num_agents, **options)

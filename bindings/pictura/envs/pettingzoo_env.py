@@ -1,4 +1,4 @@
-"""PettingZoo's ParallelEnv of the agents of one world."""
+"""PettingZoo ParallelEnv of the agents of one world."""
 
 from __future__ import annotations
 
@@ -13,11 +13,13 @@ from pictura.envs.gymnasium_spaces import action_space, observation_space
 
 
 class DriveParallelEnv(ParallelEnv):
-    """agent_0, agent_1, ...: those that found a place and still drive are `agents`. An infraction terminates an agent, the
-    end of the world's episode truncates all that are left, and so does leaving a road that ends. An agent that enters
-    such a road in the place of agent_3 is agent_3_1, the next one agent_3_2; possible_agents has the first ones alone.
-    infos have what pictura.envs.Batch.info() lists; "active" is whether the agent goes on. Options are Batch's; it runs
-    on the CPU.
+    """The agents agent_0, agent_1, ... of one world.
+
+    `agents` are those that found a place and still drive. An infraction terminates an agent; the end of the world's episode
+    truncates all remaining agents, and so does leaving a road that ends. An agent that enters such a road in the place of
+    agent_3 is agent_3_1, the next agent_3_2; possible_agents holds only the first agents. infos hold the entries of
+    pictura.envs.Batch.info(); "active" is whether the agent continues. Options are those of Batch; the environment runs on the
+    CPU.
     """
 
     metadata = {"name": "pictura_drive_v0", "render_modes": RENDER_MODES, "render_fps": 10, "is_parallelizable": True}
@@ -35,7 +37,7 @@ class DriveParallelEnv(ParallelEnv):
         self.batch = Batch(maps, num_agents, 1, num_threads=num_threads, device="cpu", array="numpy", **options)
         self.possible_agents = [f"agent_{i}" for i in range(num_agents)]
         self.agents: list[str] = []
-        # One space object each, so that seeding one does not seed the others.
+        # One space object for each agent, so that seeding one space does not seed the others.
         self.observation_spaces = {agent: observation_space(self.batch) for agent in self.possible_agents}
         self.action_spaces = {agent: action_space(self.batch) for agent in self.possible_agents}
         self._random = np.random.default_rng(options.get("seed", 0))
@@ -92,7 +94,7 @@ class DriveParallelEnv(ParallelEnv):
         return int(agent.split("_")[1])
 
     def _entered(self) -> list[str]:
-        """Agents that entered a road in the last step, in the order of their slots."""
+        """Returns the agents that entered a road in the last step, in the order of their slots."""
         simulator, state = self.batch.simulator, self.batch._state
         step = int(self.batch.view(simulator.episode_step)[0])
         entered = np.flatnonzero(self.batch.active & (state["life"] > 0) & (state["life_step"] == step))

@@ -1,4 +1,4 @@
-"""PufferLib 3's PufferEnv, which needs no PufferLib."""
+"""PufferEnv of PufferLib 3, which also works without PufferLib."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ try:
 except ImportError:
 
     class _Base:  # type: ignore[no-redef]
-        """What PufferEnv does with buffers, for use without PufferLib."""
+        """PufferEnv's treatment of buffers, for use without PufferLib."""
 
         def __init__(self, buf: dict[str, Any] | None = None) -> None:
             space, n = self.single_observation_space, self.num_agents
@@ -31,8 +31,8 @@ except ImportError:
 
 
 class DrivePufferEnv(_Base):
-    """All agents of some worlds, written into the buffers that PufferLib gives. Observations are flat or, with
-    observation="images", one image per camera: PufferLib takes a single Box. `masks` is false for the halted.
+    """All agents of all worlds, written into PufferLib's buffers. Observations are flat or, with observation="images", one
+    image per camera, since PufferLib supports a single Box. `masks` is false for halted agents.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class DrivePufferEnv(_Base):
 
     @property
     def done(self) -> bool:
-        """Worlds reset themselves."""
+        """False, since worlds reset themselves."""
         return False
 
     def reset(self, seed: int | None = None) -> tuple[np.ndarray, list[dict[str, float]]]:
@@ -84,7 +84,7 @@ class DrivePufferEnv(_Base):
         self.masks[:] = self.batch.active
 
     def _log(self) -> dict[str, float]:
-        """Means over the agents' episodes that ended since the last log, where any did."""
+        """Returns means over the agents' episodes that ended since the last log, if any did."""
         now, before = self.batch.simulator.totals(), self._before
         finished = now["finished_agent_episodes"] - before["finished_agent_episodes"]
         self._before = now

@@ -1,4 +1,4 @@
-"""TorchRL's EnvBase: a batch of worlds, each with the same number of agents in the group "agents"."""
+"""TorchRL EnvBase: a batch of worlds, each with the same number of agents in the group "agents"."""
 
 from __future__ import annotations
 
@@ -13,11 +13,13 @@ from pictura.envs.batch import Batch
 
 
 class DriveTorchRLEnv(EnvBase):
-    """batch_size [worlds]. ("agents", "observation", ...), ("agents", "action"), ("agents", "reward") and ("agents", "mask"),
-    which is false for the halted and the absent, are [worlds, agents, ...]; done, terminated and truncated are the worlds',
-    [worlds, 1]. ("agents", "terminated") is true for the agents that an infraction has just ended, ("agents", "truncated") for
-    those whose world ends or who leave by a road's end: their observation is still their own. reset() takes "_reset" [worlds]. Options are
-    pictura.envs.Batch's; on CUDA nothing is copied to the host.
+    """Environment with batch_size [worlds].
+
+    ("agents", "observation", ...), ("agents", "action"), ("agents", "reward") and ("agents", "mask"), which is false for halted
+    and absent agents, are [worlds, agents, ...]. done, terminated and truncated belong to worlds, [worlds, 1]. ("agents",
+    "terminated") is true for agents that an infraction has just ended, ("agents", "truncated") for agents whose world ends or
+    that leave by a road's end: their observation is still their own. reset() takes "_reset" [worlds]. Options are those of
+    pictura.envs.Batch; on CUDA nothing is copied to the host.
     """
 
     def __init__(
@@ -92,7 +94,7 @@ class DriveTorchRLEnv(EnvBase):
         agents = self._agents(results)
         agents["reward"] = results["reward"].reshape(*self._shape, 1).clone()
         over = self._over.reshape(*self.batch_size, 1).clone()
-        # A world ends in time, or because too many have halted: for those that still drive both are a truncation.
+        # A world ends in time, or because too many agents have halted: for agents that still drive both are a truncation.
         ends = {"done": over, "terminated": torch.zeros_like(over), "truncated": over.clone()}
         return TensorDict({"agents": agents, **ends}, self.batch_size, device=self.device)
 
