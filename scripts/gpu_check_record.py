@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Runs the commands of scripts/gpu_check and keeps their results in one JSON file, which is rewritten after each.
 
-gpu_check_record.py FILE start [--keep]                begins FILE: source hash, GPU, driver; --keep: goes on where these are the same, and stays complete
+gpu_check_record.py FILE start [--keep]                begins FILE: source hash, GPU, driver; --keep: continues if these are the same, and stays complete
 gpu_check_record.py FILE run NAME [--limit S] -- COMMAND...    seconds, and its summary or last lines
 gpu_check_record.py FILE bench NAME [--limit S] -- COMMAND...  the JSON object that it prints, even if it fails
 gpu_check_record.py FILE tests -- ctest...             counts, failed, skipped and slowest tests
@@ -25,15 +25,15 @@ SOURCES = ("common map simulator backend_cpu backend_cuda backend_gl backends co
            "examples bench tests cmake").split()
 RESULTS = pathlib.Path("bench/results")
 LAST_LINES = 40
-# "  7/353 Test  #12: Suite.Name/4-byte object <00> ....***Failed    0.01 sec"
+# Line of a test's result, such as "  7/353 Test  #12: Suite.Name/4-byte object <00> ....***Failed    0.01 sec".
 TEST = re.compile(r"\s*(\d+)/(\d+) Test\s+#\d+: (.+?) \.*\s*(Passed|\*\*\*.*?)\s+(\d+\.\d+) sec")
 NEXT_TEST = re.compile(r"\s+Start\s+\d+: ")
-# GoogleTest's and compute-sanitizer's.
+# Summary lines of GoogleTest and compute-sanitizer.
 SUMMARY = re.compile(r"\[  PASSED  \]|=========.* SUMMARY: ")
 
 
 def source_hash():
-    """Over each file's path, length and bytes, except documents."""
+    """Hash over each file's path, length and bytes, except documents."""
     files = {path for folder in SOURCES for path in pathlib.Path(folder).rglob("*") if path.is_file()}
     digest = hashlib.sha256()
     for path in sorted(files | {pathlib.Path("CMakeLists.txt")}):
@@ -54,7 +54,7 @@ def gpu_and_driver():
 
 
 def write(file, content):
-    """Writes a temporary file and renames it, so that readers, and an interrupted run, always leave a whole file."""
+    """Writes a temporary file and renames it, so that readers, and an interrupted run, always see a complete file."""
     temporary = file.with_name(f"{file.name}.{os.getpid()}.tmp")
     temporary.write_text(json.dumps(content, indent=2) + "\n")
     temporary.replace(file)
@@ -84,14 +84,14 @@ def add(file, key, entry):
 
 
 def kill_group(process):
-    """The command and its children."""
+    """Kills a command and its children."""
     with contextlib.suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
 
 
 @contextlib.contextmanager
 def started(command, stderr):
-    """A command in its own process group, which is killed with its children if the block ends early."""
+    """Starts a command in its own process group, which is killed with its children if the block ends early."""
     process = subprocess.Popen(command, text=True, errors="replace", process_group=0, stdout=subprocess.PIPE, stderr=stderr)
     try:
         yield process
@@ -101,7 +101,7 @@ def started(command, stderr):
 
 
 class Run:
-    """A finished command: its outcome in words, empty for success; seconds; its output."""
+    """Finished command: its outcome as text, empty for success; seconds; its output."""
 
     def __init__(self, command, limit_s, keeps_stdout):
         begin = time.monotonic()
@@ -128,7 +128,7 @@ class Run:
 
 
 def last_lines(text):
-    """Those that name an error or what a build failed to make, and the last ones."""
+    """Returns the lines that name an error or a failed build target, and the last lines."""
     lines = text.splitlines()
     errors = [line for line in lines[:-LAST_LINES] if "error: " in line or line.startswith("FAILED: ")]
     return errors[:LAST_LINES] + lines[-LAST_LINES:]
@@ -152,7 +152,7 @@ def run_command(file, name, command, limit_s):
 
 
 def json_object(text):
-    """The parsed text if it is a JSON object, else None."""
+    """Returns the parsed text if it is a JSON object, else None."""
     try:
         value = json.loads(text)
     except json.JSONDecodeError:
@@ -180,10 +180,10 @@ class Tests:
     def __init__(self):
         self.passed = self.total = 0
         self.failed, self.skipped, self.times = [], [], []
-        self.output_of = None  # the failed test whose output follows
+        self.output_of = None  # failed test whose output follows
 
     def take(self, line):
-        """True if the line is a test's result."""
+        """Whether the line is a test's result."""
         match = TEST.match(line)
         if not match:
             if NEXT_TEST.match(line):

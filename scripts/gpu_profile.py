@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints Nsight Compute's metrics of some kernel launches of a command, as one JSON object.
+"""Prints Nsight Compute's metrics of kernel launches of a command, as one JSON object.
 
 gpu_profile.py [--skip N] [--launches N] -- COMMAND...   runs COMMAND under ncu
 gpu_profile.py --csv FILE                                reads ncu's output: --csv --page details
@@ -17,7 +17,7 @@ import subprocess
 import sys
 import tempfile
 
-# The sections that contain the metrics.
+# Sections that contain the metrics.
 SECTIONS = ("SpeedOfLight ComputeWorkloadAnalysis MemoryWorkloadAnalysis WarpStateStats InstructionStats LaunchStats "
             "Occupancy").split()
 METRICS = ("Duration", "SM Frequency", "Executed Instructions", "Executed Ipc Active", "Issue Slots Busy",
@@ -26,7 +26,7 @@ METRICS = ("Duration", "SM Frequency", "Executed Instructions", "Executed Ipc Ac
 
 
 def rows_of(table):
-    """Rows in the format of the benches, one for each launch and metric."""
+    """Returns rows in the format of the benches, one for each launch and metric."""
     lines = [line for line in table.splitlines() if line.startswith('"')]
     rows = []
     for line in csv.DictReader(io.StringIO("\n".join(lines))):

@@ -1,4 +1,4 @@
-"""What scripts/gpu_ranks does once the command is built; its --help says what the steps are.
+"""Steps of scripts/gpu_ranks after the command is built; see its --help.
 
 Usage: gpu_ranks_record.py --pictura FILE --results FILE [OPTIONS] -- [ARGUMENTS of pictura train...]
 """
@@ -22,14 +22,14 @@ SMALL = ["--set", "simulator.num_slots=2048", "--set", "train.num_steps=32", "--
          "--set", "train.schedule=constant"]  # fmt: skip
 STEPS = ["equal", "updates", "killed", "rate"]
 MINIBATCH_OF_AN_AGENT = 0.8  # transitions: 16,384 with 20,480 agents
-WARM_UP_UPDATES = 3  # kernels are compiled, and algorithms chosen, in the first ones
+WARM_UP_UPDATES = 3  # the first updates compile kernels and select algorithms
 CHUNK = 4096
-GRADIENT_TOLERANCE = 1e-4  # of each parameter's largest; or twice what chunks of another size make on one GPU
-END_S = 60  # within which ranks end after one was killed
+GRADIENT_TOLERANCE = 1e-4  # of each parameter's largest; or twice the effect of another chunk size on one GPU
+END_S = 60  # time limit for ranks to end after one was killed
 
 
 class Ranks:
-    """`size` processes of `pictura train`, each on a GPU of its own."""
+    """`size` processes of `pictura train`, each on its own GPU."""
 
     def __init__(self, pictura, size, out, *arguments):
         self.size, self.out = size, pathlib.Path(out)
@@ -46,7 +46,7 @@ class Ranks:
         ]  # fmt: skip
 
     def progress(self):
-        """The whole rows of the run's curve so far."""
+        """Complete rows of the run's curve so far."""
         file = self.out / "progress.csv"
         if not file.exists():
             return []
@@ -54,7 +54,7 @@ class Ranks:
             return [row for row in csv.DictReader(rows) if None not in row.values()]
 
     def report(self):
-        """The report of rank 0 once all have ended. Exits where a rank failed, with what it said."""
+        """Waits for all ranks and returns rank 0's report. If a rank failed, exits with its output."""
         results = [process.communicate() for process in self.processes]
         for rank, process in enumerate(self.processes):
             if process.returncode != 0:
@@ -63,7 +63,7 @@ class Ranks:
 
 
 def checkpoint_parts(path):
-    """The first moments of a checkpoint by parameter, and the bytes of its simulator."""
+    """Returns the first moments of a checkpoint by parameter, and the bytes of its simulator."""
     content = pathlib.Path(path).read_bytes()
     header_size = struct.unpack_from("<Q", content, 16)[0]
     header, data = json.loads(content[24 : 24 + header_size]), content[24 + header_size :]
@@ -76,7 +76,7 @@ def checkpoint_parts(path):
 
 
 def largest_relative_difference(one, other):
-    """Over parameters, the largest difference in relation to the parameter's largest value; and where it is."""
+    """Returns the largest difference over parameters relative to each parameter's largest value, and the parameter."""
     differences = {
         name: max(abs(a - b) for a, b in zip(values, other[name])) / max(1e-30, *map(abs, values))
         for name, values in one.items()
@@ -90,7 +90,7 @@ def told(report, *more):
 
 
 class Steps:
-    """Each method makes a step and returns what to record of it, and whether all was as it must be."""
+    """Each method runs a step and returns its record, and whether it succeeded."""
 
     def __init__(self, options, folder):
         self.options, self.folder, self.ranks = options, folder, max(options.ranks)
@@ -102,7 +102,7 @@ class Steps:
         return Ranks(self.options.pictura, size, self.folder / name, *arguments)
 
     def equal(self):
-        # One step of the optimizer, after which the first moments are a multiple of the clipped gradient.
+        # After one optimizer step the first moments are a multiple of the clipped gradient.
         more = [*SMALL, "--set", "train.updates=1", "--set", "train.reproducible=true", "--set", "train.precision=fp32",
                 "--set", "train.update_epochs=1", "--set", "train.minibatch_size=65536"]  # fmt: skip
         cases = {"one": (1, CHUNK), "many": (self.ranks, CHUNK), "half": (1, CHUNK // 2)}
@@ -153,7 +153,7 @@ class Steps:
                            "error": errors[-1] if errors else ""})  # fmt: skip
         ranks.processes[victim].communicate()
         result = {"killed_rank": victim, "others": others, "updates_done": len(ranks.progress())}
-        # The checkpoint holds at least all but the last updates of checkpoint_every.
+        # The checkpoint lacks at most the last checkpoint_every updates.
         resumed = []
         for size in (1, *self.options.ranks):
             done = 2 + max([int(report["updates"]) for _, report in resumed], default=result["updates_done"])
@@ -192,7 +192,8 @@ class Steps:
 
     @staticmethod
     def rates(rows):
-        """Of whole updates after the warm-up: agent-steps a second, the share that the filter keeps, seconds by phase."""
+        """Returns statistics of whole updates after the warm-up: agent-steps/s, the share that the filter keeps, seconds by
+        phase."""
 
         def summary(values):
             return {"median": statistics.median(values), "min": min(values), "max": max(values)}
