@@ -1,4 +1,4 @@
-"""A reward of one's own, from the terms that the simulator returns: a Gymnasium wrapper that pays for progress and comfort."""
+"""Custom reward from the terms that the simulator returns: a Gymnasium wrapper that rewards progress and comfort."""
 
 import gymnasium
 import numpy as np
@@ -7,7 +7,7 @@ import pictura
 
 
 class ProgressReward(gymnasium.vector.VectorWrapper):
-    """Per metre driven, less what the library's reward takes for infractions, weighed anew, and a price for harsh driving."""
+    """Reward per metre driven, minus the re-weighted infraction terms of the library's reward and a penalty for harsh driving."""
 
     def __init__(self, env, per_m: float = 0.01, infraction: float = 2.0, comfort: float = 0.5) -> None:
         super().__init__(env)

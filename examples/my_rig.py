@@ -1,4 +1,4 @@
-"""Cameras of one's own: a wide one in front and a narrow one behind, of two sizes, and how much of the others they see."""
+"""Custom cameras: a wide front camera and a narrow rear camera, of two sizes, and the visibility of the other agents in them."""
 
 import math
 

@@ -81,25 +81,25 @@ def main() -> None:
             with torch.no_grad():
                 logits, values[step] = agent(seen)
             logprob = logits.log_softmax(1)
-            # A draw of the softmax (Gumbel's), without the host waiting for the device as torch.distributions lets it.
+            # Draws from the softmax (Gumbel's method) without making the host wait for the device, as torch.distributions does.
             action = (logprob - torch.empty_like(logprob).exponential_().log()).argmax(1)
             actions[step], logprobs[step] = action, logprob.gather(1, action[:, None]).squeeze(1)
             seen, rewards[step], terminations[step], truncated, info = envs.step(action)
-            # The step in which a world begins its next episode is not valid, and is not learnt from.
+            # The step in which a world begins its next episode is not valid and is excluded from learning.
             dones[step], valids[step] = terminations[step] | truncated, info["valid"]
         with torch.no_grad():
             next_value = agent(seen)[1]
             advantages, last = torch.zeros_like(rewards), torch.zeros(n, device=device)
             for t in reversed(range(args.num_steps)):
-                # After a truncation, too, the next observation is the episode's last: its value is what would have followed.
+                # After a truncation, too, the next observation is the episode's last; its value bootstraps the return.
                 following = next_value if t == args.num_steps - 1 else values[t + 1]
                 delta = rewards[t] + args.gamma * following * ~terminations[t] - values[t]
                 advantages[t] = last = delta + args.gamma * args.gae_lambda * last * ~dones[t]
             returns = advantages + values
 
         rows = valids.flatten().nonzero().squeeze(1)
-        # Minibatches of few sizes, so that the memory and the kernels chosen for one serve the next; the rest of an epoch's
-        # shuffled rows is left out.
+        # Minibatches have few sizes, so that memory and kernels chosen for one size are reused; the remaining shuffled rows of
+        # an epoch are dropped.
         coarse = max(1, args.num_steps * n // (16 * args.num_minibatches))
         size = max(coarse, len(rows) // args.num_minibatches // coarse * coarse)
         agent_steps += len(rows)
@@ -129,7 +129,7 @@ def main() -> None:
             "value_loss": value_loss.item(),
             "entropy": entropy.item(),
         }
-        if update == 1:  # in which kernels are compiled
+        if update == 1:  # the first update compiles kernels
             start, before = time.time(), agent_steps
         if not args.json and (update == 1 or update % 5 == 0 or update == num_updates):
             print(" ".join(f"{key} {value:.4g}" for key, value in summary.items()), flush=True)

@@ -1,4 +1,4 @@
-"""Agents that act at random in many worlds, and what becomes of them."""
+"""Runs agents with random actions in many worlds, and prints their totals."""
 
 import sys
 import time

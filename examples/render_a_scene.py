@@ -1,4 +1,4 @@
-"""Draws a street with three road users, made of arrays, into render_a_scene.png: what the paper's cameras see of it."""
+"""Draws a street with three road users, defined by arrays, into render_a_scene.png: the images of the paper's cameras."""
 
 import sys
 
@@ -28,7 +28,7 @@ def main(path: str = "render_a_scene.png") -> None:
 
 
 def save_png(path: str, rgb: np.ndarray) -> None:
-    """uint8 [height, width, 3], without a library for pictures."""
+    """Writes uint8 [height, width, 3] as PNG, without an image library."""
     import struct
     import zlib
 
