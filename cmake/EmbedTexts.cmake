@@ -12,7 +12,7 @@ foreach(file ${TEXTS})
     file(READ ${SOURCE_DIR}/${name} part)
     string(REPLACE "${mark}" "${part}" text "${text}")
   endforeach()
-  # Compilers take texts of 64 KiB; neighbours are joined.
+  # Compilers accept texts of 64 KiB; adjacent texts are concatenated.
   string(LENGTH "${text}" length)
   set(literals "")
   set(at 0)

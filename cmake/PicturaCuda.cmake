@@ -1,4 +1,4 @@
-# The CUDA language and toolkit, where nvcc 12.8 or later is found. Architectures come from the preset.
+# Enables the CUDA language and toolkit if nvcc 12.8 or later is found. Architectures come from the preset.
 
 set(PICTURA_HAS_CUDA OFF)
 if(NOT PICTURA_WITH_CUDA STREQUAL OFF)
@@ -16,7 +16,7 @@ if(NOT PICTURA_WITH_CUDA STREQUAL OFF)
     set(CMAKE_CUDA_STANDARD_REQUIRED ON)
     find_package(CUDAToolkit 12.8 REQUIRED)
     set(PICTURA_HAS_CUDA ON)
-    # Device code keeps the host's arithmetic contract.
+    # Device code has the same arithmetic contract as the host.
     add_compile_options(
       "$<$<COMPILE_LANGUAGE:CUDA>:--fmad=false;-Xcompiler=-Wall,-Wextra,-ffp-contract=off>"
       "$<$<AND:$<COMPILE_LANGUAGE:CUDA>,$<BOOL:${PICTURA_WERROR}>>:-Werror=all-warnings;-Xcompiler=-Werror>")

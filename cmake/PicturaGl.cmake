@@ -1,4 +1,4 @@
-# The headers of OpenGL, EGL and OSMesa for backend_gl/. Debian: libgl-dev, libegl-dev, libosmesa6-dev.
+# Finds the headers of OpenGL, EGL and OSMesa for backend_gl/. Debian: libgl-dev, libegl-dev, libosmesa6-dev.
 
 set(PICTURA_HAS_GL OFF)
 if(NOT PICTURA_WITH_GL STREQUAL OFF)

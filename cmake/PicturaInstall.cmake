@@ -44,7 +44,7 @@ if(PICTURA_HAS_CUDA)
   list(APPEND simulator_libraries pictura_simulator_cuda)
 endif()
 pictura_install_component(simulator ${simulator_libraries})
-# Of the importers only what calls them: the rest has pugixml and Eigen in it.
+# Installs only the headers that call the importers: the others include pugixml and Eigen.
 install(FILES ${PROJECT_SOURCE_DIR}/map/opendrive/opendrive.h DESTINATION ${header_folder}/map/opendrive
   COMPONENT simulator)
 install(FILES ${PROJECT_SOURCE_DIR}/map/procedural/procedural_town.h ${PROJECT_SOURCE_DIR}/map/procedural/town_options.h

@@ -1,5 +1,5 @@
-# Python and pybind11 for bindings/: the Python that Python_EXECUTABLE names (as scikit-build-core does), of the
-# virtual environment, or python3 where that imports pybind11.
+# Finds Python and pybind11 for bindings/: the Python of Python_EXECUTABLE (as scikit-build-core does), of the virtual
+# environment, or python3 if that imports pybind11.
 
 set(PICTURA_HAS_PYTHON OFF)
 if(NOT PICTURA_WITH_PYTHON STREQUAL OFF)

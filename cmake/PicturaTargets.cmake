@@ -1,5 +1,5 @@
-# Settings of every target: flags of this build, includes as `pictura/FOLDER/FILE.h` in the tree as when
-# installed, precompiled headers, and tests with their environment.
+# Settings of every target: flags of this build, includes as `pictura/FOLDER/FILE.h` in the tree and when installed, precompiled
+# headers, and tests with their environment.
 
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
@@ -25,19 +25,19 @@ include(CheckCXXCompilerFlag)
 check_cxx_compiler_flag(-Wdangling-reference PICTURA_HAS_WDANGLING_REFERENCE)
 check_cxx_compiler_flag(-mno-fma PICTURA_HAS_MNO_FMA)
 
-set(CMAKE_UNITY_BUILD_BATCH_SIZE 12)  # sources, in unity builds
+set(CMAKE_UNITY_BUILD_BATCH_SIZE 12)  # sources per unity-build batch
 
-# Flags of this build, which nothing that is installed passes on.
+# Flags of this build, which installed targets do not pass on.
 add_compile_options(
   "$<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wpedantic;-Wshadow;-Woverloaded-virtual>"
-  # Designated initializers leave the other members at their defaults, on purpose.
+  # Designated initializers intentionally leave the other members at their defaults.
   $<$<COMPILE_LANGUAGE:CXX>:-Wno-missing-field-initializers>
-  # For libraries and programs alike, so that both can read one precompiled header.
+  # Set for libraries and programs alike, so that both can read one precompiled header.
   "$<IF:$<COMPILE_LANGUAGE:CUDA>,-Xcompiler=-fPIC,-fPIC>"
   # g++ 13 assumes that every returned reference refers to a temporary argument, and that fmt's big integers, inlined,
   # copy more than they hold (fmt 9).
   "$<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_HAS_WDANGLING_REFERENCE}>>:-Wno-dangling-reference;-Wno-array-bounds;-Wno-stringop-overflow>"
-  # In a unity build every source is included, and g++ takes it for a header, which many would include.
+  # In a unity build every source is included; g++ treats it as a header that could be included several times.
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>,$<BOOL:$<TARGET_PROPERTY:UNITY_BUILD>>>:-Wno-subobject-linkage>
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_WERROR}>>:-Werror>
   # The arithmetic contract: no fused multiply-add and no reordering, on every device.
@@ -47,12 +47,12 @@ set(PICTURA_IS_SANITIZED 0)  # for tests with time limits
 if(PICTURA_SANITIZE)
   set(PICTURA_IS_SANITIZED 1)
   add_compile_options(-fsanitize=${PICTURA_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all
-    # With the checks g++ 13 does not know the length of initializer lists.
+    # With these checks g++ 13 does not know the length of initializer lists.
     "$<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>>:-Wno-array-bounds;-Wno-stringop-overread>")
   add_link_options(-fsanitize=${PICTURA_SANITIZE})
 endif()
 
-# pictura_use_headers(TARGET SCOPE): what every user of the headers needs, here and when installed.
+# pictura_use_headers(TARGET SCOPE): requirements of every user of the headers, in the tree and when installed.
 function(pictura_use_headers target scope)
   target_compile_features(${target} ${scope} cxx_std_20)
   target_include_directories(${target} ${scope} $<BUILD_INTERFACE:${PICTURA_INCLUDE_DIR}>)
@@ -77,30 +77,30 @@ function(pictura_forbid_fma target)
   endif()
 endfunction()
 
-# pictura_leave_unoptimized(TARGET): for code that calls what is optimized. Optimizing takes a compiler three quarters of
-# its time with a test.
+# pictura_leave_unoptimized(TARGET): for code that only calls optimized code. For a test, optimization takes a compiler three
+# quarters of its time.
 function(pictura_leave_unoptimized target)
   target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-O0>)
 endfunction()
 
-# pictura_optimize_little(TARGET): for what reads options and prints results, whose templates take a compiler long.
+# pictura_optimize_little(TARGET): for code that reads options and prints results, whose templates compile slowly.
 function(pictura_optimize_little target)
   target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-O1>)
 endfunction()
 
-# pictura_compile_together(TARGET): with PICTURA_UNITY several sources as one, for code whose templates, each source's own, take a compiler
-# longer than what they are used for. Libraries that others build upon are compiled source by source, so that a missing
-# include shows.
+# pictura_compile_together(TARGET): with PICTURA_UNITY it compiles several sources as one, for code whose per-source templates
+# take a compiler longer than the rest. Libraries that others build upon are compiled source by source, so that a missing
+# include causes an error.
 function(pictura_compile_together target)
   if(PICTURA_UNITY)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON)
   endif()
 endfunction()
 
-# pictura_precompile(NAME HEADERS [LINK libs...]): a precompiled header of libraries' headers, which take a compiler longer
-# than most sources that include them; pictura_use_precompiled(TARGET NAME) reads it. Headers of the project and of the
-# standard are left out, so that a source which lacks one does not compile, as long as HEADERS do not bring it along:
-# PICTURA_PRECOMPILE=OFF compiles every source as it stands.
+# pictura_precompile(NAME HEADERS [LINK libs...]): a precompiled header of libraries' headers, which take a compiler longer than
+# most sources that include them; pictura_use_precompiled(TARGET NAME) uses it. Headers of the project and of the standard
+# library are excluded, so that a source without a needed include does not compile, unless HEADERS include it.
+# PICTURA_PRECOMPILE=OFF compiles every source on its own.
 function(pictura_precompile name headers)
   if(PICTURA_PRECOMPILE)
     cmake_parse_arguments(PARSE_ARGV 2 arg "" "" "LINK")
@@ -127,7 +127,7 @@ function(pictura_test_properties out timeout_s labels)
   endif()
   set(environment ${PICTURA_TEST_ENVIRONMENT})
   if(gpu IN_LIST labels)
-    # A rig's kernels take seconds to compile; tests share them.
+    # Kernels of a rig take seconds to compile, so tests share them.
     list(REMOVE_ITEM environment PICTURA_CACHE=off)
     list(APPEND environment XDG_CACHE_HOME=${PROJECT_BINARY_DIR}/cache)
   endif()
@@ -139,10 +139,10 @@ function(pictura_test_properties out timeout_s labels)
 endfunction()
 
 # pictura_add_test(NAME SOURCES... LINK libs... [LABELS labels...] [PRECOMPILED header] [WHOLE suites...] [OPTIMIZED]):
-# GoogleTest binary NAME_test, every test its own ctest entry, with PICTURA_DATA set to ../shared/data if that exists and
-# the caller has not set it. WHOLE: suites whose tests share results that are costly to make, an entry each. OPTIMIZED: for
-# tests that compute much themselves. The label threads is for tests of what runs on several threads: the target
-# threaded_tests builds them, and the preset tsan these alone.
+# GoogleTest binary NAME_test, with a ctest entry for each test, and PICTURA_DATA set to ../shared/data if that exists and the
+# caller has not set it. WHOLE: suites whose tests share expensive results, one entry each. OPTIMIZED: for tests with much
+# computation of their own. The label threads marks tests of code that runs on several threads: the target threaded_tests builds
+# them, and the preset tsan runs only these.
 add_custom_target(threaded_tests)
 function(pictura_add_test name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "OPTIMIZED" "PRECOMPILED" "SOURCES;LINK;LABELS;WHOLE")
@@ -150,13 +150,13 @@ function(pictura_add_test name)
   include(GoogleTest)
   add_executable(${name}_test ${arg_SOURCES})
   pictura_use_headers(${name}_test PRIVATE)
-  # OpenMP also for tests that need none: a precompiled header serves only equal flags.
+  # OpenMP also for tests that do not need it, since a precompiled header requires equal flags.
   target_link_libraries(${name}_test PRIVATE ${arg_LINK} OpenMP::OpenMP_CXX GTest::gmock GTest::gtest_main)
   pictura_compile_together(${name}_test)
   if(arg_PRECOMPILED)
     pictura_use_precompiled(${name}_test ${arg_PRECOMPILED})
   else()
-    # Many compute with the rules that both devices share.
+    # Many tests compute with the rules shared by both devices.
     pictura_forbid_fma(${name}_test)
     if(NOT arg_OPTIMIZED)
       pictura_use_precompiled(${name}_test gtest)
@@ -182,8 +182,8 @@ function(pictura_add_test name)
   gtest_discover_tests(${name}_test ${filter} DISCOVERY_TIMEOUT 120 PROPERTIES ${properties})
 endfunction()
 
-# The environment of tests. Maps are not cached, so that the importer just built is tested. Torch's idle threads sleep:
-# spinning threads of parallel tests would take the processor from each other.
+# Environment of tests. Maps are not cached, so that the importer just built is tested. Torch's idle threads sleep, since
+# spinning threads of parallel tests would compete for the processor.
 set(PICTURA_TEST_ENVIRONMENT PICTURA_CACHE=off OMP_WAIT_POLICY=passive)
 if(NOT DEFINED ENV{PICTURA_DATA} AND EXISTS ${PROJECT_SOURCE_DIR}/../shared/data)
   get_filename_component(data_folder ${PROJECT_SOURCE_DIR}/../shared/data REALPATH)
@@ -192,8 +192,8 @@ endif()
 if(PICTURA_SANITIZE MATCHES thread)
   list(APPEND PICTURA_TEST_ENVIRONMENT TSAN_OPTIONS=ignore_noninstrumented_modules=1:die_after_fork=0)
 elseif(PICTURA_SANITIZE MATCHES address)
-  # The sanitizer guesses where thread-local variables of libraries loaded at run time lie from the words before them;
-  # with Mesa's it may guess wrong and abort.
+  # The sanitizer guesses the location of thread-local variables of libraries loaded at run time from the preceding words; with
+  # Mesa's libraries it may guess wrong and abort.
   list(APPEND PICTURA_TEST_ENVIRONMENT ASAN_OPTIONS=intercept_tls_get_addr=0 UBSAN_OPTIONS=print_stacktrace=1
     LSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tests/support/leaks.txt:print_suppressions=0)
 endif()

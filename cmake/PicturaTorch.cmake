@@ -26,11 +26,11 @@ if(NOT PICTURA_WITH_TORCH STREQUAL OFF)
       ${torch_root}/include ${torch_root}/include/torch/csrc/api/include)
     # By name, not by path: the wheel's folder also contains a libgomp, which the program then loads.
     target_link_libraries(pictura_torch INTERFACE -L${torch_root}/lib -ltorch_cpu -lc10)
-    # A wheel names no folder of the machine that built it: it finds torch beside itself (bindings/).
+    # A wheel contains no path of the build machine; it finds torch in its environment (bindings/).
     if(NOT SKBUILD)
       target_link_libraries(pictura_torch INTERFACE -Wl,-rpath,${torch_root}/lib)
     endif()
-    # Torch brings Gloo along, for several processes on the host, but not its headers (libgloo-dev).
+    # Torch includes Gloo, for several processes on the host, but not its headers (libgloo-dev).
     find_path(PICTURA_GLOO_INCLUDE gloo/context.h)
     if(PICTURA_GLOO_INCLUDE)
       set(PICTURA_HAS_GLOO ON)
