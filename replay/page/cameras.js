@@ -1,15 +1,16 @@
-// What the cameras of any agent see at any step, drawn by WebGL2: a twin of the renderer for images that the file does not
-// hold. docs/explanation/image.md has the rules, backend_gl/ the same for OpenGL; pixels are means of up to 8x8 samples.
+// Images of any agent's cameras at any step, drawn with WebGL2: a counterpart of the renderer for images that the file does not
+// hold. docs/explanation/image.md has the rules, backend_gl/ the same method for OpenGL; pixels are means of up to 8x8 samples.
 
 const NEAR_M = 0.1, RANGE_M = 120, MAX_PIECE_M = 10, MAX_MITRE = 4, LIGHT_RADIUS_M = 0.5, LIGHT_SIDES = 24, RIG_BODY_M = 4.5;
-const STRIP_RANKS = [2, 3, 1, 0];  // lane mark, road edge, crosswalk, stop line: the lowest lies on the others
-// Faces of a box: front, back, left, right, top, and the underside in the top's colour. Its corners are front left, rear left, rear
-// right, front right on the ground, then the same on the roof.
+const STRIP_RANKS = [2, 3, 1, 0];  // lane mark, road edge, crosswalk, stop line: the lowest rank lies above the others
+// Faces of a box: front, back, left, right, top, and the underside in the top's colour. Its corners are front left, rear left,
+// rear right, front right on the ground, then the same on the roof.
 const BOX_FACES = [[3, 0, 4, 7], [1, 2, 6, 5], [0, 1, 5, 4], [2, 3, 7, 6], [4, 5, 6, 7], [3, 2, 1, 0]];
 const FACE_FLOATS = 16, SOLID = -1;
 
-// An instance is a face of four corners in the world, in order around it, with its order among strips, or SOLID, and its colour.
-// Strips have their minimum width on screen, and are compared by the depth of a plane below them, lower by their order.
+// Vertex shader. An instance is a face of four corners in the world, in order around it, with its order among strips, or SOLID,
+// and its colour. Strips have a minimum width on screen; they are compared by the depth of a plane below them, lower by their
+// order.
 const FACE_VERTEX_SHADER = `#version 300 es
 precision highp float;
 layout(location = 0) in vec4 corner0;
@@ -25,11 +26,11 @@ flat out vec3 face_color;
 const float near_m = float(${NEAR_M}), range_m = float(${RANGE_M});
 
 vec3 seen(vec3 world) { vec3 d = world - eye; return vec3(dot(right, d), dot(down, d), dot(ahead, d)); }
-// What is before the near plane is cut off, so that the side leads from there to the other end.
+// Cuts off the part before the near plane, so that the side leads from there to the other end.
 vec3 cut(vec3 p, vec3 other) {
   return p.z >= near_m || other.z < near_m ? p : vec3(other.xy + (p.xy - other.xy) * ((other.z - near_m) / (other.z - p.z)), near_m);
 }
-// How far to move the left corner of an end on screen; the right one moves the opposite way.
+// Returns the offset of the left corner of an end on screen; the right corner moves the opposite way.
 vec2 push(vec3 left, vec3 right_corner, vec2 across) {
   if (left.z < near_m || right_corner.z < near_m) return vec2(0.0);
   float width_px = dot(focal * (left.xy / left.z - right_corner.xy / right_corner.z), across);
@@ -64,16 +65,16 @@ void main() {
     p[2].xy -= at_b * p[2].z;
     p[3].xy += at_b * p[3].z;
   }
-  // A strip of two triangles covers the quadrilateral.
+  // Two triangles of a strip cover the quadrilateral.
   vec3 at = gl_VertexID == 0 ? p[0] : gl_VertexID == 1 ? p[1] : gl_VertexID == 2 ? p[3] : p[2];
   vec2 screen = projection.xy * at.xy + projection.zw * at.z;
-  // Hardware rounds corners but keeps their depths, which tilts planes: so they are rounded here.
+  // Hardware rounds corners but keeps their depths, which tilts planes, so corners are rounded here.
   if (at.z >= near_m) {
     screen = floor(screen / at.z * positions + 0.5) / positions * at.z;
     at.xy = (screen - projection.zw * at.z) / projection.xy;
   }
   float nearer = compared == vec3(0.0) ? 1.0 : clamp(dot(compared, at), 1e-4, 2.0);
-  // -1 at the near plane, 1 infinitely far. A face that has faded to black is not drawn.
+  // -1 at the near plane, 1 at infinity. A face that has faded to black is not drawn.
   gl_Position = faded >= 1.0 ? vec4(2.0, 2.0, 2.0, 1.0) : vec4(screen, at.z - 2.0 * near_m * nearer, at.z);
 }`;
 const FACE_FRAGMENT_SHADER = `#version 300 es
@@ -90,7 +91,7 @@ uniform sampler2D drawn;
 uniform int grid, height;
 out vec4 shown;
 void main() {
-  // The first row of samples is that of the image, the first one of a canvas is its last.
+  // The first row of samples belongs to the image's first row, but a canvas's first row is its last.
   ivec2 first = ivec2(gl_FragCoord.x, height - 1 - int(gl_FragCoord.y)) * grid;
   vec3 sum = vec3(0.0);
   for (int y = 0; y < grid; ++y) {
@@ -99,10 +100,10 @@ void main() {
   shown = vec4(sum / float(grid * grid), 1.0);
 }`;
 
-// Faces in a growing array.
+// Growing array of faces.
 class Faces {
   constructor() { this.values = new Float32Array(FACE_FLOATS * 256); this.count = 0; }
-  // Where the next face stands.
+  // Offset of the next face.
   next() {
     if ((this.count + 1) * FACE_FLOATS > this.values.length) {
       const more = new Float32Array(2 * this.values.length);
@@ -122,7 +123,7 @@ class Faces {
   }
 }
 
-// The strips of a line, as append_strips() of the renderer makes them: pieces of at most 10 m that meet in mitres.
+// Returns the strips of a line, as append_strips() of the renderer creates them: pieces of at most 10 m that meet in mitres.
 function addStrips({ width_m, color, points }, faces) {
   const at = [points[0]];
   for (const b of points.slice(1)) {
@@ -150,7 +151,7 @@ function addStrips({ width_m, color, points }, faces) {
   }
 }
 
-// Right, down and forward of a camera on its body.
+// Returns right, down and forward of a camera on its body.
 function axesOf({ yaw_rad, pitch_rad, roll_rad }) {
   const turns = [  // about x, y and z, one after the other
     ([x, y, z]) => { const c = Math.cos(roll_rad), s = Math.sin(roll_rad); return [x, c * y - s * z, s * y + c * z]; },
@@ -161,7 +162,7 @@ function axesOf({ yaw_rad, pitch_rad, roll_rad }) {
 }
 
 class CameraView {
-  // Throws where the browser has no WebGL2.
+  // Throws if the browser has no WebGL2.
   constructor(replay) {
     const { scenery, header } = replay;
     Object.assign(this, { replay, header, cameras: header.cameras, heads: scenery.heads, walls: new Faces(), targets: new Map() });
@@ -171,7 +172,7 @@ class CameraView {
       addStrips(line, strips);
       for (let i = before; i < strips.count; ++i) ranks.push(STRIP_RANKS[line.kind]);
     }
-    // Those that lie on others first.
+    // Strips that lie above others come first.
     const order = ranks.map((_, i) => i).sort((a, b) => ranks[a] - ranks[b] || a - b);
     this.strips = new Faces();
     for (const i of order) this.strips.addFrom(strips, i, 0);
@@ -215,7 +216,7 @@ class CameraView {
     this.nothing = gl.createVertexArray();
   }
 
-  // Where the samples of images of a size are drawn.
+  // Returns the framebuffer in which the samples of images of a size are drawn.
   target(width, height) {
     const key = `${width}x${height}`;
     if (this.targets.has(key)) return this.targets.get(key);
@@ -242,7 +243,7 @@ class CameraView {
     into.count = faces.count;
   }
 
-  // Walls and strips within the visible range of a place.
+  // Returns walls and strips within the visible range of a position.
   facesAround(x, y) {
     const near = new Faces(), reach = RANGE_M + 2 * MAX_PIECE_M;
     const isNear = (faces, i) => {
@@ -256,7 +257,7 @@ class CameraView {
     return near;
   }
 
-  // The boxes of a frame: {x_m, y_m, z_m, heading_deg} and a body. Those of `hidden` are left out.
+  // Returns the boxes of a frame: {x_m, y_m, z_m, heading_deg} and a body. Boxes of `hidden` are excluded.
   boxesOf(frame, hidden, added) {
     const { replay } = this, boxes = [...replay.episode(frame).parked, ...added];
     for (let agent = 0; agent < replay.agents; ++agent) {
@@ -265,7 +266,7 @@ class CameraView {
     return boxes;
   }
 
-  // Boxes and lights as a camera at `eye` sees them: the faces that are turned to it.
+  // Returns the faces of boxes and lights that are turned to a camera at `eye`.
   movingFaces(eye, boxes, frame) {
     const faces = new Faces();
     for (const box of boxes) {
@@ -278,7 +279,7 @@ class CameraView {
       BOX_FACES.forEach((face, i) => { if (turned[i]) faces.add(face.map(corner => corners[corner]), SOLID, hues[Math.min(i, 4)]); });
     }
     for (const { signal, facing_rad, half_angle_rad, position: [x, y, z] } of this.heads) {
-      // A state whose hue is black is not drawn: one that is unknown, and in files of earlier versions one that is off.
+      // States with a black hue are not drawn: unknown lights, and in files of earlier versions lights that are off.
       const hue = signal < this.replay.numLights ? this.header.light_hues[this.replay.light(signal, frame)] : undefined;
       if (!hue?.some(channel => channel > 0)) continue;
       const fx = Math.cos(facing_rad), fy = Math.sin(facing_rad), dx = eye[0] - x, dy = eye[1] - y, ahead = dx * fx + dy * fy;
@@ -291,8 +292,8 @@ class CameraView {
     return faces;
   }
 
-  // What an agent's cameras see at a frame: copies the image of each into the 2D context of its size. `hidden` agents are not
-  // drawn, `added` road users are: bodies with places.
+  // Draws an agent's cameras at a frame: copies the image of each into the 2D context of its size. `hidden` agents are not
+  // drawn, `added` road users are: bodies with positions.
   draw(agent, frame, { hidden = [], added = [] }, contexts) {
     const { gl, replay, header } = this, body = replay.body(agent, frame), pose = replay.pose(agent, frame);
     if (gl.isContextLost()) throw new Error("its WebGL2 was taken away");
@@ -323,12 +324,12 @@ class CameraView {
     gl.uniform3fv(face.down, down);
     gl.uniform3fv(face.ahead, ahead);
     gl.uniform2f(face.focal, camera.focal_x_px, camera.focal_y_px);
-    // From camera coordinates to -1 .. 1 across the image, whose first row is the lowest of the texture.
+    // Converts camera coordinates to -1 .. 1 across the image, whose first row is the lowest of the texture.
     gl.uniform4f(face.projection, 2 * camera.focal_x_px / width, 2 * camera.focal_y_px / height, 2 * camera.center_x_px / width - 1, 2 * camera.center_y_px / height - 1);
     const perHalf = 0.5 * grid * 2 ** gl.getParameter(gl.SUBPIXEL_BITS);
     gl.uniform2f(face.positions, perHalf * width, perHalf * height);
     gl.uniform1f(face.floor_px, this.header.line_floor_px);
-    // Of surfaces that are equally near the first stays: agents, lights, walls, strips.
+    // Of surfaces at equal depth the first is kept: agents, lights, walls, strips.
     for (const { array, count } of [this.buffers[1], this.buffers[0]]) {
       gl.bindVertexArray(array);
       gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, count);

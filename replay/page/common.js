@@ -1,4 +1,4 @@
-// What the page of a replay and the gallery share.
+// Common parts of the replay page and the gallery.
 
 const byId = id => document.getElementById(id);
 function make(tag, text, name) {
@@ -8,11 +8,11 @@ function make(tag, text, name) {
   return element;
 }
 
-// A policy's file, or its run, since checkpoints of all runs have the same name.
+// Name of a policy: its file, or its run, since checkpoints of all runs have the same name.
 function policyName({ policy }) {
   const names = policy.split("/"), isOfRun = /^(checkpoint|policy)\./.test(names.at(-1)) && names.length > 1;
   return names.at(isOfRun ? -2 : -1);
 }
-// Which world of its map: evaluations number theirs from 2^31, all of one seed.
+// Name of a world of its map: evaluations number their worlds from 2^31, all with one seed.
 const FIRST_SCENARIO = 2 ** 31;
 const worldName = header => header.global_world >= FIRST_SCENARIO ? `scenario ${header.global_world - FIRST_SCENARIO}` : `seed ${header.seed}`;

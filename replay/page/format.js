@@ -1,4 +1,4 @@
-// Reading the page's own elements: the header, and the numbers of docs/reference/replay.md.
+// Reads the page's own elements: the header, and the numbers of docs/reference/replay.md.
 
 class Damaged extends Error {}
 
@@ -53,9 +53,9 @@ class NumberReader {
   }
   get isAtEnd() { return this.at === this.bytes.length; }
   many(count) { return Array.from({ length: count }, () => this.next()); }
-  // Of `columns` columns, one after the other, each through all frames.
+  // Reads `columns` columns, one after the other, each through all frames.
   columns(columns, frames, order) {
-    // Each number has a byte at least: this is known before room is made for a count that was changed.
+    // Each number takes at least a byte, which is checked before memory is allocated for a corrupted count.
     if (columns * frames > this.bytes.length) throw new Damaged("its numbers end too early");
     const values = new Int32Array(columns * frames);
     for (let column = 0, i = 0; column < columns; ++column) {
@@ -73,7 +73,7 @@ class NumberReader {
 
 const SHAPES = ["lane", "crosswalk", "parking_space", "marking", "stop_line", "road_edge", "wall", "light"];
 
-// [{kind, detail, width_m, points: Float32Array of x, y in metres}]
+// Returns [{kind, detail, width_m, points: Float32Array of x, y in metres}].
 function mapOf(reader) {
   const shapes = [];
   let x = 0, y = 0;
@@ -89,7 +89,7 @@ function mapOf(reader) {
   return shapes;
 }
 
-// What cameras see of the map: lines that are painted on the road, walls, and light heads, in metres and radians.
+// Returns the geometry that cameras see: painted lines, walls, and light heads, in metres and radians.
 function sceneryOf(reader) {
   const at = [0, 0, 0], point = () => at.map((_, i) => (at[i] += reader.next()) / 100), list = make => Array.from({ length: reader.next() }, make);
   const lines = list(() => ({ kind: reader.next(), color: reader.many(3), width_m: reader.next() / 1000, points: list(point) }));
@@ -122,10 +122,10 @@ function episodesOf(reader, agents) {
   });
 }
 
-// The sections that every replay has, with one for each of its tracks.
+// Sections of every replay, including one for each of its tracks.
 const SECTIONS = ["map", "scenery", "episodes", "conditioning", "lights"];
 
-// The whole replay: everything of it that views read.
+// Complete replay, with everything that views read.
 class Replay {
   constructor(header, bytes, imageBytes) {
     this.header = header;
@@ -150,7 +150,7 @@ class Replay {
         this.tracks[name] = reader.columns(agents, frames, track.order);
         this.units[name] = track.unit;
       }
-      // What is left over was written for another header.
+      // Remaining bytes were written for another header.
       if (name !== "conditioning" && !reader.isAtEnd) throw new Damaged(`its section ${name} has more numbers than its header says`);
     }
     for (const name of [...SECTIONS, ...orders.keys()]) {
@@ -176,10 +176,10 @@ class Replay {
   light(light, frame) { return this.lights[light * this.stride + frame]; }
   isFollowed(agent) { return agent === this.followed; }
   imagesOf(frame) { return this.images.frame(frame); }
-  // Whether the file has what an agent's cameras saw.
+  // Whether the file holds the images of an agent's cameras.
   hasImages(agent, frame) { return agent === this.followed && Boolean(this.images) && frame < this.images.frames; }
-  // The road user of a probe's case, where an agent is asked about it: whether it is inserted, and the change of the images
-  // that takes it away or puts it there.
+  // Returns the road user of a probe's case, if an agent's case is shown: whether it is inserted, and the change of the images
+  // that removes or adds it.
   caseUser(agent, frame) {
     const { probed } = this;
     if (!probed || probed.frame !== frame || probed.ego !== agent || (probed.removed === null && !probed.inserted)) return null;
@@ -189,7 +189,7 @@ class Replay {
     const pose = { x_m: box.x_cm / 100, y_m: box.y_cm / 100, z_m: box.z_cm / 100, heading_deg: box.heading_ddeg / 10 };
     return { isInserted: true, change: { added: [{ ...body, ...pose }] } };
   }
-  // What can be asked of a policy: 12 probabilities and the value; null where it was not.
+  // Returns a policy's response: 12 probabilities and the value; null without one.
   decision(agent, frame) {
     if (!this.isFollowed(agent, frame) || !this.decisions) return null;
     const values = [];
@@ -200,7 +200,7 @@ class Replay {
     }
     return sum > 0.5 ? { probabilities: values.slice(0, 12), value: values[12] } : null;
   }
-  // The action that is chosen at a frame, or null.
+  // Returns the action chosen at a frame, or null.
   action(agent, frame) {
     const next = frame + 1 < this.frames && this.episodeOf[frame + 1] === this.episodeOf[frame] ? this.raw("action", agent, frame + 1) : 0;
     return next ? next - 1 : null;
@@ -213,7 +213,7 @@ class Replay {
     }
     return found;
   }
-  // The pose between two frames.
+  // Interpolates the pose between two frames.
   pose(agent, time) {
     const frame = Math.min(Math.floor(time), this.frames - 1), share = time - frame, next = frame + 1;
     const a = agent * this.stride + frame, { x_m, y_m, z_m, heading_deg } = this.tracks;
@@ -221,7 +221,7 @@ class Replay {
     const mix = track => goes ? track[a] + (track[a + 1] - track[a]) * share : track[a];
     return { x_m: mix(x_m) * this.units.x_m, y_m: mix(y_m) * this.units.y_m, z_m: mix(z_m) * this.units.z_m, heading_deg: mix(heading_deg) * this.units.heading_deg };
   }
-  // Infractions and goals by frame: [{frame, agent, kind}]
+  // Returns infractions and goals by frame: [{frame, agent, kind}].
   findEvents() {
     const found = [], events = this.tracks.events;
     for (let agent = 0, i = 0; agent < this.agents; ++agent) {
@@ -231,7 +231,7 @@ class Replay {
   }
 }
 
-// The followed agent's images of the first `frames` frames, group by group.
+// Images of the followed agent in the first `frames` frames, group by group.
 class Images {
   constructor({ cameras, frames, images: { hues, frames_per_group: perGroup, group_bytes } }, bytes) {
     Object.assign(this, { cameras, hues, perGroup, frames: Math.min(frames, perGroup * group_bytes.length), bytes });
@@ -239,9 +239,9 @@ class Images {
     for (const size of group_bytes) this.begins.push(this.begins.at(-1) + size);
     if (bytes.length !== this.begins.at(-1)) throw new Damaged(`expected ${this.begins.at(-1)} bytes of images, got ${bytes.length}`);
     this.frameBytes = this.cameras.reduce((sum, c) => sum + c.width_px * c.height_px * 3, 0);
-    this.groups = new Map();  // group -> promise of its frames; a few are kept
+    this.groups = new Map();  // group -> promise of its frames; only a few are kept
   }
-  // The bytes of a frame: [height, width, 3] of each camera. The next group is made ready meanwhile.
+  // Returns the bytes of a frame: [height, width, 3] for each camera. Prepares the next group meanwhile.
   async frame(frame) {
     const group = Math.floor(frame / this.perGroup), wanted = this.group(group);
     if (group + 2 < this.begins.length) this.group(group + 1).catch(() => {});
@@ -251,7 +251,7 @@ class Images {
   group(group) {
     const frames = this.groups.get(group) || this.unpack(group);
     this.groups.delete(group);
-    this.groups.set(group, frames);  // as the last that was used
+    this.groups.set(group, frames);  // as the most recently used
     if (this.groups.size > 4) this.groups.delete(this.groups.keys().next().value);
     return frames;
   }
@@ -263,8 +263,8 @@ class Images {
   }
 }
 
-// What a header must have, all of it; header_of() in replay/file.cpp writes it. A list holds the kind of its members; what ends in "?"
-// may be null.
+// Required members of a header; header_of() in replay/file.cpp writes them. A list holds the kind of its members; a kind that
+// ends in "?" may be null.
 const HUE = ["number"], numbers = (...names) => Object.fromEntries(names.map(name => [name, "number"]));
 const HEADER = {
   command: "string", program: "string", commit: "string", map: "string", map_hash: "string", policy: "string", policy_hash: "string", light_cycles: "string", seed: "string",

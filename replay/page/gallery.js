@@ -1,4 +1,4 @@
-// The list of a folder's replays: filters by what went wrong, and orders.
+// List of a folder's replays, with filters by infraction, and sort orders.
 
 const INFRACTIONS = [
   { name: "collisions", text: "Collisions", color: "--collision" },
@@ -23,7 +23,7 @@ let order = ORDERS[0];
 function card(entry) {
   const link = make("a"), title = make("span");
   const first = entry.first_infraction;
-  // A little before the first infraction, with the one who committed it.
+  // Shows the agent of the first infraction, a little before it.
   link.href = encodeURIComponent(entry.file) + (first ? `#step=${Math.max(0, first.frame - Math.round(3 / entry.dt_s))}&agent=${first.agent}&zoom=6` : "");
   title.append(make("strong", `${entry.map}, ${worldName(entry)}`), make("small", `${policyName(entry)}, ${entry.agents} agents, ${((entry.frames - 1) * entry.dt_s).toFixed(0)} s; ${entry.file}`));
   title.title = entry.policy;

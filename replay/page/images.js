@@ -1,4 +1,4 @@
-// Images without loss, by an adaptive arithmetic coder: the twin of replay/images.cpp, see docs/reference/replay.md.
+// Lossless images, by an adaptive arithmetic coder: the counterpart of replay/images.cpp, see docs/reference/replay.md.
 
 const SHIFTS = [1, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 5];
 
@@ -7,13 +7,13 @@ class BitReader {
     this.bytes = bytes;
     this.at = this.code = 0;
     this.range = 0xffffffff;
-    for (let i = 0; i < 5; ++i) this.code = (this.code * 256 + this.next()) >>> 0;  // the first is 0
+    for (let i = 0; i < 5; ++i) this.code = (this.code * 256 + this.next()) >>> 0;  // the first byte is 0
   }
   next() {
     if (this.at >= this.bytes.length) throw new Error("a group of images ends too early");
     return this.bytes[this.at++];
   }
-  // By the chance `i` of {zero, seen}.
+  // Decodes a bit with the probability `i` of {zero, seen}.
   bit(chances, i) {
     let zero = chances.zero[i], bit = 0;
     const bound = (this.range >>> 15) * zero, seen = chances.seen[i], shift = SHIFTS[seen];
@@ -53,7 +53,7 @@ function adler32(bytes) {
   return b * 65536 + a;
 }
 
-// A hue's colour at a brightness, its highest channel, for all brightnesses: packed as in the images below.
+// Returns a hue's colour for all brightnesses, the highest channel: packed as in the images below.
 function shadesOf(hue) {
   const highest = Math.max(...hue), shades = new Int32Array(256);
   for (let brightness = 0; brightness < 256; ++brightness) {
@@ -63,12 +63,12 @@ function shadesOf(hue) {
   return shades;
 }
 
-// The frames of a group: bytes [frames, cameras, height, width, 3].
+// Returns the frames of a group: bytes [frames, cameras, height, width, 3].
 function unpackImages(cameras, hues, group, count, frameBytes) {
   const NO_HUE = 30, FREE = 31, NEW = 4;
   const reader = new BitReader(group.subarray(0, group.length - 4)), shades = hues.map(shadesOf);
   const candidate = makeChances(4 * 8000), hueChances = makeChances(32 * 32 * 32), brightness = makeChances(32 * 8 * 256), rounding = makeChances(32 * 3 * 2), free = makeChances(3 * 16 * 256);
-  // Of the pixels: colour 0xRRGGBB, by which candidate, and hue.
+  // Per pixel: colour 0xRRGGBB, candidate, and hue.
   const images = cameras.map(({ width_px, height_px }) => {
     const size = width_px * height_px;
     return { color: new Int32Array(size), how: new Uint8Array(size), hue: new Uint8Array(size).fill(NO_HUE) };
@@ -126,8 +126,8 @@ function unpackImages(cameras, hues, group, count, frameBytes) {
   return out;
 }
 
-// unpackImages() beside the page's own thread, so that playing does not halt: a function of its arguments that returns a
-// promise, or null where the browser allows no such worker.
+// Runs unpackImages() outside the page's thread, so that playback does not stall: a function of its arguments that returns a
+// promise, or null if the browser allows no such worker.
 function imageWorker() {
   const waiting = new Map();
   let worker, count = 0;

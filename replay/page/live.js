@@ -1,7 +1,7 @@
-// A replay that grows while a world runs elsewhere, and the connection to it.
+// Replay that grows while a world runs elsewhere, and the connection to that world.
 
 const MAX_LIVE_FRAMES = 8192, LIVE_PICTURES = 600;
-// An EventSource does not say why it is refused. The number is kMaxLivePages of replay/server.h.
+// An EventSource does not report why it is refused. The number is kMaxLivePages of replay/server.h.
 const REFUSED = "8 pages listen already, or the simulation has ended";
 
 class Refused extends Error {}
@@ -16,12 +16,12 @@ class LiveReplay extends Replay {
     Object.assign(this, { firstStep: step, looks: new Map(), version: 0, watched: -1, sendsImages, imageSource: "drawn by the simulation" });
     this.grow(512);
   }
-  // Begins anew, for views that hold this object: the page has missed some steps.
+  // Restarts, for views that hold this object, after the page has missed steps.
   restart(other) {
     const version = this.version + 1, map = this.map;
     Object.assign(this, other, { version, map });
   }
-  // Moves all columns into new ones with room for `stride` frames, but the first `dropped` frames.
+  // Moves all columns into new columns with room for `stride` frames, without the first `dropped` frames.
   move(stride, dropped) {
     const kept = this.frames - dropped;
     const moved = (column, count) => {
@@ -36,7 +36,7 @@ class LiveReplay extends Replay {
     Object.assign(this, { episodeOf, stride, frames: kept });
   }
   grow(stride) { this.move(Math.max(stride, this.stride), 0); }
-  // Forgets the oldest frames.
+  // Discards the oldest frames.
   drop(count) {
     this.move(this.stride, count);
     this.firstStep += count;
@@ -52,7 +52,8 @@ class LiveReplay extends Replay {
     this.events = this.events.filter(event => event.frame >= count).map(event => ({ ...event, frame: event.frame - count }));
     this.looks = new Map([...this.looks].filter(([frame]) => frame >= count).map(([frame, look]) => [frame - count, look]));
   }
-  // Adds the frame of a message. Returns how many old frames were dropped for it, or null where it does not follow.
+  // Adds the frame of a message. Returns the number of frames dropped for it, or null if the frame does not follow the last
+  // one.
   append({ step, tracks, lights, chains, episode, metrics }) {
     if (step !== this.firstStep + this.frames) return null;
     let dropped = 0;
@@ -84,7 +85,7 @@ class LiveReplay extends Replay {
     return { index, first, conditioning, bodies: bodies.map(body), chains: bodies.map(() => []),
       parked: parked.map(car => ({ ...body(car), x_m: car[4] / 100, y_m: car[5] / 100, z_m: car[6] / 100, heading_deg: car[7] / 10 })) };
   }
-  // What the watched agent sees and its policy thinks at a step.
+  // Sets the watched agent's images and its policy's response at a step.
   addLook({ step, agent, decision, images }) {
     const frame = step - this.firstStep;
     if (frame < 0 || frame >= this.frames) return;
@@ -94,11 +95,11 @@ class LiveReplay extends Replay {
     this.watched = agent;
     ++this.version;
   }
-  // A frame whose look has not come yet is taken for the watched agent's.
+  // A frame whose look has not arrived yet is assumed to be the watched agent's.
   isFollowed(agent, frame) { return (this.looks.get(frame)?.agent ?? this.watched) === agent; }
-  // One that has not come yet will.
+  // True also for images that have not arrived yet.
   hasImages(agent, frame) { return Boolean(this.sendsImages && this.isFollowed(agent, frame) && (this.looks.get(frame)?.images ?? !this.looks.has(frame))); }
-  // From what this object holds now: restart() and drop() give it other looks.
+  // Reads the present looks, which restart() and drop() replace.
   async imagesOf(frame) { return this.looks.get(frame)?.images ?? null; }
   decision(agent, frame) {
     const look = this.looks.get(frame);
@@ -109,17 +110,17 @@ class LiveReplay extends Replay {
 const DRIVING_KEYS = { w: "forward", s: "backward", a: "left", d: "right", " ": "stop",
   ArrowUp: "forward", ArrowDown: "backward", ArrowLeft: "left", ArrowRight: "right" };
 
-// Server-sent events from where this page came from, and requests to there.
+// Server-sent events from this page's server, and requests to the server.
 class LiveConnection {
   constructor(on) {
     Object.assign(this, { on, state: "connecting", paused: false, pace: 1, driven: -1, mine: -1, isMine: false, held: new Set(), sending: Promise.resolve() });
   }
-  // Resolves with the replay once the world has been described; rejects where it will not be.
+  // Resolves with the replay once the world has been described; rejects if it will not be.
   begin() {
     return new Promise((resolve, reject) => {
       const source = this.source = new EventSource("events");
       const giveUp = error => { this.close(); reject(error); };
-      // In their order, though the first takes its time to be unpacked.
+      // In order, although unpacking the first message takes time.
       let work = Promise.resolve();
       const listen = (name, act) => source.addEventListener(name, event => {
         work = work.then(() => act(JSON.parse(event.data))).catch(error => this.replay ? this.on.fault(error) : giveUp(error));
@@ -138,7 +139,7 @@ class LiveConnection {
       listen("look", message => { this.replay.addLook(message); this.on.change(); });
       listen("status", ({ paused, pace, driven }) => {
         Object.assign(this, { paused, pace, driven });
-        // Taken away, unless what was asked has only not been answered yet.
+        // Driving was taken away, unless the request is only not answered yet.
         if (driven === this.mine) this.isMine = true;
         else if (this.isMine) this.mine = -1;
         this.on.change();
@@ -146,7 +147,7 @@ class LiveConnection {
       listen("end", () => { this.state = "ended"; source.close(); this.on.change(); });
       source.addEventListener("error", () => {
         if (this.state === "ended") return;
-        // One that is only lost is tried again.
+        // A connection that is only lost is retried.
         const isRefused = source.readyState === EventSource.CLOSED;
         if (isRefused && !this.replay) { giveUp(new Refused(REFUSED)); return; }
         this.state = isRefused ? "refused" : "lost";
@@ -155,7 +156,7 @@ class LiveConnection {
       this.timer = setInterval(() => { if (this.mine >= 0) this.sendKeys(); }, 250);
     });
   }
-  // A page that cannot show the world leaves its place to another.
+  // A page that cannot show the world leaves its slot to another page.
   close() {
     this.source?.close();
     clearInterval(this.timer);
@@ -163,7 +164,7 @@ class LiveConnection {
   ask(request) {
     if (this.state === "ended") return;
     this.sending = this.sending.then(() => fetch("control", { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(request) }))
-      .catch(() => {});  // the events tell that the connection is lost
+      .catch(() => {});  // the events report a lost connection
   }
   sendKeys() { this.ask({ keys: [...new Set([...this.held].map(key => DRIVING_KEYS[key]))] }); }
   drive(agent) {
@@ -172,7 +173,7 @@ class LiveConnection {
     this.held.clear();
     this.ask({ drive: agent });
   }
-  // Whether the key is one that drives now.
+  // Whether the key drives now.
   key(key, isDown) {
     if (this.mine < 0 || !DRIVING_KEYS[key]) return false;
     const known = this.held.has(key);

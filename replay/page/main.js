@@ -1,4 +1,4 @@
-// The page: state, playing, keys, pointers, and the view's state in the address.
+// The page: state, playback, keys, pointers, and the view's state in the address.
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16];
 
@@ -11,7 +11,7 @@ function fail(message) {
 }
 
 async function main() {
-  // What happens at once, before there are views: nothing.
+  // Handlers of early events, before views exist: they do nothing.
   const live = byId("replay-live") && new LiveConnection({ fault: error => { throw error; }, restart() {}, frame() {}, change() {} });
   if (live) byId("message").firstElementChild.textContent = "Waiting for the simulation ...";
   try {
@@ -21,13 +21,13 @@ async function main() {
     const isForeseen = error instanceof Damaged || error instanceof Refused;
     fail(isForeseen ? error.message.replace(/\.$/, "") : `a part of it cannot be shown (${error.message})`);
     window.pictura = { damaged: error.message };
-    if (!isForeseen) console.error(error);  // which says where it was
+    if (!isForeseen) console.error(error);  // includes the position in the code
   }
 }
 
-// Makes the views, and plays. Throws where they cannot be made of what the replay holds.
+// Creates the views, and plays. Throws if views cannot be created from the replay.
 function show(replay, live) {
-  // Files of earlier versions do not hold the map's origin.
+  // Files of earlier versions lack the map's origin.
   const header = replay.header, last = () => replay.frames - 1, origin = header.origin_m ?? [0, 0, 0];
   byId("message").hidden = true;
   byId("app").hidden = false;
@@ -38,10 +38,10 @@ function show(replay, live) {
   const dirty = () => { isDirty = true; };
   const clampFrame = frame => Math.min(last(), Math.max(0, frame));
 
-  const counts = [];  // in the legend
+  const counts = [];  // counts in the legend
 
   const actions = {
-    // In a world that runs, the newest frame is where the page goes on with it.
+    // In a running world, the page continues at the newest frame.
     seek(frame) {
       state.time = clampFrame(frame);
       if (live) state.isAtEdge = state.time >= last();
@@ -52,13 +52,13 @@ function show(replay, live) {
       if (live) live.ask({ watch: state.agent });
       dirty();
     },
-    // An event: its step and its agent, moved into view unless it is already there.
+    // Shows an event: its step and its agent, moved into view if necessary.
     goTo(event) {
       actions.select(event.agent);
       actions.seek(event.frame);
       actions.show(event.agent);
     },
-    // Moves the view so that an agent is in it.
+    // Moves the view to show an agent.
     show(agent) {
       const pose = replay.pose(agent, state.time), [px, py] = world.pixelOf(pose.x_m, pose.y_m), edge = 40 * world.ratio;
       const isIn = px > edge && py > edge && px < world.canvas.width - edge && py < world.canvas.height - edge;
@@ -66,7 +66,7 @@ function show(replay, live) {
       if (state.zoom < 2) { state.zoom = 4; state.x = pose.x_m; state.y = pose.y_m; }
       dirty();
     },
-    // A probe's case: its ego and the road user, both on screen.
+    // Shows a probe's case: its ego and the road user, both on screen.
     showCase() {
       const { ego, removed, inserted } = replay.probed;
       actions.select(ego);
@@ -90,7 +90,7 @@ function show(replay, live) {
       if (live) live.ask({ pace: live.pace = speed });
       dirty();
     },
-    // Of a world that runs: drives the chosen agent by the keys, or gives it back.
+    // In a running world, drives the chosen agent by the keys, or returns it to its driver.
     drive(isDriving) {
       live.drive(isDriving ? state.agent : -1);
       if (isDriving) { actions.follow(true); actions.play(true); }
@@ -143,7 +143,7 @@ function show(replay, live) {
   function fillMetrics() {
     const m = replay.header.metrics;
     const shown = [["km", m.km_driven.toFixed(1)], ["goals", m.goals_reached], ["collisions", m.collisions], ["off road", m.off_road], ["red lights", m.red_light], ["walls", m.wall_contacts]];
-    // Numbers are of agents that act; in a recording that is only played nobody does.
+    // Numbers count agents that act; in a recording that is only played none does.
     if (!live && m.agent_steps === 0) { byId("metrics").replaceChildren(make("li", "as recorded: nobody acts")); return; }
     byId("metrics").replaceChildren(...shown.map(([name, value]) => {
       const item = make("li");
@@ -212,7 +212,7 @@ function show(replay, live) {
       state.playing = state.isAtEdge && !live.paused && live.state === "live";
       const lag = last() - state.time;
       if (state.isAtEdge && lag > 0) {
-        // About a step behind the newest, so that there is something to move towards; far behind, faster.
+        // Plays about a step behind the newest frame, so that there is a frame to move towards; faster if far behind.
         state.time = lag > 6 ? last() - 1 : Math.min(last(), state.time + elapsed_s * state.speed / replay.dt_s * lag);
         if (!state.playing && lag < 0.02) state.time = last();
         isDirty = true;
@@ -325,7 +325,7 @@ function show(replay, live) {
     dirty();
   });
 
-  // A world that runs.
+  // Running world.
   const LIVE_TEXTS = { lost: "connection lost, trying again", refused: REFUSED, failed: "this page cannot read what it was sent", ended: "the simulation has ended" };
   function showLive() {
     byId("live-state").textContent = LIVE_TEXTS[live.state] ?? (live.paused ? "paused" : "live");
@@ -416,7 +416,7 @@ function show(replay, live) {
   new ResizeObserver(dirty).observe(byId("stage"));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { theme = readTheme(); world.map.forget(); dirty(); });
 
-  // For tests, and for those who like to look closer: what is shown now.
+  // Current state, for tests and for inspection.
   window.pictura = {
     replay, state, actions, live,
     drawn: () => { render(); return world.drawn.map(({ agent, x_m, y_m, heading_deg, px, py }) => ({ agent, x_m, y_m, heading_deg, px, py })); },
@@ -431,7 +431,7 @@ function show(replay, live) {
   readAddress();
   if (live) live.ask({ watch: state.agent });
   fillHeader();
-  render();  // here, where a fault is still caught
+  render();  // called here, where errors are still caught
   requestAnimationFrame(now => { before = now; frame(now); });
 }
 

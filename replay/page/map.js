@@ -1,10 +1,10 @@
-// The map, kept as a picture that is drawn anew when the scale changes or its margin is used up.
+// Map, cached as a picture that is redrawn when the scale changes or its margin is used up.
 
 const LANE_COLORS = ["--road", "--road", "--parking", "--road-ramp", "--side", "--sidewalk", "--green", "--green", "--side", "--side", "--side", "--side"];
 const MARK_COLORS = ["--mark-white", "--mark-yellow"];
 const CELL_M = 80;
 
-// Shapes of one look, by the cell that they lie in, as paths in metres.
+// Shapes of one style, by grid cell, as paths in metres.
 class Batch {
   constructor(look) { this.look = look; this.cells = new Map(); }
   add(points, closed) {
@@ -24,7 +24,7 @@ class Batch {
   }
 }
 
-// Bars across a crosswalk's longest side.
+// Returns bars across a crosswalk's longest side.
 function barsOf(points) {
   let x = 0, y = 0, longest = 0, along = [1, 0];
   const count = points.length / 2;
@@ -60,7 +60,7 @@ class MapView {
       }
       if (kind === "lane") {
         const color = LANE_COLORS[detail] || "--side";
-        // In their order: what comes later covers what came before.
+        // In order: later shapes cover earlier shapes.
         if (!lanes || lanes.look.fill !== color) this.batches.push(lanes = new Batch({ fill: color }));
         lanes.add(points, true);
       } else if (kind === "crosswalk") {
@@ -87,8 +87,8 @@ class MapView {
 
   forget() { this.kept = null; }
 
-  // Draws the map behind a camera {x, y, scale: px a metre} on a canvas of this size in pixels. With `isMoving` a
-  // picture of another scale will do for now.
+  // Draws the map behind a camera {x, y, scale: px a metre} on a canvas of this size in pixels. With `isMoving` a picture of
+  // another scale is used meanwhile.
   draw(context, camera, width, height, theme, isMoving) {
     const kept = this.kept, margin = 0.25;
     const covers = kept && Math.abs(camera.x - kept.x) * camera.scale <= margin * width && Math.abs(camera.y - kept.y) * camera.scale <= margin * height;
@@ -122,7 +122,7 @@ class MapView {
       for (const cell of cells.values()) {
         if (!isVisible(cell.box)) continue;
         context.fill(cell.path);
-        context.stroke(cell.path);  // so that neighbours leave no seam
+        context.stroke(cell.path);  // so that adjacent cells leave no seam
       }
     }
     if (scale > 0.7) {

@@ -1,9 +1,9 @@
-// The panel of one agent: what it does, sees, is paid, and is conditioned on.
+// Panel of one agent: its actions, images, rewards, and conditioning.
 
-const LONG_JERKS = ["-15", "-4", "0", "+4"], LAT_JERKS = ["-4", "0", "+4"];  // m/s3, as the action space has them
+const LONG_JERKS = ["-15", "-4", "0", "+4"], LAT_JERKS = ["-4", "0", "+4"];  // m/s3, in the order of the action space
 
 const decimals = (value, digits) => (Object.is(value, -0) ? 0 : value).toFixed(digits).replace("-", "\u2212");
-// Of very different sizes: three digits that tell them apart, down to the seventh decimal, which is what is recorded.
+// Formats numbers of very different sizes: three significant digits, up to the seventh decimal, the recorded precision.
 function short(value) {
   if (Math.abs(value) < 5e-8) return "0";
   const first = Math.floor(Math.log10(Math.abs(value)));
@@ -89,7 +89,7 @@ class Panel {
     });
   }
 
-  // What the probe's case is about, and what each policy made of it.
+  // Shows the description of the probe's case, and each policy's response.
   makeCase() {
     const { probed } = this.replay;
     if (!probed) return;
@@ -105,7 +105,7 @@ class Panel {
     }));
   }
 
-  // Sums of rewards since the episode began, of one agent.
+  // Returns sums of one agent's rewards since the episode began.
   sumRewards(agent) {
     const { replay } = this, frames = replay.frames;
     this.returns = new Float64Array(frames);
@@ -159,10 +159,10 @@ class Panel {
     };
     set("speed", replay.get("speed_mps", agent, frame) * 3.6, 1, "km/h");
     set("steer", replay.get("steer_deg", agent, frame), 1, "\u00b0");
-    // Who halts is put to rest within a step, which is no braking.
+    // A halted agent is stopped within a step, which is not braking.
     set("acceleration", status === "halted" ? NaN : frame > before ? (replay.get("speed_mps", agent, frame) - replay.get("speed_mps", agent, before)) / replay.dt_s : 0, 1, "m/s\u00b2");
     set("value", decision ? decision.value : NaN, 2, "");
-    // Who is moved by a recording does nothing of its own, and is paid nothing.
+    // An agent that follows a recording has no actions and no rewards of its own.
     const isRecorded = status === "recorded";
     for (const part of [this.facts.reward.box, this.facts.return.box, byId("action-section"), byId("reward-section")]) part.hidden = isRecorded;
     this.facts.value.box.hidden = !replay.isFollowed(agent, frame) || !replay.decisions;
@@ -194,7 +194,7 @@ class Panel {
       now.textContent = short(value);
       sum.textContent = short(whole);
       row.classList.toggle("zero", value === 0 && whole === 0);
-      // Terms differ by factors of a million: the bar's length is that of the logarithm.
+      // Terms differ by factors of a million, so the bar's length shows the logarithm.
       const share = value ? Math.min(1, Math.max(0.04, 1 + Math.log10(Math.abs(value)) / 6)) / 2 : 0;
       bar.style.cssText = `left:${value < 0 ? 50 - 100 * share : 50}%;width:${100 * share}%;background:${theme[value < 0 ? "--negative" : "--positive"]}`;
     });
@@ -205,7 +205,7 @@ class Panel {
     byId("conditioning").replaceChildren(...names.flatMap((name, i) => [make("dt", name), make("dd", Number(values[agent * names.length + i].toPrecision(4)))]));
   }
 
-  // Draws what cameras see into contexts. Throws where the browser cannot.
+  // Draws the cameras' images into contexts. Throws if the browser cannot draw them.
   drawImages(agent, frame, change, contexts) {
     if (this.noDrawer) throw new Error(this.noDrawer);
     try {
@@ -222,7 +222,7 @@ class Panel {
     byId("cameras").hidden = !shows;
     if (!shows) return;
     for (const { figure, camera } of this.pictures) figure.classList.toggle("large", camera.name === state.camera);
-    // In the step of a case its road user can be taken away, or is there where the scene has nobody.
+    // In the step of a case its road user can be removed, or added if the scene lacks it.
     const user = replay.caseUser(agent, frame), change = user && state.isWithout !== user.isInserted ? user.change : null;
     byId("user-shown").hidden = !user;
     byId("user-shown").textContent = `${state.isWithout ? "without" : "with"} the road user`;
@@ -284,7 +284,7 @@ class Panel {
       context.lineWidth = 1.3 * ratio;
       context.lineJoin = "round";
       context.beginPath();
-      // Where many frames share a pixel, their lowest and highest.
+      // Draws the minimum and maximum of frames that share a pixel.
       const step = Math.max(1, Math.floor(replay.frames / width / 2));
       let isOn = false;
       for (let frame = 0; frame < replay.frames; frame += step) {

@@ -1,8 +1,8 @@
-// Events over time, one row a kind; a click goes there.
+// Events over time, one row per kind; a click seeks to an event.
 
 class Timeline {
   constructor(replay, state, canvas, tip, actions) {
-    // What is painted under and over the cursor, until it changes.
+    // Pictures painted under and over the cursor, until they change.
     Object.assign(this, { replay, state, canvas, tip, actions, kept: null, rows: new OffscreenCanvas(1, 1), events: new OffscreenCanvas(1, 1) });
     canvas.addEventListener("pointerdown", event => {
       canvas.setPointerCapture(event.pointerId);
@@ -27,7 +27,7 @@ class Timeline {
   rowOf(event) { return Math.floor((event.clientY - this.canvas.getBoundingClientRect().top) / 11.5); }
   scrub(event) { this.actions.seek(Math.round(this.frameAt(event))); }
   shows(event) { return !this.state.onlyAgent || event.agent === this.state.agent; }
-  // The event under the pointer, within 4 pixels.
+  // Returns the event under the pointer, within 4 pixels.
   eventAt(pointer) {
     const box = this.canvas.getBoundingClientRect(), x = pointer.clientX - box.left, row = this.rowOf(pointer);
     let found = null, nearest = 4.5;
@@ -53,7 +53,7 @@ class Timeline {
       canvas.width = Math.round(width * ratio);
       canvas.height = Math.round(height * ratio);
       const repaint = (picture, paint) => {
-        picture.width = canvas.width;  // which clears it
+        picture.width = canvas.width;  // this clears it
         picture.height = canvas.height;
         const context = picture.getContext("2d");
         context.scale(ratio, ratio);
@@ -80,7 +80,7 @@ class Timeline {
     context.beginPath();
     context.arc(x, 60, 4, 0, 2 * Math.PI);
     context.fill();
-    // Events lie on the cursor, and those of this step are wider than it.
+    // Draws events over the cursor; those of the current step are wider than the cursor.
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.drawImage(this.events, 0, 0);
     context.scale(ratio, ratio);
@@ -94,7 +94,7 @@ class Timeline {
     context.fillRect(this.xOf(event.frame, width) - wide / 2, event.kind * 11.5 + 1, wide, 9.5);
     context.globalAlpha = 1;
   }
-  // Where a probe's case is.
+  // Marks the position of a probe's case.
   paintCase(context, width, theme) {
     const x = this.xOf(this.replay.probed.frame, width), isLeft = x < width - 40;
     context.fillStyle = theme["--case"];
@@ -122,7 +122,7 @@ class Timeline {
     });
     context.fillStyle = theme["--dim"];
     for (const episode of replay.episodes) if (episode.first > 0) context.fillRect(this.xOf(episode.first, width) - 0.5, 0, 1, 60);
-    // Times at round seconds, about 90 pixels apart.
+    // Labels round seconds, about 90 pixels apart.
     const seconds = (replay.frames - 1) * replay.dt_s, wish = seconds / Math.max(1, (width - this.margin) / 90);
     const step = [0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1800, 3600].find(s => s >= wish) || 7200;
     const begin_s = replay.firstStep * replay.dt_s;

@@ -1,6 +1,6 @@
-// The world from above: the map, lights, agents, goal chains, and the camera that people move.
+// World from above: the map, lights, agents, goal chains, and the camera that viewers move.
 
-// By state; a light whose state is unknown is not drawn.
+// Colours by state; a light with an unknown state is not drawn.
 const LIGHT_COLORS = ["#6b7078", "#ff3b3b", "#ffc400", "#25d366"];
 const THEME = ["--ground", "--road", "--road-ramp", "--parking", "--sidewalk", "--green", "--side", "--mark-white", "--mark-yellow", "--mark-other",
   "--edge", "--wall", "--stop", "--crosswalk", "--line", "--text", "--dim", "--accent", "--panel", "--raised", "--vehicle", "--cyclist", "--pedestrian",
@@ -28,7 +28,7 @@ class WorldView {
     this.canvas.height = height;
   }
 
-  // The whole map, beside the legend where it would lie under it.
+  // Shows the whole map, beside the legend where the legend would cover it.
   fit() {
     const [x0, y0, x1, y1] = this.map.box, width = this.canvas.width / this.ratio, height = this.canvas.height / this.ratio, { legend_px } = this;
     const zoomIn = free => 0.94 * Math.min(free / (x1 - x0), height / (y1 - y0));
@@ -49,7 +49,7 @@ class WorldView {
     this.movedAt = performance.now();
   }
   get scale() { return this.state.zoom * this.ratio; }
-  // Of CSS pixels on the canvas.
+  // Converts CSS pixels on the canvas to metres.
   metresOf(px, py) {
     const { width, height } = this.canvas;
     return [this.state.x + (px * this.ratio - width / 2) / this.scale, this.state.y - (py * this.ratio - height / 2) / this.scale];
@@ -57,7 +57,7 @@ class WorldView {
   pixelOf(x, y) {
     return [this.canvas.width / 2 + (x - this.state.x) * this.scale, this.canvas.height / 2 - (y - this.state.y) * this.scale];
   }
-  // The agent drawn nearest to a place in CSS pixels, or null.
+  // Returns the agent drawn nearest to a position in CSS pixels, or null.
   agentAt(px, py) {
     let found = null, nearest = 14 * this.ratio;
     for (const agent of this.drawn) {
@@ -67,7 +67,7 @@ class WorldView {
     return found;
   }
 
-  // Returns whether it is drawn as it should be, or only for now.
+  // Draws the world. Returns false if the map is only a temporary picture.
   draw(theme) {
     const { replay, state, context } = this, { width, height } = this.canvas;
     const time = state.time, frame = Math.floor(time);
@@ -104,7 +104,7 @@ class WorldView {
     return isFinal;
   }
 
-  // The road user of a probe's case, joined with its ego in the case's step; in others only where it would be.
+  // Draws the road user of a probe's case, joined with its ego in the case's step; in other steps only its position.
   drawCase(time, frame, theme) {
     const { replay, context, ratio } = this, { ego, removed, inserted } = replay.probed, isNow = frame === replay.probed.frame;
     const isThere = agent => agent !== null && !replay.isAbsent(agent, frame);
@@ -188,7 +188,7 @@ class WorldView {
     context.lineWidth = ratio;
     context.beginPath();
     const r = Math.min(width, length) * 0.22;
-    // Rounded, and pointed to where it heads.
+    // Rounded, with a tip in its heading.
     context.moveTo(-length / 2 + r, -width / 2);
     context.lineTo(length * 0.28, -width / 2);
     context.quadraticCurveTo(length / 2, -width / 2, length / 2, 0);
@@ -200,7 +200,7 @@ class WorldView {
     context.closePath();
     context.fill();
     context.stroke();
-    if (length > 14 * ratio && body.agentClass === 0) {  // a windscreen
+    if (length > 14 * ratio && body.agentClass === 0) {  // windscreen
       context.fillStyle = theme["--outline"];
       context.globalAlpha = 0.45 * alpha;
       context.fillRect(length * 0.1, -width * 0.36, length * 0.13, width * 0.72);
@@ -218,7 +218,7 @@ class WorldView {
     context.arc(px, py, 0.75 * length_px + 5 * this.ratio, 0, 2 * Math.PI);
     context.stroke();
   }
-  // A ring in the colours of the reasons.
+  // Draws a ring in the colours of the reasons.
   drawHalt(px, py, length_px, bits, theme) {
     const { context } = this, reasons = reasonsOf(bits), radius = 0.55 * length_px + 2 * this.ratio;
     context.lineWidth = 2.4 * this.ratio;
@@ -267,7 +267,7 @@ class WorldView {
   drawTrail(time, frame, theme) {
     const { context, replay, state } = this, first = Math.max(replay.episode(frame).first, frame - 60);
     context.lineWidth = 2.5 * this.ratio;
-    context.lineCap = "butt";  // ends that overlap would show
+    context.lineCap = "butt";  // overlapping ends would show
     context.strokeStyle = theme["--accent"];
     for (let at = first; at < frame; at += 6) {
       context.globalAlpha = 0.1 + 0.5 * (at - first) / 60;
