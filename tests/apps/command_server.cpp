@@ -44,7 +44,7 @@ class Texts {
   size_t at_ = 0;
 };
 
-/// False at the end of the socket.
+/// Receives a packet. Returns false at the end of the socket.
 bool receive(std::string* packet_out, Descriptors* descriptors_out) {
   packet_out->resize(1 << 20);
   iovec memory{packet_out->data(), packet_out->size()};
@@ -71,7 +71,7 @@ bool receive(std::string* packet_out, Descriptors* descriptors_out) {
   std::vector<char*> words = texts.list();
   const auto count = static_cast<int>(words.size());
   words.push_back(nullptr);
-  // Without the destructors of static objects: torch's take as long as its loading. Outputs are closed.
+  // Skips the destructors of static objects, since torch's take as long as its loading. Outputs are closed.
   std::_Exit(pictura::run_command(count, words.data()));
 }
 
@@ -82,7 +82,7 @@ void answer(const Descriptors& descriptors, int32_t number) {
 }  // namespace
 
 int main() {
-  std::signal(SIGCHLD, SIG_IGN);  // nothing remains of those that wait
+  std::signal(SIGCHLD, SIG_IGN);  // removes ended children automatically
   std::string packet;
   Descriptors descriptors{};
   while (receive(&packet, &descriptors)) {

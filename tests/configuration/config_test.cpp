@@ -217,7 +217,7 @@ TEST(Config, TheScheduleSaysWhatIsInForce) {
   EXPECT_EQ(images_at(9), "96x54 4 0.35");
   EXPECT_EQ(images_at(10), "192x108 8 0.7");
   EXPECT_EQ(images_at(20), "64x36 8 0.7");
-  // What a run saves can be read, though its rows lead to its sizes no more.
+  // Saved configurations can be read, even if their rows no longer lead to their sizes.
   EXPECT_EQ(to_toml(parse_saved_config(to_toml(config_at(c, 20)), "s.toml")), to_toml(config_at(c, 20)));
   EXPECT_EQ(first_difference(config_at(c, 9), config_at(c, 10)), "render.line_floor_px: 0.35 became 0.7");
   EXPECT_EQ(whole_factor({32, 18}, {96, 54}), 3);
@@ -247,7 +247,7 @@ TEST(Config, KeysWithoutEffectAreRefused) {
   EXPECT_EQ(error_in("[train]\nhalted_slots = \"draw\"\nadv_filter_threshold = 0\n"), test::kNoError);
   EXPECT_THAT(error_in("[train]\nhalted_slots = \"draw\"\nadv_filter_threshold = 0\nadv_filter = \"quantile\"\n"),
               AllOf(HasSubstr("a.toml:2: train.halted_slots"), HasSubstr("train.adv_filter = \"maximum\"")));
-  // What is written for a run with a rig file can be read again.
+  // A configuration written for a run with a rig file can be read again.
   const Config c = parse_config("[render]\nrig = \"r.toml\"\n", "a.toml");
   EXPECT_EQ(to_toml(parse_config(to_toml(c), "b.toml")), to_toml(c));
 }
@@ -284,7 +284,7 @@ TEST(Config, BackendsAreCheckedWhereTheyAreRead) {
               AllOf(HasSubstr("simulator.backend: expected one of cpu, "), HasSubstr("got 'null'")));
   EXPECT_THAT(error_in("[render]\nbackend = \"vulkan\"\n"),
               AllOf(HasSubstr("render.backend: expected one of cpu, "), HasSubstr("got 'vulkan'")));
-  // A run that another build saved is read whatever drew it.
+  // A run saved by another build can be read, whatever its renderer.
   EXPECT_EQ(parse_saved_config("[render]\nbackend = \"vulkan\"\n", "a.ckpt").render.backend, "vulkan");
 }
 
@@ -330,7 +330,7 @@ TEST(Config, WhatCannotWorkInOneMemoryIsRefusedByName) {
   EXPECT_THAT(message("auto", "cuda", "cpu"), AllOf(HasSubstr("simulator.backend"), HasSubstr("render.backend")));
   EXPECT_THAT(message("cuda:0", "cpu", "cuda"), AllOf(HasSubstr("simulator.backend"), HasSubstr("\"cuda:0\"")));
   EXPECT_THAT(message("cuda", "auto", "null"), AllOf(HasSubstr("render.backend"), HasSubstr("\"null\"")));
-  // With one renderer or simulator in host memory, auto is the host; nothing is asked of a device.
+  // With a renderer or simulator in host memory, auto is the host; no device is queried.
   Config c;
   c.render.backend = "cpu";
   EXPECT_TRUE(open_learning_device(c).is_host());
@@ -411,7 +411,7 @@ TEST(Config, RangesOfTownsAreExpandedAndCopiesAreOfEachMap) {
     EXPECT_EQ(worlds[i].map, static_cast<int>(i % 9));
     EXPECT_EQ(before[i].map, static_cast<int>(i % 3));
   }
-  // Copies that no world is on are left out, maps are not.
+  // Copies that no world uses are dropped, maps are not.
   EXPECT_EQ(training_maps(with({"simulator.map_copies=2", "simulator.num_slots=16"})).size(), 4u);
   EXPECT_EQ(training_maps(with({"simulator.map_copies=2", "simulator.num_slots=4"})).size(), 3u);
   EXPECT_EQ(first_difference(plain, copied), "simulator.map_copies: 0 became 2");

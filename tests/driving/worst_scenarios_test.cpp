@@ -1,4 +1,4 @@
-// Which scenarios of an evaluation are recorded again first.
+// Order in which scenarios of an evaluation are recorded again.
 #include <gmock/gmock.h>
 
 #include "pictura/driving/replay_scenarios.h"

@@ -1,4 +1,4 @@
-// Blind corners: states that are found and matched, takeovers and their controls, and the means.
+// Blind corners: found and matched states, takeovers and their controls, and the means.
 #include "pictura/evaluation/probes/corner.h"
 
 #include <cmath>
@@ -60,7 +60,8 @@ TEST(CornerPairs, AreOfLikeDistancesAndSpeeds) {
 }
 
 TEST(CornerPairs, TakeNobodyTwiceAndScenesInTurn) {
-  // Of ego 0 two states with the same user; the second empty ego waits for whom the first does not do.
+  // Ego 0 has two states with the same user; the second empty ego waits for a user for which the first is not similar
+  // enough.
   const std::vector<CornerState> hidden{state(1, 0, 20, 5, 7, 20), state(1, 0, 21, 5, 7, 10), state(1, 2, 20, 5, 7),
                                         state(2, 0, 20, 5, 7)};
   const std::vector<CornerState> empty{state(5, 0, 20, 5, -1, 10), state(5, 0, 20.2f, 5, -1, 15), state(5, 1, 21, 5)};
@@ -87,7 +88,7 @@ bool same_runs(const CornerResults& a, const CornerResults& b) {
   return true;
 }
 
-/// In towns through which the lane keeper drives.
+/// Corners in towns through which the lane keeper drives.
 struct CornerKind {
   using Options = CornerOptions;
   using Results = CornerResults;
@@ -146,7 +147,7 @@ TEST_F(Corner, WhoIsNotSeenChangesNothingForCamerasAndMuchForVectors) {
     for (const size_t policy : {kAgent, kVectorized, kLikeForLike}) {
       const Takeover &run = all.takeover(pair, true, CornerCase::hidden, policy),
                      &without = all.takeover(pair, true, CornerCase::removed, policy);
-      // Up to where a camera sees it: what is decided there shows in the next state.
+      // Compared up to the step at which a camera sees the vehicle: its decision shows in the next state.
       const int32_t first_seen = all.takeover(pair, true, CornerCase::hidden, kAgent).input_step;
       const auto end = static_cast<size_t>(first_seen < 0 ? kTakeoverSteps : first_seen);
       compared += policy == kAgent ? end : 0;
@@ -176,8 +177,8 @@ TEST_F(Corner, WithoutWallsItIsSeenFromTheStart) {
   EXPECT_EQ(later, 0u);
 }
 
-// Vectors hold no walls: without them these policies drive the same, among the same parked cars, up to where walls end
-// a run. Of empty corners too.
+// Vectors hold no walls: without walls these policies drive the same, among the same parked cars, up to where walls end
+// a run. Also at empty corners.
 TEST_F(Corner, WallsAloneAreGone) {
   const CornerResults& all = results();
   size_t compared = 0;
@@ -220,7 +221,7 @@ TEST_F(Corner, AnotherOneIsRemovedInstead) {
       };
       EXPECT_EQ(input_of(permuted, CornerCase::hidden), input_of(all, CornerCase::hidden));
       EXPECT_EQ(input_of(all, CornerCase::removed), -1);
-      differ += input_of(permuted, CornerCase::removed) >= 0;  // who is hidden is there
+      differ += input_of(permuted, CornerCase::removed) >= 0;  // the hidden vehicle is present
     }
   }
   EXPECT_GT(removed, all.pairs.size() / 2);
@@ -278,7 +279,7 @@ TEST_F(Corner, RefusesWhatCannotBe) {
 
 // ---- results
 
-/// Eastwards from x = 0 at a speed that falls by 1 m/s each second, for so many steps.
+/// Run eastwards from x = 0 at a speed that falls by 1 m/s each second, for `steps` steps.
 Takeover run_of(float speed_mps, int32_t steps, int32_t sight_step) {
   Takeover run;
   run.steps = steps;
@@ -294,7 +295,7 @@ Takeover run_of(float speed_mps, int32_t steps, int32_t sight_step) {
   return run;
 }
 
-/// Two pairs of two scenes and two policies, of which the second is 2 m/s faster where somebody is hidden.
+/// Two pairs of two scenes and two policies; the second policy is 2 m/s faster if a vehicle is hidden.
 CornerResults made_up_corners() {
   CornerResults all;
   all.setting.maps = {"a"};
@@ -358,7 +359,7 @@ TEST(CornerResults, DifferencesAreOfPairs) {
   };
   EXPECT_NEAR(find(1, 0, {}).at_reveal.speed_mps.value, 2, 1e-5);
   EXPECT_EQ(find(1, 0, {}).scenes, 2);
-  // The first policy drives as if nobody were there: no paired difference.
+  // The first policy drives as if no vehicle were there: no paired difference.
   EXPECT_EQ(find(0, {}, CornerCase::removed).at_reveal.speed_mps.value, 0);
   EXPECT_EQ(find(0, {}, CornerCase::removed).at_reveal.approach_mps.value, 0);
   EXPECT_EQ(find(0, {}, CornerCase::removed).at_reveal.speed_mps.half_width_95, 0);

@@ -1,5 +1,5 @@
-// Evaluations in recorded scenes: the same figures as a simulator that is driven by hand, whatever the batches, and
-// what becomes of scenes that cannot be used.
+// Evaluations in recorded scenes: the same results as a simulator driven by hand, for any batches, and the treatment of
+// scenes that cannot be used.
 #include "pictura/evaluation/evaluate_scenes.h"
 
 #include <cstring>
@@ -39,7 +39,7 @@ class SceneEvaluations : public ::testing::Test {
     options_.on_agent = [this](const SceneAgent& agent) { agents_ += csv_line(agent); };
   }
 
-  /// A scene of its own seed and id.
+  /// Writes a scene with its own seed and id.
   void write(int number, const test::FixtureOptions& fixture = {}) const {
     test::FixtureOptions its = fixture;
     its.seed = static_cast<uint64_t>(number);
@@ -48,7 +48,7 @@ class SceneEvaluations : public ::testing::Test {
     write_scene_file(folder_ / fmt::format("{}.scenario", number), scene);
   }
 
-  /// All agents' rows, and the table.
+  /// Returns all agents' rows, and the table.
   std::string figures() {
     agents_.clear();
     const SceneEvaluation evaluation = evaluate_scenes(options_);
@@ -80,7 +80,7 @@ TEST_F(SceneEvaluations, AreTheSameForAnyBatch) {
   EXPECT_EQ(figures(), one_by_one);
   options_.seed = 2;
   EXPECT_NE(figures(), one_by_one);
-  // A part of the scenes gives their rows.
+  // A range of the scenes gives their rows.
   options_.seed = 1;
   options_.first_scene = 3;
   options_.num_scenes = 1;
@@ -88,7 +88,7 @@ TEST_F(SceneEvaluations, AreTheSameForAnyBatch) {
   EXPECT_THAT(one_by_one, HasSubstr(fourth.substr(0, fourth.find("\n1 1 "))));
 }
 
-/// What a hand-driven simulator counts of the evaluation's scene.
+/// Counts of a hand-driven simulator for the evaluation's scene.
 TEST_F(SceneEvaluations, EqualASimulatorThatIsDrivenByHand) {
   write(1);
   for (const char* rules : {"", "after_infraction=drive_on", "after_infraction=leave", "overlapping=drive"}) {
@@ -160,7 +160,7 @@ TEST_F(SceneEvaluations, RecordedActionsArriveAndAreRemoved) {
 TEST_F(SceneEvaluations, LeaveOutWhatCannotBeUsed) {
   write(1);
   write(2, {.num_vehicles = 1, .num_pedestrians = 2, .num_cyclists = 0});
-  // A scene of parked vehicles alone.
+  // Scene of parked vehicles only.
   Scenario parked = *test::crossing();
   for (size_t track = 0; track < parked.tracks.size(); ++track) {
     for (int32_t step = 0; step < parked.num_steps; ++step) {
@@ -242,7 +242,7 @@ TEST_F(SceneEvaluations, PartsMergeIntoTheWhole) {
     EXPECT_TRUE(has_scene_results(names.back()));
     parts.push_back(read_scene_results(names.back()));
   };
-  add_part(4, 100);  // of which there are two
+  add_part(4, 100);  // there are two of these
   add_part(0, 2);
   add_part(2, 2);
   write_results(files / "merged", merge(parts, names));
@@ -301,7 +301,7 @@ TEST_F(SceneEvaluations, KeepRolloutsOfEverybodyWhoIsThere) {
   for (const std::vector<SimulatedState>& rollout : scenes[0].rollouts) {
     ASSERT_EQ(rollout.size(), ids.size() * 80);
     ends.insert(rollout[79].x_m);
-    // A step of 0.1 s leads nowhere else.
+    // A step of 0.1 s cannot lead farther.
     for (size_t i = 0; i < ids.size(); ++i) {
       const TrackState& start = scene.states_of(tracks[i])[10];
       const SimulatedState& first = rollout[i * 80];
@@ -314,7 +314,7 @@ TEST_F(SceneEvaluations, KeepRolloutsOfEverybodyWhoIsThere) {
   }
   EXPECT_GT(ends.size(), 1u) << "draws differ between rollouts";
 
-  // Whoever follows the recording is where that has it, in the file's coordinates; who is lost stays.
+  // Agents that follow the recording are at the recorded position, in the file's coordinates; lost agents keep theirs.
   scenes.clear();
   options_.protocol.control = "self";
   evaluate_scenes(options_);

@@ -1,4 +1,4 @@
-// What goes wrong in an evaluation: every case that it counts is listed, with who, where and how.
+// Infractions in an evaluation: every counted case is listed, with agent, place and circumstances.
 #include "pictura/evaluation/infractions.h"
 
 #include <algorithm>
@@ -19,15 +19,15 @@ using ::testing::StartsWith;
 
 constexpr uint32_t kScenario = 7;
 
-// Where a vehicle's rear axle is, on a straight road along x whose two lanes lead that way at y = 0 and 4.
+// Start of a vehicle's rear axle, on a straight road along x whose two lanes lead that way at y = 0 and 4.
 struct Start {
   float x_m = 0, y_m = 0, heading_rad = 0, speed_mps = 0;
 };
 
-// The map as a file in UTM coordinates would place it.
+// Origin of the map in a file with UTM coordinates.
 constexpr std::array<double, 3> kOrigin_m{388096, 3948956, 12};
 
-// What becomes of the first of two vehicles that keep their speed, within two seconds.
+// Infraction of the first of two vehicles that keep their speed, within two seconds.
 Infraction infraction_of_the_first(const Start& first, const Start& second, int steps = 20) {
   const auto map = testing::stadium(200, 2);
   map->origin_m = kOrigin_m;
@@ -93,7 +93,7 @@ TEST(Infractions, CollisionsSayWithWhomAndHow) {
   const Infraction beside = infraction_of_the_first({.x_m = 50, .heading_rad = 0.3f, .speed_mps = 10},
                                                     {.x_m = 52, .y_m = 4, .speed_mps = 10});
   EXPECT_EQ(beside.contact, Contact::side_swipe);
-  // Who stands is not at fault, and whom it hit is told all the same.
+  // A standing vehicle is not at fault, and its collision partner is listed all the same.
   const Infraction hit = infraction_of_the_first({.x_m = 62}, driving);
   EXPECT_TRUE(hit.is(kEventCollision));
   EXPECT_FALSE(hit.is(kEventAtFault));
@@ -135,7 +135,7 @@ TEST(Evaluation, CountsLivesOnRoadsThatEnd) {
   EXPECT_GT(row.left, 12);
   EXPECT_GT(row.entered, 8);
   EXPECT_LE(row.entered, row.left);
-  // Of pedestrians and cyclists there are few; vehicles that wait at the end are counted as what they were.
+  // There are few pedestrians and cyclists; vehicles that wait at the end are counted with their previous life.
   EXPECT_GT(row.vehicle_episodes, 12);
   EXPECT_LE(row.vehicle_episodes, row.spawned + row.entered);
   EXPECT_NEAR(row.goals_per_km.value * row.km_driven, row.goals_per_vehicle.value * double(row.vehicle_episodes), 1e-6);
@@ -185,7 +185,7 @@ TEST(Infractions, OfAnEvaluationAreThoseThatItCounts) {
              one.agent_class == AgentClass::vehicle && one.is(kEventAtFault);
     })) << worst;
   }
-  // Vehicles halt at their first event, so each is counted where its one entry says.
+  // Vehicles halt at their first event, so each is counted under its only entry.
   const auto entries_with = [&observer](int any_of) {
     return std::count_if(observer.found().begin(), observer.found().end(), [any_of](const Infraction& one) {
       return one.agent_class == AgentClass::vehicle && (one.events & any_of) != 0;

@@ -1,4 +1,4 @@
-// Mixed traffic: who drives which vehicles, and what each driver's row counts.
+// Mixed traffic: the driver of each vehicle, and the counts of each driver's row.
 #include "pictura/evaluation/mixed_traffic.h"
 
 #include <algorithm>
@@ -177,7 +177,7 @@ TEST_F(MixedPolicies, DriveWhileImpaired) {
 }
 
 TEST_F(MixedPolicies, WithoutAuxiliarySlotsReadZerosWhereTheWorldFillsThem) {
-  // A share that draws nobody.
+  // Share that selects no vehicle.
   const EvaluateReport alone = evaluate_policy(policies_[test::kLikeForLike], {}),
                        beside =
                            evaluate_policy(policies_[test::kLikeForLike], {policies_[test::kVectorized] + "=1e-9"});

@@ -1,4 +1,4 @@
-// The tracked pedestrian: paths that are found, the controls that could fail, and the means.
+// Tracked pedestrian: found paths, the controls that could fail, and the means.
 #include "pictura/evaluation/probes/pedestrian.h"
 
 #include <cmath>
@@ -103,7 +103,7 @@ struct PedestrianKind {
   static void set_cases(int64_t paths, PedestrianOptions* options) {
     options->worlds.scenarios = 3;
     options->paths = paths;
-    options->min_speed_mps = -10;  // they may reverse
+    options->min_speed_mps = -10;  // allows reversing
   }
   static PedestrianResults probe(const PedestrianOptions& options) { return probe_pedestrian(options); }
   static bool is_same(const PedestrianResults& a, const PedestrianResults& b) { return test::same_bits(a, b); }
@@ -208,7 +208,7 @@ TEST_F(Pedestrian, RefusesWhatCannotBe) {
 
 // ---- results
 
-/// Two paths of two scenes: hidden at the first point (of one at the second, too), then seen, then hidden again.
+/// Two paths of two scenes: hidden at the first point (on one path at the second, too), then seen, then hidden again.
 PedestrianResults made_up_pedestrians() {
   PedestrianResults all;
   all.setting.maps = {"a"};
@@ -257,7 +257,7 @@ TEST(PedestrianResults, MeansAreAlignedAtFirstSight) {
   EXPECT_DOUBLE_EQ(first_sight.mean_visible_share, 0.75);
   EXPECT_DOUBLE_EQ(first_sight.value_change.value, -1.5);
   EXPECT_DOUBLE_EQ(first_sight.brake_change.value, (0.125 + 0.25) / 2);
-  // Of 1 and 2: the deviation is sqrt(1/2), of the mean 1/2.
+  // Values 1 and 2: the standard deviation is sqrt(1/2), that of the mean 1/2.
   EXPECT_NEAR(first_sight.value_change.half_width_95, 0.98, 1e-9);
 }
 

@@ -1,4 +1,4 @@
-// Small policies that probes are asked about, and what tests of all probes do.
+// Small policies for probes, and common tests of all probes.
 #pragma once
 
 #include <initializer_list>
@@ -14,13 +14,13 @@
 
 namespace pictura::test {
 
-constexpr size_t kAgent = 0, kVectorized = 1, kLikeForLike = 2;  // the order of policies_
+constexpr size_t kAgent = 0, kVectorized = 1, kLikeForLike = 2;  // in the order of policies_
 
-/// A policy that reads images, and both that read vectors, as good as untrained: of one update each on the town with
+/// A policy that reads images, and two that read vectors, practically untrained: one update each on the town with
 /// walls.
 class ProbedPolicies : public ::testing::Test {
  protected:
-  // For the first test, whose name the folder has.
+  // Created by the first test, whose name the folder has.
   void SetUp() override {
     if (folder_) return;
     folder_ = new ScratchFolder;
@@ -36,7 +36,7 @@ class ProbedPolicies : public ::testing::Test {
     folder_ = nullptr;
   }
 
-  /// All three, in six scenes of two towns.
+  /// Selects all three policies, in six scenes of two towns.
   static void ask(ProbeOptions* options) {
     options->policies = policies_;
     options->worlds.maps = {"procedural:1", "procedural:2"};
@@ -65,8 +65,8 @@ inline bool same_bits(const ProbeResults& a, const ProbeResults& b) {
   return true;
 }
 
-/// Tests of one probe, of which Kind says: Options and Results, kCases, how many cases most tests read,
-/// set_cases(cases, &options), probe(options), and is_same(results, results).
+/// Tests of one probe. Kind defines Options and Results, kCases (the number of cases in most tests), set_cases(cases,
+/// &options), probe(options), and is_same(results, results).
 template <typename Kind>
 class ProbeTest : public ProbedPolicies {
  protected:
@@ -81,7 +81,7 @@ class ProbeTest : public ProbedPolicies {
     return o;
   }
   static Results probe(const Options& o) { return Kind::probe(o); }
-  /// The results without a control.
+  /// Results without a control.
   static const Results& results() {
     static const Results all = probe(options());
     return all;
@@ -99,7 +99,7 @@ class ProbeTest : public ProbedPolicies {
       EXPECT_TRUE(Kind::is_same(probe(o), results())) << batch;
     }
   }
-  /// Returns what the first of two seeds gave: cases of one policy in one scene.
+  /// Checks that seeds matter. Returns the results of the first of two seeds: cases of one policy in one scene.
   static Results expect_seeds_to_decide(int64_t cases) {
     Options o = options(cases);
     o.policies = {policies_[kAgent]};

@@ -100,7 +100,7 @@ TEST_F(Removal, VectorPoliciesMissThePartnersThatTheyRead) {
     for (const size_t policy : {kVectorized, kLikeForLike}) changed[policy] += !all.response(i, policy).is_unchanged();
   }
   ASSERT_GT(near, 10);
-  // Of some partners no feature is the largest of its set: those no policy misses.
+  // Some partners have no feature that is the largest of its set, so that no policy responds to their removal.
   EXPECT_GT(changed[kVectorized], near * 3 / 4);
   EXPECT_GT(changed[kLikeForLike], near * 3 / 4);
 }
@@ -211,7 +211,7 @@ TEST_F(Removal, RefusesWhatCannotBe) {
   EXPECT_EQ(default_probe_scenes(1, 8), 16);
 }
 
-/// Cases of two scenes, with changes that are written down here.
+/// Cases of two scenes, with changes that are defined here.
 RemovalResults made_up_removals() {
   RemovalResults all;
   all.setting.maps = {"a \"b\""};
@@ -225,7 +225,7 @@ RemovalResults made_up_removals() {
   };
   const float nan = std::numeric_limits<float>::quiet_NaN();
   add(0, 1, 5, 1);       // whole: |dV| 1
-  add(0, 0.97f, 6, -3);  // of the same bin: 3; the scene's mean is 2
+  add(0, 0.97f, 6, -3);  // in the same bin: 3; the scene's mean is 2
   add(1, 1, 45, 4);      // 4: the mean of both scenes is 3
   add(0, 0, 12, 0.5f);   // hidden
   add(1, nan, 12, 2);    // in no frame
@@ -246,7 +246,7 @@ TEST(RemovalResults, MeansAreOverScenes) {
   EXPECT_EQ(whole.cases, 3);
   EXPECT_EQ(whole.scenes, 2);
   EXPECT_DOUBLE_EQ(whole.abs_value_change.value, 3);
-  // Of the scenes' means 2 and 4: the deviation is sqrt(2), of the mean 1.
+  // The scenes' means are 2 and 4: the standard deviation is sqrt(2), that of the mean 1.
   EXPECT_NEAR(whole.abs_value_change.half_width_95, 1.96, 1e-9);
   EXPECT_DOUBLE_EQ(whole.value_change.value, (-1 + 4) / 2.0);
   EXPECT_DOUBLE_EQ(whole.abs_brake_change.value, 0.25);

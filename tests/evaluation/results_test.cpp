@@ -37,7 +37,7 @@ EvaluationResults part(int first_scenario, std::vector<ScenarioCounts> scenarios
   return results;
 }
 
-/// Returns a file of format 1, which counted collisions at fault alone: `infractions` of 4 vehicles in 1 km.
+/// Returns a file of format 1, which counted only collisions at fault: `infractions` of 4 vehicles in 1 km.
 std::string file_of_format_1(int first_scenario, int infractions) {
   test::ScratchFolder folder;
   const std::string path = folder / "empty.json";
@@ -121,7 +121,7 @@ TEST(Results, FilesOfFormat1LackWhatTheyDidNotCount) {
   EXPECT_TRUE(std::isnan(row.wall_contact_rate.value));
   EXPECT_DOUBLE_EQ(row.km_per_at_fault_infraction.value, 0.5);
   EXPECT_DOUBLE_EQ(row.at_fault_collision_rate.value, 0.5);
-  // A part that counts everything makes the whole count no more than the other does, in that one's format.
+  // A part that counts everything does not extend the counts of the whole, which has the other part's format.
   for (const EvaluationResults& rest : {read_results(next_path), part(1, {counts(4, 0, 1000)})}) {
     const EvaluationResults whole = merge({old, rest}, {"old.json", "rest.json"});
     EXPECT_FALSE(whole.counts_all_collisions);

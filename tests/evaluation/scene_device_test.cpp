@@ -1,4 +1,5 @@
-// Evaluations in recorded scenes on a CUDA device give the figures of the host. Skipped as device_test.cpp says.
+// Evaluations in recorded scenes on a CUDA device give the results of the host. Skipped without a device, see
+// device_test.cpp.
 #include <fmt/format.h>
 
 #include "pictura/evaluation/evaluate_scenes.h"

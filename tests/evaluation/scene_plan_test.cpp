@@ -1,4 +1,4 @@
-// Protocols of recorded scenes: their settings as data, and who does what under them.
+// Protocols of recorded scenes: their settings as data, and the roles that follow from them.
 #include "pictura/evaluation/scene_plan.h"
 
 #include <gmock/gmock.h>
@@ -19,7 +19,7 @@ int count_of(const ScenePlan& plan, SceneRole role) {
   return static_cast<int>(std::count(plan.roles.begin(), plan.roles.end(), role));
 }
 
-/// The boxes of the scene's tracks at a step, as the simulator would have them.
+/// Boxes of the scene's tracks at a step, as in the simulator.
 std::vector<AgentBox> boxes_at(const Scenario& scene, int32_t step) {
   std::vector<AgentBox> boxes;
   for (size_t track = 0; track < scene.tracks.size(); ++track) {
@@ -48,7 +48,7 @@ TEST(SceneProtocols, AreDataAndTheirRulesCanBeChosenOtherwise) {
 
   SceneProtocol protocol = scene_protocol("womd");
   for (const SceneProtocol& known : scene_protocols()) {
-    // Every rule is written as it is read.
+    // Every rule is written as it is read back.
     for (const auto& [name, value] : rules_of(known)) set_scene_rule(name + "=" + value, &protocol);
     EXPECT_EQ(rules_of(protocol), rules_of(known)) << known.name;
   }
@@ -130,7 +130,7 @@ TEST_F(ScenePlans, TakeOverWhoAppearsLater) {
   Scenario late = *scene_;
   int32_t mover = 0;
   while (!is_moving(late, mover) || late.tracks[size_t(mover)].type != TrackType::vehicle) ++mover;
-  // It appears at step 7.
+  // The track appears at step 7.
   const auto at = static_cast<size_t>(mover);
   for (size_t step = 0; step < 7; ++step) {
     late.valid[at * size_t(late.num_steps) + step] = 0;

@@ -1,4 +1,4 @@
-// How vehicles stand: waits at red lights and the way gone in them, time in reverse, and who does not get on.
+// Standing vehicles: waits at red lights and the distance moved in them, time in reverse, and vehicles that are stuck.
 #include "pictura/evaluation/standing.h"
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@ TEST(Standing, WaitsReversingAndStuckVehicles) {
   testing::add_light(map.get(), 100, 4, 2, {0});
   const auto simulator =
       make_simulator("cpu", testing::cars({.reset_inactive_fraction = 2, .fixed_lights = true}), {map}, {{0, 3, 1}});
-  // The first creeps towards the line, the second stands behind it, the third goes backwards on the other straight.
+  // The first vehicle creeps towards the line, the second stands behind it, the third reverses on the other straight.
   const std::vector<int32_t> slots{0, 1, 2};
   std::vector<float> x_m{0, 80, 120}, y_m{0, 0, 40}, heading_rad{0, 0, kPi}, speed_mps{0.2f, 0, -0.5f};
   x_m[0] = 100 - 4.5f -
@@ -47,7 +47,7 @@ TEST(Standing, WaitsReversingAndStuckVehicles) {
   EXPECT_NEAR(counts.red_wait_moved_m, 0.02 * red_steps_of_waits, 1e-3);
   EXPECT_EQ(counts.stuck_at_end, 0) << "nobody has stood for 60 s yet";
 
-  // Only the second does not get on: the others' 5 m take 25 s and 10 s.
+  // Only the second vehicle is stuck: the others need 25 s and 10 s for 5 m.
   for (int step = kSteps; step < 620; ++step) {
     if (step % 200 == 0) simulator->set_state(slots, std::vector<NamedArray>{{"x_m", Array(x_m)}});
     const std::vector<Command> commands(3);

@@ -15,9 +15,9 @@ TEST(Chunks, AreOfOneSizeThatIsAllowed) {
 TEST(Chunks, AreMultiplesOfAGranuleOnADevice) {
   EXPECT_EQ(chunk_size(1000, {2048}, /*on_device=*/true), 1024);
   EXPECT_EQ(chunk_size(17'000, {65'536}, true), 17'152);
-  // Full ones, for any batch that is much larger.
+  // Full chunks, for any much larger batch.
   for (int64_t count = 14'337; count < 70'000; count += 119) EXPECT_EQ(chunk_size(count, {2048}, true), 2048) << count;
-  // Never more than is allowed.
+  // The maximum size is never exceeded.
   EXPECT_EQ(chunk_size(520, {260}, true), 260);
   EXPECT_EQ(chunk_size(64, {64}, true), 64);
 }

@@ -1,4 +1,4 @@
-// Programs in the place of the convolutions: what they are given, what becomes of it, and gradients.
+// Programs in place of the convolutions: their inputs, their outputs, and gradients.
 #include "pictura/policy/image_backbone.h"
 
 #include <fmt/format.h>
@@ -68,7 +68,7 @@ TEST_F(Programs, GetGradientsWhereTheyAreTrained) {
   means.forward(images_).sum().backward();
   ASSERT_TRUE(gain.grad().defined());
   EXPECT_GT(gain.grad().min().item<double>(), 0);
-  // The program computes with what an optimizer writes there.
+  // The program computes with the weights that an optimizer writes.
   const at::Tensor before = means.forward(images_).detach();
   {
     const at::NoGradGuard no_grad;

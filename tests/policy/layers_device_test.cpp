@@ -25,7 +25,7 @@ class DeviceLayers : public test::DeviceTest, public testing::WithParamInterface
     open_learning_device(config);
   }
 
-  // So that rounding inputs is no difference.
+  // Values that bf16 holds exactly, so that rounding inputs changes nothing.
   static at::Tensor numbers(at::IntArrayRef shape, double phase) { return test::numbers(shape, phase, at::kBFloat16); }
   at::ScalarType activations() const { return GetParam() == Precision::bf16 ? at::kBFloat16 : at::kFloat; }
 
@@ -39,8 +39,8 @@ class DeviceLayers : public test::DeviceTest, public testing::WithParamInterface
     return all;
   }
 
-  /// The first `num_activations` inputs are activations, all others parameters. `plain` is the layer in ATen's words,
-  /// of whose errors `of_atens` times as much is allowed.
+  /// Compares a layer with the host. The first `num_activations` inputs are activations, all others parameters. `plain`
+  /// is the layer written with ATen, whose errors times `of_atens` are the tolerance.
   void expect_as_on_the_host(const Layer& layer, const Layer& plain, const std::vector<at::Tensor>& inputs,
                              size_t num_activations, double of_atens = 2) {
     set_float32_products(GetParam());
@@ -89,7 +89,7 @@ TEST_P(DeviceLayers, LinearGelu) {
 }
 
 TEST_P(DeviceLayers, LinearNormGelu) {
-  // 36: ATen's own. 9,000 rows are more than there are partial sums.
+  // 36: ATen's own layer. 9,000 rows exceed the number of partial sums.
   for (const int64_t out : {64, 128, 192, 256, 384, 512, 36}) {
     for (const int64_t rows : {1, 7, 9000}) {
       expect_as_on_the_host([](const auto& in) { return linear_norm_gelu(in[0], in[1], in[2]); },
@@ -137,7 +137,7 @@ TEST_P(DeviceLayers, Norm) {
   const Layer plain_without = [](const auto& in) {
     return at::layer_norm(in[0], {in[0].size(-1)}, in[1], in[2]).to(in[0].scalar_type());
   };
-  // 36: ATen's own.
+  // 36: ATen's own layer.
   for (const int64_t channels : {64, 128, 192, 256, 384, 512, 36}) {
     const at::Tensor weight = numbers({channels}, 2), bias = numbers({channels}, 3);
     for (const int64_t repetitions : {1, 300}) {
@@ -148,7 +148,7 @@ TEST_P(DeviceLayers, Norm) {
   }
 }
 
-// [sets, width]: whether the largest of the members that there are, [sets, most, width], is so by more than a margin.
+// Whether the largest of the present members, [sets, most, width], leads by more than a margin, [sets, width].
 at::Tensor has_clear_largest(const at::Tensor& members, const at::Tensor& counts, double margin) {
   const at::Tensor is_padding = at::arange(members.size(1), counts.options()).unsqueeze(0) >= counts.unsqueeze(1);
   const at::Tensor padded =
@@ -166,13 +166,13 @@ TEST_P(DeviceLayers, LargestEmbedding) {
     for (const int64_t most : {1, 10, 80}) {
       for (const bool has_norm : {false, true}) {
         const at::Tensor members = numbers({sets, most, 7}, 1).to(at::kFloat),
-                         // Empty sets and full ones; what lies beyond a column of counts is not read.
+                         // Empty and full sets; entries beyond a column of counts are not read.
             counts = at::arange(sets, at::kInt).remainder(most + 1).unsqueeze(1).repeat({1, 2}).select(1, 0);
         const int64_t width = 7 + features.count();
         const std::vector<at::Tensor> parameters{numbers({64, width}, 1), numbers({64}, 2), 0.3 * numbers({64, 64}, 3),
                                                  numbers({64}, 4)};
         const auto on = [](const at::Tensor& t, const at::Tensor& where) { return t.to(where.device()); };
-        // Doubles rounded as the device holds them, with the gradient of what they were.
+        // Doubles rounded to the device's type, with the gradient of the unrounded values.
         const auto rounded = [&](const at::Tensor& x) { return x.detach().to(activations()).to(at::kDouble); };
         const auto as_held = [&](const at::Tensor& x) {
           return x.scalar_type() == at::kDouble ? x + (rounded(x) - x.detach()) : x;
@@ -186,13 +186,15 @@ TEST_P(DeviceLayers, LargestEmbedding) {
                   ? with_row_features(its_members.to(is_double ? at::kDouble : at::kFloat), features, type)
                   : its_members.to(type);
           at::Tensor before = at::linear(as_held(rows), in[0]);
-          // The product's gradient is rounded too, not the bias's: sums over sets cancel to a hundredth of their terms.
+          // The product's gradient is rounded too, but not the bias's: sums over sets cancel to a hundredth of their
+          // terms.
           if (is_double && before.requires_grad()) before.register_hook(rounded);
           before = before + in[1];
           const at::Tensor hidden = gelu(has_norm ? at::layer_norm(before, {64}).to(before.scalar_type()) : before);
           return at::linear(as_held(hidden), as_held(in[2]), in[3]);
         };
-        // Of members that are nearly equal, rounding decides which one the gradient reaches: there it is 0.
+        // Among members that are nearly equal, rounding decides which one the gradient reaches; their gradient is set
+        // to 0.
         const at::Tensor is_clear = has_clear_largest(embeddings(parameters), counts, /*margin=*/0.02);
         EXPECT_GT(is_clear.to(at::kDouble).mean().item<double>(), 0.2);
         const auto with_clear_gradient = [&](at::Tensor largest) {
@@ -212,10 +214,10 @@ TEST_P(DeviceLayers, LargestEmbedding) {
           return with_clear_gradient(
               largest_embedding(its_members, its_counts, features, has_norm, in[0], in[1], in[2], in[3]));
         };
-        // ATen rounds the embeddings as well, and so prefers other members.
+        // ATen also rounds the embeddings, and so selects other members.
         expect_as_on_the_host(layer, plain, parameters, 0, GetParam() == Precision::bf16 ? 0 : 2);
         if (GetParam() != Precision::bf16) continue;
-        // Without a way back: the same bits.
+        // Without a backward pass the bits are the same.
         const LayerPrecision precision(Precision::bf16, at::kCUDA);
         std::vector<at::Tensor> on_device;
         for (const at::Tensor& p : parameters) on_device.push_back(p.to(at::kCUDA, at::kFloat));
@@ -244,7 +246,7 @@ TEST_P(DeviceLayers, LargestEmbeddingGivesWayToNoNumberThatIsNone) {
 }
 
 TEST_P(DeviceLayers, TokenSoftmax) {
-  // 5: ATen's own.
+  // 5: ATen's own layer.
   for (const int64_t columns : {2, 64, 5}) {
     expect_as_on_the_host([](const auto& in) { return token_softmax(in[0]); },
                           [](const auto& in) { return at::_softmax(in[0], 1, /*half_to_float=*/false); },

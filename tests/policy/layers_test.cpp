@@ -1,5 +1,5 @@
-// Layers on the host: patches of images, what padding of channels means, features of rows, and the host's own passes
-// in single precision against ATen's layers in double.
+// Layers on the host: patches of images, the meaning of padding of channels, features of rows, and the host's own
+// passes in single precision against ATen's layers in double.
 #include "pictura/policy/layers.h"
 
 #include <ATen/Parallel.h>
@@ -47,7 +47,7 @@ TEST(ImagePatches, AOneByOneConvolutionOfThemIsOneOfTheImageWithTheirStride) {
 constexpr float kUnit_m = kScalePosition_m;
 
 TEST(RowFeatures, OfAPointAreNearCoordinatesAndTheBearing) {
-  // A row with two points, (3, -4) m and (0, 20) m, and a number that is none. 120 m are 1.
+  // A row with two points, (3, -4) m and (0, 20) m, and a number that belongs to no point. 120 m are 1.
   const at::Tensor row = at::tensor({3.0 / 120, -4.0 / 120, 0.0, 20.0 / 120, 0.5}, at::kDouble).unsqueeze(0);
   const at::Tensor features = row_features(row, {.points = 2, .position_unit_m = kUnit_m}, at::kDouble);
   const std::vector<double> expected{3.0 / 7, -4.0 / 8,  3.0 / 23, -4.0 / 24, 3.0 / 6, -4.0 / 6,
@@ -108,7 +108,7 @@ TEST(ConvolveGelu, ReadsNothingFromChannelsBeyondThoseOfItsWeight) {
 
 using Layer = std::function<at::Tensor(const std::vector<at::Tensor>& inputs)>;
 
-// For single precision.
+// Numbers in single precision.
 at::Tensor float_numbers(at::IntArrayRef shape, double phase) { return test::numbers(shape, phase, at::kFloat); }
 
 // The value of a layer and the gradients of its inputs, all of this type.
@@ -122,7 +122,7 @@ std::vector<at::Tensor> results(const Layer& layer, const std::vector<at::Tensor
   return all;
 }
 
-// In single precision, with and without gradients and with one thread and three, as in double.
+// Compares single precision, with and without gradients and with one thread and three, to double precision.
 void expect_as_in_double(const Layer& layer, const Layer& plain, const std::vector<at::Tensor>& inputs) {
   const std::vector<at::Tensor> expected = results(plain, inputs, at::kDouble);
   const int threads = at::get_num_threads();

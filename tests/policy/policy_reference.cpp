@@ -1,5 +1,5 @@
-// Policies and what they compute, for tests of other implementations: policy_reference FOLDER writes for each policy
-// its weights (NAME.safetensors), and inputs with the logits and values of the library's forward pass in fp32
+// Policies with their results, for tests of other implementations: policy_reference FOLDER writes for each policy its
+// weights (NAME.safetensors), and inputs with the logits and values of the library's forward pass in fp32
 // (NAME_io.safetensors).
 #include <cstdio>
 #include <string>
@@ -12,7 +12,7 @@
 namespace pictura {
 namespace {
 
-/// Of agents drawn at random; sets are filled to counts from none to all.
+/// Observations of agents drawn at random; sets have counts from none to all.
 std::vector<NamedTensor> draw_inputs(const Config& config, int64_t batch, Observation* observation_out) {
   std::vector<NamedTensor> inputs;
   const auto put = [&inputs](std::string name, at::Tensor* to, const at::Tensor& value) {
@@ -44,7 +44,7 @@ void write_reference(const std::string& folder, const std::string& name, const C
   const at::NoGradGuard no_grad;
   const PolicyNetwork policy(config.policy, 4, 7);
   for (const NamedTensor& parameter : policy.parameters()) {
-    // Away from the first values, in which biases are zero and norms one.
+    // Moves parameters away from their initial values, in which biases are zero and norms one.
     at::Tensor value = parameter.value;
     value.add_(at::randn_like(value) * 0.02);
   }

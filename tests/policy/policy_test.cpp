@@ -139,7 +139,7 @@ TEST_P(BothModalities, GradientsOfNormalizedLayersEqualDifferenceQuotients) {
       << "norms and residuals have no parameters";
 }
 
-// Whatever the scale of the layers before it, what the heads read has a mean of 0 and a variance of 1.
+// At any scale of the layers before them, the heads' inputs have a mean of 0 and a variance of 1.
 TEST(Policy, HeadsReadNormalizedActivations) {
   PolicySection section = tiny_section(Modality::vector);
   section.layer_norm = true;
@@ -153,7 +153,7 @@ TEST(Policy, HeadsReadNormalizedActivations) {
   EXPECT_LT(policy.forward(observation(Modality::vector, 3)).value.abs().max().item<double>(), 1e-9);
 }
 
-// A layer of zeros gives gelu(0) = 0, so that only its input is left.
+// A layer of zeros gives gelu(0) = 0, so that only its input remains.
 TEST(Policy, ResidualsPassOverLayersOfTheTrunk) {
   PolicySection section = tiny_section(Modality::vector);
   section.residual = true;
@@ -203,7 +203,7 @@ TEST_P(BothModalities, HasThePapersShapes) {
   }
 }
 
-// What the encoder of a group reads of a row.
+// Number of inputs of a group's encoder per row.
 int64_t inputs_of(const Policy& policy, const std::string& group) {
   for (const NamedTensor& p : policy.parameters()) {
     if (p.name == group + ".hidden.weight") return p.value.size(1);

@@ -1,4 +1,4 @@
-// Policies that are small enough for hundreds of passes.
+// Policies small enough for hundreds of passes.
 #pragma once
 
 #include "pictura/configuration/config.h"

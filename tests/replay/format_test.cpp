@@ -1,4 +1,4 @@
-// The format of replays: what is written is read back, and damage is named.
+// Format of replays: written data are read back, and damage is named.
 #include <filesystem>
 #include <random>
 
@@ -22,7 +22,7 @@ using test::message_of;
 using test::ScratchFolder;
 using testing::HasSubstr;
 
-/// Numbers of all sizes and both signs.
+/// Returns numbers of all sizes and both signs.
 int32_t any_number(std::mt19937* random) {
   const auto bits = static_cast<uint32_t>((*random)());
   return static_cast<int32_t>(bits) >> (*random)() % 32;
@@ -30,7 +30,7 @@ int32_t any_number(std::mt19937* random) {
 
 std::string any_frames(const std::vector<ReplayCamera>& cameras, int count, std::mt19937* random) {
   std::string frames(bytes_of_frame(cameras) * static_cast<size_t>(count), '\0');
-  // Runs, which every filter meets, and noise.
+  // Runs, as every filter meets, and noise.
   for (size_t i = 0; i < frames.size(); ++i) frames[i] = static_cast<char>((*random)() % 8 == 0 ? (*random)() : i / 90);
   return frames;
 }
@@ -165,8 +165,8 @@ TEST(ReplayFormat, ImagesAreReadBackByteForByte) {
 }
 
 TEST(ReplayFormat, ManySmallGroupsAreReadBack) {
-  // What is expected takes the upper part of the coder's range: black skies make long runs of 0xFF, also of the first
-  // bytes, which a carry may reach or not.
+  // The predicted symbols use the upper part of the coder's range: black skies make long runs of 0xFF, also of the
+  // first bytes, which a carry may reach or not.
   std::mt19937 random(5);
   const std::vector<ReplayCamera> cameras{{"a", 96, 54}};
   for (int i = 0; i < 300; ++i) {
@@ -192,7 +192,7 @@ TEST(ReplayFormat, HuesAtAnyBrightnessTakeLittleMoreThanTheirBrightness) {
   }
   const std::string packed = pack_images(cameras, frame);
   EXPECT_EQ(unpack_images(cameras, packed, 1), frame);
-  EXPECT_LT(packed.size(), 64 * 64 * 1.35);  // of three times as many bytes
+  EXPECT_LT(packed.size(), 64 * 64 * 1.35);  // for three times as many bytes
 }
 
 TEST(ReplayFormat, AReplayIsReadBackAsItWas) {
@@ -267,7 +267,7 @@ TEST(ReplayFormat, NoHeaderMakesTheReaderFailOtherwiseThanByAnError) {
   constexpr int kTries = 400;
   for (int i = 0; i < kTries; ++i) {
     std::string damaged = page;
-    // Digits, which leave the JSON whole, more often than other letters.
+    // Digits, which keep the JSON valid, more often than other characters.
     for (int k = 0; k < 3;) {
       const size_t at = begin + random() % (end - begin);
       const bool is_digit = damaged[at] >= '0' && damaged[at] <= '9';
@@ -288,7 +288,7 @@ TEST(ReplayFormat, NoHeaderMakesTheReaderFailOtherwiseThanByAnError) {
         unpack_images(replay.cameras, group, replay.images.frames_per_group);
       }
     } catch (const Error&) {
-      // Images are looked at only when they are shown.
+      // Images are checked only when they are shown.
     }
   }
   EXPECT_GT(refused, kTries / 4);
@@ -305,7 +305,7 @@ TEST(ReplayFormat, AGalleryListsTheWorstFirst) {
   const std::string index = read_file(folder / "index.html");
   EXPECT_LT(index.find("b.html"), index.find("c.html"));
   EXPECT_LT(index.find("c.html"), index.find("a.html"));
-  EXPECT_EQ(write_gallery(folder.path()), 3);  // the index is none of them
+  EXPECT_EQ(write_gallery(folder.path()), 3);  // without the index
   write_file(folder / "other.html", "<p>no replay</p>");
   EXPECT_THAT(message_of([&] { check_gallery(folder.path()); }), HasSubstr("other.html: expected a page of pictura"));
   EXPECT_THAT(message_of([&] { write_gallery(folder.path()); }), HasSubstr("other.html: expected a page of pictura"));

@@ -1,4 +1,4 @@
-// What live pages are told, and driving by keys, in worlds that run.
+// Messages to live pages, and driving by keys, in running worlds.
 #include "pictura/replay/live.h"
 
 #include <cmath>
@@ -25,7 +25,7 @@ std::unique_ptr<Simulator> make_town(int agents) {
 }
 
 TEST(LiveWorld, TellsWhatARecordingHolds) {
-  // Two simulators of one seed, one recorded whole, one told frame by frame.
+  // Two simulators of one seed: one is recorded whole, the other is sent frame by frame.
   const auto recorded = make_town(8), told = make_town(8);
   const auto controller = make_host_controller("random", *recorded, 1);
   Recorder recorder(*recorded, {});
@@ -52,7 +52,7 @@ TEST(LiveWorld, TellsWhatARecordingHolds) {
     EXPECT_EQ(message["metrics"]["agent_steps"], whole.metrics.agent_steps);
   }
   EXPECT_GT(recorder.recorded().episodes.size(), 1u);
-  // A page that comes now begins with this frame and the goal chains that hold.
+  // A page that connects now begins with this frame and the current goal chains.
   const LiveJson begin = live.begin();
   EXPECT_EQ(begin["step"], 60);
   EXPECT_EQ(begin["header"]["frames"], 1);
@@ -100,7 +100,7 @@ TEST(LiveRequest, NamesWhatIsWrong) {
               HasSubstr("expected JSON"));
 }
 
-// One vehicle under these keys for some steps; its state afterwards.
+// State of one vehicle after some steps under these keys.
 struct Driven {
   float speed_mps, heading_rad, accel_mps2;
 };

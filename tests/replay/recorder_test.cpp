@@ -1,4 +1,4 @@
-// What a recorder keeps of a simulator: places, rewards by term, actions, events, chains, lights and images.
+// Contents of a recording: positions, rewards by term, actions, events, chains, lights and images.
 #include "pictura/replay/recorder.h"
 
 #include <algorithm>
@@ -29,7 +29,7 @@ std::unique_ptr<Simulator> town(int agents, float reset_inactive_fraction = 0.4f
   config.parked_cars = 4;
   config.episode_steps = 150;
   config.reset_inactive_fraction = reset_inactive_fraction;
-  // Of two worlds the second is recorded: its agents, boxes and lights do not begin at 0.
+  // The second of two worlds is recorded: its agents, boxes and lights do not begin at 0.
   return make_simulator("cpu", config, {load_map("procedural:1:blocks=2x2")}, {{0, 7, 0}, {0, agents, 1}});
 }
 
@@ -79,7 +79,7 @@ TEST(Recorder, EachLifeIsAnAgent) {
       last = frame;
       ++there;
     }
-    if (agent < 6 && there == 0) continue;  // found no place
+    if (agent < 6 && there == 0) continue;  // agents without a place
     EXPECT_GT(there, 0) << agent;
     EXPECT_GE(episode.agents[agent].length_cm, 350);
     const bool has_chain = std::any_of(episode.chains.begin(), episode.chains.end(), [&](const ReplayChain& chain) {
@@ -190,7 +190,7 @@ TEST(Recorder, RewardTermsAddUpToTheSimulatorsRewardAndMetricsToItsTotals) {
         EXPECT_NEAR(sum, static_cast<double>(rewards[frame][agent]), 9e-7);
       }
     }
-    // Theirs are the terms of the motion before the halt.
+    // The rewards of infractions are the terms of the motion before the halt.
     EXPECT_GE(infractions, std::string(policy) == "random" ? 10 : 0);
     const SimulatorTotals& totals = simulator->arrays().world_totals[kWorld];
     const ReplayMoment first = replay.first_infraction;
@@ -232,7 +232,7 @@ TEST(Recorder, StepsBelongToTheFrameThatTheyLeadTo) {
       EXPECT_EQ(replay.at(Track::events, frame, agent), events[frame][agent]);
     }
   }
-  // Decisions are of the frame that they were made in; none was made in the last.
+  // Decisions belong to the frame in which they were made; the last frame has none.
   ASSERT_EQ(replay.decisions.size(), 121 * kDecisionValues);
   EXPECT_EQ(replay.decisions[10 * kDecisionValues + 3], 2500);
   EXPECT_EQ(replay.decisions[10 * kDecisionValues + kNumActions], -50000);

@@ -1,4 +1,4 @@
-// The server of live pages, its pages and a simulation at work at once, each in threads of its own.
+// Server of live pages, its pages and a simulation running concurrently, each in its own threads.
 #include "pictura/replay/server.h"
 
 #include <array>
@@ -24,12 +24,12 @@ namespace {
 
 constexpr int kFrames = 60, kRequests = 20, kServedAgents = 4;
 
-/// What a page was told: frames that did not follow one another are counted.
+/// Messages received by a page; frames that do not follow one another are counted.
 struct Told {
   int begins = 0, frames = 0, out_of_order = 0;
 };
 
-constexpr size_t kHost = std::string_view("http://").size();  // where it begins in addresses
+constexpr size_t kHost = std::string_view("http://").size();  // offset in addresses
 
 std::string request_to(const std::string& address, const char* method, const char* name, const std::string& body = "") {
   const size_t path = address.find('/', kHost);
@@ -52,7 +52,7 @@ class Connection {
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
 
-  /// Appends what comes next. Returns false at the end.
+  /// Appends the next bytes. Returns false at the end.
   bool read(std::string* text) {
     std::array<char, 4096> bytes;
     const ssize_t got = recv(socket_, bytes.data(), bytes.size(), 0);
@@ -64,7 +64,7 @@ class Connection {
   int socket_ = socket(AF_INET, SOCK_STREAM, 0);
 };
 
-/// Listens until it was told kFrames.
+/// Listens until kFrames frames have arrived.
 Told listen(const std::string& address) {
   Told told;
   std::string text;
@@ -126,7 +126,7 @@ TEST(LiveServer, TellsItsPagesAllInOrderWhileOthersComeAskAndGo) {
   }
   EXPECT_EQ(at_work, 0) << "pages or requests still wait";
   take();
-  server.reset();  // which ends whatever waits
+  server.reset();  // this ends all waiting calls
   for (std::thread& thread : threads) thread.join();
 
   for (const Told& page : told) {
@@ -145,11 +145,11 @@ TEST(LiveServer, EndsAtOnceWhateverItsConnectionsDo) {
   const auto connect = [&](const std::string& text) {
     connections.push_back(std::make_unique<Connection>(server->address(), text));
   };
-  connect(request_to(server->address(), "GET", "events"));  // which never reads
+  connect(request_to(server->address(), "GET", "events"));  // this connection never reads
   while (server->num_pages() == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   server->greet({});
   server->send("frame", [] { return LiveJson(std::string(kMaxWaitingBytes / 2, 'x')); });
-  for (int i = 0; i < 30; ++i) connect("GET / HTT");  // more than it has threads for
+  for (int i = 0; i < 30; ++i) connect("GET / HTT");  // more connections than threads
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
   const auto begin = std::chrono::steady_clock::now();
   server.reset();

@@ -1,4 +1,4 @@
-// Files: checkpoints that come back whole or are refused by name, safetensors, TensorBoard records.
+// Files: checkpoints that are read back completely or rejected by name, safetensors, TensorBoard records.
 #include "pictura/training/checkpoint.h"
 
 #include <cmath>
@@ -68,7 +68,7 @@ size_t header_bytes_of(const std::string& file) {
   return header_bytes;
 }
 
-// The same file with a hash that fits its bytes.
+// Returns the file with a hash that matches its bytes.
 std::string sealed(std::string file) {
   const uint64_t hash = hash_of(std::string_view(file).substr(0, file.size() - kHashBytes));
   std::memcpy(file.data() + file.size() - kHashBytes, &hash, kHashBytes);
@@ -79,7 +79,7 @@ nlohmann::ordered_json header_of(const std::string& file) {
   return nlohmann::ordered_json::parse(file.substr(kPreamble, header_bytes_of(file)));
 }
 
-// A file of version 1, with the hash of the data alone in its header.
+// Returns a file of version 1, with the hash of only the data in its header.
 std::string as_version_1(const std::string& file, nlohmann::ordered_json header, const std::string& data) {
   header["data"] = {{"bytes", data.size()}, {"hash", fmt::format("{:016x}", hash_of(data))}};
   const std::string text = header.dump();
@@ -91,7 +91,7 @@ std::string as_version_1(const std::string& file, nlohmann::ordered_json header,
   return preamble + text + data;
 }
 
-// The same checkpoint as version 1 wrote it.
+// Returns the checkpoint as version 1 wrote it.
 std::string as_version_1(const std::string& file) {
   const size_t data_begin = kPreamble + header_bytes_of(file);
   return as_version_1(file, header_of(file), file.substr(data_begin, file.size() - data_begin - kHashBytes));
@@ -185,7 +185,7 @@ TEST_F(CheckpointFile, BrokenFilesAreRefused) {
     write_file(broken, bytes);
     return message_of([&] { read_checkpoint(broken); });
   };
-  // At every length there is an error that names the file, and never anything else.
+  // At every length the error names the file, and no other error occurs.
   for (size_t size = 0; size < whole.size(); size += 97) {
     EXPECT_THAT(refuse(whole.substr(0, size)), HasSubstr("b.ckpt")) << size;
   }
@@ -273,7 +273,7 @@ TEST_F(CheckpointFile, TheSchemaIsThatOfTheArraysThatThePolicyReads) {
   EXPECT_EQ(with_walls.size(), 9u);
   EXPECT_EQ(with_walls.at("walls"), nlohmann::json({80, 7}));
 
-  // One that lacks the array is refused by its name.
+  // A checkpoint without the array is rejected by the array's name.
   std::string changed = read_file(path);
   changed.replace(changed.find("\"walls\":[80,7]"), 7, "\"wells\"");
   write_file(path, sealed(changed));
@@ -288,7 +288,7 @@ TEST_F(CheckpointFile, SavedUnderTheOldNameOfTheBackendsItReadsAsBefore) {
   const std::string path = folder_ / "a.ckpt";
   write_checkpoint(path, small_checkpoint(policy, config));
   std::string bytes = read_file(path);
-  // The configuration of a run that knew run.backend alone.
+  // Configuration of a run of versions that had only run.backend.
   const auto replace = [&](const std::string& from, std::string to) {
     const size_t at = bytes.find(from);
     ASSERT_NE(at, std::string::npos) << from;

@@ -9,8 +9,8 @@
 
 namespace pictura::test {
 
-// Without a simulator. The agent sees a sign s in its ego vector; "go" pays nothing at once but makes
-// the next step's right action pay: credit has to travel over one step.
+// Task without a simulator. The agent sees a sign s in its ego vector; "go" pays nothing immediately but makes the next
+// step's right action pay: credit has to travel over one step.
 struct Corridor {
   static constexpr int64_t kSlots = 128, kSteps = 8;
   static constexpr int kGo = 7;
@@ -19,7 +19,7 @@ struct Corridor {
   at::Tensor open = at::zeros({kSlots}, at::kFloat), sign = at::ones({kSlots}, at::kFloat);
 
   const std::unique_ptr<LearnerExecutor> executor = make_learner_executor(Device{});
-  const uint64_t seed;  // of the draws of actions and signs, and of the order of transitions
+  const uint64_t seed;  // seed of the draws of actions and signs, and of the order of transitions
 
   explicit Corridor(uint64_t its_seed = 9)
       : rollout(RolloutObservations(storage()), kSteps, kSlots, Device{}), seed(its_seed) {}

@@ -1,5 +1,5 @@
-// Actions that are held for several steps: who decides when, what a decision returns, and that policies drive as they
-// were trained.
+// Actions that are held for several steps: which agents decide when, the return of a decision, and that policies drive
+// as they were trained.
 #include <cmath>
 #include <random>
 
@@ -25,7 +25,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-// The steps of one agent, with the value of what it sees after the last one.
+// Steps of one agent, with the value of its observation after the last step.
 struct Steps {
   std::vector<float> rewards, values;
   std::vector<uint8_t> terminated, truncated, valid, decides;
@@ -54,7 +54,7 @@ TEST(HeldActions, ReturnTheSumOfDiscountedRewards) {
   const float halted = 4 + .5f * 8 - 20;
   EXPECT_THAT(advantages_of(steps, .5f, .5f),
               ElementsAre(1 + .5f * 2 + .25f * 20 - 10 + .125f * halted, 0, halted, 0, 0, 0));
-  // The episode is cut off there instead: step 4 resets the world, and its row is the final observation, of value 7.
+  // The episode is truncated there instead: step 4 resets the world, and its row is the final observation, of value 7.
   steps.terminated[3] = 0;
   steps.truncated[3] = 1;
   steps.values[4] = 7;
@@ -84,7 +84,7 @@ TEST(HeldActions, AreDecidedAgainWhereTheClockOrANewEpisodeSaysSo) {
     deciding += count > 0 ? 'd' : 'h';
     simulator->step(Array(idle));
   }
-  // Step 4 shows what the episode ends with, which is valued, and step 5 the start of the next one.
+  // Step 4 shows the episode's final observation, which is valued, and step 5 the start of the next episode.
   EXPECT_EQ(deciding, "dhhddddhhddh");
 }
 

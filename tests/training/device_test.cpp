@@ -1,5 +1,5 @@
 // Training on a CUDA device: it learns there in every precision, and agrees with the host where it should. Without a
-// device these tests are skipped, unless PICTURA_REQUIRE_GPU=1 says that there must be one.
+// device these tests are skipped, unless PICTURA_REQUIRE_GPU=1 requires one.
 #include "pictura/tests/backend_cuda/device_test.h"
 
 #include <algorithm>
@@ -35,20 +35,20 @@ class DeviceTraining : public test::DeviceTest {
   TrainOptions options(const std::string& run, const std::string& device, std::vector<std::string> more) const {
     return test::small_run(folder_ / run, device, std::move(more));
   }
-  /// That a device's first update does the same as the host's, and that its reproducible runs in bf16 are equal.
+  /// Checks that a device's first update equals the host's, and that its reproducible runs in bf16 are equal.
   void expect_learns_as_on_the_host(std::vector<std::string> more) const;
 
   test::ScratchFolder folder_;
 };
 
-/// The rows of a progress.csv, by the names of their columns.
+/// Rows of a progress.csv, by the names of their columns.
 class Progress {
  public:
   explicit Progress(const std::string& path) : table_(test::read_table(path)) {}
 
   const std::vector<std::string>& names() const { return table_.at(0); }
   size_t num_updates() const { return table_.size() - 1; }
-  /// update: 1 is the first.
+  /// Value of an update, counted from 1.
   double at(size_t update, const std::string& name) const {
     const auto column = std::find(names().begin(), names().end(), name) - names().begin();
     return std::stod(table_.at(update).at(static_cast<size_t>(column)));
@@ -58,8 +58,8 @@ class Progress {
   std::vector<std::vector<std::string>> table_;
 };
 
-/// That the first updates of two runs did the same: in simulation to `tolerance`, in learning to `loss_tolerance`, both
-/// of 1 + |value|. Clocks are left out.
+/// Checks that the first updates of two runs agree: in simulation to `tolerance`, in learning to `loss_tolerance`, both
+/// of 1 + |value|. Clocks are excluded.
 void expect_same_first_update(const std::string& run, const std::string& other, double tolerance,
                               double loss_tolerance) {
   const Progress a(run + "/progress.csv"), b(other + "/progress.csv");
@@ -68,7 +68,7 @@ void expect_same_first_update(const std::string& run, const std::string& other, 
     if (name.starts_with("time/") || name == "charts/agent_steps_per_s") continue;
     const double x = a.at(1, name), y = b.at(1, name);
     if (!std::isfinite(x)) {
-      EXPECT_FALSE(std::isfinite(y)) << name;  // per km, where nobody moved; of episodes, where none has ended
+      EXPECT_FALSE(std::isfinite(y)) << name;  // per km, if no agent moved; of episodes, if none has ended
       continue;
     }
     const bool is_of_learning = name.starts_with("losses/") || name.starts_with("charts/weight_rms");
@@ -90,7 +90,7 @@ void DeviceTraining::expect_learns_as_on_the_host(std::vector<std::string> more)
 class EachModality : public DeviceTraining, public testing::WithParamInterface<const char*> {
  protected:
   static std::string modality() { return std::string("policy.modality=") + GetParam(); }
-  // An update in fp32.
+  // Settings of an update in fp32.
   static std::vector<std::string> one_update() {
     return {modality(), "train.precision=fp32", "train.updates=1", "train.num_steps=30", "train.forward_chunk=3"};
   }
@@ -116,7 +116,7 @@ TEST_P(EachModality, LearnsInEachPrecision) {
         EXPECT_TRUE(std::isfinite(value) || !name.starts_with("losses/")) << name << ": " << value;
         if (!name.starts_with("time/") || name == "time/rollout_s" || name == "time/update_s") continue;
         phases_s += value;
-        // Images are drawn by the perspective policy alone.
+        // Only the perspective policy draws images.
         EXPECT_EQ(value > 0, name != "time/render_s" || !report.renderer.empty()) << name << ": " << value;
       }
       EXPECT_LT(phases_s, 1.01 * (progress.at(update, "time/rollout_s") + progress.at(update, "time/update_s")));
@@ -137,8 +137,8 @@ TEST_P(EachModality, AReproducibleRunGivesTheSamePolicyInEachPrecision) {
   }
 }
 
-// The same actions are drawn in the same worlds, but where a rounding error decides: one draw in a million or so. Then
-// what the simulators count is the same. Losses are means over minibatches between which roundings add up.
+// The same actions are drawn in the same worlds, unless a rounding error decides: one draw in a million or so. So the
+// simulators' counts are equal. Losses are means over minibatches between which roundings accumulate.
 TEST_P(EachModality, TheFirstUpdateIsTheHosts) {
   train(options("host", "cpu", one_update()));
   train(options("device", "cuda", one_update()));
@@ -182,7 +182,7 @@ TEST_P(EachModality, EvaluationAgreesWithTheHosts) {
     EXPECT_EQ(b.density, a.density);
     EXPECT_EQ(b.vehicle_episodes, a.vehicle_episodes);
     EXPECT_GT(b.vehicle_episodes, 60);
-    // An action that a rounding error decides may change the fate of a few vehicles.
+    // An action decided by a rounding error may change the result of a few vehicles.
     EXPECT_NEAR(b.at_fault_collision_rate.value, a.at_fault_collision_rate.value, 0.05);
     EXPECT_NEAR(b.off_road_rate.value, a.off_road_rate.value, 0.05);
     EXPECT_NEAR(b.red_light_rate.value, a.red_light_rate.value, 0.05);
@@ -195,7 +195,7 @@ TEST_P(EachModality, EvaluationAgreesWithTheHosts) {
   }
 }
 
-// Where a rounding error decides an action, states differ from then on: few cases may not be those of the host.
+// If a rounding error decides an action, states differ from then on: few cases may differ from the host's.
 TEST_F(DeviceTraining, RemovalAgreesWithTheHosts) {
   RemovalOptions o;
   for (const char* modality : {"perspective", "vector"}) {
@@ -238,7 +238,7 @@ TEST_F(DeviceTraining, RemovalAgreesWithTheHosts) {
   EXPECT_GT(hidden, 20);
 }
 
-// The lane keeper drives alike on both, so that policies take over in the same states, bit for bit. From there a
+// The lane keeper drives identically on both, so that policies take over in the same states, bit for bit. From there a
 // rounding error may decide an action.
 TEST_F(DeviceTraining, TakeoversAtCornersBeginAsTheHosts) {
   CornerOptions o;
@@ -358,7 +358,7 @@ TEST_P(EachModality, WhatOneDeviceSavesTheOtherGoesOnFrom) {
     };
     const TrainReport half = train(options(run, first, {modality(), "train.updates=2"}));
     const Checkpoint saved = read_checkpoint(half.checkpoint);
-    // With nothing left to do it saves what it read.
+    // With no updates left it saves the checkpoint that it read.
     const TrainReport same = resumed("train.updates=2");
     EXPECT_EQ(same.updates, 2);
     EXPECT_EQ(same.policy_hash, half.policy_hash);

@@ -1,6 +1,6 @@
-// On a CUDA device all of training but the network's arithmetic gives the host's bits, and CUDA graphs give those of
-// calls, with the network's. Without a device these tests are skipped, unless PICTURA_REQUIRE_GPU=1 says that there
-// must be one.
+// On a CUDA device all of training except the network's arithmetic gives the host's bits, and CUDA graphs give the bits
+// of training without graphs, network included. Without a device these tests are skipped, unless PICTURA_REQUIRE_GPU=1
+// requires one.
 #include <c10/core/CachingDeviceAllocator.h>
 
 #include "pictura/common/cuda/device_buffer.h"
@@ -43,13 +43,13 @@ TEST_F(DeviceExact, GraphsDriveAsCallsDo) {
   }
 }
 
-/// Some updates of a small network, and what they took.
+/// Updates of a small network, with their costs.
 struct Learnt {
   std::vector<std::string> policies;           // hashes, after each update
-  std::vector<double> losses;                  // all that is logged of them, after each update
-  std::vector<double> teacher_kl;              // the same
+  std::vector<double> losses;                  // all logged losses, after each update
+  std::vector<double> teacher_kl;              // after each update
   std::vector<int64_t> collecting, improving;  // launches of graphs, in each update
-  std::vector<int64_t> allocations;            // of memory of the device, in each update
+  std::vector<int64_t> allocations;            // allocations of device memory, in each update
 };
 
 Learnt learn(const std::vector<std::string>& more) {
@@ -109,12 +109,12 @@ TEST_P(DeviceGraphs, TeachWhatCallsTeachToTheBit) {
   EXPECT_EQ(graphs.losses, calls.losses);
   EXPECT_EQ(calls.collecting, std::vector<int64_t>(6, 0));
   EXPECT_EQ(calls.improving, std::vector<int64_t>(6, 0));
-  // Memory is settled with the last step of the first rollout; after it comes what is seen last.
+  // Memory is settled in the last step of the first rollout; after it comes the final observation.
   EXPECT_LE(graphs.collecting.front(), 2);
   for (size_t update = 3; update < 6; ++update) {
-    // Of each step its record, its simulation, and a chunk or two, each what it sees and what the policy makes of it.
+    // Each step has its record, its simulation, and one or two chunks, each with observation and policy output.
     EXPECT_GE(graphs.collecting[update], 13 + 12 + 13 * 2) << update;
-    // Of each chunk but the first what it sees, its losses and their gradients.
+    // Each chunk but the first has its observation, its losses and their gradients.
     EXPECT_GT(graphs.improving[update], 3 * 4) << update;
   }
   EXPECT_NE(calls.policies[5], calls.policies[0]);
@@ -125,7 +125,7 @@ TEST_F(DeviceExact, GraphsTeachAsCallsDoWithATeacherAndAfterIt) {
   const std::string teacher = folder / "teacher.safetensors";
   const Config config = load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml", {"policy.modality=vector", "run.seed=5"});
   write_policy(teacher, pictura::Run(config, Device{}).saved_policy(), WeightType::f32, "");
-  // Of 8,400 agent-steps an update.
+  // Scheduled for 8,400 agent-steps per update.
   const std::vector<std::string> more{"train.precision=bf16", "train.teacher=" + teacher,
                                       "train.teacher_agent_steps=25000"};
   std::vector<std::string> off = more;
@@ -164,7 +164,7 @@ TEST_F(DeviceExact, WhatCannotBeCapturedIsAnErrorThatNamesTheKey) {
     }
   });
   EXPECT_NE(message.find("train.graphs"), std::string::npos) << message;
-  // The device is as it was.
+  // The device's state is unchanged.
   RepeatedWork doubles;
   stream.run([&] {
     for (int i = 0; i < 3; ++i) doubles.run(&graphs, [&] { number.mul_(2); });

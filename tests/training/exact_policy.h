@@ -1,5 +1,5 @@
-// A policy without matrix products, whose arithmetic is exact on every device: what surrounds the network in training
-// can be compared to the bit. Runs of three updates by it, and what they did.
+// Policy without matrix products, whose arithmetic is exact on every device, so that the parts of training around the
+// network can be compared bit for bit. Runs of three updates with it, and their records.
 #pragma once
 
 #include <ATen/ATen.h>
@@ -13,9 +13,9 @@
 
 namespace pictura::test {
 
-/// Reads every bit of the arrays that it has and of the images, as a sum of integers, which has no order. The sum
-/// decides which 1, 2, 4 or 8 actions are possible, all alike, and the value. Agents of some kinds of conditioning
-/// drive straight on instead, so that they get somewhere.
+/// Reads every bit of the policy's arrays and of the images, as a sum of integers, which has no order. The sum selects
+/// which 1, 2, 4 or 8 actions are possible, with equal probability, and the value. Agents of some kinds of conditioning
+/// drive straight ahead instead, so that they make progress.
 class ExactPolicy final : public Policy {
  public:
   explicit ExactPolicy(Device device) {
@@ -47,16 +47,16 @@ class ExactPolicy final : public Policy {
     return {logits + shift, value + shift};
   }
 
-  /// A step that every device computes alike.
+  /// Takes a step that every device computes identically.
   void step() {
     const at::NoGradGuard no_grad;
     parameters_[0].value += 0.25;
   }
-  /// What was learnt from since the last call: the sum of each row, by calls of forward().
+  /// Returns the rows learnt from since the last call: the sum of each row, by calls of forward().
   std::vector<at::Tensor> take_learnt() { return std::exchange(learnt_, {}); }
 
  private:
-  static constexpr int64_t kStraightOn = (kNumLongActions - 1) * kNumLatActions + 1;  // most jerk forwards, none aside
+  static constexpr int64_t kStraightOn = (kNumLongActions - 1) * kNumLatActions + 1;  // forward jerk only, the largest
 
   static at::Tensor weighted(const at::Tensor& numbers) {
     const at::Tensor weights = at::arange(1, 2 * numbers.size(1), 2, numbers.options()) * 0x2545f4914f6cdd1d;
@@ -79,9 +79,9 @@ class ExactPolicy final : public Policy {
 /// Three updates, on the host.
 struct ExactRun {
   struct Update {
-    // As Rollout has them.
+    // Tensors of Rollout.
     std::vector<NamedTensor> rollout;
-    std::vector<at::Tensor> images;  // of some of the agents that were active
+    std::vector<at::Tensor> images;  // of some active agents
     std::vector<at::Tensor> learnt;  // see ExactPolicy
     double kept_fraction = 0, adv_threshold = 0;
   };
@@ -91,7 +91,7 @@ struct ExactRun {
   int64_t graph_launches = 0;
 };
 
-/// Of a seed with which all happens that exact_test.cpp asks for. Minibatches are chunks.
+/// Configuration with a seed that produces every event that exact_test.cpp requires. Minibatches are chunks.
 inline Config exact_config(const std::string& device, const std::vector<std::string>& more) {
   std::vector<std::string> overrides{"run.device=" + device,
                                      device == "cpu" ? "render.backend=cpu" : "render.backend=auto",
@@ -159,7 +159,7 @@ inline ExactRun run_exactly(const Config& config) {
   return result;
 }
 
-/// That two runs saw, did and got the same to the bit.
+/// Checks that two runs have the same observations, actions and results, bit for bit.
 inline void expect_same_driving(const ExactRun& a, const ExactRun& b) {
   ASSERT_EQ(a.updates.size(), b.updates.size());
   for (size_t u = 0; u < a.updates.size(); ++u) {
@@ -176,7 +176,7 @@ inline void expect_same_driving(const ExactRun& a, const ExactRun& b) {
   EXPECT_EQ(a.simulator_hash, b.simulator_hash);
 }
 
-/// That they learnt from the same transitions in the same order. Where a chunk of one is longer, it is filled up with
+/// Checks that two runs learnt from the same transitions in the same order. A longer chunk of one run is padded with
 /// its first row.
 inline void expect_same_order(const ExactRun& a, const ExactRun& b) {
   for (size_t u = 0; u < a.updates.size(); ++u) {

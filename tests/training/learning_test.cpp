@@ -15,7 +15,7 @@ namespace {
 using test::Corridor;
 
 constexpr int kUpdates = 100, kWindow = 10;
-// Mean reward per step of each `kWindow` updates.
+// Mean reward per step over each `kWindow` updates.
 using Curve = std::array<double, kUpdates / kWindow>;
 
 Curve learn(Precision precision, uint64_t seed) {

@@ -1,4 +1,4 @@
-// The memory that agents and the network take, by estimate: near what they do take, and refused where there is less.
+// Estimated memory of agents and network: close to the measured memory, and rejected if less is available.
 #include "pictura/training/memory.h"
 
 #include <ATen/Parallel.h>
@@ -31,7 +31,7 @@ double heap_bytes() {
   return static_cast<double>(info.uordblks + info.hblkhd);
 }
 
-// By a run that is ready to collect.
+// Bytes of a run that is ready to collect.
 double taken_bytes(const Config& config) {
   const double before = heap_bytes();
   const Run run(config, Device{});
@@ -50,7 +50,7 @@ TEST_P(EachRollout, TakesAboutWhatIsEstimated) {
   const auto config = [](int num_slots) { return config_of(GetParam().first, GetParam().second, num_slots); };
   const Config few = config(1000), many = config(3000);
   const bool keeps = std::string(GetParam().second) != "redrawn";
-  taken_bytes(few);  // what is made once
+  taken_bytes(few);  // one-time allocations
   const double per_agent = (taken_bytes(many) - taken_bytes(few)) / 2000,
                by_estimate = (estimated_bytes(many, keeps) - estimated_bytes(few, keeps)) / 2000;
   EXPECT_GT(by_estimate, 0.95 * per_agent) << per_agent << " bytes";
@@ -71,7 +71,7 @@ TEST(Memory, MoreAgentsThanFitAreRefusedWithTheNumberThatWould) {
 
 class EachNetwork : public ::testing::TestWithParam<std::vector<std::string>> {
  protected:
-  // With an update of one chunk of so many transitions.
+  // Configuration whose update has one chunk of `transitions` transitions.
   Config config_of_chunk(int transitions) const {
     std::vector<std::string> overrides = GetParam();
     for (const char* key : {"train.forward_chunk", "train.minibatch_size"}) {
@@ -99,7 +99,7 @@ TEST_P(EachNetwork, HasTheParametersThatAreCounted) {
   EXPECT_EQ(network_size(config, Device{}).parameters, make_policy(config, rig_of(config), Device{})->num_parameters());
 }
 
-// While there is one, all that torch allocates on the host is counted. One at a time.
+// Scope in which all host allocations of torch are counted. One at a time.
 class CountedTensors final : public c10::Allocator {
  public:
   CountedTensors() : before_(c10::GetCPUAllocator()) {
@@ -110,7 +110,7 @@ class CountedTensors final : public c10::Allocator {
   CountedTensors(const CountedTensors&) = delete;
   CountedTensors& operator=(const CountedTensors&) = delete;
 
-  /// The most that there was at once.
+  /// Peak bytes.
   static double peak_bytes() { return static_cast<double>(peak_bytes_); }
 
   c10::DataPtr allocate(size_t bytes) override {
@@ -126,7 +126,7 @@ class CountedTensors final : public c10::Allocator {
   void copy_data(void* to, const void* from, size_t bytes) const override { default_copy_data(to, from, bytes); }
 
  private:
-  // What is freed later than this ends knows its size by itself.
+  // Blocks freed after this scope store their own size.
   static void release(void* data) {
     void* const block = static_cast<char*>(data) - kHead;
     size_t bytes = 0;
@@ -142,9 +142,9 @@ class CountedTensors final : public c10::Allocator {
 };
 
 TEST_P(EachNetwork, TakesAboutWhatIsEstimatedOnTheWayForwardAndBack) {
-  at::set_num_threads(1);  // what several threads hold at once depends on when they run
+  at::set_num_threads(1);  // the peak of several threads depends on their timing
   double taken[2];
-  const int chunks[] = {256, 1024};  // at which weights and their gradients are small beside what is counted
+  const int chunks[] = {256, 1024};  // sizes at which weights and gradients are small beside the counted memory
   for (size_t i = 0; i < std::size(chunks); ++i) {
     const Config config = config_of_chunk(chunks[i]);
     const std::unique_ptr<const Policy> policy = make_policy(config, rig_of(config), Device{});
@@ -181,13 +181,13 @@ TEST(Memory, ImagesAreKeptOnADeviceWhereTheyTakeTwoFifthsOfItsMemory) {
   const int64_t bytes = int64_t{1000} * 129 * 4 * 96 * 54 * 3;
   EXPECT_TRUE(keeps({}, bytes / 2 * 5));
   EXPECT_FALSE(keeps({}, bytes / 2 * 5 - 5));
-  // Of an action that is held for four steps there is one: of steps 0, 4, ..., 128.
+  // An action that is held for four steps has one image: at steps 0, 4, ..., 128.
   EXPECT_TRUE(keeps({"policy.decision_steps=4"}, bytes / 129 * 33 / 2 * 5));
   EXPECT_FALSE(keeps({"policy.decision_steps=4"}, bytes / 129 * 33 / 2 * 5 - 5));
   EXPECT_TRUE(keeps({}, 1, Device{}));
   EXPECT_TRUE(keeps({"train.images=kept"}, 1));
   EXPECT_FALSE(keeps({"train.images=redrawn"}, 100 * bytes));
-  // The largest that the run will draw count.
+  // The largest images that the run will draw count.
   EXPECT_FALSE(keeps({"render.schedule=[[1000, 192, 108]]"}, 9 * bytes));
   EXPECT_TRUE(keeps({"render.schedule=[[1000, 192, 108]]"}, 10 * bytes));
 }
@@ -223,7 +223,7 @@ TEST(Memory, MoreMapsThanFitAreRefusedWithTheNumberThatWould) {
   EXPECT_THAT(message_of([&] { check_map_memory(config(9), Device{}, memory_bytes, 0); }),
               AllOf(HasSubstr("40 maps (simulator.maps, and simulator.map_copies of each)"), HasSubstr("by estimate"),
                     HasSubstr("cpu has"), HasSubstr("about 10 such maps would fit")));
-  // A device holds less of a map than the host, which holds it too.
+  // A device holds less of a map than the host, which holds it as well.
   EXPECT_THAT(
       message_of([&] { check_map_memory(config(9), Device{MemorySpace::cuda, 0}, kPlenty_bytes, memory_bytes); }),
       HasSubstr("cpu has"));

@@ -1,4 +1,5 @@
-// Opponents: whom saved policies drive in a run's worlds, what they do there, and that nothing is learnt from it.
+// Opponents: the agents that saved policies drive in a run's worlds, their actions there, and that nothing is learnt
+// from them.
 #include "pictura/training/opponents.h"
 
 #include <array>

@@ -33,7 +33,7 @@ void expect_orthogonal(const at::Tensor& matrix) {
   EXPECT_LT(values.max().item<double>(), 1.3) << matrix.sizes();
 }
 
-// What five steps of Newton-Schulz make of a matrix, in double.
+// Result of five Newton-Schulz steps on a matrix, in double.
 at::Tensor newton_schulz(const at::Tensor& matrix) {
   at::Tensor x = matrix.to(at::kDouble);
   x = x / x.norm();
@@ -63,7 +63,7 @@ TEST(AdamW, StepsAsLoshchilovAndHutterDefineIt) {
   train.weight_decay = 0.1;
   train.max_grad_norm = 1e9;
   Optimizer optimizer(policy, train);
-  at::Tensor weight = policy.parameters()[0].value;  // every other parameter has no gradient and stays
+  at::Tensor weight = policy.parameters()[0].value;  // all other parameters have no gradient and stay unchanged
   const std::vector<double> gradients{0.5, -0.25};
   const double start = weight.flatten()[0].item<double>();
   double expected = start, m = 0, v = 0;
@@ -110,7 +110,8 @@ TEST(Muon, GivesSingularValuesNearOne) {
 TEST(Muon, StepsAsItsDefinitionSays) {
   at::manual_seed(5);
   constexpr double kRate = 0.01, kDecay = 0.1;
-  // Wide, tall, and a convolution's [out, in, height, width]: small ones are multiplied together, filled up and turned.
+  // Wide, tall, and a convolution's [out, in, height, width]: small matrices are multiplied together, padded and
+  // transposed.
   std::vector<at::Tensor> weights, expected, momenta;
   for (const at::IntArrayRef shape : {at::IntArrayRef{3, 5}, {7, 2}, {4, 2, 3, 3}, {3, 5}}) {
     weights.push_back(leaf(at::randn(shape)));
@@ -152,7 +153,7 @@ TEST(Muon, ChangesNothingWhereAGradientIsNotFinite) {
   EXPECT_TRUE(muon.momentum(0).equal(momentum));
 }
 
-// The names of the parameters that AdamW steps beside Muon.
+// Names of the parameters that AdamW steps beside Muon.
 std::vector<std::string> stepped_by_adamw(Modality modality) {
   const PolicyNetwork policy(test::tiny_section(modality), 1, 3);
   std::vector<std::string> names;

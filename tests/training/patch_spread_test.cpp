@@ -57,7 +57,7 @@ TEST(PatchSpread, PutsSharesOfAWeightAtThePlacesOfItsPixel) {
   EXPECT_TRUE(spread_over_patches(weight, 1).equal(weight));
 }
 
-// What an agent sees whose images are constant in blocks of so many pixels squared: 7x5 blocks, which patches of two
+// Observations of an agent whose images are constant in blocks of pixels x pixels: 7x5 blocks, which patches of two
 // blocks do not divide.
 Observation blocks_of(int64_t pixels) {
   constexpr int64_t kBatch = 6;
@@ -93,7 +93,7 @@ struct GrowingPolicy {
   }
   const double max_grad_norm;
   int pixels = 1;
-  double norm = 0;  // of the last step's gradient
+  double norm = 0;  // norm of the last step's gradient
   PolicyNetwork policy;
   Optimizer optimizer;
 };
@@ -129,7 +129,7 @@ TEST(PatchSpread, KeepsHowAClippedStepChangesLogits) { expect_equal_learning(0.1
 
 class ExportedSize : public ::testing::Test {
  protected:
-  // A policy of 16x9 px in patches of 2, and what it is exported to.
+  // Writes a policy of 16x9 px in patches of 2, for exports.
   std::string write(const Config& config) {
     SavedPolicy saved;
     saved.config = config;

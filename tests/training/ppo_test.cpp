@@ -45,8 +45,8 @@ std::vector<float> plain_gae(const std::vector<float>& rewards, const std::vecto
   return advantages;
 }
 
-// Advantages of a rollout that consists of these numbers alone. [num_steps * num_slots], but values, which have a row
-// more.
+// Advantages of a rollout that consists of these numbers. [num_steps * num_slots], except values, which have one more
+// row.
 std::vector<float> advantages_of(int64_t num_steps, int64_t num_slots, const std::vector<float>& rewards,
                                  const std::vector<float>& values, const std::vector<uint8_t>& terminated,
                                  const std::vector<uint8_t>& truncated, const std::vector<uint8_t>& valid, double gamma,
@@ -160,7 +160,7 @@ TEST(AdvantageFilter, DropsTheShareOfItsQuantile) {
     train.adv_filter_quantile = share;
     corridor.rollout.rewards.copy_(
         at::arange(corridor.rollout.rewards.numel(), at::kFloat).sin().reshape_as(corridor.rollout.rewards));
-    // One that is very large, which would move the maximum, does not count.
+    // A single very large reward, which would move the maximum, does not matter.
     corridor.rollout.rewards[7][127] = 1e6;
     Optimizer optimizer(policy, train);
     AdvantageFilter filter;
@@ -252,7 +252,7 @@ TEST(Permutation, TakesEveryElementOnceAndOnlyItsArgumentsDecide) {
 }
 
 TEST(Permutation, MixesWell) {
-  // Neighbours go to places that have nothing to do with each other, and every place is as likely as any other.
+  // Neighbours get unrelated positions, and every position is equally likely.
   constexpr int64_t kSize = 5000, kParts = 10;
   int64_t neighbours = 0, counts[kParts] = {};
   double distance = 0;
@@ -328,7 +328,7 @@ TEST(Ppo, ChunksChangeNothingButRounding) {
   }
 }
 
-// A policy that keeps how many transitions each of its forward passes took.
+// Policy that records the number of transitions of each of its forward passes.
 class CountedPolicy final : public Policy {
  public:
   explicit CountedPolicy(const Policy* policy) : policy_(*policy) { parameters_ = policy->parameters(); }
@@ -348,7 +348,7 @@ TEST(Ppo, OneOf100TransitionsTellsTheLossesGradientsApart) {
   const CountedPolicy policy(&network);
   TrainSection train;
   train.minibatch_size = 512;
-  train.forward_chunk = 128;  // no chunk is filled up
+  train.forward_chunk = 128;  // no chunk needs padding
   train.update_epochs = 4;
   train.adv_filter_threshold = 0;
   Corridor corridor;
@@ -429,7 +429,7 @@ TEST(Ppo, StopsBeforeTheStepOfAMinibatchThatIsNotFinite) {
   }
 }
 
-// Both rollouts kept log-probabilities that are not the policy's: the update takes the policy's own.
+// Both rollouts hold log-probabilities that differ from the policy's: the update uses the policy's own.
 TEST(Ppo, LogProbabilitiesThatAreNotTheLearnersAreComputedAgain) {
   at::set_num_threads(1);
   TrainSection train;

@@ -1,5 +1,5 @@
-// Ranks: who is which, how they meet and lose each other, what they compute together, and that they learn what one
-// would. Ranks are threads here; tests/apps/ranks_command_test.py has them as processes.
+// Ranks: their launch, how they meet and lose each other, their joint computations, and that they learn the same as a
+// single rank. Ranks are threads here; tests/apps/ranks_command_test.py has them as processes.
 #include "pictura/training/ranks/ranks.h"
 
 #include <cstdlib>
@@ -52,7 +52,7 @@ Launch place(int rank, int size, int port) {
   return launch;
 }
 
-// Runs f(its ranks) in a thread each, and returns what each threw.
+// Runs f(its ranks) in a thread each, and returns the error of each.
 std::vector<std::string> run_ranks(int size, const std::function<void(Ranks&)>& f, const Patience& patience = {}) {
   const int port = free_port();
   std::vector<std::string> errors(static_cast<size_t>(size));
@@ -71,7 +71,7 @@ std::vector<std::string> run_ranks(int size, const std::function<void(Ranks&)>& 
 
 class LaunchVariables : public ::testing::Test {
  protected:
-  // Those that are not given are unset.
+  // Launch from these variables; all others are unset.
   static Launch launch(const std::map<std::string, std::string>& variables) {
     for (const char* name :
          {"RANK", "WORLD_SIZE", "LOCAL_RANK", "MASTER_ADDR", "MASTER_PORT", "SLURM_PROCID", "SLURM_STEP_NUM_TASKS",
@@ -252,7 +252,7 @@ PolicySection tiny_policy() {
   return policy;
 }
 
-// The slots [begin, end) of a rollout.
+// Returns the slots [begin, end) of a rollout.
 Rollout part_of(const Rollout& whole, int64_t begin, int64_t end) {
   const auto part = [&](const at::Tensor& t) { return t.narrow(1, begin, end - begin).contiguous(); };
   Rollout result(RolloutObservations(whole.observations.arrays().map(part)), whole.num_steps(), end - begin, Device{});
@@ -269,7 +269,8 @@ struct Learnt {
   UpdateStats first, last;
 };
 
-// Three updates on the corridor by ranks that have its slots up to each of these ends, in which each plays all of it.
+// Runs three updates on the corridor by ranks that own its slots up to each of these ends; each rank simulates all
+// slots.
 std::vector<Learnt> learn(const std::vector<int64_t>& ends, const TrainSection& train) {
   std::vector<Learnt> of_ranks(ends.size());
   const std::vector<std::string> errors = run_ranks(static_cast<int>(ends.size()), [&](Ranks& ranks) {
@@ -286,7 +287,7 @@ std::vector<Learnt> learn(const std::vector<int64_t>& ends, const TrainSection& 
     WeightAverage average(policy, 2);
     for (int64_t update = 0; update < 3; ++update) {
       corridor.play(policy, update);
-      // Of the last slots nothing is valid in the second update: the last rank has nothing to learn from.
+      // The last slots have no valid transitions in the second update: the last rank has nothing to learn from.
       if (update == 1) corridor.rollout.valid.narrow(1, 100, test::Corridor::kSlots - 100).fill_(0);
       Rollout own = part_of(corridor.rollout, rank == 0 ? 0 : ends[rank - 1], ends[rank]);
       ChunkRunner runner(policy, own.observations);
@@ -305,7 +306,7 @@ std::vector<Learnt> learn(const std::vector<int64_t>& ends, const TrainSection& 
   return of_ranks;
 }
 
-// Parameters step along the gradient itself, whose size nothing hides.
+// Settings with which parameters step along the unscaled gradient.
 TrainSection plain_steps() {
   TrainSection train;
   train.gamma = 0.9;
@@ -362,7 +363,7 @@ TEST(RanksLearn, WhatOneWouldHaveLearntAndTheSameToTheBit) {
     EXPECT_NEAR(ranks[0].last.all.value_loss, one.last.all.value_loss, 1e-4 * one.last.all.value_loss);
     EXPECT_NEAR(ranks[0].last.explained_variance, one.last.explained_variance, 1e-3);
     EXPECT_NEAR(ranks[0].last.all.grad_norm, one.last.all.grad_norm, 1e-3 * one.last.all.grad_norm);
-    // The sum of the gradients of all minibatches of the first update: fp32 sums in another order.
+    // Sum of the gradients of all minibatches of the first update: fp32 sums in another order.
     for (size_t i = 0; i < one.steps.size(); ++i) {
       const double largest = one.steps[i].abs().max().item<double>();
       EXPECT_LE((ranks[0].steps[i] - one.steps[i]).abs().max().item<double>(), 1e-4 * largest + 1e-9) << i;

@@ -1,4 +1,4 @@
-// One seed gives one policy: in two runs, in one that is resumed, and in every setting that promises it.
+// One seed gives one policy: in two runs, in a resumed run, and in every setting that promises it.
 #include <cstdlib>
 
 #include <ATen/Context.h>
@@ -30,8 +30,8 @@ class EachModality : public Reproducible, public testing::WithParamInterface<con
 INSTANTIATE_TEST_SUITE_P(Reproducible, EachModality, ::testing::Values("vector", "perspective"),
                          [](const auto& modality) { return std::string(modality.param); });
 
-// On the host, which has fp32 alone, a setting gives one policy. train.reproducible may give another one: it fills
-// chunks up, and the rounding of a product may depend on how many rows it has.
+// On the host, which has only fp32, each setting gives one policy. train.reproducible may give another policy: it pads
+// chunks, and the rounding of a product may depend on its number of rows.
 TEST_P(EachModality, TheHostGivesOnePolicyInEachSetting) {
   const auto policies = [this](const std::string& precision, const std::string& reproducible) {
     return test::policies_of_equal_runs(folder_ / (precision + reproducible), "cpu",
@@ -47,7 +47,7 @@ TEST_P(EachModality, TheHostGivesOnePolicyInEachSetting) {
   EXPECT_NE(other.policy_hash, fp32[0]) << "the seed counts";
 }
 
-// Those of few channels are oneDNN's, others products of their own, whose sums are those of each thread.
+// Convolutions of few channels use oneDNN, others our own products, whose sums are per thread.
 TEST_F(Reproducible, TheHostGivesOnePolicyWithWideConvolutionsAndTwoThreads) {
   const auto [whole, again, resumed] = test::policies_of_equal_runs(
       folder_ / "wide", "cpu", {"policy.conv_channels=[16, 24]", "run.num_threads=2", "train.num_steps=6"});

@@ -1,4 +1,4 @@
-// What a run does besides learning: small evaluations of itself, and other image sizes as it goes on.
+// Work of a run besides learning: small evaluations, and changes of the image size.
 #include <algorithm>
 #include <filesystem>
 
@@ -21,7 +21,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using Table = std::vector<std::vector<std::string>>;
 
-// The cells below a name.
+// Returns the cells below a column's name.
 std::vector<std::string> column(const Table& table, const std::string& name) {
   const auto at = static_cast<size_t>(std::find(table[0].begin(), table[0].end(), name) - table[0].begin());
   std::vector<std::string> cells;
@@ -41,7 +41,7 @@ class RunWithEvaluations : public ::testing::Test {
   }
   std::string evaluations(const std::string& run) const { return folder_ / (run + "/evaluation.csv"); }
 
-  /// The last evaluation of a run is that of evaluate() with its last checkpoint.
+  /// Checks that the last evaluation of a run equals that of evaluate() with its last checkpoint.
   void expect_last_row_as_evaluate_measures(const std::string& run, const std::string& checkpoint) const {
     const Table table = read_table(evaluations(run));
     EvaluateOptions o = test::one_scenario(checkpoint, 10);
@@ -107,8 +107,8 @@ TEST_F(RunWithEvaluations, MeasureCamerasAsMountedWhateverTrainingHas) {
 TEST_F(RunWithEvaluations, GoesOnWithTornAndMissingRows) {
   const TrainReport whole = train(evaluating("whole", 1));
   train(evaluating("parts", 1, 2));
-  // Killed after the checkpoint and before the evaluation that follows; a row of an update that is not done, and a torn
-  // one.
+  // The run was killed after the checkpoint and before the following evaluation; the file has a row of an update that
+  // is not done, and a torn row.
   const std::string path = evaluations("parts"), text = read_file(path);
   const size_t last_row = text.rfind('\n', text.size() - 2) + 1;
   write_file(path, text.substr(0, last_row) + "3" + text.substr(last_row + 1) + text.substr(last_row, 7));
@@ -173,7 +173,7 @@ TEST_F(RunWithImageSizes, ChangesThemBetweenUpdatesAndGoesOnExactly) {
                                      agent_steps[static_cast<size_t>(changed_after) - 1]));
   EXPECT_EQ(first_difference(read_checkpoint(whole.checkpoint).rig, paper_rig(20, 12)), "");
 
-  // Saved before, right after, and with the new size.
+  // Saved before the change, right after it, and with the new size.
   for (const int64_t updates : {changed_after - 1, changed_after, changed_after + 1}) {
     const std::string run = fmt::format("parts {}", updates);
     train(scheduled(run, "[[100, 20, 12], [100000, 40, 20]]", static_cast<int>(updates)));
@@ -213,13 +213,13 @@ TEST_F(RunWithImageSizes, SpreadsTheFirstConvolutionAndGoesOnExactly) {
     rest.old_run = OldRun::resume;
     EXPECT_EQ(train(rest).policy_hash, whole.policy_hash) << updates;
   }
-  // A checkpoint of before the change goes on with what the schedule has for later, and with nothing else.
+  // A checkpoint from before the change resumes with the schedule's later sizes, and with nothing else.
   train(scheduled("late", "[]", 2));
   TrainOptions rest = scheduled("late", schedule, 4);
   rest.old_run = OldRun::resume;
   EXPECT_THAT(message_of([&] { train(rest); }),
               AllOf(HasSubstr("checkpoint.ckpt"), HasSubstr("render.line_floor_px: 0.35 became 0.7")));
-  // Another run that begins with the weights keeps the rate of those that move together.
+  // Another run that starts from the weights keeps the learning rate of weights that move together.
   TrainOptions next = options("next", {"train.updates=1", "render.width_px=32", "render.height_px=18",
                                        "policy.patch_px=2", "render.line_floor_px=0.7"});
   next.init_from = whole.checkpoint;

@@ -1,5 +1,5 @@
-// progress.csv: what it keeps of an older file, what is logged, its notices, the progress line, and what a full disk
-// does to a run's files.
+// progress.csv: the rows kept from an existing file, logged values, notices, the progress line, and the effect of a
+// full disk on a run's files.
 #include "pictura/training/run_log.h"
 
 #include <algorithm>
@@ -26,7 +26,7 @@ using ::testing::HasSubstr;
 
 class ProgressCsvFile : public ::testing::Test {
  protected:
-  // The file after a run that has done `updates_done` updates has found `before` in it and written update 9.
+  // Returns the file after a run with `updates_done` completed updates has found `before` in it and written update 9.
   std::string after(const std::string& before, int64_t updates_done) {
     write_file(path_, before);
     ProgressCsv csv(path_, columns_, updates_done, [this](const std::string& text) { notices_.push_back(text); });
@@ -82,7 +82,7 @@ class LoggedRun : public ::testing::Test {
   test::ScratchFolder folder_;
 };
 
-// The number behind a name in the last row of a run's progress.csv.
+// Returns the number below a name in the last row of a run's progress.csv.
 double logged(const std::string& folder, const std::string& name) {
   const std::vector<std::vector<std::string>> table = test::read_table(folder + "/progress.csv");
   const auto column = std::find(table[0].begin(), table[0].end(), name) - table[0].begin();
@@ -142,7 +142,7 @@ TEST_F(LoggedRun, TheProgressLineShowsRateTimeLeftMetricsAndPhases) {
   EXPECT_LT(last.size(), 120u);
   EXPECT_THAT(last, HasSubstr(fmt::format("{:.1f} m/s", logged(folder_ / "run", "driving/mean_speed_mps"))));
 
-  // Before a hundred million updates, and before the schedule's end, the minutes end the run.
+  // The minutes end the run before a hundred million updates, and before the schedule's end.
   o = test::small_run(folder_ / "other", "cpu", {"train.updates=100000000", "train.schedule_agent_steps=1000000000"});
   o.on_progress = [&seen](const TrainProgress& progress) { seen.push_back(progress); };
   o.minutes = 0.05;
@@ -171,7 +171,7 @@ TEST_F(ProgressCsvFile, TheFirstUpdateWithOtherLogProbabilitiesThanTheLearnersIs
   EXPECT_THAT(column, ::testing::ElementsAre("losses/recomputed", "0", "1", "1", "0"));
 }
 
-// For its lifetime no file grows beyond a size, as on a disk that is full by then.
+// Scope in which no file can grow beyond a size, as on a full disk.
 class FullDisk {
  public:
   explicit FullDisk(rlim_t bytes) : old_handler_(std::signal(SIGXFSZ, SIG_IGN)) {
@@ -205,7 +205,7 @@ TEST_F(FullDisks, AreErrorsOfTheCsvAndOfEventsThatNameFileAndReason) {
   EventFile events(folder_.path());
   EXPECT_THAT(fill([&](int64_t i) { events.write(i, columns_); }),
               AllOf(HasSubstr(folder_ / "events.out.tfevents."), HasSubstr(": writing failed: File too large")));
-  // The torn row goes when the run goes on.
+  // The torn row is removed when the run resumes.
   ProgressCsv again(path_, columns_, 2000, {});
   const std::string rows = read_file(path_);
   EXPECT_EQ(rows.back(), '\n');

@@ -1,4 +1,4 @@
-// Runs of a few vehicles on the procedural town, and what they write.
+// Runs of a few vehicles on the procedural town, and the files that they write.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace pictura::test {
 
-/// Four updates of configs/smoke.toml, made smaller, on a device: run.device.
+/// Four updates of a reduced configs/smoke.toml, on a device: run.device.
 inline TrainOptions small_run(const std::string& out_folder, const std::string& device,
                               const std::vector<std::string>& more = {}) {
   TrainOptions o;
@@ -33,7 +33,7 @@ inline TrainOptions small_run(const std::string& out_folder, const std::string& 
   return o;
 }
 
-/// The hashes of the policies of three runs of two updates: one, the same again, and one that is resumed in between.
+/// Hashes of the policies of three runs of two updates: one, its repetition, and one that is resumed in between.
 inline std::array<std::string, 3> policies_of_equal_runs(const std::string& folder, const std::string& device,
                                                          std::vector<std::string> more) {
   more.push_back("train.updates=2");
@@ -59,7 +59,7 @@ inline EvaluateOptions one_scenario(const std::string& checkpoint, int steps) {
   return o;
 }
 
-/// The cells of a progress.csv; the first row is the head.
+/// Cells of a progress.csv; the first row is the head.
 inline std::vector<std::vector<std::string>> read_table(const std::string& path) {
   std::vector<std::vector<std::string>> rows;
   std::istringstream lines(read_file(path));

@@ -1,4 +1,4 @@
-// A teacher to imitate: its loss, what it needs of a run, and that a policy comes to act as it does.
+// Teacher to imitate: its loss, its requirements for a run, and that a policy learns to act like it.
 #include "pictura/training/teacher.h"
 
 #include <algorithm>
@@ -26,14 +26,14 @@ TEST(Teacher, LossIsTheWeightedDivergenceFromItsActions) {
   targets.teacher_weight = at::full({}, 0.25, doubles);
   const at::Tensor rows = at::tensor({2, 0}, at::kLong);
   TrainSection train;
-  train.ent_coef = 0;  // policy and value have no loss where advantages, returns and values are 0
+  train.ent_coef = 0;  // policy and value have no loss if advantages, returns and values are 0
   const Losses losses =
       ppo_losses({logits, at::zeros({2}, doubles)}, targets, {rows, 2, at::zeros({2}, doubles), /*shares=*/{}}, train);
   const at::Tensor p = teacher.index_select(0, rows), q = at::softmax(logits, 1);
   const double divergence = (p * (p / q).log()).sum(1).mean().item<double>();
   EXPECT_NEAR(losses.total.item<double>(), 0.25 * divergence, 1e-12);
   EXPECT_NEAR(elements_of(at::constant_pad_nd(losses.stats, {0, 1})).teacher_kl.item<double>(), divergence, 1e-12);
-  // Of a cross entropy by logits: the difference of the probabilities.
+  // Gradient of a cross entropy with respect to logits: the difference of the probabilities.
   losses.total.backward();
   EXPECT_LT((logits.grad() - 0.25 * (q - p) / 2).abs().max().item<double>(), 1e-12);
 }
@@ -52,18 +52,18 @@ TEST(Teacher, WeightFallsAlongALine) {
 
 class TeacherTest : public ::testing::Test {
  protected:
-  // Untrained policies: the weights of another seed are another's.
+  // Writes an untrained policy; another seed has other weights.
   std::string policy_of(const std::string& name, std::vector<std::string> settings) const {
     settings.insert(settings.end(), {"run.seed=5", "train.updates=1"});
     train(small_run(folder_ / name, "cpu", settings));
     return folder_ / (name + "/policy.safetensors");
   }
-  // Scaled, so that it is far from uniform.
+  // Writes a vector policy, scaled so that it is far from uniform.
   std::string vector_policy(const std::string& name, std::vector<std::string> settings = {}) const {
     settings.insert(settings.end(), {"policy.modality=vector", "train.sharpen_agent_steps=8"});
     return policy_of(name, settings);
   }
-  // How far each update's actions were from the teacher's.
+  // KL divergence of each update's actions from the teacher's.
   std::vector<double> divergences(const std::string& folder) const {
     const auto rows = read_table(folder + "/progress.csv");
     const size_t column =

@@ -1,4 +1,4 @@
-// Training end to end on a few vehicles of the procedural town: files, exact resume, ^C's boundary, evaluation.
+// Training end to end on a few vehicles of the procedural town: files, exact resume, interrupts, evaluation.
 #include <algorithm>
 #include <cmath>
 #include <csignal>
@@ -65,7 +65,8 @@ TEST_F(Training, ResumesExactly) {
   ASSERT_TRUE(std::isfinite(whole.episode_return));
   EXPECT_EQ(resumed.episode_return, whole.episode_return);
 
-  // One row per update, once each, after the head; and but for the clock every number is the whole run's.
+  // One row per update, each once, after the head; except for the clock every number equals that of the uninterrupted
+  // run.
   const std::vector<std::vector<std::string>> parts = read_table(folder_ / "parts/progress.csv"),
                                               all = read_table(folder_ / "whole/progress.csv");
   ASSERT_EQ(parts.size(), 5u);
@@ -84,7 +85,7 @@ TEST_F(Training, ResumesExactly) {
 TEST_F(Training, EndsWhenItsMinutesAreOverAndGoesOnExactly) {
   const TrainReport half = train(options("parts", {"train.updates=2"}));
   EXPECT_FALSE(half.out_of_time);
-  // Over before the first update that is left.
+  // Out of time before the first remaining update.
   TrainOptions rest = options("parts");
   rest.old_run = OldRun::resume;
   rest.minutes = 1e-9;
@@ -118,7 +119,7 @@ TEST_F(Training, KnowsBeforeItsFirstUpdateHowLongOneTakesOnThisDeviceWithAsManyA
     rest.minutes = 60;
     return train(rest);
   };
-  // An update of an hour does not end within an hour; elsewhere, or with more agents, it says nothing.
+  // An update of an hour does not end within an hour; durations elsewhere, or with more agents, do not count.
   const std::map<std::string, double> elsewhere{{"NVIDIA H100, 8 agents", 3600}, {"host, 80 agents", 3600}};
   saved.longest_update_s = elsewhere;
   saved.longest_update_s["host, 8 agents"] = 3600;
@@ -189,7 +190,7 @@ TEST_F(Training, NewEpisodesBeginWhereTheSavedOnesCannotGoOn) {
   EXPECT_GT(resumed.agent_steps, half.agent_steps);
   EXPECT_GT(resumed.km_driven, half.km_driven);
   EXPECT_EQ(read_table(folder_ / "run/progress.csv").size(), 5u);
-  // Episodes that can go on do so without a word.
+  // Episodes that can continue do so without a notice.
   notices.clear();
   resume(saved.simulator, "train.updates=2", &notices);
   EXPECT_TRUE(notices.empty());
@@ -200,7 +201,7 @@ TEST_F(Training, RefusesToResumeWithOtherCamerasByName) {
     write_file(folder_ / "rig.toml", fmt::format("[[camera]]\nname = \"ahead\"\nwidth_px = 16\nheight_px = 9\n"
                                                  "focal_px = 8\nx_m = 1\nz_m = 1.5\nyaw_deg = {}\n",
                                                  yaw_deg));
-    // The run's configuration must name the rig and not the sizes that smoke.toml has.
+    // The run's configuration must name the rig, without the sizes of smoke.toml.
     write_file(folder_ / "config.toml",
                "[simulator]\nmaps = [\"procedural\"]\nmax_agents = 8\npedestrian_fraction = 0\ncyclist_fraction = "
                "0\nwalls = false\nparked_cars = 0\n[render]\nrig = \"rig.toml\"\n"
@@ -252,7 +253,7 @@ TEST_F(Training, EachRendererWorksWithTheSimulatorOnTheCpu) {
   EXPECT_EQ(black.device, "cpu");
   const TrainReport drawn = train(options("cpu", {"train.updates=1"}));
   EXPECT_NE(black.policy_hash, drawn.policy_hash);
-  // The old key says the same.
+  // The old key has the same effect.
   TrainOptions old = options("old", {"train.updates=1", "run.backend=null"});
   std::erase(old.overrides, "render.backend=cpu");
   EXPECT_EQ(train(old).policy_hash, black.policy_hash);
@@ -266,7 +267,7 @@ TEST_F(Training, EachRendererWorksWithTheSimulatorOnTheCpu) {
 }
 
 TEST_F(Training, RolloutsThatCannotFitAreRefused) {
-  // 65,537 rows of 8,000 observations: with the vector ones 2.8 TB or so, with large images far more.
+  // 65,537 rows of 8,000 observations: about 2.8 TB for vectors, far more for large images.
   const std::vector<std::string> huge = {"train.num_steps=65536", "simulator.num_slots=8000"};
   TrainOptions vector = options("vector", huge);
   vector.overrides.push_back("policy.modality=vector");
@@ -278,7 +279,7 @@ TEST_F(Training, RolloutsThatCannotFitAreRefused) {
 }
 
 TEST_F(Training, WhatARolloutKeepsIsWhatTheActiveAgentsSaw) {
-  // With randomized cameras, whose images are the same when they are drawn again.
+  // With randomized cameras, whose images are the same when drawn again.
   const auto config_of = [](std::vector<std::string> more) {
     more.insert(more.end(),
                 {"run.num_threads=1", "render.backend=cpu", "train.num_steps=3", "render.randomization.rotation_deg=5",
@@ -295,11 +296,11 @@ TEST_F(Training, WhatARolloutKeepsIsWhatTheActiveAgentsSaw) {
   const std::unique_ptr<LearnerExecutor> executor = make_learner_executor(Device{});
   RolloutObservations all[] = {{kept, simulator.get(), renderer.get(), nullptr},
                                {redrawn, simulator.get(), renderer.get(), nullptr},
-                               // It has room for a decision in three steps, and is given one at every step.
+                               // It has room for a decision every three steps, and receives one at every step.
                                {held, simulator.get(), renderer.get(), nullptr}};
   const uint64_t generation = all[2].generation();
   simulator->reset();
-  // Full throttle and full lock: some leave the road, and some do so before the others.
+  // Full throttle and full lock: some agents leave the road, some of them earlier than others.
   std::vector<int32_t> actions(24);
   for (size_t i = 0; i < actions.size(); ++i) actions[i] = static_cast<int32_t>(i) % kNumActions;
   std::vector<at::Tensor> rows;
@@ -357,7 +358,7 @@ TEST_F(Training, KeptAndRedrawnImagesTeachTheSame) {
 }
 
 TEST_F(Training, NothingIsLearntFromHaltedSlotsThatAreDrawn) {
-  // Gradients alone change parameters, by as much.
+  // Only gradients change parameters, by as much.
   const std::vector<std::string> settings = {
       "train.updates=1",  "train.num_steps=60",    "train.adv_filter_threshold=0", "simulator.num_slots=24",
       "train.adam_eps=1", "train.learning_rate=1", "train.update_epochs=1",        "train.schedule=constant"};
@@ -381,7 +382,7 @@ TEST_F(Training, NothingIsLearntFromHaltedSlotsThatAreDrawn) {
     learnt = std::max(learnt, (with[i].value - before[i].value).abs().max().item<double>());
   }
   EXPECT_GT(learnt, 1e-3);
-  // They take their part of the minibatches.
+  // Halted agents are part of the minibatches.
   learn("draw", 64, &in_minibatches);
   EXPECT_EQ(in_minibatches.minibatches, (24 * 60 + 63) / 64);
 }
@@ -402,7 +403,7 @@ TEST_F(Training, NothingIsLearntFromImpairedAgents) {
                                            "simulator.others.inattentive=0.1"});
   EXPECT_EQ(among.slot_steps, plain.slot_steps);
   EXPECT_NEAR(static_cast<double>(among.agent_steps) / static_cast<double>(plain.agent_steps), 0.5, 0.2);
-  // All that the unimpaired did is learnt from, and nothing else.
+  // Everything that unimpaired agents did is learnt from, and nothing else.
   EXPECT_EQ(among.kept_fraction, 1);
   EXPECT_EQ(among.minibatches, (among.agent_steps + 63) / 64);
 }
@@ -465,14 +466,14 @@ TEST_F(Training, WritesWhatItPromisesAndStartsFromItsSeed) {
 TEST_F(Training, InterruptedRunSavesAndGoesOnExactly) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   TrainOptions stopped = options("stopped");
-  // The process that is stopped has a scratch folder of its own; it writes into the one of the process that started it.
+  // The stopped process has its own scratch folder; it writes into the folder of the process that started it.
   constexpr const char* kFolder = "PICTURA_TEST_STOPPED_RUN";
   setenv(kFolder, stopped.out_folder.c_str(), /*overwrite=*/0);
   stopped.out_folder = std::getenv(kFolder);
   stopped.on_progress = [](const TrainProgress& progress) {
     if (progress.update == 2) std::raise(SIGINT);
   };
-  // In a process of its own, since the flag that ^C sets is never taken back.
+  // Runs in a separate process, since the interrupt flag is never reset.
   EXPECT_EXIT(
       {
         catch_interrupts();
@@ -501,7 +502,7 @@ TEST_F(Training, ARunInTheFolderIsNeitherOverwrittenNorMixedWithUnlessAskedFor) 
   const std::vector<std::string> files = entries();
   const std::string events =
       *std::find_if(files.begin(), files.end(), [](const auto& name) { return name.starts_with("events."); });
-  // Of an earlier process, and another program's; and what is no run's.
+  // Files of an earlier process and of another program, and files that belong to no run.
   write_file(folder_ / "run/events.out.tfevents.17.5", "old");
   write_file(folder_ / "run/.pictura-0123456789abcdef.tmp", "left by a killed process");
   write_file(folder_ / "run/notes.txt", "mine");
@@ -566,7 +567,7 @@ TEST_F(Training, TheLastCheckpointsAreKept) {
   o.overrides.push_back("train.updates=4");
   train(o);
   EXPECT_EQ(updates(), (Updates{4, 3, 2, -1}));
-  // With fewer kept, those that are too many go.
+  // With a smaller number of kept checkpoints, surplus checkpoints are removed.
   const std::string newest = read_file(folder_ / "run/checkpoint.ckpt");
   constexpr auto kPrivate = std::filesystem::perms::owner_read | std::filesystem::perms::owner_write;
   std::filesystem::permissions(folder_ / "run/checkpoint.ckpt", kPrivate);
@@ -614,7 +615,7 @@ TEST_F(Training, MilestonesAreKeptAndTheSameAfterResuming) {
   train(part);
   EXPECT_EQ(milestones("parts"), milestones("whole"));
 
-  // One that cannot be written is made when the run goes on: no checkpoint is of after it.
+  // A milestone that cannot be written is written when the run resumes: no later checkpoint exists.
   const std::string first = milestones("whole").front().first;
   const std::string obstacle = folder_ / ("blocked/" + first + "/x");
   std::filesystem::create_directories(obstacle);
@@ -712,7 +713,7 @@ TEST_F(Training, BeginsWithTheWeightsOfAnotherRunAtAnyImageSize) {
 }
 
 TEST_F(Training, EndsWhereLogitsAreFiniteNoLonger) {
-  // They grow beyond all floats after an update.
+  // Logits exceed all floats after an update.
   const TrainOptions o = options("run", {"train.updates=4", "train.sharpen_agent_steps=1"});
   EXPECT_THAT(message_of([&] { train(o); }), HasSubstr("update 3: expected finite logits and values in the rollout"));
 }
@@ -720,7 +721,7 @@ TEST_F(Training, EndsWhereLogitsAreFiniteNoLonger) {
 TEST_F(Training, RefusesToDriveByLogitsThatAreNotFinite) {
   SavedPolicy policy = read_policy(train(options("run", {"train.updates=1", "policy.modality=vector"})).checkpoint);
   for (NamedTensor& parameter : policy.parameters) {
-    if (parameter.name == "actor.weight") parameter.value.fill_(3e38);  // finite, but no sum of them is
+    if (parameter.name == "actor.weight") parameter.value.fill_(3e38);  // finite, but its sums are not
   }
   const std::string path = folder_ / "large.safetensors";
   write_policy(path, policy, WeightType::f32, "");
@@ -785,10 +786,10 @@ TEST_F(Training, VectorPolicyTrainsAndIsEvaluated) {
     EXPECT_GE(rate, 0);
     EXPECT_LE(rate, 1);
   }
-  // The same again, and drawn actions are something else.
+  // The repetition is equal, and drawn actions give something else.
   const std::vector<EvaluateRow> again = evaluate(o).rows;
   EXPECT_EQ(again[0].km_driven, rows[0].km_driven);
-  // In parts, also of a session that is kept.
+  // Evaluates in parts, also with a session that is kept.
   o.scenarios = 2;
   const EvaluationResults first = evaluate(o).results;
   o.first_scenario = 2;
@@ -819,7 +820,7 @@ TEST_F(Training, InterruptedEvaluationKeepsWhatItFinished) {
   o.steps = 5;
   o.num_threads = 1;
   o.renderer = "cpu";
-  // Of 60, 120 and 150 agents the first 60 are done at 18 %.
+  // The first 60 of 60, 120 and 150 agents are done at 18 %.
   o.on_progress = [](double fraction, double) {
     if (fraction > 0.2) std::raise(SIGINT);
   };
@@ -846,7 +847,7 @@ TEST_F(Training, EvaluationRepeatsNoWorldOfTraining) {
   o.steps = 10;
   o.num_threads = 1;
   o.renderer = "cpu";
-  // The same drive by hand, in the world of that number.
+  // Repeats the drive by hand, in the world of that number.
   auto return_per_vehicle = [&](uint32_t global_world) {
     SimulatorConfig config = evaluation_simulator_config(load_config(folder_ / "run/config.toml"), o.steps);
     config.seed = o.seed;
@@ -869,7 +870,7 @@ TEST_F(Training, EvaluationRepeatsNoWorldOfTraining) {
   EXPECT_NE(evaluated, return_per_vehicle(0));
 }
 
-// A rig of one camera, unlike the paper's.
+// Writes a rig of one camera, unlike the paper's.
 std::string one_camera(const std::string& path) {
   write_file(path, "[[camera]]\nname = \"ahead\"\nwidth_px = 20\nheight_px = 12\nfocal_px = 11\nx_m = 1\nz_m = 1.5\n");
   return path;
@@ -904,7 +905,7 @@ TEST_F(Training, PoliciesDriveInTheWorldAndSeeTheImagesThatTheyWereTrainedOn) {
             simulator_config(load_config(o.config_path)).conditioning[0].high);
   EXPECT_EQ(session.make_renderer()->config().rig.cameras.size(), 1u);
 
-  // What `pictura simulate` drives in, and films.
+  // World in which `pictura simulate` drives, and which it films.
   WorldOptions world_options;
   world_options.map = "procedural";
   world_options.agents = 4;
@@ -921,7 +922,7 @@ TEST_F(Training, PoliciesDriveInTheWorldAndSeeTheImagesThatTheyWereTrainedOn) {
   EXPECT_EQ(world.trained_view->rig.cameras.at(0).name, "ahead");
   world.act();
   world.step();
-  // What is said on the command line wins.
+  // Command-line options take precedence.
   world_options.walls = false;
   world_options.parked_cars = 1;
   world_options.light_cycles = LightCycles::phases;
@@ -951,7 +952,7 @@ TEST_F(Training, ASessionGivesLogitsAndValuesOfAnyScene) {
   session.evaluate({input.observations, &input.scene, input.views, {}}, renderer.get(), logits, values);
   EXPECT_NE(values[0], values[1]);
 
-  // The controller takes the most likely of them.
+  // The controller takes the most likely action.
   std::vector<Command> commands(6);
   const std::unique_ptr<PolicyController> controller = session.make_controller(renderer.get(), /*argmax=*/true, 1);
   controller->act(input, {}, commands);
@@ -960,7 +961,7 @@ TEST_F(Training, ASessionGivesLogitsAndValuesOfAnyScene) {
     const auto first = logits.begin() + static_cast<std::ptrdiff_t>(agent * kNumActions);
     EXPECT_EQ(commands[agent].action, std::max_element(first, first + kNumActions) - first) << agent;
   }
-  // A mask leaves the others' commands alone.
+  // A mask leaves the commands of other agents unchanged.
   std::vector<Command> some(6, Command{.kind = CommandKind::absent});
   const std::vector<uint8_t> mask{0, 1, 0, 0, 1, 0};
   controller->act(input, mask, some);
@@ -969,7 +970,7 @@ TEST_F(Training, ASessionGivesLogitsAndValuesOfAnyScene) {
     EXPECT_EQ(some[agent].kind, mask[agent] ? CommandKind::action : CommandKind::absent) << agent;
   }
 
-  // A batch need not be a simulator's slots: agents 4 and 1 alone, the same numbers.
+  // A batch need not be a simulator's slots: agents 4 and 1 alone give the same numbers.
   std::vector<float> two_logits(2 * kNumActions), two_values(2);
   const std::vector<View> views{input.views[4], input.views[1]};
   std::vector<float> ego, conditioning, waypoints;
@@ -1038,7 +1039,7 @@ TEST_F(Training, APolicyIsEvaluatedThroughOtherCameras) {
   o.width_px = 40;
   o.height_px = 20;
   EXPECT_GT(evaluate(o).rows.at(0).vehicle_episodes, 0);
-  // As many cameras as in training, of any kind.
+  // Rigs need as many cameras as in training, of any kind.
   const auto write_rig = [&](int cameras) {
     std::string text;
     for (int i = 0; i < cameras; ++i) {

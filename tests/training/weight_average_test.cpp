@@ -43,7 +43,7 @@ TEST(WeightAverage, IsTheMeanAtFirstAndExponentialLater) {
     EXPECT_EQ(average.values[0].value.min().item<float>(), average.values.back().value.max().item<float>());
     return average.values[0].value.max().item<double>();
   };
-  EXPECT_DOUBLE_EQ(value_after(2), 2);  // nothing is left of the weights before the first update
+  EXPECT_DOUBLE_EQ(value_after(2), 2);  // nothing remains of the weights before the first update
   EXPECT_NEAR(value_after(4), 3, 1e-6);
   EXPECT_NEAR(value_after(9), 5, 1e-6);
   const double fourth = 5 + (1 - std::sqrt(0.5)) * (1 - 5);
