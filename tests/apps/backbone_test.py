@@ -1,4 +1,4 @@
-"""Pretrained backbones: scripts/export_backbone, and training and evaluation with what it writes.
+"""Pretrained backbones: scripts/export_backbone, and training and evaluation with its programs.
 
 Run by ctest: python3 backbone_test.py PICTURA [unittest arguments], by a Python that has torch.
 """
@@ -76,7 +76,7 @@ def export(words, stdout, stderr):
 
 
 def run_export(*arguments):
-    """scripts/export_backbone in a child of this process: it takes seconds to import torch."""
+    """Runs scripts/export_backbone in a child of this process, since importing torch takes seconds."""
     words = [str(EXPORT), *map(str, arguments)]
     with tempfile.TemporaryFile("w+") as stdout, tempfile.TemporaryFile("w+") as stderr:
         child = multiprocessing.get_context("fork").Process(target=export, args=(words, stdout.fileno(), stderr.fileno()))
@@ -123,7 +123,7 @@ class Backbones(unittest.TestCase):
         self.assertNotIn("Traceback", result.stderr)
 
     def weights(self, name):
-        """Of a run, by name, as bytes."""
+        """Returns the weights of a run, by name, as bytes."""
         data = (self.folder / name / "policy.safetensors").read_bytes()
         (length,) = struct.unpack("<Q", data[:8])
         header = json.loads(data[8 : 8 + length])
@@ -151,7 +151,7 @@ class Backbones(unittest.TestCase):
         self.assert_refused([str(vit)], *evaluate)
         self.assert_refused(["policy.backbone"], *evaluate, "--backbone", other)
         self.assertGreater(self.json_of(*evaluate, "--backbone", moved)["agent_steps"], 0)
-        # Of any size.
+        # Images of any size.
         self.assertGreater(self.json_of(*evaluate, "--backbone", moved, "--size", "33x17")["agent_steps"], 0)
 
     def test_a_trained_one_is_learnt_saved_and_resumed_like_all_parameters(self):

@@ -59,7 +59,7 @@ class Benchmarks(CommandCase):
         for row in (present, history, ratio, call):
             self.assertEqual(row["repeats"], 3)
         self.assertAlmostEqual(history["value"] * call["value"] / 1e3 / 10, 1, places=6)
-        # Images of either take about as long.
+        # Images of both kinds take about as long.
         self.assertTrue(0.1 < ratio["value"] < 10, ratio)
         self.assertTrue(ratio["min"] <= history["max"] / present["min"])
         self.assertGreater(rows["memory of the history"]["value"], 0)
@@ -101,7 +101,7 @@ class Benchmarks(CommandCase):
         simulate = ["bench", "simulate", *self.QUICK]
         facts = self.json_of(*simulate)
         rate, slots, step = facts["results"][:3]
-        # As if it had been a thousand times slower, a thousand times faster, and anything in between.
+        # Results of a run that is a thousand times slower, a thousand times faster, and in between.
         for row, low, middle, high in ((rate, 1e-3, 1e-3, 1e-3), (slots, 1e3, 1e3, 1e3), (step, 1e-3, 1, 1e3)):
             row.update(min=row["min"] * low, value=row["value"] * middle, max=row["max"] * high)
         facts.update(device="Another", commit="0123abcd", results=[rate, slots, step, {**step, "name": "gone"}])
@@ -152,7 +152,7 @@ class Benchmarks(CommandCase):
         self.assertEqual((oracle["differing_plane_pixels"], oracle["differing_answers"]), (0, 0))
         for key in ("images", "plane_pixels", "visibility_queries"):
             self.assertGreater(oracle[key], 6, key)
-        # Black images are out of tolerance. A scene is the same whichever came before it.
+        # Black images are out of tolerance. A scene does not depend on the scenes before it.
         result = run(*soak, "--backend", "null", "--first", 2, "--scenes", 1, "--json")
         self.assertEqual(result.returncode, 1)
         black = json.loads(result.stdout)
@@ -219,7 +219,7 @@ class Benchmarks(CommandCase):
         refused(2, "--sweep sizes", "--sweep", "sizes", "--size", "8x8")
         refused(2, "--memory: expected one", "--memory", "--egos", "3,4")
         refused(2, "--size", "--size", "8")
-        # What is wrong in the last case is said before a map is read.
+        # An error in the last case is reported before a map is read.
         no_town = ["--map", self.folder / "no-town.xodr"]
         refused(2, "'8'", "--size", "9x5,8", *no_town)
         refused(2, "vulkan", "--backend", "cpu,vulkan", *no_town)

@@ -1,4 +1,4 @@
-"""What tests of the `pictura` command share. A program of tests is run by ctest, one entry per class:
+"""Common parts of tests of the `pictura` command. A program of tests is run by ctest, one entry per class:
 
     python3 X_command_test.py PICTURA [unittest arguments]
 """
@@ -19,11 +19,11 @@ import sys
 import tempfile
 import unittest
 
-# The command.
+# Path of the command.
 PICTURA = os.path.abspath(sys.argv.pop(1))
 needs_ffmpeg = unittest.skipUnless(shutil.which("ffmpeg"), "no ffmpeg on this machine")
 CONFIGS = pathlib.Path(__file__).resolve().parents[2] / "configs"
-# A policy and a world so small that an update takes well under a second. On the host, whose runs are exact.
+# A policy and a world small enough for an update in well under a second. On the host, whose runs are exact.
 TINY = [
     "--config", str(CONFIGS / "smoke.toml"),
     "--set", "simulator.num_slots=6", "--set", "simulator.min_agents=3", "--set", "simulator.max_agents=3",
@@ -34,7 +34,7 @@ TINY = [
 
 
 class CommandServer:
-    """A process whose children are calls of the command: most of a start is the loading of libraries (command_server.cpp)."""
+    """Process whose children are calls of the command, since most of a start is the loading of libraries (command_server.cpp)."""
 
     def __init__(self, program):
         self.socket, stdin = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -47,7 +47,7 @@ class CommandServer:
         self.process.wait()
 
     def run(self, words, cwd, environment, timeout):
-        """As subprocess.run() with its outputs captured as text."""
+        """Runs the command like subprocess.run(), with its outputs captured as text."""
         variables = [f"{name}={value}" for name, value in environment.items()]
         texts = [os.path.abspath(cwd or "."), str(len(variables)), *variables, str(len(words)), *words]
         packet = b"".join(os.fsencode(text) + b"\0" for text in texts)
@@ -69,14 +69,14 @@ class CommandServer:
 
 @functools.cache
 def server():
-    """None where the build has no server."""
+    """Returns the server; None if the build has none."""
     program = os.environ.get("PICTURA_COMMAND_SERVER")
     return CommandServer(program) if program else None
 
 
 def run(*arguments, timeout=300, cwd=None, started=False, **variables):
-    """A call of the command; `started`: as a program, whose command line is its own. Skips the test where it would draw a chart
-    and the machine has no Matplotlib."""
+    """Runs the command. started: as a separate program, with its own command line. Skips the test if it would draw a chart and
+    the machine has no Matplotlib."""
     environment = {**os.environ, **{name: str(value) for name, value in variables.items()}}
     words = [PICTURA, *map(str, arguments)]
     if server() and not started:
@@ -115,14 +115,14 @@ class CommandCase(unittest.TestCase):
         self.assertIn(message, result.stderr)
 
     def assert_bad_numbers_are_refused(self, *commands):
-        """By each command, whose last word is the option that takes the number."""
+        """Checks each command, whose last word is the option that takes the number."""
         for arguments in commands:
             for number in ("nan", "inf", "-1", "2000000000"):
                 with self.subTest(" ".join(map(str, arguments)), number=number):
                     self.assert_refused(2, arguments[-1], *arguments, number)
 
     def python_as(self, command):
-        """A Python for charts that is a shell's command instead."""
+        """Creates a Python for charts that runs a shell command instead."""
         path = self.folder / "python"
         path.write_text(f"#!/bin/sh\n{command}\n")
         path.chmod(0o755)

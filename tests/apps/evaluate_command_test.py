@@ -71,7 +71,7 @@ class Evaluation(CommandCase):
         self.assertNotEqual(lane["rows"], alone["rows"])
         idle = self.json_of(*evaluate, "--policy", "idle", "--device", "cpu")
         self.assertEqual(idle["rows"][0]["km_driven"], 0)
-        # In parts, and in the world of a checkpoint, here without cyclists and pedestrians.
+        # Evaluates in parts, in the world of a checkpoint, here without cyclists and pedestrians.
         out = self.folder / "run"
         self.json_of("train", *TINY, "--set", "train.updates=1", "--set", "simulator.pedestrian_fraction=0", "--set",
                      "simulator.cyclist_fraction=0", "--out", out)  # fmt: skip
@@ -81,7 +81,7 @@ class Evaluation(CommandCase):
                          "--scenarios", scenarios, "--out", path)  # fmt: skip
         merged = self.json_of("evaluate", "--merge", *parts)
         self.assertEqual(merged["rows"][0]["vehicle_episodes"], 24)
-        # In another world, and on a map that has changed.
+        # Rejects parts of another world, and of a map that has changed.
         self.json_of(*evaluate[:-4], "--steps", 300, "--policy", "lane", "--scenarios", "1:2", "--out", parts[1])
         self.assert_refused(1, "b.json: config.simulator.cyclist_fraction is", "evaluate", "--merge", *parts)
         town = self.town()
@@ -126,7 +126,7 @@ class Evaluation(CommandCase):
     def test_severities_of_randomized_cameras_are_rows(self):
         out = self.folder / "run"
         self.json_of("train", *TINY, "--set", "train.updates=1", "--out", out)
-        # Sampled, so that what a policy sees makes a difference before it has learnt to drive.
+        # Sampled, so that a policy's observations matter before it has learnt to drive.
         small = [out / "checkpoint.ckpt", "--map", "procedural:1", "--agents", 20, "--steps", 60, "--sampled", "--device", "cpu"]
         drive = [*small, "--scenarios", 2]
         rows = self.json_of("evaluate", *drive, "--camera-severity", "0,0.5,2")["rows"]

@@ -17,13 +17,13 @@ MAP_CASES = sorted((pathlib.Path(__file__).resolve().parents[1] / "map" / "cases
 
 
 def processor_s(pid):
-    """Processor time that a process has taken; infinite where it has ended."""
+    """Processor time of a process; infinite if it has ended."""
     fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return math.inf if fields[0] == "Z" else (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def processor_s_of_children():
-    """The same of all children that have ended."""
+    """Processor time of all children that have ended."""
     usage = resource.getrusage(resource.RUSAGE_CHILDREN)
     return usage.ru_utime + usage.ru_stime
 
@@ -107,7 +107,7 @@ class Maps(CommandCase):
         self.assertEqual(run("town", "--blocks", "12x12", "--out", town).returncode, 0)
         command = [PICTURA, "simulate", town, "--agents", "4", "--steps", "1", "--policy", "idle"]
         with unittest.mock.patch.dict(os.environ, {"PICTURA_CACHE": "off"}):
-            # Processor time, of which other processes take none.
+            # Processor time, which does not depend on other processes.
             begin_s = processor_s_of_children()
             self.assertEqual(subprocess.run(command, capture_output=True).returncode, 0)
             whole_s = processor_s_of_children() - begin_s

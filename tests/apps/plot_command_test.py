@@ -13,7 +13,7 @@ from command_case import PICTURA, CommandCase, run
 
 class Plots(CommandCase):
     def run_folder(self, name, seed, goals, settings="a = 1"):
-        """A folder as pictura train leaves one, of updates with so many goals per 1,000 steps."""
+        """Creates a folder as written by pictura train, with updates of these numbers of goals per 1,000 steps."""
         folder = self.folder / name
         folder.mkdir()
         (folder / "config.toml").write_text(f"[run]\nseed = {seed}\n[train]\n{settings}\n")

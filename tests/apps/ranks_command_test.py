@@ -22,7 +22,7 @@ def free_port():
 
 
 def checkpoint_parts(path):
-    """The tensors of a checkpoint's policy by name, as tuples of floats, and the bytes of its simulator."""
+    """Returns the tensors of a checkpoint's policy by name, as tuples of floats, and the bytes of its simulator."""
     content = pathlib.Path(path).read_bytes()
     header_size = struct.unpack_from("<Q", content, 16)[0]
     header, data = json.loads(content[24 : 24 + header_size]), content[24 + header_size :]
@@ -37,12 +37,12 @@ def checkpoint_parts(path):
 class Ranks(CommandCase):
     """Processes that train together, on the host through Gloo."""
 
-    # Five worlds, which are two for one rank and three for the other; the whole minibatch is one step along the gradient.
+    # Five worlds, two of the first rank and three of the second; the whole minibatch is one step along the gradient.
     SETTINGS = ["train", *TINY, "--set", "simulator.num_slots=15", "--set", "run.num_threads=1"]
     GRADIENTS = ["--set", "train.adam_eps=1", "--set", "train.schedule=constant", "--set", "train.learning_rate=0.1"]
 
     def start(self, size, *arguments, port=None, of_rank=lambda rank: []):
-        """One process a rank; of_rank gives more arguments for each."""
+        """Starts one process per rank; of_rank returns further arguments for each."""
         port = port or free_port()
         place = {"WORLD_SIZE": str(size), "MASTER_ADDR": "127.0.0.1", "MASTER_PORT": str(port)}
         return [
@@ -54,7 +54,7 @@ class Ranks(CommandCase):
         ]  # fmt: skip
 
     def finish(self, processes, timeout=300):
-        """Of each its status, stdout and stderr."""
+        """Returns status, stdout and stderr of each process."""
         results = []
         for process in processes:
             out, err = process.communicate(timeout=timeout)
@@ -69,7 +69,7 @@ class Ranks(CommandCase):
         return json.loads(results[0][1])
 
     def assert_same_but_for_rounding(self, one, other, start=None):
-        """Checkpoints after one update from one state: all of the simulator's bytes, and the parameters nearly."""
+        """Compares checkpoints after one update from one state: the simulator's bytes exactly, the parameters up to rounding."""
         (tensors, simulator), (others, other_simulator) = checkpoint_parts(one), checkpoint_parts(other)
         self.assertEqual(simulator, other_simulator)
         before = checkpoint_parts(start)[0]
@@ -122,7 +122,7 @@ class Ranks(CommandCase):
                 )
 
     def long_run(self, out):
-        """Two ranks that have saved a checkpoint and go on for long."""
+        """Starts two ranks that save a checkpoint and then run for long."""
         processes = self.start(
             2, *self.SETTINGS, "--set", "train.updates=1000000", "--set", "train.checkpoint_every=1", "--out", out
         )
@@ -145,12 +145,12 @@ class Ranks(CommandCase):
             self.assertRegex(err.splitlines()[-1], f"^error: rank {victim}: .* killed or stopped")
             processes[victim].kill()
             processes[victim].communicate()
-            # The last checkpoint is whole, and one process goes on from it.
+            # The last checkpoint is complete, and one process resumes from it.
             updates = int((out / "progress.csv").read_text().splitlines()[-1].split(",")[0])
             report = self.json_of(*self.SETTINGS, "--set", f"train.updates={updates + 2}", "--out", out, "--resume")
             self.assertEqual(report["updates"], updates + 2)
 
-        # At once, since half a minute passes until a stopped rank is missed.
+        # Concurrently, since half a minute passes until a stopped rank is noticed.
         cases = [(victim, how) for victim in (0, 1) for how in (signal.SIGKILL, signal.SIGSTOP)]
         with concurrent.futures.ThreadPoolExecutor() as pool:
             for case in [pool.submit(end, *each) for each in cases]:
@@ -190,7 +190,7 @@ class Ranks(CommandCase):
             first[1].communicate()
             self.assertEqual(status, 1)
             self.assertRegex(err, f"rank 0: cannot listen at 127.0.0.1:{port} .*MASTER_PORT.*in use")
-        # What one rank finds is every rank's error.
+        # An error found by one rank is every rank's error.
         results = self.finish(self.start(2, *self.SETTINGS, "--set", "simulator.num_slots=3", "--out", self.folder / "run"))
         for status, _, err in results:
             self.assertIn(status, (1, 2))

@@ -30,7 +30,7 @@ class Images(CommandCase):
         out = self.folder / "images"
         arguments = ["render", str(self.town()), "--agents", "30", "--steps", "0", "--views", "30", "--size", "384x216", "--out", str(out)]
         with subprocess.Popen([PICTURA, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-            self.assertIn("backend", process.stderr.readline())  # before there is a world
+            self.assertIn("backend", process.stderr.readline())  # before a world is created
             process.send_signal(signal.SIGINT)
             self.assertIn("error: ", process.communicate()[1])
         self.assertEqual((process.returncode, list(out.iterdir())), (130, []))

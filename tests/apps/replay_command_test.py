@@ -17,7 +17,7 @@ from replay_pages import header_of
 
 
 class Replays(CommandCase):
-    """What the pages hold is tested with replay/, what browsers make of them in tests/replay/page_test.py."""
+    """Contents of pages are tested in tests/replay/, their behaviour in browsers in tests/replay/page_test.py."""
 
     WORLD = ["procedural:1:blocks=2x2", "--agents", 12, "--seed", 4]
 
@@ -75,7 +75,7 @@ class Replays(CommandCase):
         out, folder = self.folder / "results.json", self.folder / "gallery"
         result = run(*evaluate, "--out", out, "--replays", 2, "--gallery", folder, "--replay", self.folder / "worst.html")
         self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertNotIn("notice", result.stderr)  # they count what the evaluation did
+        self.assertNotIn("notice", result.stderr)  # counts equal the evaluation's
         scenarios = json.loads(out.read_text())["densities"][0]["scenarios"]
         rates = [s["at_fault_infraction"] / s["vehicles"] for s in scenarios]
         worst = sorted(range(4), key=lambda i: -rates[i])[:2]
@@ -86,7 +86,7 @@ class Replays(CommandCase):
         self.assertEqual(run(*evaluate, "--infractions", infractions).returncode, 0)
         with infractions.open() as file:
             rows = [row for row in csv.DictReader(file) if int(row["scenario"]) == worst[0] and int(row["agent"]) == header["followed"]]
-        self.assertTrue(rows)  # it opens with an agent that has one
+        self.assertTrue(rows)  # opens with an agent with an infraction
         self.assert_refused(2, "--gallery", *evaluate, "--replays", 2)
         self.assert_refused(2, "--follow: has no effect without --replay", *evaluate, "--follow", 1)
 
@@ -94,7 +94,7 @@ class Replays(CommandCase):
         if not has_torch():
             self.skipTest("this build has no torch")
         policies = []
-        # The second drives in the first's world, which has pedestrians and walls.
+        # The second policy drives in the first policy's world, which has pedestrians and walls.
         for name, more in {"images": ["simulator.pedestrian_fraction=0.2", "simulator.walls=true"], "vectors": ["policy.modality=vector", "policy.auxiliary=true"]}.items():
             settings = [word for one in more for word in ("--set", one)]
             self.json_of("train", *TINY, *settings, "--set", "train.updates=1", "--out", self.folder / name)
@@ -113,7 +113,7 @@ class Replays(CommandCase):
                 if number == last:
                     result = run(*probe, "--replay", path, "--case", number, "--cameras")
                     self.assertEqual(result.returncode, 0, result.stderr)
-                self.assertNotIn("notice", result.stderr)  # it drives as it did
+                self.assertNotIn("notice", result.stderr)  # drives as in the evaluation
                 header, case = header_of(path), cases[number]
                 shown = header["case"]
                 self.assertIn(f"case {number}: ", shown["what"])
@@ -121,7 +121,7 @@ class Replays(CommandCase):
                 self.assertEqual((shown["frame"], shown["ego"], header["followed"]), (int(case["step"]), int(case["ego"]), int(case["ego"])))
                 self.assertEqual(shown["removed"], int(case["hidden"]) if kind == "removal" else None)
                 self.assertIn(case["driver"], header["policy"])
-                # Of the state as it is driven: with who is removed, without who is inserted.
+                # Response to the state as driven: with the removed road user, without the inserted one.
                 state = "value" if kind == "removal" else "value_without"
                 expected = next(answer[state] for answer in shown["answers"] if answer["policy"] == case["driver"])
                 self.assertAlmostEqual(1e-4 * self.decisions_of(path)[12][shown["frame"]], expected, delta=2e-4)
@@ -140,7 +140,7 @@ class Replays(CommandCase):
         self.assertIn(f"notice: {removal}/removal.png: not drawn", result.stderr)
         self.assertEqual({file.name for file in removal.glob("[!.]*")}, {"cases.csv", "summary.json"})
         self.assertEqual(json.loads(result.stdout), json.loads((removal / "summary.json").read_text()))
-        result = run(*probe, "--replay", path, "--case", len(cases))  # how many there are is known in the end
+        result = run(*probe, "--replay", path, "--case", len(cases))  # the number of cases is known at the end
         self.assertEqual((result.returncode, f"--case: expected 0 to {len(cases) - 1}, got {len(cases)}" in result.stderr), (2, True), result.stderr)
         self.assert_refused(2, "--replay", *probe, "--case", 1)
         corner = ["probe", "corner", policies[0], "--map", "procedural:1", "--agents", 90, "--scenes", 2, "--steps", 300, "--pairs", 1, "--driver", "lane"]
@@ -155,7 +155,7 @@ class Replays(CommandCase):
         self.assertEqual((shown["frame"], shown["ego"], shown["removed"]), (0, int(case["ego"]), int(case["user"])))
         self.assertIn(f"case 0: agent {case['user']} comes hidden", shown["what"])
         self.assertIn(f"from here on images drives agent {case['ego']}", shown["what"])
-        self.assertNotIn("notice", result.stderr)  # it takes over as it did
+        self.assertNotIn("notice", result.stderr)  # takes over as in the probe
         self.assertEqual((case["policy"], case["walls"], case["case"]), ("images", "on", "hidden"))
         self.assertEqual(header["frames"], round(10 * float(case["lasted_s"])) + 1)
         self.assert_refused(2, "--case: expected 0 to 0, got 1", *corner, *out, "--case", 1)

@@ -1,9 +1,9 @@
-"""`pictura evaluate --rollouts` through an independent protobuf.
+"""Checks `pictura evaluate --rollouts` with an independent protobuf implementation.
 
-Usage: rollouts_protobuf_test.py PICTURA SCENE_FIXTURE. Google's protobuf, which is told the messages of the Waymo sim-agents
-challenge (sim_agents_submission.proto) by their numbers, must find in the file what the challenge asks for, and nothing else.
+Usage: rollouts_protobuf_test.py PICTURA SCENE_FIXTURE. Google's protobuf, with the messages of the Waymo sim-agents challenge
+(sim_agents_submission.proto) by number, must find in the file exactly the challenge's required contents.
 
-Runs with the Python that $PICTURA_PY123D names, or this one; exits with 77 where that lacks protobuf.
+Runs with the Python of $PICTURA_PY123D, or this one; exits with 77 if it lacks protobuf.
 """
 
 import json
@@ -65,7 +65,7 @@ def rollouts(Submission, folder, scenes, *more):
     subprocess.run([PICTURA, "evaluate", *map(str, words)], check=True, stdout=subprocess.DEVNULL)
     data = out.read_bytes()
     submission = Submission.FromString(data)
-    # Fields that the schema lacks would be kept, but not parsed: all is known, and written as protobuf writes it but for the order of
+    # Unknown fields would be kept but not parsed: all fields are known, and encoded like protobuf's, except for the order of
     # the submission's fields.
     submission.DiscardUnknownFields()
     assert submission.ByteSize() == len(data), (submission.ByteSize(), len(data))
@@ -74,7 +74,7 @@ def rollouts(Submission, folder, scenes, *more):
 
 
 def check_shape(rollout, recorded):
-    """The 32 rollouts of one scenario, by protobuf's JSON of its record."""
+    """Checks the 32 rollouts of one scenario, against protobuf's JSON of its record."""
     present = {track["id"]: track for track in recorded["tracks"] if track["states"][10].get("valid")}
     assert rollout.scenario_id == recorded["scenarioId"] and len(rollout.joint_scenes) == 32
     for scene in rollout.joint_scenes:
@@ -104,11 +104,11 @@ def main():
         (rollout,) = submission.scenario_rollouts
         check_shape(rollout, recorded)
         assert len({scene.SerializeToString() for scene in rollout.joint_scenes}) == 32, "each is another"
-        # Files one after the other are one submission, to which the authors' fields may be added.
+        # Concatenated files are one submission, to which the authors' fields may be added.
         both = Submission.FromString(data + data + Submission(account_name="someone").SerializeToString())
         assert len(both.scenario_rollouts) == 2 and both.account_name == "someone"
 
-        # Who follows the recording is where that has it, in its coordinates.
+        # Road users that follow the recording are at the recorded position, in its coordinates.
         _, submission = rollouts(Submission, folder, scene, "--policy", "idle", "--control", "self")
         (rollout,) = submission.scenario_rollouts
         present = check_shape(rollout, recorded)

@@ -62,7 +62,7 @@ with tempfile.TemporaryDirectory() as name:
     assert len(elements["lanes"]) == 16
     assert "format" in run(folder / "gpudrive.json").stdout
 
-    # As recorded: all formats, no agent-step, the same bits from each number of threads.
+    # Replays as recorded: all formats, no agent-step, the same bits with each number of threads.
     for file in ("womd.tfrecord", "gpudrive.json", "pufferdrive_v1.bin", "pufferdrive_v2.bin", "pufferdrive_v3c.bin"):
         replayed = simulate(folder / file)
         expected = {
@@ -79,7 +79,7 @@ with tempfile.TemporaryDirectory() as name:
     assert driven["agent_steps"] == 10 and driven["displacement_max_m"] < 0.1, driven
     assert simulate(scene, "--policy", "inverse", "--control", "1000,1014", "--steps", 10)["agent_steps"] == 20
     assert simulate(scene, "--recorded-lights")["state_hash"] != simulate(scene)["state_hash"]
-    # Longer than the recording: nobody comes again.
+    # Longer than the recording: no road user reappears.
     assert simulate(scene, "--policy", "random", "--control", "all", "--steps", 120)["episodes"] == 0
 
     def render(*words):
@@ -132,7 +132,7 @@ with tempfile.TemporaryDirectory() as name:
     refused = run(folder / "damaged.tfrecord", status=1).stderr
     assert "damaged.tfrecord: record 0: expected the checksum" in refused, refused
 
-    # Evaluations: one damaged scene of six is left out.
+    # Evaluations: one damaged scene of six is skipped.
     words = ("--policy", "idm", "--protocol", "womd", "--scenes", folder, "--threads", 1)
     if command_case.has_torch():
         done = run(*words, "--csv", folder / "agents.csv", "--json", command="evaluate")
@@ -154,7 +154,7 @@ with tempfile.TemporaryDirectory() as name:
         assert self_alone["steps"] == 80 and self_alone["start_step"] == 10
         assert self_alone["rows"][0]["vehicle_episodes"] == 1, self_alone
 
-        # Parts give what the whole gives. They do not lie among the scenes, which may be JSON too.
+        # Merged parts equal the whole. They are not in the scenes' folder, since scenes may be JSON too.
         parts = folder / "parts"
         parts.mkdir()
 

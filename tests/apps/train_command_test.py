@@ -34,7 +34,7 @@ class Training(CommandCase):
         self.assertNotIn("\r", "".join(lines))
         child, terminal = pty.fork()
         if child == 0:
-            # 50 columns.
+            # The terminal has 50 columns.
             fcntl.ioctl(0, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 50, 0, 0))
             os.execv(PICTURA, [PICTURA, *train, "--set", "train.num_steps=64", "--out", str(self.folder / "shown")])
         shown = b""
@@ -132,7 +132,7 @@ class Training(CommandCase):
 
 
 class Signals(CommandCase):
-    """Signals that end a training, and other commands."""
+    """Signals that end training and other commands."""
 
     def test_an_interrupt_leaves_a_checkpoint_to_go_on_from(self):
         out = self.folder / "run"
@@ -155,7 +155,7 @@ class Signals(CommandCase):
     LONG_UPDATES = ["train", *TINY, "--set", "train.update_epochs=1000", "--set", "train.minibatch_size=1"]
 
     def start(self, *arguments, until, **options):
-        """The process of a command that has written a file."""
+        """Starts a command and waits until it has written a file."""
         command = [PICTURA, *map(str, arguments)]
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
         self.addCleanup(process.kill)

@@ -39,7 +39,7 @@ class Usage(CommandCase):
 
 
 class Typing(CommandCase):
-    """What people type: numbers, misspelt words, options that are wrong together."""
+    """Command lines as people type them: numbers, misspelt words, contradicting options."""
 
     COMMANDS = [
         ("town",), ("map",), ("render",), ("simulate",), ("replay",), ("train",), ("evaluate",), ("plot",), ("bench", "render"),
@@ -118,7 +118,7 @@ class Typing(CommandCase):
 
 
 class Files(CommandCase):
-    """What output files do to what is there, and what a full disk and a closed end get."""
+    """Effects of output files on existing files, and errors for a full disk and a closed end."""
 
     def test_devices_links_and_fifos_stay_what_they_are(self):
         town, link, fifo = self.town(blocks="1x1"), self.folder / "link", self.folder / "fifo"
@@ -150,7 +150,7 @@ class Files(CommandCase):
                 before = "of before\n" if mode == "a" else ""
                 got = path.read_text()
                 self.assertTrue(got.startswith(before + "head\n" + expected) and got.endswith("tail\n"), (name, mode))
-        reading, writing = socket.socketpair()  # which can be opened by no name
+        reading, writing = socket.socketpair()  # a socket cannot be opened by name
         with reading, reading.makefile() as text:
             with writing:
                 subprocess.run([*town, "/dev/stdout"], stdout=writing, check=True, timeout=60)
@@ -223,7 +223,7 @@ class Files(CommandCase):
                              "--size", "96x54", "--out", out)  # fmt: skip
         self.assertEqual([pathlib.Path(path).name for path in facts["contact_sheets"]],
                          ["contact_sheet.png", "contact_sheet_2.png", "contact_sheet_3.png"])  # fmt: skip
-        # One row is as high as a page, not the more the narrower its images are.
+        # A row is as high as a page, and no higher for narrower images.
         facts = self.json_of("render", self.town(), "--agents", 2, "--steps", 0, "--views", 1, "--backend", "null",
                              "--size", "8x1000", "--out", out)  # fmt: skip
         self.assertEqual(len(facts["contact_sheets"]), 1)

@@ -19,7 +19,7 @@ PICTURA = ""
 
 
 def command_lines(text):
-    """Commands of pictura in a page's blocks, without continuation lines."""
+    """Returns pictura commands in a page's code blocks, without continuation lines."""
     blocks = re.findall(r"^```(?:sh|bash|console)?\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
     blocks += re.findall(r"(?:^    .*\n)+", text, re.MULTILINE)
     for block in blocks:
@@ -56,7 +56,7 @@ class Documents(unittest.TestCase):
     def test_the_reference_of_commands_is_what_help_prints(self):
         if not self.is_whole:
             self.skipTest("this build lacks commands")
-        # Later versions lay options out otherwise: `[0]` instead of `=0`.
+        # Later versions of CLI11 format options differently: `[0]` instead of `=0`.
         version = os.environ["CLI11_VERSION"]
         if [int(part) for part in version.split(".")[:2]] != commands.CLI11:
             self.skipTest(f"the pages are as CLI11 {commands.CLI11} lays help out, this build has {version}")

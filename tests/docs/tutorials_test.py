@@ -35,7 +35,7 @@ def shorter(line):
             words[i + 1] = "configs/smoke.toml"
         if word == "--backend":
             words[i + 1] = "cpu"
-    # The length of rollouts is their format's.
+    # The format fixes the length of rollouts.
     if words[0] in ("evaluate", "replay") and not {"--steps", "--rollouts"} & set(words):
         words += ["--steps", str(AT_MOST["--steps"])]
     if words[0] == "train":
@@ -55,7 +55,7 @@ class Tutorials(unittest.TestCase):
         for name in ("configs", "models"):
             (folder / name).symlink_to(ROOT / name)
         subprocess.run([PICTURA, "town", "--seed", "7", "--blocks", "2x2", "--out", folder / "mytown.xodr"], check=True, capture_output=True)
-        # Where pages have recorded scenes.
+        # Places recorded scenes where the pages expect them.
         for name in ("validation", "womd", "gpudrive", "pufferdrive"):
             (folder / name).mkdir()
             drive = [PICTURA, "simulate", folder / "mytown.xodr", "--agents", "6", "--parked", "2", "--steps", "30", "--policy", "lane"]

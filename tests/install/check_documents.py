@@ -1,6 +1,6 @@
-"""Checks that docs/how-to/cpp_library.md shows the consumer that tests build, letter for letter.
+"""Checks that docs/how-to/cpp_library.md contains the source of the consumer that tests build, unchanged.
 
-Usage: check_documents.py REPOSITORY. Prints what differs and exits with 1 if anything does.
+Usage: check_documents.py REPOSITORY. Prints differences and exits with 1 if there are any.
 """
 
 import pathlib

@@ -1,4 +1,4 @@
-"""Tests of the Python package: the one on PYTHONPATH, or the one that is installed."""
+"""Tests of the Python package: the package on PYTHONPATH, or the installed one."""
 
 import pathlib
 import sys
@@ -8,7 +8,7 @@ import pytest
 
 import pictura
 
-sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "support"))  # what other tests share
+sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "support"))  # shared with other tests
 
 IDLE = pictura.IDLE_ACTION
 

@@ -1,4 +1,4 @@
-"""Arrays: no copies, lifetimes, DLPack's protocol, and what is refused."""
+"""Arrays: no copies, lifetimes, DLPack's protocol, and rejected arrays."""
 
 import contextlib
 import ctypes
@@ -126,7 +126,7 @@ def test_an_array_with_one_element_has_any_stride(make):
 
 
 class Odd:
-    """An array that lies about its tensor in one way."""
+    """Array that misstates one property of its tensor."""
 
     def __init__(self, array, **lies):
         self.array, self.lies = array, lies
@@ -201,7 +201,7 @@ def test_fuzzed_arrays_are_taken_or_refused(make):
 
 
 class Tensor(ctypes.Structure):
-    """DLPack's tensor, whose every number a test may choose."""
+    """DLPack tensor whose every number a test may choose."""
 
     _fields_ = [
         ("data", ctypes.c_void_p), ("device_type", ctypes.c_int32), ("device_id", ctypes.c_int32), ("ndim", ctypes.c_int32),
@@ -212,10 +212,10 @@ class Tensor(ctypes.Structure):
 
 
 class Lender:
-    """Lends memory by a tensor of any type, shape, strides and device."""
+    """Lends memory as a tensor of any type, shape, strides and device."""
 
     memory = np.full(4096, pictura.IDLE_ACTION, np.int32)
-    living: list["Lender"] = []  # nobody says when a tensor is let go of
+    living: list["Lender"] = []  # the end of a tensor's life is not reported
 
     def __init__(self, shape, strides=None, device=(1, 0), said=None, dtype=(0, 32, 1), data=True, ndim=None):
         self.shape = (ctypes.c_int64 * max(len(shape), 1))(*shape)
@@ -242,7 +242,7 @@ def test_tensors_of_any_device_type_shape_and_stride_are_taken_or_refused(make):
     for device, said in (((2, 0), None), ((2, 7), (1, 0)), ((1, 0), (2, 0)), ((10, 0), None), ((13, 0), (1, 0)), ((-1, -1), None)):
         lender = Lender([12], device=device, said=said)
         if device == (1, 0) and pictura.HAS_CUDA:
-            simulator.step(lender)  # on the CPU, whatever it says
+            simulator.step(lender)  # on the CPU, whatever the tensor declares
         else:
             assert "cpu" in refusal(simulator, lender)
     assert "null address" in refusal(simulator, Lender([12], data=False))

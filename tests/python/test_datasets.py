@@ -1,4 +1,5 @@
-"""Scenes of other libraries: pickles of ScenarioNet's format that are written here, hostile ones, and objects like py123d's."""
+"""Scenes of other libraries: pickles in ScenarioNet's format that are written here, hostile pickles, and objects like py123d's.
+"""
 
 import os
 import pathlib
@@ -20,7 +21,7 @@ STEPS = 11
 
 
 def scene_of(coordinate: str = "waymo") -> dict:
-    """A road of two lanes one after the other, with a lane beside it, as ScenarioNet's converters write one."""
+    """Returns a road of two consecutive lanes, with a parallel lane, as ScenarioNet's converters write it."""
     x = np.arange(0, 41) * 0.5
     centre = np.stack([x, np.zeros(41), np.full(41, 3.0)], 1).astype(np.float32)
     state = {
@@ -84,7 +85,7 @@ def test_arrays_of_every_kind_are_read(tmp_path):
     state = scene["tracks"]["7"]["state"]
     state["position"] = np.asfortranarray(state["position"])
     state["heading"] = state["heading"].astype(">f8")
-    state["valid"] = list(state["valid"].astype(np.int64))  # of scalars
+    state["valid"] = list(state["valid"].astype(np.int64))  # list of scalars
     scene["dynamic_map_states"]["21"]["state"]["object_state"] = np.array(["LANE_STATE_GO"] * STEPS, object)
     scene["dynamic_map_states"]["5"]["lane"] = np.int64(20)
     scene["dynamic_map_states"]["5"]["state"]["object_state"] = np.array(["LANE_STATE_STOP"] * STEPS)
@@ -117,7 +118,7 @@ def test_flat_maps_have_outlines_as_edges(tmp_path):
 
 
 class Runs:
-    """What pickle makes a call of."""
+    """Object whose pickle contains a call."""
 
     def __init__(self, function, *arguments) -> None:
         self.call = (function, arguments)
@@ -127,7 +128,7 @@ class Runs:
 
 
 class Claims:
-    """An array that claims more than it has."""
+    """Array that declares more elements than it has."""
 
     def __reduce__(self):
         reconstruct, arguments, _ = np.zeros(1).__reduce__()
@@ -161,7 +162,7 @@ def test_hostile_pickles_run_nothing(tmp_path, monkeypatch, call, named):
 
 
 def test_pickles_cannot_change_what_they_name(tmp_path):
-    # numpy.ndarray with a state of (None, {"__setstate__": int}), which the protocol writes into what it names.
+    # numpy.ndarray with a state of (None, {"__setstate__": int}), which the protocol writes into the named object.
     change = b"\x80\x04cnumpy\nndarray\n(N}\x8c\x0c__setstate__cbuiltins\nint\nst\x94b."
     pickletools.dis(change, out=open(os.devnull, "w"))
     with pytest.raises(pictura.Error, match="sd_scene.pkl"):
@@ -274,7 +275,8 @@ def test_recordings_written_in_the_format_come_back(tmp_path):
 
 
 def scene_123d(missing: tuple[str, ...] = ()) -> object:
-    """A scene with the attributes of py123d.api.SceneAPI that are read: the self-driving car, a walker and a cone on two lanes."""
+    """Returns a scene with the attributes of py123d.api.SceneAPI that are read: the self-driving car, a walker and a cone on
+    two lanes."""
     x = np.arange(0, 41) * 0.5
 
     def line(y: float, first: float = 0.0, z: float = 1.0) -> NS:

@@ -1,5 +1,5 @@
-"""On a CUDA device: the CPU's numbers, without copies, on the caller's stream. Skipped without a device, unless
-PICTURA_REQUIRE_GPU=1 says that there must be one."""
+"""Python package on a CUDA device: the CPU's numbers, without copies, on the caller's stream. Skipped without a device, unless
+PICTURA_REQUIRE_GPU=1 requires one."""
 
 import os
 import subprocess
@@ -87,7 +87,7 @@ def test_work_of_another_stream_is_waited_for(town):
     expected = pictura.Simulator([town], [(0, 40)] * 64, executor="cpu")
     for step in range(20):
         actions = actions_of(step, 2560)
-        # Made on torch's current stream, read on the simulator's, whose result is read on torch's again.
+        # Created on torch's current stream, read on the simulator's stream, whose result is read on torch's again.
         result = simulator.step(torch.from_numpy(actions).cuda())
         reward = torch.from_dlpack(result.reward).clone()
         assert (reward.cpu().numpy() == expected.step(actions).reward.numpy()).all()
@@ -134,7 +134,7 @@ def test_others_take_it_and_act(both, name):
         actions = actions_of(step, 120)
         a, b = cpu.step(actions), cuda.step(make(actions))
         shared = [(cuda.observations["ego"], cpu.observations["ego"])]
-        if name == "cupy":  # JAX cannot be told that results are read-only: it asks by DLPack before 1.0
+        if name == "cupy":  # JAX cannot learn that results are read-only, since it uses DLPack before 1.0
             shared.append((b.reward, a.reward))
         for theirs, ours in shared:
             theirs = take(theirs)

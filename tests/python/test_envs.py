@@ -1,4 +1,4 @@
-"""Environments: the checkers of each library, and what those do not check."""
+"""Environments: the checkers of each library, and checks that these lack."""
 
 import warnings
 

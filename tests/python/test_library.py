@@ -1,4 +1,4 @@
-"""Maps, rigs, scenes, renderers and simulators: as in C++, by the same names."""
+"""Maps, rigs, scenes, renderers and simulators: as in C++, with the same names."""
 
 import importlib.util
 import pickle
@@ -253,7 +253,7 @@ def test_boxes_are_hidden_and_inserted(make):
     row = int(np.argmin(np.abs(seen - partners[2]).sum(1) == 0))
     assert (partners[2, row] == 0).all() and (seen[row] != 0).any() and (np.delete(partners[2], row, 0) == np.delete(seen, row, 0)).all()
     assert (partners[0, :-1] == np.delete(seen, row, 0)).all()
-    # The same by one list and where each part of it begins, into arrays of the caller.
+    # Repeats the queries with one list and offsets, into arrays of the caller.
     out = {name: np.full_like(array.numpy(), 7) for name, array in answers.items()}
     lists = pictura.make_queries(np.zeros(4, int), hidden=([nearest] * 3, [0, 1, 2, 3, 3]),
                                  inserted=(np.concatenate([phantom, phantom]), [0, 0, 1, 1, 2]), leaves_gaps=[0, 0, 1, 0])
@@ -369,7 +369,7 @@ def test_what_cannot_be_simulated_is_named(town):
 
 @pytest.mark.parametrize("executor", ["auto", "cpu"])
 def test_a_device_that_is_not_there_is_refused(town, executor):
-    device = "cuda:99"  # of no machine
+    device = "cuda:99"  # exists on no machine
     with pytest.raises(pictura.Error, match=device):
         pictura.Simulator([town], [(0, 4)], executor=executor, device=device)
     with pytest.raises(pictura.Error, match=device):

@@ -1,4 +1,4 @@
-"""Charts: what is read from files and drawn of it, as the lines, bands and colours of Matplotlib's figures."""
+"""Charts: data read from files, and their lines, bands and colours in Matplotlib's figures."""
 
 import json
 import math
@@ -16,7 +16,7 @@ NAN = math.nan
 
 
 def run_folder(folder, seed=1, rows="", settings="a = 1"):
-    """A run of one update per row: agent-steps, goals per 1,000 steps, seconds of collecting; 8 s of improving."""
+    """Writes a run with one update per row: agent-steps, goals per 1,000 steps, rollout seconds; 8 s of updates."""
     folder.mkdir(parents=True, exist_ok=True)
     head = "update,charts/agent_steps,driving/goals_per_1000_steps,time/rollout_s,time/update_s,a/kept,b/kept\n"
     lines = [f"{i},{row},8,0,0\n" for i, row in enumerate(rows.split(), 1)]
@@ -30,7 +30,7 @@ def goals(*runs, **options):
 
 
 def lines_of(chart, panel=0):
-    """What a panel's figure shows: (x, y) by label."""
+    """Returns the lines of a panel's figure: (x, y) by label."""
     axes = plot.figure(chart).axes[panel]
     return {line.get_label(): (list(line.get_xdata()), list(line.get_ydata())) for line in axes.lines if line.get_label()[0] != "_"}
 
@@ -55,7 +55,7 @@ def test_seeds_of_one_configuration_are_a_mean_with_a_band_where_all_of_them_are
     assert (alone["name"], alone["last"]) == ("other", {"driving/goals_per_1000_steps": 6})
     (panel,) = chart.panels
     assert (panel.title, panel.x_label, panel.y_label) == ("Goals", "agent-steps", "per 1,000 agent-steps")
-    # Both are between 100 and 200 agent-steps: 10, 15, 20 and 4, 5, 6.
+    # The common stretch is 100 to 200 agent-steps: 10, 15, 20 and 4, 5, 6.
     assert lines_of(chart) == {"town_s*, 2 seeds": ([100, 150, 200], [7, 10, 13]), "other": ([0, 50], [5, 6])}
     (band,) = plot.figure(chart).axes[0].collections
     corners = {tuple(corner) for corner in band.get_paths()[0].vertices}
@@ -89,7 +89,7 @@ def test_names_are_those_of_folders_and_whole_where_they_are_alike(tmp_path):
     names = lambda *runs: [series.name for series in goals(*runs).panels[0].series]
     assert names(a + "/") == ["run"]
     assert names(a, b) == [a, b]
-    # What names have in common at their beginning and end does not overlap.
+    # The common begin and end of names do not overlap.
     assert names(run_folder(tmp_path / "aa", 1, "0,1,1"), run_folder(tmp_path / "aaa", 2, "0,1,1")) == ["aa*, 2 seeds"]
 
 
@@ -218,7 +218,7 @@ def test_rates_of_rendering_are_read_from_results_of_one_benchmark_or_of_several
     names = ["cuda 96x54 2048 egos", "cuda 32x18 2048 egos", "cuda 96x54 64 egos", "cpu 64x64 2048 egos", "cuda 32x18 2048 egos", "other"]
     rows = [{"name": name, "value": 1e5 * (i + 1)} for i, name in enumerate(names)]
     chart = plot.render_rates(results({"results": rows}))
-    assert lines_of(chart, 0) == {"cuda": ([32, 96], [2e5, 1e5])}  # ascending, and the first of two
+    assert lines_of(chart, 0) == {"cuda": ([32, 96], [2e5, 1e5])}  # ascending, and the first of two points
     assert lines_of(chart, 1) == {"cuda": ([64, 2048], [3e5, 1e5])}
     assert lines_of(chart, 2) == {"cpu": ([64], [4e5])}
     axes = plot.figure(chart).axes[0]
@@ -256,7 +256,7 @@ def test_a_breakdown_stands_beside_the_papers(results):
     assert lines_of(chart, 1) == {mine: ([32], [2]), "the paper, H100 NVL": ([64], [0.5])}
     assert chart.panels[2].title == mine
     assert lines_of(chart, 2) == {"env": ([32], [1]), "rendering": ([32], [2]), "total": ([32], [4])}
-    # A panel of other names has a legend of its own; one above is of the first two.
+    # A panel with other names has its own legend; the legend above belongs to the first two panels.
     drawn = plot.figure(chart)
     assert [axes.get_legend() is not None for axes in drawn.axes] == [False, False, True]
     assert [text.get_text() for text in drawn.legends[0].get_texts()] == list(lines_of(chart, 0))
@@ -330,7 +330,7 @@ def test_corner_shows_speeds_with_and_without_walls(tmp_path):
     assert x == pytest.approx([0, 0.1, 0.2]) and y[:2] == [5, 4] and math.isnan(y[2])
     assert chart.panels[0].series[0].low[0] == 4 and math.isnan(chart.panels[0].series[0].low[1])
     dark = lambda panel: [color != plot._REVEALING[0] for _, color in chart.panels[panel].strip]
-    assert dark(0) == [True, True, True, False]  # of both policies
+    assert dark(0) == [True, True, True, False]  # both policies
     assert dark(3) == [False, True, True, False]
 
 
@@ -350,7 +350,7 @@ def test_pages_have_the_curves_of_their_path_or_pair(tmp_path):
     assert lines_of(chart, 0)["a"] == ([0, 0.1], [5, 4])
     assert math.isnan(lines_of(chart, 0)["untrained b"][1][1])
     assert chart.panels[0].marks == [(0.0, "x"), (0.1, "xo")]
-    assert (lines_of(chart, 1), chart.panels[1].marks) == ({"a": ([0, 0.1], [2, 1])}, [(0.0, "x")])  # no walls hide it
+    assert (lines_of(chart, 1), chart.panels[1].marks) == ({"a": ([0, 0.1], [2, 1])}, [(0.0, "x")])  # no walls hide the vehicle
 
 
 def test_charts_go_below_pictures(tmp_path):
@@ -433,7 +433,7 @@ def test_the_document_shows_charts(tmp_path, monkeypatch, curves):
 
 
 def answer(request, python=(sys.executable,)):
-    """As a program, far from the package: neither NumPy nor an extension is needed to read files."""
+    """Runs plot.py as a program outside the package: reading files needs neither NumPy nor an extension."""
     return subprocess.run([*python, plot.__file__, json.dumps(request)], capture_output=True, text=True, env={"PYTHONSAFEPATH": "1"})
 
 

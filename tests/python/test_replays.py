@@ -35,7 +35,7 @@ def test_a_recording_holds_what_the_simulator_did(make, tmp_path):
     header = header_of(page)
     assert header["policy"] == "by hand" and header["map"] == "procedural:3" and header["command"].startswith("python")
     assert mcap.read_bytes().startswith(b"\x89MCAP")
-    # It has been written: what comes later is not in it.
+    # The replay has been written: later steps are not in it.
     simulator.step(actions_of(0, simulator.num_slots))
     assert recorder.num_steps == 30
     assert pictura.write_gallery(str(tmp_path)) == 1 and (tmp_path / "index.html").exists()
@@ -53,7 +53,7 @@ def test_a_recording_changes_nothing_and_sees_steps_of_every_kind(make):
         simulator.reset(seed=3)
         simulator.step(actions_of(6, 8))
     assert plain.state_hash() == watched.state_hash()
-    assert recorder.num_steps == 13  # a reset leads to a frame as well
+    assert recorder.num_steps == 13  # a reset adds a frame as well
     del recorder
     plain.step(actions_of(7, 8))
     watched.step(actions_of(7, 8))
@@ -77,7 +77,7 @@ def test_a_reset_of_another_world_is_none_of_the_recorded_one(make):
     simulator = make(3, 2)
     recorder = pictura.Recorder(simulator, world=1)
     scenes = pictura.SceneRecorder(simulator, world=1)
-    simulator.reset(np.array([1, 0], np.uint8))  # both are at the start of an episode
+    simulator.reset(np.array([1, 0], np.uint8))  # both worlds are at the start of an episode
     assert recorder.num_steps == scenes.num_steps == 0
     simulator.step(actions_of(0, 6))
     simulator.reset(np.array([1, 0], np.uint8))
@@ -113,7 +113,7 @@ def test_what_cannot_be_recorded_is_refused_by_name(make, tmp_path):
 
 def test_a_live_view_shows_steps_and_lets_a_page_drive(make):
     simulator = make(5, seed=2)
-    recorder = pictura.Recorder(simulator)  # before whom the view gives other commands
+    recorder = pictura.Recorder(simulator)  # the view replaces its commands
     view = pictura.LiveView(simulator, follow=1, wait_for_page=False)
     events = Events(view.address)
     before = simulator.state["x_m"].numpy().copy()

@@ -1,4 +1,4 @@
-"""Recorded scenes: what was read of them, and worlds whose agents are their tracks."""
+"""Recorded scenes: their contents, and worlds whose agents are their tracks."""
 
 import os
 import pathlib
@@ -125,7 +125,7 @@ def test_some_drive_among_the_recorded(scene):
     simulator.run(shared, 1)
     status = simulator.state["status"].numpy()
     assert status[scene.sdc_track] == ACTIVE and (status == ACTIVE).sum() == 1
-    mask[:] = 0  # is read at every step
+    mask[:] = 0  # the mask is read at every step
     simulator.run(shared, 1)
     assert (simulator.state["status"].numpy() == ACTIVE).sum() == 0
     with pytest.raises(pictura.Error, match=r"mask of 'idle'.*\[12\]"):
@@ -154,7 +154,7 @@ def test_inverse_actions_follow_and_idm_drives(scene):
         for step in range(1, 41):
             simulator.run(shared, 1)
             if simulator.state["status"].numpy()[scene.sdc_track] != ACTIVE:
-                break  # the fixture's road users stand in its way
+                break  # the fixture's road users block it
             driven += 1
             place = feet_of(simulator)[scene.sdc_track, :2]
             recorded = scene.tracks()["position_m"][scene.sdc_track, step, :2]
@@ -252,7 +252,7 @@ def equal_arrays(a: dict, b: dict) -> bool:
 
 
 def crossing_arrays() -> dict:
-    """Two lanes one after the other and one beside the first, far from the origin, with two road users and a light."""
+    """Returns two consecutive lanes and one beside the first, far from the origin, with two road users and a light."""
     x = 650_000 + np.arange(0, 41) * 0.5
     y = np.full_like(x, 4_800_000.25)
     z = np.full_like(x, 12.5)

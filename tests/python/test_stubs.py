@@ -1,4 +1,4 @@
-"""The type stubs say what the extension has."""
+"""Type stubs match the extension."""
 
 import pathlib
 import subprocess

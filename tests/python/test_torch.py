@@ -1,4 +1,4 @@
-"""Policies in Python: the numbers of C++, and weights that the command takes."""
+"""Policies in Python: the same numbers as in C++, and weights that the command accepts."""
 
 import copy
 import json
@@ -125,7 +125,7 @@ def test_broken_headers_are_named(tmp_path):
 
 @pytest.mark.skipif(not MODELS, reason="no released policies here")
 def test_sizes_of_broken_headers_take_no_memory(tmp_path):
-    """A system that promises more memory than it has gives terabytes, and fills them until it ends the process."""
+    """A system that overcommits memory would grant terabytes, and fill them until it ends the process."""
     header, tensors = header_and_tensors(MODELS[-1])
     path = tmp_path / "huge.safetensors"
     config = header["__metadata__"]["config"]
@@ -182,7 +182,7 @@ def test_weights_of_python_run_in_the_command(tmp_path):
 
 
 def run_onnx(path, observation):
-    """Logits and values of ONNX Runtime on the CPU."""
+    """Returns logits and values of ONNX Runtime on the CPU."""
     runtime = pytest.importorskip("onnxruntime")
     session = runtime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
     assert [each.name for each in session.get_inputs()] == list(observation)
@@ -190,7 +190,7 @@ def run_onnx(path, observation):
 
 
 def drawn_observation(policy, like, rows: int):
-    """Rows of arrays as they are in `like`, each scaled anew, and counts and pixels drawn anew."""
+    """Returns rows of arrays as in `like`, with new random scales, counts and pixels."""
     draw = torch.Generator().manual_seed(1)
     observation = {}
     for name in policy.observation_names:

@@ -1,5 +1,5 @@
-"""Training, evaluation and saved policies through Python: the numbers of pictura.torch and of the command. Skipped where the
-package was built without torch."""
+"""Training, evaluation and saved policies in Python: the same numbers as pictura.torch and the command. Skipped if the package
+was built without torch."""
 
 import csv
 import json
@@ -25,13 +25,13 @@ from pictura.torch import load_policy  # noqa: E402
 
 MODELS = sorted((pathlib.Path(__file__).parents[2] / "models").glob("*.safetensors"))
 SMOKE = str(pathlib.Path(__file__).parents[2] / "configs" / "smoke.toml")
-# First values are so small that logits say nothing: a high rate for a few updates gives others.
+# Initial values are too small for meaningful logits; a few updates at a high rate enlarge them.
 TRAIN = ["train.updates=3", "train.learning_rate=0.01", "train.weight_average=2", "run.device=cpu", "run.num_threads=2"]
 
 
 @pytest.fixture(scope="module", params=["perspective", "vector"])
 def trained(request, tmp_path_factory):
-    """(modality, folder of the run, progress, report)."""
+    """Returns (modality, folder of the run, progress, report)."""
     out = tmp_path_factory.mktemp(request.param)
     progress = []
     report = pictura.train(
@@ -103,7 +103,7 @@ def test_environments_are_made_for_a_policy(trained):
         actions = policy.act(seen)
         assert torch.equal(actions, policy.act({name: torch.from_numpy(array) for name, array in seen.items()}))
         envs.step(actions.numpy())
-    # The same world as the session's, and another one than where nothing is said of it.
+    # The same world as the session's, and another world than the default.
     world = pictura.PolicySession(str(path), device="cpu").training_world() | {"num_threads": 1, "seed": 0, "stagger_episodes": False}
     ours, its = pictura.Simulator([pictura.Map.load("procedural:3")], [(0, 4, 0), (0, 4, 1)], **world), envs.batch.simulator
     ours.reset(None, 5)
@@ -202,18 +202,18 @@ def test_a_controller_outlives_its_session(trained, town):
 
 
 def options_of(arguments):
-    """Of the command, for arguments of the functions."""
+    """Returns the command's options for arguments of the functions."""
     names = {"agents_per_world": "agents", "num_threads": "threads", "sample_steps": "every"}
     return [f"--{names.get(name, name.removesuffix('_mps').replace('_', '-'))}={value}" for name, value in arguments.items()]
 
 
 def visible_files(folder):
-    """Without the list of what the command wrote."""
+    """Returns the visible files, without the list of files that the command wrote."""
     return sorted(each.name for each in folder.iterdir() if not each.name.startswith("."))
 
 
 def probed_by_command(probe, folder, out, arguments):
-    """What `pictura probe` prints as JSON, of the same arguments as the function's; its files go to `out`."""
+    """Returns the JSON that `pictura probe` prints for the same arguments as the function's; its files go to `out`."""
     command = os.environ.get("PICTURA_COMMAND")
     if not command:
         pytest.skip("PICTURA_COMMAND names no command")
@@ -287,7 +287,7 @@ def test_evaluation_gives_the_commands_numbers(trained):
     command = os.environ.get("PICTURA_COMMAND")
     folder, done = trained[1], []
     options = {"scenarios": 2, "steps": 40, "agents_per_world": 6, "num_threads": 2, "device": "cpu"}
-    # Sampled actions: the likeliest one of a policy that has hardly learnt may stand.
+    # Sampled actions, since the most likely action of a policy that has hardly learnt may stand still.
     report = pictura.evaluate(
         str(folder / "checkpoint.ckpt"), ["procedural:1"], argmax=False, on_progress=lambda fraction, eta_s: done.append(fraction), **options
     )
@@ -306,7 +306,7 @@ def test_evaluation_gives_the_commands_numbers(trained):
 
 
 def replay_of(page):
-    """The header of a replay, and its case."""
+    """Returns the header of a replay, and its case."""
     header = json.loads(re.search(r'id="replay-header">(.*?)</script>', page.read_text()).group(1))
     return header, header["case"]
 
@@ -323,7 +323,7 @@ def test_removal_is_the_commands(trained, tmp_path):
     report = pictura.probe_removal(
         [str(folder / "checkpoint.ckpt")], ["procedural:1"], cases_file=str(cases), on_progress=lambda fraction, eta_s: done.append(fraction),
         **options)  # fmt: skip
-    # Fewer than asked for where a processor's rounding has this policy's agents halt earlier.
+    # Fewer cases than requested if a processor's rounding makes this policy's agents halt earlier.
     number = report["cases"]
     assert report["kind"] == "removal" and 40 <= number <= report["cases_asked"] == 60 and done[-1] == 1
     (policy,) = report["policy"]
@@ -357,7 +357,7 @@ def test_removal_is_the_commands(trained, tmp_path):
     assert (tmp_path / "out" / "removal.png").exists() and json.loads((tmp_path / "out" / "summary.json").read_text()) == theirs
 
 
-@pytest.mark.parametrize("trained", ["vector"], indirect=True)  # minutes with images; what both do is compared above
+@pytest.mark.parametrize("trained", ["vector"], indirect=True)  # minutes with images; the common part is compared above
 def test_pedestrian_is_the_commands(trained, tmp_path):
     _, folder, _, _ = trained
     done, cases = [], tmp_path / "cases.csv"
@@ -387,7 +387,7 @@ def test_pedestrian_is_the_commands(trained, tmp_path):
     assert visible_files(tmp_path / "out") == ["cases.csv", *drawn, "pedestrian.png", "summary.json"]
 
 
-@pytest.mark.parametrize("trained", ["vector"], indirect=True)  # minutes with images; what both do is compared above
+@pytest.mark.parametrize("trained", ["vector"], indirect=True)  # minutes with images; the common part is compared above
 def test_corner_is_the_commands(trained, tmp_path):
     _, folder, _, _ = trained
     done, cases = [], tmp_path / "cases.csv"

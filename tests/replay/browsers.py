@@ -1,6 +1,6 @@
-"""Headless browsers for tests, by their own protocols and the standard library alone.
+"""Headless browsers for tests, through their own protocols, with only the standard library.
 
-Chromium speaks the DevTools protocol over a pair of pipes, Firefox Marionette over a socket.
+Chromium uses the DevTools protocol over a pair of pipes, Firefox Marionette over a socket.
 """
 
 import base64
@@ -16,7 +16,7 @@ import time
 
 
 class Browser:
-    """Whatever runs expressions in a page."""
+    """Runs expressions in a page."""
 
     def wait_for(self, expression, timeout_s=60):
         end = time.monotonic() + timeout_s
@@ -27,7 +27,7 @@ class Browser:
 
 
 class Chromium(Browser):
-    """One page. `errors` collects what it logs as errors and what it throws."""
+    """One page. `errors` collects its logged errors and exceptions."""
 
     def __init__(self, width=1280, height=720, scheme="dark", touch=False):
         self.profile = tempfile.TemporaryDirectory(prefix="pictura-chromium-", ignore_cleanup_errors=True)
@@ -89,7 +89,7 @@ class Chromium(Browser):
         self.open_address(pathlib.Path(path).resolve().as_uri() + fragment)
 
     def open_address(self, address):
-        # A new document each time, though only the fragment differs.
+        # Loads a new document each time, even if only the fragment differs.
         self.call("Page.navigate", url="about:blank")
         self.call("Page.navigate", url=address)
         self.wait_for("document.readyState === 'complete'")
@@ -148,7 +148,7 @@ class Firefox(Browser):
              "--profile", self.profile.name, "--width", str(width), "--height", str(height)],
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment)  # fmt: skip
         self.socket, self.buffer, self.count = self._connect(port), b"", 0
-        self._read()  # its greeting
+        self._read()  # reads its greeting
         self.call("WebDriver:NewSession", {"capabilities": {"alwaysMatch": {"acceptInsecureCerts": True}}})
         self.call("WebDriver:SetWindowRect", {"width": width, "height": height})
 
@@ -184,7 +184,7 @@ class Firefox(Browser):
         self.call("WebDriver:Navigate", {"url": pathlib.Path(path).resolve().as_uri()})
 
     def run(self, expression):
-        # In the page's own world, not in one that only sees its document.
+        # Runs in the page's own JavaScript world, not in a world that only shares its document.
         return self.call("WebDriver:ExecuteScript", {"script": f"return window.wrappedJSObject ? window.wrappedJSObject.eval({json.dumps(expression)}) : eval({json.dumps(expression)})",
                                                      "args": [], "sandbox": None})["value"]  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""`pictura simulate --serve`: who is let in, what is sent, that a page which does not read holds nothing up, and a page in
+"""`pictura simulate --serve`: accepted requests, sent messages, that a page which does not read delays nothing, and a page in
 Chromium that drives an agent.
 
 Run by ctest, one entry per class: python3 live_test.py PICTURA [unittest arguments].
@@ -28,7 +28,7 @@ WORLD = ["procedural:1:blocks=2x2", "--agents", "12", "--policy", "lane", "--see
 
 
 class Served(unittest.TestCase):
-    """Each test has a simulation of its own."""
+    """Each test has its own simulation."""
 
     def serve(self, *arguments):
         self.process = subprocess.Popen([PICTURA, "simulate", *WORLD, "--serve", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -180,7 +180,7 @@ class Http(Served):
         quick = Events(self.address)
         quick.next("begin")
         self.control({"pace": 64})
-        # More than what may wait for the slow page, in messages and in the system's buffers.
+        # More frames than may wait for the slow page, in messages and in the system's buffers.
         begin, first = time.monotonic(), quick.next("frame")["step"]
         steps = [quick.next("frame")["step"] for _ in range(200)]
         self.assertEqual(steps, list(range(first + 1, first + 201)))
@@ -198,7 +198,7 @@ class Http(Served):
 
     def test_a_port_that_another_of_ours_has_is_an_error(self):
         self.serve()
-        # It would wait for its first page: the time ends it where it does listen.
+        # The command would wait for its first page: the timeout ends it if it does listen.
         result = subprocess.run([PICTURA, "simulate", *WORLD, "--serve", str(self.port)], capture_output=True, text=True, timeout=60)
         self.assertEqual((result.returncode, result.stderr), (1, f"error: serve: cannot listen on 127.0.0.1:{self.port}: is the port taken?\n"))
         self.assertEqual(self.ask()[0].status, 200)
@@ -214,10 +214,10 @@ class Http(Served):
 
 
 class Limits(Served):
-    """What a connection may cost, whoever has opened it."""
+    """Limits on the cost of a connection from any client."""
 
     def raw(self, text):
-        """A connection that has sent text."""
+        """Opens a connection and sends text."""
         connection = socket.create_connection(("127.0.0.1", self.port), timeout=30)
         self.addCleanup(connection.close)
         connection.sendall(text if isinstance(text, bytes) else text.encode())
@@ -235,7 +235,7 @@ class Limits(Served):
         json_type = "Content-Type: application/json"
         nested = gzip.compress(b"[" * 1000000)
         for status, request in [
-            # Of 1 MB once it is decompressed, which overflowed the stack.
+            # 1 MB after decompression, which overflowed the stack.
             (415, self.head("POST", "control", json_type, "Content-Encoding: gzip", f"Content-Length: {len(nested)}").encode() + nested),
             (501, self.head("POST", "control", json_type, "Transfer-Encoding: chunked") + "ffffffff\r\n"),
             (413, self.head("POST", "control", json_type, "Content-Length: 18446744073709551615")),
@@ -248,7 +248,7 @@ class Limits(Served):
             (405, self.head("DELETE", "")),
             (431, self.head("GET", "", *["X: y"] * 20000)),
             (431, self.head("GET", "", "X: " + "y" * 20000)),
-            # No part of an answer is sent alone.
+            # Range requests are answered in full.
             (200, self.head("GET", "", "Range: bytes=" + ",".join(["0-"] * 1000))),
         ]:
             with self.subTest(request[:200]):
@@ -280,7 +280,7 @@ class Limits(Served):
         begin = time.monotonic()
         self.process.send_signal(signal.SIGINT)
         self.process.wait(timeout=60)
-        self.assertLess(time.monotonic() - begin, 1 + 2)  # what the command does besides
+        self.assertLess(time.monotonic() - begin, 1 + 2)  # other work of the command
         for connection in [*idle, *halfway, deaf]:
             connection.close()
         events.close()
@@ -330,7 +330,7 @@ class Chromium(Served):
         self.assertEqual(self.browser.run("pictura.replay.frames"), paused)
         self.browser.key("ArrowRight")
         self.browser.wait_for(f"pictura.replay.frames === {paused + 1} && pictura.state.time === {paused}")
-        # Back in what it has seen, while the world stands.
+        # The page goes back in its recorded frames while the world is paused.
         self.browser.key("Home")
         self.assertEqual(self.browser.run("[pictura.state.time, pictura.state.isAtEdge]"), [0, False])
         self.browser.key(" ")
@@ -347,7 +347,7 @@ class Chromium(Served):
 
     def test_a_person_drives(self):
         active = "[...Array(12).keys()].filter(a => pictura.replay.raw('status', a, pictura.replay.frames - 1) === 0 && pictura.replay.body(a, pictura.replay.frames - 1).agentClass === 0)"
-        # Other agents may hit one that stops in their way: then another one is driven.
+        # Other agents may hit an agent that stops in their way; then another agent is driven.
         tried = []
         while len(tried) < 10:
             self.browser.wait_for(f"{active}.length > 0")
@@ -357,25 +357,25 @@ class Chromium(Served):
                 break
         else:
             self.fail(f"agents {tried} were halted while they were driven")
-        self.assertIn(3, [action // 3 for action in actions])  # 4 m/s3 along; the wheels may still have to be straightened
+        self.assertIn(3, [action // 3 for action in actions])  # 4 m/s3 along; the wheels may still be turning straight
         self.assertEqual(self.browser.errors, [])
 
     def drive(self, agent):
-        """Takes an agent, stops it, drives on and gives it back: its actions since it stood, or None where it was halted."""
+        """Takes an agent, stops it, drives on and gives it back. Returns its actions since it stood, or None if it was halted."""
         last = "pictura.replay.frames - 1"
         self.browser.run(f"pictura.actions.select({agent})")
         self.browser.key("t")
         self.browser.wait_for(f"pictura.live.driven === {agent} && document.getElementById('drive').getAttribute('aria-pressed') === 'true'")
 
-        def hold(key, until):  # or until it is halted; whether it is not
+        def hold(key, until):  # until the condition, or until it is halted; returns whether it is not halted
             self.hold(key, True)
-            # Kept in the page, since another episode may begin between two looks.
+            # Stored in the page, since another episode may begin between two looks.
             self.browser.run("window.wasHalted = false")
             self.browser.wait_for(f"(window.wasHalted ||= pictura.replay.raw('status', {agent}, {last}) !== 0) || {until}")
             self.hold(key, False)
             return not self.browser.run("window.wasHalted")
 
-        # Stop first: then whatever moves it is the keys.
+        # Stops first, so that any motion comes from the keys.
         actions = None
         if hold(" ", f"Math.abs(pictura.replay.get('speed_mps', {agent}, {last})) < 0.2"):
             at = self.browser.run(last)
@@ -386,7 +386,7 @@ class Chromium(Served):
         return actions
 
     def test_images_go_on_after_the_page_fell_behind(self):
-        # As after messages that were lost: the page begins anew with the newest step, then forgets its oldest ones.
+        # As after lost messages: the page restarts with the newest step, then discards its oldest steps.
         self.control({"paused": True})
         self.browser.wait_for("pictura.live.paused")
         self.browser.run("""new Promise(resolve => {
@@ -405,7 +405,7 @@ class Chromium(Served):
         self.assertEqual(self.browser.errors, [])
 
     def test_a_halt_is_told_by_the_worlds_clock(self):
-        # A page that began later than the world.
+        # A page that connected after the world's start.
         self.browser.wait_for("pictura.replay.frames > 5")
         self.control({"paused": True})
         self.browser.wait_for("pictura.live.paused")
@@ -414,7 +414,7 @@ class Chromium(Served):
         self.assertIn("60.5 s, step 605", self.browser.run("document.getElementById('clock').textContent"))
 
     def fill_up(self):
-        """Takes all places that pages have, once those of others are free."""
+        """Takes all slots for pages, once other pages have freed theirs."""
         pages, end = [], time.monotonic() + 60
         while len(pages) < 8:
             try:
@@ -435,7 +435,7 @@ class Chromium(Served):
         message = self.browser.run("document.getElementById('message').innerText")
         self.assertEqual(message.strip(), "This page cannot show the simulation: 8 pages listen already, or the simulation has ended.")
         self.assertTrue(self.browser.run("document.getElementById('app').hidden"))
-        # It has one once another page has gone.
+        # A slot is free once another page has gone.
         pages[0].close()
         self.control({"paused": False})
         end = time.monotonic() + 60

@@ -1,4 +1,4 @@
-"""MCAP files of replays, read by PyPI's mcap: whole, indexed, by Foxglove's schemas, and the same numbers as the page.
+"""MCAP files of replays, read by PyPI's mcap: complete, indexed, with Foxglove's schemas, and the same numbers as the page.
 
 Run by ctest: python3 mcap_test.py PICTURA [unittest arguments]. Skipped without mcap (requirements.txt).
 """
@@ -26,8 +26,9 @@ TYPES = {"object": dict, "array": list, "string": str, "boolean": bool, "integer
 
 
 def differences(value, schema, path=""):
-    """What a value and its schema do not agree on, as (what, where) of members: undeclared, lacking, or of another type."""
-    is_true_or_false = isinstance(value, bool)  # which is a number to Python
+    """Returns differences between a value and its schema, as (what, where) of members: undeclared, missing, or of another type.
+    """
+    is_true_or_false = isinstance(value, bool)  # a bool is a number in Python
     if is_true_or_false != (schema["type"] == "boolean") or not isinstance(value, TYPES[schema["type"]]):
         return {("type", path)}
     found = set()
@@ -66,7 +67,7 @@ class Mcap(unittest.TestCase):
                                    "/events": "foxglove.Log", "/agent": "pictura.Agent", **cameras})  # fmt: skip
 
     def test_messages_have_what_their_schemas_declare(self):
-        # A scene has what is drawn in it alone, and nobody asks random actions for probabilities.
+        # A scene contains only what it draws, and random actions have no probabilities.
         parts = {".entities." + name for name in ("cubes", "spheres", "lines", "texts")}
         absent = {"/map": parts - {".entities.lines"}, "/agents": parts - {".entities.cubes", ".entities.texts"}, "/lights": parts - {".entities.spheres"},
                   "/agent": {".probabilities", ".value"}}  # fmt: skip

@@ -1,7 +1,7 @@
-"""Replays and galleries in headless browsers: no error, something drawn, what was recorded shown where it was.
+"""Replays and galleries in headless browsers: no error, something drawn, and recorded objects shown at their positions.
 
-Run by ctest, one entry per class: python3 page_test.py PICTURA [unittest arguments]. Classes whose browser is not
-installed are skipped.
+Run by ctest, one entry per class: python3 page_test.py PICTURA [unittest arguments]. Classes whose browser is not installed are
+skipped.
 """
 
 import base64
@@ -23,7 +23,7 @@ PICTURA = ""
 
 
 def png_pixels(png):
-    """(width, height, rows of RGB bytes) of an 8-bit RGB or RGBA PNG."""
+    """Returns (width, height, rows of RGB bytes) of an 8-bit RGB or RGBA PNG."""
     at, parts, width, height, channels = 8, [], 0, 0, 3
     while at < len(png):
         size, kind = struct.unpack(">I4s", png[at : at + 8])
@@ -52,7 +52,7 @@ def png_pixels(png):
 
 
 class Recorded:
-    """A replay as this file reads it, by docs/reference/replay.md alone."""
+    """A replay as read by this file, which follows docs/reference/replay.md alone."""
 
     def __init__(self, path):
         page = pathlib.Path(path).read_text()
@@ -168,7 +168,7 @@ class Chromium(PageCase):
         colors = [bytes.fromhex(color[1:]) for color in shown]
         _, _, rows = png_pixels(self.browser.screenshot())
         px, py = round(left + drawn["px"]), round(top + drawn["py"])
-        # Of the class's colour at its centre, which a number or a windscreen may cover in places.
+        # The pixel at its centre has the class's colour, unless a number or a windscreen covers it.
         near = {rows[py + dy][3 * (px + dx) : 3 * (px + dx) + 3] for dy in range(-2, 3) for dx in range(-2, 3)}
         self.assertTrue(near & set(colors), (near, colors))
 
@@ -253,7 +253,7 @@ class Chromium(PageCase):
             self.assertAlmostEqual(float(now.replace("\u2212", "-")), value, delta=max(0.0051, 0.01 * abs(value)) if abs(value) >= 1 else 0.006 * abs(value) + 1e-9)
 
     def test_a_recorded_track_shows_what_it_has(self):
-        # Of one whose status is that of tracks in recordings, which only move.
+        # An agent with the status of tracks in recordings, which only move.
         self.open(fragment="#step=20&agent=4")
         self.browser.run("pictura.replay.tracks.status.fill(4); pictura.actions.seek(21); pictura.drawn() && null")
         self.assertIn("as recorded", self.browser.run("document.getElementById('agent-status').textContent"))
@@ -297,7 +297,7 @@ class Chromium(PageCase):
                 color = bytes.fromhex(self.browser.run("getComputedStyle(document.documentElement).getPropertyValue('--case')").strip()[1:])
                 count = lambda: sum(row[3 * i : 3 * i + 3] == color for row in png_pixels(self.browser.screenshot())[2][50:590] for i in range(0, 930))
                 self.assertGreater(count(), 60)  # the mark's ring
-                # Its images with the road user and without it.
+                # Images with the road user and without it.
                 change = '{hidden: [%d]}' % removed if name == "removed" else "pictura.replay.caseUser(%d, 20).change" % ego
                 changed, as_driven = self.drawn_pictures(ego, 20, change), self.drawn_pictures(ego, 20)
                 self.assertTrue(changed != as_driven)
@@ -360,7 +360,7 @@ class Chromium(PageCase):
         self.assertEqual(self.browser.errors, [])
 
     def test_the_page_draws_what_the_file_holds_no_images_of(self):
-        # Of an agent that was not followed, and of the followed one after the last image that was kept.
+        # Images of an agent that was not followed, and of the followed agent after the last kept image.
         self.open(fragment="#step=50&agent=7")
         self.browser.wait_for("pictura.pictured().agent === 7")
         self.assertEqual(self.browser.run("pictura.pictured()"), {"frame": 50, "agent": 7, "isKept": False})
@@ -439,7 +439,7 @@ class Chromium(PageCase):
                 self.assert_damaged(changed(f'"{name}":', f'"other_{name}":'), f"its header: metrics.{name}: expected")
 
     def test_what_cannot_be_shown_says_so(self):
-        # A header that has all that it must have, but tracks that no view knows.
+        # Header with all required members, but with tracks that no view knows.
         page = self.path.read_text()
         at = page.index('id="replay-header">')
         self.assert_damaged(page[:at] + page[at:].replace('"name":"steer_deg"', '"name":"steering"'), "This replay is damaged: a part of it cannot be shown")

@@ -1,6 +1,6 @@
-"""The scripts: their help from any folder, what they refuse, what scripts/setup links, what scripts/format formats, what
-scripts/gpu_carry leaves when it fails, what those that train do with a run that is there, the status of those that measure and
-of lists of work, and the results of scripts/gpu_check_record.py.
+"""The scripts: their help from any folder, rejected arguments, links of scripts/setup, files of scripts/format, files that
+scripts/gpu_carry leaves after a failure, treatment of existing runs, exit statuses of measurements and of lists of work, and
+results of scripts/gpu_check_record.py.
 
 Run by ctest: python3 scripts_test.py [unittest arguments].
 """
@@ -22,7 +22,7 @@ SCRIPTS = pathlib.Path(__file__).resolve().parents[2] / "scripts"
 
 
 class Scratch(unittest.TestCase):
-    """Copies of scripts in a folder of their own, with programs in the place of others."""
+    """Copies of scripts in a separate folder, with substitutes for other programs."""
 
     COPIED = ()
 
@@ -48,7 +48,7 @@ class Scratch(unittest.TestCase):
         return subprocess.run([self.root / "scripts" / name, *arguments], env=environment, capture_output=True, text=True, timeout=60)
 
     def environment(self):
-        """Without what would lead to programs, data or a checkout elsewhere."""
+        """Returns the environment without variables that lead to programs, data or a checkout elsewhere."""
         return {name: value for name, value in os.environ.items() if not name.startswith(("GIT_", "PICTURA_"))}
 
 
@@ -101,7 +101,7 @@ class Help(Scratch):
 
 
 class Format(Scratch):
-    """A checkout of its own, with a clang-format that says which files it gets."""
+    """A separate checkout, with a clang-format that records its files."""
 
     COPIED = ("format",)
 
@@ -142,7 +142,7 @@ class Format(Scratch):
 
 
 class Carry(Scratch):
-    """With programs that fetch nothing, in the place of apt-get and pip."""
+    """Runs with substitutes for apt-get and pip that download nothing."""
 
     COPIED = ("gpu_carry",)
 
@@ -189,7 +189,7 @@ class OnADevice(Scratch):
         super().setUp()
         self.write("CMakeLists.txt", "project(nothing)")
         self.write("python/torch/__init__.py", "")
-        # Trains until there is no time, or fails, as its first argument says; exports what is no broken checkpoint.
+        # Trains until its time is over, or fails, as its first argument selects; exports all but broken checkpoints.
         self.write_program("pictura", """
             case "$1 $2" in
               "train late") echo '{"out_of_time": true}' ;;
@@ -237,7 +237,7 @@ class Lanes(OnADevice):
         self.assertEqual(status, 0, said)
         for what in ("GPU 0: no time for long", "GPU 1: training is not done: out of time", "GPU 2: trained is done"):
             self.assertIn(what, said)
-        self.write_program("bin/timeout", "exit 124")  # as it ends what takes too long
+        self.write_program("bin/timeout", "exit 124")  # status of a command that took too long
         status, said, _ = self.work("0 slow -50 true", seconds=0)
         self.assertEqual(status, 0, said)
         self.assertIn("slow is not done: out of time", said)
@@ -310,7 +310,7 @@ class Check(OnADevice):
 
 
 class ReproduceTable(unittest.TestCase):
-    """With a program in the place of pictura that reports what it was asked."""
+    """Runs with a substitute for pictura that reports its arguments."""
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory(prefix="pictura-test-")
@@ -348,7 +348,7 @@ print(json.dumps({{"rows": rows, "policy_hash": "abc", "device": "cpu", "precisi
                                "--policies", self.root / "a.safetensors", *arguments], capture_output=True, text=True, timeout=60)  # fmt: skip
 
     def table(self, cycles, folder="out"):
-        """The facts and the cells of a table, without its head."""
+        """Returns the facts and the cells of a table, without its head."""
         facts = json.loads((self.root / folder / f"table_{cycles}.json").read_text())
         lines = (self.root / folder / f"table_{cycles}.md").read_text().splitlines()
         return facts, [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines[2:]]
@@ -407,7 +407,7 @@ print(json.dumps({{"rows": rows, "policy_hash": "abc", "device": "cpu", "precisi
             self.assertEqual("--device cuda:" in line, "--policy" not in line, line)
         first, _ = self.table("phases")
         self.assertEqual([row["policy"] for row in first["rows"][:6]], ["a", "b", "c", "d", "lane keeper", "idle"])
-        # On which device is no reason to evaluate again.
+        # Another device does not cause a new evaluation.
         self.assertEqual(self.run_script("--light-cycles", "phases", "--density", "medium", "--policies", *policies).returncode, 0)
         self.assertEqual(len(self.asked.read_text().splitlines()), 12)
         self.assertEqual(self.run_script("--devices", "cuda:0", "--device", "cuda").returncode, 1)
@@ -449,7 +449,7 @@ print(json.dumps({{"rows": rows, "policy_hash": "abc", "device": "cpu", "precisi
         policy = self.root / "a.safetensors"
         points = "".join(f'{{policy = "{policy}", agent_steps = {steps}, gpu_hours = 0.5}},' for steps in (1e6, 2e6))
         trainings.write_text(f'[[line]]\nname = "an agent"\ndashed = true\npoints = [{points}]\n')
-        for _ in range(2):  # the second time nothing is evaluated
+        for _ in range(2):  # the second run evaluates nothing
             result = self.run_script("--curves", trainings, "--scenarios", "2")
             self.assertEqual((result.returncode, len(self.asked.read_text().splitlines())), (0, 2), result.stderr)
         curves = json.loads((self.root / "out/curves.json").read_text())
@@ -515,7 +515,7 @@ class Setup(unittest.TestCase):
         path.chmod(0o755)
 
     def link(self):
-        """The link that set-up leaves, however often it runs."""
+        """Returns the link left by set-up, after two runs."""
         environment = dict(os.environ, PICTURA_VENV="venv", PATH=f"{self.root}/bin:/usr/bin:/bin")
         for _ in range(2):
             result = subprocess.run([self.root / "scripts/setup"], env=environment, capture_output=True, text=True, timeout=60)
@@ -541,7 +541,7 @@ class Setup(unittest.TestCase):
 
 
 class Runs(unittest.TestCase):
-    """Copies of the scripts that train, with a `pictura` that keeps what it is asked for, and fails."""
+    """Copies of the scripts that train, with a `pictura` that records its arguments and fails."""
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory(prefix="pictura-test-")
@@ -563,7 +563,7 @@ class Runs(unittest.TestCase):
 
     def asked(self, name, *arguments):
         environment = {**os.environ, "PICTURA_VENV": "venv", "PATH": f"{self.root}/venv/bin:/usr/bin:/bin"}
-        environment.pop("PICTURA_PROGRAM", None)  # else the scripts ask that one
+        environment.pop("PICTURA_PROGRAM", None)  # else the scripts would use that program
         result = subprocess.run([self.root / "scripts" / name, *arguments], env=environment, capture_output=True, text=True,
                                 timeout=60)  # fmt: skip
         self.assertEqual(result.returncode, 3, result.stderr)
@@ -578,7 +578,7 @@ class Runs(unittest.TestCase):
             return subprocess.run([self.root / "scripts/demo", *arguments], env=environment, capture_output=True, text=True,
                                   timeout=60)  # fmt: skip
 
-        # Each run's return is its seed, kept in its folder; every other metric is 2, but no run has an infraction.
+        # Each run's return is its seed, stored in its folder; every other metric is 2, but no run has an infraction.
         self.write_program("build/cpu/apps/pictura", """
             if [ "$1" = train ]; then
               mkdir -p "$7"; echo "${5#run.seed=}" >"$7/seed"
