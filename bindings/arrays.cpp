@@ -394,27 +394,27 @@ BorrowedArray borrow_structs(const py::handle& object, std::string_view what, si
 
 void bind_arrays(py::module_& module) {
   py::class_<LentArray>(module, "Array", R"(
-An array in the library's memory, lent without a copy.
+Array in the library's memory, lent without a copy.
 
-NumPy takes it by `numpy.asarray(array)` where it is on the CPU; `numpy.from_dlpack`, `torch.from_dlpack`, JAX and CuPy take
-it on any device. The memory lives for as long as any of them does, also when its simulator or renderer is gone. Its
+NumPy accesses it with `numpy.asarray(array)` if it is on the CPU; `numpy.from_dlpack`, `torch.from_dlpack`, JAX and CuPy access
+it on any device. The memory lives as long as any of these references, even after its simulator or renderer is gone. Its
 contents change with the calls that write it.)")
       .def_property_readonly(
           "shape", [](const LentArray& lent) { return py::tuple(py::cast(values_of(lent.array.shape))); },
           py::doc("Lengths, a tuple of int."))
       .def_property_readonly(
           "strides", [](const LentArray& lent) { return py::tuple(py::cast(values_of(lent.array.strides))); },
-          py::doc("In elements, a tuple of int."))
-      .def_property_readonly("dtype", numpy_name, py::doc("NumPy's name of the element type, as 'float32'."))
+          py::doc("Strides in elements, a tuple of int."))
+      .def_property_readonly("dtype", numpy_name, py::doc("NumPy's name of the element type, for instance 'float32'."))
       .def_property_readonly(
           "device", [](const LentArray& lent) { return name_of(lent.array.device); }, py::doc("'cpu' or 'cuda:0'."))
       .def_property_readonly(
           "read_only", [](const LentArray& lent) { return lent.array.is_read_only; },
-          py::doc("Whether it must not be written."))
-      .def("numpy", numpy_of, "A NumPy view. Raises TypeError where the array is not on the CPU.")
+          py::doc("Whether the array is read-only."))
+      .def("numpy", numpy_of, "Returns a NumPy view. Raises TypeError if the array is not on the CPU.")
       .def(
           "torch", [](const py::object& self) { return py::module_::import("torch").attr("from_dlpack")(self); },
-          "A torch tensor over the same memory. Imports torch.")
+          "Returns a torch tensor over the same memory. Imports torch.")
       .def(
           "__array__",
           [](const py::object& self, const py::object& dtype, const py::object& copy) -> py::object {
@@ -431,7 +431,7 @@ contents change with the calls that write it.)")
           py::arg("dtype") = py::none(), py::arg("copy") = py::none())
       .def("__dlpack__", dlpack_of, py::kw_only(), py::arg("stream") = py::none(), py::arg("max_version") = py::none(),
            py::arg("dl_device") = py::none(), py::arg("copy") = py::none(),
-           "DLPack's protocol, versioned where max_version is (1, 0) or later. Raises BufferError for what cannot be "
+           "DLPack's protocol, versioned if max_version is (1, 0) or later. Raises BufferError if the array cannot be "
            "lent.")
       .def(
           "__dlpack_device__",
@@ -446,7 +446,7 @@ contents change with the calls that write it.)")
            })
       .def(
           "__getitem__", [](const py::object& self, const py::object& at) -> py::object { return numpy_of(self)[at]; },
-          "As of the NumPy view.")
+          "Indexes the NumPy view.")
       .def("__repr__",
            [](const LentArray& lent) { return fmt::format("<pictura.Array {}: {}>", lent.what, lent.array.text()); });
 }

@@ -64,10 +64,11 @@ void define_controller(py::class_<PyController>* controller) {
             return std::make_unique<PyController>(shared_controller(drivers, simulator));
           },
           py::arg("drivers"), py::arg("simulator"),
-          R"(Controllers that share a simulator's slots, of (controller, mask): of two that command a slot, the later one drives.
+          R"(Returns a controller of several drivers that share a simulator's slots, of (controller, mask): if two command a slot, the later
+one drives.
 
-mask: uint8 or bool [slots] in the simulator's memory, which is read at every step; None: all. Raises pictura.Error for another
-array and for a controller of another simulator.)")
+mask: uint8 or bool [slots] in the simulator's memory, which is read at every step; None: all slots. Raises pictura.Error for
+another array and for a controller of another simulator.)")
       .def_property_readonly("name", &PyController::name)
       .def(
           "act",
@@ -76,8 +77,8 @@ array and for a controller of another simulator.)")
             return self.lent_commands(simulator.stream());
           },
           py::arg("simulator"),
-          R"(Commands for all slots, which may be changed before step_commands() takes them: NumPy's COMMAND_DTYPE [slots], or uint8
-[slots, 28] on CUDA. The same memory at every call.)");
+          R"(Returns commands for all slots, which may be changed before step_commands() executes them: NumPy's COMMAND_DTYPE [slots], or
+uint8 [slots, 28] on CUDA. Every call returns the same memory.)");
 }
 
 }  // namespace pictura::python

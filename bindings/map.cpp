@@ -145,7 +145,7 @@ py::dict facts_of(const MapFacts& facts) {
 }
 
 void bind_maps(py::module_& module) {
-  py::class_<Geometry>(module, "Geometry", "What renderers draw of a map: strips on the road, walls, heads of lights.")
+  py::class_<Geometry>(module, "Geometry", "Geometry of a map for renderers: strips on the road, walls, light heads.")
       .def(py::init([](const std::vector<std::tuple<py::array_t<float, py::array::c_style | py::array::forcecast>,
                                                     float, std::array<float, 3>>>& lines,
                        const py::array_t<float, py::array::c_style | py::array::forcecast>& walls) {
@@ -172,56 +172,56 @@ void bind_maps(py::module_& module) {
              return Geometry{geometry};
            }),
            py::arg("lines") = py::list(), py::arg("walls") = py::array_t<float>(std::vector<size_t>{0, 7}),
-           R"(A geometry of one's own.
+           R"(Creates a custom geometry.
 
-lines: of (points [n, 3] in metres, width in metres, colour of three numbers in [0, 1]).
+lines: list of (points [n, 3] in metres, width in metres, colour of three numbers in [0, 1]).
 walls: float [n, 7]: both ends of the foot, in metres, and the height.
-Raises pictura.Error for other shapes; a renderer refuses what is not finite.)")
+Raises pictura.Error for other shapes; renderers reject numbers that are not finite.)")
       .def_property_readonly(
           "num_strips", [](const Geometry& self) { return self.geometry->strips.size(); },
-          py::doc("Straight pieces of lines."))
+          py::doc("Number of straight pieces of lines."))
       .def_property_readonly(
-          "num_walls", [](const Geometry& self) { return self.geometry->walls.size(); }, py::doc("Faces of walls."))
+          "num_walls", [](const Geometry& self) { return self.geometry->walls.size(); },
+          py::doc("Number of wall faces."))
       .def_property_readonly(
           "num_lights", [](const Geometry& self) { return self.geometry->num_signals; },
-          py::doc("Light states that a world on it has."));
+          py::doc("Number of light states of a world with this geometry."));
 
   py::class_<Map, std::shared_ptr<Map>>(module, "Map", R"(
-A road network: lanes, markings, edges, lights. Immutable; simulators and renderers share it.
+Road network: lanes, markings, edges, lights. Immutable; simulators and renderers share it.
 
-Positions are metres in the map's frame, z up; `origin_m` is its place in the file's coordinates.)")
+Positions are metres in the map's frame, z up; `origin_m` is the frame's origin in the file's coordinates.)")
       .def_static(
           "load", load_named_map, py::arg("name"), py::kw_only(), py::arg("strict") = false,
           py::arg("chord_error_m") = OpenDriveOptions{}.chord_error_m,
           R"(Loads a map by name: an OpenDRIVE file (.xodr), a town of the map folder, 'procedural:SEED', or 'city:SEED'.
 
-Faults that have one sensible meaning are mended, as `mends` says; strict: refuse them too. chord_error_m: how far sampled curves
-may lie from true ones.
-Raises pictura.Error naming file, line and element; pictura.UsageError where there is no such map.)")
+Faults with a single sensible meaning are repaired and listed in `mends`. strict: rejects such faults too. chord_error_m:
+maximum distance of sampled curves from the true curves.
+Raises pictura.Error naming file, line and element; pictura.UsageError if the map does not exist.)")
       .def_static("from_text", from_text, py::arg("text"), py::arg("source") = "text", py::kw_only(),
                   py::arg("strict") = false,
-                  "Parses the text of an OpenDRIVE file; `source` names it in messages. Raises as load() does.")
+                  "Parses the text of an OpenDRIVE file; `source` is its name in messages. Raises as load() does.")
       .def_property_readonly(
           "name", [](const Map& self) { return self.road()->name; },
-          py::doc("'Town01', 'procedural:7', or the file's stem."))
-      .def_property_readonly("mends", mends_of,
-                             py::doc("Faults of the file that were mended: (kind, what was done, message) each."))
+          py::doc("Name of the map: 'Town01', 'procedural:7', or the file's stem."))
+      .def_property_readonly("mends", mends_of, py::doc("Repaired faults of the file: (kind, repair, message) each."))
       .def_property_readonly(
           "origin_m", [](const Map& self) { return self.road()->origin_m; },
           py::doc("File coordinates of the map's origin, three floats in metres."))
       .def_property_readonly(
           "geo_reference", [](const Map& self) { return self.road()->geo_reference; },
-          py::doc("Of the file's coordinates, a PROJ string; may be empty."))
+          py::doc("PROJ string of the file's coordinates; may be empty."))
       .def_property_readonly(
           "facts", [](const Map& self) { return facts_of(self.road()->facts); },
           py::doc("Counts and lengths by name, as `pictura map` prints them."))
       .def(
           "arrays", [](const Map& self) { return arrays_of(*self.road()); },
-          R"(Copies of the network's geometry as NumPy arrays by name.
+          R"(Copies the network's geometry to NumPy arrays by name.
 
-lane_points float32 [points, 6]: x, y, z, heading in radians, width, arc length; lane_point_range int32 [lanes, 2] says
-whose they are. Ranges are half-open. lane_type uint8 [lanes] counts pictura.LANE_TYPES; lane_links int32 lists successors and
-predecessors; road_edges, stop_lines and building_lines float32 [n, 6] are two ends each. Lengths are metres.)")
+lane_points float32 [points, 6]: x, y, z, heading in radians, width, arc length; lane_point_range int32 [lanes, 2] is each
+lane's range of points. Ranges are half-open. lane_type uint8 [lanes] indexes pictura.LANE_TYPES; lane_links int32 lists
+successors and predecessors; road_edges, stop_lines and building_lines float32 [n, 6] are two ends each. Lengths are metres.)")
       .def(
           "geometry",
           [](Map& self, bool walls, uint64_t wall_seed, const std::string& light_heads) {
@@ -230,19 +230,18 @@ predecessors; road_edges, stop_lines and building_lines float32 [n, 6] are two e
             return Geometry{std::shared_ptr<const StaticGeometry>(compiled, &compiled->geometry)};
           },
           py::arg("walls") = true, py::arg("wall_seed") = 0, py::arg("light_heads") = name_of(MapOptions{}.light_heads),
-          "What renderers draw of it. walls: along the building lines, of heights drawn from wall_seed. light_heads: "
-          "as "
-          "Simulator takes it.")
+          R"(Returns the map's geometry for renderers. walls: adds walls along the building lines, with heights drawn from wall_seed.
+light_heads: as for Simulator.)")
       .def(
           "draw", [](const Map& self, int width_px, int height_px) { return draw(*self.road(), width_px, height_px); },
           py::arg("width_px") = 1024, py::arg("height_px") = 1024,
-          "A picture from above, uint8 [height, width, 3], north up. Sizes of 16 to 8192 px.")
+          "Draws the map from above, uint8 [height, width, 3], north up. Sizes from 16 to 8192 px.")
       .def("__repr__", [](const Map& self) {
         return fmt::format("<pictura.Map {}: {} lanes, {:.1f} km>", self.road()->name, self.road()->lanes.size(),
                            self.road()->facts.driving_lane_km);
       });
-  module.def("map_folder", map_folder, "Where towns are looked up: $PICTURA_DATA, or the user's data folder.");
-  module.def("known_towns", known_towns, "Names of the towns in the map folder, sorted.");
+  module.def("map_folder", map_folder, "Returns the folder of towns: $PICTURA_DATA, or the user's data folder.");
+  module.def("known_towns", known_towns, "Returns the names of the towns in the map folder, sorted.");
   py::list types;
   for (int i = 0; i <= static_cast<int>(LaneType::other); ++i) types.append(to_string(static_cast<LaneType>(i)));
   module.attr("LANE_TYPES") = py::tuple(types);

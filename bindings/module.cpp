@@ -18,7 +18,7 @@ PYBIND11_MODULE(_pictura, module) {
       py::exception<pictura::UsageError>(module, "UsageError", py::make_tuple(error, py::handle(PyExc_ValueError)))
           .release();
   error.attr("__doc__") = "The work failed; the message names what was expected and what came.";
-  usage_error.attr("__doc__") = "What was asked for cannot be asked for.";
+  usage_error.attr("__doc__") = "Invalid usage: an argument that does not exist or does not fit the others.";
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(thrown);
@@ -38,7 +38,7 @@ PYBIND11_MODULE(_pictura, module) {
 #endif
   module.def(
       "_hash64", [](const py::bytes& bytes) { return pictura::hash_of(std::string_view(bytes)); }, py::arg("data"),
-      "FNV-1a, with which files of the library end.");
+      "Returns the FNV-1a hash that ends files of the library.");
   module.def(
       "_removed_keys",
       [] {
@@ -47,7 +47,7 @@ PYBIND11_MODULE(_pictura, module) {
           keys.append(py::make_tuple(name, value, reason));
         return keys;
       },
-      "Removed keys of configurations, a tuple each: name, the one value that is still read, as JSON, and the reason.");
+      "Returns removed keys of configurations, a tuple each: name, the only valid value, as JSON, and the reason.");
   pictura::python::bind_arrays(module);
   pictura::python::bind_maps(module);
   pictura::python::bind_scenarios(module);

@@ -392,8 +392,8 @@ void bind_dtypes(py::module_& module) {
 
 void bind_rig(py::module_& module) {
   py::class_<Camera>(module, "Camera", R"(
-A pinhole camera on a body: x forward, y left, z up, in metres from the rig's origin. Angles are radians: yaw is
-counter-clockwise, pitch positive looks up, roll positive turns it clockwise as seen from behind.)")
+Pinhole camera on a body: x forward, y left, z up, in metres from the rig's origin. Angles are radians: yaw is
+counter-clockwise, positive pitch looks up, positive roll is clockwise as seen from behind.)")
       .def(py::init([](const std::string& name, int width_px, int height_px, std::optional<float> focal_px,
                        std::array<float, 3> position_m, float yaw_rad, float pitch_rad, float roll_rad) {
              Camera camera;
@@ -453,11 +453,11 @@ counter-clockwise, pitch positive looks up, roll positive turns it clockwise as 
     validate(rig);
     return rig;
   };
-  py::class_<Rig>(module, "Rig", "One or more cameras of any sizes on a body; their order is that of images.")
+  py::class_<Rig>(module, "Rig", "One or more cameras of any sizes on a body, in the order of images.")
       .def(py::init(made), py::arg("cameras"), "Raises pictura.Error unless there are 1 to 64 valid cameras.")
       .def_static("paper", paper_rig, py::arg("width_px") = 96, py::arg("height_px") = 54,
                   py::arg("square_pixels") = false,
-                  "The paper's four cameras: front, front left, front right and back. Sizes of 1 to 8192 px.")
+                  "Returns the paper's four cameras: front, front left, front right and back. Sizes from 1 to 8192 px.")
       .def_static("load", load_rig, py::arg("path"),
                   "Reads a rig from a TOML file. Raises pictura.Error naming file, camera and key.")
       .def_readonly("cameras", &Rig::cameras)
@@ -468,17 +468,16 @@ counter-clockwise, pitch positive looks up, roll positive turns it clockwise as 
 
 void bind_scene(py::module_& module) {
   py::class_<Scene, std::shared_ptr<Scene>>(module, "Scene", R"(
-What moves: boxes of agents and states of lights, for one or more worlds. A simulator's `scene` is what it shows at each
-call; a scene of arrays is a copy of them.)")
+Moving objects: boxes of agents and states of lights, for one or more worlds. A simulator's `scene` follows the simulator; a
+scene of arrays is a copy of the arrays.)")
       .def(
           py::init(&make_scene), py::arg("center_m"), py::arg("heading_rad"), py::arg("size_m"), py::arg("agent_class"),
           py::kw_only(), py::arg("world_begin") = py::none(), py::arg("geometry") = py::none(),
           py::arg("light_states") = py::none(), py::arg("light_begin") = py::none(),
-          R"(center_m [n, 3]: of the box's foot. heading_rad [n]. size_m [n, 3]: length, width, height. agent_class [n]: 0
-vehicle, 1 cyclist, 2 pedestrian. world_begin [worlds + 1]: the first box of each world; all are in one without it.
-geometry [worlds]: the handles that geometries were uploaded to; 0 without it. light_states: 0 off, 1 red, 2 yellow, 3
-green, 4 unknown, of all worlds; light_begin [worlds + 1]. Raises pictura.Error for other shapes; render() refuses what
-does not fit together.)")
+          R"(center_m [n, 3]: centre of the box's foot. heading_rad [n]. size_m [n, 3]: length, width, height. agent_class [n]: 0 vehicle, 1
+cyclist, 2 pedestrian. world_begin [worlds + 1]: first box of each world; default: a single world. geometry [worlds]: handles of
+uploaded geometries; default: 0. light_states: 0 off, 1 red, 2 yellow, 3 green, 4 unknown, of all worlds; light_begin [worlds +
+1]. Raises pictura.Error for other shapes; render() rejects arrays that do not fit together.)")
       .def_property_readonly(
           "num_worlds", [](const Scene& self) { return self.batch().geometry.size(); }, py::doc("Worlds."))
       .def_property_readonly(
@@ -494,7 +493,7 @@ does not fit together.)")
           py::doc(
               "uint8 [boxes, 36], read-only: `numpy.asarray(boxes).view(BOX_DTYPE)[:, 0]` has their fields by name."));
 
-  py::class_<SceneFile>(module, "SceneFile", "A scene of one TOML file: geometry, boxes, rig and views.")
+  py::class_<SceneFile>(module, "SceneFile", "Scene of one TOML file: geometry, boxes, rig and views.")
       .def(py::init(&load_scene), py::arg("path"), "Raises pictura.Error naming file, line, table and key.")
       .def_property_readonly("rig", [](const SceneFile& self) { return self.config.rig; })
       .def_property_readonly("line_floor_px", [](const SceneFile& self) { return self.config.line_floor_px; })
@@ -510,19 +509,18 @@ does not fit together.)")
 
   module.def("make_views", make_views, py::arg("origin_m"), py::arg("heading_rad"), py::kw_only(),
              py::arg("world") = py::none(), py::arg("ego_agent") = py::none(), py::arg("body_length_m") = py::none(),
-             R"(Poses of a rig, a NumPy array of VIEW_DTYPE [n].
+             R"(Returns poses of a rig, a NumPy array of VIEW_DTYPE [n].
 
-origin_m [n, 3]: of the rig, on the ground. heading_rad [n]. world [n]: 0 without it. ego_agent [n]: the box of the
-scene that is left out, -1 for none. body_length_m [n]: shorter bodies than 4.5 m draw cameras nearer to their origin.)");
+origin_m [n, 3]: origin of the rig, on the ground. heading_rad [n]. world [n]: default: 0. ego_agent [n]: box of the scene that
+is left out, -1 for none. body_length_m [n]: bodies shorter than 4.5 m move cameras nearer to their origin.)");
 }
 
 void bind_images(py::module_& module) {
   py::class_<Images, std::shared_ptr<Images>>(module, "Images", R"(
-Images of some views by each camera of a rig, in the renderer's memory, and their planes where they were asked for.
-A renderer draws into it as often as wanted.)")
+Images of views by each camera of a rig, in the renderer's memory, and their planes if requested. A renderer can draw into them
+repeatedly.)")
       .def_property_readonly(
-          "num_views", [](const Images& self) { return self.layout().num_views; },
-          py::doc("Views that it has room for."))
+          "num_views", [](const Images& self) { return self.layout().num_views; }, py::doc("Capacity in views."))
       .def_property_readonly(
           "rgb",
           [](const std::shared_ptr<Images>& self) {
@@ -539,7 +537,7 @@ A renderer draws into it as often as wanted.)")
             for (size_t i = 0; i < self->layout().blocks.size(); ++i) blocks.append(Images::block(self, i));
             return blocks;
           },
-          py::doc("One [views, cameras of that size, 3, height, width] for each distinct size."))
+          py::doc("Arrays [views, cameras of one size, 3, height, width], one for each distinct size."))
       .def(
           "camera",
           [](const std::shared_ptr<Images>& self, size_t index) {
@@ -561,8 +559,8 @@ A renderer draws into it as often as wanted.)")
             return planes;
           },
           py::arg("camera"),
-          R"(Of the front surface at each pixel's centre, [views, height, width]: depth_m float32 (infinite where nothing is),
-class_id uint8 (0: nothing), instance_id uint16 (1 + the agent's index in its world, 0: no agent). Raises pictura.Error
+          R"(Returns planes of the front surface at each pixel's centre, [views, height, width]: depth_m float32 (infinite without a
+surface), class_id uint8 (0: none), instance_id uint16 (1 + the agent's index in its world, 0: no agent). Raises pictura.Error
 for images without planes.)");
 }
 
@@ -570,7 +568,7 @@ void bind_renderer(py::module_& module) {
   py::class_<RendererInside>(module, "_RendererInside");
   py::class_<PyRenderer>(module, "Renderer", R"(
 Draws scenes: 'cpu', 'cuda', 'gl' ('gl:egl', 'gl:osmesa'), 'null', or 'auto'. One thread at a time; several renderers are
-independent. On CUDA its work is put on `stream`.)")
+independent. On CUDA its work is enqueued on `stream`.)")
       .def(
           py::init([](const std::string& name, const std::optional<Rig>& rig, const std::string& device,
                       int num_threads, float line_floor_px, bool debug_palette, const std::string& samples,
@@ -593,31 +591,31 @@ independent. On CUDA its work is put on `stream`.)")
           py::arg("num_threads") = 0, py::arg("line_floor_px") = RendererConfig{}.line_floor_px,
           py::arg("debug_palette") = false, py::arg("samples") = "1", py::arg("camera_severity") = 0.0,
           py::arg("stream") = py::none(),
-          R"(rig: the paper's without one. device: where scenes, views and images lie, 'cpu' or 'cuda:0'. num_threads: 0 for
-all. line_floor_px: the least width of a line on screen. debug_palette: tint halted and parked agents. samples: for 'gl',
-'4' (MSAA) or '4x4' (supersampling). camera_severity: of randomized cameras, 0 to 2, as in evaluations (docs/explanation/cameras.md); draws are keyed by the
-field `key` of views, which a simulator fills. stream: a cudaStream_t as int; None: the legacy default stream.
-Raises pictura.UsageError listing the names, pictura.Error where the backend cannot run here.)")
+          R"(rig: default: the paper's. device: memory of scenes, views and images, 'cpu' or 'cuda:0'. num_threads: 0 for all. line_floor_px:
+minimum width of a line on screen. debug_palette: tints halted and parked agents. samples: for 'gl', '4' (MSAA) or '4x4'
+(supersampling). camera_severity: severity of randomized cameras, 0 to 2, as in evaluations (docs/explanation/cameras.md); draws
+are keyed by the field `key` of views, which a simulator fills. stream: a cudaStream_t as int; None: the legacy default stream.
+Raises pictura.UsageError listing the names, pictura.Error if the backend cannot run here.)")
       .def_static(
           "_of", [](const RendererInside& inside) { return std::make_unique<PyRenderer>(inside.renderer); },
           py::arg("inside"))
       .def("_inside", &PyRenderer::inside)
       .def_property_readonly("name", [](PyRenderer& self) { return std::string(self.renderer().name()); })
-      .def_property_readonly("choice", &PyRenderer::choice, py::doc("What was chosen, and why."))
+      .def_property_readonly("choice", &PyRenderer::choice, py::doc("Selected renderer, with the reason."))
       .def_property_readonly("device", [](PyRenderer& self) { return name_of(self.renderer().device()); })
       .def_property_readonly("rig", [](PyRenderer& self) { return self.renderer().config().rig; })
       .def_property(
           "stream", [](const PyRenderer& self) { return reinterpret_cast<intptr_t>(self.stream().handle); },
           [](PyRenderer& self, const py::object& stream) { self.set_stream(stream_of(stream)); },
-          py::doc("The cudaStream_t that work is put on, as int; 0: the legacy default stream."))
+          py::doc("cudaStream_t of the work, as int; 0: the legacy default stream."))
       .def(
           "upload",
           [](PyRenderer& self, int handle, const Geometry& geometry) {
             self.calls().run("upload", [&] { self.renderer().upload(handle, *geometry.geometry, self.stream()); });
           },
           py::arg("handle"), py::arg("geometry"),
-          "Copies a geometry; `handle`, 0 to 65535, is what scenes name it by. Raises pictura.Error where it is "
-          "invalid.")
+          "Copies a geometry under `handle`, 0 to 65535, which scenes refer to. Raises pictura.Error if the geometry "
+          "is invalid.")
       .def(
           "make_images",
           [](PyRenderer& self, int num_views, const std::string& type, bool planes) {
@@ -625,23 +623,24 @@ Raises pictura.UsageError listing the names, pictura.Error where the backend can
                                             self.renderer().device(), self.stream());
           },
           py::arg("num_views"), py::kw_only(), py::arg("dtype") = "uint8", py::arg("planes") = false,
-          "Memory for images of so many views: 'uint8' of 0 to 255, or 'float32' or 'float16' (not on all) of 0 to 1.")
+          "Allocates images of num_views views: 'uint8' of 0 to 255, or 'float32' or 'float16' (not on all renderers) "
+          "of 0 to 1.")
       .def("render", &PyRenderer::render, py::arg("scene"), py::arg("views"), py::arg("out") = py::none(),
            py::kw_only(), py::arg("dtype") = "uint8", py::arg("planes") = false,
            R"(Draws every camera for every view. Returns `out`.
 
-views: VIEW_DTYPE [n], or a simulator's. out: Images, or for a rig of one size an array [n, cameras, 3, height, width] of
-uint8, float32, float16 or bfloat16 (0 to 255) in the renderer's memory (NumPy, torch, ...); new Images of `dtype` and
-`planes` without it. On CUDA the call returns when the work is on the stream; on the CPU ^C ends it between views. Raises
-pictura.Error naming what does not fit.)")
+views: VIEW_DTYPE [n], or a simulator's. out: Images, or for a rig of one size an array [n, cameras, 3, height, width] of uint8,
+float32, float16 or bfloat16 (0 to 255) in the renderer's memory (NumPy, torch, ...); default: new Images of `dtype` and
+`planes`. On CUDA the call returns when the work is enqueued; on the CPU ^C ends it between views. Raises pictura.Error naming
+the array that does not fit.)")
       .def(
           "visibility", &PyRenderer::visibility, py::arg("scene"), py::arg("views"), py::arg("queries"),
-          R"(How much of agents can be seen: for each query of (view, box of the scene), int [n, 2], the coverage in the view's
-images over the coverage when drawn alone, float32 [n], NaN where it is in no camera's frame.)")
+          R"(Returns the visibility of agents: for each query of (view, box of the scene), int [n, 2], the coverage in the view's images over
+the coverage when drawn alone, float32 [n]; NaN outside all cameras' frames.)")
       .def(
           "check", [](PyRenderer& self) { self.calls().run("check", [&] { self.renderer().check(self.stream()); }); },
-          "Waits for the work on the stream; raises pictura.Error for faults that a device found.");
-  module.def("renderer_names", renderer_names, "Names that this build knows.");
+          "Waits for the work on the stream; raises pictura.Error for faults found by a device.");
+  module.def("renderer_names", renderer_names, "Returns the renderers of this build.");
 }
 
 }  // namespace

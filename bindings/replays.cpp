@@ -150,8 +150,8 @@ py::dict dict_of(const ReplayMetrics& metrics) {
 
 void bind_replays(py::module_& module) {
   py::class_<PyRecorder, std::shared_ptr<PyRecorder>>(module, "Recorder", R"(
-Records a world of a simulator on the CPU from now on: every step that the simulator takes, however it is asked to, for as long as
-the recorder lives.)")
+Records a world of a simulator on the CPU from now on: every step of the simulator, by any function, as long as the recorder
+lives.)")
       .def(
           py::init([](const py::object& simulator, int world, int follow, const std::optional<Rig>& rig) {
             SimulatorInside inside = inside_of<SimulatorInside>(simulator, "Recorder", "Simulator");
@@ -165,27 +165,26 @@ the recorder lives.)")
           }),
           py::arg("simulator"), py::kw_only(), py::arg("world") = 0, py::arg("follow") = -1,
           py::arg("rig") = py::none(), py::keep_alive<1, 2>(),
-          R"(follow: the agent of that world that the page opens with, whose decisions are kept; -1: none. rig: keeps that agent's
-images of every step, drawn by the CPU renderer, without loss; without it the page draws the paper's cameras itself. Raises pictura.UsageError where there is no such world or agent and
-where the simulator is on a device.)")
+          R"(follow: agent of that world with which the page opens, and whose decisions are recorded; -1: none. rig: records that agent's
+images at every step, drawn by the CPU renderer, without loss; by default the page draws the paper's cameras itself. Raises
+pictura.UsageError if the world or agent does not exist or the simulator is on a device.)")
       .def(
           "decide",
           [](PyRecorder& self, const py::array_t<float, py::array::c_style | py::array::forcecast>& logits,
              float value) { self.decide(decision_of_python(logits, value)); },
           py::arg("logits"), py::arg("value") = 0.0f,
-          "What a policy makes of the followed agent's state, for the next step: logits [12], and its value.")
-      .def_property_readonly("num_steps", &PyRecorder::num_steps, "Steps, and resets, until now.")
+          "Records a policy's response to the followed agent's state, for the next step: logits [12], and its value.")
+      .def_property_readonly("num_steps", &PyRecorder::num_steps, "Number of steps and resets so far.")
       .def_property_readonly(
-          "metrics", [](const PyRecorder& self) { return dict_of(self.metrics()); },
-          "Counts and sums until now, by name.")
+          "metrics", [](const PyRecorder& self) { return dict_of(self.metrics()); }, "Counts and sums so far, by name.")
       .def(
           "write", &PyRecorder::write, py::arg("path"), py::arg("policy") = "",
-          R"(Ends the recording and writes it, whole or not at all: *.html, a page for any browser, or *.mcap, for Foxglove; as often
-as one likes. policy: its name in the page. Raises pictura.Error naming the file.)");
+          R"(Ends the recording and writes it, completely or not at all: *.html, a page for any browser, or *.mcap, for Foxglove. May be
+called repeatedly. policy: its name in the page. Raises pictura.Error naming the file.)");
 
   py::class_<PyLiveView, std::shared_ptr<PyLiveView>>(module, "LiveView", R"(
-A page in the browser that shows the only world of a simulator on the CPU while it runs: pause, step, pace, and drive an agent by
-the keyboard. The simulator's steps then wait until they are due: in real time, or as the page says.)")
+Page in the browser that shows the only world of a simulator on the CPU while it runs: pause, step, pace, and drive an agent
+with the keyboard. The simulator's steps then wait until they are due: in real time, or at the page's pace.)")
       .def(
           py::init([](const py::object& simulator, int port, const std::string& host_name, int follow,
                       const std::optional<Rig>& rig, bool wait_for_page) {
@@ -203,18 +202,20 @@ the keyboard. The simulator's steps then wait until they are due: in real time, 
           }),
           py::arg("simulator"), py::kw_only(), py::arg("port") = 0, py::arg("host_name") = "", py::arg("follow") = 0,
           py::arg("rig") = py::none(), py::arg("wait_for_page") = true, py::keep_alive<1, 2>(),
-          R"(port: of the loopback, 0 for a free one. host_name: if given, listens on all addresses, for pages that name this machine so.
-follow: the agent that pages open with. rig: what its images are drawn with; without it pages draw the paper's cameras themselves. wait_for_page: no step is taken before
-a page has come. Raises pictura.UsageError where this package cannot serve, pictura.Error where the port is taken.)")
+          R"(port: of the loopback, 0 for a free one. host_name: if given, listens on all addresses, for pages that address this machine by
+this name. follow: agent with which pages open. rig: cameras of its images; by default pages draw the paper's cameras
+themselves. wait_for_page: waits for the first page before the first step. Raises pictura.UsageError if this package lacks the
+server, pictura.Error if the port is in use.)")
       .def(
           "decide",
           [](PyLiveView& self, int agent, const py::array_t<float, py::array::c_style | py::array::forcecast>& logits,
              float value) { self.decide(agent, decision_of_python(logits, value)); },
           py::arg("agent"), py::arg("logits"), py::arg("value") = 0.0f,
-          "What a policy makes of an agent's state: shown while pages follow that agent, until the next call.")
-      .def_property_readonly("address", &PyLiveView::address, "Of the page, with its secret.")
-      .def_property_readonly("num_pages", &PyLiveView::num_pages, "Pages that listen.")
-      .def("close", &PyLiveView::close, "Tells pages that it is over, and lets the simulator run freely.");
+          "Shows a policy's response to an agent's state while pages follow that agent, until the next call.")
+      .def_property_readonly("address", &PyLiveView::address, "Address of the page, including its secret.")
+      .def_property_readonly("num_pages", &PyLiveView::num_pages, "Number of connected pages.")
+      .def("close", &PyLiveView::close,
+           "Tells pages that the simulation has ended, and lets the simulator run freely.");
 
   module.def(
       "write_gallery",
@@ -223,9 +224,8 @@ a page has come. Raises pictura.UsageError where this package cannot serve, pict
         return write_gallery(folder);
       },
       py::arg("folder"),
-      "Writes FOLDER/index.html over the replays that lie in it, worst first, and returns how many. Raises "
-      "pictura.Error naming a page "
-      "that is none.");
+      R"(Writes FOLDER/index.html over the replays in the folder, worst first, and returns their number. Raises pictura.Error naming a
+page that is no replay.)");
 }
 
 }  // namespace pictura::python

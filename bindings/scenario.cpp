@@ -211,17 +211,17 @@ class PySceneRecorder final : public StepObserver {
 
 void bind_scenarios(py::module_& module) {
   py::class_<RecordedScene, Map, std::shared_ptr<RecordedScene>>(module, "Scenario", R"(
-A recorded scene: a map, the tracks of all road users, and the lights as they were recorded. Immutable.
+Recorded scene: a map, the tracks of all road users, and the recorded lights. Immutable.
 
-It is the map of worlds whose agents are its tracks, in their order, from `start_step` on:
+A scenario is the map of worlds whose agents are its tracks, in their order, from `start_step` on:
 pictura.Simulator([scene], [(0, scene.num_tracks)], **scene.world()). Commands of kind 3 and the controller 'log' replay it.)")
       .def_static(
           "load", load_scene, py::arg("name"), py::kw_only(), py::arg("start_step") = 0,
-          R"(Loads a scene by name: FILE.json, FILE.bin, FILE.scenario, a file with '.tfrecord' in its name, or a folder of them; with '#7' or
-'#SCENARIO_ID' one of several.
+          R"(Loads a scene by name: FILE.json, FILE.bin, FILE.scenario, a file with '.tfrecord' in its name, or a folder of these; '#7' or
+'#SCENARIO_ID' selects one of several scenes.
 
-start_step: of the recording, at which episodes begin.
-Raises pictura.Error naming file, record and field; pictura.UsageError where there is no such scene or step.)")
+start_step: step of the recording at which episodes begin.
+Raises pictura.Error naming file, record and field; pictura.UsageError if the scene or step does not exist.)")
       .def_static(
           "from_arrays",
           [](const py::dict& tracks, const py::dict& lanes, const std::optional<py::dict>& lines,
@@ -237,82 +237,87 @@ Raises pictura.Error naming file, record and field; pictura.UsageError where the
           py::arg("lights") = py::none(), py::arg("dt_s") = 0.1, py::arg("current_step") = py::none(),
           py::arg("sdc_track") = py::none(), py::arg("id") = "", py::arg("origin_m") = py::none(),
           py::arg("tolerance_m") = 0.01,
-          R"(A scene of arrays: NumPy's, or what becomes them, in dicts. Lengths are metres, positions float64 in any frame.
+          R"(Creates a scene from arrays in dicts: NumPy arrays, or objects that convert to them. Lengths are metres, positions float64 in
+any frame.
 
-tracks: id int64 [T], type [T] (counts pictura.TRACK_TYPES), size_m [T, 3] (length, width, height), valid bool [T, S], position_m
-[T, S, 3] (of the box's foot), heading_rad [T, S], velocity_mps [T, S, 2]; states that are not valid may hold anything.
-Lines are points float64 [P, 3], one after the other, and begin int32 [N + 1], where each begins among them and where the last ends.
-lanes: points and begin along the centre, id int64 [N] of 0 or more, type [N] (pictura.LANE_TYPES); where known speed_limit_mps [N] (0:
-unknown), width_m [P] (all 0 along a lane: unknown), in_junction bool [N], entries and exits, ids of lanes one after the other,
-with entries_begin and exits_begin [N + 1], left_neighbor and right_neighbor [N], ids of lanes of the same direction, or -1. Without
-entries and exits, lanes are linked where their ends meet.
-lines: points, begin, type [N] (pictura.LINE_TYPES). edges: points and begin, the road on the left. crosswalks: points and begin of their
-outlines. stop_signs: position_m [N, 3], lanes with lanes_begin. lights: lanes with lanes_begin [L + 1], states [L, S]
-(pictura.LIGHT_STATES), and stop_lines [L, 2, 3]; without those, a line lies across the lanes' starts.
-dt_s: between states. current_step: of the present; None: 10, or the last one. sdc_track: index of the self-driving car's track.
-origin_m: of the map, about which numbers are rounded to float32; None: the middle of lanes and edges. tolerance_m: how far lines may
-deviate when they are thinned; 0 keeps all their points.
-Raises pictura.UsageError naming the array and the element, pictura.Error where what they state is no scene.)")
+tracks: id int64 [T], type [T] (index in pictura.TRACK_TYPES), size_m [T, 3] (length, width, height), valid bool [T, S],
+position_m [T, S, 3] (of the box's foot), heading_rad [T, S], velocity_mps [T, S, 2]; states that are not valid may hold
+anything.
+Polylines are points float64 [P, 3], one polyline after the other, and begin int32 [N + 1], the offset of each polyline in the
+points and the end of the last.
+lanes: points and begin along the centre, id int64 [N] of 0 or more, type [N] (pictura.LANE_TYPES); if known speed_limit_mps [N]
+(0: unknown), width_m [P] (all 0 along a lane: unknown), in_junction bool [N], entries and exits, ids of lanes one after the
+other, with entries_begin and exits_begin [N + 1], left_neighbor and right_neighbor [N], ids of lanes of the same direction, or
+-1. Without entries and exits, lanes are linked at common ends.
+lines: points, begin, type [N] (pictura.LINE_TYPES). edges: points and begin, with the road on the left. crosswalks: points and
+begin of their outlines. stop_signs: position_m [N, 3], lanes with lanes_begin. lights: lanes with lanes_begin [L + 1], states
+[L, S] (pictura.LIGHT_STATES), and stop_lines [L, 2, 3]; by default stop lines cross the begins of the lanes.
+dt_s: time between states. current_step: step of the present; None: 10, or the last step. sdc_track: index of the self-driving
+car's track. origin_m: of the map, about which numbers are rounded to float32; None: the middle of lanes and edges. tolerance_m:
+maximum deviation of lines when they are thinned; 0 keeps all points.
+Raises pictura.UsageError naming the array and the element, pictura.Error if the arrays do not form a scene.)")
       .def(
           "to_arrays", [](const RecordedScene& self) { return arrays_of_scene(*self.scenario()); },
-          R"(What pictura.Scenario.from_arrays(**arrays) makes the same scene of: its arguments by name.
+          R"(Returns the arguments by name with which pictura.Scenario.from_arrays(**arrays) creates the same scene.
 
-Not among them: who is to be predicted and who should be replayed, walls, parking spaces, signs that are no stop signs, widths of
-paint, and what a run that was saved has to replay to the bit.)")
+The arrays do not contain: tracks to predict and tracks marked for replay, walls, parking spaces, signs other than stop signs,
+widths of paint, and the data with which a saved run replays to the bit.)")
       .def(
           "starting_at",
           [](const RecordedScene& self, int32_t start_step) {
             return std::make_shared<RecordedScene>(self.scenario(), self.source(), start_step, self.recorded_lights());
           },
           py::arg("start_step"),
-          R"(The same scene, whose episodes begin at another step; nothing is copied.
+          R"(Returns the same scene with episodes that begin at another step; nothing is copied.
 
-Raises pictura.UsageError for a step that it does not have.)")
+Raises pictura.UsageError for a step that the scene does not have.)")
       .def(
           "with_recorded_lights",
           [](const RecordedScene& self) {
             return std::make_shared<RecordedScene>(self.scenario(), self.source(), self.start_step(), true);
           },
-          "The same scene, whose worlds have its lights as recorded: drawn, observed, and red ones hold.")
+          "Returns the same scene with worlds that use its recorded lights: they are drawn and observed, and red "
+          "lights count.")
       .def_property_readonly(
           "start_step", [](const RecordedScene& self) { return self.start_step(); },
-          py::doc("Of the recording, at which episodes begin."))
+          py::doc("Step of the recording at which episodes begin."))
       .def_property_readonly(
           "id", [](const RecordedScene& self) { return self.scenario()->id; },
-          py::doc("The recording's, such as '637f20cafde22ff8'; may be empty."))
+          py::doc("Id of the recording, such as '637f20cafde22ff8'; may be empty."))
       .def_property_readonly(
           "format", [](const RecordedScene& self) { return self.scenario()->format; },
-          py::doc("'womd', 'gpudrive', 'pufferdrive v1', ..."))
+          py::doc("File format: 'womd', 'gpudrive', 'pufferdrive v1', ..."))
       .def_property_readonly(
           "num_tracks", [](const RecordedScene& self) { return self.scenario()->tracks.size(); },
-          py::doc("How many agents its worlds have."))
+          py::doc("Number of agents of its worlds."))
       .def_property_readonly(
           "num_steps", [](const RecordedScene& self) { return self.scenario()->num_steps; },
-          py::doc("States of each track, from the first one of the recording on."))
+          py::doc("Number of states of each track, from the recording's first step on."))
       .def_property_readonly(
           "dt_s", [](const RecordedScene& self) { return self.scenario()->dt_s; }, py::doc("Seconds between states."))
       .def_property_readonly(
           "current_step", [](const RecordedScene& self) { return self.scenario()->current_step; },
-          py::doc("The last step of the history that a predictor is given."))
+          py::doc("Last step of the history that predictors are given."))
       .def_property_readonly(
           "sdc_track",
           [](const RecordedScene& self) -> std::optional<int32_t> {
             const int32_t track = self.scenario()->sdc_track;
             return track < 0 ? std::nullopt : std::optional(track);
           },
-          py::doc("The self-driving car's track; None where the file does not say."))
+          py::doc("Track of the self-driving car; None if the file does not mark it."))
       .def_property_readonly(
           "facts", [](const RecordedScene& self) { return facts_of_scene(*self.scenario()); },
           py::doc(
               "Counts and lengths of the map, and counts of tracks and lights, by name, as `pictura map` prints them."))
       .def_property_readonly(
           "notes", [](const RecordedScene& self) { return notes_of(*self.scenario()); },
-          py::doc("What was left out or changed on the way from the file: (what, how often, the first place) each."))
+          py::doc("Elements that were dropped or changed when the file was converted: (what, how often, first place) "
+                  "each."))
       .def(
           "tracks", [](const RecordedScene& self) { return tracks_of_scene(*self.scenario()); },
-          R"(Copies of the tracks as NumPy arrays by name.
+          R"(Copies the tracks to NumPy arrays by name.
 
-id int64 [tracks], as in the file; type uint8 [tracks] counts pictura.TRACK_TYPES; size_m float32 [tracks, 3]: length, width,
+id int64 [tracks], as in the file; type uint8 [tracks] indexes pictura.TRACK_TYPES; size_m float32 [tracks, 3]: length, width,
 height. valid bool [tracks, steps]; position_m float32 [tracks, steps, 3], centre of the box's foot in the map's frame;
 heading_rad [tracks, steps]; velocity_mps [tracks, steps, 2]: 0 where not valid.)")
       .def(
@@ -322,16 +327,16 @@ heading_rad [tracks, steps]; velocity_mps [tracks, steps, 2]: 0 where not valid.
             return mask_of(absent ? tracks_of(scenario, words) : tracks_of(scenario, words, self.start_step()));
           },
           py::arg("words"), py::kw_only(), py::arg("absent") = false,
-          R"(uint8 [tracks]: 1 for the tracks that words with commas between them name: self (the self-driving car), vehicles (the
-others), others (who is no vehicle), all, tracks_to_predict, objects_of_interest, and ids of tracks.
+          R"(Returns uint8 [tracks]: 1 for the tracks that comma-separated words select: self (the self-driving car), vehicles (the others),
+others (all non-vehicles), all, tracks_to_predict, objects_of_interest, and ids of tracks.
 
-absent: also those that are not there at start_step. Raises pictura.UsageError for another word, and where nobody is left.)")
+absent: includes tracks that are absent at start_step. Raises pictura.UsageError for another word, and if no track remains.)")
       .def(
           "world", world_of,
-          R"(Options by which pictura.Simulator([scene], worlds, **options) makes its worlds: the recording's time step, an episode
-as long as what is left of it, no walls, no parked cars, no early end, plain dynamics.
+          R"(Returns the options with which pictura.Simulator([scene], worlds, **options) creates the scene's worlds: the recording's time
+step, an episode as long as the rest of the recording, no walls, no parked cars, no early end, plain dynamics.
 
-Options given are kept but for these, as those of a pictura.PolicySession: scene.world(**session.training_world()).)")
+All other given options are kept, for instance those of a pictura.PolicySession: scene.world(**session.training_world()).)")
       .def(
           "save",
           [](const RecordedScene& self, const std::string& path) {
@@ -339,7 +344,7 @@ Options given are kept but for these, as those of a pictura.PolicySession: scene
             write_scene_file(path, *self.scenario());
           },
           py::arg("path"),
-          R"(Writes it, whole or not at all, as *.scenario, which load() reads again to the bit.
+          R"(Writes the scene, completely or not at all, as *.scenario, which load() reads back to the bit.
 
 Raises pictura.UsageError for another ending, pictura.Error naming the file.)")
       .def(
@@ -348,14 +353,16 @@ Raises pictura.UsageError for another ending, pictura.Error naming the file.)")
             return draw(*self.road(), width_px, height_px, self.scenario().get(), self.start_step());
           },
           py::arg("width_px") = 1024, py::arg("height_px") = 1024,
-          R"(A picture from above, uint8 [height, width, 3], north up: the ways of all tracks, and who is there at start_step.
+          R"(Draws the scene from above, uint8 [height, width, 3], north up: the paths of all tracks, and the road users at start_step.
 
-Sizes of 16 to 8192 px.)")
-      .def("inverse_actions", inverse_actions_of, py::arg("num_threads") = 0,
-           R"(The actions by which the simulator's dynamics follow the recording most closely, as NumPy arrays by name.
+Sizes from 16 to 8192 px.)")
+      .def(
+          "inverse_actions", inverse_actions_of, py::arg("num_threads") = 0,
+          R"(Computes the actions with which the simulator's dynamics follow the recording most closely, as NumPy arrays by name.
 
-actions int32, is_followed bool and error_m float32 [tracks, steps from start_step on]: for the step after each state, whether
-there is a state to start from and one to reach, and how far from the recorded place it leads. num_threads: 0 for all.)")
+actions int32, is_followed bool and error_m float32 [tracks, steps from start_step on]: for the step after each state the
+action, whether its start and end states are recorded, and the distance of its end from the recorded position. num_threads: 0
+for all.)")
       .def("__repr__", [](const RecordedScene& self) {
         const Scenario& scenario = *self.scenario();
         return fmt::format("<pictura.Scenario {} ({}): {} tracks, {} steps, from step {}>", scenario.id,
@@ -363,8 +370,8 @@ there is a state to start from and one to reach, and how far from the recorded p
       });
 
   py::class_<PySceneRecorder, std::shared_ptr<PySceneRecorder>>(module, "SceneRecorder", R"(
-Records the present episode of a world of a simulator on the CPU as a scene: every step from now on, however it is asked for, for as
-long as the recorder lives.)")
+Records the present episode of a world of a simulator on the CPU as a scene: every step from now on, by any function, as long as
+the recorder lives.)")
       .def(py::init([](const py::object& simulator, int world) {
              auto inside = inside_of<SimulatorInside>(simulator, "SceneRecorder", "Simulator");
              const auto watch = inside.watch;
@@ -373,15 +380,15 @@ long as the recorder lives.)")
              return recorder;
            }),
            py::arg("simulator"), py::kw_only(), py::arg("world") = 0, py::keep_alive<1, 2>(),
-           "Raises pictura.UsageError where there is no such world and where the simulator is on a device.")
-      .def_property_readonly("num_steps", &PySceneRecorder::num_steps, "Steps until now.")
+           "Raises pictura.UsageError if the world does not exist or the simulator is on a device.")
+      .def_property_readonly("num_steps", &PySceneRecorder::num_steps, "Number of steps so far.")
       .def(
           "scenario", &PySceneRecorder::scenario, py::kw_only(), py::arg("id") = "", py::arg("self_agent") = -1,
-          R"(The pictura.Scenario of what was driven until now: controlled agents and parked cars that were there as tracks, with the
-number of their box in the world as id, and lights as recorded ones.
+          R"(Returns the pictura.Scenario recorded so far: controlled agents and parked cars as tracks, with the number of their box in the
+world as id, and lights as recorded lights.
 
-self_agent: of the world, whose track becomes the self-driving car's; -1: nobody's. Raises pictura.UsageError for one that was
-never there.)");
+self_agent: agent of the world whose track becomes the self-driving car's; -1: none. Raises pictura.UsageError for an agent that
+was never present.)");
   py::list types;
   for (int i = 0; i <= static_cast<int>(TrackType::other); ++i) types.append(to_string(static_cast<TrackType>(i)));
   module.attr("TRACK_TYPES") = py::tuple(types);

@@ -79,7 +79,7 @@ py::dict report_of(const SpawnReport& report) {
 
 void bind_step_result(py::module_& module) {
   py::class_<StepArraysOfPython>(module, "StepResult", R"(
-What a step returns, one element a slot, in the simulator's memory: every step writes the same arrays again.)")
+Results of a step, one element per slot, in the simulator's memory; every step overwrites the same arrays.)")
       .def_readonly("reward", &StepArraysOfPython::reward, "float32 [slots].")
       .def_readonly("terminated", &StepArraysOfPython::terminated,
                     "bool [slots]: an infraction ended the agent's episode in this step.")
@@ -88,10 +88,11 @@ What a step returns, one element a slot, in the simulator's memory: every step w
       .def_readonly("valid", &StepArraysOfPython::valid,
                     "bool [slots]: the agent was active when the step began: learn from it.")
       .def_readonly("refusal", &StepArraysOfPython::refusal,
-                    "uint8 [slots]: why the agent is absent from this episode: 1 no place, 2 all taken; 0: it is not.")
+                    "uint8 [slots]: reason why the agent is absent from this episode: 1 no place, 2 all places taken; "
+                    "0: it is present.")
       .def_readonly("reward_terms", &StepArraysOfPython::reward_terms,
-                    "float32 [slots, 11]: of which the reward is made, in the order of pictura.REWARD_TERMS.")
-      .def_readonly("distance_m", &StepArraysOfPython::distance_m, "float32 [slots]: driven in this step.");
+                    "float32 [slots, 11]: terms of the reward, in the order of pictura.REWARD_TERMS.")
+      .def_readonly("distance_m", &StepArraysOfPython::distance_m, "float32 [slots]: distance driven in this step.");
 }
 
 struct SimulatorArguments {
@@ -119,16 +120,16 @@ void define_construction(py::class_<PySimulator>* simulator) {
         return std::make_unique<PySimulator>(arguments.executor, arguments.config, arguments.maps,
                                              worlds_of(arguments.worlds), stream_of(arguments.stream));
       },
-      R"(maps: of pictura.Map. worlds: of (index of the map, agents), or (map, agents, global world), which keys the
-world's random numbers. executor: 'cpu', 'cuda' or 'auto'. device: where observations and scenes are wanted. num_threads: of
-the host, 0 for all. reset_inactive_fraction: a world resets when this part of its agents is inactive; more than 1: never.
-stagger_episodes: the first episode of each world ends after a drawn number of steps. light_cycles: 'phases', those of a junction
-take turns, or 'independent', each light cycles alone. reset_at_standstill: accelerations end where the speed changes its sign.
-blind, phantom_braking, inattentive: shares of agents that are impaired, drawn per episode, and never valid.
-light_heads: 'as_mapped', or 'visible': heads beside or before their stop line stand 10 m beyond it, 3.5 m high.
-conditioning: a number or (low, high) by name, see CONDITIONING_NAMES; the paper's ranges otherwise. stream: a cudaStream_t
-as int; None: the legacy default stream. The other defaults are the paper's training world.
-Raises pictura.UsageError naming what cannot be simulated, pictura.Error where there is no device.)");
+      R"(maps: list of pictura.Map. worlds: list of (index of the map, agents), or (map, agents, global world), which keys the world's
+random numbers. executor: 'cpu', 'cuda' or 'auto'. device: memory of observations and scenes. num_threads: of the host, 0 for
+all. reset_inactive_fraction: a world resets when this fraction of its agents is inactive; more than 1: never. stagger_episodes:
+the first episode of each world ends after a drawn number of steps. light_cycles: 'phases' (the lights of a junction take turns)
+or 'independent' (each light has its own cycle). reset_at_standstill: accelerations end when the speed changes its sign. blind,
+phantom_braking, inattentive: shares of impaired agents, drawn per episode, which are never valid. light_heads: 'as_mapped', or
+'visible': heads beside or before their stop line are moved 10 m beyond it, 3.5 m high. conditioning: a number or (low, high) by
+name, see CONDITIONING_NAMES; default: the paper's ranges. stream: a cudaStream_t as int; None: the legacy default stream. The
+other defaults are the paper's training world. Raises pictura.UsageError naming an option that cannot be simulated,
+pictura.Error if the device does not exist.)");
   (*simulator)
       .def("_inside",
            [](PySimulator& self) {
@@ -139,7 +140,7 @@ Raises pictura.UsageError naming what cannot be simulated, pictura.Error where t
              return inside;
            })
       .def_property_readonly("name", [](PySimulator& self) { return std::string(self.simulator().name()); })
-      .def_property_readonly("choice", &PySimulator::choice, py::doc("What was chosen for 'auto', and why."))
+      .def_property_readonly("choice", &PySimulator::choice, py::doc("Executor selected for 'auto', with the reason."))
       .def_property_readonly("device", [](PySimulator& self) { return name_of(self.simulator().device()); })
       .def_property_readonly("maps", &PySimulator::maps)
       .def_property_readonly(
@@ -160,7 +161,7 @@ Raises pictura.UsageError naming what cannot be simulated, pictura.Error where t
       .def_property(
           "stream", [](const PySimulator& self) { return reinterpret_cast<intptr_t>(self.stream().handle); },
           [](PySimulator& self, const py::object& stream) { self.set_stream(stream_of(stream)); },
-          py::doc("The cudaStream_t that work is put on, as int; 0: the legacy default stream."));
+          py::doc("cudaStream_t of the work, as int; 0: the legacy default stream."));
 }
 
 // Defines methods that change the state, and queries of observations.
@@ -171,38 +172,37 @@ void define_steps(py::class_<PySimulator>* simulator) {
           [](PySimulator& self, const std::vector<std::shared_ptr<Map>>& maps, const py::sequence& worlds,
              uint64_t seed) { self.set_worlds(maps, worlds_of(worlds), seed); },
           py::arg("maps"), py::arg("worlds"), py::arg("seed") = 0,
-          R"(Other worlds on other maps, at the start of their first episodes: what a new simulator would be. Take the arrays
-anew: those of before stay valid memory, which later calls may write. Raises as the constructor does.)")
+          R"(Replaces the worlds by other worlds on other maps, at the start of their first episodes, as in a new simulator. Get the arrays
+again afterwards: previous arrays remain valid memory, which later calls may write. Raises as the constructor does.)")
       .def(
           "reset", &PySimulator::reset, py::arg("world_mask") = py::none(), py::arg("seed") = py::none(),
-          R"(Starts new episodes. world_mask: uint8 or bool [worlds] in the simulator's memory, the worlds that start; all without
-it. seed: theirs from now on; the simulator's own without it. Raises pictura.Error for another array.)")
+          R"(Starts new episodes. world_mask: uint8 or bool [worlds] in the simulator's memory, the worlds to reset; default: all. seed:
+their seed from now on; default: the simulator's own. Raises pictura.Error for another array.)")
       .def(
           "step", &PySimulator::step, py::arg("actions"),
-          R"(Advances every world by one step. actions: int32 [slots] in the simulator's memory, each in [0, 12): 3 times the
-longitudinal jerk's index (-15, -4, 0, 4 m/s3) plus the lateral one's (-4, 0, 4 m/s3, left positive). Those of inactive agents
-are ignored. A world whose last step ended its episode starts the next one instead, and its slots are not valid.
-Returns the StepResult. Raises pictura.Error, which leaves the state as it was, for another array and for actions out of
-range.)")
+          R"(Advances every world by one step. actions: int32 [slots] in the simulator's memory, each in [0, 12): 3 times the index of the
+longitudinal jerk (-15, -4, 0, 4 m/s3) plus the index of the lateral jerk (-4, 0, 4 m/s3, left positive). Actions of inactive
+agents are ignored. A world whose last step ended its episode starts the next one instead, and its slots are not valid. Returns
+the StepResult. Raises pictura.Error, which leaves the state unchanged, for another array and for actions out of range.)")
       .def(
           "step_commands", &PySimulator::step_commands, py::arg("commands"),
-          R"(The same by commands, COMMAND_DTYPE [slots]: kind 0 an action, 1 a kinematic state, 2 absence from the episode,
-3 as recorded, in worlds of a pictura.Scenario.)")
+          R"(Advances every world by one step with commands, COMMAND_DTYPE [slots]: kind 0 an action, 1 a kinematic state, 2 absence from the
+episode, 3 as recorded, in worlds of a pictura.Scenario. Returns and raises as step() does.)")
       .def(
           "set_state", &PySimulator::set_state, py::arg("slots"), py::arg("fields"),
-          R"(Gives fields of chosen agents other values. slots: int32 [n], each once. fields: arrays [n] or [n, per agent] by the
-names of AGENT_FIELDS, of their types, all in the simulator's memory. Lane, height, box, view and observation follow. Raises
-pictura.Error naming what is wrong; on CUDA values are checked as in step().)")
+          R"(Sets fields of agents. slots: int32 [n], each once. fields: arrays [n] or [n, per agent] by the names of AGENT_FIELDS, of their
+types, all in the simulator's memory. Lane, height, box, view and observation are updated. Raises pictura.Error naming an
+invalid value; on CUDA values are checked as in step().)")
       .def(
           "observe", &PySimulator::observe, py::arg("queries"), py::arg("hidden") = py::none(),
           py::arg("inserted") = py::none(), py::kw_only(), py::arg("out") = py::none(),
-          R"(What chosen slots would observe if boxes of their worlds were not there, and others were. Partners alone differ;
-the state stays as it is. pictura.make_queries() makes the arguments:
-queries: QUERY_DTYPE [n], or uint8 [n, 24]: a slot, its ranges [begin, end) of the lists `hidden` and `inserted`, and leaves_gaps:
-0: who was too far to be among the partners comes in for who is hidden; 1: rows of zeros stay in their place.
+          R"(Returns the observations of slots if boxes of their worlds were absent, and other boxes present. Only partners differ; the state
+is unchanged. pictura.make_queries() creates the arguments:
+queries: QUERY_DTYPE [n], or uint8 [n, 24]: a slot, its ranges [begin, end) of the lists `hidden` and `inserted`, and
+leaves_gaps. 0: hidden partners are replaced by boxes that were too far away; 1: rows of zeros replace them.
 hidden: int32 [m], indices into the scene's boxes. inserted: INSERTED_DTYPE [k], or uint8 [k, 40]: a box of BOX_DTYPE and its
-speed_mps. out: arrays of the caller by the names of `observations`, with n in place of the slots; new ones without it. All lie
-in the simulator's memory. Returns out, arrays by name. Raises pictura.Error naming what is wrong with an array or a query, and
+speed_mps. out: arrays of the caller by the names of `observations`, with n in place of the slots; default: new arrays. All
+arrays are in the simulator's memory. Returns out, arrays by name. Raises pictura.Error naming an invalid array or query, and
 then writes nothing; on CUDA queries are checked as in step().)");
 }
 
@@ -215,14 +215,14 @@ void define_arrays(py::class_<PySimulator>* simulator) {
                   "boundaries, controls, walls, set_counts, conditioning, waypoints."))
       .def_property_readonly("state", &PySimulator::state,
                              py::doc("Every field of the agents by name, read-only, [slots] or [slots, per agent]."))
-      .def_property_readonly("scene", &PySimulator::scene, py::doc("What renderers draw, of all worlds."))
+      .def_property_readonly("scene", &PySimulator::scene, py::doc("Scene of all worlds, for renderers."))
       .def_property_readonly(
           "views", [](PySimulator& self) { return self.lend_structs<View>(self.simulator().views(), "views"); },
-          py::doc("One view a slot: uint8 [slots, 60] that render() takes; its fields are VIEW_DTYPE's."))
+          py::doc("One view per slot: uint8 [slots, 60] for render(); its fields are those of VIEW_DTYPE."))
       .def_property_readonly(
           "episode_step",
           [](PySimulator& self) { return self.lend_span(self.simulator().episode_step(), "episode_step"); },
-          py::doc("int32 [worlds]: steps done in the present episode."))
+          py::doc("int32 [worlds]: completed steps in the present episode."))
       .def_property_readonly(
           "episode_index",
           [](PySimulator& self) { return self.lend_span(self.simulator().episode_index(), "episode_index"); },
@@ -250,27 +250,28 @@ void define_totals_and_copies(py::class_<PySimulator>* simulator) {
             return report_of(
                 self.calls().run("spawn_report", [&] { return self.simulator().spawn_report(self.stream()); }));
           },
-          "What became of the agents that were asked for: counts by name. Waits for the stream.")
+          "Returns counts by name of requested, spawned, refused, entered and left agents, and of parked cars. Waits "
+          "for the stream.")
       .def(
           "totals",
           [](PySimulator& self) {
             return dict_of(
                 self.calls().run("totals", [&] { return SimulatorTotals(self.simulator().totals(self.stream())); }));
           },
-          "Counts and sums since construction by name; reward_terms is a dict. Waits for the stream.")
+          "Returns counts and sums since construction by name; reward_terms is a dict. Waits for the stream.")
       .def(
           "state_hash",
           [](PySimulator& self) {
             return self.calls().run("state_hash", [&] { return self.simulator().state_hash(self.stream()); });
           },
-          "64 bits over the whole state, equal on every executor. Waits for the stream.")
+          "Returns 64 bits over the complete state, equal on every executor. Waits for the stream.")
       .def(
           "save",
           [](PySimulator& self) {
             const auto bytes = self.calls().run("save", [&] { return self.simulator().save(self.stream()); });
             return py::bytes(reinterpret_cast<const char*>(bytes.data()), bytes.size());
           },
-          "The whole state as bytes, for exact resume on any executor. Waits for the stream.")
+          "Returns the complete state as bytes, for exact resume on any executor. Waits for the stream.")
       .def(
           "restore",
           [](PySimulator& self, const py::bytes& saved) {
@@ -280,24 +281,24 @@ void define_totals_and_copies(py::class_<PySimulator>* simulator) {
                   Span<const uint8_t>(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()), self.stream());
             });
           },
-          py::arg("saved"), "Back. Raises pictura.Error naming what differs.")
+          py::arg("saved"), "Restores a saved state. Raises pictura.Error naming the difference.")
       .def(
           "restore",
           [](PySimulator& self, const Snapshot& snapshot) {
             PICTURA_CHECK(snapshot.of == self.shared(), "restore: expected a snapshot of this simulator");
             self.calls().run("restore", [&] { self.simulator().restore(*snapshot.state, self.stream()); });
           },
-          py::arg("snapshot"), "To a snapshot of these worlds; on CUDA without waiting.")
+          py::arg("snapshot"), "Restores a snapshot of these worlds; on CUDA without waiting.")
       .def(
           "snapshot",
           [](PySimulator& self) {
             return std::make_unique<Snapshot>(Snapshot{
                 self.shared(), self.calls().run("snapshot", [&] { return self.simulator().snapshot(self.stream()); })});
           },
-          "A copy of the state in the simulator's memory.")
+          "Returns a copy of the state in the simulator's memory.")
       .def(
           "check", [](PySimulator& self) { self.calls().run("check", [&] { self.simulator().check(self.stream()); }); },
-          "Waits for the work on the stream; raises pictura.Error for what a device found wrong.");
+          "Waits for the work on the stream; raises pictura.Error for errors found by a device.");
 }
 
 // Defines a picture, and loops in C++.
@@ -306,11 +307,12 @@ void define_drawing_and_loops(py::class_<PySimulator>* simulator) {
       .def(
           "draw", &PySimulator::draw, py::arg("world") = 0, py::arg("agent") = -1, py::kw_only(),
           py::arg("width_px") = 640, py::arg("height_px") = 480, py::arg("width_m") = 150.0f,
-          R"(A world from above, uint8 [height, width, 3], on the CPU. agent: the one of that world in the middle, with its
-waypoints; -1 shows the whole map. width_m: what is shown around it.)")
+          R"(Draws a world from above, uint8 [height, width, 3], on the CPU. agent: agent of that world in the middle, shown with its
+waypoints; -1 shows the whole map. width_m: width of the shown surroundings.)")
       .def(
           "run", [](PySimulator& self, PyController& controller, int64_t steps) { self.run(controller, steps); },
-          py::arg("controller"), py::arg("steps"), "Steps with a controller for all agents. ^C ends it between steps.")
+          py::arg("controller"), py::arg("steps"),
+          "Takes steps with a controller for all agents. ^C ends the call between steps.")
       .def(
           "time_steps",
           [](PySimulator& self, const py::object& actions, int64_t steps) {
@@ -322,8 +324,8 @@ waypoints; -1 shows the whole map. width_m: what is shown around it.)")
             return std::chrono::duration<double>(Clock::now() - begin).count();
           },
           py::arg("actions"), py::arg("steps"),
-          "Seconds that so many steps with the same actions take from C++, for measurements: what step() adds is "
-          "Python's.")
+          R"(Returns the seconds of this number of steps with the same actions, called from C++, for measurements of Python's overhead in
+step().)")
       .def_property_readonly(
           "geometries",
           [](PySimulator& self) {
@@ -335,7 +337,7 @@ waypoints; -1 shows the whole map. width_m: what is shown around it.)")
             }
             return geometries;
           },
-          py::doc("Of its maps, by the handles that its scene names them by."));
+          py::doc("Geometries of its maps, by their handles in the scene."));
 }
 
 void bind_functions(py::module_& module) {
@@ -349,8 +351,8 @@ void bind_functions(py::module_& module) {
         return worlds;
       },
       py::arg("seed"), py::arg("num_slots"), py::arg("min_agents"), py::arg("max_agents"), py::arg("num_maps"),
-      "Worlds of sizes drawn from U{min, max} until they fill the slots; maps are taken in turn.");
-  module.def("simulator_names", simulator_names, "Executors that this build knows.");
+      "Draws worlds of sizes from U{min, max} until they fill the slots; they use the maps in turn.");
+  module.def("simulator_names", simulator_names, "Returns the executors of this build.");
 }
 
 }  // namespace
@@ -358,20 +360,20 @@ void bind_functions(py::module_& module) {
 void bind_simulator(py::module_& module) {
   bind_names(module);
   bind_step_result(module);
-  py::class_<Snapshot>(module, "Snapshot", "A state that a simulator keeps in its own memory.");
+  py::class_<Snapshot>(module, "Snapshot", "State that a simulator keeps in its own memory.");
 
   // All classes are declared first, so that signatures can name them.
   py::class_<SimulatorInside>(module, "_SimulatorInside");
   py::class_<ControllerInside>(module, "_ControllerInside");
   py::class_<PyController> controller_class(module, "Controller", R"(
-Who drives in one simulator on the CPU: 'lane' (the lane keeper), 'idm_lanes' (along lanes, behind others), 'idle' or 'random', in
-worlds of recorded scenes 'log', 'inverse' or 'idm', or a policy of a pictura.PolicySession, or several of them.)");
+Driver in one simulator on the CPU: 'lane' (the lane keeper), 'idm_lanes' (along lanes, behind others), 'idle' or 'random', in
+worlds of recorded scenes 'log', 'inverse' or 'idm', a policy of a pictura.PolicySession, or several of these.)");
   py::class_<PySimulator> simulator_class(module, "Simulator", R"(
-Many worlds, each on one map, stepped together. Arrays have one element a slot: the controlled agents of world 0, then those
+Many worlds, each on one map, stepped together. Arrays have one element per slot: the controlled agents of world 0, then those
 of world 1, and so on. Executors 'cpu' and 'cuda' give the same bits.
 
-One thread at a time; several simulators are independent. The GIL is released while C++ works. On CUDA its work is put on
-`stream`, calls return before it is done, and what is wrong with values is raised by check() or a later call.)");
+One thread at a time; several simulators are independent. The GIL is released while C++ works. On CUDA its work is enqueued on
+`stream`, calls return before it is done, and invalid values raise an error in check() or a later call.)");
   define_construction(&simulator_class);
   define_steps(&simulator_class);
   define_arrays(&simulator_class);

@@ -14,21 +14,21 @@ class Error(RuntimeError):
     """
 class UsageError(Error, ValueError):
     """
-    What was asked for cannot be asked for.
+    Invalid usage: an argument that does not exist or does not fit the others.
     """
 class Array:
     """
-    An array in the library's memory, lent without a copy.
+    Array in the library's memory, lent without a copy.
     
-    NumPy takes it by `numpy.asarray(array)` where it is on the CPU; `numpy.from_dlpack`, `torch.from_dlpack`, JAX and CuPy take
-    it on any device. The memory lives for as long as any of them does, also when its simulator or renderer is gone. Its
+    NumPy accesses it with `numpy.asarray(array)` if it is on the CPU; `numpy.from_dlpack`, `torch.from_dlpack`, JAX and CuPy access
+    it on any device. The memory lives as long as any of these references, even after its simulator or renderer is gone. Its
     contents change with the calls that write it.
     """
     def __array__(self, dtype: typing.Any = None, copy: typing.Any = None) -> typing.Any:
         ...
     def __dlpack__(self, *, stream: typing.Any = None, max_version: typing.Any = None, dl_device: typing.Any = None, copy: typing.Any = None) -> typing.Any:
         """
-        DLPack's protocol, versioned where max_version is (1, 0) or later. Raises BufferError for what cannot be lent.
+        DLPack's protocol, versioned if max_version is (1, 0) or later. Raises BufferError if the array cannot be lent.
         """
     def __dlpack_device__(self) -> tuple[int, int]:
         """
@@ -36,7 +36,7 @@ class Array:
         """
     def __getitem__(self, arg0: typing.Any) -> typing.Any:
         """
-        As of the NumPy view.
+        Indexes the NumPy view.
         """
     def __len__(self) -> int:
         ...
@@ -46,11 +46,11 @@ class Array:
         ...
     def numpy(self) -> numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]:
         """
-        A NumPy view. Raises TypeError where the array is not on the CPU.
+        Returns a NumPy view. Raises TypeError if the array is not on the CPU.
         """
     def torch(self) -> typing.Any:
         """
-        A torch tensor over the same memory. Imports torch.
+        Returns a torch tensor over the same memory. Imports torch.
         """
     @property
     def device(self) -> str:
@@ -60,12 +60,12 @@ class Array:
     @property
     def dtype(self) -> str:
         """
-        NumPy's name of the element type, as 'float32'.
+        NumPy's name of the element type, for instance 'float32'.
         """
     @property
     def read_only(self) -> bool:
         """
-        Whether it must not be written.
+        Whether the array is read-only.
         """
     @property
     def shape(self) -> tuple:
@@ -75,56 +75,56 @@ class Array:
     @property
     def strides(self) -> tuple:
         """
-        In elements, a tuple of int.
+        Strides in elements, a tuple of int.
         """
 class Geometry:
     """
-    What renderers draw of a map: strips on the road, walls, heads of lights.
+    Geometry of a map for renderers: strips on the road, walls, light heads.
     """
     def __init__(self, lines: collections.abc.Sequence[tuple[typing.Annotated[numpy.typing.ArrayLike, numpy.float32], typing.SupportsFloat | typing.SupportsIndex, typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]]] = [], walls: typing.Annotated[numpy.typing.ArrayLike, numpy.float32] = ...) -> None:
         """
-        A geometry of one's own.
+        Creates a custom geometry.
         
-        lines: of (points [n, 3] in metres, width in metres, colour of three numbers in [0, 1]).
+        lines: list of (points [n, 3] in metres, width in metres, colour of three numbers in [0, 1]).
         walls: float [n, 7]: both ends of the foot, in metres, and the height.
-        Raises pictura.Error for other shapes; a renderer refuses what is not finite.
+        Raises pictura.Error for other shapes; renderers reject numbers that are not finite.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
     @property
     def num_lights(self) -> int:
         """
-        Light states that a world on it has.
+        Number of light states of a world with this geometry.
         """
     @property
     def num_strips(self) -> int:
         """
-        Straight pieces of lines.
+        Number of straight pieces of lines.
         """
     @property
     def num_walls(self) -> int:
         """
-        Faces of walls.
+        Number of wall faces.
         """
 class Map:
     """
-    A road network: lanes, markings, edges, lights. Immutable; simulators and renderers share it.
+    Road network: lanes, markings, edges, lights. Immutable; simulators and renderers share it.
     
-    Positions are metres in the map's frame, z up; `origin_m` is its place in the file's coordinates.
+    Positions are metres in the map's frame, z up; `origin_m` is the frame's origin in the file's coordinates.
     """
     @staticmethod
     def from_text(text: str, source: str = 'text', *, strict: bool = False) -> Map:
         """
-        Parses the text of an OpenDRIVE file; `source` names it in messages. Raises as load() does.
+        Parses the text of an OpenDRIVE file; `source` is its name in messages. Raises as load() does.
         """
     @staticmethod
     def load(name: str, *, strict: bool = False, chord_error_m: typing.SupportsFloat | typing.SupportsIndex = 0.019999999552965164) -> Map:
         """
         Loads a map by name: an OpenDRIVE file (.xodr), a town of the map folder, 'procedural:SEED', or 'city:SEED'.
         
-        Faults that have one sensible meaning are mended, as `mends` says; strict: refuse them too. chord_error_m: how far sampled curves
-        may lie from true ones.
-        Raises pictura.Error naming file, line and element; pictura.UsageError where there is no such map.
+        Faults with a single sensible meaning are repaired and listed in `mends`. strict: rejects such faults too. chord_error_m:
+        maximum distance of sampled curves from the true curves.
+        Raises pictura.Error naming file, line and element; pictura.UsageError if the map does not exist.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
@@ -132,19 +132,20 @@ class Map:
         ...
     def arrays(self) -> dict:
         """
-        Copies of the network's geometry as NumPy arrays by name.
+        Copies the network's geometry to NumPy arrays by name.
         
-        lane_points float32 [points, 6]: x, y, z, heading in radians, width, arc length; lane_point_range int32 [lanes, 2] says
-        whose they are. Ranges are half-open. lane_type uint8 [lanes] counts pictura.LANE_TYPES; lane_links int32 lists successors and
-        predecessors; road_edges, stop_lines and building_lines float32 [n, 6] are two ends each. Lengths are metres.
+        lane_points float32 [points, 6]: x, y, z, heading in radians, width, arc length; lane_point_range int32 [lanes, 2] is each
+        lane's range of points. Ranges are half-open. lane_type uint8 [lanes] indexes pictura.LANE_TYPES; lane_links int32 lists
+        successors and predecessors; road_edges, stop_lines and building_lines float32 [n, 6] are two ends each. Lengths are metres.
         """
     def draw(self, width_px: typing.SupportsInt | typing.SupportsIndex = 1024, height_px: typing.SupportsInt | typing.SupportsIndex = 1024) -> numpy.typing.NDArray[numpy.uint8]:
         """
-        A picture from above, uint8 [height, width, 3], north up. Sizes of 16 to 8192 px.
+        Draws the map from above, uint8 [height, width, 3], north up. Sizes from 16 to 8192 px.
         """
     def geometry(self, walls: bool = True, wall_seed: typing.SupportsInt | typing.SupportsIndex = 0, light_heads: str = 'as_mapped') -> Geometry:
         """
-        What renderers draw of it. walls: along the building lines, of heights drawn from wall_seed. light_heads: as Simulator takes it.
+        Returns the map's geometry for renderers. walls: adds walls along the building lines, with heights drawn from wall_seed.
+        light_heads: as for Simulator.
         """
     @property
     def facts(self) -> dict:
@@ -154,17 +155,17 @@ class Map:
     @property
     def geo_reference(self) -> str:
         """
-        Of the file's coordinates, a PROJ string; may be empty.
+        PROJ string of the file's coordinates; may be empty.
         """
     @property
     def mends(self) -> list[tuple[str, str, str]]:
         """
-        Faults of the file that were mended: (kind, what was done, message) each.
+        Repaired faults of the file: (kind, repair, message) each.
         """
     @property
     def name(self) -> str:
         """
-        'Town01', 'procedural:7', or the file's stem.
+        Name of the map: 'Town01', 'procedural:7', or the file's stem.
         """
     @property
     def origin_m(self) -> typing.Annotated[list[float], "FixedSize(3)"]:
@@ -173,39 +174,42 @@ class Map:
         """
 class Scenario(Map):
     """
-    A recorded scene: a map, the tracks of all road users, and the lights as they were recorded. Immutable.
+    Recorded scene: a map, the tracks of all road users, and the recorded lights. Immutable.
     
-    It is the map of worlds whose agents are its tracks, in their order, from `start_step` on:
+    A scenario is the map of worlds whose agents are its tracks, in their order, from `start_step` on:
     pictura.Simulator([scene], [(0, scene.num_tracks)], **scene.world()). Commands of kind 3 and the controller 'log' replay it.
     """
     @staticmethod
     def from_arrays(tracks: dict, lanes: dict, *, lines: dict | None = None, edges: dict | None = None, crosswalks: dict | None = None, stop_signs: dict | None = None, lights: dict | None = None, dt_s: typing.SupportsFloat | typing.SupportsIndex = 0.1, current_step: typing.SupportsInt | typing.SupportsIndex | None = None, sdc_track: typing.SupportsInt | typing.SupportsIndex | None = None, id: str = '', origin_m: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"] | None = None, tolerance_m: typing.SupportsFloat | typing.SupportsIndex = 0.01) -> Scenario:
         """
-        A scene of arrays: NumPy's, or what becomes them, in dicts. Lengths are metres, positions float64 in any frame.
+        Creates a scene from arrays in dicts: NumPy arrays, or objects that convert to them. Lengths are metres, positions float64 in
+        any frame.
         
-        tracks: id int64 [T], type [T] (counts pictura.TRACK_TYPES), size_m [T, 3] (length, width, height), valid bool [T, S], position_m
-        [T, S, 3] (of the box's foot), heading_rad [T, S], velocity_mps [T, S, 2]; states that are not valid may hold anything.
-        Lines are points float64 [P, 3], one after the other, and begin int32 [N + 1], where each begins among them and where the last ends.
-        lanes: points and begin along the centre, id int64 [N] of 0 or more, type [N] (pictura.LANE_TYPES); where known speed_limit_mps [N] (0:
-        unknown), width_m [P] (all 0 along a lane: unknown), in_junction bool [N], entries and exits, ids of lanes one after the other,
-        with entries_begin and exits_begin [N + 1], left_neighbor and right_neighbor [N], ids of lanes of the same direction, or -1. Without
-        entries and exits, lanes are linked where their ends meet.
-        lines: points, begin, type [N] (pictura.LINE_TYPES). edges: points and begin, the road on the left. crosswalks: points and begin of their
-        outlines. stop_signs: position_m [N, 3], lanes with lanes_begin. lights: lanes with lanes_begin [L + 1], states [L, S]
-        (pictura.LIGHT_STATES), and stop_lines [L, 2, 3]; without those, a line lies across the lanes' starts.
-        dt_s: between states. current_step: of the present; None: 10, or the last one. sdc_track: index of the self-driving car's track.
-        origin_m: of the map, about which numbers are rounded to float32; None: the middle of lanes and edges. tolerance_m: how far lines may
-        deviate when they are thinned; 0 keeps all their points.
-        Raises pictura.UsageError naming the array and the element, pictura.Error where what they state is no scene.
+        tracks: id int64 [T], type [T] (index in pictura.TRACK_TYPES), size_m [T, 3] (length, width, height), valid bool [T, S],
+        position_m [T, S, 3] (of the box's foot), heading_rad [T, S], velocity_mps [T, S, 2]; states that are not valid may hold
+        anything.
+        Polylines are points float64 [P, 3], one polyline after the other, and begin int32 [N + 1], the offset of each polyline in the
+        points and the end of the last.
+        lanes: points and begin along the centre, id int64 [N] of 0 or more, type [N] (pictura.LANE_TYPES); if known speed_limit_mps [N]
+        (0: unknown), width_m [P] (all 0 along a lane: unknown), in_junction bool [N], entries and exits, ids of lanes one after the
+        other, with entries_begin and exits_begin [N + 1], left_neighbor and right_neighbor [N], ids of lanes of the same direction, or
+        -1. Without entries and exits, lanes are linked at common ends.
+        lines: points, begin, type [N] (pictura.LINE_TYPES). edges: points and begin, with the road on the left. crosswalks: points and
+        begin of their outlines. stop_signs: position_m [N, 3], lanes with lanes_begin. lights: lanes with lanes_begin [L + 1], states
+        [L, S] (pictura.LIGHT_STATES), and stop_lines [L, 2, 3]; by default stop lines cross the begins of the lanes.
+        dt_s: time between states. current_step: step of the present; None: 10, or the last step. sdc_track: index of the self-driving
+        car's track. origin_m: of the map, about which numbers are rounded to float32; None: the middle of lanes and edges. tolerance_m:
+        maximum deviation of lines when they are thinned; 0 keeps all points.
+        Raises pictura.UsageError naming the array and the element, pictura.Error if the arrays do not form a scene.
         """
     @staticmethod
     def load(name: str, *, start_step: typing.SupportsInt | typing.SupportsIndex = 0) -> Scenario:
         """
-        Loads a scene by name: FILE.json, FILE.bin, FILE.scenario, a file with '.tfrecord' in its name, or a folder of them; with '#7' or
-        '#SCENARIO_ID' one of several.
+        Loads a scene by name: FILE.json, FILE.bin, FILE.scenario, a file with '.tfrecord' in its name, or a folder of these; '#7' or
+        '#SCENARIO_ID' selects one of several scenes.
         
-        start_step: of the recording, at which episodes begin.
-        Raises pictura.Error naming file, record and field; pictura.UsageError where there is no such scene or step.
+        start_step: step of the recording at which episodes begin.
+        Raises pictura.Error naming file, record and field; pictura.UsageError if the scene or step does not exist.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
@@ -213,66 +217,67 @@ class Scenario(Map):
         ...
     def draw(self, width_px: typing.SupportsInt | typing.SupportsIndex = 1024, height_px: typing.SupportsInt | typing.SupportsIndex = 1024) -> numpy.typing.NDArray[numpy.uint8]:
         """
-        A picture from above, uint8 [height, width, 3], north up: the ways of all tracks, and who is there at start_step.
+        Draws the scene from above, uint8 [height, width, 3], north up: the paths of all tracks, and the road users at start_step.
         
-        Sizes of 16 to 8192 px.
+        Sizes from 16 to 8192 px.
         """
     def inverse_actions(self, num_threads: typing.SupportsInt | typing.SupportsIndex = 0) -> dict:
         """
-        The actions by which the simulator's dynamics follow the recording most closely, as NumPy arrays by name.
+        Computes the actions with which the simulator's dynamics follow the recording most closely, as NumPy arrays by name.
         
-        actions int32, is_followed bool and error_m float32 [tracks, steps from start_step on]: for the step after each state, whether
-        there is a state to start from and one to reach, and how far from the recorded place it leads. num_threads: 0 for all.
+        actions int32, is_followed bool and error_m float32 [tracks, steps from start_step on]: for the step after each state the
+        action, whether its start and end states are recorded, and the distance of its end from the recorded position. num_threads: 0
+        for all.
         """
     def mask(self, words: str, *, absent: bool = False) -> numpy.typing.NDArray[numpy.uint8]:
         """
-        uint8 [tracks]: 1 for the tracks that words with commas between them name: self (the self-driving car), vehicles (the
-        others), others (who is no vehicle), all, tracks_to_predict, objects_of_interest, and ids of tracks.
+        Returns uint8 [tracks]: 1 for the tracks that comma-separated words select: self (the self-driving car), vehicles (the others),
+        others (all non-vehicles), all, tracks_to_predict, objects_of_interest, and ids of tracks.
         
-        absent: also those that are not there at start_step. Raises pictura.UsageError for another word, and where nobody is left.
+        absent: includes tracks that are absent at start_step. Raises pictura.UsageError for another word, and if no track remains.
         """
     def save(self, path: str) -> None:
         """
-        Writes it, whole or not at all, as *.scenario, which load() reads again to the bit.
+        Writes the scene, completely or not at all, as *.scenario, which load() reads back to the bit.
         
         Raises pictura.UsageError for another ending, pictura.Error naming the file.
         """
     def starting_at(self, start_step: typing.SupportsInt | typing.SupportsIndex) -> Scenario:
         """
-        The same scene, whose episodes begin at another step; nothing is copied.
+        Returns the same scene with episodes that begin at another step; nothing is copied.
         
-        Raises pictura.UsageError for a step that it does not have.
+        Raises pictura.UsageError for a step that the scene does not have.
         """
     def to_arrays(self) -> dict:
         """
-        What pictura.Scenario.from_arrays(**arrays) makes the same scene of: its arguments by name.
+        Returns the arguments by name with which pictura.Scenario.from_arrays(**arrays) creates the same scene.
         
-        Not among them: who is to be predicted and who should be replayed, walls, parking spaces, signs that are no stop signs, widths of
-        paint, and what a run that was saved has to replay to the bit.
+        The arrays do not contain: tracks to predict and tracks marked for replay, walls, parking spaces, signs other than stop signs,
+        widths of paint, and the data with which a saved run replays to the bit.
         """
     def tracks(self) -> dict:
         """
-        Copies of the tracks as NumPy arrays by name.
+        Copies the tracks to NumPy arrays by name.
         
-        id int64 [tracks], as in the file; type uint8 [tracks] counts pictura.TRACK_TYPES; size_m float32 [tracks, 3]: length, width,
+        id int64 [tracks], as in the file; type uint8 [tracks] indexes pictura.TRACK_TYPES; size_m float32 [tracks, 3]: length, width,
         height. valid bool [tracks, steps]; position_m float32 [tracks, steps, 3], centre of the box's foot in the map's frame;
         heading_rad [tracks, steps]; velocity_mps [tracks, steps, 2]: 0 where not valid.
         """
     def with_recorded_lights(self) -> Scenario:
         """
-        The same scene, whose worlds have its lights as recorded: drawn, observed, and red ones hold.
+        Returns the same scene with worlds that use its recorded lights: they are drawn and observed, and red lights count.
         """
     def world(self, **kwargs) -> dict:
         """
-        Options by which pictura.Simulator([scene], worlds, **options) makes its worlds: the recording's time step, an episode
-        as long as what is left of it, no walls, no parked cars, no early end, plain dynamics.
+        Returns the options with which pictura.Simulator([scene], worlds, **options) creates the scene's worlds: the recording's time
+        step, an episode as long as the rest of the recording, no walls, no parked cars, no early end, plain dynamics.
         
-        Options given are kept but for these, as those of a pictura.PolicySession: scene.world(**session.training_world()).
+        All other given options are kept, for instance those of a pictura.PolicySession: scene.world(**session.training_world()).
         """
     @property
     def current_step(self) -> int:
         """
-        The last step of the history that a predictor is given.
+        Last step of the history that predictors are given.
         """
     @property
     def dt_s(self) -> float:
@@ -287,66 +292,66 @@ class Scenario(Map):
     @property
     def format(self) -> str:
         """
-        'womd', 'gpudrive', 'pufferdrive v1', ...
+        File format: 'womd', 'gpudrive', 'pufferdrive v1', ...
         """
     @property
     def id(self) -> str:
         """
-        The recording's, such as '637f20cafde22ff8'; may be empty.
+        Id of the recording, such as '637f20cafde22ff8'; may be empty.
         """
     @property
     def notes(self) -> list:
         """
-        What was left out or changed on the way from the file: (what, how often, the first place) each.
+        Elements that were dropped or changed when the file was converted: (what, how often, first place) each.
         """
     @property
     def num_steps(self) -> int:
         """
-        States of each track, from the first one of the recording on.
+        Number of states of each track, from the recording's first step on.
         """
     @property
     def num_tracks(self) -> int:
         """
-        How many agents its worlds have.
+        Number of agents of its worlds.
         """
     @property
     def sdc_track(self) -> int | None:
         """
-        The self-driving car's track; None where the file does not say.
+        Track of the self-driving car; None if the file does not mark it.
         """
     @property
     def start_step(self) -> int:
         """
-        Of the recording, at which episodes begin.
+        Step of the recording at which episodes begin.
         """
 class SceneRecorder:
     """
-    Records the present episode of a world of a simulator on the CPU as a scene: every step from now on, however it is asked for, for as
-    long as the recorder lives.
+    Records the present episode of a world of a simulator on the CPU as a scene: every step from now on, by any function, as long as
+    the recorder lives.
     """
     def __init__(self, simulator: typing.Any, *, world: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         """
-        Raises pictura.UsageError where there is no such world and where the simulator is on a device.
+        Raises pictura.UsageError if the world does not exist or the simulator is on a device.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
     def scenario(self, *, id: str = '', self_agent: typing.SupportsInt | typing.SupportsIndex = -1) -> Scenario:
         """
-        The pictura.Scenario of what was driven until now: controlled agents and parked cars that were there as tracks, with the
-        number of their box in the world as id, and lights as recorded ones.
+        Returns the pictura.Scenario recorded so far: controlled agents and parked cars as tracks, with the number of their box in the
+        world as id, and lights as recorded lights.
         
-        self_agent: of the world, whose track becomes the self-driving car's; -1: nobody's. Raises pictura.UsageError for one that was
-        never there.
+        self_agent: agent of the world whose track becomes the self-driving car's; -1: none. Raises pictura.UsageError for an agent that
+        was never present.
         """
     @property
     def num_steps(self) -> int:
         """
-        Steps until now.
+        Number of steps so far.
         """
 class Camera:
     """
-    A pinhole camera on a body: x forward, y left, z up, in metres from the rig's origin. Angles are radians: yaw is
-    counter-clockwise, pitch positive looks up, roll positive turns it clockwise as seen from behind.
+    Pinhole camera on a body: x forward, y left, z up, in metres from the rig's origin. Angles are radians: yaw is
+    counter-clockwise, positive pitch looks up, positive roll is clockwise as seen from behind.
     """
     name: str
     def __getstate__(self) -> tuple[str, int, int, float, float, float, float, float, float, float, float, float, float]:
@@ -423,7 +428,7 @@ class Camera:
         ...
 class Rig:
     """
-    One or more cameras of any sizes on a body; their order is that of images.
+    One or more cameras of any sizes on a body, in the order of images.
     """
     @staticmethod
     def load(path: str) -> Rig:
@@ -433,7 +438,7 @@ class Rig:
     @staticmethod
     def paper(width_px: typing.SupportsInt | typing.SupportsIndex = 96, height_px: typing.SupportsInt | typing.SupportsIndex = 54, square_pixels: bool = False) -> Rig:
         """
-        The paper's four cameras: front, front left, front right and back. Sizes of 1 to 8192 px.
+        Returns the paper's four cameras: front, front left, front right and back. Sizes from 1 to 8192 px.
         """
     def __getstate__(self) -> tuple[list[Camera]]:
         ...
@@ -452,16 +457,15 @@ class Rig:
         ...
 class Scene:
     """
-    What moves: boxes of agents and states of lights, for one or more worlds. A simulator's `scene` is what it shows at each
-    call; a scene of arrays is a copy of them.
+    Moving objects: boxes of agents and states of lights, for one or more worlds. A simulator's `scene` follows the simulator; a
+    scene of arrays is a copy of the arrays.
     """
     def __init__(self, center_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], heading_rad: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], size_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], agent_class: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], *, world_begin: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, geometry: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, light_states: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, light_begin: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None) -> None:
         """
-        center_m [n, 3]: of the box's foot. heading_rad [n]. size_m [n, 3]: length, width, height. agent_class [n]: 0
-        vehicle, 1 cyclist, 2 pedestrian. world_begin [worlds + 1]: the first box of each world; all are in one without it.
-        geometry [worlds]: the handles that geometries were uploaded to; 0 without it. light_states: 0 off, 1 red, 2 yellow, 3
-        green, 4 unknown, of all worlds; light_begin [worlds + 1]. Raises pictura.Error for other shapes; render() refuses what
-        does not fit together.
+        center_m [n, 3]: centre of the box's foot. heading_rad [n]. size_m [n, 3]: length, width, height. agent_class [n]: 0 vehicle, 1
+        cyclist, 2 pedestrian. world_begin [worlds + 1]: first box of each world; default: a single world. geometry [worlds]: handles of
+        uploaded geometries; default: 0. light_states: 0 off, 1 red, 2 yellow, 3 green, 4 unknown, of all worlds; light_begin [worlds +
+        1]. Raises pictura.Error for other shapes; render() rejects arrays that do not fit together.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
@@ -477,7 +481,7 @@ class Scene:
         """
 class SceneFile:
     """
-    A scene of one TOML file: geometry, boxes, rig and views.
+    Scene of one TOML file: geometry, boxes, rig and views.
     """
     def __init__(self, path: str) -> None:
         """
@@ -509,8 +513,8 @@ class SceneFile:
         """
 class Images:
     """
-    Images of some views by each camera of a rig, in the renderer's memory, and their planes where they were asked for.
-    A renderer draws into it as often as wanted.
+    Images of views by each camera of a rig, in the renderer's memory, and their planes if requested. A renderer can draw into them
+    repeatedly.
     """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
@@ -520,19 +524,19 @@ class Images:
         """
     def planes(self, camera: typing.SupportsInt | typing.SupportsIndex) -> dict:
         """
-        Of the front surface at each pixel's centre, [views, height, width]: depth_m float32 (infinite where nothing is),
-        class_id uint8 (0: nothing), instance_id uint16 (1 + the agent's index in its world, 0: no agent). Raises pictura.Error
+        Returns planes of the front surface at each pixel's centre, [views, height, width]: depth_m float32 (infinite without a
+        surface), class_id uint8 (0: none), instance_id uint16 (1 + the agent's index in its world, 0: no agent). Raises pictura.Error
         for images without planes.
         """
     @property
     def blocks(self) -> list:
         """
-        One [views, cameras of that size, 3, height, width] for each distinct size.
+        Arrays [views, cameras of one size, 3, height, width], one for each distinct size.
         """
     @property
     def num_views(self) -> int:
         """
-        Views that it has room for.
+        Capacity in views.
         """
     @property
     def rgb(self) -> Array:
@@ -545,18 +549,18 @@ class _RendererInside:
 class Renderer:
     """
     Draws scenes: 'cpu', 'cuda', 'gl' ('gl:egl', 'gl:osmesa'), 'null', or 'auto'. One thread at a time; several renderers are
-    independent. On CUDA its work is put on `stream`.
+    independent. On CUDA its work is enqueued on `stream`.
     """
     @staticmethod
     def _of(inside: _RendererInside) -> Renderer:
         ...
     def __init__(self, name: str = 'auto', rig: Rig | None = None, *, device: str = 'cpu', num_threads: typing.SupportsInt | typing.SupportsIndex = 0, line_floor_px: typing.SupportsFloat | typing.SupportsIndex = 0.3499999940395355, debug_palette: bool = False, samples: str = '1', camera_severity: typing.SupportsFloat | typing.SupportsIndex = 0.0, stream: typing.Any = None) -> None:
         """
-        rig: the paper's without one. device: where scenes, views and images lie, 'cpu' or 'cuda:0'. num_threads: 0 for
-        all. line_floor_px: the least width of a line on screen. debug_palette: tint halted and parked agents. samples: for 'gl',
-        '4' (MSAA) or '4x4' (supersampling). camera_severity: of randomized cameras, 0 to 2, as in evaluations (docs/explanation/cameras.md); draws are keyed by the
-        field `key` of views, which a simulator fills. stream: a cudaStream_t as int; None: the legacy default stream.
-        Raises pictura.UsageError listing the names, pictura.Error where the backend cannot run here.
+        rig: default: the paper's. device: memory of scenes, views and images, 'cpu' or 'cuda:0'. num_threads: 0 for all. line_floor_px:
+        minimum width of a line on screen. debug_palette: tints halted and parked agents. samples: for 'gl', '4' (MSAA) or '4x4'
+        (supersampling). camera_severity: severity of randomized cameras, 0 to 2, as in evaluations (docs/explanation/cameras.md); draws
+        are keyed by the field `key` of views, which a simulator fills. stream: a cudaStream_t as int; None: the legacy default stream.
+        Raises pictura.UsageError listing the names, pictura.Error if the backend cannot run here.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
@@ -564,34 +568,34 @@ class Renderer:
         ...
     def check(self) -> None:
         """
-        Waits for the work on the stream; raises pictura.Error for faults that a device found.
+        Waits for the work on the stream; raises pictura.Error for faults found by a device.
         """
     def make_images(self, num_views: typing.SupportsInt | typing.SupportsIndex, *, dtype: str = 'uint8', planes: bool = False) -> Images:
         """
-        Memory for images of so many views: 'uint8' of 0 to 255, or 'float32' or 'float16' (not on all) of 0 to 1.
+        Allocates images of num_views views: 'uint8' of 0 to 255, or 'float32' or 'float16' (not on all renderers) of 0 to 1.
         """
     def render(self, scene: Scene, views: typing.Any, out: typing.Any = None, *, dtype: str = 'uint8', planes: bool = False) -> typing.Any:
         """
         Draws every camera for every view. Returns `out`.
         
-        views: VIEW_DTYPE [n], or a simulator's. out: Images, or for a rig of one size an array [n, cameras, 3, height, width] of
-        uint8, float32, float16 or bfloat16 (0 to 255) in the renderer's memory (NumPy, torch, ...); new Images of `dtype` and
-        `planes` without it. On CUDA the call returns when the work is on the stream; on the CPU ^C ends it between views. Raises
-        pictura.Error naming what does not fit.
+        views: VIEW_DTYPE [n], or a simulator's. out: Images, or for a rig of one size an array [n, cameras, 3, height, width] of uint8,
+        float32, float16 or bfloat16 (0 to 255) in the renderer's memory (NumPy, torch, ...); default: new Images of `dtype` and
+        `planes`. On CUDA the call returns when the work is enqueued; on the CPU ^C ends it between views. Raises pictura.Error naming
+        the array that does not fit.
         """
     def upload(self, handle: typing.SupportsInt | typing.SupportsIndex, geometry: Geometry) -> None:
         """
-        Copies a geometry; `handle`, 0 to 65535, is what scenes name it by. Raises pictura.Error where it is invalid.
+        Copies a geometry under `handle`, 0 to 65535, which scenes refer to. Raises pictura.Error if the geometry is invalid.
         """
     def visibility(self, scene: Scene, views: typing.Any, queries: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> numpy.typing.NDArray[numpy.float32]:
         """
-        How much of agents can be seen: for each query of (view, box of the scene), int [n, 2], the coverage in the view's
-        images over the coverage when drawn alone, float32 [n], NaN where it is in no camera's frame.
+        Returns the visibility of agents: for each query of (view, box of the scene), int [n, 2], the coverage in the view's images over
+        the coverage when drawn alone, float32 [n]; NaN outside all cameras' frames.
         """
     @property
     def choice(self) -> str:
         """
-        What was chosen, and why.
+        Selected renderer, with the reason.
         """
     @property
     def device(self) -> str:
@@ -605,26 +609,26 @@ class Renderer:
     @property
     def stream(self) -> int:
         """
-        The cudaStream_t that work is put on, as int; 0: the legacy default stream.
+        cudaStream_t of the work, as int; 0: the legacy default stream.
         """
     @stream.setter
     def stream(self, arg1: typing.Any) -> None:
         ...
 class StepResult:
     """
-    What a step returns, one element a slot, in the simulator's memory: every step writes the same arrays again.
+    Results of a step, one element per slot, in the simulator's memory; every step overwrites the same arrays.
     """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
     @property
     def distance_m(self) -> typing.Any:
         """
-        float32 [slots]: driven in this step.
+        float32 [slots]: distance driven in this step.
         """
     @property
     def refusal(self) -> typing.Any:
         """
-        uint8 [slots]: why the agent is absent from this episode: 1 no place, 2 all taken; 0: it is not.
+        uint8 [slots]: reason why the agent is absent from this episode: 1 no place, 2 all places taken; 0: it is present.
         """
     @property
     def reward(self) -> typing.Any:
@@ -634,7 +638,7 @@ class StepResult:
     @property
     def reward_terms(self) -> typing.Any:
         """
-        float32 [slots, 11]: of which the reward is made, in the order of pictura.REWARD_TERMS.
+        float32 [slots, 11]: terms of the reward, in the order of pictura.REWARD_TERMS.
         """
     @property
     def terminated(self) -> typing.Any:
@@ -653,7 +657,7 @@ class StepResult:
         """
 class Snapshot:
     """
-    A state that a simulator keeps in its own memory.
+    State that a simulator keeps in its own memory.
     """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
@@ -665,8 +669,8 @@ class _ControllerInside:
         ...
 class Controller:
     """
-    Who drives in one simulator on the CPU: 'lane' (the lane keeper), 'idm_lanes' (along lanes, behind others), 'idle' or 'random', in
-    worlds of recorded scenes 'log', 'inverse' or 'idm', or a policy of a pictura.PolicySession, or several of them.
+    Driver in one simulator on the CPU: 'lane' (the lane keeper), 'idm_lanes' (along lanes, behind others), 'idle' or 'random', in
+    worlds of recorded scenes 'log', 'inverse' or 'idm', a policy of a pictura.PolicySession, or several of these.
     """
     @staticmethod
     def _of(inside: _ControllerInside) -> Controller:
@@ -674,10 +678,11 @@ class Controller:
     @staticmethod
     def shared(drivers: collections.abc.Sequence[tuple[Controller, typing.Any]], simulator: Simulator) -> Controller:
         """
-        Controllers that share a simulator's slots, of (controller, mask): of two that command a slot, the later one drives.
+        Returns a controller of several drivers that share a simulator's slots, of (controller, mask): if two command a slot, the later
+        one drives.
         
-        mask: uint8 or bool [slots] in the simulator's memory, which is read at every step; None: all. Raises pictura.Error for another
-        array and for a controller of another simulator.
+        mask: uint8 or bool [slots] in the simulator's memory, which is read at every step; None: all slots. Raises pictura.Error for
+        another array and for a controller of another simulator.
         """
     def __init__(self, name: str, simulator: Simulator, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         """
@@ -687,32 +692,32 @@ class Controller:
         ...
     def act(self, simulator: Simulator) -> typing.Any:
         """
-        Commands for all slots, which may be changed before step_commands() takes them: NumPy's COMMAND_DTYPE [slots], or uint8
-        [slots, 28] on CUDA. The same memory at every call.
+        Returns commands for all slots, which may be changed before step_commands() executes them: NumPy's COMMAND_DTYPE [slots], or
+        uint8 [slots, 28] on CUDA. Every call returns the same memory.
         """
     @property
     def name(self) -> str:
         ...
 class Simulator:
     """
-    Many worlds, each on one map, stepped together. Arrays have one element a slot: the controlled agents of world 0, then those
+    Many worlds, each on one map, stepped together. Arrays have one element per slot: the controlled agents of world 0, then those
     of world 1, and so on. Executors 'cpu' and 'cuda' give the same bits.
     
-    One thread at a time; several simulators are independent. The GIL is released while C++ works. On CUDA its work is put on
-    `stream`, calls return before it is done, and what is wrong with values is raised by check() or a later call.
+    One thread at a time; several simulators are independent. The GIL is released while C++ works. On CUDA its work is enqueued on
+    `stream`, calls return before it is done, and invalid values raise an error in check() or a later call.
     """
     def __init__(self, maps: collections.abc.Sequence[Map], worlds: collections.abc.Sequence, *, executor: str = 'auto', device: str = 'cpu', seed: typing.SupportsInt | typing.SupportsIndex = 0, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, dt_s: typing.SupportsFloat | typing.SupportsIndex = 0.10000000149011612, episode_steps: typing.SupportsInt | typing.SupportsIndex = 1280, reset_inactive_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.4000000059604645, pedestrian_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.10000000149011612, cyclist_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.10000000149011612, parked_cars: typing.SupportsInt | typing.SupportsIndex = 32, light_cycles: str = 'phases', walls: bool = True, wall_seed: typing.SupportsInt | typing.SupportsIndex = 0, light_heads: str = 'as_mapped', wall_observations: bool = False, reset_at_standstill: bool = False, blind: typing.SupportsFloat | typing.SupportsIndex = 0.0, phantom_braking: typing.SupportsFloat | typing.SupportsIndex = 0.0, inattentive: typing.SupportsFloat | typing.SupportsIndex = 0.0, stagger_episodes: bool = False, fixed_lights: bool = False, auxiliary_observations: bool = True, vector_observations: bool = True, conditioning: dict = {}, stream: typing.Any = None) -> None:
         """
-        maps: of pictura.Map. worlds: of (index of the map, agents), or (map, agents, global world), which keys the
-        world's random numbers. executor: 'cpu', 'cuda' or 'auto'. device: where observations and scenes are wanted. num_threads: of
-        the host, 0 for all. reset_inactive_fraction: a world resets when this part of its agents is inactive; more than 1: never.
-        stagger_episodes: the first episode of each world ends after a drawn number of steps. light_cycles: 'phases', those of a junction
-        take turns, or 'independent', each light cycles alone. reset_at_standstill: accelerations end where the speed changes its sign.
-        blind, phantom_braking, inattentive: shares of agents that are impaired, drawn per episode, and never valid.
-        light_heads: 'as_mapped', or 'visible': heads beside or before their stop line stand 10 m beyond it, 3.5 m high.
-        conditioning: a number or (low, high) by name, see CONDITIONING_NAMES; the paper's ranges otherwise. stream: a cudaStream_t
-        as int; None: the legacy default stream. The other defaults are the paper's training world.
-        Raises pictura.UsageError naming what cannot be simulated, pictura.Error where there is no device.
+        maps: list of pictura.Map. worlds: list of (index of the map, agents), or (map, agents, global world), which keys the world's
+        random numbers. executor: 'cpu', 'cuda' or 'auto'. device: memory of observations and scenes. num_threads: of the host, 0 for
+        all. reset_inactive_fraction: a world resets when this fraction of its agents is inactive; more than 1: never. stagger_episodes:
+        the first episode of each world ends after a drawn number of steps. light_cycles: 'phases' (the lights of a junction take turns)
+        or 'independent' (each light has its own cycle). reset_at_standstill: accelerations end when the speed changes its sign. blind,
+        phantom_braking, inattentive: shares of impaired agents, drawn per episode, which are never valid. light_heads: 'as_mapped', or
+        'visible': heads beside or before their stop line are moved 10 m beyond it, 3.5 m high. conditioning: a number or (low, high) by
+        name, see CONDITIONING_NAMES; default: the paper's ranges. stream: a cudaStream_t as int; None: the legacy default stream. The
+        other defaults are the paper's training world. Raises pictura.UsageError naming an option that cannot be simulated,
+        pictura.Error if the device does not exist.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
@@ -720,90 +725,90 @@ class Simulator:
         ...
     def check(self) -> None:
         """
-        Waits for the work on the stream; raises pictura.Error for what a device found wrong.
+        Waits for the work on the stream; raises pictura.Error for errors found by a device.
         """
     def draw(self, world: typing.SupportsInt | typing.SupportsIndex = 0, agent: typing.SupportsInt | typing.SupportsIndex = -1, *, width_px: typing.SupportsInt | typing.SupportsIndex = 640, height_px: typing.SupportsInt | typing.SupportsIndex = 480, width_m: typing.SupportsFloat | typing.SupportsIndex = 150.0) -> numpy.typing.NDArray[numpy.uint8]:
         """
-        A world from above, uint8 [height, width, 3], on the CPU. agent: the one of that world in the middle, with its
-        waypoints; -1 shows the whole map. width_m: what is shown around it.
+        Draws a world from above, uint8 [height, width, 3], on the CPU. agent: agent of that world in the middle, shown with its
+        waypoints; -1 shows the whole map. width_m: width of the shown surroundings.
         """
     def observe(self, queries: typing.Any, hidden: typing.Any = None, inserted: typing.Any = None, *, out: typing.Any = None) -> typing.Any:
         """
-        What chosen slots would observe if boxes of their worlds were not there, and others were. Partners alone differ;
-        the state stays as it is. pictura.make_queries() makes the arguments:
-        queries: QUERY_DTYPE [n], or uint8 [n, 24]: a slot, its ranges [begin, end) of the lists `hidden` and `inserted`, and leaves_gaps:
-        0: who was too far to be among the partners comes in for who is hidden; 1: rows of zeros stay in their place.
+        Returns the observations of slots if boxes of their worlds were absent, and other boxes present. Only partners differ; the state
+        is unchanged. pictura.make_queries() creates the arguments:
+        queries: QUERY_DTYPE [n], or uint8 [n, 24]: a slot, its ranges [begin, end) of the lists `hidden` and `inserted`, and
+        leaves_gaps. 0: hidden partners are replaced by boxes that were too far away; 1: rows of zeros replace them.
         hidden: int32 [m], indices into the scene's boxes. inserted: INSERTED_DTYPE [k], or uint8 [k, 40]: a box of BOX_DTYPE and its
-        speed_mps. out: arrays of the caller by the names of `observations`, with n in place of the slots; new ones without it. All lie
-        in the simulator's memory. Returns out, arrays by name. Raises pictura.Error naming what is wrong with an array or a query, and
+        speed_mps. out: arrays of the caller by the names of `observations`, with n in place of the slots; default: new arrays. All
+        arrays are in the simulator's memory. Returns out, arrays by name. Raises pictura.Error naming an invalid array or query, and
         then writes nothing; on CUDA queries are checked as in step().
         """
     def reset(self, world_mask: typing.Any = None, seed: typing.SupportsInt | typing.SupportsIndex | None = None) -> None:
         """
-        Starts new episodes. world_mask: uint8 or bool [worlds] in the simulator's memory, the worlds that start; all without
-        it. seed: theirs from now on; the simulator's own without it. Raises pictura.Error for another array.
+        Starts new episodes. world_mask: uint8 or bool [worlds] in the simulator's memory, the worlds to reset; default: all. seed:
+        their seed from now on; default: the simulator's own. Raises pictura.Error for another array.
         """
     @typing.overload
     def restore(self, saved: bytes) -> None:
         """
-        Back. Raises pictura.Error naming what differs.
+        Restores a saved state. Raises pictura.Error naming the difference.
         """
     @typing.overload
     def restore(self, snapshot: Snapshot) -> None:
         """
-        To a snapshot of these worlds; on CUDA without waiting.
+        Restores a snapshot of these worlds; on CUDA without waiting.
         """
     def run(self, controller: Controller, steps: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
-        Steps with a controller for all agents. ^C ends it between steps.
+        Takes steps with a controller for all agents. ^C ends the call between steps.
         """
     def save(self) -> bytes:
         """
-        The whole state as bytes, for exact resume on any executor. Waits for the stream.
+        Returns the complete state as bytes, for exact resume on any executor. Waits for the stream.
         """
     def set_state(self, slots: typing.Any, fields: dict) -> None:
         """
-        Gives fields of chosen agents other values. slots: int32 [n], each once. fields: arrays [n] or [n, per agent] by the
-        names of AGENT_FIELDS, of their types, all in the simulator's memory. Lane, height, box, view and observation follow. Raises
-        pictura.Error naming what is wrong; on CUDA values are checked as in step().
+        Sets fields of agents. slots: int32 [n], each once. fields: arrays [n] or [n, per agent] by the names of AGENT_FIELDS, of their
+        types, all in the simulator's memory. Lane, height, box, view and observation are updated. Raises pictura.Error naming an
+        invalid value; on CUDA values are checked as in step().
         """
     def set_worlds(self, maps: collections.abc.Sequence[Map], worlds: collections.abc.Sequence, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         """
-        Other worlds on other maps, at the start of their first episodes: what a new simulator would be. Take the arrays
-        anew: those of before stay valid memory, which later calls may write. Raises as the constructor does.
+        Replaces the worlds by other worlds on other maps, at the start of their first episodes, as in a new simulator. Get the arrays
+        again afterwards: previous arrays remain valid memory, which later calls may write. Raises as the constructor does.
         """
     def snapshot(self) -> Snapshot:
         """
-        A copy of the state in the simulator's memory.
+        Returns a copy of the state in the simulator's memory.
         """
     def spawn_report(self) -> dict:
         """
-        What became of the agents that were asked for: counts by name. Waits for the stream.
+        Returns counts by name of requested, spawned, refused, entered and left agents, and of parked cars. Waits for the stream.
         """
     def state_hash(self) -> int:
         """
-        64 bits over the whole state, equal on every executor. Waits for the stream.
+        Returns 64 bits over the complete state, equal on every executor. Waits for the stream.
         """
     def step(self, actions: typing.Any) -> typing.Any:
         """
-        Advances every world by one step. actions: int32 [slots] in the simulator's memory, each in [0, 12): 3 times the
-        longitudinal jerk's index (-15, -4, 0, 4 m/s3) plus the lateral one's (-4, 0, 4 m/s3, left positive). Those of inactive agents
-        are ignored. A world whose last step ended its episode starts the next one instead, and its slots are not valid.
-        Returns the StepResult. Raises pictura.Error, which leaves the state as it was, for another array and for actions out of
-        range.
+        Advances every world by one step. actions: int32 [slots] in the simulator's memory, each in [0, 12): 3 times the index of the
+        longitudinal jerk (-15, -4, 0, 4 m/s3) plus the index of the lateral jerk (-4, 0, 4 m/s3, left positive). Actions of inactive
+        agents are ignored. A world whose last step ended its episode starts the next one instead, and its slots are not valid. Returns
+        the StepResult. Raises pictura.Error, which leaves the state unchanged, for another array and for actions out of range.
         """
     def step_commands(self, commands: typing.Any) -> typing.Any:
         """
-        The same by commands, COMMAND_DTYPE [slots]: kind 0 an action, 1 a kinematic state, 2 absence from the episode,
-        3 as recorded, in worlds of a pictura.Scenario.
+        Advances every world by one step with commands, COMMAND_DTYPE [slots]: kind 0 an action, 1 a kinematic state, 2 absence from the
+        episode, 3 as recorded, in worlds of a pictura.Scenario. Returns and raises as step() does.
         """
     def time_steps(self, actions: typing.Any, steps: typing.SupportsInt | typing.SupportsIndex) -> float:
         """
-        Seconds that so many steps with the same actions take from C++, for measurements: what step() adds is Python's.
+        Returns the seconds of this number of steps with the same actions, called from C++, for measurements of Python's overhead in
+        step().
         """
     def totals(self) -> dict:
         """
-        Counts and sums since construction by name; reward_terms is a dict. Waits for the stream.
+        Returns counts and sums since construction by name; reward_terms is a dict. Waits for the stream.
         """
     @property
     def agent_of_slot(self) -> Array:
@@ -813,7 +818,7 @@ class Simulator:
     @property
     def choice(self) -> str:
         """
-        What was chosen for 'auto', and why.
+        Executor selected for 'auto', with the reason.
         """
     @property
     def device(self) -> str:
@@ -834,7 +839,7 @@ class Simulator:
     @property
     def episode_step(self) -> Array:
         """
-        int32 [worlds]: steps done in the present episode.
+        int32 [worlds]: completed steps in the present episode.
         """
     @property
     def episode_steps(self) -> int:
@@ -842,7 +847,7 @@ class Simulator:
     @property
     def geometries(self) -> dict:
         """
-        Of its maps, by the handles that its scene names them by.
+        Geometries of its maps, by their handles in the scene.
         """
     @property
     def maps(self) -> list[Map]:
@@ -864,7 +869,7 @@ class Simulator:
     @property
     def scene(self) -> Scene:
         """
-        What renderers draw, of all worlds.
+        Scene of all worlds, for renderers.
         """
     @property
     def seed(self) -> int:
@@ -877,7 +882,7 @@ class Simulator:
     @property
     def stream(self) -> int:
         """
-        The cudaStream_t that work is put on, as int; 0: the legacy default stream.
+        cudaStream_t of the work, as int; 0: the legacy default stream.
         """
     @stream.setter
     def stream(self, arg1: typing.Any) -> None:
@@ -885,7 +890,7 @@ class Simulator:
     @property
     def views(self) -> Array:
         """
-        One view a slot: uint8 [slots, 60] that render() takes; its fields are VIEW_DTYPE's.
+        One view per slot: uint8 [slots, 60] for render(); its fields are those of VIEW_DTYPE.
         """
     @property
     def world_of_slot(self) -> Array:
@@ -899,105 +904,107 @@ class Simulator:
         """
 class Recorder:
     """
-    Records a world of a simulator on the CPU from now on: every step that the simulator takes, however it is asked to, for as long as
-    the recorder lives.
+    Records a world of a simulator on the CPU from now on: every step of the simulator, by any function, as long as the recorder
+    lives.
     """
     def __init__(self, simulator: typing.Any, *, world: typing.SupportsInt | typing.SupportsIndex = 0, follow: typing.SupportsInt | typing.SupportsIndex = -1, rig: Rig | None = None) -> None:
         """
-        follow: the agent of that world that the page opens with, whose decisions are kept; -1: none. rig: keeps that agent's
-        images of every step, drawn by the CPU renderer, without loss; without it the page draws the paper's cameras itself. Raises pictura.UsageError where there is no such world or agent and
-        where the simulator is on a device.
+        follow: agent of that world with which the page opens, and whose decisions are recorded; -1: none. rig: records that agent's
+        images at every step, drawn by the CPU renderer, without loss; by default the page draws the paper's cameras itself. Raises
+        pictura.UsageError if the world or agent does not exist or the simulator is on a device.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
     def decide(self, logits: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], value: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
-        What a policy makes of the followed agent's state, for the next step: logits [12], and its value.
+        Records a policy's response to the followed agent's state, for the next step: logits [12], and its value.
         """
     def write(self, path: str, policy: str = '') -> None:
         """
-        Ends the recording and writes it, whole or not at all: *.html, a page for any browser, or *.mcap, for Foxglove; as often
-        as one likes. policy: its name in the page. Raises pictura.Error naming the file.
+        Ends the recording and writes it, completely or not at all: *.html, a page for any browser, or *.mcap, for Foxglove. May be
+        called repeatedly. policy: its name in the page. Raises pictura.Error naming the file.
         """
     @property
     def metrics(self) -> dict:
         """
-        Counts and sums until now, by name.
+        Counts and sums so far, by name.
         """
     @property
     def num_steps(self) -> int:
         """
-        Steps, and resets, until now.
+        Number of steps and resets so far.
         """
 class LiveView:
     """
-    A page in the browser that shows the only world of a simulator on the CPU while it runs: pause, step, pace, and drive an agent by
-    the keyboard. The simulator's steps then wait until they are due: in real time, or as the page says.
+    Page in the browser that shows the only world of a simulator on the CPU while it runs: pause, step, pace, and drive an agent
+    with the keyboard. The simulator's steps then wait until they are due: in real time, or at the page's pace.
     """
     def __init__(self, simulator: typing.Any, *, port: typing.SupportsInt | typing.SupportsIndex = 0, host_name: str = '', follow: typing.SupportsInt | typing.SupportsIndex = 0, rig: Rig | None = None, wait_for_page: bool = True) -> None:
         """
-        port: of the loopback, 0 for a free one. host_name: if given, listens on all addresses, for pages that name this machine so.
-        follow: the agent that pages open with. rig: what its images are drawn with; without it pages draw the paper's cameras themselves. wait_for_page: no step is taken before
-        a page has come. Raises pictura.UsageError where this package cannot serve, pictura.Error where the port is taken.
+        port: of the loopback, 0 for a free one. host_name: if given, listens on all addresses, for pages that address this machine by
+        this name. follow: agent with which pages open. rig: cameras of its images; by default pages draw the paper's cameras
+        themselves. wait_for_page: waits for the first page before the first step. Raises pictura.UsageError if this package lacks the
+        server, pictura.Error if the port is in use.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
     def close(self) -> None:
         """
-        Tells pages that it is over, and lets the simulator run freely.
+        Tells pages that the simulation has ended, and lets the simulator run freely.
         """
     def decide(self, agent: typing.SupportsInt | typing.SupportsIndex, logits: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], value: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
-        What a policy makes of an agent's state: shown while pages follow that agent, until the next call.
+        Shows a policy's response to an agent's state while pages follow that agent, until the next call.
         """
     @property
     def address(self) -> str:
         """
-        Of the page, with its secret.
+        Address of the page, including its secret.
         """
     @property
     def num_pages(self) -> int:
         """
-        Pages that listen.
+        Number of connected pages.
         """
 def _hash64(data: bytes) -> int:
     """
-    FNV-1a, with which files of the library end.
+    Returns the FNV-1a hash that ends files of the library.
     """
 def _removed_keys() -> list:
     """
-    Removed keys of configurations, a tuple each: name, the one value that is still read, as JSON, and the reason.
+    Returns removed keys of configurations, a tuple each: name, the only valid value, as JSON, and the reason.
     """
 def draw_worlds(seed: typing.SupportsInt | typing.SupportsIndex, num_slots: typing.SupportsInt | typing.SupportsIndex, min_agents: typing.SupportsInt | typing.SupportsIndex, max_agents: typing.SupportsInt | typing.SupportsIndex, num_maps: typing.SupportsInt | typing.SupportsIndex) -> list[tuple[int, int, int]]:
     """
-    Worlds of sizes drawn from U{min, max} until they fill the slots; maps are taken in turn.
+    Draws worlds of sizes from U{min, max} until they fill the slots; they use the maps in turn.
     """
 def known_towns() -> list[str]:
     """
-    Names of the towns in the map folder, sorted.
+    Returns the names of the towns in the map folder, sorted.
     """
 def make_views(origin_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], heading_rad: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], *, world: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, ego_agent: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, body_length_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32] | None = None) -> numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]:
     """
-    Poses of a rig, a NumPy array of VIEW_DTYPE [n].
+    Returns poses of a rig, a NumPy array of VIEW_DTYPE [n].
     
-    origin_m [n, 3]: of the rig, on the ground. heading_rad [n]. world [n]: 0 without it. ego_agent [n]: the box of the
-    scene that is left out, -1 for none. body_length_m [n]: shorter bodies than 4.5 m draw cameras nearer to their origin.
+    origin_m [n, 3]: origin of the rig, on the ground. heading_rad [n]. world [n]: default: 0. ego_agent [n]: box of the scene that
+    is left out, -1 for none. body_length_m [n]: bodies shorter than 4.5 m move cameras nearer to their origin.
     """
 def map_folder() -> str:
     """
-    Where towns are looked up: $PICTURA_DATA, or the user's data folder.
+    Returns the folder of towns: $PICTURA_DATA, or the user's data folder.
     """
 def renderer_names() -> list[str]:
     """
-    Names that this build knows.
+    Returns the renderers of this build.
     """
 def simulator_names() -> list[str]:
     """
-    Executors that this build knows.
+    Returns the executors of this build.
     """
 def write_gallery(folder: str) -> int:
     """
-    Writes FOLDER/index.html over the replays that lie in it, worst first, and returns how many. Raises pictura.Error naming a page that is none.
+    Writes FOLDER/index.html over the replays in the folder, worst first, and returns their number. Raises pictura.Error naming a
+    page that is no replay.
     """
 AGENT_FIELDS: tuple = (('x_m', 'f32', 1, False, 'rear axle, or the centre of a pedestrian'), ('y_m', 'f32', 1, False, ''), ('z_m', 'f32', 1, False, 'height of the road under it'), ('heading_rad', 'f32', 1, False, 'counter-clockwise from x, in [-pi, pi]'), ('cos_heading', 'f32', 1, True, ''), ('sin_heading', 'f32', 1, True, ''), ('speed_mps', 'f32', 1, False, 'signed, along the heading'), ('accel_long_mps2', 'f32', 1, False, ''), ('accel_lat_mps2', 'f32', 1, False, 'positive to the left'), ('steer_rad', 'f32', 1, False, 'front wheel angle, positive to the left'), ('jerk_long_mps3', 'f32', 1, False, 'realised in the last step'), ('jerk_lat_mps3', 'f32', 1, False, ''), ('length_m', 'f32', 1, False, 'of the box'), ('width_m', 'f32', 1, False, ''), ('height_m', 'f32', 1, False, ''), ('lane', 'i32', 1, True, 'current lane, -1 none'), ('lane_offset_m', 'f32', 1, True, 'signed, positive to the left of the centre line'), ('lane_angle_rad', 'f32', 1, True, "heading less the lane's direction, in [-pi, pi]"), ('speed_limit_mps', 'f32', 1, True, 'of the current lane'), ('waypoint_x_m', 'f32', 3, False, 'the goal chain; passed ones stay until the chain is renewed'), ('waypoint_y_m', 'f32', 3, False, ''), ('waypoint_z_m', 'f32', 3, False, ''), ('next_waypoint', 'i32', 1, False, 'index of the active one, in [0, 3)'), ('goal_lane', 'i32', 1, False, 'lane (or piece of a walkway) of the last waypoint, where the next chain starts'), ('goal_lane_s_m', 'f32', 1, False, 'arc length of the last waypoint on it'), ('goal_chains', 'i32', 1, False, 'chains drawn in this episode'), ('goal_x_m', 'f32', 1, False, 'last waypoint that the metric Goals waits for, see rules/step.h'), ('goal_y_m', 'f32', 1, False, ''), ('goal_z_m', 'f32', 1, False, ''), ('goal_open', 'u8', 1, False, '1 while the metric waits for it'), ('conditioning', 'f32', 17, False, 'reward coefficients and dynamics multipliers; see simulator/conditioning.h'), ('agent_class', 'u8', 1, False, 'AgentClass'), ('status', 'u8', 1, False, 'AgentStatus'), ('refusal', 'u8', 1, True, 'SpawnFailure, of an absent agent'), ('halt_reason', 'u8', 1, False, 'Event bits that halted it'), ('events', 'u8', 1, False, 'Event bits of the last step'), ('goals_reached', 'i32', 1, False, 'last waypoints passed within 2 m in this episode'), ('waypoints_reached', 'i32', 1, False, 'waypoints of any kind that paid or passed in this episode'), ('distance_m', 'f32', 1, False, 'sum of |speed| dt in this episode'), ('first_motion_step', 'i32', 1, False, 'first step of this episode above kRest_mps, from 1; 0: none yet'), ('episode_events', 'u8', 1, False, "union of the episode's event bits"), ('episode_return', 'f32', 1, False, 'sum of rewards in this episode'), ('life', 'i32', 1, True, 'lives of this episode that ended before by leaving'), ('life_step', 'i32', 1, True, 'steps of this episode before the life began; counts are of a life'), ('left', 'u8', 1, True, '1: it left in the last step'))
 BOX_DTYPE: numpy.dtypes.VoidDType
