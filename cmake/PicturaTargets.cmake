@@ -1,5 +1,5 @@
-# Settings of every target: flags of this build, includes as `pictura/FOLDER/FILE.h` in the tree and when installed, precompiled
-# headers, and tests with their environment.
+# Settings of every target: flags of this build, includes as `pictura/FOLDER/FILE.h` in the tree and when installed,
+# precompiled headers, and tests with their environment.
 
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
@@ -77,8 +77,8 @@ function(pictura_forbid_fma target)
   endif()
 endfunction()
 
-# pictura_leave_unoptimized(TARGET): for code that only calls optimized code. For a test, optimization takes a compiler three
-# quarters of its time.
+# pictura_leave_unoptimized(TARGET): for code that only calls optimized code. For a test, optimization takes a compiler
+# three quarters of its time.
 function(pictura_leave_unoptimized target)
   target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-O0>)
 endfunction()
@@ -88,19 +88,19 @@ function(pictura_optimize_little target)
   target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-O1>)
 endfunction()
 
-# pictura_compile_together(TARGET): with PICTURA_UNITY it compiles several sources as one, for code whose per-source templates
-# take a compiler longer than the rest. Libraries that others build upon are compiled source by source, so that a missing
-# include causes an error.
+# pictura_compile_together(TARGET): with PICTURA_UNITY it compiles several sources as one, for code whose per-source
+# templates take a compiler longer than the rest. Libraries that others build upon are compiled source by source, so
+# that a missing include causes an error.
 function(pictura_compile_together target)
   if(PICTURA_UNITY)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON)
   endif()
 endfunction()
 
-# pictura_precompile(NAME HEADERS [LINK libs...]): a precompiled header of libraries' headers, which take a compiler longer than
-# most sources that include them; pictura_use_precompiled(TARGET NAME) uses it. Headers of the project and of the standard
-# library are excluded, so that a source without a needed include does not compile, unless HEADERS include it.
-# PICTURA_PRECOMPILE=OFF compiles every source on its own.
+# pictura_precompile(NAME HEADERS [LINK libs...]): a precompiled header of libraries' headers, which take a compiler
+# longer than most sources that include them; pictura_use_precompiled(TARGET NAME) uses it. Headers of the project and
+# of the standard library are excluded, so that a source without a needed include does not compile, unless HEADERS
+# include it. PICTURA_PRECOMPILE=OFF compiles every source on its own.
 function(pictura_precompile name headers)
   if(PICTURA_PRECOMPILE)
     cmake_parse_arguments(PARSE_ARGV 2 arg "" "" "LINK")
@@ -139,10 +139,10 @@ function(pictura_test_properties out timeout_s labels)
 endfunction()
 
 # pictura_add_test(NAME SOURCES... LINK libs... [LABELS labels...] [PRECOMPILED header] [WHOLE suites...] [OPTIMIZED]):
-# GoogleTest binary NAME_test, with a ctest entry for each test, and PICTURA_DATA set to ../shared/data if that exists and the
-# caller has not set it. WHOLE: suites whose tests share expensive results, one entry each. OPTIMIZED: for tests with much
-# computation of their own. The label threads marks tests of code that runs on several threads: the target threaded_tests builds
-# them, and the preset tsan runs only these.
+# GoogleTest binary NAME_test, with a ctest entry for each test, and PICTURA_DATA set to ../shared/data if that exists
+# and the caller has not set it. WHOLE: suites whose tests share expensive results, one entry each. OPTIMIZED: for tests
+# with much computation of their own. The label threads marks tests of code that runs on several threads: the target
+# threaded_tests builds them, and the preset tsan runs only these.
 add_custom_target(threaded_tests)
 function(pictura_add_test name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "OPTIMIZED" "PRECOMPILED" "SOURCES;LINK;LABELS;WHOLE")
@@ -182,8 +182,8 @@ function(pictura_add_test name)
   gtest_discover_tests(${name}_test ${filter} DISCOVERY_TIMEOUT 120 PROPERTIES ${properties})
 endfunction()
 
-# Environment of tests. Maps are not cached, so that the importer just built is tested. Torch's idle threads sleep, since
-# spinning threads of parallel tests would compete for the processor.
+# Environment of tests. Maps are not cached, so that the importer just built is tested. Torch's idle threads sleep,
+# since spinning threads of parallel tests would compete for the processor.
 set(PICTURA_TEST_ENVIRONMENT PICTURA_CACHE=off OMP_WAIT_POLICY=passive)
 if(NOT DEFINED ENV{PICTURA_DATA} AND EXISTS ${PROJECT_SOURCE_DIR}/../shared/data)
   get_filename_component(data_folder ${PROJECT_SOURCE_DIR}/../shared/data REALPATH)
@@ -192,8 +192,8 @@ endif()
 if(PICTURA_SANITIZE MATCHES thread)
   list(APPEND PICTURA_TEST_ENVIRONMENT TSAN_OPTIONS=ignore_noninstrumented_modules=1:die_after_fork=0)
 elseif(PICTURA_SANITIZE MATCHES address)
-  # The sanitizer guesses the location of thread-local variables of libraries loaded at run time from the preceding words; with
-  # Mesa's libraries it may guess wrong and abort.
+  # The sanitizer guesses the location of thread-local variables of libraries loaded at run time from the preceding
+  # words; with Mesa's libraries it may guess wrong and abort.
   list(APPEND PICTURA_TEST_ENVIRONMENT ASAN_OPTIONS=intercept_tls_get_addr=0 UBSAN_OPTIONS=print_stacktrace=1
     LSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tests/support/leaks.txt:print_suppressions=0)
 endif()

@@ -7,7 +7,8 @@ import pictura
 
 
 class ProgressReward(gymnasium.vector.VectorWrapper):
-    """Reward per metre driven, minus the re-weighted infraction terms of the library's reward and a penalty for harsh driving."""
+    """Reward per metre driven, minus the re-weighted infraction terms of the library's reward and a penalty for harsh
+    driving."""
 
     def __init__(self, env, per_m: float = 0.01, infraction: float = 2.0, comfort: float = 0.5) -> None:
         super().__init__(env)

@@ -81,7 +81,8 @@ def main() -> None:
             with torch.no_grad():
                 logits, values[step] = agent(seen)
             logprob = logits.log_softmax(1)
-            # Draws from the softmax (Gumbel's method) without making the host wait for the device, as torch.distributions does.
+            # Draws from the softmax (Gumbel's method) without making the host wait for the device, as
+            # torch.distributions does.
             action = (logprob - torch.empty_like(logprob).exponential_().log()).argmax(1)
             actions[step], logprobs[step] = action, logprob.gather(1, action[:, None]).squeeze(1)
             seen, rewards[step], terminations[step], truncated, info = envs.step(action)
@@ -98,8 +99,8 @@ def main() -> None:
             returns = advantages + values
 
         rows = valids.flatten().nonzero().squeeze(1)
-        # Minibatches have few sizes, so that memory and kernels chosen for one size are reused; the remaining shuffled rows of
-        # an epoch are dropped.
+        # Minibatches have few sizes, so that memory and kernels chosen for one size are reused; the remaining shuffled
+        # rows of an epoch are dropped.
         coarse = max(1, args.num_steps * n // (16 * args.num_minibatches))
         size = max(coarse, len(rows) // args.num_minibatches // coarse * coarse)
         agent_steps += len(rows)

@@ -1,4 +1,5 @@
-"""Draws a street with three road users, defined by arrays, into render_a_scene.png: the images of the paper's cameras."""
+"""Draws a street with three road users, defined by arrays, into render_a_scene.png: the images of the paper's
+cameras."""
 
 import sys
 

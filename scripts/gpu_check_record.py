@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Runs the commands of scripts/gpu_check and keeps their results in one JSON file, which is rewritten after each.
 
-gpu_check_record.py FILE start [--keep]                begins FILE: source hash, GPU, driver; --keep: continues if these are the same, and stays complete
+gpu_check_record.py FILE start [--keep]                begins FILE: source hash, GPU, driver; --keep: continues if these
+                                                       are the same, and stays complete
 gpu_check_record.py FILE run NAME [--limit S] -- COMMAND...    seconds, and its summary or last lines
 gpu_check_record.py FILE bench NAME [--limit S] -- COMMAND...  the JSON object that it prints, even if it fails
 gpu_check_record.py FILE tests -- ctest...             counts, failed, skipped and slowest tests

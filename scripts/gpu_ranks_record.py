@@ -192,8 +192,8 @@ class Steps:
 
     @staticmethod
     def rates(rows):
-        """Returns statistics of whole updates after the warm-up: agent-steps/s, the share that the filter keeps, seconds by
-        phase."""
+        """Returns statistics of whole updates after the warm-up: agent-steps/s, the share that the filter keeps,
+        seconds by phase."""
 
         def summary(values):
             return {"median": statistics.median(values), "min": min(values), "max": max(values)}

@@ -1,14 +1,14 @@
 """Driving policies that learn by self-play from what a car's cameras see: maps, simulators and renderers for Python.
 
-The package holds the library's objects; environments are in pictura.envs, policies as torch modules in pictura.torch. train,
-evaluate, the probes and PolicySession need a package that was built with torch, and load it on first use.
+The package holds the library's objects; environments are in pictura.envs, policies as torch modules in pictura.torch.
+train, evaluate, the probes and PolicySession need a package that was built with torch, and load it on first use.
 """
 
 import os
 from typing import TYPE_CHECKING
 
-# Waiting threads of torch's loops spin for milliseconds unless this variable limits it; see apps/limit_spinning.cpp for the
-# reason. The variable is read once, when the first of pictura and torch is imported.
+# Waiting threads of torch's loops spin for milliseconds unless this variable limits it; see apps/limit_spinning.cpp for
+# the reason. The variable is read once, when the first of pictura and torch is imported.
 if "OMP_WAIT_POLICY" not in os.environ:
     os.environ.setdefault("GOMP_SPINCOUNT", "2000")
 
@@ -93,9 +93,9 @@ def make_vec(maps="procedural:3", num_agents: int = 16, **options):
 def make_vec_for(policy, maps="procedural:3", num_agents: int = 16, **options):
     """Returns make_vec()'s environment with the world, cameras and observation of a policy's training.
 
-    policy: a file, or the result of pictura.torch.load_policy(). options: replace settings of the policy's training. A policy
-    of decision_steps n expects its actions to be held for n steps. Needs a package that was built with torch. Raises
-    pictura.UsageError for a policy without a file.
+    policy: a file, or the result of pictura.torch.load_policy(). options: replace settings of the policy's training. A
+    policy of decision_steps n expects its actions to be held for n steps. Needs a package that was built with torch.
+    Raises pictura.UsageError for a policy without a file.
     """
     from pictura.envs.gymnasium_vector import DriveVectorEnv
 

@@ -20,8 +20,8 @@ def built_torch() -> str | None:
 
 
 def wrong_torch() -> str | None:
-    """Returns why a package that was built with torch cannot use the installed torch, or None. Does not import torch, which
-    takes a second."""
+    """Returns why a package that was built with torch cannot use the installed torch, or None. Does not import torch,
+    which takes a second."""
     built = built_torch()
     if built is None:
         return None

@@ -1,8 +1,8 @@
 """Scenes from files of other libraries, through pictura.Scenario.from_arrays().
 
 load_scenarionet() reads the pickles of ScenarioNet and MetaDrive (sd_*.pkl: Waymo, nuScenes, nuPlan, Argoverse 2). Nothing in a
-pickle is executed: it may hold only NumPy arrays and plain values. from_py123d() takes scenes of py123d, which it does not
-import.
+pickle is executed: it may hold only NumPy arrays and plain values. from_py123d() takes scenes of py123d, which it does
+not import.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ _NUMPY = re.compile(r"numpy\.(_?core\.(multiarray|numeric)\.)?(\w+)")
 def _plain_values(data: bytes) -> Any:
     """Returns the contents of a pickle of NumPy arrays and builtins; object arrays become lists.
 
-    Its callables are stand-ins that are created for every pickle, since a pickle can also change the objects that it names.
+    Its callables are stand-ins that are created for every pickle, since a pickle can also change the objects that it
+    names.
     """
 
     class Type:
@@ -70,8 +71,8 @@ def _plain_values(data: bytes) -> Any:
         **{f"builtins.{kind.__name__}": kind for kind in (int, float, set)},
     }
 
-    # The Python implementation, half as fast as the C implementation, which allocates memory for as many memoized values as a
-    # pickle declares.
+    # The Python implementation, half as fast as the C implementation, which allocates memory for as many memoized
+    # values as a pickle declares.
     class Unpickler(pickle._Unpickler):
         def find_class(self, module: str, name: str) -> Any:
             whole = f"{module.replace('__builtin__', 'builtins')}.{name}"
@@ -223,8 +224,8 @@ def _is_inside(point: np.ndarray, ring: np.ndarray) -> bool:
 
 
 def _edges_of_outlines(rings: list[np.ndarray]) -> list[np.ndarray]:
-    """Converts outlines of drivable areas to edges with the road on their left: outer rings run counter-clockwise, rings of
-    holes clockwise."""
+    """Converts outlines of drivable areas to edges with the road on their left: outer rings run counter-clockwise,
+    rings of holes clockwise."""
     if len(rings) * sum(map(len, rings)) > _MAX_OUTLINE_WORK:
         raise _Fault(f"map_features: expected fewer outlines, got {len(rings)} of {sum(map(len, rings))} points")
     edges = []
@@ -356,10 +357,10 @@ def _scenarionet_arrays(scene: Any) -> dict[str, Any]:
 def load_scenarionet(path: str | os.PathLike[str]) -> pictura.Scenario:
     """Loads the scene of a ScenarioNet or MetaDrive pickle (sd_*.pkl).
 
-    The scene keeps road users, lanes with links, neighbours, widths and limits, lines, edges, crosswalks, stop signs and
-    lights. It drops cones, barriers, sidewalks, driveways and speed bumps. Ids that are not integers are replaced by positions.
-    Maps are flat, except in Waymo's frame. Raises pictura.Error naming the file and the part, also if a pickle names anything
-    but NumPy arrays and builtins.
+    The scene keeps road users, lanes with links, neighbours, widths and limits, lines, edges, crosswalks, stop signs
+    and lights. It drops cones, barriers, sidewalks, driveways and speed bumps. Ids that are not integers are replaced
+    by positions. Maps are flat, except in Waymo's frame. Raises pictura.Error naming the file and the part, also if a
+    pickle names anything but NumPy arrays and builtins.
     """
     path = os.fspath(path)
     if os.path.getsize(path) > _MAX_BYTES:
@@ -517,11 +518,12 @@ def _123d_lights(scene: Any, iterations: range, lanes: dict[str, int]) -> dict[s
 
 
 def from_py123d(scene: Any, *, radius_m: float = 200.0) -> pictura.Scenario:
-    """Converts the scene of a py123d.api.SceneAPI: nuPlan, Argoverse 2, nuScenes, Waymo and others through one interface.
+    """Converts the scene of a py123d.api.SceneAPI: nuPlan, Argoverse 2, nuScenes, Waymo and others through one
+    interface.
 
-    radius_m: radius around the self-driving car at the scene's present, within which maps of whole towns are kept. The scene
-    keeps road users, lanes with links, neighbours, limits and the widths between their boundaries, lines, edges, crosswalks,
-    stop signs and lights. Raises pictura.Error naming the scene and the part.
+    radius_m: radius around the self-driving car at the scene's present, within which maps of whole towns are kept. The
+    scene keeps road users, lanes with links, neighbours, limits and the widths between their boundaries, lines, edges,
+    crosswalks, stop signs and lights. Raises pictura.Error naming the scene and the part.
     """
     metadata = scene.get_scene_metadata()
     place = f"{metadata.dataset}: {metadata.initial_uuid}"

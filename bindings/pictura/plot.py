@@ -4,14 +4,16 @@
     plot.save(plot.run_curves(["runs/a", "runs/b"], x="hours"), "curves.png")
     plot.figure(plot.probe_means("probe_removal/summary.json"))  # a Matplotlib figure, for notebooks
 
-A function whose name ends in _curves, _rates, _costs, _parts or _means reads files and returns a Chart, the data to draw.
-figure() and save() draw a Chart. Only these two need Matplotlib; the rest needs only Python 3.11, neither NumPy nor pictura's
-extensions. `pictura plot`, `pictura probe` and `pictura bench --plot` contain this file and run it as a program:
+A function whose name ends in _curves, _rates, _costs, _parts or _means reads files and returns a Chart, the data to
+draw. figure() and save() draw a Chart. Only these two need Matplotlib; the rest needs only Python 3.11, neither NumPy
+nor pictura's extensions. `pictura plot`, `pictura probe` and `pictura bench --plot` contain this file and run it as a
+program:
 
     python -m pictura.plot '{"chart": "run_curves", "runs": ["runs/a"], "out": "curves.png"}'
 
-The program takes a function's name and arguments as one JSON object, with the picture's name as "out". It exits with 0, with
-1 after an error, or with 3 without Matplotlib, after writing the chart's data as JSON to the picture's name and ".json".
+The program takes a function's name and arguments as one JSON object, with the picture's name as "out". It exits with 0,
+with 1 after an error, or with 3 without Matplotlib, after writing the chart's data as JSON to the picture's name and
+".json".
 """
 
 from __future__ import annotations
@@ -279,11 +281,12 @@ def _labels_of(column: str) -> tuple[str, str]:
 def run_curves(runs: Sequence[str], metrics: Sequence[str] = METRICS, x: str = "agent_steps", group: str = "seeds") -> Chart:
     """Returns curves of training runs, with a panel for each metric and a line for each run.
 
-    runs: folders that `pictura train` wrote. metrics: columns of progress.csv, or the part after the slash if only one column
-    has it. x: "agent_steps", or "hours" of rollouts and updates. group: "seeds" draws one line for runs whose config.toml
-    differ only in run.seed: their mean over the stretch that all of them cover, with a band from the lowest to the highest;
-    "none" draws a line for each run. A line has at most MAX_RUN_POINTS points, each the mean of equally many consecutive
-    updates. Raises PlotError naming a missing folder, file or column, or runs that have no stretch in common.
+    runs: folders that `pictura train` wrote. metrics: columns of progress.csv, or the part after the slash if only one
+    column has it. x: "agent_steps", or "hours" of rollouts and updates. group: "seeds" draws one line for runs whose
+    config.toml differ only in run.seed: their mean over the stretch that all of them cover, with a band from the lowest
+    to the highest; "none" draws a line for each run. A line has at most MAX_RUN_POINTS points, each the mean of equally
+    many consecutive updates. Raises PlotError naming a missing folder, file or column, or runs that have no stretch in
+    common.
     """
     _need(runs and metrics, "run_curves: expected a run and a metric or more")
     read: list[_Run] = []
@@ -367,8 +370,8 @@ def _evaluation_series(line: dict[str, Any], metric: str, x: str) -> Series:
 def evaluation_curves(path: str, x: str = "agent_steps") -> Chart:
     """Returns metrics of the evaluation protocol during trainings: medium traffic, with a band over all densities.
 
-    path: output of `scripts/reproduce_table --curves`. x: "agent_steps", or "hours" of one GPU. Raises PlotError naming the
-    file, the line and what is missing.
+    path: output of `scripts/reproduce_table --curves`. x: "agent_steps", or "hours" of one GPU. Raises PlotError naming
+    the file, the line and what is missing.
     """
     x_label = "time on one GPU (h)" if x == "hours" else "agent-steps"
     panels = {metric: Panel(title, x_label, y_label, starts_at_zero=True) for metric, title, y_label in _PROTOCOL}
@@ -402,8 +405,8 @@ def evaluation_curves(path: str, x: str = "agent_steps") -> Chart:
 def severity_curves(results: Sequence[str]) -> Chart:
     """Returns metrics of the evaluation protocol by the severity of randomized cameras, with 95 % intervals.
 
-    results: outputs of `pictura evaluate --camera-severity ... --json`; each file and density is a line. Raises PlotError
-    naming the file and what is missing.
+    results: outputs of `pictura evaluate --camera-severity ... --json`; each file and density is a line. Raises
+    PlotError naming the file and what is missing.
     """
     panels = {metric: Panel(title, "severity", y_label, starts_at_zero=True) for metric, title, y_label in _PROTOCOL}
     for path in results:
@@ -432,8 +435,8 @@ _RATE, _SIZE = "agent-steps/s", "width of a 16:9 image (px)"
 
 
 def _read_results(paths: Sequence[str]) -> list[tuple[str, float]]:
-    """Returns names and values of results: outputs of `pictura bench --json`, and files of scripts/gpu_check, which hold
-    several."""
+    """Returns names and values of results: outputs of `pictura bench --json`, and files of scripts/gpu_check, which
+    hold several."""
     results: list[tuple[str, float]] = []
     for path in paths:
         content, before = _read_json(path), len(results)
@@ -450,7 +453,8 @@ def _sweep(title: str, x_label: str, y_label: str) -> Panel:
 
 
 def _add_point(panel: Panel, name: str, x: float, y: float) -> None:
-    """Adds a point to the series of that name. Points ascend in x; of several points with the same x the first is kept."""
+    """Adds a point to the series of that name. Points ascend in x; of several points with the same x the first is
+    kept."""
     series = next((series for series in panel.series if series.name == name), None)
     if series is None:
         series = Series(name)
@@ -498,8 +502,8 @@ def step_costs(results: Sequence[str]) -> Chart:
 
 
 def rank_rates(results: Sequence[str]) -> Chart:
-    """Returns rates and efficiencies by number of GPUs, from files of scripts/gpu_ranks: with a fixed number of agents on each
-    GPU, and with a fixed number in all."""
+    """Returns rates and efficiencies by number of GPUs, from files of scripts/gpu_ranks: with a fixed number of agents
+    on each GPU, and with a fixed number in all."""
     cases = {"each": "The same number of agents on each GPU", "in_all": "The same number of agents in all"}
     rates = {case: _sweep(title, "GPUs", _RATE) for case, title in cases.items()}
     efficiencies = {
@@ -528,8 +532,8 @@ def rank_rates(results: Sequence[str]) -> Chart:
 def breakdown_parts(results: Sequence[str], parts: Sequence[str], paper: dict[str, dict[str, float]]) -> Chart:
     """Returns the seconds of an update by size, from `pictura bench breakdown`, beside the paper's.
 
-    parts: columns of the table; the third panel shows those of the first case. paper: the paper's seconds by size, of "total"
-    and of "rendering".
+    parts: columns of the table; the third panel shows those of the first case. paper: the paper's seconds by size, of
+    "total" and of "rendering".
     """
     seconds = "time of an update (s)"
     shown = {"total": _sweep("Whole update", _SIZE, seconds), "rendering": _sweep("Rendering", _SIZE, seconds)}
@@ -568,7 +572,8 @@ def _share_color(share: float) -> str:
 
 
 def _names_of(summary: dict[str, Any]) -> dict[str, str]:
-    """Returns the policies' names in charts by their names in rows: untrained weights respond in place of some policies."""
+    """Returns the policies' names in charts by their names in rows: untrained weights respond in place of some
+    policies."""
     return {one["name"]: ("untrained " if one.get("untrained_hash") else "") + one["name"] for one in summary["policy"]}
 
 
@@ -652,10 +657,12 @@ _PROBES = {"removal": _removal_means, "pedestrian": _pedestrian_means, "corner":
 
 
 def probe_means(summary: str) -> Chart:
-    """Returns the means of a probe with their 95 % intervals, like the paper's figures, from summary.json of `pictura probe`.
+    """Returns the means of a probe with their 95 % intervals, like the paper's figures, from summary.json of `pictura
+    probe`.
 
-    For removal: absolute changes by occlusion of the user, and for wholly hidden users by distance. For pedestrian: changes
-    relative to where the pedestrian is first seen, with its visibility as a strip. For corner: mean speeds since the takeover.
+    For removal: absolute changes by occlusion of the user, and for wholly hidden users by distance. For pedestrian:
+    changes relative to where the pedestrian is first seen, with its visibility as a strip. For corner: mean speeds
+    since the takeover.
     """
     content = _read_json(summary)
     kind = content.get("kind") if isinstance(content, dict) else None
@@ -673,7 +680,8 @@ def _read_cases(file_name: str, /, **wanted: str) -> list[dict[str, str]]:
 
 
 def path_curves(folder: str, path: int, marks: Sequence[tuple[float, str]] = ()) -> Chart:
-    """Returns the changes of value and braking along one path of `pictura probe pedestrian`, with the visibility as a strip.
+    """Returns the changes of value and braking along one path of `pictura probe pedestrian`, with the visibility as a
+    strip.
 
     marks: positions along the path in m, and their letters.
     """
@@ -868,8 +876,8 @@ def figure(chart: Chart, width_in: float | None = None) -> Figure:
 
 
 def _write(path: str, content: bytes) -> None:
-    """Writes a temporary file and renames it, so that no reader sees a partial file. Targets that are no regular files are
-    written directly."""
+    """Writes a temporary file and renames it, so that no reader sees a partial file. Targets that are no regular files
+    are written directly."""
     if path.startswith(("/dev/", "/proc/")) or (os.path.exists(path) and not os.path.isfile(path)):
         pathlib.Path(path).write_bytes(content)
         return
@@ -950,7 +958,8 @@ CHARTS = {chart.__name__: chart for chart in (run_curves, evaluation_curves, sev
 
 
 def _answer(request: dict[str, Any]) -> None:
-    """Draws the chart of a request. "report" in the request selects what is printed: "json", "text", or nothing if absent."""
+    """Draws the chart of a request. "report" in the request selects what is printed: "json", "text", or nothing if
+    absent."""
     name, report = request.pop("chart", None), request.pop("report", None)
     if name == "probe_charts":
         return probe_charts(**request)

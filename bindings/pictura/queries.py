@@ -7,10 +7,10 @@ from pictura._pictura import INSERTED_DTYPE, QUERY_DTYPE, Error
 def make_queries(slots, *, hidden=None, inserted=None, leaves_gaps=False):
     """Returns queries for Simulator.observe(), on the CPU, as the tuple (queries, hidden, inserted) of NumPy arrays.
 
-    slots: [n] of int. hidden: boxes that each query leaves out, as n lists of indices into the scene's boxes, or as (indices,
-    begin) with the indices of query i from begin[i] up to begin[i + 1]. inserted: boxes that each query adds, likewise, of
-    INSERTED_DTYPE. leaves_gaps: bool, or [n] of bool: whether rows of zeros replace hidden boxes. Raises pictura.Error naming
-    the argument that does not fit.
+    slots: [n] of int. hidden: boxes that each query leaves out, as n lists of indices into the scene's boxes, or as
+    (indices, begin) with the indices of query i from begin[i] up to begin[i + 1]. inserted: boxes that each query adds,
+    likewise, of INSERTED_DTYPE. leaves_gaps: bool, or [n] of bool: whether rows of zeros replace hidden boxes. Raises
+    pictura.Error naming the argument that does not fit.
     """
     queries = np.zeros(len(slots), QUERY_DTYPE)
     queries["slot"] = slots

@@ -49,7 +49,8 @@ def point_features(rows: Tensor, points: int) -> Tensor:
 
 
 def segment_features(rows: Tensor) -> Tensor:
-    """Features [..., 4] of the agent's position relative to the segments of rows [..., 7]: along them and to their left."""
+    """Features [..., 4] of the agent's position relative to the segments of rows [..., 7]: along them and to their
+    left."""
     x_m, y_m = (rows[..., :2] * -_SCALE_POSITION_M).unbind(-1)  # agent relative to the middle
     cos, sin = rows[..., 4:6].unbind(-1)
     return _near_and_far(torch.stack([x_m * cos + y_m * sin, cos * y_m - sin * x_m], -1))
@@ -60,7 +61,8 @@ def _normalize(x: Tensor) -> Tensor:
 
 
 def _refuse_removed(config: Mapping[str, Any]) -> None:
-    """Raises pictura.UsageError if the `policy` table holds a removed key with a value other than its only valid one."""
+    """Raises pictura.UsageError if the `policy` table holds a removed key with a value other than its only valid
+    one."""
     for key, value, reason in _removed_keys():
         name = key.removeprefix("policy.")
         if name in config and json.dumps(config[name]) != value:
@@ -85,8 +87,8 @@ class _Encoder(nn.Module):
 class _Attention(nn.Module):
     """Learned queries of each camera, which attend to the tokens of its feature map.
 
-    Queries are equal for all images, so scores are computed directly from tokens, q (W t) = (q W) t, and values from weighted
-    sums of tokens (docs/explanation/network.md): neither keys nor values are computed for each token.
+    Queries are equal for all images, so scores are computed directly from tokens, q (W t) = (q W) t, and values from
+    weighted sums of tokens (docs/explanation/network.md): neither keys nor values are computed for each token.
     """
 
     def __init__(self, cameras: int, queries: int, width: int, heads: int, mlp: int) -> None:
@@ -101,7 +103,8 @@ class _Attention(nn.Module):
             self.mlp_norm, self.mlp_hidden, self.mlp_out = nn.LayerNorm(width), nn.Linear(width, mlp), nn.Linear(mlp, width)
 
     def forward(self, maps: Tensor, first: int) -> Tensor:
-        """Returns [cameras, batch, width] for maps [cameras, batch, width, rows, columns] of cameras from number `first` on."""
+        """Returns [cameras, batch, width] for maps [cameras, batch, width, rows, columns] of cameras from number
+        `first` on."""
         cameras, rows, columns = maps.shape[0], *maps.shape[-2:]
         y = (torch.arange(rows, device=maps.device) + 0.5) * (math.pi / rows)
         x = (torch.arange(columns, device=maps.device) + 0.5) * (math.pi / columns)
@@ -126,12 +129,13 @@ class Policy(nn.Module):
     """Policy of either modality: forward(observation) returns logits [batch, 12] and values [batch].
 
     observation: float32 tensors by the names of pictura.Simulator.observations, [batch, ...] on the module's device: `ego`,
-    `conditioning` and `waypoints`; for the vector policy the entity sets and `set_counts`; for the perspective policy `rgb`
-    uint8 [batch, cameras, 3, height, width], or a list of these for cameras of several sizes in the order of the rig. NumPy
-    arrays are converted to tensors. config: the `policy` table of a configuration (docs/reference/configuration.md). walls:
-    whether a vector policy reads walls. metadata: contents of the file of a policy that load_policy() read, besides the
-    weights: `path`, `config` (the whole configuration of its training), `schema`, `rig`, `update` and `agent_steps` among
-    others; else empty. Raises pictura.UsageError if an observation differs from those of the policy's training.
+    `conditioning` and `waypoints`; for the vector policy the entity sets and `set_counts`; for the perspective policy
+    `rgb` uint8 [batch, cameras, 3, height, width], or a list of these for cameras of several sizes in the order of the
+    rig. NumPy arrays are converted to tensors. config: the `policy` table of a configuration
+    (docs/reference/configuration.md). walls: whether a vector policy reads walls. metadata: contents of the file of a
+    policy that load_policy() read, besides the weights: `path`, `config` (the whole configuration of its training),
+    `schema`, `rig`, `update` and `agent_steps` among others; else empty. Raises pictura.UsageError if an observation
+    differs from those of the policy's training.
     """
 
     def __init__(self, config: Mapping[str, Any], num_cameras: int = 4, walls: bool = False) -> None:
@@ -255,15 +259,15 @@ class Policy(nn.Module):
         return self.project(torch.cat(embedded, 1))
 
     def _maps(self, pixels: Tensor) -> Tensor:
-        """Returns feature maps [cameras, batch, width, rows, columns] of pixels uint8 [batch, cameras, 3, height, width]. The
-        cameras share the convolutions, so they form one batch."""
+        """Returns feature maps [cameras, batch, width, rows, columns] of pixels uint8 [batch, cameras, 3, height,
+        width]. The cameras share the convolutions, so they form one batch."""
         patch, x = self.patch_px, pixels.transpose(0, 1)
         right, below = -x.shape[4] % patch, -x.shape[3] % patch
         if right or below:
             x = functional.pad(x, (0, right, 0, below))
         x = x.flatten(0, 1)
-        # Patches are taken before the conversion from bytes. Channels are last on CUDA, as tensor cores read them; on a CPU
-        # this would be slower.
+        # Patches are taken before the conversion from bytes. Channels are last on CUDA, as tensor cores read them; on a
+        # CPU this would be slower.
         layout = torch.channels_last if x.is_cuda else torch.contiguous_format
         x = functional.pixel_unshuffle(x, patch).to(self.actor.weight.dtype, memory_format=layout)
         for i, layer in enumerate(self.conv):
@@ -355,7 +359,8 @@ def load_policy(path: str | os.PathLike[str], average: bool = False) -> Policy:
 
     average: loads the average of weights that a checkpoint of a run with train.weight_average holds.
 
-    Raises pictura.Error naming what is wrong with the file, pictura.UsageError for a backbone that is a separate program.
+    Raises pictura.Error naming what is wrong with the file, pictura.UsageError for a backbone that is a separate
+    program.
     """
     path = os.fspath(path)
     with _named(path):
@@ -384,10 +389,11 @@ def _load(path: str, average: bool) -> Policy:
 
 
 def save_policy(policy: Policy, path: str | os.PathLike[str], like: str | os.PathLike[str]) -> None:
-    """Writes a policy's weights in place of those of `like`, a checkpoint (.ckpt) or safetensors of the same architecture.
+    """Writes a policy's weights in place of those of `like`, a checkpoint (.ckpt) or safetensors of the same
+    architecture.
 
-    Everything else in the file remains, including the type of its numbers, so that the `pictura` command accepts it. The file
-    is written completely or not at all. Raises pictura.Error if the architectures differ.
+    Everything else in the file remains, including the type of its numbers, so that the `pictura` command accepts it.
+    The file is written completely or not at all. Raises pictura.Error if the architectures differ.
     """
     path, like = os.fspath(path), os.fspath(like)
     weights = {name: value.detach().to("cpu", torch.float32).contiguous() for name, value in policy.state_dict().items()}
@@ -455,13 +461,14 @@ def _example_observation(policy: Policy) -> dict[str, Tensor]:
 
 
 def export_onnx(policy: Policy, path: str | os.PathLike[str]) -> None:
-    """Writes a policy as an ONNX model of opset 20, with torch's exporter, which needs the packages onnx and onnxscript.
+    """Writes a policy as an ONNX model of opset 20, with torch's exporter, which needs the packages onnx and
+    onnxscript.
 
-    Inputs are the arrays of an observation by name, as forward() reads them, [batch, ...] of any batch; images of cameras of
-    several sizes are rgb_0, rgb_1, ... Outputs are `logits` float32 [batch, 12] and `value` float32 [batch]. The model's
-    property `pictura` holds the policy file's contents besides its weights, without the path, as JSON. The file is written
-    completely or not at all. Raises pictura.Error if a package is missing, pictura.UsageError for an image policy without a
-    file.
+    Inputs are the arrays of an observation by name, as forward() reads them, [batch, ...] of any batch; images of
+    cameras of several sizes are rgb_0, rgb_1, ... Outputs are `logits` float32 [batch, 12] and `value` float32 [batch].
+    The model's property `pictura` holds the policy file's contents besides its weights, without the path, as JSON. The
+    file is written completely or not at all. Raises pictura.Error if a package is missing, pictura.UsageError for an
+    image policy without a file.
     """
     for package in ("onnx", "onnxscript"):
         if importlib.util.find_spec(package) is None:

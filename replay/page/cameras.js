@@ -1,16 +1,17 @@
-// Images of any agent's cameras at any step, drawn with WebGL2: a counterpart of the renderer for images that the file does not
-// hold. docs/explanation/image.md has the rules, backend_gl/ the same method for OpenGL; pixels are means of up to 8x8 samples.
+// Images of any agent's cameras at any step, drawn with WebGL2: a counterpart of the renderer for images that the file
+// does not hold. docs/explanation/image.md has the rules, backend_gl/ the same method for OpenGL; pixels are means of
+// up to 8x8 samples.
 
 const NEAR_M = 0.1, RANGE_M = 120, MAX_PIECE_M = 10, MAX_MITRE = 4, LIGHT_RADIUS_M = 0.5, LIGHT_SIDES = 24, RIG_BODY_M = 4.5;
 const STRIP_RANKS = [2, 3, 1, 0];  // lane mark, road edge, crosswalk, stop line: the lowest rank lies above the others
-// Faces of a box: front, back, left, right, top, and the underside in the top's colour. Its corners are front left, rear left,
-// rear right, front right on the ground, then the same on the roof.
+// Faces of a box: front, back, left, right, top, and the underside in the top's colour. Its corners are front left,
+// rear left, rear right, front right on the ground, then the same on the roof.
 const BOX_FACES = [[3, 0, 4, 7], [1, 2, 6, 5], [0, 1, 5, 4], [2, 3, 7, 6], [4, 5, 6, 7], [3, 2, 1, 0]];
 const FACE_FLOATS = 16, SOLID = -1;
 
-// Vertex shader. An instance is a face of four corners in the world, in order around it, with its order among strips, or SOLID,
-// and its colour. Strips have a minimum width on screen; they are compared by the depth of a plane below them, lower by their
-// order.
+// Vertex shader. An instance is a face of four corners in the world, in order around it, with its order among strips,
+// or SOLID, and its colour. Strips have a minimum width on screen; they are compared by the depth of a plane below
+// them, lower by their order.
 const FACE_VERTEX_SHADER = `#version 300 es
 precision highp float;
 layout(location = 0) in vec4 corner0;
@@ -123,7 +124,8 @@ class Faces {
   }
 }
 
-// Returns the strips of a line, as append_strips() of the renderer creates them: pieces of at most 10 m that meet in mitres.
+// Returns the strips of a line, as append_strips() of the renderer creates them: pieces of at most 10 m that meet in
+// mitres.
 function addStrips({ width_m, color, points }, faces) {
   const at = [points[0]];
   for (const b of points.slice(1)) {
@@ -292,8 +294,8 @@ class CameraView {
     return faces;
   }
 
-  // Draws an agent's cameras at a frame: copies the image of each into the 2D context of its size. `hidden` agents are not
-  // drawn, `added` road users are: bodies with positions.
+  // Draws an agent's cameras at a frame: copies the image of each into the 2D context of its size. `hidden` agents are
+  // not drawn, `added` road users are: bodies with positions.
   draw(agent, frame, { hidden = [], added = [] }, contexts) {
     const { gl, replay, header } = this, body = replay.body(agent, frame), pose = replay.pose(agent, frame);
     if (gl.isContextLost()) throw new Error("its WebGL2 was taken away");

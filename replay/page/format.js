@@ -178,8 +178,8 @@ class Replay {
   imagesOf(frame) { return this.images.frame(frame); }
   // Whether the file holds the images of an agent's cameras.
   hasImages(agent, frame) { return agent === this.followed && Boolean(this.images) && frame < this.images.frames; }
-  // Returns the road user of a probe's case, if an agent's case is shown: whether it is inserted, and the change of the images
-  // that removes or adds it.
+  // Returns the road user of a probe's case, if an agent's case is shown: whether it is inserted, and the change of the
+  // images that removes or adds it.
   caseUser(agent, frame) {
     const { probed } = this;
     if (!probed || probed.frame !== frame || probed.ego !== agent || (probed.removed === null && !probed.inserted)) return null;
@@ -263,8 +263,8 @@ class Images {
   }
 }
 
-// Required members of a header; header_of() in replay/file.cpp writes them. A list holds the kind of its members; a kind that
-// ends in "?" may be null.
+// Required members of a header; header_of() in replay/file.cpp writes them. A list holds the kind of its members; a
+// kind that ends in "?" may be null.
 const HUE = ["number"], numbers = (...names) => Object.fromEntries(names.map(name => [name, "number"]));
 const HEADER = {
   command: "string", program: "string", commit: "string", map: "string", map_hash: "string", policy: "string", policy_hash: "string", light_cycles: "string", seed: "string",

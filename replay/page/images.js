@@ -126,8 +126,8 @@ function unpackImages(cameras, hues, group, count, frameBytes) {
   return out;
 }
 
-// Runs unpackImages() outside the page's thread, so that playback does not stall: a function of its arguments that returns a
-// promise, or null if the browser allows no such worker.
+// Runs unpackImages() outside the page's thread, so that playback does not stall: a function of its arguments that
+// returns a promise, or null if the browser allows no such worker.
 function imageWorker() {
   const waiting = new Map();
   let worker, count = 0;

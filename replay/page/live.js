@@ -52,8 +52,8 @@ class LiveReplay extends Replay {
     this.events = this.events.filter(event => event.frame >= count).map(event => ({ ...event, frame: event.frame - count }));
     this.looks = new Map([...this.looks].filter(([frame]) => frame >= count).map(([frame, look]) => [frame - count, look]));
   }
-  // Adds the frame of a message. Returns the number of frames dropped for it, or null if the frame does not follow the last
-  // one.
+  // Adds the frame of a message. Returns the number of frames dropped for it, or null if the frame does not follow the
+  // last one.
   append({ step, tracks, lights, chains, episode, metrics }) {
     if (step !== this.firstStep + this.frames) return null;
     let dropped = 0;

@@ -87,8 +87,8 @@ class MapView {
 
   forget() { this.kept = null; }
 
-  // Draws the map behind a camera {x, y, scale: px a metre} on a canvas of this size in pixels. With `isMoving` a picture of
-  // another scale is used meanwhile.
+  // Draws the map behind a camera {x, y, scale: px a metre} on a canvas of this size in pixels. With `isMoving` a
+  // picture of another scale is used meanwhile.
   draw(context, camera, width, height, theme, isMoving) {
     const kept = this.kept, margin = 0.25;
     const covers = kept && Math.abs(camera.x - kept.x) * camera.scale <= margin * width && Math.abs(camera.y - kept.y) * camera.scale <= margin * height;

@@ -34,7 +34,8 @@ TINY = [
 
 
 class CommandServer:
-    """Process whose children are calls of the command, since most of a start is the loading of libraries (command_server.cpp)."""
+    """Process whose children are calls of the command, since most of a start is the loading of libraries
+    (command_server.cpp)."""
 
     def __init__(self, program):
         self.socket, stdin = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -75,8 +76,8 @@ def server():
 
 
 def run(*arguments, timeout=300, cwd=None, started=False, **variables):
-    """Runs the command. started: as a separate program, with its own command line. Skips the test if it would draw a chart and
-    the machine has no Matplotlib."""
+    """Runs the command. started: as a separate program, with its own command line. Skips the test if it would draw a
+    chart and the machine has no Matplotlib."""
     environment = {**os.environ, **{name: str(value) for name, value in variables.items()}}
     words = [PICTURA, *map(str, arguments)]
     if server() and not started:

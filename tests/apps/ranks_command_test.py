@@ -69,7 +69,8 @@ class Ranks(CommandCase):
         return json.loads(results[0][1])
 
     def assert_same_but_for_rounding(self, one, other, start=None):
-        """Compares checkpoints after one update from one state: the simulator's bytes exactly, the parameters up to rounding."""
+        """Compares checkpoints after one update from one state: the simulator's bytes exactly, the parameters up to
+        rounding."""
         (tensors, simulator), (others, other_simulator) = checkpoint_parts(one), checkpoint_parts(other)
         self.assertEqual(simulator, other_simulator)
         before = checkpoint_parts(start)[0]

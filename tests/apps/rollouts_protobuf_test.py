@@ -1,7 +1,7 @@
 """Checks `pictura evaluate --rollouts` with an independent protobuf implementation.
 
-Usage: rollouts_protobuf_test.py PICTURA SCENE_FIXTURE. Google's protobuf, with the messages of the Waymo sim-agents challenge
-(sim_agents_submission.proto) by number, must find in the file exactly the challenge's required contents.
+Usage: rollouts_protobuf_test.py PICTURA SCENE_FIXTURE. Google's protobuf, with the messages of the Waymo sim-agents
+challenge (sim_agents_submission.proto) by number, must find in the file exactly the challenge's required contents.
 
 Runs with the Python of $PICTURA_PY123D, or this one; exits with 77 if it lacks protobuf.
 """
@@ -65,8 +65,8 @@ def rollouts(Submission, folder, scenes, *more):
     subprocess.run([PICTURA, "evaluate", *map(str, words)], check=True, stdout=subprocess.DEVNULL)
     data = out.read_bytes()
     submission = Submission.FromString(data)
-    # Unknown fields would be kept but not parsed: all fields are known, and encoded like protobuf's, except for the order of
-    # the submission's fields.
+    # Unknown fields would be kept but not parsed: all fields are known, and encoded like protobuf's, except for the
+    # order of the submission's fields.
     submission.DiscardUnknownFields()
     assert submission.ByteSize() == len(data), (submission.ByteSize(), len(data))
     assert submission.submission_type == SIM_AGENTS_SUBMISSION

@@ -1,4 +1,5 @@
-"""Scenes of other libraries: pickles in ScenarioNet's format that are written here, hostile pickles, and objects like py123d's.
+"""Scenes of other libraries: pickles in ScenarioNet's format that are written here, hostile pickles, and objects like
+py123d's.
 """
 
 import os
@@ -275,8 +276,8 @@ def test_recordings_written_in_the_format_come_back(tmp_path):
 
 
 def scene_123d(missing: tuple[str, ...] = ()) -> object:
-    """Returns a scene with the attributes of py123d.api.SceneAPI that are read: the self-driving car, a walker and a cone on
-    two lanes."""
+    """Returns a scene with the attributes of py123d.api.SceneAPI that are read: the self-driving car, a walker and a
+    cone on two lanes."""
     x = np.arange(0, 41) * 0.5
 
     def line(y: float, first: float = 0.0, z: float = 1.0) -> NS:

@@ -1,5 +1,5 @@
-"""Python package on a CUDA device: the CPU's numbers, without copies, on the caller's stream. Skipped without a device, unless
-PICTURA_REQUIRE_GPU=1 requires one."""
+"""Python package on a CUDA device: the CPU's numbers, without copies, on the caller's stream. Skipped without a device,
+unless PICTURA_REQUIRE_GPU=1 requires one."""
 
 import os
 import subprocess

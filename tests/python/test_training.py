@@ -1,5 +1,5 @@
-"""Training, evaluation and saved policies in Python: the same numbers as pictura.torch and the command. Skipped if the package
-was built without torch."""
+"""Training, evaluation and saved policies in Python: the same numbers as pictura.torch and the command. Skipped if the
+package was built without torch."""
 
 import csv
 import json

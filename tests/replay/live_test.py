@@ -1,5 +1,5 @@
-"""`pictura simulate --serve`: accepted requests, sent messages, that a page which does not read delays nothing, and a page in
-Chromium that drives an agent.
+"""`pictura simulate --serve`: accepted requests, sent messages, that a page which does not read delays nothing, and a
+page in Chromium that drives an agent.
 
 Run by ctest, one entry per class: python3 live_test.py PICTURA [unittest arguments].
 """
@@ -361,7 +361,8 @@ class Chromium(Served):
         self.assertEqual(self.browser.errors, [])
 
     def drive(self, agent):
-        """Takes an agent, stops it, drives on and gives it back. Returns its actions since it stood, or None if it was halted."""
+        """Takes an agent, stops it, drives on and gives it back. Returns its actions since it stood, or None if it was
+        halted."""
         last = "pictura.replay.frames - 1"
         self.browser.run(f"pictura.actions.select({agent})")
         self.browser.key("t")

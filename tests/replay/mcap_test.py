@@ -1,4 +1,5 @@
-"""MCAP files of replays, read by PyPI's mcap: complete, indexed, with Foxglove's schemas, and the same numbers as the page.
+"""MCAP files of replays, read by PyPI's mcap: complete, indexed, with Foxglove's schemas, and the same numbers as the
+page.
 
 Run by ctest: python3 mcap_test.py PICTURA [unittest arguments]. Skipped without mcap (requirements.txt).
 """
@@ -26,7 +27,8 @@ TYPES = {"object": dict, "array": list, "string": str, "boolean": bool, "integer
 
 
 def differences(value, schema, path=""):
-    """Returns differences between a value and its schema, as (what, where) of members: undeclared, missing, or of another type.
+    """Returns differences between a value and its schema, as (what, where) of members: undeclared, missing, or of
+    another type.
     """
     is_true_or_false = isinstance(value, bool)  # a bool is a number in Python
     if is_true_or_false != (schema["type"] == "boolean") or not isinstance(value, TYPES[schema["type"]]):

@@ -1,7 +1,7 @@
 """Replays and galleries in headless browsers: no error, something drawn, and recorded objects shown at their positions.
 
-Run by ctest, one entry per class: python3 page_test.py PICTURA [unittest arguments]. Classes whose browser is not installed are
-skipped.
+Run by ctest, one entry per class: python3 page_test.py PICTURA [unittest arguments]. Classes whose browser is not
+installed are skipped.
 """
 
 import base64

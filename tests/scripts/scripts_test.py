@@ -1,6 +1,6 @@
-"""The scripts: their help from any folder, rejected arguments, links of scripts/setup, files of scripts/format, files that
-scripts/gpu_carry leaves after a failure, treatment of existing runs, exit statuses of measurements and of lists of work, and
-results of scripts/gpu_check_record.py.
+"""The scripts: their help from any folder, rejected arguments, links of scripts/setup, files of scripts/format, files
+that scripts/gpu_carry leaves after a failure, treatment of existing runs, exit statuses of measurements and of lists of
+work, and results of scripts/gpu_check_record.py.
 
 Run by ctest: python3 scripts_test.py [unittest arguments].
 """

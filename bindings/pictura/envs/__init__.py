@@ -7,7 +7,8 @@ from pictura.envs.batch import Batch  # noqa: F401
 
 
 def register() -> None:
-    """Registers pictura/Drive-v0 and pictura/Log-v0 with Gymnasium, as `import pictura` does if Gymnasium is installed."""
+    """Registers pictura/Drive-v0 and pictura/Log-v0 with Gymnasium, as `import pictura` does if Gymnasium is
+    installed."""
     from gymnasium.envs.registration import register as register_with_gymnasium
     from gymnasium.envs.registration import registry
 

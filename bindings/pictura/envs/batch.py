@@ -48,11 +48,12 @@ def refuse_unknown(options: Mapping[str, Any], *makers: Callable[..., Any]) -> N
 class Batch:
     """Simulator whose slots are agents to be trained, with images if they are observed.
 
-    maps: names or pictura.Map, which the worlds use in turn. num_agents: of each world. observation: "vector" (a dict of entity
-    sets), "flat" (the same numbers as one float32 [slots, n]), "images" (uint8 rgb with ego, conditioning and waypoints), or
-    "both". actions: "discrete", 12 of them, or "multi_discrete", [longitudinal 4, lateral 3]. array: "numpy", or "torch" for
-    tensors over the simulator's memory; CUDA devices support "torch" only. rig: of the images; default: the paper's. Other
-    options are those of pictura.Simulator. Raises pictura.UsageError for values that do not exist.
+    maps: names or pictura.Map, which the worlds use in turn. num_agents: of each world. observation: "vector" (a dict
+    of entity sets), "flat" (the same numbers as one float32 [slots, n]), "images" (uint8 rgb with ego, conditioning and
+    waypoints), or "both". actions: "discrete", 12 of them, or "multi_discrete", [longitudinal 4, lateral 3]. array:
+    "numpy", or "torch" for tensors over the simulator's memory; CUDA devices support "torch" only. rig: of the images;
+    default: the paper's. Other options are those of pictura.Simulator. Raises pictura.UsageError for values that do not
+    exist.
     """
 
     def __init__(
@@ -133,8 +134,8 @@ class Batch:
     # Observations
 
     def observe(self, copy: bool = True) -> Any:
-        """Returns the present observation of every slot: an array or a dict of arrays [slots, ...]. They are views of the
-        simulator's memory unless copied, except "flat", which is always a copy."""
+        """Returns the present observation of every slot: an array or a dict of arrays [slots, ...]. They are views of
+        the simulator's memory unless copied, except "flat", which is always a copy."""
         if self.observation == "flat":
             rows = [self._own[key].reshape(self.num_slots, -1) for key in self._flat_keys]
             return np.concatenate(rows, axis=1) if self.array == "numpy" else self._torch.cat(rows, dim=1)
@@ -164,8 +165,8 @@ class Batch:
     # Actions
 
     def action_indices(self, actions: Any) -> Any:
-        """Converts a user's actions to int32 [slots] in [0, 12). Raises pictura.Error for other shapes and for numbers that are
-        not integers."""
+        """Converts a user's actions to int32 [slots] in [0, 12). Raises pictura.Error for other shapes and for numbers
+        that are not integers."""
         library = self._torch if self.array == "torch" else np
         if self.array == "torch":
             if not isinstance(actions, library.Tensor):
@@ -215,8 +216,8 @@ class Batch:
         return self._state["status"] == STATUS_ACTIVE
 
     def info(self, copy: bool = True) -> dict[str, Any]:
-        """Returns the infos of every slot after a step, by name; docs/reference/python.md lists them. They are views of the
-        simulator's memory unless copied, except "active"."""
+        """Returns the infos of every slot after a step, by name; docs/reference/python.md lists them. They are views of
+        the simulator's memory unless copied, except "active"."""
         results = self._result_views
         names = ("events", "halt_reason", "goals_reached", "waypoints_reached", "episode_return", "agent_class")
         info = {name: self._state[name] for name in names}
@@ -230,8 +231,8 @@ class Batch:
         return self.simulator.draw(world, agent, width_px=width_px, height_px=height_px)
 
     def show(self, agent: int = 0) -> None:
-        """Opens a page in the browser that shows the only world from now on, and prints its address on stderr; steps then take
-        real time. On the CPU."""
+        """Opens a page in the browser that shows the only world from now on, and prints its address on stderr; steps
+        then take real time. On the CPU."""
         if self.live is None:
             rig = self.renderer.rig if self.renderer is not None else None
             self.live = pictura.LiveView(self.simulator, follow=agent, rig=rig, wait_for_page=False)

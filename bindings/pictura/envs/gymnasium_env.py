@@ -16,13 +16,13 @@ from pictura.envs.gymnasium_spaces import action_space, observation_space
 class DriveEnv(gymnasium.Env):
     """One vehicle of a world.
 
-    others: the other agents keep their lanes ("lane"), stand ("idle"), act at random ("random"), or follow a policy, a function
-    from the observations of all slots to actions int32 [slots]. render_mode: "rgb_array", from above, or "human", a live page
-    in the browser.
+    others: the other agents keep their lanes ("lane"), stand ("idle"), act at random ("random"), or follow a policy, a
+    function from the observations of all slots to actions int32 [slots]. render_mode: "rgb_array", from above, or
+    "human", a live page in the browser.
 
-    An episode ends when the agent's infraction halts it (terminated) or when its world's episode ends (truncated). Other
-    options are those of pictura.envs.Batch. The environment runs on the CPU, in one thread unless num_threads is given, so that
-    processes can be forked.
+    An episode ends when the agent's infraction halts it (terminated) or when its world's episode ends (truncated).
+    Other options are those of pictura.envs.Batch. The environment runs on the CPU, in one thread unless num_threads is
+    given, so that processes can be forked.
     """
 
     metadata = {"render_modes": RENDER_MODES, "render_fps": 10}
@@ -88,9 +88,10 @@ class DriveEnv(gymnasium.Env):
 class LogEnv(DriveEnv):
     """One road user of a recorded scene from start_step on.
 
-    control: words that pictura.Scenario.mask takes; their first road user is driven, by default the self-driving car. others:
-    as recorded ("log"), or vehicles by the intelligent driver model along their recorded paths ("idm") or along lanes
-    ("idm_lanes"). scene: a name or a pictura.Scenario, whose world it is. The goal is the end of the road user's recording.
+    control: words that pictura.Scenario.mask takes; their first road user is driven, by default the self-driving car.
+    others: as recorded ("log"), or vehicles by the intelligent driver model along their recorded paths ("idm") or along
+    lanes ("idm_lanes"). scene: a name or a pictura.Scenario, whose world it is. The goal is the end of the road user's
+    recording.
 
     Before the first action the road user is as recorded. Other options are those of DriveEnv.
     """

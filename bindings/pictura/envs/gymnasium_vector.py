@@ -21,13 +21,13 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
     agents of a world begin together. On roads that end a slot whose agent leaves reports `truncated` with that agent's last
     observation, and waits, not active, until another agent enters.
 
-    autoreset: with "next_step" the step after a world's end begins its next episode; its rewards are 0. With "same_step" the
-    step that ends an episode begins the next, and info["final_obs"] and info["final_info"] hold the last observations and infos
-    of the slots that ended in that step.
+    autoreset: with "next_step" the step after a world's end begins its next episode; its rewards are 0. With
+    "same_step" the step that ends an episode begins the next, and info["final_obs"] and info["final_info"] hold the
+    last observations and infos of the slots that ended in that step.
 
-    num_envs: the required number of slots; default: num_agents times num_worlds. copy: whether calls return copies; otherwise
-    they return views that the next step overwrites. Other options are those of pictura.envs.Batch. On CUDA all arrays are torch
-    tensors in device memory.
+    num_envs: the required number of slots; default: num_agents times num_worlds. copy: whether calls return copies;
+    otherwise they return views that the next step overwrites. Other options are those of pictura.envs.Batch. On CUDA
+    all arrays are torch tensors in device memory.
     """
 
     def __init__(
@@ -108,7 +108,8 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
 class AgentStatistics(gymnasium.vector.VectorWrapper):
     """Counts the agents' events like the simulator's totals: `statistics`, a dict of numbers since construction.
 
-    Steps of halted agents are not counted. Counts equal those of pictura.Simulator.totals(); sums equal them up to rounding.
+    Steps of halted agents are not counted. Counts equal those of pictura.Simulator.totals(); sums equal them up to
+    rounding.
     """
 
     def __init__(self, env: DriveVectorEnv) -> None:

@@ -15,11 +15,11 @@ from pictura.envs.gymnasium_spaces import action_space, observation_space
 class DriveParallelEnv(ParallelEnv):
     """The agents agent_0, agent_1, ... of one world.
 
-    `agents` are those that found a place and still drive. An infraction terminates an agent; the end of the world's episode
-    truncates all remaining agents, and so does leaving a road that ends. An agent that enters such a road in the place of
-    agent_3 is agent_3_1, the next agent_3_2; possible_agents holds only the first agents. infos hold the entries of
-    pictura.envs.Batch.info(); "active" is whether the agent continues. Options are those of Batch; the environment runs on the
-    CPU.
+    `agents` are those that found a place and still drive. An infraction terminates an agent; the end of the world's
+    episode truncates all remaining agents, and so does leaving a road that ends. An agent that enters such a road in
+    the place of agent_3 is agent_3_1, the next agent_3_2; possible_agents holds only the first agents. infos hold the
+    entries of pictura.envs.Batch.info(); "active" is whether the agent continues. Options are those of Batch; the
+    environment runs on the CPU.
     """
 
     metadata = {"name": "pictura_drive_v0", "render_modes": RENDER_MODES, "render_fps": 10, "is_parallelizable": True}

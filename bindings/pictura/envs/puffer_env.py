@@ -31,8 +31,8 @@ except ImportError:
 
 
 class DrivePufferEnv(_Base):
-    """All agents of all worlds, written into PufferLib's buffers. Observations are flat or, with observation="images", one
-    image per camera, since PufferLib supports a single Box. `masks` is false for halted agents.
+    """All agents of all worlds, written into PufferLib's buffers. Observations are flat or, with observation="images",
+    one image per camera, since PufferLib supports a single Box. `masks` is false for halted agents.
     """
 
     def __init__(

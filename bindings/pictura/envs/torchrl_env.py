@@ -15,11 +15,11 @@ from pictura.envs.batch import Batch
 class DriveTorchRLEnv(EnvBase):
     """Environment with batch_size [worlds].
 
-    ("agents", "observation", ...), ("agents", "action"), ("agents", "reward") and ("agents", "mask"), which is false for halted
-    and absent agents, are [worlds, agents, ...]. done, terminated and truncated belong to worlds, [worlds, 1]. ("agents",
-    "terminated") is true for agents that an infraction has just ended, ("agents", "truncated") for agents whose world ends or
-    that leave by a road's end: their observation is still their own. reset() takes "_reset" [worlds]. Options are those of
-    pictura.envs.Batch; on CUDA nothing is copied to the host.
+    ("agents", "observation", ...), ("agents", "action"), ("agents", "reward") and ("agents", "mask"), which is false
+    for halted and absent agents, are [worlds, agents, ...]. done, terminated and truncated belong to worlds, [worlds,
+    1]. ("agents", "terminated") is true for agents that an infraction has just ended, ("agents", "truncated") for
+    agents whose world ends or that leave by a road's end: their observation is still their own. reset() takes "_reset"
+    [worlds]. Options are those of pictura.envs.Batch; on CUDA nothing is copied to the host.
     """
 
     def __init__(
@@ -94,7 +94,8 @@ class DriveTorchRLEnv(EnvBase):
         agents = self._agents(results)
         agents["reward"] = results["reward"].reshape(*self._shape, 1).clone()
         over = self._over.reshape(*self.batch_size, 1).clone()
-        # A world ends in time, or because too many agents have halted: for agents that still drive both are a truncation.
+        # A world ends in time, or because too many agents have halted: for agents that still drive both are a
+        # truncation.
         ends = {"done": over, "terminated": torch.zeros_like(over), "truncated": over.clone()}
         return TensorDict({"agents": agents, **ends}, self.batch_size, device=self.device)
 
