@@ -5,6 +5,7 @@ import pathlib
 import re
 
 import numpy as np
+import pytest
 
 import pictura
 
@@ -55,3 +56,19 @@ def test_a_metric_of_ones_own_is_counted(tmp_path, monkeypatch):
             exec(compile(block, "docs/how-to/own_metric.md", "exec"), names)  # noqa: S102
     assert names["hard_steps"].sum() > 0 and names["distance_m"].sum() > 1000
     assert (tmp_path / "drive.html").exists()
+
+
+def test_the_benchmarks_function_drives(monkeypatch):
+    pytest.importorskip("pictura._training")
+    evaluate = pictura.evaluate
+
+    def shorter(checkpoint, **options):
+        rows = evaluate(checkpoint, ["procedural:1"], steps=5, agents_per_world=4, device="cpu", **options)["rows"]
+        return {"rows": [{"part": "towns", "name": "grid towns", "not_driven": None, **row} for row in rows]}
+
+    monkeypatch.setattr(pictura, "evaluate_robust", shorter)
+    page = "docs/how-to/robust_benchmark.md"
+    (block,) = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.S)
+    names: dict[str, object] = {}
+    exec(compile(block, page, "exec"), names)  # noqa: S102
+    assert names["report"]["rows"][0]["vehicle_episodes"] > 0
