@@ -91,10 +91,10 @@ int run_command(int argc, char** argv) {
   add_replay_command(app);
 #ifdef PICTURA_HAS_TORCH
   add_train_command(app);
+#endif
   add_evaluate_command(app);
   add_probe_command(app);
   add_export_command(app);
-#endif
   add_plot_command(app);
   add_completion_command(app);
   add_bench_command(app);

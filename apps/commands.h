@@ -15,9 +15,9 @@ void add_replay_command(CLI::App& app);
 void add_simulate_command(CLI::App& app);
 #ifdef PICTURA_HAS_TORCH
 void add_train_command(CLI::App& app);
+#endif
 void add_evaluate_command(CLI::App& app);
 void add_probe_command(CLI::App& app);
 void add_export_command(CLI::App& app);
-#endif
 
 }  // namespace pictura

@@ -13,8 +13,8 @@ namespace pictura {
 
 namespace {
 
-constexpr int kDotSteps = 5;  // between dots of a path
-constexpr int kTopSize_px = 560, kGap_px = 8;
+constexpr int kDotSteps = 5;  // between dots of a way
+constexpr int kTopSize_px = 560, kRowGap_px = 8;
 constexpr float kCornerMargin_m = 8;
 constexpr Rgb kUserColor = rgb8(73, 80, 87);
 
@@ -59,10 +59,10 @@ RgbImage from_above(const CornerResults& results, size_t pair, bool walls) {
 void draw_corner_example(const CornerResults& results, const std::string& path) {
   const size_t pair = example_of(results);
   const RgbImage with_walls = from_above(results, pair, true), without = from_above(results, pair, false);
-  RgbImage page{with_walls.width_px + kGap_px + without.width_px, with_walls.height_px, {}};
+  RgbImage page{with_walls.width_px + kRowGap_px + without.width_px, with_walls.height_px, {}};
   page.rgb.assign(size_t{3} * static_cast<size_t>(page.width_px) * static_cast<size_t>(page.height_px), 255);
   paste(with_walls, 0, 0, &page);
-  paste(without, with_walls.width_px + kGap_px, 0, &page);
+  paste(without, with_walls.width_px + kRowGap_px, 0, &page);
   write_png(path, page.width_px, page.height_px, page.rgb);
 }
 

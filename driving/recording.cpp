@@ -8,20 +8,17 @@
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/messages.h"
 #include "pictura/driving/world.h"
+#include "pictura/policy/session.h"
 #include "pictura/replay/file.h"
 #include "pictura/replay/gallery.h"
 #include "pictura/replay/mcap.h"
 #include "pictura/replay/recorder.h"
 #include "pictura/version.h"
-#ifdef PICTURA_HAS_TORCH
-#include "pictura/policy/session.h"
-#endif
 
 namespace pictura {
 
 namespace {
 
-#ifdef PICTURA_HAS_TORCH
 /// Returns the observations of one slot.
 ObservationView of_slot(const ObservationView& all, size_t slot) {
   ObservationView one;
@@ -31,7 +28,6 @@ ObservationView of_slot(const ObservationView& all, size_t slot) {
 #undef X
   return one;
 }
-#endif
 
 /// Quotes a word for shells.
 std::string quoted(const std::string& word) {
@@ -80,17 +76,12 @@ std::string command_line() {
   return line;
 }
 
-RendererConfig cameras_of([[maybe_unused]] const RecordedDriver& driver) {
-#ifdef PICTURA_HAS_TORCH
+RendererConfig cameras_of(const RecordedDriver& driver) {
   if (driver.session && driver.session->reads_images()) return driver.session->renderer_config();
-#endif
   return {};
 }
 
-std::optional<ReplayDecision> decision_of_agent([[maybe_unused]] Simulator& simulator,
-                                                [[maybe_unused]] const RecordedDriver& driver,
-                                                [[maybe_unused]] int agent) {
-#ifdef PICTURA_HAS_TORCH
+std::optional<ReplayDecision> decision_of_agent(Simulator& simulator, const RecordedDriver& driver, int agent) {
   const auto slot = static_cast<size_t>(agent);
   if (!driver.session || simulator.state().status[slot] != AgentStatus::active) return {};
   std::array<float, kNumActions> logits{};
@@ -99,17 +90,12 @@ std::optional<ReplayDecision> decision_of_agent([[maybe_unused]] Simulator& simu
       {of_slot(simulator.observations(), slot), &simulator.scene(), simulator.views().subspan(slot, 1), {}},
       driver.renderer, logits, value);
   return decision_of(logits, value[0]);
-#else
-  return {};
-#endif
 }
 
 ReplayOrigin origin_of(const RecordedDriver& driver) {
   ReplayOrigin origin{.command = command_line(), .commit = PICTURA_COMMIT, .version = PICTURA_VERSION};
   origin.policy = origin.policy_hash = driver.policy;
-#ifdef PICTURA_HAS_TORCH
   if (driver.session) origin.policy_hash = driver.session->policy_hash();
-#endif
   return origin;
 }
 

@@ -11,12 +11,10 @@
 #include "pictura/common/support/suggestion.h"
 #include "pictura/driving/reported_map.h"
 #include "pictura/map/scenario/load_scenario.h"
+#include "pictura/policy/session.h"
 #include "pictura/simulator/controllers/host_controllers.h"
 #include "pictura/simulator/controllers/shared_control.h"
 #include "pictura/simulator/recorded_scene.h"
-#ifdef PICTURA_HAS_TORCH
-#include "pictura/policy/session.h"
-#endif
 
 namespace pictura {
 
@@ -68,7 +66,6 @@ DrivenWorld make_world(const WorldOptions& options, const std::string& policy) {
   const bool is_trained = !is_host_controller(policy);
   config.vector_observations = options.vector_observations;
   if (is_trained) {
-#ifdef PICTURA_HAS_TORCH
     const std::vector<std::string> names = host_controller_names();
     if (const std::string near = suggestion(policy, names); !near.empty() && !std::filesystem::exists(policy)) {
       fail_usage("--policy: expected {}, or a checkpoint's file, got '{}'{}", fmt::join(names, ", "), policy, near);
@@ -81,11 +78,6 @@ DrivenWorld make_world(const WorldOptions& options, const std::string& policy) {
     const SimulatorConfig defaults;
     config = world.session->evaluation_world(defaults.episode_steps);
     config.reset_inactive_fraction = defaults.reset_inactive_fraction;
-#else
-    const std::vector<std::string> names = host_controller_names();
-    fail_usage("--policy: expected {} (this build has no torch for checkpoints), got '{}'{}", fmt::join(names, ", "),
-               policy, suggestion(policy, names));
-#endif
   }
   if (!is_trained && options.decision_steps > 0)
     fail_usage("--decision-steps: expected a trained policy, got --policy {}", policy);
@@ -112,12 +104,10 @@ DrivenWorld make_world(const WorldOptions& options, const std::string& policy) {
         make_simulator(options.simulator, config, {load_reported_map(options.map)}, {{0, options.agents, 0}});
   }
   world.commands.resize(static_cast<size_t>(world.simulator->num_slots()));
-#ifdef PICTURA_HAS_TORCH
   if (is_trained) {
     if (world.renderer) upload_maps(*world.simulator, world.renderer.get());
     world.controller = world.session->make_controller(world.renderer.get(), /*argmax=*/true, options.seed);
   }
-#endif
   if (!world.controller) world.controller = make_controller(policy, *world.simulator, options.seed);
   if (controlled.empty()) return world;
   std::vector<Driver> drivers;

@@ -12,9 +12,8 @@
 #include "pictura/evaluation/standing.h"
 #include "pictura/map/load_map.h"
 #include "pictura/map/map_cache.h"
+#include "pictura/policy/learning_device.h"
 #include "pictura/policy/session.h"
-#include "pictura/policy/struct_copies.h"
-#include "pictura/policy/torch_device.h"
 #include "pictura/simulator/agent_state.h"
 #include "pictura/simulator/drive_steps.h"
 

@@ -20,9 +20,8 @@
 #include "pictura/evaluation/scene_plan.h"
 #include "pictura/map/file_position.h"
 #include "pictura/map/scenario/load_scenario.h"
+#include "pictura/policy/learning_device.h"
 #include "pictura/policy/session.h"
-#include "pictura/policy/struct_copies.h"
-#include "pictura/policy/torch_device.h"
 #include "pictura/simulator/drive_steps.h"
 #include "pictura/simulator/recorded_scene.h"
 #include "pictura/simulator/rules/limits.h"
@@ -98,7 +97,7 @@ class BatchDrive {
   BatchDrive(const LoadedScenes& batch, const SceneProtocol& protocol, double density, int rollout, uint64_t seed,
              Simulator* simulator)
       : batch_(batch), protocol_(protocol), density_(density), rollout_(rollout), simulator_(*simulator) {
-    const std::vector<AgentBox> boxes = host_copy_of_structs(simulator_.scene().agents, device());
+    const std::vector<AgentBox> boxes = host_copy(simulator_.scene().agents, device());
     const auto num_slots = static_cast<size_t>(simulator_.num_slots());
     roles_.reserve(num_slots);
     for (size_t world = 0; world < batch.maps.size(); ++world) {
@@ -131,7 +130,7 @@ class BatchDrive {
     places_.resize(kept_slots_.size() * static_cast<size_t>(protocol_.steps));
     // Boxes stand on the road of the map, recorded boxes near it. A constant offset per agent keeps boxes from rising
     // or falling at the start.
-    const std::vector<AgentBox> boxes = host_copy_of_structs(simulator_.scene().agents, device());
+    const std::vector<AgentBox> boxes = host_copy(simulator_.scene().agents, device());
     for (const int32_t kept : kept_slots_) {
       const auto slot = static_cast<size_t>(kept);
       const CompiledMap& map = map_of(slot);
@@ -320,7 +319,7 @@ class BatchDrive {
       ++driven_steps_[slot];
       if (step > last_steps_[slot]) continue;
       // Boxes are copied only if an agent is measured.
-      if (boxes.empty()) boxes = host_copy_of_structs(simulator_.scene().agents, device());
+      if (boxes.empty()) boxes = host_copy(simulator_.scene().agents, device());
       const CompiledMap& map = map_of(slot);
       const std::optional<float> apart_m =
           displacement_m(*map.scenario, track_of_slot_[slot], map.start_step + step, boxes[slot].center_m);
@@ -334,7 +333,7 @@ class BatchDrive {
 
   /// Records poses after a step of the episode, and before the first step; absent agents keep their last pose.
   void note_places(int step) {
-    const std::vector<AgentBox> boxes = host_copy_of_structs(simulator_.scene().agents, device());
+    const std::vector<AgentBox> boxes = host_copy(simulator_.scene().agents, device());
     const auto steps = static_cast<size_t>(protocol_.steps), at = static_cast<size_t>(step);
     for (size_t i = 0; i < kept_slots_.size(); ++i) {
       const auto slot = static_cast<size_t>(kept_slots_[i]);

@@ -11,9 +11,9 @@
 #include "pictura/configuration/apply_config.h"
 #include "pictura/configuration/compare_configs.h"
 #include "pictura/configuration/config.h"
-#include "pictura/policy/saved_policy.h"
+#include "pictura/policy/learning_device.h"
 #include "pictura/policy/session.h"
-#include "pictura/policy/torch_device.h"
+#include "pictura/policy/stored_policy.h"
 #include "pictura/simulator/controllers/host_controllers.h"
 #include "pictura/simulator/hash_values.h"
 
@@ -78,7 +78,7 @@ EvaluatedDriver controller_driver(const DriverOptions& options, int steps) {
     fail_usage("decision_steps: expected a trained policy, got the controller {}", options.controller);
   const bool is_own = options.make_own_controller != nullptr;
   const std::optional<Rig> rig = is_own ? named_rig(options) : std::nullopt;
-  Config config = options.checkpoint.empty() ? Config() : read_policy(options.checkpoint).config;
+  Config config = options.checkpoint.empty() ? Config() : read_stored_policy(options.checkpoint).config;
   config.policy.modality = rig ? Modality::perspective : Modality::vector;
   config = adapted(config, options);
   config.policy.modality = is_own ? Modality::vector : Modality::perspective;  // other controllers read no vectors,

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "pictura/policy/struct_copies.h"
+#include "pictura/policy/learning_device.h"
 #include "pictura/simulator/simulator.h"
 
 namespace pictura {
@@ -22,8 +22,8 @@ struct WorldArrays {
       : status(of_slots(simulator, simulator.state().status)),
         agent_class(of_slots(simulator, simulator.state().agent_class)),
         speed_mps(of_slots(simulator, simulator.state().speed_mps)),
-        boxes(host_copy_of_structs(simulator.scene().agents, simulator.device())),
-        lights(host_copy_of_structs(simulator.scene().light_states, simulator.device())),
+        boxes(host_copy(simulator.scene().agents, simulator.device())),
+        lights(host_copy(simulator.scene().light_states, simulator.device())),
         slot_begin(host_copy(simulator.slots().slot_begin, simulator.device())),
         box_begin(host_copy(simulator.scene().world_begin, simulator.device())),
         light_begin(host_copy(simulator.scene().light_begin, simulator.device())) {}
@@ -31,7 +31,7 @@ struct WorldArrays {
   /// Copies a field of the agents' state.
   template <typename T>
   static std::vector<T> of_slots(Simulator& simulator, const T* values) {
-    return host_copy_of_structs(Span<const T>(values, static_cast<size_t>(simulator.num_slots())), simulator.device());
+    return host_copy(Span<const T>(values, static_cast<size_t>(simulator.num_slots())), simulator.device());
   }
 
   size_t first_slot(size_t world) const { return static_cast<size_t>(slot_begin[world]); }

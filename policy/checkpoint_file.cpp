@@ -1,6 +1,7 @@
 #include "pictura/policy/checkpoint_file.h"
 
 #include <cstring>
+#include <utility>
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/hash.h"
@@ -19,11 +20,6 @@ constexpr uint32_t kVersion = 2;
 constexpr uint32_t kVersionHashingDataAlone = 1;
 constexpr uint32_t kByteOrder = 0x01020304;
 constexpr size_t kPreamble = sizeof(kMagic) + 2 * sizeof(uint32_t) + sizeof(uint64_t);
-
-std::string bytes_of(const at::Tensor& tensor) {
-  const at::Tensor host = tensor.detach().to(at::kCPU, at::kFloat).contiguous();
-  return {static_cast<const char*>(host.const_data_ptr()), host.nbytes()};
-}
 
 template <typename T>
 void append(std::string* bytes, T value) {
@@ -70,9 +66,9 @@ CheckpointFile::CheckpointFile(std::string_view file, const std::string& its_pat
   });
 }
 
-std::vector<NamedTensor> CheckpointFile::tensors(const char* list) const {
+std::vector<StoredTensor> CheckpointFile::tensors(const char* list) const {
   return read_header(path, [&] {
-    std::vector<NamedTensor> all;
+    std::vector<StoredTensor> all;
     for (const ordered_json& entry : header.at(list)) {
       const auto shape = entry.at("shape").get<std::vector<int64_t>>();
       const auto offset = entry.at("offset").get<uint64_t>();
@@ -83,9 +79,9 @@ std::vector<NamedTensor> CheckpointFile::tensors(const char* list) const {
         PICTURA_CHECK(bytes <= data.size(), "{}: {}: bad shape", path, list);
       }
       PICTURA_CHECK(bytes <= data.size() && offset <= data.size() - bytes, "{}: {}: bad offset", path, list);
-      at::Tensor value = at::empty(shape, at::kFloat);
-      std::memcpy(value.data_ptr(), data.data() + offset, bytes);
-      all.push_back({entry.at("name").get<std::string>(), value});
+      StoredTensor tensor{entry.at("name").get<std::string>(), shape, std::vector<float>(bytes / sizeof(float))};
+      std::memcpy(tensor.values.data(), data.data() + offset, bytes);
+      all.push_back(std::move(tensor));
     }
     return all;
   });
@@ -100,9 +96,9 @@ std::string_view CheckpointFile::bytes(const char* entry) const {
   });
 }
 
-SavedPolicy CheckpointFile::policy() const {
+StoredPolicy CheckpointFile::policy() const {
   return read_header(path, [&] {
-    SavedPolicy result;
+    StoredPolicy result;
     result.path = path;
     result.config = parse_saved_config(header.at("config").get<std::string>(), path + ": config");
     check_schema(header.at("schema"), result.config, path);
@@ -116,7 +112,7 @@ SavedPolicy CheckpointFile::policy() const {
   });
 }
 
-void CheckpointWriter::add_policy(const SavedPolicy& policy) {
+void CheckpointWriter::add_policy(const PolicyFacts& policy) {
   header["config"] = to_toml(policy.config);
   header["schema"] = schema_to_json(policy.config);
   header["rig"] = rig_to_json(policy.rig);
@@ -124,16 +120,16 @@ void CheckpointWriter::add_policy(const SavedPolicy& policy) {
   header["counters"] = {{"update", policy.update}, {"agent_steps", policy.agent_steps}};
 }
 
-void CheckpointWriter::add_weights(const SavedPolicy& policy) {
+void CheckpointWriter::add_weights(const StoredPolicy& policy) {
   if (!policy.rate_factors.empty()) header["rate_factors"] = policy.rate_factors;
   add_tensors("parameters", policy.parameters);
 }
 
-void CheckpointWriter::add_tensors(const char* list, const std::vector<NamedTensor>& tensors) {
+void CheckpointWriter::add_tensors(const char* list, const std::vector<StoredTensor>& tensors) {
   ordered_json& entries = header[list] = ordered_json::array();
-  for (const NamedTensor& tensor : tensors) {
-    entries.push_back({{"name", tensor.name}, {"shape", tensor.value.sizes().vec()}, {"offset", data.size()}});
-    data += bytes_of(tensor.value);
+  for (const StoredTensor& tensor : tensors) {
+    entries.push_back({{"name", tensor.name}, {"shape", tensor.shape}, {"offset", data.size()}});
+    data.append(reinterpret_cast<const char*>(tensor.values.data()), tensor.values.size() * sizeof(float));
   }
 }
 

@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pictura/common/error.h"
-#include "pictura/policy/saved_policy.h"
+#include "pictura/policy/stored_policy.h"
 
 namespace pictura {
 
@@ -26,11 +26,11 @@ struct CheckpointFile {
 
   /// Returns the tensors of a list in the header. Throws Error naming the file and the list if a tensor lies outside
   /// the data.
-  std::vector<NamedTensor> tensors(const char* list) const;
+  std::vector<StoredTensor> tensors(const char* list) const;
   /// Returns the bytes of a header entry that holds offset and size. Throws as tensors() does.
   std::string_view bytes(const char* entry) const;
   /// Returns the policy. Throws Error naming the entry of the observation schema that differs from the current schema.
-  SavedPolicy policy() const;
+  StoredPolicy policy() const;
 
   std::string path;
   nlohmann::ordered_json header;
@@ -43,9 +43,9 @@ struct CheckpointWriter {
   std::string data;
 
   /// Adds configuration, schema, rig and counters of a policy. add_weights() adds its weights.
-  void add_policy(const SavedPolicy& policy);
-  void add_weights(const SavedPolicy& policy);
-  void add_tensors(const char* list, const std::vector<NamedTensor>& tensors);
+  void add_policy(const PolicyFacts& policy);
+  void add_weights(const StoredPolicy& policy);
+  void add_tensors(const char* list, const std::vector<StoredTensor>& tensors);
   void add_bytes(const char* entry, std::string_view bytes);
   /// Returns the bytes of the complete file.
   std::string finish();

@@ -7,7 +7,7 @@
 #include "pictura/common/error.h"
 #include "pictura/configuration/apply_config.h"
 #include "pictura/policy/patch_spread.h"
-#include "pictura/policy/saved_policy.h"
+#include "pictura/policy/stored_policy.h"
 
 namespace pictura {
 
@@ -15,7 +15,7 @@ namespace {
 
 // Returns the policy for images of another size: patches and line floor grow with the images, and the first convolution
 // is spread.
-SavedPolicy resized_policy(const SavedPolicy& policy, ImageSize size) {
+StoredPolicy resized_policy(const StoredPolicy& policy, ImageSize size) {
   const Config& config = policy.config;
   if (!config.reads_images()) fail_usage("{}: size: its policy reads no images", policy.path);
   if (!config.render.rig.empty()) {
@@ -31,7 +31,7 @@ SavedPolicy resized_policy(const SavedPolicy& policy, ImageSize size) {
     fail_usage("{}: size: expected one whole number of times {}x{}, got {}x{}", policy.path, camera.width_px,
                camera.height_px, size.width_px, size.height_px);
   }
-  SavedPolicy result = policy;
+  StoredPolicy result = policy;
   result.config.policy.patch_px *= factor;
   // Rounded to the value that a person would write: .35 times 3 is 1.05, not 1.0499999999999998.
   result.config.render.line_floor_px = std::round(1e6 * factor * config.render.line_floor_px) / 1e6;
@@ -45,10 +45,10 @@ SavedPolicy resized_policy(const SavedPolicy& policy, ImageSize size) {
   result.config.render.schedule.clear();  // belongs to the run at the old size
   result.rig = paper_rig(size.width_px, size.height_px);
   const auto first = std::find_if(result.parameters.begin(), result.parameters.end(),
-                                  [](const NamedTensor& parameter) { return parameter.name == kFirstConvolution; });
+                                  [](const StoredTensor& parameter) { return parameter.name == kFirstConvolution; });
   PICTURA_CHECK(first != result.parameters.end(), "{}: of another architecture: it has no parameter '{}'", policy.path,
                 kFirstConvolution);
-  first->value = spread_over_patches(first->value, factor);
+  *first = spread_over_patches(*first, factor);
   if (factor > 1) result.rate_factors.try_emplace(kFirstConvolution, 1).first->second *= rate_factor_of_spread(factor);
   return result;
 }
@@ -56,12 +56,14 @@ SavedPolicy resized_policy(const SavedPolicy& policy, ImageSize size) {
 }  // namespace
 
 ExportedPolicy export_policy(const std::string& policy_path, const std::string& out, const ExportOptions& options) {
-  const SavedPolicy policy = read_policy(policy_path, options.average);
+  const StoredPolicy policy = read_stored_policy(policy_path, options.average);
   check_finite(policy.path, policy.parameters);
-  write_policy(out, options.size ? resized_policy(policy, *options.size) : policy, options.weights, options.commit);
-  const SavedPolicy written = read_policy(out);
+  const StoredPolicy exported = options.size ? resized_policy(policy, *options.size) : policy;
+  write_stored_policy(out, exported, options.weights, options.commit);
+  const StoredPolicy written = read_stored_policy(out);
   ExportedPolicy result;
-  for (const NamedTensor& parameter : written.parameters) result.parameters += parameter.value.numel();
+  for (const StoredTensor& parameter : written.parameters)
+    result.parameters += static_cast<int64_t>(parameter.values.size());
   result.file_bytes = static_cast<int64_t>(std::filesystem::file_size(out));
   result.updates = written.update;
   result.agent_steps = written.agent_steps;

@@ -6,20 +6,6 @@ namespace pictura::host {
 
 namespace {
 
-template <int kFloats>
-struct VectorOf {
-  typedef float Type __attribute__((vector_size(kFloats * sizeof(float)), aligned(alignof(float)), may_alias));
-};
-
-template <int kFloats>
-PICTURA_INLINE const typename VectorOf<kFloats>::Type& vector_at(const float* from) {
-  return *reinterpret_cast<const typename VectorOf<kFloats>::Type*>(from);
-}
-template <int kFloats>
-PICTURA_INLINE typename VectorOf<kFloats>::Type& vector_at(float* from) {
-  return *reinterpret_cast<typename VectorOf<kFloats>::Type*>(from);
-}
-
 constexpr int kChannelMultiple = 8;
 
 // Inputs of outputs in an array: each output reads `run` numbers in each of `kernel` rows, which are row_step apart.

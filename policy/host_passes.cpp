@@ -226,19 +226,21 @@ namespace {
 
 constexpr int64_t kColors = 3;
 
-// Writes the patches of an image. `planes`: the image's three colors. The compiler knows the loop bounds of patches
-// that lie wholly in the image.
+// `planes`: the three colors of an image. Small patches, of kPatch px, have bounds which the compiler knows; 0: of any
+// size.
 template <int64_t kPatch>
-void patches_of_image(const uint8_t* planes, int64_t height, int64_t width, float* out) {
-  for (int64_t top = 0; top < height; top += kPatch) {
-    for (int64_t left = 0; left < width; left += kPatch) {
-      const bool is_whole = top + kPatch <= height && left + kPatch <= width;
+void patches_of_image(const uint8_t* planes, int64_t height, int64_t width, [[maybe_unused]] int64_t patch_px,
+                      float* out) {
+  const int64_t patch = kPatch > 0 ? kPatch : patch_px;
+  for (int64_t top = 0; top < height; top += patch) {
+    for (int64_t left = 0; left < width; left += patch) {
+      const bool is_whole = top + patch <= height && left + patch <= width;
       const auto put = [&](int64_t color, int64_t y, int64_t x) {
         *out++ = static_cast<float>(planes[(color * height + top + y) * width + left + x]);
       };
       for (int64_t color = 0; color < kColors; ++color) {
-        for (int64_t y = 0; y < kPatch; ++y) {
-          for (int64_t x = 0; x < kPatch; ++x) {
+        for (int64_t y = 0; y < patch; ++y) {
+          for (int64_t x = 0; x < patch; ++x) {
             if (is_whole || (top + y < height && left + x < width))
               put(color, y, x);
             else
@@ -257,11 +259,13 @@ void patches(const uint8_t* images, int64_t views, int64_t cameras, int64_t came
   const auto of_image = patch_px == 1   ? patches_of_image<1>
                         : patch_px == 2 ? patches_of_image<2>
                         : patch_px == 3 ? patches_of_image<3>
-                                        : patches_of_image<4>;
+                        : patch_px == 4 ? patches_of_image<4>
+                                        : patches_of_image<0>;
   const int64_t numbers =
       ((height + patch_px - 1) / patch_px) * ((width + patch_px - 1) / patch_px) * kColors * patch_px * patch_px;
   for (int64_t view = 0; view < views; ++view) {
-    of_image(images + (view * cameras + camera) * kColors * height * width, height, width, out + view * numbers);
+    of_image(images + (view * cameras + camera) * kColors * height * width, height, width, patch_px,
+             out + view * numbers);
   }
 }
 
@@ -313,6 +317,16 @@ void largest_members_backward(const float* grad, const int32_t* which, int64_t s
   add_all([&](float g, int64_t channel, int64_t row) {
     add_row(g, activations + row * hidden, weight_grad_inout + channel * hidden);
   });
+}
+
+void log_softmax(const float* logits, int64_t rows, int64_t actions, float* out) {
+  for (int64_t row = 0; row < rows; ++row, logits += actions, out += actions) {
+    const double largest = *std::max_element(logits, logits + actions);
+    double sum = 0;
+    for (int64_t i = 0; i < actions; ++i) sum += std::exp(logits[i] - largest);
+    const double shift = largest + std::log(sum);
+    for (int64_t i = 0; i < actions; ++i) out[i] = static_cast<float>(logits[i] - shift);
+  }
 }
 
 }  // namespace pictura::host

@@ -40,9 +40,9 @@ void unfold(const ConvolutionSize& size, const float* images, int64_t n, float* 
 /// Computes the gradient of the images from the gradient of the taps that unfold() gathers.
 void fold(const ConvolutionSize& size, const float* taps_grad, int64_t n, float* images_grad_out);
 
-/// Splits u8 images [views, cameras, 3, height, width] of one camera into patches of patch_px^2 pixels, patch_px at
-/// most 4: [views, rows, columns, 3 patch_px^2]. Channel (c * patch_px + y) * patch_px + x is color c, 0 to 255, of
-/// pixel (x, y) of the patch; pixels beyond the image are 0. rows, columns: height and width over patch_px, rounded up.
+/// u8 images [views, cameras, 3, height, width] as patches of patch_px^2 pixels: [views, rows,
+/// columns, 3 patch_px^2] of one camera; channel (c * patch_px + y) * patch_px + x is color c, 0 to 255, of pixel (x,
+/// y) of the patch, beyond the image 0. rows, columns: height and width over patch_px, rounded up.
 void patches(const uint8_t* images, int64_t views, int64_t cameras, int64_t camera, int64_t height, int64_t width,
              int64_t patch_px, float* out);
 
@@ -64,5 +64,8 @@ void largest_members(const float* members, const int32_t* counts, int64_t sets, 
 void largest_members_backward(const float* grad, const int32_t* which, int64_t sets, int64_t channels, int64_t hidden,
                               const float* weight, const float* activations, float* activations_grad_inout,
                               float* weight_grad_inout);
+
+/// Log-probabilities of actions from their logits, [rows, actions]; `out` may be `logits`.
+void log_softmax(const float* logits, int64_t rows, int64_t actions, float* out);
 
 }  // namespace pictura::host

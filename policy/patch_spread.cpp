@@ -14,13 +14,27 @@ int patch_side_px(int64_t channels) {
   return side;
 }
 
-at::Tensor repeat_over_patches(const at::Tensor& weight, int factor) {
-  const int64_t side = patch_side_px(weight.size(1));
-  return weight.unflatten(1, {3, side, side}).repeat_interleave(factor, 2).repeat_interleave(factor, 3).flatten(1, 3);
+StoredTensor repeat_over_patches(const StoredTensor& weight, int factor) {
+  const int64_t side = patch_side_px(weight.shape.at(1)), large = side * factor;
+  const int64_t of_tap = weight.shape.at(2) * weight.shape.at(3);
+  StoredTensor result{weight.name, weight.shape, {}};
+  result.shape[1] = 3 * large * large;
+  result.values.reserve(weight.values.size() * static_cast<size_t>(factor * factor));
+  for (int64_t plane = 0; plane < weight.shape[0] * 3; ++plane) {  // of an output and a color
+    for (int64_t y = 0; y < large; ++y) {
+      for (int64_t x = 0; x < large; ++x) {
+        const auto from = weight.values.begin() + ((plane * side + y / factor) * side + x / factor) * of_tap;
+        result.values.insert(result.values.end(), from, from + of_tap);
+      }
+    }
+  }
+  return result;
 }
 
-at::Tensor spread_over_patches(const at::Tensor& weight, int factor) {
-  return repeat_over_patches(weight, factor) / (double(factor) * factor);
+StoredTensor spread_over_patches(const StoredTensor& weight, int factor) {
+  StoredTensor result = repeat_over_patches(weight, factor);
+  for (float& value : result.values) value /= static_cast<float>(factor * factor);
+  return result;
 }
 
 }  // namespace pictura

@@ -2,7 +2,9 @@
 // are spread over the pixels that replace it. The policy computes the same function, with the same number of tokens.
 #pragma once
 
-#include <ATen/ATen.h>
+#include <cstdint>
+
+#include "pictura/policy/stored_policy.h"
 
 namespace pictura {
 
@@ -15,14 +17,14 @@ int patch_side_px(int64_t channels);
 /// Returns the weight [out, 3 p^2, kernel, kernel] over patches of k p px: weight[o, c, y, x] / k^2 at each position
 /// [o, c, k y + i, k x + j], i and j below k. Images that are constant in blocks of k x k px give the same features as
 /// `weight` does of one pixel a block.
-at::Tensor spread_over_patches(const at::Tensor& weight, int factor);
+StoredTensor spread_over_patches(const StoredTensor& weight, int factor);
 
 /// Returns the weight, or Adam's moments of it, repeated undivided at each position of spread_over_patches(). Spread
 /// weights inherit the Adam moments of their source weight. A feature is a sum of w x over pixels; where a block is
 /// constant, each of its k^2 weights has the gradient dL/dw of the source weight. So its moments, and its direction m /
 /// sqrt(v), equal those of the source weight. Together the k^2 weights move the feature k^2 times as far: see
 /// rate_factor_of_spread().
-at::Tensor repeat_over_patches(const at::Tensor& weight, int factor);
+StoredTensor repeat_over_patches(const StoredTensor& weight, int factor);
 
 /// Learning-rate factor of spread weights: 1 / k^2, with which a step moves the features as far as before the spread.
 /// Weight decay keeps the full rate, since it scales the sum as it scales each weight. In the gradient norm k^2 equal

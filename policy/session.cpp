@@ -1,19 +1,11 @@
 #include "pictura/policy/session.h"
 
-#include <ATen/Parallel.h>
-
-#include "pictura/backends/make_policy_executor.h"
 #include "pictura/backends/make_renderer.h"
 #include "pictura/common/error.h"
 #include "pictura/common/pixel_samples.h"
-#include "pictura/common/support/parallel_for.h"
 #include "pictura/configuration/apply_config.h"
-#include "pictura/policy/decision_clock.h"
-#include "pictura/policy/observation.h"
-#include "pictura/policy/precision.h"
-#include "pictura/policy/saved_policy.h"
-#include "pictura/policy/torch_device.h"
-#include "pictura/simulator/controllers/host_controllers.h"
+#include "pictura/policy/session_parts.h"
+#include "pictura/simulator/actions.h"
 
 namespace pictura {
 
@@ -52,22 +44,8 @@ Config adapted(const Config& trained, const SessionOptions& options) {
   return config;
 }
 
-namespace {
-
-Config with_seed(Config config, uint64_t seed) {
-  config.run.seed = seed;
-  return config;
-}
-
-// Returns the configuration with cameras mounted as in the rig, even if they were randomized in training.
-Config as_mounted(Config config) {
-  config.render.randomization = {};
-  return config;
-}
-
-// Returns the rig of the options, else the rig of training. No weight depends on sizes or poses.
-Rig chosen_rig(const SavedPolicy& saved, const SessionOptions& options) {
-  std::optional<Rig> named = named_rig(options);
+Rig chosen_rig(const PolicyFacts& saved, const SessionOptions& options) {
+  const std::optional<Rig> named = named_rig(options);
   if (!named) return saved.rig;
   if (!saved.config.reads_images()) fail_usage("{}: its policy reads no images: no rig or size", saved.path);
   if (options.rig.empty() && !saved.config.render.rig.empty()) {
@@ -81,8 +59,6 @@ Rig chosen_rig(const SavedPolicy& saved, const SessionOptions& options) {
   }
   return *named;
 }
-
-}  // namespace
 
 std::optional<Rig> named_rig(const SessionOptions& options) {
   const bool has_size = options.width_px != 0 || options.height_px != 0;
@@ -98,145 +74,38 @@ RendererConfig evaluation_renderer_config(const Config& config, const Rig& rig, 
   return result;
 }
 
-struct PolicySession::Parts {
-  Parts(const SavedPolicy& saved, const SessionOptions& options)
-      : config(adapted(saved.config, options)),
-        device(open_learning_device(config)),
-        rig(chosen_rig(saved, options)),
-        camera_severity(options.camera_severity),
-        executor(make_policy_executor(device)),
-        own_policy(make_policy(config, rig, device)),
-        policy(*own_policy) {
-    restore_policy(saved, policy);
-  }
-  Parts(const Parts& trained, uint64_t seed)
-      : config(with_seed(trained.config, seed)),
-        device(trained.device),
-        rig(trained.rig),
-        camera_severity(trained.camera_severity),
-        executor(make_policy_executor(device)),
-        own_policy(make_policy(config, rig, device)),
-        policy(*own_policy) {}
-  Parts(const Config& its_config, const Rig& its_rig, Device its_device, const Policy& its_policy)
-      : config(as_mounted(its_config)),
-        device(its_device),
-        rig(its_rig),
-        executor(make_policy_executor(device)),
-        policy(its_policy) {}
+void SessionParts::check_images(const PolicyInput& input, size_t batch, const Renderer* renderer) const {
+  PICTURA_CHECK(renderer && input.scene, "policy: it reads images: expected a renderer and a scene");
+  PICTURA_CHECK(renderer->device() == device, "policy: expected a renderer for memory of {}, got one for {}",
+                name_of(device), name_of(renderer->device()));
+  PICTURA_CHECK(input.views.size() == batch, "policy: expected {} views, got {}", batch, input.views.size());
+  PICTURA_CHECK(input.is_drawn.empty() || input.is_drawn.size() == batch, "policy: is_drawn: expected {} flags, got {}",
+                batch, input.is_drawn.size());
+}
 
-  /// Runs the policy for the agents of a batch at `indices`, i64 [n].
-  Decision decide(const PolicyInput& input, int64_t batch, const at::Tensor& indices, Renderer* renderer) const {
-    at::set_num_threads(resolve_num_threads(config.run.num_threads));
-    set_float32_products(config.train.precision);
-    set_reproducible(config.train.reproducible);
-    if (config.reads_images()) check_images(input, static_cast<size_t>(batch), renderer);
-    const ChunkSizes chunks =
-        input.full_chunk > 0 ? ChunkSizes{input.full_chunk, true} : ChunkSizes{config.train.forward_chunk};
-    Decision decision = pictura::decide(indices, chunks, [&](const at::Tensor& some) {
-      Observation observation = select_arrays(config, input.observations, device, batch, some);
-      if (input.hides_auxiliary) hide_auxiliary(&observation);
-      if (config.reads_images()) observation.images = draw(input, some, renderer);
-      return policy.forward(observation);
-    });
-    PICTURA_CHECK(decision.is_finite(),
-                  "policy: expected finite logits and values, got infinities or NaN: its weights are "
-                  "too large for {}",
-                  device.is_host() ? "fp32" : name_of(config.train.precision));
-    return decision;
-  }
-
-  const Config config;
-  const Device device;
-  const Rig rig;
-  const double camera_severity = 0;
-  const std::unique_ptr<PolicyExecutor> executor;
-  const std::unique_ptr<const Policy> own_policy;  // null if another object owns the policy
-  const Policy& policy;
-
- private:
-  void check_images(const PolicyInput& input, size_t batch, const Renderer* renderer) const {
-    PICTURA_CHECK(renderer && input.scene, "policy: it reads images: expected a renderer and a scene");
-    PICTURA_CHECK(renderer->device() == device, "policy: expected a renderer for memory of {}, got one for {}",
-                  name_of(device), name_of(renderer->device()));
-    PICTURA_CHECK(input.views.size() == batch, "policy: expected {} views, got {}", batch, input.views.size());
-    PICTURA_CHECK(input.is_drawn.empty() || input.is_drawn.size() == batch,
-                  "policy: is_drawn: expected {} flags, got {}", batch, input.is_drawn.size());
-  }
-
-  std::vector<ImageBlock> draw(const PolicyInput& input, const at::Tensor& indices, Renderer* renderer) const {
-    if (input.is_drawn.empty()) {
-      return draw_images(*input.scene, SelectedViews(input.views, device, indices).views(), renderer,
-                         policy.drawn_patch_px());
-    }
-    const auto batch = static_cast<int64_t>(input.is_drawn.size());
-    const at::Tensor drawn =
-        at::nonzero(tensor_over(input.is_drawn, device, {batch}).index_select(0, indices)).squeeze(1);
-    const std::vector<ImageBlock> some =
-        draw_images(*input.scene, SelectedViews(input.views, device, indices.index_select(0, drawn)).views(), renderer);
-    std::vector<ImageBlock> all = allocate_images(rig, {indices.size(0)}, device);
-    for (size_t i = 0; i < all.size(); ++i) all[i].pixels.zero_().index_copy_(0, drawn, some[i].pixels);
-    return all;
-  }
-};
-
-/// Controller of one simulator.
-class SessionController final : public PolicyController {
- public:
-  SessionController(const PolicySession::Parts* parts, Renderer* renderer, const ActionChoice& choice,
-                    bool hides_auxiliary)
-      : parts_(*parts),
-        renderer_(renderer),
-        choice_(choice),
-        hides_auxiliary_(hides_auxiliary),
-        clock_(parts->config.policy.decision_steps) {}
-
-  std::string_view name() const override { return "policy"; }
-
-  void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream) override {
-    check_controller_arrays(name(), input, parts_.device, mask, commands_out);
-    const auto num_slots = static_cast<int64_t>(commands_out.size());
-    if (!actions_.defined() || actions_.size(0) != num_slots) {
-      actions_ = at::zeros({num_slots}, at::TensorOptions(at::kInt).device(torch_device(parts_.device)));
-    }
-    const at::Tensor active = active_slots(input, mask, false, parts_.executor.get());
-    num_driven_ = active.size(0);
-    const at::Tensor slots = clock_.deciding(input, active, step_++);
-    const Decision decision = parts_.decide({.observations = input.observations,
-                                             .scene = &input.scene,
-                                             .views = input.views,
-                                             .hides_auxiliary = hides_auxiliary_},
-                                            num_slots, slots, renderer_);
-    const Span<int32_t> actions = span_of<int32_t>(actions_);
-    parts_.executor->choose_actions(input, span_of<const int64_t>(slots), span_of<const float>(decision.log_probs),
-                                    choice_, actions, current_stream(parts_.device));
-    parts_.executor->write_commands(actions, mask, commands_out, current_stream(parts_.device));
-  }
-
-  int64_t num_driven() const override { return num_driven_; }
-
- private:
-  const PolicySession::Parts& parts_;
-  Renderer* renderer_;
-  ActionChoice choice_;
-  bool hides_auxiliary_;
-  DecisionClock clock_;
-  int64_t step_ = 0;    // calls of act()
-  at::Tensor actions_;  // i32 [slots], held until the next decision
-  int64_t num_driven_ = 0;
-};
+void SessionParts::check_outputs(bool are_finite) const {
+  PICTURA_CHECK(are_finite,
+                "policy: expected finite logits and values, got infinities or NaN: its weights are "
+                "too large for {}",
+                device.is_host() ? "fp32" : name_of(config.train.precision));
+}
 
 PolicySession::PolicySession(const std::string& path, const SessionOptions& options)
-    : parts_(std::make_unique<Parts>(read_policy(path, options.average), options)) {}
+#ifdef PICTURA_HAS_TORCH
+    : PolicySession(open_torch_session(path, options)){}
+#else
+    : PolicySession(open_host_session(path, options)) {
+}
+#endif
 
-PolicySession::PolicySession(const Config& config, const Rig& rig, Device device, const Policy& policy)
-    : parts_(std::make_unique<Parts>(config, rig, device, policy)) {}
-
-PolicySession::PolicySession(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+      PolicySession::PolicySession(std::unique_ptr<SessionParts> parts)
+    : parts_(std::move(parts)) {
+}
 
 PolicySession::~PolicySession() = default;
 
 std::unique_ptr<PolicySession> PolicySession::untrained(uint64_t seed) const {
-  return std::unique_ptr<PolicySession>(new PolicySession(std::make_unique<Parts>(*parts_, seed)));
+  return std::make_unique<PolicySession>(parts_->untrained(seed));
 }
 
 bool PolicySession::reads_images() const { return parts_->config.reads_images(); }
@@ -263,25 +132,20 @@ SimulatorConfig PolicySession::evaluation_world(int steps) const {
 
 const Config& PolicySession::config() const { return parts_->config; }
 
-std::string PolicySession::policy_hash() const { return parts_->policy.hash(); }
+std::string PolicySession::policy_hash() const { return parts_->policy_hash(); }
 
 void PolicySession::evaluate(const PolicyInput& input, Renderer* renderer, Span<float> logits_out,
                              Span<float> values_out) {
   PICTURA_CHECK(logits_out.size() == values_out.size() * kNumActions,
                 "policy: expected memory for {} logits, {} for each value, got {}", values_out.size() * kNumActions,
                 kNumActions, logits_out.size());
-  if (values_out.empty()) return;
-  const auto batch = static_cast<int64_t>(values_out.size());
-  const at::Tensor all = at::arange(batch, at::TensorOptions(at::kLong).device(torch_device(parts_->device)));
-  const Decision decision = parts_->decide(input, batch, all, renderer);
-  tensor_over(logits_out, parts_->device, {batch, kNumActions}).copy_(decision.logits);
-  tensor_over(values_out, parts_->device, {batch}).copy_(decision.value);
+  if (!values_out.empty()) parts_->evaluate(input, renderer, logits_out, values_out);
 }
 
 std::unique_ptr<PolicyController> PolicySession::make_controller(Renderer* renderer, bool argmax, uint64_t seed,
                                                                  bool hides_auxiliary) {
   PICTURA_CHECK(!reads_images() || renderer, "policy: it reads images: expected a renderer");
-  return std::make_unique<SessionController>(parts_.get(), renderer, ActionChoice{argmax, seed}, hides_auxiliary);
+  return parts_->make_controller(renderer, argmax, seed, hides_auxiliary);
 }
 
 }  // namespace pictura

@@ -16,6 +16,7 @@ namespace pictura {
 
 class Policy;
 struct Config;
+struct SessionParts;
 
 /// Returns the training configuration with the changes of the options. Device settings belong to the machine that
 /// trained the policy; here any renderer that draws the same images is used.
@@ -56,12 +57,14 @@ class PolicySession {
   /// the file if it is neither, truncated, of another observation schema or architecture, or cannot run on this device.
   /// Throws UsageError if it cannot use the cameras of the options.
   explicit PolicySession(const std::string& path, const SessionOptions& options = {});
-  /// Wraps a policy of a configuration with the cameras of `rig`, with the policy's weights at each call; the policy
-  /// must outlive the session. Its cameras are not randomized.
+  /// The policy of a configuration with cameras of `rig`, as it is when it is asked; it must outlive the session. Its
+  /// cameras are not randomized. Builds without torch lack it.
   PolicySession(const Config& config, const Rig& rig, Device device, const Policy& policy);
+  /// What an implementation made (policy/session_parts.h).
+  explicit PolicySession(std::unique_ptr<SessionParts> parts);
   ~PolicySession();
-  /// Returns the same policy before training, in the same worlds and with the same cameras: weights are drawn from
-  /// `seed` as train draws them, except those of a backbone's program.
+  /// The same policy as it is before training, in the same worlds and with the same cameras: weights are drawn from
+  /// `seed` as train draws them, but for those of a backbone's program. Throws Error in builds without torch.
   std::unique_ptr<PolicySession> untrained(uint64_t seed) const;
   PolicySession(const PolicySession&) = delete;
   PolicySession& operator=(const PolicySession&) = delete;
@@ -103,10 +106,7 @@ class PolicySession {
                                                     bool hides_auxiliary = false);
 
  private:
-  friend class SessionController;
-  struct Parts;
-  explicit PolicySession(std::unique_ptr<Parts> parts);
-  std::unique_ptr<Parts> parts_;
+  std::unique_ptr<SessionParts> parts_;
 };
 
 }  // namespace pictura

@@ -116,6 +116,28 @@ Stream current_stream(Device device) {
   return device.is_host() ? Stream{} : Stream{torch_stream(device).native_handle()};
 }
 
+namespace {
+
+at::Tensor bytes_over(const std::byte* memory, size_t bytes, Device device) {
+  return tensor_over(Span<const uint8_t>(reinterpret_cast<const uint8_t*>(memory), bytes), device,
+                     {static_cast<int64_t>(bytes)});
+}
+
+}  // namespace
+
+std::shared_ptr<std::byte> allocate_bytes(size_t bytes, Device device) {
+  const at::Tensor memory =
+      at::empty({static_cast<int64_t>(bytes)}, at::TensorOptions(at::kByte).device(torch_device(device)));
+  auto* const data = reinterpret_cast<std::byte*>(memory.data_ptr<uint8_t>());
+  return {data, [memory](std::byte*) {}};  // it lives as long as this function
+}
+
+void set_to_zero(std::byte* memory, size_t bytes, Device device) { bytes_over(memory, bytes, device).zero_(); }
+
+void copy_bytes(std::byte* to, Device to_device, const std::byte* from, Device from_device, size_t bytes) {
+  if (bytes > 0) bytes_over(to, bytes, to_device).copy_(bytes_over(from, bytes, from_device));
+}
+
 OwnStream::OwnStream(Device device)
     : stream_(c10::impl::VirtualGuardImpl(torch_device(device).type()).getStreamFromGlobalPool(torch_device(device))) {}
 

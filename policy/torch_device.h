@@ -7,21 +7,11 @@
 
 #include <ATen/ATen.h>
 
-#include "pictura/common/array.h"
-#include "pictura/configuration/config.h"
+#include "pictura/policy/learning_device.h"
 
 namespace pictura {
 
-/// Device on which this configuration learns, in the process with this local rank. If the configuration leaves the
-/// device open and there are several, the rank selects it. Opens torch's CUDA library for a CUDA device. Throws Error
-/// naming the key and the reason if the configuration cannot learn there, or if the simulator or the renderer uses
-/// other memory.
-Device open_learning_device(const Config& config, int local_rank = 0);
-
 at::Device torch_device(Device device);
-
-/// Torch's current stream of a device, on which tensors are computed. Autograd enqueues the backward pass on it too.
-Stream current_stream(Device device);
 
 /// Stream of a device that waits for no other stream.
 class OwnStream {
@@ -63,15 +53,6 @@ at::Tensor tensor_over(Span<T> array, Device device, at::IntArrayRef shape) {
       .options(at::TensorOptions(c10::CppTypeToScalarType<StoredAs<Element>>::value).device(where))
       .target_device(where)
       .make_tensor();
-}
-
-/// Returns a host copy of an array in the memory of `device`.
-template <typename T>
-std::vector<T> host_copy(Span<const T> array, Device device) {
-  std::vector<T> copy(array.size());
-  const auto size = static_cast<int64_t>(array.size());
-  tensor_over(Span<T>(copy), Device{}, {size}).copy_(tensor_over(array, device, {size}));
-  return copy;
 }
 
 }  // namespace pictura

@@ -26,4 +26,19 @@ inline bool has_wide_vectors() {
 #endif
 }
 
+/// Vectors of floats, which may begin at any float.
+template <int kFloats>
+struct VectorOf {
+  typedef float Type __attribute__((vector_size(kFloats * sizeof(float)), aligned(alignof(float)), may_alias));
+};
+
+template <int kFloats>
+PICTURA_INLINE const typename VectorOf<kFloats>::Type& vector_at(const float* from) {
+  return *reinterpret_cast<const typename VectorOf<kFloats>::Type*>(from);
+}
+template <int kFloats>
+PICTURA_INLINE typename VectorOf<kFloats>::Type& vector_at(float* from) {
+  return *reinterpret_cast<typename VectorOf<kFloats>::Type*>(from);
+}
+
 }  // namespace pictura::host

@@ -20,11 +20,11 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
     writer.header["recent"].push_back({{"finished", r.finished}, {"finished_return", r.finished_return}});
   }
   writer.header["longest_update_s"] = checkpoint.longest_update_s;
-  writer.add_weights(checkpoint);
-  writer.add_tensors("first_moments", checkpoint.first_moments);
-  writer.add_tensors("second_moments", checkpoint.second_moments);
+  writer.add_weights({checkpoint, to_stored(checkpoint.parameters)});
+  writer.add_tensors("first_moments", to_stored(checkpoint.first_moments));
+  writer.add_tensors("second_moments", to_stored(checkpoint.second_moments));
   if (!checkpoint.average.empty()) {
-    writer.add_tensors("average", checkpoint.average);
+    writer.add_tensors("average", to_stored(checkpoint.average));
     writer.header["counters"]["averaged_updates"] = checkpoint.averaged_updates;
   }
   writer.add_bytes("simulator",
@@ -38,11 +38,12 @@ Checkpoint parse_checkpoint(const std::string& bytes, const std::string& path) {
   const CheckpointFile file(bytes, path);
   return read_header(path, [&] {
     const ordered_json &header = file.header, &counters = header.at("counters");
-    Checkpoint result{file.policy()};
-    result.first_moments = file.tensors("first_moments");
-    result.second_moments = file.tensors("second_moments");
+    const StoredPolicy policy = file.policy();
+    Checkpoint result{{policy, to_tensors(policy.parameters)}};
+    result.first_moments = to_tensors(file.tensors("first_moments"));
+    result.second_moments = to_tensors(file.tensors("second_moments"));
     if (header.contains("average")) {
-      result.average = file.tensors("average");
+      result.average = to_tensors(file.tensors("average"));
       result.averaged_updates = counters.at("averaged_updates");
     }
     const std::string_view simulator = file.bytes("simulator");

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "pictura/policy/learning_device.h"
 #include "pictura/policy/rules/policy_executor.h"
 #include "pictura/policy/session.h"
-#include "pictura/policy/struct_copies.h"
 #include "pictura/training/ranks/communicator.h"
 
 namespace pictura {

@@ -6,6 +6,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/policy/patch_spread.h"
+#include "pictura/policy/saved_policy.h"
 #include "pictura/training/optimizer.h"
 #include "pictura/training/weight_average.h"
 
@@ -20,7 +21,22 @@ size_t first_convolution_among(const std::vector<NamedTensor>& tensors) {
   return static_cast<size_t>(first - tensors.begin());
 }
 
+// A function of stored tensors applied to a tensor.
+template <typename F>
+at::Tensor applied(const at::Tensor& tensor, const F& f) {
+  const StoredTensor result = f(to_stored({{kFirstConvolution, tensor}}).front());
+  return to_tensors({result}).front().value.to(tensor.options());
+}
+
 }  // namespace
+
+at::Tensor spread_over_patches(const at::Tensor& weight, int factor) {
+  return applied(weight, [factor](const StoredTensor& stored) { return spread_over_patches(stored, factor); });
+}
+
+at::Tensor repeat_over_patches(const at::Tensor& weight, int factor) {
+  return applied(weight, [factor](const StoredTensor& stored) { return repeat_over_patches(stored, factor); });
+}
 
 void spread_first_convolution(const Policy& policy, int factor, Optimizer* optimizer_inout,
                               WeightAverage* average_inout) {

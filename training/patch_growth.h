@@ -1,11 +1,17 @@
 // Growth of the first convolution's patches during training, when images become larger: see policy/patch_spread.h.
 #pragma once
 
+#include <ATen/ATen.h>
+
 namespace pictura {
 
 class Optimizer;
 class Policy;
 class WeightAverage;
+
+/// As of policy/patch_spread.h, of fp32 tensors on any device.
+at::Tensor spread_over_patches(const at::Tensor& weight, int factor);
+at::Tensor repeat_over_patches(const at::Tensor& weight, int factor);
 
 /// Spreads the first convolution of a policy in place, together with its optimizer state (moments, rate factor and
 /// memory for gradients) and its average, if there is one. No graph of autograd or CUDA may hold the weight. Throws

@@ -137,8 +137,8 @@ void add_bench_command(CLI::App& app) {
       "  pictura bench worlds --map procedural:1 --episodes 5");
 #ifdef PICTURA_HAS_TORCH
   add_train_benchmark(*command);
-  add_scenes_benchmark(*command);
 #endif
+  add_scenes_benchmark(*command);
 #ifdef PICTURA_HAS_BENCH
   add_simulate_benchmark(*command);
   add_quality_benchmark(*command);

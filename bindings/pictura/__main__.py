@@ -4,16 +4,21 @@ import os
 import pathlib
 import sys
 
-from pictura._load_training import wrong_torch
+from pictura._load_training import torch_folder, usable_torch, why_no_torch
 
 
 def main() -> None:
-    """Replaces this process by the command, with the same arguments."""
-    if wrong := wrong_torch():
-        sys.exit(f"error: the pictura command was {wrong}")
-    program = pathlib.Path(__file__).parent / "bin" / "pictura"
+    """Becomes the command, with the same arguments: that of the torch that is installed, or the one without torch."""
+    folder = pathlib.Path(__file__).parent / "bin"
+    program = folder / "pictura"
+    if minor := usable_torch():
+        program = folder / f"torch_{minor.replace('.', '_')}" / "pictura"
+        libraries = str(torch_folder() / "lib")  # it may be in another environment than this package
+        os.environ["LD_LIBRARY_PATH"] = ":".join(filter(None, [libraries, os.environ.get("LD_LIBRARY_PATH")]))
+    elif sys.argv[1:2] == ["train"]:
+        sys.exit(f"error: pictura train: {why_no_torch()}")
     if not program.exists():
-        sys.exit(f"error: this package was built without the command: expected {program}")
+        sys.exit(f"error: the pictura command: {why_no_torch() if any(folder.glob('torch_*')) else f'expected {program}'}")
     os.environ.setdefault("PICTURA_PYTHON", sys.executable)  # draws charts
     os.execv(program, [str(program), *sys.argv[1:]])
 

@@ -1,45 +1,85 @@
-"""Loads pictura._training with the torch that it was built with, or reports what is missing."""
+"""Chooses what computes: an extension that was built with the minor version of the torch that is installed, or, on the CPU,
+the one without torch. No torch is imported for the choice, which takes a second."""
 
+import functools
+import importlib
+import importlib.machinery
 import importlib.util
 import pathlib
 import re
 
-_HOW = (
-    "with torch 2.9 or later installed, pip install --no-build-isolation -Ccmake.define.PICTURA_WITH_TORCH=ON . from a checkout"
-    " (docs/reference/python.md)"
-)
+_PACKAGE = pathlib.Path(__file__).parent
 
 
-def built_torch() -> str | None:
-    """Returns the version of torch that the package was built with, or None."""
-    try:
-        from pictura._built_torch import VERSION
-    except ImportError:
-        return None
-    return VERSION
+def built_torches() -> list[str]:
+    """Minor versions of torch that the package has a pictura._training for, as '2.11', in ascending order."""
+    names = [
+        path.name[: -len(suffix)]
+        for suffix in importlib.machinery.EXTENSION_SUFFIXES
+        for path in _PACKAGE.glob(f"_training_*{suffix}")
+    ]
+    found = {match[1] + "." + match[2] for name in names if (match := re.fullmatch(r"_training_(\d+)_(\d+)", name))}
+    return sorted(found, key=lambda minor: [int(part) for part in minor.split(".")])
 
 
-def wrong_torch() -> str | None:
-    """Returns why a package that was built with torch cannot use the installed torch, or None. Does not import torch,
-    which takes a second."""
-    built = built_torch()
-    if built is None:
-        return None
+def torch_folder() -> pathlib.Path | None:
+    """Where torch is installed, or None."""
     spec = importlib.util.find_spec("torch")
-    if spec is None or spec.origin is None:  # a folder of that name is not torch
-        return f"built with torch {built}, and no torch is installed: pip install torch=={built.split('+')[0]}"
-    (found,) = re.findall(r"^__version__ = '(.*)'$", (pathlib.Path(spec.origin).parent / "version.py").read_text(), re.M)
-    return None if found == built else f"built with torch {built}, and torch {found} is installed: build it again: {_HOW}"
+    # A folder of that name is no torch.
+    return pathlib.Path(spec.origin).parent if spec and spec.origin else None
+
+
+def installed_torch() -> str | None:
+    """The version of the torch that is installed, as '2.11.0+cu130', or None."""
+    folder = torch_folder()
+    if folder is None:
+        return None
+    (version,) = re.findall(r"^__version__ = '(.*)'$", (folder / "version.py").read_text(), re.M)
+    return version
+
+
+def usable_torch() -> str | None:
+    """The minor version of the torch that is installed, where the package was built for it, else None."""
+    installed = installed_torch()
+    minor = ".".join(installed.split(".")[:2]) if installed else None
+    return minor if minor in built_torches() else None
+
+
+def why_no_torch() -> str:
+    """What keeps the package from using torch, and the remedy, where usable_torch() is None."""
+    built = built_torches()
+    if not built:
+        return (
+            "this package was built without torch: install a wheel that has it, or build one from a checkout:"
+            " pip install torch scikit-build-core pybind11 cmake, then"
+            " pip install --no-build-isolation -Ccmake.define.PICTURA_WITH_TORCH=ON ."
+        )
+    found = installed_torch()
+    remedy = f"pip install 'torch=={built[-1]}.*'"
+    if found is None:
+        return f"it needs torch {' or '.join(built)}, and none is installed: pip install 'pictura[train]', or {remedy}"
+    return f"it was built for torch {' and '.join(built)}, and torch {found} is installed: {remedy}"
+
+
+@functools.cache
+def _extension():
+    """The extension module; one a process, since both know the same types."""
+    if minor := usable_torch():
+        import torch  # noqa: F401  (with what its own __init__ loads)
+
+        return importlib.import_module(f"pictura._training_{minor.replace('.', '_')}")
+    try:
+        return importlib.import_module("pictura._driving")
+    except ModuleNotFoundError:  # built beside torch, which is not there
+        raise ImportError(why_no_torch()) from None
 
 
 def load(name: str):
-    """Returns `name` of pictura._training. Raises ImportError naming what is missing, or the expected torch."""
-    if built_torch() is None:
-        raise ImportError(f"pictura.{name}: this package was built without pictura._training, which needs torch: {_HOW}")
-    if wrong := wrong_torch():
-        raise ImportError(f"pictura.{name}: pictura._training was {wrong}")
-    import torch  # noqa: F401  (with what its own __init__ loads)
-
-    from pictura import _training
-
-    return getattr(_training, name)
+    """`name` of the extension. Raises ImportError naming what is missing and the remedy."""
+    if name == "train" and usable_torch() is None:
+        raise ImportError(f"pictura.{name}: {why_no_torch()}")
+    try:
+        extension = _extension()
+    except ImportError as error:
+        raise ImportError(f"pictura.{name}: {error}") from error
+    return getattr(extension, name)

@@ -5,7 +5,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/evaluation/evaluate.h"
-#include "pictura/policy/struct_copies.h"
+#include "pictura/policy/learning_device.h"
 
 namespace pictura {
 
@@ -54,7 +54,7 @@ void DrivenScenes::add(Simulator& simulator, int driver) {
     if (scene.states.empty()) {
       scene.world = spec;
       scene.driver = driver;
-      const std::vector<AgentBox> boxes = host_copy_of_structs(simulator.scene().agents, device);
+      const std::vector<AgentBox> boxes = host_copy(simulator.scene().agents, device);
       const auto begin = boxes.begin() + host_copy(simulator.scene().world_begin, device)[world];
       scene.bodies.assign(begin, begin + spec.num_agents);
       for (size_t slot = first; slot < end; ++slot) {

@@ -1,31 +1,35 @@
 // Memory on the network's device for agents' observations.
 #pragma once
 
+#include <memory>
 #include <vector>
 
-#include "pictura/policy/torch_device.h"
+#include "pictura/policy/learning_device.h"
 #include "pictura/simulator/observation_arrays.h"
 #include "pictura/simulator/simulator.h"
 
 namespace pictura {
 
-/// Observation arrays of `count` agents, for the parts that a simulator observes.
+/// Of `count` agents, of the parts that a simulator observes: zeros at first.
 class ObservationRows {
  public:
   ObservationRows(int64_t count, const SimulatorConfig& config) {
     for (const ObservationArray& array : kObservationArrays) {
-      const auto type = array.type == ElementType::f32 ? at::kFloat : at::kInt;
-      arrays_.push_back(config.observes(array.part)
-                            ? at::zeros({count, array.rows * array.features},
-                                        at::TensorOptions(type).device(torch_device(config.device)))
-                            : at::Tensor());
+      static_assert(sizeof(float) == sizeof(int32_t), "all elements have one size");
+      const int64_t elements = config.observes(array.part) ? count * array.rows * array.features : 0;
+      const size_t bytes = static_cast<size_t>(elements) * sizeof(float);
+      arrays_.push_back(elements > 0 ? allocate_bytes(bytes, config.device) : nullptr);
+      if (elements > 0) set_to_zero(arrays_.back().get(), bytes, config.device);
     }
   }
   ObservationView rows(int64_t begin, int64_t count) const {
     ObservationView view;
-    const at::Tensor* array = arrays_.data();
-#define X(name, type, rows, features, part, comment)                               \
-  if (array->defined()) view.name = span_of<type>(array->narrow(0, begin, count)); \
+    const std::shared_ptr<std::byte>* array = arrays_.data();
+#define X(name, type, rows, features, part, comment)                                                           \
+  if (*array) {                                                                                                \
+    constexpr int64_t kOfOne = int64_t{rows} * (features);                                                     \
+    view.name = {reinterpret_cast<type*>(array->get()) + begin * kOfOne, static_cast<size_t>(count * kOfOne)}; \
+  }                                                                                                            \
   ++array;
     PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
@@ -33,7 +37,7 @@ class ObservationRows {
   }
 
  private:
-  std::vector<at::Tensor> arrays_;
+  std::vector<std::shared_ptr<std::byte>> arrays_;
 };
 
 }  // namespace pictura

@@ -12,7 +12,6 @@
 #include "pictura/common/raster/check.h"
 #include "pictura/configuration/apply_config.h"
 #include "pictura/evaluation/probes/observation_rows.h"
-#include "pictura/policy/observation.h"
 #include "pictura/simulator/rules/dynamics.h"
 
 namespace pictura {
@@ -112,10 +111,10 @@ ProbeFrame::ProbeFrame(Simulator& simulator, int steps_done, int drives)
   lane = host_copy(Span<const int32_t>(state.lane, slots), device);
   speed_mps = host_copy(Span<const float>(state.speed_mps, slots), device);
   const SceneBatch& scene = simulator.scene();
-  boxes = host_copy_of_structs(scene.agents, device);
-  lights = host_copy_of_structs(scene.light_states, device);
+  boxes = host_copy(scene.agents, device);
+  lights = host_copy(scene.light_states, device);
   geometry = host_copy(scene.geometry, device);
-  views = host_copy_of_structs(simulator.views(), device);
+  views = host_copy(simulator.views(), device);
   box_begin = host_copy(scene.world_begin, device);
   light_begin = host_copy(scene.light_begin, device);
   slot_begin = host_copy(simulator.slots().slot_begin, device);
@@ -419,10 +418,9 @@ std::vector<float> ProbeRun::visibility(const SceneBatch& scene, const std::vect
   if (queries.empty()) return {};
   const DeviceCopy<View> its_views(views, device_);
   const DeviceCopy<VisibilityQuery> its_queries(queries, device_);
-  const at::Tensor visible =
-      at::empty({static_cast<int64_t>(queries.size())}, at::TensorOptions(at::kFloat).device(torch_device(device_)));
-  measuring_->visibility(scene, its_views.span(), its_queries.span(), span_of<float>(visible), current_stream(device_));
-  return host_copy(span_of<const float>(visible), device_);
+  DeviceArray<float> visible(queries.size(), device_);
+  measuring_->visibility(scene, its_views.span(), its_queries.span(), visible.span(), current_stream(device_));
+  return host_copy(visible.span(), device_);
 }
 
 // Evaluates the pending pairs with all policies.
@@ -436,11 +434,10 @@ void ProbeRun::respond() {
 
   const SceneOnDevice on_device(pending_->scene, device_);
   const DeviceCopy<View> views(pending_->views, device_), views_without(pending_->views_without, device_);
-  const at::TensorOptions floats = at::TensorOptions(at::kFloat).device(torch_device(device_));
   const auto rows = static_cast<int64_t>(count);
   const size_t first = results_.responses.size();
   results_.responses.resize(first + count * num_policies);
-  const at::Tensor logits = at::empty({rows, kNumActions}, floats), values = at::empty({rows}, floats);
+  DeviceArray<float> logits(count * kNumActions, device_), values(count, device_);
   for (size_t policy = 0; policy < num_policies; ++policy) {
     const Participant& one = participants_[policy];
     for (const bool is_without : {false, true}) {
@@ -449,9 +446,9 @@ void ProbeRun::respond() {
                               .scene = &on_device.scene(),
                               .views = is_without ? views_without.span() : views.span(),
                               .full_chunk = pass_};
-      one.answering().evaluate(input, one.renderer.get(), span_of<float>(logits), span_of<float>(values));
-      const std::vector<float> its_logits = host_copy(span_of<const float>(logits), device_),
-                               its_values = host_copy(span_of<const float>(values), device_);
+      one.answering().evaluate(input, one.renderer.get(), logits.span(), values.span());
+      const std::vector<float> its_logits = host_copy(logits.span(), device_),
+                               its_values = host_copy(values.span(), device_);
       for (size_t i = 0; i < count; ++i) {
         PairedResponse& response = results_.responses[first + i * num_policies + policy];
         (is_without ? response.value_without : response.value) = its_values[i];

@@ -14,8 +14,8 @@
 #include "pictura/common/support/stopwatch.h"
 #include "pictura/evaluation/probes/probe_options.h"
 #include "pictura/evaluation/probes/probe_results.h"
+#include "pictura/policy/learning_device.h"
 #include "pictura/policy/session.h"
-#include "pictura/policy/struct_copies.h"
 #include "pictura/simulator/simulator.h"
 
 namespace pictura {

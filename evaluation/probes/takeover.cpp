@@ -11,6 +11,7 @@
 #include "pictura/evaluation/probes/corner_states.h"
 #include "pictura/evaluation/probes/observation_rows.h"
 #include "pictura/evaluation/probes/probe_run.h"
+#include "pictura/policy/host_passes.h"
 #include "pictura/policy/rules/choose_action.h"
 #include "pictura/simulator/rules/observe.h"
 
@@ -155,8 +156,8 @@ bool TakeoverWorlds::look(Worlds* worlds, size_t policy, const std::vector<Takeo
   const std::vector<float> x_m = copy(state.x_m), y_m = copy(state.y_m), speed_mps = copy(state.speed_mps);
   const std::vector<AgentStatus> status = copy(state.status);
   const std::vector<uint8_t> halt_reason = copy(state.halt_reason);
-  const std::vector<View> views = host_copy_of_structs(simulator.views(), device);
-  const std::vector<AgentBox> boxes = host_copy_of_structs(simulator.scene().agents, device);
+  const std::vector<View> views = host_copy(simulator.views(), device);
+  const std::vector<AgentBox> boxes = host_copy(simulator.scene().agents, device);
   const std::vector<int32_t> box_begin = host_copy(simulator.scene().world_begin, device);
 
   worlds->views.clear();
@@ -220,13 +221,12 @@ std::vector<int32_t> TakeoverWorlds::decide(Worlds* worlds, size_t policy, const
   const ObservationView rows = worlds->rows->rows(0, count);
   simulator.observe(DeviceCopy(queries, device).span(), {}, {}, rows, current_stream(device));
   const DeviceCopy views(worlds->views, device);
-  const at::TensorOptions floats = at::TensorOptions(at::kFloat).device(torch_device(device));
-  const at::Tensor logits = at::empty({count, kNumActions}, floats), values = at::empty({count}, floats);
+  DeviceArray<float> logits(starts.size() * kNumActions, device), values(starts.size(), device);
   const PolicyInput input{
       .observations = rows, .scene = &simulator.scene(), .views = views.span(), .full_chunk = takeover_pass(device)};
-  run_.session(policy).evaluate(input, run_.renderer(policy), span_of<float>(logits), span_of<float>(values));
-  const at::Tensor all = at::log_softmax(logits, 1);
-  const std::vector<float> log_probs = host_copy(span_of<const float>(all), device);
+  run_.session(policy).evaluate(input, run_.renderer(policy), logits.span(), values.span());
+  std::vector<float> log_probs = host_copy(logits.span(), device);
+  host::log_softmax(log_probs.data(), count, kNumActions, log_probs.data());
   std::vector<int32_t> actions;
   for (size_t i = 0; i < starts.size(); ++i) {
     const float* const one = &log_probs[i * kNumActions];

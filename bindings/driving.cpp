@@ -1,0 +1,551 @@
+// Evaluation, probes and saved policies, in the extension beside torch and in the one without. What they take and give
+// are objects of pictura._pictura.
+#include "pictura/bindings/driving.h"
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include "pictura/bindings/arrays.h"
+#include "pictura/bindings/call.h"
+#include "pictura/bindings/objects.h"
+#include "pictura/bindings/options.h"
+#include "pictura/common/error.h"
+#include "pictura/driving/replay_cases.h"
+#include "pictura/evaluation/evaluate.h"
+#include "pictura/evaluation/evaluate_scenes.h"
+#include "pictura/evaluation/probes/corner.h"
+#include "pictura/evaluation/probes/pedestrian.h"
+#include "pictura/evaluation/probes/removal.h"
+#include "pictura/evaluation/robust_protocol.h"
+#include "pictura/policy/session.h"
+#include "pictura/simulator/observation_arrays.h"
+#include "pictura/simulator/simulator_options.h"
+#ifdef PICTURA_HAS_CUDA
+#include "pictura/common/cuda/device_buffer.h"
+#include "pictura/common/cuda/device_guard.h"
+#endif
+
+namespace pictura::python {
+
+namespace {
+
+/// Adds each metric of an evaluation's row as (value, half of its 95 % interval).
+template <typename Row>
+void add_metrics(const Row& row, py::dict* row_out) {
+  for (const auto& [name, estimate] : metrics_of(row)) {
+    (*row_out)[py::str(name)] = py::make_tuple(estimate.value, estimate.half_width_95);
+  }
+}
+
+/// Counts and metrics of a row of evaluate().
+void add_row(const EvaluateRow& row, py::dict* row_out) {
+  py::dict& d = *row_out;
+  d["scenarios"] = row.scenarios;
+  d["steps"] = row.steps;
+  d["vehicle_episodes"] = row.vehicle_episodes;
+  d["infractions"] = row.infractions;
+  d["km_driven"] = row.km_driven;
+  add_metrics(row, &d);
+}
+
+py::dict dict_of(const EvaluateReport& report) {
+  py::list rows;
+  for (const EvaluateRow& row : report.rows) {
+    py::dict d;
+    d["density"] = row.density;
+    d["driver"] = row.driver.empty() ? py::object(py::none()) : py::str(row.driver);
+    add_row(row, &d);
+    rows.append(d);
+  }
+  py::dict d;
+  d["rows"] = rows;
+  d["seconds"] = report.seconds;
+  d["agent_steps"] = report.agent_steps;
+  d["policy_hash"] = report.results.setting.policy_hash;
+  d["light_cycles"] = name_of(report.results.setting.light_cycles);
+  d["others"] = report.results.setting.others;
+  d["camera_severity"] = report.results.setting.camera_severity;
+  return d;
+}
+
+py::dict dict_of(const SceneAgent& agent) {
+  const auto has = [&agent](Event event) { return (agent.events & event) != 0; };
+  py::dict d;
+  d["scenario_id"] = agent.scenario_id;
+  d["density"] = agent.density;
+  d["rollout"] = agent.rollout;
+  d["track_id"] = agent.track_id;
+  d["type"] = to_string(agent.type);
+  d["takeover_step"] = agent.takeover_step;
+  d["driven_steps"] = agent.driven_steps;
+  d["arrived"] = agent.arrived;
+  d["collision"] = has(kEventCollision);
+  d["at_fault"] = has(kEventAtFault);
+  d["off_road"] = has(kEventOffRoad);
+  d["distance_m"] = agent.distance_m;
+  d["mean_displacement_m"] = agent.mean_displacement_m;
+  d["final_displacement_m"] = agent.final_displacement_m;
+  return d;
+}
+
+py::dict dict_of(const SceneEvaluation& evaluation, const std::vector<SceneAgent>& agents) {
+  py::list rows, agent_dicts;
+  for (const SceneRow& row : evaluation.rows) {
+    py::dict d;
+    d["density"] = row.density;
+    d["scenes"] = row.scenes;
+    d["vehicle_episodes"] = row.vehicle_episodes;
+    d["km_driven"] = row.km_driven;
+    add_metrics(row, &d);
+    rows.append(d);
+  }
+  for (const SceneAgent& agent : agents) agent_dicts.append(dict_of(agent));
+  py::dict d;
+  d["rows"] = rows;
+  d["agents"] = agent_dicts;
+  d["scenes"] = evaluation.found;
+  d["scored"] = evaluation.results.scored();
+  d["without_drivers"] = evaluation.results.without_drivers;
+  d["faults"] = evaluation.faults();
+  d["seconds"] = evaluation.seconds;
+  d["agent_steps"] = evaluation.results.agent_steps();
+  d["policy_hash"] = evaluation.results.setting.policy_hash;
+  return d;
+}
+
+/// Options with which pictura.Simulator creates such a world.
+py::dict dict_of(SimulatorConfig config) {
+  py::dict d;
+  for (const Parameter& parameter : parameters_of("", config)) d[parameter.name.c_str()] = parameter.value;
+  py::dict conditioning;
+  for (int i = 0; i < kNumConditioning; ++i) {
+    const ConditioningRange& range = config.conditioning[i];
+    conditioning[kConditioningNames[i]] =
+        range.low == range.high ? py::cast(range.low) : py::make_tuple(range.low, range.high);
+  }
+  d["conditioning"] = conditioning;
+  return d;
+}
+
+struct SceneArguments {
+  SceneEvaluateOptions options;
+  std::string protocol = "womd";
+  std::optional<std::string> control;
+  std::optional<int> start_step, steps;
+  std::optional<std::vector<double>> densities;
+  py::dict rules;
+  std::string rollouts;
+};
+
+template <typename Visitor>
+void visit_options(SceneArguments& arguments, Visitor&& v) {
+  SceneEvaluateOptions& options = arguments.options;
+  v.value({"checkpoint"}, options.checkpoint);
+  v.value({"scenes"}, options.scenes);
+  v.value({"protocol"}, arguments.protocol);
+  v.controller({"controller"}, options);
+  v.value({"control"}, arguments.control);
+  v.value({"start_step"}, arguments.start_step);
+  v.value({"steps"}, arguments.steps);
+  v.value({"densities"}, arguments.densities);
+  v.value({"rules"}, arguments.rules);
+  v.value({"first_scene"}, options.first_scene);
+  v.value({"num_scenes"}, options.num_scenes);
+  visit_options(static_cast<DriverOptions&>(options), v);
+  v.value({"rollouts"}, arguments.rollouts);
+  v.callback({"on_progress"}, options.on_progress);
+}
+
+template <typename Probe>
+struct ProbeArguments {
+  Probe probe;
+  std::string cases_file;
+  CaseReplayOptions replay;
+};
+
+template <typename Probe, typename Visitor>
+void visit_options(ProbeArguments<Probe>& arguments, Visitor&& v) {
+  EvaluateOptions& worlds = arguments.probe.worlds;
+  v.value({"policies"}, arguments.probe.policies);
+  v.maps({"maps"}, worlds.maps);
+  v.value({"agents_per_world"}, worlds.agents_per_world);
+  v.value({"steps"}, worlds.steps);
+  visit_options(arguments.probe, v);
+  visit_options(static_cast<DriverOptions&>(worlds), v);
+  visit_light_options(worlds, v);
+  v.value({"cases_file"}, arguments.cases_file);
+  v.value({"replay"}, arguments.replay.path);
+  v.value({"case"}, arguments.replay.number);
+  v.value({"cameras"}, arguments.replay.recording.cameras);
+  v.callback({"on_progress"}, worlds.on_progress);
+}
+
+/// Arguments for opening a policy.
+struct PolicyArguments : DriverOptions {};
+
+template <typename Visitor>
+void visit_options(PolicyArguments& arguments, Visitor&& v) {
+  v.value({"checkpoint"}, arguments.checkpoint);
+  visit_options(static_cast<SessionOptions&>(arguments), v);
+  visit_light_options(arguments, v);
+}
+
+/// Throws UsageError if `replay` is no page, or if the requested case is not below `count`.
+void check_case_replay(const CaseReplayOptions& replay, int64_t count) {
+  const std::string& path = replay.path;
+  if (path.empty() && (replay.number || replay.recording.cameras)) {
+    fail_usage("replay: expected a file *.html for a case or cameras, got none");
+  }
+  if (!path.empty() && !path.ends_with(".html")) fail_usage("replay: expected a file *.html, got '{}'", path);
+  if (replay.number && *replay.number < 0) fail_usage("case: expected 0 or more, got {}", *replay.number);
+  check_case_number(replay, count);
+}
+
+/// Defines a probe, which writes the requested files and returns its summary. `most` is its maximum number of cases, if
+/// it is known in advance.
+template <typename Probe, typename Results, typename Row>
+void def_probe(py::module_* module, const char* name, Results (*ask)(const Probe&),
+               void (*write_cases)(const std::string&, const Results&),
+               std::string (*summary_json)(const Results&, const std::vector<Row>&, const std::string&),
+               std::type_identity_t<int64_t Probe::*> most, const char* doc) {
+  const auto probe = [=](const ProbeArguments<Probe>& arguments) -> py::object {
+    const std::string& cases_file = arguments.cases_file;
+    check_case_replay(arguments.replay, most ? arguments.probe.*most : std::numeric_limits<int64_t>::max());
+    const Results results = run_to_an_orderly_end(name, arguments.probe.worlds.num_threads, {}, [&] {
+      Results found = ask(arguments.probe);
+      if (!cases_file.empty()) write_cases(cases_file, found);
+      if (!arguments.replay.path.empty()) write_case_replay(arguments.replay, arguments.probe, found);
+      return found;
+    });
+    return py::module_::import("json").attr("loads")(summary_json(results, summarize(results), cases_file));
+  };
+  def_with_options<ProbeArguments<Probe>>(module, {name, {"policies", "maps"}}, probe, doc);
+}
+
+/// Logits and values of a batch, in the memory of a session's device.
+struct Answers {
+  std::vector<float> on_host;
+#ifdef PICTURA_HAS_CUDA
+  DeviceBuffer<float> on_device;
+#endif
+  Span<float> all;
+
+  Answers(int64_t batch, Device device) {
+    const auto count = static_cast<size_t>(batch * (kNumActions + 1));
+#ifdef PICTURA_HAS_CUDA
+    if (!device.is_host()) {
+      const DeviceGuard guard(device);
+      on_device = DeviceBuffer<float>(count);
+      all = {on_device.data(), count};
+      return;
+    }
+#endif
+    PICTURA_CHECK(device.is_host(), "evaluate: this build has no CUDA");
+    on_host.resize(count);
+    all = on_host;
+  }
+};
+
+/// Controller of a session, which holds session and renderer: both may be called from other threads.
+class SessionController final : public Controller {
+ public:
+  SessionController(std::shared_ptr<PolicySession> session, std::shared_ptr<Turnstile> of_session,
+                    RendererInside renderer, std::unique_ptr<Controller> controller)
+      : session_(std::move(session)),
+        of_session_(std::move(of_session)),
+        renderer_(std::move(renderer)),
+        controller_(std::move(controller)) {}
+
+  std::string_view name() const override { return controller_->name(); }
+  void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
+    const Turnstile::Pass in_session(of_session_.get(), "the controller's session");
+    std::optional<Turnstile::Pass> in_renderer;
+    if (renderer_.turnstile) in_renderer.emplace(renderer_.turnstile.get(), "the controller's renderer");
+    controller_->act(input, mask, commands_out, stream);
+  }
+
+ private:
+  std::shared_ptr<PolicySession> session_;
+  std::shared_ptr<Turnstile> of_session_;
+  RendererInside renderer_;
+  std::unique_ptr<Controller> controller_;
+};
+
+class PySession {
+ public:
+  PySession(const std::string& checkpoint, const SessionOptions& options)
+      : session_(std::make_shared<PolicySession>(checkpoint, options)),
+        calls_(options.num_threads, session_->device()) {}
+
+  PolicySession& session() { return *session_; }
+
+  py::object make_renderer() {
+    std::shared_ptr<Renderer> renderer = calls_.run("make_renderer", [&] { return session_->make_renderer(); });
+    if (!renderer) return py::none();
+    return of_main("Renderer")(RendererInside{std::move(renderer), nullptr});
+  }
+
+  py::object make_controller(const py::object& simulator, const py::object& renderer, bool argmax, uint64_t seed) {
+    const auto of = inside_of<SimulatorInside>(simulator, "make_controller", "Simulator").simulator;
+    RendererInside drawing;
+    if (!renderer.is_none()) drawing = inside_of<RendererInside>(renderer, "make_controller", "Renderer");
+    ControllerInside inside;
+    inside.of = of;
+    inside.controller = std::make_shared<SessionController>(
+        session_, calls_.turnstile(), drawing, session_->make_controller(drawing.renderer.get(), argmax, seed));
+    return of_main("Controller")(inside);
+  }
+
+  py::tuple evaluate(const py::dict& observations, const Scene* scene, const py::object& views,
+                     const py::object& renderer, const py::object& is_drawn) {
+    const Device device = session_->device();
+    std::vector<BorrowedArray> borrowed;
+    PolicyInput input;
+    int64_t batch = -1;
+    const auto names = [] {
+      std::vector<std::string> all;
+      for (const ObservationArray& array : kObservationArrays) all.emplace_back(array.name);
+      return all;
+    };
+    for (const auto& [key, value] : observations) {
+      const auto name = py::cast<std::string>(key);
+      borrowed.push_back(borrow(value, "evaluate: " + name, {}));
+      const Array& array = borrowed.back().array();
+      PICTURA_CHECK(array.shape.rank() > 0, "evaluate: {}: expected [batch, ...], got {}", name, array.text());
+      if (batch < 0) batch = array.shape[0];
+      bool is_known = false;
+#define X(its_name, type, rows, features, part, comment)                                                     \
+  if (name == #its_name) {                                                                                   \
+    const Dims shape = rows == 1 && array.shape.rank() == 2 ? Dims{batch, int64_t{features}}                 \
+                                                            : Dims{batch, int64_t{rows}, int64_t{features}}; \
+    const Span<const type> span = array.checked<const type>("evaluate: " #its_name, shape, device);          \
+    input.observations.its_name = {const_cast<type*>(span.data()), span.size()};                             \
+    is_known = true;                                                                                         \
+  }
+      PICTURA_OBSERVATION_ARRAYS(X)
+#undef X
+      PICTURA_CHECK(is_known, "evaluate: expected observations by the names {}, got '{}'", fmt::join(names(), ", "),
+                    name);
+    }
+    PICTURA_CHECK(batch >= 0, "evaluate: expected observations, got none");
+    SceneBatch scene_batch;
+    if (scene) {
+      scene_batch = scene->batch();
+      input.scene = &scene_batch;
+    }
+    if (!views.is_none()) {
+      borrowed.push_back(borrow_structs(views, "evaluate: views", sizeof(View), {}));
+      const auto bytes = borrowed.back().array().checked<const uint8_t>(
+          "evaluate: views", {batch, static_cast<int64_t>(sizeof(View))}, device);
+      PICTURA_CHECK(reinterpret_cast<uintptr_t>(bytes.data()) % alignof(View) == 0,
+                    "evaluate: views: expected aligned memory");
+      input.views = {reinterpret_cast<const View*>(bytes.data()), static_cast<size_t>(batch)};
+    }
+    if (!is_drawn.is_none()) {
+      borrowed.push_back(borrow(is_drawn, "evaluate: is_drawn", {}));
+      input.is_drawn = borrowed.back().array().checked<const uint8_t>("evaluate: is_drawn", {batch}, device);
+    }
+    std::optional<RendererInside> inside;
+    if (!renderer.is_none()) inside = inside_of<RendererInside>(renderer, "evaluate", "Renderer");
+
+    const auto answers = std::make_shared<Answers>(batch, device);
+    const auto count = static_cast<size_t>(batch);
+    const Span<float> logits(answers->all.data(), count * kNumActions);
+    const Span<float> values(answers->all.data() + count * kNumActions, count);
+    calls_.run("evaluate", [&] {
+      std::optional<Turnstile::Pass> in_renderer;
+      if (inside) in_renderer.emplace(inside->turnstile.get(), "evaluate: renderer");
+      session_->evaluate(input, inside ? inside->renderer.get() : nullptr, logits, values);
+    });
+    return py::make_tuple(LentArray{Array(logits.data(), {batch, kNumActions}, device), answers, {}, false, "logits"},
+                          LentArray{Array(values.data(), {batch}, device), answers, {}, false, "values"});
+  }
+
+ private:
+  static py::object of_main(const char* type) { return py::module_::import("pictura._pictura").attr(type).attr("_of"); }
+
+  std::shared_ptr<PolicySession> session_;
+  Calls calls_;
+};
+
+void bind_evaluation(py::module_& module) {
+  def_with_options<EvaluateOptions>(
+      &module, {"evaluate", {"checkpoint", "maps"}},
+      [](const EvaluateOptions& options) {
+        return dict_of(run_to_an_orderly_end("evaluate", options.num_threads, {},
+                                             [&options] { return pictura::evaluate(options); }));
+      },
+      R"(Runs the paper's evaluation, like `pictura evaluate`, in worlds that no training has.
+
+checkpoint: a policy's; '' with a controller in the paper's world. maps: names, files or ranges such as procedural:1-64.
+controller: 'lane', 'idm_lanes', 'random' or 'idle', which drives instead, or a function(observations) of NumPy arrays [slots,
+...] by name, like pictura.Simulator.observations, that returns actions int [slots], on the CPU. A function gets images, too, if cameras are
+named (rig, or width_px and height_px): `rgb` uint8 [slots, cameras, 3, height, width], black for inactive agents; rgb_0, rgb_1, ...
+if cameras have several sizes. densities: 'light', 'medium'
+and 'dense', with 60, 120 and 150 agents per world, or with agents_per_world. device, simulator, renderer: 'auto' or names;
+renderer '': as in training. rig, or width_px and height_px: other cameras. backbone: path of the program of policy.backbone.
+conditioning: numbers by name. light_cycles: 'phases' or 'independent', light_heads: 'as_mapped' or 'visible'; '': as in
+training. average: uses the average of weights in the checkpoint. camera_severity: severity of randomized cameras, 0 to 2
+(docs/explanation/cameras.md). decision_steps: steps for which an action is held; 0: as in training. others: other drivers, such
+as {'lane': 0.3, 'other.safetensors': 0.2}: policies or controllers, and their shares of vehicles; 'blind', 'phantom_braking'
+and 'inattentive': shares of agents that the policy drives while impaired. on_progress: called with the completed fraction and
+the remaining seconds, from a separate thread.
+Returns a dict: rows, one per density and driver (None: the evaluated driver), with its counts, and each metric as (value, half
+of its 95 % interval); seconds, agent_steps, policy_hash, light_cycles, others. ^C raises KeyboardInterrupt. Raises
+pictura.Error naming file and key of bad input.)");
+  def_with_options<RobustOptions>(
+      &module, {"evaluate_robust", {"checkpoint"}},
+      [](const RobustOptions& options) {
+        return dict_of(run_to_an_orderly_end("evaluate_robust", options.num_threads, {},
+                                             [&options] { return pictura::evaluate_robust(options); }));
+      },
+      R"(Runs the robust protocol, like `pictura evaluate --protocol robust`: a fixed set of generated towns, other drivers and
+randomized cameras (docs/how-to/robust_benchmark.md).
+
+checkpoint: a policy's; '' with a controller: a name or a function, as for evaluate(). A function gets images if cameras are named
+(rig, or width_px and height_px). scenarios: scenarios per condition; other numbers than the default give a trial. All other
+arguments are those of evaluate(); seed, conditioning and camera_severity are fixed.
+Returns a dict: rows, one per condition, with part, name, not_driven (the reason if the condition does not apply, else None),
+counts, and each metric as (value, half of its 95 % interval); pooled: the same over the conditions of 'towns', 'others', 'cameras'
+and 'all'; seconds, agent_steps, policy_hash. ^C raises KeyboardInterrupt.)");
+  def_with_options<SceneArguments>(
+      &module, {"evaluate_scenes", {"checkpoint", "scenes"}},
+      [](SceneArguments& arguments) {
+        SceneEvaluateOptions& options = arguments.options;
+        SceneProtocol& protocol = options.protocol;
+        protocol = scene_protocol(arguments.protocol);
+        protocol.control = arguments.control.value_or(protocol.control);
+        protocol.start_step = arguments.start_step.value_or(protocol.start_step);
+        protocol.steps = arguments.steps.value_or(protocol.steps);
+        protocol.densities = arguments.densities.value_or(protocol.densities);
+        for (const auto& [name, value] : arguments.rules) {
+          set_scene_rule(fmt::format("{}={}", py::cast<std::string>(name), py::cast<std::string>(py::str(value))),
+                         &protocol);
+        }
+        std::vector<SceneAgent> agents;
+        options.on_agent = [&agents](const SceneAgent& agent) { agents.push_back(agent); };
+        std::optional<RolloutsFile> file;
+        if (!arguments.rollouts.empty()) {
+          check_rollouts(protocol);
+          file.emplace(arguments.rollouts);
+          options.on_rollouts = [&file](const SceneRollouts& scene) { file->write(scene); };
+        }
+        const SceneEvaluation evaluation = run_to_an_orderly_end(
+            "evaluate_scenes", options.num_threads, {}, [&options] { return pictura::evaluate_scenes(options); });
+        if (file) file->commit();
+        return dict_of(evaluation, agents);
+      },
+      R"(Runs the paper's zero-shot evaluation in recorded scenes, like `pictura evaluate --protocol`.
+
+checkpoint: a policy's; '' with a controller: 'log', 'inverse', 'idm', 'idm_lanes', 'random' or 'idle', which drives instead.
+scenes: files, folders, 'FILE#K'. protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3', 'waymax' or 'simagents';
+control, start_step, steps, densities (shares of road users that remain) and rules (values by name,
+docs/explanation/evaluation.md) replace the protocol's settings. first_scene, num_scenes: range of the scenes; 0: all from the
+first on. rollouts: file of the rollouts, with the protocol 'simagents', in the format of the Waymo sim-agents challenge. The
+others as in evaluate().
+Returns a dict: rows, one per density, with each metric as (value, half of its 95 % interval); agents, one for every driven road
+user of a scene, density and rollout; scenes, scored, without_drivers, faults (skipped scenes, with reasons); seconds,
+agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error if no scene can be used.)");
+}
+
+void bind_probes(py::module_& module) {
+  def_probe(
+      &module, "probe_removal", &probe_removal, &write_removal_cases, &removal_summary_json, &RemovalOptions::removals,
+      R"(Measures how policies' value and braking change when one road user is removed, like `pictura probe removal`.
+
+policies: checkpoints or safetensors; the world is the first policy's. maps, density, agents_per_world, steps and the arguments
+after argmax: as in evaluate(). scenes: number of driven scenarios, an equal share by each policy; 0: equally many on each map
+for each policy, two per map or more. removals: total number. sample_steps: steps between states. range_m: maximum distance of a
+user. control: 'none', 'nobody', 'permuted' or 'untrained'. batch: cases in a call. cases_file: a CSV file for every case.
+replay: a page *.html that plays the scene of one case and shows its images with and without the road user
+(docs/reference/replay.md); case: its number in cases_file, by default the case with the largest change in the first policy's
+value; cameras: keeps the ego's images of every step.
+Returns a dict, that of the command's summary.json (docs/explanation/probes.md). ^C raises KeyboardInterrupt. Raises
+pictura.Error naming file and key of bad input.)");
+  def_probe(
+      &module, "probe_pedestrian", &probe_pedestrian, &write_pedestrian_cases, &pedestrian_summary_json, nullptr,
+      R"(Measures how policies' value and braking change as a pedestrian emerges from behind a vehicle and is hidden again, like `pictura
+probe pedestrian`.
+
+policies, maps, density, agents_per_world, scenes, steps, sample_steps, batch and the arguments after argmax: as in
+probe_removal(). paths: total number, each through one state. hider_range_m: maximum distance of the vehicle behind which a path
+begins. min_speed_mps: minimum speed of the ego, forwards. height_m: height of the pedestrian. control: 'none', 'nobody' or
+'untrained'. cases_file: a CSV file for every point of every path. replay, case, cameras: as in probe_removal().
+Returns a dict, that of the command's summary.json (docs/explanation/probes.md). ^C raises KeyboardInterrupt. Raises
+pictura.Error naming file and key of bad input.)");
+  def_probe(
+      &module, "probe_corner", &probe_corner, &write_corner_cases, &corner_summary_json, &CornerOptions::pairs,
+      R"(Measures how policies approach blind corners with a hidden vehicle, and similar empty corners, like `pictura probe corner`.
+
+policies, maps, density, agents_per_world, scenes, steps, sample_steps and the arguments after argmax: as in probe_removal().
+pairs: total number. max_distance_m: maximum distance before the corner at which a policy takes over. min_speed_mps: minimum
+speed of the ego then, and of the hidden vehicle. user_range_m: maximum distance of the hidden vehicle before the junction.
+driver: 'lane' drives the scenes instead of the policies. control: 'none', 'permuted' or 'untrained'. batch: pairs that run at
+once. cases_file: a CSV file for every run. replay, case, cameras: as in probe_removal(); a case is a pair, by default that of
+the example's figure.
+Returns a dict, that of the command's summary.json (docs/explanation/probes.md). ^C raises KeyboardInterrupt. Raises
+pictura.Error naming file and key of bad input.)");
+}
+
+void bind_session(py::module_& module) {
+  py::class_<PySession> session(module, "PolicySession", R"(
+Saved policy: evaluates scenes and observations, and holds the world and cameras of its training. One thread at a time, also for
+renderers that are passed to it.)");
+  def_init_with_options<PolicyArguments>(
+      &session, {"PolicySession", {"checkpoint"}},
+      [](const PolicyArguments& arguments) {
+        check_process("PolicySession", arguments.num_threads, {});
+        return std::make_unique<PySession>(arguments.checkpoint, arguments);
+      },
+      R"(checkpoint: a .ckpt file. num_threads: 0 for all. device: 'auto', 'cpu' or 'cuda', the policy's device; simulators, renderers
+and arrays passed to it use the same device. The others as in pictura.evaluate(). Raises pictura.Error naming the file, or
+pictura.UsageError if the policy cannot use these cameras.)");
+  session.def_property_readonly("reads_images", [](PySession& self) { return self.session().reads_images(); })
+      .def_property_readonly("rig", [](PySession& self) { return self.session().rig(); })
+      .def_property_readonly("device", [](PySession& self) { return name_of(self.session().device()); })
+      .def(
+          "training_world", [](PySession& self) { return dict_of(self.session().training_world()); },
+          "Returns the options with which pictura.Simulator(maps, worlds, **options) creates the world of its "
+          "training.")
+      .def(
+          "evaluation_world",
+          [](PySession& self, int steps) { return dict_of(self.session().evaluation_world(steps)); }, py::arg("steps"),
+          "Returns the options of the paper's evaluation world: episodes of `steps` steps, fixed conditioning and "
+          "lights.")
+      .def("make_renderer", &PySession::make_renderer,
+           "Returns a pictura.Renderer of its images, to which the maps must be uploaded; None if the policy reads no "
+           "images.")
+      .def("evaluate", &PySession::evaluate, py::arg("observations"), py::kw_only(), py::arg("scene") = nullptr,
+           py::arg("views") = py::none(), py::arg("renderer") = py::none(), py::arg("is_drawn") = py::none(),
+           R"(Returns logits float32 [batch, 12] and values float32 [batch], on its device.
+
+observations: arrays [batch, ...] by name, like pictura.Simulator.observations. A policy that reads images also needs scene,
+views [batch] and a renderer from make_renderer(); is_drawn: uint8 [batch], 0 where its images are black. Raises pictura.Error
+naming what is missing or does not fit.)")
+      .def(
+          "make_controller", &PySession::make_controller, py::arg("simulator"), py::arg("renderer") = py::none(),
+          py::arg("argmax") = true, py::arg("seed") = 0,
+          R"(Returns a pictura.Controller that drives in this simulator, which must use the session's device: with the most likely action, or
+draws keyed by seed, world, agent, episode and step as in training. renderer: for a policy that reads images, from
+make_renderer(), with the simulator's geometries. Raises pictura.Error if a geometry or the renderer is missing.)");
+}
+
+}  // namespace
+
+void bind_driving(py::module_& module) {
+  // Types and exceptions are defined by that extension.
+  py::module_::import("pictura._pictura");
+  bind_evaluation(module);
+  bind_probes(module);
+  bind_session(module);
+  refuse_unmade_objects(module);
+  pickle_by_new_protocols(module);
+}
+
+}  // namespace pictura::python

@@ -1,0 +1,36 @@
+// Tensors in the layout of safetensors (https://github.com/huggingface/safetensors), which other tools read: u64
+// length, a JSON header, raw data. Only for the files that write them.
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+namespace pictura {
+
+enum class SafeType : uint8_t { f32, bf16, i64 };
+
+/// Name of a type in the header.
+std::string_view name_of(SafeType type);
+
+struct SafeTensor {
+  std::string name;
+  SafeType type = SafeType::f32;
+  std::vector<int64_t> shape;
+  std::string bytes;  // little endian, in row-major order
+};
+
+/// The bytes of a file. metadata: an object of strings.
+std::string safetensors(const std::vector<SafeTensor>& tensors, const nlohmann::ordered_json& metadata);
+
+/// The nearest bfloat16 of a finite number, of two equally near ones the even.
+inline uint16_t bf16_of(float value) {
+  const auto bits = std::bit_cast<uint32_t>(value);
+  return static_cast<uint16_t>((bits + 0x7FFFu + ((bits >> 16) & 1u)) >> 16);
+}
+
+}  // namespace pictura

@@ -1,0 +1,49 @@
+// What a PolicySession consists of: the settings of a policy that drives, and what computes.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "pictura/configuration/config.h"
+#include "pictura/policy/session.h"
+#include "pictura/policy/stored_policy.h"
+
+namespace pictura {
+
+struct SessionParts {
+  SessionParts(const Config& its_config, Device its_device, const Rig& its_rig, double its_camera_severity)
+      : config(its_config), device(its_device), rig(its_rig), camera_severity(its_camera_severity) {}
+  virtual ~SessionParts() = default;
+  SessionParts(const SessionParts&) = delete;
+  SessionParts& operator=(const SessionParts&) = delete;
+
+  /// As the functions of PolicySession.
+  virtual std::string policy_hash() const = 0;
+  virtual std::unique_ptr<SessionParts> untrained(uint64_t seed) const = 0;
+  virtual void evaluate(const PolicyInput& input, Renderer* renderer, Span<float> logits_out,
+                        Span<float> values_out) const = 0;
+  virtual std::unique_ptr<PolicyController> make_controller(Renderer* renderer, bool argmax, uint64_t seed,
+                                                            bool hides_auxiliary) const = 0;
+
+  const Config config;
+  const Device device;
+  const Rig rig;
+  const double camera_severity;
+
+ protected:
+  /// Throws Error where what a policy with images needs is missing, or not that of a batch.
+  void check_images(const PolicyInput& input, size_t batch, const Renderer* renderer) const;
+  /// Throws Error naming the precision where a policy's outputs are not finite.
+  void check_outputs(bool are_finite) const;
+};
+
+/// The cameras that the options ask for, else those of training. No weight depends on sizes or poses. Throws as
+/// PolicySession does.
+Rig chosen_rig(const PolicyFacts& saved, const SessionOptions& options);
+
+/// A policy that torch computes; one that the host computes (policy/host_network.h), which throws Error where the
+/// options ask for another device, and where the policy has a program in place of convolutions.
+std::unique_ptr<SessionParts> open_torch_session(const std::string& path, const SessionOptions& options);
+std::unique_ptr<SessionParts> open_host_session(const std::string& path, const SessionOptions& options);
+
+}  // namespace pictura
