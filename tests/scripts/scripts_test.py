@@ -5,18 +5,23 @@ work, and results of scripts/gpu_check_record.py.
 Run by ctest: python3 scripts_test.py [unittest arguments].
 """
 
+import functools
 import hashlib
+import http.server
 import json
 import os
 import pathlib
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tarfile
 import tempfile
+import threading
 import time
 import unittest
+import zipfile
 
 SCRIPTS = pathlib.Path(__file__).resolve().parents[2] / "scripts"
 
@@ -500,12 +505,13 @@ class Setup(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.root = pathlib.Path(folder.name)
         (self.root / "scripts").mkdir()
-        for name in ("scripts/setup", "requirements.txt"):
+        names = ("requirements.txt", "scripts/setup", "scripts/install_torch")
+        for name in names:
             shutil.copy(SCRIPTS.parent / name, self.root / name)
-        installed = (self.root / "requirements.txt").read_bytes() + (self.root / "scripts/setup").read_bytes()
+        installed = b"".join((self.root / name).read_bytes() for name in names)
         self.write_program("venv/bin/python", "echo 2.11.0")
         self.write_program("venv/bin/cmake", "echo cmake version 3.30")
-        (self.root / "venv/pictura-setup").write_text(hashlib.sha256(installed).hexdigest()[:16])
+        self.hash = hashlib.sha256(installed).hexdigest()[:16]
         self.write_program("bin/dpkg-query", "echo installed")
 
     def write_program(self, name, script):
@@ -517,6 +523,8 @@ class Setup(unittest.TestCase):
     def link(self):
         """Returns the link left by set-up, after two runs."""
         environment = dict(os.environ, PICTURA_VENV="venv", PATH=f"{self.root}/bin:/usr/bin:/bin")
+        which = subprocess.run([self.root / "scripts/install_torch", "--which"], env=environment, capture_output=True, text=True).stdout
+        (self.root / "venv/pictura-setup").write_text(f"{self.hash} {which}")
         for _ in range(2):
             result = subprocess.run([self.root / "scripts/setup"], env=environment, capture_output=True, text=True, timeout=60)
             self.assertEqual((result.returncode, result.stderr), (0, ""), result.stdout)
@@ -538,6 +546,78 @@ class Setup(unittest.TestCase):
                 self.assertIn(name, parents, "a preset that does not lead to base")
                 name = parents[name]
         self.assertIn("/compile_commands.json", (SCRIPTS.parent / ".gitignore").read_text().split())
+
+
+class InstallTorch(Scratch):
+    """Wheels of the right names that are no torch, in folders, and in an index that this process serves."""
+
+    COPIED = ("install_torch",)
+
+    def setUp(self):
+        super().setUp()
+        if not self.has_pip():
+            self.skipTest("needs a Python with venv and pip")
+        for folder, version in (("default", "2.11.0"), ("cpu/torch", "2.11.0+cpu")):
+            wheel = self.root / folder / f"torch-{version}-py3-none-any.whl"
+            wheel.parent.mkdir(parents=True)
+            with zipfile.ZipFile(wheel, "w") as archive:
+                info = f"torch-{version}.dist-info"
+                archive.writestr("torch/__init__.py", f"__version__ = '{version}'\n")
+                archive.writestr(f"{info}/METADATA", f"Metadata-Version: 2.1\nName: torch\nVersion: {version}\n")
+                archive.writestr(f"{info}/WHEEL", "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
+                archive.writestr(f"{info}/RECORD", "")
+        subprocess.run([sys.executable, "-m", "venv", self.root / "venv"], check=True, timeout=120)
+
+    @staticmethod
+    def has_pip():
+        return subprocess.run([sys.executable, "-c", "import ensurepip, venv"], capture_output=True).returncode == 0
+
+    def install(self, *options, index=None):
+        """What is installed, and what was said."""
+        default = {"PIP_NO_INDEX": "1"} if index is None or not index.startswith("http") else {"PIP_INDEX_URL": f"file://{self.root}/none"}
+        result = self.run_script("install_torch", self.root / "venv/bin/python", *options, PIP_FIND_LINKS=str(self.root / "default"),
+                                 PIP_CACHE_DIR=str(self.root / "cache"), PICTURA_TORCH_INDEX=index or "", **default)  # fmt: skip
+        self.assertEqual(result.returncode, 0, result.stderr + result.stdout)
+        version = subprocess.run([self.root / "venv/bin/python", "-c", "import torch; print(torch.__version__)"], capture_output=True, text=True)
+        return version.stdout.strip(), result.stdout
+
+    def test_the_build_for_cpus_comes_from_a_folder(self):
+        self.assertEqual(self.install("--cpu", index=str(self.root / "cpu/torch"))[0], "2.11.0+cpu")
+
+    def test_the_build_for_cpus_comes_from_an_index(self):
+        handler = functools.partial(QuietHandler, directory=self.root / "cpu")
+        with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+            threading.Thread(target=server.serve_forever, daemon=True).start()
+            self.assertEqual(self.install("--cpu", index=f"http://127.0.0.1:{server.server_port}/")[0], "2.11.0+cpu")
+            server.shutdown()
+
+    def test_the_default_build_comes_where_the_other_is_not_found_or_not_reached(self):
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            unreachable = f"http://127.0.0.1:{free.getsockname()[1]}/"
+        for index in (None, str(self.root / "default"), unreachable):
+            with self.subTest(index):
+                version, said = self.install("--cpu", index=index)
+                self.assertEqual(version, "2.11.0")
+                self.assertIn("instead the default build", said)
+                self.assertIn("PICTURA_TORCH_INDEX", said)
+
+    def test_with_a_gpu_the_default_build_is_chosen(self):
+        version, said = self.install("--gpu", index=str(self.root / "cpu/torch"))
+        self.assertEqual(version, "2.11.0")
+        self.assertNotIn("+cpu", said)
+
+    def test_a_compiler_of_cuda_code_chooses_it_too(self):
+        which = lambda *options: self.run_script("install_torch", "--which", *options).stdout.strip()  # noqa: E731
+        has_gpu = list(pathlib.Path("/dev").glob("nvidia[0-9]*")) or os.access("/usr/local/cuda/bin/nvcc", os.X_OK) or shutil.which("nvcc")
+        self.assertEqual(which(), "gpu" if has_gpu else "cpu")
+        self.write_program("bin/nvcc", "true")
+        self.assertEqual((which(), which("--cpu"), which("--gpu")), ("gpu", "cpu", "gpu"))
+
+
+class QuietHandler(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, *_):
+        pass
 
 
 class Runs(unittest.TestCase):
