@@ -61,6 +61,20 @@ int end_output(int status) {
   return status;
 }
 
+// What help says of training.
+#ifdef PICTURA_HAS_TORCH
+constexpr const char *kOfTraining = "training and evaluation.\n",
+                     *kExamplesOfTraining =
+                         "  pictura train --config configs/demo.toml --out runs/demo\n"
+                         "  pictura plot runs/demo --out curves.png\n";
+#else
+constexpr const char *kOfTraining =
+                         "evaluation.\n"
+                         "This build has no torch, with which policies are trained, and computed on GPUs: pip install "
+                         "'pictura[train]'.\n",
+                     *kExamplesOfTraining = "  pictura evaluate models/vector.safetensors --map procedural:1-8\n";
+#endif
+
 }  // namespace
 
 int run_command(int argc, char** argv) {
@@ -69,7 +83,7 @@ int run_command(int argc, char** argv) {
   // Writing beyond the file size limit (ulimit -f) then gives a write error instead of killing the process.
   std::signal(SIGXFSZ, SIG_IGN);
   CLI::App app{
-      "Self-play driving from rendered views: maps, simulation, images, training and evaluation.\n"
+      std::string("Self-play driving from rendered views: maps, simulation, images, ") + kOfTraining +
       "MAP is a .xodr file, a CARLA town's name (looked up in $PICTURA_DATA), procedural[:SEED], or city[:SEED]."};
   app.name("pictura");
   app.set_version_flag("--version", PICTURA_VERSION);
@@ -80,10 +94,8 @@ int run_command(int argc, char** argv) {
       "  pictura map procedural:7 --png map.png\n"
       "  pictura render procedural --agents 40 --steps 50 --views 4 --out images\n"
       "  pictura simulate procedural --agents 40 --steps 300 --video drive.mp4\n"
-      "  pictura replay procedural --agents 40 --out drive.html\n"
-      "  pictura train --config configs/demo.toml --out runs/demo\n"
-      "  pictura plot runs/demo --out curves.png\n"
-      "Every subcommand has its own help: pictura render --help");
+      "  pictura replay procedural --agents 40 --out drive.html\n" +
+      std::string(kExamplesOfTraining) + "Every subcommand has its own help: pictura render --help");
   add_town_command(app);
   add_map_command(app);
   add_render_command(app);

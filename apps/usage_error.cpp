@@ -18,10 +18,9 @@ const std::map<std::string, std::string>& needs_of_commands() {
     for (const char* name : {"simulate", "quality", "render", "worlds", "soak", "history"}) {
       needs[fmt::format("pictura bench {}", name)] = "benchmarks (PICTURA_BUILD_BENCH)";
     }
-    for (const char* name : {"train", "evaluate", "probe", "export", "bench train"}) {
-      needs[fmt::format("pictura {}", name)] = "torch (PICTURA_WITH_TORCH)";
-    }
-    needs["pictura bench breakdown"] = "torch (PICTURA_WITH_TORCH), or no benchmarks (PICTURA_BUILD_BENCH)";
+    const std::string torch = "torch: pip install 'pictura[train]', or build with PICTURA_WITH_TORCH=ON";
+    needs["pictura train"] = needs["pictura bench train"] = torch;
+    needs["pictura bench breakdown"] = torch + "; or no benchmarks (PICTURA_BUILD_BENCH)";
     return needs;
   }();
   return kNeeds;

@@ -127,10 +127,16 @@ void add_compare_option(CLI::App* command, std::optional<EarlierReport>* earlier
 }
 
 void add_bench_command(CLI::App& app) {
+#ifdef PICTURA_HAS_TORCH
+  constexpr const char *kTrain = "bench train, ", *kBreakdown = "bench breakdown, ";
+#else
+  constexpr const char *kTrain = "", *kBreakdown = "";
+#endif
   CLI::App* command = app.add_subcommand(
       "bench",
-      "Measure rates, quality and worlds: bench render, bench history, bench simulate, bench train, bench scenes, "
-      "bench breakdown, bench quality, bench worlds, bench map, bench soak");
+      fmt::format("Measure rates, quality and worlds: bench render, bench history, bench simulate, {}bench scenes, "
+                  "{}bench quality, bench worlds, bench map, bench soak",
+                  kTrain, kBreakdown));
   command->require_subcommand(1);
   command->footer(
       "Examples:\n  pictura bench simulate --map Town01 --agents 120 --json\n  pictura bench render --size 192x108\n"

@@ -95,7 +95,7 @@ class Typing(CommandCase):
             self.assert_refused(2, "unknown option '--confg'; did you mean '--config'?", "train", "--confg", "a.toml")
             self.assert_refused(1, "got 'bf61'; did you mean 'bf16'?", "train", "--config", CONFIGS / "smoke.toml", "--set", "train.precision=bf61", "--out", "x")
         else:
-            self.assert_refused(2, "pictura train: this build has no torch", "train", "--config", "a.toml")
+            self.assert_refused(2, "pictura train: this build has no torch: pip install 'pictura[train]'", "train", "--config", "a.toml")
 
     def test_values_that_would_be_ignored_are_refused(self):
         town = self.town(blocks="1x1")
