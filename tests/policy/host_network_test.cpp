@@ -164,7 +164,7 @@ TEST_P(ReleasedPolicy, HoldsActionsAsTorchsDoes) {
 
 INSTANTIATE_TEST_SUITE_P(Models, ReleasedPolicy,
                          ::testing::Values("perspective", "perspective_taught", "vector", "vector_auxiliary"),
-                         [](const auto& info) { return info.param; });
+                         [](const auto& model) { return model.param; });
 
 TEST(ReleasedPolicies, AreAllTested) {
   size_t files = 0;
@@ -257,7 +257,7 @@ TEST(HostNetwork, RefusesWhatItCannotCompute) {
   const PolicyNetwork network(config.policy, 3, 1);
   const StoredPolicy saved{{.path = "a.safetensors", .config = config}, to_stored(network.parameters())};
   const auto refusal = [](const StoredPolicy& policy) { return message_of([&] { HostNetwork(policy, 3); }); };
-  EXPECT_EQ(refusal(saved), "");
+  EXPECT_EQ(refusal(saved), test::kNoError);
   StoredPolicy other = saved;
   other.config.policy.backbone_width = 7;
   EXPECT_THAT(refusal(other),
@@ -267,7 +267,7 @@ TEST(HostNetwork, RefusesWhatItCannotCompute) {
   EXPECT_THAT(refusal(other), HasSubstr("parameter 'critic.bias': expected finite numbers"));
   other = saved;
   other.parameters.push_back({"more", {1}, {0}});
-  EXPECT_THAT(refusal(other), HasSubstr("expected 31 parameters, got 32"));
+  EXPECT_THAT(refusal(other), HasSubstr("expected 32 parameters, got 33"));
   other = saved;
   other.backbone_hash = "0123456789abcdef";
   EXPECT_THAT(refusal(other), HasSubstr("which needs torch"));
