@@ -6,12 +6,18 @@ policies on the CPU without torch. They are loaded on first use.
 """
 
 import os
+import pathlib
 from typing import TYPE_CHECKING
 
-# Waiting threads of torch's loops spin for milliseconds unless this variable limits it; see apps/limit_spinning.cpp for
-# the reason. The variable is read once, when the first of pictura and torch is imported.
+from pictura._processor import folder_of_extensions
+
+# Threads of torch's loops spin while they wait, for milliseconds unless this limits it (apps/limit_spinning.cpp says why).
+# It is read once, when the first of pictura and torch is imported.
 if "OMP_WAIT_POLICY" not in os.environ:
     os.environ.setdefault("GOMP_SPINCOUNT", "2000")
+
+# Submodules are looked for there first.
+__path__.insert(0, str(folder_of_extensions(pathlib.Path(__file__).parent, pathlib.Path("/proc/cpuinfo").read_text())))
 
 from pictura._pictura import (  # noqa: E402, F401
     AGENT_FIELDS,

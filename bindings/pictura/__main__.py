@@ -1,15 +1,15 @@
 """The package's `pictura` command: `python -m pictura`."""
 
 import os
-import pathlib
 import sys
 
+from pictura import _load_training
 from pictura._load_training import torch_folder, usable_torch, why_no_torch
 
 
 def main() -> None:
     """Becomes the command, with the same arguments: that of the torch that is installed, or the one without torch."""
-    folder = pathlib.Path(__file__).parent / "bin"
+    folder = _load_training.folder() / "bin"
     program = folder / "pictura"
     if minor := usable_torch():
         program = folder / f"torch_{minor.replace('.', '_')}" / "pictura"

@@ -8,7 +8,12 @@ import importlib.util
 import pathlib
 import re
 
-_PACKAGE = pathlib.Path(__file__).parent
+import pictura
+
+
+def folder() -> pathlib.Path:
+    """Where the extensions and the command are that this processor runs."""
+    return pathlib.Path(pictura.__path__[0])
 
 
 def built_torches() -> list[str]:
@@ -16,7 +21,7 @@ def built_torches() -> list[str]:
     names = [
         path.name[: -len(suffix)]
         for suffix in importlib.machinery.EXTENSION_SUFFIXES
-        for path in _PACKAGE.glob(f"_training_*{suffix}")
+        for path in folder().glob(f"_training_*{suffix}")
     ]
     found = {match[1] + "." + match[2] for name in names if (match := re.fullmatch(r"_training_(\d+)_(\d+)", name))}
     return sorted(found, key=lambda minor: [int(part) for part in minor.split(".")])
@@ -31,10 +36,10 @@ def torch_folder() -> pathlib.Path | None:
 
 def installed_torch() -> str | None:
     """The version of the torch that is installed, as '2.11.0+cu130', or None."""
-    folder = torch_folder()
-    if folder is None:
+    its_folder = torch_folder()
+    if its_folder is None:
         return None
-    (version,) = re.findall(r"^__version__ = '(.*)'$", (folder / "version.py").read_text(), re.M)
+    (version,) = re.findall(r"^__version__ = '(.*)'$", (its_folder / "version.py").read_text(), re.M)
     return version
 
 

@@ -102,7 +102,7 @@ def test_the_minor_version_of_torch_chooses_and_others_are_refused_with_the_reme
 def test_the_command_says_what_is_missing(monkeypatch, tmp_path):
     from pictura import __main__ as command
 
-    monkeypatch.setattr(command, "__file__", str(tmp_path / "__main__.py"))
+    monkeypatch.setattr(_load_training, "folder", lambda: tmp_path)
     monkeypatch.setattr(command, "usable_torch", lambda: None)
     monkeypatch.setattr(sys, "argv", ["pictura", "train", "--config", "a.toml"])
     with pytest.raises(SystemExit, match="error: pictura train: .*pip install"):
