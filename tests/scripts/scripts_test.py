@@ -5,6 +5,7 @@ work, and results of scripts/gpu_check_record.py.
 Run by ctest: python3 scripts_test.py [unittest arguments].
 """
 
+import base64
 import functools
 import hashlib
 import http.server
@@ -96,7 +97,7 @@ class Help(Scratch):
     def test_what_a_shell_script_does_not_know_is_refused_before_it_does_anything(self):
         unknown = [(name, "--bogus") for name in self.SHELL if name not in self.PASSES_OPTIONS_ON]
         more = [("demo", "--seed", "3", "extra"), ("demo", "out", "extra"), ("demo", "--seeds", "2", "out", "extra"), ("figures", "a", "b"),
-                ("film", "a", "b"), ("python_stubs", "a", "b"), ("gpu_carry", "a"), ("format", "--check", "a")]  # fmt: skip
+                ("film", "a", "b"), ("python_stubs", "a", "b"), ("setup", "--cpu", "a"), ("gpu_carry", "a"), ("format", "--check", "a")]  # fmt: skip
         for name, *arguments in unknown + more:
             with self.subTest(name, arguments=arguments):
                 result = self.run_script(name, *arguments)
@@ -613,6 +614,69 @@ class InstallTorch(Scratch):
         self.assertEqual(which(), "gpu" if has_gpu else "cpu")
         self.write_program("bin/nvcc", "true")
         self.assertEqual((which(), which("--cpu"), which("--gpu")), ("gpu", "cpu", "gpu"))
+
+
+class JoinWheels(Scratch):
+    """Wheels of the right names whose files hold the names of their builds."""
+
+    COPIED = ("join_wheels",)
+    NAME = "pictura-1-cp311-cp311-linux_x86_64.whl"
+    SUFFIX = "cpython-311-x86_64-linux-gnu.so"
+
+    def wheel(self, build, *names):
+        path = self.root / build / self.NAME
+        path.parent.mkdir()
+        with zipfile.ZipFile(path, "w") as archive:
+            for name in ("pictura/__init__.py", f"pictura/_pictura.{self.SUFFIX}", *names, "pictura-1.dist-info/RECORD"):
+                archive.writestr(name, "" if name.endswith("RECORD") else f"{build} {name}")
+            command = zipfile.ZipInfo("pictura/bin/" + ("torch_2_11/" if build == "torch" else "") + "pictura")
+            command.external_attr = 0o755 << 16
+            archive.writestr(command, build)
+        return path
+
+    def join(self, *arguments):
+        (self.root / "out").mkdir(exist_ok=True)
+        return self.run_script("join_wheels", self.root / "out", *arguments)
+
+    def setUp(self):
+        super().setUp()
+        self.v3 = self.wheel("v3", f"pictura/_driving.{self.SUFFIX}")
+        self.old = self.wheel("old", f"pictura/_driving.{self.SUFFIX}")
+        self.torch = self.wheel("torch", f"pictura/_training_2_11.{self.SUFFIX}")
+
+    def test_each_build_has_its_place_and_the_record_is_of_all_files(self):
+        result = self.join(self.v3, "--x86-64", self.old, "--torch", self.torch)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with zipfile.ZipFile(self.root / "out" / self.NAME) as archive:
+            builds = {info.filename: archive.read(info).decode().split(" ")[0] for info in archive.infolist()}
+            record = archive.read("pictura-1.dist-info/RECORD").decode()
+            mode = archive.getinfo("pictura/x86_64/bin/pictura").external_attr >> 16
+            for line in record.splitlines()[:-1]:
+                name, digest, size = line.split(",")
+                if not name.endswith("RECORD"):
+                    data = archive.read(name)
+                    self.assertEqual(int(size), len(data))
+                    expected = base64.urlsafe_b64encode(hashlib.sha256(data).digest()).decode().rstrip("=")
+                    self.assertEqual(digest, f"sha256={expected}")
+        self.assertEqual(mode, 0o755)
+        self.assertEqual(sorted(line.split(",")[0] for line in record.splitlines()), sorted(builds))
+        del builds["pictura-1.dist-info/RECORD"]
+        self.assertEqual(builds, {
+            "pictura/__init__.py": "v3", f"pictura/_pictura.{self.SUFFIX}": "v3", f"pictura/_driving.{self.SUFFIX}": "v3",
+            "pictura/bin/pictura": "v3", f"pictura/x86_64/_pictura.{self.SUFFIX}": "old", f"pictura/x86_64/_driving.{self.SUFFIX}": "old",
+            "pictura/x86_64/bin/pictura": "old", f"pictura/_training_2_11.{self.SUFFIX}": "torch", "pictura/bin/torch_2_11/pictura": "torch",
+        })  # fmt: skip
+
+    def test_what_does_not_fit_together_is_refused(self):
+        for arguments, message in (((self.torch,), "expected a build without torch"),
+                                   ((self.v3, "--torch", self.torch, self.torch), "another wheel has it too"),
+                                   ((self.v3, "--x86-64", self.root / "none.whl"), "expected a wheel named"),
+                                   ((self.root / "none.whl",), "none.whl")):  # fmt: skip
+            with self.subTest(message):
+                result = self.join(*arguments)
+                self.assertEqual(result.returncode, 1)
+                self.assertIn(message, result.stderr)
+        self.assertEqual(list((self.root / "out").iterdir()), [])
 
 
 class QuietHandler(http.server.SimpleHTTPRequestHandler):
