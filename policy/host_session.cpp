@@ -81,7 +81,9 @@ struct HostSession final : SessionParts {
   void decide(const PolicyInput& input, int64_t batch, Span<const int64_t> indices, Renderer* renderer,
               float* logits_out, float* values_out) const {
     if (config.reads_images()) check_images(input, static_cast<size_t>(batch), renderer);
-    const int64_t total = static_cast<int64_t>(indices.size()), most = config.train.forward_chunk;
+    constexpr int64_t kMostAtOnce = 512;  // agents, whose images take 62 KB each at the paper's size
+    const auto total = static_cast<int64_t>(indices.size());
+    const int64_t most = std::min<int64_t>(config.train.forward_chunk, kMostAtOnce);
     for (int64_t begin = 0; begin < total; begin += most) {
       const auto some = indices.subspan(static_cast<size_t>(begin), static_cast<size_t>(std::min(most, total - begin)));
       GatheredRows rows(config, input.observations, batch, some);

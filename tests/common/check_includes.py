@@ -46,7 +46,7 @@ MAY_INCLUDE = {
 }
 # Libraries restricted to folders: pattern of the include -> files that may include it.
 STAYS_IN = [
-    (re.compile(r"^(torch|ATen|c10)/"), re.compile(r"^(tests/)?(policy|evaluation|training)/|^tests/configuration/")),
+    (re.compile(r"^(torch|ATen|c10)/"), re.compile(r"^(tests/)?(policy|training)/|^tests/(configuration|evaluation)/")),
     (re.compile(r"^(GL|EGL|GLES\d?)/"), re.compile(r"^(backend_gl|tests/backend_gl)/")),
     (re.compile(r"^(cuda|nvrtc|cub/|nccl)"), re.compile(r"^((tests/)?backend_cuda|common/cuda|backend_gl/cuda|bench)/")),
     (re.compile(r"^pybind11/"), re.compile(r"^bindings/")),
