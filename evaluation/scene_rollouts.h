@@ -1,9 +1,11 @@
-// Rollouts of recorded scenes in the format of the Waymo Open Sim Agents Challenge, and their file. Scoring is not
-// included. Has no torch headers.
+// Rollouts of recorded scenes in the shape that the Waymo Open Sim Agents Challenge asks for, and their file, written
+// and read. realism.h scores them. Without torch headers.
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "pictura/common/support/output_file.h"
@@ -51,6 +53,23 @@ class RolloutsFile {
   std::string path_;
   OutputFile file_;
   size_t size_ = 0;  // bytes
+};
+
+/// A file of such messages, one after the other, ours or of another program.
+class RolloutsReader {
+ public:
+  /// Reads the file and finds its scenes. Throws Error naming the file, and the field where there is one: bytes that
+  /// are no such message, a submission of another type, a scenario that is there twice.
+  explicit RolloutsReader(const std::string& path);
+  std::vector<std::string> scenario_ids() const;  // in order of their names
+  bool has(const std::string& scenario_id) const { return scenes_.contains(scenario_id); }
+  /// One scene. Throws Error naming file, scenario and field: trajectories of different lengths, rollouts of different
+  /// objects, an object that is there twice.
+  SceneRollouts read(const std::string& scenario_id) const;
+
+ private:
+  std::string path_, bytes_;
+  std::map<std::string, std::string_view> scenes_;  // messages ScenarioRollouts in bytes_
 };
 
 }  // namespace pictura

@@ -78,6 +78,13 @@ class WireReader {
     WireReader packed(bytes());
     while (!packed.rest_.empty()) visit(std::bit_cast<double>(packed.take_number<uint64_t>()));
   }
+  /// The same for a repeated float.
+  template <typename Visit>
+  void numbers32(Visit&& visit) const {
+    if (type_ == WireType::fixed32) return visit(number32());
+    WireReader packed(bytes());
+    while (!packed.rest_.empty()) visit(std::bit_cast<float>(packed.take_number<uint32_t>()));
+  }
 
  private:
   void expect(WireType type) const {
