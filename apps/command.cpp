@@ -107,6 +107,7 @@ int run_command(int argc, char** argv) {
   add_evaluate_command(app);
   add_probe_command(app);
   add_export_command(app);
+  add_score_command(app);
   add_plot_command(app);
   add_completion_command(app);
   add_bench_command(app);

@@ -13,6 +13,7 @@ void add_completion_command(CLI::App& app);
 void add_render_command(CLI::App& app);
 void add_replay_command(CLI::App& app);
 void add_simulate_command(CLI::App& app);
+void add_score_command(CLI::App& app);
 #ifdef PICTURA_HAS_TORCH
 void add_train_command(CLI::App& app);
 #endif

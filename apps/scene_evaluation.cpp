@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "pictura/apps/realism_table.h"
 #include "pictura/cli/backend_options.h"
 #include "pictura/cli/evaluation_options.h"
 #include "pictura/cli/file_options.h"
@@ -106,6 +107,7 @@ void print_report(const DriverOptions& options, const SceneEvaluation& evaluatio
                {"seconds", evaluation.seconds > 0 ? Json(evaluation.seconds) : Json(nullptr)},
                {"rows", rows},
                {"paper_rows", paper}});
+  if (!evaluation.realism.version.empty()) json["realism"] = realism_json(evaluation.realism);
   print_json(json);
 }
 
@@ -124,6 +126,10 @@ void print(const DriverOptions& options, const SceneEvaluation& evaluation, bool
     print_report(options, evaluation);
   else
     print_table(evaluation);
+  if (!json && !evaluation.realism.version.empty()) {
+    print_result("\n");
+    print_realism(evaluation.realism);
+  }
 }
 
 }  // namespace
@@ -164,11 +170,17 @@ void add_scene_options(CLI::App* command, SceneArguments* arguments) {
   command->add_option(
       "--rollouts", arguments->rollouts,
       "A file for the rollouts, as the Waymo sim-agents challenge takes them: with --protocol simagents");
+  command
+      ->add_option(
+          "--realism", arguments->realism,
+          "Score how realistic the rollouts are, by the weights of the challenge of that year: with --protocol "
+          "simagents; pictura score does the same for a file of rollouts")
+      ->check(one_of(realism_version_names()));
 }
 
 void refuse_idle_scene_options(const CLI::App& command, const SceneArguments& arguments) {
   if (arguments.protocol.empty()) {
-    refuse_options(command, {"--scenes", "--control", "--start", "--rule", "--csv", "--rollouts"},
+    refuse_options(command, {"--scenes", "--control", "--start", "--rule", "--csv", "--rollouts", "--realism"},
                    "without --protocol");
     return;
   }
@@ -199,13 +211,16 @@ void run_scene_evaluation(const CLI::App& command, const SceneArguments& argumen
     options.on_agent = [&csv](const SceneAgent& agent) { csv->write(csv_line(agent)); };
   }
   std::unique_ptr<RolloutsFile> rollouts;
-  if (!arguments.rollouts.empty()) {
+  options.realism = arguments.realism;
+  if (!arguments.rollouts.empty() || !arguments.realism.empty()) {
     check_rollouts(protocol);
     if (options.controller.empty() && options.argmax) {
       print_message(
           "notice: the rollouts of a scene are equal, since the most likely actions are taken; --sampled "
           "draws them\n");
     }
+  }
+  if (!arguments.rollouts.empty()) {
     rollouts = std::make_unique<RolloutsFile>(arguments.rollouts);
     options.on_rollouts = [&rollouts](const SceneRollouts& scene) { rollouts->write(scene); };
   }

@@ -15,11 +15,11 @@ namespace pictura {
 struct SceneArguments {
   std::string protocol;  // empty: no recorded scenes
   std::vector<std::string> scenes, rules;
-  std::string control, csv, rollouts;
+  std::string control, csv, rollouts, realism;
   std::optional<int> start_step;
 };
 
-/// Adds --protocol, --scenes, --control, --start, --rule, --csv and --rollouts.
+/// Adds --protocol, --scenes, --control, --start, --rule, --csv, --rollouts and --realism.
 void add_scene_options(CLI::App* command, SceneArguments* arguments);
 
 /// Throws UsageError for options that have no effect with, or without, --protocol.

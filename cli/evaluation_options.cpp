@@ -1,7 +1,5 @@
 #include "pictura/cli/evaluation_options.h"
 
-#include <cmath>
-
 #include "pictura/cli/backend_options.h"
 #include "pictura/cli/map_options.h"
 #include "pictura/cli/number_options.h"
@@ -46,14 +44,6 @@ CLI::Option* add_average_option(CLI::App* command, bool* average_out) {
       "--average", *average_out,
       "The average of the weights that a checkpoint holds (train.weight_average), instead of those "
       "after its last update");
-}
-
-std::string interval_text(const Estimate& estimate, int decimals) {
-  if (!std::isfinite(estimate.value)) return "-";
-  const std::string value = fmt::format("{:.{}f} +- ", estimate.value, decimals);
-  // A single scenario has no interval.
-  if (!std::isfinite(estimate.half_width_95)) return value + "-";
-  return value + fmt::format("{:.{}f}", estimate.half_width_95, decimals);
 }
 
 void EvaluationProgress::update(double done, double eta_s) {

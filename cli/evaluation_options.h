@@ -5,6 +5,7 @@
 #include <string>
 
 #include "pictura/cli/backend_options.h"
+#include "pictura/cli/interval_text.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/support/json.h"
 #include "pictura/common/support/stopwatch.h"
@@ -22,10 +23,7 @@ CLI::Option* add_sampled_option(CLI::App* command, bool* argmax_out);
 /// Adds --average, which selects the average of weights that a checkpoint holds.
 CLI::Option* add_average_option(CLI::App* command, bool* average_out);
 
-/// Text of an estimate and the half width of its interval, "0.123 +- 0.045"; "-" for missing values.
-std::string interval_text(const Estimate& estimate, int decimals = 3);
-
-/// Reports the progress of an evaluation, and once, if it takes long, its duration and how to shorten it.
+/// Says how far an evaluation is, and once, where it takes long, for how long and what can be done about it.
 class EvaluationProgress {
  public:
   /// `finished` names the result reported after an interrupt: "the scenarios that are finished".

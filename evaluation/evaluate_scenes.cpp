@@ -426,6 +426,27 @@ void count_agents(const std::vector<std::vector<std::vector<SceneAgent>>>& agent
   }
 }
 
+/// Scores the rollouts of a batch's scenes.
+void add_realism(const LoadedScenes& batch, const std::vector<SceneRollouts>& rollouts,
+                 const SceneEvaluateOptions& options, RealismReport* report_inout) {
+  std::vector<SceneRealism> scores(batch.maps.size());
+  std::vector<std::string> faults(batch.maps.size());
+  parallel_for(options.num_threads, static_cast<int64_t>(scores.size()), [&](int64_t item) {
+    const auto i = static_cast<size_t>(item);
+    try {
+      scores[i] = RealismScene(batch.maps[i]->scenario).score(rollouts[i], realism_version(options.realism));
+    } catch (const Error& error) {
+      faults[i] = error.what();
+    }
+  });
+  for (size_t i = 0; i < scores.size(); ++i) {
+    if (faults[i].empty())
+      report_inout->scenes.push_back(std::move(scores[i]));
+    else
+      report_inout->faults.push_back(std::move(faults[i]));
+  }
+}
+
 SceneEvaluation evaluate_scenes(const EvaluatedDriver& driver, Renderer* renderer,
                                 const SceneEvaluateOptions& options) {
   const SceneProtocol& protocol = options.protocol;
@@ -449,6 +470,8 @@ SceneEvaluation evaluate_scenes(const EvaluatedDriver& driver, Renderer* rendere
   map_options.observed_span_m = protocol.observed_span_m;
   std::unique_ptr<Simulator> simulator;
   EvaluationClock clock(options.on_progress);
+  const bool keeps_rollouts = options.on_rollouts || !options.realism.empty();
+  evaluation.realism.version = options.realism;
   const int at_once = scenes_at_once(options, driver.device);
   const auto num_drives = static_cast<int>(protocol.densities.size()) * protocol.rollouts;
   const double work = double(evaluation.found) * num_drives * protocol.steps;
@@ -467,7 +490,7 @@ SceneEvaluation evaluate_scenes(const EvaluatedDriver& driver, Renderer* rendere
         simulator = make_simulator(options.simulator, config, batch.maps, worlds);
       const double density = protocol.densities[i / protocol.rollouts];
       BatchDrive drive(batch, protocol, density, rollout, options.seed, simulator.get());
-      if (options.on_rollouts) drive.keep_places();
+      if (keeps_rollouts) drive.keep_places();
       const Driving driving = driver.drive(*simulator);
       const double done = double(first) * num_drives * protocol.steps + double(end - first) * i * protocol.steps;
       const bool is_finished = drive.run(driving.controller.get(), [&](int steps) {
@@ -478,13 +501,14 @@ SceneEvaluation evaluate_scenes(const EvaluatedDriver& driver, Renderer* rendere
         break;
       }
       agents.push_back(drive.results());
-      if (options.on_rollouts) drive.add_rollout(&rollouts);
+      if (keeps_rollouts) drive.add_rollout(&rollouts);
     }
     if (evaluation.interrupted) break;
     for (size_t scene = 0; scene < batch.maps.size(); ++scene) {
       count_agents(agents, scene, options, &results);
       if (options.on_rollouts) options.on_rollouts(rollouts[scene]);
     }
+    if (!options.realism.empty()) add_realism(batch, rollouts, options, &evaluation.realism);
     results.faults.insert(results.faults.end(), batch.faults.begin(), batch.faults.end());
     results.without_drivers += batch.without_drivers;
     results.num_scenes = end;
@@ -518,7 +542,8 @@ SimulatorConfig protocol_config(const SceneProtocol& protocol, SimulatorConfig c
 
 SceneEvaluation evaluate_scenes(const SceneEvaluateOptions& options) {
   check(options.protocol);
-  if (options.on_rollouts) check_rollouts(options.protocol);
+  if (options.on_rollouts || !options.realism.empty()) check_rollouts(options.protocol);
+  if (!options.realism.empty()) realism_version(options.realism);
   if (!options.controller.empty()) {
     return evaluate_scenes(controller_driver(options, options.protocol.steps), nullptr, options);
   }

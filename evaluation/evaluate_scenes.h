@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pictura/evaluation/evaluated_driver.h"
+#include "pictura/evaluation/realism.h"
 #include "pictura/evaluation/scene_protocol.h"
 #include "pictura/evaluation/scene_results.h"
 #include "pictura/evaluation/scene_rollouts.h"
@@ -23,15 +24,18 @@ struct SceneEvaluateOptions : DriverOptions {
   std::function<void(const SceneAgent&)> on_agent;
   // Called for every scored scene; the protocol must satisfy check_rollouts().
   std::function<void(const SceneRollouts&)> on_rollouts;
+  std::string
+      realism;  // one of realism_version_names(): rollouts are scored, of that protocol too; empty: they are not
   std::function<void(double done_fraction, double eta_s)> on_progress;
 };
 
 struct SceneEvaluation {
   SceneResults results;
-  std::vector<SceneRow> rows;  // by the protocol's densities
-  int found = 0;               // scenes available for evaluation
-  bool interrupted = false;    // interrupted; completed scenes are reported
-  double seconds = 0;          // wall time including the loading of scenes
+  std::vector<SceneRow> rows;  // by the densities of the protocol
+  int found = 0;               // scenes that there were to evaluate
+  bool interrupted = false;    // ^C came; what is finished is reported
+  double seconds = 0;          // with the loading of scenes
+  RealismReport realism;       // where it was asked for
 
   /// Scenes, files and ends of files that are left out, with reasons.
   std::vector<std::string> faults() const;

@@ -177,6 +177,14 @@ with tempfile.TemporaryDirectory() as name:
         report = json.loads(run(*sim_agents, "--rollouts", rollouts, "--json", command="evaluate").stdout)
         assert report["rules"]["rollouts"] == "32" and report["rows"][0]["vehicle_episodes"] == 32 * 8, report
         assert 32 * 12 * 4 * 320 < rollouts.stat().st_size < 32 * 12 * (4 * 320 + 30), rollouts.stat().st_size
+        # Their realism, at once and from the file.
+        report = json.loads(run(*sim_agents, "--realism", "2025", "--json", command="evaluate").stdout)["realism"]
+        score = json.loads(run(rollouts, "--scenes", scene, "--json", command="score").stdout)
+        assert score == report and 0 < score["realism"] < 1 and score["scored"] == 1 and len(score["likelihoods"]) == 10, score
+        table = run(rollouts, "--scenes", folder / "pufferdrive_v1.bin", command="score", status=1).stderr
+        assert "rollouts.binproto: expected rollouts of a scene of" in table and "1 are not in it" in table, table
+        table = run(*sim_agents, "--realism", "2024", command="evaluate").stdout
+        assert "realism 2024: 1 scenes, 2 road users scored" in table and "distance_to_road_edge        0.10" in table, table
 
         rate = json.loads(
             run("scenes", "--policy", "idm", "--protocol", "waymax", "--scenes", scene, "--copies", 3, "--repeats", 2, "--device",
@@ -188,6 +196,8 @@ with tempfile.TemporaryDirectory() as name:
         for expected, bad in [
             ("--rollouts: has no effect without --protocol", ("--policy", "idle", "--rollouts", folder / "x")),
             ("expected 32 rollouts of 80 steps from step 10", (*words, "--rollouts", folder / "x")),
+            ("--realism: has no effect without --protocol", ("--policy", "idle", "--realism", "2025")),
+            ("expected 32 rollouts of 80 steps from step 10", (*words, "--realism", "2025")),
             ("got rollouts=4, 80 steps", (*sim_agents, "--rule", "rollouts=4", "--rollouts", folder / "x")),
             ("--protocol: expected --scenes as well", ("--policy", "idm", "--protocol", "womd")),
             ("--csv: has no effect without --protocol", ("--policy", "idle", "--csv", folder / "x.csv")),
