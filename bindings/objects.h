@@ -122,5 +122,6 @@ void bind_scenarios(py::module_& module);
 void bind_rendering(py::module_& module);
 void bind_simulator(py::module_& module);
 void bind_replays(py::module_& module);
+void bind_realism(py::module_& module);
 
 }  // namespace pictura::python

@@ -7,7 +7,7 @@ import numpy
 import numpy.dtypes
 import numpy.typing
 import typing
-__all__: list[str] = ['AGENT_FIELDS', 'Array', 'BOX_DTYPE', 'COMMAND_DTYPE', 'CONDITIONING_NAMES', 'Camera', 'Controller', 'EVENTS', 'EVENT_TOTALS', 'Error', 'Geometry', 'HAS_CUDA', 'IDLE_ACTION', 'INSERTED_DTYPE', 'Images', 'LANE_TYPES', 'LIGHT_STATES', 'LINE_TYPES', 'LiveView', 'Map', 'NUM_ACTIONS', 'OBSERVATION_ARRAYS', 'QUERY_DTYPE', 'REWARD_TERMS', 'Recorder', 'Renderer', 'Rig', 'Scenario', 'Scene', 'SceneFile', 'SceneRecorder', 'Simulator', 'Snapshot', 'StepResult', 'TRACK_TYPES', 'UsageError', 'VIEW_DTYPE', 'draw_worlds', 'known_towns', 'make_views', 'map_folder', 'renderer_names', 'simulator_names', 'write_gallery']
+__all__: list[str] = ['AGENT_FIELDS', 'Array', 'BOX_DTYPE', 'COMMAND_DTYPE', 'CONDITIONING_NAMES', 'Camera', 'Controller', 'EVENTS', 'EVENT_TOTALS', 'Error', 'Geometry', 'HAS_CUDA', 'IDLE_ACTION', 'INSERTED_DTYPE', 'Images', 'LANE_TYPES', 'LIGHT_STATES', 'LINE_TYPES', 'LiveView', 'Map', 'NUM_ACTIONS', 'OBSERVATION_ARRAYS', 'QUERY_DTYPE', 'REALISM_VERSIONS', 'REWARD_TERMS', 'Recorder', 'Renderer', 'Rig', 'Scenario', 'Scene', 'SceneFile', 'SceneRecorder', 'Simulator', 'Snapshot', 'StepResult', 'TRACK_TYPES', 'UsageError', 'VIEW_DTYPE', 'draw_worlds', 'known_towns', 'make_views', 'map_folder', 'renderer_names', 'simulator_names', 'write_gallery']
 class Error(RuntimeError):
     """
     The work failed; the message names what was expected and what came.
@@ -970,9 +970,25 @@ def _hash64(data: bytes) -> int:
     """
     Returns the FNV-1a hash that ends files of the library.
     """
+def _read_rollouts(path: str) -> dict:
+    """
+    See pictura.realism.read_rollouts().
+    """
+def _realism_features(scene: Scenario, track_ids: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], center_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], heading_rad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple:
+    """
+    See pictura.realism.features().
+    """
+def _realism_score(scene: Scenario, track_ids: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], center_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], heading_rad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], version: str) -> str:
+    """
+    See pictura.realism.score(): its result as JSON.
+    """
 def _removed_keys() -> list:
     """
     Returns removed keys of configurations, a tuple each: name, the only valid value, as JSON, and the reason.
+    """
+def _score_rollouts(path: str, scenes: collections.abc.Sequence[str], version: str, num_threads: typing.SupportsInt | typing.SupportsIndex) -> str:
+    """
+    See pictura.realism.score_file(): its result as JSON.
     """
 def draw_worlds(seed: typing.SupportsInt | typing.SupportsIndex, num_slots: typing.SupportsInt | typing.SupportsIndex, min_agents: typing.SupportsInt | typing.SupportsIndex, max_agents: typing.SupportsInt | typing.SupportsIndex, num_maps: typing.SupportsInt | typing.SupportsIndex) -> list[tuple[int, int, int]]:
     """
@@ -1021,6 +1037,7 @@ LINE_TYPES: tuple = ('unknown', 'broken_single_white', 'solid_single_white', 'so
 NUM_ACTIONS: int = 12
 OBSERVATION_ARRAYS: tuple = (('ego', 'f32', 1, 9), ('partners', 'f32', 16, 8), ('lanes', 'f32', 80, 7), ('boundaries', 'f32', 80, 7), ('controls', 'f32', 10, 7), ('walls', 'f32', 80, 7), ('set_counts', 'i32', 1, 5), ('conditioning', 'f32', 1, 17), ('waypoints', 'f32', 3, 3))
 QUERY_DTYPE: numpy.dtypes.VoidDType
+REALISM_VERSIONS: tuple = ('2024', '2025')
 REWARD_TERMS: tuple = ('goal', 'collision', 'off_road', 'stop_line', 'comfort', 'lane_align', 'lane_center', 'velocity', 'overspeed', 'reverse', 'timestep')
 TRACK_TYPES: tuple = ('unset', 'vehicle', 'pedestrian', 'cyclist', 'other')
 VIEW_DTYPE: numpy.dtypes.VoidDType
