@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "pictura/map/opendrive/build.h"
+#include "pictura/map/stripes.h"
 
 namespace pictura::opendrive {
 
@@ -12,8 +13,6 @@ namespace {
 constexpr double kDefaultMarkWidth_m = 0.125, kBoldMarkWidth_m = 0.25;
 constexpr double kStopLineWidth_m = 0.4, kMinStopLine_m = 0.1, kMinParking_m = 0.1;
 constexpr double kMinMarkLength_m = 0.05;
-// Dashes of 3 m with gaps of 9 m: the North American pattern, as in CARLA's towns.
-constexpr double kDash_m = 3.0, kDashPeriod_m = 12.0;
 // Botts' dots: 4 inches wide, one every 48 inches.
 constexpr double kDot_m = 0.1016, kDotPeriod_m = 1.2192;
 

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <tuple>
 
+#include "pictura/map/light_phases.h"
 #include "pictura/map/opendrive/build.h"
 #include "pictura/map/opendrive/lights.h"
 #include "pictura/map/opendrive/sections.h"
@@ -273,18 +274,13 @@ class SignalBuilder {
   /// Adds a light for each line without a controller. Lines of one junction with equal or opposite headings share a
   /// phase; a line away from junctions is alone.
   void add_uncontrolled_lights() {
-    constexpr double kSameAxis_rad = 0.25 * std::numbers::pi;
-    std::map<int32_t, std::vector<double>> headings;  // [junction] heading of the first line of each phase
+    std::map<int32_t, std::vector<double>> headings;  // [junction] of the first line of each phase
     for (auto& [key, line] : uncontrolled_) {
       Phase phase{std::get<0>(key), 0};
       if (phase.junction >= 0) {
         std::vector<double>& phases = headings[phase.junction];
         const double heading = end_of(line.approach.incoming.front()).heading_rad;
-        const auto same = std::find_if(phases.begin(), phases.end(), [&](double other) {
-          return std::abs(std::remainder(heading - other, std::numbers::pi)) <= kSameAxis_rad;
-        });
-        phase.phase = static_cast<int32_t>(same - phases.begin());
-        if (same == phases.end()) phases.push_back(heading);
+        phase.phase = phase_of_heading(heading, &phases);
       }
       add_light(line.signal_index, phase, &line.approach);
     }

@@ -11,6 +11,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/grid.h"
 #include "pictura/map/polyline.h"
+#include "pictura/map/polyline_lanes.h"
 #include "pictura/map/scenario/logged_scene.h"
 #include "pictura/map/scenario/scenario_fields.h"
 
@@ -50,20 +51,6 @@ std::vector<CurvePoint> cut_into_pieces(Conversion* conversion, const std::vecto
 /// Throws Error naming `what` where a point is too far from the origin.
 std::vector<CurvePoint> resampled(Conversion* conversion, const LoggedPoints& points, const std::vector<double>& widths,
                                   const std::string& what);
-
-/// A segment of a lane. LaneSegments holds segments in a grid, for queries of crossings and of near lanes.
-struct LaneSegment {
-  Vec3 a_m, b_m;
-  int32_t lane = 0;
-};
-struct LaneSegments {
-  std::vector<LaneSegment> segments;
-  Grid grid;
-};
-LaneSegments segments_of(const RoadMap& map, bool (*is_wanted)(const Lane&));
-
-/// Returns the crossing in plan of two segments at about one height, ends included; nothing for parallel segments.
-std::optional<Vec2> crossing(Vec3 a, Vec3 b, Vec3 c, Vec3 d);
 
 /// Sets the origin: the centre of the lanes' and edges' bounding box, in whole metres.
 void choose_origin(Conversion* conversion);

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numbers>
 #include <numeric>
 #include <optional>
 #include <set>
@@ -23,7 +22,6 @@ constexpr int32_t kWidthStride = 5;                                 // points of
 constexpr double kMeetingEnds_m = 0.1, kMeetingHeading_rad = 1.05;  // limits for ends of lanes that continue each other
 constexpr double kWideGap_m = 1.0;
 constexpr float kMeetingLevel_m = 1.0f;
-constexpr float kSharedEnd_m = 0.05f;
 
 std::string place_of(const LoggedLane& lane) { return fmt::format("lane {}", lane.id); }
 
@@ -168,43 +166,11 @@ LaneType type_of(LoggedLaneType type) {
   return LaneType::other;
 }
 
-void append_points(const std::vector<CurvePoint>& points, RoadMap* map, Lane* lane) {
-  lane->points.begin = static_cast<int32_t>(map->lane_points.size());
-  const auto heading_of = [&](std::size_t i) {
-    const Eigen::Vector2d chord =
-        (points[std::min(i + 1, points.size() - 1)].position_m - points[i + 1 < points.size() ? i : i - 1].position_m)
-            .head<2>();
-    return std::atan2(chord.y(), chord.x());
-  };
-  double s_m = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (i > 0) s_m += plan_distance_m(points[i - 1].position_m, points[i].position_m);
-    double heading = heading_of(i);
-    if (i > 0 && i + 1 < points.size()) {
-      // Mean direction of the chords that meet here.
-      heading = heading_of(i - 1) + 0.5 * std::remainder(heading - heading_of(i - 1), 2 * std::numbers::pi);
-    }
-    map->lane_points.push_back({to_vec3(points[i].position_m),
-                                static_cast<float>(std::remainder(heading, 2 * std::numbers::pi)),
-                                static_cast<float>(points[i].width), static_cast<float>(s_m)});
-  }
-  lane->points.end = static_cast<int32_t>(map->lane_points.size());
-  lane->length_m = static_cast<float>(s_m);
-}
-
-const LanePoint& start_of(const RoadMap& map, int32_t lane) { return map.points_of(map.lanes[lane])[0]; }
-const LanePoint& end_of(const RoadMap& map, int32_t lane) {
-  const Span<const LanePoint> points = map.points_of(map.lanes[lane]);
-  return points[points.size() - 1];
-}
-
-using Links = std::set<std::pair<int32_t, int32_t>>;
-
-/// Returns the links that the file contains, from either side.
-Links stated_links(Conversion* conversion) {
+/// The links that the file states, from either side.
+LaneLinks stated_links(Conversion* conversion) {
   LoggedScene& scene = conversion->scene;
   const RoadMap& map = conversion->out->map;
-  Links links;
+  LaneLinks links;
   const auto add = [&](int64_t from_id, int64_t to_id, const LoggedLane& stated_by) {
     const auto from = conversion->lane_of_id.find(from_id), to = conversion->lane_of_id.find(to_id);
     if (from == conversion->lane_of_id.end() || to == conversion->lane_of_id.end()) {
@@ -236,8 +202,8 @@ Links stated_links(Conversion* conversion) {
   return links;
 }
 
-/// Returns links between lanes where one ends at the start of the other, in about the same direction.
-Links meeting_links(Conversion* conversion) {
+/// Links between lanes of which one ends where the other starts, in about its direction.
+LaneLinks meeting_links(Conversion* conversion) {
   const RoadMap& map = conversion->out->map;
   std::vector<Aabb2> starts;
   constexpr float kReach_m = static_cast<float>(kMeetingEnds_m);
@@ -248,7 +214,7 @@ Links meeting_links(Conversion* conversion) {
     starts.push_back(box_around(start_of(map, static_cast<int32_t>(i)).position_m));
   }
   const Grid grid(starts, 10.0f);
-  Links links;
+  LaneLinks links;
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {
     const LanePoint& end = end_of(map, static_cast<int32_t>(i));
     visit_items(grid.view(), box_around(end.position_m), [&](std::size_t other) {
@@ -263,25 +229,7 @@ Links meeting_links(Conversion* conversion) {
   return links;
 }
 
-void set_links(const Links& links, RoadMap* map) {
-  std::vector<std::vector<int32_t>> after(map->lanes.size()), before(map->lanes.size());
-  for (const auto& [from, to] : links) {
-    after[from].push_back(to);
-    before[to].push_back(from);
-  }
-  const auto append = [&](const std::vector<int32_t>& lanes) {
-    IndexRange range{static_cast<int32_t>(map->lane_links.size()), 0};
-    map->lane_links.insert(map->lane_links.end(), lanes.begin(), lanes.end());
-    range.end = static_cast<int32_t>(map->lane_links.size());
-    return range;
-  };
-  for (std::size_t i = 0; i < map->lanes.size(); ++i) {
-    map->lanes[i].successors = append(after[i]);
-    map->lanes[i].predecessors = append(before[i]);
-  }
-}
-
-/// Returns the neighbour beside which the lane runs longest, or -1.
+/// The neighbour beside which the lane runs longest, or -1.
 int32_t longest_neighbor(Conversion* conversion, const std::vector<LoggedNeighbor>& neighbors, int32_t own) {
   std::map<int32_t, int64_t> lengths;
   conversion->count_work(10 * neighbors.size());
@@ -363,7 +311,7 @@ void make_lanes(Conversion* conversion) {
     lane.speed_limit_mps =
         logged.speed_limit_mps > 0 ? static_cast<float>(logged.speed_limit_mps) : kDefaultSpeedLimit_mps;
     lane.source_road = index;
-    append_points(points, &map, &lane);
+    append_lane_points(points, &map, &lane);
     map.road_names.push_back(std::to_string(logged.id));
     map.lanes.push_back(lane);
     conversion->logged_lane.push_back(i);
@@ -374,74 +322,15 @@ void make_lanes(Conversion* conversion) {
 
 void link_lanes(Conversion* conversion) {
   RoadMap& map = conversion->out->map;
-  set_links(conversion->scene.has_links ? stated_links(conversion) : meeting_links(conversion), &map);
+  set_lane_links(conversion->scene.has_links ? stated_links(conversion) : meeting_links(conversion), &map);
   if (!conversion->scene.is_stated) infer_types(&map);
   set_neighbors(conversion);
 }
 
 void find_junctions(Conversion* conversion) {
-  RoadMap& map = conversion->out->map;
-  const LaneSegments driven =
-      segments_of(map, [](const Lane& lane) { return lane.type == LaneType::driving || lane.type == LaneType::other; });
-  // Lanes that fork, merge or continue each other share an end.
-  const auto is_end = [&](int32_t lane, Vec2 p) {
-    return length(start_of(map, lane).position_m.xy() - p) < kSharedEnd_m ||
-           length(end_of(map, lane).position_m.xy() - p) < kSharedEnd_m;
-  };
-  std::vector<std::pair<int32_t, int32_t>> crossings;
-  for (const LaneSegment& segment : driven.segments) {
-    const Aabb2 box{{min_of(segment.a_m.x, segment.b_m.x), min_of(segment.a_m.y, segment.b_m.y)},
-                    {max_of(segment.a_m.x, segment.b_m.x), max_of(segment.a_m.y, segment.b_m.y)}};
-    visit_items(driven.grid.view(), box, [&](std::size_t item) {
-      conversion->count_work(4);
-      const LaneSegment& other = driven.segments[item];
-      if (other.lane <= segment.lane) return;
-      const std::optional<Vec2> place = crossing(segment.a_m, segment.b_m, other.a_m, other.b_m);
-      if (place && !is_end(segment.lane, *place) && !is_end(other.lane, *place)) {
-        crossings.emplace_back(segment.lane, other.lane);
-      }
-    });
-  }
-  for (const auto& [a, b] : crossings) {
-    for (const int32_t lane : {a, b}) map.lanes[lane].in_junction = true;
-  }
-  // Lanes that cross belong to one junction.
-  std::vector<int32_t> group(map.lanes.size());
-  std::iota(group.begin(), group.end(), 0);
-  const auto first_of = [&](int32_t lane) {
-    while (group[lane] != lane) {
-      int32_t& parent = group[lane];
-      parent = group[parent];
-      lane = parent;
-    }
-    return lane;
-  };
-  const auto join = [&](int32_t a, int32_t b) {
-    a = first_of(a);
-    b = first_of(b);
-    group[std::max(a, b)] = std::min(a, b);
-  };
-  for (const auto& [a, b] : crossings) join(a, b);
-  // Lanes that fork or merge do too.
-  for (const Lane& lane : map.lanes) {
-    for (const IndexRange range : {lane.successors, lane.predecessors}) {
-      int32_t before = -1;
-      for (const int32_t other : map.links(range)) {
-        if (!map.lanes[other].in_junction) continue;
-        if (before >= 0) join(before, other);
-        before = other;
-      }
-    }
-  }
-  std::map<int32_t, int32_t> junctions;
-  for (std::size_t i = 0; i < map.lanes.size(); ++i) {
-    Lane& lane = map.lanes[i];
-    if (!lane.in_junction) continue;
-    const int32_t first = first_of(static_cast<int32_t>(i));
-    const auto [junction, is_new] = junctions.emplace(first, static_cast<int32_t>(map.junctions.size()));
-    if (is_new) map.junctions.push_back({.name = map.road_names[first]});
-    lane.junction = junction->second;
-  }
+  find_crossing_junctions(
+      [](const Lane& lane) { return lane.type == LaneType::driving || lane.type == LaneType::other; }, 0,
+      [conversion](std::size_t amount) { conversion->count_work(amount); }, &conversion->out->map);
 }
 
 }  // namespace pictura::conversion

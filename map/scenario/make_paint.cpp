@@ -7,13 +7,13 @@
 #include "pictura/common/error.h"
 #include "pictura/common/scene.h"
 #include "pictura/map/scenario/conversion.h"
+#include "pictura/map/stripes.h"
 
 namespace pictura::conversion {
 
 namespace {
 
 constexpr float kMarkWidth_m = 0.15f;
-constexpr double kDash_m = 3.0, kDashPeriod_m = 12.0;
 constexpr double kStripeOffset_m = 0.15;  // of the two stripes of a double line from its middle
 /// Minimum length of gaps. Edges are dense; longer pieces are gaps of the recording, which are kept unless they cross a
 /// lane.
@@ -95,55 +95,10 @@ void append_marking(Conversion* conversion, std::vector<CurvePoint> points, Mark
   map->markings.push_back(marking);
 }
 
-/// Returns the line moved to its left in plan; corners are mitred, sharp corners by at most twice the offset.
-std::vector<CurvePoint> moved_left(const std::vector<CurvePoint>& line, double offset_m) {
-  std::vector<CurvePoint> moved = line;
-  const auto normal_of = [&](std::size_t i) {
-    const Eigen::Vector2d way = (line[i + 1].position_m - line[i].position_m).head<2>();
-    return Eigen::Vector2d(-way.y(), way.x()).normalized().eval();
-  };
-  for (std::size_t i = 0; i < line.size(); ++i) {
-    Eigen::Vector2d normal = normal_of(std::min(i, line.size() - 2));
-    if (i > 0 && i + 1 < line.size()) {
-      const Eigen::Vector2d sum = normal + normal_of(i - 1);
-      normal = sum.norm() > 1e-9 ? (2 * sum / std::max(sum.squaredNorm(), 1.0)).eval() : normal;
-    }
-    moved[i].position_m.head<2>() += offset_m * normal;
-  }
-  return moved;
-}
-
-/// Returns the part of a line between two lengths along it.
-std::vector<CurvePoint> part_of(const std::vector<CurvePoint>& line, double begin_m, double end_m) {
-  std::vector<CurvePoint> part;
-  double s_m = 0;
-  for (std::size_t i = 0; i + 1 < line.size() && s_m < end_m; ++i) {
-    const double way_m = plan_distance_m(line[i].position_m, line[i + 1].position_m);
-    const auto at = [&](double s) {
-      return CurvePoint{0, line[i].position_m + (s - s_m) / way_m * (line[i + 1].position_m - line[i].position_m), 0};
-    };
-    if (s_m + way_m > begin_m) {
-      if (part.empty()) part.push_back(at(std::max(begin_m, s_m)));
-      part.push_back(at(std::min(end_m, s_m + way_m)));
-    }
-    s_m += way_m;
-  }
-  return part;
-}
-
-/// Appends dashes in the middle of the line; a short line is one dash.
 void append_dashes(Conversion* conversion, const std::vector<CurvePoint>& line, MarkColor color) {
-  double length_m = 0;
-  for (std::size_t i = 1; i < line.size(); ++i) {
-    length_m += plan_distance_m(line[i - 1].position_m, line[i].position_m);
-  }
-  const int dashes = std::max(1, static_cast<int>(std::floor((length_m + kDashPeriod_m - kDash_m) / kDashPeriod_m)));
-  const double begin_m = std::max(0.0, 0.5 * (length_m - ((dashes - 1) * kDashPeriod_m + kDash_m)));
-  for (int i = 0; i < dashes; ++i) {
-    conversion->count_work(line.size());
-    const double at_m = begin_m + i * kDashPeriod_m;
-    append_marking(conversion, part_of(line, at_m, std::min(length_m, at_m + kDash_m)), color, true);
-  }
+  const std::vector<std::vector<CurvePoint>> dashes = dashes_of(line);
+  conversion->count_work(dashes.size() * line.size());
+  for (const std::vector<CurvePoint>& dash : dashes) append_marking(conversion, dash, color, true);
 }
 
 }  // namespace

@@ -14,8 +14,7 @@ namespace conversion {
 
 namespace {
 
-constexpr float kSegmentCell_m = 10.0f;
-// Stop points this near, of lanes that start in about one direction, belong to one light.
+// Stop points this near, of lanes that start in about one direction, are one light's.
 constexpr double kSameStopPoint_m = 0.5, kSameHeading_rad = 0.5;
 constexpr double kStatedPiece_m = 9.99;  // used instead of kMaxPiece_m
 
@@ -79,32 +78,6 @@ std::vector<CurvePoint> resampled(Conversion* conversion, const LoggedPoints& po
   // The ends of omitted parts may be duplicates.
   if (scene.is_stated) line = cut_into_pieces(conversion, line, what);
   return line;
-}
-
-LaneSegments segments_of(const RoadMap& map, bool (*is_wanted)(const Lane&)) {
-  LaneSegments result;
-  std::vector<Aabb2> boxes;
-  for (std::size_t lane = 0; lane < map.lanes.size(); ++lane) {
-    if (!is_wanted(map.lanes[lane])) continue;
-    const Span<const LanePoint> points = map.points_of(map.lanes[lane]);
-    for (std::size_t i = 1; i < points.size(); ++i) {
-      const Vec3 a = points[i - 1].position_m, b = points[i].position_m;
-      result.segments.push_back({a, b, static_cast<int32_t>(lane)});
-      boxes.push_back({{min_of(a.x, b.x), min_of(a.y, b.y)}, {max_of(a.x, b.x), max_of(a.y, b.y)}});
-    }
-  }
-  result.grid = Grid(boxes, kSegmentCell_m);
-  return result;
-}
-
-std::optional<Vec2> crossing(Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
-  const Eigen::Vector2d u(b.x - a.x, b.y - a.y), v(d.x - c.x, d.y - c.y), w(c.x - a.x, c.y - a.y);
-  const double det = u.x() * v.y() - u.y() * v.x();
-  if (std::abs(det) <= 1e-9 * u.norm() * v.norm()) return std::nullopt;
-  const double s = (w.x() * v.y() - w.y() * v.x()) / det, t = (w.x() * u.y() - w.y() * u.x()) / det;
-  if (s < 0 || s > 1 || t < 0 || t > 1) return std::nullopt;
-  if (std::abs((a.z + s * (b.z - a.z)) - (c.z + t * (d.z - c.z))) >= double{kSameRoadLevel_m}) return std::nullopt;
-  return Vec2{static_cast<float>(a.x + s * u.x()), static_cast<float>(a.y + s * u.y())};
 }
 
 void choose_origin(Conversion* conversion) {

@@ -1,0 +1,58 @@
+// Lanes that a file gives as polylines: their points, their links, and the junctions where they cross. Shared by the
+// importers of recorded scenes and of Lanelet2 maps.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "pictura/common/grid.h"
+#include "pictura/map/polyline.h"
+#include "pictura/map/road_map.h"
+
+namespace pictura {
+
+inline const LanePoint& start_of(const RoadMap& map, int32_t lane) { return map.points_of(map.lanes[lane])[0]; }
+inline const LanePoint& end_of(const RoadMap& map, int32_t lane) {
+  const Span<const LanePoint> points = map.points_of(map.lanes[lane]);
+  return points[points.size() - 1];
+}
+
+/// Appends the points (at least two, about the map's origin, none repeated) and sets the lane's range and length.
+/// Headings at inner points are between the directions of the chords that meet there.
+void append_lane_points(const std::vector<CurvePoint>& points, RoadMap* map, Lane* lane_out);
+
+/// Pairs (lane, successor).
+using LaneLinks = std::set<std::pair<int32_t, int32_t>>;
+
+/// Sets the successors and predecessors of all lanes.
+void set_lane_links(const LaneLinks& links, RoadMap* map);
+
+/// Lanes in a grid, for what crosses them and for what is near.
+struct LaneSegment {
+  Vec3 a_m, b_m;
+  int32_t lane = 0;
+};
+struct LaneSegments {
+  std::vector<LaneSegment> segments;
+  Grid grid;
+};
+using LanePredicate = bool (*)(const Lane&);
+LaneSegments segments_of(const RoadMap& map, LanePredicate is_wanted);
+
+/// Where two segments cross in plan at about one height, ends included; nothing for parallel ones.
+std::optional<Vec2> crossing(Vec3 a, Vec3 b, Vec3 c, Vec3 d);
+
+/// Marks the wanted lanes of different roads that cross each other elsewhere than at their ends as lanes of junctions,
+/// adds the junctions of these and of the lanes already marked, and assigns them. Lanes that cross, fork or merge are
+/// of one junction, which has the name of the first lane's road. With a bridged length, which is for roads that are cut
+/// into many lanes, junction lanes that follow each other are of one junction too, and so are the wanted lanes between
+/// two of them that are at most so long. `count_work` is told the work of loops whose length a file decides.
+void find_crossing_junctions(LanePredicate is_wanted, float bridged_m,
+                             const std::function<void(std::size_t)>& count_work, RoadMap* map);
+
+}  // namespace pictura

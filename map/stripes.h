@@ -1,0 +1,25 @@
+// Painted stripes along polylines: parallel lines, parts, and dashes. Shared by the importers.
+#pragma once
+
+#include <vector>
+
+#include "pictura/map/polyline.h"
+
+namespace pictura {
+
+/// Dashes of 3 m with gaps of 9 m: the North American pattern, which CARLA's towns imitate.
+constexpr double kDash_m = 3.0, kDashPeriod_m = 12.0;
+
+/// The line moved to its left in plan, none of whose points (at least two) repeats the one before; corners are mitred,
+/// sharp ones at most to twice the offset.
+std::vector<CurvePoint> moved_left(const std::vector<CurvePoint>& line, double offset_m);
+
+/// The part of a line between two lengths along it.
+std::vector<CurvePoint> part_of(const std::vector<CurvePoint>& line, double begin_m, double end_m);
+
+double plan_length_m(const std::vector<CurvePoint>& line);
+
+/// Dashes in the middle of the line; a short line is one dash.
+std::vector<std::vector<CurvePoint>> dashes_of(const std::vector<CurvePoint>& line);
+
+}  // namespace pictura
