@@ -145,6 +145,8 @@ OpenLanes find_open_lanes(const RoadMap& map) {
       exits.push_back(mouth_of(map, lane, false));
       starts.visit_near(exits.back().middle_m, [&](int32_t other, float gap_m) {
         if (groups.of_lane[other] == group) return;
+        // On a two-way lane the way back begins there.
+        if (dot(mouth_of(map, other, true).direction, exits.back().direction) <= 0) return;
         open.missing_links.push_back({lane, other, gap_m});
       });
     }
