@@ -1,6 +1,7 @@
 #include "pictura/map/load_map.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <optional>
@@ -9,8 +10,10 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/interrupt.h"
+#include "pictura/common/support/numbers.h"
 #include "pictura/common/support/parallel_for.h"
 #include "pictura/common/support/suggestion.h"
+#include "pictura/map/lanelet2/lanelet2.h"
 #include "pictura/map/map_cache.h"
 #include "pictura/map/map_copy.h"
 #include "pictura/map/procedural/procedural_town.h"
@@ -21,20 +24,45 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kExtension = ".xodr";
-// File size per crossing of a procedural town with streets of default length, compared with CARLA's files.
+constexpr std::string_view kExtension = ".xodr", kLanelet2Extension = ".osm";
+// Bytes for each crossing of a procedural town with streets of default length, in a file as large as CARLA's.
 constexpr double kFileBytesPerCrossing = 80e3;
 constexpr double kCrossingsPerMotorway = 12;  // a motorway's weight in crossings, plus one for each block along it
 constexpr std::size_t kMaxFile_bytes = std::size_t{1} << 29;
 
 std::vector<fs::path> town_folders() { return {fs::path(map_folder()), fs::path(map_folder()) / "carla"}; }
 
-/// Returns the file of a name that is not procedural. Throws UsageError if there is none.
+/// FILE.osm[@LATITUDE,LONGITUDE].
+struct Lanelet2Name {
+  std::string path;
+  std::optional<GeoPoint> origin;
+};
+
+/// Nothing for names of other maps. Throws UsageError naming it when what follows the @ is no place.
+std::optional<Lanelet2Name> parse_lanelet2_name(std::string_view name) {
+  if (name.ends_with(kLanelet2Extension)) return Lanelet2Name{std::string(name), std::nullopt};
+  const std::size_t at = name.rfind('@');
+  if (at == std::string_view::npos || !name.substr(0, at).ends_with(kLanelet2Extension)) return std::nullopt;
+  const std::string_view place = name.substr(at + 1);
+  const std::size_t comma = std::min(place.find(','), place.size());
+  const std::optional<double> latitude = parse_number(place.substr(0, comma));
+  const std::optional<double> longitude = parse_number(place.substr(std::min(comma + 1, place.size())));
+  if (!latitude || !longitude || *latitude < -80 || *latitude > 84 || std::abs(*longitude) > 180) {
+    fail_usage(
+        "map '{}': expected @LATITUDE,LONGITUDE in degrees behind the file, with -80 to 84 and -180 to 180, "
+        "got '@{}'",
+        name, place);
+  }
+  return Lanelet2Name{std::string(name.substr(0, at)), GeoPoint{*latitude, *longitude}};
+}
+
+/// The file of a name that is not procedural. Throws UsageError when there is none.
 std::string file_path_of(const std::string& name) {
   std::error_code error;
+  if (const std::optional<Lanelet2Name> lanelet2 = parse_lanelet2_name(name)) return lanelet2->path;
   if (is_map_file(name)) return name;
   if (fs::exists(name, error) && !fs::is_directory(name, error)) {
-    fail_usage("map '{}': expected a file that ends in {}", name, kExtension);
+    fail_usage("map '{}': expected a file that ends in {} or {}", name, kExtension, kLanelet2Extension);
   }
   if (!name.empty() && name.find('/') == std::string::npos) {
     for (const fs::path& folder : town_folders()) {
@@ -49,20 +77,28 @@ std::string file_path_of(const std::string& name) {
     known.emplace_back(family.name);
     families.push_back(fmt::format("{}[:SEED[:OPTIONS]]", family.name));
   }
-  fail_usage("map '{}': expected an {} file, {}, or a town in {}, which has {}{}", name, kExtension,
-             fmt::join(families, ", "), map_folder(),
+  fail_usage("map '{}': expected an {} or {} file, {}, or a town in {}, which has {}{}", name, kExtension,
+             kLanelet2Extension, fmt::join(families, ", "), map_folder(),
              towns.empty() ? "none: CARLA's come with CARLA, as Maps/OpenDrive/*.xodr; procedural:1 needs no file"
                            : fmt::format("{}", fmt::join(towns, ", ")),
              suggestion(name, known));
 }
 
-RoadMap load_file(const std::string& path, const OpenDriveOptions& options, const ImportProgress& progress,
+RoadMap load_file(const std::string& name, const OpenDriveOptions& options, const ImportProgress& progress,
                   LoadReport* report) {
+  const std::string path = file_path_of(name);
+  const std::optional<Lanelet2Name> lanelet2 = parse_lanelet2_name(name);
   report->source = path;
-  const std::string text = read_file(path, kMaxFile_bytes);
-  const std::string cache_path = map_cache_path(path, options);
-  if (cache_path.empty()) return parse_opendrive(text, path, options, progress);
-  const MapCacheKey key = map_cache_key(text, options);
+  std::string text = read_file(path, kMaxFile_bytes);
+  const auto import = [&] {
+    return lanelet2 ? parse_lanelet2(text, path, options, lanelet2->origin, progress)
+                    : parse_opendrive(text, path, options, progress);
+  };
+  // An origin makes another map of the file.
+  const bool has_origin = lanelet2 && lanelet2->origin;
+  const std::string cache_path = map_cache_path(has_origin ? name : path, options);
+  if (cache_path.empty()) return import();
+  const MapCacheKey key = map_cache_key(has_origin ? text + name.substr(path.size()) : text, options);
   try {
     if (const std::optional<std::string> cached = read_cached(cache_path)) {
       RoadMap map = decode_map(*cached, key, cache_path);
@@ -73,7 +109,7 @@ RoadMap load_file(const std::string& path, const OpenDriveOptions& options, cons
   } catch (const Error& rejection) {
     report->cache_rejection = rejection.what();
   }
-  RoadMap map = parse_opendrive(text, path, options, progress);
+  RoadMap map = import();
   try_to_cache(cache_path, encode_map(map, key));
   return map;
 }
@@ -81,7 +117,8 @@ RoadMap load_file(const std::string& path, const OpenDriveOptions& options, cons
 }  // namespace
 
 bool is_map_file(std::string_view name) {
-  return !town_family_of(name) && parse_map_copy(name).map.ends_with(kExtension);
+  const std::string_view map = parse_map_copy(name).map;
+  return !town_family_of(name) && (map.ends_with(kExtension) || parse_lanelet2_name(map));
 }
 
 std::vector<std::string> known_towns() {
@@ -127,9 +164,8 @@ std::shared_ptr<const RoadMap> load_map(const std::string& name, const OpenDrive
     *map = parse_opendrive(procedural_town(*town), original, its_options, progress);
     map->name = map_name;
   } else {
-    const std::string path = file_path_of(original);
-    set_plan(fs::path(path).stem().string());
-    *map = load_file(path, its_options, progress, &report);
+    set_plan(fs::path(file_path_of(original)).stem().string());
+    *map = load_file(original, its_options, progress, &report);
   }
   if (asked.copy > 0) map->name = map_copy_name(map->name, asked.copy);
   return map;
@@ -163,6 +199,7 @@ MapText map_text(const std::string& name) {
     fail_usage("map '{}': expected a map with a text of its own, got a copy, which is deformed after reading", name);
   }
   if (const std::optional<TownOptions> town = parse_town_name(name)) return {procedural_town(*town), name};
+  if (parse_lanelet2_name(name)) fail_usage("map '{}': expected an OpenDRIVE map, got one of Lanelet2", name);
   const std::string path = file_path_of(name);
   return {read_file(path, kMaxFile_bytes), path};
 }

@@ -19,11 +19,12 @@ struct LoadReport {
   std::string source;           // the file or the procedural town's name, for messages
 };
 
-/// Loads a map by name. The name is a file (.xodr), a town's name looked up as NAME.xodr in the map folder,
-/// `procedural[:SEED[:NAME=VALUE,...]]`, or `city[...]` likewise. A suffix #COPY selects the affine copy of that number
-/// (map_copy.h), which replaces options.plan. Files and their copies are imported once and stored in the cache
-/// (map_cache.h); failures of the cache only cost time. Throws Error naming the file and the line or element, and
-/// UsageError when there is no such map.
+/// Loads `name`: an OpenDRIVE file (.xodr), a Lanelet2 file (.osm, with @LATITUDE,LONGITUDE behind it in coordinates
+/// about that place), a town's name looked up as NAME.xodr in the map folder, `procedural[:SEED[:NAME=VALUE,...]]`,
+/// `city[...]` likewise, or one of these with #COPY behind it, its affine copy of that number (map_copy.h), which
+/// replaces options.plan. Files and their copies are imported once and stored in the
+/// cache (map_cache.h); a cache that cannot be read or written only costs time. Throws Error naming the file and the
+/// line or element; UsageError when there is no such map.
 std::shared_ptr<const RoadMap> load_map(const std::string& name, const OpenDriveOptions& options = {},
                                         LoadReport* report_out = nullptr, const ImportProgress& progress = {});
 
@@ -34,8 +35,8 @@ struct MapText {
 /// Loads several maps on num_threads host threads (0: all). Throws as load_map() does.
 std::vector<std::shared_ptr<const RoadMap>> load_maps(const std::vector<std::string>& names, int num_threads = 0);
 
-/// Returns the text that load_map() would import for this name. Throws as load_map() does, and UsageError for copies,
-/// which have no text.
+/// The text that load_map() would import for this name. Throws as load_map() does, and UsageError for copies, which
+/// have none, and for Lanelet2 files, which are no OpenDRIVE.
 MapText map_text(const std::string& name);
 
 /// Returns the size of a map's file, from which memory is estimated. For a procedural town, it is about the size of a

@@ -83,6 +83,15 @@ Text text_of(MendKind kind) {
     case MendKind::unlisted_light: return {"lights that the controllers of their junction leave out", "left out"};
     case MendKind::laneless_light: return {"lights without a lane", "left out"};
     case MendKind::missing_link: return {"lanes that end without a link where others begin", "routes end before them"};
+    case MendKind::repeated_element: return {"element ids used twice", "the first counts"};
+    case MendKind::missing_element: return {"references to elements that do not exist", "left out"};
+    case MendKind::missing_position: return {"points without a position", "left out"};
+    case MendKind::short_way: return {"lines of fewer than two points", "left out"};
+    case MendKind::borderless_lanelet: return {"lanelets without one left and one right border", "left out"};
+    case MendKind::empty_lanelet: return {"lanelets of no length", "left out"};
+    case MendKind::unknown_subtype: return {"unknown subtypes of lanelets", "counted as other lanes"};
+    case MendKind::open_area: return {"areas whose outline is not closed or crosses itself", "left out"};
+    case MendKind::empty_rule: return {"regulatory elements without what they need", "left out"};
   }
   return {"unknown", "unknown"};
 }
@@ -94,7 +103,7 @@ const char* action_of(MendKind kind) { return text_of(kind).action; }
 
 std::vector<MendKind> mend_kinds() {
   std::vector<MendKind> kinds;
-  for (int i = 0; i <= static_cast<int>(MendKind::missing_link); ++i) kinds.push_back(static_cast<MendKind>(i));
+  for (int i = 0; i <= static_cast<int>(MendKind::empty_rule); ++i) kinds.push_back(static_cast<MendKind>(i));
   return kinds;
 }
 

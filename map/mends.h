@@ -9,7 +9,7 @@
 
 namespace pictura {
 
-/// Kinds of repaired faults, in the order of the table in docs/reference/opendrive_conformance.md.
+/// The kinds, in the order of the tables in docs/reference/opendrive.md and docs/reference/lanelet2.md.
 enum class MendKind : uint8_t {
   record_order,
   record_beyond_end,
@@ -72,9 +72,22 @@ enum class MendKind : uint8_t {
   unlisted_light,
   laneless_light,
   missing_link,
+  // Of Lanelet2 files.
+  repeated_element,
+  missing_element,
+  missing_position,
+  short_way,
+  borderless_lanelet,
+  empty_lanelet,
+  unknown_subtype,
+  open_area,
+  empty_rule,
 };
 
-/// Names of the fault, such as "records out of order", and of its repair, such as "sorted".
+/// The first kind that only Lanelet2 files have; those before it are in the table of docs/reference/opendrive.md.
+inline constexpr MendKind kFirstLanelet2Mend = MendKind::repeated_element;
+
+/// The fault, as "records out of order", and what is done about it, as "sorted".
 const char* to_string(MendKind kind);
 const char* action_of(MendKind kind);
 

@@ -1,0 +1,237 @@
+// The drivable surface beside lanes, and the edges of all of it: areas, the outline, and barriers between lanes.
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <optional>
+
+#include "pictura/common/scene.h"
+#include "pictura/map/endless_lanes.h"
+#include "pictura/map/lanelet2/build.h"
+#include "pictura/map/open_lanes.h"
+#include "pictura/map/road_edges.h"
+
+namespace pictura::lanelet2 {
+
+namespace {
+
+constexpr double kSamePoint_m = 1e-3;
+
+double area_of(const Points& a, std::size_t i, std::size_t j, std::size_t k) {
+  const Eigen::Vector2d u = (a[j] - a[i]).head<2>(), v = (a[k] - a[i]).head<2>();
+  return u.x() * v.y() - u.y() * v.x();
+}
+
+/// Twice the area; positive for rings that run counter-clockwise.
+double signed_area(const Points& ring) {
+  double sum = 0;
+  for (std::size_t i = 1; i + 1 < ring.size(); ++i) sum += area_of(ring, 0, i, i + 1);
+  return sum;
+}
+
+/// Whether two sides that share no corner cross or touch.
+bool crosses_itself(const Points& ring, SampleBudget* budget) {
+  const std::size_t n = ring.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t k = i + 2; k < n; ++k) {
+      if (i == 0 && k + 1 == n) continue;
+      budget->count_sample();
+      const std::size_t j = i + 1, l = (k + 1) % n;
+      if (area_of(ring, i, j, k) * area_of(ring, i, j, l) <= 0 &&
+          area_of(ring, k, l, i) * area_of(ring, k, l, j) <= 0) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+/// The triangles of a ring by ear clipping, as indices; nothing if it crosses itself.
+std::optional<std::vector<std::array<std::size_t, 3>>> triangulate(const Points& ring, SampleBudget* budget) {
+  if (crosses_itself(ring, budget)) return std::nullopt;
+  std::vector<std::size_t> left(ring.size());
+  std::iota(left.begin(), left.end(), std::size_t{0});
+  if (signed_area(ring) < 0) std::reverse(left.begin(), left.end());
+  std::vector<std::array<std::size_t, 3>> triangles;
+  const auto is_ear = [&](std::size_t at) {
+    const std::size_t a = left[(at + left.size() - 1) % left.size()], b = left[at], c = left[(at + 1) % left.size()];
+    if (area_of(ring, a, b, c) <= 0) return false;
+    return std::none_of(left.begin(), left.end(), [&](std::size_t p) {
+      budget->count_sample();
+      return p != a && p != b && p != c && area_of(ring, a, b, p) >= 0 && area_of(ring, b, c, p) >= 0 &&
+             area_of(ring, c, a, p) >= 0;
+    });
+  };
+  while (left.size() > 3) {
+    std::size_t ear = 0;
+    while (ear < left.size() && !is_ear(ear)) ++ear;
+    if (ear == left.size()) {
+      // Points on a straight line are no corners.
+      ear = 0;
+      const auto corner = [&](std::size_t at) {
+        return std::abs(
+            area_of(ring, left[(at + left.size() - 1) % left.size()], left[at], left[(at + 1) % left.size()]));
+      };
+      while (ear < left.size() && corner(ear) > 1e-9) ++ear;
+      if (ear == left.size()) return std::nullopt;
+    } else {
+      triangles.push_back({left[(ear + left.size() - 1) % left.size()], left[ear], left[(ear + 1) % left.size()]});
+    }
+    left.erase(left.begin() + static_cast<std::ptrdiff_t>(ear));
+  }
+  triangles.push_back({left[0], left[1], left[2]});
+  return triangles;
+}
+
+class AreaBuilder {
+ public:
+  explicit AreaBuilder(Build* build) : build_(*build), file_(build->file) {}
+
+  void run() {
+    for (const Relation& relation : file_.relations) {
+      const std::string_view type = relation.tags.of("type");
+      if ((type != "multipolygon" && type != "area") || !is_drivable_area(relation.tags)) continue;
+      build_.budget.work().check();
+      for (const Points& ring : rings_of(relation, "outer")) add_surface(ring, relation);
+      for (Points ring : rings_of(relation, "inner")) add_hole(&ring);
+    }
+    // Autoware's, which are closed without a repeated point.
+    for (const Way& way : file_.ways) {
+      if (way.tags.of("type") != "parking_lot" || way.nodes.size() < 3) continue;
+      add_surface(without_repeated(build_.points_of(static_cast<int32_t>(&way - file_.ways.data()))), way);
+    }
+  }
+
+ private:
+  static bool is_drivable_area(const Tags& tags) {
+    const std::string_view subtype = tags.of("subtype");
+    return subtype == "parking" || subtype == "freespace" || (!subtype.empty() && is_for_vehicles(tags));
+  }
+
+  static Points without_repeated(Points ring) {
+    const auto is_same = [](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+      return plan_distance_m(a, b) < kSamePoint_m;
+    };
+    ring.erase(std::unique(ring.begin(), ring.end(), is_same), ring.end());
+    while (ring.size() > 1 && is_same(ring.front(), ring.back())) ring.pop_back();
+    return ring;
+  }
+
+  /// The ways of a role, joined at shared points.
+  std::vector<Points> rings_of(const Relation& relation, std::string_view role) {
+    std::vector<int32_t> ways = relation.ways(role);
+    std::erase_if(ways, [&](int32_t way) { return file_.ways[way].nodes.size() < 2; });
+    std::vector<Points> rings;
+    while (!ways.empty()) {
+      Border at{ways.front(), false};
+      ways.erase(ways.begin());
+      const int32_t first = build_.first_node(at);
+      Points ring = build_.points_of(at);
+      while (build_.last_node(at) != first) {
+        const auto next = std::find_if(ways.begin(), ways.end(), [&](int32_t way) {
+          build_.budget.count_sample();
+          return build_.first_node({way, false}) == build_.last_node(at) ||
+                 build_.last_node({way, false}) == build_.last_node(at);
+        });
+        if (next == ways.end()) {
+          note_fault(relation);
+          return rings;
+        }
+        at = {*next, build_.first_node({*next, false}) != build_.last_node(at)};
+        ways.erase(next);
+        const Points more = build_.points_of(at);
+        ring.insert(ring.end(), more.begin() + 1, more.end());
+      }
+      ring = without_repeated(std::move(ring));
+      if (ring.size() >= 3) rings.push_back(std::move(ring));
+    }
+    return rings;
+  }
+
+  template <typename Item>
+  void note_fault(const Item& item) const {
+    file_.where(item).mend(build_.faults, MendKind::open_area, "expected a closed outline that does not cross itself");
+  }
+
+  template <typename Item>
+  void add_surface(const Points& ring, const Item& item) {
+    const auto triangles = ring.size() < 3 ? std::nullopt : triangulate(ring, &build_.budget);
+    if (!triangles) return note_fault(item);
+    for (const auto& [a, b, c] : *triangles) {
+      // As a quad with a corner in the middle of a side.
+      build_.bands.push_back({{ring[a], ring[c]}, {0.5 * (ring[a] + ring[b]), ring[b]}});
+      build_.band_roads.push_back(-1);
+    }
+  }
+
+  /// The surface is around it, so on the right of a ring that runs counter-clockwise.
+  void add_hole(Points* ring) {
+    if (signed_area(*ring) < 0) std::reverse(ring->begin(), ring->end());
+    ring->push_back(ring->front());
+    const std::vector<CurvePoint> line = cut_line(*ring, &build_.budget);
+    for (std::size_t i = 1; i < line.size(); ++i) {
+      build_.map->road_edges.push_back({to_vec3(line[i - 1].position_m), to_vec3(line[i].position_m)});
+      build_.map->provenance.road_edges.push_back({});
+    }
+  }
+
+  Build& build_;
+  const OsmFile& file_;
+};
+
+/// Lines that no vehicle crosses. Low curbs are driven over.
+bool is_barrier(const Tags& tags) {
+  const std::string_view type = tags.of("type");
+  if (type == "curbstone") return tags.of("subtype") != "low";
+  return type == "road_border" || type == "wall" || type == "fence" || type == "guard_rail" ||
+         type == "jersey_barrier" || type == "gate";
+}
+
+}  // namespace
+
+void build_areas(Build* build) { AreaBuilder(build).run(); }
+
+void build_edges(Build* build) {
+  RoadMap& map = *build->map;
+  std::vector<int32_t> bands_of_edges;
+  const std::vector<RoadEdge> outline = outline_of(build->bands, double{build->options.chord_error_m}, &bands_of_edges);
+  map.road_edges.insert(map.road_edges.end(), outline.begin(), outline.end());
+  for (const int32_t band : bands_of_edges) map.provenance.road_edges.push_back({build->band_roads[band], 0});
+  if (!has_endless_roads(map)) {
+    const OpenLanes open = find_open_lanes(map);
+    for (const OpenLanes::MissingLink& link : open.missing_links) {
+      const Lane &from = map.lanes[link.from], &to = map.lanes[link.to];
+      const opendrive::SourceLocation where{&build->file.source, 0, "lanelet " + map.road_names[from.source_road],
+                                            "relation"};
+      build->faults->mend({MendKind::missing_link, map.provenance.lanes[link.from].line,
+                           fmt::format("{}: <relation>: ends {:.2f} m from the start of lanelet {}, with which it "
+                                       "shares no points there",
+                                       where.owner, link.gap_m, map.road_names[to.source_road])},
+                          build->file.source.name());
+    }
+    open_mouths(open, &map);
+  }
+  // A barrier with lanes on both sides is an edge for both.
+  std::map<int32_t, int> sides;  // by way: 1 for a lane on its right, 2 for one on its left
+  for (std::size_t i = 0; i < map.lanes.size(); ++i) {
+    if (!is_drivable(map.lanes[i].type)) continue;
+    const auto& [left, right] = build->lane_sides[i];
+    sides[left.way] |= left.is_reversed ? 2 : 1;
+    sides[right.way] |= right.is_reversed ? 1 : 2;
+  }
+  for (const auto& [index, beside] : sides) {
+    const Way& way = build->file.ways[index];
+    if (beside != 3 || !is_barrier(way.tags)) continue;
+    const std::vector<CurvePoint> line = cut_line(build->points_of(index), &build->budget);
+    for (const bool is_reversed : {false, true}) {
+      for (std::size_t i = 1; i < line.size(); ++i) {
+        const std::size_t at = is_reversed ? line.size() - i : i;
+        const Vec3 a = to_vec3(line[at - 1].position_m), b = to_vec3(line[at].position_m);
+        map.road_edges.push_back(is_reversed ? RoadEdge{b, a} : RoadEdge{a, b});
+        map.provenance.road_edges.push_back(build->source_of(-1, way.offset));
+      }
+    }
+  }
+}
+
+}  // namespace pictura::lanelet2
