@@ -84,7 +84,8 @@ int run_command(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);
   CLI::App app{
       std::string("Self-play driving from rendered views: maps, simulation, images, ") + kOfTraining +
-      "MAP is a .xodr file, a CARLA town's name (looked up in $PICTURA_DATA), procedural[:SEED], or city[:SEED]."};
+      "MAP is a .xodr file, a Lanelet2 .osm file (FILE.osm@LATITUDE,LONGITUDE: about that place), a CARLA town's name\n"
+      "(looked up in $PICTURA_DATA), procedural[:SEED], or city[:SEED]."};
   app.name("pictura");
   app.set_version_flag("--version", PICTURA_VERSION);
   app.require_subcommand(1);

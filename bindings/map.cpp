@@ -194,7 +194,8 @@ Positions are metres in the map's frame, z up; `origin_m` is the frame's origin 
       .def_static(
           "load", load_named_map, py::arg("name"), py::kw_only(), py::arg("strict") = false,
           py::arg("chord_error_m") = OpenDriveOptions{}.chord_error_m,
-          R"(Loads a map by name: an OpenDRIVE file (.xodr), a town of the map folder, 'procedural:SEED', or 'city:SEED'.
+          R"(Loads a map by name: an OpenDRIVE file (.xodr), a Lanelet2 file (.osm, or .osm@LATITUDE,LONGITUDE in coordinates about
+that place), a town of the map folder, 'procedural:SEED', or 'city:SEED'.
 
 Faults with a single sensible meaning are repaired and listed in `mends`. strict: rejects such faults too. chord_error_m:
 maximum distance of sampled curves from the true curves.

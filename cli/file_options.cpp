@@ -17,11 +17,12 @@ void add_map_or_scene(CLI::App* command, std::string* map_out, const std::string
   command
       ->add_option(
           "MAP", *map_out,
-          fmt::format("A .xodr file, a town's name, procedural[:SEED], city[:SEED], the N-th affine copy of one "
-                      "of these (MAP#N), {}or a recorded scene: FILE.json, "
-                      "FILE.bin, FILE.scenario, FILE.tfrecord[#K] or FOLDER[#K], with a number or a "
-                      "scenario's id as K",
-                      more))
+          fmt::format(
+              "A .xodr or .osm file, a town's name, procedural[:SEED], city[:SEED], the N-th affine copy of one "
+              "of these (MAP#N), {}or a recorded scene: FILE.json, "
+              "FILE.bin, FILE.scenario, FILE.tfrecord[#K] or FOLDER[#K], with a number or a "
+              "scenario's id as K",
+              more))
       ->required();
 }
 

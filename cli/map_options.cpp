@@ -14,6 +14,12 @@ bool is_option_of_town(const std::string& piece) {
   return equals != std::string::npos && piece.find_first_of(":/") > equals;
 }
 
+// The longitude behind FILE.osm@LATITUDE.
+bool is_longitude_after(const std::string& before) {
+  const std::size_t place = before.rfind(".osm@");
+  return place != std::string::npos && before.find(',', place) == std::string::npos;
+}
+
 }  // namespace
 
 CLI::Option* add_map_list_option(CLI::App* command, std::vector<std::string>* maps, const std::string& help) {
@@ -24,7 +30,7 @@ CLI::Option* add_map_list_option(CLI::App* command, std::vector<std::string>* ma
       for (std::size_t begin = 0; begin <= word.size();) {
         const std::size_t end = std::min(word.find(kComma, begin), word.size());
         const std::string piece = word.substr(begin, end - begin);
-        if (begin > 0 && is_option_of_town(piece))
+        if (begin > 0 && (is_option_of_town(piece) || is_longitude_after(maps->back())))
           maps->back() += kComma + piece;
         else
           maps->push_back(piece);

@@ -120,7 +120,8 @@ class Map:
     @staticmethod
     def load(name: str, *, strict: bool = False, chord_error_m: typing.SupportsFloat | typing.SupportsIndex = 0.019999999552965164) -> Map:
         """
-        Loads a map by name: an OpenDRIVE file (.xodr), a town of the map folder, 'procedural:SEED', or 'city:SEED'.
+        Loads a map by name: an OpenDRIVE file (.xodr), a Lanelet2 file (.osm, or .osm@LATITUDE,LONGITUDE in coordinates about
+        that place), a town of the map folder, 'procedural:SEED', or 'city:SEED'.
         
         Faults with a single sensible meaning are repaired and listed in `mends`. strict: rejects such faults too. chord_error_m:
         maximum distance of sampled curves from the true curves.
