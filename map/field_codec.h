@@ -125,7 +125,7 @@ class FieldReader {
       uint64_t count = 0;
       get(&count);
       PICTURA_CHECK(count <= rest_.size() / min_bytes<Item>(),
-                    "damaged: a size of {} elements of at least {} bytes, where {} bytes are left", count,
+                    "damaged: a size of {} elements of at least {} bytes, but {} bytes remain", count,
                     min_bytes<Item>(), rest_.size());
       value_out->resize(count);
       get_items(value_out->data(), value_out->size());
@@ -146,7 +146,7 @@ class FieldReader {
   }
 
   void expect_end() const {
-    PICTURA_CHECK(rest_.empty(), "damaged: {} bytes are left after the last element", rest_.size());
+    PICTURA_CHECK(rest_.empty(), "damaged: {} bytes remain after the last element", rest_.size());
   }
 
  private:
@@ -159,7 +159,7 @@ class FieldReader {
     }
   }
   void get_bytes(void* out, std::size_t size) {
-    PICTURA_CHECK(size <= rest_.size(), "damaged: expected {} bytes more, {} are left", size, rest_.size());
+    PICTURA_CHECK(size <= rest_.size(), "damaged: expected {} more bytes, got {}", size, rest_.size());
     if (size > 0) std::memcpy(out, rest_.data(), size);
     rest_.remove_prefix(size);
   }

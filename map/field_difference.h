@@ -35,7 +35,7 @@ std::string difference_of_fields(const T& a, const T& b, std::index_sequence<I..
 
 template <typename Items>
 std::string difference_of_items(const Items& a, const Items& b) {
-  if (a.size() != b.size()) return fmt::format(": {} and {} of them", a.size(), b.size());
+  if (a.size() != b.size()) return fmt::format(": {} and {} elements", a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
     if (const std::string inside = difference(a[i], b[i]); !inside.empty()) {
       return fmt::format("[{}]{}{}", i, inside[0] == '.' ? "" : ": ", inside);

@@ -79,8 +79,9 @@ std::string file_path_of(const std::string& name) {
   }
   fail_usage("map '{}': expected an {} or {} file, {}, or a town in {}, which has {}{}", name, kExtension,
              kLanelet2Extension, fmt::join(families, ", "), map_folder(),
-             towns.empty() ? "none: CARLA's come with CARLA, as Maps/OpenDrive/*.xodr; procedural:1 needs no file"
-                           : fmt::format("{}", fmt::join(towns, ", ")),
+             towns.empty()
+                 ? "none: CARLA's towns are part of CARLA, as Maps/OpenDrive/*.xodr; procedural:1 needs no file"
+                 : fmt::format("{}", fmt::join(towns, ", ")),
              suggestion(name, known));
 }
 
@@ -196,7 +197,7 @@ int64_t map_file_bytes(const std::string& name) {
 
 MapText map_text(const std::string& name) {
   if (parse_map_copy(name).copy > 0) {
-    fail_usage("map '{}': expected a map with a text of its own, got a copy, which is deformed after reading", name);
+    fail_usage("map '{}': expected a map with its own text, got a copy, which is deformed after reading", name);
   }
   if (const std::optional<TownOptions> town = parse_town_name(name)) return {procedural_town(*town), name};
   if (parse_lanelet2_name(name)) fail_usage("map '{}': expected an OpenDRIVE map, got one of Lanelet2", name);

@@ -38,17 +38,17 @@ std::string_view checked_payload(std::string_view bytes, const MapCacheKey& key)
   PICTURA_CHECK(bytes.size() >= sizeof header, "truncated: {} bytes, expected at least {} for the header", bytes.size(),
                 sizeof header);
   std::memcpy(&header, bytes.data(), sizeof header);
-  PICTURA_CHECK(header.byte_order == kByteOrder, "written on a machine of another byte order");
+  PICTURA_CHECK(header.byte_order == kByteOrder, "written on a machine with a different byte order");
   PICTURA_CHECK(header.version == kVersion, "expected version {}, got {}", kVersion, header.version);
-  PICTURA_CHECK(header.key.importer == key.importer, "stale: made by another version of the importer");
+  PICTURA_CHECK(header.key.importer == key.importer, "stale: written by a different version of the importer");
   PICTURA_CHECK(header.key.source == key.source, "stale: the map file has changed");
-  PICTURA_CHECK(header.key.options == key.options, "stale: made with other options");
+  PICTURA_CHECK(header.key.options == key.options, "stale: written with different options");
   const std::string_view payload = bytes.substr(sizeof header);
   PICTURA_CHECK(header.payload_bytes <= payload.size(), "truncated: expected {} bytes after the header, got {}",
                 header.payload_bytes, payload.size());
   PICTURA_CHECK(header.payload_bytes == payload.size(), "damaged: expected {} bytes after the header, got {}",
                 header.payload_bytes, payload.size());
-  PICTURA_CHECK(header.payload_hash == hash_of(payload), "damaged: its bytes do not have the hash in its header");
+  PICTURA_CHECK(header.payload_hash == hash_of(payload), "damaged: its bytes do not match the hash in its header");
   return payload;
 }
 

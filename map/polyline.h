@@ -74,7 +74,7 @@ class SampleBudget {
     constexpr std::int64_t kSamplesPerCheck = 1024;
     if (remaining_ % kSamplesPerCheck == 0) work_.check();
     if (--remaining_ < 0) {
-      fail("{}: its curves need more than the {} samples that a file of its size may take", source_, max_samples_);
+      fail("{}: its curves need more than {} samples, the limit for a file of its size", source_, max_samples_);
     }
   }
 

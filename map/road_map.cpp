@@ -49,7 +49,7 @@ void check_mutual(const RoadMap& map, IndexRange Lane::* range, IndexRange Lane:
       check_index("lane", i, field, other, map.lanes.size(), 0);
       const Span<const int32_t> back = map.links(map.lanes[other].*mirror);
       PICTURA_CHECK(std::find(back.begin(), back.end(), static_cast<int32_t>(i)) != back.end(),
-                    "lane {}: {}: lane {} does not name it in return", i, field, other);
+                    "lane {}: {}: lane {} does not refer back to it", i, field, other);
     }
   }
 }
@@ -68,11 +68,11 @@ void validate_lanes(const RoadMap& map) {
     check_number("lane", i, "length_m", lane.length_m, 1e-4f, 1e6f);
     if (lane.left_neighbor >= 0) {
       PICTURA_CHECK(map.lanes[lane.left_neighbor].right_neighbor == static_cast<int32_t>(i),
-                    "lane {}: left_neighbor: lane {} does not name it in return", i, lane.left_neighbor);
+                    "lane {}: left_neighbor: lane {} does not refer back to it", i, lane.left_neighbor);
     }
     if (lane.right_neighbor >= 0) {
       PICTURA_CHECK(map.lanes[lane.right_neighbor].left_neighbor == static_cast<int32_t>(i),
-                    "lane {}: right_neighbor: lane {} does not name it in return", i, lane.right_neighbor);
+                    "lane {}: right_neighbor: lane {} does not refer back to it", i, lane.right_neighbor);
     }
     const Span<const LanePoint> points = map.points_of(lane);
     for (std::size_t k = 0; k < points.size(); ++k) {

@@ -48,7 +48,7 @@ std::string with_null_for_nan(std::string_view text) {
 const Json& member(const Json& object, const char* field) {
   if (!object.is_object()) fail_field("", "expected an object, got {}", object.type_name());
   const auto found = object.find(field);
-  if (found == object.end()) fail_field(field, "expected it, got nothing");
+  if (found == object.end()) fail_field(field, "is missing");
   return *found;
 }
 
@@ -238,7 +238,7 @@ void read_light(const std::string& lane, const Json& light, const std::map<std::
     if (light.contains("time_index")) {
       const Json& times = array_of(light, "time_index");
       if (times.size() != states.size()) {
-        fail_field("time_index", "expected {} of them, got {}", states.size(), times.size());
+        fail_field("time_index", "expected {} elements, got {}", states.size(), times.size());
       }
       within("time_index", i, [&] {
         const int64_t time = times[i].is_number_integer() ? times[i].get<int64_t>() : -1;
@@ -264,7 +264,7 @@ std::string lane_of_light(const Json& light) {
     if (!light.is_object() || !light.contains(field)) continue;
     return light[field].is_string() ? text_of(light, field) : std::to_string(integer_of(light, field));
   }
-  fail_field("lane", "expected it, got nothing");
+  fail_field("lane", "is missing");
 }
 
 void read_lights(const Json& lights, const Json& roads, LoggedScene* scene) {

@@ -25,7 +25,7 @@ SourceLocation Element::where() const { return {source_, node_.offset_debug(), *
 
 Element Element::required_child(const char* name) const {
   const Element element = child(name);
-  if (!element) fail("expected a <{}> in it, found none", name);
+  if (!element) fail("expected a <{}> inside, found none", name);
   return element;
 }
 

@@ -20,7 +20,7 @@ class Faults {
     if (strict_) throw Error(message_of(mend, source));
     // The limit bounds memory.
     if (mends_.size() >= kMaxMends) {
-      fail("{} (after {} other faults, the most that are mended)", message_of(mend, source), kMaxMends);
+      fail("{} (after {} other faults, the maximum that is repaired)", message_of(mend, source), kMaxMends);
     }
     mends_.push_back(std::move(mend));
   }

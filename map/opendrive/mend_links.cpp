@@ -121,7 +121,7 @@ class LinkMender {
       return;
     }
     if (back->kind == RoadLink::Kind::none) {
-      link->where.mend(faults_, MendKind::one_sided_link, "the {} of road {} is not linked back to the {} of this one",
+      link->where.mend(faults_, MendKind::one_sided_link, "the {} of road {} is not linked back to the {} of this road",
                        name_of(link->contact), link->id, name_of(end));
       *back = {.kind = RoadLink::Kind::road, .id = road->id, .contact = end, .where = target->where};
       return;
@@ -129,7 +129,7 @@ class LinkMender {
     if (back->kind != RoadLink::Kind::road || (back->id == road->id && back->contact == end)) return;
     const bool touches = distance_m(*road, end, *target, link->contact) <= kTouch_m;
     link->where.mend(faults_, touches ? MendKind::unreturned_link : MendKind::contrary_link,
-                     "the {} of road {} is linked to the {} of road {} instead of the {} of this one",
+                     "the {} of road {} is linked to the {} of road {} instead of the {} of this road",
                      name_of(link->contact), link->id, name_of(back->contact), back->id, name_of(end));
     if (!touches) leave_out(link);
   }

@@ -107,7 +107,7 @@ GeometryPiece read_geometry(const Element& element) {
     piece.start_curvature = spiral.number_or_zero("curvStart");
     piece.end_curvature = spiral.number_or_zero("curvEnd");
   } else {
-    element.fail("expected a <line>, <arc>, <spiral>, <poly3> or <paramPoly3> in it, found none");
+    element.fail("expected a <line>, <arc>, <spiral>, <poly3> or <paramPoly3> inside, found none");
   }
   const double turn = std::max(std::abs(piece.start_curvature), std::abs(piece.end_curvature)) * piece.length;
   if (!(turn <= kMaxTurn_rad)) element.fail("expected a curve of at most {} rad, got {}", kMaxTurn_rad, turn);
@@ -125,7 +125,7 @@ double distance_m(const GeometryPiece& before, const GeometryPiece& piece) {
 double join_stations(const Geometry& geometry, GeometryPiece* before, GeometryPiece* piece) {
   const double end = before->s + before->length, error = piece->s - end;
   if (std::abs(error) <= kStationTolerance_m) return 0;
-  constexpr const char* kMessage = "attribute s: expected {}, where the one before it ends, got {}";
+  constexpr const char* kMessage = "attribute s: expected {}, where the previous geometry ends, got {}";
   if (piece->s > before->s) {
     GeometryPiece cut = *before;
     cut.length = piece->s - before->s;
@@ -149,7 +149,7 @@ std::optional<Jump> jump_between(const Geometry& geometry, std::size_t index, co
   if (gap_m <= kMaxGap_m) return std::nullopt;
   const Eigen::Vector2d end = pose_on(before, before.length).position_m;
   constexpr const char* kMessage =
-      "begins {:.3f} m from the end of the one before it, at ({}, {}); expected at most {} m";
+      "begins {:.3f} m from the end of the previous geometry, at ({}, {}); expected at most {} m";
   const bool can_spread = can_spread_jump(gap_m, road.length);
   if (!(gap_m <= (can_spread ? kMaxJump_m : kMaxCut_m))) {
     geometry.element.fail(kMessage, gap_m, end.x(), end.y(), kMaxGap_m);
@@ -199,7 +199,7 @@ void join_geometry(const std::vector<Geometry>& geometries, FileRoad* road) {
     } else if (piece.s > kStationTolerance_m) {
       const bool is_near = can_cut(piece.s, piece.length);
       geometry.element.mend(is_near ? MendKind::geometry_station : MendKind::moved_geometry,
-                            "attribute s: expected 0 for the first one, got {}", piece.s);
+                            "attribute s: expected 0 for the first geometry, got {}", piece.s);
       if (!is_near) moved = -piece.s;
       piece.s = 0;
     }
@@ -229,9 +229,8 @@ void read_elevation(const Element& profile, double described, FileRoad* road) {
   for (std::size_t i = 1; i < cubics.size(); ++i) {
     const double s = cubics[i].s, before_m = Profile{{cubics[i - 1]}}.value(s), rise_m = cubics[i].a - before_m;
     if (std::abs(rise_m) <= kMaxStep_m || s >= std::min(described, road->length)) continue;
-    profile.mend(MendKind::height_jump,
-                 "at s {} it goes on {:.3f} m above {:.3f} m, where it was; expected at most {} m", s, rise_m, before_m,
-                 kMaxStep_m);
+    profile.mend(MendKind::height_jump, "at s {} it jumps by {:.3f} m from {:.3f} m; expected a jump of at most {} m",
+                 s, rise_m, before_m, kMaxStep_m);
     jumps.push_back({s, rise_m});
     if (jumps.size() > kMaxJumps) profile.fail("expected at most {} jumps in a road", kMaxJumps);
   }

@@ -116,7 +116,7 @@ void read_width(const Element& element, double section_length, FileLane* lane) {
   const char* const name = by_border ? "border" : "width";
   Profile profile = read_profile(element, name, "sOffset", section_length);
   if (profile.cubics.empty()) {
-    element.mend(MendKind::missing_width, "expected a <width> or <border> in it, found none");
+    element.mend(MendKind::missing_width, "expected a <width> or <border> inside, found none");
     lane->is_void = true;
     return;
   }
@@ -219,7 +219,7 @@ std::vector<SectionElement> section_elements(const Element& lanes, double road_l
     const double s = read_station(element, "s", road_length).value_or(road_length);
     append_record(element, "s", &SectionElement::s, {s, element}, &sections);
   });
-  if (sections.empty()) lanes.fail("expected a <laneSection> in it, found none");
+  if (sections.empty()) lanes.fail("expected a <laneSection> inside, found none");
   sort_records(&SectionElement::s, &sections);
   SectionElement& first = sections.front();
   if (first.s > kStationTolerance_m) {

@@ -90,7 +90,7 @@ FileRoad read_road(const Element& element, const Offset& offset, Faults* faults)
 template <typename Item>
 void append(Item item, const Element& element, std::vector<Item>* items, std::unordered_map<std::string, int>* index) {
   if (!index->emplace(item.id, static_cast<int>(items->size())).second) {
-    element.fail("attribute id: another {} has it already", element.name());
+    element.fail("attribute id: another {} already has it", element.name());
   }
   items->push_back(std::move(item));
 }
@@ -136,7 +136,7 @@ void read_network(std::string_view text, const std::string& source_name, Faults*
     append(read_road(road, offset, faults), road, &network.roads, &network.road_index);
     check_extent(network.roads.back(), faults);
   });
-  if (network.roads.empty()) root.fail("expected at least one <road> in it, found none");
+  if (network.roads.empty()) root.fail("expected at least one <road> inside, found none");
   root.each("junction", [&](const Element& element) {
     const std::string name = name_of(element);
     const Element junction = element.with_owner(&name);

@@ -100,7 +100,7 @@ class SignalBuilder {
     for (std::size_t road = 0; road < build_.network.roads.size(); ++road) {
       for (const FileSignal& signal : build_.network.roads[road].signals) {
         if (!index_by_id_.emplace(signal.id, placed_signals_.size()).second) {
-          signal.where.mend(build_.faults, MendKind::repeated_signal, "attribute id: another signal has {} already",
+          signal.where.mend(build_.faults, MendKind::repeated_signal, "attribute id: another signal already has {}",
                             signal.id);
         }
         placed_signals_.push_back({road, &signal});
@@ -121,7 +121,7 @@ class SignalBuilder {
       });
       if (!controllers.emplace(controller.id, std::move(valid)).second) {
         controller.where.mend(build_.faults, MendKind::repeated_controller,
-                              "attribute id: another controller has it already");
+                              "attribute id: another controller already has it");
       }
     }
     return controllers;

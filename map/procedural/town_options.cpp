@@ -24,7 +24,8 @@ std::vector<std::string> option_names() {
 int take_blocks(std::string_view count, std::string_view value, std::string_view map_name) {
   const std::optional<uint64_t> number = parse_unsigned(count);
   if (!number || *number < 1 || *number > uint64_t{kMaxTownBlocks}) {
-    fail_usage("map '{}': blocks: expected AxB, as 4x3, with 1 to {} each, got '{}'", map_name, kMaxTownBlocks, value);
+    fail_usage("map '{}': blocks: expected AxB, for instance 4x3, with 1 to {} each, got '{}'", map_name,
+               kMaxTownBlocks, value);
   }
   return static_cast<int>(*number);
 }
@@ -68,7 +69,7 @@ const std::vector<TownFeature>& town_features() {
       {"motorway", &TownOptions::motorway, 0, 1, "Chance of a motorway around the town, with two interchanges"},
       {"slip-lanes", &TownOptions::slip_lanes, 0, 1, "Share of right turns that bypass their light"},
       {"lane-spread-m", &TownOptions::lane_spread_m, 0, 0.4,
-       "Maximum difference of the width of lanes, equal in all of a town, from 3.5 m"},
+       "Maximum deviation of the lane width from 3.5 m, equal for all lanes of a town"},
       {"hills-m", &TownOptions::hills_m, 0, 50, "Maximum height difference, before grades are limited"},
       {"overpasses", &TownOptions::overpasses, 0, 1, "Share of inner crossings where one street crosses over another"},
       {"crosswalks", &TownOptions::crosswalks, 0, 1, "Share of crossings with crosswalks"},

@@ -47,13 +47,13 @@ class Cursor {
     return values;
   }
   std::string_view take_bytes(const char* field, std::size_t size) {
-    if (size > rest_.size()) fail_field(field, "expected {} bytes, got the {} that are left", size, rest_.size());
+    if (size > rest_.size()) fail_field(field, "expected {} bytes, got the remaining {}", size, rest_.size());
     const std::string_view bytes = rest_.substr(0, size);
     rest_.remove_prefix(size);
     return bytes;
   }
   void expect_end() const {
-    if (!rest_.empty()) fail_field("", "expected the end of the file, got {} bytes more", rest_.size());
+    if (!rest_.empty()) fail_field("", "expected the end of the file, got {} more bytes", rest_.size());
   }
   std::string_view rest() const { return rest_; }
 
@@ -76,7 +76,7 @@ void require_steps(LoggedScene* scene, int32_t steps) {
   }
   if (scene->num_steps == 0) scene->num_steps = steps;
   if (scene->num_steps != steps) {
-    fail_field("T", "expected {} steps, as of the agents before, got {}", scene->num_steps, steps);
+    fail_field("T", "expected {} steps, as for the previous agents, got {}", scene->num_steps, steps);
   }
 }
 
@@ -425,8 +425,8 @@ LoggedScene parse_scene(std::string_view bytes, const std::string& source) {
       reasons += fmt::format("; as {}: {}{}{}", layout.name, error.path, error.path.empty() ? "" : ": ", error.reason);
     }
   }
-  fail("{}: expected a PufferDrive scene of layout v1, v2 or v3c, got {} bytes that are none{}", source, bytes.size(),
-       reasons);
+  fail("{}: expected a PufferDrive scene of layout v1, v2 or v3c, got {} bytes of another format{}", source,
+       bytes.size(), reasons);
 }
 
 }  // namespace pictura::pufferdrive

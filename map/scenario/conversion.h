@@ -31,7 +31,7 @@ struct Conversion {
   /// Counts work, so that no file can take minutes. Throws Error at the limit.
   void count_work(std::size_t amount) {
     remaining_work -= static_cast<int64_t>(amount);
-    if (remaining_work < 0) fail("{}: its map needs more work than a scene may take", scene.source);
+    if (remaining_work < 0) fail("{}: its map exceeds the work limit of a scene", scene.source);
   }
   Eigen::Vector3d from_origin(const Eigen::Vector3d& p) const { return p - origin; }
   /// Rounds a point as a map stores it where a program stated the scene, so that state_scene() returns the same point.

@@ -303,7 +303,7 @@ void make_lanes(Conversion* conversion) {
       continue;
     }
     const int32_t index = static_cast<int32_t>(map.lanes.size());
-    PICTURA_CHECK(conversion->lane_of_id.emplace(logged.id, index).second, "{}: lane {}: expected an id of its own",
+    PICTURA_CHECK(conversion->lane_of_id.emplace(logged.id, index).second, "{}: lane {}: expected a unique id",
                   scene.source, logged.id);
     Lane lane;
     lane.type = logged.map_type.value_or(type_of(logged.type));

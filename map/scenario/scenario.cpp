@@ -133,7 +133,7 @@ void validate(const Scenario& scenario) {
                   kMaxScenarioTracks, scenario.tracks.size());
     const std::size_t steps = static_cast<std::size_t>(scenario.num_steps);
     const auto check_size = [](const char* what, std::size_t size, std::size_t expected) {
-      PICTURA_CHECK(size == expected, "{}: expected {} of them, got {}", what, expected, size);
+      PICTURA_CHECK(size == expected, "{}: expected {} elements, got {}", what, expected, size);
     };
     check_size("states", scenario.states.size(), scenario.tracks.size() * steps);
     if (!scenario.driven.empty()) check_size("driven", scenario.driven.size(), scenario.tracks.size() * steps);

@@ -15,7 +15,7 @@ namespace {
 
 constexpr FieldFileKind kCached{.magic = {'P', 'I', 'C', 'T', 'R', 'S', 'C', 'N'},
                                 .layout = PICTURA_MAP_FINGERPRINT,
-                                .other = "stale: made by another version of the importer"};
+                                .other = "stale: written by a different version of the importer"};
 
 struct FieldFileHeader {
   std::array<char, 8> magic{};
@@ -56,16 +56,16 @@ void decode_fields(std::string_view bytes, const FieldFileKind& kind, const Scen
     std::memcpy(&header, bytes.data(), sizeof header);
     PICTURA_CHECK(header.magic == kind.magic, "foreign: expected it to begin with {}",
                   std::string_view(kind.magic.data(), kind.magic.size()));
-    PICTURA_CHECK(header.byte_order == kByteOrder, "written on a machine of another byte order");
+    PICTURA_CHECK(header.byte_order == kByteOrder, "written on a machine with a different byte order");
     PICTURA_CHECK(header.version == kind.version, "expected version {}, got {}", kind.version, header.version);
     PICTURA_CHECK(header.layout == kind.layout, "{}", kind.other);
     PICTURA_CHECK(header.content == key.content && header.record == key.record,
-                  "stale: the scene's file has changed, or this is another one's");
+                  "stale: the scene's file has changed, or the cache belongs to another file");
     const std::string_view payload = bytes.substr(sizeof header);
     PICTURA_CHECK(header.payload_bytes == payload.size(), "{}: expected {} bytes after the header, got {}",
                   header.payload_bytes > payload.size() ? "truncated" : "damaged", header.payload_bytes,
                   payload.size());
-    PICTURA_CHECK(header.payload_crc == crc32c(payload), "damaged: its bytes do not have the checksum in its header");
+    PICTURA_CHECK(header.payload_crc == crc32c(payload), "damaged: its bytes do not match the checksum in its header");
     FieldReader reader(payload);
     get(&reader);
     reader.expect_end();

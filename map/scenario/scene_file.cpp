@@ -12,7 +12,7 @@ FieldFileKind scene_file_kind() {
   append_layout<Scenario>(&layout);
   return {.magic = {'P', 'I', 'C', 'T', 'S', 'C', 'E', 'N'},
           .layout = hash_of(layout),
-          .other = "expected the fields that this version's scenes have: it was written by another version of pictura"};
+          .other = "expected the fields of this version's scenes: it was written by another version of pictura"};
 }
 
 void write_scene_file(const std::string& path, const Scenario& scenario) {

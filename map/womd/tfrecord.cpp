@@ -64,7 +64,8 @@ RecordList list_records(const ByteSource& source, const std::string& name) {
     const auto sum = number_at<uint32_t>(header, kLength_bytes);
     if (const uint32_t expected = masked_crc32c(std::string_view(header).substr(0, kLength_bytes)); sum != expected) {
       list.fault = fmt::format(
-          "{}: record {}: expected the checksum {:08x} of its length at {}, got {:08x}: damaged, or no TFRecord file",
+          "{}: record {}: expected the checksum {:08x} of its length at {}, got {:08x}: damaged, or not a TFRecord "
+          "file",
           name, k, expected, at, sum);
       break;
     }

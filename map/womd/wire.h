@@ -32,8 +32,8 @@ class WireReader {
       case WireType::bytes: {
         const uint64_t length = take_varint();
         if (length > rest_.size()) {
-          fail_field("", "field {}: expected at most the {} bytes that are left of its message, got a length of {}",
-                     field_, rest_.size(), length);
+          fail_field("", "field {}: expected at most the {} remaining bytes of its message, got a length of {}", field_,
+                     rest_.size(), length);
         }
         bytes_ = rest_.substr(0, static_cast<std::size_t>(length));
         rest_.remove_prefix(bytes_.size());
@@ -115,7 +115,7 @@ class WireReader {
       value |= static_cast<uint64_t>(byte & 0x7F) << shift;
       if (byte < 0x80) return value;
     }
-    fail_field("", "expected a varint of at most 64 bits, got a longer one");
+    fail_field("", "expected a varint of at most 64 bits, got a longer varint");
   }
 
   template <typename T>
@@ -123,7 +123,7 @@ class WireReader {
     static_assert(std::endian::native == std::endian::little, "the wire format is little-endian");
     T value;
     if (rest_.size() < sizeof value) {
-      fail_field("", "expected {} bytes of a number, got the {} that are left of the message", sizeof value,
+      fail_field("", "expected {} bytes of a number, got the {} remaining bytes of the message", sizeof value,
                  rest_.size());
     }
     std::memcpy(&value, rest_.data(), sizeof value);

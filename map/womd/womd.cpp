@@ -440,7 +440,7 @@ std::string scan_scenario_id(const ByteSource& source, RecordPlace place) {
     WireReader field(head);
     const auto [head_bytes, value_bytes] = field.next_extent();
     if (value_bytes > end - at - head_bytes) {
-      fail_field("", "field {}: expected at most the {} bytes that are left of the record, got {}", field.field(),
+      fail_field("", "field {}: expected at most the {} remaining bytes of the record, got {}", field.field(),
                  end - at - head_bytes, value_bytes);
     }
     if (field.field() == kScenarioId && field.type() == WireType::bytes && value_bytes <= kMaxId) {

@@ -55,7 +55,7 @@ RoadMap full_map() {
   map.sign_lanes = {0, 1};
   map.signs.push_back({"12", "206", "-1", "OpenDRIVE", {1, 2, 3}, 0.5f, {0, 2}});
   map.facts.signs = 1;
-  map.mends.push_back({MendKind::repeated_signal, 18, "road 1: <signal>: attribute id: another signal has 12 already"});
+  map.mends.push_back({MendKind::repeated_signal, 18, "road 1: <signal>: attribute id: another signal already has 12"});
   map.provenance.stop_lines.assign(map.stop_lines.size(), {0, 17});
   map.provenance.signs.assign(map.signs.size(), {1, 18});
   return map;
@@ -116,9 +116,9 @@ TEST(MapCache, EveryBitOfTheHeaderIsChecked) {
     const char* expected = i < kVersionAt        ? "foreign"
                            : i < kByteOrderAt    ? "expected version"
                            : i < kImporterAt     ? "byte order"
-                           : i < kSourceAt       ? "stale: made by another version of the importer"
+                           : i < kSourceAt       ? "stale: written by a different version of the importer"
                            : i < kOptionsAt      ? "stale: the map file has changed"
-                           : i < kPayloadBytesAt ? "stale: made with other options"
+                           : i < kPayloadBytesAt ? "stale: written with different options"
                                                  : "";
     for (int bit = 0; bit < 8; ++bit) {
       std::string damaged = bytes;
@@ -138,15 +138,15 @@ TEST(MapCache, ForeignFilesAndOtherKeysAreRejected) {
   std::string bytes = encode_map(parse_opendrive(small_file(), "small"), kKey);
   MapCacheKey other = kKey;
   other.importer++;
-  EXPECT_THAT(reason_of(bytes, other), HasSubstr("another version of the importer"));
+  EXPECT_THAT(reason_of(bytes, other), HasSubstr("a different version of the importer"));
   other = kKey;
   other.source++;
   EXPECT_THAT(reason_of(bytes, other), HasSubstr("the map file has changed"));
   other = kKey;
   other.options++;
-  EXPECT_THAT(reason_of(bytes, other), HasSubstr("other options"));
+  EXPECT_THAT(reason_of(bytes, other), HasSubstr("different options"));
   std::reverse(bytes.begin() + kByteOrderAt, bytes.begin() + kImporterAt);
-  EXPECT_THAT(reason_of(bytes), HasSubstr("another byte order"));
+  EXPECT_THAT(reason_of(bytes), HasSubstr("a different byte order"));
 }
 
 TEST(MapCache, FlippedBytesAreRejected) {
@@ -156,7 +156,7 @@ TEST(MapCache, FlippedBytesAreRejected) {
     std::string damaged = bytes;
     const std::size_t at = kHeaderBytes + random() % (bytes.size() - kHeaderBytes);
     damaged[at] = static_cast<char>(damaged[at] ^ (1 + random() % 255));
-    ASSERT_THAT(reason_of(damaged), HasSubstr("damaged: its bytes do not have the hash")) << "at " << at;
+    ASSERT_THAT(reason_of(damaged), HasSubstr("damaged: its bytes do not match the hash")) << "at " << at;
   }
 }
 
@@ -177,8 +177,8 @@ TEST(MapCache, SizesAreCheckedBeforeAllocation) {
     }
   }
   EXPECT_EQ(reason_of(with_header(payload)), "(accepted)");
-  EXPECT_THAT(reason_of(with_header(payload + "x")), HasSubstr("1 bytes are left"));
-  EXPECT_THAT(reason_of(with_header(payload.substr(0, 4))), HasSubstr("damaged: expected 8 bytes more, 4 are left"));
+  EXPECT_THAT(reason_of(with_header(payload + "x")), HasSubstr("1 bytes remain"));
+  EXPECT_THAT(reason_of(with_header(payload.substr(0, 4))), HasSubstr("damaged: expected 8 more bytes, got 4"));
 }
 
 TEST(MapCache, ContentWithAValidHashIsStillValidated) {
@@ -268,7 +268,7 @@ TEST_F(MapCacheFolder, OtherOptionsHaveTheirOwnFile) {
   EXPECT_EQ(outcome(coarse), "cached");
   EXPECT_EQ(outcome(), "cached");
   fs::copy_file(map_cache_path(source_, coarse), cache_file(), fs::copy_options::overwrite_existing);
-  EXPECT_THAT(outcome(), HasSubstr("stale: made with other options"));
+  EXPECT_THAT(outcome(), HasSubstr("stale: written with different options"));
   EXPECT_EQ(outcome(), "cached");
 }
 
@@ -278,7 +278,7 @@ TEST_F(MapCacheFolder, AnotherImporterImportsAgain) {
   MapCacheKey key = map_cache_key(read_file(source_), {});
   key.importer++;
   write_file(cache_file(), encode_map(*map_, key));
-  EXPECT_THAT(outcome(), HasSubstr("stale: made by another version of the importer"));
+  EXPECT_THAT(outcome(), HasSubstr("stale: written by a different version of the importer"));
   EXPECT_EQ(outcome(), "cached");
 }
 

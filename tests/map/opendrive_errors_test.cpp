@@ -109,7 +109,7 @@ TEST(OpenDriveErrors, IdsAreUnique) {
   EXPECT_THAT(message_of(file_of(road.text() + "<junction id=\"1\"/><junction id=\"1\"/>")),
               HasSubstr("another junction"));
   road.rest = R"(<signals><signal id="5" s="0" t="0"/><signal id="5" s="1" t="0"/></signals>)";
-  EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("another signal has 5 already"));
+  EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("another signal already has 5"));
 }
 
 TEST(OpenDriveErrors, LinksMustHaveATarget) {
@@ -249,7 +249,7 @@ TEST(OpenDriveErrors, WhatSmallFilesRepeatIsBounded) {
   EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("attribute sOffset: expected a number in"));
   // Dashes that are too short to be painted.
   road.right = lane_of(-1, "driving", 3, mark("0", 0.001, 0.049));
-  EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("its curves need more than the"));
+  EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("its curves need more than"));
 
   // Sections without length, with every link given twice: links would double with each section.
   RoadText sections;

@@ -369,7 +369,8 @@ TEST(OpenDriveMends, SmallGapsOfShortRoadsAreBridged) {
   road.length = 2;
   road.geometry = line_at(0, 0, 0, 0, 1) + line_at(1, 1, 0.3, 0, 1);
   const RoadMap map = mended(road.text(), MendKind::geometry_gap);
-  EXPECT_THAT(said(map), HasSubstr("bad.xodr:8: road 1: <geometry>: begins 0.300 m from the end of the one before it"));
+  EXPECT_THAT(said(map),
+              HasSubstr("bad.xodr:8: road 1: <geometry>: begins 0.300 m from the end of the previous geometry"));
   EXPECT_NEAR(last_point(map, map.lanes[0]).position_m.y - first_point(map, map.lanes[0]).position_m.y, 0.3, 1e-4);
   road.geometry = line_at(0, 0, 0, 0, 1) + line_at(1, 1, 0.7, 0, 1);
   EXPECT_THROW(parse_opendrive(file_of(road.text()), "bad.xodr"), Error);
@@ -452,7 +453,7 @@ TEST(OpenDriveMends, LargeJumpsAreRefused) {
   road.geometry = line_at(0, 0, 0, 0, 50) + line_at(50, 50, 5.1, 0, 50);
   EXPECT_THAT(
       test::message_of([&] { parse_opendrive(file_of(road.text()), "bad.xodr"); }),
-      HasSubstr("bad.xodr:8: road 1: <geometry>: begins 5.100 m from the end of the one before it, at (50, 0)"));
+      HasSubstr("bad.xodr:8: road 1: <geometry>: begins 5.100 m from the end of the previous geometry, at (50, 0)"));
   std::string jumps;
   for (int i = 0; i < 1100; ++i) jumps += line_at(i, i, i % 2, 0, 1);
   road.length = 1100;
@@ -477,7 +478,7 @@ TEST(OpenDriveMends, GeometriesFollowEachOther) {
   road.geometry = line_at(0, 0, 0, 0, 50) + line_at(70, 50, 0, 0, 20) + line_at(90, 70, 0, 0, 30);
   const RoadMap moved = mended(road.text(), MendKind::moved_geometry);
   expect_straight(moved);
-  EXPECT_THAT(said(moved), HasSubstr("attribute s: expected 50, where the one before it ends, got 70"));
+  EXPECT_THAT(said(moved), HasSubstr("attribute s: expected 50, where the previous geometry ends, got 70"));
   road.geometry = line_at(40, 0, 0, 0, 50) + line_at(90, 50, 0, 0, 50);
   expect_straight(mended(road.text(), MendKind::moved_geometry));
   road.geometry = line_at(50, 50, 0, 0, 50) + line_at(0, 0, 0, 0, 50);
@@ -638,7 +639,7 @@ TEST(OpenDriveMends, SignalsOfOneIdAllStand) {
           R"(</signals>)"),
       MendKind::repeated_signal);
   EXPECT_EQ(map.signs.size(), 2u);
-  EXPECT_THAT(said(map), HasSubstr("road 1: <signal>: attribute id: another signal has 5 already"));
+  EXPECT_THAT(said(map), HasSubstr("road 1: <signal>: attribute id: another signal already has 5"));
   EXPECT_EQ(mended(with_rest(R"(<signals><signal id="5" s="10" t="-4" orientation="left"/></signals>)"),
                    MendKind::unknown_orientation)
                 .signs.size(),
@@ -722,7 +723,7 @@ TEST(OpenDriveMends, OneSidedLinksBecomeMutual) {
   const std::string to_2 = link_to("successor", "2", "start");
   const RoadMap map = mended(two_roads(to_2, ""), MendKind::one_sided_link);
   EXPECT_THAT(said(map),
-              HasSubstr("road 1: <successor>: the start of road 2 is not linked back to the end of this one"));
+              HasSubstr("road 1: <successor>: the start of road 2 is not linked back to the end of this road"));
   EXPECT_EQ(difference(map, sound(two_roads(to_2, link_to("predecessor", "1", "end")))), "");
 }
 
@@ -750,7 +751,7 @@ TEST(OpenDriveMends, LinksThatAreReturnedElsewhereAreKeptWhereTheEndsTouch) {
   EXPECT_EQ(num_links(apart), 1);
   EXPECT_THAT(said(apart),
               HasSubstr("road 3: <successor>: the start of road 2 is linked to the end of road 1 instead of "
-                        "the end of this one"));
+                        "the end of this road"));
   third.geometry = line_at(0, 0, 0, 0, 100);
   EXPECT_EQ(num_links(mended(two_roads(to_2, to_1) + third.text(), MendKind::unreturned_link)), 2);
   RoadText ring = straight();
@@ -854,7 +855,7 @@ TEST(OpenDriveMends, FaultsWithoutAMeaningAreRefused) {
         << from << " -> " << to;
   }
   EXPECT_THAT(test::message_of([&] { parse_opendrive(file_of(straight().text() + straight().text()), "bad.xodr"); }),
-              HasSubstr("road 1: <road>: attribute id: another road has it already"));
+              HasSubstr("road 1: <road>: attribute id: another road already has it"));
 }
 
 TEST(OpenDriveMends, DamagedFilesGiveAValidMapOrAnError) {

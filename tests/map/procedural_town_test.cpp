@@ -368,7 +368,8 @@ TEST(ProceduralTownOptions, AreReadFromMapNames) {
   EXPECT_THAT(message_of("1:parkin=1"), HasSubstr("did you mean 'parking'?"));
   EXPECT_THAT(message_of("1:parking=1,parking=0"), HasSubstr("parking: given twice"));
   EXPECT_THAT(message_of("1:hills-m=2m"), HasSubstr("hills-m: expected a number of 0 to 50, got '2m'"));
-  EXPECT_THAT(message_of("1:blocks=4"), HasSubstr("blocks: expected AxB, as 4x3, with 1 to 32 each, got '4'"));
+  EXPECT_THAT(message_of("1:blocks=4"),
+              HasSubstr("blocks: expected AxB, for instance 4x3, with 1 to 32 each, got '4'"));
   EXPECT_THAT(message_of("1:blocks=4x3x2"), HasSubstr("blocks: expected AxB"));
   EXPECT_THAT(message_of("1:roundabouts=2"), HasSubstr("roundabouts: expected 0 to 1, got 2"));
 }

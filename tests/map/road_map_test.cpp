@@ -37,7 +37,7 @@ TEST(RoadMap, EveryDamageIsFoundAndNamed) {
       {"source_road", [](RoadMap* map) { map->lanes[0].source_road = -1; }},
       {"speed_limit_mps", [&](RoadMap* map) { map->lanes[0].speed_limit_mps = nan; }},
       {"length_m", [](RoadMap* map) { map->lanes[0].length_m = 0; }},
-      {"in return",
+      {"refer back",
        [&](RoadMap* map) { map->lane_links[map->lanes[linked].successors.begin] = static_cast<int32_t>(linked); }},
       {"lane 0", [&](RoadMap* map) { map->lane_points[0].position_m.x = nan; }},
       {"width_m", [](RoadMap* map) { map->lane_points[0].width_m = -1; }},

@@ -93,7 +93,7 @@ TEST(GpuDrive, FaultsAreNamed) {
     changed.replace(at, from.size(), to);
     return message_of([&] { read_json(changed); });
   };
-  EXPECT_EQ(reason("\"objects\"", "\"object\""), "scene.json: objects: expected it, got nothing");
+  EXPECT_EQ(reason("\"objects\"", "\"object\""), "scene.json: objects: is missing");
   EXPECT_EQ(reason("\"valid\":[true", "\"valid\":[2"),
             "scene.json: objects[0].valid[0]: expected true or false, got 2");
   EXPECT_EQ(reason("\"valid\":[true,", "\"valid\":["), "scene.json: objects[0].valid: expected 3 steps, got 2");

@@ -148,7 +148,7 @@ TEST(Womd, FaultyFieldsAreNamed) {
   EXPECT_THAT(reason_of([](LoggedScene* scene) { scene->lanes[1].points[0].x() += 4e4; }),
               AllOf(HasSubstr(record), HasSubstr("expected coordinates within 10000 m of the map's centre")));
   EXPECT_EQ(reason_of([](LoggedScene* scene) { scene->lanes[1].id = scene->lanes[0].id; }),
-            record + "lane 100: expected an id of its own");
+            record + "lane 100: expected a unique id");
 }
 
 TEST(Womd, TracksHaveAStateForEveryTimestamp) {
@@ -183,14 +183,14 @@ TEST(WireFormat, FaultsAreFound) {
     return bytes;
   };
   EXPECT_EQ(reason(long_varint(9, '\xFF', '\x01')), "");
-  EXPECT_EQ(reason(long_varint(9, '\xFF', '\x02')), "expected a varint of at most 64 bits, got a longer one");
-  EXPECT_EQ(reason(long_varint(10, '\x80', '\x01')), "expected a varint of at most 64 bits, got a longer one");
+  EXPECT_EQ(reason(long_varint(9, '\xFF', '\x02')), "expected a varint of at most 64 bits, got a longer varint");
+  EXPECT_EQ(reason(long_varint(10, '\x80', '\x01')), "expected a varint of at most 64 bits, got a longer varint");
   EXPECT_EQ(reason("\x09"
                    "1234567"),
-            "expected 8 bytes of a number, got the 7 that are left of the message");
+            "expected 8 bytes of a number, got the 7 remaining bytes of the message");
   EXPECT_EQ(reason("\x12\x05"
                    "1234"),
-            "field 2: expected at most the 4 bytes that are left of its message, got a length of 5");
+            "field 2: expected at most the 4 remaining bytes of its message, got a length of 5");
   for (const char type : {3, 4, 6, 7}) {
     EXPECT_THAT(reason(std::string(1, static_cast<char>(0x08 | type))), HasSubstr("expected wire type 0, 1, 2 or 5"));
   }
