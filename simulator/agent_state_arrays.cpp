@@ -33,8 +33,7 @@ std::vector<NamedArray> agent_state_arrays(const AgentStateView& state, int num_
 StateEdit state_edit(const Array& slots, Span<const NamedArray> fields, int num_slots, Device device) {
   StateEdit edit;
   const int64_t count = slots.shape.rank() == 1 ? slots.shape[0] : 0;
-  PICTURA_CHECK(count <= num_slots, "set_state: slots: expected at most {} of them, each once, got {}", num_slots,
-                count);
+  PICTURA_CHECK(count <= num_slots, "set_state: slots: expected at most {} distinct slots, got {}", num_slots, count);
   edit.count = static_cast<int32_t>(count);
   edit.slots = slots.checked<const int32_t>("set_state: slots", {count}, device).data();
   for (const NamedArray& given : fields) {

@@ -370,7 +370,7 @@ CellLists lists_by_distance(const MapRules& map, const std::string& map_name, co
       find_neighbors(points, point_cells, center, range_m, &keys, &found);
       // Checked before they are made, since one cell may need all of them.
       PICTURA_CHECK(lists.items.size() + found.size() * static_cast<size_t>(lists_per_cell) <= kMaxItems,
-                    "map {}: expected lists of what is near of at most {} entries in all, got more: too much lies "
+                    "map {}: expected at most {} entries in the lists of nearby elements, got more: too many elements "
                     "within {} m of ({}, {})",
                     map_name, kMaxItems, range_m, center.x, center.y);
       append(found, &lists);

@@ -85,8 +85,8 @@ std::vector<LightState> light_states_of(const Scenario& scenario, int32_t start_
 
 /// Returns the scene's road with its lights.
 std::shared_ptr<const RoadMap> lit_road(const Scenario& scenario) {
-  PICTURA_CHECK(scenario.map.lights.empty(), "scene {}: expected a map without lights of its own beside recorded ones",
-                scenario.id);
+  PICTURA_CHECK(scenario.map.lights.empty(),
+                "scene {}: expected a map without its own lights, since recorded lights are added", scenario.id);
   auto road = std::make_shared<RoadMap>(scenario.map);
   for (const RecordedLight& recorded : scenario.lights) {
     const SinCos heading = sincos_of(recorded.stop_heading_rad);
@@ -158,8 +158,7 @@ std::shared_ptr<const CompiledMap> compile_scenario(std::shared_ptr<const Scenar
                                                     int32_t start_step) {
   if (!scenario) fail_usage("simulator: expected a scene, got a null pointer");
   if (start_step < 0 || start_step >= scenario->num_steps) {
-    fail_usage("scene {}: expected a step of its recording to start at, in [0, {}), got {}", scenario->id,
-               scenario->num_steps, start_step);
+    fail_usage("scene {}: expected a start step in [0, {}), got {}", scenario->id, scenario->num_steps, start_step);
   }
   PICTURA_CHECK(scenario->tracks.size() <= kMaxAgentsPerWorld, "scene {}: expected at most {} tracks, got {}",
                 scenario->id, kMaxAgentsPerWorld, scenario->tracks.size());
@@ -202,7 +201,7 @@ std::vector<uint8_t> tracks_named(const Scenario& scenario, const std::string& w
 std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words) {
   visit_words(scenario, words, [&scenario](const std::string& word, const std::vector<uint8_t>& named) {
     if (!names_nobody(named)) return;
-    fail_usage("scene {}: expected tracks, got '{}', which names none of its {}", scenario.id, word, named.size());
+    fail_usage("scene {}: expected tracks, got '{}', which selects none of its {}", scenario.id, word, named.size());
   });
   return tracks_named(scenario, words);
 }
@@ -213,7 +212,7 @@ std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& word
     mask[i] &= scenario.valid_of(static_cast<int32_t>(i))[step];
   }
   if (names_nobody(mask)) {
-    fail_usage("'{}': expected a track that is there at step {}, got none", words, step);
+    fail_usage("'{}': expected a track that is present at step {}, got none", words, step);
   }
   return mask;
 }

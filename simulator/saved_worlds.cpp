@@ -20,8 +20,8 @@ std::vector<size_t> part_begins(const std::vector<WorldSpec>& all, int num_parts
   const auto parts = static_cast<size_t>(num_parts);
   if (all.size() < parts) {
     fail_usage(
-        "simulator: {} worlds cannot be divided over {} processes: expected one or more for each (more agents, or "
-        "smaller worlds)",
+        "simulator: {} worlds cannot be divided over {} processes: expected at least one world per process (use more "
+        "agents or smaller worlds)",
         all.size(), num_parts);
   }
   std::vector<int64_t> agents_before{0};

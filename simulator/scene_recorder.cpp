@@ -57,7 +57,7 @@ void copy_lights(const Scenario& from, int32_t start_step, Scenario* to) {
 SceneRecorder::SceneRecorder(Simulator& simulator, int world)
     : simulator_(simulator), world_(static_cast<size_t>(world)) {
   if (!simulator.device().is_host()) {
-    fail_usage("scenes are recorded of simulators on cpu, got one on {}", name_of(simulator.device()));
+    fail_usage("scenes are recorded only from simulators on cpu, got a simulator on {}", name_of(simulator.device()));
   }
   if (world < 0 || world_ >= simulator.worlds().size()) {
     fail_usage("expected a world to record in [0, {}), got {}", simulator.worlds().size(), world);
@@ -172,7 +172,7 @@ Scenario SceneRecorder::scenario(std::string id, int self_agent) const {
     }
   }
   if (self_agent >= 0 && scenario.sdc_track < 0) {
-    fail_usage("expected an agent that was there as the self-driving car, got {}", self_agent);
+    fail_usage("expected a recorded agent as the self-driving car, got {}", self_agent);
   }
 
   const auto num_lights = scenario.map.lights.size();

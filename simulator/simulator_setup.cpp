@@ -62,15 +62,15 @@ void check(const SimulatorConfig& config, const CompiledMaps& maps, const std::v
     if (!map) fail_usage("simulator: expected maps, got a null pointer");
     const MapOptions expected = map_options(config);
     if (map->options.walls != expected.walls || (expected.walls && map->options.wall_seed != expected.wall_seed)) {
-      fail_usage("simulator: map {}: expected one compiled with walls {}, wall seed {}; got walls {}, wall seed {}",
+      fail_usage("simulator: map {}: expected a map compiled with walls {}, wall seed {}; got walls {}, wall seed {}",
                  map->road->name, expected.walls, expected.wall_seed, map->options.walls, map->options.wall_seed);
     }
     if (map->options.light_heads != expected.light_heads) {
-      fail_usage("simulator: map {}: expected one compiled with light heads {}, got {}", map->road->name,
+      fail_usage("simulator: map {}: expected a map compiled with light heads {}, got {}", map->road->name,
                  name_of(expected.light_heads), name_of(map->options.light_heads));
     }
     if (expected.observe_walls && !map->options.observe_walls) {
-      fail_usage("simulator: map {}: expected one compiled with observe_walls, since walls are observed",
+      fail_usage("simulator: map {}: expected a map compiled with observe_walls, since walls are observed",
                  map->road->name);
     }
   }

@@ -249,9 +249,9 @@ void SimulatorState::restore(const SimulatorSetup& setup, Span<const uint8_t> by
   PICTURA_CHECK(bytes.size() >= sizeof(header), "simulator state: expected at least {} bytes, got {}", sizeof(header),
                 bytes.size());
   std::memcpy(&header, bytes.data(), sizeof(header));
-  PICTURA_CHECK(header.magic == expected.magic, "simulator state: these bytes are something else");
+  PICTURA_CHECK(header.magic == expected.magic, "simulator state: not the bytes of a saved simulator");
   PICTURA_CHECK(header.byte_order == expected.byte_order,
-                "simulator state: written by a machine of another byte order");
+                "simulator state: written on a machine with a different byte order");
   PICTURA_CHECK(header.version == expected.version, "simulator state: expected version {}, got {}", expected.version,
                 header.version);
   const std::vector<Fingerprint> prints = fingerprints(setup);
@@ -261,7 +261,7 @@ void SimulatorState::restore(const SimulatorSetup& setup, Span<const uint8_t> by
                   "simulator state: ends within its fingerprints, after {} bytes", bytes.size());
     uint64_t saved = 0;
     std::memcpy(&saved, bytes.data() + at, sizeof(saved));
-    PICTURA_CHECK(saved == prints[i].value, "simulator state: saved with another {}", prints[i].name);
+    PICTURA_CHECK(saved == prints[i].value, "simulator state: the saved state differs in: {}", prints[i].name);
   }
   PICTURA_CHECK(header.num_fingerprints == prints.size(), "simulator state: expected {} fingerprints, got {}",
                 prints.size(), header.num_fingerprints);
@@ -288,10 +288,10 @@ std::string rejection_text(int64_t rejected) {
       return fmt::format("slot {}: expected an action in [0, {}), got {}", slot, kNumActions,
                          static_cast<int32_t>(rejected));
     case CommandKind::kinematic_state:
-      return fmt::format("slot {}: expected a kinematic state within {} m, {} rad and {} m/s, got one beyond", slot,
+      return fmt::format("slot {}: expected a kinematic state within {} m, {} rad and {} m/s, got a state beyond", slot,
                          kMaxCommanded_m, kMaxCommanded_rad, kMaxCommanded_mps);
     case CommandKind::recorded:
-      return fmt::format("slot {}: expected a world on a recorded scene, since it is told to follow the record", slot);
+      return fmt::format("slot {}: expected a world on a recorded scene, since its command follows the record", slot);
     default:
       return fmt::format("slot {}: expected a command that is an action, a kinematic state, absence or the record",
                          slot);
@@ -335,7 +335,9 @@ std::string query_fault_text(int64_t fault, int num_slots) {
     case QueryFault::inserted_end:
       return text(fmt::format(
           "inserted_end: expected inserted_begin to the length of the list of inserted boxes, got {}", value));
-    default: return text(fmt::format("inserted: expected finite numbers, got others in box {} of the list", value));
+    default:
+      return text(
+          fmt::format("inserted: expected finite numbers, got non-finite numbers in box {} of the list", value));
   }
 }
 

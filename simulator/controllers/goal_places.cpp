@@ -93,7 +93,7 @@ RoutePoint start_place(const WorldView& world, int agent) {
     const Vec3 place = pose_of(world, agent, at).position_m;
     if (place.x == world.agents.x_m[slot] && place.y == world.agents.y_m[slot]) return at;
   }
-  fail("agent {}: expected it where one of its tries put it", agent);
+  fail("agent {}: expected it at one of its spawn points", agent);
 }
 
 std::array<RoutePoint, kNumWaypoints> goal_places(const WorldView& world, int agent, uint32_t chain, RoutePoint from) {

@@ -76,8 +76,8 @@ void check_worlds(std::string_view controller, const Simulator& simulator) {
   for (const WorldSpec& world : simulator.worlds()) {
     const CompiledMap& map = *simulator.maps()[world.map];
     if (needs_record && !map.scenario) {
-      fail_usage("controller {}: world {}: expected a recorded scene, got map {}, of which there is no record",
-                 controller, world.global_world, map.road->name);
+      fail_usage("controller {}: world {}: expected a recorded scene, got map {}, which has no recording", controller,
+                 world.global_world, map.road->name);
     }
     if (controller == "lane" && map.scenario) {
       fail_usage("controller lane: world {}: expected a map of roads, got recorded scene {}", world.global_world,

@@ -161,7 +161,7 @@ InverseTable::InverseTable(const Simulator& simulator) {
   for (const Conditioning which : {Conditioning::throttle, Conditioning::steer, Conditioning::acceleration}) {
     const ConditioningRange& range = simulator.config().conditioning[static_cast<size_t>(which)];
     if (range.low != 1 || range.high != 1) {
-      fail_usage("controller inverse: conditioning {}: expected 1, by which actions were searched, got {} to {}",
+      fail_usage("controller inverse: conditioning {}: expected 1, as in the action search, got {} to {}",
                  kConditioningNames[static_cast<size_t>(which)], range.low, range.high);
     }
   }

@@ -105,7 +105,7 @@ void LaneKeepingAgent::drop_plan() {
 /// Continues to the waypoints of a new chain, or back to a missed waypoint.
 void LaneKeepingAgent::follow_goals() {
   const int32_t chain = world_.agents.goal_chains[slot_] - 1;
-  PICTURA_CHECK(chain <= chain_ + 1, "lane keeping: expected a look at every chain, got {} after {}", chain, chain_);
+  PICTURA_CHECK(chain <= chain_ + 1, "lane keeping: expected consecutive goal chains, got {} after {}", chain, chain_);
   if (chain != chain_) {
     waypoints_ = goal_places(world_, self_, static_cast<uint32_t>(chain), waypoints_.back());
     chain_ = chain;

@@ -23,8 +23,8 @@ void SharedControl::act(const SimulatorArrays& input, Span<const uint8_t> mask, 
                         Stream stream) {
   for (const Driver& driver : drivers_) {
     PICTURA_CHECK(mask.empty() || driver.mask.empty(),
-                  "controller {}: expected no mask, since its drivers have their own, got one of {} slots", name_,
-                  mask.size());
+                  "controller {}: expected no mask, since its drivers have their own masks, got a mask of {} slots",
+                  name_, mask.size());
     driver.controller->act(input, driver.mask.empty() ? mask : driver.mask, commands_out, stream);
   }
 }

@@ -116,7 +116,7 @@ with tempfile.TemporaryDirectory() as name:
     assert "--control: has no effect with the policy log" in refusal(scene, "--control", "self")
     assert "--start: has no effect on procedural:1, which is no recorded scene" in refusal("procedural:1", "--start", 4)
     assert "--control: expected self (or sdc), vehicles" in refusal(scene, "--policy", "idle", "--control", "cars")
-    assert "names none of its 12" in refusal(scene, "--policy", "idle", "--control", "3")
+    assert "selects none of its 12" in refusal(scene, "--policy", "idle", "--control", "3")
     assert "in [0, 91), got 91" in refusal(scene, "--start", 91)
     assert "--follow: expected 0 to 11, got 12" in refusal(scene, "--replay", folder / "x.html", "--follow", 12)
     assert "expected a recorded scene, got map" in refusal("procedural:1", "--agents", 2, "--policy", "log")

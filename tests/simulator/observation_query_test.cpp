@@ -343,7 +343,7 @@ TEST(ObservationQueries, AreRefusedByNameAndNothingIsWritten) {
       refusal({.inserted_begin = 1, .inserted_end = 9}),
       "observe: query 1: inserted_end: expected inserted_begin to the length of the list of inserted boxes, got 9");
   EXPECT_EQ(refusal({.inserted_end = 2}),
-            "observe: query 1: inserted: expected finite numbers, got others in box 1 of the list");
+            "observe: query 1: inserted: expected finite numbers, got non-finite numbers in box 1 of the list");
 }
 
 TEST(ObservationQueries, AreAnsweredOnlyInArraysThatFit) {

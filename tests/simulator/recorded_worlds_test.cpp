@@ -96,7 +96,7 @@ TEST(RecordedWorlds, StartAtAChosenStep) {
   expect_as_recorded(*simulator, *scene, 11);
   EXPECT_EQ(simulator->config().episode_steps, scene->num_steps - 11);
   EXPECT_THAT(test::message_of<UsageError>([&] { compile_scenario(scene, {}, scene->num_steps); }),
-              HasSubstr("expected a step of its recording to start at, in [0, 91), got 91"));
+              HasSubstr("expected a start step in [0, 91), got 91"));
 }
 
 std::unique_ptr<Simulator> lit_world_of(const std::shared_ptr<const Scenario>& scene, int32_t start_step = 0) {
@@ -401,7 +401,7 @@ TEST(RecordedWorlds, AreSavedAndRestored) {
   EXPECT_EQ(a->state_hash(), b->state_hash());
   // Another start is another record.
   const auto later = world_of(scene, 1, {});
-  EXPECT_THAT(test::message_of<Error>([&] { later->restore(a->save()); }), HasSubstr("saved with another"));
+  EXPECT_THAT(test::message_of<Error>([&] { later->restore(a->save()); }), HasSubstr("the saved state differs in"));
 }
 
 TEST(RecordedWorlds, WithTheLargestBoxAreRestored) {
@@ -670,7 +670,7 @@ TEST(RecordedWorlds, WordsNameTracks) {
   EXPECT_EQ(count("others"), 4);
   EXPECT_EQ(count(std::to_string(scene->tracks[2].id) + "," + std::to_string(scene->tracks[3].id)), 2);
   EXPECT_THAT(test::message_of<UsageError>([&] { tracks_of(*scene, "cars"); }), HasSubstr("got 'cars'"));
-  EXPECT_THAT(test::message_of<UsageError>([&] { tracks_of(*scene, "4"); }), HasSubstr("names none of its 12"));
+  EXPECT_THAT(test::message_of<UsageError>([&] { tracks_of(*scene, "4"); }), HasSubstr("selects none of its 12"));
 }
 
 TEST(RecordedWorlds, SamplesAreReplayed) {

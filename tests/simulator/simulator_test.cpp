@@ -446,11 +446,11 @@ TEST(Simulator, MapsAreSharedAndNamedByHandles) {
   EXPECT_THAT(refusal(maps, {1, -1}), HasSubstr("expected handles in [0, 65536), got -1"));
   EXPECT_THAT(refusal({nullptr}, {}), HasSubstr("got a null pointer"));
   EXPECT_THAT(refusal({compile_map(testing::ring_road(40), {.walls = !config.walls})}, {}),
-              HasSubstr("map ring: expected one compiled with walls"));
+              HasSubstr("map ring: expected a map compiled with walls"));
   MapOptions seen = map_options(config);
   seen.light_heads = LightHeads::visible;
   EXPECT_THAT(refusal({compile_map(testing::ring_road(40), seen)}, {}),
-              HasSubstr("map ring: expected one compiled with light heads as_mapped, got visible"));
+              HasSubstr("map ring: expected a map compiled with light heads as_mapped, got visible"));
 }
 
 TEST(Simulator, ASnapshotIsTheStateThatWas) {
