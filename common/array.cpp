@@ -73,7 +73,7 @@ void Array::check(std::string_view what, ElementType expected_type, bool is_writ
                               is_contiguous() && !(is_written && is_read_only) &&
                               (data != nullptr || shape.count() == 0);
   PICTURA_CHECK(is_as_expected, "{}: expected {} {} on {}{}, got {}{}", what, name_of(expected_type),
-                expected_shape.text(), name_of(expected_device), is_written ? " that can be written" : "", text(),
+                expected_shape.text(), name_of(expected_device), is_written ? ", writable" : "", text(),
                 data == nullptr && shape.count() != 0 ? " at a null address" : "");
 }
 

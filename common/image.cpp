@@ -130,7 +130,7 @@ ImageBatch HostImages::batch() {
 
 std::vector<uint8_t> HostImages::interleaved(int view, int camera_index) const {
   PICTURA_CHECK(layout_.format == PixelFormat::u8 && layout_.order == ChannelOrder::planar,
-                "images: expected planar ones of the format u8");
+                "images: expected planar images of the format u8");
   const CameraLayout& from = layout_.cameras[camera_index];
   const ImageLayout one =
       image_layout(Span<const ImageSize>(&from.size, 1), 1, PixelFormat::u8, ChannelOrder::interleaved);

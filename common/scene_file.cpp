@@ -177,7 +177,7 @@ void read_views(TomlFields* root, SceneFile* out) {
   std::set<std::string> names;
   for (TomlFields& row : root->tables("view")) {
     const std::string name = row.file_name("name", fmt::format("view{}", out->views.size()));
-    if (!names.insert(name).second) row.refuse("name", fmt::format("'{}' is taken", name));
+    if (!names.insert(name).second) row.refuse("name", fmt::format("'{}' is already used", name));
     out->view_names.push_back(name);
     out->view_captions.push_back(row.text("caption", name));
     out->views.push_back(read_view(&row, &out->scene));
@@ -191,9 +191,9 @@ Rig read_rig(TomlFields* root, const std::string& source, const std::string& fol
   const Rig rig = read_cameras(root);
   const bool has_cameras = root->has("camera"), in_file = root->has("rig");
   if (has_cameras && rig.cameras.empty()) root->refuse("camera", "expected one or more [[camera]] tables");
-  if (in_file && has_cameras) root->refuse("rig", "has no effect beside [[camera]] tables");
+  if (in_file && has_cameras) root->refuse("rig", "has no effect with [[camera]] tables");
   for (const char* key : {"size_px", "square_pixels"}) {
-    if (root->has(key) && (has_cameras || in_file)) root->refuse(key, "is for the paper's cameras alone");
+    if (root->has(key) && (has_cameras || in_file)) root->refuse(key, "is only for the paper's cameras");
   }
   if (in_file) {
     const std::string path = (std::filesystem::path(folder) / root->text("rig", "")).string();

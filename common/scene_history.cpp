@@ -23,10 +23,10 @@ SceneHistory::SceneHistory(const SceneHistorySize& size) : size_(size) {
 void SceneHistory::put(int step, const SceneBatch& scene, Span<const View> views, Stream stream) {
   PICTURA_CHECK(step >= 0 && step < size_.num_steps && step <= num_steps_,
                 "scene history: expected a step of 0 to {}, got {}", std::min(num_steps_, size_.num_steps - 1), step);
-  PICTURA_CHECK(scene.device == device(), "scene history: expected a scene on {}, got one on {}", name_of(device()),
+  PICTURA_CHECK(scene.device == device(), "scene history: expected a scene on {}, got a scene on {}", name_of(device()),
                 name_of(scene.device));
   const auto check = [](const char* what, std::size_t expected, std::size_t got) {
-    PICTURA_CHECK(got == expected, "scene history: {}: expected {} of a step, got {}", what, expected, got);
+    PICTURA_CHECK(got == expected, "scene history: {}: expected {} per step, got {}", what, expected, got);
   };
   check("worlds", size_.worlds, scene.geometry.size());
   check("world_begin", size_.worlds + 1, scene.world_begin.size());

@@ -84,12 +84,12 @@ struct VideoWriter::Impl {
 
 void VideoWriter::Impl::start(std::vector<std::string> arguments) {
   int ends[2];
-  PICTURA_CHECK(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) == 0, "{}: no socket for ffmpeg: {}", path,
-                std::strerror(errno));
+  PICTURA_CHECK(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) == 0,
+                "{}: cannot open a socket for ffmpeg: {}", path, std::strerror(errno));
   frames.reset(ends[0]);
   const Descriptor child_end(ends[1]);
   messages.reset(std::tmpfile());
-  PICTURA_CHECK(messages, "{}: no file for ffmpeg's messages: {}", path, std::strerror(errno));
+  PICTURA_CHECK(messages, "{}: cannot create a file for ffmpeg's messages: {}", path, std::strerror(errno));
 
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
@@ -120,8 +120,8 @@ VideoWriter::VideoWriter(const std::string& path, int width_px, int height_px, d
   const std::string ending = target.extension().string();
   if (ending != ".mp4" && ending != ".gif") fail_usage("{}: expected a film's name to end with .mp4 or .gif", path);
   PICTURA_CHECK(width_px >= 2 && height_px >= 2 && width_px <= 8192 && height_px <= 8192,
-                "{}: expected frames of 2 to 8192 px a side, got {}x{}", path, width_px, height_px);
-  PICTURA_CHECK(frames_per_s > 0 && frames_per_s <= 1000, "{}: expected 1000 frames a second at most, got {}", path,
+                "{}: expected frames of 2 to 8192 px per side, got {}x{}", path, width_px, height_px);
+  PICTURA_CHECK(frames_per_s > 0 && frames_per_s <= 1000, "{}: expected at most 1000 frames per second, got {}", path,
                 frames_per_s);
   impl_->path = path;
   impl_->width_px = width_px;
@@ -183,7 +183,7 @@ void VideoWriter::add(const RgbImage& frame) {
 
 void VideoWriter::finish() {
   PICTURA_CHECK(impl_->child >= 0, "{}: the film has ended", impl_->path);
-  PICTURA_CHECK(impl_->num_frames > 0, "{}: a film needs a frame", impl_->path);
+  PICTURA_CHECK(impl_->num_frames > 0, "{}: expected at least one frame, got none", impl_->path);
   impl_->frames.reset();
   const int status = impl_->reap();
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) impl_->fail_with_message(status);

@@ -21,8 +21,7 @@ void check_color(std::string_view renderer, std::string_view piece, std::size_t 
 // Checks that a grid contains all pieces: grids are built from the pieces that a geometry has at that time.
 void check_grid(std::string_view renderer, std::string_view pieces, std::size_t count, const Grid& grid) {
   PICTURA_CHECK(grid.num_boxes() == count,
-                "renderer {}: geometry: expected grids that were built with all {} {}, got one of {}: build_grids() "
-                "comes last",
+                "renderer {}: geometry: expected grids built from all {} {}, got a grid of {}: call build_grids() last",
                 renderer, count, pieces, grid.num_boxes());
 }
 
@@ -66,8 +65,8 @@ void check_images(const Renderer& renderer, std::size_t num_views, const ImageBa
                 "renderer {}: images: expected the format u8 or f32, got {}", name,
                 images.format == PixelFormat::f16 ? "f16" : "bf16");
   PICTURA_CHECK(images.order == ChannelOrder::planar || (draws_all && images.order == ChannelOrder::patches),
-                "renderer {}: images: expected planar channels{}, got {} ones", name, draws_all ? " or patches" : "",
-                name_of(images.order));
+                "renderer {}: images: expected planar channels{}, got {} channels", name,
+                draws_all ? " or patches" : "", name_of(images.order));
   check_patch_px(name, images.order, images.patch_px);
   PICTURA_CHECK(images.num_views >= 0 && static_cast<std::size_t>(images.num_views) == num_views,
                 "renderer {}: images: expected images of {} views, got {}", name, num_views, images.num_views);

@@ -69,8 +69,7 @@ class InputFile {
  private:
   struct stat status() const {
     struct stat result{};
-    PICTURA_CHECK(::fstat(file_.get(), &result) == 0, "{}: cannot be asked for its size: {}", path_,
-                  std::strerror(errno));
+    PICTURA_CHECK(::fstat(file_.get(), &result) == 0, "{}: its size cannot be read: {}", path_, std::strerror(errno));
     return result;
   }
 
@@ -164,7 +163,7 @@ void make_output_folder(const std::string& path) {
   std::error_code making, asking;
   fs::create_directories(path, making);
   const bool is_folder = fs::is_directory(path, asking);
-  PICTURA_CHECK(is_folder, "{}: cannot be made: {}", path,
+  PICTURA_CHECK(is_folder, "{}: cannot be created: {}", path,
                 making   ? making.message()
                 : asking ? asking.message()
                          : "it is a file");

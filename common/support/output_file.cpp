@@ -133,7 +133,7 @@ void Descriptor::reset(int fd) {
 OutputFile::OutputFile(const std::string& path, Staging staging) : path_(path) {
   PICTURA_CHECK(!path.empty(), "expected the name of a file to write, got an empty one");
   // System calls would end the name at the zero byte.
-  PICTURA_CHECK(path.find('\0') == std::string::npos, "{}: expected the name of a file, got one with a zero byte in it",
+  PICTURA_CHECK(path.find('\0') == std::string::npos, "{}: expected the name of a file, got a name with a zero byte",
                 path.substr(0, path.find('\0')));
   struct stat status{};
   const bool exists = ::stat(path.c_str(), &status) == 0;

@@ -167,7 +167,7 @@ std::vector<TomlFields> TomlFields::tables(std::string_view key) {
   std::vector<TomlFields> tables;
   const toml::node* node = find(key);
   if (!node) return tables;
-  if (node->is_table()) refuse(key, fmt::format("expected [[{}]] tables, got one [{}]", key, key));
+  if (node->is_table()) refuse(key, fmt::format("expected [[{}]] tables, got a table [{}]", key, key));
   for (const toml::node& element : list_of(key, *node)) {
     if (!element.is_table()) refuse(key, element, "a table");
     tables.emplace_back(*element.as_table(), source_, fmt::format("{} {}", key, tables.size()));
@@ -178,7 +178,7 @@ std::vector<TomlFields> TomlFields::tables(std::string_view key) {
 void TomlFields::refuse_unknown() const {
   for (const auto& [key, node] : *table_) {
     if (std::find(known_.begin(), known_.end(), key.str()) == known_.end()) {
-      fail("{}:{}: {}{}unknown key '{}'{}; known here: {}", source_, node.source().begin.line, name_,
+      fail("{}:{}: {}{}unknown key '{}'{}; known keys: {}", source_, node.source().begin.line, name_,
            name_.empty() ? "" : ": ", key.str(), suggestion(key.str(), known_), fmt::join(known_, ", "));
     }
   }

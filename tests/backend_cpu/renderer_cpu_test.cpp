@@ -580,8 +580,8 @@ TEST_F(CpuRendererErrors, GeometryThatIsFaulty) {
       {"light head 0: expected a finite position", [](StaticGeometry* g) { g->heads[0].facing = {}; }},
       {"light head 0: expected the cosine", [](StaticGeometry* g) { g->heads[0].cos_half_angle = kNone; }},
       {"light head 0: expected a signal below 1, got 1", [](StaticGeometry* g) { g->heads[0].signal = 1; }},
-      {"built with all 2 strips, got one of 1", [](StaticGeometry* g) { g->strips.push_back(g->strips[0]); }},
-      {"built with all 0 walls, got one of 1", [](StaticGeometry* g) { g->walls.clear(); }},
+      {"built from all 2 strips, got a grid of 1", [](StaticGeometry* g) { g->strips.push_back(g->strips[0]); }},
+      {"built from all 0 walls, got a grid of 1", [](StaticGeometry* g) { g->walls.clear(); }},
   };
   for (const Case& each : cases) {
     StaticGeometry geometry = sound;

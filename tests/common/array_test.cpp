@@ -62,7 +62,7 @@ TEST(Array, RejectsByName) {
   EXPECT_THAT(refused(float{}, {8}, kGpu), HasSubstr("expected f32 [8] on cuda:1, got f32 [8] on cpu"));
   const std::vector<float> constant(8);
   EXPECT_THAT(message_of([&] { Array(constant).checked<float>("images", {8}, {}); }),
-              HasSubstr("images: expected f32 [8] on cpu that can be written, got f32 [8] on cpu, read-only"));
+              HasSubstr("images: expected f32 [8] on cpu, writable, got f32 [8] on cpu, read-only"));
   Array gaps = array;
   gaps.strides = {2};
   EXPECT_THAT(message_of([&] { gaps.checked<float>("images", {8}, {}); }), HasSubstr("with strides [2]"));

@@ -119,7 +119,7 @@ TEST(Rig, BadRigsAreRejectedByName) {
                 const std::string one = "[[camera]]\nname = 'a'\nwidth_px = 8\nheight_px = 8\nfocal_px = 9\n";
                 load_rig(written(one + one));
               }),
-              HasSubstr("'a' is taken"));
+              HasSubstr("'a' is already used"));
   EXPECT_THAT(message_of([] { load_rig(written("[[camera\n")); }), HasSubstr(":1: "));
   EXPECT_THAT(message_of([] { load_rig(written("x = 1\n")); }), HasSubstr("unknown key 'x'"));
   EXPECT_THAT(message_of([] { load_rig(written("\n")); }), HasSubstr("[[camera]]"));

@@ -137,9 +137,9 @@ TEST(SceneFile, WholeNumbersHaveAnyNotation) {
 TEST(SceneFile, BadFilesAreRejectedWithTheirLine) {
   EXPECT_THAT(parse_error("[[view\n"), HasSubstr("s.toml:1: "));
   EXPECT_THAT(parse_error(""), HasSubstr("expected one or more [[view]] tables"));
-  EXPECT_THAT(parse_error("sky = 1\n" + kView), HasSubstr("s.toml:1: unknown key 'sky'; known here: camera, rig"));
+  EXPECT_THAT(parse_error("sky = 1\n" + kView), HasSubstr("s.toml:1: unknown key 'sky'; known keys: camera, rig"));
   EXPECT_THAT(parse_error(kView + "heading_degs = 1\n"),
-              HasSubstr("s.toml:5: view 0: unknown key 'heading_degs'; did you mean 'heading_deg'?; known here: "));
+              HasSubstr("s.toml:5: view 0: unknown key 'heading_degs'; did you mean 'heading_deg'?; known keys: "));
   EXPECT_THAT(parse_error(kView + "speed_mps = 1\n"), HasSubstr("s.toml:5: view 0: unknown key 'speed_mps'"));
   EXPECT_THAT(parse_error("[[view]]\nx_m = 1.0\ny_m = 2.0\n"), HasSubstr("s.toml:1: view 0: heading_deg: is missing"));
   EXPECT_THAT(parse_error("[[view]]\nx_m = nan\n"), HasSubstr("s.toml:2: view 0: x_m: expected a number in"));
@@ -156,7 +156,7 @@ TEST(SceneFile, BadFilesAreRejectedWithTheirLine) {
   EXPECT_THAT(parse_error(kAgent + kView + "hidden = [nan]\n"), HasSubstr("expected an integer"));
   EXPECT_THAT(parse_error("size_px = [1e300, 8]\n" + kView), HasSubstr("expected an integer in [1, 8192], got 1.0"));
   EXPECT_THAT(parse_error(kView + "name = '../a'\n"), HasSubstr("got '../a'"));
-  EXPECT_THAT(parse_error(kView + kView + "name = 'view0'\n"), HasSubstr("'view0' is taken"));
+  EXPECT_THAT(parse_error(kView + kView + "name = 'view0'\n"), HasSubstr("'view0' is already used"));
   EXPECT_THAT(parse_error(kView + "[[agent]]\nclass = 'tram'\n"),
               HasSubstr("s.toml:6: agent 0: class: expected one of vehicle, cyclist, pedestrian, got 'tram'"));
   EXPECT_THAT(parse_error(kView + kAgent + "drawn = 1\n"), HasSubstr("drawn: expected true or false, got 1"));
@@ -173,7 +173,7 @@ TEST(SceneFile, BadFilesAreRejectedWithTheirLine) {
   EXPECT_THAT(parse_error(mark + "style = 'broken'\ndash_m = 0.0\ngap_m = 0.0\n"), HasSubstr("dash_m: expected"));
   EXPECT_THAT(parse_error(mark + "color = 'white'\ncolor_rgb = [1, 2, 3]\n"), HasSubstr("color: is for"));
   EXPECT_THAT(parse_error("rig = 'a.toml'\n[[camera]]\nwidth_px = 8\nheight_px = 8\nfocal_px = 9\n" + kView),
-              HasSubstr("rig: has no effect beside [[camera]]"));
+              HasSubstr("rig: has no effect with [[camera]]"));
   EXPECT_THAT(parse_error("rig = 'no/such.toml'\n" + kView), HasSubstr("no/such.toml: no such file"));
   EXPECT_THAT(parse_error("size_px = [0, 8]\n" + kView), HasSubstr("size_px: expected an integer in [1, 8192], got 0"));
   EXPECT_THAT(parse_error("[[camera]]\nwidth_px = 8\nheight_px = 8\nfocal_px = 9\nzoom = 2\n" + kView),
@@ -202,14 +202,14 @@ TEST(SceneFile, WhatWouldDrawNothingIsRefused) {
 
 TEST(SceneFile, MessagesAreOneLineAndNameWhatWasMeant) {
   const std::string one_table = parse_error("[view]\nx_m = 1.0\ny_m = 2.0\nheading_deg = 3.0\n");
-  EXPECT_THAT(one_table, HasSubstr("s.toml:1: view: expected [[view]] tables, got one [view]"));
+  EXPECT_THAT(one_table, HasSubstr("s.toml:1: view: expected [[view]] tables, got a table [view]"));
   EXPECT_THAT(parse_error(kView + "x = 1\n"), HasSubstr("heading_deg, ego, body_length_m, hidden"));
   const std::string table = parse_error("line_floor_px = {a = 1, b = 2}\n" + kView);
   EXPECT_THAT(table, HasSubstr("line_floor_px: expected a number in [0, 8], got a table"));
   EXPECT_THAT(parse_error("size_px = [8, 4]\n[[camera]]\nwidth_px = 8\nheight_px = 8\nfocal_px = 9\n" + kView),
-              HasSubstr("s.toml:1: size_px: is for the paper's cameras alone"));
+              HasSubstr("s.toml:1: size_px: is only for the paper's cameras"));
   EXPECT_THAT(parse_error("sky = 1\n" + kView),
-              HasSubstr("known here: camera, rig, size_px, square_pixels, line_floor_px"));
+              HasSubstr("known keys: camera, rig, size_px, square_pixels, line_floor_px"));
   EXPECT_THAT(parse_error("rig = 'no/such.toml'\n" + kView), HasSubstr("s.toml: rig: "));
 }
 

@@ -239,24 +239,24 @@ TEST(SceneHistory, ScenesOfAnotherDeviceOrSizeAreRefusedByName) {
   const auto shorter = [](auto span) { return span.subspan(0, span.size() - 1); };
   const int lights = static_cast<int>(lights_of_step());
   EXPECT_EQ(refusal([](SceneBatch* scene) { scene->device = {MemorySpace::cuda, 0}; }),
-            "scene history: expected a scene on cpu, got one on cuda:0");
+            "scene history: expected a scene on cpu, got a scene on cuda:0");
   EXPECT_EQ(refusal([&](SceneBatch* scene) { scene->geometry = shorter(scene->geometry); }),
-            "scene history: worlds: expected 4 of a step, got 3");
+            "scene history: worlds: expected 4 per step, got 3");
   EXPECT_EQ(refusal([&](SceneBatch* scene) { scene->world_begin = shorter(scene->world_begin); }),
-            "scene history: world_begin: expected 5 of a step, got 4");
+            "scene history: world_begin: expected 5 per step, got 4");
   EXPECT_EQ(refusal([&](SceneBatch* scene) { scene->light_begin = shorter(scene->light_begin); }),
-            "scene history: light_begin: expected 5 of a step, got 4");
+            "scene history: light_begin: expected 5 per step, got 4");
   EXPECT_EQ(refusal([&](SceneBatch* scene) { scene->agents = shorter(scene->agents); }),
-            "scene history: agents: expected 110 of a step, got 109");
+            "scene history: agents: expected 110 per step, got 109");
   EXPECT_EQ(refusal([&](SceneBatch* scene) { scene->light_states = shorter(scene->light_states); }),
-            fmt::format("scene history: lights: expected {} of a step, got {}", lights, lights - 1));
+            fmt::format("scene history: lights: expected {} per step, got {}", lights, lights - 1));
   const std::vector<int32_t> hidden{3};
   EXPECT_EQ(refusal([&](SceneBatch* scene) { scene->hidden_agents = hidden; }),
-            "scene history: hidden agents: expected 0 of a step, got 1");
+            "scene history: hidden agents: expected 0 per step, got 1");
   std::vector<View> views = step.views;
   views.pop_back();
   EXPECT_EQ(message_of([&] { history->put(1, step.scene.batch(), views); }),
-            "scene history: views: expected 10 of a step, got 9");
+            "scene history: views: expected 10 per step, got 9");
   // Refused steps leave nothing in the history.
   expect_holds(*history, {make_step(0)});
 }

@@ -740,7 +740,7 @@ TEST(Video, RejectsBadPathsAndFrames) {
   {
     VideoWriter video(folder / "film.mp4", 64, 48, 10);
     EXPECT_THAT(test::message_of([&] { video.add(solid(48, 64, {0, 0, 0})); }), HasSubstr("64x48 px, got 48x64"));
-    EXPECT_THAT(test::message_of([&] { video.finish(); }), HasSubstr("needs a frame"));
+    EXPECT_THAT(test::message_of([&] { video.finish(); }), HasSubstr("expected at least one frame"));
     video.add(solid(64, 48, {0, 0, 0}));
   }
   EXPECT_EQ(folder.num_entries(), 0u) << "an unfinished film leaves nothing";

@@ -105,7 +105,7 @@ def test_what_does_not_fit_a_renderer_is_named(make):
         renderer.render(simulator.scene, simulator.views, np.zeros((3, 4, 3, 9, 15), np.uint8))
     frozen = np.zeros((3, 4, 3, 9, 16), np.uint8)
     frozen.setflags(write=False)
-    with pytest.raises(pictura.Error, match="that can be written"):
+    with pytest.raises(pictura.Error, match="on cpu, writable"):
         renderer.render(simulator.scene, simulator.views, frozen)
     with pytest.raises(pictura.UsageError, match="cpu"):
         pictura.Renderer("cpo")

@@ -600,7 +600,7 @@ TEST_F(CudaSceneHistoryTest, ScenesInHostMemoryAreRefused) {
   const Worlds worlds(short_episodes());
   const Histories histories(worlds, 1);
   EXPECT_EQ(message_of([&] { histories.device->put(0, worlds.cpu->scene(), worlds.cpu->views()); }),
-            "scene history: expected a scene on cuda:0, got one on cpu");
+            "scene history: expected a scene on cuda:0, got a scene on cpu");
 }
 
 }  // namespace

@@ -46,7 +46,7 @@ TEST_F(FileTest, ErrorsNameThePath) {
 TEST_F(FileTest, AFolderThatCannotBeReachedIsAnErrorAndNoneForACache) {
   const std::string unreachable = folder_ / (std::string(300, 'x') + "/deeper");  // file systems end at 255
   EXPECT_EQ(test::message_of([&] { make_output_folder(unreachable); }),
-            unreachable + ": cannot be made: File name too long");
+            unreachable + ": cannot be created: File name too long");
   EXPECT_NO_THROW(try_to_cache(unreachable + "/a.map", "x"));
   EXPECT_EQ(folder_.num_entries(), 0u);
 }
