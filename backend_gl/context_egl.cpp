@@ -86,11 +86,10 @@ EGLDisplay open_display(const Egl& egl, int cuda_device) {
     const EGLDisplay display = initialized(EGL_PLATFORM_DEVICE_EXT, device);
     if (display != EGL_NO_DISPLAY) return display;
   }
-  PICTURA_CHECK(
-      cuda_device < 0,
-      "renderer {}: EGL knows no device that is CUDA's number {}; is NVIDIA's libEGL_nvidia.so.0 installed, and "
-      "named by a file that __EGL_VENDOR_LIBRARY_FILENAMES or /usr/share/glvnd/egl_vendor.d holds?",
-      kName, cuda_device);
+  PICTURA_CHECK(cuda_device < 0,
+                "renderer {}: EGL has no device with CUDA's number {}; is NVIDIA's libEGL_nvidia.so.0 installed, and "
+                "listed by a file in __EGL_VENDOR_LIBRARY_FILENAMES or /usr/share/glvnd/egl_vendor.d?",
+                kName, cuda_device);
   const EGLDisplay display = initialized(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY);
   PICTURA_CHECK(display != EGL_NO_DISPLAY,
                 "renderer {}: no GPU, and no software rasterizer either (Debian package libegl-mesa0): EGL error {:#x}",
@@ -102,14 +101,14 @@ class EglContext final : public Context {
  public:
   explicit EglContext(int cuda_device) : display_(open_display(egl_, cuda_device)) {
     const EGLenum api_before = egl_.query_api();
-    PICTURA_CHECK(egl_.bind_api(EGL_OPENGL_API), "renderer {}: the driver has OpenGL ES alone", kName);
+    PICTURA_CHECK(egl_.bind_api(EGL_OPENGL_API), "renderer {}: the driver has only OpenGL ES", kName);
     const EGLint attributes[] = {
         EGL_CONTEXT_MAJOR_VERSION,           4,       EGL_CONTEXT_MINOR_VERSION, 5, EGL_CONTEXT_OPENGL_PROFILE_MASK,
         EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
     context_ = egl_.create_context(display_, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, attributes);
     const EGLint error = egl_.get_error();
     egl_.bind_api(api_before);
-    PICTURA_CHECK(context_ != EGL_NO_CONTEXT, "renderer {}: {} gives no OpenGL 4.5 core context: EGL error {:#x}",
+    PICTURA_CHECK(context_ != EGL_NO_CONTEXT, "renderer {}: {} provides no OpenGL 4.5 core context: EGL error {:#x}",
                   kName, egl_.query_string(display_, EGL_VENDOR), error);
   }
   ~EglContext() override { egl_.destroy_context(display_, context_); }

@@ -21,7 +21,7 @@ class OsmesaContext final : public Context {
                               5,
                               0};
     context_ = create_(attributes, nullptr);
-    PICTURA_CHECK(context_, "renderer {}: {} gives no OpenGL 4.5 core context", kName, kFile);
+    PICTURA_CHECK(context_, "renderer {}: {} provides no OpenGL 4.5 core context", kName, kFile);
   }
   ~OsmesaContext() override { destroy_(context_); }
   std::string name() const override { return kName; }

@@ -85,7 +85,7 @@ int ImageArray::max_layers() const {
   const int64_t image_bytes = 3 * static_cast<int64_t>(plane_bytes());
   const int64_t max_bytes = gl_.integer(GL_MAX_SHADER_STORAGE_BLOCK_SIZE);
   PICTURA_CHECK(image_bytes <= max_bytes,
-                "renderer {}: {}x{} pixels: expected at most {} bytes an image, which is this driver's limit, got {}",
+                "renderer {}: {}x{} pixels: expected at most {} bytes per image, which is this driver's limit, got {}",
                 renderer_, width_px_, height_px_, max_bytes, image_bytes);
   const int64_t texels = int64_t{width_px_} * height_px_ * samples_.grid * samples_.grid * samples_.multisample;
   const int64_t most = std::max<int64_t>(1, kArrayBytes / (texels * texel_bytes(format_)));

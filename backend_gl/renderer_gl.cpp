@@ -52,7 +52,7 @@ class GlRenderer final : public Renderer {
                   "renderer {}: expected 1 sample or more, got a grid of {} and {} samples", name_,
                   config_.samples.grid, config_.samples.multisample);
     PICTURA_CHECK(!config_.randomization.changes_colors(),
-                  "renderer {}: randomized brightness, noise and lost images are cpu's and cuda's", name_);
+                  "renderer {}: only cpu and cuda support randomized brightness, noise and lost images", name_);
     const gl::CurrentContext current(context_.get());
     gl_ = std::make_unique<gl::Functions>(*context_);
     drawn_by_ = reinterpret_cast<const char*>(gl_->GetString(GL_RENDERER));
@@ -86,7 +86,8 @@ class GlRenderer final : public Renderer {
     for (std::size_t i = 0; i < images_out.cameras.size(); ++i) {
       const CameraImages& camera = images_out.cameras[i];
       PICTURA_CHECK(!camera.depth_m && !camera.class_id && !camera.instance_id,
-                    "renderer {}: images: camera {}: depth, class and instance planes are cpu's and cuda's", name_, i);
+                    "renderer {}: images: camera {}: only cpu and cuda support depth, class and instance planes", name_,
+                    i);
     }
     if (interop_) {
       check_device(name_, "scene", device(), scene.device);
@@ -102,7 +103,7 @@ class GlRenderer final : public Renderer {
   }
 
   void visibility(const SceneBatch&, const ViewBatch&, Span<const VisibilityQuery>, Span<float>, Stream) override {
-    fail("renderer {}: visibility is cpu's and cuda's", name_);
+    fail("renderer {}: only cpu and cuda support visibility", name_);
   }
 
  private:
@@ -272,7 +273,7 @@ class GlRenderer final : public Renderer {
 
 std::unique_ptr<gl::CudaInterop> interop_for(const std::string& name, Device device) {
   if (device.is_host()) return nullptr;
-  PICTURA_CHECK(name != "gl:osmesa", "renderer gl:osmesa: draws in host memory alone; device memory is gl:egl's");
+  PICTURA_CHECK(name != "gl:osmesa", "renderer gl:osmesa: draws only in host memory; use gl:egl for device memory");
 #ifdef PICTURA_HAS_CUDA
   return gl::make_cuda_interop(device);
 #else

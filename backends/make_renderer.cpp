@@ -90,7 +90,7 @@ std::unique_ptr<Renderer> make_renderer(const std::string& name, const RendererC
   if (name == "gl" || name == "gl:egl" || name == "gl:osmesa") return make_gl_renderer(name, config, choice_out);
 #endif
   if (config.samples != PixelSamples{}) {
-    fail_usage("renderer {}: samples: only gl takes samples; the others compute exact coverage", name);
+    fail_usage("renderer {}: samples: only gl supports samples; the other renderers compute exact coverage", name);
   }
   if (name == "cpu") return chosen("cpu: asked for"), make_cpu_renderer(config);
   if (name == "null") return chosen("null: asked for"), std::make_unique<NullRenderer>(config);

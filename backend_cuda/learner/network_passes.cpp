@@ -52,7 +52,7 @@ class NetworkPassesCuda final : public NetworkPasses {
   }
 
   void row_features(const RowSize& size, const float* rows, ActivationType type, void* out, Stream stream) override {
-    PICTURA_CHECK(size.width() <= RowSize::kMostWidth, "row_features: {} numbers a row", size.width());
+    PICTURA_CHECK(size.width() <= RowSize::kMostWidth, "row_features: {} numbers per row", size.width());
     launch(cuda::launch_row_features, stream, size, rows, type, out);
   }
 

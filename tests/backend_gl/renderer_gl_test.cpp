@@ -324,7 +324,7 @@ TEST_P(GlRenderer, RejectsUnsupportedFeaturesByName) {
         renderer->visibility(town.scene.batch(), town.views, Span<const VisibilityQuery>(&query, 1),
                              Span<float>(&visibility, 1));
       },
-      "renderer " + name + ": visibility");
+      "renderer " + name + ": only cpu and cuda support visibility");
   HostImages halves(renderer->config().rig, 1, PixelFormat::f16);
   expect_error([&] { renderer->render(town.scene.batch(), town.views, halves.batch()); }, "got f16");
   expect_error([&] { make_renderer(name, {.samples = {.multisample = 1024}}); },
@@ -333,7 +333,7 @@ TEST_P(GlRenderer, RejectsUnsupportedFeaturesByName) {
                "samples along an axis, which is this driver's limit, got 131072");
   expect_error([&] { make_renderer(name, {.samples = {.grid = 0}}); }, "expected 1 sample or more");
   expect_error([&] { make_renderer(name, {.randomization = {.dropped_probability = 0.1}}); },
-               "renderer " + name + ": randomized brightness, noise and lost images are cpu's and cuda's");
+               "renderer " + name + ": only cpu and cuda support randomized brightness, noise and lost images");
 }
 
 TEST(GlNames, AnUnknownOneListsAll) {
@@ -341,7 +341,8 @@ TEST(GlNames, AnUnknownOneListsAll) {
 }
 
 TEST(GlNames, OtherBackendsTakeNoSamples) {
-  expect_error([] { make_renderer("cpu", {.samples = {.grid = 4}}); }, "renderer cpu: samples: only gl takes samples");
+  expect_error([] { make_renderer("cpu", {.samples = {.grid = 4}}); },
+               "renderer cpu: samples: only gl supports samples");
 }
 
 TEST(GlNames, GlSaysWhichContextItTook) {
@@ -354,7 +355,7 @@ TEST(GlNames, GlSaysWhichContextItTook) {
 
 TEST(GlNames, OsmesaDrawsOnlyInHostMemory) {
   expect_error([] { make_renderer("gl:osmesa", {.device = {MemorySpace::cuda, 0}}); },
-               "renderer gl:osmesa: draws in host");
+               "renderer gl:osmesa: draws only in host");
 }
 
 }  // namespace
