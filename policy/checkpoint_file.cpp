@@ -40,7 +40,8 @@ bool is_checkpoint(std::string_view file) { return file.starts_with(std::string_
 CheckpointFile::CheckpointFile(std::string_view file, const std::string& its_path) : path(its_path) {
   PICTURA_CHECK(is_checkpoint(file), "{}: not a checkpoint: expected it to begin with PICTCKPT", path);
   PICTURA_CHECK(file.size() >= kPreamble, "{}: truncated: {} bytes", path, file.size());
-  PICTURA_CHECK(at_offset<uint32_t>(file, 12) == kByteOrder, "{}: written on a machine of another byte order", path);
+  PICTURA_CHECK(at_offset<uint32_t>(file, 12) == kByteOrder, "{}: written on a machine with a different byte order",
+                path);
   const auto version = at_offset<uint32_t>(file, 8);
   PICTURA_CHECK(version == kVersion || version == kVersionHashingDataAlone,
                 "{}: expected checkpoint version {} or {}, got {}", path, kVersionHashingDataAlone, kVersion, version);
@@ -49,7 +50,7 @@ CheckpointFile::CheckpointFile(std::string_view file, const std::string& its_pat
     PICTURA_CHECK(file.size() >= kPreamble + sizeof(uint64_t), "{}: truncated: {} bytes", path, file.size());
     content.remove_suffix(sizeof(uint64_t));
     PICTURA_CHECK(hash_of(content) == at_offset<uint64_t>(file, content.size()),
-                  "{}: damaged or truncated: its bytes do not have the hash that it ends with", path);
+                  "{}: damaged or truncated: its bytes do not match the hash at its end", path);
   }
   const auto header_bytes = at_offset<uint64_t>(file, 16);
   PICTURA_CHECK(header_bytes <= content.size() - kPreamble, "{}: truncated: its header has {} bytes, the file {}", path,
@@ -62,7 +63,7 @@ CheckpointFile::CheckpointFile(std::string_view file, const std::string& its_pat
                   data.size());
     PICTURA_CHECK(
         version == kVersion || fmt::format("{:016x}", hash_of(data)) == header.at("data").at("hash").get<std::string>(),
-        "{}: damaged: its data do not have the hash that its header names", path);
+        "{}: damaged: its data do not match the hash in its header", path);
   });
 }
 

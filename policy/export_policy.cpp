@@ -19,16 +19,16 @@ StoredPolicy resized_policy(const StoredPolicy& policy, ImageSize size) {
   const Config& config = policy.config;
   if (!config.reads_images()) fail_usage("{}: size: its policy reads no images", policy.path);
   if (!config.render.rig.empty()) {
-    fail_usage("{}: size: its policy sees through the cameras of {}, whose sizes are theirs", policy.path,
+    fail_usage("{}: size: its policy uses the cameras of {}, whose file gives the sizes", policy.path,
                config.render.rig);
   }
   if (config.policy.backbone != "conv") {
-    fail_usage("{}: size: its policy has the program {} in place of convolutions", policy.path, config.policy.backbone);
+    fail_usage("{}: size: its policy uses the program {} instead of convolutions", policy.path, config.policy.backbone);
   }
   const Camera& camera = policy.rig.cameras.at(0);
   const int factor = whole_factor({camera.width_px, camera.height_px}, size);
   if (factor == 0) {
-    fail_usage("{}: size: expected one whole number of times {}x{}, got {}x{}", policy.path, camera.width_px,
+    fail_usage("{}: size: expected an integer multiple of {}x{}, got {}x{}", policy.path, camera.width_px,
                camera.height_px, size.width_px, size.height_px);
   }
   StoredPolicy result = policy;

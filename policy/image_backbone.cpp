@@ -74,11 +74,10 @@ ImageBackbone::ImageBackbone(const std::string& path, const at::TensorOptions& o
   try {
     parts_->program = torch::jit::load(path, options.device(), files);
   } catch (const std::exception& error) {
-    fail("{}: expected a TorchScript program, as scripts/export_backbone writes it: {}", path,
-         first_line(error.what()));
+    fail("{}: expected a TorchScript program written by scripts/export_backbone: {}", path, first_line(error.what()));
   }
   PICTURA_CHECK(!files[kDescription].empty(),
-                "{}: a TorchScript program without {}: expected one that scripts/export_backbone wrote", path,
+                "{}: a TorchScript program without {}: expected a program written by scripts/export_backbone", path,
                 kDescription);
   parts_->read_description(files[kDescription]);
   parts_->program.to(options.device(), parts_->type);
@@ -104,7 +103,7 @@ void ImageBackbone::check_images(const Rig& rig) const {
   for (const Camera& camera : rig.cameras) {
     PICTURA_CHECK(parts_->filled_up(camera.width_px) == parts_->width_px &&
                       parts_->filled_up(camera.height_px) == parts_->height_px,
-                  "{}: was traced for images of {}x{} alone, with patches of {}: camera '{}' has {}x{}", parts_->path,
+                  "{}: was traced only for images of {}x{}, with patches of {}: camera '{}' has {}x{}", parts_->path,
                   parts_->width_px, parts_->height_px, parts_->patch_px, camera.name, camera.width_px,
                   camera.height_px);
   }

@@ -25,7 +25,7 @@ ordered_json schema_to_json(const Config& config) {
 void check_schema(const ordered_json& saved, const Config& config, const std::string& path) {
   const ordered_json expected = schema_to_json(config);
   for (const auto& [name, shape] : expected.items()) {
-    PICTURA_CHECK(saved.contains(name), "{}: observation schema: {}: expected {}, got nothing", path, name,
+    PICTURA_CHECK(saved.contains(name), "{}: observation schema: {}: expected {}, got no value", path, name,
                   shape.dump());
     const ordered_json& got = saved.at(name);
     PICTURA_CHECK(got == shape, "{}: observation schema: {}: expected {}, got {}", path, name, shape.dump(),

@@ -54,15 +54,14 @@ Rig chosen_rig(const PolicyFacts& saved, const SessionOptions& options) {
   }
   const size_t expected = saved.rig.cameras.size();
   if (named->cameras.size() != expected) {
-    fail_usage("{}: expected {} cameras, as the policy was trained with, got {}", options.rig, expected,
-               named->cameras.size());
+    fail_usage("{}: expected {} cameras, as in training, got {}", options.rig, expected, named->cameras.size());
   }
   return *named;
 }
 
 std::optional<Rig> named_rig(const SessionOptions& options) {
   const bool has_size = options.width_px != 0 || options.height_px != 0;
-  if (has_size && !options.rig.empty()) fail_usage("rig: has sizes of its own: expected a rig or a size, got both");
+  if (has_size && !options.rig.empty()) fail_usage("rig: has its own sizes: expected a rig or a size, got both");
   if (has_size) return paper_rig(options.width_px, options.height_px);
   if (options.rig.empty()) return std::nullopt;
   return load_rig(options.rig);

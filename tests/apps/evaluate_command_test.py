@@ -36,7 +36,7 @@ class Evaluation(CommandCase):
         begin = ["train", *at_its_size, "--init-from", larger]
         self.json_of(*begin, "--set", "policy.patch_px=3", "--out", self.folder / "next")
         self.assert_refused(1, "'conv.0.weight'", *begin, "--out", self.folder / "other")
-        for size, expected in ("40x27", "whole number of times 16x9, got 40x27"), ("many", "--size"):
+        for size, expected in ("40x27", "integer multiple of 16x9, got 40x27"), ("many", "--size"):
             self.assert_refused(2, expected, "export", checkpoint, "--size", size, "--out", self.folder / "x.safetensors")
 
     def test_an_evaluation_in_parts_is_merged_exactly(self):

@@ -101,7 +101,7 @@ class Training(CommandCase):
         self.assert_refused(2, "expected one of cpu, ", *one, *out, "--renderer", "vulkan")
         self.assert_refused(2, "expected one of cpu, ", *one, *out, "--simulator", "null")
         self.assert_refused(1, "run.device: expected one of cpu, cuda, cuda:N, auto", *one, *out, "--device", "gpu")
-        on_host = 'render.backend: "null" works in host memory, but run.device is "cuda"'
+        on_host = 'render.backend: "null" uses host memory, but run.device is "cuda"'
         self.assert_refused(1, on_host, *one, *out, "--renderer", "null", "--device", "cuda")
         if not pathlib.Path("/dev/nvidia0").exists():
             self.assert_refused(1, "run.device: cuda: ", *one, *out, "--device", "cuda")

@@ -503,7 +503,7 @@ def test_functions_see_what_the_cameras_see():
     for handle, geometry in simulator.geometries.items():
         renderer.upload(handle, geometry)
     assert np.array_equal(np.asarray(renderer.render(simulator.scene, simulator.views).blocks[0]), plain[0])
-    with pytest.raises(pictura.UsageError, match="rig: has sizes of its own"):
+    with pytest.raises(pictura.UsageError, match="rig: has its own sizes"):
         pictura.evaluate("", maps, controller=idle, rig="front.toml", **options)
     with pytest.raises(pictura.UsageError, match="camera_severity: expected a policy that reads images"):
         pictura.evaluate("", maps, controller=idle, camera_severity=1, **{**options, "width_px": 0, "height_px": 0})

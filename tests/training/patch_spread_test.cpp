@@ -184,7 +184,7 @@ TEST_F(ExportedSize, SpreadsTheFirstConvolutionOfAFile) {
 TEST_F(ExportedSize, IsRefusedWhereAPolicyCannotHaveIt) {
   const std::string path = write(config());
   EXPECT_THAT(refusal(path, {40, 27}),
-              AllOf(HasSubstr(path), HasSubstr("size: expected one whole number of times 16x9, got 40x27")));
+              AllOf(HasSubstr(path), HasSubstr("size: expected an integer multiple of 16x9, got 40x27")));
   EXPECT_THAT(refusal(path, {32, 27}), HasSubstr("got 32x27"));
   EXPECT_THAT(refusal(path, {8, 4}), HasSubstr("got 8x4"));
   EXPECT_THAT(refusal(path, {160, 90}), HasSubstr("expected patches of at most 16 px"));

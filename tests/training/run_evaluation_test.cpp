@@ -267,8 +267,8 @@ TEST_F(RunWithImageSizes, BeginsWithWeightsOfOtherCamerasOfTheSameNumber) {
   const std::vector<NamedTensor> begun = read_checkpoint(folder_ / "with 4/untrained.ckpt").parameters,
                                  other = read_checkpoint(first).parameters;
   for (size_t i = 0; i < other.size(); ++i) EXPECT_TRUE(begun.at(i).value.equal(other[i].value)) << other[i].name;
-  EXPECT_THAT(message_of([&] { train(with_cameras(3)); }), AllOf(HasSubstr(first), HasSubstr("sees through 4 cameras"),
-                                                                 HasSubstr("expected 3"), HasSubstr("rig.toml")));
+  EXPECT_THAT(message_of([&] { train(with_cameras(3)); }),
+              AllOf(HasSubstr(first), HasSubstr("uses 4 cameras"), HasSubstr("expected 3"), HasSubstr("rig.toml")));
 }
 
 }  // namespace
