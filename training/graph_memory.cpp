@@ -66,7 +66,7 @@ GraphMemory::~GraphMemory() {
 #else
 GraphMemory::~GraphMemory() = default;
 void GraphMemory::serve(Stream, const std::function<void()>&) {
-  fail("graphs: this torch has none for {}", name_of(device_));
+  fail("graphs: this torch has no graphs for {}", name_of(device_));
 }
 void GraphMemory::make_room() const {}
 void GraphMemory::release() {}

@@ -238,8 +238,7 @@ TrainReport train(const TrainOptions& options) {
     const std::string text = error.what_without_backtrace();
     const std::string why =
         "train: " + text.substr(0, text.find('\n')) +
-        " A smaller train.forward_chunk or simulator.num_slots takes less, and so does train.graphs = "
-        "\"off\".";
+        " A smaller train.forward_chunk or simulator.num_slots needs less memory, as does train.graphs = \"off\".";
     ranks.announce(why);
     throw OutOfMemory(why);
   } catch (const std::exception& error) {

@@ -206,9 +206,8 @@ void check_memory(const Config& config, Device device, int64_t memory_bytes, int
   if (network.bytes(chunk) > available) {
     const double fitting = std::floor((available - network.bytes(0)) / network.transition_bytes);
     fail(
-        "train: a network of {:.3g} million parameters needs {:.3g} GB by estimate, {:.3g} GB of them for {} "
-        "transitions "
-        "at once (train.forward_chunk); {} has {:.3g} GB: {}",
+        "train: a network of {:.3g} million parameters needs {:.3g} GB by estimate, {:.3g} GB of which for {} "
+        "transitions at once (train.forward_chunk); {} has {:.3g} GB: {}",
         network.parameters / 1e6, network.bytes(chunk) / 1e9, network.transition_bytes * chunk / 1e9, chunk,
         name_of(device), available / 1e9,
         fitting >= 1 ? fmt::format("about {} transitions would fit", fitting)

@@ -30,7 +30,7 @@ Config config_of(const SavedPolicy& saved, const Config& run) {
   if (config.render.backend == "cpu" || config.render.backend == "cuda") config.render.backend = "auto";
   const std::string key = fmt::format("{}: simulator.others.policies", saved.path);
   PICTURA_CHECK(run.reads_images() || run.policy.auxiliary || config.reads_images() || !config.policy.auxiliary,
-                "{}: its policy.auxiliary is true, expected false, as the learner's", key);
+                "{}: its policy.auxiliary is true, expected false, as in the learner", key);
   PICTURA_CHECK(run.train.num_steps % config.policy.decision_steps == 0,
                 "{}: its policy.decision_steps is {}, expected a divisor of train.num_steps ({})", key,
                 config.policy.decision_steps, run.train.num_steps);

@@ -18,7 +18,8 @@ std::unique_ptr<DeviceGraph> Graphs::capture(const std::function<void()>& work) 
   } catch (const c10::OutOfMemoryError&) {
     throw;
   } catch (const std::exception& error) {
-    fail("train: work could not be captured into a CUDA graph (train.graphs = \"off\" does without): {}", error.what());
+    fail("train: work could not be captured into a CUDA graph (train.graphs = \"off\" uses no graphs): {}",
+         error.what());
   }
   return graph;
 }

@@ -22,8 +22,8 @@ RolloutObservations::RolloutObservations(const Config& config, Simulator* simula
   const Device device = simulator->device();
   PICTURA_CHECK(!config.reads_images() || renderer, "training: a policy that reads images needs a renderer");
   PICTURA_CHECK(!renderer || renderer->device() == device,
-                "training: simulator '{}' works on {}, renderer '{}' on {}: expected both on one", simulator->name(),
-                name_of(device), renderer->name(), name_of(renderer->device()));
+                "training: simulator '{}' runs on {}, renderer '{}' on {}: expected both on one device",
+                simulator->name(), name_of(device), renderer->name(), name_of(renderer->device()));
   const int num_slots = simulator->num_slots(), num_steps = config.train.num_steps + 1;
   arrays_ = allocate_observations(config, num_steps, num_slots, device);
   decision_steps_ = config.policy.decision_steps;

@@ -190,16 +190,16 @@ ImageSize Run::image_size() const {
 void Run::begin_with(const SavedPolicy& other) {
   PICTURA_CHECK(
       !config.reads_images() || !other.config.reads_images() || other.rig.cameras.size() == rig.cameras.size(),
-      "{}: its policy sees through {} cameras, expected {}, as {} has", other.path, other.rig.cameras.size(),
-      rig.cameras.size(), config.render.rig.empty() ? "the paper's rig" : config.render.rig);
+      "{}: its policy uses {} cameras, expected {}, as in {}", other.path, other.rig.cameras.size(), rig.cameras.size(),
+      config.render.rig.empty() ? "the paper's rig" : config.render.rig);
   // Checked here, since settings without parameters would go unnoticed, and differing shapes would not name the
   // setting.
   for (const auto& [key, got, expected] :
        {std::tuple{"policy.segment_features", other.config.policy.segment_features, config.policy.segment_features},
         std::tuple{"policy.layer_norm", other.config.policy.layer_norm, config.policy.layer_norm},
         std::tuple{"policy.residual", other.config.policy.residual, config.policy.residual}}) {
-    PICTURA_CHECK(got == expected, "{}: of another architecture: {}: expected {}, got {}", other.path, key, expected,
-                  got);
+    PICTURA_CHECK(got == expected, "{}: has a different architecture: {}: expected {}, got {}", other.path, key,
+                  expected, got);
   }
   restore_policy(other, *policy);
   restore_rate_factors(other);
@@ -208,11 +208,11 @@ void Run::begin_with(const SavedPolicy& other) {
 
 std::string Run::restore(const Checkpoint& saved) {
   const std::string difference = first_difference(saved.config, config_at(config, saved.agent_steps));
-  PICTURA_CHECK(difference.empty(), "{}: saved under another configuration: {}", saved.path, difference);
+  PICTURA_CHECK(difference.empty(), "{}: saved with a different configuration: {}", saved.path, difference);
   agent_steps = saved.agent_steps;
   update_image_size();
   const std::string rig_difference = config.reads_images() ? first_difference(saved.rig, rig) : "";
-  PICTURA_CHECK(rig_difference.empty(), "{}: saved with other cameras than {} has: {}", saved.path,
+  PICTURA_CHECK(rig_difference.empty(), "{}: saved with cameras that differ from those of {}: {}", saved.path,
                 config.render.rig.empty() ? "the paper's rig" : config.render.rig, rig_difference);
   restore_policy(saved, *policy);
   restore_rate_factors(saved);

@@ -23,7 +23,7 @@ RunKeeper::RunKeeper(const TrainOptions& options, Ranks* ranks, Communicator* co
   old_files_ = run_files(options.out_folder);
   PICTURA_CHECK(
       old_files_.empty() || options.old_run != OldRun::refuse,
-      "{}: holds a run already ({}): expected to resume or overwrite it (--resume, --overwrite), or another folder",
+      "{}: already holds a run ({}): expected to resume or overwrite it (--resume, --overwrite), or another folder",
       options.out_folder, fmt::join(old_files_, ", "));
 }
 
@@ -33,7 +33,7 @@ std::vector<RecentUpdate> RunKeeper::begin(Run* run) {
     const Checkpoint saved = parse_checkpoint(file_of_first(checkpoint_path(), communicator_), checkpoint_path());
     const std::string why_new_episodes = run->restore(saved);
     if (!why_new_episodes.empty()) {
-      options_.notify("the saved episodes cannot go on, new ones begin: " + why_new_episodes);
+      options_.notify("the saved episodes cannot continue, new episodes begin: " + why_new_episodes);
     }
     for (const std::string& change : differences_to_report(saved.config, run->config)) options_.notify(change);
     const OptimizerKind before = saved.config.train.optimizer, now = run->config.train.optimizer;

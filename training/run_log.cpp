@@ -143,7 +143,7 @@ ProgressCsv::ProgressCsv(const std::string& path, const Scalars& columns, int64_
     if (!lines.empty() && lines[0] != head) {
       const std::string aside = next_free_name(path);
       std::filesystem::rename(path, aside);
-      if (on_notice) on_notice(fmt::format("{}: had other columns, and is now {}", path, aside));
+      if (on_notice) on_notice(fmt::format("{}: had other columns and was renamed to {}", path, aside));
     } else {
       for (size_t i = 1; i < lines.size(); ++i) {
         if (!is_row(lines[i], columns.size() + 1, updates_done)) continue;
@@ -209,11 +209,11 @@ TrainProgress RunLog::add(int64_t update, int64_t agent_steps, const UpdateRecor
 
   if (const std::optional<LossStats>& rejected = record.stats.rejected; rejected && !has_said_rejected_ && on_notice_) {
     has_said_rejected_ = true;
-    on_notice_(fmt::format(
-        "update {}: before its first step the learner's log-probabilities differ by {:.2g} in the mean from the "
-        "rollout's (expected less than {}), and {:.2g} of the ratios are clipped (less than {}): they are computed "
-        "again, here and wherever losses/recomputed is 1",
-        update, rejected->abs_log_ratio, kMaxAbsLogRatio, rejected->clip_fraction, kMaxClipFraction));
+    on_notice_(
+        fmt::format("update {}: before its first step the learner's log-probabilities differ by {:.2g} in the mean "
+                    "from the rollout's (expected less than {}), and {:.2g} of the ratios are clipped (less than {}): "
+                    "the log-probabilities are recomputed, here and wherever losses/recomputed is 1",
+                    update, rejected->abs_log_ratio, kMaxAbsLogRatio, rejected->clip_fraction, kMaxClipFraction));
   }
 
   progress.cost = {.agent_steps = totals.agent_steps,

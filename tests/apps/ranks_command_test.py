@@ -174,13 +174,13 @@ class Ranks(CommandCase):
         other = lambda rank: ["--set", f"train.learning_rate={0.001 * (rank + 1)}"]
         for status, _, err in self.finish(self.start(2, *self.SETTINGS, "--out", self.folder / "run", of_rank=other)):
             self.assertEqual(status, 1)
-            self.assertIn("ranks 0 and 1 have other settings: train.learning_rate: 0.001 and 0.002", err)
+            self.assertIn("ranks 0 and 1 have different settings: train.learning_rate: 0.001 and 0.002", err)
         self.assertFalse((self.folder / "run").exists())
         for status, _, err in self.finish(
             self.start(2, *self.SETTINGS, "--out", self.folder / "run", of_rank=lambda rank: ["--resume"][:rank])
         ):
             self.assertEqual(status, 1)
-            self.assertIn("ranks 0 and 1 have other settings: old_run", err)
+            self.assertIn("ranks 0 and 1 have different settings: old_run", err)
 
     def test_bad_input_is_refused_by_name(self):
         with socket.create_server(("0.0.0.0", 0)) as server:
@@ -202,7 +202,7 @@ class Ranks(CommandCase):
             capture_output=True, text=True, env=environment, timeout=60,
         )  # fmt: skip
         self.assertEqual(result.returncode, 1)
-        self.assertIn("RANK is set and WORLD_SIZE is not", result.stderr)
+        self.assertIn("RANK is set but WORLD_SIZE is not", result.stderr)
 
 
 if __name__ == "__main__":

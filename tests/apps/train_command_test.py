@@ -62,7 +62,7 @@ class Training(CommandCase):
     def test_a_folder_with_a_run_asks_what_to_do_with_it(self):
         one = ["train", *TINY, "--set", "train.updates=1", "--out", self.folder / "run"]
         first = self.json_of(*one)
-        self.assert_refused(1, f"{self.folder}/run: holds a run already (checkpoint.ckpt, ", *one)
+        self.assert_refused(1, f"{self.folder}/run: already holds a run (checkpoint.ckpt, ", *one)
         self.assert_refused(1, "(--resume, --overwrite)", *one)
         self.assert_refused(2, "excludes", *one, "--overwrite", "--resume")
         self.assertEqual(self.json_of(*one, "--overwrite")["policy_hash"], first["policy_hash"])

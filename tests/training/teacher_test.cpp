@@ -111,7 +111,7 @@ TEST_F(TeacherTest, OthersAreRefusedByName) {
   };
   const std::string images = policy_of("images", {}), vectors = vector_policy("vectors", {"policy.auxiliary=true"});
   EXPECT_THAT(message(images),
-              ::testing::HasSubstr(images + ": train.teacher: its policy reads images, expected one of"));
+              ::testing::HasSubstr(images + ": train.teacher: its policy reads images, expected a policy of"));
   EXPECT_THAT(message(vectors, {"policy.modality=vector"}),
               ::testing::HasSubstr(vectors + ": train.teacher: its policy.auxiliary is true, expected false"));
   EXPECT_THAT(message(folder_ / "absent.safetensors"), ::testing::HasSubstr("absent.safetensors"));

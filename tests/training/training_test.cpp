@@ -172,7 +172,7 @@ TEST_F(Training, NewEpisodesBeginWhereTheSavedOnesCannotGoOn) {
     std::vector<std::string> notices;
     const TrainReport nothing_more = resume(simulator, "train.updates=2", &notices);
     ASSERT_EQ(notices.size(), 1u);
-    EXPECT_THAT(notices[0], AllOf(HasSubstr("new ones begin"), HasSubstr("simulator state: ")));
+    EXPECT_THAT(notices[0], AllOf(HasSubstr("new episodes begin"), HasSubstr("simulator state: ")));
     EXPECT_EQ(nothing_more.policy_hash, half.policy_hash);
     EXPECT_EQ(nothing_more.updates, 2);
     EXPECT_EQ(nothing_more.agent_steps, half.agent_steps);
@@ -510,7 +510,7 @@ TEST_F(Training, ARunInTheFolderIsNeitherOverwrittenNorMixedWithUnlessAskedFor) 
 
   const std::string checkpoint = read_file(folder_ / "run/checkpoint.ckpt");
   EXPECT_THAT(message_of([&] { train(options("run", {"train.updates=1"})); }),
-              AllOf(HasSubstr((folder_ / "run") + ": holds a run already"), HasSubstr("checkpoint.ckpt, config.toml"),
+              AllOf(HasSubstr((folder_ / "run") + ": already holds a run"), HasSubstr("checkpoint.ckpt, config.toml"),
                     HasSubstr(events), HasSubstr("progress.csv"), ::testing::Not(HasSubstr("notes.txt"))));
   EXPECT_EQ(read_file(folder_ / "run/checkpoint.ckpt"), checkpoint);
 
@@ -677,7 +677,7 @@ TEST_F(Training, GoesOnWithOtherNumbersOfAgentsAndMinibatches) {
   const TrainReport report = train(rest);
   EXPECT_EQ(report.updates, 2);
   EXPECT_GT(report.agent_steps, first.agent_steps);
-  EXPECT_THAT(notices, Contains(HasSubstr("new ones begin: simulator state: saved with another worlds")));
+  EXPECT_THAT(notices, Contains(HasSubstr("new episodes begin: simulator state: the saved state differs in: worlds")));
   EXPECT_THAT(notices, Contains(HasSubstr("simulator.num_slots: ")));
   EXPECT_THAT(notices, Contains(HasSubstr("train.minibatch_size: ")));
 }
@@ -701,7 +701,7 @@ TEST_F(Training, BeginsWithTheWeightsOfAnotherRunAtAnyImageSize) {
   }
   TrainOptions wider = options("wider", {"policy.backbone_width=64"});
   wider.init_from = first;
-  EXPECT_THAT(message_of([&] { train(wider); }), AllOf(HasSubstr(first), HasSubstr("another architecture")));
+  EXPECT_THAT(message_of([&] { train(wider); }), AllOf(HasSubstr(first), HasSubstr("a different architecture")));
   TrainOptions normalized = options("normalized", {"policy.layer_norm=true"});
   normalized.init_from = first;
   EXPECT_THAT(message_of([&] { train(normalized); }),

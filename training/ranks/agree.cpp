@@ -15,7 +15,7 @@ void check_equal_settings(const Config& config, const std::string& manner, Ranks
     const auto config_of = [&](size_t of) { return parse_saved_config(configs[of], fmt::format("rank {}", of)); };
     std::string difference = first_difference_of_ranks(config_of(0), config_of(rank));
     if (difference.empty() && manners[rank] != manners[0]) difference = manners[0] + " and " + manners[rank];
-    PICTURA_CHECK(difference.empty(), "ranks 0 and {} have other settings: {}", rank, difference);
+    PICTURA_CHECK(difference.empty(), "ranks 0 and {} have different settings: {}", rank, difference);
   }
 }
 

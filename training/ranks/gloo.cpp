@@ -95,8 +95,8 @@ std::unique_ptr<Communicator> make_gloo_communicator(Ranks* ranks) { return std:
 
 std::unique_ptr<Communicator> make_gloo_communicator(Ranks*) {
   fail(
-      "several processes that learn on the host need Gloo, without whose headers this program was built: install "
-      "libgloo-dev and build again");
+      "several processes that learn on the host need Gloo, but this program was built without its headers: install "
+      "libgloo-dev and rebuild");
 }
 
 #endif

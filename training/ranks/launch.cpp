@@ -39,10 +39,10 @@ constexpr Names kSlurm{"SLURM_PROCID", "SLURM_STEP_NUM_TASKS", "SLURM_LOCALID"};
 Launch place_by(const Names& names) {
   Launch launch;
   const std::optional<int> size = integer(names.size, 1, kMostRanks);
-  PICTURA_CHECK(size, "{} is set and {} is not: set both, or neither", names.rank, names.size);
+  PICTURA_CHECK(size, "{} is set but {} is not: set both or neither", names.rank, names.size);
   launch.size = *size;
   const std::optional<int> rank = integer(names.rank, 0, launch.size - 1);
-  PICTURA_CHECK(rank, "{} is set and {} is not: set both, or neither", names.size, names.rank);
+  PICTURA_CHECK(rank, "{} is set but {} is not: set both or neither", names.size, names.rank);
   launch.rank = *rank;
   launch.local_rank = *integer(names.local_rank, 0, kMostRanks - 1, launch.rank);
   return launch;

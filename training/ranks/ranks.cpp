@@ -81,7 +81,7 @@ void Ranks::join() {
     store_->set(fmt::format("beat/{}", rank()), Beat{}.text());
     PICTURA_CHECK(
         store_->add(fmt::format("joined/{}", rank()), 1) == 1,
-        "rank {}: another process at {} has this rank already: give every process its own RANK, and every run "
+        "rank {}: another process at {} already has this rank: give every process its own RANK, and every run "
         "its own MASTER_PORT",
         rank(), meeting);
     const Clock::time_point end = Clock::now() + milliseconds_of(patience_.join_s);
@@ -93,7 +93,7 @@ void Ranks::join() {
       }
       std::this_thread::sleep_for(milliseconds(missing.empty() ? 0 : 50));
     } while (!missing.empty() && Clock::now() < end);
-    PICTURA_CHECK(missing.empty(), "rank {}: {} of {} ranks did not come to {} within {:.0f} s: {}", rank(),
+    PICTURA_CHECK(missing.empty(), "rank {}: {} of {} ranks did not reach {} within {:.0f} s: {}", rank(),
                   missing.size(), size(), meeting, patience_.join_s, fmt::join(missing, ", "));
     store_->setTimeout(kStoreTimeout);
   } catch (const c10::Error& error) {
@@ -240,7 +240,7 @@ class BeatHistory {
       if (beat.has_left) continue;
       least = std::min(least.value_or(beat.steps), beat.steps);
       if (seconds_since(seen_[r].changed) > silent_s_) {
-        return fmt::format("rank {}: no sign of life for {:.0f} s: it was killed or stopped, or its host is gone", r,
+        return fmt::format("rank {}: no heartbeat for {:.0f} s: it was killed or stopped, or its host is gone", r,
                            silent_s_);
       }
     }
@@ -253,8 +253,7 @@ class BeatHistory {
     for (size_t r = 0; r < seen_.size(); ++r) {
       if (!seen_[r].beat.has_left && seen_[r].beat.steps == least_steps_) behind.push_back(r);
     }
-    return fmt::format("rank {}: alive, but not a step further for {:.0f} s: it hangs", fmt::join(behind, ", "),
-                       no_progress_s);
+    return fmt::format("rank {}: alive, but no step for {:.0f} s: it hangs", fmt::join(behind, ", "), no_progress_s);
   }
 
  private:
