@@ -42,7 +42,7 @@ class Reader {
   template <typename Int>
   void value_unless(const std::string& other, bool is_set, const std::string& key, Int& its_value, int64_t low,
                     int64_t high) {
-    if (find(key) && is_set) refuse(key, fmt::format("has no effect together with {}: leave one of them out", other));
+    if (find(key) && is_set) refuse(key, fmt::format("has no effect together with {}: omit one of the two", other));
     value(key, its_value, low, high);
   }
 
@@ -92,7 +92,7 @@ class Reader {
     if (!node) return;
     const toml::node *new_simulator = find("simulator.backend"), *new_renderer = find("render.backend");
     if (new_simulator && new_renderer) {
-      refuse(key, "has no effect together with simulator.backend and render.backend: leave it out");
+      refuse(key, "has no effect together with simulator.backend and render.backend: omit it");
     }
     std::string its_name;
     name(key, its_name, renderer_names());
@@ -272,7 +272,7 @@ class Reader {
       if (each.substr(each.rfind('.') + 1) == last) return fmt::format("; did you mean '{}'?", each);
     }
     const std::string nearest = suggestion(key, known);
-    return nearest.empty() ? "; docs/reference/configuration.md names every key" : nearest;
+    return nearest.empty() ? "; docs/reference/configuration.md lists every key" : nearest;
   }
 
   const toml::table& table_;
@@ -348,8 +348,8 @@ void check_patch_changes(const Config& c, const Reader& reader) {
       const int factor = whole_factor(size, next);
       if (factor == 0 || change.patch_px != factor * patch_px) {
         reader.refuse("render.schedule",
-                      fmt::format("from {} agent-steps on: expected images and patches that are both one whole number "
-                                  "of times {}x{} in patches of {}, got {}x{} in patches of {}",
+                      fmt::format("from {} agent-steps on: expected images and patches that are both the same integer "
+                                  "multiple of {}x{} in patches of {}, got {}x{} in patches of {}",
                                   change.agent_steps, size.width_px, size.height_px, patch_px, next.width_px,
                                   next.height_px, change.patch_px));
       }
@@ -371,7 +371,7 @@ void check_contradictions(const Config& c, const Reader& reader) {
   }
   const std::string policies = "simulator.others.policies";
   if (c.simulator.other_policies.size() > kMaxOtherPolicies) {
-    reader.refuse(policies, fmt::format("expected {} policies at most, got {}", kMaxOtherPolicies,
+    reader.refuse(policies, fmt::format("expected at most {} policies, got {}", kMaxOtherPolicies,
                                         c.simulator.other_policies.size()));
   }
   const OtherShares& others = c.simulator.others;
@@ -379,23 +379,25 @@ void check_contradictions(const Config& c, const Reader& reader) {
   for (const std::string& text : c.simulator.other_policies) {
     const std::optional<NamedShare> policy = parse_share(text);
     if (!policy) {
-      reader.refuse(policies,
-                    fmt::format("expected a policy's file and its share above 0, as models/vector.safetensors=0.1, "
-                                "got '{}'",
-                                text));
+      reader.refuse(
+          policies,
+          fmt::format("expected a policy's file and its share above 0, for instance models/vector.safetensors=0.1, "
+                      "got '{}'",
+                      text));
     }
     shares += policy->share;
   }
   if (shares >= 1) {
-    reader.refuse("simulator.others",
-                  fmt::format("expected shares below 1 in all, since the other agents learn, got {:.6g}", shares));
+    reader.refuse(
+        "simulator.others",
+        fmt::format("expected shares that sum to less than 1, since the other agents learn, got {:.6g}", shares));
   }
   const size_t layers = c.policy.conv_channels.size();
   for (const auto& [key, values] : {std::pair{"policy.conv_kernels", &c.policy.conv_kernels},
                                     std::pair{"policy.conv_strides", &c.policy.conv_strides}}) {
     if (values->size() != layers) {
       reader.refuse(key,
-                    fmt::format("expected {} values, as policy.conv_channels has, got {}", layers, values->size()));
+                    fmt::format("expected {} values, as many as policy.conv_channels, got {}", layers, values->size()));
     }
   }
   if (c.train.num_steps % c.policy.decision_steps != 0) {
@@ -423,15 +425,16 @@ void check_contradictions(const Config& c, const Reader& reader) {
                               c.policy.conv_channels.back(), c.policy.attention_heads));
   }
   if (c.policy.auxiliary && c.policy.modality == Modality::perspective) {
-    reader.refuse("policy.auxiliary", "has no effect with the modality \"perspective\": images have no such slots");
+    reader.refuse("policy.auxiliary",
+                  "has no effect with the modality \"perspective\": images have no auxiliary slots");
   }
   if (c.policy.segment_features && c.policy.modality == Modality::perspective) {
     reader.refuse("policy.segment_features",
-                  "has no effect with the modality \"perspective\", which reads no lists of segments");
+                  "has no effect with the modality \"perspective\", which reads no segments");
   }
   if (c.simulator.wall_observations && c.policy.modality == Modality::perspective) {
     reader.refuse("simulator.wall_observations",
-                  "has no effect with the modality \"perspective\": such a policy sees walls in its images");
+                  "has no effect with the modality \"perspective\": such a policy observes walls in its images");
   }
   if (c.train.decay_agent_steps > c.train.schedule_agent_steps) {
     reader.refuse("train.decay_agent_steps", fmt::format("expected at most train.schedule_agent_steps ({}), got {}",
@@ -439,16 +442,16 @@ void check_contradictions(const Config& c, const Reader& reader) {
   }
   if (c.train.halted_slots == HaltedSlots::draw && c.train.adv_filter == FilterThreshold::quantile) {
     reader.refuse("train.halted_slots",
-                  "\"draw\" takes every transition: expected train.adv_filter = \"maximum\", got \"quantile\"");
+                  "\"draw\" uses every transition: expected train.adv_filter = \"maximum\", got \"quantile\"");
   }
   if (c.train.halted_slots == HaltedSlots::draw && c.train.adv_filter_threshold > 0) {
     reader.refuse("train.halted_slots",
-                  fmt::format("\"draw\" takes every transition: expected train.adv_filter_threshold = 0, got {}",
+                  fmt::format("\"draw\" uses every transition: expected train.adv_filter_threshold = 0, got {}",
                               shortest(c.train.adv_filter_threshold)));
   }
   if (c.render.samples != PixelSamples{} && !c.render.backend.starts_with("gl")) {
-    reader.refuse("render.samples", fmt::format("expected one sample with render.backend \"{}\", got {}: only gl takes "
-                                                "samples; the others compute exact coverage",
+    reader.refuse("render.samples", fmt::format("expected one sample with render.backend \"{}\", got {}: only gl "
+                                                "supports samples; the other renderers compute exact coverage",
                                                 c.render.backend, text_of(c.render.samples)));
   }
 }

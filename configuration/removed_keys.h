@@ -12,9 +12,9 @@ struct RemovedKey {
 
 inline constexpr std::array kRemovedKeys{
     RemovedKey{"simulator.dynamics.forbid_reversing", "false",
-               "the rule was removed, since nothing is learnt with it: docs/research/experiments.md"},
+               "the rule was removed, since policies learn nothing with it: docs/research/experiments.md"},
     RemovedKey{"policy.goal_features", "false", "distances to goals were removed: docs/research/experiments.md"},
-    RemovedKey{"policy.critic_layers", "0", "trunks of the critic's own were removed: docs/research/experiments.md"},
+    RemovedKey{"policy.critic_layers", "0", "separate trunks of the critic were removed: docs/research/experiments.md"},
     RemovedKey{"policy.value_head", "\"linear\"", "other heads were removed: docs/research/experiments.md"},
 };
 

@@ -105,7 +105,7 @@ class Training(CommandCase):
         self.assert_refused(1, on_host, *one, *out, "--renderer", "null", "--device", "cuda")
         if not pathlib.Path("/dev/nvidia0").exists():
             self.assert_refused(1, "run.device: cuda: ", *one, *out, "--device", "cuda")
-        self.assert_refused(1, "only gl takes samples", *one, *out, "--renderer", "cpu", "--samples", "4x4")
+        self.assert_refused(1, "only gl supports samples", *one, *out, "--renderer", "cpu", "--samples", "4x4")
         self.assert_refused(1, "render.backend: expected one of cpu, ", *one, *out, "--set", "render.backend=vulkan")
         evaluate = ["evaluate", self.folder / "black" / "checkpoint.ckpt", "--map", "procedural:1", "--agents", 2,
                     "--scenarios", 1, "--steps", 2]  # fmt: skip

@@ -78,7 +78,7 @@ TEST(Config, UnknownKeysSuggestTheNearest) {
   EXPECT_THAT(error_in("", {"train.updats=1"}), HasSubstr("did you mean 'train.updates'?"));
   EXPECT_THAT(error_in("", {"train.precision=bf61"}), HasSubstr("got 'bf61'; did you mean 'bf16'?"));
   EXPECT_EQ(error_in("", {"trian.updates=1"}), "--set trian.updates: unknown key; did you mean 'train.updates'?");
-  EXPECT_THAT(error_in("", {"train.zebra=1"}), HasSubstr("docs/reference/configuration.md names every key"));
+  EXPECT_THAT(error_in("", {"train.zebra=1"}), HasSubstr("docs/reference/configuration.md lists every key"));
 }
 
 TEST(Config, KeysCanBeUnsetAndARigReplacesTheSizesOfTheFile) {
@@ -197,7 +197,7 @@ TEST(Config, PatchesGrowAsImagesDo) {
   for (const char* bad : {"[[5, 192, 108, 6, 1]]", "[[5, 144, 81, 6, 1]]", "[[5, 192, 54, 8, 1]]",
                           "[[5, 96, 54, 8, 1]]", "[[5, 48, 27, 2, 1]]"}) {
     EXPECT_THAT(error_of(bad), AllOf(HasSubstr("a.toml:2: render.schedule: from 5 agent-steps on"),
-                                     HasSubstr("one whole number of times 96x54 in patches of 4, got")))
+                                     HasSubstr("the same integer multiple of 96x54 in patches of 4, got")))
         << bad;
   }
   EXPECT_THAT(error_of("[[5, 64, 36], [6, 192, 108, 8, 1]]"), HasSubstr("64x36 in patches of 4, got 192x108"));
@@ -264,7 +264,7 @@ TEST(Config, RemovedKeysAreReadWithTheirOneValueAlone) {
   EXPECT_THAT(error_in("[policy]\nmodality = \"vector\"\ngoal_features = true\n"),
               HasSubstr("a.toml:3: policy.goal_features: expected false, got true: distances to goals were removed"));
   EXPECT_THAT(error_in("", {"policy.critic_layers=2"}),
-              HasSubstr("--set policy.critic_layers: expected 0, got 2: trunks of the critic's own were removed"));
+              HasSubstr("--set policy.critic_layers: expected 0, got 2: separate trunks of the critic were removed"));
   EXPECT_THAT(
       error_in("[simulator.dynamics]\nforbid_reversing = true\n"),
       HasSubstr("a.toml:2: simulator.dynamics.forbid_reversing: expected false, got true: the rule was removed"));
@@ -513,8 +513,9 @@ TEST(Config, ImpairedAgentsAreOfTrainingAlone) {
   EXPECT_EQ(first_difference(Config{}, c), "simulator.others.blind: 0.0 became 0.05");
   EXPECT_EQ(parse_config(to_toml(c), "b.toml").simulator.others, expected);
   EXPECT_THAT(error_in("[simulator.others]\nblind = 1.5\n"), HasSubstr("a.toml:2: simulator.others.blind"));
-  EXPECT_THAT(error_in("[simulator.others]\nblind = 0.5\ninattentive = 0.5\n"),
-              HasSubstr("simulator.others: expected shares below 1 in all, since the other agents learn, got 1"));
+  EXPECT_THAT(
+      error_in("[simulator.others]\nblind = 0.5\ninattentive = 0.5\n"),
+      HasSubstr("simulator.others: expected shares that sum to less than 1, since the other agents learn, got 1"));
 }
 
 TEST(Config, EvaluationFixesConditioningAndLightsAndEndsNothingEarly) {

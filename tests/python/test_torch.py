@@ -70,7 +70,7 @@ def test_removed_keys_are_read_with_their_one_value_alone(reference):
     policy = load_policy(reference / "vector.safetensors")
     for name, kept, other, message in (
         ("goal_features", False, True, "policy.goal_features: expected false, got true: distances to goals were removed"),
-        ("critic_layers", 0, 2, "policy.critic_layers: expected 0, got 2: trunks of the critic's own were removed"),
+        ("critic_layers", 0, 2, "policy.critic_layers: expected 0, got 2: separate trunks of the critic were removed"),
         ("value_head", "linear", "two_hot", 'policy.value_head: expected "linear", got "two_hot": other heads were removed'),
     ):
         Policy(policy.config | {name: kept}).load_state_dict(policy.state_dict())

@@ -133,11 +133,10 @@ TEST_F(OpponentsTest, AreRefusedByName) {
   EXPECT_THAT(message({held + "=0.1"}, {"train.num_steps=6"}),
               HasSubstr("its policy.decision_steps is 4, expected a divisor of train.num_steps (6)"));
   EXPECT_THAT(message({folder_ / "absent.safetensors=0.1"}), HasSubstr("absent.safetensors"));
-  EXPECT_THAT(message({"half"}),
-              HasSubstr("simulator.others.policies: expected a policy's file and its share above 0, as "
-                        "models/vector.safetensors=0.1, got 'half'"));
-  EXPECT_THAT(message({"a=0.5", "b=0.5"}), HasSubstr("expected shares below 1 in all"));
-  EXPECT_THAT(message(std::vector<std::string>(9, "a=0.1")), HasSubstr("expected 8 policies at most, got 9"));
+  EXPECT_THAT(message({"half"}), HasSubstr("simulator.others.policies: expected a policy's file and its share above 0, "
+                                           "for instance models/vector.safetensors=0.1, got 'half'"));
+  EXPECT_THAT(message({"a=0.5", "b=0.5"}), HasSubstr("expected shares that sum to less than 1"));
+  EXPECT_THAT(message(std::vector<std::string>(9, "a=0.1")), HasSubstr("expected at most 8 policies, got 9"));
 }
 
 }  // namespace
