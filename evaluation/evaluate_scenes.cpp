@@ -516,8 +516,8 @@ SceneEvaluation evaluate_scenes(const EvaluatedDriver& driver, Renderer* rendere
   evaluation.seconds = clock.seconds();
   const std::vector<std::string> faults = evaluation.faults();
   PICTURA_CHECK(results.scored() > 0 || evaluation.interrupted || results.without_drivers > 0,
-                "{}: expected a scene, got {} that cannot be used: {}", fmt::join(options.scenes, ", "), faults.size(),
-                faults.empty() ? "no scene is there" : faults.front());
+                "{}: expected a usable scene, got {} unusable: {}", fmt::join(options.scenes, ", "), faults.size(),
+                faults.empty() ? "no scene found" : faults.front());
   evaluation.rows = rows_of(results);
   if (!evaluation.interrupted) clock.finish();
   return evaluation;

@@ -56,22 +56,24 @@ std::vector<OtherDriver> other_drivers(const std::vector<std::string>& texts) {
   for (const std::string& text : texts) {
     const std::optional<NamedShare> parsed = parse_share(text);
     if (!parsed) {
-      fail_usage("others: expected a policy's file, one of {}, or {}, and its share above 0, as lane=0.25; got '{}'",
-                 fmt::join(town_controller_names(), ", "), fmt::join(impairment_names(), ", "), text);
+      fail_usage(
+          "others: expected a policy's file, one of {}, or {}, and its share above 0, for instance lane=0.25; got '{}'",
+          fmt::join(town_controller_names(), ", "), fmt::join(impairment_names(), ", "), text);
     }
     const auto& [name, share] = *parsed;
     const Impairment impairment = impairment_named(name);
     const auto is_same = [impairment](const OtherDriver& other) { return other.impairment == impairment; };
     if (impairment != Impairment::none && std::any_of(others.begin(), others.end(), is_same)) {
-      fail_usage("others: expected {} once, got it twice", name);
+      fail_usage("others: {} is given twice", name);
     }
     others.push_back({name, share, impairment});
     sum += share;
   }
   if (others.size() > kMaxOtherDrivers) {
-    fail_usage("others: expected {} at most, got {}", kMaxOtherDrivers, others.size());
+    fail_usage("others: expected at most {}, got {}", kMaxOtherDrivers, others.size());
   }
-  if (sum >= 1) fail_usage("others: expected shares below 1 in all, since somebody is to be measured, got {}", sum);
+  if (sum >= 1)
+    fail_usage("others: expected shares that sum to less than 1, since some vehicles must be evaluated, got {}", sum);
   return others;
 }
 
@@ -91,7 +93,7 @@ MixedTraffic::MixedTraffic(const std::vector<OtherDriver>& others, const DriverO
     const bool is_impaired = driver.impairment != Impairment::none;
     const bool is_built_in = !options.controller.empty() && !options.make_own_controller;
     if (is_impaired && driver.impairment != Impairment::phantom_braking && is_built_in) {
-      fail_usage("others: {}: has no effect on the controller {}, which does not drive by observations", driver.name,
+      fail_usage("others: {}: has no effect on the controller {}, which does not use observations", driver.name,
                  options.controller);
     }
     if (!is_impaired && !is_controller(driver.name)) {

@@ -58,7 +58,7 @@ DensityResult joined(std::vector<Part> parts) {
   for (size_t i = 1; i < parts.size(); ++i) {
     const DensityResult& next = *parts[i].result;
     const auto end = all.first_scenario + static_cast<int>(all.scenarios.size());
-    PICTURA_CHECK(next.agents_per_world == all.agents_per_world, "{}: {}: has {} agents a world, {} has {}",
+    PICTURA_CHECK(next.agents_per_world == all.agents_per_world, "{}: {}: has {} agents per world, {} has {}",
                   *parts[i].name, next.density, next.agents_per_world, *parts[0].name, all.agents_per_world);
     PICTURA_CHECK(next.first_scenario == end,
                   "{}: {}: begins with scenario {}: expected {}, the next after those of {}", *parts[i].name,

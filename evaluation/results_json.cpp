@@ -11,7 +11,7 @@ namespace pictura {
 
 namespace {
 
-constexpr const char* kExpected = "expected the results that pictura evaluate --out writes";
+constexpr const char* kExpected = "expected results written by pictura evaluate --out";
 
 }  // namespace
 
@@ -85,9 +85,9 @@ Json read_results_json(const std::string& path, const std::vector<std::string>& 
   try {
     json = parse_json(text);
   } catch (const Json::parse_error& error) {
-    fail("{}: {}, got no JSON from byte {}", path, kExpected, error.byte);
+    fail("{}: {}, got invalid JSON from byte {}", path, kExpected, error.byte);
   } catch (const Json::out_of_range&) {
-    fail("{}: {}, got a number beyond what a double holds", path, kExpected);
+    fail("{}: {}, got a number outside the range of a double", path, kExpected);
   }
   parse_results(path, [&] {
     PICTURA_CHECK(std::find(formats.begin(), formats.end(), json.value("format", "")) != formats.end(),
@@ -100,7 +100,7 @@ void parse_results(const std::string& path, const std::function<void()>& parse) 
   try {
     parse();
   } catch (const Json::exception&) {
-    fail("{}: {}, got JSON in which a value is missing or of another type", path, kExpected);
+    fail("{}: {}, got JSON with a missing value or a value of a wrong type", path, kExpected);
   } catch (const Error& error) {
     fail("{}: {}: {}", path, kExpected, error.what());
   }

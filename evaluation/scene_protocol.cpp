@@ -55,25 +55,26 @@ constexpr Rule number_rule(const char* name, const char* values, const char* wha
 using P = SceneProtocol;
 constexpr std::array kRules{
     word_rule<&P::overlapping, kOverlappingWords>(
-        "overlapping", "replay, drive", "vehicles whose box touches another or an edge, or is off the road, at first"),
-    word_rule<&P::others, kOthersWords>("others", "replay, absent",
-                                        "pedestrians, cyclists and whoever else is no vehicle"),
-    word_rule<&P::late, kLateWords>("late", "replay, drive, absent",
-                                    "vehicles that the recording has only after the start; absent: all road users"),
+        "overlapping", "replay, drive",
+        "vehicles whose initial box touches another box or an edge, or is off the road"),
+    word_rule<&P::others, kOthersWords>("others", "replay, absent", "pedestrians, cyclists and other non-vehicles"),
+    word_rule<&P::late, kLateWords>(
+        "late", "replay, drive, absent",
+        "vehicles that appear in the recording only after the start; absent: all road users"),
     word_rule<&P::record_end, kRecordEndWords>("record_end", "stand, vanish",
-                                               "who follows the recording, after its end"),
+                                               "road users that follow the recording, after its end"),
     word_rule<&P::after_infraction, kInfractionWords>("after_infraction", "halt, leave, drive_on",
-                                                      "who collided or left the road"),
-    word_rule<&P::leave_at_goal, kYesNo>("leave_at_goal", "no, yes", "whether who arrives is removed"),
+                                                      "agents that collided or left the road"),
+    word_rule<&P::leave_at_goal, kYesNo>("leave_at_goal", "no, yes", "whether agents that arrive are removed"),
     word_rule<&P::waypoints, kWaypointsWords>(
-        "waypoints", "goal, path", "the goal in all three slots, or before it two places on the recorded path"),
+        "waypoints", "goal, path", "the goal in all three slots, or two points on the recorded path and the goal"),
     number_rule<&P::least_way_m, 0, 1000>("least_way_m", "0 to 1000",
-                                          "who starts nearer to its goal follows the recording"),
-    word_rule<&P::replay_experts, kYesNo>("replay_experts", "no, yes", "whether who the file marks as expert is"),
-    number_rule<&P::rollouts, 1, 1000>("rollouts", "1 to 1000",
-                                       "times that each scene is driven, with draws of their own"),
-    number_rule<&P::max_driven, 0, 4096>("max_driven", "0 to 4096", "vehicles of a scene, at most; 0: all"),
-    number_rule<&P::box_scale, 0, 2>("box_scale", "0 to 2", "of lengths and widths of all road users"),
+                                          "minimum distance to the goal; nearer road users follow the recording"),
+    word_rule<&P::replay_experts, kYesNo>("replay_experts", "no, yes",
+                                          "whether road users marked as expert are replayed"),
+    number_rule<&P::rollouts, 1, 1000>("rollouts", "1 to 1000", "drives of each scene, each with its own draws"),
+    number_rule<&P::max_driven, 0, 4096>("max_driven", "0 to 4096", "maximum number of vehicles per scene; 0: all"),
+    number_rule<&P::box_scale, 0, 2>("box_scale", "0 to 2", "scale of lengths and widths of all road users"),
     number_rule<&P::observed_span_m, 0, 100>("observed_span_m", "0 to 100",
                                              "longest observed piece of lanes and edges; 0: as in training, 10 m")};
 

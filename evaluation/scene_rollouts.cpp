@@ -28,7 +28,7 @@ enum class Trajectory : uint8_t { center_x = 2, center_y = 3, center_z = 4, head
 constexpr uint64_t kSimAgentsSubmission = 1;
 
 /// A packed field of one member of all states.
-void append_floats(Trajectory field, Span<const SimulatedState> states, float SimulatedState::*member,
+void append_floats(Trajectory field, Span<const SimulatedState> states, float SimulatedState::* member,
                    std::string* out) {
   std::vector<float> numbers;
   numbers.reserve(states.size());
@@ -120,8 +120,9 @@ void check_rollouts(const SceneProtocol& protocol) {
   }
   fail_usage(
       "--rollouts, --realism: expected {} rollouts of {} steps from step {}, at a density of 100 % with others=replay, "
-      "as the "
-      "protocol simagents has; got rollouts={}, {} steps from step {}, {}, others={}",
+      "as "
+      "in the "
+      "protocol simagents; got rollouts={}, {} steps from step {}, {}, others={}",
       kChallengeRollouts, kChallengeSteps, kChallengeStart, protocol.rollouts, protocol.steps, protocol.start_step,
       protocol.densities.size() == 1 ? fmt::format("{:g} %", 100 * protocol.densities[0])
                                      : fmt::format("{} densities", protocol.densities.size()),
@@ -160,7 +161,7 @@ void RolloutsFile::write(const std::string& bytes) {
   size_ += bytes.size();
   PICTURA_CHECK(
       size_ <= static_cast<size_t>(std::numeric_limits<int32_t>::max()),
-      "{}: expected at most 2 GiB, which protobuf reads as one message: take fewer scenes, by --scenarios A:B", path_);
+      "{}: expected at most 2 GiB, which protobuf reads as one message: use fewer scenes, with --scenarios A:B", path_);
   file_.write(bytes);
 }
 

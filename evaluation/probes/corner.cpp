@@ -229,7 +229,7 @@ class CornerProbe {
 
 void check(const CornerOptions& options) {
   const CornerSearch& search = options.search;
-  PICTURA_CHECK(options.worlds.adds_walls, "probe: expected worlds with walls, as CornerOptions has them");
+  PICTURA_CHECK(options.worlds.adds_walls, "probe: expected worlds with walls");
   if (options.pairs < 1) fail_usage("probe: expected one pair or more, got {}", options.pairs);
   if (options.worlds.steps <= kTakeoverSteps + options.sample_steps) {
     fail_usage("probe: expected more than {} steps, of which a takeover takes {}, got {}",

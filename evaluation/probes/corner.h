@@ -24,20 +24,23 @@ template <typename Visitor>
 void visit_options(CornerOptions& options, Visitor&& v) {
   visit_options(static_cast<ProbeOptions&>(options), v);
   CornerSearch& search = options.search;
-  v.value({"pairs", "--pairs", "Pairs in all: a corner with a hidden vehicle, and an empty one", 1}, options.pairs);
-  v.value({"max_distance_m", "--max-distance", "How far before the corner a policy may take over, m; at least 8 m", 8.1,
-           kCornerLead_m},
+  v.value({"pairs", "--pairs", "Total number of pairs: a corner with a hidden vehicle, and an empty corner", 1},
+          options.pairs);
+  v.value({"max_distance_m", "--max-distance",
+           "Maximum distance before the corner at which a policy takes over, m; at least 8 m", 8.1, kCornerLead_m},
           search.max_distance_m);
-  v.value({"min_speed_mps", "--min-speed", "Of the ego at the takeover and of who is hidden, forwards, m/s", -100, 100},
+  v.value({"min_speed_mps", "--min-speed",
+           "Minimum forward speed of the ego at the takeover and of the hidden vehicle, m/s", -100, 100},
           search.min_speed_mps);
-  v.value({"user_range_m", "--range", "How far before the junction the hidden vehicle may be, m", 1, kCornerLead_m},
-          search.user_range_m);
+  v.value(
+      {"user_range_m", "--range", "Maximum distance of the hidden vehicle before the junction, m", 1, kCornerLead_m},
+      search.user_range_m);
   v.name({"driver", "--driver",
-          "Who drives the scenes in which policies take over, instead of the policies: lane, the lane keeper"},
+          "Driver of the scenes in which policies take over, instead of the policies: lane, the lane keeper"},
          options.worlds.controller, {"lane"});
   v.choice({"control", "--control",
-            "A control: permuted removes another vehicle near the ego instead of who is hidden; untrained has policies "
-            "with fresh weights take over in the same states"},
+            "Control: permuted removes another vehicle near the ego instead of the hidden vehicle; untrained uses "
+            "policies with fresh weights in the same states"},
            options.control, kCornerControlNames);
 }
 

@@ -29,17 +29,17 @@ struct ProbeOptions {
 template <typename Visitor>
 void visit_options(ProbeOptions& probe, Visitor&& v) {
   EvaluateOptions& worlds = probe.worlds;
-  v.choice({"density", "--density", "light, medium or dense: 60, 120 or 150 agents a world"}, worlds.densities.front(),
-           kDensityNames);
+  v.choice({"density", "--density", "light, medium or dense: 60, 120 or 150 agents per world"},
+           worlds.densities.front(), kDensityNames);
   v.value({"scenes", "--scenes",
-           "Scenarios that are driven, an equal share by each policy; default: as many on each map for each policy, "
-           "two a map or more",
+           "Number of driven scenarios, an equal share per policy; default: equally many on each map for each policy, "
+           "two per map or more",
            1},
           worlds.scenarios);
-  v.value({"first_scene", "--first-scene", "The number of the first scenario", 0}, worlds.first_scenario);
+  v.value({"first_scene", "--first-scene", "Number of the first scenario", 0}, worlds.first_scenario);
   v.value({"sample_steps", "--every", "Steps between sampled states", 1}, probe.sample_steps);
-  v.value({"batch", "--batch",
-           "Cases in a call, rounded up to whole passes of a network; changes memory and time alone", 1, 1 << 20},
+  v.value({"batch", "--batch", "Cases in a call, rounded up to whole passes of a network; changes only memory and time",
+           1, 1 << 20},
           probe.batch);
 }
 

@@ -89,15 +89,14 @@ void check_probe(const ProbeOptions& options, size_t num_policies) {
   const int scenes = options.worlds.scenarios, steps = options.worlds.steps;
   if (num_policies == 0) fail_usage("probe: expected one policy or more");
   if (scenes < 1 || scenes % static_cast<int>(num_policies) != 0) {
-    fail_usage("probe: expected a number of scenes that {} policies can drive equal shares of, got {}", num_policies,
-               scenes);
+    fail_usage("probe: expected a number of scenes divisible among {} policies, got {}", num_policies, scenes);
   }
   if (options.sample_steps < 1 || options.sample_steps >= steps) {
     fail_usage("probe: expected a sample every 1 to {} steps, got {}", steps - 1, options.sample_steps);
   }
-  if (options.batch < 1) fail_usage("probe: expected one case a call or more, got {}", options.batch);
+  if (options.batch < 1) fail_usage("probe: expected one case per call or more, got {}", options.batch);
   if (options.worlds.densities.empty() && options.worlds.agents_per_world <= 0) {
-    fail_usage("probe: expected a density, or a number of agents a world");
+    fail_usage("probe: expected a density, or a number of agents per world");
   }
 }
 
@@ -315,7 +314,7 @@ void ProbeRun::drive() {
   const uint64_t state = driver.worlds->simulator->state_hash(current_stream(device_));
   for_each_other([&](Simulator& other) {
     PICTURA_CHECK(other.state_hash(current_stream(device_)) == state,
-                  "probe: worlds with and without auxiliary observations are in different states");
+                  "probe: worlds with and without auxiliary observations have different states");
   });
   results_.interrupted = report.interrupted;
   if (driver_ == 0) results_.setting = report.results.setting;

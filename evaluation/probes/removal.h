@@ -20,11 +20,12 @@ struct RemovalOptions : ProbeOptions {
 template <typename Visitor>
 void visit_options(RemovalOptions& options, Visitor&& v) {
   visit_options(static_cast<ProbeOptions&>(options), v);
-  v.value({"removals", "--removals", "Cases in all: one user hidden for one ego in one state", 1}, options.removals);
-  v.value({"range_m", "--range", "How far away a user may be, m", 1, 1000}, options.range_m);
+  v.value({"removals", "--removals", "Total number of cases: one user hidden for one ego in one state", 1},
+          options.removals);
+  v.value({"range_m", "--range", "Maximum distance of a user, m", 1, 1000}, options.range_m);
   v.choice({"control", "--control",
-            "A control: nobody hides no one; permuted hides another of the ego's users, drawn anew for each case; "
-            "untrained has policies with fresh weights answer in the same states"},
+            "Control: nobody hides no user; permuted hides another of the ego's users, redrawn for each case; "
+            "untrained uses policies with fresh weights in the same states"},
            options.control, kRemovalControlNames);
 }
 

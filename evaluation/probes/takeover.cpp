@@ -175,7 +175,7 @@ bool TakeoverWorlds::look(Worlds* worlds, size_t policy, const std::vector<Takeo
       const DrivenState& driven = start.scene->at(start.step, start.ego);
       PICTURA_CHECK(x_m[slot] == driven.position_m.x && y_m[slot] == driven.position_m.y &&
                         speed_mps[slot] == driven.speed_mps && status[slot] == driven.status,
-                    "probe: scene {}, step {}: agent {} is not in the state that it was driven to",
+                    "probe: scene {}, step {}: agent {} is not in its driven state",
                     start.scene->world.global_world - kFirstEvaluationWorld, start.step, start.ego);
     }
     if (one.steps < step) continue;

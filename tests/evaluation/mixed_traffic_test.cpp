@@ -78,10 +78,10 @@ TEST(MixedTraffic, IsReadFromTexts) {
     return test::message_of<UsageError>([&] { other_drivers(texts); });
   };
   for (const char* text : {"lane", "=0.5", "lane=", "lane=0", "lane=-1", "lane=nan", "lane=half"}) {
-    EXPECT_THAT(refused({text}), HasSubstr("as lane=0.25; got '" + std::string(text) + "'"));
+    EXPECT_THAT(refused({text}), HasSubstr("for instance lane=0.25; got '" + std::string(text) + "'"));
   }
-  EXPECT_THAT(refused({"lane=0.5", "idle=0.5"}), HasSubstr("expected shares below 1 in all"));
-  EXPECT_THAT(refused(std::vector<std::string>(9, "lane=0.1")), HasSubstr("expected 8 at most, got 9"));
+  EXPECT_THAT(refused({"lane=0.5", "idle=0.5"}), HasSubstr("expected shares that sum to less than 1"));
+  EXPECT_THAT(refused(std::vector<std::string>(9, "lane=0.1")), HasSubstr("expected at most 8, got 9"));
 }
 
 TEST(MixedTraffic, OfOneControllerCountsEachVehicleOnce) {
@@ -152,7 +152,7 @@ TEST(MixedTraffic, RefusesImpairmentsWithoutEffect) {
   EXPECT_THAT(test::message_of<UsageError>([] { evaluate_controller("lane", {"blind=0.1"}); }),
               HasSubstr("others: blind: has no effect on the controller lane"));
   EXPECT_EQ(test::message_of<UsageError>([] { other_drivers({"blind=0.1", "blind=0.2"}); }),
-            "others: expected blind once, got it twice");
+            "others: blind is given twice");
 }
 
 class MixedPolicies : public test::ProbedPolicies {};

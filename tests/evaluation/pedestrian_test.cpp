@@ -200,7 +200,7 @@ TEST_F(Pedestrian, SeedsDecideWhatIsFound) { EXPECT_EQ(expect_seeds_to_decide(2)
 TEST_F(Pedestrian, RefusesWhatCannotBe) {
   PedestrianOptions o = options(2);
   o.worlds.scenarios = 4;
-  EXPECT_THAT(message_of([&] { probe(o); }), HasSubstr("3 policies can drive equal shares of, got 4"));
+  EXPECT_THAT(message_of([&] { probe(o); }), HasSubstr("divisible among 3 policies, got 4"));
   o = options(2);
   o.hider_range_m = 3;
   EXPECT_THAT(message_of([&] { probe(o); }), HasSubstr("a range above 5 m, got 3"));

@@ -199,7 +199,7 @@ TEST_F(Removal, PoliciesOfVectorsNeedNoImages) {
 TEST_F(Removal, RefusesWhatCannotBe) {
   RemovalOptions o = options(10);
   o.worlds.scenarios = 4;
-  EXPECT_THAT(message_of([&] { probe(o); }), HasSubstr("3 policies can drive equal shares of, got 4"));
+  EXPECT_THAT(message_of([&] { probe(o); }), HasSubstr("divisible among 3 policies, got 4"));
   o = options(10);
   o.sample_steps = 60;
   EXPECT_THAT(message_of([&] { probe(o); }), HasSubstr("every 1 to 59 steps, got 60"));

@@ -183,7 +183,7 @@ TEST(Results, PartsThatDoNotFitAreRefusedByName) {
   EXPECT_THAT(merged_message(populated, first), HasSubstr("config.simulator.cyclist_fraction is null"));
   EvaluationResults crowd = part(2, {counts(4, 1, 10)});
   crowd.densities[0].agents_per_world = 9;
-  EXPECT_THAT(merged_message(first, crowd), HasSubstr("has 9 agents a world, a.json has 8"));
+  EXPECT_THAT(merged_message(first, crowd), HasSubstr("has 9 agents per world, a.json has 8"));
   EXPECT_THAT(message_of([] { merge({}, {}); }), HasSubstr("one part or more"));
 }
 
