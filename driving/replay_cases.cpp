@@ -11,7 +11,7 @@ namespace pictura {
 
 namespace {
 
-constexpr const char* kWhyOtherwise = "the policy's numbers differ in their last bits where batches or devices differ";
+constexpr const char* kWhyOtherwise = "the policy's numbers differ in their last bits between batch sizes and devices";
 
 // Scene, step and ego of a case, with the ego's speed.
 struct CasePlace {
@@ -45,10 +45,9 @@ size_t chosen_case(const CaseReplayOptions& options, const ProbeResults& results
 }
 
 std::string about(const RemovalCase& one, RemovalControl control) {
-  if (one.hidden < 0) return fmt::format("a control: nobody is hidden from agent {}", one.ego);
+  if (one.hidden < 0) return fmt::format("control: no agent is hidden from agent {}", one.ego);
   if (control == RemovalControl::permuted)
-    return fmt::format("a control: agent {} is hidden from agent {} instead of agent {}", one.hidden, one.ego,
-                       one.user);
+    return fmt::format("control: agent {} is hidden from agent {} instead of agent {}", one.hidden, one.ego, one.user);
   return fmt::format("agent {} is hidden from agent {}: a {}{} {:.1f} m away, {}", one.user, one.ego,
                      one.user_halted ? "halted " : "", to_string(one.user_class), one.distance_m,
                      one.is_in_frame() ? fmt::format("of which its cameras see {:.0f} %", 100 * one.visible_share)
@@ -56,18 +55,17 @@ std::string about(const RemovalCase& one, RemovalControl control) {
 }
 
 std::string about(const PedestrianPoint& point, const PedestrianPath& path, PedestrianControl control) {
-  if (control == PedestrianControl::nobody)
-    return fmt::format("a control: no pedestrian is shown to agent {}", path.ego);
+  if (control == PedestrianControl::nobody) return fmt::format("control: no pedestrian is shown to agent {}", path.ego);
   return fmt::format("a pedestrian is shown to agent {}: {:.1f} m away, of which its cameras see {:.0f} %", path.ego,
                      point.distance_m, 100 * point.visible_share);
 }
 
 std::string about(const CornerState& one, int32_t removed, CornerControl control) {
   const std::string hidden =
-      fmt::format("agent {} comes hidden towards agent {}, which is {:.1f} m before a blind corner", one.user, one.ego,
-                  one.distance_m);
+      fmt::format("agent {} approaches hidden, towards agent {}, which is {:.1f} m before a blind corner", one.user,
+                  one.ego, one.distance_m);
   if (control != CornerControl::permuted) return hidden;
-  return fmt::format("{}; a control: {} is removed instead", hidden,
+  return fmt::format("{}; control: {} is removed instead", hidden,
                      removed < 0 ? "nobody" : fmt::format("agent {}", removed));
 }
 
@@ -118,8 +116,8 @@ void write_scene(const CaseReplayOptions& options, const ProbeOptions& probe, co
   ScenarioCounts counts;
   Replay replay = record_scenario(driven_by(probe, place), scenario_of(probe, results, place), recording, &counts);
   if (place.step >= replay.num_frames) {
-    fail("--replay: case {} is at step {} of scenario {}, which was over after {} steps when it was driven again: {}",
-         number, place.step, place.scene, replay.num_frames - 1, kWhyOtherwise);
+    fail("--replay: case {} is at step {} of scenario {}, which ended after {} steps when driven again: {}", number,
+         place.step, place.scene, replay.num_frames - 1, kWhyOtherwise);
   }
   write(options, results, number, place, place.step, std::move(probed), std::move(replay));
 }
@@ -166,7 +164,7 @@ void write_case_replay(const CaseReplayOptions& options, const CornerOptions& pr
                                          .agent = state.ego,
                                          .steps = kTakeoverSteps},
                                         options.recording);
-  const std::string what = fmt::format("{}; from here on {} drives agent {}, and all others go where they went",
+  const std::string what = fmt::format("{}; from here on {} drives agent {}, and all other agents repeat their motion",
                                        about(state, results.scenes_of_pairs[pair].removed, results.control),
                                        results.policies[0].answers_as(), state.ego);
   write(options, results, pair, place, 0, {.what = what, .removed = state.user}, replay);

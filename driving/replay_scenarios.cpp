@@ -139,8 +139,8 @@ void write(const EvaluateOptions& options, const EvaluationResults& results, con
   const ScenarioCounts& evaluated = counts_of(results, place);
   if (counts.any_infraction == evaluated.any_infraction && counts.goals == evaluated.goals) return;
   print_message(
-      "notice: {}: {} infractions and {} goals, in the evaluation {} and {}: the policy's numbers differ in "
-      "their last bits where batches or devices differ\n",
+      "notice: {}: {} infractions and {} goals, in the evaluation {} and {}: the policy's numbers differ in their last "
+      "bits between batch sizes and devices\n",
       path, counts.any_infraction, counts.goals, evaluated.any_infraction, evaluated.goals);
 }
 
@@ -179,7 +179,7 @@ Replay record_takeover(const EvaluateOptions& options, const RecordedScenario& s
   ScenarioKeeper keeper(takeover.step);
   one.observer = &keeper;
   drive(one, scenario, session_of(one).get());
-  if (!keeper.kept()) fail("scenario {} was over before step {}", scenario.number, takeover.step);
+  if (!keeper.kept()) fail("scenario {} ended before step {}", scenario.number, takeover.step);
   const DrivenScene& scene = keeper.scene(scenario.number);
 
   auto session = std::make_unique<PolicySession>(takeover.policy, one);

@@ -58,8 +58,8 @@ std::vector<uint8_t> controlled_tracks(const WorldOptions& options, const Compil
 DrivenWorld make_world(const WorldOptions& options, const std::string& policy) {
   if (options.simulator == "cuda") {
     fail_usage(
-        "--simulator cuda: its states and scenes lie on the device, and reading them back for pictures and reports "
-        "is missing from this version: choose cpu");
+        "--simulator cuda: its states and scenes lie on the device, and reading them back for pictures and reports is "
+        "not supported in this version: use cpu");
   }
   SimulatorConfig config;
   DrivenWorld world;
@@ -82,9 +82,8 @@ DrivenWorld make_world(const WorldOptions& options, const std::string& policy) {
   if (!is_trained && options.decision_steps > 0)
     fail_usage("--decision-steps: expected a trained policy, got --policy {}", policy);
   if (!is_trained && (options.others.blind > 0 || options.others.inattentive > 0)) {
-    fail_usage(
-        "--blind and --inattentive: expected a trained policy, got --policy {}, which does not drive by observations",
-        policy);
+    fail_usage("--blind and --inattentive: expected a trained policy, got --policy {}, which does not use observations",
+               policy);
   }
   apply_world_options(options, &config);
   config.fixed_lights = true;

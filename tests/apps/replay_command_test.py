@@ -153,7 +153,7 @@ class Replays(CommandCase):
         header = header_of(path)
         shown = header["case"]
         self.assertEqual((shown["frame"], shown["ego"], shown["removed"]), (0, int(case["ego"]), int(case["user"])))
-        self.assertIn(f"case 0: agent {case['user']} comes hidden", shown["what"])
+        self.assertIn(f"case 0: agent {case['user']} approaches hidden", shown["what"])
         self.assertIn(f"from here on images drives agent {case['ego']}", shown["what"])
         self.assertNotIn("notice", result.stderr)  # takes over as in the probe
         self.assertEqual((case["policy"], case["walls"], case["case"]), ("images", "on", "hidden"))
