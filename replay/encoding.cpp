@@ -33,7 +33,7 @@ void put_number(int32_t value, std::string* bytes_inout) {
 int32_t NumberReader::next() {
   uint32_t bits = 0;
   for (int shift = 0; shift < 35; shift += 7) {
-    PICTURA_CHECK(at_ < bytes_.size(), "the numbers end too early, after {} bytes", bytes_.size());
+    PICTURA_CHECK(at_ < bytes_.size(), "the numbers are truncated after {} bytes", bytes_.size());
     const auto byte = static_cast<uint8_t>(bytes_[at_++]);
     bits |= static_cast<uint32_t>(byte & 0x7F) << shift;
     if (byte < 0x80) return static_cast<int32_t>((bits >> 1) ^ (0u - (bits & 1)));
@@ -44,7 +44,7 @@ int32_t NumberReader::next() {
 int32_t NumberReader::next_count() {
   const int32_t count = next();
   PICTURA_CHECK(count >= 0 && static_cast<std::size_t>(count) <= bytes_.size() - at_,
-                "expected a count of at most {}, the bytes that are left, got {}", bytes_.size() - at_, count);
+                "expected a count of at most {}, the remaining bytes, got {}", bytes_.size() - at_, count);
   return count;
 }
 
@@ -84,13 +84,12 @@ std::string deflate(std::string_view bytes) {
 
 std::string inflate(std::string_view stream, std::size_t size) {
   // A zlib stream cannot be shorter than about a thousandth of its content.
-  PICTURA_CHECK(size / 1040 <= stream.size(), "expected the zlib stream of {} bytes, got {} bytes", size,
-                stream.size());
+  PICTURA_CHECK(size / 1040 <= stream.size(), "expected a zlib stream of {} bytes, got {} bytes", size, stream.size());
   std::string bytes(size, '\0');
   uLongf inflated = size;
   const int status = uncompress(reinterpret_cast<Bytef*>(bytes.data()), &inflated,
                                 reinterpret_cast<const Bytef*>(stream.data()), stream.size());
-  PICTURA_CHECK(status == Z_OK && inflated == size, "expected the zlib stream of {} bytes, got a damaged one", size);
+  PICTURA_CHECK(status == Z_OK && inflated == size, "expected a zlib stream of {} bytes, got a damaged stream", size);
   return bytes;
 }
 

@@ -235,7 +235,7 @@ std::string conditioning_bytes(const std::vector<ReplayEpisode>& episodes) {
 void conditioning_from(std::string_view bytes, int32_t num_agents, std::vector<ReplayEpisode>* episodes_inout) {
   const size_t count = size(num_agents) * kNumConditioning;
   PICTURA_CHECK(bytes.size() == episodes_inout->size() * count * sizeof(float),
-                "conditioning: expected {} numbers an episode, got {} bytes", count, bytes.size());
+                "conditioning: expected {} numbers per episode, got {} bytes", count, bytes.size());
   for (size_t i = 0; i < episodes_inout->size(); ++i) {
     std::vector<float>& conditioning = (*episodes_inout)[i].conditioning;
     conditioning.resize(count);
@@ -585,7 +585,7 @@ auto of_page(const std::string& path, Read&& read) {
   try {
     return read(std::string_view(page));
   } catch (const Json::exception&) {
-    fail("{}: expected a replay's header, got damaged JSON, or one in which a value is missing", path);
+    fail("{}: expected a replay's header, got damaged JSON, or JSON with a missing value", path);
   } catch (const Error& error) {
     fail("{}: {}", path, error.what());
   }

@@ -48,7 +48,7 @@ std::vector<Json> entries_of(const std::string& folder) {
       }
       entry["infractions"] = infractions_of(header);
     } catch (const Json::exception&) {
-      fail("{}: expected a replay's header, got one in which a value is missing", path);
+      fail("{}: expected a replay's header, got a header with a missing value", path);
     }
     entries.push_back(std::move(entry));
   }
@@ -60,7 +60,7 @@ void check_index(const std::string& folder) {
   const std::string index = (std::filesystem::path(folder) / kIndex).string();
   if (!std::filesystem::exists(index)) return;
   PICTURA_CHECK(read_file(index).find(kIndexElement) != std::string::npos,
-                "{}: expected an index of replays, or none: another page would be lost", index);
+                "{}: expected an index of replays, or none: otherwise another page would be overwritten", index);
 }
 
 }  // namespace

@@ -115,10 +115,10 @@ HttpRequest parse_head(std::string_view head) {
 }
 
 size_t body_bytes(const HttpRequest& request) {
-  if (request.count("transfer-encoding") > 0) throw HttpRefusal{501, "transfer codings are not read"};
+  if (request.count("transfer-encoding") > 0) throw HttpRefusal{501, "transfer codings are not supported"};
   for (const auto& [name, value] : request.fields) {
     if (name == "content-encoding" && in_lower_case(value) != "identity")
-      throw HttpRefusal{415, "encodings are not read"};
+      throw HttpRefusal{415, "encodings are not supported"};
   }
   if (request.count("content-length") == 0) return 0;
   const std::optional<uint64_t> bytes = parse_unsigned(request.value("content-length"));

@@ -94,7 +94,7 @@ class Decoder {
 
  private:
   uint8_t next() {
-    PICTURA_CHECK(at_ < bytes_.size(), "images: a group ends too early, after {} bytes", bytes_.size());
+    PICTURA_CHECK(at_ < bytes_.size(), "images: a group is truncated after {} bytes", bytes_.size());
     return static_cast<uint8_t>(bytes_[at_++]);
   }
 
@@ -284,7 +284,7 @@ std::string pack_images(const std::vector<ReplayCamera>& cameras, std::string_vi
 
 std::string unpack_images(const std::vector<ReplayCamera>& cameras, std::string_view group, int count) {
   std::string frames(bytes_of_frame(cameras) * static_cast<size_t>(count), '\0');
-  PICTURA_CHECK(group.size() >= kChecksumBytes, "images: a group ends too early, after {} bytes", group.size());
+  PICTURA_CHECK(group.size() >= kChecksumBytes, "images: a group is truncated after {} bytes", group.size());
   const std::string_view coded = group.substr(0, group.size() - kChecksumBytes);
   auto coder = std::make_unique<PixelCoder<Decoder>>(Decoder(coded));
   code_frames(
@@ -292,7 +292,7 @@ std::string unpack_images(const std::vector<ReplayCamera>& cameras, std::string_
       [&frames](size_t at, Pixel pixel) { std::memcpy(frames.data() + at, &pixel, 3); });
   uint32_t sum = 0;
   for (const char byte : group.substr(coded.size())) sum = sum << 8 | static_cast<uint8_t>(byte);
-  PICTURA_CHECK(sum == checksum(frames), "images: a group is damaged: its checksum is another");
+  PICTURA_CHECK(sum == checksum(frames), "images: a group is damaged: wrong checksum");
   return frames;
 }
 

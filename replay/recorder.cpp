@@ -396,7 +396,7 @@ void Recorder::set_origin(ReplayOrigin origin) {
 
 void Recorder::forget() {
   Replay& replay = parts_->replay;
-  PICTURA_CHECK(replay.followed < 0, "replay: frames that hold decisions or images cannot be forgotten");
+  PICTURA_CHECK(replay.followed < 0, "replay: frames with decisions or images cannot be discarded");
   const auto keep_last = [](auto& values, int32_t count) { values.erase(values.begin(), values.end() - count); };
   for (std::vector<int32_t>& track : replay.tracks) keep_last(track, replay.num_agents);
   keep_last(replay.lights, replay.num_lights);

@@ -36,7 +36,7 @@ constexpr std::chrono::seconds kHeartbeat{10};  // reveals to the server that a 
 std::string random_token() {
   std::array<unsigned char, kTokenBytes> bytes{};
   if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
-    throw std::system_error(errno, std::generic_category(), "serve: no random numbers");
+    throw std::system_error(errno, std::generic_category(), "serve: the system gives no random numbers");
   }
   std::string token;
   for (const unsigned char byte : bytes) token += fmt::format("{:02x}", byte);
@@ -90,7 +90,7 @@ struct LiveServer::Parts {
           [this](const HttpRequest& request, HttpAnswer& answer) { answer_request(request, answer); });
     } catch (const std::system_error& error) {
       fail("serve: cannot listen on {}:{}: {}", everywhere ? "0.0.0.0" : "127.0.0.1", options.port,
-           error.code() == std::errc::address_in_use ? "is the port taken?" : error.code().message());
+           error.code() == std::errc::address_in_use ? "is the port in use?" : error.code().message());
     }
     const int port = server->port();
     address = fmt::format("http://{}:{}/{}/", everywhere ? host_name : "127.0.0.1", port, token);
@@ -129,7 +129,7 @@ struct LiveServer::Parts {
       take_request(request);
       answer.send(204, "", "");
     } else {
-      throw HttpRefusal{404, "nothing here"};
+      throw HttpRefusal{404, "not found"};
     }
   }
 
@@ -150,7 +150,7 @@ struct LiveServer::Parts {
     const std::string_view path = request.path;
     if (path.size() < token.size() + 2 || !is_equal(path.substr(1, token.size()), token) ||
         path[token.size() + 1] != '/') {
-      throw HttpRefusal{404, "nothing here"};
+      throw HttpRefusal{404, "not found"};
     }
   }
 
@@ -159,7 +159,7 @@ struct LiveServer::Parts {
     {
       const std::lock_guard lock(mutex);
       if (listeners.size() >= kMaxLivePages) {
-        throw HttpRefusal{503, fmt::format("{} pages listen already", kMaxLivePages)};
+        throw HttpRefusal{503, fmt::format("{} pages are already connected", kMaxLivePages)};
       }
       listeners.push_back(listener);
     }
@@ -201,7 +201,7 @@ struct LiveServer::Parts {
     try {
       const LiveRequest asked = parse_live_request(request.body, options.num_agents);
       const std::lock_guard lock(mutex);
-      if (requests.size() >= kMaxWaitingMessages) throw HttpRefusal{503, "too many requests wait"};
+      if (requests.size() >= kMaxWaitingMessages) throw HttpRefusal{503, "too many pending requests"};
       requests.push_back(asked);
     } catch (const Error& error) {
       throw HttpRefusal{400, error.what()};

@@ -197,7 +197,7 @@ class CameraView {
         gl.attachShader(made, shader);
       }
       gl.linkProgram(made);
-      if (!gl.getProgramParameter(made, gl.LINK_STATUS) && !gl.isContextLost()) throw new Error(gl.getProgramInfoLog(made) || "its WebGL2 takes no program");
+      if (!gl.getProgramParameter(made, gl.LINK_STATUS) && !gl.isContextLost()) throw new Error(gl.getProgramInfoLog(made) || "its WebGL2 rejects the shader program");
       return { program: made, ...Object.fromEntries(uniforms.map(name => [name, gl.getUniformLocation(made, name)])) };
     };
     this.face = program(FACE_VERTEX_SHADER, FACE_FRAGMENT_SHADER, ["eye", "right", "down", "ahead", "projection", "focal", "positions", "floor_px"]);
@@ -298,7 +298,7 @@ class CameraView {
   // not drawn, `added` road users are: bodies with positions.
   draw(agent, frame, { hidden = [], added = [] }, contexts) {
     const { gl, replay, header } = this, body = replay.body(agent, frame), pose = replay.pose(agent, frame);
-    if (gl.isContextLost()) throw new Error("its WebGL2 was taken away");
+    if (gl.isContextLost()) throw new Error("its WebGL2 context was lost");
     const c = Math.cos(pose.heading_deg * Math.PI / 180), s = Math.sin(pose.heading_deg * Math.PI / 180);
     const turned = ([x, y, z]) => [x * c - y * s, x * s + y * c, z];
     const back = header.classes[body.agentClass].reference_to_center * body.length_m, shrink = Math.min(1, body.length_m / RIG_BODY_M);

@@ -31,7 +31,7 @@ function bytesOfBase64(text) {
 
 async function inflated(bytes, size) {
   if (typeof DecompressionStream === "undefined") {
-    throw new Damaged("This browser is too old to read the replay: it lacks DecompressionStream. Any of 2023 or later has it.");
+    throw new Damaged("This browser is too old to read the replay: it lacks DecompressionStream. Browsers of 2023 or later have it.");
   }
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   const out = new Uint8Array(await new Response(stream).arrayBuffer());
@@ -44,7 +44,7 @@ class NumberReader {
   next() {
     let bits = 0, shift = 0, byte;
     do {
-      if (this.at >= this.bytes.length || shift > 28) throw new Damaged("its numbers end too early");
+      if (this.at >= this.bytes.length || shift > 28) throw new Damaged("its numbers are truncated");
       byte = this.bytes[this.at++];
       bits |= (byte & 127) << shift;
       shift += 7;
@@ -56,7 +56,7 @@ class NumberReader {
   // Reads `columns` columns, one after the other, each through all frames.
   columns(columns, frames, order) {
     // Each number takes at least a byte, which is checked before memory is allocated for a corrupted count.
-    if (columns * frames > this.bytes.length) throw new Damaged("its numbers end too early");
+    if (columns * frames > this.bytes.length) throw new Damaged("its numbers are truncated");
     const values = new Int32Array(columns * frames);
     for (let column = 0, i = 0; column < columns; ++column) {
       let value = 0, difference = 0;
@@ -151,13 +151,13 @@ class Replay {
         this.units[name] = track.unit;
       }
       // Remaining bytes were written for another header.
-      if (name !== "conditioning" && !reader.isAtEnd) throw new Damaged(`its section ${name} has more numbers than its header says`);
+      if (name !== "conditioning" && !reader.isAtEnd) throw new Damaged(`its section ${name} has more numbers than its header declares`);
     }
     for (const name of [...SECTIONS, ...orders.keys()]) {
       if (!header.sections.some(section => section.name === name)) throw new Damaged(`it lacks the section ${name}`);
     }
     const perEpisode = agents * header.conditioning.length;
-    if (conditioning.length !== this.episodes.length * perEpisode) throw new Damaged("its conditioning is not that of its agents and episodes");
+    if (conditioning.length !== this.episodes.length * perEpisode) throw new Damaged("its conditioning does not match its agents and episodes");
     this.episodes.forEach((episode, i) => { episode.conditioning = conditioning.subarray(i * perEpisode, (i + 1) * perEpisode); });
     this.stride = frames;
     this.episodeOf = new Uint16Array(frames);
@@ -282,7 +282,7 @@ const HEADER = {
 
 function checkHeader(header) {
   const check = (value, kind, where) => {
-    const refuse = wanted => { throw new Damaged(`its header: ${where.join(".")}: expected ${wanted}, got ${value === undefined ? "nothing" : JSON.stringify(value).slice(0, 40)}`); };
+    const refuse = wanted => { throw new Damaged(`its header: ${where.join(".")}: expected ${wanted}, got ${value === undefined ? "no value" : JSON.stringify(value).slice(0, 40)}`); };
     if (kind === "count") { if (!Number.isInteger(value) || value < 0) refuse("a whole number"); }
     else if (typeof kind === "string") { if (typeof value !== kind) refuse(`a ${kind}`); }
     else if (Array.isArray(kind)) {
@@ -306,7 +306,7 @@ function checkHeader(header) {
 async function readReplay() {
   const text = id => {
     const element = document.getElementById(id);
-    if (!element) throw new Damaged("the file ends too early; was it copied whole?");
+    if (!element) throw new Damaged("the file is truncated; was it copied completely?");
     return element.textContent;
   };
   let header;
@@ -316,8 +316,8 @@ async function readReplay() {
     if (error instanceof Damaged) throw error;
     throw new Damaged("its header cannot be read");
   }
-  if (header.format !== "pictura replay") throw new Damaged("its header is of something else");
-  if (header.version !== 2) throw new Damaged(`it is of version ${header.version}, this page reads version 2`);
+  if (header.format !== "pictura replay") throw new Damaged("its header is not that of a replay");
+  if (header.version !== 2) throw new Damaged(`its version is ${header.version}, this page reads version 2`);
   checkHeader(header);
   const whole = header.sections.reduce((sum, section) => sum + section.bytes, 0);
   try {

@@ -10,7 +10,7 @@ class BitReader {
     for (let i = 0; i < 5; ++i) this.code = (this.code * 256 + this.next()) >>> 0;  // the first byte is 0
   }
   next() {
-    if (this.at >= this.bytes.length) throw new Error("a group of images ends too early");
+    if (this.at >= this.bytes.length) throw new Error("a group of images is truncated");
     return this.bytes[this.at++];
   }
   // Decodes a bit with the probability `i` of {zero, seen}.

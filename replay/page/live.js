@@ -2,7 +2,7 @@
 
 const MAX_LIVE_FRAMES = 8192, LIVE_PICTURES = 600;
 // An EventSource does not report why it is refused. The number is kMaxLivePages of replay/server.h.
-const REFUSED = "8 pages listen already, or the simulation has ended";
+const REFUSED = "8 pages are already connected, or the simulation has ended";
 
 class Refused extends Error {}
 

@@ -144,7 +144,7 @@ function show(replay, live) {
     const m = replay.header.metrics;
     const shown = [["km", m.km_driven.toFixed(1)], ["goals", m.goals_reached], ["collisions", m.collisions], ["off road", m.off_road], ["red lights", m.red_light], ["walls", m.wall_contacts]];
     // Numbers count agents that act; in a recording that is only played none does.
-    if (!live && m.agent_steps === 0) { byId("metrics").replaceChildren(make("li", "as recorded: nobody acts")); return; }
+    if (!live && m.agent_steps === 0) { byId("metrics").replaceChildren(make("li", "as recorded: no agent acts")); return; }
     byId("metrics").replaceChildren(...shown.map(([name, value]) => {
       const item = make("li");
       item.append(make("b", value), ` ${name}`);
@@ -326,7 +326,7 @@ function show(replay, live) {
   });
 
   // Running world.
-  const LIVE_TEXTS = { lost: "connection lost, trying again", refused: REFUSED, failed: "this page cannot read what it was sent", ended: "the simulation has ended" };
+  const LIVE_TEXTS = { lost: "connection lost, reconnecting", refused: REFUSED, failed: "this page cannot read the received data", ended: "the simulation has ended" };
   function showLive() {
     byId("live-state").textContent = LIVE_TEXTS[live.state] ?? (live.paused ? "paused" : "live");
     byId("live-state").className = live.state === "live" && !live.paused ? "on" : "";

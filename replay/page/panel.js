@@ -152,7 +152,7 @@ class Panel {
         word.style.color = theme[reason.color];
         return word;
       }));
-    } else line.textContent = status === "absent" ? `${status}: it found no place in this episode, or the recording does not have it now` : status === "recorded" ? `${size}, as recorded` : `${size}, ${status}, waypoint ${replay.raw("next_waypoint", agent, frame) + 1} of 3`;
+    } else line.textContent = status === "absent" ? `${status}: the agent found no place in this episode, or is not in the recording now` : status === "recorded" ? `${size}, as recorded` : `${size}, ${status}, waypoint ${replay.raw("next_waypoint", agent, frame) + 1} of 3`;
     const decision = replay.decision(agent, frame), before = Math.max(replay.episode(frame).first, frame - 1);
     const set = (key, value, digits, unit) => {
       this.facts[key].value.replaceChildren(Number.isFinite(value) ? decimals(value, digits) : "\u2013", make("small", ` ${unit}`));
@@ -173,9 +173,9 @@ class Panel {
 
   drawActions(frame, agent) {
     const { replay } = this, decision = replay.decision(agent, frame), chosen = replay.action(agent, frame);
-    byId("action-note").textContent = decision ? "probability of each, the chosen one framed"
-      : !replay.decisions || replay.followed < 0 ? "the chosen one framed"
-      : replay.isFollowed(agent, frame) ? "its policy is not asked now" : `the policy's probabilities are those of agent ${replay.followed}`;
+    byId("action-note").textContent = decision ? "probability of each action; frame: the chosen action"
+      : !replay.decisions || replay.followed < 0 ? "frame: the chosen action"
+      : replay.isFollowed(agent, frame) ? "its policy does not act now" : `the policy's probabilities are those of agent ${replay.followed}`;
     this.cells.forEach((cell, i) => {
       const p = decision ? decision.probabilities[i] : 0;
       cell.classList.toggle("chosen", i === chosen);

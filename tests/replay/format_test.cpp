@@ -104,7 +104,7 @@ TEST(ReplayFormat, NumbersOfAllSizesAreReadBack) {
   NumberReader reader(bytes);
   for (const int32_t number : numbers) EXPECT_EQ(reader.next(), number);
   EXPECT_TRUE(reader.is_at_end());
-  EXPECT_THAT(message_of([&] { reader.next(); }), HasSubstr("end too early"));
+  EXPECT_THAT(message_of([&] { reader.next(); }), HasSubstr("are truncated"));
   NumberReader too_long("\xff\xff\xff\xff\xff\xff");
   EXPECT_THAT(message_of([&] { too_long.next(); }), HasSubstr("expected a number of up to five bytes"));
 }
@@ -155,8 +155,8 @@ TEST(ReplayFormat, ImagesAreReadBackByteForByte) {
     EXPECT_EQ(unpack_images(cameras, pack_images(cameras, frames), count), frames);
   }
   const std::string packed = pack_images(cameras, any_frames(cameras, 2, &random));
-  EXPECT_THAT(message_of([&] { unpack_images(cameras, packed.substr(0, 40), 2); }), HasSubstr("ends too early"));
-  EXPECT_THAT(message_of([&] { unpack_images(cameras, packed.substr(0, 3), 2); }), HasSubstr("ends too early"));
+  EXPECT_THAT(message_of([&] { unpack_images(cameras, packed.substr(0, 40), 2); }), HasSubstr("is truncated"));
+  EXPECT_THAT(message_of([&] { unpack_images(cameras, packed.substr(0, 3), 2); }), HasSubstr("is truncated"));
   for (const size_t at : {size_t{9}, packed.size() / 2, packed.size() - 1}) {
     std::string damaged = packed;
     damaged[at] = static_cast<char>(damaged[at] ^ 4);
@@ -245,14 +245,14 @@ TEST(ReplayFormat, WhatIsDamagedIsNamed) {
   EXPECT_THAT(message(page.substr(0, data + 200)), HasSubstr("ends within a replay's numbers"));
   std::string flipped = page;
   flipped[data + 101] = flipped[data + 101] == 'A' ? 'B' : 'A';
-  EXPECT_THAT(message(flipped), HasSubstr("a damaged one"));
+  EXPECT_THAT(message(flipped), HasSubstr("a damaged stream"));
   EXPECT_THAT(message(without("\"version\":2,", "\"version\":3,")),
               HasSubstr("expected a replay of version 2, got version 3"));
   EXPECT_THAT(message(without("\"agents\":3", "\"agents\":4")), HasSubstr("a.html"));
   EXPECT_THAT(message(without("\"agents\":3", "\"agents\":-1")), HasSubstr("agents: expected"));
   EXPECT_THAT(message(without("\"frame\":49", "\"frame\":50")), HasSubstr("case: expected a frame below 50, got 50"));
   EXPECT_THAT(message(without("\"ego\":2", "\"ego\":3")), HasSubstr("case: expected an agent below 3, got 3"));
-  EXPECT_THAT(message(without("\"map_hash\"", "\"map_mash\"")), HasSubstr("a value is missing"));
+  EXPECT_THAT(message(without("\"map_hash\"", "\"map_mash\"")), HasSubstr("a missing value"));
   EXPECT_THAT(message(without("{\"format\"", "{\"format")), HasSubstr("damaged JSON"));
 }
 

@@ -200,7 +200,7 @@ class Http(Served):
         self.serve()
         # The command would wait for its first page: the timeout ends it if it does listen.
         result = subprocess.run([PICTURA, "simulate", *WORLD, "--serve", str(self.port)], capture_output=True, text=True, timeout=60)
-        self.assertEqual((result.returncode, result.stderr), (1, f"error: serve: cannot listen on 127.0.0.1:{self.port}: is the port taken?\n"))
+        self.assertEqual((result.returncode, result.stderr), (1, f"error: serve: cannot listen on 127.0.0.1:{self.port}: is the port in use?\n"))
         self.assertEqual(self.ask()[0].status, 200)
 
     def test_it_ends_after_its_steps_and_reports(self):
@@ -301,7 +301,7 @@ class Usage(unittest.TestCase):
             taken.listen()
             port = taken.getsockname()[1]
             result = subprocess.run([PICTURA, "simulate", *WORLD, "--serve", str(port)], capture_output=True, text=True, timeout=60)
-        self.assertEqual((result.returncode, result.stderr), (1, f"error: serve: cannot listen on 127.0.0.1:{port}: is the port taken?\n"))
+        self.assertEqual((result.returncode, result.stderr), (1, f"error: serve: cannot listen on 127.0.0.1:{port}: is the port in use?\n"))
 
 
 class Chromium(Served):
@@ -434,7 +434,7 @@ class Chromium(Served):
         self.browser.open_address(self.address)
         self.browser.wait_for("document.querySelector('#message.error')")
         message = self.browser.run("document.getElementById('message').innerText")
-        self.assertEqual(message.strip(), "This page cannot show the simulation: 8 pages listen already, or the simulation has ended.")
+        self.assertEqual(message.strip(), "This page cannot show the simulation: 8 pages are already connected, or the simulation has ended.")
         self.assertTrue(self.browser.run("document.getElementById('app').hidden"))
         # A slot is free once another page has gone.
         pages[0].close()

@@ -418,14 +418,14 @@ class Chromium(PageCase):
             return page[:at] + page[at:].replace(old, new, 1)
 
         for old, new, message in [
-            ('"frames":91,', '"frames":90,', "has more numbers than its header says"),
-            ('"frames":91,', '"frames":92,', "its numbers end too early"),
-            ('"frames":91,', '"frames":900000000,', "its numbers end too early"),
+            ('"frames":91,', '"frames":90,', "has more numbers than its header declares"),
+            ('"frames":91,', '"frames":92,', "its numbers are truncated"),
+            ('"frames":91,', '"frames":900000000,', "its numbers are truncated"),
             ('"agents":24,', '"agents":23,', "This replay is damaged"),
             ('"name":"y_m","bytes"', '"name":"why_m","bytes"', "unknown section why_m"),
             ('"followed":4,', '"followed":24,', "followed: expected an agent below 24, got 24"),
             ('"dt_s":', '"dt_s":"0.1","was":', 'dt_s: expected a number, got "0.1"'),
-            ('"width_px":', '"width":', "cameras.0.width_px: expected a whole number, got nothing"),
+            ('"width_px":', '"width":', "cameras.0.width_px: expected a whole number, got no value"),
         ]:
             with self.subTest(new):
                 self.assert_damaged(changed(old, new), message)

@@ -161,7 +161,7 @@ TEST(LiveServer, HasItsPortForItselfAndRefusesNamesThatNoBrowserSends) {
   const std::string address = first.address();
   const int port = std::stoi(address.substr(address.rfind(':') + 1));
   EXPECT_THAT(test::message_of([&] { LiveServer(LiveServerOptions{.port = port, .num_agents = 1}); }),
-              testing::HasSubstr("is the port taken?"));
+              testing::HasSubstr("is the port in use?"));
   const LiveServer named(LiveServerOptions{.host_name = "LocalHost", .num_agents = 1});
   EXPECT_THAT(named.address(), testing::StartsWith("http://localhost:"));
   for (const char* name : {"a b", "x/y", "a:1", "\"><script>"}) {
