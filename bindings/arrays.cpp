@@ -201,15 +201,15 @@ py::object dlpack_of(const LentArray& lent, const py::object& stream, const py::
   }
   const bool copies = !copy.is_none() && cast_checked<bool>(copy, lent.what, "copy=True, False or None");
   if (copies && !lent.array.device.is_host()) {
-    refuse(fmt::format("{}: is on {}, where it makes no copies: take it without one and copy it", lent.what,
-                       name_of(lent.array.device)));
+    refuse(fmt::format("{}: is on {}, where pictura cannot copy it: pass copy=False or None, then copy the result",
+                       lent.what, name_of(lent.array.device)));
   }
   const bool is_versioned = !max_version.is_none() && cast_checked<std::pair<uint32_t, uint32_t>>(
                                                           max_version, lent.what, "max_version (major, minor), or None")
                                                               .first >= 1;
   const bool is_read_only = lent.array.is_read_only && !copies;
   if (is_read_only && !is_versioned) {
-    refuse(fmt::format("{}: is read-only, which DLPack before 1.0 cannot say: pass max_version=(1, 0) or copy=True",
+    refuse(fmt::format("{}: is read-only, which DLPack before 1.0 cannot express: pass max_version=(1, 0) or copy=True",
                        lent.what));
   }
   order_before(lent, stream);
@@ -236,10 +236,10 @@ py::object dlpack_of(const LentArray& lent, const py::object& stream, const py::
 py::array numpy_of(const py::object& self) {
   const auto& lent = py::cast<const LentArray&>(self);
   if (!lent.array.device.is_host() || lent.array.type == ElementType::bf16) {
-    PyErr_SetString(PyExc_TypeError, fmt::format("{}: expected an array on cpu that NumPy has a type for, got {}; "
-                                                 "torch.from_dlpack takes it as it is",
-                                                 lent.what, lent.array.text())
-                                         .c_str());
+    PyErr_SetString(PyExc_TypeError,
+                    fmt::format("{}: expected an array on cpu with a NumPy type, got {}; use torch.from_dlpack",
+                                lent.what, lent.array.text())
+                        .c_str());
     throw py::error_already_set();
   }
   std::vector<py::ssize_t> shape, strides;
@@ -361,7 +361,7 @@ BorrowedArray borrow(const py::handle& object, std::string_view what, Stream str
     return borrowed;
   }
   PICTURA_CHECK(py::hasattr(object, "__dlpack__") && py::hasattr(object, "__dlpack_device__"),
-                "{}: expected an array that speaks DLPack (NumPy, torch, ...), got {}", what, type_name_of(object));
+                "{}: expected an array with DLPack (NumPy, torch, ...), got {}", what, type_name_of(object));
   const py::object capsule = capsule_of(object, what, stream);
   if (PyCapsule_IsValid(capsule.ptr(), kVersionedName)) {
     auto* tensor = static_cast<DLManagedTensorVersioned*>(PyCapsule_GetPointer(capsule.ptr(), kVersionedName));
@@ -387,7 +387,7 @@ BorrowedArray borrow_structs(const py::handle& object, std::string_view what, si
   if (array.dtype().kind() != 'V') return borrow(object, what, stream);
   PICTURA_CHECK(array.ndim() == 1 && static_cast<size_t>(array.itemsize()) == size &&
                     (array.size() <= 1 || static_cast<size_t>(array.strides(0)) == size),
-                "{}: expected structs of {} bytes, [n] without gaps, got {} dimensions of {} bytes", what, size,
+                "{}: expected structs of {} bytes, contiguous [n], got {} dimensions of {} bytes", what, size,
                 array.ndim(), array.itemsize());
   return borrow(array.attr("view")("uint8").attr("reshape")(array.size(), size), what, stream);
 }
@@ -422,8 +422,7 @@ contents change with the calls that write it.)")
             const bool same = dtype.is_none() || py::dtype::from_args(dtype).equal(view.attr("dtype"));
             if (same && (copy.is_none() || !py::cast<bool>(copy))) return view;
             if (!copy.is_none() && !py::cast<bool>(copy)) {
-              PyErr_SetString(PyExc_ValueError,
-                              "array: another element type needs a copy, and copy=False was asked for");
+              PyErr_SetString(PyExc_ValueError, "array: another element type needs a copy, and copy=False was given");
               throw py::error_already_set();
             }
             return view.attr("astype")(dtype.is_none() ? view.attr("dtype") : dtype);

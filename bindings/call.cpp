@@ -27,10 +27,11 @@ bool is_forked(std::atomic<pid_t>* process) {
 void check_process(std::string_view what, int num_threads, Device device) {
   PICTURA_CHECK(
       device.is_host() || !is_forked(&processes().of_cuda),
-      "{}: this process was forked after CUDA was used, which does not survive that: start processes by spawn", what);
+      "{}: this process was forked after CUDA was used, which does not survive a fork: use the start method spawn",
+      what);
   PICTURA_CHECK(num_threads == 1 || !is_forked(&processes().of_threads),
-                "{}: this process was forked after pictura had used several threads, which do not survive that: pass "
-                "num_threads=1, or start processes by spawn",
+                "{}: this process was forked after pictura had used several threads, which do not survive a fork: pass "
+                "num_threads=1, or use the start method spawn",
                 what);
 }
 
@@ -49,7 +50,7 @@ void for_each_class(const py::module_& module, F&& f) {
 void refuse_unmade_objects(const py::module_& module) {
   for_each_class(module, [](const py::object&, py::detail::type_info* info) {
     info->operator_new = [](size_t) -> void* {
-      fail("expected an object that was made by calling its class, got one of __new__ alone");
+      fail("expected an object created by calling its class, got an object created by __new__ alone");
     };
   });
 }

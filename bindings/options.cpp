@@ -84,16 +84,16 @@ void OptionsFunction::read(const py::args& by_place, const py::dict& by_name,
     refuse(fmt::format("got an unexpected keyword argument '{}'{}", given, suggestion(given, known)));
   }
   if (by_place.size() > required.size()) {
-    refuse(fmt::format("takes {} arguments by place, got {}", required.size(), by_place.size()));
+    refuse(fmt::format("takes {} positional arguments, got {}", required.size(), by_place.size()));
   }
   for (const Parameter& parameter : parameters) {
     const size_t place = std::find(required.begin(), required.end(), parameter.name) - required.begin();
     const bool is_named = by_name.contains(parameter.name), is_placed = place < by_place.size();
-    if (is_named && is_placed) refuse(fmt::format("got two values of '{}'", parameter.name));
+    if (is_named && is_placed) refuse(fmt::format("got two values for '{}'", parameter.name));
     if (is_named) parameter.set(by_name[parameter.name.c_str()]);
     if (is_placed) parameter.set(by_place[place]);
     if (!is_named && !is_placed && place < required.size()) {
-      refuse(fmt::format("misses the argument '{}'", parameter.name));
+      refuse(fmt::format("is missing the argument '{}'", parameter.name));
     }
   }
 }

@@ -493,7 +493,7 @@ class PyController {
   void act(const PySimulator& simulator) {
     const bool has_same_worlds = std::ranges::equal(of().maps(), maps_) && std::ranges::equal(of().worlds(), worlds_);
     PICTURA_CHECK(simulator.shared() == inside_.of && has_same_worlds,
-                  "Controller: expected the simulator, and the worlds, that it was made for");
+                  "Controller: expected its own simulator and worlds");
     inside_.controller->act(of().arrays(), {}, commands_->span, simulator.stream());
   }
   Span<const Command> commands() const { return commands_->span; }

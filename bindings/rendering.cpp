@@ -306,7 +306,8 @@ class PyRenderer {
                                : array.type == ElementType::bf16 ? PixelFormat::bf16
                                                                  : PixelFormat::u8;
     const ImageLayout layout = image_layout(renderer_->config().rig, num_views, format);
-    PICTURA_CHECK(layout.blocks.size() == 1, "render: out: expected pictura.Images, since the cameras have {} sizes",
+    PICTURA_CHECK(layout.blocks.size() == 1,
+                  "render: out: expected pictura.Images, since the cameras have {} different sizes",
                   layout.blocks.size());
     const ImageSize size = layout.blocks[0].size;
     const Dims shape{num_views, static_cast<int64_t>(layout.cameras.size()), 3, size.height_px, size.width_px};
@@ -318,7 +319,7 @@ class PyRenderer {
       case PixelFormat::bf16: {
         PICTURA_CHECK(
             array.shape == shape && array.device == renderer_->device() && array.is_contiguous() && !array.is_read_only,
-            "render: out: expected {} {} on {} that can be written, got {}", name_of(array.type), shape.text(),
+            "render: out: expected {} {} on {}, writable, got {}", name_of(array.type), shape.text(),
             name_of(renderer_->device()), array.text());
         first = array.data;
       }

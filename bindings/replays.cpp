@@ -128,7 +128,7 @@ class PyLiveView final : public StepObserver {
 
  private:
   LiveView& open() const {
-    PICTURA_CHECK(view_, "LiveView: it was closed");
+    PICTURA_CHECK(view_, "LiveView: is closed");
     return *view_;
   }
 

@@ -93,8 +93,7 @@ class ArrayReader {
     for (py::ssize_t i = 0; i < array.size(); ++i) {
       const int64_t code = array.data()[i];
       if (code >= 0 && code < count) continue;
-      fail_usage("{}: expected a number in [0, {}), which counts pictura.{}, got {}", element(key, array, i), count,
-                 names, code);
+      fail_usage("{}: expected an index in [0, {}) of pictura.{}, got {}", element(key, array, i), count, names, code);
     }
     return array;
   }
@@ -166,8 +165,7 @@ class ArrayReader {
 
   template <typename T>
   Numbers<T> read(const char* key, const Shape& shape, std::string_view kinds, const char* expected) const {
-    if (!arrays_.contains(key))
-      fail_usage("{}: expected an array of shape {}, got nothing", place(key), text_of(shape));
+    if (!arrays_.contains(key)) fail_usage("{}: expected an array of shape {}, got None", place(key), text_of(shape));
     const py::array given = py::array::ensure(arrays_[key]);
     if (!given) {
       PyErr_Clear();
@@ -237,7 +235,7 @@ std::set<int64_t> read_lanes(const py::dict& given, LoggedScene* scene) {
   for (py::ssize_t i = 0; i < lanes; ++i) {
     if (id.data()[i] < 0) fail_usage("{}: expected an id of 0 or more, got {}", arrays.place("id", i), id.data()[i]);
     if (ids.insert(id.data()[i]).second) continue;
-    fail_usage("{}: expected an id of its own, got {} again", arrays.place("id", i), id.data()[i]);
+    fail_usage("{}: expected a unique id, got {} again", arrays.place("id", i), id.data()[i]);
   }
   const Numbers<int64_t> type = arrays.codes("type", {lanes}, kLaneTypes, "LANE_TYPES");
   std::vector<LoggedPoints> lines = arrays.polylines(lanes);

@@ -105,7 +105,7 @@ def make_vec_for(policy, maps="procedural:3", num_agents: int = 16, **options):
 
     path = policy if isinstance(policy, (str, os.PathLike)) else getattr(policy, "metadata", {}).get("path")
     if path is None:
-        raise UsageError("policy: expected the name of a file, or a policy that pictura.torch.load_policy() read")
+        raise UsageError("policy: expected a file name, or a policy loaded by pictura.torch.load_policy()")
     session = __getattr__("PolicySession")(os.fspath(path), device="cpu")
     world = session.training_world()
     for of_the_session in ("device", "num_threads", "seed", "stagger_episodes"):

@@ -79,12 +79,12 @@ def _plain_values(data: bytes) -> Any:
             from_numpy = _NUMPY.fullmatch(whole)
             found = stand_ins.get(f"numpy {from_numpy[3]}" if from_numpy else whole)
             if found is None:
-                raise pickle.UnpicklingError(f"expected NumPy's arrays and builtins alone, got {whole}")
+                raise pickle.UnpicklingError(f"expected only NumPy arrays and builtins, got {whole}")
             return found
 
     def unwrapped(value: Any, depth: int = 0) -> Any:
         if depth > 20:
-            raise pickle.UnpicklingError("expected values within 20 others at most, got deeper ones")
+            raise pickle.UnpicklingError("expected values nested at most 20 deep, got deeper values")
         if isinstance(value, Array):
             return unwrapped(value.value, depth + 1)
         if isinstance(value, dict):
@@ -115,7 +115,7 @@ def _entry(mapping: Any, key: str, place: str) -> Any:
     if not isinstance(mapping, dict):
         raise _Fault(f"{place}: expected a dict, got {type(mapping).__name__}")
     if key not in mapping:
-        raise _Fault(f"{place}: expected '{key}', got nothing")
+        raise _Fault(f"{place}: expected '{key}', got no value")
     return mapping[key]
 
 
@@ -368,13 +368,13 @@ def load_scenarionet(path: str | os.PathLike[str]) -> pictura.Scenario:
     try:
         scene = _plain_values(pathlib.Path(path).read_bytes())
     except Exception as error:  # any error that the bytes cause in the unpickler
-        raise pictura.Error(f"{path}: no pickle of a scene: {type(error).__name__}: {error}") from None
+        raise pictura.Error(f"{path}: not a pickle of a scene: {type(error).__name__}: {error}") from None
     try:
         return pictura.Scenario.from_arrays(**_scenarionet_arrays(scene))
     except (_Fault, pictura.Error) as fault:
         raise pictura.Error(f"{path}: {fault}") from None
     except (TypeError, ValueError, OverflowError) as error:
-        raise pictura.Error(f"{path}: no scene of ScenarioNet: {error}") from error
+        raise pictura.Error(f"{path}: not a scene of ScenarioNet: {error}") from error
 
 
 _123D_LABELS = {

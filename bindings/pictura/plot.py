@@ -156,7 +156,7 @@ def _read_progress(folder: str) -> tuple[str, dict[str, list[float]]]:
     lines = pathlib.Path(path).read_text(encoding="utf-8").splitlines()
     names = lines[0].split(",") if lines else []
     for i, name in enumerate(names):
-        _need(name not in names[:i], f"{path}:1: column '{name}' stands twice")
+        _need(name not in names[:i], f"{path}:1: column '{name}' appears twice")
     columns: dict[str, list[float]] = {name: [] for name in names}
     for number, line in enumerate(lines[1:], 2):
         cells = line.split(",")
@@ -165,7 +165,7 @@ def _read_progress(folder: str) -> tuple[str, dict[str, list[float]]]:
             _need(i < len(names) and value is not None, f"{path}:{number}: expected {len(names)} numbers, got '{cell}' as number {i + 1}")
             columns[names[i]].append(value)  # type: ignore[arg-type]
         _need(len(cells) == len(names), f"{path}:{number}: expected {len(names)} numbers, got {len(cells)}")
-    _need(columns and len(columns[names[0]]) > 0, f"{path}: has no update yet")
+    _need(columns and len(columns[names[0]]) > 0, f"{path}: has no updates yet")
     return path, columns
 
 
@@ -178,7 +178,7 @@ def _read_run(folder: str, groups_seeds: bool) -> _Run:
     config_path = f"{folder}/config.toml"
     _need(
         os.path.exists(config_path),
-        f"{config_path}: expected beside progress.csv, to find runs that differ in their seed alone; --group none needs none",
+        f"{config_path}: expected beside progress.csv, to find runs that differ only in their seed; --group none does not need the file",
     )
     try:
         config = tomllib.loads(pathlib.Path(config_path).read_text(encoding="utf-8"))
@@ -233,7 +233,7 @@ def _height_at(curve: Series, x: float) -> float:
 def _mean_of_curves(curves: list[Series], name: str) -> Series:
     """Returns the mean of curves where all of them are defined, with a band from the lowest to the highest."""
     low, high = max(curve.x[0] for curve in curves), min(curve.x[-1] for curve in curves)
-    _need(low <= high, f"{name}: these runs have no stretch in common; --group none draws them apart")
+    _need(low <= high, f"{name}: these runs share no range; --group none draws them separately")
     last = max(len(curve.x) for curve in curves) - 1
     mean = Series(name)
     for i in range(last + 1):
@@ -311,7 +311,7 @@ def run_curves(runs: Sequence[str], metrics: Sequence[str] = METRICS, x: str = "
     panels = []
     for column in columns:
         title, unit = _labels_of(column)
-        panel = Panel(title, "time of collecting and improving (h)" if x == "hours" else "agent-steps", unit)
+        panel = Panel(title, "time of rollouts and updates (h)" if x == "hours" else "agent-steps", unit)
         for name, line in zip(line_names, members, strict=True):
             curves = [_curve_of(read[i], x, column) for i in line]
             panel.series.append(curves[0] if len(curves) == 1 else _mean_of_curves(curves, name))
@@ -504,10 +504,10 @@ def step_costs(results: Sequence[str]) -> Chart:
 def rank_rates(results: Sequence[str]) -> Chart:
     """Returns rates and efficiencies by number of GPUs, from files of scripts/gpu_ranks: with a fixed number of agents
     on each GPU, and with a fixed number in all."""
-    cases = {"each": "The same number of agents on each GPU", "in_all": "The same number of agents in all"}
+    cases = {"each": "The same number of agents on each GPU", "in_all": "The same total number of agents"}
     rates = {case: _sweep(title, "GPUs", _RATE) for case, title in cases.items()}
     efficiencies = {
-        case: Panel("Rate over GPUs times the rate of one", "GPUs", "efficiency", x_scale="log", starts_at_zero=True) for case in cases
+        case: Panel("Rate divided by (GPUs x rate of one GPU)", "GPUs", "efficiency", x_scale="log", starts_at_zero=True) for case in cases
     }
     for path in results:
         content = _read_json(path)
@@ -558,9 +558,9 @@ def breakdown_parts(results: Sequence[str], parts: Sequence[str], paper: dict[st
 # ---- probes
 
 TAKEOVER_STEP_S = 0.1
-_CASES = {"hidden": "hidden vehicle", "removed": "the same without it", "empty": "empty corner"}
+_CASES = {"hidden": "hidden vehicle", "removed": "the same without the user", "empty": "empty corner"}
 _CHANGES = {"d_value": ("Value", "dV"), "d_p_brake": ("Braking probability", "dP(brake)")}
-_SEEN = "strip: share that is seen, none (red) to all (blue)"
+_SEEN = "strip: visible share, none (red) to all (blue)"
 
 
 def _share_color(share: float) -> str:
@@ -703,7 +703,7 @@ def takeover_curves(folder: str, pair: int) -> Chart:
     for walls in ("on", "off"):
         panel = Panel(
             _with_walls("Speed towards the hidden vehicle", walls == "on"),
-            "time since the takeover (s)\nx: it enters the input, o: line of sight opens",
+            "time since the takeover (s)\nx: the vehicle enters the input, o: line of sight opens",
             "speed (m/s)",
         )
         marks: dict[float, str] = {}

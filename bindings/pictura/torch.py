@@ -141,7 +141,7 @@ class Policy(nn.Module):
     def __init__(self, config: Mapping[str, Any], num_cameras: int = 4, walls: bool = False) -> None:
         super().__init__()
         if config.get("backbone", "conv") != "conv":
-            raise pictura.UsageError(f"policy.backbone: expected 'conv', got '{config['backbone']}', which is a program of its own")
+            raise pictura.UsageError(f"policy.backbone: expected 'conv', got '{config['backbone']}', which is a separate program")
         _refuse_removed(config)
         self.config = dict(config)
         self.metadata: dict[str, Any] = {}
@@ -211,7 +211,7 @@ class Policy(nn.Module):
         if missing:
             raise pictura.UsageError(
                 f"observation: a {self.modality} policy reads {', '.join(names)}: expected '{missing[0]}', got {', '.join(observation)};"
-                " pictura.make_vec_for(policy) makes environments that show what it reads"
+                " pictura.make_vec_for(policy) makes environments with these observations"
             )
         return {name: _as_tensors(observation[name], self.actor.weight.device) for name in names}
 
@@ -249,7 +249,7 @@ class Policy(nn.Module):
         for number, (expected, got) in enumerate(zip(learnt, shown)):
             if got != expected:
                 raise pictura.UsageError(
-                    f"rgb: camera {number}: expected images of {expected[0]}x{expected[1]}, which the policy was trained with, got"
+                    f"rgb: camera {number}: expected images of {expected[0]}x{expected[1]}, as in training, got"
                     f" {got[0]}x{got[1]}; pictura.make_vec_for(policy) shows those, `pictura export --size` grows a policy"
                 )
         embedded, first = [], 0
@@ -294,7 +294,7 @@ def _read_safetensors(path: str) -> tuple[dict[str, Any], dict[str, Tensor]]:
         raise pictura.Error(f"{path}: no safetensors: {len(data)} bytes")
     (length,) = struct.unpack_from("<Q", data)
     if length > len(data) - 8:
-        raise pictura.Error(f"{path}: no safetensors, or truncated: its header has {length} bytes, the file {len(data)}")
+        raise pictura.Error(f"{path}: not safetensors, or truncated: its header has {length} bytes, the file {len(data)}")
     try:
         header = json.loads(data[8 : 8 + length])
     except ValueError as error:
@@ -321,7 +321,7 @@ def _read_checkpoint(path: str) -> tuple[dict[str, Any], bytearray, int]:
         raise pictura.Error(f"{path}: expected a checkpoint of version 2 and this byte order, got {version}, {order:#x}")
     (stored,) = struct.unpack_from("<Q", data, len(data) - 8)
     if _hash64(bytes(data[:-8])) != stored:
-        raise pictura.Error(f"{path}: damaged or truncated: its bytes do not have the hash that it ends with")
+        raise pictura.Error(f"{path}: damaged or truncated: its bytes do not match the hash at its end")
     return json.loads(data[size : size + length]), data, size + length
 
 
@@ -330,7 +330,7 @@ def _policy_of(config_toml: str, tensors: dict[str, Tensor], metadata: Mapping[s
         whole_config = tomllib.loads(config_toml)
         config = whole_config["policy"]
     except (tomllib.TOMLDecodeError, KeyError) as error:
-        raise pictura.Error(f"{path}: expected the configuration of its training, with a table 'policy': {error}") from error
+        raise pictura.Error(f"{path}: expected the training configuration, with a table 'policy': {error}") from error
     queries = tensors.get("attention.queries")
     # Allocates no memory: if the system overcommits memory, the sizes in a broken file could exhaust it.
     with torch.device("meta"):
@@ -338,7 +338,7 @@ def _policy_of(config_toml: str, tensors: dict[str, Tensor], metadata: Mapping[s
     weights = {name: tensor.to(torch.float32) if tensor.is_floating_point() else tensor for name, tensor in tensors.items()}
     missing, unexpected = policy.load_state_dict(weights, strict=False, assign=True)
     if missing or unexpected:
-        raise pictura.Error(f"{path}: of another architecture: expected {sorted(missing)}, got {sorted(unexpected)}")
+        raise pictura.Error(f"{path}: has a different architecture: expected {sorted(missing)}, got {sorted(unexpected)}")
     policy.metadata = {**metadata, "path": path, "config": whole_config}
     return policy
 
@@ -351,7 +351,7 @@ def _named(path: str) -> Iterator[None]:
     except (pictura.Error, OSError):
         raise
     except Exception as error:
-        raise pictura.Error(f"{path}: damaged, or no policy of this library: {type(error).__name__}: {error}") from error
+        raise pictura.Error(f"{path}: damaged, or not a policy of this library: {type(error).__name__}: {error}") from error
 
 
 def load_policy(path: str | os.PathLike[str], average: bool = False) -> Policy:
@@ -370,7 +370,7 @@ def load_policy(path: str | os.PathLike[str], average: bool = False) -> Policy:
 def _load(path: str, average: bool) -> Policy:
     if pathlib.Path(path).suffix != ".ckpt":
         if average:
-            raise pictura.Error(f"{path}: holds one set of weights: expected a checkpoint to choose the average of")
+            raise pictura.Error(f"{path}: holds one set of weights: expected a checkpoint for the weight average")
         metadata, tensors = _read_safetensors(path)
         texts = {name: json.loads(metadata[name]) for name in ("schema", "rig", "rate_factors") if metadata.get(name)}
         numbers = {name: int(metadata[name]) for name in ("update", "agent_steps") if name in metadata}
@@ -378,7 +378,7 @@ def _load(path: str, average: bool) -> Policy:
     header, data, begin = _read_checkpoint(path)
     tensors = {}
     if average and "average" not in header:
-        raise pictura.Error(f"{path}: holds no average of weights: expected a checkpoint of a run with train.weight_average")
+        raise pictura.Error(f"{path}: holds no weight average: expected a checkpoint of a run with train.weight_average")
     for entry in header["average" if average else "parameters"]:
         count = math.prod(entry["shape"])
         values = torch.frombuffer(data, dtype=torch.float32, count=count, offset=begin + entry["offset"])
@@ -410,7 +410,7 @@ def save_policy(policy: Policy, path: str | os.PathLike[str], like: str | os.Pat
             types = {name: _TYPES[entry["dtype"]] for name, entry in header.items()}
             weights = {name: value.to(types.get(name, value.dtype)) for name, value in weights.items()}
     if {name: shape for name, (shape, _) in entries.items()} != {name: list(value.shape) for name, value in weights.items()}:
-        raise pictura.Error(f"{like}: of another architecture than the policy: expected the same names and shapes of weights")
+        raise pictura.Error(f"{like}: its architecture differs from the policy: expected the same names and shapes of weights")
     for name, value in weights.items():
         raw = value.view(torch.uint8).numpy().tobytes()
         data[entries[name][1] : entries[name][1] + len(raw)] = raw
@@ -452,7 +452,7 @@ def _example_observation(policy: Policy) -> dict[str, Tensor]:
     example = {name: torch.zeros(2, *known[name][1], dtype=known[name][0]) for name in policy.observation_names if name != "rgb"}
     if policy.modality == "perspective":
         if "rig" not in policy.metadata:
-            raise pictura.UsageError("policy: expected one that load_policy() read, whose file says the size of its images")
+            raise pictura.UsageError("policy: expected a policy loaded by load_policy(), whose file gives the image size")
         blocks = [(size, len(list(group))) for size, group in itertools.groupby(tuple(each["size_px"]) for each in policy.metadata["rig"])]
         for number, ((width, height), cameras) in enumerate(blocks):
             name = "rgb" if len(blocks) == 1 else f"rgb_{number}"

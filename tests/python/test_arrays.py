@@ -112,7 +112,7 @@ def test_wrong_actions_are_refused_by_name(make):
     assert refusal(simulator, good[:12].astype(np.int64)) == f"{expected}, got i64 [12] on cpu"
     assert refusal(simulator, np.full(12, np.nan, np.float32)) == f"{expected}, got f32 [12] on cpu"
     assert refusal(simulator, good[:12].reshape(3, 4)) == f"{expected}, got i32 [3, 4] on cpu"
-    assert refusal(simulator, [0] * 12) == "step: actions: expected an array that speaks DLPack (NumPy, torch, ...), got list"
+    assert refusal(simulator, [0] * 12) == "step: actions: expected an array with DLPack (NumPy, torch, ...), got list"
     assert refusal(simulator, np.full(12, 12, np.int32)).startswith("step: slot 0: expected an action in [0, 12), got 12")
     assert refusal(simulator, np.full(12, -1, np.int32)).endswith("got -1")
     assert "DLPack's code 0 with 8 bits" in refusal(simulator, good[:12].astype(np.int8))

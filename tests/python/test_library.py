@@ -318,7 +318,7 @@ def test_a_controller_drives_in_the_worlds_that_it_was_made_for(make, name):
     simulator.run(controller, 3)
     other = pictura.Map.load("procedural:1:blocks=1x1")
     simulator.set_worlds([other], [(0, 8)])
-    with pytest.raises(pictura.Error, match="the worlds, that it was made for"):
+    with pytest.raises(pictura.Error, match="expected its own simulator and worlds"):
         simulator.run(controller, 1)
     simulator.run(pictura.Controller(name, simulator), 3)
 
@@ -351,9 +351,9 @@ def test_what_cannot_be_simulated_is_named(town):
             pictura.Simulator([town], [(0, 4)], **options)
     for arguments, options, message in (
         ([[town], [(0, 4)]], {"wals": True}, r"Simulator\(\) got an unexpected keyword argument 'wals'; did you mean 'walls'\?"),
-        ([[town]], {}, "misses the argument 'worlds'"),
-        ([[town], [(0, 4)]], {"maps": [town]}, "got two values of 'maps'"),
-        ([[town], [(0, 4)], "cpu"], {}, "takes 2 arguments by place, got 3"),
+        ([[town]], {}, "is missing the argument 'worlds'"),
+        ([[town], [(0, 4)]], {"maps": [town]}, "got two values for 'maps'"),
+        ([[town], [(0, 4)], "cpu"], {}, "takes 2 positional arguments, got 3"),
         ([[town], [(0, 4)]], {"parked_cars": "many"}, r"Simulator\(\).*\n.*parked_cars: typing.SupportsInt[^\n]*\n\nInvoked with: 'many'"),
     ):
         with pytest.raises(TypeError, match=message):

@@ -99,14 +99,14 @@ def test_what_is_missing_of_a_run_is_named(tmp_path):
     expect_refused("nowhere: expected the folder of a training run", goals, f"{tmp_path}/nowhere")
     (tmp_path / "empty").mkdir()
     expect_refused("/empty: expected the folder of a training run: it has no progress.csv", goals, f"{tmp_path}/empty")
-    expect_refused("young/progress.csv: has no update yet", goals, run_folder(tmp_path / "young"))
+    expect_refused("young/progress.csv: has no updates yet", goals, run_folder(tmp_path / "young"))
     expect_refused("is the same folder as", goals, a, a + "/.")
     expect_refused("a/progress.csv: expected a column 'speed'; it has update, ", plot.run_curves, [a], metrics=["speed"])
     expect_refused("'kept' may be a/kept or b/kept", plot.run_curves, [a], metrics=["kept"])
     assert plot.run_curves([a], metrics=["a/kept"]).facts["metrics"] == ["a/kept"]
-    expect_refused("no stretch in common", goals, a, run_folder(tmp_path / "b", 2, "50,1,1 60,1,1"))
+    expect_refused("share no range", goals, a, run_folder(tmp_path / "b", 2, "50,1,1 60,1,1"))
     progress.write_text("update,charts/agent_steps,charts/agent_steps\n1,2,3\n")
-    expect_refused("a/progress.csv:1: column 'charts/agent_steps' stands twice", goals, a)
+    expect_refused("a/progress.csv:1: column 'charts/agent_steps' appears twice", goals, a)
     for text, message in {"2,x,3": "got 'x' as number 2", "2,3": "got 2", "2,3,4,5": "got '5' as number 4", "2,1_0,3": "got '1_0' as number 2"}.items():
         progress.write_text(f"update,charts/agent_steps,driving/goals_per_1000_steps\n1,2,3\n{text}\n")
         expect_refused(f"a/progress.csv:3: expected 3 numbers, {message}", goals, a)

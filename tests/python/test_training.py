@@ -124,7 +124,7 @@ def test_environments_are_made_for_a_policy(trained):
         with pytest.raises(pictura.UsageError, match=f"expected images of {width}x{height}, .*, got {2 * width}x{2 * height}"):
             policy.act(shown)
     del policy.metadata["path"]
-    with pytest.raises(pictura.UsageError, match="policy: expected the name of a file"):
+    with pytest.raises(pictura.UsageError, match="policy: expected a file name"):
         pictura.make_vec_for(policy)
 
 
@@ -188,7 +188,7 @@ def test_what_does_not_fit_a_session_is_named(trained, session, town):
         with pytest.raises(pictura.Error, match="expected a renderer"):
             session.make_controller(simulator)
     other = world_of(session, town, agents=5)
-    with pytest.raises(pictura.Error, match="made for"):
+    with pytest.raises(pictura.Error, match="its own simulator"):
         session.make_controller(simulator, renderer).act(other)
     with pytest.raises(pictura.Error, match="nowhere.ckpt"):
         pictura.PolicySession("nowhere.ckpt")
@@ -535,7 +535,7 @@ def test_unknown_arguments_are_answered_with_the_nearest():
         expected = rf"{function.__name__}\(\) got an unexpected keyword argument '{name}'; did you mean '{nearest}'\?"
         with pytest.raises(TypeError, match=expected):
             function([], [], **{name: 3})
-    with pytest.raises(TypeError, match=r"PolicySession\(\) misses the argument 'checkpoint'"):
+    with pytest.raises(TypeError, match=r"PolicySession\(\) is missing the argument 'checkpoint'"):
         pictura.PolicySession(device="cpu")
 
 

@@ -54,7 +54,7 @@ class DriveEnv(gymnasium.Env):
                 if self.render_mode == "human":
                     self.batch.show(self._slot)
                 return self._observation(), self._info()
-        raise pictura.Error("reset: no vehicle found a place in 100 episodes: expected a map or an option that has room")
+        raise pictura.Error("reset: no vehicle found a place in 100 episodes: expected a map or options with more room")
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         if not self.action_space.contains(action):

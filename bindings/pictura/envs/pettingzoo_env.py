@@ -59,13 +59,13 @@ class DriveParallelEnv(ParallelEnv):
                 if self.render_mode == "human":
                     self.batch.show()
                 return self._observations(self.agents), self._infos(self.agents)
-        raise pictura.Error("reset: no agent found a place in 100 episodes: expected a map or an option that has room")
+        raise pictura.Error("reset: no agent found a place in 100 episodes: expected a map or options with more room")
 
     def step(self, actions: dict[str, Any]) -> tuple[dict, dict, dict, dict, dict]:
         acting = self.agents
         missing = [agent for agent in acting if agent not in actions]
         if missing:
-            raise pictura.Error(f"step: expected an action of every live agent, got none of {', '.join(missing)}")
+            raise pictura.Error(f"step: expected an action of every live agent, got no action of {', '.join(missing)}")
         width = 2 if self.batch.actions == "multi_discrete" else 1
         idle = divmod(pictura.IDLE_ACTION, 3) if width == 2 else pictura.IDLE_ACTION
         slots = {agent: self._slot(agent) for agent in acting}
