@@ -17,7 +17,7 @@ def main(steps: int = 500) -> None:
         simulator.step(random.integers(0, pictura.NUM_ACTIONS, simulator.num_slots, dtype=np.int32))
     seconds = time.perf_counter() - start
     totals = simulator.totals()
-    print(f"{simulator.num_slots} agents, {steps} steps in {seconds:.1f} s, {totals['episodes']} worlds began anew")
+    print(f"{simulator.num_slots} agents, {steps} steps in {seconds:.1f} s, {totals['episodes']} worlds restarted")
     for name in ("collisions", "off_road", "red_light", "wall_contacts", "waypoints_reached"):
         print(f"{name:18} {totals[name]:6} ({1000 * totals[name] / totals['agent_steps']:.2f} in 1000 agent-steps)")
 

@@ -301,7 +301,7 @@ class Check(OnADevice):
         self.assertEqual(self.measured("squares"), ["squares"])
 
     def test_only_that_matches_nothing_is_an_error(self):
-        error = "error: gpu_check: --only: expected what matches one of 'draw', 'squares', got 'plains'\n"
+        error = "error: gpu_check: --only: expected an expression that matches one of 'draw', 'squares', got 'plains'\n"
         self.assertEqual(self.check("--only", "plains", "profile", "squares"), (1, error))
 
     def test_only_is_a_regular_expression(self):
@@ -495,7 +495,7 @@ print(json.dumps({{"rows": rows, "policy_hash": "abc", "device": "cpu", "precisi
         (self.root / "b/a.safetensors").write_text("")
         result = self.run_script("--policies", self.root / "a.safetensors", self.root / "b/a.safetensors")
         self.assertEqual(result.returncode, 1)
-        self.assertIn("a.safetensors: expected names that differ, got 'a' twice", result.stderr)
+        self.assertIn("a.safetensors: expected distinct names, got 'a' twice", result.stderr)
 
 
 class Setup(unittest.TestCase):
