@@ -221,10 +221,10 @@ class HistoryBench {
       const std::vector<uint8_t> actual = images.view_of(all, static_cast<int64_t>(i));
       int64_t differing = 0;
       for (std::size_t k = 0; k < expected.size(); ++k) differing += actual[k] != expected[k];
-      PICTURA_CHECK(differing == 0,
-                    "bench history: slot {} of step {}: expected the images that were drawn at the time, got {} other "
-                    "values of {}",
-                    rows[i] % simulator_->num_slots(), rows[i] / simulator_->num_slots(), differing, expected.size());
+      PICTURA_CHECK(
+          differing == 0,
+          "bench history: slot {} of step {}: expected the images drawn at the time, got {} differing values of {}",
+          rows[i] % simulator_->num_slots(), rows[i] / simulator_->num_slots(), differing, expected.size());
     }
   }
 

@@ -48,7 +48,7 @@ StepBench::StepBench(Simulator* simulator, uint64_t seed)
     const DeviceBuffer<int32_t>& uploaded = actions_->device.emplace_back(Span<const int32_t>(set));
     actions_->sets.emplace_back(uploaded.data(), Dims{simulator->num_slots()}, simulator->device());
 #else
-    fail("step bench: simulator {}: this build reaches no device memory", simulator->name());
+    fail("step bench: simulator {}: this build does not support device memory", simulator->name());
 #endif
   }
 }

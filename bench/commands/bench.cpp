@@ -50,7 +50,8 @@ std::string population_of_crowds() {
 void add_maps_option(CLI::App* command, std::vector<std::string>* maps, const std::string& default_maps) {
   add_map_list_option(
       command, maps,
-      fmt::format("Maps, with commas between them, in turn; towns: all of the map folder; default: {}", default_maps));
+      fmt::format("Maps, separated by commas, used in turn; towns: all towns of the map folder; default: {}",
+                  default_maps));
 }
 
 std::vector<std::string> named_maps(const std::vector<std::string>& maps) {
@@ -123,7 +124,7 @@ void report_benchmark(bool json, const BenchContext& context, const std::vector<
 void add_compare_option(CLI::App* command, std::optional<EarlierReport>* earlier) {
   command->add_option_function<std::string>(
       "--compare", [earlier](const std::string& path) { earlier->emplace(path); },
-      "Also print the ratios to an earlier result, a file with what --json printed");
+      "Also print the ratios to an earlier result: a file with the output of --json");
 }
 
 void add_bench_command(CLI::App& app) {

@@ -274,29 +274,34 @@ void add_breakdown_benchmark(CLI::App& bench) {
   auto arguments = std::make_shared<BreakdownArguments>();
   TrainingCase& measured = arguments->measured;
   CLI::App* command = bench.add_subcommand(
-      "breakdown", "Where the time of an update goes, by size and renderer, beside the paper's table");
+      "breakdown", "Time of the parts of an update, by size and renderer, next to the paper's table");
   command->add_option("--config", measured.config_path, "TOML file")->capture_default_str();
-  command->add_option("--set", measured.overrides, "Override a key, as simulator.maps=[\"Town02\"]; may be given often")
+  command
+      ->add_option("--set", measured.overrides,
+                   "Override a key, for instance simulator.maps=[\"Town02\"]; may be given several times")
       ->allow_extra_args(false);
   command->add_option("--backend", arguments->backends, "Renderers: cpu, cuda, gl:egl, gl:osmesa, null")
       ->delimiter(',')
       ->capture_default_str();
-  command->add_option("--samples", arguments->samples, "Samples of a pixel, for gl: 1, N (MSAA) or NxN (supersampling)")
+  command->add_option("--samples", arguments->samples, "Samples per pixel, for gl: 1, N (MSAA) or NxN (supersampling)")
       ->delimiter(',')
       ->capture_default_str();
   command->add_option("--size", arguments->sizes, "Sizes in pixels, WxH; default: the paper's five")->delimiter(',');
-  command->add_option("--agents", arguments->agents, "Of each of the two worlds; default: both readings of the paper")
+  command
+      ->add_option("--agents", arguments->agents,
+                   "Agents of each of the two worlds; default: both readings of the paper")
       ->delimiter(',')
       ->transform(whole_number(1, kMaxAgentsPerWorld))
       ->capture_default_str();
   add_number_option(command, "--chunk", arguments->chunk,
-                    "Transitions through the network at once, or less where memory lacks", 1, 1 << 30);
-  command->add_option("--device", arguments->device, "What learns: cpu, cuda, cuda:N, auto")->capture_default_str();
+                    "Transitions per network pass, fewer if memory does not suffice", 1, 1 << 30);
+  command->add_option("--device", arguments->device, "Device of the network: cpu, cuda, cuda:N, auto")
+      ->capture_default_str();
   command->add_option("--simulator", arguments->simulator, "cpu, cuda, auto")->capture_default_str();
   command->add_flag("--host-steps", arguments->host_steps,
-                    "Also time the steps of an update by the simulator on the host, on their own");
-  add_number_option(command, "--warm-up", measured.warm_up, "Updates before those that are measured, in each case", 1);
-  add_number_option(command, "--updates", measured.updates, "Updates that are measured", 1);
+                    "Also time the simulator steps of an update on the host, separately");
+  add_number_option(command, "--warm-up", measured.warm_up, "Updates before the measured updates, in each case", 1);
+  add_number_option(command, "--updates", measured.updates, "Measured updates", 1);
   add_number_option(command, "--check", arguments->checked_views,
                     "Number of egos whose images are compared with the oracle's before each case", 0);
   add_plot_options(command, "Plot these results instead of measuring", &arguments->plot);

@@ -76,14 +76,15 @@ void run_history(HistoryArguments arguments) {
 void add_history_benchmark(CLI::App& bench) {
   auto arguments = std::make_shared<HistoryArguments>();
   HistoryCase& measured = arguments->measured;
-  CLI::App* command =
-      bench.add_subcommand("history", "Images of random agents of random steps, against those of the present scene");
+  CLI::App* command = bench.add_subcommand(
+      "history", "Images of random agents of random steps, compared with images of the present scene");
   add_maps_option(command, &arguments->maps);
   add_world_options(command, &arguments->world);
   command->add_option("--backend", measured.backend, "cpu or cuda: simulator, history and renderer")
       ->capture_default_str();
-  add_number_option(command, "--slots", arguments->slots, "So many agents in worlds of 1 to --agents", 1, kMaxSlots);
-  add_number_option(command, "--steps", measured.num_steps, "Of the history", 1, 1 << 16);
+  add_number_option(command, "--slots", arguments->slots, "Total number of agents, in worlds of 1 to --agents", 1,
+                    kMaxSlots);
+  add_number_option(command, "--steps", measured.num_steps, "Steps of the history", 1, 1 << 16);
   add_number_option(command, "--warm-up", measured.warm_up_steps, "Steps before the history begins", 0);
   add_number_option(command, "--views", measured.num_views, "Agents drawn in one call", 1, kMaxSlots);
   command->add_option("--size", arguments->size, "Pixels of an image, WxH")->capture_default_str();

@@ -124,12 +124,12 @@ void run_quality(QualityArguments arguments) {
 void add_quality_benchmark(CLI::App& bench) {
   auto arguments = std::make_shared<QualityArguments>();
   CLI::App* command = bench.add_subcommand("quality", "PSNR of images against a ray caster");
-  add_maps_option(command, &arguments->maps, "all towns of the map folder and two procedural ones");
+  add_maps_option(command, &arguments->maps, "all towns of the map folder and two procedural towns");
   command->add_option("--size", arguments->sizes, "Sizes, WxH; default: the paper's five")->delimiter(',');
   add_number_option(command, "--agents", arguments->world.agents, "Agents in each world", 1, kMaxAgentsPerWorld);
-  add_number_option(command, "--views", arguments->world.views, "Agents whose cameras are drawn, of each world", 1);
+  add_number_option(command, "--views", arguments->world.views, "Agents whose cameras are drawn, in each world", 1);
   add_number_option(command, "--steps", arguments->world.steps, "Steps of random actions before the images", 0);
-  add_seed_option(command, &arguments->world.seed, "Worlds are drawn from it");
+  add_seed_option(command, &arguments->world.seed, "Seed of the worlds");
   add_threads_option(command, &arguments->world.num_threads);
   command->add_flag("!--no-walls", arguments->world.walls, "Leave out the walls along the building lines");
   add_number_option(command, "--line-floor", arguments->line_floor_px, "Minimum width of a line on screen in pixels", 0,

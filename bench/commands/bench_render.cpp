@@ -224,7 +224,7 @@ void add_render_benchmark(CLI::App& bench) {
       ->delimiter(',')
       ->capture_default_str();
   command->add_option("--size", arguments->sizes, "Sizes in pixels, WxH; default: 96x54")->delimiter(',');
-  command->add_option("--samples", arguments->samples, "Samples of a pixel, for gl: 1, N (MSAA) or NxN (supersampling)")
+  command->add_option("--samples", arguments->samples, "Samples per pixel, for gl: 1, N (MSAA) or NxN (supersampling)")
       ->delimiter(',')
       ->capture_default_str();
   command->add_option("--format", arguments->format, "Type of a channel's value")
@@ -232,7 +232,7 @@ void add_render_benchmark(CLI::App& bench) {
       ->capture_default_str();
   add_number_option(
       command, "--patch", arguments->patch_px,
-      "Draw patches of 4, 8, 12 or 16 px squared, as first convolutions take them; default: planar images", 4, 16)
+      "Draw patches of 4, 8, 12 or 16 px squared, the input of first convolutions; default: planar images", 4, 16)
       ->check(one_of({"4", "8", "12", "16"}).description("{4,8,12,16}"));
   command->add_flag("--planes", arguments->planes, "Draw depth, class and instance planes too");
   command->add_flag("--host-memory", arguments->host_memory,

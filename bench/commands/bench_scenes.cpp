@@ -30,7 +30,7 @@ struct ScenesArguments {
 SceneEvaluation measured(const SceneEvaluateOptions& options) {
   SceneEvaluation evaluation = evaluate_scenes(options);
   if (evaluation.interrupted) throw Interrupted("interrupted");
-  PICTURA_CHECK(evaluation.results.scored() > 0, "bench scenes: expected a scene with somebody to drive, got none");
+  PICTURA_CHECK(evaluation.results.scored() > 0, "bench scenes: expected a scene with a road user to drive, got none");
   return evaluation;
 }
 
@@ -85,26 +85,26 @@ void run_scenes(const ScenesArguments& arguments) {
 void add_scenes_benchmark(CLI::App& bench) {
   auto arguments = std::make_shared<ScenesArguments>();
   SceneEvaluateOptions& options = arguments->evaluate;
-  CLI::App* command = bench.add_subcommand("scenes", "Evaluations in recorded scenes, as evaluate --protocol");
-  command->add_option("CHECKPOINT", options.checkpoint, "A checkpoint that train wrote, or safetensors");
-  command->add_option("--policy", options.controller, "A controller that drives instead, such as idm or random");
-  command->add_option("--protocol", arguments->protocol, "As evaluate has it")
+  CLI::App* command = bench.add_subcommand("scenes", "Evaluations in recorded scenes, like evaluate --protocol");
+  command->add_option("CHECKPOINT", options.checkpoint, "Checkpoint written by train, or safetensors");
+  command->add_option("--policy", options.controller, "Controller that drives instead, such as idm or random");
+  command->add_option("--protocol", arguments->protocol, "Protocol, as in evaluate")
       ->check(one_of(scene_protocol_names()))
       ->capture_default_str();
   command
       ->add_option("--scenes", options.scenes,
-                   "Files, folders of them, FILE#K or FILE#SCENARIO_ID, with commas between")
+                   "Files, folders of files, FILE#K or FILE#SCENARIO_ID, separated by commas")
       ->delimiter(',')
       ->allow_extra_args(false);
-  add_number_option(command, "--copies", arguments->copies, "How often each scene is evaluated in one measurement", 1,
-                    100'000);
+  add_number_option(command, "--copies", arguments->copies, "Evaluations of each scene per measurement", 1, 100'000);
   command
-      ->add_option("--rule", arguments->rules, "NAME=VALUE in place of one of the protocol's; may be given many times")
+      ->add_option("--rule", arguments->rules,
+                   "NAME=VALUE in place of a setting of the protocol; may be given several times")
       ->allow_extra_args(false);
   add_number_option(command, "--at-once", options.scenes_at_once,
-                    "Scenes that are simulated together; default: 256 on a device, 16 on the host", 1, 100'000);
+                    "Scenes simulated together; default: 256 on a device, 16 on the host", 1, 100'000);
   add_sampled_option(command, &options.argmax);
-  add_policy_backend_options(command, "auto, and drawn as in training", &options);
+  add_policy_backend_options(command, "auto, and as in training", &options);
   add_threads_option(command, &options.num_threads);
   add_number_option(command, "--repeats", arguments->repeats, "Measurements; the median is printed", 1, 1000);
   command->add_flag("--json", arguments->json, "Print one JSON object");

@@ -144,16 +144,17 @@ void run_simulate(SimulateArguments arguments) {
 
 void add_simulate_benchmark(CLI::App& bench) {
   auto arguments = std::make_shared<SimulateArguments>();
-  CLI::App* command = bench.add_subcommand("simulate", "Steps of worlds, observations included");
+  CLI::App* command = bench.add_subcommand("simulate", "Steps of worlds, including observations");
   add_maps_option(command, &arguments->maps);
   add_world_options(command, &arguments->world);
   command->add_option("--backend", arguments->backends, "cpu, cuda")->delimiter(',')->capture_default_str();
-  auto* worlds =
-      add_number_option(command, "--worlds", arguments->num_worlds, "Default: one for each map", 1, kMaxSlots);
-  auto* slots = add_number_option(command, "--slots", arguments->slots,
-                                  "So many agents in worlds of 1 to --agents, as in training, instead of equal worlds",
-                                  1, kMaxSlots)
-                    ->excludes(worlds);
+  auto* worlds = add_number_option(command, "--worlds", arguments->num_worlds, "Number of worlds; default: one per map",
+                                   1, kMaxSlots);
+  auto* slots =
+      add_number_option(command, "--slots", arguments->slots,
+                        "Total number of agents, in worlds of 1 to --agents, as in training, instead of equal worlds",
+                        1, kMaxSlots)
+          ->excludes(worlds);
   command
       ->add_option(
           "--sweep", arguments->sweep,

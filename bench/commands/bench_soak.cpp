@@ -122,9 +122,9 @@ void add_soak_benchmark(CLI::App& bench) {
   add_number_option(command, "--scenes", soak.max_scenes, "Maximum number of scenes; 0: limited by time only", 0);
   add_number_option(command, "--first", soak.first_scene,
                     "Number of the first scene; a number gives the same scene in every run", 0);
-  add_number_option(command, "--agents", soak.agents, "Maximum number of agents of a world", 1, kMaxAgentsPerWorld);
-  add_number_option(command, "--views", soak.views, "Views of a scene", 1, 4096);
-  add_seed_option(command, &soak.seed, "Worlds are drawn from it");
+  add_number_option(command, "--agents", soak.agents, "Maximum number of agents per world", 1, kMaxAgentsPerWorld);
+  add_number_option(command, "--views", soak.views, "Views per scene", 1, 4096);
+  add_seed_option(command, &soak.seed, "Seed of the worlds");
   add_threads_option(command, &soak.num_threads);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(

@@ -91,15 +91,16 @@ void add_train_benchmark(CLI::App& bench) {
   CLI::App* command = bench.add_subcommand("train", "Whole updates of a configuration");
   command->add_option("--config", measured.config_path, "TOML file")->capture_default_str();
   command
-      ->add_option("--set", measured.overrides, "Override a key, as simulator.num_slots=4096; may be given many times")
+      ->add_option("--set", measured.overrides,
+                   "Override a key, for instance simulator.num_slots=4096; may be given several times")
       ->allow_extra_args(false);
-  add_policy_backend_options(command, "as the configuration says", &arguments->backends);
-  command->add_option("--init-from", measured.init_from, "Begin with the weights of this checkpoint");
-  add_number_option(command, "--warm-up", measured.warm_up, "Updates before those that are measured", 1);
-  add_number_option(command, "--updates", measured.updates, "Updates that are measured, whatever train.updates says",
-                    1);
-  command->add_flag("--kernels", measured.profiles_kernels,
-                    "Time each kernel in one update more: the longest, and the share of the wall time without any");
+  add_policy_backend_options(command, "as in the configuration", &arguments->backends);
+  command->add_option("--init-from", measured.init_from, "Start with the weights of this checkpoint");
+  add_number_option(command, "--warm-up", measured.warm_up, "Updates before the measured updates", 1);
+  add_number_option(command, "--updates", measured.updates, "Measured updates, independent of train.updates", 1);
+  command->add_flag(
+      "--kernels", measured.profiles_kernels,
+      "Time each kernel in an additional update: the longest kernels, and the share of wall time without kernels");
   command->add_flag("--json", arguments->json, "Print one JSON object");
   add_compare_option(command, &arguments->earlier);
   add_plot_options(command, "Plot rates of scripts/gpu_ranks from its files instead of measuring", &arguments->plot);

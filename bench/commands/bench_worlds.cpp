@@ -47,12 +47,12 @@ void run_worlds(WorldsArguments arguments) {
 
 void add_worlds_benchmark(CLI::App& bench) {
   auto arguments = std::make_shared<WorldsArguments>();
-  CLI::App* command =
-      bench.add_subcommand("worlds", "Distributions over many episodes: who is there, what befalls them");
+  CLI::App* command = bench.add_subcommand("worlds", "Distributions over many episodes: agents and their events");
   add_maps_option(command, &arguments->maps, "all towns of the map folder, else procedural:1");
   add_number_option(command, "--episodes", arguments->options.episodes, "Episodes on each map", 1, 10'000);
-  add_number_option(command, "--agents", arguments->options.agents, "Asked for in each world", 1, kMaxAgentsPerWorld);
-  add_seed_option(command, &arguments->options.seed, "Worlds are drawn from it");
+  add_number_option(command, "--agents", arguments->options.agents, "Requested agents per world", 1,
+                    kMaxAgentsPerWorld);
+  add_seed_option(command, &arguments->options.seed, "Seed of the worlds");
   add_threads_option(command, &arguments->options.num_threads);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(

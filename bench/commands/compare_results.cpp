@@ -80,7 +80,7 @@ EarlierReport::EarlierReport(const std::string& path) : path_(path) {
                          !report_["results"].empty() && std::ranges::all_of(report_["results"], is_row);
   const auto is_text = [this](const char* key) { return !report_.contains(key) || report_[key].is_string(); };
   PICTURA_CHECK(is_report && is_text("commit") && is_text("device") && is_text("workload"),
-                "{}: expected what a benchmark printed with --json, an object with \"results\"", path);
+                "{}: expected the output of a benchmark's --json, an object with \"results\"", path);
 }
 
 void EarlierReport::add_comparison(Json* report_inout) const {
@@ -111,7 +111,7 @@ void EarlierReport::print_comparison(const Json& report) const {
       print_result("  the {} differs: {}\n", key, report_.value(key, "unknown"));
   }
   const std::vector<Comparison> comparisons = compare_results(report_["results"], report["results"]);
-  if (comparisons.empty()) print_result("  it has no result of these names\n");
+  if (comparisons.empty()) print_result("  it has no results of these names\n");
   for (const Comparison& each : comparisons) {
     print_result("{:50} {:>14.6g} -> {:<14.6g} {:18} x{:.3f} ({:.3f} to {:.3f}) {}\n", each.name, each.before,
                  each.after, each.unit, each.ratio, each.low, each.high, name_of(each.change));

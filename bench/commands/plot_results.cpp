@@ -9,7 +9,7 @@ namespace pictura {
 
 void add_plot_options(CLI::App* command, const std::string& description, PlotArguments* arguments) {
   command->add_option("--plot", arguments->results, description)->delimiter(',');
-  command->add_option("--figure", arguments->figure, "The picture of --plot, a PNG or .svg")
+  command->add_option("--figure", arguments->figure, "Picture of --plot: a PNG or .svg")
       ->check(file_ending(".png", ".svg"));
 }
 
@@ -27,7 +27,7 @@ void draw_results(const std::string& chart, const PlotArguments& arguments, Json
 
 void add_repeat_options(CLI::App* command, RateArguments* arguments) {
   add_number_option(command, "--repeats", arguments->repeats, "Measurements of each case; the median is printed", 1);
-  add_number_option(command, "--repeat-seconds", arguments->repeat_s, "Least length of a measurement, s", 1e-3, 3600);
+  add_number_option(command, "--repeat-seconds", arguments->repeat_s, "Minimum length of a measurement, s", 1e-3, 3600);
   command->add_flag("--json", arguments->json, "Print one JSON object");
 }
 

@@ -50,9 +50,9 @@ def main() -> None:
     arguments = sys.argv[at + 1 :]
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("commands", nargs="+")
-    parser.add_argument("--busy", default="0,1,2", help="how many busy processes, with commas between them")
+    parser.add_argument("--busy", default="0,1,2", help="numbers of busy processes, separated by commas")
     parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--max-foreign", type=float, default=0.05, help="share of the processors that others may take in a round")
+    parser.add_argument("--max-foreign", type=float, default=0.05, help="maximum share of the processors used by other processes in a round")
     args = parser.parse_args(sys.argv[1:at])
     for number in map(int, args.busy.split(",")):
         processes = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(number)]

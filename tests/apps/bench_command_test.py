@@ -123,7 +123,7 @@ class Benchmarks(CommandCase):
         self.assert_refused(1, "none.json", *simulate, "--compare", self.folder / "none.json")
         for bad in ("{", "[]", '{"results": []}', '{"results": [{"name": "cpu", "value": 1}]}'):
             earlier.write_text(bad)
-            self.assert_refused(1, "earlier.json: expected what a benchmark printed", "bench", "render", *self.QUICK, "--compare", earlier)
+            self.assert_refused(1, "earlier.json: expected the output of a benchmark's --json", "bench", "render", *self.QUICK, "--compare", earlier)
 
     def test_quality_is_measured_on_each_map_and_size(self):
         maps = ["--map", "procedural:1,procedural:2", "--agents", 4, "--steps", 1, "--views", 1]
