@@ -96,7 +96,7 @@ int run_command(int argc, char** argv) {
       "  pictura render procedural --agents 40 --steps 50 --views 4 --out images\n"
       "  pictura simulate procedural --agents 40 --steps 300 --video drive.mp4\n"
       "  pictura replay procedural --agents 40 --out drive.html\n" +
-      std::string(kExamplesOfTraining) + "Every subcommand has its own help: pictura render --help");
+      std::string(kExamplesOfTraining) + "Help of a subcommand: pictura render --help");
   add_town_command(app);
   add_map_command(app);
   add_render_command(app);

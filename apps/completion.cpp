@@ -8,8 +8,7 @@ namespace pictura {
 
 void add_completion_command(CLI::App& app) {
   auto shell = std::make_shared<std::string>();
-  CLI::App* command =
-      app.add_subcommand("completion", "Print a script by which a shell completes commands and options");
+  CLI::App* command = app.add_subcommand("completion", "Print a shell script that completes commands and options");
   command->add_option("SHELL", *shell, "bash, zsh or fish")->required();
   command->footer(
       "Examples:\n  source <(pictura completion bash)\n"

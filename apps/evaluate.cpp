@@ -117,16 +117,17 @@ void print_table(const Reports& reports) {
   for (const auto& [label, row] : rows) {
     if (row.left == 0) continue;
     print_result(
-        "{}: vehicles are lives on roads that end: {} of {} agents spawned, {} entered, {} left; {} goals/km\n", label,
-        row.spawned, row.asked, row.entered, row.left, interval_text(row.goals_per_km));
+        "{}: vehicles are counted per life on roads that end: {} of {} agents spawned, {} entered, {} left; {} "
+        "goals/km\n",
+        label, row.spawned, row.asked, row.entered, row.left, interval_text(row.goals_per_km));
   }
   for (const auto& [label, row] : rows) {
     if (row.never_moved_share.value < kManyNeverMoved) continue;
-    print_result("{}: {:.0f} % of the vehicles never moved, so that few infractions say little\n", label,
+    print_result("{}: {:.0f} % of the vehicles never moved, so few infractions mean little\n", label,
                  100 * row.never_moved_share.value);
   }
   print_result("traffic lights: {}\n", name_of(setting.light_cycles));
-  if (!setting.others.empty()) print_result("among others, by their shares: {}\n", fmt::join(setting.others, ", "));
+  if (!setting.others.empty()) print_result("shares of other drivers: {}\n", fmt::join(setting.others, ", "));
   if (reports.size() == 1 && setting.camera_severity > 0) {
     print_result("randomized cameras: severity {}\n", setting.camera_severity);
   }
@@ -166,7 +167,7 @@ void print_report(const EvaluateOptions& options, const Reports& reports, const 
 }
 
 void print_groups(const std::vector<InfractionGroup>& groups) {
-  print_result("{:10} {:>7} {:>7}  {}\n", "infraction", "count", "share", "of vehicles, the commonest");
+  print_result("{:10} {:>7} {:>7}  {}\n", "infraction", "count", "share", "of vehicles, the most frequent");
   std::map<std::string, int64_t> totals;
   for (const InfractionGroup& group : groups) totals[group.kind] += group.count;
   for (const auto& [kind, total] : totals) {
@@ -218,7 +219,7 @@ void check_driver(const DriverOptions& options, bool has_parts, bool has_scenes)
     fail_usage("--policy: expected one of {}; got '{}'", fmt::join(names, ", "), options.controller);
   }
   if (!options.controller.empty() && !(options.renderer.empty() && options.samples.empty())) {
-    fail_usage("--renderer, --samples: {} sees no images", options.controller);
+    fail_usage("--renderer, --samples: {} reads no images", options.controller);
   }
 }
 
@@ -230,8 +231,8 @@ EvaluateReport merged(const std::vector<std::string>& paths) {
   report.rows = rows_of(report.results);
   if (!report.results.counts_all_collisions) {
     print_message(
-        "notice: --merge: files of an earlier version count collisions at fault alone: collisions, walls and km "
-        "per infraction are unknown, km per at-fault infraction is what they called km per infraction\n");
+        "notice: --merge: files of an earlier version count only collisions at fault: collisions, walls and km per "
+        "infraction are unknown; their km per infraction is km per at-fault infraction\n");
   }
   return report;
 }
@@ -253,7 +254,7 @@ void evaluate_in_scenes(const CLI::App& command, const EvaluateArguments& argume
   const EvaluateOptions& evaluation = arguments.evaluation;
   check_driver(evaluation, /*has_parts=*/false, /*has_scenes=*/true);
   refuse_recording_options(command, "--replay or --gallery");
-  refuse_options(command, {"--light-heads"}, "in recorded scenes, whose heads all stand beyond their line");
+  refuse_options(command, {"--light-heads"}, "in recorded scenes, whose light heads are all beyond their stop line");
   refuse_options(command, {"--others"}, "in recorded scenes");
   if (arguments.severities.size() > 1) fail_usage("--camera-severity: in recorded scenes expected one, got several");
   SceneEvaluateOptions in_scenes;
@@ -286,7 +287,7 @@ void check_severities(const CLI::App& command, const EvaluateArguments& argument
 
 // Evaluates at each severity, in the same worlds, until an interrupt.
 Reports evaluate_severities(const std::vector<double>& severities, EvaluateOptions* evaluation) {
-  EvaluationProgress progress("the scenarios that are finished");
+  EvaluationProgress progress("the completed scenarios");
   const auto count = static_cast<double>(severities.size());
   Reports reports;
   evaluation->on_progress = [&](double done, double eta_s) {
@@ -318,7 +319,8 @@ void evaluate_in_towns(const CLI::App& command, EvaluateArguments* arguments) {
   if (lists_infractions && merges) fail_usage("--infractions: has no effect with --merge");
   if (!evaluation.others.empty()) {
     if (merges) fail_usage("--others: has no effect with --merge");
-    if (records || lists_infractions) fail_usage("--others: not with --replay, --gallery or --infractions");
+    if (records || lists_infractions)
+      fail_usage("--others: cannot be combined with --replay, --gallery or --infractions");
   }
   check_severities(command, *arguments);
   if (!arguments->gallery.empty()) {
@@ -343,7 +345,7 @@ void evaluate_in_towns(const CLI::App& command, EvaluateArguments* arguments) {
   for (const auto& [label, row] : labelled(reports)) finished += row.scenarios;
   const size_t num_densities = evaluation.agents_per_world > 0 ? 1 : evaluation.densities.size();
   throw Interrupted(
-      fmt::format("interrupted; {} of {} scenarios are finished, and counted above", finished,
+      fmt::format("interrupted; {} of {} scenarios are completed and counted above", finished,
                   arguments->severities.size() * num_densities * static_cast<size_t>(evaluation.scenarios)));
 }
 
@@ -378,18 +380,18 @@ void add_evaluate_command(CLI::App& app) {
   EvaluateOptions& options = arguments->evaluation;
   CLI::App* command = app.add_subcommand("evaluate", "Measure a policy's driving (the paper's protocols)");
   CLI::Option* const checkpoint =
-      command->add_option("CHECKPOINT", options.checkpoint, "A checkpoint that train wrote, or safetensors");
+      command->add_option("CHECKPOINT", options.checkpoint, "Checkpoint written by train, or safetensors");
   CLI::Option* const policy =
       command
           ->add_option(
               "--policy", options.controller,
-              fmt::format("Who drives instead of the checkpoint's policy, in its world, or, without a "
-                          "checkpoint, in the paper's: {}; in recorded scenes {}, random, idle or idm_lanes",
+              fmt::format("Controller that drives instead of the checkpoint's policy, in its world, or, without a "
+                          "checkpoint, in the paper's world: {}; in recorded scenes {}, random, idle or idm_lanes",
                           fmt::join(town_controller_names(), ", "), fmt::join(record_controller_names(), ", ")))
           ->check(one_of(host_controller_names()));
   command
       ->add_option("--merge", arguments->parts,
-                   "Instead of evaluating: join parts of one evaluation, which --out wrote, exactly")
+                   "Instead of evaluating: merge parts of one evaluation, written by --out, without loss")
       ->excludes(checkpoint)
       ->excludes(policy);
   add_evaluation_options(command, &arguments->evaluation)->excludes(policy);
@@ -397,55 +399,53 @@ void add_evaluate_command(CLI::App& app) {
   add_decision_steps_option(command, &options.decision_steps)->excludes(policy);
   command
       ->add_option("--density", arguments->densities,
-                   "light, medium, dense: 60, 120, 150 agents a world; with --protocol the shares of road users that "
-                   "stay, in %, as 100,75,50, by default the protocol's")
+                   "light, medium, dense: 60, 120, 150 agents per world; with --protocol the shares of road users that "
+                   "remain, in %, for instance 100,75,50; default: the protocol's")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->capture_default_str();
   command
       ->add_option("--others", options.others,
-                   fmt::format("Who else drives, as lane=0.25,models/vector.safetensors=0.25: policies' files or {}, "
-                               "each with its share of vehicles, or, with its share of agents, the policy itself "
-                               "while impaired: {}. A row each shows who drives well among whom",
+                   fmt::format("Other drivers, for instance lane=0.25,models/vector.safetensors=0.25: policy files or "
+                               "{}, each with its share of vehicles; or the policy itself while impaired, with its "
+                               "share of agents: {}. A table row per driver gives its metrics",
                                fmt::join(town_controller_names(), ", "), fmt::join(impairment_names(), ", ")))
       ->delimiter(',')
       ->allow_extra_args(false);
   command
       ->add_option("--scenarios", arguments->scenarios,
-                   "Scenarios per density: N, or A:B for the part of them from A up to but not including B; with "
-                   "--protocol scenes, by default all")
+                   "Scenarios per density: N, or A:B for the range from A up to, but excluding, B; with --protocol "
+                   "scenes; default: all")
       ->capture_default_str();
   CLI::Option* const rig = command->add_option(
-      "--rig", options.rig, "A rig file with as many cameras as in training, instead of those of training");
+      "--rig", options.rig, "Rig file with as many cameras as in training, instead of the cameras of training");
   rig->excludes(policy);
   command->add_option("--size", arguments->size, "Pixels of an image, WxH, of the paper's rig; default: as in training")
       ->excludes(rig)
       ->excludes(policy);
   command
-      ->add_option(
-          "--camera-severity", arguments->severities,
-          fmt::format(
-              "Randomizes cameras, by 0 (as mounted) to {}, 1 in full (docs/explanation/cameras.md): one number, "
-              "or several with commas between them, a row each, as 0,0.25,0.5,1",
-              kMaxCameraSeverity))
+      ->add_option("--camera-severity", arguments->severities,
+                   fmt::format("Randomizes cameras, by 0 (as mounted) to {}, 1 in full (docs/explanation/cameras.md): "
+                               "one number, or several separated by commas, a row each, for instance 0,0.25,0.5,1",
+                               kMaxCameraSeverity))
       ->delimiter(',')
       ->transform(number(0, kMaxCameraSeverity))
       ->allow_extra_args(false)
       ->excludes(policy);
   command->add_option("--backbone", options.backbone,
-                      "The program of policy.backbone, where it does not lie where it did in training");
-  command->add_option("--out", arguments->out, "A file for the counts of each scenario, or scene, which --merge reads");
+                      "Path of the program of policy.backbone, if it has moved since training");
+  command->add_option("--out", arguments->out, "File for the counts of each scenario or scene, for --merge");
   command
       ->add_option("--infractions", arguments->infractions,
-                   "A file for every infraction: where, with whom, at what speed; and a table of the commonest kinds")
+                   "File for every infraction: place, partner, speed; and a table of the most frequent kinds")
       ->check(file_ending(".csv"));
-  command->add_option("--replay", arguments->replay, "Record the worst scenario again, as a page that a browser plays")
+  command->add_option("--replay", arguments->replay, "Record the worst scenario again, as a page for browsers")
       ->check(file_ending(".html"));
   CLI::Option* const replays = add_number_option(command, "--replays", arguments->replays,
                                                  "Record the N worst scenarios again, into --gallery", 1);
   CLI::Option* const gallery = command->add_option(
       "--gallery", arguments->gallery,
-      "A folder for the pages of --replays, in place of an earlier gallery's, and an index of them");
+      "Folder for the pages of --replays and their index; replaces the pages of an earlier gallery");
   replays->needs(gallery);
   gallery->needs(replays);
   add_recording_options(command, &arguments->recording);
@@ -461,7 +461,7 @@ void add_evaluate_command(CLI::App& app) {
       "  pictura evaluate run.ckpt --density medium --scenarios 40 --others lane=0.3,idm_lanes=0.2\n"
       "  pictura evaluate run.ckpt --density medium --scenarios 40 --camera-severity 0,0.25,0.5,1\n"
       "  pictura evaluate run.ckpt --protocol robust\n"
-      "In parts, on several machines or after one another:\n"
+      "In parts, on several machines or in sequence:\n"
       "  pictura evaluate run.ckpt --scenarios 0:100 --out a.json\n"
       "  pictura evaluate run.ckpt --scenarios 100:200 --out b.json\n"
       "  pictura evaluate --merge a.json b.json\n"

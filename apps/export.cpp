@@ -16,21 +16,22 @@ void add_export_command(CLI::App& app) {
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("export", "Write the weights of a policy as safetensors");
-  command->add_option("POLICY", arguments->policy, "A checkpoint that train wrote, or safetensors")->required();
-  command->add_option("--out", arguments->out, "The file to write")->check(file_ending(".safetensors"))->required();
+  command->add_option("POLICY", arguments->policy, "Checkpoint written by train, or safetensors")->required();
+  command->add_option("--out", arguments->out, "File to write")->check(file_ending(".safetensors"))->required();
   command
       ->add_option("--weights", arguments->weights,
-                   "bf16: rounded to 8 significant bits, half the size; f32: as they are")
+                   "bf16: rounded to 8 significant bits, half the size; f32: unchanged")
       ->check(one_of({"bf16", "f32"}).description("{bf16,f32}"))
       ->capture_default_str();
   add_average_option(command, &arguments->average);
   command->add_option("--size", arguments->size,
-                      "Pixels of an image, WxH, a whole number of times those of the policy: its first convolution is "
-                      "spread over patches as many times as large; default: as they are");
+                      "Pixels of an image, WxH, an integer multiple of the policy's size: its first convolution is "
+                      "spread over patches larger by the same factor; default: unchanged");
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "The file holds what the policy needs to drive: weights, configuration, cameras. simulate, evaluate, replay and\n"
-      "train --init-from take it in the place of a checkpoint; a run cannot go on from it. ONNX models are written in\n"
+      "train --init-from accept it in place of a checkpoint; a run cannot be resumed from it. ONNX models are written "
+      "in\n"
       "Python: pictura.torch.export_onnx(pictura.torch.load_policy(POLICY), \"policy.onnx\").\n"
       "Examples:\n"
       "  pictura export runs/town01/checkpoint.ckpt --out town01.safetensors\n"

@@ -162,7 +162,7 @@ void run_map(const CLI::App& command, const MapArguments& arguments) {
   }
   if (command.count("--lenient") > 0) {
     fail_usage(
-        "--lenient: is gone: faults that have one sensible meaning are mended by default; --strict refuses them");
+        "--lenient: was removed: faults with a single sensible meaning are repaired by default; --strict rejects them");
   }
   if (arguments.full && !arguments.json) fail_usage("--full: lists elements as JSON; expected --json with it");
   if (is_scene_name(arguments.map)) return run_scene(arguments);
@@ -216,7 +216,7 @@ void add_map_command(CLI::App& app) {
       ->add_option("--png", arguments->png,
                    "Draw lanes, markings, edges, lights, signs, crosswalks, parking and building lines into this file")
       ->check(file_ending(".png"));
-  command->add_option("--svg", arguments->svg, "Draw the same as vector graphics")->check(file_ending(".svg"));
+  command->add_option("--svg", arguments->svg, "Draw the same picture as vector graphics")->check(file_ending(".svg"));
   add_number_option(command, "--size", arguments->size_px, "Longer side of the picture in pixels", 64, 16384);
   CLI::Option* box =
       command->add_option("--box", arguments->box, "Draw only this part: two corners, in the file's metres")
@@ -229,15 +229,15 @@ void add_map_command(CLI::App& app) {
           ->transform(number(-kFarthest_m, kFarthest_m))
           ->type_name("X Y")
           ->excludes(box);
-  add_number_option(command, "--radius", arguments->radius_m, "How far to draw around --at, in metres", 0.5,
-                    kFarthest_m)
+  add_number_option(command, "--radius", arguments->radius_m, "Radius around --at, in metres", 0.5, kFarthest_m)
       ->needs(at);
-  command->add_option("--xodr", arguments->xodr, "Write the map as OpenDRIVE, with only what the importer uses")
+  command
+      ->add_option("--xodr", arguments->xodr, "Write the map as OpenDRIVE, with only the elements used by the importer")
       ->check(file_ending(".xodr"));
   command->add_flag("--strict", arguments->strict,
-                    "Refuse every fault of the file, also those that are mended and counted by default");
+                    "Reject every fault of the file, including faults that are repaired by default");
   command->add_flag("--lenient")->group("");  // option of earlier versions: rejected with a hint to its replacement
-  command->add_flag("--json", arguments->json, "Print one JSON object; its mends list every fault that was mended");
+  command->add_flag("--json", arguments->json, "Print one JSON object; its key mends lists every repaired fault");
   command->add_flag("--full", arguments->full, "With --json: list every element with its position in the file");
   command->footer(
       "Examples:\n  pictura map Town01 --json\n  pictura map procedural:7 --png town.png\n"

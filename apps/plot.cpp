@@ -20,56 +20,53 @@ void add_plot_command(CLI::App& app) {
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("plot", "Draw curves of training runs");
-  command->add_option("RUN", arguments->runs, "Folders that pictura train wrote (--out)");
+  command->add_option("RUN", arguments->runs, "Folders written by pictura train --out");
   CLI::Option* const evaluations =
       command
           ->add_option("--evaluations", arguments->evaluations,
-                       "Instead of runs: a file of evaluations along trainings, as scripts/reproduce_table --curves "
-                       "writes it; five metrics of the protocol, a line at medium density in a band of all")
+                       "Instead of runs: a file of evaluations during training, as written by scripts/reproduce_table "
+                       "--curves; five metrics of the protocol, a line at medium density in a band of all densities")
           ->check(CLI::ExistingFile)
           ->excludes("RUN");
   CLI::Option* const severities =
       command
           ->add_option("--severities", arguments->severities,
-                       "Instead of runs: what evaluate --camera-severity --json printed; metrics of the protocol by "
+                       "Instead of runs: output of evaluate --camera-severity --json; metrics of the protocol by "
                        "severity, a line for each file and density in its 95 % interval")
           ->check(CLI::ExistingFile)
           ->excludes("RUN")
           ->excludes(evaluations);
-  command->add_option("--out", arguments->out, "The picture to write: a PNG, or vector graphics as .svg")
+  command->add_option("--out", arguments->out, "Picture to write: a PNG, or vector graphics as .svg")
       ->check(file_ending(".png", ".svg"))
       ->capture_default_str();
   command
       ->add_option("--x", arguments->x,
-                   "Over agent-steps, or hours of collecting and improving (of evaluations: of one GPU)")
+                   "Horizontal axis: agent-steps, or hours of rollouts and updates (for evaluations: of one GPU)")
       ->check(one_of({"agent_steps", "hours"}).description("{agent_steps,hours}"))
       ->capture_default_str()
       ->excludes(severities);
   command
       ->add_option("--metrics", arguments->metrics,
-                   "Columns of progress.csv, a panel each; what follows the slash is enough where one column has it; "
+                   "Columns of progress.csv, one panel each; the part after the slash suffices if it is unique; "
                    "default: return, goals, speed and three kinds of infractions")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->excludes(evaluations)
       ->excludes(severities);
   command
-      ->add_option(
-          "--group", arguments->group,
-          "seeds: runs whose config.toml differ in run.seed alone are one line, their mean, with a band from the "
-          "lowest to the highest; none: a line each")
+      ->add_option("--group", arguments->group,
+                   "seeds: runs whose config.toml differ only in run.seed are one line, their mean, with a band from "
+                   "the lowest to the highest; none: one line per run")
       ->check(one_of({"seeds", "none"}).description("{seeds,none}"))
       ->capture_default_str()
       ->excludes(evaluations)
       ->excludes(severities);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
-      "docs/reference/run_folder.md lists the columns. With many updates, points are means of consecutive updates. "
-      "A mean ends\n"
-      "where the first of its runs does.\n"
-      "Python 3.11 with Matplotlib draws (PICTURA_PYTHON names one). Without it the data is written to OUT.json, and "
-      "the\n"
-      "status is 1.\n"
+      "docs/reference/run_folder.md lists the columns. With many updates, points are means of consecutive updates.\n"
+      "A mean ends where the first of its runs does.\n"
+      "Python 3.11 with Matplotlib draws (PICTURA_PYTHON gives its path). Without it the data is written to OUT.json,\n"
+      "and the status is 1.\n"
       "Examples:\n"
       "  pictura plot runs/a runs/b --out curves.png\n"
       "  pictura plot runs/town01_seed* --x hours --metrics episode_return,off_road_per_km\n"

@@ -41,7 +41,7 @@ constexpr std::array<const char*, 3> kCornerExamples{
     "pictura probe corner agent.safetensors --map procedural:1,procedural:2 --density light --pairs 10 --min-speed 1"};
 
 constexpr const char* kCaseOfReplay =
-    "The case of --replay, as numbered in cases.csv; default: where the first policy's value changes most";
+    "Case of --replay, as numbered in cases.csv; default: where the first policy's value changes most";
 
 std::string footer(const std::array<const char*, 3>& examples) {
   return fmt::format(
@@ -64,13 +64,14 @@ void add_options(CLI::App* command, ProbeArguments<Probe>* arguments, const std:
                  const std::string& files, const std::array<const char*, 3>& examples) {
   Probe& probe = arguments->probe;
   command
-      ->add_option("POLICY", probe.policies, "Checkpoints that train wrote, or safetensors; the world is the first's")
+      ->add_option("POLICY", probe.policies,
+                   "Checkpoints written by train, or safetensors; the world is the first policy's")
       ->required();
   add_evaluation_options(command, &probe.worlds);
   visit_options(probe, FlagAdder(command));
   add_case_replay_options(command, &arguments->replay, case_help);
   arguments->out = "probe_" + command->get_name();
-  command->add_option("--out", arguments->out, "The folder for " + files)->capture_default_str();
+  command->add_option("--out", arguments->out, "Folder for " + files)->capture_default_str();
   command->add_flag("--json", arguments->json, "Print one JSON object, that of summary.json");
   command->footer(footer(examples));
 }
@@ -141,7 +142,7 @@ void print_table(const CornerResults& results, const std::vector<CornerRow>& row
   }
   print_result(
       "at the reveal, where line of sight past the walls opens; deceleration over the next 2 s, m/s2\n{}\n"
-      "{} of {} pairs, of {} states with somebody hidden and {} empty ones, in {}\n",
+      "{} of {} pairs, of {} states with a hidden vehicle and {} empty states, in {}\n",
       kEstimateNote, results.pairs.size(), results.pairs_asked, results.hidden_found, results.empty_found,
       format_duration(results.seconds));
 }
@@ -173,8 +174,8 @@ void report(const ProbeArguments<Probe>& arguments, const std::string& summary, 
 
 void add_removal_command(CLI::App& probe) {
   auto arguments = std::make_shared<ProbeArguments<RemovalOptions>>();
-  CLI::App* command = probe.add_subcommand(
-      "removal", "How value and braking change when one road user is taken away, by how occluded it is");
+  CLI::App* command =
+      probe.add_subcommand("removal", "How value and braking change when one road user is removed, by its occlusion");
   add_options(command, arguments.get(), kCaseOfReplay, "cases.csv, summary.json and removal.png", kRemovalExamples);
   command->callback([arguments] {
     check_case_number(arguments->replay, arguments->probe.removals);
@@ -185,8 +186,8 @@ void add_removal_command(CLI::App& probe) {
     write_removal_cases(cases_file, results);
     report(*arguments, removal_summary_json(results, rows, cases_file), results, rows, Json::array(), &out);
     if (results.interrupted) {
-      throw Interrupted(fmt::format("interrupted; {} of {} removals are done, and written to {}", results.cases.size(),
-                                    results.removals_asked, arguments->out));
+      throw Interrupted(fmt::format("interrupted; {} of {} removals are completed and written to {}",
+                                    results.cases.size(), results.removals_asked, arguments->out));
     }
     if (!arguments->replay.path.empty()) write_case_replay(arguments->replay, arguments->probe, results);
   });
@@ -195,7 +196,7 @@ void add_removal_command(CLI::App& probe) {
 void add_pedestrian_command(CLI::App& probe) {
   auto arguments = std::make_shared<ProbeArguments<PedestrianOptions>>();
   CLI::App* command = probe.add_subcommand(
-      "pedestrian", "How value and braking change as a pedestrian comes out from behind a vehicle and is hidden again");
+      "pedestrian", "How value and braking change as a pedestrian emerges from behind a vehicle and is hidden again");
   add_options(command, arguments.get(), kCaseOfReplay,
               "cases.csv, summary.json, pedestrian.png and path_000.png, path_001.png, ...", kPedestrianExamples);
   command->callback([arguments] {
@@ -216,7 +217,7 @@ void add_pedestrian_command(CLI::App& probe) {
     }
     report(*arguments, pedestrian_summary_json(results, rows, cases_file), results, rows, pages, &out);
     if (results.interrupted) {
-      throw Interrupted(fmt::format("interrupted; {} of {} paths are done, and written to {} without figures",
+      throw Interrupted(fmt::format("interrupted; {} of {} paths are completed and written to {} without figures",
                                     results.paths.size(), results.paths_asked, arguments->out));
     }
     if (!arguments->replay.path.empty()) write_case_replay(arguments->replay, arguments->probe, results);
@@ -226,8 +227,8 @@ void add_pedestrian_command(CLI::App& probe) {
 void add_corner_command(CLI::App& probe) {
   auto arguments = std::make_shared<ProbeArguments<CornerOptions>>();
   CLI::App* command = probe.add_subcommand(
-      "corner", "How policies drive on towards blind corners with a hidden vehicle, and towards empty ones like them");
-  add_options(command, arguments.get(), "The pair of --replay, as numbered in cases.csv; default: that of example.png",
+      "corner", "How policies approach blind corners with a hidden vehicle, and similar empty corners");
+  add_options(command, arguments.get(), "Pair of --replay, as numbered in cases.csv; default: the pair of example.png",
               "cases.csv, summary.json, corner.png and example.png", kCornerExamples);
   command->callback([arguments] {
     check_case_number(arguments->replay, arguments->probe.pairs);
@@ -243,7 +244,7 @@ void add_corner_command(CLI::App& probe) {
     }
     report(*arguments, corner_summary_json(results, rows, cases_file), results, rows, pages, &out);
     if (results.interrupted) {
-      throw Interrupted(fmt::format("interrupted; {} of {} pairs are done, and written to {}", results.pairs.size(),
+      throw Interrupted(fmt::format("interrupted; {} of {} pairs are completed and written to {}", results.pairs.size(),
                                     results.pairs_asked, arguments->out));
     }
     if (!arguments->replay.path.empty()) write_case_replay(arguments->replay, arguments->probe, results);
@@ -253,7 +254,7 @@ void add_corner_command(CLI::App& probe) {
 }  // namespace
 
 void add_probe_command(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("probe", "Ask policies what they see: probe removal, pedestrian, corner");
+  CLI::App* command = app.add_subcommand("probe", "Probe what policies respond to: removal, pedestrian, corner");
   command->require_subcommand(1);
   command->footer(footer({kRemovalExamples[0], kPedestrianExamples[0], kCornerExamples[0]}));
   add_removal_command(*command);

@@ -61,7 +61,7 @@ std::unique_ptr<Renderer> open_renderer(const RenderArguments& arguments, Render
   const std::string name = world.renderer.empty() ? "auto" : world.renderer;
   std::string choice;
   auto renderer = make_renderer(name, config, &choice);
-  PICTURA_CHECK(renderer->device().is_host(), "--renderer {}: pictures are written from host memory; choose cpu",
+  PICTURA_CHECK(renderer->device().is_host(), "--renderer {}: pictures are written from host memory; use cpu",
                 renderer->name());
   if (name == "auto") print_message("backend {}\n", choice);
   make_output_folder(arguments.out);
@@ -153,8 +153,8 @@ void render_scene_file(const RenderArguments& arguments) {
 /// Renderer configuration of a map's worlds.
 RendererConfig config_of(const RenderArguments& arguments) {
   const Pair size = parse_pair("--size", arguments.size, 8192);
-  if (!arguments.rig.empty() && arguments.size_given) fail_usage("--size: the rig of --rig has sizes of its own");
-  if (!arguments.rig.empty() && arguments.square_pixels) fail_usage("--square-pixels: has no effect beside --rig");
+  if (!arguments.rig.empty() && arguments.size_given) fail_usage("--size: the rig of --rig has its own sizes");
+  if (!arguments.rig.empty() && arguments.square_pixels) fail_usage("--square-pixels: has no effect with --rig");
   RendererConfig config;
   config.rig =
       arguments.rig.empty() ? paper_rig(size.first, size.second, arguments.square_pixels) : load_rig(arguments.rig);
@@ -220,25 +220,25 @@ void refuse_world_options(const CLI::App& command) {
                  {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--light-cycles",
                   "--light-heads", "--steps", "--views", "--size", "--square-pixels", "--rig", "--line-floor",
                   "--simulator", "--start", "--recorded-lights", "--tracks"},
-                 "on a scene file, which says that itself");
+                 "on a scene file, which defines it");
 }
 
 }  // namespace
 
 void add_render_command(CLI::App& app) {
   auto arguments = std::make_shared<RenderArguments>();
-  CLI::App* command = app.add_subcommand("render", "Write what the cameras of some agents see");
+  CLI::App* command = app.add_subcommand("render", "Write camera images of agents");
   add_map_or_scene(command, &arguments->world.map, "a scene file (.toml), ");
   add_world_options(command, &arguments->world);
   add_light_cycles_option(command, &arguments->world.light_cycles, name_of(SimulatorConfig{}.light_cycles));
   add_light_heads_option(command, &arguments->world.light_heads);
   add_number_option(command, "--steps", arguments->steps, "Steps of random actions before the pictures", 0);
-  add_number_option(command, "--views", arguments->views, "Draw the cameras of the first so many agents", 1);
+  add_number_option(command, "--views", arguments->views, "Number of agents whose cameras are drawn", 1);
   add_scene_options(command, &arguments->world);
   command->add_option("--tracks", arguments->tracks,
-                      "Of a recorded scene, whose cameras are drawn, of those who are there at --start: self, vehicles "
-                      "(the others), others (who is no vehicle), all, tracks_to_predict, objects_of_interest, and ids, "
-                      "with commas between them; default: self, or the first where the file does not say who that is");
+                      "Tracks of a recorded scene whose cameras are drawn, among those present at --start: self, "
+                      "vehicles (the others), others (non-vehicles), all, tracks_to_predict, objects_of_interest, and "
+                      "ids, separated by commas; default: self, or the first track if the file does not mark self");
   CLI::Option* size =
       command->add_option("--size", arguments->size, "Image size in pixels, WxH")->capture_default_str();
   command->add_flag("--square-pixels", arguments->square_pixels,
@@ -246,16 +246,14 @@ void add_render_command(CLI::App& app) {
   add_backend_options(command, "auto", &arguments->world);
   command->add_option("--rig", arguments->rig, "TOML file with [[camera]] tables instead of the paper's four cameras");
   add_number_option(command, "--line-floor", arguments->line_floor_px,
-                    "Least width of a line on screen in pixels; 0 turns it off", 0, kMaxLineFloor_px);
+                    "Minimum width of a line on screen in pixels; 0: no minimum", 0, kMaxLineFloor_px);
   command->add_option("--planes", arguments->planes, "Also write these planes as pictures: depth, class, instance")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(one_of({"depth", "class", "instance"}));
   command->add_flag("--figure", arguments->figure,
                     "Also write VIEW.png, its first camera enlarged with a caption, and figure.png with all of them");
-  command
-      ->add_option("--out", arguments->out,
-                   "Folder for the pictures; those that an earlier call wrote there are removed")
+  command->add_option("--out", arguments->out, "Folder for the pictures; pictures of an earlier call are removed")
       ->required();
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
@@ -274,7 +272,7 @@ void add_render_command(CLI::App& app) {
       refuse_options(*command,
                      {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--light-cycles",
                       "--light-heads", "--steps", "--views"},
-                     "on a recorded scene, which says that itself: --start and --tracks choose of it");
+                     "on a recorded scene, which defines it: --start and --tracks select from the scene");
       return render_recorded_scene(*arguments);
     }
     refuse_scene_options(*command, arguments->world.map, {"--tracks"});

@@ -89,20 +89,19 @@ void run_replay(const ReplayArguments& arguments) {
 
 void add_replay_command(CLI::App& app) {
   auto arguments = std::make_shared<ReplayArguments>();
-  CLI::App* command = app.add_subcommand("replay", "Record a world as a page that a browser plays");
+  CLI::App* command = app.add_subcommand("replay", "Record a world as a page for browsers");
   add_driving_options(command, &arguments->world, &arguments->steps, &arguments->policy);
   add_recording_options(command, &arguments->recording);
-  CLI::Option* const out =
-      command->add_option("--out", arguments->out, "The page to write")->check(file_ending(".html"));
+  CLI::Option* const out = command->add_option("--out", arguments->out, "Page to write")->check(file_ending(".html"));
   CLI::Option* const gallery =
       command->add_option("--gallery", arguments->gallery,
-                          "Instead of one page: a folder for pages of several seeds, in place of an earlier "
-                          "gallery's, and an index of all replays in it, worst first");
+                          "Instead of one page: a folder for pages of several seeds and an index of all replays in it, "
+                          "worst first; replaces the pages of an earlier gallery");
   gallery->excludes(out);
-  command->add_option("--mcap", arguments->mcap, "The same as an MCAP file, for Foxglove; with or without a page")
+  command->add_option("--mcap", arguments->mcap, "Also write an MCAP file, for Foxglove; with or without a page")
       ->check(file_ending(".mcap"))
       ->excludes(gallery);
-  add_number_option(command, "--episodes", arguments->episodes, "How many seeds, from --seed on, --gallery records", 1,
+  add_number_option(command, "--episodes", arguments->episodes, "Number of seeds, from --seed on, for --gallery", 1,
                     10000);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(

@@ -42,8 +42,8 @@ void print_table(const SceneEvaluation& evaluation) {
   const SceneProtocol& protocol = evaluation.results.protocol;
   print_settings(protocol);
   const SceneResults& results = evaluation.results;
-  print_result("{} scenes: {} scored, {} with nobody to drive, {} faults\n\n", evaluation.found, results.scored(),
-               results.without_drivers, evaluation.faults().size());
+  print_result("{} scenes: {} scored, {} without a road user to drive, {} faults\n\n", evaluation.found,
+               results.scored(), results.without_drivers, evaluation.faults().size());
   constexpr const char* kLine = "{:8} {:34} {:>8} {:>9} {:>17} {:>17} {:>17} {:>17} {:>17} {:>9}\n";
   print_result(fmt::runtime(kLine), "density", "agent", "scenes", "vehicles", "at-fault", "off-road", "goals",
                "collisions", "displacement m", "km");
@@ -64,7 +64,7 @@ void print_table(const SceneEvaluation& evaluation) {
   print_result("+- is the half width of a 95 % confidence interval over scenes\n");
   if (evaluation.seconds <= 0) return;
   const auto steps = static_cast<double>(results.agent_steps());
-  print_result("{} agent-steps in {}: {}/s, {:.1f} scenes a minute\n", format_count(steps),
+  print_result("{} agent-steps in {}: {}/s, {:.1f} scenes per minute\n", format_count(steps),
                format_duration(evaluation.seconds), format_count(steps / evaluation.seconds),
                60 * results.scored() / evaluation.seconds);
 }
@@ -145,31 +145,30 @@ void add_scene_options(CLI::App* command, SceneArguments* arguments) {
   command
       ->add_option("--protocol", arguments->protocol,
                    fmt::format("Evaluate in recorded scenes instead of on maps: womd, the paper's zero-shot protocol, "
-                               "or, with their settings, {}; or {}: in generated towns, among others and with "
-                               "randomized cameras, all of it fixed, so that drivers can be compared",
+                               "or, with their settings, {}; or {}: in generated towns, with other drivers and "
+                               "randomized cameras, all settings fixed, so that drivers can be compared",
                                fmt::join(names.begin() + 1, names.end(), ", "), kRobustProtocol))
       ->check(one_of(protocols));
   command
       ->add_option("--scenes", arguments->scenes,
-                   "Its scenes: files, folders of them, FILE#K or FILE#SCENARIO_ID, with commas between them")
+                   "Scenes of the protocol: files, folders of files, FILE#K or FILE#SCENARIO_ID, separated by commas")
       ->delimiter(',')
       ->allow_extra_args(false);
   command->add_option("--control", arguments->control,
-                      "Who is driven: self (or sdc), vehicles (the others), others (who is no vehicle), all, "
-                      "tracks_to_predict, objects_of_interest, and ids, with commas between them; default: the "
-                      "protocol's");
-  add_number_option(command, "--start", arguments->start_step,
-                    "The step of recordings to start at; default: the protocol's", 0, kMaxScenarioSteps - 1);
+                      "Driven tracks: self (or sdc), vehicles (the others), others (non-vehicles), all, "
+                      "tracks_to_predict, objects_of_interest, and ids, separated by commas; default: the protocol's");
+  add_number_option(command, "--start", arguments->start_step, "Start step in recordings; default: the protocol's", 0,
+                    kMaxScenarioSteps - 1);
   command
       ->add_option("--rule", arguments->rules,
-                   fmt::format("NAME=VALUE in place of one of the protocol's; may be given many times. {}",
+                   fmt::format("NAME=VALUE in place of a setting of the protocol; may be given several times. {}",
                                fmt::join(rules, "; ")))
       ->allow_extra_args(false);
-  command->add_option("--csv", arguments->csv, "A file with a row for every driven road user of every scene")
+  command->add_option("--csv", arguments->csv, "File with a row for every driven road user of every scene")
       ->check(file_ending(".csv"));
   command->add_option(
       "--rollouts", arguments->rollouts,
-      "A file for the rollouts, as the Waymo sim-agents challenge takes them: with --protocol simagents");
+      "File for the rollouts, in the format of the Waymo sim-agents challenge: with --protocol simagents");
   command
       ->add_option(
           "--realism", arguments->realism,
@@ -186,7 +185,7 @@ void refuse_idle_scene_options(const CLI::App& command, const SceneArguments& ar
   }
   refuse_options(command, {"--map", "--agents", "--merge", "--infractions", "--replay", "--replays", "--light-cycles"},
                  "with --protocol");
-  if (arguments.scenes.empty()) fail_usage("--protocol: expected --scenes as well");
+  if (arguments.scenes.empty()) fail_usage("--protocol: expected also --scenes");
 }
 
 void run_scene_evaluation(const CLI::App& command, const SceneArguments& arguments, int steps,
@@ -216,15 +215,15 @@ void run_scene_evaluation(const CLI::App& command, const SceneArguments& argumen
     check_rollouts(protocol);
     if (options.controller.empty() && options.argmax) {
       print_message(
-          "notice: the rollouts of a scene are equal, since the most likely actions are taken; --sampled "
-          "draws them\n");
+          "notice: the rollouts of a scene are equal, since the most likely actions are used; --sampled samples "
+          "actions\n");
     }
   }
   if (!arguments.rollouts.empty()) {
     rollouts = std::make_unique<RolloutsFile>(arguments.rollouts);
     options.on_rollouts = [&rollouts](const SceneRollouts& scene) { rollouts->write(scene); };
   }
-  EvaluationProgress progress("the scenes that are finished");
+  EvaluationProgress progress("the completed scenes");
   options.on_progress = [&progress](double done, double eta_s) { progress.update(done, eta_s); };
   const SceneEvaluation evaluation = evaluate_scenes(options);
   progress.finish();
@@ -233,7 +232,7 @@ void run_scene_evaluation(const CLI::App& command, const SceneArguments& argumen
   if (!out.empty()) write_results(out, evaluation.results);
   print(options, evaluation, json);
   if (evaluation.interrupted) {
-    throw Interrupted(fmt::format("interrupted; {} of {} scenes are finished, and counted above",
+    throw Interrupted(fmt::format("interrupted; {} of {} scenes are completed and counted above",
                                   evaluation.results.num_scenes, evaluation.found));
   }
 }

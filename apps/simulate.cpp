@@ -265,21 +265,19 @@ void add_simulate_command(CLI::App& app) {
   auto arguments = std::make_shared<SimulateArguments>();
   CLI::App* command = app.add_subcommand("simulate", "Drive a world and count what happens");
   add_driving_options(command, &arguments->world, &arguments->steps, &arguments->policy);
-  command->add_option(
-      "--video", arguments->video,
-      "Film it into this .mp4 or .gif: from above, with goals, lights and why agents halted, and from one "
-      "agent's cameras");
+  command->add_option("--video", arguments->video,
+                      "Film the world into this .mp4 or .gif: from above, with goals, lights and the reasons of halts, "
+                      "and from one agent's cameras");
   add_number_option(command, "--film-width", arguments->film_width_m,
-                    "Metres that it shows from above; 0: the whole map", 0, 1e5);
+                    "Width shown from above, in metres; 0: the whole map", 0, 1e5);
   add_number_option(command, "--film-agent", arguments->film_agent,
-                    "The agent that the film follows; default: 0, in recorded scenes the self-driving car", 0);
-  command->add_option("--replay", arguments->replay, "Record it as a page that a browser plays")
+                    "Agent that the film follows; default: 0, in recorded scenes the self-driving car", 0);
+  command->add_option("--replay", arguments->replay, "Record the world as a page for browsers")
       ->check(file_ending(".html"));
-  command->add_option("--mcap", arguments->mcap, "The same as an MCAP file, for Foxglove")->check(file_ending(".mcap"));
+  command->add_option("--mcap", arguments->mcap, "Also write an MCAP file, for Foxglove")->check(file_ending(".mcap"));
   command
-      ->add_option(
-          "--scene", arguments->scene,
-          "Save the first episode as a recorded scene, which SCENE may name: to the bit, lights as recorded ones")
+      ->add_option("--scene", arguments->scene,
+                   "Save the first episode as a recorded scene for SCENE: bit-exact, with recorded lights")
       ->check(file_ending(std::string(kSceneFileEnding)));
   add_serve_options(command, &arguments->serve);
   add_recording_options(command, &arguments->recording);

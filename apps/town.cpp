@@ -22,7 +22,7 @@ void add_town_command(CLI::App& app) {
   for (const TownFamily& family : town_families()) families.emplace_back(family.name);
   command
       ->add_option("--family", arguments->family,
-                   "Towns whose defaults options that are not given have; below are those of procedural")
+                   "Family of towns that sets the defaults; below are the defaults of procedural")
       ->check(CLI::IsMember(families))
       ->capture_default_str();
   command->add_option("--blocks", arguments->blocks, "Blocks of houses along x and y, as AxB")->capture_default_str();
@@ -30,7 +30,7 @@ void add_town_command(CLI::App& app) {
     add_number_option(command, fmt::format("--{}", feature.name), arguments->town.*feature.value, feature.help,
                       feature.low, feature.high);
   }
-  command->add_option("--out", arguments->out, "The .xodr file to write")->check(file_ending(".xodr"))->required();
+  command->add_option("--out", arguments->out, ".xodr file to write")->check(file_ending(".xodr"))->required();
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "A share above 0 selects at least one.\n"

@@ -23,29 +23,30 @@ void add_train_command(CLI::App& app) {
                    "TOML file; configs/ holds smoke, demo, town01, agent and paper")
       ->required();
   command
-      ->add_option("--set", arguments->train.overrides, "Override a key, as train.updates=2; may be given many times")
+      ->add_option("--set", arguments->train.overrides,
+                   "Override a key, for instance train.updates=2; may be given several times")
       ->allow_extra_args(false);
-  add_policy_backend_options(command, "as the configuration says", &arguments->backends);
+  add_policy_backend_options(command, "as in the configuration", &arguments->backends);
   command->add_option("--out", arguments->train.out_folder, "Folder for checkpoints, curves and logs")->required();
-  CLI::Option* const resume = command->add_flag("--resume", arguments->resume, "Go on from the checkpoint in --out");
+  CLI::Option* const resume = command->add_flag("--resume", arguments->resume, "Resume from the checkpoint in --out");
   command
       ->add_flag("--overwrite", arguments->overwrite,
-                 "Begin anew; the run that lies in --out is removed once the new one has a checkpoint")
+                 "Start a new run; the existing run in --out is removed once the new run has a checkpoint")
       ->excludes(resume);
   command
       ->add_option("--init-from", arguments->train.init_from,
-                   "Begin with the weights of this checkpoint or safetensors, of the same network at any image size")
+                   "Start with the weights of this checkpoint or safetensors, of the same network at any image size")
       ->excludes(resume);
-  add_number_option(command, "--minutes", arguments->train.minutes,
-                    "Save and end before this much wall time has passed, as far as the longest update until now tells; "
-                    "go on with --resume",
-                    1e-9, 1e9);
+  add_number_option(
+      command, "--minutes", arguments->train.minutes,
+      "Save and end before this wall time is over, estimated from the longest update so far; continue with --resume",
+      1e-9, 1e9);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
-      "Several processes train one policy, each on its GPU, where torchrun, srun or the variables RANK, WORLD_SIZE,\n"
-      "LOCAL_RANK, MASTER_ADDR and MASTER_PORT say so; sizes are those of all together, and rank 0 reports and "
-      "writes.\n"
-      "Examples:\n  pictura train --config configs/demo.toml --out runs/demo\n"
+      "Several processes train one policy, each on its own GPU, if torchrun, srun or the variables RANK, WORLD_SIZE,\n"
+      "LOCAL_RANK, MASTER_ADDR and MASTER_PORT define them; sizes are totals over all, and rank 0 reports and writes.\n"
+      "Examples:\n"
+      "  pictura train --config configs/demo.toml --out runs/demo\n"
       "  pictura train --config configs/town01.toml --set run.seed=3 --set train.updates=50 --out runs/seed3\n"
       "  pictura train --config configs/town01.toml --out runs/town01 --resume --minutes 25\n"
       "  torchrun --nproc-per-node 2 --no-python pictura train --config configs/paper.toml --out runs/paper");
@@ -66,7 +67,7 @@ void add_train_command(CLI::App& app) {
     line.finish();
     const auto end_as_asked = [&] {
       if (report.interrupted) {
-        throw Interrupted(fmt::format("interrupted; go on with --resume --out {}", arguments->train.out_folder));
+        throw Interrupted(fmt::format("interrupted; continue with --resume --out {}", arguments->train.out_folder));
       }
     };
     if (arguments->train.launch.rank > 0) return end_as_asked();
@@ -89,7 +90,8 @@ void add_train_command(CLI::App& app) {
                    format_count(static_cast<double>(report.agent_steps)), report.updates, report.km_driven,
                    report.checkpoint, report.policy_hash);
       if (!phases.empty()) print_result("time of the last update: {}\n", phases);
-      if (report.out_of_time) print_result("out of time: go on with --resume --out {}\n", arguments->train.out_folder);
+      if (report.out_of_time)
+        print_result("out of time: continue with --resume --out {}\n", arguments->train.out_folder);
     }
     end_as_asked();
   });

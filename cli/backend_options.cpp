@@ -23,22 +23,25 @@ void add_backend_options(CLI::App* command, const std::string& otherwise, Sessio
   const auto described = [&otherwise](const char* what, const std::vector<std::string>& names) {
     return fmt::format("{}: {}; default: {}", what, fmt::join(names, ", "), otherwise);
   };
-  command->add_option("--simulator", options_out->simulator, described("What simulates", simulator_names()))
+  command->add_option("--simulator", options_out->simulator, described("Backend of the simulator", simulator_names()))
       ->check(one_of(simulator_names()));
-  command->add_option("--renderer,--backend", options_out->renderer, described("What draws", renderer_names()))
+  command
+      ->add_option("--renderer,--backend", options_out->renderer,
+                   described("Backend of the renderer", renderer_names()))
       ->check(one_of(renderer_names()));
   auto complaint = [](const std::string& text) -> std::string {
     return parse_pixel_samples(text) ? "" : fmt::format("expected {}, got '{}'", kPixelSamplesExpected, text);
   };
   command
-      ->add_option("--samples", options_out->samples,
-                   "Of a pixel, for gl: 1, N (MSAA) or NxN (supersampling); the others compute exact coverage")
+      ->add_option(
+          "--samples", options_out->samples,
+          "Samples per pixel, for gl: 1, N (MSAA) or NxN (supersampling); other renderers compute exact coverage")
       ->check(CLI::Validator(complaint, ""));
 }
 
 void add_policy_backend_options(CLI::App* command, const std::string& otherwise, SessionOptions* options_out) {
   command->add_option("--device", options_out->device,
-                      fmt::format("What the policy runs on: cpu, cuda, cuda:N or auto; default: {}", otherwise));
+                      fmt::format("Device of the policy: cpu, cuda, cuda:N or auto; default: {}", otherwise));
   add_backend_options(command, otherwise, options_out);
 }
 

@@ -42,8 +42,8 @@ void open_source(Descriptor* source_out) {
   source_out->reset(::memfd_create("plot.py", MFD_CLOEXEC));
   const bool is_written = source_out->get() >= 0 &&
                           ::write(source_out->get(), text.data(), text.size()) == static_cast<ssize_t>(text.size());
-  PICTURA_CHECK(is_written && ::lseek(source_out->get(), 0, SEEK_SET) == 0, "charts: no memory for plot.py: {}",
-                std::strerror(errno));
+  PICTURA_CHECK(is_written && ::lseek(source_out->get(), 0, SEEK_SET) == 0,
+                "charts: cannot allocate memory for plot.py: {}", std::strerror(errno));
 }
 
 /// Python process that runs plot.py; ended by the destructor.
@@ -53,7 +53,7 @@ class Plotter {
     Descriptor source;
     open_source(&source);
     int ends[2];
-    PICTURA_CHECK(::pipe2(ends, O_CLOEXEC) == 0, "charts: no pipe for {}: {}", python, std::strerror(errno));
+    PICTURA_CHECK(::pipe2(ends, O_CLOEXEC) == 0, "charts: cannot open a pipe for {}: {}", python, std::strerror(errno));
     messages_.reset(ends[0]);
     const Descriptor child_end(ends[1]);
 
@@ -78,9 +78,9 @@ class Plotter {
     posix_spawnattr_destroy(&attributes);
     if (code != 0) {
       child_ = -1;
-      throw NoMatplotlib(
-          fmt::format("charts need Python 3.11 with Matplotlib (PICTURA_PYTHON names one): {} cannot be started: {}",
-                      python, std::strerror(code)));
+      throw NoMatplotlib(fmt::format(
+          "charts need Python 3.11 with Matplotlib (PICTURA_PYTHON gives its path): {} cannot be started: {}", python,
+          std::strerror(code)));
     }
   }
   ~Plotter() {

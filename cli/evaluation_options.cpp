@@ -13,21 +13,20 @@ namespace pictura {
 CLI::Option* add_evaluation_options(CLI::App* command, EvaluateOptions* options_out) {
   EvaluateOptions& options = *options_out;
   options.maps = Config().simulator.maps;
-  add_map_list_option(
-      command, &options.maps,
-      "Maps that the scenarios are spread over, with commas between them; procedural:1-64 is a town for each seed");
+  add_map_list_option(command, &options.maps,
+                      "Maps of the scenarios, separated by commas; procedural:1-64 is a town for each seed");
   add_number_option(command, "--agents", options.agents_per_world,
-                    "Agents a world, instead of the densities' own numbers", 1, kMaxAgentsPerWorld);
+                    "Agents per world, instead of the densities' numbers", 1, kMaxAgentsPerWorld);
   add_number_option(command, "--steps", options.steps, "Steps of 0.1 s per scenario", 1);
   CLI::Option* const sampled = add_sampled_option(command, &options.argmax);
-  add_seed_option(command, &options.seed, "Scenarios are drawn from it");
-  add_policy_backend_options(command, "auto, and drawn as in training", &options);
+  add_seed_option(command, &options.seed, "Seed of the scenarios");
+  add_policy_backend_options(command, "auto, and as in training", &options);
   command
       ->add_option("--conditioning", options.conditioning,
-                   "What every agent is told, as collision=1, in place of a value of the configuration's "
-                   "[evaluate.conditioning]; may be given many times")
+                   "Conditioning of every agent, for instance collision=1, instead of a value of the configuration's "
+                   "[evaluate.conditioning]; may be given several times")
       ->allow_extra_args(false);
-  add_light_cycles_option(command, &options.light_cycles, "as the policy was trained");
+  add_light_cycles_option(command, &options.light_cycles, "as in training");
   add_light_heads_option(command, &options.light_heads);
   add_threads_option(command, &options.num_threads);
   return sampled;
@@ -36,14 +35,13 @@ CLI::Option* add_evaluation_options(CLI::App* command, EvaluateOptions* options_
 CLI::Option* add_sampled_option(CLI::App* command, bool* argmax_out) {
   return command->add_flag_function(
       "--sampled", [argmax_out](int64_t) { *argmax_out = false; },
-      "Draw actions from the policy instead of taking the most likely");
+      "Sample actions from the policy instead of using the most likely action");
 }
 
 CLI::Option* add_average_option(CLI::App* command, bool* average_out) {
   return command->add_flag(
       "--average", *average_out,
-      "The average of the weights that a checkpoint holds (train.weight_average), instead of those "
-      "after its last update");
+      "Use the average of the weights (train.weight_average) instead of the weights after the last update");
 }
 
 void EvaluationProgress::update(double done, double eta_s) {
@@ -54,7 +52,7 @@ void EvaluationProgress::update(double done, double eta_s) {
     has_estimate_ = true;
     if (elapsed_s + eta_s > kLong_s) {
       line_.finish();
-      print_message("notice: this takes {} at most; ^C reports {}, and --scenarios A:B evaluates a part\n",
+      print_message("notice: this takes at most {}; ^C reports {}, and --scenarios A:B evaluates a range\n",
                     format_duration(elapsed_s + eta_s), finished_);
     }
   }

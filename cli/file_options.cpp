@@ -67,7 +67,8 @@ void refuse_shared_files(const CLI::App& app) {
         if (file.empty()) continue;
         const auto [other, is_new] = name_of_file.emplace(file, option->get_name());
         if (!is_new && writes) {
-          fail_usage("{}: expected another file than that of {}, got '{}'", option->get_name(), other->second, text);
+          fail_usage("{}: expected a file different from that of {}, got '{}'", option->get_name(), other->second,
+                     text);
         }
       }
     }

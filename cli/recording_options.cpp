@@ -6,18 +6,18 @@
 namespace pictura {
 
 void add_recording_options(CLI::App* command, RecordingOptions* options_out) {
-  add_number_option(command, "--follow", options_out->followed,
-                    "The agent whose decisions and images the replay holds, and that it opens with; default: 0, in "
-                    "recorded scenes the self-driving car, in evaluated scenarios the one with the gravest infraction",
-                    0, kMaxAgentsPerWorld - 1);
+  add_number_option(
+      command, "--follow", options_out->followed,
+      "Agent whose decisions and images the replay holds, and with which it opens; default: 0, in recorded scenes the "
+      "self-driving car, in evaluated scenarios the agent with the most severe infraction",
+      0, kMaxAgentsPerWorld - 1);
   add_cameras_option(command, options_out);
 }
 
 CLI::Option* add_cameras_option(CLI::App* command, RecordingOptions* options_out) {
-  return command->add_flag(
-      "--cameras", options_out->cameras,
-      "Keep the followed agent's images as well, without loss: as its policy was trained, else the "
-      "paper's. A page holds 10 MB of them, and draws what it does not hold");
+  return command->add_flag("--cameras", options_out->cameras,
+                           "Also keep the followed agent's images, lossless: with the cameras of its policy's "
+                           "training, otherwise the paper's. A page holds 10 MB of images and draws the others");
 }
 
 void refuse_recording_options(const CLI::App& command, const std::string& needed) {

@@ -26,13 +26,14 @@ void add_serve_options(CLI::App* command, ServeOptions* options_out) {
               fail_usage("--serve: expected a port of 1 to 65535, got '{}'", text);
             options_out->port = static_cast<int>(*port);
           },
-          "Let a browser watch, pause, step and drive: prints the page's address, on this machine alone. It begins "
-          "when a page opens, runs in real time, and without --steps goes on until ^C. Default port: a free one")
+          "Let a browser watch, pause, step and drive: prints the page's address, reachable only from this machine. "
+          "The simulation begins when a page opens, runs in real time, and without --steps runs until ^C. Default "
+          "port: a free one")
       ->type_name("[PORT]")
       ->expected(0, 1);
   command->add_option("--serve-host", options_out->host_name,
-                      "With --serve: listen on all of this machine's addresses, for pages that name it so. Whoever "
-                      "has the address can then drive; nothing is encrypted");
+                      "With --serve: listen on all of this machine's addresses, for pages that use this host name. "
+                      "Anyone with the address can then drive; nothing is encrypted");
 }
 
 }  // namespace pictura

@@ -18,7 +18,7 @@ void add_world_options(CLI::App* command, WorldOptions* options_out) {
   const SimulatorConfig simulator;
   auto with_default = [](const char* what, auto preset, auto simulators) {
     return fmt::format("{}; default: {}{}", what, preset.value_or(simulators),
-                       preset ? "" : ", or, with a trained policy, what it was trained with");
+                       preset ? "" : ", or, with a trained policy, as in training");
   };
   add_number_option(
       command, "--pedestrians", options_out->pedestrian_fraction,
@@ -29,7 +29,7 @@ void add_world_options(CLI::App* command, WorldOptions* options_out) {
   add_number_option(command, "--parked", options_out->parked_cars,
                     with_default("Parked cars", options_out->parked_cars, simulator.parked_cars), 0,
                     kMaxAgentsPerWorld);
-  add_seed_option(command, &options_out->seed, "Places, sizes, goals and actions");
+  add_seed_option(command, &options_out->seed, "Seed of places, sizes, goals and actions");
   add_threads_option(command, &options_out->num_threads);
   command->add_flag("!--no-walls", options_out->walls, "Leave out the walls along the building lines");
 }
@@ -38,8 +38,8 @@ void add_light_cycles_option(CLI::App* command, std::optional<LightCycles>* cycl
   command
       ->add_option_function<std::string>(
           "--light-cycles", [cycles_out](const std::string& name) { *cycles_out = light_cycles_named(name); },
-          fmt::format("How traffic lights cycle: phases (those of a junction take turns) or independent (each "
-                      "alone); default: {}",
+          fmt::format("How traffic lights cycle: phases (the lights of a junction take turns) or independent (each "
+                      "light alone); default: {}",
                       otherwise))
       ->check(one_of({std::begin(kLightCyclesNames), std::end(kLightCyclesNames)}));
 }
@@ -54,17 +54,17 @@ void add_light_heads_option(CLI::App* command, std::optional<LightHeads>* heads_
   command
       ->add_option_function<std::string>(
           "--light-heads", [heads_out](const std::string& name) { *heads_out = light_heads_named(name); },
-          fmt::format("Where heads of lights stand: as_mapped, or visible: those beside or before their stop line {} m "
-                      "beyond it; default: {}, or, with a trained policy, what it was trained with",
+          fmt::format("Position of light heads: as_mapped, or visible: heads beside or before their stop line are "
+                      "moved {} m beyond it; default: {}, or, with a trained policy, as in training",
                       kVisibleHeadAhead_m, name_of(SimulatorConfig{}.light_heads)))
       ->check(one_of({kLightHeadsNames.begin(), kLightHeadsNames.end()}));
 }
 
 void add_scene_options(CLI::App* command, WorldOptions* options_out) {
-  add_number_option(command, "--start", options_out->start_step, "The step of a recorded scene to start at", 0,
+  add_number_option(command, "--start", options_out->start_step, "Start step in a recorded scene", 0,
                     kMaxScenarioSteps - 1);
   command->add_flag("--recorded-lights", options_out->recorded_lights,
-                    "Put the lights of a recorded scene there, as recorded: drawn, observed, and red ones hold");
+                    "Add the recorded lights to a recorded scene: drawn, observed and enforced");
 }
 
 void refuse_scene_options(const CLI::App& command, const std::string& map, std::initializer_list<const char*> more) {
@@ -84,32 +84,32 @@ void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_
   add_world_options(command, world_out);
   add_light_cycles_option(
       command, &world_out->light_cycles,
-      fmt::format("{}, or, with a trained policy, as it was trained", name_of(SimulatorConfig{}.light_cycles)));
+      fmt::format("{}, or, with a trained policy, as in training", name_of(SimulatorConfig{}.light_cycles)));
   add_light_heads_option(command, &world_out->light_heads);
   command
       ->add_option("--control", world_out->controlled,
-                   "Of a recorded scene, which tracks --policy drives: self, vehicles (the others), others (who is no "
-                   "vehicle), all, tracks_to_predict, objects_of_interest, and ids, with commas between them; whoever "
-                   "is not there at the start follows the recording")
+                   "Tracks of a recorded scene that --policy drives: self, vehicles (the others), others "
+                   "(non-vehicles), all, tracks_to_predict, objects_of_interest, and ids, separated by commas; tracks "
+                   "absent at the start follow the recording")
       ->capture_default_str();
   add_scene_options(command, world_out);
-  add_number_option(command, "--steps", *steps_out,
-                    "Steps of 0.1 s; of a recorded scene by default as many as are recorded", 1);
+  add_number_option(command, "--steps", *steps_out, "Steps of 0.1 s; default for a recorded scene: its length", 1);
   command
       ->add_option(
           "--policy", *policy_out,
           "random, idle, lane, idm_lanes (along lanes, behind others), in recorded scenes log (as recorded, the "
           "default there), inverse (by the actions that follow the recording) or idm (along recorded paths, "
-          "behind others), or a checkpoint or safetensors that train wrote")
+          "behind others), or a checkpoint or safetensors written by train")
       ->capture_default_str();
   OtherShares& others = world_out->others;
-  add_number_option(command, "--blind", others.blind, "Share of the agents that see no other for some seconds", 0, 1);
+  add_number_option(command, "--blind", others.blind,
+                    "Share of the agents that see no other road users for some seconds", 0, 1);
   add_number_option(command, "--phantom-braking", others.phantom_braking,
                     "Share of the agents that brake hard for some seconds", 0, 1);
-  add_number_option(command, "--inattentive", others.inattentive, "Share of the agents that see no traffic light", 0,
+  add_number_option(command, "--inattentive", others.inattentive, "Share of the agents that see no traffic lights", 0,
                     1);
   add_decision_steps_option(command, &world_out->decision_steps);
-  add_policy_backend_options(command, "auto, and drawn as in training", world_out);
+  add_policy_backend_options(command, "auto, and as in training", world_out);
 }
 
 void settle_driving_options(const CLI::App& command, WorldOptions* world_inout, int* steps_inout,
@@ -120,10 +120,10 @@ void settle_driving_options(const CLI::App& command, WorldOptions* world_inout, 
   refuse_options(command,
                  {"--agents", "--pedestrians", "--cyclists", "--parked", "--no-walls", "--light-cycles",
                   "--light-heads", "--blind", "--phantom-braking", "--inattentive"},
-                 "on a recorded scene, which says that itself");
+                 "on a recorded scene, which defines it");
   if (command.count("--policy") == 0) *policy_inout = "log";
   if (*policy_inout == "log") {
-    refuse_options(command, {"--control"}, "with the policy log, which drives everybody as recorded");
+    refuse_options(command, {"--control"}, "with the policy log, which drives all agents as recorded");
   }
   if (command.count("--steps") == 0) {
     *steps_inout = 0;

@@ -92,7 +92,7 @@ class Evaluation(CommandCase):
         self.assert_refused(2, "random, idle, lane, idm_lanes, log, inverse, idm; got 'pilot'", *evaluate, "--policy", "pilot")
         self.assert_refused(2, "random, idle, lane, idm_lanes; got 'log'", *evaluate, "--policy", "log")
         self.assert_refused(2, "excludes", *evaluate, "--policy", "lane", "--sampled")
-        self.assert_refused(2, "lane sees no images", *evaluate, "--policy", "lane", "--renderer", "cpu")
+        self.assert_refused(2, "lane reads no images", *evaluate, "--policy", "lane", "--renderer", "cpu")
         self.assert_refused(2, "expected a CHECKPOINT, --policy, or --merge", *evaluate)
 
     def test_a_policy_is_driven_in_the_world_that_it_was_trained_in(self):

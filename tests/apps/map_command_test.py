@@ -159,7 +159,7 @@ class Maps(CommandCase):
         self.assert_refused(1, "<signal>", "map", town)
         town.write_text(text)
         self.assertEqual(self.json_of("map", town, "--strict")["mends"], [])
-        self.assert_refused(2, "--lenient: is gone", "map", town, "--lenient")
+        self.assert_refused(2, "--lenient: was removed", "map", town, "--lenient")
 
     def test_bad_files_are_refused_by_name(self):
         text = self.town().read_text()

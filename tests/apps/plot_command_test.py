@@ -99,7 +99,7 @@ class Plots(CommandCase):
         (panel,) = json.loads(pathlib.Path(f"{curves}.json").read_text())["panels"]
         self.assertEqual(panel["series"][0]["y"], [1, 2])
         result = run(*arguments, PICTURA_PYTHON=self.folder / "nowhere")
-        self.assertEqual((result.returncode, "PICTURA_PYTHON names one" in result.stderr), (1, True), result.stderr)
+        self.assertEqual((result.returncode, "PICTURA_PYTHON gives its path" in result.stderr), (1, True), result.stderr)
         result = run(*arguments, PICTURA_PYTHON=self.python_as("echo broken >&2; exit 5"))
         self.assertEqual((result.returncode, result.stderr), (1, "error: broken\n"))
         result = run(*arguments, PICTURA_PYTHON=self.python_as("kill -9 $$"))

@@ -199,7 +199,7 @@ with tempfile.TemporaryDirectory() as name:
             ("--realism: has no effect without --protocol", ("--policy", "idle", "--realism", "2025")),
             ("expected 32 rollouts of 80 steps from step 10", (*words, "--realism", "2025")),
             ("got rollouts=4, 80 steps", (*sim_agents, "--rule", "rollouts=4", "--rollouts", folder / "x")),
-            ("--protocol: expected --scenes as well", ("--policy", "idm", "--protocol", "womd")),
+            ("--protocol: expected also --scenes", ("--policy", "idm", "--protocol", "womd")),
             ("--csv: has no effect without --protocol", ("--policy", "idle", "--csv", folder / "x.csv")),
             ("--map: has no effect with --protocol", (*words, "--map", "procedural:1")),
             ("expected shares in %, above 0 and at most 100, got 'dense'", (*words, "--density", "dense")),

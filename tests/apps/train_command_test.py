@@ -175,7 +175,7 @@ class Signals(CommandCase):
                 process.send_signal(getattr(signal, name))
                 _, errors = process.communicate(timeout=120)
                 self.assertEqual(process.returncode, status, errors)
-                self.assertEqual(errors.splitlines()[-1], f"error: interrupted; go on with --resume --out {out}")
+                self.assertEqual(errors.splitlines()[-1], f"error: interrupted; continue with --resume --out {out}")
                 for file in ("checkpoint.ckpt", "policy.safetensors"):
                     self.assertTrue((out / file).exists(), file)
                 result = run(*self.LONG, "--out", out, "--resume", "--minutes", 0.0001, "--json")

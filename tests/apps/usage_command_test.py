@@ -208,7 +208,7 @@ class Files(CommandCase):
         town, page = self.town(blocks="1x1"), self.folder / "page"
         for first, second in [("--replay", "--mcap"), ("--mcap", "--scene"), ("--policy", "--replay")]:
             with self.subTest(first=first, second=second):
-                self.assert_refused(2, "expected another file than that of --", "simulate", town, first, page, second, page)
+                self.assert_refused(2, "expected a file different from that of --", "simulate", town, first, page, second, page)
         relative = [os.path.abspath(PICTURA), "simulate", town, "--replay", "page", "--mcap", "./page"]
         self.assertEqual(subprocess.run(relative, cwd=self.folder, stderr=subprocess.DEVNULL).returncode, 2)
         self.assertFalse(page.exists())

@@ -65,8 +65,8 @@ def tree(pictura, command=()):
 
 def of_whole_build(text):
     """The help of a build with every backend, whichever this build has."""
-    text = re.sub(r"(What simulates: )cpu.*?(; default)", r"\1cpu, cuda, auto\2", text)
-    return re.sub(r"(What draws: )cpu.*?(; default)", r"\1cpu, cuda, gl, gl:egl, gl:osmesa, null, auto\2", text)
+    text = re.sub(r"(Backend of the simulator: )cpu.*?(; default)", r"\1cpu, cuda, auto\2", text)
+    return re.sub(r"(Backend of the renderer: )cpu.*?(; default)", r"\1cpu, cuda, gl, gl:egl, gl:osmesa, null, auto\2", text)
 
 
 def page_name(command):
