@@ -40,10 +40,11 @@ void print_realism(const RealismReport& report) {
                    interval_text(mean_of(report, feature)));
     }
   }
-  const auto mean = [&report](double SceneRealism::*member) { return interval_text(mean_of(report, member)); };
+  const auto mean = [&report](double SceneRealism::* member) { return interval_text(mean_of(report, member)); };
   print_result("{:28} {:>6.2f} {:>17}\n", "realism", 1.0, mean(&SceneRealism::score));
   print_result("{:28} {:>6} {:>17}\n\n", "  by road user", "", mean(&SceneRealism::score_by_object));
-  const auto line = [&mean](const char* what, double SceneRealism::*member, double SceneRealism::*recorded = nullptr) {
+  const auto line = [&mean](const char* what, double SceneRealism::* member,
+                            double SceneRealism::* recorded = nullptr) {
     print_result("{:34} {:>17} {:>17}\n", what, mean(member), recorded ? mean(recorded) : "");
   };
   print_result("{:34} {:>17} {:>17}\n", "", "rollouts", "recorded");
@@ -76,7 +77,7 @@ void add_score_command(CLI::App& app) {
       ->check(CLI::ExistingFile);
   command
       ->add_option("--scenes", arguments->scenes,
-                   "Its scenes: files, folders of them, FILE#K or FILE#SCENARIO_ID, with commas between them")
+                   "Scenes of the protocol: files, folders of files, FILE#K or FILE#SCENARIO_ID, separated by commas")
       ->required()
       ->delimiter(',')
       ->allow_extra_args(false);

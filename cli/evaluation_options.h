@@ -26,7 +26,7 @@ CLI::Option* add_average_option(CLI::App* command, bool* average_out);
 /// Says how far an evaluation is, and once, where it takes long, for how long and what can be done about it.
 class EvaluationProgress {
  public:
-  /// `finished` names the result reported after an interrupt: "the scenarios that are finished".
+  /// `finished` names the result reported after an interrupt: "the completed scenarios".
   explicit EvaluationProgress(std::string finished) : finished_(std::move(finished)) {}
   void update(double done, double eta_s);
   void finish() { line_.finish(); }

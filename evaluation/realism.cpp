@@ -475,7 +475,7 @@ Estimate mean_over(const std::vector<SceneRealism>& scenes, const Value& value_o
 
 }  // namespace
 
-Estimate mean_of(const RealismReport& report, double SceneRealism::*member) {
+Estimate mean_of(const RealismReport& report, double SceneRealism::* member) {
   return mean_over(report.scenes, [member](const SceneRealism& scene) { return scene.*member; });
 }
 

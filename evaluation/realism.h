@@ -120,7 +120,7 @@ RealismReport score_rollouts(const std::string& path, const std::vector<std::str
                              const std::function<void(double)>& on_progress = {});
 
 /// Mean over the scenes that have it.
-Estimate mean_of(const RealismReport& report, double SceneRealism::*member);
+Estimate mean_of(const RealismReport& report, double SceneRealism::* member);
 Estimate mean_of(const RealismReport& report, RealismFeature feature);
 /// The weighted mean of a group's likelihoods, scene by scene: kinematic, interactive or map.
 struct RealismGroup {

@@ -46,7 +46,7 @@ StoredPolicy resized_policy(const StoredPolicy& policy, ImageSize size) {
   result.rig = paper_rig(size.width_px, size.height_px);
   const auto first = std::find_if(result.parameters.begin(), result.parameters.end(),
                                   [](const StoredTensor& parameter) { return parameter.name == kFirstConvolution; });
-  PICTURA_CHECK(first != result.parameters.end(), "{}: of another architecture: it has no parameter '{}'", policy.path,
+  PICTURA_CHECK(first != result.parameters.end(), "{}: has a different architecture: no parameter '{}'", policy.path,
                 kFirstConvolution);
   *first = spread_over_patches(*first, factor);
   if (factor > 1) result.rate_factors.try_emplace(kFirstConvolution, 1).first->second *= rate_factor_of_spread(factor);

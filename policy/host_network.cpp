@@ -111,7 +111,7 @@ class ParameterReader {
     for (const StoredTensor& one : saved_.parameters) {
       if (one.name == name && one.shape.size() > dimension) return one.shape[dimension];
     }
-    fail("{}: of another architecture: it has no parameter '{}'", saved_.path, name);
+    fail("{}: has a different architecture: no parameter '{}'", saved_.path, name);
   }
   /// Throws Error where the file has parameters that were not taken.
   void finish() const { check_parameter_count(saved_.path, saved_.parameters, taken_); }

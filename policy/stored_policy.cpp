@@ -96,12 +96,12 @@ StoredPolicy parse_safetensors(const std::string& file, const std::string& path)
     const ordered_json header = parse_json(file.substr(kLengthBytes, length));
     const ordered_json metadata = header.value("__metadata__", ordered_json::object());
     PICTURA_CHECK(metadata.contains("config") && metadata.contains("schema"),
-                  "{}: expected safetensors of a policy, as training or `pictura export` writes them: "
+                  "{}: expected safetensors of a policy, written by training or `pictura export`: "
                   "its metadata lack 'config' or 'schema'",
                   path);
     const auto text = [&](const char* key) { return metadata.at(key).get<std::string>(); };
     PICTURA_CHECK(hash_of_file(file, text("hash")) == text("hash"),
-                  "{}: damaged or truncated: its bytes do not have the hash that its metadata name", path);
+                  "{}: damaged or truncated: its bytes do not match the hash in its metadata", path);
     result.config = parse_saved_config(text("config"), path + ": config");
     check_schema(parse_json(text("schema")), result.config, path);
     result.rig = rig_from_json(parse_json(text("rig")));
@@ -140,13 +140,13 @@ std::string read_policy_file(const std::string& path) {
 
 StoredPolicy parse_stored_policy(const std::string& file, const std::string& path, bool average) {
   PICTURA_CHECK(!average || is_checkpoint(file),
-                "{}: holds one set of weights: expected a checkpoint to choose the average of", path);
+                "{}: holds one set of weights: expected a checkpoint for the weight average", path);
   if (!is_checkpoint(file)) return parse_safetensors(file, path);
   const CheckpointFile checkpoint(file, path);
   StoredPolicy policy = checkpoint.policy();
   if (average) {
     PICTURA_CHECK(checkpoint.header.contains("average"),
-                  "{}: holds no average of weights: expected a checkpoint of a run with train.weight_average", path);
+                  "{}: holds no weight average: expected a checkpoint of a run with train.weight_average", path);
     policy.parameters = checkpoint.tensors("average");
   }
   return policy;
@@ -187,15 +187,15 @@ void check_finite(const std::string& path, const std::vector<StoredTensor>& save
 const StoredTensor& find_parameter(const std::string& path, const std::vector<StoredTensor>& saved,
                                    const std::string& name, const std::vector<int64_t>& shape) {
   const auto found = std::find_if(saved.begin(), saved.end(), [&](const StoredTensor& t) { return t.name == name; });
-  PICTURA_CHECK(found != saved.end(), "{}: of another architecture: it has no parameter '{}'", path, name);
-  PICTURA_CHECK(found->shape == shape, "{}: of another architecture: parameter '{}': expected [{}], got [{}]", path,
-                name, fmt::join(shape, ", "), fmt::join(found->shape, ", "));
+  PICTURA_CHECK(found != saved.end(), "{}: has a different architecture: no parameter '{}'", path, name);
+  PICTURA_CHECK(found->shape == shape, "{}: has a different architecture: parameter '{}': expected [{}], got [{}]",
+                path, name, fmt::join(shape, ", "), fmt::join(found->shape, ", "));
   return *found;
 }
 
 void check_parameter_count(const std::string& path, const std::vector<StoredTensor>& saved, size_t expected) {
-  PICTURA_CHECK(saved.size() == expected, "{}: of another architecture: expected {} parameters, got {}", path, expected,
-                saved.size());
+  PICTURA_CHECK(saved.size() == expected, "{}: has a different architecture: expected {} parameters, got {}", path,
+                expected, saved.size());
 }
 
 std::string hash_of_parameters(const std::vector<StoredTensor>& parameters) {

@@ -295,10 +295,9 @@ TEST_F(RealismFiles, AreReadAsTheyWereWritten) {
 }
 
 TEST_F(RealismFiles, AreRefusedByFileScenarioAndField) {
-  EXPECT_THAT(message_of<Error>([&] {
-                RolloutsReader(write("twice", bytes_of({rollout_at(8, 0), rollout_at(8, 0)})));
-              }),
-              AllOf(HasSubstr("twice: scenario_rollouts[1]"), HasSubstr("'straight' is there twice")));
+  EXPECT_THAT(
+      message_of<Error>([&] { RolloutsReader(write("twice", bytes_of({rollout_at(8, 0), rollout_at(8, 0)}))); }),
+      AllOf(HasSubstr("twice: scenario_rollouts[1]"), HasSubstr("'straight' is there twice")));
   std::string other;
   append_integer(2, 2, &other);
   EXPECT_THAT(message_of<Error>([&] { RolloutsReader(write("type", other)); }),

@@ -261,7 +261,7 @@ TEST(HostNetwork, RefusesWhatItCannotCompute) {
   StoredPolicy other = saved;
   other.config.policy.backbone_width = 7;
   EXPECT_THAT(refusal(other),
-              HasSubstr("a.safetensors: of another architecture: parameter 'backbone.0.weight': expected [7, "));
+              HasSubstr("a.safetensors: has a different architecture: parameter 'backbone.0.weight': expected [7, "));
   other = saved;
   other.parameters.back().values[0] = NAN;
   EXPECT_THAT(refusal(other), HasSubstr("parameter 'critic.bias': expected finite numbers"));
