@@ -41,3 +41,14 @@ def as_python_markdown(markdown):
         if text.startswith("```"):
             in_code, block = not in_code, "code" if in_code else ""
     return "\n".join(lines)
+
+
+def on_page_content(html, **_):
+    """Marks what docs/site.css keeps wide on narrow screens: short code, and cells of several words."""
+    html = re.sub(r"<code>([^<\s]{1,24})</code>", r'<code class="short">\1</code>', html)
+    return re.sub(r"<td>(.*?)</td>", with_width, html)
+
+
+def with_width(cell):
+    is_wide = len(re.sub(r"<[^>]*>", "", cell[1])) > 25 and "<img" not in cell[1]
+    return f'<td class="wide">{cell[1]}</td>' if is_wide else cell[0]
