@@ -6,11 +6,14 @@
 """
 
 import re
+import textwrap
 
 ITEM = re.compile(r" *([-*] |\d+\. )")
 
 
 def on_page_markdown(markdown, page, **_):
+    if is_help(page):
+        markdown = "\n".join(line for long in markdown.split("\n") for line in wrapped_help(long))
     depth = page.file.src_uri.count("/")
     outside = re.compile(r"\[([^\]]*)\]\((?:\.\./){%d}([^)#]*)[^)]*\)" % (depth + 1))
     return as_python_markdown(outside.sub(lambda link: f"{link[1]} (`{link[2]}` in the repository)", markdown))
@@ -43,12 +46,26 @@ def as_python_markdown(markdown):
     return "\n".join(lines)
 
 
-def on_page_content(html, **_):
-    """Marks what docs/site.css keeps wide on narrow screens: short code, and cells of several words."""
+def is_help(page):
+    return page.file.src_uri.startswith("reference/commands/")
+
+
+def wrapped_help(line):
+    """A line of a help text as lines of at most 96 columns, indented like its descriptions; examples stay whole."""
+    is_option = re.match(r"  -|  [A-Z]| {30}\S", line)
+    return textwrap.wrap(line, 96, subsequent_indent=" " * 30, break_on_hyphens=False) if is_option else [line]
+
+
+def on_page_content(html, page, **_):
+    """Marks what docs/site.css keeps whole or wide on narrow screens: help texts, short code, numbers and long cells."""
+    if is_help(page):
+        html = html.replace('<div class="highlight">', '<div class="highlight help">')
     html = re.sub(r"<code>([^<\s]{1,24})</code>", r'<code class="short">\1</code>', html)
     return re.sub(r"<td>(.*?)</td>", with_width, html)
 
 
 def with_width(cell):
-    is_wide = len(re.sub(r"<[^>]*>", "", cell[1])) > 25 and "<img" not in cell[1]
-    return f'<td class="wide">{cell[1]}</td>' if is_wide else cell[0]
+    length = len(re.sub(r"<[^>]*>", "", cell[1]))
+    if 25 < length and "<img" not in cell[1]:
+        return f'<td class="wide">{cell[1]}</td>'
+    return f'<td class="short">{cell[1]}</td>' if length < 15 else cell[0]
