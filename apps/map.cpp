@@ -112,14 +112,14 @@ void print_table(const Json& object) {
 }
 
 /// Repairs by kind: how often, where first, and the message of each.
-Json mends_of(const RoadMap& map, const std::string& source) {
+Json repairs_of(const RoadMap& map, const std::string& source) {
   Json groups = Json::array();
-  for (const MendGroup& group : group_mends(map.mends)) {
+  for (const RepairGroup& group : group_repairs(map.mends)) {
     Json faults = Json::array();
-    for (const Mend* mend : group.mends) faults.push_back(message_of(*mend, source));
+    for (const Repair* repair : group.repairs) faults.push_back(message_of(*repair, source));
     groups.push_back({{"fault", to_string(group.kind)},
                       {"done", action_of(group.kind)},
-                      {"count", group.mends.size()},
+                      {"count", group.repairs.size()},
                       {"faults", std::move(faults)}});
   }
   return groups;
@@ -192,7 +192,7 @@ void run_map(const CLI::App& command, const MapArguments& arguments) {
   object["cached"] = report.cached;
   if (!report.cache_rejection.empty()) object["cache_refused"] = report.cache_rejection;
   object["load_ms"] = load_ms;
-  object["mends"] = mends_of(*map, report.source);
+  object["mends"] = repairs_of(*map, report.source);
   object["statistics"] = statistics_of(*map);
   if (arguments.full) return print_listing(object, *map);
   if (arguments.json) return print_json(object);

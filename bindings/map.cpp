@@ -81,12 +81,12 @@ py::dict arrays_of(const RoadMap& map) {
 }
 
 /// Returns (kind, action, message) for each repaired fault.
-std::vector<std::tuple<std::string, std::string, std::string>> mends_of(const Map& map) {
-  std::vector<std::tuple<std::string, std::string, std::string>> mends;
-  for (const Mend& mend : map.road()->mends) {
-    mends.emplace_back(to_string(mend.kind), action_of(mend.kind), message_of(mend, map.source()));
+std::vector<std::tuple<std::string, std::string, std::string>> repairs_of(const Map& map) {
+  std::vector<std::tuple<std::string, std::string, std::string>> repairs;
+  for (const Repair& repair : map.road()->mends) {
+    repairs.emplace_back(to_string(repair.kind), action_of(repair.kind), message_of(repair, map.source()));
   }
-  return mends;
+  return repairs;
 }
 
 std::shared_ptr<Map> load_named_map(const std::string& name, bool strict, float chord_error_m) {
@@ -206,7 +206,7 @@ Raises pictura.Error naming file, line and element; pictura.UsageError if the ma
       .def_property_readonly(
           "name", [](const Map& self) { return self.road()->name; },
           py::doc("Name of the map: 'Town01', 'procedural:7', or the file's stem."))
-      .def_property_readonly("mends", mends_of, py::doc("Repaired faults of the file: (kind, repair, message) each."))
+      .def_property_readonly("mends", repairs_of, py::doc("Repaired faults of the file: (kind, repair, message) each."))
       .def_property_readonly(
           "origin_m", [](const Map& self) { return self.road()->origin_m; },
           py::doc("File coordinates of the map's origin, three floats in metres."))

@@ -82,7 +82,7 @@ std::shared_ptr<RecordedScene> scene_of_arrays(const SceneArrays& arrays, const 
 
 /// Arguments of from_arrays() for a scenario.
 py::dict arrays_of_scene(const Scenario& scenario) {
-  py::dict d = to_arrays(state_scene(scenario));
+  py::dict d = to_arrays(scene_of_scenario(scenario));
   d["dt_s"] = scenario.dt_s;
   d["current_step"] = scenario.current_step;
   d["sdc_track"] = scenario.sdc_track < 0 ? py::object(py::none()) : py::int_(scenario.sdc_track);

@@ -478,7 +478,7 @@ LoggedScene scene_from_arrays(const SceneArrays& arrays) {
   scene.source = "Scenario.from_arrays";
   scene.names = {.tracks = "tracks", .features = "lanes"};
   scene.format = "arrays";
-  scene.is_stated = true;
+  scene.is_authored = true;
   read_tracks(arrays.tracks, &scene);
   const std::set<int64_t> lanes = read_lanes(arrays.lanes, &scene);
   if (arrays.lines) read_lines(*arrays.lines, &scene);

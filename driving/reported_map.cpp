@@ -16,7 +16,7 @@ std::shared_ptr<const RoadMap> load_reported_map(const std::string& name) {
 
 void print_mends(const RoadMap& map, const std::string& source) {
   if (map.mends.empty()) return;
-  for (const std::string& line : describe_mends(map.mends, source)) {
+  for (const std::string& line : describe_repairs(map.mends, source)) {
     print_message("repaired: {}\n", printable(line));
   }
   print_message("{} fault{} repaired; --json lists all, --strict rejects them\n", map.mends.size(),

@@ -48,7 +48,7 @@ PICTURA_FIELDS(BuildingLine, a_m, b_m)
 PICTURA_FIELDS(SourceElement, road, line)
 PICTURA_FIELDS(Provenance, lanes, markings, road_edges, crosswalks, parking_spaces, stop_lines, signs, lights,
                junctions, building_lines)
-PICTURA_FIELDS(Mend, kind, line, message)
+PICTURA_FIELDS(Repair, kind, line, message)
 PICTURA_FIELDS(MapFacts, roads, junction_roads, junctions, signal_junctions, lanes, driving_lanes, driving_lane_km,
                driving_lane_km_in_junctions, traffic_lights, stop_lines, crosswalks, parking_spaces, painted_stop_lines,
                signs, z_min_m, z_max_m)

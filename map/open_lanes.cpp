@@ -15,7 +15,7 @@ constexpr float kMissingLink_m = 1.0f;
 const Lane& lane_at(const RoadMap& map, int32_t lane) { return map.lanes[lane]; }
 bool is_route_lane(const RoadMap& map, int32_t lane) { return is_route(lane_at(map, lane).type); }
 
-LaneMouth mouth_of(const RoadMap& map, int32_t lane, bool at_start) {
+LaneOpening opening_of(const RoadMap& map, int32_t lane, bool at_start) {
   const Span<const LanePoint> points = map.points_of(lane_at(map, lane));
   const LanePoint& end = at_start ? points[0] : points[points.size() - 1];
   return {lane, end.position_m, {std::cos(end.heading_rad), std::sin(end.heading_rad)}, 0.5f * end.width_m};
@@ -55,9 +55,9 @@ class LaneStarts {
 
 /// Ways of groups of lanes. Lanes that agents can change between, and that begin and end together, form one node of an
 /// acyclic graph. Groups on which endless routes start are excluded.
-class GroupWays {
+class RemainingRouteLengths {
  public:
-  GroupWays(const RoadMap& map, const LaneGroups& groups) : way_after_m_(map.lanes.size(), INFINITY) {
+  RemainingRouteLengths(const RoadMap& map, const LaneGroups& groups) : way_after_m_(map.lanes.size(), INFINITY) {
     std::vector<int> successors_left(map.lanes.size(), 0);
     std::vector<std::size_t> ready;
     for (std::size_t i = 0; i < map.lanes.size(); ++i) {
@@ -96,17 +96,18 @@ class GroupWays {
   std::vector<float> way_after_m_;  // [lanes] of the groups, by their leftmost lane
 };
 
-/// Appends the parts of an edge beside a mouth that are at least kMinEdge_m long. The edge across a mouth goes through
-/// its middle, but not always at right angles to the lane: where lanes widen, their centre lines are oblique.
-void append_parts_beside(const RoadEdge& edge, const LaneMouth& mouth, std::vector<RoadEdge>* parts_out) {
+/// Appends the parts of an edge beside an opening that are at least kMinEdge_m long. The edge across an opening goes
+/// through its middle, but not always at right angles to the lane: where lanes widen, their centre lines are oblique.
+void append_edge_parts_beside(const RoadEdge& edge, const LaneOpening& opening, std::vector<RoadEdge>* parts_out) {
   constexpr float kOff_m = 0.1f, kBeyond_m = 0.05f, kMinEdge_m = 0.01f, kMaxAlong = 0.7f;
-  const Vec2 a = edge.a_m.xy() - mouth.middle_m.xy(), edge_m = (edge.b_m - edge.a_m).xy();
+  const Vec2 a = edge.a_m.xy() - opening.middle_m.xy(), edge_m = (edge.b_m - edge.a_m).xy();
   const float length_m = length(edge_m);
   const Vec2 way = edge_m * (1 / length_m);
-  const bool is_across = std::fabs(dot(way, mouth.direction)) < kMaxAlong && std::fabs(cross(way, a)) < kOff_m;
-  const bool is_level = std::fabs(edge.a_m.z - mouth.middle_m.z) < kSameRoadLevel_m;
-  // Positions along the edge: the mouth is between begin_m and end_m.
-  const float reach_m = mouth.half_width_m + kBeyond_m, begin_m = -dot(a, way) - reach_m, end_m = begin_m + 2 * reach_m;
+  const bool is_across = std::fabs(dot(way, opening.direction)) < kMaxAlong && std::fabs(cross(way, a)) < kOff_m;
+  const bool is_level = std::fabs(edge.a_m.z - opening.middle_m.z) < kSameRoadLevel_m;
+  // Positions along the edge: the opening is between begin_m and end_m.
+  const float reach_m = opening.half_width_m + kBeyond_m, begin_m = -dot(a, way) - reach_m,
+              end_m = begin_m + 2 * reach_m;
   if (!is_across || !is_level || end_m < 0 || begin_m > length_m) {
     parts_out->push_back(edge);
     return;
@@ -125,7 +126,7 @@ bool has_endless_roads(const RoadMap& map) {
 
 OpenLanes find_open_lanes(const RoadMap& map) {
   const LaneGroups groups = group_lanes(map);
-  const GroupWays ways(map, groups);
+  const RemainingRouteLengths ways(map, groups);
   const LaneStarts starts(map);
   OpenLanes open;
   open.way_after_m.assign(map.lanes.size(), INFINITY);
@@ -134,19 +135,19 @@ OpenLanes find_open_lanes(const RoadMap& map) {
   }
   for (std::size_t group = 0; group < map.lanes.size(); ++group) {
     bool is_led_to = false;
-    std::vector<LaneMouth> exits, entries;
+    std::vector<LaneOpening> exits, entries;
     const std::size_t links_before = open.missing_links.size();
     for (const std::size_t i : groups.members[group]) {
       if (!is_route(map.lanes[i].type)) continue;
       const auto lane = static_cast<int32_t>(i);
       for (const int32_t before : map.links(map.lanes[i].predecessors)) is_led_to |= is_route_lane(map, before);
-      if (is_open(map, open, i)) entries.push_back(mouth_of(map, lane, true));
+      if (is_open(map, open, i)) entries.push_back(opening_of(map, lane, true));
       if (open.way_after_m[i] > 0) continue;
-      exits.push_back(mouth_of(map, lane, false));
+      exits.push_back(opening_of(map, lane, false));
       starts.visit_near(exits.back().middle_m, [&](int32_t other, float gap_m) {
         if (groups.of_lane[other] == group) return;
         // On a two-way lane the way back begins there.
-        if (dot(mouth_of(map, other, true).direction, exits.back().direction) <= 0) return;
+        if (dot(opening_of(map, other, true).direction, exits.back().direction) <= 0) return;
         open.missing_links.push_back({lane, other, gap_m});
       });
     }
@@ -161,16 +162,16 @@ bool is_open(const RoadMap& map, const OpenLanes& open, std::size_t lane) {
   return is_route(map.lanes[lane].type) && ahead_m >= kMinOpenWay_m && ahead_m < INFINITY;
 }
 
-void open_mouths(const OpenLanes& open, RoadMap* map_inout) {
+void remove_edges_across_openings(const OpenLanes& open, RoadMap* map_inout) {
   RoadMap& map = *map_inout;
   std::vector<RoadEdge> kept, parts, next;
   std::vector<SourceElement> sources;
   for (std::size_t i = 0; i < map.road_edges.size(); ++i) {
     parts = {map.road_edges[i]};
-    for (const std::vector<LaneMouth>* mouths : {&open.exits, &open.entries}) {
-      for (const LaneMouth& mouth : *mouths) {
+    for (const std::vector<LaneOpening>* openings : {&open.exits, &open.entries}) {
+      for (const LaneOpening& opening : *openings) {
         next.clear();
-        for (const RoadEdge& part : parts) append_parts_beside(part, mouth, &next);
+        for (const RoadEdge& part : parts) append_edge_parts_beside(part, opening, &next);
         parts.swap(next);
       }
     }

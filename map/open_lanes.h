@@ -16,7 +16,7 @@ constexpr float kMinOpenWay_m = 20.0f;
 bool has_endless_roads(const RoadMap& map);
 
 /// A line across the end of a lane, where traffic leaves the map, or across its start, where traffic enters.
-struct LaneMouth {
+struct LaneOpening {
   int32_t lane = -1;
   Vec3 middle_m;
   Vec2 direction;  // of traffic, unit vector
@@ -28,8 +28,8 @@ struct OpenLanes {
   // [lanes] Longest way of a route beyond the end of the lane, or of a lane beside it. 0: routes end with the lane.
   // Infinite on endless lanes, and on lanes of other types.
   std::vector<float> way_after_m;
-  std::vector<LaneMouth> exits;    // of lanes where routes end, except at missing links
-  std::vector<LaneMouth> entries;  // of open lanes without predecessors, of themselves or of lanes beside them
+  std::vector<LaneOpening> exits;    // of lanes where routes end, except at missing links
+  std::vector<LaneOpening> entries;  // of open lanes without predecessors, of themselves or of lanes beside them
 
   /// A missing link: the end of a lane where routes end, within 1 m of the start of another lane.
   struct MissingLink {
@@ -44,7 +44,7 @@ OpenLanes find_open_lanes(const RoadMap& map);
 bool is_open(const RoadMap& map, const OpenLanes& open, std::size_t lane);
 
 /// Removes road edges across exits and entries, so that traffic can pass there.
-void open_mouths(const OpenLanes& open, RoadMap* map);
+void remove_edges_across_openings(const OpenLanes& open, RoadMap* map);
 
 /// Numbers of driving and ramp lanes by their use.
 struct LaneUse {

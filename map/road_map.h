@@ -11,7 +11,7 @@
 #include "pictura/common/grid.h"
 #include "pictura/common/math.h"
 #include "pictura/common/span.h"
-#include "pictura/map/mends.h"
+#include "pictura/map/repairs.h"
 
 namespace pictura {
 
@@ -176,7 +176,7 @@ struct RoadMap {
   std::vector<BuildingLine> building_lines;
   MapFacts facts;
   Provenance provenance;
-  std::vector<Mend> mends;  // repaired faults of the file
+  std::vector<Repair> mends;  // repaired faults of the file
 
   Span<const LanePoint> points_of(const Lane& lane) const {
     return {lane_points.data() + lane.points.begin, static_cast<size_t>(lane.points.size())};

@@ -159,9 +159,9 @@ void add_lanes(const RoadMap& map, const PieceRule& rule, const OpenLanes* open,
 
 /// Adds exits, and entries with their turns: entries within kSharedTurn_m of each other, directly or transitively,
 /// share a turn.
-void add_mouths(const OpenLanes& open, MapRules* out) {
+void add_openings(const OpenLanes& open, MapRules* out) {
   constexpr float kSharedTurn_m = 5.0f;
-  for (const LaneMouth& exit : open.exits) {
+  for (const LaneOpening& exit : open.exits) {
     const MapLane& lane = out->lanes[static_cast<size_t>(exit.lane)];
     const LaneSegment& last = out->segments[static_cast<size_t>(lane.first_segment + lane.num_segments - 1)];
     out->exits.push_back({exit.middle_m, exit.direction, exit.half_width_m, last.slope});
@@ -493,7 +493,7 @@ MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool obs
   if (out.record.agents.empty() && !has_endless_roads(map)) open = find_open_lanes(map);
   out.is_open = open.has_value();
   add_lanes(map, rule, open ? &*open : nullptr, &out);
-  if (open) add_mouths(*open, &out);
+  if (open) add_openings(*open, &out);
   PICTURA_CHECK(!out.segments.empty(), "map {}: expected at least one drivable lane, got none", map.name);
   add_barriers(map, walls, rule, &out);
   const auto barrier_box = [&out](const Barrier& barrier) {

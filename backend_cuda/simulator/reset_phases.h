@@ -41,7 +41,7 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
     chosen_try[i] = -1;
   });
   // Whether the map and the boxes that stood before this turn leave a try free.
-  const auto look_at = [&](const auto& group, int i, int t) {
+  const auto evaluate_try = [&](const auto& group, int i, int t) {
     const AgentBox box = box_of_try(i, t);
     const bool is_free = is_clear(world, box, scratch.standing, group) && permits(group, i, t, box);
     if (is_free && group.rank() == 0) try_boxes[i * kSpawnTries + t] = box;
@@ -54,7 +54,7 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
     for (int t = 0; t < kSpawnTries && chosen < 0; ++t) {
       if (t == known) {
         ++known;
-        if (look_at(group, i, t)) free |= 1u << t;
+        if (evaluate_try(group, i, t)) free |= 1u << t;
         group.sync();
       }
       const AgentBox& box = try_boxes[i * kSpawnTries + t];
@@ -83,7 +83,7 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
       const int num_tries = min_of(kTurn, count - turn_begin) * first_tries;
       team.template for_each_by_groups<kThreadsPerAgent>(num_tries, [&](const auto& group, int k) {
         const int i = turn_begin + k / first_tries, t = k % first_tries;
-        const bool is_free = look_at(group, i, t);
+        const bool is_free = evaluate_try(group, i, t);
         if (group.rank() == 0 && is_free) team.set_bits(&free_tries[i], 1u << t);
         if (group.rank() == 0 && t == 0) known_tries[i] = first_tries;
       });

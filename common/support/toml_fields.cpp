@@ -34,8 +34,8 @@ std::string shown(const toml::node& node) {
   // Tables have many lines, and texts with line breaks are printed in triple quotes.
   std::string text = node.is_table() ? "a table" : value.str();
   if (node.is_string()) text = fmt::format("'{}'", *node.value<std::string>());
-  constexpr std::size_t kMostShown = 60;
-  if (text.size() > kMostShown) text = text.substr(0, kMostShown) + "...";
+  constexpr std::size_t kMaxShown = 60;
+  if (text.size() > kMaxShown) text = text.substr(0, kMaxShown) + "...";
   std::replace(text.begin(), text.end(), '\n', ' ');
   return text;
 }

@@ -150,7 +150,8 @@ class AreaBuilder {
 
   template <typename Item>
   void note_fault(const Item& item) const {
-    file_.where(item).mend(build_.faults, MendKind::open_area, "expected a closed outline that does not cross itself");
+    file_.where(item).record_repair(build_.faults, RepairKind::open_area,
+                                    "expected a closed outline that does not cross itself");
   }
 
   template <typename Item>
@@ -203,13 +204,14 @@ void build_edges(Build* build) {
       const Lane &from = map.lanes[link.from], &to = map.lanes[link.to];
       const opendrive::SourceLocation where{&build->file.source, 0, "lanelet " + map.road_names[from.source_road],
                                             "relation"};
-      build->faults->mend({MendKind::missing_link, map.provenance.lanes[link.from].line,
-                           fmt::format("{}: <relation>: ends {:.2f} m from the start of lanelet {}, with which it "
-                                       "shares no points there",
-                                       where.owner, link.gap_m, map.road_names[to.source_road])},
-                          build->file.source.name());
+      build->faults->record_repair(
+          {RepairKind::missing_link, map.provenance.lanes[link.from].line,
+           fmt::format("{}: <relation>: ends {:.2f} m from the start of lanelet {}, with which it "
+                       "shares no points there",
+                       where.owner, link.gap_m, map.road_names[to.source_road])},
+          build->file.source.name());
     }
-    open_mouths(open, &map);
+    remove_edges_across_openings(open, &map);
   }
   // A barrier with lanes on both sides is an edge for both.
   std::map<int32_t, int> sides;  // by way: 1 for a lane on its right, 2 for one on its left

@@ -196,7 +196,8 @@ class LaneBuilder {
     set_widths(band, &line);
     line = cut_line(line, &build_.budget);
     if (line.size() < 2) {
-      return file_.where(relation).mend(build_.faults, MendKind::empty_lanelet, "its center line has no length");
+      return file_.where(relation).record_repair(build_.faults, RepairKind::empty_lanelet,
+                                                 "its center line has no length");
     }
     std::vector<CurvePoint> points;
     for (const std::size_t index : thin_polyline(line, double{build_.options.chord_error_m}, double{kMaxPiece_m})) {
@@ -232,7 +233,8 @@ class LaneBuilder {
     if (by_subtype == LaneType::shoulder || by_subtype == LaneType::parking) return *by_subtype;
     if (const std::optional<LaneType> stated = type_of_participants(relation.tags)) return *stated;
     if (!by_subtype) {
-      file_.where(relation).mend(build_.faults, MendKind::unknown_subtype, "tag subtype: '{}' is not known", subtype);
+      file_.where(relation).record_repair(build_.faults, RepairKind::unknown_subtype, "tag subtype: '{}' is not known",
+                                          subtype);
     }
     return by_subtype.value_or(LaneType::other);
   }
@@ -269,15 +271,15 @@ class LaneBuilder {
         if (stated.empty()) stated = file_.ways[way].tags.of("subtype");
       }
       if (const std::optional<double> mps = speed_of_sign_mps(stated)) return *mps;
-      file_.where(rule).mend(build_.faults, MendKind::unreadable_speed,
-                             "expected a speed limit like '50 km/h', got '{}'", stated);
+      file_.where(rule).record_repair(build_.faults, RepairKind::unreadable_speed,
+                                      "expected a speed limit like '50 km/h', got '{}'", stated);
     }
     for (const std::string_view key : {"speed_limit:vehicle:car", "speed_limit:vehicle", "speed_limit"}) {
       const std::string_view stated = relation.tags.of(key);
       if (stated.empty()) continue;
       if (const std::optional<double> mps = parse_speed_mps(stated)) return *mps;
-      file_.where(relation).mend(build_.faults, MendKind::unreadable_speed,
-                                 "tag {}: expected a speed limit like '50 km/h', got '{}'", key, stated);
+      file_.where(relation).record_repair(build_.faults, RepairKind::unreadable_speed,
+                                          "tag {}: expected a speed limit like '50 km/h', got '{}'", key, stated);
     }
     return default_speed_mps(relation.tags);
   }
@@ -292,7 +294,8 @@ class LaneBuilder {
     for (std::size_t i = right.size(); i-- > 0;) add(right[i]);
     if (ring.size() > 1 && length(ring.back() - ring.front()) <= static_cast<float>(kSamePoint_m)) ring.pop_back();
     if (ring.size() < 3) {
-      return file_.where(relation).mend(build_.faults, MendKind::empty_lanelet, "expected a crosswalk with an area");
+      return file_.where(relation).record_repair(build_.faults, RepairKind::empty_lanelet,
+                                                 "expected a crosswalk with an area");
     }
     const auto first = static_cast<int32_t>(map_.outline_points.size());
     map_.outline_points.insert(map_.outline_points.end(), ring.begin(), ring.end());
@@ -430,9 +433,9 @@ void find_lanelets(Build* build) {
     const std::vector<int32_t> left = relation.ways("left"), right = relation.ways("right");
     const auto is_line = [&](int32_t way) { return file.ways[way].nodes.size() >= 2; };
     if (left.size() != 1 || right.size() != 1 || !is_line(left[0]) || !is_line(right[0])) {
-      file.where(relation).mend(build->faults, MendKind::borderless_lanelet,
-                                "expected one left and one right border of two points, got {} and {}", left.size(),
-                                right.size());
+      file.where(relation).record_repair(build->faults, RepairKind::borderless_lanelet,
+                                         "expected one left and one right border of two points, got {} and {}",
+                                         left.size(), right.size());
       continue;
     }
     Lanelet lanelet{.relation = static_cast<int32_t>(i), .left = {left[0]}, .right = {right[0]}};

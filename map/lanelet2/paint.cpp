@@ -61,7 +61,7 @@ class Painter {
     for (int i = 0; i <= static_cast<int>(MarkColor::black); ++i) {
       if (name == to_string(static_cast<MarkColor>(i))) return static_cast<MarkColor>(i);
     }
-    file_.where(way).mend(build_.faults, MendKind::unknown_color, "tag color: '{}' is not known", name);
+    file_.where(way).record_repair(build_.faults, RepairKind::unknown_color, "tag color: '{}' is not known", name);
     return MarkColor::white;
   }
 
@@ -152,8 +152,9 @@ class Painter {
     const Eigen::Vector3d along = points.back() - points.front();
     double length_m = along.head<2>().norm(), width_m = width_of(way, 100);
     if (length_m < kMinLine_m || width_m < kMinLine_m) {
-      return file_.where(way).mend(build_.faults, MendKind::shapeless_object,
-                                   "expected a parking space with a length and a width of at least {} m", kMinLine_m);
+      return file_.where(way).record_repair(build_.faults, RepairKind::shapeless_object,
+                                            "expected a parking space with a length and a width of at least {} m",
+                                            kMinLine_m);
     }
     double heading = std::atan2(along.y(), along.x());
     if (width_m > length_m) {

@@ -80,7 +80,7 @@ class Reader {
   template <typename Item>
   bool add_id(const Item& item, Index* index, std::size_t at) {
     if (index->emplace(item.id, static_cast<int32_t>(at)).second) return true;
-    file_.where(item).mend(faults_, MendKind::repeated_element, "attribute id: another one has it already");
+    file_.where(item).record_repair(faults_, RepairKind::repeated_element, "attribute id: another one has it already");
     return false;
   }
 
@@ -116,7 +116,8 @@ class Reader {
       const int64_t id = integer(reference, "ref");
       const auto found = node_of_id_.find(id);
       if (found == node_of_id_.end()) {
-        file_.where(way).mend(faults_, MendKind::missing_element, "refers to node {}, which does not exist", id);
+        file_.where(way).record_repair(faults_, RepairKind::missing_element, "refers to node {}, which does not exist",
+                                       id);
       } else {
         way.nodes.push_back(found->second);
       }
@@ -133,8 +134,8 @@ class Reader {
       const Index& index = is_way ? way_of_id_ : relation_of_id_;
       const auto found = index.find(id);
       if (found == index.end()) {
-        file_.where(*relation).mend(faults_, MendKind::missing_element, "refers to {} {} as {}, which does not exist",
-                                    type, id, role);
+        file_.where(*relation).record_repair(faults_, RepairKind::missing_element,
+                                             "refers to {} {} as {}, which does not exist", type, id, role);
         continue;
       }
       Relation::Member member{.role = role};
@@ -264,20 +265,22 @@ void place_nodes(const std::optional<GeoPoint>& origin, const PlanMap& plan, ope
     node.position_m.y() = plan.yx * place->x_m + plan.yy * place->y_m;
   }
   if (!(plan == PlanMap{})) file.geo_reference.clear();  // a copy lies nowhere on Earth
-  std::vector<bool> is_noted(file.nodes.size(), false);
+  std::vector<bool> is_recorded(file.nodes.size(), false);
   for (Way& way : file.ways) {
     std::erase_if(way.nodes, [&](int32_t index) {
       const Node& node = file.nodes[index];
       if (node.has_position) return false;
-      if (!is_noted[index]) {
-        file.where(node).mend(faults, MendKind::missing_position,
-                              "expected lat and lon, or the tags local_x and local_y, like other nodes of the file");
+      if (!is_recorded[index]) {
+        file.where(node).record_repair(
+            faults, RepairKind::missing_position,
+            "expected lat and lon, or the tags local_x and local_y, like other nodes of the file");
       }
-      is_noted[index] = true;
+      is_recorded[index] = true;
       return true;
     });
     if (way.nodes.size() >= 2) continue;
-    file.where(way).mend(faults, MendKind::short_way, "expected at least two nodes, got {}", way.nodes.size());
+    file.where(way).record_repair(faults, RepairKind::short_way, "expected at least two nodes, got {}",
+                                  way.nodes.size());
     way.nodes.clear();
   }
 }

@@ -92,12 +92,13 @@ class RuleBuilder {
       return plan_distance_m(points.front(), points.back()) < double{kMinStopLine_m};
     });
     if (heads.empty()) {
-      return file_.where(relation).mend(build_.faults, MendKind::empty_rule, "expected a way with the role refers");
+      return file_.where(relation).record_repair(build_.faults, RepairKind::empty_rule,
+                                                 "expected a way with the role refers");
     }
     if (lanes_of_rule_[index].empty()) {
       if (is_referred_to_[index]) return;  // a light for those who walk
-      return file_.where(relation).mend(build_.faults, MendKind::laneless_light,
-                                        "expected a lanelet that refers to it as regulatory_element");
+      return file_.where(relation).record_repair(build_.faults, RepairKind::laneless_light,
+                                                 "expected a lanelet that refers to it as regulatory_element");
     }
     std::vector<int32_t> key = lines.empty() ? heads : std::vector<int32_t>{lines.front()};
     std::sort(key.begin(), key.end());
@@ -184,8 +185,8 @@ class RuleBuilder {
     TrafficLight light{.name = std::to_string(relation.id)};
     set_stop_line(*approach, &light);
     if (length((light.stop_b_m - light.stop_a_m).xy()) < kMinStopLine_m) {
-      return file_.where(relation).mend(build_.faults, MendKind::laneless_light, "controls lanes less than {} m wide",
-                                        kMinStopLine_m);
+      return file_.where(relation).record_repair(build_.faults, RepairKind::laneless_light,
+                                                 "controls lanes less than {} m wide", kMinStopLine_m);
     }
     const Vec2 forward{std::cos(light.stop_heading_rad), std::sin(light.stop_heading_rad)};
     light.head_facing = forward * -1.0f;

@@ -67,13 +67,14 @@ double Element::number_in(const char* attribute, double low, double high) const 
 double Element::size(const char* attribute, double high) const {
   const double value = number_in(attribute, std::numeric_limits<double>::lowest(), high, 0);
   if (value >= 0) return value;
-  mend(MendKind::negative_size, "attribute {}: expected a number in [0, {}], got {}", attribute, high, value);
+  record_repair(RepairKind::negative_size, "attribute {}: expected a number in [0, {}], got {}", attribute, high,
+                value);
   return 0;
 }
 
 bool Element::has_or_zero(const char* attribute) const {
   if (has(attribute)) return true;
-  mend(MendKind::missing_zero, "attribute {} is missing", attribute);
+  record_repair(RepairKind::missing_zero, "attribute {} is missing", attribute);
   return false;
 }
 
@@ -87,7 +88,7 @@ bool Element::flag(const char* attribute) const {
   const std::string value = text(attribute, "false");
   if (value == "true" || value == "1") return true;
   if (value != "false" && value != "0") {
-    mend(MendKind::unknown_flag, "attribute {}: expected true or false, got '{}'", attribute, value);
+    record_repair(RepairKind::unknown_flag, "attribute {}: expected true or false, got '{}'", attribute, value);
   }
   return false;
 }
@@ -107,8 +108,8 @@ std::optional<double> read_station(const Element& record, const char* attribute,
                                    std::optional<double> fallback) {
   const double s = fallback ? record.number(attribute, *fallback) : record.number(attribute);
   if (s >= -kStationTolerance_m && s <= length + kStationTolerance_m) return s;
-  record.mend(s < 0 ? MendKind::record_before_start : MendKind::record_beyond_end,
-              "attribute {}: expected a number in [0, {}], got {}", attribute, length, s);
+  record.record_repair(s < 0 ? RepairKind::record_before_start : RepairKind::record_beyond_end,
+                       "attribute {}: expected a number in [0, {}], got {}", attribute, length, s);
   if (s < 0) return s;
   return std::nullopt;
 }

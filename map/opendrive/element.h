@@ -30,8 +30,8 @@ class Element {
   }
   /// Records a fault that the caller repairs by action_of(kind); strict reading throws it.
   template <typename... Args>
-  void mend(MendKind kind, fmt::format_string<Args...> format, Args&&... args) const {
-    where().mend(faults_, kind, format, std::forward<Args>(args)...);
+  void record_repair(RepairKind kind, fmt::format_string<Args...> format, Args&&... args) const {
+    where().record_repair(faults_, kind, format, std::forward<Args>(args)...);
   }
 
   explicit operator bool() const { return static_cast<bool>(node_); }
@@ -102,8 +102,8 @@ template <typename Record>
 void append_record(const Element& element, const char* attribute, double Record::* station, Record record,
                    std::vector<Record>* records) {
   if (!records->empty() && record.*station < records->back().*station) {
-    element.mend(MendKind::record_order, "attribute {}: expected at least the previous one's {}, got {}", attribute,
-                 records->back().*station, record.*station);
+    element.record_repair(RepairKind::record_order, "attribute {}: expected at least the previous one's {}, got {}",
+                          attribute, records->back().*station, record.*station);
   }
   records->push_back(std::move(record));
 }

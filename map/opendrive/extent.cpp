@@ -25,7 +25,7 @@ void at_probes(const std::vector<double>& stations, Probe&& probe) {
 
 /// Checks widths. Negative widths count as zero, which is recorded once per lane.
 void check_widths(const FileRoad& road, const FileSection& section, const FileLane& lane, Faults* faults) {
-  bool is_noted = false;
+  bool is_recorded = false;
   at_probes(formula_changes(road, section, lane.id, section.s, section.end), [&](double s) {
     const double ds = std::min(s, section.end - 1e-6) - section.s;
     const double width =
@@ -35,10 +35,10 @@ void check_widths(const FileRoad& road, const FileSection& section, const FileLa
     if (!(width <= kMaxWidth_m)) {
       lane.where.fail("its width at s {:.3f} is {:.3f} m; expected at most {}", s, width, kMaxWidth_m);
     }
-    if (width >= -kWidthTolerance_m || is_noted) return;
-    lane.where.mend(faults, MendKind::negative_width, "its width at s {:.3f} is {:.3f} m; expected at least 0", s,
-                    width);
-    is_noted = true;
+    if (width >= -kWidthTolerance_m || is_recorded) return;
+    lane.where.record_repair(faults, RepairKind::negative_width,
+                             "its width at s {:.3f} is {:.3f} m; expected at least 0", s, width);
+    is_recorded = true;
   });
 }
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "pictura/common/error.h"
-#include "pictura/map/mends.h"
+#include "pictura/map/repairs.h"
 
 namespace pictura::opendrive {
 
@@ -16,22 +16,22 @@ class Faults {
 
   /// Records a fault that the caller repairs by action_of(kind). In strict reading, throws Error with its message
   /// instead.
-  void mend(Mend mend, const std::string& source) {
-    if (strict_) throw Error(message_of(mend, source));
+  void record_repair(Repair repair, const std::string& source) {
+    if (strict_) throw Error(message_of(repair, source));
     // The limit bounds memory.
-    if (mends_.size() >= kMaxMends) {
-      fail("{} (after {} other faults, the maximum that is repaired)", message_of(mend, source), kMaxMends);
+    if (repairs_.size() >= kMaxRepairs) {
+      fail("{} (after {} other faults, the maximum that is repaired)", message_of(repair, source), kMaxRepairs);
     }
-    mends_.push_back(std::move(mend));
+    repairs_.push_back(std::move(repair));
   }
 
-  std::vector<Mend> take() { return std::move(mends_); }
+  std::vector<Repair> take() { return std::move(repairs_); }
 
  private:
-  static constexpr std::size_t kMaxMends = 1'000'000;
+  static constexpr std::size_t kMaxRepairs = 1'000'000;
 
   bool strict_;
-  std::vector<Mend> mends_;
+  std::vector<Repair> repairs_;
 };
 
 }  // namespace pictura::opendrive

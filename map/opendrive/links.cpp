@@ -48,8 +48,8 @@ class Linker {
   /// Whether the lane exists; if not, the link to it is repaired by omission.
   bool exists(const LaneEnd& end, const SourceLocation& where) const {
     if (file_lane(end)) return true;
-    where.mend(build_.faults, MendKind::missing_lane, "is linked to lane {} of road {}, which does not exist there",
-               end.id, road_of(end.road).id);
+    where.record_repair(build_.faults, RepairKind::missing_lane,
+                        "is linked to lane {} of road {}, which does not exist there", end.id, road_of(end.road).id);
     return false;
   }
 
@@ -75,9 +75,9 @@ class Linker {
     if (next < 0 || next >= static_cast<int>(file_road.sections.size())) {
       const RoadLink& link = at_end ? file_road.successor : file_road.predecessor;
       if (link.kind == RoadLink::Kind::none && !link.where.source && is_drivable(lane.type)) {
-        lane.where.mend(build_.faults, MendKind::dangling_link,
-                        "is linked to lane {} beyond the {} of its road, which is linked to nothing there", target_id,
-                        at_end ? "end" : "start");
+        lane.where.record_repair(build_.faults, RepairKind::dangling_link,
+                                 "is linked to lane {} beyond the {} of its road, which is linked to nothing there",
+                                 target_id, at_end ? "end" : "start");
       }
       if (link.kind != RoadLink::Kind::road) return;  // connections link the lanes of a junction
       target = end_of_road(road_named(link.id), link.contact, target_id);
@@ -101,20 +101,21 @@ class Linker {
     if (lane_a < 0 || lane_b < 0) return;
     const LaneType type_a = build_.map->lanes[lane_a].type;
     const LaneType type_b = build_.map->lanes[lane_b].type;
-    const auto leave_out = [&](MendKind kind, const std::string& reason) {
+    const auto leave_out = [&](RepairKind kind, const std::string& reason) {
       if (!is_drivable(type_a) && !is_drivable(type_b)) return;
       if (!left_out_.emplace(std::minmax(lane_a, lane_b)).second) return;
-      where.mend(build_.faults, kind, "links lane {} of road {} with lane {} of road {}, {}", a.id, road_of(a.road).id,
-                 b.id, road_of(b.road).id, reason);
+      where.record_repair(build_.faults, kind, "links lane {} of road {} with lane {} of road {}, {}", a.id,
+                          road_of(a.road).id, b.id, road_of(b.road).id, reason);
     };
     if (type_a != type_b && !(is_drivable(type_a) && is_drivable(type_b))) {
-      return leave_out(MendKind::unlike_link, fmt::format("which are {} and {}", to_string(type_a), to_string(type_b)));
+      return leave_out(RepairKind::unlike_link,
+                       fmt::format("which are {} and {}", to_string(type_a), to_string(type_b)));
     }
-    if (is_exit(a) == is_exit(b)) return leave_out(MendKind::opposed_link, "whose traffic meets head on there");
+    if (is_exit(a) == is_exit(b)) return leave_out(RepairKind::opposed_link, "whose traffic meets head on there");
     const auto [from, to] = is_exit(a) ? std::pair(lane_a, lane_b) : std::pair(lane_b, lane_a);
     const float gap_m = length(end_of(from) - begin_of(to));
     if (!(gap_m <= kMaxLinkGap_m)) {
-      return leave_out(MendKind::distant_link, fmt::format("which are {:.2f} m apart there", gap_m));
+      return leave_out(RepairKind::distant_link, fmt::format("which are {:.2f} m apart there", gap_m));
     }
     links_.emplace(from, to);
   }

@@ -26,8 +26,8 @@ void SourceLocation::fail_with(const std::string& message) const {
   pictura::fail("{}:{}: {}: <{}>: {}", source ? source->name() : "network", line(), owner, element, message);
 }
 
-void SourceLocation::mend_with(Faults* faults, MendKind kind, const std::string& message) const {
-  faults->mend({kind, line(), fmt::format("{}: <{}>: {}", owner, element, message)}, source->name());
+void SourceLocation::record_repair_with(Faults* faults, RepairKind kind, const std::string& message) const {
+  faults->record_repair({kind, line(), fmt::format("{}: <{}>: {}", owner, element, message)}, source->name());
 }
 
 }  // namespace pictura::opendrive

@@ -49,11 +49,11 @@ struct SourceLocation {
   }
 
   /// Records a fault that the caller repairs, or throws; see Faults.
-  void mend_with(Faults* faults, MendKind kind, const std::string& message) const;
+  void record_repair_with(Faults* faults, RepairKind kind, const std::string& message) const;
 
   template <typename... Args>
-  void mend(Faults* faults, MendKind kind, fmt::format_string<Args...> format, Args&&... args) const {
-    mend_with(faults, kind, fmt::format(format, std::forward<Args>(args)...));
+  void record_repair(Faults* faults, RepairKind kind, fmt::format_string<Args...> format, Args&&... args) const {
+    record_repair_with(faults, kind, fmt::format(format, std::forward<Args>(args)...));
   }
 };
 
@@ -149,7 +149,7 @@ struct RoadLink {
   enum class Kind : uint8_t { none, road, junction } kind = Kind::none;
   std::string id;
   ContactPoint contact = ContactPoint::start;
-  bool has_contact = true;  // false: missing in the file and determined by mend_links()
+  bool has_contact = true;  // false: missing in the file and determined by repair_links()
   SourceLocation where;     // also set for a link that was omitted
 };
 
@@ -233,8 +233,8 @@ struct LaneLink {
 struct Connection {
   std::string incoming_road, connecting_road;       // in direct junctions, connecting_road is the linked road
   ContactPoint contact = ContactPoint::start;       // end of the connecting road at the incoming road
-  bool has_contact = true;                          // false: missing in the file and determined by mend_links()
-  ContactPoint incoming_end = ContactPoint::start;  // end of the incoming road at the junction; set by mend_links()
+  bool has_contact = true;                          // false: missing in the file and determined by repair_links()
+  ContactPoint incoming_end = ContactPoint::start;  // end of the incoming road at the junction; set by repair_links()
   std::vector<LaneLink> lane_links;
   SourceLocation where;
 };

@@ -81,7 +81,7 @@ class MarkPainter {
 
   /// Paints the mark from `begin` to `end`.
   void paint(const RoadMark& mark, double begin, double end) {
-    is_noted_ = false;
+    is_recorded_ = false;
     const double mark_begin = section_.s + mark.s_offset;
     for (const Stripe& stripe : stripes_of(mark, lane_.id, mark_begin)) {
       if (!stripe.broken) {
@@ -133,9 +133,9 @@ class MarkPainter {
   }
 
   void note_self_crossing(const RoadMark& mark, double s) {
-    if (is_noted_) return;
-    is_noted_ = true;
-    mark.where.mend(build_.faults, MendKind::self_crossing_mark, "at s {:.3f} it runs against the road", s);
+    if (is_recorded_) return;
+    is_recorded_ = true;
+    mark.where.record_repair(build_.faults, RepairKind::self_crossing_mark, "at s {:.3f} it runs against the road", s);
   }
 
   /// Adds the points in [begin, end) if they form a line.
@@ -157,7 +157,7 @@ class MarkPainter {
   const FileRoad& road_;
   const FileSection& section_;
   const FileLane& lane_;
-  bool is_noted_ = false;  // whether the self-crossing of the mark is recorded
+  bool is_recorded_ = false;  // whether the self-crossing of the mark is recorded
 };
 
 /// Returns the corners of an object: its outline, or its bounding box.
@@ -189,13 +189,14 @@ std::vector<Vec3> corners_of(Build* build, const FileRoad& road, const FileObjec
 
 void add_crosswalk(Build* build, std::size_t road, const FileObject& object) {
   if (object.outline.empty() && !(object.length > 0 && object.width > 0)) {
-    return object.where.mend(build->faults, MendKind::shapeless_object,
-                             "expected a crosswalk with an outline, or a length and a width");
+    return object.where.record_repair(build->faults, RepairKind::shapeless_object,
+                                      "expected a crosswalk with an outline, or a length and a width");
   }
   const std::vector<Vec3> corners = corners_of(build, build->network.roads[road], object);
   if (corners.size() < 3) {
-    return object.where.mend(build->faults, MendKind::shapeless_object,
-                             "expected a crosswalk with at least three distinct corners, got {}", corners.size());
+    return object.where.record_repair(build->faults, RepairKind::shapeless_object,
+                                      "expected a crosswalk with at least three distinct corners, got {}",
+                                      corners.size());
   }
   RoadMap& map = *build->map;
   const int32_t first = static_cast<int32_t>(map.outline_points.size());
@@ -209,8 +210,9 @@ void add_stop_line(Build* build, std::size_t road, const FileObject& object) {
   constexpr std::size_t kMaxCorners = 64;
   const std::vector<Vec3> corners = corners_of(build, build->network.roads[road], object);
   if (corners.size() > kMaxCorners) {
-    return object.where.mend(build->faults, MendKind::shapeless_object,
-                             "expected a stop line of at most {} corners, got {}", kMaxCorners, corners.size());
+    return object.where.record_repair(build->faults, RepairKind::shapeless_object,
+                                      "expected a stop line of at most {} corners, got {}", kMaxCorners,
+                                      corners.size());
   }
   Vec2 along{};
   for (const Vec3 a : corners) {
@@ -219,8 +221,8 @@ void add_stop_line(Build* build, std::size_t road, const FileObject& object) {
     }
   }
   if (length(along) < kMinStopLine_m) {
-    return object.where.mend(build->faults, MendKind::shapeless_object,
-                             "expected a stop line at least {} m long, got {}", kMinStopLine_m, length(along));
+    return object.where.record_repair(build->faults, RepairKind::shapeless_object,
+                                      "expected a stop line at least {} m long, got {}", kMinStopLine_m, length(along));
   }
   if (corners.size() >= 4) {
     // The longest extent of a box is its diagonal, so its longest side is used.
@@ -264,9 +266,10 @@ void add_parking_space(Build* build, std::size_t road_index, const FileObject& o
   double heading = pose.heading + object.heading;
   double length_m = object.length, width_m = object.width;
   if (!(length_m >= kMinParking_m && width_m >= kMinParking_m)) {
-    return object.where.mend(build->faults, MendKind::shapeless_object,
-                             "expected a parking space with a length and a width of at least {} m, got {} and {}",
-                             kMinParking_m, length_m, width_m);
+    return object.where.record_repair(
+        build->faults, RepairKind::shapeless_object,
+        "expected a parking space with a length and a width of at least {} m, got {} and {}", kMinParking_m, length_m,
+        width_m);
   }
   // Rows keep their number of spaces: along the road, each space stretches with the road.
   if (road.deformation) {

@@ -76,11 +76,11 @@ PlaneCubic read_param_poly3(const Element& element, double length) {
   if (fits(curve_m)) return cubic;
   constexpr const char* kMessage = "its curve is {:.3f} m long; expected the geometry's length, {} m";
   if (fits(measure_to(other))) {
-    element.mend(MendKind::parameter_range, kMessage, curve_m, length);
+    element.record_repair(RepairKind::parameter_range, kMessage, curve_m, length);
     return cubic;
   }
   if (!(curve_m >= kMinRoadLength_m && curve_m <= kMaxRoadLength_m)) element.fail(kMessage, curve_m, length);
-  element.mend(MendKind::line_length, kMessage, curve_m, length);
+  element.record_repair(RepairKind::line_length, kMessage, curve_m, length);
   measure_to(stated);
   return cubic;
 }
@@ -132,12 +132,12 @@ double join_stations(const Geometry& geometry, GeometryPiece* before, GeometryPi
     measure(&cut);
     if (can_cut(error, before->length) ||
         distance_m(cut, *piece) <= distance_m(*before, *piece) + kStationTolerance_m) {
-      geometry.element.mend(MendKind::geometry_station, kMessage, end, piece->s);
+      geometry.element.record_repair(RepairKind::geometry_station, kMessage, end, piece->s);
       *before = std::move(cut);
       return 0;
     }
   }
-  geometry.element.mend(MendKind::moved_geometry, kMessage, end, piece->s);
+  geometry.element.record_repair(RepairKind::moved_geometry, kMessage, end, piece->s);
   piece->s = end;
   return -error;
 }
@@ -154,8 +154,8 @@ std::optional<Jump> jump_between(const Geometry& geometry, std::size_t index, co
   if (!(gap_m <= (can_spread ? kMaxJump_m : kMaxCut_m))) {
     geometry.element.fail(kMessage, gap_m, end.x(), end.y(), kMaxGap_m);
   }
-  geometry.element.mend(can_spread ? MendKind::geometry_jump : MendKind::geometry_gap, kMessage, gap_m, end.x(),
-                        end.y(), kMaxGap_m);
+  geometry.element.record_repair(can_spread ? RepairKind::geometry_jump : RepairKind::geometry_gap, kMessage, gap_m,
+                                 end.x(), end.y(), kMaxGap_m);
   if (!can_spread) return std::nullopt;
   return Jump{.piece = index, .shift_m = Eigen::Vector2d{road.geometry[index].x, road.geometry[index].y} - end};
 }
@@ -181,9 +181,9 @@ void drop_kinks(std::vector<Geometry>* geometries) {
       kept.push_back(geometry);
       continue;
     }
-    geometry.element.mend(MendKind::empty_geometry,
-                          "attribute length: expected at least {} where the line turns by {:.3f} rad, got {}",
-                          kStationTolerance_m, turn_rad, geometry.piece.length);
+    geometry.element.record_repair(RepairKind::empty_geometry,
+                                   "attribute length: expected at least {} where the line turns by {:.3f} rad, got {}",
+                                   kStationTolerance_m, turn_rad, geometry.piece.length);
   }
   *geometries = std::move(kept);
 }
@@ -198,8 +198,8 @@ void join_geometry(const std::vector<Geometry>& geometries, FileRoad* road) {
       moved += join_stations(geometry, &road->geometry.back(), &piece);
     } else if (piece.s > kStationTolerance_m) {
       const bool is_near = can_cut(piece.s, piece.length);
-      geometry.element.mend(is_near ? MendKind::geometry_station : MendKind::moved_geometry,
-                            "attribute s: expected 0 for the first geometry, got {}", piece.s);
+      geometry.element.record_repair(is_near ? RepairKind::geometry_station : RepairKind::moved_geometry,
+                                     "attribute s: expected 0 for the first geometry, got {}", piece.s);
       if (!is_near) moved = -piece.s;
       piece.s = 0;
     }
@@ -210,7 +210,7 @@ void join_geometry(const std::vector<Geometry>& geometries, FileRoad* road) {
   if (std::abs(end - road->length) > kMaxGap_m) {
     constexpr const char* kMessage = "the reference line ends at {}; expected the road's length, {}";
     if (!(end <= kMaxRoadLength_m)) geometries.back().element.fail(kMessage, end, road->length);
-    geometries.back().element.mend(MendKind::line_length, kMessage, end, road->length);
+    geometries.back().element.record_repair(RepairKind::line_length, kMessage, end, road->length);
     road->length = end;
   }
   std::vector<Jump> jumps;
@@ -229,8 +229,9 @@ void read_elevation(const Element& profile, double described, FileRoad* road) {
   for (std::size_t i = 1; i < cubics.size(); ++i) {
     const double s = cubics[i].s, before_m = Profile{{cubics[i - 1]}}.value(s), rise_m = cubics[i].a - before_m;
     if (std::abs(rise_m) <= kMaxStep_m || s >= std::min(described, road->length)) continue;
-    profile.mend(MendKind::height_jump, "at s {} it jumps by {:.3f} m from {:.3f} m; expected a jump of at most {} m",
-                 s, rise_m, before_m, kMaxStep_m);
+    profile.record_repair(RepairKind::height_jump,
+                          "at s {} it jumps by {:.3f} m from {:.3f} m; expected a jump of at most {} m", s, rise_m,
+                          before_m, kMaxStep_m);
     jumps.push_back({s, rise_m});
     if (jumps.size() > kMaxJumps) profile.fail("expected at most {} jumps in a road", kMaxJumps);
   }
@@ -265,8 +266,8 @@ std::vector<CrossSection> read_shape(const Element& lateral, double road_length)
     if (!s) return;
     const double t = element.number_in("t", -kMaxOffset_m, kMaxOffset_m);
     if (!shapes.empty() && *s == shapes.back().s && t < shapes.back().height.s) {
-      element.mend(MendKind::record_order, "attribute t: expected at least the previous one's {}, got {}",
-                   shapes.back().height.s, t);
+      element.record_repair(RepairKind::record_order, "attribute t: expected at least the previous one's {}, got {}",
+                            shapes.back().height.s, t);
     }
     append_record(element, "s", &Shape::s, {*s, read_cubic(element, t)}, &shapes);
   });
@@ -287,8 +288,8 @@ std::vector<CrossSection> read_shape(const Element& lateral, double road_length)
 void read_banking(const Element& lateral, FileRoad* road) {
   if (!lateral) return;
   if (const Element strips = lateral.child("crossSectionSurface")) {
-    strips.mend(MendKind::strip_surface,
-                "cross-sections as strips are not supported; expected <superelevation> or <shape>");
+    strips.record_repair(RepairKind::strip_surface,
+                         "cross-sections as strips are not supported; expected <superelevation> or <shape>");
   }
   road->superelevation = read_profile(lateral, "superelevation", "s", road->length);
   lateral.each("crossfall", [&](const Element& element) {
@@ -320,8 +321,8 @@ double read_reference_line(const Element& road_element, FileRoad* road) {
                  [&](const Element& element) { drawn += element.number_in("length", 0, kMaxRoadLength_m); });
   const bool is_short = drawn < kMinRoadLength_m;
   if (is_short) {
-    road_element.mend(MendKind::short_road, "attribute length: expected at least {} with <geometry>, got {}",
-                      kMinRoadLength_m, drawn);
+    road_element.record_repair(RepairKind::short_road, "attribute length: expected at least {} with <geometry>, got {}",
+                               kMinRoadLength_m, drawn);
     road->length = kMinRoadLength_m;
     road->geometry.push_back(straight_piece(plan_view, road->length));
   } else {
@@ -329,7 +330,7 @@ double read_reference_line(const Element& road_element, FileRoad* road) {
     plan_view.each("geometry", [&](const Element& element) {
       GeometryPiece piece = read_geometry(element);
       if (piece.length == 0) {
-        return element.mend(MendKind::empty_geometry, "attribute length: expected more than 0");
+        return element.record_repair(RepairKind::empty_geometry, "attribute length: expected more than 0");
       }
       const double s = piece.s;
       append_record(element, "s", &Geometry::s, {s, element, std::move(piece)}, &geometries);

@@ -5,17 +5,17 @@ namespace pictura::opendrive {
 
 namespace {
 
-/// Sets the end to which a link or connection refers. A missing or unknown end is recorded, and mend_links() determines
-/// it.
+/// Sets the end to which a link or connection refers. A missing or unknown end is recorded, and repair_links()
+/// determines it.
 template <typename Link>
 void read_contact(const Element& element, Link* link) {
   const std::string text = element.text("contactPoint", "");
   link->contact = text == "end" ? ContactPoint::end : ContactPoint::start;
   link->has_contact = text == "start" || text == "end";
   if (!element.has("contactPoint")) {
-    element.mend(MendKind::missing_contact, "attribute contactPoint is missing");
+    element.record_repair(RepairKind::missing_contact, "attribute contactPoint is missing");
   } else if (!link->has_contact) {
-    element.mend(MendKind::missing_contact, "attribute contactPoint: expected start or end, got '{}'", text);
+    element.record_repair(RepairKind::missing_contact, "attribute contactPoint: expected start or end, got '{}'", text);
   }
 }
 
@@ -29,8 +29,8 @@ RoadLink read_road_link(const Element& element) {
     link.kind = RoadLink::Kind::junction;
   } else if (type == "road") {
     if (element.has("elementS")) {
-      element.mend(MendKind::link_into_road,
-                   "attribute elementS: links to the middle of a road (virtual junctions) are not supported");
+      element.record_repair(RepairKind::link_into_road,
+                            "attribute elementS: links to the middle of a road (virtual junctions) are not supported");
       return link;
     }
     link.kind = RoadLink::Kind::road;
@@ -70,8 +70,8 @@ FileJunction read_junction(const Element& element) {
   junction.is_direct = type == "direct";
   if (type != "default" && !junction.is_direct) {
     // Kept without connections, since roads refer to the junction.
-    element.mend(MendKind::unsupported_junction,
-                 "attribute type: '{}' junctions are not supported; expected default or direct", type);
+    element.record_repair(RepairKind::unsupported_junction,
+                          "attribute type: '{}' junctions are not supported; expected default or direct", type);
     return junction;
   }
   element.each("connection", [&](const Element& child) {

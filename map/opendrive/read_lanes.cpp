@@ -55,7 +55,8 @@ LaneType lane_type(const Element& element, const std::string& name) {
   };
   const auto found = kTypes.find(name);
   if (found != kTypes.end()) return found->second;
-  element.mend(MendKind::unknown_lane_type, "attribute type: '{}' is not a lane type of OpenDRIVE 1.4 to 1.8", name);
+  element.record_repair(RepairKind::unknown_lane_type,
+                        "attribute type: '{}' is not a lane type of OpenDRIVE 1.4 to 1.8", name);
   return LaneType::other;
 }
 
@@ -94,8 +95,8 @@ LaneDirection read_direction(const Element& element) {
   if (text == "reversed") return LaneDirection::reversed;
   if (text == "both") return LaneDirection::both;
   if (text != "standard") {
-    element.mend(MendKind::unknown_direction, "attribute direction: expected standard, reversed or both, got '{}'",
-                 text);
+    element.record_repair(RepairKind::unknown_direction,
+                          "attribute direction: expected standard, reversed or both, got '{}'", text);
   }
   return LaneDirection::standard;
 }
@@ -103,7 +104,7 @@ LaneDirection read_direction(const Element& element) {
 /// Reads a lane's type. A centre lane has no surface of any type; a lane without a type is a special lane.
 void read_type(const Element& element, bool is_center, FileLane* lane) {
   lane->type_name = element.text("type", is_center ? "none" : "special1");
-  if (!element.has("type")) element.mend(MendKind::missing_lane_type, "attribute type is missing");
+  if (!element.has("type")) element.record_repair(RepairKind::missing_lane_type, "attribute type is missing");
   lane->type = lane_type(element, lane->type_name);
   lane->is_void = lane->type_name == "none";
   lane->is_level = element.flag("level");
@@ -116,13 +117,13 @@ void read_width(const Element& element, double section_length, FileLane* lane) {
   const char* const name = by_border ? "border" : "width";
   Profile profile = read_profile(element, name, "sOffset", section_length);
   if (profile.cubics.empty()) {
-    element.mend(MendKind::missing_width, "expected a <width> or <border> inside, found none");
+    element.record_repair(RepairKind::missing_width, "expected a <width> or <border> inside, found none");
     lane->is_void = true;
     return;
   }
   const Cubic first = profile.cubics.front();
   if (first.s > kStationTolerance_m) {
-    element.mend(MendKind::late_width, "expected its first <{}> at sOffset 0, got {}", name, first.s);
+    element.record_repair(RepairKind::late_width, "expected its first <{}> at sOffset 0, got {}", name, first.s);
     profile.cubics.insert(profile.cubics.begin(), Cubic{.s = 0, .a = first.a});
   }
   const double limit = by_border ? kMaxOffset_m : kMaxLaneWidth_m;
@@ -158,7 +159,7 @@ FileLane read_side_lane(const Element& element, double section_length) {
 FileLane read_center_lane(const Element& element, double section_length) {
   FileLane lane = read_lane(element, true, section_length);
   if (lane.id != 0) {
-    element.mend(MendKind::center_id, "attribute id: expected 0 for the center lane, got {}", lane.id);
+    element.record_repair(RepairKind::center_id, "attribute id: expected 0 for the center lane, got {}", lane.id);
     lane.id = 0;
   }
   return lane;
@@ -200,7 +201,7 @@ void read_side(const Element& section, const char* side, int sign, double sectio
     const int expected = sign * (std::abs(before) + 1);
     constexpr const char* kMessage = "attribute id: expected {}, as lanes count from the center without gaps, got {}";
     if (lane.id == before) lane.where.fail(kMessage, expected, lane.id);
-    if (lane.id != expected) parent.mend(MendKind::lane_gap, kMessage, expected, lane.id);
+    if (lane.id != expected) parent.record_repair(RepairKind::lane_gap, kMessage, expected, lane.id);
     before = lane.id;
   }
   if (std::abs(before) != static_cast<int>(lanes_out->size())) fill_gaps(sign, lanes_out);
@@ -225,7 +226,7 @@ std::vector<SectionElement> section_elements(const Element& lanes, double road_l
   if (first.s > kStationTolerance_m) {
     constexpr const char* kMessage = "attribute s: expected the first section at 0, got {}";
     if (first.s > kMaxLateSection_m) first.element.fail(kMessage, first.s);
-    first.element.mend(MendKind::late_section, kMessage, first.s);
+    first.element.record_repair(RepairKind::late_section, kMessage, first.s);
     first.s = 0;
   }
   for (SectionElement& section : sections) section.s = std::clamp(section.s, 0.0, road_length);
@@ -275,7 +276,8 @@ void read_lanes(const Element& road_element, Faults* faults, FileRoad* road) {
     const double length = section.end - section.s;
     if (road->sections.size() == 1 || length >= kMinSection_m) continue;
     if (section.s < road->length) {  // sections beyond the end are already recorded
-      section.where.mend(faults, MendKind::short_section, "is {} m long; expected at least {}", length, kMinSection_m);
+      section.where.record_repair(faults, RepairKind::short_section, "is {} m long; expected at least {}", length,
+                                  kMinSection_m);
     }
     bridge_section(i, road);
   }

@@ -20,7 +20,8 @@ MarkColor mark_color(const Element& element, const std::string& name) {
   };
   const auto found = kColors.find(name);
   if (found != kColors.end()) return found->second;
-  element.mend(MendKind::unknown_color, "attribute color: '{}' is not a mark's color of OpenDRIVE 1.4 to 1.8", name);
+  element.record_repair(RepairKind::unknown_color,
+                        "attribute color: '{}' is not a mark's color of OpenDRIVE 1.4 to 1.8", name);
   return MarkColor::white;
 }
 
@@ -30,8 +31,8 @@ LaneChange lane_change(const Element& element) {
   if (text == "decrease") return LaneChange::decrease;
   if (text == "none") return LaneChange::none;
   if (text != "both") {
-    element.mend(MendKind::unknown_lane_change,
-                 "attribute laneChange: expected both, increase, decrease or none, got '{}'", text);
+    element.record_repair(RepairKind::unknown_lane_change,
+                          "attribute laneChange: expected both, increase, decrease or none, got '{}'", text);
   }
   return LaneChange::both;
 }
@@ -41,8 +42,8 @@ void check_type(const Element& element, const std::string& type) {
       "none",          "solid",      "broken", "solid solid", "solid broken", "broken solid",
       "broken broken", "botts dots", "grass",  "curb",        "custom",       "edge"};
   if (!kTypes.contains(type)) {
-    element.mend(MendKind::unknown_mark, "attribute type: '{}' is not a road mark's type of OpenDRIVE 1.4 to 1.8",
-                 type);
+    element.record_repair(RepairKind::unknown_mark,
+                          "attribute type: '{}' is not a road mark's type of OpenDRIVE 1.4 to 1.8", type);
   }
 }
 
@@ -52,9 +53,9 @@ void read_line(const Element& element, bool is_explicit, std::vector<MarkLine>* 
   line.length = element.number_or_zero_in("length", 0, kMaxRoadLength_m);
   if (!is_explicit) line.space = element.number_or_zero_in("space", 0, kMaxRoadLength_m);
   if (line.length + line.space < kMinDashPeriod_m) {
-    element.mend(is_explicit ? MendKind::empty_line : MendKind::endless_dash,
-                 "attribute length: expected at least {} m with the space, got {}", kMinDashPeriod_m,
-                 line.length + line.space);
+    element.record_repair(is_explicit ? RepairKind::empty_line : RepairKind::endless_dash,
+                          "attribute length: expected at least {} m with the space, got {}", kMinDashPeriod_m,
+                          line.length + line.space);
     if (is_explicit) return;
     line.space = 0;
   }
@@ -70,8 +71,8 @@ RoadMark read_mark(const Element& element, double section_length) {
   mark.where = element.where();
   mark.s_offset = element.number_in("sOffset", -kMaxRoadLength_m, kMaxRoadLength_m, 0);
   if (mark.s_offset < 0) {
-    element.mend(MendKind::record_before_start, "attribute sOffset: expected a number from 0 on, got {}",
-                 mark.s_offset);
+    element.record_repair(RepairKind::record_before_start, "attribute sOffset: expected a number from 0 on, got {}",
+                          mark.s_offset);
   }
   mark.type = element.text("type");
   check_type(element, mark.type);
@@ -97,8 +98,9 @@ std::vector<RoadMark> read_marks(const Element& lane_element, double section_len
   lane_element.each("roadMark", [&](const Element& element) {
     RoadMark mark = read_mark(element, section_length);
     if (mark.s_offset > section_length + kStationTolerance_m) {
-      return element.mend(MendKind::record_beyond_end, "attribute sOffset: expected a number in [0, {}], got {}",
-                          section_length, mark.s_offset);
+      return element.record_repair(RepairKind::record_beyond_end,
+                                   "attribute sOffset: expected a number in [0, {}], got {}", section_length,
+                                   mark.s_offset);
     }
     append_record(element, "sOffset", &RoadMark::s_offset, std::move(mark), &marks);
   });

@@ -43,12 +43,13 @@ bool is_near_road(const Element& element, double road_length) {
   const double low_s = -kMaxOverhang_m, high_s = road_length + kMaxOverhang_m;
   const double s = element.number("s"), t = element.number_or_zero("t");
   if (!(s >= low_s && s <= high_s)) {
-    element.mend(MendKind::misplaced_item, "attribute s: expected a number in [{}, {}], got {}", low_s, high_s, s);
+    element.record_repair(RepairKind::misplaced_item, "attribute s: expected a number in [{}, {}], got {}", low_s,
+                          high_s, s);
     return false;
   }
   if (!(std::abs(t) <= kMaxOffset_m)) {
-    element.mend(MendKind::misplaced_item, "attribute t: expected a number in [{}, {}], got {}", -kMaxOffset_m,
-                 kMaxOffset_m, t);
+    element.record_repair(RepairKind::misplaced_item, "attribute t: expected a number in [{}, {}], got {}",
+                          -kMaxOffset_m, kMaxOffset_m, t);
     return false;
   }
   return true;
@@ -114,13 +115,13 @@ std::optional<FileObject> read_object(const Element& element, FileObject::Kind k
 bool can_repeat(const Element& repeat, const FileObject& object) {
   const double distance = repeat.number_in("distance", 0, kMaxRoadLength_m);
   if (distance < kMinRepeat_m) {
-    repeat.mend(MendKind::continuous_object,
-                "attribute distance: expected at least {} m (continuous objects are not supported), got {}",
-                kMinRepeat_m, distance);
+    repeat.record_repair(RepairKind::continuous_object,
+                         "attribute distance: expected at least {} m (continuous objects are not supported), got {}",
+                         kMinRepeat_m, distance);
     return false;
   }
   if (std::any_of(object.outline.begin(), object.outline.end(), [](const auto& c) { return c.along_road; })) {
-    repeat.mend(MendKind::repeated_corners, "objects with <cornerRoad> cannot be repeated");
+    repeat.record_repair(RepairKind::repeated_corners, "objects with <cornerRoad> cannot be repeated");
     return false;
   }
   return true;
@@ -136,8 +137,8 @@ std::vector<FileObject> repeated(const Element& element, const FileObject& objec
     const double begin = std::max(*station, 0.0), distance = repeat.number("distance");
     double length = repeat.number_in("length", 0, kMaxRoadLength_m);
     if (length > road_length + kMaxOverhang_m) {
-      repeat.mend(MendKind::record_beyond_end, "attribute length: expected a number in [0, {}], got {}",
-                  road_length + kMaxOverhang_m, length);
+      repeat.record_repair(RepairKind::record_beyond_end, "attribute length: expected a number in [0, {}], got {}",
+                           road_length + kMaxOverhang_m, length);
       length = road_length - begin;
     }
     auto between = [&](const char* start, const char* end, double fallback, double u) {
@@ -168,7 +169,8 @@ Orientation read_orientation(const Element& element) {
   if (text == "+") return Orientation::along;
   if (text == "-") return Orientation::against;
   if (text != "none") {
-    element.mend(MendKind::unknown_orientation, "attribute orientation: expected +, - or none, got '{}'", text);
+    element.record_repair(RepairKind::unknown_orientation, "attribute orientation: expected +, - or none, got '{}'",
+                          text);
   }
   return Orientation::either;
 }

@@ -9,8 +9,8 @@
 #include "pictura/common/support/interrupt.h"
 #include "pictura/map/opendrive/document.h"
 #include "pictura/map/opendrive/extent.h"
-#include "pictura/map/opendrive/mend_links.h"
 #include "pictura/map/opendrive/read_parts.h"
+#include "pictura/map/opendrive/repair_links.h"
 #include "pictura/map/opendrive/sections.h"
 
 namespace pictura::opendrive {
@@ -104,14 +104,15 @@ std::optional<double> read_speed_mps(const Element& element) {
   if (max == "no limit" || max == "undefined") return 0;
   const std::optional<double> value = element.finite_number("max");
   if (!value || !(*value >= 0 && *value <= kMaxSpeed)) {
-    element.mend(MendKind::unreadable_speed, "attribute max: expected a number in [0, {}], got '{}'", kMaxSpeed, max);
+    element.record_repair(RepairKind::unreadable_speed, "attribute max: expected a number in [0, {}], got '{}'",
+                          kMaxSpeed, max);
     return std::nullopt;
   }
   const std::string unit = element.text("unit", "m/s");
   if (unit == "m/s") return *value;
   if (unit == "km/h") return *value / 3.6;
   if (unit == "mph") return *value * 0.44704;
-  element.mend(MendKind::unreadable_speed, "attribute unit: expected m/s, km/h or mph, got '{}'", unit);
+  element.record_repair(RepairKind::unreadable_speed, "attribute unit: expected m/s, km/h or mph, got '{}'", unit);
   return std::nullopt;
 }
 
@@ -146,7 +147,7 @@ void read_network(std::string_view text, const std::string& source_name, Faults*
     const std::string name = name_of(element);
     network.controllers.push_back(read_controller(element.with_owner(&name)));
   });
-  mend_links(&network, faults);
+  repair_links(&network, faults);
 }
 
 }  // namespace pictura::opendrive

@@ -55,8 +55,8 @@ class SignalBuilder {
       for (const SignalReference& reference : build_.network.roads[road].signal_references) {
         const auto signal = index_by_id_.find(reference.signal);
         if (signal == index_by_id_.end()) {
-          reference.where.mend(build_.faults, MendKind::missing_signal, "refers to signal {}, which does not exist",
-                               reference.signal);
+          reference.where.record_repair(build_.faults, RepairKind::missing_signal,
+                                        "refers to signal {}, which does not exist", reference.signal);
           continue;
         }
         is_referenced[signal->second] = true;
@@ -76,7 +76,7 @@ class SignalBuilder {
       Approaches approaches = std::move(lone_approaches_[signal_index]);
       for (const int32_t lane : signal_lanes_[signal_index]) find_approaches(lane, &approaches);
       if (approaches.empty()) {
-        signal.where.mend(build_.faults, MendKind::laneless_light, "controls no lane with a stop line");
+        signal.where.record_repair(build_.faults, RepairKind::laneless_light, "controls no lane with a stop line");
       } else if (is_controlled) {
         for (auto& [way, approach] : approaches) add_light(signal_index, phases_.at(signal.id), &approach);
       } else {
@@ -100,8 +100,8 @@ class SignalBuilder {
     for (std::size_t road = 0; road < build_.network.roads.size(); ++road) {
       for (const FileSignal& signal : build_.network.roads[road].signals) {
         if (!index_by_id_.emplace(signal.id, placed_signals_.size()).second) {
-          signal.where.mend(build_.faults, MendKind::repeated_signal, "attribute id: another signal already has {}",
-                            signal.id);
+          signal.where.record_repair(build_.faults, RepairKind::repeated_signal,
+                                     "attribute id: another signal already has {}", signal.id);
         }
         placed_signals_.push_back({road, &signal});
       }
@@ -115,13 +115,13 @@ class SignalBuilder {
       FileController valid = controller;
       std::erase_if(valid.signals, [&](const std::string& signal) {
         if (index_by_id_.contains(signal)) return false;
-        controller.where.mend(build_.faults, MendKind::missing_signal, "controls signal {}, which does not exist",
-                              signal);
+        controller.where.record_repair(build_.faults, RepairKind::missing_signal,
+                                       "controls signal {}, which does not exist", signal);
         return true;
       });
       if (!controllers.emplace(controller.id, std::move(valid)).second) {
-        controller.where.mend(build_.faults, MendKind::repeated_controller,
-                              "attribute id: another controller already has it");
+        controller.where.record_repair(build_.faults, RepairKind::repeated_controller,
+                                       "attribute id: another controller already has it");
       }
     }
     return controllers;
@@ -136,8 +136,8 @@ class SignalBuilder {
       for (const std::string& id : build_.network.junctions[j].controllers) {
         const auto controller = controllers.find(id);
         if (controller == controllers.end()) {
-          build_.network.junctions[j].where.mend(build_.faults, MendKind::missing_controller,
-                                                 "refers to controller {}, which does not exist", id);
+          build_.network.junctions[j].where.record_repair(build_.faults, RepairKind::missing_controller,
+                                                          "refers to controller {}, which does not exist", id);
           continue;
         }
         for (const std::string& signal : controller->second.signals) {
@@ -245,10 +245,12 @@ class SignalBuilder {
   void add_uncontrolled(std::size_t signal_index, const Approaches& approaches) {
     const FileSignal& signal = *placed_signals_[signal_index].signal;
     if (const char* const junction = ruled_junction(approaches)) {
-      signal.where.mend(build_.faults, MendKind::unlisted_light, "no controller of junction {} controls it", junction);
+      signal.where.record_repair(build_.faults, RepairKind::unlisted_light, "no controller of junction {} controls it",
+                                 junction);
       return;
     }
-    signal.where.mend(build_.faults, MendKind::uncontrolled_light, "no controller of a junction controls it");
+    signal.where.record_repair(build_.faults, RepairKind::uncontrolled_light,
+                               "no controller of a junction controls it");
     for (const auto& [way, approach] : approaches) {
       const int32_t junction_index = junction_of(approach);
       // On roads, lines are distinguished by their lanes.
@@ -357,8 +359,8 @@ class SignalBuilder {
       }
     }
     if (!(length((light.stop_b_m - light.stop_a_m).xy()) >= kMinStopLine_m)) {
-      return signal.where.mend(build_.faults, MendKind::laneless_light, "controls lanes that are less than {} m wide",
-                               kMinStopLine_m);
+      return signal.where.record_repair(build_.faults, RepairKind::laneless_light,
+                                        "controls lanes that are less than {} m wide", kMinStopLine_m);
     }
     light.stop_heading_rad = reference.heading_rad;
     light.head_facing = Vec2{-direction.cos, -direction.sin};

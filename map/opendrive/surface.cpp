@@ -117,12 +117,12 @@ void open_road_ends(Build* build) {
   const OpenLanes open = find_open_lanes(map);
   for (const OpenLanes::MissingLink& link : open.missing_links) {
     const Lane& to = map.lanes[link.to];
-    build->file_lanes[link.from].lane->where.mend(
-        build->faults, MendKind::missing_link,
+    build->file_lanes[link.from].lane->where.record_repair(
+        build->faults, RepairKind::missing_link,
         "ends {:.2f} m from the start of lane {} of road {}, to which it has no link", link.gap_m, to.source_lane,
         map.road_names[to.source_road]);
   }
-  open_mouths(open, build->map);
+  remove_edges_across_openings(open, build->map);
 }
 
 void build_building_lines(Build* build) {

@@ -82,7 +82,7 @@ struct LoggedPolygon {
 };
 
 struct LoggedState {
-  Eigen::Vector3d center_m{0, 0, 0};  // centre of the box; of its bottom face where LoggedScene::is_stated
+  Eigen::Vector3d center_m{0, 0, 0};  // centre of the box; of its bottom face where LoggedScene::is_authored
   double heading_rad = 0;
   double velocity_x_mps = 0, velocity_y_mps = 0;
   double length_m = 0, width_m = 0, height_m = 0;
@@ -129,8 +129,8 @@ struct LoggedScene {
   bool has_links = true;  // if false, lanes are linked where their ends meet
   /// Whether a program states the scene, rather than a recording's file. Then nothing is inferred: types of lanes,
   /// directions of links, sides and gaps of edges, and the grouping of lights are as stated. Points are rounded first,
-  /// so that state_scene() of a scenario gives the same scenario again.
-  bool is_stated = false;
+  /// so that scene_of_scenario() of a scenario gives the same scenario again.
+  bool is_authored = false;
   double tolerance_m = 0.02;                // maximum deviation of thinned polylines; 0: all points are kept
   std::optional<Eigen::Vector3d> origin_m;  // origin of the map; by default the centre of lanes and edges
   std::vector<ConversionNote> notes;
@@ -156,6 +156,6 @@ Scenario make_scenario(LoggedScene scene);
 /// lines, signs other than stop signs, widths and colours of marks other than white and yellow, the lights of the map
 /// itself, and SavedMotion. A double line becomes two stripes, a broken line its dashes. Lanes have the ids of the file
 /// if these are unique, else their indices.
-LoggedScene state_scene(const Scenario& scenario);
+LoggedScene scene_of_scenario(const Scenario& scenario);
 
 }  // namespace pictura

@@ -37,9 +37,9 @@ double distance_to(const Eigen::Vector2d& p, const LoggedPoints& line) {
 }
 
 /// Measures widths from the borders to which lanes refer.
-class WidthRuler {
+class LaneWidthEstimator {
  public:
-  explicit WidthRuler(Conversion* conversion) : conversion_(conversion) {
+  explicit LaneWidthEstimator(Conversion* conversion) : conversion_(conversion) {
     for (const LoggedLine& line : conversion->scene.lines) features_.emplace(line.id, &line.points);
     for (const LoggedEdge& edge : conversion->scene.edges) features_.emplace(edge.id, &edge.points);
   }
@@ -167,7 +167,7 @@ LaneType type_of(LoggedLaneType type) {
 }
 
 /// The links that the file states, from either side.
-LaneLinks stated_links(Conversion* conversion) {
+LaneLinks given_links(Conversion* conversion) {
   LoggedScene& scene = conversion->scene;
   const RoadMap& map = conversion->out->map;
   LaneLinks links;
@@ -184,7 +184,7 @@ LaneLinks stated_links(Conversion* conversion) {
     const int32_t a = from->second, b = to->second;
     const float gap_m = length(end_of(map, a).position_m - start_of(map, b).position_m);
     const float other_m = length(end_of(map, b).position_m - start_of(map, a).position_m);
-    if (!scene.is_stated && gap_m > kWideGap_m && other_m < kMeetingEnds_m) {
+    if (!scene.is_authored && gap_m > kWideGap_m && other_m < kMeetingEnds_m) {
       if (links.emplace(b, a).second)
         scene.note("links whose lanes meet the other way round swapped", place_of(stated_by));
       return;
@@ -291,7 +291,7 @@ void infer_types(RoadMap* map) {
 void make_lanes(Conversion* conversion) {
   LoggedScene& scene = conversion->scene;
   RoadMap& map = conversion->out->map;
-  WidthRuler ruler(conversion);
+  LaneWidthEstimator ruler(conversion);
   std::vector<std::optional<std::vector<double>>> widths;
   for (const LoggedLane& lane : scene.lanes) widths.push_back(ruler.measure(lane));
   complete_widths(conversion, &widths);
@@ -322,8 +322,8 @@ void make_lanes(Conversion* conversion) {
 
 void link_lanes(Conversion* conversion) {
   RoadMap& map = conversion->out->map;
-  set_lane_links(conversion->scene.has_links ? stated_links(conversion) : meeting_links(conversion), &map);
-  if (!conversion->scene.is_stated) infer_types(&map);
+  set_lane_links(conversion->scene.has_links ? given_links(conversion) : meeting_links(conversion), &map);
+  if (!conversion->scene.is_authored) infer_types(&map);
   set_neighbors(conversion);
 }
 

@@ -19,7 +19,7 @@ constexpr double kStripeOffset_m = 0.15;  // of the two stripes of a double line
 /// lane.
 constexpr double kJump_m = 2.0;
 constexpr float kNearLane_m = 6.0f;
-constexpr int kFewestVotes = 20;
+constexpr int kMinVotes = 20;
 constexpr float kNearSign_m = 10.0f;
 constexpr double kCell_m = 10.0;  // cell size of segments_of()'s grid
 
@@ -63,7 +63,7 @@ bool are_reversed(Conversion* conversion, const LaneSegments& lanes,
       (side > 0 ? left : right)++;
     }
   }
-  return left + right >= kFewestVotes && right > left;
+  return left + right >= kMinVotes && right > left;
 }
 
 bool crosses_a_lane(Conversion* conversion, const LaneSegments& lanes, Vec3 a, Vec3 b) {
@@ -82,7 +82,7 @@ bool crosses_a_lane(Conversion* conversion, const LaneSegments& lanes, Vec3 a, V
 
 void append_marking(Conversion* conversion, std::vector<CurvePoint> points, MarkColor color, bool broken) {
   RoadMap* map = &conversion->out->map;
-  if (conversion->scene.is_stated) {
+  if (conversion->scene.is_authored) {
     // Rounded so that the stripe or dash can be stated as a line.
     for (CurvePoint& point : points) point.position_m = conversion->rounded(point.position_m);
     points = cut_into_pieces(conversion, points, "a stripe or dash");
@@ -118,7 +118,7 @@ void make_edges(Conversion* conversion) {
       part.clear();
     };
     for (const Eigen::Vector3d& p : edge.points) {
-      if (!part.empty() && !scene.is_stated && plan_distance_m(part.back(), p) > kJump_m) {
+      if (!part.empty() && !scene.is_authored && plan_distance_m(part.back(), p) > kJump_m) {
         const Vec3 a = to_vec3(conversion->from_origin(part.back())), b = to_vec3(conversion->from_origin(p));
         const bool is_near = std::abs(b.x) <= kMaxScenarioRadius_m && std::abs(b.y) <= kMaxScenarioRadius_m;
         if (is_near && crosses_a_lane(conversion, lanes, a, b)) {
@@ -132,7 +132,7 @@ void make_edges(Conversion* conversion) {
   }
   // Edges of a RoadMap have the road on their right.
   bool is_reversed = are_reversed(conversion, lanes, lines);
-  if (is_reversed && scene.is_stated) {
+  if (is_reversed && scene.is_authored) {
     scene.note("edges with lanes on their right, though the road is stated to be on their left", "the first edge");
     is_reversed = false;
   } else if (is_reversed) {

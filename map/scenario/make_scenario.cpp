@@ -16,7 +16,7 @@ namespace {
 
 // Stop points this near, of lanes that start in about one direction, are one light's.
 constexpr double kSameStopPoint_m = 0.5, kSameHeading_rad = 0.5;
-constexpr double kStatedPiece_m = 9.99;  // used instead of kMaxPiece_m
+constexpr double kAuthoredPiece_m = 9.99;  // used instead of kMaxPiece_m
 
 float wrapped(double heading_rad) { return static_cast<float>(std::remainder(heading_rad, 2 * std::numbers::pi)); }
 
@@ -43,7 +43,8 @@ std::vector<CurvePoint> cut_into_pieces(Conversion* conversion, const std::vecto
         continue;
       }
       // Rounding must not make a piece so long that it would be cut again.
-      const double piece_m = conversion->scene.is_stated && way_m > kMaxPiece_m ? kStatedPiece_m : double{kMaxPiece_m};
+      const double piece_m =
+          conversion->scene.is_authored && way_m > kMaxPiece_m ? kAuthoredPiece_m : double{kMaxPiece_m};
       const int pieces = static_cast<int>(std::ceil(way_m / piece_m - kPieceRounding));
       conversion->count_work(static_cast<std::size_t>(pieces));
       for (int k = 1; k < pieces; ++k) {
@@ -76,7 +77,7 @@ std::vector<CurvePoint> resampled(Conversion* conversion, const LoggedPoints& po
     line = std::move(thinned);
   }
   // The ends of omitted parts may be duplicates.
-  if (scene.is_stated) line = cut_into_pieces(conversion, line, what);
+  if (scene.is_authored) line = cut_into_pieces(conversion, line, what);
   return line;
 }
 
@@ -147,7 +148,7 @@ void make_tracks(Conversion* conversion) {
       Eigen::Vector3d p = conversion->rounded(conversion->from_origin(state.center_m));
       check_radius(*conversion, fmt::format("{}: step {}", place, step), p);
       // Recorded sizes vary along a track: the bottom face is below the centre by half of the height at that step.
-      if (!scene.is_stated) p.z() -= 0.5 * (state.height_m > 0 ? state.height_m : last->height_m);
+      if (!scene.is_authored) p.z() -= 0.5 * (state.height_m > 0 ? state.height_m : last->height_m);
       out.states.push_back({to_vec3(p),
                             wrapped(state.heading_rad),
                             {static_cast<float>(state.velocity_x_mps), static_cast<float>(state.velocity_y_mps)}});
@@ -269,7 +270,7 @@ void make_lights(Conversion* conversion) {
     FoundLight one = find_light(out.map, light, std::move(lanes));
     conversion->count_work(found.size());
     const auto same = std::find_if(found.begin(), found.end(),
-                                   [&](const FoundLight& other) { return !scene.is_stated && are_one(other, one); });
+                                   [&](const FoundLight& other) { return !scene.is_authored && are_one(other, one); });
     if (same == found.end()) {
       found.push_back(std::move(one));
     } else {

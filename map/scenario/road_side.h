@@ -43,7 +43,7 @@ PICTURA_HD RoadSide road_side(Span<const SideEdge> edges, const GridView& cells,
   best.distance_m = kRoadSideReach_m;
   if (edges.empty()) return {};
   const Vec2 p = position_m.xy();
-  const auto look_at = [&](int32_t index) {
+  const auto visit_edge = [&](int32_t index) {
     const SideEdge& edge = edges[index];
     const Vec2 a = edge.a_m.xy(), way = (edge.b_m - edge.a_m).xy();
     const float t = clamp(dot(p - a, way) / max_of(dot(way, way), 1e-12f), 0.0f, 1.0f);
@@ -65,7 +65,7 @@ PICTURA_HD RoadSide road_side(Span<const SideEdge> edges, const GridView& cells,
     for (int y = range.y0; y <= range.y1; ++y) {
       const int32_t end = range.end(cells, y);
       for (int32_t i = range.begin(cells, y) + group.rank(); i < end; i += group.size()) {
-        look_at(cells.items[i]);
+        visit_edge(cells.items[i]);
       }
     }
     best = group.of_lowest(best.distance_m, best.edge < 0 ? static_cast<int>(edges.size()) : best.edge, best);

@@ -111,7 +111,7 @@ Scenario straight_road() {
   scene.source = scene.id = "straight";
   scene.num_steps = 91;
   scene.current_step = 10;
-  scene.is_stated = true;
+  scene.is_authored = true;
   scene.tolerance_m = 0;
   scene.origin_m = Eigen::Vector3d(0, 0, 0);
   LoggedLane before{.id = 1, .points = {{-20, 0, 0}, {20, 0, 0}}, .exits = {2}};

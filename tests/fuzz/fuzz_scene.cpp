@@ -35,9 +35,9 @@ void exercise(const Scenario& scenario) {
 
 /// Checks that a scene made from a scenario gives the same scenario again and again.
 void exercise_statement(const Scenario& scenario) {
-  Scenario stated = make_scenario(state_scene(scenario));
+  Scenario stated = make_scenario(scene_of_scenario(scenario));
   stated.notes.clear();
-  Scenario again = make_scenario(state_scene(stated));
+  Scenario again = make_scenario(scene_of_scenario(stated));
   again.notes.clear();
   const std::string difference = first_difference(stated, again);
   if (difference.empty()) return;

@@ -18,8 +18,8 @@
 #include "pictura/map/lanelet2/osm.h"
 #include "pictura/map/load_map.h"
 #include "pictura/map/map_fields.h"
-#include "pictura/map/mends.h"
 #include "pictura/map/open_lanes.h"
+#include "pictura/map/repairs.h"
 #include "pictura/tests/map/lanelet2_text.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
@@ -46,17 +46,17 @@ RoadMap import(const OsmText& text) { return parse_lanelet2(text.text(), "road.o
 /// Imports a map without faults.
 RoadMap sound(const OsmText& text) {
   RoadMap map = import(text);
-  EXPECT_EQ(describe_mends(map.mends, "road.osm"), std::vector<std::string>{});
+  EXPECT_EQ(describe_repairs(map.mends, "road.osm"), std::vector<std::string>{});
   return map;
 }
 
 /// Imports a map with faults of one kind; strict reading must refuse it with the message of one.
-RoadMap mended(const OsmText& text, MendKind kind, std::size_t count = 1) {
+RoadMap mended(const OsmText& text, RepairKind kind, std::size_t count = 1) {
   RoadMap map = import(text);
   std::vector<std::string> messages;
-  for (const Mend& mend : map.mends) {
-    EXPECT_STREQ(to_string(mend.kind), to_string(kind)) << mend.message;
-    messages.push_back(message_of(mend, "road.osm"));
+  for (const Repair& repair : map.mends) {
+    EXPECT_STREQ(to_string(repair.kind), to_string(kind)) << repair.message;
+    messages.push_back(message_of(repair, "road.osm"));
   }
   EXPECT_EQ(map.mends.size(), count) << to_string(kind);
   const std::string refusal = error_message([&] { parse_lanelet2(text.text(), "road.osm", {.strict = true}); });
@@ -229,7 +229,7 @@ TEST(Lanelet2, LanesThatMeetWithoutSharedPointsAreToldOf) {
   text.node(1, 0, 3).node(2, 50, 3).node(4, 0, 0).node(5, 50, 0);
   text.node(102, 50, 3).node(3, 100, 3).node(105, 50, 0).node(6, 100, 0);
   text.way(11, {1, 2}).way(12, {4, 5}).way(13, {102, 3}).way(14, {105, 6}).lanelet(20, 11, 12).lanelet(21, 13, 14);
-  const RoadMap map = mended(text, MendKind::missing_link);
+  const RoadMap map = mended(text, RepairKind::missing_link);
   EXPECT_THAT(map.mends[0].message, HasSubstr("lanelet 20: <relation>: ends 0.00 m from the start of lanelet 21"));
   EXPECT_EQ(map.mends[0].line, 15);
 }
@@ -685,42 +685,42 @@ TEST(Lanelet2, FaultsWithOneMeaningAreMended) {
     add(&text);
     return text;
   };
-  mended(with([](OsmText* text) { text->way(11, {3, 4}); }), MendKind::repeated_element);
-  mended(with([](OsmText* text) { text->node(1, 5, 5); }), MendKind::repeated_element);
-  const RoadMap missing = mended(with([](OsmText* text) { text->way(30, {1, 77, 2}); }), MendKind::missing_element);
+  mended(with([](OsmText* text) { text->way(11, {3, 4}); }), RepairKind::repeated_element);
+  mended(with([](OsmText* text) { text->node(1, 5, 5); }), RepairKind::repeated_element);
+  const RoadMap missing = mended(with([](OsmText* text) { text->way(30, {1, 77, 2}); }), RepairKind::missing_element);
   EXPECT_EQ(message_of(missing.mends[0], "road.osm"),
             "road.osm:10: way 30: <way>: refers to node 77, which does not exist");
-  mended(with([](OsmText* text) { text->lanelet(21, 11, 12, {}, {99}); }), MendKind::missing_element);
+  mended(with([](OsmText* text) { text->lanelet(21, 11, 12, {}, {99}); }), RepairKind::missing_element);
   mended(with([](OsmText* text) { text->line(R"(<node id="9" lat="1" lon="2"/>)").way(30, {1, 9, 2}); }),
-         MendKind::missing_position);
-  mended(with([](OsmText* text) { text->way(30, {1}); }), MendKind::short_way);
+         RepairKind::missing_position);
+  mended(with([](OsmText* text) { text->way(30, {1}); }), RepairKind::short_way);
   const RoadMap borderless =
       mended(with([](OsmText* text) {
                text->relation(21, {{"way", "left", 11}}, {{"type", "lanelet"}, {"subtype", "road"}});
              }),
-             MendKind::borderless_lanelet);
+             RepairKind::borderless_lanelet);
   EXPECT_EQ(borderless.lanes.size(), 1u);
   mended(with([](OsmText* text) {
            text->node(8, 0, 3.5).way(30, {1, 8}).node(9, 0, 0).way(31, {3, 9}).lanelet(21, 30, 31);
          }),
-         MendKind::empty_lanelet);
-  EXPECT_EQ(mended(street({{"subtype", "canal"}}), MendKind::unknown_subtype).lanes[0].type, LaneType::other);
-  EXPECT_FLOAT_EQ(mended(street({{"speed_limit", "fast"}}), MendKind::unreadable_speed).lanes[0].speed_limit_mps,
+         RepairKind::empty_lanelet);
+  EXPECT_EQ(mended(street({{"subtype", "canal"}}), RepairKind::unknown_subtype).lanes[0].type, LaneType::other);
+  EXPECT_FLOAT_EQ(mended(street({{"speed_limit", "fast"}}), RepairKind::unreadable_speed).lanes[0].speed_limit_mps,
                   50 / 3.6f);
-  mended(street({}, {{"type", "line_thin"}, {"subtype", "solid"}, {"color", "pink"}}), MendKind::unknown_color);
-  mended(with([](OsmText* text) { text->way(30, {1, 2}, {{"type", "parking_space"}}); }), MendKind::shapeless_object);
+  mended(street({}, {{"type", "line_thin"}, {"subtype", "solid"}, {"color", "pink"}}), RepairKind::unknown_color);
+  mended(with([](OsmText* text) { text->way(30, {1, 2}, {{"type", "parking_space"}}); }), RepairKind::shapeless_object);
   mended(with([](OsmText* text) {
            text->relation(30, {{"way", "outer", 11}}, {{"type", "multipolygon"}, {"subtype", "parking"}});
          }),
-         MendKind::open_area);
+         RepairKind::open_area);
   mended(with([](OsmText* text) {  // crosses itself
            text->way(30, {1, 2, 3, 4, 1});
            text->relation(31, {{"way", "outer", 30}}, {{"type", "multipolygon"}, {"subtype", "parking"}});
          }),
-         MendKind::open_area);
+         RepairKind::open_area);
   mended(with([](OsmText* text) { text->relation(30, {{"way", "refers", 11}}, {{"subtype", "traffic_light"}}); }),
-         MendKind::laneless_light);
-  mended(with([](OsmText* text) { text->relation(30, {}, {{"subtype", "traffic_light"}}); }), MendKind::empty_rule);
+         RepairKind::laneless_light);
+  mended(with([](OsmText* text) { text->relation(30, {}, {{"subtype", "traffic_light"}}); }), RepairKind::empty_rule);
 }
 
 TEST(Lanelet2, DeletedElementsAreNotThere) {
@@ -807,7 +807,7 @@ TEST(Lanelet2, HostileFilesGiveAMapOrAnError) {
 
 TEST(Lanelet2, EveryKindOfFaultStandsInTheTable) {
   const std::string docs = read_file(PICTURA_LANELET2_DOCS);
-  for (const MendKind kind : mend_kinds()) {
+  for (const RepairKind kind : repair_kinds()) {
     if (kind < kFirstLanelet2Mend) continue;
     EXPECT_THAT(docs, HasSubstr(fmt::format("| {} | {} |", to_string(kind), action_of(kind))));
   }

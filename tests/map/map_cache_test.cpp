@@ -55,7 +55,8 @@ RoadMap full_map() {
   map.sign_lanes = {0, 1};
   map.signs.push_back({"12", "206", "-1", "OpenDRIVE", {1, 2, 3}, 0.5f, {0, 2}});
   map.facts.signs = 1;
-  map.mends.push_back({MendKind::repeated_signal, 18, "road 1: <signal>: attribute id: another signal already has 12"});
+  map.mends.push_back(
+      {RepairKind::repeated_signal, 18, "road 1: <signal>: attribute id: another signal already has 12"});
   map.provenance.stop_lines.assign(map.stop_lines.size(), {0, 17});
   map.provenance.signs.assign(map.signs.size(), {1, 18});
   return map;

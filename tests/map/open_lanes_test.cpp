@@ -19,21 +19,23 @@ using ::testing::HasSubstr;
 
 RoadMap map_of(const std::string& text) { return parse_opendrive(text, "open.xodr"); }
 
-/// Number of edges that cross a line slightly beyond, or before, the mouth.
-int edges_across(const RoadMap& map, const LaneMouth& mouth) {
+/// Number of edges that cross a line slightly beyond, or before, the opening.
+int edges_across(const RoadMap& map, const LaneOpening& opening) {
   int count = 0;
   for (const RoadEdge& edge : map.road_edges) {
-    const Vec2 middle = (edge.a_m.xy() + edge.b_m.xy()) * 0.5f - mouth.middle_m.xy();
-    const bool is_across = std::fabs(cross((edge.b_m - edge.a_m).xy(), mouth.direction)) > 0.1f;
-    count += is_across && std::fabs(dot(middle, mouth.direction)) < 0.5f &&
-             std::fabs(cross(middle, mouth.direction)) < mouth.half_width_m;
+    const Vec2 middle = (edge.a_m.xy() + edge.b_m.xy()) * 0.5f - opening.middle_m.xy();
+    const bool is_across = std::fabs(cross((edge.b_m - edge.a_m).xy(), opening.direction)) > 0.1f;
+    count += is_across && std::fabs(dot(middle, opening.direction)) < 0.5f &&
+             std::fabs(cross(middle, opening.direction)) < opening.half_width_m;
   }
   return count;
 }
 
 void expect_no_edges_across(const RoadMap& map, const OpenLanes& open) {
-  for (const LaneMouth& mouth : open.exits) EXPECT_EQ(edges_across(map, mouth), 0) << "exit of lane " << mouth.lane;
-  for (const LaneMouth& mouth : open.entries) EXPECT_EQ(edges_across(map, mouth), 0) << "entry of lane " << mouth.lane;
+  for (const LaneOpening& opening : open.exits)
+    EXPECT_EQ(edges_across(map, opening), 0) << "exit of lane " << opening.lane;
+  for (const LaneOpening& opening : open.entries)
+    EXPECT_EQ(edges_across(map, opening), 0) << "entry of lane " << opening.lane;
 }
 
 TEST(OpenLanes, AStreetIsAnExitAndAnEntryAtEitherEnd) {
@@ -82,7 +84,7 @@ TEST(OpenLanes, ACrossingHasOneExitAndOneEntryAnArm) {
   EXPECT_TRUE(open.missing_links.empty());
   expect_no_edges_across(map, open);
   EXPECT_EQ(count_lane_use(map).open, 20);
-  for (const LaneMouth& exit : open.exits) EXPECT_NEAR(length(exit.middle_m.xy()), std::hypot(72, 1.75), 0.01);
+  for (const LaneOpening& exit : open.exits) EXPECT_NEAR(length(exit.middle_m.xy()), std::hypot(72, 1.75), 0.01);
   for (size_t lane = 0; lane < map.lanes.size(); ++lane) {
     if (open.way_after_m[lane] <= 60) continue;
     EXPECT_NEAR(open.way_after_m[lane], 24 + 60, 0.1) << "straight on, which is longest";
@@ -94,7 +96,7 @@ TEST(OpenLanes, ALaneThatEndsBesideAnotherIsNoExit) {
   const OpenLanes open = find_open_lanes(map);
   EXPECT_EQ(open.exits.size(), 2u);
   EXPECT_EQ(open.entries.size(), 3u);
-  for (const LaneMouth& exit : open.exits) EXPECT_NEAR(exit.middle_m.x - open.entries[0].middle_m.x, 250, 0.01);
+  for (const LaneOpening& exit : open.exits) EXPECT_NEAR(exit.middle_m.x - open.entries[0].middle_m.x, 250, 0.01);
   expect_no_edges_across(map, open);
   for (const size_t lane : {0u, 1u, 2u}) EXPECT_NEAR(open.way_after_m[lane], 150, 0.01);
 }
@@ -112,7 +114,7 @@ TEST(OpenLanes, MissingLinksAreNoExitsAndAreCounted) {
   ASSERT_EQ(open.exits.size(), 1u);
   EXPECT_EQ(open.exits[0].lane, 1);
   ASSERT_EQ(map.mends.size(), 1u);
-  EXPECT_EQ(map.mends[0].kind, MendKind::missing_link);
+  EXPECT_EQ(map.mends[0].kind, RepairKind::missing_link);
   EXPECT_THAT(message_of(map.mends[0], "open.xodr"),
               HasSubstr("ends 0.30 m from the start of lane -1 of road 2, to which it has no link"));
   EXPECT_THAT(test::message_of([] { parse_opendrive(test::unlinked_roads(), "open.xodr", {.strict = true}); }),

@@ -6,9 +6,9 @@
 #include <gtest/gtest.h>
 
 #include "pictura/common/support/file.h"
-#include "pictura/map/mends.h"
 #include "pictura/map/open_lanes.h"
 #include "pictura/map/opendrive/opendrive.h"
+#include "pictura/map/repairs.h"
 
 namespace pictura {
 namespace {
@@ -45,7 +45,7 @@ TEST(OpenDriveCases, ThePageSaysWhatIsMadeOfEachFile) {
     const RoadMap map = parse_opendrive(read_file(PICTURA_MAP_CASES "/" + file), file);
     const LaneUse use = count_lane_use(map);
     std::string done;
-    for (const MendGroup& group : group_mends(map.mends)) {
+    for (const RepairGroup& group : group_repairs(map.mends)) {
       done += fmt::format("{}{}: {}", done.empty() ? "" : "; ", to_string(group.kind), action_of(group.kind));
     }
     table += fmt::format("| `{0}` | {1} | {2}, {3:.3f} km | {4}, {5} | {6} |\n", its.name, its.kind, map.facts.lanes,

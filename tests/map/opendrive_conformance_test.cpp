@@ -7,8 +7,8 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
-#include "pictura/map/mends.h"
 #include "pictura/map/opendrive/opendrive.h"
+#include "pictura/map/repairs.h"
 #include "pictura/tests/map/small_roads.h"
 
 namespace pictura {
@@ -156,7 +156,7 @@ std::string made_of(const std::string& text) {
     const RoadMap map = parse_opendrive(text, "FILE");
     if (map.mends.empty()) return "accepted";
     std::string made;
-    for (const MendGroup& group : group_mends(map.mends)) {
+    for (const RepairGroup& group : group_repairs(map.mends)) {
       made += fmt::format("{}{}: {}", made.empty() ? "" : "; ", to_string(group.kind), action_of(group.kind));
     }
     return made;

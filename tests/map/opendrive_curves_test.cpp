@@ -73,7 +73,7 @@ TEST(OpenDriveCurves, ACurveOfAnotherLengthThanItsGeometryKeepsItsShape) {
   const RoadMap map = parse(
       parabola(R"(<paramPoly3 pRange="normalized" aU="0" bU="30" cU="0" dU="0" aV="0" bV="0" cV="9" dV="0"/>)").text());
   ASSERT_EQ(map.mends.size(), 1u);
-  EXPECT_EQ(map.mends[0].kind, MendKind::line_length);
+  EXPECT_EQ(map.mends[0].kind, RepairKind::line_length);
   expect_at(map, map.lane_points.front().position_m, 0, 0);
   expect_at(map, map.lane_points.back().position_m, 30, 9);
   EXPECT_NEAR(map.lanes[0].length_m, parabola_length(30), 0.02);
@@ -84,7 +84,7 @@ TEST(OpenDriveCurves, TheParameterRangeThatFitsCounts) {
   const char* const curve = R"(<paramPoly3 pRange="{}" aU="0" bU="60" cU="0" dU="0" aV="0" bV="0" cV="36" dV="0"/>)";
   RoadMap map = parse(parabola(fmt::format(fmt::runtime(curve), "arcLength")).text());
   ASSERT_EQ(map.mends.size(), 1u);
-  EXPECT_EQ(map.mends[0].kind, MendKind::parameter_range);
+  EXPECT_EQ(map.mends[0].kind, RepairKind::parameter_range);
   map.mends.clear();
   map.provenance = {};
   RoadMap same = parse(parabola(fmt::format(fmt::runtime(curve), "normalized")).text());
@@ -219,7 +219,7 @@ TEST(OpenDriveBanking, CrossSectionsOfStripsAreFlattened) {
   RoadMap map = banked("<crossSectionSurface><tOffset><coefficients s=\"0\" a=\"0\"/></tOffset></crossSectionSurface>");
   ASSERT_EQ(map.mends.size(), 1u);
   EXPECT_THAT(map.mends[0].message, ::testing::HasSubstr("<crossSectionSurface>: cross-sections as strips"));
-  EXPECT_EQ(map.mends[0].kind, MendKind::strip_surface);
+  EXPECT_EQ(map.mends[0].kind, RepairKind::strip_surface);
   map.mends.clear();
   RoadMap flat = banked("");
   for (RoadMap* each : {&map, &flat}) each->provenance = {};

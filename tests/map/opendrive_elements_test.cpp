@@ -11,8 +11,8 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/map/map_cache.h"
-#include "pictura/map/mends.h"
 #include "pictura/map/opendrive/opendrive.h"
+#include "pictura/map/repairs.h"
 #include "pictura/tests/map/small_roads.h"
 
 namespace pictura {
@@ -249,11 +249,11 @@ std::string contents_of(RoadMap map) {
 }
 
 /// Kinds of faults of one map that another lacks, and their repairs.
-std::string mends_beyond(const RoadMap& map, const RoadMap& other) {
-  std::set<MendKind> known;
-  for (const Mend& mend : other.mends) known.insert(mend.kind);
+std::string repairs_beyond(const RoadMap& map, const RoadMap& other) {
+  std::set<RepairKind> known;
+  for (const Repair& repair : other.mends) known.insert(repair.kind);
   std::string text;
-  for (const MendGroup& group : group_mends(map.mends)) {
+  for (const RepairGroup& group : group_repairs(map.mends)) {
     if (known.contains(group.kind)) continue;
     text += fmt::format("{}{}: {}", text.empty() ? "" : "; ", to_string(group.kind), action_of(group.kind));
   }
@@ -269,9 +269,9 @@ std::string done_with(const Element& element) {
   } catch (const Error& error) {
     return with ? "read, and required" : fmt::format("refused: `{}`", error.what());
   }
-  const std::string mends = mends_beyond(*with, *without);
-  if (!mends.empty()) return mends;
-  const bool is_missed = !mends_beyond(*without, *with).empty();
+  const std::string repairs = repairs_beyond(*with, *without);
+  if (!repairs.empty()) return repairs;
+  const bool is_missed = !repairs_beyond(*without, *with).empty();
   return is_missed || contents_of(*with) != contents_of(*without) ? "read" : "ignored";
 }
 

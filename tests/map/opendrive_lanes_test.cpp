@@ -46,7 +46,7 @@ TEST(OpenDriveLanes, BordersAreOffsetsFromTheReferenceLine) {
   road.right = R"(<lane id="-1" type="driving"><border sOffset="0" a="-3" b="0.1" c="0" d="0"/></lane>)";
   const RoadMap crossed = parse(road.text());
   ASSERT_EQ(crossed.mends.size(), 1u);
-  EXPECT_EQ(crossed.mends[0].kind, MendKind::negative_width);
+  EXPECT_EQ(crossed.mends[0].kind, RepairKind::negative_width);
 }
 
 TEST(OpenDriveLanes, WidthsOverrideBorders) {

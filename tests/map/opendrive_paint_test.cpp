@@ -193,7 +193,7 @@ TEST(OpenDrivePaint, RepeatedParkingSpacesAreInARow) {
     expect_at(map, map.parking_spaces[i].center_m, 20 + 6 * i, -5 - i);
   }
   road.rest = fmt::format(fmt::runtime(object), 0);
-  EXPECT_EQ(parse(road.text()).mends.at(0).kind, MendKind::continuous_object);
+  EXPECT_EQ(parse(road.text()).mends.at(0).kind, RepairKind::continuous_object);
 }
 
 }  // namespace

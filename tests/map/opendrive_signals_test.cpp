@@ -93,9 +93,9 @@ TEST(OpenDriveLights, WithoutValidityTheyControlTheLanesOfTheirOrientation) {
 }
 
 /// Kinds of the repairs of a map.
-std::vector<MendKind> kinds_of(const RoadMap& map) {
-  std::vector<MendKind> kinds;
-  for (const Mend& mend : map.mends) kinds.push_back(mend.kind);
+std::vector<RepairKind> kinds_of(const RoadMap& map) {
+  std::vector<RepairKind> kinds;
+  for (const Repair& repair : map.mends) kinds.push_back(repair.kind);
   return kinds;
 }
 
@@ -109,7 +109,7 @@ TEST(OpenDriveLights, OneOnARoadStandsAloneAtItsStation) {
     return parse(test::ring_with("", [&](RoadText* road) { road->rest = "<signals>" + lights + "</signals>"; }));
   };
   const RoadMap map = ring_of(light("7", 100, -5));
-  EXPECT_EQ(kinds_of(map), std::vector<MendKind>{MendKind::uncontrolled_light});
+  EXPECT_EQ(kinds_of(map), std::vector<RepairKind>{RepairKind::uncontrolled_light});
   ASSERT_EQ(map.lights.size(), 1u);
   const TrafficLight& alone = map.lights[0];
   EXPECT_EQ(alone.junction, -1);
@@ -131,7 +131,7 @@ TEST(OpenDriveLights, OneOnARoadStandsAloneAtItsStation) {
   EXPECT_EQ(ring_of(light("7", 40 * std::numbers::pi, -5)).lights.size(), 1u);
   const RoadMap nothing = ring_of(light("7", 100, -5, "-"));
   EXPECT_EQ(nothing.lights.size(), 0u);
-  EXPECT_EQ(kinds_of(nothing), std::vector<MendKind>{MendKind::laneless_light});
+  EXPECT_EQ(kinds_of(nothing), std::vector<RepairKind>{RepairKind::laneless_light});
 }
 
 TEST(OpenDriveLights, OneForBothDirectionsHasALineForEach) {
@@ -188,7 +188,7 @@ std::string crossing(const std::string& more_on_w, const std::string& junction_m
 
 TEST(OpenDriveLights, WithoutControllersThoseOfAJunctionCycleByHeading) {
   const RoadMap map = parse(crossing(light("second head", 99, 3)));
-  EXPECT_EQ(kinds_of(map), std::vector<MendKind>(4, MendKind::uncontrolled_light));
+  EXPECT_EQ(kinds_of(map), std::vector<RepairKind>(4, RepairKind::uncontrolled_light));
   ASSERT_EQ(map.lights.size(), 3u);
   EXPECT_EQ(map.junctions.at(0).num_phases, 2);
   for (const TrafficLight& each : map.lights) {
@@ -204,7 +204,7 @@ TEST(OpenDriveLights, ThoseThatTheControllersOfAJunctionLeaveOutDoNotStand) {
       parse(crossing("", R"(<controller id="90"/>)") + R"(<controller id="90"><control signalId="w"/></controller>)");
   ASSERT_EQ(map.lights.size(), 1u);
   EXPECT_EQ(map.lights[0].name, "w");
-  EXPECT_EQ(kinds_of(map), std::vector<MendKind>(2, MendKind::unlisted_light));
+  EXPECT_EQ(kinds_of(map), std::vector<RepairKind>(2, RepairKind::unlisted_light));
 }
 
 TEST(OpenDriveSigns, ApplyToTheLanesThatTheyNameAndFaceTheirTraffic) {

@@ -28,8 +28,8 @@ void check_round_trip(const std::string& text, const std::string& name) {
   // them.
   for (RoadMap* map : {&original, &exported}) {
     map->provenance = {};
-    std::erase_if(map->mends, [](const Mend& mend) { return mend.kind == MendKind::short_section; });
-    for (Mend& mend : map->mends) mend.line = 0;
+    std::erase_if(map->mends, [](const Repair& repair) { return repair.kind == RepairKind::short_section; });
+    for (Repair& repair : map->mends) repair.line = 0;
     for (Lane& lane : map->lanes) lane.source_section = 0;
   }
   EXPECT_EQ(first_difference(original, exported), "");

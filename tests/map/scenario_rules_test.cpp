@@ -379,14 +379,14 @@ TEST(SceneCache, OtherBytesOfTheSameSizeAndTimeAreAnotherScene) {
 
 /// Converts the scene that a scenario states; the conversion must add no notes.
 Scenario stated_again(const Scenario& scenario) {
-  Scenario again = make_scenario(state_scene(scenario));
+  Scenario again = make_scenario(scene_of_scenario(scenario));
   again.notes.clear();
   return again;
 }
 
 TEST(StatedScenes, WhatAProgramStatesIsTakenAsItIs) {
   LoggedScene scene = small_scene();
-  scene.is_stated = true;
+  scene.is_authored = true;
   scene.tolerance_m = 0.01;
   scene.lanes.push_back(lane_at(2, 0, 40, 20));
   scene.lanes.push_back(lane_at(3, 0, 40, 60));
@@ -413,7 +413,7 @@ TEST(StatedScenes, WhatAProgramStatesIsTakenAsItIs) {
 
 TEST(StatedScenes, ComeBackToTheBit) {
   LoggedScene scene = test::make_fixture();
-  scene.is_stated = true;
+  scene.is_authored = true;
   scene.tolerance_m = 0.01;
   for (std::size_t i = 0; i < scene.stop_signs.size(); ++i) scene.stop_signs[i].id = static_cast<int64_t>(i);
   Scenario first = make_scenario(scene);
@@ -427,7 +427,7 @@ TEST(StatedScenes, ComeBackToTheBit) {
 TEST(StatedScenes, ComeBackToTheBitFromAnyPlace) {
   for (const double away_m : {0.0, 3000.0, 9000.0}) {
     LoggedScene scene = small_scene();
-    scene.is_stated = true;
+    scene.is_authored = true;
     scene.origin_m = Vector3d(0.1, 1e6 + 0.3, 7.7);
     scene.lanes[0].points.clear();
     for (int i = 0; i < 400; ++i) {

@@ -18,7 +18,7 @@ PICTURA_HD inline int find_pieces_in_sight(Span<const Vec2> middles, Span<const 
   const Float8 cos = frame.forward.x, sin = frame.forward.y;
   const int num_items = static_cast<int>(items.size());
   int count = 0;
-  const auto look_at = [&](const int32_t* eight, uint32_t these) {
+  const auto append_visible = [&](const int32_t* eight, uint32_t these) {
     Float8 x, y;
     gather_pairs(&middles.data()->x, eight, &x, &y);
     const Float8 from_ego_x = x + minus_origin_x, from_ego_y = y + minus_origin_y;
@@ -29,15 +29,15 @@ PICTURA_HD inline int find_pieces_in_sight(Span<const Vec2> middles, Span<const 
     count += popcount(seen);
   };
   int i = 0;
-  for (; i + 8 <= num_items && count < capacity; i += 8) look_at(items.data() + i, 0xFF);
+  for (; i + 8 <= num_items && count < capacity; i += 8) append_visible(items.data() + i, 0xFF);
   const int left = num_items - i;
   if (left > 0 && count < capacity) {
     if (num_items >= 8) {
-      look_at(items.data() + num_items - 8, last_of_eight(left));
+      append_visible(items.data() + num_items - 8, last_of_eight(left));
     } else {
       int32_t few[8];
       for (int k = 0; k < 8; ++k) few[k] = items[min_of(k, left - 1)];
-      look_at(few, first_of_eight(left));
+      append_visible(few, first_of_eight(left));
     }
   }
   return count;

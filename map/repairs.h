@@ -10,7 +10,7 @@
 namespace pictura {
 
 /// The kinds, in the order of the tables in docs/reference/opendrive.md and docs/reference/lanelet2.md.
-enum class MendKind : uint8_t {
+enum class RepairKind : uint8_t {
   record_order,
   record_beyond_end,
   record_before_start,
@@ -85,34 +85,34 @@ enum class MendKind : uint8_t {
 };
 
 /// The first kind that only Lanelet2 files have; those before it are in the table of docs/reference/opendrive.md.
-inline constexpr MendKind kFirstLanelet2Mend = MendKind::repeated_element;
+inline constexpr RepairKind kFirstLanelet2Mend = RepairKind::repeated_element;
 
 /// The fault, as "records out of order", and what is done about it, as "sorted".
-const char* to_string(MendKind kind);
-const char* action_of(MendKind kind);
+const char* to_string(RepairKind kind);
+const char* action_of(RepairKind kind);
 
 /// Returns all kinds, in order.
-std::vector<MendKind> mend_kinds();
+std::vector<RepairKind> repair_kinds();
 
-struct Mend {
-  MendKind kind = MendKind::record_order;
+struct Repair {
+  RepairKind kind = RepairKind::record_order;
   int32_t line = 0;     // line of the element in the file
   std::string message;  // "OWNER: <element>: ", then the expected and the actual value
 };
 
 /// Returns "FILE:LINE: OWNER: <element>: ...", in the format of errors; `source` is the file's name.
-std::string message_of(const Mend& mend, const std::string& source);
+std::string message_of(const Repair& repair, const std::string& source);
 
-struct MendGroup {
-  MendKind kind = MendKind::record_order;
-  std::vector<const Mend*> mends;  // in the order of their lines; not empty
+struct RepairGroup {
+  RepairKind kind = RepairKind::record_order;
+  std::vector<const Repair*> repairs;  // in the order of their lines; not empty
 };
 
-/// Groups repairs by kind, the most frequent kinds first. The groups refer to `mends`.
-std::vector<MendGroup> group_mends(Span<const Mend> mends);
+/// Groups repairs by kind, the most frequent kinds first. The groups refer to `repairs`.
+std::vector<RepairGroup> group_repairs(Span<const Repair> repairs);
 
 /// Describes repairs in one line per kind: their number, the repair, and the message of the first. Empty without
 /// repairs.
-std::vector<std::string> describe_mends(Span<const Mend> mends, const std::string& source);
+std::vector<std::string> describe_repairs(Span<const Repair> repairs, const std::string& source);
 
 }  // namespace pictura

@@ -13,9 +13,9 @@ namespace {
 
 constexpr std::string_view kStopSign = "206";  // code in OpenDRIVE's catalogue
 
-class Statement {
+class SceneBuilder {
  public:
-  explicit Statement(const Scenario& scenario) : from_(scenario), map_(scenario.map) {
+  explicit SceneBuilder(const Scenario& scenario) : from_(scenario), map_(scenario.map) {
     scene_.source = scenario.id;
     scene_.id = scenario.id;
     scene_.name = map_.name;
@@ -24,7 +24,7 @@ class Statement {
     scene_.num_steps = scenario.num_steps;
     scene_.current_step = scenario.current_step;
     scene_.sdc_track = scenario.sdc_track;
-    scene_.is_stated = true;
+    scene_.is_authored = true;
     scene_.tolerance_m = 0;
     scene_.origin_m = origin_;
   }
@@ -171,6 +171,6 @@ class Statement {
 
 }  // namespace
 
-LoggedScene state_scene(const Scenario& scenario) { return Statement(scenario).result(); }
+LoggedScene scene_of_scenario(const Scenario& scenario) { return SceneBuilder(scenario).result(); }
 
 }  // namespace pictura

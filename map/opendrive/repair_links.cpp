@@ -1,4 +1,4 @@
-#include "pictura/map/opendrive/mend_links.h"
+#include "pictura/map/opendrive/repair_links.h"
 
 #include <cmath>
 #include <limits>
@@ -29,7 +29,7 @@ RoadLink* link_at(FileRoad* road, ContactPoint end) {
 }
 
 /// Removes a road's link except for its location, by which lanes know that a link existed.
-void leave_out(RoadLink* link) {
+void clear_link(RoadLink* link) {
   link->kind = RoadLink::Kind::none;
   link->id.clear();
 }
@@ -51,15 +51,15 @@ ContactPoint touching_end(const FileRoad& a, ContactPoint end, const FileRoad& b
   return !touches && distance_m(a, end, b, other_end(contact)) <= kTouch_m ? other_end(contact) : contact;
 }
 
-class LinkMender {
+class LinkRepairer {
  public:
-  LinkMender(Network* network, Faults* faults) : network_(*network), faults_(faults) {}
+  LinkRepairer(Network* network, Faults* faults) : network_(*network), faults_(faults) {}
 
-  void mend() {
+  void repair() {
     for (FileRoad& road : network_.roads) {
       if (!road.junction.empty() && !network_.junction_index.contains(road.junction)) {
-        road.where.mend(faults_, MendKind::missing_junction, "belongs to junction {}, which does not exist",
-                        road.junction);
+        road.where.record_repair(faults_, RepairKind::missing_junction, "belongs to junction {}, which does not exist",
+                                 road.junction);
         road.junction.clear();
       }
       for (const ContactPoint end : {ContactPoint::start, ContactPoint::end}) check_target(&road, end);
@@ -82,14 +82,15 @@ class LinkMender {
   void check_target(FileRoad* road, ContactPoint end) {
     RoadLink* const link = link_at(road, end);
     if (link->kind == RoadLink::Kind::junction && !network_.junction_index.contains(link->id)) {
-      link->where.mend(faults_, MendKind::missing_junction, "refers to junction {}, which does not exist", link->id);
-      leave_out(link);
+      link->where.record_repair(faults_, RepairKind::missing_junction, "refers to junction {}, which does not exist",
+                                link->id);
+      clear_link(link);
     }
     if (link->kind != RoadLink::Kind::road) return;
     const FileRoad* const target = road_named(link->id);
     if (!target) {
-      link->where.mend(faults_, MendKind::missing_road, "refers to road {}, which does not exist", link->id);
-      leave_out(link);
+      link->where.record_repair(faults_, RepairKind::missing_road, "refers to road {}, which does not exist", link->id);
+      clear_link(link);
       return;
     }
     if (!link->has_contact) {
@@ -99,9 +100,9 @@ class LinkMender {
       link->has_contact = true;
     } else if (const ContactPoint contact = touching_end(*road, end, *target, link->contact);
                contact != link->contact && !(target == road && contact == end)) {
-      link->where.mend(faults_, MendKind::wrong_end,
-                       "attribute contactPoint: expected {}, which touches the {} of this road, got {}",
-                       name_of(contact), name_of(end), name_of(link->contact));
+      link->where.record_repair(faults_, RepairKind::wrong_end,
+                                "attribute contactPoint: expected {}, which touches the {} of this road, got {}",
+                                name_of(contact), name_of(end), name_of(link->contact));
       link->contact = contact;
     }
   }
@@ -114,24 +115,25 @@ class LinkMender {
     FileRoad* const target = road_named(link->id);
     RoadLink* const back = link_at(target, link->contact);
     if (target == road && (link->contact == end || back->kind != RoadLink::Kind::road)) {
-      link->where.mend(faults_, MendKind::contrary_link,
-                       "its {} is linked to the road's own {}, which is not linked back", name_of(end),
-                       name_of(link->contact));
-      leave_out(link);
+      link->where.record_repair(faults_, RepairKind::contrary_link,
+                                "its {} is linked to the road's own {}, which is not linked back", name_of(end),
+                                name_of(link->contact));
+      clear_link(link);
       return;
     }
     if (back->kind == RoadLink::Kind::none) {
-      link->where.mend(faults_, MendKind::one_sided_link, "the {} of road {} is not linked back to the {} of this road",
-                       name_of(link->contact), link->id, name_of(end));
+      link->where.record_repair(faults_, RepairKind::one_sided_link,
+                                "the {} of road {} is not linked back to the {} of this road", name_of(link->contact),
+                                link->id, name_of(end));
       *back = {.kind = RoadLink::Kind::road, .id = road->id, .contact = end, .where = target->where};
       return;
     }
     if (back->kind != RoadLink::Kind::road || (back->id == road->id && back->contact == end)) return;
     const bool touches = distance_m(*road, end, *target, link->contact) <= kTouch_m;
-    link->where.mend(faults_, touches ? MendKind::unreturned_link : MendKind::contrary_link,
-                     "the {} of road {} is linked to the {} of road {} instead of the {} of this road",
-                     name_of(link->contact), link->id, name_of(back->contact), back->id, name_of(end));
-    if (!touches) leave_out(link);
+    link->where.record_repair(faults_, touches ? RepairKind::unreturned_link : RepairKind::contrary_link,
+                              "the {} of road {} is linked to the {} of road {} instead of the {} of this road",
+                              name_of(link->contact), link->id, name_of(back->contact), back->id, name_of(end));
+    if (!touches) clear_link(link);
   }
 
   /// Finds both ends of a connection: by the connecting road's link, else by the incoming road's link to the junction,
@@ -142,7 +144,8 @@ class LinkMender {
     for (const auto& [road, id] :
          {std::pair(incoming, &connection->incoming_road), std::pair(connecting, &connection->connecting_road)}) {
       if (road) continue;
-      connection->where.mend(faults_, MendKind::missing_road, "refers to road {}, which does not exist", *id);
+      connection->where.record_repair(faults_, RepairKind::missing_road, "refers to road {}, which does not exist",
+                                      *id);
       return false;
     }
     const auto is_back = [&](ContactPoint contact) {
@@ -178,8 +181,8 @@ class LinkMender {
 
   void note_wrong_end(const Connection& connection) {
     if (!connection.has_contact) return;  // already recorded
-    connection.where.mend(
-        faults_, MendKind::wrong_end, "attribute contactPoint: expected {}, which is linked to road {}, got {}",
+    connection.where.record_repair(
+        faults_, RepairKind::wrong_end, "attribute contactPoint: expected {}, which is linked to road {}, got {}",
         name_of(other_end(connection.contact)), connection.incoming_road, name_of(connection.contact));
   }
 
@@ -187,16 +190,17 @@ class LinkMender {
     for (const ContactPoint contact : {connection->contact, other_end(connection->contact)}) {
       for (const ContactPoint end : {ContactPoint::end, ContactPoint::start}) {
         if (distance_m(incoming, end, connecting, contact) > kTouch_m) continue;
-        connection->where.mend(faults_, MendKind::one_sided_link,
-                               "its incoming road {} has no link to this junction; its {} touches the {} of road {}",
-                               incoming.id, name_of(end), name_of(contact), connecting.id);
+        connection->where.record_repair(
+            faults_, RepairKind::one_sided_link,
+            "its incoming road {} has no link to this junction; its {} touches the {} of road {}", incoming.id,
+            name_of(end), name_of(contact), connecting.id);
         connection->contact = contact;
         connection->incoming_end = end;
         return true;
       }
     }
-    connection->where.mend(faults_, MendKind::unconnected_road, "its incoming road {} has no end at this junction",
-                           connection->incoming_road);
+    connection->where.record_repair(faults_, RepairKind::unconnected_road,
+                                    "its incoming road {} has no end at this junction", connection->incoming_road);
     return false;
   }
 
@@ -206,6 +210,6 @@ class LinkMender {
 
 }  // namespace
 
-void mend_links(Network* network, Faults* faults) { LinkMender(network, faults).mend(); }
+void repair_links(Network* network, Faults* faults) { LinkRepairer(network, faults).repair(); }
 
 }  // namespace pictura::opendrive

@@ -7,8 +7,8 @@
 
 namespace pictura::opendrive {
 
-/// Repairs links as MendKind describes. Afterwards every road link, every road's junction and both roads of every
+/// Repairs links as RepairKind describes. Afterwards every road link, every road's junction and both roads of every
 /// connection exist, contact points are known, and Connection::incoming_end is set.
-void mend_links(Network* network, Faults* faults);
+void repair_links(Network* network, Faults* faults);
 
 }  // namespace pictura::opendrive

@@ -14,8 +14,8 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/map/map_fields.h"
-#include "pictura/map/mends.h"
 #include "pictura/map/opendrive/opendrive.h"
+#include "pictura/map/repairs.h"
 #include "pictura/tests/map/small_roads.h"
 #include "pictura/tests/support/error_message.h"
 
@@ -39,17 +39,18 @@ using ::testing::StartsWith;
 
 /// Imports a file whose faults are all of one kind, apart from missing links that follow from omissions. Strict reading
 /// must refuse the file with the message of a repair.
-RoadMap mended(const std::string& contents, MendKind kind, std::size_t count = 1) {
+RoadMap repaired(const std::string& contents, RepairKind kind, std::size_t count = 1) {
   const std::string text = file_of(contents);
   RoadMap map = parse_opendrive(text, "bad.xodr");
-  std::erase_if(map.mends,
-                [kind](const Mend& mend) { return mend.kind == MendKind::missing_link && kind != mend.kind; });
-  const std::vector<std::string> described = describe_mends(map.mends, "bad.xodr");
+  std::erase_if(map.mends, [kind](const Repair& repair) {
+    return repair.kind == RepairKind::missing_link && kind != repair.kind;
+  });
+  const std::vector<std::string> described = describe_repairs(map.mends, "bad.xodr");
   EXPECT_EQ(described.size(), 1u) << fmt::format("{}", fmt::join(described, "\n"));
   std::set<std::string> messages;
-  for (const Mend& mend : map.mends) messages.insert(message_of(mend, "bad.xodr"));
+  for (const Repair& repair : map.mends) messages.insert(message_of(repair, "bad.xodr"));
   EXPECT_EQ(map.mends.size(), count) << to_string(kind) << "\n" << fmt::format("{}", fmt::join(messages, "\n"));
-  for (const Mend& mend : map.mends) EXPECT_STREQ(to_string(mend.kind), to_string(kind)) << mend.message;
+  for (const Repair& repair : map.mends) EXPECT_STREQ(to_string(repair.kind), to_string(kind)) << repair.message;
   const std::string refusal = test::message_of([&] { parse_opendrive(text, "bad.xodr", {.strict = true}); });
   EXPECT_TRUE(messages.contains(refusal)) << to_string(kind) << ": " << refusal;
   EXPECT_THAT(refusal, StartsWith("bad.xodr:"));
@@ -105,17 +106,17 @@ TEST(OpenDriveMends, ShapesComeInAnyOrderOfT) {
   road.left = sorted.left = lane_of(1, "driving", 3);
   road.lateral = shape(0, 0, 0.2) + shape(0, -9, 0.1) + shape(50, 0, 0.3) + shape(50, -9, 0.5);
   sorted.lateral = shape(0, -9, 0.1) + shape(0, 0, 0.2) + shape(50, -9, 0.5) + shape(50, 0, 0.3);
-  const RoadMap map = mended(road.text(), MendKind::record_order, 2);
+  const RoadMap map = repaired(road.text(), RepairKind::record_order, 2);
   EXPECT_THAT(said(map), HasSubstr("road 1: <shape>: attribute t: expected at least the previous one's 0, got -9"));
   EXPECT_EQ(difference(map, sound(sorted.text())), "");
 }
 
 TEST(OpenDriveMends, RecordsOutOfOrderAreSorted) {
   const auto map_of = [](const std::string& widths, const std::string& offsets, const std::string& speeds,
-                         const std::string& heights, bool is_mended) {
+                         const std::string& heights, bool is_repaired) {
     RoadText road = straight(lane_with(widths + heights + speeds));
     road.lane_offset = offsets;
-    return is_mended ? mended(road.text(), MendKind::record_order, 4) : sound(road.text());
+    return is_repaired ? repaired(road.text(), RepairKind::record_order, 4) : sound(road.text());
   };
   const std::string offset = R"(<laneOffset s="{}" a="{}" b="0" c="0" d="0"/>)";
   const std::string offset_0 = R"(<laneOffset s="0" a="0.5" b="0" c="0" d="0"/>)";
@@ -137,14 +138,14 @@ TEST(OpenDriveMends, RecordsBeyondTheEndAreLeftOut) {
                                      R"(<height sOffset="130" inner="1" outer="1"/>)"));
   road.lane_offset = R"(<laneOffset s="100.5" a="7" b="0" c="0" d="0"/>)";
   road.type = R"(<type s="125" type="town"><speed max="3"/></type>)";
-  const RoadMap map = mended(road.text(), MendKind::record_beyond_end, 5);
+  const RoadMap map = repaired(road.text(), RepairKind::record_beyond_end, 5);
   EXPECT_THAT(said(map), HasSubstr("road 1: <type>: attribute s: expected a number in [0, 100], got 125"));
   EXPECT_EQ(difference(map, sound(straight().text())), "");
 }
 
 TEST(OpenDriveMends, RecordsBeforeTheStartApplyFromThere) {
-  const RoadMap map = mended(straight(lane_with(width(-2, 3) + R"(<speed sOffset="-1" max="9"/>)")).text(),
-                             MendKind::record_before_start, 2);
+  const RoadMap map = repaired(straight(lane_with(width(-2, 3) + R"(<speed sOffset="-1" max="9"/>)")).text(),
+                               RepairKind::record_before_start, 2);
   EXPECT_FLOAT_EQ(map.lane_points.front().width_m, 3);
   EXPECT_FLOAT_EQ(map.lanes.front().speed_limit_mps, 9);
 }
@@ -154,27 +155,27 @@ TEST(OpenDriveMends, MarksBeforeTheirSectionApplyFromItsStart) {
     return straight(lane_with(width(0, 3) + "<roadMark sOffset=\"" + offset + "\" type=\"broken\" color=\"white\"/>"))
         .text();
   };
-  const RoadMap map = mended(road_with("-2"), MendKind::record_before_start);
+  const RoadMap map = repaired(road_with("-2"), RepairKind::record_before_start);
   EXPECT_FALSE(map.markings.empty());
   EXPECT_FALSE(sound(road_with("0")).markings.empty());
 }
 
 TEST(OpenDriveMends, WidthsBeginWithTheirSection) {
-  const RoadMap map = mended(straight(lane_with(width(4, 3, 0.01))).text(), MendKind::late_width);
+  const RoadMap map = repaired(straight(lane_with(width(4, 3, 0.01))).text(), RepairKind::late_width);
   EXPECT_FLOAT_EQ(map.lane_points.front().width_m, 3);
   EXPECT_NEAR(map.lane_points.back().width_m, 3.96, 1e-3);
 }
 
 TEST(OpenDriveMends, ALaneWithoutWidthHasNoSurface) {
   const RoadMap map =
-      mended(straight(lane_of(-1, "driving", 3) + lane_with("", -2, "shoulder")).text(), MendKind::missing_width);
+      repaired(straight(lane_of(-1, "driving", 3) + lane_with("", -2, "shoulder")).text(), RepairKind::missing_width);
   EXPECT_EQ(map.lanes.size(), 1u);
   EXPECT_EQ(map.facts.lanes, 1);
 }
 
 TEST(OpenDriveMends, WidthsBelowZeroCountAsZero) {
-  const RoadMap map = mended(straight(lane_with(width(0, 3) + width(50, 3, -0.1)) + lane_of(-2, "driving", 3)).text(),
-                             MendKind::negative_width);
+  const RoadMap map = repaired(straight(lane_with(width(0, 3) + width(50, 3, -0.1)) + lane_of(-2, "driving", 3)).text(),
+                               RepairKind::negative_width);
   EXPECT_THAT(said(map), HasSubstr("road 1: <lane>: its width at s"));
   for (const LanePoint& point : map.lane_points) EXPECT_GE(point.width_m, 0);
   const Lane& inner = lane_named(map, "1", 0, -1);
@@ -185,7 +186,7 @@ TEST(OpenDriveMends, WidthsBelowZeroCountAsZero) {
 TEST(OpenDriveMends, MissingCoefficientsAndHeightsAreZero) {
   RoadText road = straight(lane_with(R"(<width sOffset="0" a="3"/><height sOffset="0" outer="0"/>)"));
   road.geometry = R"(<geometry s="0" x="0" y="0" hdg="0" length="100"><spiral/></geometry>)";
-  const RoadMap map = mended(road.text(), MendKind::missing_zero, 6);
+  const RoadMap map = repaired(road.text(), RepairKind::missing_zero, 6);
   const RoadMap same = sound(straight(lane_with(width(0, 3) + R"(<height sOffset="0" inner="0" outer="0"/>)")).text());
   EXPECT_EQ(difference(map, same), "");
 }
@@ -200,14 +201,14 @@ TEST(OpenDriveMends, SectionsAreSortedAndBeginWithTheRoad) {
   };
   RoadText road;
   road.sections = section(0, 3, after) + section(60, 5, before) + section(30, 4, before + after);
-  RoadMap map = mended(road.text(), MendKind::record_order);
+  RoadMap map = repaired(road.text(), RepairKind::record_order);
   ASSERT_EQ(map.lanes.size(), 3u);
   EXPECT_FLOAT_EQ(first_point(map, map.lanes[1]).width_m, 4);
   EXPECT_THAT(list(map, map.lanes[1].successors), ElementsAre(2));
   road.sections = section(0, 3) + section(120, 4);
-  EXPECT_EQ(mended(road.text(), MendKind::record_beyond_end).lanes.size(), 1u);
+  EXPECT_EQ(repaired(road.text(), RepairKind::record_beyond_end).lanes.size(), 1u);
   road.sections = section(0.2, 3);
-  EXPECT_FLOAT_EQ(mended(road.text(), MendKind::late_section).lanes[0].length_m, 100);
+  EXPECT_FLOAT_EQ(repaired(road.text(), RepairKind::late_section).lanes[0].length_m, 100);
   road.sections = section(5, 3);
   EXPECT_THAT(test::message_of([&] { parse_opendrive(file_of(road.text()), "bad.xodr"); }),
               HasSubstr("road 1: <laneSection>: attribute s: expected the first section at 0, got 5"));
@@ -215,15 +216,15 @@ TEST(OpenDriveMends, SectionsAreSortedAndBeginWithTheRoad) {
 
 TEST(OpenDriveMends, GapsInLaneIdsAreFilled) {
   const RoadMap map =
-      mended(straight(lane_of(-1, "driving", 3) + lane_of(-4, "driving", 3) + lane_of(-2, "driving", 3)).text(),
-             MendKind::lane_gap);
+      repaired(straight(lane_of(-1, "driving", 3) + lane_of(-4, "driving", 3) + lane_of(-2, "driving", 3)).text(),
+               RepairKind::lane_gap);
   EXPECT_EQ(map.lanes.size(), 3u);
   EXPECT_FLOAT_EQ(first_point(map, lane_named(map, "1", 0, -4)).position_m.y + static_cast<float>(map.origin_m[1]),
                   -7.5f);
 }
 
 TEST(OpenDriveMends, TheCenterLaneIsZero) {
-  const RoadMap map = mended(replaced(straight().text(), "<lane id=\"0\"", "<lane id=\"3\""), MendKind::center_id);
+  const RoadMap map = repaired(replaced(straight().text(), "<lane id=\"0\"", "<lane id=\"3\""), RepairKind::center_id);
   EXPECT_EQ(difference(map, sound(straight().text())), "");
 }
 
@@ -249,9 +250,9 @@ int num_endless(const RoadMap& map) {
 TEST(OpenDriveMends, RoadsOfNoLengthAreAMillimetreLong) {
   RoadText road = straight();
   road.length = 1e-5;
-  EXPECT_NEAR(mended(road.text(), MendKind::short_road).lanes[0].length_m, 1e-3, 1e-6);
+  EXPECT_NEAR(repaired(road.text(), RepairKind::short_road).lanes[0].length_m, 1e-3, 1e-6);
   road.length = 0;
-  EXPECT_EQ(mended(road.text(), MendKind::short_road).lanes.size(), 1u);
+  EXPECT_EQ(repaired(road.text(), RepairKind::short_road).lanes.size(), 1u);
 }
 
 TEST(OpenDriveMends, ProfilesOfRoadsOfNoLengthAreConstant) {
@@ -261,7 +262,7 @@ TEST(OpenDriveMends, ProfilesOfRoadsOfNoLengthAreConstant) {
   road.lateral = R"(<superelevation s="0" a="0" b="9e9" c="0" d="0"/>)";
   road.lane_offset = R"(<laneOffset s="0" a="0" b="-3e6" c="0" d="4e18"/>)";
   road.right = lane_with(R"(<link><predecessor id="-1"/><successor id="-1"/></link>)" + width(0, 3.5, 7e12));
-  const RoadMap map = mended(ring_with(road.text()), MendKind::short_road);
+  const RoadMap map = repaired(ring_with(road.text()), RepairKind::short_road);
   const Lane& lane = lane_named(map, "3", 0, -1);
   EXPECT_EQ(num_endless(map), 3);
   EXPECT_FLOAT_EQ(first_point(map, lane).width_m, 3.5);
@@ -272,7 +273,7 @@ TEST(OpenDriveMends, ProfilesOfRoadsOfNoLengthAreConstant) {
 }
 
 TEST(OpenDriveMends, RoadsWithoutADrawnLengthHaveNone) {
-  const RoadMap map = mended(ring_with(between_the_halves(0.1, 0).text()), MendKind::short_road);
+  const RoadMap map = repaired(ring_with(between_the_halves(0.1, 0).text()), RepairKind::short_road);
   EXPECT_EQ(num_endless(map), 3);
   EXPECT_NEAR(map.facts.driving_lane_km, 0.251, 1e-3);
   EXPECT_THAT(said(map), HasSubstr("road 3: <road>: attribute length: expected at least 0.001 with <geometry>, got 0"));
@@ -284,12 +285,12 @@ TEST(OpenDriveMends, SectionsOfNoLengthLeaveTheLaneOffset) {
     return fmt::format("<laneSection s=\"{}\"><center/><right>{}</right></laneSection>", s, lanes);
   };
   const auto in_sections = [&](const std::string& offsets, const std::string& sections) {
-    return mended(ring_with("",
-                            [&](RoadText* road) {
-                              road->lane_offset = offsets;
-                              road->sections = sections;
-                            }),
-                  MendKind::short_section);
+    return repaired(ring_with("",
+                              [&](RoadText* road) {
+                                road->lane_offset = offsets;
+                                road->sections = sections;
+                              }),
+                    RepairKind::short_section);
   };
   const std::string offset = R"(<laneOffset s="{}" a="{}" b="0" c="0" d="0"/>)";
   const double near_end = 40 * std::numbers::pi - 2e-5;
@@ -327,7 +328,7 @@ TEST(OpenDriveMends, SectionsOfNoLengthLeaveTheLaneOffset) {
 TEST(OpenDriveMends, GeometriesOfNoLengthAreLeftOut) {
   RoadText road = straight();
   road.geometry = line_at(0, 0, 0, 0, 60) + line_at(60, 60, 0, 1, 0) + line_at(60, 60, 0, 0, 40);
-  const RoadMap map = mended(road.text(), MendKind::empty_geometry);
+  const RoadMap map = repaired(road.text(), RepairKind::empty_geometry);
   EXPECT_THAT(said(map), HasSubstr("bad.xodr:8: road 1: <geometry>: attribute length: expected more than 0"));
   EXPECT_FLOAT_EQ(map.lanes[0].length_m, 100);
 }
@@ -336,7 +337,7 @@ TEST(OpenDriveMends, TheRoadIsWhatItsGeometrySays) {
   for (const double length : {99.55, 100.45, 98.0, 101.1, 50.0, 500.0}) {
     RoadText road = straight();
     road.geometry = line_at(0, 0, 0, 0, length);
-    const RoadMap map = mended(road.text(), MendKind::line_length);
+    const RoadMap map = repaired(road.text(), RepairKind::line_length);
     EXPECT_NEAR(map.lanes[0].length_m, length, 1e-3);
     EXPECT_NEAR(map.facts.driving_lane_km, 1e-3 * length, 1e-9);
     EXPECT_THAT(said(map), HasSubstr(fmt::format("bad.xodr:7: road 1: <geometry>: the reference line ends at {}; "
@@ -356,19 +357,19 @@ TEST(OpenDriveMends, ProfilesAreHeldBeyondTheStatedLength) {
   road.geometry = line_at(0, 0, 0, 0, 100);
   road.elevation = R"(<elevation s="0" a="1" b="0.05" c="0" d="0"/>)";
   road.lane_offset = R"(<laneOffset s="0" a="0" b="0.1" c="0" d="0"/>)";
-  const RoadMap map = mended(road.text(), MendKind::line_length);
+  const RoadMap map = repaired(road.text(), RepairKind::line_length);
   EXPECT_FLOAT_EQ(last_point(map, map.lanes[0]).width_m, 2);
   test::expect_at(map, last_point(map, map.lanes[0]).position_m, 100, 1, 2);
   // Records further along count.
   road.elevation += R"(<elevation s="60" a="7" b="0" c="0" d="0"/>)";
-  EXPECT_NEAR(mended(road.text(), MendKind::line_length).facts.z_max_m, 7, 1e-6);
+  EXPECT_NEAR(repaired(road.text(), RepairKind::line_length).facts.z_max_m, 7, 1e-6);
 }
 
 TEST(OpenDriveMends, SmallGapsOfShortRoadsAreBridged) {
   RoadText road = straight();
   road.length = 2;
   road.geometry = line_at(0, 0, 0, 0, 1) + line_at(1, 1, 0.3, 0, 1);
-  const RoadMap map = mended(road.text(), MendKind::geometry_gap);
+  const RoadMap map = repaired(road.text(), RepairKind::geometry_gap);
   EXPECT_THAT(said(map),
               HasSubstr("bad.xodr:8: road 1: <geometry>: begins 0.300 m from the end of the previous geometry"));
   EXPECT_NEAR(last_point(map, map.lanes[0]).position_m.y - first_point(map, map.lanes[0]).position_m.y, 0.3, 1e-4);
@@ -384,7 +385,7 @@ TEST(OpenDriveMends, JumpsAreSpreadOverTheRoad) {
     RoadText road = straight();
     road.length = 200;
     road.geometry = line_at(0, 0, 0, 0, 100) + line_at(100, 100 + along, aside, 0, 100);
-    const RoadMap map = mended(road.text(), MendKind::geometry_jump);
+    const RoadMap map = repaired(road.text(), RepairKind::geometry_jump);
     const Lane& lane = map.lanes[0];
     const Span<const LanePoint> points = map.points_of(lane);
     test::expect_at(map, points[0].position_m, 0, -1.5);
@@ -408,7 +409,7 @@ TEST(OpenDriveMends, JumpsAreSpreadOverTheRoad) {
 TEST(OpenDriveMends, JumpsNearAnEndLeaveTheEnd) {
   RoadText road = straight();
   road.geometry = line_at(0, 0, 0, 0, 2) + line_at(2, 2, 1, 0, 49) + line_at(51, 51, 0, 0, 49);
-  const RoadMap map = mended(road.text(), MendKind::geometry_jump, 2);
+  const RoadMap map = repaired(road.text(), RepairKind::geometry_jump, 2);
   test::expect_at(map, first_point(map, map.lanes[0]).position_m, 0, -1.5);
   test::expect_at(map, last_point(map, map.lanes[0]).position_m, 100, -1.5);
 }
@@ -418,7 +419,7 @@ TEST(OpenDriveMends, JumpsOfTheElevationAreSpreadOverTheRoad) {
     RoadText road = straight();
     road.elevation = fmt::format(
         R"(<elevation s="0" a="1" b="0" c="0" d="0"/><elevation s="50" a="{}" b="0.1" c="0" d="0"/>)", 1 + rise);
-    const RoadMap map = mended(road.text(), MendKind::height_jump);
+    const RoadMap map = repaired(road.text(), RepairKind::height_jump);
     const double half_m = std::min(50.0, std::max(5.0, 5 * std::abs(rise)));
     const Span<const LanePoint> points = map.points_of(map.lanes[0]);
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -443,7 +444,7 @@ TEST(OpenDriveMends, GeometriesOfNextToNoLengthTurnNothing) {
                                       line_at(0, 0, 0, kNorth, 100) + line_at(100, 0, 100, 0, 1e-9)}) {
     RoadText road = straight();
     road.geometry = geometry;
-    const RoadMap map = mended(road.text(), MendKind::empty_geometry);
+    const RoadMap map = repaired(road.text(), RepairKind::empty_geometry);
     for (const LanePoint& point : map.points_of(map.lanes[0])) EXPECT_NEAR(point.heading_rad, kNorth, 1e-6);
   }
 }
@@ -465,10 +466,10 @@ TEST(OpenDriveMends, LargeJumpsAreRefused) {
 TEST(OpenDriveMends, GeometriesFollowEachOther) {
   RoadText road = straight();
   road.geometry = line_at(0, 0, 0, 0, 50) + line_at(50.3, 50.3, 0, 0, 49.7);
-  EXPECT_FLOAT_EQ(mended(road.text(), MendKind::geometry_station).lanes[0].length_m, 100);
+  EXPECT_FLOAT_EQ(repaired(road.text(), RepairKind::geometry_station).lanes[0].length_m, 100);
   // The previous line ends where the next begins if its length is that of the station.
   road.geometry = line_at(0, 0, 0, 0, 50) + line_at(53, 53, 0, 0, 47);
-  EXPECT_FLOAT_EQ(mended(road.text(), MendKind::geometry_station).lanes[0].length_m, 100);
+  EXPECT_FLOAT_EQ(repaired(road.text(), RepairKind::geometry_station).lanes[0].length_m, 100);
   // Lengths fit but stations do not: all later stations move. Or stations are out of order.
   const auto expect_straight = [](const RoadMap& map) {
     test::expect_at(map, first_point(map, map.lanes[0]).position_m, 0, -1.5);
@@ -476,36 +477,36 @@ TEST(OpenDriveMends, GeometriesFollowEachOther) {
     EXPECT_NEAR(map.facts.driving_lane_km, 0.1, 1e-12);
   };
   road.geometry = line_at(0, 0, 0, 0, 50) + line_at(70, 50, 0, 0, 20) + line_at(90, 70, 0, 0, 30);
-  const RoadMap moved = mended(road.text(), MendKind::moved_geometry);
+  const RoadMap moved = repaired(road.text(), RepairKind::moved_geometry);
   expect_straight(moved);
   EXPECT_THAT(said(moved), HasSubstr("attribute s: expected 50, where the previous geometry ends, got 70"));
   road.geometry = line_at(40, 0, 0, 0, 50) + line_at(90, 50, 0, 0, 50);
-  expect_straight(mended(road.text(), MendKind::moved_geometry));
+  expect_straight(repaired(road.text(), RepairKind::moved_geometry));
   road.geometry = line_at(50, 50, 0, 0, 50) + line_at(0, 0, 0, 0, 50);
-  expect_straight(mended(road.text(), MendKind::record_order));
+  expect_straight(repaired(road.text(), RepairKind::record_order));
 }
 
 // Names of elements.
 
 TEST(OpenDriveMends, LanesWithoutATypeHaveOne) {
-  const RoadMap center = mended(ring_with("",
-                                          [](RoadText* road) {
-                                            road->sections =
-                                                R"(<laneSection s="0"><center><lane id="0"/></center><right>)" +
-                                                road->right + "</right></laneSection>";
-                                          }),
-                                MendKind::missing_lane_type);
+  const RoadMap center = repaired(ring_with("",
+                                            [](RoadText* road) {
+                                              road->sections =
+                                                  R"(<laneSection s="0"><center><lane id="0"/></center><right>)" +
+                                                  road->right + "</right></laneSection>";
+                                            }),
+                                  RepairKind::missing_lane_type);
   EXPECT_EQ(difference(center, sound(ring_with())), "");
   EXPECT_EQ(num_endless(center), 2);
-  const RoadMap side = mended(replaced(straight().text(), "id=\"-1\" type=\"driving\"", "id=\"-1\" type=\"\""),
-                              MendKind::missing_lane_type);
+  const RoadMap side = repaired(replaced(straight().text(), "id=\"-1\" type=\"driving\"", "id=\"-1\" type=\"\""),
+                                RepairKind::missing_lane_type);
   EXPECT_EQ(side.lanes.at(0).type, LaneType::other);
   EXPECT_THAT(said(side), HasSubstr("road 1: <lane>: attribute type is missing"));
 }
 
 TEST(OpenDriveMends, UnknownFlagsAreFalse) {
-  const RoadMap map = mended(replaced(straight().text(), "type=\"driving\"", "type=\"driving\" level=\"none\""),
-                             MendKind::unknown_flag);
+  const RoadMap map = repaired(replaced(straight().text(), "type=\"driving\"", "type=\"driving\" level=\"none\""),
+                               RepairKind::unknown_flag);
   EXPECT_EQ(difference(map, sound(straight().text())), "");
 }
 
@@ -517,11 +518,12 @@ TEST(OpenDriveMends, AttributesWithoutAValueAreMissing) {
 
 TEST(OpenDriveMends, UnknownNamesHaveAMeaning) {
   const RoadMap lanes =
-      mended(straight(lane_of(-1, "driving", 3) + lane_of(-2, "canal", 2)).text(), MendKind::unknown_lane_type);
+      repaired(straight(lane_of(-1, "driving", 3) + lane_of(-2, "canal", 2)).text(), RepairKind::unknown_lane_type);
   EXPECT_EQ(lane_named(lanes, "1", 0, -2).type, LaneType::other);
   EXPECT_THAT(said(lanes), HasSubstr("road 1: <lane>: attribute type: 'canal' is not a lane type"));
-  const RoadMap direction = mended(replaced(straight().text(), "type=\"driving\"", "type=\"driving\" direction=\"up\""),
-                                   MendKind::unknown_direction);
+  const RoadMap direction =
+      repaired(replaced(straight().text(), "type=\"driving\"", "type=\"driving\" direction=\"up\""),
+               RepairKind::unknown_direction);
   EXPECT_EQ(difference(direction, sound(straight().text())), "");
 }
 
@@ -532,17 +534,18 @@ std::string with_mark(const std::string& mark) {
 }
 
 TEST(OpenDriveMends, UnknownMarksArePaintedByTheirLines) {
-  EXPECT_EQ(mended(with_mark(R"(<roadMark sOffset="0" type="wavy"/>)"), MendKind::unknown_mark).markings.size(), 0u);
+  EXPECT_EQ(repaired(with_mark(R"(<roadMark sOffset="0" type="wavy"/>)"), RepairKind::unknown_mark).markings.size(),
+            0u);
   const RoadMap lines =
-      mended(with_mark(R"(<roadMark sOffset="0" type="wavy" color="yellow"><type name="" width="0.2">)"
-                       R"(<line length="5" space="5" tOffset="0" sOffset="0" width="0.2"/></type></roadMark>)"),
-             MendKind::unknown_mark);
+      repaired(with_mark(R"(<roadMark sOffset="0" type="wavy" color="yellow"><type name="" width="0.2">)"
+                         R"(<line length="5" space="5" tOffset="0" sOffset="0" width="0.2"/></type></roadMark>)"),
+               RepairKind::unknown_mark);
   EXPECT_EQ(lines.markings.size(), 10u);
   const RoadMap pink =
-      mended(with_mark(R"(<roadMark sOffset="0" type="solid" color="pink"/>)"), MendKind::unknown_color);
+      repaired(with_mark(R"(<roadMark sOffset="0" type="solid" color="pink"/>)"), RepairKind::unknown_color);
   EXPECT_EQ(pink.markings.at(0).color, MarkColor::white);
   EXPECT_EQ(
-      mended(with_mark(R"(<roadMark sOffset="0" type="solid" laneChange="some"/>)"), MendKind::unknown_lane_change)
+      repaired(with_mark(R"(<roadMark sOffset="0" type="solid" laneChange="some"/>)"), RepairKind::unknown_lane_change)
           .markings.size(),
       1u);
 }
@@ -555,18 +558,21 @@ TEST(OpenDriveMends, SizesBelowZeroAreTheDefault) {
                      "</roadMark>");
   };
   const std::string minus = R"( width="-1")", ten = R"( width="0.1")";
-  EXPECT_EQ(difference(mended(mark(minus, "", ""), MendKind::negative_size), sound(mark("", "", ""))), "");
-  EXPECT_EQ(difference(mended(mark(minus, ten, minus), MendKind::negative_size, 2), sound(mark(ten, ten, ten))), "");
+  EXPECT_EQ(difference(repaired(mark(minus, "", ""), RepairKind::negative_size), sound(mark("", "", ""))), "");
+  EXPECT_EQ(difference(repaired(mark(minus, ten, minus), RepairKind::negative_size, 2), sound(mark(ten, ten, ten))),
+            "");
 }
 
 TEST(OpenDriveMends, MarksBeyondTheirSectionAreLeftOut) {
-  EXPECT_EQ(mended(with_mark(R"(<roadMark sOffset="105" type="solid"/>)"), MendKind::record_beyond_end).markings.size(),
-            0u);
+  EXPECT_EQ(
+      repaired(with_mark(R"(<roadMark sOffset="105" type="solid"/>)"), RepairKind::record_beyond_end).markings.size(),
+      0u);
 }
 
 TEST(OpenDriveMends, MarksOutOfOrderAreSorted) {
   const std::string solid = R"(<roadMark sOffset="0" type="solid"/>)", none = R"(<roadMark sOffset="40" type="none"/>)";
-  EXPECT_EQ(difference(mended(with_mark(none + solid), MendKind::record_order), sound(with_mark(solid + none))), "");
+  EXPECT_EQ(difference(repaired(with_mark(none + solid), RepairKind::record_order), sound(with_mark(solid + none))),
+            "");
 }
 
 TEST(OpenDriveMends, DashesOfNoLengthAreContinuous) {
@@ -576,17 +582,17 @@ TEST(OpenDriveMends, DashesOfNoLengthAreContinuous) {
                     R"(width="0.15"/></{}></roadMark>)",
                     kind, space, kind));
   };
-  const RoadMap map = mended(mark("type", "space=\"0\""), MendKind::endless_dash);
+  const RoadMap map = repaired(mark("type", "space=\"0\""), RepairKind::endless_dash);
   ASSERT_EQ(map.markings.size(), 1u);
   EXPECT_FALSE(map.markings[0].broken);
-  EXPECT_EQ(mended(mark("explicit", ""), MendKind::empty_line).markings.size(), 1u) << "the pattern of the type";
+  EXPECT_EQ(repaired(mark("explicit", ""), RepairKind::empty_line).markings.size(), 1u) << "the pattern of the type";
 }
 
 TEST(OpenDriveMends, SpeedsThatCannotBeReadAreLeftOut) {
   for (const char* speed : {R"(max="fast")", R"(max="-3")", R"(max="50" unit="knots")", "", R"(max="1e9")"}) {
     const RoadMap map =
-        mended(straight(lane_of(-1, "driving", 3, fmt::format("<speed sOffset=\"0\" {}/>", speed))).text(),
-               MendKind::unreadable_speed);
+        repaired(straight(lane_of(-1, "driving", 3, fmt::format("<speed sOffset=\"0\" {}/>", speed))).text(),
+                 RepairKind::unreadable_speed);
     EXPECT_EQ(difference(map, sound(straight().text())), "") << speed;
   }
 }
@@ -600,20 +606,20 @@ std::string with_rest(const std::string& rest) {
 }
 
 TEST(OpenDriveMends, ObjectsThatCannotStandAreLeftOut) {
-  for (const auto& [kind, object] : std::vector<std::pair<MendKind, std::string>>{
-           {MendKind::misplaced_item, R"(<object id="1" type="crosswalk" s="500" t="0" length="2" width="2"/>)"},
-           {MendKind::misplaced_item,
+  for (const auto& [kind, object] : std::vector<std::pair<RepairKind, std::string>>{
+           {RepairKind::misplaced_item, R"(<object id="1" type="crosswalk" s="500" t="0" length="2" width="2"/>)"},
+           {RepairKind::misplaced_item,
             R"(<object id="1" type="crosswalk" s="5" t="0"><outline><cornerRoad s="999" t="0"/>)"
             R"(</outline></object>)"},
-           {MendKind::shapeless_object, R"(<object id="1" type="crosswalk" s="5" t="0"/>)"},
-           {MendKind::shapeless_object, R"(<object id="1" type="parking" s="5" t="0" length="5"/>)"},
-           {MendKind::shapeless_object, R"(<object id="1" type="stopLine" s="5" t="0"/>)"}}) {
-    const RoadMap map = mended(with_rest("<objects>" + object + "</objects>"), kind);
+           {RepairKind::shapeless_object, R"(<object id="1" type="crosswalk" s="5" t="0"/>)"},
+           {RepairKind::shapeless_object, R"(<object id="1" type="parking" s="5" t="0" length="5"/>)"},
+           {RepairKind::shapeless_object, R"(<object id="1" type="stopLine" s="5" t="0"/>)"}}) {
+    const RoadMap map = repaired(with_rest("<objects>" + object + "</objects>"), kind);
     EXPECT_EQ(difference(map, sound(straight().text())), "") << object;
     EXPECT_THAT(said(map), HasSubstr("road 1: <")) << object;
   }
-  EXPECT_EQ(mended(with_rest(R"(<signals><signal id="1" s="-57" t="1" orientation="+"/></signals>)"),
-                   MendKind::misplaced_item)
+  EXPECT_EQ(repaired(with_rest(R"(<signals><signal id="1" s="-57" t="1" orientation="+"/></signals>)"),
+                     RepairKind::misplaced_item)
                 .signs.size(),
             0u);
 }
@@ -623,25 +629,26 @@ TEST(OpenDriveMends, RepeatsThatCannotBeDrawnStandOnce) {
     return with_rest(R"(<objects><object id="1" type="parking" s="5" t="-5" length="5" width="2">)" + contents +
                      "</object></objects>");
   };
-  EXPECT_EQ(
-      mended(parking(R"(<repeat s="0" length="50" distance="0"/>)"), MendKind::continuous_object).parking_spaces.size(),
-      1u);
-  EXPECT_EQ(mended(parking(R"(<repeat s="0" length="50" distance="5"/><outline><cornerRoad s="1" t="-4"/></outline>)"),
-                   MendKind::repeated_corners)
+  EXPECT_EQ(repaired(parking(R"(<repeat s="0" length="50" distance="0"/>)"), RepairKind::continuous_object)
                 .parking_spaces.size(),
             1u);
+  EXPECT_EQ(
+      repaired(parking(R"(<repeat s="0" length="50" distance="5"/><outline><cornerRoad s="1" t="-4"/></outline>)"),
+               RepairKind::repeated_corners)
+          .parking_spaces.size(),
+      1u);
 }
 
 TEST(OpenDriveMends, SignalsOfOneIdAllStand) {
-  const RoadMap map = mended(
+  const RoadMap map = repaired(
       with_rest(
           R"(<signals><signal id="5" s="10" t="-4" orientation="+"/><signal id="5" s="20" t="-4" orientation="+"/>)"
           R"(</signals>)"),
-      MendKind::repeated_signal);
+      RepairKind::repeated_signal);
   EXPECT_EQ(map.signs.size(), 2u);
   EXPECT_THAT(said(map), HasSubstr("road 1: <signal>: attribute id: another signal already has 5"));
-  EXPECT_EQ(mended(with_rest(R"(<signals><signal id="5" s="10" t="-4" orientation="left"/></signals>)"),
-                   MendKind::unknown_orientation)
+  EXPECT_EQ(repaired(with_rest(R"(<signals><signal id="5" s="10" t="-4" orientation="left"/></signals>)"),
+                     RepairKind::unknown_orientation)
                 .signs.size(),
             1u);
 }
@@ -649,15 +656,16 @@ TEST(OpenDriveMends, SignalsOfOneIdAllStand) {
 TEST(OpenDriveMends, ReferencesToWhatIsAbsentAreLeftOut) {
   const std::string road = straight().text();
   const std::string control = R"(<controller id="4"><control signalId="6"/></controller>)";
-  EXPECT_EQ(difference(mended(with_rest(R"(<signals><signalReference id="77" s="0" t="0" orientation="+"/></signals>)"),
-                              MendKind::missing_signal),
-                       sound(road)),
-            "");
-  EXPECT_THAT(said(mended(road + control, MendKind::missing_signal)),
+  EXPECT_EQ(
+      difference(repaired(with_rest(R"(<signals><signalReference id="77" s="0" t="0" orientation="+"/></signals>)"),
+                          RepairKind::missing_signal),
+                 sound(road)),
+      "");
+  EXPECT_THAT(said(repaired(road + control, RepairKind::missing_signal)),
               HasSubstr("controller 4: <controller>: controls signal 6, which does not exist"));
-  mended(road + R"(<junction id="3"><controller id="9"/></junction>)", MendKind::missing_controller);
-  mended(road + R"(<controller id="4"/><controller id="4"/>)", MendKind::repeated_controller);
-  const RoadMap lost = mended(replaced(road, "junction=\"-1\"", "junction=\"5\""), MendKind::missing_junction);
+  repaired(road + R"(<junction id="3"><controller id="9"/></junction>)", RepairKind::missing_controller);
+  repaired(road + R"(<controller id="4"/><controller id="4"/>)", RepairKind::repeated_controller);
+  const RoadMap lost = repaired(replaced(road, "junction=\"-1\"", "junction=\"5\""), RepairKind::missing_junction);
   EXPECT_EQ(difference(lost, sound(road)), "");
 }
 
@@ -684,24 +692,24 @@ int num_links(const RoadMap& map) { return static_cast<int>(map.lane_links.size(
 TEST(OpenDriveMends, LinksToWhatIsAbsentAreLeftOut) {
   const std::string to_2 = link_to("successor", "2", "start"), to_1 = link_to("predecessor", "1", "end");
   EXPECT_EQ(num_links(sound(two_roads(to_2, to_1))), 1);
-  EXPECT_THAT(said(mended(two_roads(link_to("successor", "9", "start"), ""), MendKind::missing_road)),
+  EXPECT_THAT(said(repaired(two_roads(link_to("successor", "9", "start"), ""), RepairKind::missing_road)),
               HasSubstr("bad.xodr:5: road 1: <successor>: refers to road 9, which does not exist"));
-  EXPECT_THAT(
-      said(mended(two_roads(R"(<successor elementType="junction" elementId="9"/>)", ""), MendKind::missing_junction)),
-      HasSubstr("road 1: <successor>: refers to junction 9, which does not exist"));
-  const RoadMap lane = mended(two_roads(to_2, to_1, "-7"), MendKind::missing_lane);
+  EXPECT_THAT(said(repaired(two_roads(R"(<successor elementType="junction" elementId="9"/>)", ""),
+                            RepairKind::missing_junction)),
+              HasSubstr("road 1: <successor>: refers to junction 9, which does not exist"));
+  const RoadMap lane = repaired(two_roads(to_2, to_1, "-7"), RepairKind::missing_lane);
   EXPECT_THAT(said(lane), HasSubstr("road 1: <lane>: is linked to lane -7 of road 2, which does not exist there"));
   EXPECT_EQ(num_links(lane), 0);
   EXPECT_EQ(
-      num_links(mended(two_roads(R"(<successor elementType="road" elementId="2" elementS="5" elementDir="+"/>)", ""),
-                       MendKind::link_into_road)),
+      num_links(repaired(two_roads(R"(<successor elementType="road" elementId="2" elementS="5" elementDir="+"/>)", ""),
+                         RepairKind::link_into_road)),
       0);
 }
 
 TEST(OpenDriveMends, LinksThatTrafficCannotFollowAreLeftOut) {
   const std::string to_2 = link_to("successor", "2", "start"), to_1 = link_to("predecessor", "1", "end");
   const std::string sound_text = two_roads(to_2, to_1);
-  const RoadMap dangling = mended(two_roads("", ""), MendKind::dangling_link);
+  const RoadMap dangling = repaired(two_roads("", ""), RepairKind::dangling_link);
   EXPECT_EQ(num_links(dangling), 0);
   EXPECT_THAT(said(dangling), HasSubstr("road 1: <lane>: is linked to lane -1 beyond the end of its road, which is "
                                         "linked to nothing there"));
@@ -711,17 +719,18 @@ TEST(OpenDriveMends, LinksThatTrafficCannotFollowAreLeftOut) {
     const std::size_t at = text.rfind(second) + second.size();
     return text.replace(at, std::string("driving").size(), type);
   };
-  EXPECT_THAT(said(mended(with_second("shoulder"), MendKind::unlike_link)),
+  EXPECT_THAT(said(repaired(with_second("shoulder"), RepairKind::unlike_link)),
               HasSubstr("links lane -1 of road 1 with lane -1 of road 2, which are driving and shoulder"));
-  EXPECT_THAT(said(mended(with_second("driving\" direction=\"reversed"), MendKind::opposed_link)),
+  EXPECT_THAT(said(repaired(with_second("driving\" direction=\"reversed"), RepairKind::opposed_link)),
               HasSubstr("whose traffic meets head on there"));
-  EXPECT_THAT(said(mended(replaced(sound_text, "x=\"100\" y=\"0\"", "x=\"100\" y=\"1.5\""), MendKind::distant_link)),
-              HasSubstr("which are 1.50 m apart there"));
+  EXPECT_THAT(
+      said(repaired(replaced(sound_text, "x=\"100\" y=\"0\"", "x=\"100\" y=\"1.5\""), RepairKind::distant_link)),
+      HasSubstr("which are 1.50 m apart there"));
 }
 
 TEST(OpenDriveMends, OneSidedLinksBecomeMutual) {
   const std::string to_2 = link_to("successor", "2", "start");
-  const RoadMap map = mended(two_roads(to_2, ""), MendKind::one_sided_link);
+  const RoadMap map = repaired(two_roads(to_2, ""), RepairKind::one_sided_link);
   EXPECT_THAT(said(map),
               HasSubstr("road 1: <successor>: the start of road 2 is not linked back to the end of this road"));
   EXPECT_EQ(difference(map, sound(two_roads(to_2, link_to("predecessor", "1", "end")))), "");
@@ -729,15 +738,15 @@ TEST(OpenDriveMends, OneSidedLinksBecomeMutual) {
 
 TEST(OpenDriveMends, GeometryShowsTheEndOfALink) {
   const std::string to_2 = link_to("successor", "2", "start"), to_1 = link_to("predecessor", "1", "end");
-  const RoadMap map = mended(two_roads(link_to("successor", "2", "end"), to_1), MendKind::wrong_end);
+  const RoadMap map = repaired(two_roads(link_to("successor", "2", "end"), to_1), RepairKind::wrong_end);
   EXPECT_THAT(said(map),
               HasSubstr("road 1: <successor>: attribute contactPoint: expected start, which touches the end of "
                         "this road, got end"));
   EXPECT_EQ(difference(map, sound(two_roads(to_2, to_1))), "");
-  EXPECT_EQ(difference(mended(two_roads(link_to("successor", "2", ""), to_1), MendKind::missing_contact),
+  EXPECT_EQ(difference(repaired(two_roads(link_to("successor", "2", ""), to_1), RepairKind::missing_contact),
                        sound(two_roads(to_2, to_1))),
             "");
-  EXPECT_EQ(num_links(mended(two_roads(link_to("successor", "2", "middle"), to_1), MendKind::missing_contact)), 1);
+  EXPECT_EQ(num_links(repaired(two_roads(link_to("successor", "2", "middle"), to_1), RepairKind::missing_contact)), 1);
 }
 
 TEST(OpenDriveMends, LinksThatAreReturnedElsewhereAreKeptWhereTheEndsTouch) {
@@ -747,53 +756,54 @@ TEST(OpenDriveMends, LinksThatAreReturnedElsewhereAreKeptWhereTheEndsTouch) {
   third.link = link_to("successor", "2", "start");
   third.right = lane_of(-1, "driving", 3, R"(<link><successor id="-1"/></link>)");
   const std::string to_2 = link_to("successor", "2", "start"), to_1 = link_to("predecessor", "1", "end");
-  const RoadMap apart = mended(two_roads(to_2, to_1) + third.text(), MendKind::contrary_link);
+  const RoadMap apart = repaired(two_roads(to_2, to_1) + third.text(), RepairKind::contrary_link);
   EXPECT_EQ(num_links(apart), 1);
   EXPECT_THAT(said(apart),
               HasSubstr("road 3: <successor>: the start of road 2 is linked to the end of road 1 instead of "
                         "the end of this road"));
   third.geometry = line_at(0, 0, 0, 0, 100);
-  EXPECT_EQ(num_links(mended(two_roads(to_2, to_1) + third.text(), MendKind::unreturned_link)), 2);
+  EXPECT_EQ(num_links(repaired(two_roads(to_2, to_1) + third.text(), RepairKind::unreturned_link)), 2);
   RoadText ring = straight();
   ring.link = link_to("predecessor", "1", "start");
-  mended(ring.text(), MendKind::contrary_link);
+  repaired(ring.text(), RepairKind::contrary_link);
 }
 
 TEST(OpenDriveMends, ConnectionsFindTheirEnds) {
   const std::string good = test::three_roads();
   ASSERT_EQ(num_links(sound(good)), 4);
   // The connecting road begins at the incoming road; the file refers to its end.
-  const RoadMap wrong =
-      mended(replaced(good, "connectingRoad=\"2\" contactPoint=\"start\"", "connectingRoad=\"2\" contactPoint=\"end\""),
-             MendKind::wrong_end);
+  const RoadMap wrong = repaired(
+      replaced(good, "connectingRoad=\"2\" contactPoint=\"start\"", "connectingRoad=\"2\" contactPoint=\"end\""),
+      RepairKind::wrong_end);
   EXPECT_EQ(difference(wrong, sound(good)), "");
   EXPECT_THAT(said(wrong), HasSubstr("junction 7: <connection>: attribute contactPoint"));
-  EXPECT_EQ(difference(mended(replaced(good, "connectingRoad=\"2\" contactPoint=\"start\"", "connectingRoad=\"2\""),
-                              MendKind::missing_contact),
+  EXPECT_EQ(difference(repaired(replaced(good, "connectingRoad=\"2\" contactPoint=\"start\"", "connectingRoad=\"2\""),
+                                RepairKind::missing_contact),
                        sound(good)),
             "");
   const std::string more = R"(<connection id="1" incomingRoad="{}" connectingRoad="{}" contactPoint="start"/>)";
-  for (const auto& [incoming, connecting, kind] : std::vector<std::tuple<const char*, const char*, MendKind>>{
-           {"1", "8", MendKind::missing_road}, {"8", "2", MendKind::missing_road}}) {
-    EXPECT_EQ(num_links(mended(test::three_roads("", fmt::format(fmt::runtime(more), incoming, connecting)), kind)), 4);
+  for (const auto& [incoming, connecting, kind] : std::vector<std::tuple<const char*, const char*, RepairKind>>{
+           {"1", "8", RepairKind::missing_road}, {"8", "2", RepairKind::missing_road}}) {
+    EXPECT_EQ(num_links(repaired(test::three_roads("", fmt::format(fmt::runtime(more), incoming, connecting)), kind)),
+              4);
   }
   // A road that neither leads to the junction nor touches it.
   RoadText far = straight();
   far.id = "5";
   far.geometry = line_at(0, 0, 500, 0, 100);
-  EXPECT_EQ(num_links(mended(far.text() + test::three_roads("", fmt::format(fmt::runtime(more), "5", "2")),
-                             MendKind::unconnected_road)),
+  EXPECT_EQ(num_links(repaired(far.text() + test::three_roads("", fmt::format(fmt::runtime(more), "5", "2")),
+                               RepairKind::unconnected_road)),
             4);
   // A road that touches the junction without a link.
   far.geometry = line_at(0, 0, 0, 0, 100);
-  mended(far.text() + test::three_roads("", fmt::format(fmt::runtime(more), "5", "2")), MendKind::one_sided_link);
+  repaired(far.text() + test::three_roads("", fmt::format(fmt::runtime(more), "5", "2")), RepairKind::one_sided_link);
 }
 
 TEST(OpenDriveMends, JunctionsOfOtherKindsConnectNothing) {
   RoadText road = straight();
   road.link = R"(<successor elementType="junction" elementId="3"/>)";
-  const RoadMap map = mended(road.text() + R"(<junction id="3" type="virtual" mainRoad="2" sStart="1" sEnd="2"/>)",
-                             MendKind::unsupported_junction);
+  const RoadMap map = repaired(road.text() + R"(<junction id="3" type="virtual" mainRoad="2" sStart="1" sEnd="2"/>)",
+                               RepairKind::unsupported_junction);
   EXPECT_THAT(said(map), HasSubstr("junction 3: <junction>: attribute type: 'virtual' junctions are not supported"));
   EXPECT_EQ(map.junctions.size(), 1u);
 }
@@ -808,7 +818,7 @@ TEST(OpenDriveMends, MarksThatRunBackAreCut) {
       R"(<geometry s="10" x="9.2073549240394827" y="-2.2984884706593015" hdg="-1" length="5"><line/></geometry>)";
   road.right =
       lane_of(-1, "driving", 3) + lane_of(-2, "driving", 5, R"(<roadMark sOffset="0" type="solid" width="0.1"/>)");
-  const RoadMap map = mended(road.text(), MendKind::self_crossing_mark);
+  const RoadMap map = repaired(road.text(), RepairKind::self_crossing_mark);
   EXPECT_THAT(said(map), HasSubstr("road 1: <roadMark>:"));
   ASSERT_EQ(map.markings.size(), 2u) << "before and after";
 }
@@ -821,7 +831,7 @@ TEST(OpenDriveMends, MendsAreGroupedWithTheMostFrequentFirst) {
   road.type = R"(<type s="125" type="town"/>)";
   const RoadMap map = parse_opendrive(file_of(road.text()), "bad.xodr");
   EXPECT_THAT(
-      describe_mends(map.mends, "bad.xodr"),
+      describe_repairs(map.mends, "bad.xodr"),
       ElementsAre(AllOf(StartsWith("3 x unknown colors of road marks: painted white; first: bad.xodr:"),
                         HasSubstr("road 1: <roadMark>: attribute color: 'pink'")),
                   StartsWith("1 x records beyond the end of their section or road: left out; first: bad.xodr:")));
@@ -863,7 +873,7 @@ TEST(OpenDriveMends, DamagedFilesGiveAValidMapOrAnError) {
   const std::string valid_text = file_of(test::three_roads());
   std::mt19937 random(7);
   const std::string alphabet = "0123456789-.e\"<>/= abcxyz";
-  int maps = 0, mended_maps = 0;
+  int maps = 0, repaired_maps = 0;
   for (int trial = 0; trial < 3000; ++trial) {
     std::string text = valid_text;
     for (unsigned damage = random() % 3 + 1; damage-- > 0;) {
@@ -877,17 +887,17 @@ TEST(OpenDriveMends, DamagedFilesGiveAValidMapOrAnError) {
     try {
       const RoadMap map = parse_opendrive(text, "damaged.xodr");
       ++maps;
-      mended_maps += map.mends.empty() ? 0 : 1;
+      repaired_maps += map.mends.empty() ? 0 : 1;
     } catch (const Error&) {
     }
   }
   EXPECT_GT(maps, 150);
-  EXPECT_GT(mended_maps, 60);
+  EXPECT_GT(repaired_maps, 60);
 }
 
 TEST(OpenDriveMends, EveryKindStandsInTheTable) {
   const std::string docs = read_file(PICTURA_OPENDRIVE_DOCS);
-  for (const MendKind kind : mend_kinds()) {
+  for (const RepairKind kind : repair_kinds()) {
     if (kind >= kFirstLanelet2Mend) continue;
     EXPECT_THAT(docs, HasSubstr(fmt::format("| {} | {} |", to_string(kind), action_of(kind))));
   }
