@@ -29,7 +29,7 @@ std::vector<DrivenEpisode> drive_lane_keeping_episodes(const std::shared_ptr<con
     episodes.push_back({state.goals_reached[slot],
                         state.halt_reason[slot],
                         agent ? agent->stops() : 0,
-                        agent ? agent->steps_astray() : 0,
+                        agent ? agent->steps_off_path() : 0,
                         state.distance_m[slot],
                         {state.x_m[slot], state.y_m[slot]}});
   }

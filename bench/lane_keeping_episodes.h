@@ -12,7 +12,7 @@ namespace pictura {
 struct DrivenEpisode {
   int goals = 0;  // last waypoints passed within 2 m
   int halt_reason = kEventNone;
-  int stops = 0, steps_astray = 0;
+  int stops = 0, steps_off_path = 0;
   float distance_m = 0;
   Vec2 end_m;
 };

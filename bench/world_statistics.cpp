@@ -101,7 +101,7 @@ void count_random_policy(Simulator& simulator, const WorldStatisticsOptions& opt
 
 void drive_lanes(const std::shared_ptr<const RoadMap>& map, const SimulatorConfig& config, int episodes,
                  Counts* counts_inout) {
-  static_assert(LaneKeepingAgent::kAstray_m == 1);
+  static_assert(LaneKeepingAgent::kOffPath_m == 1);
   constexpr std::pair<const char*, Event> kReasons[] = {{"lane driver: collisions", kEventCollision},
                                                         {"lane driver: off-road", kEventOffRoad},
                                                         {"lane driver: wall contacts", kEventWall},
@@ -112,7 +112,7 @@ void drive_lanes(const std::shared_ptr<const RoadMap>& map, const SimulatorConfi
     counts_inout->of("lane driver: distance", "m", w) = driven[w].distance_m;
     counts_inout->of("lane driver: wait at red lights", "s", w) = driven[w].stops * static_cast<double>(config.dt_s);
     counts_inout->of("lane driver: more than 1 m from its path", "s", w) =
-        driven[w].steps_astray * static_cast<double>(config.dt_s);
+        driven[w].steps_off_path * static_cast<double>(config.dt_s);
     for (const auto& [name, event] : kReasons) {
       counts_inout->of(name, "drivers", w) = (driven[w].halt_reason & event) != 0;
     }

@@ -47,18 +47,18 @@ class ScenarioKeeper final : public EvaluationObserver {
   void begin(Simulator& simulator) override { simulator_ = &simulator; }
   void before_step(Span<const Command>) override {
     scenes_.add(*simulator_, 0);
-    if (steps_++ == step_) kept_ = keep_worlds(*simulator_, simulator_->save(), {0})[0];
+    if (steps_++ == step_) kept_ = extract_worlds(*simulator_, simulator_->save(), {0})[0];
   }
 
   const DrivenScene& scene(int number) const { return scenes_.of(number); }
-  const KeptWorld* kept() const { return kept_.get(); }
+  const SavedWorld* kept() const { return kept_.get(); }
 
  private:
   const int step_;
   int steps_ = 0;
   Simulator* simulator_ = nullptr;
   DrivenScenes scenes_;
-  std::shared_ptr<const KeptWorld> kept_;
+  std::shared_ptr<const SavedWorld> kept_;
 };
 
 // Options of an evaluation of one scenario, on the host.

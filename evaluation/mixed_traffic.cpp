@@ -125,7 +125,7 @@ SimulatorConfig MixedTraffic::adapted(SimulatorConfig world) const {
     visit_impairments(world.others, [&other](const char* name, float& share) {
       if (other->driver.name == name) share = static_cast<float>(other->driver.share);
     });
-    if (other->session) world.observe_also(other->session->training_world());
+    if (other->session) world.add_observations(other->session->training_world());
   }
   return world;
 }

@@ -24,7 +24,7 @@ const RecordedState& state_of(const CompiledMap& map, size_t track, int32_t step
 /// First episode step at which the track is present; -1: none.
 int32_t first_step(const CompiledMap& map, size_t track) {
   for (int32_t step = 0; step < map.rules.record.num_steps; ++step) {
-    if (state_of(map, track, step).is_there) return step;
+    if (state_of(map, track, step).is_present) return step;
   }
   return -1;
 }
@@ -43,7 +43,7 @@ bool overlaps(const MapView& map, Span<const AgentBox> boxes, const std::vector<
 /// Episode step at which each track would be taken over, ignoring overlaps and thinning, [tracks]; -1: never.
 std::vector<int32_t> takeovers(const CompiledMap& map, const SceneProtocol& protocol) {
   const Scenario& scene = *map.scenario;
-  const std::vector<uint8_t> named = tracks_named(scene, protocol.control);
+  const std::vector<uint8_t> named = tracks_selected_by(scene, protocol.control);
   std::vector<int32_t> steps(named.size(), -1);
   for (size_t track = 0; track < named.size(); ++track) {
     if (!named[track]) continue;
@@ -131,7 +131,7 @@ std::vector<Vec3> path_waypoints(const CompiledMap& map, int32_t track, int32_t 
   std::vector<float> way_m;
   for (int32_t step = takeover_step; step < map.rules.record.num_steps; ++step) {
     const RecordedState& state = state_of(map, index, step);
-    if (!state.is_there) continue;
+    if (!state.is_present) continue;
     way_m.push_back(path.empty() ? 0.0f : way_m.back() + length((state.position_m - path.back()).xy()));
     path.push_back(state.position_m);
   }

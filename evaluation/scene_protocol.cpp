@@ -176,7 +176,7 @@ void check(const SceneProtocol& protocol) {
       fail_usage("evaluate: density: expected above 0 to 100 %, got {}", density * 100);
   }
   if (!(protocol.box_scale > 0)) fail_usage("rule box_scale: expected more than 0, got {}", protocol.box_scale);
-  tracks_named(Scenario{}, protocol.control);
+  tracks_selected_by(Scenario{}, protocol.control);
 }
 
 const std::vector<PaperSceneRow>& paper_scene_rows() {

@@ -22,7 +22,7 @@ enum class Waypoints : uint8_t { goal, path };
 /// (zero-shot evaluation, appendix B), and ours where the paper is silent; docs/explanation/evaluation.md lists which.
 struct SceneProtocol {
   std::string name = "womd";
-  std::string control = "self,vehicles";  // tracks_named() of the scene
+  std::string control = "self,vehicles";  // tracks_selected_by() of the scene
   int start_step = 0;                     // first step in the recording
   int steps = 600;
   std::vector<double> densities{1.0, 0.75, 0.5};  // shares of a scene's road users that remain

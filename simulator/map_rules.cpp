@@ -290,7 +290,7 @@ void add_record(MapRecord record, MapRules* out) {
   }
   for (size_t i = 1; i < record.states.size(); ++i) {
     const RecordedState &before = record.states[i - 1], &now = record.states[i];
-    if (i % static_cast<size_t>(record.num_steps) == 0 || !before.is_there || !now.is_there) continue;
+    if (i % static_cast<size_t>(record.num_steps) == 0 || !before.is_present || !now.is_present) continue;
     out->max_speed_mps = std::max(out->max_speed_mps, length((now.position_m - before.position_m).xy()) / record.dt_s);
   }
   out->record = std::move(record);
@@ -387,7 +387,7 @@ void end_list(CellLists* lists_inout) { lists_inout->begin.push_back(static_cast
 /// less than half a turn counter-clockwise of it, `left`. The result is 1 or 0, and never 0 for a visible neighbour.
 /// Neighbours must not be farther than the far corner of the visible range. This takes most of the time of compiling a
 /// map, so it uses neither angles nor branches. Conditions are integers because compilers vectorize only these.
-void find_seen(const Neighbors& neighbors, Vec2 right, Vec2 left, std::vector<int32_t>* seen_out) {
+void find_visible(const Neighbors& neighbors, Vec2 right, Vec2 left, std::vector<int32_t>* seen_out) {
   constexpr float most_behind_m = kRoadBehind_m + kCellRadius_m, most_aside_m = kRoadAside_m + kCellRadius_m;
   // A piece behind also enters the window sideways as the heading turns away from it, so pieces this close are kept.
   const float close_m = std::sqrt(square(most_behind_m) + square(most_aside_m));
@@ -428,7 +428,7 @@ CellLists lists_of_pieces(const MapRules& map, const std::string& map_name, cons
   return lists_by_distance(map, map_name, middles, sight_m, kSectors,
                            [&seen](const Neighbors& neighbors, CellLists* lists) {
                              for (int sector = 0; sector < kSectors; ++sector) {
-                               find_seen(neighbors, sector_begin(sector), sector_begin(sector + 1), &seen);
+                               find_visible(neighbors, sector_begin(sector), sector_begin(sector + 1), &seen);
                                // Each neighbour is written, and the next one overwrites it if it is not visible.
                                size_t end = lists->items.size();
                                lists->items.resize(end + neighbors.size());

@@ -84,7 +84,7 @@ std::vector<LightState> light_states_of(const Scenario& scenario, int32_t start_
 }
 
 /// Returns the scene's road with its lights.
-std::shared_ptr<const RoadMap> lit_road(const Scenario& scenario) {
+std::shared_ptr<const RoadMap> road_with_lights(const Scenario& scenario) {
   PICTURA_CHECK(scenario.map.lights.empty(),
                 "scene {}: expected a map without its own lights, since recorded lights are added", scenario.id);
   auto road = std::make_shared<RoadMap>(scenario.map);
@@ -103,8 +103,8 @@ std::shared_ptr<const RoadMap> lit_road(const Scenario& scenario) {
   return road;
 }
 
-/// Returns the tracks that one word selects; see tracks_named().
-std::vector<uint8_t> tracks_of_word(const Scenario& scenario, const std::string& word) {
+/// Returns the tracks that one word selects; see tracks_selected_by().
+std::vector<uint8_t> tracks_selected_by_word(const Scenario& scenario, const std::string& word) {
   std::vector<uint8_t> mask(scenario.tracks.size());
   const auto choose = [&](auto&& is_chosen) {
     for (size_t i = 0; i < mask.size(); ++i) mask[i] = is_chosen(static_cast<int32_t>(i), scenario.tracks[i]);
@@ -145,7 +145,7 @@ void visit_words(const Scenario& scenario, const std::string& words, Visit&& vis
   for (size_t begin = 0; begin <= words.size();) {
     const size_t end = std::min(words.find(',', begin), words.size());
     const std::string word = words.substr(begin, end - begin);
-    visit(word, tracks_of_word(scenario, word));
+    visit(word, tracks_selected_by_word(scenario, word));
     begin = end + 1;
   }
 }
@@ -165,7 +165,7 @@ std::shared_ptr<const CompiledMap> compile_scenario(std::shared_ptr<const Scenar
   std::shared_ptr<const RoadMap> road(scenario, &scenario->map);
   MapRecord record = record_of(*scenario, start_step);
   if (options.recorded_lights) {
-    road = lit_road(*scenario);
+    road = road_with_lights(*scenario);
     record.light_states = light_states_of(*scenario, start_step);
   }
   const std::shared_ptr<CompiledMap> map = compile_map(std::move(road), options, std::move(record));
@@ -190,7 +190,7 @@ WorldSpec scene_world(const CompiledMap& map, int index, uint32_t global_world) 
   return {index, static_cast<int>(map.rules.record.agents.size()), global_world};
 }
 
-std::vector<uint8_t> tracks_named(const Scenario& scenario, const std::string& words) {
+std::vector<uint8_t> tracks_selected_by(const Scenario& scenario, const std::string& words) {
   std::vector<uint8_t> mask(scenario.tracks.size());
   visit_words(scenario, words, [&mask](const std::string&, const std::vector<uint8_t>& named) {
     for (size_t i = 0; i < mask.size(); ++i) mask[i] |= named[i];
@@ -203,7 +203,7 @@ std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& word
     if (!names_nobody(named)) return;
     fail_usage("scene {}: expected tracks, got '{}', which selects none of its {}", scenario.id, word, named.size());
   });
-  return tracks_named(scenario, words);
+  return tracks_selected_by(scenario, words);
 }
 
 std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words, int32_t step) {

@@ -34,8 +34,8 @@ WorldSpec scene_world(const CompiledMap& map, int index = 0, uint32_t global_wor
 /// Returns [tracks] 1 for tracks that comma-separated words select: self or sdc (the self-driving car), vehicles (other
 /// vehicles), others (all except vehicles), all, tracks_to_predict, objects_of_interest, and ids of tracks. A word may
 /// select no track. Throws UsageError for other words.
-std::vector<uint8_t> tracks_named(const Scenario& scenario, const std::string& words);
-/// Variant of tracks_named() that also throws UsageError for a word that selects no track.
+std::vector<uint8_t> tracks_selected_by(const Scenario& scenario, const std::string& words);
+/// Variant of tracks_selected_by() that also throws UsageError for a word that selects no track.
 std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words);
 /// Variant of tracks_of() without tracks that are absent at a step. Also throws UsageError when no track remains.
 std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words, int32_t step);

@@ -7,7 +7,7 @@
 
 namespace pictura {
 
-struct KeptWorld {
+struct SavedWorld {
   WorldSpec spec;
   SimulatorState state;
 };
@@ -44,7 +44,7 @@ SimulatorSetup setup_of(const Simulator& simulator, std::vector<WorldSpec> world
 
 }  // namespace
 
-std::vector<WorldSpec> worlds_of_part(const std::vector<WorldSpec>& all, int part, int num_parts) {
+std::vector<WorldSpec> worlds_in_part(const std::vector<WorldSpec>& all, int part, int num_parts) {
   const std::vector<size_t> begins = part_begins(all, num_parts);
   const auto at = [&](int of) { return all.begin() + static_cast<int64_t>(begins[of]); };
   return {at(part), at(part + 1)};
@@ -57,7 +57,7 @@ std::vector<uint8_t> join_saved_states(const Simulator& simulator, const std::ve
   SimulatorState joined(setup);
   int first_world = 0;
   for (int part = 0; part < num_parts; ++part) {
-    const SimulatorSetup its_setup = setup_of(simulator, worlds_of_part(all, part, num_parts));
+    const SimulatorSetup its_setup = setup_of(simulator, worlds_in_part(all, part, num_parts));
     SimulatorState its(its_setup);
     its.restore(its_setup, parts[part]);
     joined.copy_worlds(setup, first_world, its, its_setup, 0, its_setup.num_worlds());
@@ -66,10 +66,10 @@ std::vector<uint8_t> join_saved_states(const Simulator& simulator, const std::ve
   return joined.save(setup);
 }
 
-std::vector<uint8_t> part_of_saved_state(const Simulator& simulator, const std::vector<WorldSpec>& all,
-                                         Span<const uint8_t> saved, int part, int num_parts) {
+std::vector<uint8_t> extract_saved_part(const Simulator& simulator, const std::vector<WorldSpec>& all,
+                                        Span<const uint8_t> saved, int part, int num_parts) {
   const SimulatorSetup setup = setup_of(simulator, all),
-                       its_setup = setup_of(simulator, worlds_of_part(all, part, num_parts));
+                       its_setup = setup_of(simulator, worlds_in_part(all, part, num_parts));
   SimulatorState whole(setup), its(its_setup);
   whole.restore(setup, saved);
   its.copy_worlds(its_setup, 0, whole, setup, static_cast<int>(part_begins(all, num_parts)[part]),
@@ -77,23 +77,23 @@ std::vector<uint8_t> part_of_saved_state(const Simulator& simulator, const std::
   return its.save(its_setup);
 }
 
-std::vector<std::shared_ptr<const KeptWorld>> keep_worlds(const Simulator& simulator, Span<const uint8_t> saved,
-                                                          const std::vector<size_t>& worlds) {
+std::vector<std::shared_ptr<const SavedWorld>> extract_worlds(const Simulator& simulator, Span<const uint8_t> saved,
+                                                              const std::vector<size_t>& worlds) {
   const SimulatorSetup setup = setup_of(simulator, simulator.worlds());
   SimulatorState whole(setup);
   whole.restore(setup, saved);
-  std::vector<std::shared_ptr<const KeptWorld>> kept;
+  std::vector<std::shared_ptr<const SavedWorld>> kept;
   for (const size_t world : worlds) {
     const WorldSpec& spec = setup.worlds[world];
     const SimulatorSetup its_setup = setup_of(simulator, {spec});
-    auto its = std::make_shared<KeptWorld>(KeptWorld{spec, SimulatorState(its_setup)});
+    auto its = std::make_shared<SavedWorld>(SavedWorld{spec, SimulatorState(its_setup)});
     its->state.copy_worlds(its_setup, 0, whole, setup, static_cast<int>(world), 1);
     kept.push_back(std::move(its));
   }
   return kept;
 }
 
-std::vector<uint8_t> saved_state_of(const Simulator& simulator, const std::vector<const KeptWorld*>& worlds) {
+std::vector<uint8_t> saved_state_of(const Simulator& simulator, const std::vector<const SavedWorld*>& worlds) {
   const SimulatorSetup setup = setup_of(simulator, simulator.worlds());
   PICTURA_CHECK(worlds.size() == setup.worlds.size(), "simulator state: expected {} kept worlds, got {}",
                 setup.worlds.size(), worlds.size());

@@ -165,10 +165,10 @@ Scenario SceneRecorder::scenario(std::string id, int self_agent) const {
       scenario.sdc_track = static_cast<int32_t>(scenario.tracks.size());
     scenario.tracks.push_back(track);
     for (size_t step = 0; step < steps; ++step) {
-      const bool is_there = is_valid(step);
-      scenario.states.push_back(is_there ? states_[step * bodies_.size() + i] : TrackState{});
-      scenario.valid.push_back(is_there ? 1 : 0);
-      scenario.driven.push_back(is_there ? driven_[step * bodies_.size() + i] : SavedMotion{});
+      const bool is_present = is_valid(step);
+      scenario.states.push_back(is_present ? states_[step * bodies_.size() + i] : TrackState{});
+      scenario.valid.push_back(is_present ? 1 : 0);
+      scenario.driven.push_back(is_present ? driven_[step * bodies_.size() + i] : SavedMotion{});
     }
   }
   if (self_agent >= 0 && scenario.sdc_track < 0) {

@@ -56,7 +56,7 @@ struct SimulatorConfig {
 
   static std::array<ConditioningRange, kNumConditioning> default_conditioning();
   /// Adds the observations of another configuration.
-  void observe_also(const SimulatorConfig& other) {
+  void add_observations(const SimulatorConfig& other) {
     vector_observations |= other.vector_observations;
     auxiliary_observations |= other.auxiliary_observations;
     wall_observations |= other.wall_observations;

@@ -199,9 +199,9 @@ void add_crosswalks(const RoadMap& map, Network* out) {
     int32_t before = -1;
     for (const Vec3& at : end_m) {
       const int32_t walk = node_near(at, out, &cells);
-      const bool is_there = walk >= 0 && length((at - out->at(walk)).xy()) < kMinPiece_m;
-      const int32_t end = is_there ? walk : out->add_node(at);
-      if (walk >= 0 && !is_there) out->edges.push_back({walk, end});
+      const bool is_present = walk >= 0 && length((at - out->at(walk)).xy()) < kMinPiece_m;
+      const int32_t end = is_present ? walk : out->add_node(at);
+      if (walk >= 0 && !is_present) out->edges.push_back({walk, end});
       if (before >= 0) out->edges.push_back({before, end});
       before = end;
     }

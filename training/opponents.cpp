@@ -59,7 +59,7 @@ Opponents::Opponents(const Config& config, Device device, Communicator* communic
 Opponents::~Opponents() = default;
 
 void Opponents::add_arrays(SimulatorConfig* config) const {
-  for (const auto& opponent : opponents_) config->observe_also(opponent->session->training_world());
+  for (const auto& opponent : opponents_) config->add_observations(opponent->session->training_world());
 }
 
 void Opponents::enter(const Simulator& simulator) {

@@ -68,7 +68,7 @@ Run::Run(const Config& its_config, Device its_device, Communicator* its_communic
       teacher(make_teacher(config, device, communicator)),
       opponents(make_opponents(config, device, communicator)),
       simulator(make_training_simulator(config, device, teacher.get(), opponents.get(),
-                                        worlds_of_part(all_worlds, communicator->rank(), communicator->size()))),
+                                        worlds_in_part(all_worlds, communicator->rank(), communicator->size()))),
       renderer(make_training_renderer(config, rig, *simulator)),
       executor(make_learner_executor(device)),
       timer(device),
@@ -237,7 +237,7 @@ std::string Run::restore(const Checkpoint& saved) {
       simulator->restore(saved.simulator);
     } else {
       simulator->restore(
-          part_of_saved_state(*simulator, all_worlds, saved.simulator, communicator->rank(), communicator->size()));
+          extract_saved_part(*simulator, all_worlds, saved.simulator, communicator->rank(), communicator->size()));
     }
   } catch (const Error& error) {
     why_new_episodes = error.what();

@@ -75,7 +75,7 @@ class SimulatorCpu final : public Simulator {
   std::vector<uint8_t> save(Stream) const override { return worlds_.state.save(worlds_.setup); }
   void restore(Span<const uint8_t> bytes, Stream) override {
     worlds_.state.restore(worlds_.setup, bytes);
-    show_restored();
+    publish_restored();
   }
   std::unique_ptr<StateSnapshot> snapshot(Stream) const override {
     auto copy = std::make_unique<HostSnapshot>();
@@ -88,7 +88,7 @@ class SimulatorCpu final : public Simulator {
     PICTURA_CHECK(copy && copy->worlds == worlds_token_,
                   "restore: expected a snapshot of these worlds of this simulator");
     worlds_.state = copy->state;  // copied, so that arrays keep their memory
-    show_restored();
+    publish_restored();
   }
 
  private:
@@ -110,7 +110,7 @@ class SimulatorCpu final : public Simulator {
     for (int i = 0; i < edit.count; ++i) {
       const int64_t fault = find_edit_fault(edit, i, num_slots(), first_element.data(),
                                             [&](int slot) { return worlds_.world(world_index(slot)); });
-      if (fault != kNothingWrong) fail("set_state: {}", edit_fault_text(fault, num_slots()));
+      if (fault != kNoEditFault) fail("set_state: {}", edit_fault_text(fault, num_slots()));
     }
     std::vector<uint8_t> is_edited(static_cast<size_t>(worlds_.setup.num_worlds()));
     for (int i = 0; i < edit.count; ++i) {
@@ -121,7 +121,7 @@ class SimulatorCpu final : public Simulator {
     for_each_world([this, &is_edited](int w) {
       if (!is_edited[w]) return;
       sort_into_cells(worlds_.world(w), &worlds_.box_cells[w]);
-      show(w);
+      write_observations(w);
     });
   }
 
@@ -143,7 +143,7 @@ class SimulatorCpu final : public Simulator {
     worlds_.state.episode_index[w] = 0;
     clear_results(w);
     begin_episode(w);
-    show(w);
+    write_observations(w);
   }
 
   void begin() {
@@ -177,12 +177,12 @@ class SimulatorCpu final : public Simulator {
                            .sums = results_.sums}};
   }
 
-  void show_restored() {
+  void publish_restored() {
     totals_ = worlds_.state.totals();
     for_each_world([this](int w) {
       clear_results(w);
       sort_into_cells(worlds_.world(w), &worlds_.box_cells[w]);
-      show(w);
+      write_observations(w);
     });
   }
 
@@ -205,7 +205,7 @@ class SimulatorCpu final : public Simulator {
         step_world(w, commands);
       }
       worlds_.state.world_totals[index].slot_steps += worlds_.setup.worlds[index].num_agents;
-      show(w);
+      write_observations(w);
     });
     totals_ = worlds_.state.totals();
     return arrays_.results;
@@ -296,7 +296,7 @@ class SimulatorCpu final : public Simulator {
 
     for (int agent = 0; agent < world.num_agents; ++agent) {
       const auto slot = static_cast<size_t>(world.first_slot + agent);
-      results.valid[slot] = takes_part(world, agent, commands[slot]);
+      results.valid[slot] = is_counted(world, agent, commands[slot]);
       advance(world, agent, commands[slot], steps);
     }
     sort_into_cells(world, &worlds_.box_cells[index]);
@@ -325,12 +325,12 @@ class SimulatorCpu final : public Simulator {
   }
 
   /// Writes the observations of the world's agents and the views of their cameras.
-  void show(int w) {
+  void write_observations(int w) {
     const WorldView world = worlds_.world(w);
     const ObservationView observations = results_.observation_view();
     for (int agent = 0; agent < world.num_agents; ++agent) {
       results_.views[world.first_slot + agent] = view_of(world, agent, hidden_from(world, agent));
-      results_.driver[world.first_slot + agent] = static_cast<uint8_t>(driver_of(other_of(world, agent)));
+      results_.driver[world.first_slot + agent] = static_cast<uint8_t>(driver_of(driver_kind_of(world, agent)));
     }
     pictura::observe(world, 0, world.num_agents, worlds_.setup.config.vector_observations, observations);
   }

@@ -250,7 +250,7 @@ struct DeviceScratch {
   DeviceBuffer<int32_t> known_tries, chosen_try, next_try;
   DeviceBuffer<int32_t> chain_first, chain_next, crowd_begin, crowd_items;
   DeviceBuffer<uint8_t> began, prepares;
-  DeviceBuffer<int32_t> rejected_slot, first_element, wrong_element;
+  DeviceBuffer<int32_t> rejected_slot, first_element, faulty_element;
   // Initial state of the next episode.
   DeviceAgents next_agents;
   DeviceBuffer<AgentBox> next_boxes;
@@ -280,7 +280,7 @@ struct DeviceScratch {
         prepares(num_worlds),
         rejected_slot(1),
         first_element(num_slots),
-        wrong_element(1),
+        faulty_element(1),
         next_agents(num_slots),
         next_boxes(num_boxes),
         next_light_plans(num_lights),

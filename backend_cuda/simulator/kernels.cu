@@ -231,8 +231,8 @@ void launch_queries(const PhaseArrays& arrays, const ObservationQueries& asked, 
   launch_queries(DeviceLaunch{streams}, arrays, asked);
 }
 
-void launch_restored(const PhaseArrays& arrays, const StepStreams& streams) {
-  launch_restored(DeviceLaunch{streams}, arrays);
+void launch_publish_restored(const PhaseArrays& arrays, const StepStreams& streams) {
+  launch_publish_restored(DeviceLaunch{streams}, arrays);
 }
 
 void launch_step(const PhaseArrays& arrays, const int32_t* actions, const StepStreams& streams) {

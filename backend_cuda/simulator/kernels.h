@@ -19,7 +19,7 @@ struct StepStreams {
 void launch_reset(const PhaseArrays& arrays, const uint8_t* mask, uint64_t seed, const StepStreams& streams);
 void launch_edit(const PhaseArrays& arrays, const StateEdit& edit, const StepStreams& streams);
 void launch_queries(const PhaseArrays& arrays, const ObservationQueries& asked, const StepStreams& streams);
-void launch_restored(const PhaseArrays& arrays, const StepStreams& streams);
+void launch_publish_restored(const PhaseArrays& arrays, const StepStreams& streams);
 void launch_step(const PhaseArrays& arrays, const int32_t* actions, const StepStreams& streams);
 void launch_step(const PhaseArrays& arrays, const Command* commands, const StepStreams& streams);
 

@@ -91,7 +91,7 @@ struct WriteObservation {
     const Hides hidden = hidden_from(world, agent);
     if (group.rank() == group.size() - 1) {
       arrays.views[slot] = view_of(world, agent, hidden);
-      arrays.driver[slot] = static_cast<uint8_t>(driver_of(other_of(world, agent)));
+      arrays.driver[slot] = static_cast<uint8_t>(driver_of(driver_kind_of(world, agent)));
     }
     observe_own(world, agent, slot, arrays.observations, group);
     if (!arrays.entity_sets) return;

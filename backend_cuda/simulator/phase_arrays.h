@@ -55,11 +55,11 @@ struct PhaseArrays {
   uint8_t* prepares = nullptr;       // [num_worlds] whether that episode is made in the current step
   int32_t* next_spawned = nullptr;   // [num_worlds] number of agents in the next episode
   int32_t* rejected_slot = nullptr;  // lowest slot with a command out of range, or kNoSlot
-  int64_t* rejected_command = nullptr;  // first rejected command since the host checked, or kNothingRejected
+  int64_t* rejected_command = nullptr;  // first rejected command since the host checked, or kNoRejection
   int32_t* first_element = nullptr;     // [num_slots] first element of an edit for the slot, or kNoSlot
-  int32_t* wrong_element = nullptr;     // first element of the edit or the queries with a fault, or kNoSlot
-  int64_t* wrong_edit = nullptr;        // first fault of an edit since the host checked, or kNothingWrong
-  int64_t* wrong_query = nullptr;       // first fault of a query since the host checked, or kNoQueryFault
+  int32_t* faulty_element = nullptr;    // first element of the edit or the queries with a fault, or kNoSlot
+  int64_t* faulty_edit = nullptr;       // first fault of an edit since the host checked, or kNoEditFault
+  int64_t* faulty_query = nullptr;      // first fault of a query since the host checked, or kNoQueryFault
 
   PICTURA_HD WorldView world(int w) const {
     WorldView world = worlds[w];

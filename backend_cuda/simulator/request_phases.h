@@ -24,7 +24,7 @@ PICTURA_HD inline int64_t find_fault(const PhaseArrays& arrays, const Observatio
   return find_query_fault(asked, i, arrays.num_slots,
                           [&arrays](int slot) { return arrays.world(arrays.world_of_slot[slot]); });
 }
-static_assert(kNoQueryFault == kNothingWrong);
+static_assert(kNoQueryFault == kNoEditFault);
 
 /// Phase that finds the first element with a fault in an edit or in queries.
 template <typename Request>
@@ -34,7 +34,7 @@ struct CheckRequest {
   PICTURA_HD int64_t fault(int i) const { return find_fault(arrays, request, i); }
   template <typename Atomics>
   PICTURA_HD void operator()(const Atomics& atomics, int i) const {
-    if (fault(i) != kNothingWrong) atomics.lower(arrays.wrong_element, i);
+    if (fault(i) != kNoEditFault) atomics.lower(arrays.faulty_element, i);
   }
 };
 
@@ -44,8 +44,8 @@ struct ApplyEdit {
   template <typename Atomics>
   PICTURA_HD void operator()(const Atomics& atomics, int i) const {
     const PhaseArrays& arrays = check.arrays;
-    if (*arrays.wrong_element != kNoSlot) {
-      if (i == 0 && *arrays.wrong_edit == kNothingWrong) *arrays.wrong_edit = check.fault(*arrays.wrong_element);
+    if (*arrays.faulty_element != kNoSlot) {
+      if (i == 0 && *arrays.faulty_edit == kNoEditFault) *arrays.faulty_edit = check.fault(*arrays.faulty_element);
       return;
     }
     const int slot = check.request.slots[i], w = arrays.world_of_slot[slot];
@@ -60,7 +60,7 @@ template <typename Launch>
 void launch_edit(const Launch& launch, const PhaseArrays& arrays, const StateEdit& edit) {
   if (edit.count == 0) return;
   launch.fill(arrays.first_element, static_cast<size_t>(arrays.num_slots) * sizeof(int32_t), kNoSlot & 0xFF);
-  launch.fill(arrays.wrong_element, sizeof(int32_t), kNoSlot & 0xFF);
+  launch.fill(arrays.faulty_element, sizeof(int32_t), kNoSlot & 0xFF);
   launch.threads(edit.count, MarkEdit{arrays, edit});
   launch.threads(edit.count, CheckRequest<StateEdit>{arrays, edit});
   launch.threads(edit.count, ApplyEdit{{arrays, edit}});
@@ -73,8 +73,9 @@ struct LatchQueryFault {
   CheckRequest<ObservationQueries> check;
   template <typename Atomics>
   PICTURA_HD void operator()(const Atomics&, int) const {
-    const int32_t wrong = *check.arrays.wrong_element;
-    if (wrong != kNoSlot && *check.arrays.wrong_query == kNoQueryFault) *check.arrays.wrong_query = check.fault(wrong);
+    const int32_t wrong = *check.arrays.faulty_element;
+    if (wrong != kNoSlot && *check.arrays.faulty_query == kNoQueryFault)
+      *check.arrays.faulty_query = check.fault(wrong);
   }
 };
 
@@ -86,7 +87,7 @@ struct AnswerQueries {
 
   template <typename ThreadGroup>
   PICTURA_HD void operator()(const ThreadGroup& group, int i) const {
-    if (*arrays.wrong_element != kNoSlot) return;
+    if (*arrays.faulty_element != kNoSlot) return;
     const ObservationQuery& query = asked.queries[i];
     const WorldView world = arrays.world(arrays.world_of_slot[query.slot]);
     const int agent = query.slot - world.first_slot;
@@ -102,7 +103,7 @@ template <typename Launch>
 void launch_queries(const Launch& launch, const PhaseArrays& arrays, const ObservationQueries& asked) {
   const auto count = static_cast<int32_t>(asked.queries.size());
   if (count == 0) return;
-  launch.fill(arrays.wrong_element, sizeof(int32_t), kNoSlot & 0xFF);
+  launch.fill(arrays.faulty_element, sizeof(int32_t), kNoSlot & 0xFF);
   launch.threads(count, CheckRequest<ObservationQueries>{arrays, asked});
   launch.threads(1, LatchQueryFault{{arrays, asked}});
   launch.template groups<kWarp>(count, AnswerQueries{arrays, asked});

@@ -252,7 +252,7 @@ struct TakeEpisode {
 
 /// Launches the phases that publish a restored state.
 template <typename Launch>
-void launch_restored(const Launch& launch, const PhaseArrays& arrays) {
+void launch_publish_restored(const Launch& launch, const PhaseArrays& arrays) {
   const auto num_slots = static_cast<size_t>(arrays.num_slots);
   launch.fill(arrays.results.reward, num_slots * sizeof(float), 0);
   launch.fill(arrays.results.sums, num_slots * sizeof(StepSums), 0);

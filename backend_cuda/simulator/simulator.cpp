@@ -32,11 +32,11 @@ class SimulatorCuda final : public Simulator {
     const DeviceGuard guard(device_);
     side_ = std::make_unique<SideStream>();
     rejected_command_ = std::make_unique<MappedValue<int64_t>>();
-    *rejected_command_->host() = kNothingRejected;
-    wrong_edit_ = std::make_unique<MappedValue<int64_t>>();
-    *wrong_edit_->host() = kNothingWrong;
-    wrong_query_ = std::make_unique<MappedValue<int64_t>>();
-    *wrong_query_->host() = kNoQueryFault;
+    *rejected_command_->host() = kNoRejection;
+    faulty_edit_ = std::make_unique<MappedValue<int64_t>>();
+    *faulty_edit_->host() = kNoEditFault;
+    faulty_query_ = std::make_unique<MappedValue<int64_t>>();
+    *faulty_query_->host() = kNoQueryFault;
     allocate(setup_.needs());
     begin(nullptr);
     PICTURA_CUDA(cudaDeviceSynchronize());  // so that any stream can be used
@@ -116,7 +116,7 @@ class SimulatorCuda final : public Simulator {
                   "restore: expected a snapshot of these worlds of this simulator");
     const DeviceGuard guard(device_);
     copy->state.copy_to(state_, handle_of(stream));
-    show_restored(handle_of(stream));
+    publish_restored(handle_of(stream));
   }
 
  private:
@@ -219,10 +219,10 @@ class SimulatorCuda final : public Simulator {
   /// Copies the host's state to the device.
   void put_state(cudaStream_t stream) {
     state_.put_from(host_, stream);
-    show_restored(stream);
+    publish_restored(stream);
   }
-  void show_restored(cudaStream_t stream) {
-    cuda::launch_restored(phase_arrays(), side_->streams_from(stream));
+  void publish_restored(cudaStream_t stream) {
+    cuda::launch_publish_restored(phase_arrays(), side_->streams_from(stream));
     PICTURA_CUDA(cudaGetLastError());
   }
 
@@ -243,10 +243,10 @@ class SimulatorCuda final : public Simulator {
   }
 
   void throw_rejected() {
-    if (const auto fault = take(wrong_edit_.get())) {
+    if (const auto fault = take(faulty_edit_.get())) {
       fail("set_state: in an earlier call: {}", edit_fault_text(*fault, num_slots()));
     }
-    if (const auto fault = take(wrong_query_.get())) {
+    if (const auto fault = take(faulty_query_.get())) {
       fail("observe: in an earlier call: {}", query_fault_text(*fault, num_slots()));
     }
     if (const auto rejected = take(rejected_command_.get())) {
@@ -255,10 +255,10 @@ class SimulatorCuda final : public Simulator {
   }
   /// Returns and clears the fault that the device has latched since the last call, if any.
   static std::optional<int64_t> take(MappedValue<int64_t>* latched) {
-    static_assert(kNothingRejected == kNothingWrong && kNoQueryFault == kNothingWrong);
+    static_assert(kNoRejection == kNoEditFault && kNoQueryFault == kNoEditFault);
     const int64_t fault = *latched->host();
-    if (fault == kNothingWrong) return {};
-    *latched->host() = kNothingWrong;
+    if (fault == kNoEditFault) return {};
+    *latched->host() = kNoEditFault;
     return fault;
   }
 
@@ -351,9 +351,9 @@ class SimulatorCuda final : public Simulator {
     arrays.rejected_slot = scratch_.rejected_slot.data();
     arrays.rejected_command = rejected_command_->device();
     arrays.first_element = scratch_.first_element.data();
-    arrays.wrong_element = scratch_.wrong_element.data();
-    arrays.wrong_edit = wrong_edit_->device();
-    arrays.wrong_query = wrong_query_->device();
+    arrays.faulty_element = scratch_.faulty_element.data();
+    arrays.faulty_edit = faulty_edit_->device();
+    arrays.faulty_query = faulty_query_->device();
     return arrays;
   }
 
@@ -370,7 +370,7 @@ class SimulatorCuda final : public Simulator {
   DeviceScratch scratch_;
   bool has_crowds_ = false;  // whether some world is a crowd
   std::unique_ptr<SideStream> side_;
-  std::unique_ptr<MappedValue<int64_t>> rejected_command_, wrong_edit_, wrong_query_;
+  std::unique_ptr<MappedValue<int64_t>> rejected_command_, faulty_edit_, faulty_query_;
 };
 
 }  // namespace

@@ -33,7 +33,7 @@ struct Advance {
     const int agent = slot - world.first_slot;
     if (!arrays.episode_over[w]) {
       const CommandType& command = commands[slot];
-      const bool drives = takes_part(world, agent, command);
+      const bool drives = is_counted(world, agent, command);
       if (group.rank() == 0) arrays.results.valid[slot] = drives;
       advance(world, agent, command, arrays.episode_step[w] + 1, group);
     } else if (group.rank() == 0) {
@@ -96,7 +96,7 @@ struct FinishStep {
  private:
   template <typename ThreadGroup>
   PICTURA_HD void refuse(const ThreadGroup& group, int w) const {
-    if (w > 0 || group.rank() > 0 || *arrays.rejected_command != kNothingRejected) return;
+    if (w > 0 || group.rank() > 0 || *arrays.rejected_command != kNoRejection) return;
     *arrays.rejected_command = rejected_command(*arrays.rejected_slot, commands[*arrays.rejected_slot]);
   }
 

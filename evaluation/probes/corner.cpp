@@ -95,7 +95,7 @@ class CornerProbe {
   void keep(const ProbeFrame& frame, const std::vector<size_t>& worlds) {
     if (worlds.empty()) return;
     const std::vector<uint8_t> saved = driven_->save(current_stream(run_.device()));
-    const auto kept = keep_worlds(*driven_, saved, worlds);
+    const auto kept = extract_worlds(*driven_, saved, worlds);
     for (size_t i = 0; i < worlds.size(); ++i) kept_[{frame.scene_of(worlds[i]), frame.step}] = kept[i];
   }
 
@@ -222,7 +222,7 @@ class CornerProbe {
   std::vector<BlindCorners> corners_;  // [maps]
   std::vector<LineOfSight> sights_;    // [maps]
   Simulator* driven_ = nullptr;
-  std::map<std::pair<int32_t, int32_t>, std::shared_ptr<const KeptWorld>> kept_;  // by scene and step
+  std::map<std::pair<int32_t, int32_t>, std::shared_ptr<const SavedWorld>> kept_;  // by scene and step
   std::vector<Found> hidden_;
   std::vector<CornerState> empty_;
 };

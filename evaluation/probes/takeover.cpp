@@ -106,7 +106,7 @@ TakeoverWorlds::Worlds* TakeoverWorlds::prepare(size_t policy, const std::vector
   }
   const CompiledMaps& maps = walls ? run_.maps() : open_maps_;
   std::vector<WorldSpec> specs;
-  std::vector<const KeptWorld*> kept;
+  std::vector<const SavedWorld*> kept;
   for (const TakeoverStart& start : starts) {
     specs.push_back(start.scene->world);
     kept.push_back(start.world);

@@ -26,10 +26,10 @@ constexpr int takeover_pass(Device device) { return device.is_host() ? 8 : 256; 
 
 struct TakeoverStart {
   const DrivenScene* scene = nullptr;
-  const KeptWorld* world = nullptr;  // the scene's world, in the state in which the policy takes over
-  int32_t step = 0, ego = 0;         // steps done in the scenario at the takeover
-  int32_t user = -1;                 // hidden vehicle; -1: none
-  int32_t removed = -1;              // removed agent; -1: none
+  const SavedWorld* world = nullptr;  // the scene's world, in the state in which the policy takes over
+  int32_t step = 0, ego = 0;          // steps done in the scenario at the takeover
+  int32_t user = -1;                  // hidden vehicle; -1: none
+  int32_t removed = -1;               // removed agent; -1: none
 };
 
 /// One run of one policy. Element k is the value after k steps; NaN after the end of the run.

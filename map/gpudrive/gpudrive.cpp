@@ -311,12 +311,12 @@ void convert_degrees(LoggedScene* scene) {
   }
   if (!(fit_of_degrees > fit || (is_large && fit_of_degrees == fit))) return;
   for (std::size_t i = 0; i < scene->tracks.size(); ++i) {
-    bool is_there = false;
+    bool is_present = false;
     for (LoggedState& state : scene->tracks[i].states) {
       state.heading_rad *= kRadians;
-      is_there = is_there || state.valid;
+      is_present = is_present || state.valid;
     }
-    if (is_there) scene->note("tracks whose headings are degrees", fmt::format("objects[{}]", i));
+    if (is_present) scene->note("tracks whose headings are degrees", fmt::format("objects[{}]", i));
   }
 }
 

@@ -17,7 +17,7 @@ FollowedPath path_of(const MapRecord& record, size_t agent) {
   const auto num_steps = static_cast<size_t>(record.num_steps);
   for (size_t step = 0; step < num_steps; ++step) {
     const RecordedState& state = record.states[agent * num_steps + step];
-    if (!state.is_there) continue;
+    if (!state.is_present) continue;
     path.add(state.position_m, state.heading_rad);
   }
   return path;
@@ -196,7 +196,7 @@ void IdmController::act(const SimulatorArrays& input, Span<const uint8_t> mask, 
 
 /// Returns the agent's place on its path. A path along lanes is rebuilt where the agent was moved or the path runs out.
 float IdmController::place_on_path(const SimulatorArrays& input, size_t slot) {
-  constexpr float kAstray_m = 1, kLeast_m = 60;
+  constexpr float kOffPath_m = 1, kLeast_m = 60;
   const auto world = static_cast<size_t>(input.slots.world_of_slot[slot]);
   FollowedPath& path = paths_[slot];
   const Vec3 here{input.state.x_m[slot], input.state.y_m[slot], input.state.z_m[slot]};
@@ -205,7 +205,7 @@ float IdmController::place_on_path(const SimulatorArrays& input, size_t slot) {
   // Progress along the path is monotonic except at an episode start.
   float s_m = path.points_m.empty() ? 0.0f : path.nearest_m(here.xy(), begins ? 0.0f : progress_m_[slot]);
   const auto serves = [&] {
-    return length((path.at(s_m).position_m - here).xy()) <= kAstray_m &&
+    return length((path.at(s_m).position_m - here).xy()) <= kOffPath_m &&
            (path.ends || path.length_m() - s_m >= kLeast_m);
   };
   if (on_lanes_[slot] && (begins || path.points_m.empty() || !serves())) {
@@ -251,7 +251,7 @@ IdmController::Front IdmController::box_ahead(const SimulatorArrays& input, size
 
 /// Distance from the bumper to the first line along the path that stops the agent; infinite if there is none.
 float IdmController::closed_line_ahead_m(const SimulatorArrays& input, size_t slot, float s_m) const {
-  constexpr float kLook_m = 45;
+  constexpr float kLookahead_m = 45;
   const FollowedPath& path = paths_[slot];
   const auto world = static_cast<size_t>(input.slots.world_of_slot[slot]);
   const Span<const StopLine> lines = views_[world].stop_lines;
@@ -263,9 +263,10 @@ float IdmController::closed_line_ahead_m(const SimulatorArrays& input, size_t sl
     const LightState light = input.scene.light_states[static_cast<size_t>(input.scene.light_begin[world]) + i];
     const bool is_red = light == LightState::red;
     if (!is_red && light != LightState::yellow) continue;
-    if (length((line.middle_m - here).xy()) > kLook_m + input.state.length_m[slot]) continue;
+    if (length((line.middle_m - here).xy()) > kLookahead_m + input.state.length_m[slot]) continue;
     Vec2 before{};
-    for (float ahead_m = 0; ahead_m <= std::min(kLook_m, path.length_m() - s_m) && ahead_m <= nearest_m; ++ahead_m) {
+    for (float ahead_m = 0; ahead_m <= std::min(kLookahead_m, path.length_m() - s_m) && ahead_m <= nearest_m;
+         ++ahead_m) {
       const FollowedPath::Pose pose = path.at(s_m + ahead_m);
       const AgentBox box = box_at(input.state, static_cast<int>(slot), pose.position_m, sincos_of(pose.heading_rad));
       const Vec2 way{box.cos_heading, box.sin_heading};

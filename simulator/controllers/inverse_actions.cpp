@@ -17,15 +17,15 @@ namespace {
 /// A sequence of actions: its last action, and its predecessor in the beam of the previous step.
 struct Sequence {
   Motion motion;
-  double cost = 0;           // of all steps
-  double foreseen_cost = 0;  // including the cost of returning to the record
+  double cost = 0;            // of all steps
+  double predicted_cost = 0;  // including the cost of returning to the record
   float error_m = 0;
   int32_t action = 0;
   int32_t before = -1;
 };
 
 /// Key of similarity: of sequences that lead to about the same motion, the cheapest is kept, so that a beam is diverse.
-auto likeness(const Motion& motion) {
+auto similarity_key(const Motion& motion) {
   const auto rounded = [](float value, float unit) { return static_cast<int32_t>(std::lround(value / unit)); };
   return std::tuple(rounded(motion.x_m, 0.02f), rounded(motion.y_m, 0.02f), rounded(motion.heading_rad, 0.01f),
                     rounded(motion.accel_long_mps2, 0.4f), rounded(motion.accel_lat_mps2, 0.4f));
@@ -85,23 +85,23 @@ double cost_of_return(const Motion& motion, const Target& target, float dt_s) {
 /// Returns the beam of the next step, over all actions.
 std::vector<Sequence> next_beam(const std::vector<Sequence>& beam, const Target& target,
                                 const DynamicsParameters& parameters, const ClassLimits& limits, float dt_s) {
-  std::map<decltype(likeness(Motion{})), Sequence> best;
+  std::map<decltype(similarity_key(Motion{})), Sequence> best;
   for (size_t i = 0; i < beam.size(); ++i) {
     for (int32_t action = 0; action < kNumActions; ++action) {
       Sequence next;
       next.motion = move(beam[i].motion, controls_of_action(action), parameters, limits, dt_s);
       next.cost = beam[i].cost + cost_of(next.motion, target.state, &next.error_m);
-      next.foreseen_cost = next.cost + cost_of_return(next.motion, target, dt_s);
+      next.predicted_cost = next.cost + cost_of_return(next.motion, target, dt_s);
       next.action = action;
       next.before = static_cast<int32_t>(i);
-      const auto [found, is_new] = best.emplace(likeness(next.motion), next);
-      if (!is_new && next.foreseen_cost < found->second.foreseen_cost) found->second = next;
+      const auto [found, is_new] = best.emplace(similarity_key(next.motion), next);
+      if (!is_new && next.predicted_cost < found->second.predicted_cost) found->second = next;
     }
   }
   std::vector<Sequence> all;
   for (const auto& [key, sequence] : best) all.push_back(sequence);
   std::stable_sort(all.begin(), all.end(),
-                   [](const Sequence& a, const Sequence& b) { return a.foreseen_cost < b.foreseen_cost; });
+                   [](const Sequence& a, const Sequence& b) { return a.predicted_cost < b.predicted_cost; });
   all.resize(std::min<size_t>(all.size(), kBeamWidth));
   return all;
 }
@@ -147,7 +147,7 @@ InverseActions find_inverse_actions(const CompiledMap& scene, float dt_s, int nu
     const Span<const RecordedState> states(record.states.data() + first, num_steps);
     for (size_t begin = 0; begin < num_steps;) {
       size_t end = begin;
-      while (end < num_steps && states[end].is_there) ++end;
+      while (end < num_steps && states[end].is_present) ++end;
       if (end > begin + 1) {
         follow_run(states.subspan(begin, end - begin), record.agents[agent], rules, dt_s, first + begin, &out);
       }

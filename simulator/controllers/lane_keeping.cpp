@@ -161,7 +161,7 @@ void LaneKeepingAgent::find_place() {
     best_m = apart_m;
     place_ = i;
   }
-  steps_astray_ += best_m > kAstray_m;
+  steps_off_path_ += best_m > kOffPath_m;
 }
 
 /// Pure pursuit (Coulter, Implementation of the pure pursuit path tracking algorithm, 1992) from a place on the path.
@@ -243,18 +243,18 @@ float LaneKeepingAgent::speed_before_light(const Motion& now) {
 /// if none is near. Points of the path are too coarse to tell whether the bumper is past a line at which it stands, so
 /// the agent's own place is used there.
 float LaneKeepingAgent::to_closed_line(const Motion& now) const {
-  constexpr float kLook_m = 45, kAt_m = 1;
+  constexpr float kLookahead_m = 45, kAt_m = 1;
   const Vec2 here = points()[place_].position_m.xy();
   std::vector<size_t> near;
   for (size_t light = 0; light < world_.map.stop_lines.size(); ++light) {
     const LightState state = world_.lights[light];
     const bool closes = state == LightState::red || state == LightState::yellow;
-    if (closes && length(world_.map.stop_lines[light].middle_m.xy() - here) < kLook_m + 10) near.push_back(light);
+    if (closes && length(world_.map.stop_lines[light].middle_m.xy() - here) < kLookahead_m + 10) near.push_back(light);
   }
   if (near.empty()) return 1000;
   const SinCos ahead_of_it = sincos_of(now.heading_rad);
   const Vec2 bumper = Vec2{now.x_m, now.y_m} + Vec2{ahead_of_it.cos, ahead_of_it.sin} * agent_.to_bumper_m();
-  const size_t first = ahead(place_, agent_.to_bumper_m() - kAt_m), last = ahead(place_, kLook_m);
+  const size_t first = ahead(place_, agent_.to_bumper_m() - kAt_m), last = ahead(place_, kLookahead_m);
   for (size_t i = first; i < last; ++i) {
     const PathPoint &a = points()[i], &b = points()[i + 1];
     const float to_line_m = std::max(LanePath::kSpacing_m * static_cast<float>(i - first) - kAt_m, 0.0f);
@@ -277,7 +277,7 @@ float LaneKeepingAgent::to_closed_line(const Motion& now) const {
 /// Speed from which the agent can stop before it would touch another agent on its path: at the current place of the
 /// other agent or, where the other agent has priority, at its expected place.
 float LaneKeepingAgent::speed_behind_others() const {
-  constexpr float kLook_m = 40, kMargin_m = 0.4f, kGap_m = 2;
+  constexpr float kLookahead_m = 40, kMargin_m = 0.4f, kGap_m = 2;
   // Other agents may halt at any time; the agent then brakes hard.
   constexpr float kBraking_mps2 = 1.5f, kHardBraking_mps2 = 3;
   constexpr float kForesight_s = 4, kStep_s = 0.5f;
@@ -289,12 +289,12 @@ float LaneKeepingAgent::speed_behind_others() const {
     const int slot = world_.first_slot + other;
     const AgentBox box = box_of(world_.agents, slot);
     const Vec2 apart = box.center_m.xy() - points()[place_].position_m.xy();
-    if (other == self_ || !box.drawn || dot(apart, apart) > square(kLook_m)) continue;
-    for (size_t i = place_ + way.size(); i < ahead(place_, kLook_m); ++i) {
+    if (other == self_ || !box.drawn || dot(apart, apart) > square(kLookahead_m)) continue;
+    for (size_t i = place_ + way.size(); i < ahead(place_, kLookahead_m); ++i) {
       way.push_back(agent_.box(points()[i].position_m, points()[i].heading_rad, kMargin_m));
     }
     const Vec2 velocity = Vec2{box.cos_heading, box.sin_heading} * world_.agents.speed_mps[slot];
-    const bool crosses = has_way(other), merges = changes_lane && !follows(box);
+    const bool crosses = has_right_of_way(other), merges = changes_lane && !follows(box);
     for (float soon_s = 0; soon_s <= (crosses || merges ? kForesight_s : 0); soon_s += kStep_s) {
       AgentBox there = box;
       there.center_m = box.center_m + Vec3{velocity.x, velocity.y, 0} * soon_s;
@@ -315,7 +315,7 @@ float LaneKeepingAgent::speed_behind_others() const {
 }
 
 /// Whether the other agent has priority: agents with lower indices do, unless they go the same way.
-bool LaneKeepingAgent::has_way(int other) const {
+bool LaneKeepingAgent::has_right_of_way(int other) const {
   const float turned = wrap_angle(world_.agents.heading_rad[world_.first_slot + other] - agent_.now().heading_rad);
   return other < self_ && std::fabs(turned) > 0.5f;
 }

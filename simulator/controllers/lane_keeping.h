@@ -35,9 +35,9 @@ class LaneKeepingAgent {
   size_t search_nodes() const { return search_nodes_; }
   /// Number of steps of waiting at a red light.
   int stops() const { return stops_; }
-  /// Number of steps with the rear axle more than kAstray_m from the path.
-  int steps_astray() const { return steps_astray_; }
-  static constexpr float kAstray_m = 1;
+  /// Number of steps with the rear axle more than kOffPath_m from the path.
+  int steps_off_path() const { return steps_off_path_; }
+  static constexpr float kOffPath_m = 1;
 
  private:
   // A node takes 1 to 4 us. Where roads end, an agent's search takes at most 10 ms per step; a few vehicles then find
@@ -65,7 +65,7 @@ class LaneKeepingAgent {
   float speed_before_light(const Motion& now);
   float to_closed_line(const Motion& now) const;
   float speed_behind_others() const;
-  bool has_way(int other) const;
+  bool has_right_of_way(int other) const;
   bool is_changing_lane() const;
   bool follows(const AgentBox& other) const;
   const std::vector<PathPoint>& points() const { return path_.points(); }
@@ -85,7 +85,7 @@ class LaneKeepingAgent {
   size_t search_nodes_;
   size_t min_search_nodes_ = 0;  // minimum of search_nodes_ to begin the next search
   bool halts_ = false;           // halts before leaving the road, until a way is found
-  int stops_ = 0, steps_astray_ = 0;
+  int stops_ = 0, steps_off_path_ = 0;
 };
 
 /// Drives all vehicles and cyclists of a simulator; pedestrians stand still.

@@ -43,9 +43,9 @@ PICTURA_HD inline AgentField invalid_field(const MapView& map, const RuleOptions
   if (fabsf(agents.z_m[slot]) > kMaxCommanded_m) return AgentField::z_m;
   if (fabsf(agents.heading_rad[slot]) > kMaxCommanded_rad) return AgentField::heading_rad;
   // Absent agents have no body.
-  const bool is_there = has_body(status);
-  if (agents.length_m[slot] < 0 || (is_there && agents.length_m[slot] == 0)) return AgentField::length_m;
-  if (agents.width_m[slot] < 0 || (is_there && agents.width_m[slot] == 0)) return AgentField::width_m;
+  const bool is_present = has_body(status);
+  if (agents.length_m[slot] < 0 || (is_present && agents.length_m[slot] == 0)) return AgentField::length_m;
+  if (agents.width_m[slot] < 0 || (is_present && agents.width_m[slot] == 0)) return AgentField::width_m;
   if (agents.height_m[slot] < 0 || agents.height_m[slot] > kMaxCommanded_m) return AgentField::height_m;
   if (square(agents.length_m[slot]) + square(agents.width_m[slot]) > square(2.0f * map.max_box_radius_m)) {
     return AgentField::length_m;
@@ -79,7 +79,7 @@ PICTURA_HD inline AgentRecord edited_agent(const AgentStateView& agents, const S
 
 /// Fault of an element of an edit, in one word that a host reads atomically: a field's number or one of the constants
 /// below, the element and the slot.
-constexpr int64_t kNothingWrong = -1;
+constexpr int64_t kNoEditFault = -1;
 constexpr int32_t kNoSuchSlot = static_cast<int32_t>(AgentField::none), kSlotAgain = kNoSuchSlot + 1;
 PICTURA_HD constexpr int64_t edit_fault(int32_t what, int32_t element, int32_t slot) {
   return (int64_t{what} << 56) | (int64_t{element} << 32) | static_cast<uint32_t>(slot);
@@ -100,7 +100,7 @@ PICTURA_HD int64_t find_edit_fault(const StateEdit& edit, int i, int num_slots, 
   const WorldView world = world_of(slot);
   AgentRecord agent = edited_agent(world.agents, edit, i);
   const AgentField field = invalid_field(world.map, world.options, agent.view(), 0);
-  return field == AgentField::none ? kNothingWrong : edit_fault(static_cast<int32_t>(field), i, slot);
+  return field == AgentField::none ? kNoEditFault : edit_fault(static_cast<int32_t>(field), i, slot);
 }
 
 /// Writes the agent of element i, which must be without fault, into its world. The agent appears there at once, without

@@ -10,7 +10,7 @@ constexpr float kMaxEntry_mps = 8.0f;
 constexpr float kEntryGap_m = 2.0f, kEntryHeadway_s = 2.0f;  // to the next box
 
 /// Whether an agent waits to enter; in the step in which it leaves, its box is still visible.
-PICTURA_HD inline bool waits(const WorldView& world, int agent) {
+PICTURA_HD inline bool is_waiting_to_enter(const WorldView& world, int agent) {
   return world.agents.status[world.first_slot + agent] == AgentStatus::waiting && !world.boxes[agent].drawn;
 }
 
@@ -49,16 +49,16 @@ struct NextBox {
 template <typename ThreadGroup>
 PICTURA_HD NextBox next_box(const WorldView& world, const AgentBox& own, RoutePoint at, const ThreadGroup& group) {
   constexpr float kStride_m = 0.5f;
-  constexpr float kLook_m = kEntryGap_m + kEntryHeadway_s * kMaxEntry_mps;
+  constexpr float kLookahead_m = kEntryGap_m + kEntryHeadway_s * kMaxEntry_mps;
   const float ahead_m = reference_to_center(own.agent_class, own.length_m);
   NextBox next;
   int next_index = world.num_boxes;
   for (int i = group.rank(); i < world.num_boxes; i += group.size()) {
     const AgentBox& other = world.boxes[i];
     const Vec2 apart = (other.center_m - own.center_m).xy();
-    const float reach_m = kLook_m + radius(own) + world.map.max_box_radius_m;
+    const float reach_m = kLookahead_m + radius(own) + world.map.max_box_radius_m;
     if (!other.drawn || dot(apart, apart) > square(reach_m)) continue;
-    for (float way_m = kStride_m; way_m - kStride_m < min_of(next.gap_m, kLook_m); way_m += kStride_m) {
+    for (float way_m = kStride_m; way_m - kStride_m < min_of(next.gap_m, kLookahead_m); way_m += kStride_m) {
       const RoutePoint there = point_ahead(world.map, at, way_m);
       const LanePose pose = pose_on_lane(world.map, there.lane, there.s_m);
       const SinCos heading = sincos_of(pose.heading_rad);
@@ -138,7 +138,7 @@ template <typename ThreadGroup, typename Entered>
 PICTURA_HD void enter_waiting(const WorldView& world, int step, const ThreadGroup& group, const Entered& entered) {
   if (world.map.entries.empty()) return;
   for (int agent = 0; agent < world.num_agents; ++agent) {
-    if (!waits(world, agent) || !try_to_enter(world, agent, step, group)) continue;
+    if (!is_waiting_to_enter(world, agent) || !try_to_enter(world, agent, step, group)) continue;
     group.sync();
     entered(agent);
   }

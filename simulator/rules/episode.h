@@ -26,15 +26,15 @@ PICTURA_HD inline void clear_result(const StepArrays& results, int slot) {
 template <typename CommandType>
 PICTURA_HD bool accepts(const WorldView& world, int agent, const CommandType& command) {
   if (!takes_actions(world, agent)) return true;
-  return is_sound(command) && (has_record(world.map) || !tells_to_follow_record(command));
+  return is_valid(command) && (has_record(world.map) || !is_follow_record_command(command));
 }
 
 /// Whether a step of the agent counts and is used for learning: the agent takes actions, the command is neither to
 /// leave nor to follow the record, and in this episode the agent is neither impaired nor driven by another policy.
 template <typename CommandType>
-PICTURA_HD bool takes_part(const WorldView& world, int agent, const CommandType& command) {
-  return takes_actions(world, agent) && !tells_to_leave(command) && !tells_to_follow_record(command) &&
-         other_of(world, agent) == 0;
+PICTURA_HD bool is_counted(const WorldView& world, int agent, const CommandType& command) {
+  return takes_actions(world, agent) && !is_leave_command(command) && !is_follow_record_command(command) &&
+         driver_kind_of(world, agent) == 0;
 }
 
 /// Whether the agent counts as driving in the decision whether an episode ends. Agents that follow a record count, even
@@ -46,7 +46,7 @@ PICTURA_HD inline bool keeps_episode(const WorldView& world, int agent) {
 }
 
 /// Rejected command of a step, in one word that a host reads atomically: slot, kind and, for an action, its value.
-constexpr int64_t kNothingRejected = -1;
+constexpr int64_t kNoRejection = -1;
 PICTURA_HD constexpr int64_t rejected_command(int32_t slot, CommandKind kind, int32_t action) {
   const auto kind_bits = static_cast<int64_t>(static_cast<uint32_t>(kind) < 4 ? static_cast<uint32_t>(kind) : 4u);
   return (kind_bits << 60) | (static_cast<int64_t>(slot) << 32) | static_cast<uint32_t>(action);
@@ -76,7 +76,7 @@ PICTURA_HD inline void count_events(int events, SimulatorTotals* totals_inout){
 PICTURA_HD inline void apply_reward_and_halt(const WorldView& world, int agent, int step, const StepArrays& results) {
   const int slot = world.first_slot + agent;
   const float speed_mps = world.agents.speed_mps[slot];
-  const bool is_other = other_of(world, agent) != 0;
+  const bool is_other = driver_kind_of(world, agent) != 0;
   const bool drives = results.valid[slot] || is_other;
   int32_t& first_motion_step = world.agents.first_motion_step[slot];
   if (drives && first_motion_step == 0 && fabsf(speed_mps) > kRest_mps) first_motion_step = step;
@@ -127,7 +127,7 @@ PICTURA_HD inline bool episode_ends(const WorldView& world, int steps, int spawn
 PICTURA_HD inline void finish_agent(const WorldView& world, int agent, bool ends, const StepArrays& results,
                                     SimulatorTotals* totals_inout) {
   const int slot = world.first_slot + agent;
-  const bool counts = other_of(world, agent) == 0;
+  const bool counts = driver_kind_of(world, agent) == 0;
   results.truncated[slot] = counts && ((ends && is_active(world, agent)) || has_left(world, agent));
   if (!results.terminated[slot] && !results.truncated[slot]) return;
   ++totals_inout->finished_agent_episodes;

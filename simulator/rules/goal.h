@@ -39,7 +39,8 @@ PICTURA_HD inline RoutePoint through_lane(const MapView& map, RoutePoint at) {
 
 /// Advances distance_m along lanes, choosing among successors with equal probability. From a lane without a successor
 /// from which the route continues, it changes to the nearest lane with one. Stops where routes end.
-PICTURA_HD inline RoutePoint walk(const MapView& map, RoutePoint at, float distance_m, RandomStream* random_inout) {
+PICTURA_HD inline RoutePoint advance_along_lanes(const MapView& map, RoutePoint at, float distance_m,
+                                                 RandomStream* random_inout) {
   constexpr int kMaxLanesWalked = 64;  // a safety bound, for many lanes shorter than a metre
   for (int i = 0; i < kMaxLanesWalked; ++i) {
     const float left_m = map.lanes[at.lane].length_m - at.s_m;
@@ -62,7 +63,7 @@ PICTURA_HD inline RoutePoint next_waypoint(const MapView& map, RoutePoint at, Ra
   const float gap_m = random_inout->uniform(kMinWaypointGap_m, kMaxWaypointGap_m);
   const float change = random_inout->uniform();
   if (change < kLaneChangeChance) at = neighbor_of(map, at, change < 0.5f * kLaneChangeChance ? -1 : 1);
-  return walk(map, at, gap_m, random_inout);
+  return advance_along_lanes(map, at, gap_m, random_inout);
 }
 
 /// Whether the way from `from` to `to` comes within radius_m of `goal`, on the level of `goal`.

@@ -12,8 +12,8 @@ namespace pictura {
 
 /// Draws an agent's kind in an episode: 0 for an agent that learns, else one more than the index of a share in
 /// OtherShares.
-PICTURA_HD inline int draw_other(const OtherShares& shares, uint64_t seed, uint32_t world, uint32_t agent,
-                                 uint32_t episode) {
+PICTURA_HD inline int draw_driver_kind(const OtherShares& shares, uint64_t seed, uint32_t world, uint32_t agent,
+                                       uint32_t episode) {
   if (shares.sum() <= 0.0f) return 0;
   RandomStream random(
       {.seed = seed, .world = world, .agent = agent, .episode = episode, .purpose = Purpose::impairment});
@@ -31,8 +31,8 @@ PICTURA_HD inline int draw_other(const OtherShares& shares, uint64_t seed, uint3
   return 0;
 }
 
-/// Impairment and driver of a result of draw_other(). The driver is 0 for the simulator's main policy, and 1 + i for
-/// policy i.
+/// Impairment and driver of a result of draw_driver_kind(). The driver is 0 for the simulator's main policy, and 1 + i
+/// for policy i.
 PICTURA_HD constexpr Impairment impairment_of(int other) {
   return other > kNumImpairments ? Impairment::none : static_cast<Impairment>(other);
 }
@@ -41,14 +41,14 @@ PICTURA_HD constexpr int driver_of(int other) { return max_of(other - kNumImpair
 /// Draws an agent's impairment in an episode.
 PICTURA_HD inline Impairment draw_impairment(const OtherShares& shares, uint64_t seed, uint32_t world, uint32_t agent,
                                              uint32_t episode) {
-  return impairment_of(draw_other(shares, seed, world, agent, episode));
+  return impairment_of(draw_driver_kind(shares, seed, world, agent, episode));
 }
 
 /// Whether an agent's impairment is active in its observation after `step` steps of the episode, and in its next
 /// action. Inattention is always active; the others are active in one spell of U(1, 5) s in every 10 s, at a random
 /// time within them.
-PICTURA_HD inline bool shows_at(Impairment impairment, int step, float dt_s, uint64_t seed, uint32_t world,
-                                uint32_t agent, uint32_t episode) {
+PICTURA_HD inline bool is_active_at(Impairment impairment, int step, float dt_s, uint64_t seed, uint32_t world,
+                                    uint32_t agent, uint32_t episode) {
   constexpr float kPeriod_s = 10.0f, kMinSpell_s = 1.0f, kMaxSpell_s = 5.0f;
   if (impairment == Impairment::none || impairment == Impairment::inattentive) return impairment != Impairment::none;
   const int period_steps = static_cast<int>(kPeriod_s / dt_s + 0.5f);

@@ -125,7 +125,7 @@ struct RecordedState {
   Vec3 position_m;  // of the reference point
   float heading_rad = 0;
   float speed_mps = 0;  // signed, along the heading
-  int32_t is_there = 0;
+  int32_t is_present = 0;
 };
 
 struct MapView {

@@ -109,9 +109,10 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
   }
 }
 
-/// Variant of nearest_partners() for a sequence of boxes: box_at(i) is one of num_boxes, and counts where is_there(i).
-template <typename ThreadGroup, typename BoxAt, typename IsThere>
-PICTURA_HD auto nearest_boxes(int num_boxes, const BoxAt& box_at, const IsThere& is_there, Vec2 origin,
+/// Variant of nearest_partners() for a sequence of boxes: box_at(i) is one of num_boxes, and counts where
+/// is_present(i).
+template <typename ThreadGroup, typename BoxAt, typename IsPresent>
+PICTURA_HD auto nearest_boxes(int num_boxes, const BoxAt& box_at, const IsPresent& is_present, Vec2 origin,
                               const ThreadGroup& group) {
   typename ThreadGroup::template Nearest<kMaxPartners> nearest;
   for (int first = 0; first < num_boxes; first += group.size()) {
@@ -119,7 +120,8 @@ PICTURA_HD auto nearest_boxes(int num_boxes, const BoxAt& box_at, const IsThere&
     const AgentBox& box = box_at(i);
     const Vec2 apart = box.center_m.xy() - origin;
     const float d2 = dot(apart, apart);
-    nearest.offer(first + group.rank() < num_boxes && box.drawn && is_there(i) && d2 < square(kPartnerRange_m), d2, i);
+    nearest.offer(first + group.rank() < num_boxes && box.drawn && is_present(i) && d2 < square(kPartnerRange_m), d2,
+                  i);
   }
   nearest.settle();
   return nearest;

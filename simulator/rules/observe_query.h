@@ -56,10 +56,10 @@ class QueriedObservation {
     const auto box_at = [&](int item) -> const AgentBox& {
       return item < world.num_boxes ? world.boxes[item] : inserted_[item - world.num_boxes].box;
     };
-    const auto is_there = [&](int item) {
+    const auto is_present = [&](int item) {
       return item >= world.num_boxes || (item != agent && (leaves_gaps_ || !hides(world, item)));
     };
-    return nearest_boxes(world.num_boxes + static_cast<int>(inserted_.size()), box_at, is_there, origin, group);
+    return nearest_boxes(world.num_boxes + static_cast<int>(inserted_.size()), box_at, is_present, origin, group);
   }
 
   Span<const int32_t> hidden_;
@@ -105,7 +105,7 @@ PICTURA_HD constexpr int64_t query_fault(QueryFault what, int32_t query, int32_t
 }
 
 /// Whether all observed values of a box are finite.
-PICTURA_HD inline bool is_sound(const InsertedBox& one) {
+PICTURA_HD inline bool is_valid(const InsertedBox& one) {
   const AgentBox& box = one.box;
   return is_finite(box.center_m) && is_finite(box.cos_heading) && is_finite(box.sin_heading) &&
          is_finite(box.length_m) && is_finite(box.width_m) && is_finite(box.height_m) && is_finite(one.speed_mps);
@@ -134,7 +134,7 @@ PICTURA_HD int64_t find_query_fault(const ObservationQueries& asked, int i, int 
     if (box < world.first_box || box - world.first_box >= world.num_boxes) return fault(QueryFault::hidden_box, box);
   }
   for (int32_t k = inserted_begin; k < query.inserted_end; ++k) {
-    if (!is_sound(asked.inserted[k])) return fault(QueryFault::inserted_box, k);
+    if (!is_valid(asked.inserted[k])) return fault(QueryFault::inserted_box, k);
   }
   return kNoQueryFault;
 }

@@ -39,7 +39,7 @@ PICTURA_HD LaneFit fit_agent(const WorldView& world, int agent, Vec2 p, float z_
 }
 
 /// Removes the box of an agent that no longer has a body.
-PICTURA_HD inline void clear_place(const WorldView& world, int agent) {
+PICTURA_HD inline void remove_box(const WorldView& world, int agent) {
   const int slot = world.first_slot + agent;
   world.agents.events[slot] = kEventNone;
   world.boxes[agent] = world.boxes_before[agent] = box_of(world.agents, slot);
@@ -48,7 +48,7 @@ PICTURA_HD inline void clear_place(const WorldView& world, int agent) {
 /// Removes an agent from its world's episode.
 PICTURA_HD inline void leave(const WorldView& world, int agent) {
   world.agents.status[world.first_slot + agent] = AgentStatus::absent;
-  clear_place(world, agent);
+  remove_box(world, agent);
 }
 
 /// Places an agent at its recorded state `step` steps after the episode's start, or nowhere. An agent that was not
@@ -61,7 +61,7 @@ PICTURA_HD void follow_record(const WorldView& world, int agent, int step, const
   const bool goes_on = agents.status[slot] == AgentStatus::recorded;
   const int32_t lane_before = goes_on ? agents.lane[slot] : -1;
   const AgentBox before = world.boxes[agent];
-  if (!at.is_there) {
+  if (!at.is_present) {
     group.sync();
     if (group.rank() == 0) leave(world, agent);
     return;

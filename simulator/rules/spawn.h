@@ -151,12 +151,12 @@ PICTURA_HD RoutePoint next_walk_waypoint(const WorldView& world, int agent, Rout
                                          const ThreadGroup& group = {}) {
   constexpr float kStride_m = 1.0f;
   constexpr int kMaxStrides = 64;
-  at = stroll(world.map, at, random_inout->uniform(kMinWaypointGap_m, kMaxWaypointGap_m), random_inout);
+  at = advance_along_walkway(world.map, at, random_inout->uniform(kMinWaypointGap_m, kMaxWaypointGap_m), random_inout);
   for (int i = 0; i < kMaxStrides; ++i) {
     const LanePose pose = pose_on_walk(world.map, at.lane, at.s_m);
     const AgentBox box = box_at(world.agents, world.first_slot + agent, pose.position_m, sincos_of(pose.heading_rad));
     if (is_clear(world, box, world.num_agents, world.num_boxes, group)) break;
-    at = stroll(world.map, at, kStride_m, random_inout);
+    at = advance_along_walkway(world.map, at, kStride_m, random_inout);
   }
   return at;
 }

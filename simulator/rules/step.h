@@ -104,10 +104,10 @@ PICTURA_HD inline DynamicsParameters dynamics_of(const WorldView& world, int slo
 }
 
 /// Whether a command to an agent is valid; see command.h.
-PICTURA_HD inline bool is_sound(int32_t action) { return action >= 0 && action < kNumActions; }
-PICTURA_HD inline bool is_sound(const Command& command) {
+PICTURA_HD inline bool is_valid(int32_t action) { return action >= 0 && action < kNumActions; }
+PICTURA_HD inline bool is_valid(const Command& command) {
   switch (command.kind) {
-    case CommandKind::action: return is_sound(command.action);
+    case CommandKind::action: return is_valid(command.action);
     case CommandKind::kinematic_state:  // comparisons are false for NaN
       return fabsf(command.x_m) <= kMaxCommanded_m && fabsf(command.y_m) <= kMaxCommanded_m &&
              fabsf(command.z_m) <= kMaxCommanded_m && fabsf(command.heading_rad) <= kMaxCommanded_rad &&
@@ -118,10 +118,12 @@ PICTURA_HD inline bool is_sound(const Command& command) {
   }
 }
 
-PICTURA_HD constexpr bool tells_to_leave(int32_t) { return false; }
-PICTURA_HD inline bool tells_to_leave(const Command& command) { return command.kind == CommandKind::absent; }
-PICTURA_HD constexpr bool tells_to_follow_record(int32_t) { return false; }
-PICTURA_HD inline bool tells_to_follow_record(const Command& command) { return command.kind == CommandKind::recorded; }
+PICTURA_HD constexpr bool is_leave_command(int32_t) { return false; }
+PICTURA_HD inline bool is_leave_command(const Command& command) { return command.kind == CommandKind::absent; }
+PICTURA_HD constexpr bool is_follow_record_command(int32_t) { return false; }
+PICTURA_HD inline bool is_follow_record_command(const Command& command) {
+  return command.kind == CommandKind::recorded;
+}
 
 /// Whether a command to follow the record has an effect: on all agents that have not halted, including absent agents.
 PICTURA_HD inline bool may_follow_record(const WorldView& world, int agent) {
@@ -134,7 +136,7 @@ PICTURA_HD inline Motion commanded_motion(const WorldView& world, int agent, int
   const Motion from = motion_of(world.agents, slot);
   Controls controls = controls_of_action(action);
   DynamicsParameters parameters = dynamics_of(world, slot);
-  if (shown_impairment(world, agent) == Impairment::phantom_braking) {
+  if (active_impairment(world, agent) == Impairment::phantom_braking) {
     controls.jerk_long_mps3 = braking_jerk_mps3(from);
     parameters.rules.reset_at_standstill = true;  // otherwise braking would drive it backwards
   }
@@ -160,7 +162,7 @@ PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& co
   const int slot = world.first_slot + agent;
   const AgentBox before = world.boxes[agent];
   const bool is_recorded = agents.status[slot] == AgentStatus::recorded;
-  if (tells_to_follow_record(command) && may_follow_record(world, agent)) {
+  if (is_follow_record_command(command) && may_follow_record(world, agent)) {
     return follow_record(world, agent, step, group);
   }
   if (!takes_actions(world, agent)) {
@@ -168,13 +170,13 @@ PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& co
     if (world.map.is_open) agents.left[slot] = 0;
     // An agent that left at the end of the last step was still visible in it.
     const bool is_gone = !has_body(agents.status[slot]) && before.drawn;
-    if (is_gone) return clear_place(world, agent);
+    if (is_gone) return remove_box(world, agent);
     world.boxes_before[agent] = before;
     agents.events[slot] = kEventNone;
     return;
   }
 
-  if (tells_to_leave(command)) {
+  if (is_leave_command(command)) {
     group.sync();
     if (group.rank() == 0) leave(world, agent);
     return;

@@ -30,7 +30,8 @@ PICTURA_HD inline int32_t choose_way(const MapView& map, int32_t piece_index, Ra
 }
 
 /// Advances distance_m along walkways from s_m on a piece.
-PICTURA_HD inline RoutePoint stroll(const MapView& map, RoutePoint at, float distance_m, RandomStream* random_inout) {
+PICTURA_HD inline RoutePoint advance_along_walkway(const MapView& map, RoutePoint at, float distance_m,
+                                                   RandomStream* random_inout) {
   constexpr int kMaxPiecesWalked = 1024;  // a safety bound, for many pieces of a few centimetres
   for (int i = 0; i < kMaxPiecesWalked; ++i) {
     const WalkPiece& piece = map.walk_pieces[at.lane];

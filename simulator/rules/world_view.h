@@ -131,22 +131,23 @@ PICTURA_HD inline AgentBox box_of(const AgentStateView& agents, int slot) {
   return box;
 }
 
-/// Kind of the agent in this episode, see draw_other().
-PICTURA_HD inline int other_of(const WorldView& world, int agent) {
-  return draw_other(world.options.others, world.seed, world.global_world, static_cast<uint32_t>(agent), world.episode);
+/// Kind of the agent in this episode, see draw_driver_kind().
+PICTURA_HD inline int driver_kind_of(const WorldView& world, int agent) {
+  return draw_driver_kind(world.options.others, world.seed, world.global_world, static_cast<uint32_t>(agent),
+                          world.episode);
 }
 
 /// The agent's impairment if it is active at this step.
-PICTURA_HD inline Impairment shown_impairment(const WorldView& world, int agent) {
-  const Impairment impairment = impairment_of(other_of(world, agent));
-  const bool shows = shows_at(impairment, world.step, world.options.dt_s, world.seed, world.global_world,
-                              static_cast<uint32_t>(agent), world.episode);
+PICTURA_HD inline Impairment active_impairment(const WorldView& world, int agent) {
+  const Impairment impairment = impairment_of(driver_kind_of(world, agent));
+  const bool shows = is_active_at(impairment, world.step, world.options.dt_s, world.seed, world.global_world,
+                                  static_cast<uint32_t>(agent), world.episode);
   return shows ? impairment : Impairment::none;
 }
 
 /// Objects that are hidden from the agent at this step.
 PICTURA_HD inline Hides hidden_from(const WorldView& world, int agent) {
-  return hidden_by(shown_impairment(world, agent));
+  return hidden_by(active_impairment(world, agent));
 }
 
 /// Returns the view of the agent's cameras; the view of an absent agent excludes no agent, see Simulator::views().

@@ -61,7 +61,7 @@ TEST(Goal, RoutesLeaveALaneThatEndsForTheNearestThatGoesOn) {
   EXPECT_EQ(through_lane(view, {8, 50}).lane, 8);
   EXPECT_FLOAT_EQ(through_lane(view, {0, 50}).s_m, 50);
   RandomStream random({.seed = 3, .purpose = Purpose::goals});
-  const RoutePoint at = walk(view, {0, 190}, 30, &random);
+  const RoutePoint at = advance_along_lanes(view, {0, 190}, 30, &random);
   EXPECT_EQ(at.lane, 9);
   EXPECT_NEAR(at.s_m, 20, 1e-3);
 }

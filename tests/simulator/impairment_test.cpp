@@ -39,9 +39,9 @@ Impairment shown_of_slot(const Simulator& simulator, int slot) {
   const int32_t world = slots.world_of_slot[slot];
   const Impairment impairment = impairment_of_slot(simulator, slot);
   const bool shows =
-      shows_at(impairment, simulator.episode_step()[world], simulator.config().dt_s, simulator.arrays().seed[world],
-               slots.global_world[world], static_cast<uint32_t>(slots.agent_of_slot[slot]),
-               static_cast<uint32_t>(simulator.episode_index()[world]));
+      is_active_at(impairment, simulator.episode_step()[world], simulator.config().dt_s, simulator.arrays().seed[world],
+                   slots.global_world[world], static_cast<uint32_t>(slots.agent_of_slot[slot]),
+                   static_cast<uint32_t>(simulator.episode_index()[world]));
   return shows ? impairment : Impairment::none;
 }
 
@@ -77,7 +77,7 @@ TEST(Impairment, ShowsInOneSpellOfSecondsInEveryTen) {
       int steps = 0, begins = 0;
       bool showed = false;
       for (int step = 0; step < period_steps; ++step) {
-        const bool shows = shows_at(Impairment::blind, spell * period_steps + step, dt_s, 3, 1, 2, 0);
+        const bool shows = is_active_at(Impairment::blind, spell * period_steps + step, dt_s, 3, 1, 2, 0);
         steps += shows;
         begins += shows && !showed;
         begun_at_once += shows && step == 0;
@@ -91,8 +91,8 @@ TEST(Impairment, ShowsInOneSpellOfSecondsInEveryTen) {
     EXPECT_NEAR(shown / double(kSpells * period_steps), 0.3, 0.02);
     EXPECT_LT(begun_at_once, kSpells / 10);
   }
-  EXPECT_TRUE(shows_at(Impairment::inattentive, 1234, 0.1f, 3, 1, 2, 0));
-  EXPECT_FALSE(shows_at(Impairment::none, 1234, 0.1f, 3, 1, 2, 0));
+  EXPECT_TRUE(is_active_at(Impairment::inattentive, 1234, 0.1f, 3, 1, 2, 0));
+  EXPECT_FALSE(is_active_at(Impairment::none, 1234, 0.1f, 3, 1, 2, 0));
 }
 
 TEST(Impairment, HidesRoadUsersOrLightsFromListsAndImagesAndNothingElse) {
@@ -111,8 +111,8 @@ TEST(Impairment, HidesRoadUsersOrLightsFromListsAndImagesAndNothingElse) {
     ASSERT_TRUE(testing::same_bits(impaired->scene().agents, plain->scene().agents)) << step;
     for (int slot = 0; slot < plain->num_slots(); ++slot) {
       const Impairment shown = shown_of_slot(*impaired, slot);
-      const bool is_there = plain->views()[slot].ego_agent >= 0;
-      EXPECT_EQ(impaired->views()[slot].hides, is_there ? hidden_by(shown) : kHidesNothing);
+      const bool is_present = plain->views()[slot].ego_agent >= 0;
+      EXPECT_EQ(impaired->views()[slot].hides, is_present ? hidden_by(shown) : kHidesNothing);
       EXPECT_EQ(plain->views()[slot].hides, kHidesNothing);
       for (const EntitySet set : {EntitySet::partners, EntitySet::lanes, EntitySet::boundaries, EntitySet::controls}) {
         const bool is_missed = (shown == Impairment::blind && set == EntitySet::partners) ||

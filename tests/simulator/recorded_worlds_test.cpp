@@ -46,13 +46,13 @@ void expect_as_recorded(Simulator& simulator, const Scenario& scene, int32_t ste
     SCOPED_TRACE(::testing::Message() << "track " << track << ", step " << step);
     const auto at = static_cast<size_t>(step);
     const AgentBox& box = boxes[track];
-    const bool is_there = scene.valid_of(track)[at] != 0;
-    ASSERT_EQ(box.drawn != 0, is_there);
-    ASSERT_EQ(status_of(simulator, track), is_there ? AgentStatus::recorded : AgentStatus::absent);
+    const bool is_present = scene.valid_of(track)[at] != 0;
+    ASSERT_EQ(box.drawn != 0, is_present);
+    ASSERT_EQ(status_of(simulator, track), is_present ? AgentStatus::recorded : AgentStatus::absent);
     const RecordedTrack& about = scene.tracks[track];
     ASSERT_EQ(box.length_m, about.length_m);
     ASSERT_EQ(box.height_m, about.height_m);
-    if (!is_there) continue;
+    if (!is_present) continue;
     const TrackState& state = scene.states_of(track)[at];
     ASSERT_LT(length((box.center_m - state.position_m).xy()), 1e-3f);
     ASSERT_LT(std::abs(box.center_m.z - state.position_m.z), 1);  // on the road, where the record is near a road
@@ -186,9 +186,9 @@ TEST(RecordedWorlds, StandStillAfterTheEndOfTheRecord) {
 int32_t mover(const Scenario& scene, size_t last) {
   for (int32_t track = 0; track < static_cast<int32_t>(scene.tracks.size()); ++track) {
     const Span<const uint8_t> valid = scene.valid_of(track);
-    bool is_there = true;
-    for (size_t step = 0; step <= last; ++step) is_there = is_there && valid[step];
-    if (is_there && is_moving(scene, track) && scene.tracks[track].type == TrackType::vehicle) {
+    bool is_present = true;
+    for (size_t step = 0; step <= last; ++step) is_present = is_present && valid[step];
+    if (is_present && is_moving(scene, track) && scene.tracks[track].type == TrackType::vehicle) {
       return track;
     }
   }

@@ -28,7 +28,7 @@ TEST(PartsOfWorlds, AreConsecutiveAndNearlyEqual) {
   for (const int num_parts : {1, 2, 3, 8}) {
     size_t next = 0;
     for (int part = 0; part < num_parts; ++part) {
-      const std::vector<WorldSpec> worlds = worlds_of_part(all, part, num_parts);
+      const std::vector<WorldSpec> worlds = worlds_in_part(all, part, num_parts);
       EXPECT_NEAR(static_cast<double>(agents_of(worlds)), 20480.0 / num_parts, 120);
       for (const WorldSpec& world : worlds) EXPECT_EQ(world.global_world, next++);
     }
@@ -39,9 +39,9 @@ TEST(PartsOfWorlds, AreConsecutiveAndNearlyEqual) {
 TEST(PartsOfWorlds, HaveOneWorldAtLeast) {
   const std::vector<WorldSpec> all{{0, 1, 0}, {0, 1, 1}, {0, 100, 2}, {0, 1, 3}};
   const size_t expected[] = {2, 1, 1};
-  for (int part = 0; part < 3; ++part) EXPECT_EQ(worlds_of_part(all, part, 3).size(), expected[part]) << part;
-  for (int part = 0; part < 4; ++part) EXPECT_EQ(worlds_of_part(all, part, 4).size(), 1u);
-  EXPECT_THAT(test::message_of([&] { worlds_of_part(all, 0, 5); }), HasSubstr("4 worlds cannot be divided over 5"));
+  for (int part = 0; part < 3; ++part) EXPECT_EQ(worlds_in_part(all, part, 3).size(), expected[part]) << part;
+  for (int part = 0; part < 4; ++part) EXPECT_EQ(worlds_in_part(all, part, 4).size(), 1u);
+  EXPECT_THAT(test::message_of([&] { worlds_in_part(all, 0, 5); }), HasSubstr("4 worlds cannot be divided over 5"));
 }
 
 // Two maps with traffic lights and parked cars, worlds of several sizes, short episodes: everything in a state.
@@ -73,7 +73,7 @@ TEST(PartsOfWorlds, StepAndSaveAsOneSimulatorDoes) {
   const std::unique_ptr<Simulator> part = make_simulator("cpu", config, maps, all);
   std::vector<std::vector<uint8_t>> saved;
   for (int i = 0; i < 3; ++i) {
-    part->set_worlds(whole->maps(), {}, worlds_of_part(all, i, 3), config.seed);
+    part->set_worlds(whole->maps(), {}, worlds_in_part(all, i, 3), config.seed);
     step(part.get(), 0, 40);
     saved.push_back(part->save());
   }
@@ -84,8 +84,8 @@ TEST(PartsOfWorlds, StepAndSaveAsOneSimulatorDoes) {
   step(whole.get(), 40, 60);
   std::vector<std::vector<uint8_t>> later;
   for (int i = 0; i < 2; ++i) {
-    part->set_worlds(whole->maps(), {}, worlds_of_part(all, i, 2), config.seed);
-    part->restore(part_of_saved_state(*part, all, joined, i, 2));
+    part->set_worlds(whole->maps(), {}, worlds_in_part(all, i, 2), config.seed);
+    part->restore(extract_saved_part(*part, all, joined, i, 2));
     step(part.get(), 40, 60);
     later.push_back(part->save());
   }
@@ -93,7 +93,7 @@ TEST(PartsOfWorlds, StepAndSaveAsOneSimulatorDoes) {
 
   std::vector<WorldSpec> others = all;
   ++others[0].num_agents;
-  EXPECT_THAT(test::message_of([&] { part_of_saved_state(*whole, others, joined, 0, 1); }), HasSubstr("worlds"));
+  EXPECT_THAT(test::message_of([&] { extract_saved_part(*whole, others, joined, 0, 1); }), HasSubstr("worlds"));
 }
 
 // Two worlds of different moments in another order, without walls and entity observations.
@@ -108,9 +108,9 @@ TEST(KeptWorlds, GoOnInAnotherSimulator) {
     for (int i = 0; i < count; ++i) simulator->step(actions);
   };
   step(whole.get(), 20);
-  const auto early = keep_worlds(*whole, whole->save(), {1});
+  const auto early = extract_worlds(*whole, whole->save(), {1});
   step(whole.get(), 10);
-  const auto late = keep_worlds(*whole, whole->save(), {0, 2});
+  const auto late = extract_worlds(*whole, whole->save(), {0, 2});
 
   config.walls = false;
   config.vector_observations = false;

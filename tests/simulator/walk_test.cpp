@@ -127,7 +127,7 @@ TEST(Walkways, StrollsHaveTheirLengthAndTurnBackAtDeadEnds) {
     // The distance is shorter than the way to the far end and back. So the way from A to B is the distance, or is
     // mirrored at one end.
     const float distance_m = random.uniform(20, 60);
-    const RoutePoint to = stroll(view, from, distance_m, &random);
+    const RoutePoint to = advance_along_walkway(view, from, distance_m, &random);
     const LanePose a = pose_on_walk(view, from.lane, from.s_m), b = pose_on_walk(view, to.lane, to.s_m);
     EXPECT_EQ(a.position_m.y, b.position_m.y);
     const float ahead = a.position_m.x + distance_m * std::cos(a.heading_rad);

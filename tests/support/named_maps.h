@@ -16,8 +16,8 @@ namespace pictura::test {
 inline std::string missing(const std::string& map) {
   const std::vector<std::string> towns = known_towns();
   const std::string town(parse_map_copy(map).map);
-  const bool is_there = !town.starts_with("Town") || std::binary_search(towns.begin(), towns.end(), town);
-  return is_there ? "" : "needs " + town + ".xodr; set PICTURA_DATA";
+  const bool is_present = !town.starts_with("Town") || std::binary_search(towns.begin(), towns.end(), town);
+  return is_present ? "" : "needs " + town + ".xodr; set PICTURA_DATA";
 }
 
 /// Returns a test's name from its map.

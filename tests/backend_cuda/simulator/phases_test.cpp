@@ -56,7 +56,7 @@ void expect_same(const SimulatorConfig& config, const CompiledMaps& maps, const 
     ASSERT_TRUE(testing::same_bits(result.sums, Span<const StepSums>(other.results.sums)));
   }
   EXPECT_EQ(cpu->save(), other.save());
-  EXPECT_EQ(other.rejected(), kNothingRejected);
+  EXPECT_EQ(other.rejected(), kNoRejection);
 }
 
 void expect_same(const SimulatorConfig& config, const std::vector<std::shared_ptr<const RoadMap>>& maps,
@@ -277,7 +277,7 @@ TEST(Phases, BeginChosenWorldsAndSetChosenAgents) {
     }
     expect_same_view(cpu.get(), &other);
   }
-  EXPECT_EQ(other.wrong_edit(), kNothingWrong);
+  EXPECT_EQ(other.faulty_edit(), kNoEditFault);
 }
 
 TEST(Phases, RefuseAWrongEditAndChangeNothing) {
@@ -288,10 +288,10 @@ TEST(Phases, RefuseAWrongEditAndChangeNothing) {
   const std::vector<NamedArray> fields{{"x_m", Array(x_m)}};
   executor.set_state(state_edit(slots, fields, 40, {}));
   EXPECT_EQ(executor.save(), before);
-  EXPECT_EQ(edit_fault_text(executor.wrong_edit(), 40), "slot 31: x_m: the value is out of range");
+  EXPECT_EQ(edit_fault_text(executor.faulty_edit(), 40), "slot 31: x_m: the value is out of range");
   const std::vector<int32_t> other_slots{40}, good_slots{5};
   executor.set_state(state_edit(other_slots, {}, 40, {}));
-  EXPECT_EQ(edit_fault_text(executor.wrong_edit(), 40), "slot 31: x_m: the value is out of range")
+  EXPECT_EQ(edit_fault_text(executor.faulty_edit(), 40), "slot 31: x_m: the value is out of range")
       << "the first one stands";
   executor.set_state(state_edit(good_slots, std::vector<NamedArray>{{"x_m", Array(x_m.data(), {1}, {})}}, 40, {}));
   EXPECT_NE(executor.save(), before);
@@ -320,7 +320,7 @@ TEST(Phases, AnswerQueriesAsTheCpuExecutorDoes) {
     cpu->observe(drawn.queries, drawn.hidden, drawn.inserted, expected.view());
     other.observe(drawn.asked(answers.view()));
     EXPECT_EQ(testing::first_difference(expected.view(), answers.view()), "");
-    EXPECT_EQ(other.wrong_query(), kNoQueryFault);
+    EXPECT_EQ(other.faulty_query(), kNoQueryFault);
     expect_same_view(cpu.get(), &other);
   }
 }
@@ -334,7 +334,7 @@ TEST(Phases, RefuseAWrongQueryAndWriteNothing) {
   const auto text_after = [&] {
     executor.observe({queries, hidden, {}, answers.view()});
     EXPECT_EQ(testing::first_difference(answers.view(), untouched.view()), "");
-    return query_fault_text(executor.wrong_query(), 40);
+    return query_fault_text(executor.faulty_query(), 40);
   };
   queries[4].hidden_end = 2;
   queries[5].slot = 40;

@@ -166,9 +166,9 @@ class ShuffledExecutor {
     launch_reset(ShuffledLaunch{&random_}, arrays(), mask.data(), seed);
   }
   void set_state(const StateEdit& edit) { launch_edit(ShuffledLaunch{&random_}, arrays(), edit); }
-  int64_t wrong_edit() const { return wrong_edit_; }
+  int64_t faulty_edit() const { return faulty_edit_; }
   void observe(const ObservationQueries& asked) { launch_queries(ShuffledLaunch{&random_}, arrays(), asked); }
-  int64_t wrong_query() const { return wrong_query_; }
+  int64_t faulty_query() const { return faulty_query_; }
 
   template <typename CommandType>
   void step(const std::vector<CommandType>& commands) {
@@ -212,9 +212,9 @@ class ShuffledExecutor {
     arrays.rejected_slot = &rejected_slot_;
     arrays.rejected_command = &rejected_command_;
     arrays.first_element = first_element_.data();
-    arrays.wrong_element = &wrong_element_;
-    arrays.wrong_edit = &wrong_edit_;
-    arrays.wrong_query = &wrong_query_;
+    arrays.faulty_element = &wrong_element_;
+    arrays.faulty_edit = &faulty_edit_;
+    arrays.faulty_query = &faulty_query_;
     return arrays;
   }
 
@@ -235,8 +235,8 @@ class ShuffledExecutor {
   std::vector<uint8_t> began_, prepares_;
   std::vector<int32_t> first_element_;
   int32_t rejected_slot_ = 0, wrong_element_ = 0;
-  int64_t wrong_edit_ = kNothingWrong, wrong_query_ = kNoQueryFault;
-  int64_t rejected_command_ = kNothingRejected;
+  int64_t faulty_edit_ = kNoEditFault, faulty_query_ = kNoQueryFault;
+  int64_t rejected_command_ = kNoRejection;
 };
 
 }  // namespace pictura::testing

@@ -29,7 +29,7 @@ void expect_lane_keeping(const std::vector<std::string>& towns, float cyclist_fr
   for (const std::string& town : towns) {
     SCOPED_TRACE(town);
     const auto map = load_map(town);
-    int stops = 0, goals = 0, steps_astray = 0;
+    int stops = 0, goals = 0, steps_off_path = 0;
     double distance_m = 0;
     for (const DrivenEpisode& driven :
          drive_lane_keeping_episodes(map, {.num_threads = 1, .cyclist_fraction = cyclist_fraction},
@@ -37,12 +37,12 @@ void expect_lane_keeping(const std::vector<std::string>& towns, float cyclist_fr
       EXPECT_EQ(driven.halt_reason, kEventNone) << "at " << driven.end_m.x << ' ' << driven.end_m.y;
       stops += driven.stops;
       goals += driven.goals;
-      steps_astray += driven.steps_astray;
+      steps_off_path += driven.steps_off_path;
       distance_m += driven.distance_m;
     }
     EXPECT_GT(goals, drivers * steps / 1000);
     EXPECT_GT(distance_m, 0.25 * drivers * steps);
-    EXPECT_LT(steps_astray, 0.02 * drivers * steps);
+    EXPECT_LT(steps_off_path, 0.02 * drivers * steps);
     if (!map->lights.empty()) {
       EXPECT_GT(stops, 0) << "nobody ever waited at a red light";
     }
