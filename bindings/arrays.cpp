@@ -163,7 +163,7 @@ void drop_older(PyObject* capsule) {
   tensor->deleter(tensor);
 }
 
-[[noreturn]] void refuse(const std::string& message) {
+[[noreturn]] void throw_error(const std::string& message) {
   PyErr_SetString(PyExc_BufferError, message.c_str());
   throw py::error_already_set();
 }
@@ -174,7 +174,7 @@ constexpr const char* kStream = "a stream as int, or None";
 void order_before(const LentArray& lent, const py::object& stream) {
   if (lent.array.device.is_host()) {
     if (!stream.is_none() && cast_checked<int64_t>(stream, lent.what, kStream) != -1) {
-      refuse(fmt::format("{}: expected stream=None for an array on cpu", lent.what));
+      throw_error(fmt::format("{}: expected stream=None for an array on cpu", lent.what));
     }
     return;
   }
@@ -182,7 +182,7 @@ void order_before(const LentArray& lent, const py::object& stream) {
   const int64_t number = stream.is_none() ? 1 : cast_checked<int64_t>(stream, lent.what, kStream);
   if (number == -1) return;
   if (number == 0 || number < -1) {
-    refuse(fmt::format("{}: expected a stream of None, -1, 1, 2 or a cudaStream_t, got {}", lent.what, number));
+    throw_error(fmt::format("{}: expected a stream of None, -1, 1, 2 or a cudaStream_t, got {}", lent.what, number));
   }
   order_streams(lent.array.device, lent.stream, stream_of_number(number));
 #endif
@@ -195,22 +195,22 @@ py::object dlpack_of(const LentArray& lent, const py::object& stream, const py::
         cast_checked<std::pair<int32_t, int32_t>>(dl_device, lent.what, "dl_device (type, index), or None");
     const std::pair<int32_t, int32_t> own{lent.array.device.is_host() ? kCpu : kCuda, lent.array.device.index};
     if (wanted != own) {
-      refuse(fmt::format("{}: is on {}; expected dl_device ({}, {}), got ({}, {})", lent.what,
-                         name_of(lent.array.device), own.first, own.second, wanted.first, wanted.second));
+      throw_error(fmt::format("{}: is on {}; expected dl_device ({}, {}), got ({}, {})", lent.what,
+                              name_of(lent.array.device), own.first, own.second, wanted.first, wanted.second));
     }
   }
   const bool copies = !copy.is_none() && cast_checked<bool>(copy, lent.what, "copy=True, False or None");
   if (copies && !lent.array.device.is_host()) {
-    refuse(fmt::format("{}: is on {}, where pictura cannot copy it: pass copy=False or None, then copy the result",
-                       lent.what, name_of(lent.array.device)));
+    throw_error(fmt::format("{}: is on {}, where pictura cannot copy it: pass copy=False or None, then copy the result",
+                            lent.what, name_of(lent.array.device)));
   }
   const bool is_versioned = !max_version.is_none() && cast_checked<std::pair<uint32_t, uint32_t>>(
                                                           max_version, lent.what, "max_version (major, minor), or None")
                                                               .first >= 1;
   const bool is_read_only = lent.array.is_read_only && !copies;
   if (is_read_only && !is_versioned) {
-    refuse(fmt::format("{}: is read-only, which DLPack before 1.0 cannot express: pass max_version=(1, 0) or copy=True",
-                       lent.what));
+    throw_error(fmt::format(
+        "{}: is read-only, which DLPack before 1.0 cannot express: pass max_version=(1, 0) or copy=True", lent.what));
   }
   order_before(lent, stream);
   if (is_versioned) {

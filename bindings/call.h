@@ -136,11 +136,11 @@ auto run_to_an_orderly_end(std::string_view what, int num_threads, Device device
     }
     if (!raised && PyErr_CheckSignals() != 0) {
       raised = std::make_exception_ptr(py::error_already_set());
-      take_interrupt(SIGINT);
+      record_interrupt(SIGINT);
     }
   }
   if (raised) {
-    forget_interrupt();
+    clear_interrupt();
     std::rethrow_exception(raised);
   }
   return result.get();

@@ -75,25 +75,25 @@ std::string OptionsFunction::signature(const std::vector<Parameter>& parameters,
 
 void OptionsFunction::read(const py::args& by_place, const py::dict& by_name,
                            const std::vector<Parameter>& parameters) const {
-  const auto refuse = [this](const std::string& why) { throw py::type_error(fmt::format("{}() {}", name, why)); };
+  const auto throw_error = [this](const std::string& why) { throw py::type_error(fmt::format("{}() {}", name, why)); };
   std::vector<std::string> known;
   for (const Parameter& parameter : parameters) known.push_back(parameter.name);
   for (const auto& [key, value] : by_name) {
     const auto given = py::cast<std::string>(key);
     if (std::find(known.begin(), known.end(), given) != known.end()) continue;
-    refuse(fmt::format("got an unexpected keyword argument '{}'{}", given, suggestion(given, known)));
+    throw_error(fmt::format("got an unexpected keyword argument '{}'{}", given, suggestion(given, known)));
   }
   if (by_place.size() > required.size()) {
-    refuse(fmt::format("takes {} positional arguments, got {}", required.size(), by_place.size()));
+    throw_error(fmt::format("takes {} positional arguments, got {}", required.size(), by_place.size()));
   }
   for (const Parameter& parameter : parameters) {
     const size_t place = std::find(required.begin(), required.end(), parameter.name) - required.begin();
     const bool is_named = by_name.contains(parameter.name), is_placed = place < by_place.size();
-    if (is_named && is_placed) refuse(fmt::format("got two values for '{}'", parameter.name));
+    if (is_named && is_placed) throw_error(fmt::format("got two values for '{}'", parameter.name));
     if (is_named) parameter.set(by_name[parameter.name.c_str()]);
     if (is_placed) parameter.set(by_place[place]);
     if (!is_named && !is_placed && place < required.size()) {
-      refuse(fmt::format("is missing the argument '{}'", parameter.name));
+      throw_error(fmt::format("is missing the argument '{}'", parameter.name));
     }
   }
 }

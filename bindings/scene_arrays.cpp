@@ -69,16 +69,16 @@ class ArrayReader {
   std::string place(const char* key, py::ssize_t index) const { return fmt::format("{}[{}]", place(key), index); }
 
   /// Reads finite numbers in [least, largest]; rows whose `where` is 0 may hold anything.
-  Numbers<double> numbers(const char* key, const Shape& shape, double least = -1e9, double largest = 1e9,
+  Numbers<double> numbers(const char* key, const Shape& shape, double minimum = -1e9, double largest = 1e9,
                           const uint8_t* where = nullptr) const {
     const Numbers<double> array = read<double>(key, shape, "biuf", "numbers");
     const py::ssize_t row = array.ndim() > 2 ? array.shape(array.ndim() - 1) : 1;
     for (py::ssize_t i = 0; i < array.size(); ++i) {
       if (where && !where[i / row]) continue;
       const double value = array.data()[i];
-      if (value >= least && value <= largest) continue;
+      if (value >= minimum && value <= largest) continue;
       if (!std::isfinite(value)) fail_usage("{}: expected a finite number, got {}", element(key, array, i), value);
-      fail_usage("{}: expected a number in [{:g}, {:g}], got {:g}", element(key, array, i), least, largest, value);
+      fail_usage("{}: expected a number in [{:g}, {:g}], got {:g}", element(key, array, i), minimum, largest, value);
     }
     return array;
   }
@@ -114,12 +114,12 @@ class ArrayReader {
     const Numbers<int64_t> array = integers(key, {items == kAnyLength ? kAnyLength : items + 1});
     if (array.size() == 0) fail_usage("{}: expected at least [0], got an empty array", place(key));
     for (py::ssize_t i = 0; i < array.size(); ++i) {
-      const int64_t least = i == 0 ? 0 : array.data()[i - 1];
+      const int64_t minimum = i == 0 ? 0 : array.data()[i - 1];
       const int64_t most = i == 0 ? 0 : total;
       const bool is_last = i + 1 == array.size();
-      if (array.data()[i] >= least && array.data()[i] <= most && (!is_last || array.data()[i] == total)) continue;
+      if (array.data()[i] >= minimum && array.data()[i] <= most && (!is_last || array.data()[i] == total)) continue;
       fail_usage("{}: expected {}, got {}", place(key, i),
-                 is_last ? fmt::format("{}, the number of elements", total) : fmt::format("{} to {}", least, most),
+                 is_last ? fmt::format("{}, the number of elements", total) : fmt::format("{} to {}", minimum, most),
                  array.data()[i]);
     }
     return array;

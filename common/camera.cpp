@@ -74,7 +74,7 @@ Rig read_cameras(TomlFields* fields_inout) {
     Camera camera;
     camera.name = row.file_name("name", fmt::format("camera{}", rig.cameras.size()));
     row.rename(fmt::format("camera {} '{}'", rig.cameras.size(), camera.name));
-    if (!names.insert(camera.name).second) row.refuse("name", fmt::format("'{}' is already used", camera.name));
+    if (!names.insert(camera.name).second) row.throw_error("name", fmt::format("'{}' is already used", camera.name));
     camera.width_px = row.integer("width_px", kSize_px);
     camera.height_px = row.integer("height_px", kSize_px);
     camera.focal_x_px = camera.focal_y_px = row.number("focal_px", kFocal_px);

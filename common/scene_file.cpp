@@ -93,19 +93,19 @@ void read_line(TomlFields* row, std::vector<Strip>* strips_out) {
                                   : kind == StripKind::stop_line ? kStopLineColor
                                                                  : white_or_yellow);
   if (row->has("color") && (kind != StripKind::lane_mark || row->has("color_rgb"))) {
-    row->refuse("color", "is for lane marks without color_rgb");
+    row->throw_error("color", "is for lane marks without color_rgb");
   }
   const float width_m = row->number("width_m", kSize_m);
   std::vector<Vec3> points_m = row->points("points_m", kCoordinate_m, 2);
   if (row->flag("closed", false)) points_m.push_back(points_m.front());
   float length_m = 0;
   for (std::size_t i = 1; i < points_m.size(); ++i) length_m += length(points_m[i] - points_m[i - 1]);
-  if (length_m > kMaxLine_m) row->refuse("points_m", fmt::format("expected at most {} m of line", kMaxLine_m));
+  if (length_m > kMaxLine_m) row->throw_error("points_m", fmt::format("expected at most {} m of line", kMaxLine_m));
   const int style = row->choice("style", kStyles, solid);
   for (const char* key : {"dash_m", "gap_m"}) {
-    if (row->has(key) && style != broken) row->refuse(key, "is for broken lines");
+    if (row->has(key) && style != broken) row->throw_error(key, "is for broken lines");
   }
-  if (row->has("spacing_m") && style != twofold) row->refuse("spacing_m", "is for double lines");
+  if (row->has("spacing_m") && style != twofold) row->throw_error("spacing_m", "is for double lines");
   std::vector<Strip> strips;
   if (style == broken) {
     const float dash_m = row->number("dash_m", {0.1, 1e3}), gap_m = row->number("gap_m", {0.1, 1e3});
@@ -113,7 +113,7 @@ void read_line(TomlFields* row, std::vector<Strip>* strips_out) {
   } else {
     append_strips(points_m, width_m, color, kind, &strips);
   }
-  if (strips.empty()) row->refuse("points_m", "expected points at different places");
+  if (strips.empty()) row->throw_error("points_m", "expected points at different places");
   if (style == twofold) {
     const float aside_m = 0.5f * row->number("spacing_m", kSize_m);
     const std::vector<Strip> right = moved_aside(strips, -aside_m);
@@ -121,7 +121,7 @@ void read_line(TomlFields* row, std::vector<Strip>* strips_out) {
     strips.insert(strips.end(), right.begin(), right.end());
   }
   if (strips_out->size() + strips.size() > kMaxStrips) {
-    row->refuse("points_m", fmt::format("expected at most {} pieces of lines in a scene", kMaxStrips));
+    row->throw_error("points_m", fmt::format("expected at most {} pieces of lines in a scene", kMaxStrips));
   }
   strips_out->insert(strips_out->end(), strips.begin(), strips.end());
 }
@@ -132,7 +132,7 @@ void read_wall(TomlFields* row, std::vector<WallFace>* walls_out) {
   const Rgb color = color_of(row, kWallColor);
   for (std::size_t i = 1; i < points_m.size(); ++i) {
     if (length(points_m[i].xy() - points_m[i - 1].xy()) < 1e-3f) {
-      row->refuse("points_m", fmt::format("points {} and {} are at the same place", i - 1, i));
+      row->throw_error("points_m", fmt::format("points {} and {} are at the same place", i - 1, i));
     }
     walls_out->push_back({points_m[i - 1], points_m[i], height_m, color});
   }
@@ -155,17 +155,17 @@ View read_view(TomlFields* row, SceneOwner* scene_inout) {
   const Vec3 origin_m = position_of(row);
   View view = make_view(origin_m, radians_of(row->number("heading_deg", kHeading_deg)));
   if (row->has("ego")) {
-    if (scene_inout->agents.empty()) row->refuse("ego", "the scene has no agents");
+    if (scene_inout->agents.empty()) row->throw_error("ego", "the scene has no agents");
     view.ego_agent = row->integer("ego", agent_index);
     view.body_length_m = scene_inout->agents[view.ego_agent].length_m;
   }
   view.body_length_m = row->number("body_length_m", kSize_m, view.body_length_m);
   view.hidden_begin = static_cast<int32_t>(scene_inout->hidden_agents.size());
   if (row->has("hidden")) {
-    if (scene_inout->agents.empty()) row->refuse("hidden", "the scene has no agents");
+    if (scene_inout->agents.empty()) row->throw_error("hidden", "the scene has no agents");
     std::set<int> hidden;
     for (const int agent : row->integers("hidden", agent_index, {})) {
-      if (!hidden.insert(agent).second) row->refuse("hidden", fmt::format("agent {} is listed twice", agent));
+      if (!hidden.insert(agent).second) row->throw_error("hidden", fmt::format("agent {} is listed twice", agent));
       scene_inout->hidden_agents.push_back(agent);
     }
   }
@@ -177,23 +177,23 @@ void read_views(TomlFields* root, SceneFile* out) {
   std::set<std::string> names;
   for (TomlFields& row : root->tables("view")) {
     const std::string name = row.file_name("name", fmt::format("view{}", out->views.size()));
-    if (!names.insert(name).second) row.refuse("name", fmt::format("'{}' is already used", name));
+    if (!names.insert(name).second) row.throw_error("name", fmt::format("'{}' is already used", name));
     out->view_names.push_back(name);
     out->view_captions.push_back(row.text("caption", name));
     out->views.push_back(read_view(&row, &out->scene));
     row.refuse_unknown();
   }
-  if (out->views.empty()) root->refuse("view", "expected one or more [[view]] tables");
-  if (out->views.size() > kMaxViews) root->refuse("view", fmt::format("expected at most {} views", kMaxViews));
+  if (out->views.empty()) root->throw_error("view", "expected one or more [[view]] tables");
+  if (out->views.size() > kMaxViews) root->throw_error("view", fmt::format("expected at most {} views", kMaxViews));
 }
 
 Rig read_rig(TomlFields* root, const std::string& source, const std::string& folder) {
   const Rig rig = read_cameras(root);
   const bool has_cameras = root->has("camera"), in_file = root->has("rig");
-  if (has_cameras && rig.cameras.empty()) root->refuse("camera", "expected one or more [[camera]] tables");
-  if (in_file && has_cameras) root->refuse("rig", "has no effect with [[camera]] tables");
+  if (has_cameras && rig.cameras.empty()) root->throw_error("camera", "expected one or more [[camera]] tables");
+  if (in_file && has_cameras) root->throw_error("rig", "has no effect with [[camera]] tables");
   for (const char* key : {"size_px", "square_pixels"}) {
-    if (root->has(key) && (has_cameras || in_file)) root->refuse(key, "is only for the paper's cameras");
+    if (root->has(key) && (has_cameras || in_file)) root->throw_error(key, "is only for the paper's cameras");
   }
   if (in_file) {
     const std::string path = (std::filesystem::path(folder) / root->text("rig", "")).string();
@@ -206,7 +206,7 @@ Rig read_rig(TomlFields* root, const std::string& source, const std::string& fol
   if (has_cameras) return rig;
   const bool square_pixels = root->flag("square_pixels", false);
   const std::vector<int> size_px = root->integers("size_px", {1, 8192}, {96, 54});
-  if (size_px.size() != 2) root->refuse("size_px", "expected [width, height]");
+  if (size_px.size() != 2) root->throw_error("size_px", "expected [width, height]");
   return paper_rig(size_px[0], size_px[1], square_pixels);
 }
 
@@ -223,7 +223,7 @@ SceneFile parse_scene(const std::string& text, const std::string& source, const 
     out.scene.agents.push_back(read_agent(&row));
     row.refuse_unknown();
   }
-  if (out.scene.agents.size() > kMaxAgents) root.refuse("agent", fmt::format("expected at most {}", kMaxAgents));
+  if (out.scene.agents.size() > kMaxAgents) root.throw_error("agent", fmt::format("expected at most {}", kMaxAgents));
   for (TomlFields& row : root.tables("line")) {
     read_line(&row, &out.geometry.strips);
     row.refuse_unknown();

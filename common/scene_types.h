@@ -135,7 +135,7 @@ PICTURA_HD inline bool has_finite_pose(const View& view) {
   return is_finite(view.origin_m) && is_direction(view.cos_heading, view.sin_heading) && view.body_length_m >= 0.0f &&
          is_finite(view.body_length_m);
 }
-PICTURA_HD inline bool hides_within(const View& view, size_t hidden_agents) {
+PICTURA_HD inline bool has_valid_hidden_range(const View& view, size_t hidden_agents) {
   return view.hidden_begin >= 0 && view.hidden_begin <= view.hidden_end &&
          static_cast<size_t>(view.hidden_end) <= hidden_agents;
 }

@@ -42,7 +42,8 @@ class Reader {
   template <typename Int>
   void value_unless(const std::string& other, bool is_set, const std::string& key, Int& its_value, int64_t low,
                     int64_t high) {
-    if (find(key) && is_set) refuse(key, fmt::format("has no effect together with {}: omit one of the two", other));
+    if (find(key) && is_set)
+      throw_error(key, fmt::format("has no effect together with {}: omit one of the two", other));
     value(key, its_value, low, high);
   }
 
@@ -53,7 +54,7 @@ class Reader {
 
   void value(const std::string& key, bool& value) {
     if (const toml::node* node = find(key)) {
-      if (!node->is_boolean()) refuse(key, *node, "expected true or false");
+      if (!node->is_boolean()) throw_error(key, *node, "expected true or false");
       value = node->as_boolean()->get();
     }
   }
@@ -73,7 +74,7 @@ class Reader {
   void device(const std::string& key, std::string& value) {
     if (const toml::node* node = find(key)) {
       value = text_of(key, *node);
-      if (!is_device(value)) refuse(key, *node, fmt::format("expected one of {}", kDevices));
+      if (!is_device(value)) throw_error(key, *node, fmt::format("expected one of {}", kDevices));
     }
   }
 
@@ -81,7 +82,7 @@ class Reader {
     if (const toml::node* node = find(key)) {
       const std::string text = node->is_integer() ? fmt::format("{}", node->as_integer()->get()) : text_of(key, *node);
       const std::optional<PixelSamples> parsed = parse_pixel_samples(text);
-      if (!parsed) refuse(key, *node, fmt::format("expected {}", kPixelSamplesExpected));
+      if (!parsed) throw_error(key, *node, fmt::format("expected {}", kPixelSamplesExpected));
       value = *parsed;
     }
   }
@@ -92,7 +93,7 @@ class Reader {
     if (!node) return;
     const toml::node *new_simulator = find("simulator.backend"), *new_renderer = find("render.backend");
     if (new_simulator && new_renderer) {
-      refuse(key, "has no effect together with simulator.backend and render.backend: omit it");
+      throw_error(key, "has no effect together with simulator.backend and render.backend: omit it");
     }
     std::string its_name;
     name(key, its_name, renderer_names());
@@ -104,7 +105,7 @@ class Reader {
   /// Reads the old unit of the schedule, in updates of at most agent_steps_per_update each.
   void old_schedule(const std::string& key, int64_t agent_steps_per_update, int64_t& schedule_agent_steps) {
     if (!find(key)) return;
-    if (find("train.schedule_agent_steps")) refuse(key, "has no effect together with train.schedule_agent_steps");
+    if (find("train.schedule_agent_steps")) throw_error(key, "has no effect together with train.schedule_agent_steps");
     constexpr int64_t kMost = int64_t{1} << 60;
     int64_t updates = 0;
     value(key, updates, 1, int64_t{1} << 40);
@@ -118,7 +119,7 @@ class Reader {
     std::ostringstream value;
     value << toml::json_formatter(*node);
     if (value.str() == key.value) return;
-    refuse(key.name, fmt::format("expected {}, got {}: {}", key.value, value.str(), key.reason));
+    throw_error(key.name, fmt::format("expected {}, got {}: {}", key.value, value.str(), key.reason));
   }
 
   /// Reads a list that may be empty if its default is empty.
@@ -144,11 +145,11 @@ class Reader {
     const toml::node* node = find(key);
     if (!node) return;
     const std::string expected = fmt::format("expected {}", kSizeChangesExpected);
-    if (!node->is_array()) refuse(key, *node, expected);
+    if (!node->is_array()) throw_error(key, *node, expected);
     value.clear();
     for (const toml::node& element : *node->as_array()) {
       const toml::array* const change = element.as_array();
-      if (!change || (change->size() != 3 && change->size() != 5)) refuse(key, *node, expected);
+      if (!change || (change->size() != 3 && change->size() != 5)) throw_error(key, *node, expected);
       constexpr int64_t kMostPixels = 8192;
       value.push_back({integer_of(key, (*change)[0], 1, int64_t{1} << 60),
                        static_cast<int>(integer_of(key, (*change)[1], 1, kMostPixels)),
@@ -158,7 +159,7 @@ class Reader {
         value.back().line_floor_px = number_of(key, (*change)[4], 0, kMaxLineFloor_px);
       }
       if (value.size() > 1 && value.back().agent_steps <= value[value.size() - 2].agent_steps) {
-        refuse(key, *node, "expected ascending agent_steps");
+        throw_error(key, *node, "expected ascending agent_steps");
       }
     }
   }
@@ -176,13 +177,13 @@ class Reader {
   void range(const std::string& key, ConditioningRange& value) {
     if (const toml::node* node = find(key)) {
       const toml::array& pair = elements_of(key, *node);
-      if (pair.size() != 2) refuse(key, *node, "expected [low, high]");
+      if (pair.size() != 2) throw_error(key, *node, "expected [low, high]");
       value.low = static_cast<float>(number_of(key, pair[0], -kMaxConditioning, kMaxConditioning));
       value.high = static_cast<float>(number_of(key, pair[1], -kMaxConditioning, kMaxConditioning));
-      if (value.low > value.high) refuse(key, *node, "expected low <= high");
+      if (value.low > value.high) throw_error(key, *node, "expected low <= high");
       const bool is_fixed = value.low == value.high;
       if (value.mixture && !(value.low > 0 && (is_fixed || (value.low <= 1 && value.high >= 1)))) {
-        refuse(key, *node, "expected 0 < low <= 1 <= high, or low = high > 0");
+        throw_error(key, *node, "expected 0 < low <= 1 <= high, or low = high > 0");
       }
     }
   }
@@ -199,10 +200,10 @@ class Reader {
     }
   }
 
-  [[noreturn]] void refuse(const std::string& key, const toml::node& node, const std::string& expected) const {
-    refuse(key, fmt::format("{}, got {}", expected, shown(node)));
+  [[noreturn]] void throw_error(const std::string& key, const toml::node& node, const std::string& expected) const {
+    throw_error(key, fmt::format("{}, got {}", expected, format_value(node)));
   }
-  [[noreturn]] void refuse(const std::string& key, const std::string& message) const {
+  [[noreturn]] void throw_error(const std::string& key, const std::string& message) const {
     if (overridden_.count(key)) fail("--set {}: {}", key, message);
     const toml::node* node = table_.at_path(key).node();
     fail("{}: {}: {}", node ? line_of(*node) : source_, key, message);
@@ -211,8 +212,8 @@ class Reader {
  private:
   [[noreturn]] void refuse_name(const std::string& key, const toml::node& node, const std::string& name,
                                 const std::vector<std::string>& known) const {
-    refuse(key,
-           fmt::format("expected one of {}, got {}{}", fmt::join(known, ", "), shown(node), suggestion(name, known)));
+    throw_error(key, fmt::format("expected one of {}, got {}{}", fmt::join(known, ", "), format_value(node),
+                                 suggestion(name, known)));
   }
 
   const toml::node* find(const std::string& key) {
@@ -233,7 +234,7 @@ class Reader {
   int64_t integer_of(const std::string& key, const toml::node& node, int64_t low, int64_t high) const {
     const std::optional<int64_t> number = whole_number(node);
     if (!number || *number < low || *number > high) {
-      refuse(key, node, fmt::format("expected an integer in [{}, {}]", low, high));
+      throw_error(key, node, fmt::format("expected an integer in [{}, {}]", low, high));
     }
     return *number;
   }
@@ -241,7 +242,7 @@ class Reader {
   double number_of(const std::string& key, const toml::node& node, double low, double high) const {
     const auto number = node.value<double>();
     if (!number || !(*number >= low && *number <= high)) {
-      refuse(key, node, fmt::format("expected a number in [{}, {}]", text_of_number(low), text_of_number(high)));
+      throw_error(key, node, fmt::format("expected a number in [{}, {}]", text_of_number(low), text_of_number(high)));
     }
     return *number;
   }
@@ -255,12 +256,13 @@ class Reader {
   }
 
   std::string text_of(const std::string& key, const toml::node& node) const {
-    if (!node.is_string()) refuse(key, node, "expected a string");
+    if (!node.is_string()) throw_error(key, node, "expected a string");
     return node.as_string()->get();
   }
 
   const toml::array& elements_of(const std::string& key, const toml::node& node) const {
-    if (!node.is_array() || node.as_array()->empty()) refuse(key, node, "expected a list with one element or more");
+    if (!node.is_array() || node.as_array()->empty())
+      throw_error(key, node, "expected a list with one element or more");
     return *node.as_array();
   }
 
@@ -342,16 +344,17 @@ void check_patch_changes(const Config& c, const Reader& reader) {
   for (const RenderSection::SizeChange& change : c.render.schedule) {
     const ImageSize next{change.width_px, change.height_px};
     if (change.has_patches() && c.policy.backbone != "conv") {
-      reader.refuse("render.schedule", "patches have no effect with a program in policy.backbone");
+      reader.throw_error("render.schedule", "patches have no effect with a program in policy.backbone");
     }
     if (change.has_patches() && change.patch_px != patch_px) {
       const int factor = whole_factor(size, next);
       if (factor == 0 || change.patch_px != factor * patch_px) {
-        reader.refuse("render.schedule",
-                      fmt::format("from {} agent-steps on: expected images and patches that are both the same integer "
-                                  "multiple of {}x{} in patches of {}, got {}x{} in patches of {}",
-                                  change.agent_steps, size.width_px, size.height_px, patch_px, next.width_px,
-                                  next.height_px, change.patch_px));
+        reader.throw_error(
+            "render.schedule",
+            fmt::format("from {} agent-steps on: expected images and patches that are both the same integer "
+                        "multiple of {}x{} in patches of {}, got {}x{} in patches of {}",
+                        change.agent_steps, size.width_px, size.height_px, patch_px, next.width_px, next.height_px,
+                        change.patch_px));
       }
       patch_px = change.patch_px;
     }
@@ -361,25 +364,25 @@ void check_patch_changes(const Config& c, const Reader& reader) {
 
 void check_contradictions(const Config& c, const Reader& reader) {
   if (c.simulator.min_agents > c.simulator.max_agents) {
-    reader.refuse("simulator.min_agents", fmt::format("expected at most simulator.max_agents ({}), got {}",
-                                                      c.simulator.max_agents, c.simulator.min_agents));
+    reader.throw_error("simulator.min_agents", fmt::format("expected at most simulator.max_agents ({}), got {}",
+                                                           c.simulator.max_agents, c.simulator.min_agents));
   }
   if (c.simulator.pedestrian_fraction + c.simulator.cyclist_fraction > 1) {
-    reader.refuse("simulator.pedestrian_fraction",
-                  fmt::format("expected at most 1 together with simulator.cyclist_fraction, got {} + {}",
-                              c.simulator.pedestrian_fraction, c.simulator.cyclist_fraction));
+    reader.throw_error("simulator.pedestrian_fraction",
+                       fmt::format("expected at most 1 together with simulator.cyclist_fraction, got {} + {}",
+                                   c.simulator.pedestrian_fraction, c.simulator.cyclist_fraction));
   }
   const std::string policies = "simulator.others.policies";
   if (c.simulator.other_policies.size() > kMaxOtherPolicies) {
-    reader.refuse(policies, fmt::format("expected at most {} policies, got {}", kMaxOtherPolicies,
-                                        c.simulator.other_policies.size()));
+    reader.throw_error(policies, fmt::format("expected at most {} policies, got {}", kMaxOtherPolicies,
+                                             c.simulator.other_policies.size()));
   }
   const OtherShares& others = c.simulator.others;
   double shares = static_cast<double>(others.sum());
   for (const std::string& text : c.simulator.other_policies) {
     const std::optional<NamedShare> policy = parse_share(text);
     if (!policy) {
-      reader.refuse(
+      reader.throw_error(
           policies,
           fmt::format("expected a policy's file and its share above 0, for instance models/vector.safetensors=0.1, "
                       "got '{}'",
@@ -388,7 +391,7 @@ void check_contradictions(const Config& c, const Reader& reader) {
     shares += policy->share;
   }
   if (shares >= 1) {
-    reader.refuse(
+    reader.throw_error(
         "simulator.others",
         fmt::format("expected shares that sum to less than 1, since the other agents learn, got {:.6g}", shares));
   }
@@ -396,63 +399,64 @@ void check_contradictions(const Config& c, const Reader& reader) {
   for (const auto& [key, values] : {std::pair{"policy.conv_kernels", &c.policy.conv_kernels},
                                     std::pair{"policy.conv_strides", &c.policy.conv_strides}}) {
     if (values->size() != layers) {
-      reader.refuse(key,
-                    fmt::format("expected {} values, as many as policy.conv_channels, got {}", layers, values->size()));
+      reader.throw_error(
+          key, fmt::format("expected {} values, as many as policy.conv_channels, got {}", layers, values->size()));
     }
   }
   if (c.train.num_steps % c.policy.decision_steps != 0) {
-    reader.refuse("train.num_steps", fmt::format("expected a multiple of policy.decision_steps ({}), got {}",
-                                                 c.policy.decision_steps, c.train.num_steps));
+    reader.throw_error("train.num_steps", fmt::format("expected a multiple of policy.decision_steps ({}), got {}",
+                                                      c.policy.decision_steps, c.train.num_steps));
   }
   if (c.policy.decision_steps > 1 && c.train.halted_slots == HaltedSlots::draw) {
-    reader.refuse("train.halted_slots", "\"draw\" expects policy.decision_steps = 1");
+    reader.throw_error("train.halted_slots", "\"draw\" expects policy.decision_steps = 1");
   }
   for (const int kernel : c.policy.conv_kernels) {
-    if (kernel % 2 == 0) reader.refuse("policy.conv_kernels", fmt::format("expected odd sizes, got {}", kernel));
+    if (kernel % 2 == 0) reader.throw_error("policy.conv_kernels", fmt::format("expected odd sizes, got {}", kernel));
   }
   if (!c.render.schedule.empty() && !c.render.rig.empty()) {
-    reader.refuse("render.schedule", "has no effect together with render.rig, whose file gives the sizes");
+    reader.throw_error("render.schedule", "has no effect together with render.rig, whose file gives the sizes");
   }
   if (!c.render.schedule.empty() && !c.reads_images()) {
-    reader.refuse("render.schedule", "has no effect with the modality \"vector\", which reads no images");
+    reader.throw_error("render.schedule", "has no effect with the modality \"vector\", which reads no images");
   }
   if (c.policy.backbone != "conv" && !c.reads_images()) {
-    reader.refuse("policy.backbone", "has no effect with the modality \"vector\", which reads no images");
+    reader.throw_error("policy.backbone", "has no effect with the modality \"vector\", which reads no images");
   }
   if (c.policy.backbone == "conv" && c.policy.conv_channels.back() % c.policy.attention_heads != 0) {
-    reader.refuse("policy.attention_heads",
-                  fmt::format("expected a divisor of the last of policy.conv_channels ({}), got {}",
-                              c.policy.conv_channels.back(), c.policy.attention_heads));
+    reader.throw_error("policy.attention_heads",
+                       fmt::format("expected a divisor of the last of policy.conv_channels ({}), got {}",
+                                   c.policy.conv_channels.back(), c.policy.attention_heads));
   }
   if (c.policy.auxiliary && c.policy.modality == Modality::perspective) {
-    reader.refuse("policy.auxiliary",
-                  "has no effect with the modality \"perspective\": images have no auxiliary slots");
+    reader.throw_error("policy.auxiliary",
+                       "has no effect with the modality \"perspective\": images have no auxiliary slots");
   }
   if (c.policy.segment_features && c.policy.modality == Modality::perspective) {
-    reader.refuse("policy.segment_features",
-                  "has no effect with the modality \"perspective\", which reads no segments");
+    reader.throw_error("policy.segment_features",
+                       "has no effect with the modality \"perspective\", which reads no segments");
   }
   if (c.simulator.wall_observations && c.policy.modality == Modality::perspective) {
-    reader.refuse("simulator.wall_observations",
-                  "has no effect with the modality \"perspective\": such a policy observes walls in its images");
+    reader.throw_error("simulator.wall_observations",
+                       "has no effect with the modality \"perspective\": such a policy observes walls in its images");
   }
   if (c.train.decay_agent_steps > c.train.schedule_agent_steps) {
-    reader.refuse("train.decay_agent_steps", fmt::format("expected at most train.schedule_agent_steps ({}), got {}",
-                                                         c.train.schedule_agent_steps, c.train.decay_agent_steps));
+    reader.throw_error("train.decay_agent_steps",
+                       fmt::format("expected at most train.schedule_agent_steps ({}), got {}",
+                                   c.train.schedule_agent_steps, c.train.decay_agent_steps));
   }
   if (c.train.halted_slots == HaltedSlots::draw && c.train.adv_filter == FilterThreshold::quantile) {
-    reader.refuse("train.halted_slots",
-                  "\"draw\" uses every transition: expected train.adv_filter = \"maximum\", got \"quantile\"");
+    reader.throw_error("train.halted_slots",
+                       "\"draw\" uses every transition: expected train.adv_filter = \"maximum\", got \"quantile\"");
   }
   if (c.train.halted_slots == HaltedSlots::draw && c.train.adv_filter_threshold > 0) {
-    reader.refuse("train.halted_slots",
-                  fmt::format("\"draw\" uses every transition: expected train.adv_filter_threshold = 0, got {}",
-                              shortest(c.train.adv_filter_threshold)));
+    reader.throw_error("train.halted_slots",
+                       fmt::format("\"draw\" uses every transition: expected train.adv_filter_threshold = 0, got {}",
+                                   shortest(c.train.adv_filter_threshold)));
   }
   if (c.render.samples != PixelSamples{} && !c.render.backend.starts_with("gl")) {
-    reader.refuse("render.samples", fmt::format("expected one sample with render.backend \"{}\", got {}: only gl "
-                                                "supports samples; the other renderers compute exact coverage",
-                                                c.render.backend, text_of(c.render.samples)));
+    reader.throw_error("render.samples", fmt::format("expected one sample with render.backend \"{}\", got {}: only gl "
+                                                     "supports samples; the other renderers compute exact coverage",
+                                                     c.render.backend, text_of(c.render.samples)));
   }
 }
 
@@ -478,15 +482,15 @@ Config parse(const std::string& text, const std::string& source, const std::vect
   try {
     config.simulator.maps = expand_map_names(config.simulator.maps);
   } catch (const UsageError& error) {
-    reader.refuse("simulator.maps", error.what());
+    reader.throw_error("simulator.maps", error.what());
   }
   check_contradictions(config, reader);
   // A saved configuration has the sizes in force, which differ from those at the start of the schedule.
   if (!any_name) check_patch_changes(config, reader);
   // Earlier versions accepted such values, so saved configurations may contain them.
   if (!any_name && config.simulator.min_agents > config.simulator.num_slots) {
-    reader.refuse("simulator.min_agents", fmt::format("expected at most simulator.num_slots ({}), got {}",
-                                                      config.simulator.num_slots, config.simulator.min_agents));
+    reader.throw_error("simulator.min_agents", fmt::format("expected at most simulator.num_slots ({}), got {}",
+                                                           config.simulator.num_slots, config.simulator.min_agents));
   }
   return config;
 }

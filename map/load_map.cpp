@@ -111,7 +111,7 @@ RoadMap load_file(const std::string& name, const OpenDriveOptions& options, cons
     report->cache_rejection = rejection.what();
   }
   RoadMap map = import();
-  try_to_cache(cache_path, encode_map(map, key));
+  write_to_cache(cache_path, encode_map(map, key));
   return map;
 }
 

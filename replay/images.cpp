@@ -174,13 +174,13 @@ class PixelCoder {
  private:
   /// Returns the nearest hue that matches the pixel up to rounding, else kFree.
   int hue_of(Pixel pixel) const {
-    int best = kFree, least = 4;
+    int best = kFree, minimum = 4;
     for (size_t i = 0; i < hues_.size(); ++i) {
       const Pixel guess = shade(hues_[i], pixel.highest());
       const int r = std::abs(guess.r - pixel.r), g = std::abs(guess.g - pixel.g), b = std::abs(guess.b - pixel.b);
-      if (std::max({r, g, b}) > 1 || r + g + b >= least) continue;
+      if (std::max({r, g, b}) > 1 || r + g + b >= minimum) continue;
       best = static_cast<int>(i);
-      least = r + g + b;
+      minimum = r + g + b;
     }
     return best;
   }

@@ -57,7 +57,7 @@ void ImageDrawer::make_strips() {
     const Strip* eight[kLanes];
     for (int lane = 0; lane < kLanes; ++lane) eight[lane] = &strips[strips_[begin + (lane < count ? lane : 0)]];
     const StripsX8 made = set_up_strips(setting_, eight);
-    for (unsigned lanes = (made.visible | made.crossing) & first_of_eight(count); lanes != 0; lanes &= lanes - 1) {
+    for (unsigned lanes = (made.visible | made.crossing) & first_lanes_mask(count); lanes != 0; lanes &= lanes - 1) {
       const int lane = std::countr_zero(lanes);
       const Strip& strip = *eight[lane];
       const PrimitiveRef primitive = strip_ref(strip, strips_[begin + lane]);
@@ -198,9 +198,9 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
           fragments_.resize(2 * fragments_.size() + 2 * kLanes);
         }
         const unsigned passing =
-            first_of_eight(spans.end[lane] - x) & passes_occluder_bound_x8(face, &occluder_bounds_[row + x], x, y);
+            first_lanes_mask(spans.end[lane] - x) & passes_occluder_bound_x8(face, &occluder_bounds_[row + x], x, y);
         const unsigned full =
-            passing & first_of_eight(spans.full_end[lane] - x) & ~first_of_eight(spans.full_begin[lane] - x);
+            passing & first_lanes_mask(spans.full_end[lane] - x) & ~first_lanes_mask(spans.full_begin[lane] - x);
         for (unsigned lanes = full; lanes != 0; lanes &= lanes - 1) {
           add(row + x + std::countr_zero(lanes), {1.0f, kAllSamples});
         }
@@ -407,9 +407,9 @@ void ImageDrawer::draw_planes(const ImageTarget& target) const {
       for (int x = face.box.x_begin; x < face.box.x_end; ++x) {
         const Vec2 center = pixel_center(x, y);
         FrontFace& front = fronts[x];
-        if (is_again && !front.wants_again()) continue;
+        if (is_again && !front.needs_second_pass()) continue;
         if (!covers_point(edges_.at(face.edge_begin), face.edge_count, center.x, center.y)) continue;
-        is_again ? front.offer_again(face, center) : front.offer(face, center);
+        is_again ? front.add_second_pass(face, center) : front.offer(face, center);
       }
     }
   };

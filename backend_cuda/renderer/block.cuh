@@ -107,7 +107,8 @@ __device__ inline bool set_view(ViewState* state, const DrawTask& task, int32_t 
   }
   const GeometryHandle handle = task.scene.geometry[view.world];
   if (handle < 0 || handle >= task.num_geometries) return fault(FaultKind::bad_geometry);
-  if (!has_finite_pose(view) || !hides_within(view, task.scene.hidden_agents.size())) return fault(FaultKind::bad_pose);
+  if (!has_finite_pose(view) || !has_valid_hidden_range(view, task.scene.hidden_agents.size()))
+    return fault(FaultKind::bad_pose);
   const size_t world = static_cast<size_t>(view.world);
   state->geometry = task.geometries + handle;
   state->world_begin = task.scene.world_begin[world];

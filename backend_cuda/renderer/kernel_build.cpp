@@ -184,7 +184,7 @@ KernelCode build_kernels(const KernelProgram& program, const KernelTarget& targe
   if (!code.bytes.empty()) return code;
   code.cached = false;
   code.bytes = compile(nvrtc, program, compilation);
-  if (!path.empty()) try_to_cache(path, header_of(compilation.key, code.bytes) + code.bytes);
+  if (!path.empty()) write_to_cache(path, header_of(compilation.key, code.bytes) + code.bytes);
   return code;
 }
 

@@ -44,7 +44,7 @@ __device__ __noinline__ void draw_planes(CameraPlanes planes, int width_px, int6
       }
     };
     each([&](const ScreenFace& face) { front.offer(face, center); });
-    if (front.wants_again()) each([&](const ScreenFace& face) { front.offer_again(face, center); });
+    if (front.needs_second_pass()) each([&](const ScreenFace& face) { front.add_second_pass(face, center); });
     const ScreenFace* face = front.front(center, [](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
     const int64_t at = first_pixel + static_cast<int64_t>(y) * width_px + x;
     const float infinity = __uint_as_float(0x7F800000u);

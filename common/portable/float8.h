@@ -166,12 +166,12 @@ inline uint32_t equal8(const int32_t* integers, int32_t value) {
 /// The smallest 64-bit keys inserted so far, four for each of kFours, in ascending order. Each key is in [0,
 /// 0x7FF0...0), where integers are ordered as the doubles with the same bits.
 template <int kFours>
-struct LeastKeys {
+struct SmallestKeys {
   static constexpr int kCount = 4 * kFours;
   __m256d keys[kFours];
   static constexpr int64_t kNone = 0x7FEFFFFFFFFFFFFF;
 
-  LeastKeys() {
+  SmallestKeys() {
     for (__m256d& four : keys) four = _mm256_castsi256_pd(_mm256_set1_epi64x(kNone));
   }
   /// Inserts a key and drops the largest, which may be the new key.
@@ -351,12 +351,12 @@ PICTURA_HD inline uint32_t equal8(const int32_t* integers, int32_t value) {
 }
 
 template <int kFours>
-struct alignas(32) LeastKeys {
+struct alignas(32) SmallestKeys {
   static constexpr int kCount = 4 * kFours;
   int64_t keys[kCount];
   static constexpr int64_t kNone = 0x7FEFFFFFFFFFFFFF;
 
-  PICTURA_HD LeastKeys() {
+  PICTURA_HD SmallestKeys() {
     for (int64_t& key : keys) key = kNone;
   }
   PICTURA_HD void insert(int64_t key) {
@@ -378,11 +378,11 @@ PICTURA_HD inline Mask8 operator>=(const Float8& a, const Float8& b) { return b 
 PICTURA_HD inline Float8 reciprocal_in_range(const Float8& a) { return 1.0f / a; }
 PICTURA_HD inline Float8 saturate(const Float8& a) { return min_no_nan(max_no_nan(a, 0.0f), 1.0f); }
 
-/// Bits of the first or last `count` of eight elements, where groups of eight overlap or are padded. first_of_eight()
+/// Bits of the first or last `count` of eight elements, where groups of eight overlap or are padded. first_lanes_mask()
 /// takes any count: above 8, all bits; below 0, none.
-PICTURA_HD constexpr uint32_t first_of_eight(int count) {
+PICTURA_HD constexpr uint32_t first_lanes_mask(int count) {
   return count >= 8 ? 0xFFu : count <= 0 ? 0u : (1u << count) - 1;
 }
-PICTURA_HD constexpr uint32_t last_of_eight(int count) { return 0xFFu << (8 - count) & 0xFF; }
+PICTURA_HD constexpr uint32_t last_lanes_mask(int count) { return 0xFFu << (8 - count) & 0xFF; }
 
 }  // namespace pictura

@@ -46,9 +46,9 @@ PICTURA_HD inline float min_no_nan(float a, float b) {
 #elif defined(__AVX__)
   // Inline assembly, because g++ 12 compiles a conditional expression with a constant b to a branch, which a pixel's
   // edges mispredict.
-  float least;
-  asm("vminss %2, %1, %0" : "=x"(least) : "x"(a), "xm"(b));
-  return least;
+  float minimum;
+  asm("vminss %2, %1, %0" : "=x"(minimum) : "x"(a), "xm"(b));
+  return minimum;
 #else
   return a < b ? a : b;
 #endif

@@ -147,7 +147,7 @@ void check_views(std::string_view renderer, const SceneBatch& scene, Span<const 
     PICTURA_CHECK(view.ego_agent >= -1 && view.ego_agent < static_cast<int64_t>(scene.agents.size()),
                   "renderer {}: view {}: expected an ego below {} or -1, got {}", renderer, i, scene.agents.size(),
                   view.ego_agent);
-    PICTURA_CHECK(hides_within(view, scene.hidden_agents.size()),
+    PICTURA_CHECK(has_valid_hidden_range(view, scene.hidden_agents.size()),
                   "renderer {}: view {}: expected hidden agents within a list of {}, got [{}, {})", renderer, i,
                   scene.hidden_agents.size(), view.hidden_begin, view.hidden_end);
     PICTURA_CHECK(has_finite_pose(view),

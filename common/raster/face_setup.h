@@ -131,11 +131,11 @@ class FrontFace {
     const ScreenFace*& best = is_of_strip ? strip_ : solid_;
     const ScreenFace* const before = best;
     if (!before || nearer(face, *before, at_px)) best = &face;
-    wants_again_ = wants_again_ || (before && (is_of_strip || are_equally_near(face, *before, at_px)));
+    needs_second_pass_ = needs_second_pass_ || (before && (is_of_strip || are_equally_near(face, *before, at_px)));
   }
   /// Whether all faces must be offered a second time, because several may be on one level or equally near.
-  PICTURA_HD bool wants_again() const { return wants_again_; }
-  PICTURA_HD void offer_again(const ScreenFace& face, Vec2 at_px) {
+  PICTURA_HD bool needs_second_pass() const { return needs_second_pass_; }
+  PICTURA_HD void add_second_pass(const ScreenFace& face, Vec2 at_px) {
     if (is_strip(face)) {
       if (!of_one_level(face, *strip_, at_px)) return;
       if (!painted_ || face.object_id < painted_->object_id) painted_ = &face;
@@ -164,7 +164,7 @@ class FrontFace {
   const ScreenFace *solid_ = nullptr, *strip_ = nullptr;  // nearest solid and nearest strip
   const ScreenFace* first_solid_ = nullptr;               // lowest object id among the equally near solids
   const ScreenFace* painted_ = nullptr;  // strip with the lowest rank on the level of the nearest strip
-  bool wants_again_ = false;
+  bool needs_second_pass_ = false;
 };
 
 }  // namespace pictura

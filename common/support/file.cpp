@@ -100,8 +100,8 @@ std::string read_file(const std::string& path, std::size_t max_bytes,
     check_size(file.size_bytes());
     bytes.reserve(file.size_bytes() + kChunk_bytes);
   }
-  while (bytes.size() < kFirst_bytes && file.append_to(&bytes, kChunk_bytes) > 0) check_size(bytes.size());
-  if (check) check(std::string_view(bytes).substr(0, kFirst_bytes));
+  while (bytes.size() < kPrefix_bytes && file.append_to(&bytes, kChunk_bytes) > 0) check_size(bytes.size());
+  if (check) check(std::string_view(bytes).substr(0, kPrefix_bytes));
   while (file.append_to(&bytes, kChunk_bytes) > 0) check_size(bytes.size());
   file.check_unchanged(bytes.size());
   return bytes;
@@ -148,7 +148,7 @@ std::optional<std::string> read_cached(const std::string& path) {
   return read_file(path);
 }
 
-void try_to_cache(const std::string& path, std::string_view bytes) {
+void write_to_cache(const std::string& path, std::string_view bytes) {
   std::error_code error;
   if (fs::exists(path, error) && !fs::is_regular_file(path, error)) return;
   try {

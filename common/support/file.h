@@ -11,11 +11,11 @@
 namespace pictura {
 
 /// Number of bytes that read_file() passes to its check.
-constexpr std::size_t kFirst_bytes = 64;
+constexpr std::size_t kPrefix_bytes = 64;
 
 /// Returns the bytes of a file. Throws Error naming the path and the reason for folders, for files above max_bytes, and
 /// for files whose size or modification time changes during reading. Throws Interrupted while it waits for a FIFO's
-/// writer. `check`, which may throw, gets the first kFirst_bytes (fewer for a shorter file) before more is read.
+/// writer. `check`, which may throw, gets the first kPrefix_bytes (fewer for a shorter file) before more is read.
 std::string read_file(const std::string& path, std::size_t max_bytes = std::size_t{1} << 30,
                       const std::function<void(std::string_view first)>& check = {});
 
@@ -35,7 +35,7 @@ std::optional<std::string> read_cached(const std::string& path);
 
 /// Writes a file of a cache folder, creating the folder. Failures are silent: the user chooses the cache folder, and
 /// may be unable to change its permissions.
-void try_to_cache(const std::string& path, std::string_view bytes);
+void write_to_cache(const std::string& path, std::string_view bytes);
 
 /// Creates the folder and its parents. Throws Error naming the folder unless it then exists and is writable.
 void make_output_folder(const std::string& path);

@@ -39,13 +39,13 @@ void catch_interrupts() {
   if (std::signal(SIGHUP, on_interrupt) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
 }
 
-void take_interrupt(int signal) {
+void record_interrupt(int signal) {
   if (first_signal) return;
   first_came_ms = now_ms();  // the same request may also reach this process a moment later
   first_signal = signal;
 }
 
-void forget_interrupt() { first_signal = 0; }
+void clear_interrupt() { first_signal = 0; }
 
 int interrupting_signal() { return first_signal; }
 

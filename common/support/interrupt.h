@@ -10,14 +10,14 @@ namespace pictura {
 /// status 128 + its number. SIGHUP stays ignored where it already is (nohup).
 void catch_interrupts();
 
-/// Returns the first signal, or 0. Always 0 unless catch_interrupts() or take_interrupt() was called.
+/// Returns the first signal, or 0. Always 0 unless catch_interrupts() or record_interrupt() was called.
 int interrupting_signal();
 
 /// Records a signal if none is recorded: another process that cooperates with this one received it.
-void take_interrupt(int signal);
+void record_interrupt(int signal);
 
 /// Clears the recorded signal, for a process that continues after it has ended the interrupted work.
-void forget_interrupt();
+void clear_interrupt();
 
 inline bool interrupted() { return interrupting_signal() != 0; }
 /// Throws Interrupted where a signal is recorded.

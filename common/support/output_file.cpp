@@ -193,9 +193,9 @@ void OutputFile::stage_named() {
 
 void OutputFile::write(std::string_view bytes) { write_all(staged_.get(), bytes, path_); }
 
-void OutputFile::commit() { is_through_ ? pour() : replace(); }
+void OutputFile::commit() { is_through_ ? write_through() : replace(); }
 
-void OutputFile::pour() {
+void OutputFile::write_through() {
   const Descriptor through(open_through(target_, path_));
   std::string chunk(std::size_t{1} << 16, '\0');
   for (off_t offset = 0;;) {

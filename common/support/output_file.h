@@ -60,7 +60,7 @@ class OutputFile {
   std::string staging_folder() const;
   void stage_unnamed();
   void stage_named();
-  void pour();
+  void write_through();
   void replace();
 
   std::string path_;                     // as given by the caller, for messages

@@ -41,12 +41,12 @@ std::string nearest_word(std::string_view word, const std::vector<std::string>& 
   constexpr std::size_t kMaxLetters = 100;  // of a name; the time grows with its square
   if (word.empty() || word.size() > kMaxLetters) return "";
   std::string nearest;
-  std::size_t least = word.size();
+  std::size_t minimum = word.size();
   for (const std::string& candidate : known) {
     const std::size_t letters = distance(lower(word), lower(candidate));
-    if (3 * letters <= std::max(word.size(), candidate.size()) && letters < least) {
+    if (3 * letters <= std::max(word.size(), candidate.size()) && letters < minimum) {
       nearest = candidate;
-      least = letters;
+      minimum = letters;
     }
   }
   return nearest;

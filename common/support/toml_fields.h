@@ -23,7 +23,7 @@ toml::table parse_toml(const std::string& text, const std::string& source);
 std::optional<int64_t> whole_number(const toml::node& node);
 
 /// Formats a value for messages, in one short line.
-std::string shown(const toml::node& node);
+std::string format_value(const toml::node& node);
 
 /// One table. Readers with a fallback return it where the key is missing; other readers throw. All throw Error for a
 /// wrong type or range. The table must outlive the object.
@@ -52,23 +52,23 @@ class TomlFields {
   /// Reads a list of `size` numbers.
   std::vector<float> numbers(std::string_view key, Range range, std::size_t size);
   std::vector<int> integers(std::string_view key, Range range, std::vector<int> fallback);
-  /// Reads a list of at least `least` points [x, y] (z is 0) or [x, y, z].
-  std::vector<Vec3> points(std::string_view key, Range range, std::size_t least);
+  /// Reads a list of at least `minimum` points [x, y] (z is 0) or [x, y, z].
+  std::vector<Vec3> points(std::string_view key, Range range, std::size_t minimum);
   /// Returns the [[key]] tables; empty if there are none.
   std::vector<TomlFields> tables(std::string_view key);
 
   /// Throws for the first unread key; call after all keys were read.
   void refuse_unknown() const;
   /// Throws "file:line: table: key: message".
-  [[noreturn]] void refuse(std::string_view key, std::string_view message) const;
+  [[noreturn]] void throw_error(std::string_view key, std::string_view message) const;
 
  private:
   const toml::node* find(std::string_view key);  // also records the key as known
-  const toml::node& need(std::string_view key);
+  const toml::node& require(std::string_view key);
   int integer_of(std::string_view key, const toml::node& node, Range range) const;
   float number_of(std::string_view key, const toml::node& node, Range range) const;
   const toml::array& list_of(std::string_view key, const toml::node& node) const;
-  [[noreturn]] void refuse(std::string_view key, const toml::node& node, std::string_view expected) const;
+  [[noreturn]] void throw_error(std::string_view key, const toml::node& node, std::string_view expected) const;
 
   const toml::table* table_;
   std::string source_, name_;

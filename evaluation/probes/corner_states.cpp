@@ -124,13 +124,13 @@ std::vector<CornerPair> match_corners(const std::vector<CornerState>& hidden, co
       is_left = true;
       const CornerState& one = states[turn];
       const CornerState* likest = nullptr;
-      float least = 3;  // sum of both differences, in units of the tolerances
+      float minimum = 3;  // sum of both differences, in units of the tolerances
       for (const CornerState& other : unused) {
         if (other.scene == one.scene && other.ego == one.ego) continue;
         const float apart = std::abs(other.distance_m - one.distance_m) / kSameDistance_m,
                     faster = std::abs(other.speed_mps - one.speed_mps) / kSameSpeed_mps;
-        if (apart > 1 || faster > 1 || apart + faster >= least) continue;
-        least = apart + faster;
+        if (apart > 1 || faster > 1 || apart + faster >= minimum) continue;
+        minimum = apart + faster;
         likest = &other;
       }
       if (!likest) continue;

@@ -96,7 +96,7 @@ ShardIds find_ids(const std::string& path, const womd::ByteSource& file,
     // Stale or damaged files are replaced.
   }
   ShardIds ids = scan_ids(file, records);
-  try_to_cache(cached, encode_cached(key, [&](FieldWriter* writer) { writer->put(ids); }));
+  write_to_cache(cached, encode_cached(key, [&](FieldWriter* writer) { writer->put(ids); }));
   return ids;
 }
 
@@ -220,7 +220,7 @@ Scenario load_scenario(const SceneRef& scene, SceneReport* report_out) {
     report.cache_rejection = rejection.what();
   }
   Scenario scenario = import_scene(scene, bytes);
-  try_to_cache(cached, encode_scenario(scenario, key));
+  write_to_cache(cached, encode_scenario(scenario, key));
   return scenario;
 }
 

@@ -27,11 +27,11 @@ int32_t DrivenAgent::speed_action(const Motion& from, float wanted_mps) const {
   // The rounding residue of an acceleration would first be stopped at zero, by all opposing jerks alike.
   if (std::fabs(along.accel_mps2) < 1e-3f) along.accel_mps2 = 0;
   int32_t best = kStraight;
-  float least = INFINITY;
+  float minimum = INFINITY;
   for (int32_t action = kStraight; action < kNumActions; action += kNumLatActions) {
     const float off = std::fabs(along_after(along, action).accel_mps2 - wanted_mps2);
-    if (off >= least) continue;
-    least = off;
+    if (off >= minimum) continue;
+    minimum = off;
     best = action;
   }
   return best;

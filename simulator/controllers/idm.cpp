@@ -106,14 +106,14 @@ void FollowedPath::add(Vec3 point_m, float its_heading_rad) {
 }
 
 float FollowedPath::nearest_m(Vec2 p, float from_s_m) const {
-  float best_m = from_s_m, least = INFINITY;
+  float best_m = from_s_m, minimum = INFINITY;
   for (size_t i = 0; i + 1 < points_m.size(); ++i) {
     if (s_m[i + 1] + kMinPiece_m < from_s_m) continue;
     const Vec2 a = points_m[i].xy(), way = (points_m[i + 1] - points_m[i]).xy();
     const float t = std::clamp(dot(p - a, way) / dot(way, way), 0.0f, 1.0f);
     const float apart_m = length(p - (a + way * t));
-    if (apart_m >= least) continue;
-    least = apart_m;
+    if (apart_m >= minimum) continue;
+    minimum = apart_m;
     best_m = s_m[i] + t * (s_m[i + 1] - s_m[i]);
   }
   return best_m;

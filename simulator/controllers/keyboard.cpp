@@ -44,13 +44,13 @@ int32_t action_of_keys(const DrivingKeys& keys, const AgentStateView& state, int
   const float speed_mps = state.speed_mps[slot];
   const float along = wanted_long(keys, speed_mps), across = wanted_lat(keys, speed_mps);
   int32_t best = kIdleAction;
-  float least = INFINITY;
+  float minimum = INFINITY;
   for (int32_t action = 0; action < kNumActions; ++action) {
     const Controls controls = controls_of_action(action);
     const float missed = miss(state.accel_long_mps2[slot], controls.jerk_long_mps3, dt_s, along) +
                          miss(state.accel_lat_mps2[slot], controls.jerk_lat_mps3, dt_s, across);
-    if (missed < least) {
-      least = missed;
+    if (missed < minimum) {
+      minimum = missed;
       best = action;
     }
   }

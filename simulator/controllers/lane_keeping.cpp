@@ -177,14 +177,14 @@ int32_t LaneKeepingAgent::pursuing_action(const Motion& now, size_t place, float
   const int32_t straight = agent_.speed_action(now, wanted_mps);
   const float wanted_rad = steer_to(now, place);
   int32_t best = straight;
-  float least = INFINITY;
+  float minimum = INFINITY;
   for (const int32_t side : {-1, 0, 1}) {
     // An acceleration that changes its sign stops at zero for one step, so that steering takes effect only in the
     // second step.
     const Motion next = agent_.after(agent_.after(now, straight + side), straight + side);
     const float off = std::fabs(next.steer_rad - wanted_rad);
-    if (off >= least) continue;
-    least = off;
+    if (off >= minimum) continue;
+    minimum = off;
     best = straight + side;
   }
   return best;

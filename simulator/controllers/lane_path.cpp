@@ -128,11 +128,11 @@ float LanePath::turn_of(int32_t index) const {
 /// Returns the successor with the shortest way to `to`; -1 if no way leads there.
 int32_t LanePath::best_successor(RoutePoint to) const {
   int32_t best = -1;
-  double least = INFINITY;
+  double minimum = INFINITY;
   for (const int32_t next : successors_of(at_.lane)) {
     const auto route = graph_->route({next, 0}, lane_place(map_, *graph_, to));
-    if (!route || route->length_m >= least) continue;
-    least = route->length_m;
+    if (!route || route->length_m >= minimum) continue;
+    minimum = route->length_m;
     best = next;
   }
   return best;

@@ -69,11 +69,11 @@ TEST(DriveSteps, AnInterruptEndsItBeforeTheNextAct) {
   const auto simulator = town();
   std::vector<Command> commands(3);
   const auto act = [](int step) {
-    if (step == 1) take_interrupt(SIGINT);
+    if (step == 1) record_interrupt(SIGINT);
     return true;
   };
   const DriveEnd end = drive_steps(*simulator, commands, 5, act);
-  forget_interrupt();
+  clear_interrupt();
   EXPECT_EQ(end.steps, 2);
   EXPECT_TRUE(end.is_interrupted);
 }

@@ -23,7 +23,7 @@ bool any_rank(bool is_so, Communicator* communicator) { return communicator->max
 
 bool any_rank_interrupted(Communicator* communicator) {
   const auto signal = static_cast<int>(communicator->max_of(interrupting_signal()));
-  if (signal != 0) take_interrupt(signal);
+  if (signal != 0) record_interrupt(signal);
   return signal != 0;
 }
 

@@ -231,27 +231,27 @@ class BeatHistory {
   // Adds the last round's heartbeats of all ranks. Returns the reason why a rank is lost; empty: no rank is lost.
   std::string add(const std::vector<Beat>& beats, double no_progress_s) {
     bool may_hang = true;
-    std::optional<int64_t> least;
+    std::optional<int64_t> minimum;
     for (size_t r = 0; r < seen_.size(); ++r) {
       const Beat& beat = beats[r];
       if (beat.number != seen_[r].beat.number) seen_[r].changed = Clock::now();
       seen_[r].beat = beat;
       may_hang = may_hang && !beat.is_busy && beat.steps > 0;
       if (beat.has_left) continue;
-      least = std::min(least.value_or(beat.steps), beat.steps);
+      minimum = std::min(minimum.value_or(beat.steps), beat.steps);
       if (seconds_since(seen_[r].changed) > silent_s_) {
         return fmt::format("rank {}: no heartbeat for {:.0f} s: it was killed or stopped, or its host is gone", r,
                            silent_s_);
       }
     }
-    if (!may_hang || least.value_or(-1) != least_steps_) {
-      least_steps_ = least.value_or(-1);
+    if (!may_hang || minimum.value_or(-1) != min_steps_) {
+      min_steps_ = minimum.value_or(-1);
       progressed_ = Clock::now();
     }
     if (seconds_since(progressed_) <= no_progress_s) return "";
     std::vector<size_t> behind;
     for (size_t r = 0; r < seen_.size(); ++r) {
-      if (!seen_[r].beat.has_left && seen_[r].beat.steps == least_steps_) behind.push_back(r);
+      if (!seen_[r].beat.has_left && seen_[r].beat.steps == min_steps_) behind.push_back(r);
     }
     return fmt::format("rank {}: alive, but no step for {:.0f} s: it hangs", fmt::join(behind, ", "), no_progress_s);
   }
@@ -263,7 +263,7 @@ class BeatHistory {
   };
   double silent_s_;
   std::vector<Seen> seen_;
-  int64_t least_steps_ = -1;
+  int64_t min_steps_ = -1;
   Clock::time_point progressed_ = Clock::now();  // time of the last change of the minimum number of steps
 };
 

@@ -70,7 +70,7 @@ class BallGrid {
       for (int32_t i = begin(cells.x_begin, y); i < row_end; i += kLanes) {
         const Vec3x8 middle_m{load8(&x_m_[i]), load8(&y_m_[i]), load8(&z_m_[i])};
         unsigned lanes = bits_of(sphere_in_frustum(f, to_camera(camera, middle_m), load8(&radius_m_[i])));
-        lanes &= first_of_eight(row_end - i);
+        lanes &= first_lanes_mask(row_end - i);
         for (; lanes != 0; lanes &= lanes - 1) {
           const int32_t at = i + std::countr_zero(lanes);
           const int starts = starts_[at] | row_starts | (at < first_column_end ? kStartsColumn : 0);

@@ -45,7 +45,7 @@ class NearestOfOneThread {
     for (; i + 8 <= num_items; i += 8) gather(places + i, items + i, 0xFF);
     const int left = num_items - i;
     if (left > 0 && num_items >= 8) {
-      gather(places + num_items - 8, items + num_items - 8, last_of_eight(left));
+      gather(places + num_items - 8, items + num_items - 8, last_lanes_mask(left));
     } else if (left > 0) {
       Vec2 few_places[8];
       int32_t few_items[8];
@@ -53,7 +53,7 @@ class NearestOfOneThread {
         few_places[k] = places[min_of(k, left - 1)];
         few_items[k] = items[min_of(k, left - 1)];
       }
-      gather(few_places, few_items, first_of_eight(left));
+      gather(few_places, few_items, first_lanes_mask(left));
     }
     insert_near();
   }
@@ -73,7 +73,7 @@ class NearestOfOneThread {
     return int64_t{static_cast<int32_t>(bits_from_float(distance2))} << 32 | item;
   }
   static constexpr int kGathered = 64;
-  using Keys = LeastKeys<(capacity + 3) / 4>;
+  using Keys = SmallestKeys<(capacity + 3) / 4>;
   Keys keys_;
   int count_ = 0;
   int32_t items_[capacity];

@@ -33,11 +33,11 @@ PICTURA_HD inline int find_pieces_in_sight(Span<const Vec2> middles, Span<const 
   const int left = num_items - i;
   if (left > 0 && count < capacity) {
     if (num_items >= 8) {
-      append_visible(items.data() + num_items - 8, last_of_eight(left));
+      append_visible(items.data() + num_items - 8, last_lanes_mask(left));
     } else {
       int32_t few[8];
       for (int k = 0; k < 8; ++k) few[k] = items[min_of(k, left - 1)];
-      append_visible(few, first_of_eight(left));
+      append_visible(few, first_lanes_mask(left));
     }
   }
   return count;

@@ -72,9 +72,9 @@ std::vector<uint32_t> results_of(const Float8Inputs& in) {
   add_words(numbers, num_chosen);
   results.push_back(equal8(in.integers, in.integers[3]));
 
-  LeastKeys<2> least;
+  SmallestKeys<2> least;
   for (int k = 0; k < 16; ++k) least.insert(int64_t{in.integers[k % 8]} * in.indices[(k + k / 8) % 8] + k);
-  int64_t keys[LeastKeys<2>::kCount];
+  int64_t keys[SmallestKeys<2>::kCount];
   least.store(keys);
   for (const int64_t key : keys) {
     results.push_back(static_cast<uint32_t>(key));

@@ -25,11 +25,11 @@ TEST(Float8, HasTheSameBitsInARegisterAndInMemory) {
 }
 
 TEST(Float8, CountsTheFirstOfAnyNumber) {
-  EXPECT_EQ(first_of_eight(-1), 0u);
-  EXPECT_EQ(first_of_eight(0), 0u);
-  EXPECT_EQ(first_of_eight(3), 0b111u);
-  EXPECT_EQ(first_of_eight(8), 0xFFu);
-  EXPECT_EQ(first_of_eight(40), 0xFFu);
+  EXPECT_EQ(first_lanes_mask(-1), 0u);
+  EXPECT_EQ(first_lanes_mask(0), 0u);
+  EXPECT_EQ(first_lanes_mask(3), 0b111u);
+  EXPECT_EQ(first_lanes_mask(8), 0xFFu);
+  EXPECT_EQ(first_lanes_mask(40), 0xFFu);
 }
 
 }  // namespace

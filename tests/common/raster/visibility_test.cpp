@@ -243,8 +243,8 @@ TEST(Order, FacesInOnePlaneAreOrderedByObject) {
         FrontFace front;
         const ScreenFace *const one = swapped ? &second : &first, *const other = swapped ? &first : &second;
         for (const ScreenFace* face : {one, other}) front.offer(*face, {0.5f, 0.5f});
-        ASSERT_TRUE(front.wants_again());
-        for (const ScreenFace* face : {one, other}) front.offer_again(*face, {0.5f, 0.5f});
+        ASSERT_TRUE(front.needs_second_pass());
+        for (const ScreenFace* face : {one, other}) front.add_second_pass(*face, {0.5f, 0.5f});
         EXPECT_EQ(front.front({0.5f, 0.5f}, never), &first);
       }
     }

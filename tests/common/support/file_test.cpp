@@ -47,7 +47,7 @@ TEST_F(FileTest, AFolderThatCannotBeReachedIsAnErrorAndNoneForACache) {
   const std::string unreachable = folder_ / (std::string(300, 'x') + "/deeper");  // file systems end at 255
   EXPECT_EQ(test::message_of([&] { make_output_folder(unreachable); }),
             unreachable + ": cannot be created: File name too long");
-  EXPECT_NO_THROW(try_to_cache(unreachable + "/a.map", "x"));
+  EXPECT_NO_THROW(write_to_cache(unreachable + "/a.map", "x"));
   EXPECT_EQ(folder_.num_entries(), 0u);
 }
 
@@ -117,8 +117,8 @@ TEST_F(FileTest, WhatIsNoRegularFileIsNoCache) {
     EXPECT_THAT(test::message_of([&] { read_cached(path); }), testing::HasSubstr("expected a regular file")) << path;
   }
   EXPECT_EQ(read_cached(folder_ / "none"), std::nullopt);
-  try_to_cache(fifo, "x");
-  try_to_cache(file, "x");
+  write_to_cache(fifo, "x");
+  write_to_cache(file, "x");
   EXPECT_EQ(read_cached(file), "x");
   EXPECT_TRUE(std::filesystem::is_fifo(fifo));
 }

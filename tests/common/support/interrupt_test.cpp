@@ -14,12 +14,12 @@ class Interrupts : public ::testing::Test {
  protected:
   void SetUp() override {
     for (const int signal : {SIGINT, SIGTERM, SIGHUP}) before_[signal] = std::signal(signal, SIG_DFL);
-    forget_interrupt();
+    clear_interrupt();
     catch_interrupts();
   }
   void TearDown() override {
     for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, before_[signal]);
-    forget_interrupt();
+    clear_interrupt();
   }
 
  private:
@@ -31,13 +31,13 @@ TEST_F(Interrupts, TheFirstSignalIsKept) {
   std::raise(SIGTERM);
   std::raise(SIGINT);
   EXPECT_EQ(interrupting_signal(), SIGTERM);
-  forget_interrupt();
+  clear_interrupt();
   EXPECT_FALSE(interrupted());
 }
 
 // Of several cooperating processes, each gets the signal from the others and, a moment later, itself.
 TEST_F(Interrupts, ASignalThatAnotherProcessHasToldOfIsTheSameRequest) {
-  take_interrupt(SIGTERM);
+  record_interrupt(SIGTERM);
   std::raise(SIGTERM);
   EXPECT_EQ(interrupting_signal(), SIGTERM);
 }
