@@ -15,16 +15,16 @@ std::unique_ptr<DeviceGraph> capture_cuda_graph(Device device, Stream stream, co
 std::string cuda_unavailable();
 std::string cuda_product_name(Device device);
 
-std::string why_no_cuda_device() { return cuda_unavailable(); }
+std::string cuda_unavailable_reason() { return cuda_unavailable(); }
 #else
-std::string why_no_cuda_device() { return "this build has no CUDA"; }
+std::string cuda_unavailable_reason() { return "this build has no CUDA"; }
 #endif
 
 namespace {
 
 void check_device(Device device) {
   if (device.is_host()) return;
-  const std::string why_not = why_no_cuda_device();
+  const std::string why_not = cuda_unavailable_reason();
   PICTURA_CHECK(why_not.empty(), "learner: {}: {}", name_of(device), why_not);
 }
 

@@ -11,7 +11,7 @@
 namespace pictura {
 
 /// Empty where this build and this machine have a CUDA device, else the reason why not.
-std::string why_no_cuda_device();
+std::string cuda_unavailable_reason();
 
 /// Product name of a device, such as "NVIDIA H100 80GB HBM3"; "host" for the host. Throws Error for a device that does
 /// not exist.

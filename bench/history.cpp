@@ -122,7 +122,7 @@ class Images {
 };
 
 // An image drawn at its step.
-struct SeenView {
+struct CheckedView {
   int64_t row = 0;
   std::vector<uint8_t> pixels;
 };
@@ -275,7 +275,7 @@ class HistoryBench {
   std::vector<int64_t> present_rows_;  // rows of present agents at every step
   std::size_t first_of_last_step_ = 0;
   std::vector<View> views_;  // of the last step, on the host
-  std::vector<SeenView> seen_;
+  std::vector<CheckedView> seen_;
   std::vector<Elements<int64_t>> history_choices_;
   std::vector<Elements<View>> present_choices_;
   std::size_t next_ = 0;

@@ -68,10 +68,10 @@ StepTiming StepBench::run(int64_t steps) {
   return {steps, elapsed_s, done.agent_steps, done.slot_steps};
 }
 
-StepTiming StepBench::run_for(double duration_s, int64_t steps_between_looks) {
+StepTiming StepBench::run_for(double duration_s, int64_t steps_between_clock_reads) {
   StepTiming sum;
   while (sum.elapsed_s < duration_s) {
-    const StepTiming part = run(steps_between_looks);
+    const StepTiming part = run(steps_between_clock_reads);
     sum.steps += part.steps;
     sum.elapsed_s += part.elapsed_s;
     sum.agent_steps += part.agent_steps;

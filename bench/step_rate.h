@@ -26,9 +26,9 @@ class StepBench {
 
   /// Takes `steps` steps and waits for their end.
   StepTiming run(int64_t steps);
-  /// Takes steps for at least `duration_s`. Waits after every `steps_between_looks` steps, because reading the clock
-  /// requires it.
-  StepTiming run_for(double duration_s, int64_t steps_between_looks);
+  /// Takes steps for at least `duration_s`. Waits after every `steps_between_clock_reads` steps, because reading the
+  /// clock requires it.
+  StepTiming run_for(double duration_s, int64_t steps_between_clock_reads);
 
  private:
   struct Actions;

@@ -292,7 +292,7 @@ void draw_on(Canvas& canvas, const Layout& layout, const RoadMap& map, const Sce
   MapLayers(map).paint(canvas, layout.left_top_m, layout.px_per_m);
   paint_details(map, canvas, layout.left_top_m, layout.px_per_m);
   if (scenario) {
-    paint_ways(*scenario, canvas, layout.left_top_m, layout.px_per_m);
+    paint_paths(*scenario, canvas, layout.left_top_m, layout.px_per_m);
     paint_boxes(*scenario, scenario->current_step, canvas, layout.left_top_m, layout.px_per_m);
   }
   draw_band(canvas, layout, map);

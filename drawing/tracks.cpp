@@ -45,7 +45,7 @@ Rgb track_color(TrackType type) {
   return kUnknownTrackInk;
 }
 
-void paint_ways(const Scenario& scenario, Canvas& canvas, const Eigen::Vector2d& left_top_m, double px_per_m) {
+void paint_paths(const Scenario& scenario, Canvas& canvas, const Eigen::Vector2d& left_top_m, double px_per_m) {
   GroundPen pen(canvas, left_top_m, px_per_m);
   for (std::size_t i = 0; i < scenario.tracks.size(); ++i) {
     const Span<const TrackState> states = scenario.states_of(static_cast<int32_t>(i));

@@ -12,7 +12,7 @@ constexpr Rgb kSdcInk = hex(0x0B6E4F), kUnknownTrackInk = hex(0x6B7178);
 Rgb track_color(TrackType type);
 
 /// Paints every track as a line through its valid states, interrupted at gaps, and the stop lines of recorded lights.
-void paint_ways(const Scenario& scenario, Canvas& canvas, const Eigen::Vector2d& left_top_m, double px_per_m);
+void paint_paths(const Scenario& scenario, Canvas& canvas, const Eigen::Vector2d& left_top_m, double px_per_m);
 
 /// Paints the boxes of all tracks that are valid at a step of the scenario.
 void paint_boxes(const Scenario& scenario, int32_t step, Canvas& canvas, const Eigen::Vector2d& left_top_m,

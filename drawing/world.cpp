@@ -236,7 +236,7 @@ struct WorldPainter::Impl {
       GroundPen pen(canvas, left_top, px_per_m);
       for (const WallFace& wall : walls) paint_wall(pen, wall);
     }
-    if (scenario) paint_ways(*scenario, canvas, left_top, px_per_m);
+    if (scenario) paint_paths(*scenario, canvas, left_top, px_per_m);
     cairo_surface_flush(canvas.surface());
     return tiles.emplace(std::pair{column, row}, std::move(canvas)).first->second;
   }

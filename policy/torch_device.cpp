@@ -22,7 +22,7 @@ std::string why_torch_has_no_cuda() {
 }
 
 std::string why_not_on_cuda() {
-  const std::string no_device = why_no_cuda_device();
+  const std::string no_device = cuda_unavailable_reason();
   return no_device.empty() ? why_torch_has_no_cuda() : no_device;
 }
 

@@ -401,7 +401,7 @@ void ImageDrawer::visit_fragments(const std::function<void(int, const PixelCover
 void ImageDrawer::draw_planes(const ImageTarget& target) const {
   const int width = setting_.camera.width_px, height = setting_.camera.height_px;
   std::vector<FrontFace> fronts(static_cast<std::size_t>(width));
-  auto offer = [&](int y, bool is_again) {
+  auto add_row = [&](int y, bool is_again) {
     for (const ScreenFace& face : faces_) {
       if (y < face.box.y_begin || y >= face.box.y_end) continue;
       for (int x = face.box.x_begin; x < face.box.x_end; ++x) {
@@ -409,14 +409,14 @@ void ImageDrawer::draw_planes(const ImageTarget& target) const {
         FrontFace& front = fronts[x];
         if (is_again && !front.needs_second_pass()) continue;
         if (!covers_point(edges_.at(face.edge_begin), face.edge_count, center.x, center.y)) continue;
-        is_again ? front.add_second_pass(face, center) : front.offer(face, center);
+        is_again ? front.add_second_pass(face, center) : front.add(face, center);
       }
     }
   };
   for (int y = 0; y < height; ++y) {
     std::fill(fronts.begin(), fronts.end(), FrontFace{});
-    offer(y, /*is_again=*/false);
-    offer(y, /*is_again=*/true);
+    add_row(y, /*is_again=*/false);
+    add_row(y, /*is_again=*/true);
     for (int x = 0; x < width; ++x) {
       const Vec2 center = pixel_center(x, y);
       const ScreenFace* face =

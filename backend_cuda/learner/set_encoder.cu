@@ -487,8 +487,8 @@ void launch_largest_embedding(const SetSize& size, const float* members, const i
                               cudaStream_t stream) {
   if (size.sets() == 0) return;
   // A block loads the weights once, so there are only as many blocks as run at the same time.
-  constexpr int64_t kMostBlocks = 132 * 4;
-  const int64_t blocks = std::min((size.sets() + kWarps - 1) / kWarps, kMostBlocks);
+  constexpr int64_t kMaxBlocks = 132 * 4;
+  const int64_t blocks = std::min((size.sets() + kWarps - 1) / kWarps, kMaxBlocks);
   largest_embedding<<<static_cast<unsigned>(blocks), kThreads, 0, stream>>>(size, members, counts, parameters,
                                                                             static_cast<Half*>(out), which_out);
 }

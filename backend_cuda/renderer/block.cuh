@@ -90,14 +90,14 @@ __device__ inline int warp_next(int32_t* counter) {
 }
 
 // Records a fault. Only the first fault is kept, until the host has thrown it.
-__device__ inline void note_fault(const DrawTask& task, int32_t index, FaultKind kind) {
+__device__ inline void record_fault(const DrawTask& task, int32_t index, FaultKind kind) {
   atomicCAS(task.fault, kNoFault, word_of({kind, index}));
 }
 
 // Sets the state of a view. Returns false and records a fault if the view refers to something that does not exist.
 __device__ inline bool set_view(ViewState* state, const DrawTask& task, int32_t view_index) {
   auto fault = [&](FaultKind kind) {
-    note_fault(task, view_index, kind);
+    record_fault(task, view_index, kind);
     return false;
   };
   state->view = task.views[view_index];

@@ -137,8 +137,8 @@ __device__ inline WarpFace make_light(const FaceSetupContext& context, int32_t i
   const LightHead head = context.heads[index];
   const PinholeCamera& camera = context.setting.camera;
   LightDisk disk;
-  const bool is_seen = light_to_camera(head, context.lights[head.signal], camera, &disk);
-  return {to_camera(camera, light_corner(head, lane_index())), is_seen ? kLightSides : 0, disk.plane, disk.color,
+  const bool is_visible = light_to_camera(head, context.lights[head.signal], camera, &disk);
+  return {to_camera(camera, light_corner(head, lane_index())), is_visible ? kLightSides : 0, disk.plane, disk.color,
           light_ref(index)};
 }
 

@@ -177,7 +177,7 @@ __host__ __device__ inline size_t large_bytes(const Scratch& sizes) {
 }
 
 // Sets the block's slice of a launch's scratch memory. Collective over all threads of the block.
-__device__ inline void take_scratch(const Scratch& scratch) {
+__device__ inline void claim_scratch(const Scratch& scratch) {
   if (threadIdx.x == 0) {
     Scratch own = scratch;
     own.faces += static_cast<size_t>(blockIdx.x) * static_cast<size_t>(scratch.max_faces);

@@ -81,7 +81,7 @@ std::string message_of(const Fault& fault) {
   return fmt::format("{} {}: {}", where, fault.index, what());
 }
 
-Scratch large_sizes(int pieces, int heads, std::size_t agents) {
+Scratch overflow_sizes(int pieces, int heads, std::size_t agents) {
   // A camera sees up to three faces of an agent and one of every other primitive; faces of four corners have at most
   // nine edges after clipping.
   Scratch sizes;

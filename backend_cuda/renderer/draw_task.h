@@ -32,7 +32,7 @@ DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeC
 
 /// Returns the sizes of a block's scratch memory in the last launch. They suffice for all primitives of a world with
 /// `agents` agents on a map with `pieces` pieces, of which `heads` are light heads.
-Scratch large_sizes(int pieces, int heads, std::size_t agents);
+Scratch overflow_sizes(int pieces, int heads, std::size_t agents);
 
 /// Returns the text of a fault, which must not be `none`.
 std::string message_of(const Fault& fault);

@@ -312,14 +312,14 @@ __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_
   return true;
 }
 
-// Selects the offered solid faces with the largest area as occluders. Lane i holds the entry and area of occluder i;
+// Selects the added solid faces with the largest area as occluders. Lane i holds the entry and area of occluder i;
 // the occluder itself is in the context's setting.
 class BestOccluders {
  public:
   __device__ explicit BestOccluders(FaceSetupContext* context) : context_(context) {}
 
   /// Offers the entry's face of each lane with is_active. Collective over all lanes of the warp.
-  __device__ void offer(bool is_active, uint32_t entry) {
+  __device__ void add(bool is_active, uint32_t entry) {
     const ImageSetting& setting = context_->setting;
     const FaceSetupContext* context = context_;
     Quad quad;
@@ -346,7 +346,7 @@ class BestOccluders {
     ScreenQuad on_screen;
     bool is_clockwise = false;
   };
-  // Whether the lane's offered face and the face that it holds are among the best.
+  // Whether the lane's added face and the face that it holds are among the best.
   struct Chosen {
     bool own = false, kept = false;
   };
@@ -372,7 +372,7 @@ class BestOccluders {
     return chosen;
   }
 
-  // Replaces dropped faces by the chosen offers. Returns the slot of the lane's own offer.
+  // Replaces dropped faces by the chosen added faces. Returns the slot of the lane's own face.
   __device__ int insert(const Offered& own, Chosen chosen) {
     unsigned slots = ~__ballot_sync(kAllLanes, chosen.kept) & ((1u << Occluders::kMaxCount) - 1);
     int slot = 0;
@@ -414,7 +414,7 @@ __device__ inline void find_occluders(FaceSetupContext* context, const uint32_t*
     queue.push(is_candidate(entry), entry, 0);
     if (queue.is_ready() || (!is_more && !queue.is_empty())) {
       const WarpQueue::Pair candidate = queue.take();
-      best.offer(candidate.is_valid, candidate.a);
+      best.add(candidate.is_valid, candidate.a);
     }
     if (!is_more) break;
   }

@@ -17,7 +17,7 @@ __device__ inline int32_t camera_of(const DrawTask& task, int32_t image) { retur
 __device__ inline int32_t num_drawn_views(const DrawTask& task) {
   if (task.view_count == nullptr) return task.num_views;
   const int32_t count = *task.view_count, drawn = clamp(count, 0, task.max_views);
-  if (drawn != count && blockIdx.x == 0 && threadIdx.x == 0) note_fault(task, count, FaultKind::bad_view_count);
+  if (drawn != count && blockIdx.x == 0 && threadIdx.x == 0) record_fault(task, count, FaultKind::bad_view_count);
   return clamp(drawn - task.first_view, 0, task.num_views);
 }
 

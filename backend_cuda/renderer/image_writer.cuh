@@ -66,7 +66,7 @@ struct ImageWriter {
   // Calls change(effect, i) for each pixel, where the image has an effect; values beyond the image stay black. The
   // effect is in shared memory, because no registers are left.
   template <typename Change>
-  __device__ void for_each_shown(const Place& place, Change&& change) const {
+  __device__ void for_each_pixel_with_effect(const Place& place, Change&& change) const {
     if constexpr (kRandomizesCameras) {
       const ImageEffect& effect = block_state()->effect;
       if (!effect.is_on) return;
@@ -91,7 +91,7 @@ struct ImageWriter {
                  : full != Memory::kNone ? memory.faces[full].color_bytes
                                          : 0u;
     }
-    for_each_shown(
+    for_each_pixel_with_effect(
         place, [&](const ImageEffect& effect, int i) { bytes[i] = effect.of_bytes(bytes[i], place.x + i, place.y); });
     store_channels(all + first, place,
                    [&](int i, int channel) { return value_of(static_cast<uint8_t>(bytes[i] >> (8 * channel))); });
@@ -109,8 +109,8 @@ struct ImageWriter {
         colors[i] = memory.faces[full].color;
       }
     }
-    for_each_shown(place,
-                   [&](const ImageEffect& effect, int i) { colors[i] = effect.of(colors[i], place.x + i, place.y); });
+    for_each_pixel_with_effect(
+        place, [&](const ImageEffect& effect, int i) { colors[i] = effect.of(colors[i], place.x + i, place.y); });
     store_channels(all + first, place, [&](int i, int channel) {
       return value_of(channel == 0 ? colors[i].r : channel == 1 ? colors[i].g : colors[i].b);
     });

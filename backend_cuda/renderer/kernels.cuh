@@ -238,14 +238,14 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDeferredBlocksPerPro
 extern "C" __global__ void __launch_bounds__(kLargeThreads)
     pictura_draw_overflow(const __grid_constant__ DrawTask task, const __grid_constant__ Scratch scratch) {
   wait_for_earlier_launch();
-  take_scratch(scratch);
+  claim_scratch(scratch);
   const BlockState* state = block_state();
   const int32_t count = task.counters->overflow;
   PICTURA_NO_UNROLL
   for (int32_t i = static_cast<int32_t>(blockIdx.x); i < count; i += static_cast<int32_t>(gridDim.x)) {
     const int32_t image = task.overflow_images[i];
     const bool is_drawn = prepare_and_draw<LargeDrawMemory>(task, image, setup_target_of(state->scratch));
-    if (!is_drawn && threadIdx.x == 0) note_fault(task, view_of(task, image), FaultKind::capacity_exceeded);
+    if (!is_drawn && threadIdx.x == 0) record_fault(task, view_of(task, image), FaultKind::capacity_exceeded);
   }
   sync_block();
   if (threadIdx.x == 0 && atomicAdd(&task.counters->finished_blocks, 1) + 1 == static_cast<int32_t>(gridDim.x)) {
@@ -256,14 +256,14 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
 extern "C" __global__ void __launch_bounds__(kLargeThreads)
     pictura_visibility(const __grid_constant__ VisibilityTask task, const __grid_constant__ Scratch scratch) {
   wait_for_earlier_launch();
-  take_scratch(scratch);
+  claim_scratch(scratch);
   BlockState* state = block_state();
   const int32_t num_drawn = num_drawn_views(task.draw);
   PICTURA_NO_UNROLL
   for (int32_t q = static_cast<int32_t>(blockIdx.x); q < task.num_queries; q += static_cast<int32_t>(gridDim.x)) {
     const auto [view, agent] = task.queries[q];
     auto fault = [&](int32_t index, FaultKind kind) {
-      if (threadIdx.x == 0) note_fault(task.draw, index, kind);
+      if (threadIdx.x == 0) record_fault(task.draw, index, kind);
     };
     VisibilitySum sum;
     const bool is_view = view >= 0 && view < task.draw.num_views;

@@ -43,7 +43,7 @@ __device__ __noinline__ void draw_planes(CameraPlanes planes, int width_px, int6
         for (int i = 0; i < num_faces; ++i) ask(memory.faces[i]);
       }
     };
-    each([&](const ScreenFace& face) { front.offer(face, center); });
+    each([&](const ScreenFace& face) { front.add(face, center); });
     if (front.needs_second_pass()) each([&](const ScreenFace& face) { front.add_second_pass(face, center); });
     const ScreenFace* face = front.front(center, [](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
     const int64_t at = first_pixel + static_cast<int64_t>(y) * width_px + x;

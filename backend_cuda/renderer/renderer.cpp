@@ -33,7 +33,7 @@ struct ScratchMemory {
   std::size_t agents = 0, views = 0;
   int pieces = 0, heads = 0;
   cuda::ScratchPlan plan;
-  cuda::LargeBuffers<DeviceBuffer> large;
+  cuda::OverflowBuffers<DeviceBuffer> large;
   cuda::PoolBuffers<DeviceBuffer> pool;
 };
 
@@ -153,11 +153,11 @@ class CudaRenderer final : public Renderer {
     const int heads = std::max(scratch_.heads, geometries_.max_heads());
     if (agents == scratch_.agents && views == scratch_.views && pieces == scratch_.pieces && heads == scratch_.heads)
       return;
-    cuda::Scratch large = cuda::large_sizes(pieces, heads, agents);
+    cuda::Scratch large = cuda::overflow_sizes(pieces, heads, agents);
     const std::size_t large_bytes = cuda::large_block_bytes(large);
     const cuda::ScratchPlan plan =
         cuda::plan_scratch({.large_blocks = kLargeBlocks,
-                            .large_block_bytes = cuda::LargeBuffers<DeviceBuffer>::block_bytes(large, large_bytes),
+                            .large_block_bytes = cuda::OverflowBuffers<DeviceBuffer>::block_bytes(large, large_bytes),
                             .views = views,
                             .view_bytes = cameras_.size() * cuda::kPoolImageBytes,
                             .pool_bytes = cuda::kMinPoolBytes},
@@ -167,7 +167,7 @@ class CudaRenderer final : public Renderer {
     scratch_ = ScratchMemory();
     ++scratch_generation_;
     ScratchMemory larger{agents, views, pieces, heads, plan, {}, {}};
-    larger.large = cuda::LargeBuffers<DeviceBuffer>(large, large_bytes);
+    larger.large = cuda::OverflowBuffers<DeviceBuffer>(large, large_bytes);
     larger.pool = cuda::PoolBuffers<DeviceBuffer>(cuda::pool_sizes(plan.views * cameras_.size()));
     scratch_ = std::move(larger);
   }

@@ -79,11 +79,11 @@ class PoolBuffers {
 
 /// Owner of the memory of the blocks of the last launch.
 template <template <typename> class Buffer>
-class LargeBuffers {
+class OverflowBuffers {
  public:
-  LargeBuffers() = default;
+  OverflowBuffers() = default;
   /// Allocates for sizes.blocks blocks.
-  LargeBuffers(const Scratch& sizes, std::size_t bytes_per_block)
+  OverflowBuffers(const Scratch& sizes, std::size_t bytes_per_block)
       : scratch_(sizes),
         faces_(count(sizes.blocks, sizes.max_faces)),
         edges_(count(sizes.blocks, sizes.max_edges)),

@@ -20,7 +20,7 @@ struct DeviceAtomics {
   __device__ void lower(int32_t* value, int32_t bound) const { atomicMin(value, bound); }
 };
 
-/// The nearest of the items offered by a warp's threads: the thread of rank k holds the k-th nearest, as squared
+/// The nearest of the items added by a warp's threads: the thread of rank k holds the k-th nearest, as squared
 /// distance and item.
 template <int capacity>
 class NearestOfWarp {
@@ -30,12 +30,12 @@ class NearestOfWarp {
   __device__ int count() const { return min(capacity, __popc(__ballot_sync(~0u, key_ != kNone))); }
   /// at: must be the caller's own rank.
   __device__ int32_t item(int) const { return static_cast<int32_t>(key_); }
-  __device__ void offer(bool is_one, float distance2, int32_t item) {
-    const uint64_t offered = is_one ? uint64_t{__float_as_uint(distance2)} << 32 | static_cast<uint32_t>(item) : kNone;
+  __device__ void add(bool is_one, float distance2, int32_t item) {
+    const uint64_t added = is_one ? uint64_t{__float_as_uint(distance2)} << 32 | static_cast<uint32_t>(item) : kNone;
     const bool is_first = threadIdx.x % kWarp == 0;
     const uint64_t worst = __shfl_sync(~0u, key_, capacity - 1);
-    for (uint32_t better = __ballot_sync(~0u, offered < worst); better != 0; better &= better - 1) {
-      const uint64_t next = __shfl_sync(~0u, offered, __ffs(static_cast<int>(better)) - 1);
+    for (uint32_t better = __ballot_sync(~0u, added < worst); better != 0; better &= better - 1) {
+      const uint64_t next = __shfl_sync(~0u, added, __ffs(static_cast<int>(better)) - 1);
       const uint64_t before = __shfl_up_sync(~0u, key_, 1);
       if (next < key_) key_ = is_first || before < next ? next : before;
     }

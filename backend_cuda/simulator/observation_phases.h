@@ -68,10 +68,10 @@ class ObservationWriter {
       for (int k = 0; k < kAtOnce; ++k) {
         float row[8];
         write_piece(pieces[k], row_frame, row);
-        const bool is_seen = is_in_sight(pieces[k], frame) && first + k * group.size() < num_items;
-        const uint32_t seen = group.ballot(is_seen);
+        const bool is_visible = is_in_sight(pieces[k], frame) && first + k * group.size() < num_items;
+        const uint32_t seen = group.ballot(is_visible);
         const int at = count + group.count_before(seen);
-        for (int f = 0; f < kLaneFeatures && is_seen && at < capacity; ++f) rows[at * kLaneFeatures + f] = row[f];
+        for (int f = 0; f < kLaneFeatures && is_visible && at < capacity; ++f) rows[at * kLaneFeatures + f] = row[f];
         count = min_of(capacity, count + popcount(seen));
       }
     }

@@ -69,7 +69,7 @@ struct FinishStep {
   const CommandType* commands;
   template <typename ThreadGroup>
   PICTURA_HD void operator()(const ThreadGroup& group, int w) const {
-    if (arrays.has_rejected_command()) return refuse(group, w);
+    if (arrays.has_rejected_command()) return reject(group, w);
     const bool begins = arrays.episode_over[w] != 0;
     SimulatorTotals totals;
     bool ends = false;
@@ -95,7 +95,7 @@ struct FinishStep {
 
  private:
   template <typename ThreadGroup>
-  PICTURA_HD void refuse(const ThreadGroup& group, int w) const {
+  PICTURA_HD void reject(const ThreadGroup& group, int w) const {
     if (w > 0 || group.rank() > 0 || *arrays.rejected_command != kNoRejection) return;
     *arrays.rejected_command = rejected_command(*arrays.rejected_slot, commands[*arrays.rejected_slot]);
   }

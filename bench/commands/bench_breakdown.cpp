@@ -193,7 +193,7 @@ Json breakdown_request() {
 }
 
 void run_breakdown(const BreakdownArguments& arguments) {
-  if (wants_plot(arguments.plot)) return draw_results("breakdown_parts", arguments.plot, breakdown_request());
+  if (has_plot_arguments(arguments.plot)) return draw_results("breakdown_parts", arguments.plot, breakdown_request());
   const std::vector<BreakdownCase> cases = breakdown_cases_of(arguments);
   const Config first =
       load_config(arguments.measured.config_path, overrides_of(arguments, cases.front(), arguments.chunk));

@@ -164,7 +164,7 @@ void append_results(const std::string& name, const RenderCase& measured, const R
 }
 
 void run_render(RenderArguments arguments) {
-  if (wants_plot(arguments.rate.plot)) return draw_results("render_rates", arguments.rate.plot);
+  if (has_plot_arguments(arguments.rate.plot)) return draw_results("render_rates", arguments.rate.plot);
   apply_defaults(&arguments);
   std::vector<NamedCase> cases = render_cases_of(arguments);
   ProgressLine progress;

@@ -113,7 +113,7 @@ void measure(const SimulateArguments& arguments, const std::string& backend, con
 }
 
 void run_simulate(SimulateArguments arguments) {
-  if (wants_plot(arguments.rate.plot)) return draw_results("step_costs", arguments.rate.plot);
+  if (has_plot_arguments(arguments.rate.plot)) return draw_results("step_costs", arguments.rate.plot);
   check_backends(arguments.backends, simulator_names());
   arguments.maps = named_maps(arguments.maps);
   std::vector<std::shared_ptr<const RoadMap>> maps;

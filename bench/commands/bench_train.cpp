@@ -42,7 +42,7 @@ void add_kernels(const TrainingMeasurement& measurement, std::vector<BenchResult
 }
 
 void run_train(TrainArguments arguments) {
-  if (wants_plot(arguments.plot)) return draw_results("rank_rates", arguments.plot);
+  if (has_plot_arguments(arguments.plot)) return draw_results("rank_rates", arguments.plot);
   TrainingCase& measured = arguments.measured;
   for (const std::string& text : overrides_of(arguments.backends)) measured.overrides.push_back(text);
   const TrainingMeasurement measurement = measure_training(measured);

@@ -13,7 +13,7 @@ void add_plot_options(CLI::App* command, const std::string& description, PlotArg
       ->check(file_ending(".png", ".svg"));
 }
 
-bool wants_plot(const PlotArguments& arguments) {
+bool has_plot_arguments(const PlotArguments& arguments) {
   if (arguments.results.empty() != arguments.figure.empty()) fail_usage("--plot and --figure: expected both");
   return !arguments.results.empty();
 }

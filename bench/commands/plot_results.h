@@ -19,7 +19,7 @@ struct PlotArguments {
 /// Adds the options --plot, which `description` documents, and --figure.
 void add_plot_options(CLI::App* command, const std::string& description, PlotArguments* arguments);
 /// Whether both options were given. Throws UsageError if only one was given.
-bool wants_plot(const PlotArguments& arguments);
+bool has_plot_arguments(const PlotArguments& arguments);
 /// Draws a chart of pictura.plot from the results; `request` has further arguments of its function.
 void draw_results(const std::string& chart, const PlotArguments& arguments, Json request = Json::object());
 

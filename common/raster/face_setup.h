@@ -121,19 +121,19 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, PrimitiveRef primi
   return true;
 }
 
-/// The front surface at a screen point. Faces that cover the point are offered in any order; front() returns the face
+/// The front surface at a screen point. Faces that cover the point are added in any order; front() returns the face
 /// in front of all others, or null. Among equally near solids, and among strips on the level of the nearest strip, the
 /// lowest object id wins. is_in_front() orders the remaining solid and strip.
 class FrontFace {
  public:
-  PICTURA_HD void offer(const ScreenFace& face, Vec2 at_px) {
+  PICTURA_HD void add(const ScreenFace& face, Vec2 at_px) {
     const bool is_of_strip = is_strip(face);
     const ScreenFace*& best = is_of_strip ? strip_ : solid_;
     const ScreenFace* const before = best;
     if (!before || nearer(face, *before, at_px)) best = &face;
     needs_second_pass_ = needs_second_pass_ || (before && (is_of_strip || are_equally_near(face, *before, at_px)));
   }
-  /// Whether all faces must be offered a second time, because several may be on one level or equally near.
+  /// Whether all faces must be added a second time, because several may be on one level or equally near.
   PICTURA_HD bool needs_second_pass() const { return needs_second_pass_; }
   PICTURA_HD void add_second_pass(const ScreenFace& face, Vec2 at_px) {
     if (is_strip(face)) {

@@ -81,7 +81,7 @@ std::vector<bool> free_points(const CrossingPath& path, Span<const AgentBox> box
 
 std::optional<PathPart> used_part(Span<const float> visible_shares) {
   const auto is_hidden = [&](int i) { return i >= 0 && i < kPathPoints && visible_shares[i] == 0; };
-  const auto is_seen = [&](int i) { return i < kPathPoints && visible_shares[i] > 0; };
+  const auto is_visible = [&](int i) { return i < kPathPoints && visible_shares[i] > 0; };
   if (!is_hidden(kPathOrigin)) return {};
   constexpr int kHidden = static_cast<int>(kPathHidden_m / kPathSpacing_m),
                 kSeen = static_cast<int>(kPathSeen_m / kPathSpacing_m),
@@ -90,7 +90,7 @@ std::optional<PathPart> used_part(Span<const float> visible_shares) {
   while (is_hidden(part.first_seen)) ++part.first_seen;
   while (is_hidden(part.begin - 1)) --part.begin;
   float most = 0;
-  for (part.hidden_again = part.first_seen; is_seen(part.hidden_again); ++part.hidden_again)
+  for (part.hidden_again = part.first_seen; is_visible(part.hidden_again); ++part.hidden_again)
     most = max_of(most, visible_shares[part.hidden_again]);
   for (part.end = part.hidden_again; is_hidden(part.end);) ++part.end;
   if (part.first_seen - part.begin < kHidden || part.end - part.hidden_again < kHidden) return {};

@@ -134,7 +134,7 @@ class AreaBuilder {
                  build_.last_node({way, false}) == build_.last_node(at);
         });
         if (next == ways.end()) {
-          note_fault(relation);
+          record_fault(relation);
           return rings;
         }
         at = {*next, build_.first_node({*next, false}) != build_.last_node(at)};
@@ -149,7 +149,7 @@ class AreaBuilder {
   }
 
   template <typename Item>
-  void note_fault(const Item& item) const {
+  void record_fault(const Item& item) const {
     file_.where(item).record_repair(build_.faults, RepairKind::open_area,
                                     "expected a closed outline that does not cross itself");
   }
@@ -157,7 +157,7 @@ class AreaBuilder {
   template <typename Item>
   void add_surface(const Points& ring, const Item& item) {
     const auto triangles = ring.size() < 3 ? std::nullopt : triangulate(ring, &build_.budget);
-    if (!triangles) return note_fault(item);
+    if (!triangles) return record_fault(item);
     for (const auto& [a, b, c] : *triangles) {
       // As a quad with a corner in the middle of a side.
       build_.bands.push_back({{ring[a], ring[c]}, {0.5 * (ring[a] + ring[b]), ring[b]}});

@@ -99,7 +99,7 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
             const Vec2 apart = centers[k] - origin;
             const float d2 = dot(apart, apart);
             const bool is_one = first + k * group.size() < end && others[k] != agent && d2 < square(reach);
-            nearest.offer(is_one, d2, others[k]);
+            nearest.add(is_one, d2, others[k]);
           }
         }
       }
@@ -120,8 +120,7 @@ PICTURA_HD auto nearest_boxes(int num_boxes, const BoxAt& box_at, const IsPresen
     const AgentBox& box = box_at(i);
     const Vec2 apart = box.center_m.xy() - origin;
     const float d2 = dot(apart, apart);
-    nearest.offer(first + group.rank() < num_boxes && box.drawn && is_present(i) && d2 < square(kPartnerRange_m), d2,
-                  i);
+    nearest.add(first + group.rank() < num_boxes && box.drawn && is_present(i) && d2 < square(kPartnerRange_m), d2, i);
   }
   nearest.settle();
   return nearest;
@@ -182,7 +181,7 @@ PICTURA_HD int observe_controls(const WorldView& world, int slot, const NearPlac
     const int32_t light = items[min_of(i, num_items - 1)];
     const Vec2 apart = world.map.stop_lines[light].middle_m.xy() - frame.origin_m.xy();
     const float d2 = dot(apart, apart);
-    nearest.offer(i < num_items && d2 < square(kControlRange_m), d2, light);
+    nearest.add(i < num_items && d2 < square(kControlRange_m), d2, light);
   }
   nearest.settle();
   const int32_t lane = world.agents.lane[slot];

@@ -338,9 +338,10 @@ TEST(Config, WhatCannotWorkInOneMemoryIsRefusedByName) {
   c.simulator.backend = "cpu";
   c.render.backend = "cuda";  // draws for host memory
   EXPECT_TRUE(open_learning_device(c).is_host());
-  if (!why_no_cuda_device().empty()) {
+  if (!cuda_unavailable_reason().empty()) {
     EXPECT_TRUE(open_learning_device({}).is_host());
-    EXPECT_THAT(message("cuda", "auto", "auto"), AllOf(HasSubstr("run.device: cuda"), HasSubstr(why_no_cuda_device())));
+    EXPECT_THAT(message("cuda", "auto", "auto"),
+                AllOf(HasSubstr("run.device: cuda"), HasSubstr(cuda_unavailable_reason())));
     EXPECT_THAT(message("auto", "cuda", "auto"), HasSubstr("simulator.backend"));
   }
 }

@@ -61,7 +61,7 @@ std::optional<PlaceInLane> pose_before_end(const RoadMap& map, int32_t lane, flo
 }
 
 /// Returns whether a camera draws the head's centre, and no wall is between them.
-bool is_seen(const PinholeCamera& camera, const LightHead& head, const LineOfSight& walls) {
+bool is_visible(const PinholeCamera& camera, const LightHead& head, const LineOfSight& walls) {
   LightDisk disk;
   if (!light_is_visible(head, LightState::red, camera.position_m)) return false;
   if (!light_to_camera(head, LightState::red, camera, &disk)) return false;
@@ -105,7 +105,7 @@ Shares shares_of(const RoadMap& map, const StaticGeometry& geometry, Span<const 
           view.body_length_m = length_m;
           ++pairs;
           seen += std::any_of(cameras.begin(), cameras.end(), [&](const PinholeCamera& camera) {
-            return is_seen(place_camera(camera, view), head, walls);
+            return is_visible(place_camera(camera, view), head, walls);
           });
         }
       }

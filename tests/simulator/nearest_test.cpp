@@ -33,7 +33,7 @@ TEST(NearestOfOneThread, IsTheBeginningOfTheSortedOnesWhateverTheirNumber) {
     together.settle();
     for (size_t i = 0; i < places.size(); ++i) {
       const float distance2 = dot(places[i], places[i]);
-      one_by_one.offer(items[i] != except && distance2 < 20.0f, distance2, items[i]);
+      one_by_one.add(items[i] != except && distance2 < 20.0f, distance2, items[i]);
     }
     one_by_one.settle();
     const int expected = std::min(kCapacity, static_cast<int>(sorted.size()));

@@ -7,12 +7,12 @@
 
 namespace pictura {
 
-/// The nearest of the offered items, in ascending order of squared distance, then item; items are not negative. Without
+/// The nearest of the added items, in ascending order of squared distance, then item; items are not negative. Without
 /// branches, since processors cannot predict the place of an item in the order.
 template <int capacity>
 class NearestOfOneThread {
  public:
-  PICTURA_HD void offer(bool is_one, float distance2, int32_t item) {
+  PICTURA_HD void add(bool is_one, float distance2, int32_t item) {
     keys_.insert(is_one ? key_of(distance2, item) : Keys::kNone);
     count_ += is_one;
   }
@@ -57,7 +57,7 @@ class NearestOfOneThread {
     }
     insert_near();
   }
-  /// Finishes the selection: call after the last offer and before the functions below.
+  /// Finishes the selection: call after the last add() and before the functions below.
   PICTURA_HD void settle() {
     int64_t keys[Keys::kCount];
     keys_.store(keys);

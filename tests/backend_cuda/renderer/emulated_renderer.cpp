@@ -47,7 +47,7 @@ struct EmulatedRenderer::Setup {
   cuda::DrawCounters counters;
   cuda::FaultWord fault = cuda::kNoFault;
   cuda::PoolBuffers<HostBuffer> pool;
-  cuda::LargeBuffers<HostBuffer> large;
+  cuda::OverflowBuffers<HostBuffer> large;
 
   Setup(const EmulatedRenderer& renderer, const cuda::DrawTask& draw, const SceneBatch& scene) : task(draw) {
     int pieces = 0, heads = 0;
@@ -66,9 +66,9 @@ struct EmulatedRenderer::Setup {
     task.counters = &counters;
     task.fault = &fault;
     cuda::choose_tiles(&task, kBlocks);
-    cuda::Scratch sizes = cuda::large_sizes(pieces, heads, scene.agents.size());
+    cuda::Scratch sizes = cuda::overflow_sizes(pieces, heads, scene.agents.size());
     sizes.blocks = kBlocks;
-    large = cuda::LargeBuffers<HostBuffer>(sizes, cuda::large_bytes(sizes));
+    large = cuda::OverflowBuffers<HostBuffer>(sizes, cuda::large_bytes(sizes));
   }
   Setup(const Setup&) = delete;
 };

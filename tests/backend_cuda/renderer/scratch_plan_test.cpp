@@ -87,8 +87,8 @@ TEST(Pool, HasCapacityForEveryBatch) {
 TEST(LargeBlocks, AllocateTheComputedSize) {
   const Scratch sizes{.blocks = 3, .max_faces = 7, .max_edges = 11};
   allocated_bytes = 0;
-  LargeBuffers<CountedBuffer>(sizes, 160);
-  EXPECT_EQ(allocated_bytes, 3 * LargeBuffers<CountedBuffer>::block_bytes(sizes, 160));
+  OverflowBuffers<CountedBuffer>(sizes, 160);
+  EXPECT_EQ(allocated_bytes, 3 * OverflowBuffers<CountedBuffer>::block_bytes(sizes, 160));
 }
 
 }  // namespace

@@ -242,7 +242,7 @@ TEST(Order, FacesInOnePlaneAreOrderedByObject) {
       for (const bool swapped : {false, true}) {
         FrontFace front;
         const ScreenFace *const one = swapped ? &second : &first, *const other = swapped ? &first : &second;
-        for (const ScreenFace* face : {one, other}) front.offer(*face, {0.5f, 0.5f});
+        for (const ScreenFace* face : {one, other}) front.add(*face, {0.5f, 0.5f});
         ASSERT_TRUE(front.needs_second_pass());
         for (const ScreenFace* face : {one, other}) front.add_second_pass(*face, {0.5f, 0.5f});
         EXPECT_EQ(front.front({0.5f, 0.5f}, never), &first);
