@@ -183,7 +183,7 @@ Replay record_takeover(const EvaluateOptions& options, const RecordedScenario& s
   const DrivenScene& scene = keeper.scene(scenario.number);
 
   auto session = std::make_unique<PolicySession>(takeover.policy, one);
-  if (takeover.untrained) session = session->untrained(one.seed);
+  if (takeover.untrained) session = session->make_untrained(one.seed);
   SimulatorConfig world = session->evaluation_world(one.steps);
   world.seed = one.seed;
   const std::unique_ptr<Simulator> simulator =

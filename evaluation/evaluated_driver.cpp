@@ -80,7 +80,7 @@ EvaluatedDriver controller_driver(const DriverOptions& options, int steps) {
   const std::optional<Rig> rig = is_own ? named_rig(options) : std::nullopt;
   Config config = options.checkpoint.empty() ? Config() : read_stored_policy(options.checkpoint).config;
   config.policy.modality = rig ? Modality::perspective : Modality::vector;
-  config = adapted(config, options);
+  config = with_session_options(config, options);
   config.policy.modality = is_own ? Modality::vector : Modality::perspective;  // other controllers read no vectors,
   if (!rig) config.render.backend = "auto";                                    // and nothing is drawn
   const std::string& name = options.controller;

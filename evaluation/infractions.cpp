@@ -110,10 +110,10 @@ struct InfractionObserver::Frame : WorldArrays {
 
   explicit Frame(Simulator& simulator) : WorldArrays(simulator) {
     const AgentStateView state = simulator.state();
-    events = of_slots(simulator, state.events);
-    lane_offset_m = of_slots(simulator, state.lane_offset_m);
-    lane_angle_rad = of_slots(simulator, state.lane_angle_rad);
-    lane = of_slots(simulator, state.lane);
+    events = values_of_slots(simulator, state.events);
+    lane_offset_m = values_of_slots(simulator, state.lane_offset_m);
+    lane_angle_rad = values_of_slots(simulator, state.lane_angle_rad);
+    lane = values_of_slots(simulator, state.lane);
   }
 };
 

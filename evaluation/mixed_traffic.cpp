@@ -148,7 +148,7 @@ size_t MixedTraffic::drawn_driver(uint32_t global_world, uint32_t agent) const {
 }
 
 std::vector<uint8_t> MixedTraffic::driver_of_slots(Simulator& simulator) const {
-  const std::vector<AgentClass> agent_class = WorldArrays::of_slots(simulator, simulator.state().agent_class);
+  const std::vector<AgentClass> agent_class = WorldArrays::values_of_slots(simulator, simulator.state().agent_class);
   const std::vector<int32_t> slot_begin = host_copy(simulator.slots().slot_begin, simulator.device());
   std::vector<uint8_t> driver_of_slot(agent_class.size(), 0);
   for (size_t world = 0; world < simulator.worlds().size(); ++world) {

@@ -47,7 +47,7 @@ StandingObserver::StandingObserver(Simulator& simulator, std::vector<uint8_t> dr
 void StandingObserver::after_step(const StepResult& /*result*/) {
   ++step_;
   const WorldArrays now(simulator_);
-  const std::vector<float> distance_m = WorldArrays::of_slots(simulator_, simulator_.state().distance_m);
+  const std::vector<float> distance_m = WorldArrays::values_of_slots(simulator_, simulator_.state().distance_m);
   const float dt_s = simulator_.config().dt_s;
   for (size_t world = 0; world < simulator_.worlds().size(); ++world) {
     const MapView map = simulator_.maps()[simulator_.worlds()[world].map]->rules.view();

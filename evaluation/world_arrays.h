@@ -19,9 +19,9 @@ struct WorldArrays {
   std::vector<int32_t> slot_begin, box_begin, light_begin;  // [worlds + 1]
 
   explicit WorldArrays(Simulator& simulator)
-      : status(of_slots(simulator, simulator.state().status)),
-        agent_class(of_slots(simulator, simulator.state().agent_class)),
-        speed_mps(of_slots(simulator, simulator.state().speed_mps)),
+      : status(values_of_slots(simulator, simulator.state().status)),
+        agent_class(values_of_slots(simulator, simulator.state().agent_class)),
+        speed_mps(values_of_slots(simulator, simulator.state().speed_mps)),
         boxes(host_copy(simulator.scene().agents, simulator.device())),
         lights(host_copy(simulator.scene().light_states, simulator.device())),
         slot_begin(host_copy(simulator.slots().slot_begin, simulator.device())),
@@ -30,7 +30,7 @@ struct WorldArrays {
 
   /// Copies a field of the agents' state.
   template <typename T>
-  static std::vector<T> of_slots(Simulator& simulator, const T* values) {
+  static std::vector<T> values_of_slots(Simulator& simulator, const T* values) {
     return host_copy(Span<const T>(values, static_cast<size_t>(simulator.num_slots())), simulator.device());
   }
 

@@ -12,20 +12,20 @@ namespace pictura {
 /// Granularity of chunk sizes on a device: sizes are multiples of this number, unless the maximum size is smaller.
 constexpr int64_t kChunkGranule = 256;
 
-/// Sizes of the chunks of a batch: equal parts of at most `most` rows. With `are_full` every chunk has `most` rows, so
-/// that arithmetic that depends on the chunk size does not depend on the batch size.
+/// Sizes of the chunks of a batch: equal parts of at most `max_size` rows. With `are_full` every chunk has `max_size`
+/// rows, so that arithmetic that depends on the chunk size does not depend on the batch size.
 struct ChunkSizes {
-  int64_t most = 1;
+  int64_t max_size = 1;
   bool are_full = false;
 };
 
 /// Returns the size of each chunk of a batch of `count` rows.
 inline int64_t chunk_size(int64_t count, const ChunkSizes& sizes, bool on_device) {
-  const int64_t most = sizes.most;
-  if (sizes.are_full) return most;
-  const int64_t chunks = (count + most - 1) / most, granule = on_device ? kChunkGranule : 1;
+  const int64_t max_size = sizes.max_size;
+  if (sizes.are_full) return max_size;
+  const int64_t chunks = (count + max_size - 1) / max_size, granule = on_device ? kChunkGranule : 1;
   const int64_t equal = (count + chunks - 1) / chunks;
-  return std::min(most, (equal + granule - 1) / granule * granule);
+  return std::min(max_size, (equal + granule - 1) / granule * granule);
 }
 
 /// Consecutive rows of a batch from row `begin` on. Only the first `count` of `rows`, i64 [chunk size], belong to the

@@ -8,7 +8,7 @@ namespace {
 
 // Values of each slot's world: [slots].
 template <typename T>
-at::Tensor of_slots(const SimulatorArrays& input, Span<const T> of_worlds) {
+at::Tensor values_of_slots(const SimulatorArrays& input, Span<const T> of_worlds) {
   const auto num_slots = static_cast<int64_t>(input.slots.world_of_slot.size());
   return tensor_over(of_worlds, input.device, {static_cast<int64_t>(of_worlds.size())})
       .index_select(0, tensor_over(input.slots.world_of_slot, input.device, {num_slots}));
@@ -16,8 +16,8 @@ at::Tensor of_slots(const SimulatorArrays& input, Span<const T> of_worlds) {
 
 }  // namespace
 
-at::Tensor DecisionClock::deciding(const SimulatorArrays& input, const at::Tensor& active, int64_t step,
-                                   Span<const uint8_t> episode_over) {
+at::Tensor DecisionClock::select_deciding(const SimulatorArrays& input, const at::Tensor& active, int64_t step,
+                                          Span<const uint8_t> episode_over) {
   if (decision_steps_ == 1) return active;
   const auto num_slots = static_cast<int64_t>(input.slots.world_of_slot.size());
   const at::Tensor acted_before = acted_;
@@ -27,9 +27,9 @@ at::Tensor DecisionClock::deciding(const SimulatorArrays& input, const at::Tenso
                                            input.device, {num_slots});
   const at::Tensor left =
       tensor_over(Span<const uint8_t>(input.state.left, static_cast<size_t>(num_slots)), input.device, {num_slots});
-  at::Tensor decides = (acted_before == 0).logical_or_(of_slots(input, input.episode_step) == life_step);
+  at::Tensor decides = (acted_before == 0).logical_or_(values_of_slots(input, input.episode_step) == life_step);
   decides.logical_or_(left);
-  if (!episode_over.empty()) decides.logical_or_(of_slots(input, episode_over));
+  if (!episode_over.empty()) decides.logical_or_(values_of_slots(input, episode_over));
   return active.index_select(0, at::nonzero(decides.index_select(0, active)).squeeze(1));
 }
 

@@ -18,8 +18,8 @@ class DecisionClock {
   /// caller numbers the steps. episode_over: u8 [worlds], or empty. In the worlds that it marks all agents decide, so
   /// that the value of their last observation is known; so do agents that have just left a road that ends. On a device
   /// the call waits for a count, unless all agents decide.
-  at::Tensor deciding(const SimulatorArrays& input, const at::Tensor& active, int64_t step,
-                      Span<const uint8_t> episode_over = {});
+  at::Tensor select_deciding(const SimulatorArrays& input, const at::Tensor& active, int64_t step,
+                             Span<const uint8_t> episode_over = {});
 
  private:
   const int64_t decision_steps_;

@@ -16,8 +16,8 @@ struct Windows {
 
 // Computes outputs [window, window + kWindows) of all channels.
 template <int kFloats, int kVectors, int kWindows>
-PICTURA_INLINE void some_outputs(const Windows& windows, int64_t window, const float* padded, const float* weight,
-                                 float* out) {
+PICTURA_INLINE void block_outputs(const Windows& windows, int64_t window, const float* padded, const float* weight,
+                                  float* out) {
   using Vector = typename VectorOf<kFloats>::Type;
   constexpr int kOutputs = kFloats * kVectors;
   Vector sums[kWindows][kVectors] = {};
@@ -42,15 +42,15 @@ template <int kFloats, int kVectors, int kWindows>
 PICTURA_INLINE void all_outputs(const Windows& windows, const float* padded, const float* weight, float* out) {
   int64_t window = 0;
   for (; window + kWindows <= windows.count; window += kWindows) {
-    some_outputs<kFloats, kVectors, kWindows>(windows, window, padded, weight, out);
+    block_outputs<kFloats, kVectors, kWindows>(windows, window, padded, weight, out);
   }
-  for (; window < windows.count; ++window) some_outputs<kFloats, kVectors, 1>(windows, window, padded, weight, out);
+  for (; window < windows.count; ++window) block_outputs<kFloats, kVectors, 1>(windows, window, padded, weight, out);
 }
 
 // Computes weight gradients of taps [tap, tap + kTaps) of row k of the kernel.
 template <int kFloats, int kVectors, int kTaps>
-PICTURA_INLINE void some_weight_gradients(const Windows& windows, int64_t k, int64_t tap, const float* padded,
-                                          const float* grad, float* weight_grad) {
+PICTURA_INLINE void block_weight_gradients(const Windows& windows, int64_t k, int64_t tap, const float* padded,
+                                           const float* grad, float* weight_grad) {
   using Vector = typename VectorOf<kFloats>::Type;
   constexpr int kOutputs = kFloats * kVectors;
   float* const to = weight_grad + (k * windows.run + tap) * kOutputs;
@@ -79,10 +79,10 @@ PICTURA_INLINE void all_weight_gradients(const Windows& windows, const float* pa
   for (int64_t k = 0; k < windows.kernel; ++k) {
     int64_t tap = 0;
     for (; tap + kTaps <= windows.run; tap += kTaps) {
-      some_weight_gradients<kFloats, kVectors, kTaps>(windows, k, tap, padded, grad, weight_grad);
+      block_weight_gradients<kFloats, kVectors, kTaps>(windows, k, tap, padded, grad, weight_grad);
     }
     for (; tap < windows.run; ++tap) {
-      some_weight_gradients<kFloats, kVectors, 1>(windows, k, tap, padded, grad, weight_grad);
+      block_weight_gradients<kFloats, kVectors, 1>(windows, k, tap, padded, grad, weight_grad);
     }
   }
 }
@@ -90,8 +90,8 @@ PICTURA_INLINE void all_weight_gradients(const Windows& windows, const float* pa
 // Computes gradients of the inputs that windows [window, window + kWindows) read at taps [tap, tap + kVectors *
 // kFloats) of row k of the kernel.
 template <int kFloats, int kVectors, int kWindows>
-PICTURA_INLINE void some_image_gradients(const Windows& windows, int64_t window, int64_t k, int64_t tap,
-                                         int64_t outputs, const float* grad, const float* weight, float* padded_grad) {
+PICTURA_INLINE void block_image_gradients(const Windows& windows, int64_t window, int64_t k, int64_t tap,
+                                          int64_t outputs, const float* grad, const float* weight, float* padded_grad) {
   using Vector = typename VectorOf<kFloats>::Type;
   const int64_t first = k * windows.run + tap, taps = windows.kernel * windows.run;
   Vector sums[kWindows][kVectors] = {};
@@ -118,10 +118,10 @@ PICTURA_INLINE void image_gradients_of(const Windows& windows, int64_t window, i
   for (int64_t k = 0; k < windows.kernel; ++k) {
     int64_t tap = 0;
     for (; tap + kVectors * kFloats <= windows.run; tap += kVectors * kFloats) {
-      some_image_gradients<kFloats, kVectors, kWindows>(windows, window, k, tap, outputs, grad, weight, padded_grad);
+      block_image_gradients<kFloats, kVectors, kWindows>(windows, window, k, tap, outputs, grad, weight, padded_grad);
     }
     for (; tap < windows.run; tap += kChannelMultiple) {
-      some_image_gradients<kChannelMultiple, 1, kWindows>(windows, window, k, tap, outputs, grad, weight, padded_grad);
+      block_image_gradients<kChannelMultiple, 1, kWindows>(windows, window, k, tap, outputs, grad, weight, padded_grad);
     }
   }
 }
@@ -177,9 +177,12 @@ void run(bool is_wide, Pass pass, const ConvolutionSize& size, const std::vector
 
 }  // namespace
 
-DirectConvolution::DirectConvolution(const ConvolutionSize& size, int64_t outputs, int64_t most, bool is_wide)
-    : size_(size), outputs_(outputs), is_wide_(is_wide), padded_(static_cast<size_t>(most * size.padded_numbers())) {
-  for (int64_t image = 0; image < most; ++image) {
+DirectConvolution::DirectConvolution(const ConvolutionSize& size, int64_t outputs, int64_t max_images, bool is_wide)
+    : size_(size),
+      outputs_(outputs),
+      is_wide_(is_wide),
+      padded_(static_cast<size_t>(max_images * size.padded_numbers())) {
+  for (int64_t image = 0; image < max_images; ++image) {
     for (int64_t row = 0; row < size.rows(); ++row) {
       for (int64_t column = 0; column < size.columns(); ++column) {
         windows_.push_back(image * size.padded_numbers() +

@@ -26,11 +26,12 @@ struct ConvolutionSize {
 class DirectConvolution {
  public:
   /// Whether the convolution supports this number of outputs, and the image gradient this number of channels.
-  static bool takes(int64_t outputs) { return outputs == 8 || outputs == 16 || outputs == 32; }
-  static bool takes_gradient(int64_t channels) { return channels % 8 == 0; }
+  static bool supports(int64_t outputs) { return outputs == 8 || outputs == 16 || outputs == 32; }
+  static bool supports_gradient(int64_t channels) { return channels % 8 == 0; }
 
-  /// Creates a convolution for blocks of at most `most` images.
-  DirectConvolution(const ConvolutionSize& size, int64_t outputs, int64_t most, bool is_wide = has_wide_vectors());
+  /// Creates a convolution for blocks of at most `max_images` images.
+  DirectConvolution(const ConvolutionSize& size, int64_t outputs, int64_t max_images,
+                    bool is_wide = has_wide_vectors());
 
   /// Copies images [n, height, width, channels] for the functions below.
   void read(const float* images, int64_t n);

@@ -162,8 +162,8 @@ class SetEncoder {
       float* const its_rows = room(&rows, members * group.size.width());
       float* const hidden = room(&activations, members * width_);
       float* const its_embeddings = room(&embeddings, members * width_);
-      host::member_rows(members_of(arrays, group) + begin * group.most * group.size.columns, counts.data(), count,
-                        group.most, group.size, its_rows);
+      host::member_rows(members_of(arrays, group) + begin * group.max_members * group.size.columns, counts.data(),
+                        count, group.max_members, group.size, its_rows);
       group.encoder.apply_hidden(its_rows, members, hidden);
       host::multiply({hidden, width_}, group.encoder.out.weight.data(), members, width_, width_, its_embeddings);
       host::largest_members(its_embeddings, counts.data(), count, width_, largest.data(), which.data());
@@ -181,7 +181,7 @@ class SetEncoder {
   struct SetGroup {
     Group encoder;
     RowSize size;
-    int64_t most, set;  // rows of the array; its column of set_counts
+    int64_t max_members, set;  // rows of the array; its column of set_counts
     std::string array;
   };
   static const float* members_of(const ObservationView& arrays, const SetGroup& group) {

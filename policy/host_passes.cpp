@@ -269,11 +269,11 @@ void patches(const uint8_t* images, int64_t views, int64_t cameras, int64_t came
   }
 }
 
-void member_rows(const float* members, const int32_t* counts, int64_t sets, int64_t most, const RowSize& size,
+void member_rows(const float* members, const int32_t* counts, int64_t sets, int64_t max_members, const RowSize& size,
                  float* out) {
   for (int64_t set = 0; set < sets; ++set) {
     for (int32_t member = 0; member < counts[set]; ++member) {
-      const float* const row = members + (set * most + member) * size.columns;
+      const float* const row = members + (set * max_members + member) * size.columns;
       out = std::copy_n(row, size.columns, out);
       for (int i = 0; i < size.features.count(); ++i) *out++ = row_feature(size.features, row, i);
     }

@@ -47,9 +47,9 @@ void patches(const uint8_t* images, int64_t views, int64_t cameras, int64_t came
              int64_t patch_px, float* out);
 
 /// Writes the present members of sets consecutively, set after set, each followed by its features. members: [sets,
-/// most, size.columns]; counts: [sets], at most `most`. size.keeps_rows must be set; size.rows is not read. out: [sum
-/// of counts, size.width()].
-void member_rows(const float* members, const int32_t* counts, int64_t sets, int64_t most, const RowSize& size,
+/// max_members, size.columns]; counts: [sets], at most `max_members`. size.keeps_rows must be set; size.rows is not
+/// read. out: [sum of counts, size.width()].
+void member_rows(const float* members, const int32_t* counts, int64_t sets, int64_t max_members, const RowSize& size,
                  float* out);
 
 /// Finds the largest member of each set in each channel, and its index in the set, the first of equal members; 0 and -1

@@ -83,9 +83,10 @@ struct HostSession final : SessionParts {
     if (config.reads_images()) check_images(input, static_cast<size_t>(batch), renderer);
     constexpr int64_t kMostAtOnce = 512;  // agents, whose images take 62 KB each at the paper's size
     const auto total = static_cast<int64_t>(indices.size());
-    const int64_t most = std::min<int64_t>(config.train.forward_chunk, kMostAtOnce);
-    for (int64_t begin = 0; begin < total; begin += most) {
-      const auto some = indices.subspan(static_cast<size_t>(begin), static_cast<size_t>(std::min(most, total - begin)));
+    const int64_t max_members = std::min<int64_t>(config.train.forward_chunk, kMostAtOnce);
+    for (int64_t begin = 0; begin < total; begin += max_members) {
+      const auto some =
+          indices.subspan(static_cast<size_t>(begin), static_cast<size_t>(std::min(max_members, total - begin)));
       GatheredRows rows(config, input.observations, batch, some);
       if (input.hides_auxiliary) rows.hide_auxiliary();
       HostObservation observation{static_cast<int64_t>(some.size()), rows.view, {}};
@@ -166,7 +167,7 @@ class HostController final : public PolicyController {
     check_controller_arrays(name(), input, session_.device, mask, commands_out);
     actions_.resize(commands_out.size());
     std::vector<int64_t> slots(commands_out.size());
-    slots.resize(static_cast<size_t>(session_.executor->select_asked({input.state.status, mask, nullptr}, slots)));
+    slots.resize(static_cast<size_t>(session_.executor->select_deciding({input.state.status, mask, nullptr}, slots)));
     num_driven_ = static_cast<int64_t>(slots.size());
     keep_deciding(input, &slots);
     std::vector<float> logits(slots.size() * kNumActions), values(slots.size());

@@ -162,7 +162,7 @@ class Blocks {
 
   int64_t parts() const { return parts_; }
   /// Size of the largest block.
-  int64_t most() const { return std::min(block_, count_); }
+  int64_t max_size() const { return std::min(block_, count_); }
 
   /// Calls make(part) once per part. It returns a function that is called with (begin, end) of each block of the part.
   template <typename Make>
@@ -249,9 +249,9 @@ at::Tensor forward_with_slopes(AutogradContext* context, const at::Tensor& x, co
 
 // Convolution of few outputs by host::DirectConvolution, one block of images at a time. Shapes as in HostConvolution.
 struct HostDirectConvolution : Function<HostDirectConvolution> {
-  static bool takes(const at::Tensor& x, const at::Tensor& weight) {
-    return host::DirectConvolution::takes(weight.size(0)) &&
-           (host::DirectConvolution::takes_gradient(x.size(3)) || !keeps_gradients({x}));
+  static bool supports(const at::Tensor& x, const at::Tensor& weight) {
+    return host::DirectConvolution::supports(weight.size(0)) &&
+           (host::DirectConvolution::supports_gradient(x.size(3)) || !keeps_gradients({x}));
   }
 
   static at::Tensor compute(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias, int64_t stride,
@@ -263,13 +263,13 @@ struct HostDirectConvolution : Function<HostDirectConvolution> {
                      sums = slope_out ? at::empty_like(out) : out;
     const Blocks blocks = blocks_of(x.size(0), size, outputs);
     blocks.run([&](int64_t) {
-      return
-          [&, convolution = host::DirectConvolution(size, outputs, blocks.most())](int64_t begin, int64_t end) mutable {
-            convolution.read(read(x, begin), end - begin);
-            convolution.compute(read(by_tap), write(sums, begin));
-            host::bias_gelu(read(sums, begin), read(bias), (end - begin) * size.pixels(), outputs, write(out, begin),
-                            slope_out ? write(sums, begin) : nullptr);
-          };
+      return [&, convolution = host::DirectConvolution(size, outputs, blocks.max_size())](int64_t begin,
+                                                                                          int64_t end) mutable {
+        convolution.read(read(x, begin), end - begin);
+        convolution.compute(read(by_tap), write(sums, begin));
+        host::bias_gelu(read(sums, begin), read(bias), (end - begin) * size.pixels(), outputs, write(out, begin),
+                        slope_out ? write(sums, begin) : nullptr);
+      };
     });
     if (slope_out) *slope_out = sums;
     return out;
@@ -291,9 +291,9 @@ struct HostDirectConvolution : Function<HostDirectConvolution> {
                      bias_sums = at::zeros({blocks.parts(), outputs}, weight.options()),
                      grad_x = context->needs_input_grad(0) ? at::empty_like(x) : at::Tensor();
     blocks.run([&](int64_t part) {
-      return [&, part, convolution = host::DirectConvolution(size, outputs, blocks.most()),
-              sums_grad = at::empty({blocks.most() * size.pixels(), outputs}, weight.options())](int64_t begin,
-                                                                                                 int64_t end) mutable {
+      return [&, part, convolution = host::DirectConvolution(size, outputs, blocks.max_size()),
+              sums_grad = at::empty({blocks.max_size() * size.pixels(), outputs}, weight.options())](
+                 int64_t begin, int64_t end) mutable {
         host::bias_gelu_backward(read(slope, begin), read(grad, begin), (end - begin) * size.pixels(), outputs,
                                  write(sums_grad), write(bias_sums, part));
         convolution.read(read(x, begin), end - begin);
@@ -317,7 +317,7 @@ struct HostDirectConvolution : Function<HostDirectConvolution> {
 // its backward pass is two to four times as fast as oneDNN's.
 struct HostConvolution : Function<HostConvolution> {
   /// With fewer outputs, the products leave most of a vector unit idle.
-  static constexpr int64_t kLeastOutputs = 16;
+  static constexpr int64_t kMinOutputs = 16;
 
   HostConvolution(const at::Tensor& x, const at::Tensor& w, int64_t stride)
       : size(convolution_size(x, w, stride)),
@@ -332,7 +332,7 @@ struct HostConvolution : Function<HostConvolution> {
 
   bool reads_pixels() const { return size.kernel == 1 && size.stride == 1; }
   at::Tensor scratch(int64_t columns) const {
-    return at::empty({blocks.most() * size.pixels(), columns}, weight.options());
+    return at::empty({blocks.max_size() * size.pixels(), columns}, weight.options());
   }
   at::Tensor of_images(const at::Tensor& rows, int64_t begin, int64_t end) const {
     return rows.narrow(0, begin * size.pixels(), (end - begin) * size.pixels());
@@ -409,7 +409,7 @@ struct HostSets : Function<HostSets> {
   static variable_list compute(const at::Tensor& members, const at::Tensor& counts, const RowFeatures& features,
                                bool has_norm, const at::Tensor& hidden_weight, const at::Tensor& hidden_bias,
                                const at::Tensor& weight, const at::Tensor& bias) {
-    const int64_t sets = members.size(0), most = members.size(1), hidden = hidden_weight.size(0),
+    const int64_t sets = members.size(0), max_members = members.size(1), hidden = hidden_weight.size(0),
                   channels = weight.size(0);
     const RowSize size = row_size(members, features, /*keeps_rows=*/true);
     const std::vector<int64_t> begins = begins_of(counts);
@@ -417,16 +417,16 @@ struct HostSets : Function<HostSets> {
     const at::Tensor rows = at::empty({begins.back(), size.width()}, options),
                      largest = at::empty({sets, channels}, options),
                      which = at::empty({sets, channels}, counts.options());
-    const Blocks blocks(sets, host::kBlockNumbers / (most * (hidden + channels)));
+    const Blocks blocks(sets, host::kBlockNumbers / (max_members * (hidden + channels)));
     const at::Tensor hidden_transposed = hidden_weight.detach().t(), transposed = weight.detach().t(),
                      gelu_bias = gelu_bias_of(hidden_bias.detach(), has_norm);
     blocks.run([&](int64_t) {
-      return [&, hidden_memory = at::empty({blocks.most() * most, hidden}, options),
-              memory = at::empty({blocks.most() * most, channels}, options)](int64_t begin, int64_t end) {
+      return [&, hidden_memory = at::empty({blocks.max_size() * max_members, hidden}, options),
+              memory = at::empty({blocks.max_size() * max_members, channels}, options)](int64_t begin, int64_t end) {
         const auto first = begins[begin], count = begins[end] - first;
         const int32_t* const its_counts = counts.const_data_ptr<int32_t>() + begin;
         const at::Tensor some = rows.narrow(0, first, count);
-        host::member_rows(read(members, begin), its_counts, end - begin, most, size, write(some));
+        host::member_rows(read(members, begin), its_counts, end - begin, max_members, size, write(some));
         at::Tensor activations = hidden_memory.narrow(0, 0, count), embeddings = memory.narrow(0, 0, count);
         at::mm_out(activations, some, hidden_transposed);
         if (has_norm) host::bias_norm(read(activations), read(hidden_bias), count, hidden, write(activations), nullptr);
@@ -638,7 +638,7 @@ at::Tensor space_to_depth(const at::Tensor& images, int64_t patch_px) {
 
 at::Tensor linear_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias) {
   if (is_on_host(x)) return host_bias_gelu(at::linear(x, weight), bias);
-  if (!x.is_cuda() || !NetworkPasses::gelu_takes(bias.size(0))) return gelu(at::linear(x, weight, bias));
+  if (!x.is_cuda() || !NetworkPasses::supports_gelu(bias.size(0))) return gelu(at::linear(x, weight, bias));
   return BiasGelu<false>::apply(at::linear(x, weight), bias);
 }
 
@@ -649,7 +649,7 @@ at::Tensor normalize(const at::Tensor& x) {
 }
 
 at::Tensor linear_norm_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias) {
-  if (!x.is_cuda() || !NetworkPasses::norm_takes(bias.size(0))) return gelu(normalize(at::linear(x, weight, bias)));
+  if (!x.is_cuda() || !NetworkPasses::supports_norm(bias.size(0))) return gelu(normalize(at::linear(x, weight, bias)));
   return BiasGelu<true>::apply(at::linear(x, weight), bias);
 }
 
@@ -664,15 +664,15 @@ at::Tensor convolve_gelu(const at::Tensor& x, const at::Tensor& weight, const at
                  : Convolution::compute(images, padded, bias, stride, /*slope_out=*/nullptr);
     };
     at::Tensor out;
-    if (const at::Tensor images = channels_last(x); HostDirectConvolution::takes(images, weight))
+    if (const at::Tensor images = channels_last(x); HostDirectConvolution::supports(images, weight))
       out = convolve.template operator()<HostDirectConvolution>(images);
-    else if (bias.size(0) < HostConvolution::kLeastOutputs)
+    else if (bias.size(0) < HostConvolution::kMinOutputs)
       out = host_bias_gelu(channels_last(at::conv2d(x, padded, {}, {stride}, {padding})), bias);
     else
       out = convolve.template operator()<HostConvolution>(images);
     return out.permute({0, 3, 1, 2});
   }
-  if (!x.is_cuda() || !NetworkPasses::gelu_takes(bias.size(0))) {
+  if (!x.is_cuda() || !NetworkPasses::supports_gelu(bias.size(0))) {
     return gelu(at::conv2d(x, padded, bias, {stride}, {padding}));
   }
   const at::Tensor rows = at::conv2d(x, padded, {}, {stride}, {padding}).permute({0, 2, 3, 1}).contiguous();
@@ -680,7 +680,7 @@ at::Tensor convolve_gelu(const at::Tensor& x, const at::Tensor& weight, const at
 }
 
 at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tensor& weight, const at::Tensor& bias) {
-  if (!is_supported(x) || !NetworkPasses::norm_takes(x.size(-1))) {
+  if (!is_supported(x) || !NetworkPasses::supports_norm(x.size(-1))) {
     return at::layer_norm(position.defined() ? x + position : x, {x.size(-1)}, weight, bias);
   }
   std::optional<at::Tensor> added;
@@ -688,11 +688,11 @@ at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tenso
   return Norm::apply(x.contiguous(), added, weight, bias);
 }
 
-bool takes_sets(const at::Tensor& members, const RowFeatures& features, const at::Tensor& hidden_weight,
-                const at::Tensor& weight) {
+bool has_fused_set_encoder(const at::Tensor& members, const RowFeatures& features, const at::Tensor& hidden_weight,
+                           const at::Tensor& weight) {
   if (is_on_host(members)) return true;
   return is_bf16_on_device(members) && members.scalar_type() == at::kFloat &&
-         SetSize::takes(weight.size(0), hidden_weight.size(0), members.size(2) + features.count(), members.size(1));
+         SetSize::supports(weight.size(0), hidden_weight.size(0), members.size(2) + features.count(), members.size(1));
 }
 
 at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& counts, const RowFeatures& features,
@@ -716,8 +716,8 @@ at::Tensor token_softmax(const at::Tensor& scores) {
   return TokenSoftmax::apply(scores.contiguous());
 }
 
-bool takes_feature_rows(const at::Tensor& rows, const RowFeatures& features) {
-  return rows.is_cuda() && rows.scalar_type() == at::kFloat && rows.size(-1) + features.count() <= RowSize::kMostWidth;
+bool has_fused_row_features(const at::Tensor& rows, const RowFeatures& features) {
+  return rows.is_cuda() && rows.scalar_type() == at::kFloat && rows.size(-1) + features.count() <= RowSize::kMaxWidth;
 }
 
 at::Tensor feature_rows(const at::Tensor& rows, const RowFeatures& features, bool keeps_rows, at::ScalarType type) {
@@ -732,8 +732,8 @@ at::Tensor feature_rows(const at::Tensor& rows, const RowFeatures& features, boo
 }
 
 at::Tensor image_patches(const at::Tensor& images, int64_t patch_px, at::ScalarType type) {
-  if (images.is_cpu() && type == at::kFloat && PatchSize::takes(patch_px)) return host_patches(images, patch_px);
-  if (!images.is_cuda() || !PatchSize::takes(patch_px)) {
+  if (images.is_cpu() && type == at::kFloat && PatchSize::supports(patch_px)) return host_patches(images, patch_px);
+  if (!images.is_cuda() || !PatchSize::supports(patch_px)) {
     return space_to_depth(by_camera(images), patch_px)
         .to(type, /*non_blocking=*/false, /*copy=*/false, at::MemoryFormat::ChannelsLast);
   }

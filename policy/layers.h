@@ -28,8 +28,8 @@ at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tenso
 
 /// Whether largest_embedding() supports these members: f32 on the host, or on a CUDA device that computes in bf16, for
 /// layers of the sizes in SetSize.
-bool takes_sets(const at::Tensor& members, const RowFeatures& features, const at::Tensor& hidden_weight,
-                const at::Tensor& weight);
+bool has_fused_set_encoder(const at::Tensor& members, const RowFeatures& features, const at::Tensor& hidden_weight,
+                           const at::Tensor& weight);
 /// Largest value of each channel over the members of a set: [sets, channels], 0 for an empty set. Each member passes
 /// through a linear layer with GELU (linear_norm_gelu() if `has_norm`) and a second linear layer. members: [sets,
 /// maximum, columns], without gradient, each followed by its features; counts: i32 [sets], the members of each set.
@@ -41,7 +41,7 @@ at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& counts
 at::Tensor token_softmax(const at::Tensor& scores);
 
 /// Whether feature_rows() supports these rows, [..., columns]: f32 on a CUDA device, few enough numbers a row.
-bool takes_feature_rows(const at::Tensor& rows, const RowFeatures& features);
+bool has_fused_row_features(const at::Tensor& rows, const RowFeatures& features);
 /// Features of rows, [..., columns], as RowSize describes them, in `type`. Without gradient.
 at::Tensor feature_rows(const at::Tensor& rows, const RowFeatures& features, bool keeps_rows, at::ScalarType type);
 

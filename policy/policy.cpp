@@ -57,7 +57,7 @@ class ParameterMaker {
   /// Type and device of all parameters.
   const at::TensorOptions& options() const { return options_; }
   /// Adds parameters that are not drawn.
-  void adopt(const std::vector<NamedTensor>& parameters) {
+  void add_parameters(const std::vector<NamedTensor>& parameters) {
     parameters_->insert(parameters_->end(), parameters.begin(), parameters.end());
   }
 
@@ -125,7 +125,7 @@ class VectorEncoder final : public SceneEncoder {
       at::Tensor members = o.*group.members;
       const at::Tensor counts = o.set_counts.select(1, group.set);
       const PolicyNetwork::Linear &hidden = group.encoder.hidden, &out = group.encoder.out;
-      if (takes_sets(members, group.features, hidden.weight, out.weight)) {
+      if (has_fused_set_encoder(members, group.features, hidden.weight, out.weight)) {
         embeddings.push_back(largest_embedding(members, counts, group.features, group.encoder.layer_norm, hidden.weight,
                                                hidden.bias, out.weight, out.bias));
         continue;
@@ -162,7 +162,7 @@ class PerspectiveEncoder final : public SceneEncoder {
         image_type_(image_type),
         backbone_(load_backbone(config, make->options())),
         width_(backbone_ ? backbone_->channels() : config.conv_channels.back()) {
-    if (backbone_) make->adopt(backbone_->parameters());
+    if (backbone_) make->add_parameters(backbone_->parameters());
     int64_t in = 3 * int64_t{config.patch_px} * config.patch_px;
     for (size_t i = 0; i < config.conv_channels.size() && !backbone_; ++i) {
       const int64_t out = config.conv_channels[i], kernel = config.conv_kernels[i];

@@ -23,7 +23,7 @@ at::Tensor beside_segments(const at::Tensor& rows, double unit_m) {
 }  // namespace
 
 at::Tensor row_features(const at::Tensor& rows, const RowFeatures& features, at::ScalarType type) {
-  if (takes_feature_rows(rows, features)) return feature_rows(rows, features, /*keeps_rows=*/false, type);
+  if (has_fused_row_features(rows, features)) return feature_rows(rows, features, /*keeps_rows=*/false, type);
   const double unit_m = features.position_unit_m;
   std::vector<at::Tensor> all;
   if (features.points > 0) {
@@ -36,7 +36,7 @@ at::Tensor row_features(const at::Tensor& rows, const RowFeatures& features, at:
 }
 
 at::Tensor with_row_features(const at::Tensor& rows, const RowFeatures& features, at::ScalarType type) {
-  if (takes_feature_rows(rows, features)) return feature_rows(rows, features, /*keeps_rows=*/true, type);
+  if (has_fused_row_features(rows, features)) return feature_rows(rows, features, /*keeps_rows=*/true, type);
   return at::cat({rows.to(type), row_features(rows, features, type)}, -1);
 }
 

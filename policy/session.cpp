@@ -9,7 +9,7 @@
 
 namespace pictura {
 
-Config adapted(const Config& trained, const SessionOptions& options) {
+Config with_session_options(const Config& trained, const SessionOptions& options) {
   Config config = with_evaluate_conditioning(trained, options.conditioning);
   config.run.num_threads = options.num_threads;
   config.run.device = options.device;
@@ -103,8 +103,8 @@ PolicySession::PolicySession(const std::string& path, const SessionOptions& opti
 
 PolicySession::~PolicySession() = default;
 
-std::unique_ptr<PolicySession> PolicySession::untrained(uint64_t seed) const {
-  return std::make_unique<PolicySession>(parts_->untrained(seed));
+std::unique_ptr<PolicySession> PolicySession::make_untrained(uint64_t seed) const {
+  return std::make_unique<PolicySession>(parts_->make_untrained(seed));
 }
 
 bool PolicySession::reads_images() const { return parts_->config.reads_images(); }

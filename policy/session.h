@@ -20,7 +20,7 @@ struct SessionParts;
 
 /// Returns the training configuration with the changes of the options. Device settings belong to the machine that
 /// trained the policy; here any renderer that draws the same images is used.
-Config adapted(const Config& trained, const SessionOptions& options);
+Config with_session_options(const Config& trained, const SessionOptions& options);
 
 /// Observations of a batch of agents, in the memory of the session's device.
 struct PolicyInput {
@@ -65,7 +65,7 @@ class PolicySession {
   ~PolicySession();
   /// The same policy as it is before training, in the same worlds and with the same cameras: weights are drawn from
   /// `seed` as train draws them, but for those of a backbone's program. Throws Error in builds without torch.
-  std::unique_ptr<PolicySession> untrained(uint64_t seed) const;
+  std::unique_ptr<PolicySession> make_untrained(uint64_t seed) const;
   PolicySession(const PolicySession&) = delete;
   PolicySession& operator=(const PolicySession&) = delete;
 

@@ -14,16 +14,16 @@ namespace {
 
 // Returns the reason why torch cannot compute on CUDA devices; empty if it can. Opens torch's CUDA library here instead
 // of linking it, so that programs start on machines without it.
-std::string why_torch_has_no_cuda() {
+std::string torch_cuda_unavailable_reason() {
   static const void* const library = dlopen("libtorch_cuda.so", RTLD_NOW | RTLD_GLOBAL | RTLD_NODELETE);
   if (!library) return "this torch has no CUDA (libtorch_cuda.so cannot be opened): install a torch with CUDA";
   if (!at::globalContext().hasCUDA()) return "torch finds no CUDA device: its CUDA may be newer than the driver";
   return "";
 }
 
-std::string why_not_on_cuda() {
+std::string cuda_rejection_reason() {
   const std::string no_device = cuda_unavailable_reason();
-  return no_device.empty() ? why_torch_has_no_cuda() : no_device;
+  return no_device.empty() ? torch_cuda_unavailable_reason() : no_device;
 }
 
 }  // namespace
@@ -33,7 +33,7 @@ Device open_learning_device(const Config& config, int local_rank) {
                     &renderer = config.render.backend;
   // Called before anything is computed, even on the host: torch looks for its CUDA library once, and a process that
   // learns on the host may use a device later.
-  const std::string why_not = why_not_on_cuda();
+  const std::string why_not = cuda_rejection_reason();
   const bool draws_on_host =
       config.reads_images() && (renderer == "cpu" || renderer == "null" || renderer == "gl:osmesa");
   const auto refuse_on_device = [&wanted](const char* key, const std::string& value, const char* instead) {

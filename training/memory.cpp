@@ -112,8 +112,8 @@ void add_entity_sets(const Config& config, Device device, LayerSum* sum) {
     const double features = array.features + row_features_of(config.policy, array.name).count();
     const bool is_one_pass =
         device.is_host() || (config.train.precision == Precision::bf16 &&
-                             SetSize::takes(config.policy.embedding_width, config.policy.embedding_width,
-                                            static_cast<int64_t>(features), array.rows));
+                             SetSize::supports(config.policy.embedding_width, config.policy.embedding_width,
+                                               static_cast<int64_t>(features), array.rows));
     if (is_one_pass) {
       // The features of members and the indices of the largest members are kept: see largest_embedding().
       sum->add_parameters((features + 1) * width + (width + 1) * width);
@@ -122,7 +122,7 @@ void add_entity_sets(const Config& config, Device device, LayerSum* sum) {
       continue;
     }
     sum->add_values(array.rows * features, 2);
-    const bool keeps_norm = config.policy.layer_norm && !NetworkPasses::norm_takes(config.policy.embedding_width);
+    const bool keeps_norm = config.policy.layer_norm && !NetworkPasses::supports_norm(config.policy.embedding_width);
     sum->add_group(array.rows, features, width, keeps_norm, 2);
   }
 }

@@ -20,7 +20,7 @@ class LearnerExecutorCpu final : public LearnerExecutor {
   Device device() const override { return {}; }
   int64_t memory_bytes() const override { return int64_t{sysconf(_SC_PHYS_PAGES)} * sysconf(_SC_PAGESIZE); }
 
-  int64_t select_asked(const AskedSlots& asked, Span<int64_t> slots_out, Stream) override {
+  int64_t select_deciding(const DecidingSlots& asked, Span<int64_t> slots_out, Stream) override {
     return select(static_cast<int64_t>(slots_out.size()), slots_out, asked);
   }
 

@@ -109,7 +109,7 @@ void launch_permute(const Permutation& permutation, Span<const int64_t> items, i
   launch(static_cast<int64_t>(items.size()), Permute{permutation, items.data(), items_out}, stream);
 }
 
-cudaError_t select(const AskedSlots& rule, int64_t count, int64_t* items_out, int64_t* num_items_out, void* scratch,
+cudaError_t select(const DecidingSlots& rule, int64_t count, int64_t* items_out, int64_t* num_items_out, void* scratch,
                    size_t* scratch_bytes, cudaStream_t stream) {
   return select_if(rule, count, items_out, num_items_out, scratch, scratch_bytes, stream);
 }

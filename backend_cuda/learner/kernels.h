@@ -27,7 +27,7 @@ struct KeptTransitions {
   Span<const uint8_t> valid;
   float threshold;
 };
-cudaError_t select(const AskedSlots& rule, int64_t count, int64_t* items_out, int64_t* num_items_out, void* scratch,
+cudaError_t select(const DecidingSlots& rule, int64_t count, int64_t* items_out, int64_t* num_items_out, void* scratch,
                    size_t* scratch_bytes_inout, cudaStream_t stream);
 cudaError_t select(const KeptTransitions& rule, int64_t count, int64_t* items_out, int64_t* num_items_out,
                    void* scratch, size_t* scratch_bytes_inout, cudaStream_t stream);

@@ -29,7 +29,7 @@ class LearnerExecutorCuda final : public LearnerExecutor {
     return static_cast<int64_t>(free_bytes);
   }
 
-  int64_t select_asked(const AskedSlots& asked, Span<int64_t> slots_out, Stream stream) override {
+  int64_t select_deciding(const DecidingSlots& asked, Span<int64_t> slots_out, Stream stream) override {
     return select(asked, slots_out.size(), slots_out, handle_of(stream));
   }
 

@@ -17,47 +17,47 @@ class NetworkPassesCuda final : public NetworkPasses {
   explicit NetworkPassesCuda(Device device) : device_(device) {}
 
   void bias_gelu(const ActivationSize& size, const void* x, const float* bias, void* out, Stream stream) override {
-    PICTURA_CHECK(gelu_takes(size.channels), "bias_gelu: rows of {} channels", size.channels);
+    PICTURA_CHECK(supports_gelu(size.channels), "bias_gelu: rows of {} channels", size.channels);
     launch(cuda::launch_bias_gelu, stream, size, x, bias, out);
   }
 
   void bias_gelu_backward(const ActivationSize& size, const void* x, const float* bias, const void* grad_out,
                           void* grad_x_out, float* grad_bias_sums_out, Stream stream) override {
-    PICTURA_CHECK(gelu_takes(size.channels), "bias_gelu_backward: rows of {} channels", size.channels);
+    PICTURA_CHECK(supports_gelu(size.channels), "bias_gelu_backward: rows of {} channels", size.channels);
     launch(cuda::launch_bias_gelu_backward, stream, size, x, bias, grad_out, grad_x_out, grad_bias_sums_out);
   }
 
   void bias_norm_gelu(const ActivationSize& size, const void* x, const float* bias, void* out, Stream stream) override {
-    PICTURA_CHECK(norm_takes(size.channels), "bias_norm_gelu: rows of {} channels", size.channels);
+    PICTURA_CHECK(supports_norm(size.channels), "bias_norm_gelu: rows of {} channels", size.channels);
     launch(cuda::launch_bias_norm_gelu, stream, size, x, bias, out);
   }
 
   void bias_norm_gelu_backward(const ActivationSize& size, const void* x, const float* bias, const void* grad_out,
                                void* grad_x_out, float* grad_bias_sums_out, Stream stream) override {
-    PICTURA_CHECK(norm_takes(size.channels), "bias_norm_gelu_backward: rows of {} channels", size.channels);
+    PICTURA_CHECK(supports_norm(size.channels), "bias_norm_gelu_backward: rows of {} channels", size.channels);
     launch(cuda::launch_bias_norm_gelu_backward, stream, size, x, bias, grad_out, grad_x_out, grad_bias_sums_out);
   }
 
   void norm(const ActivationSize& size, const void* x, const void* position, int64_t period, const float* weight,
             const float* bias, void* out, Stream stream) override {
-    PICTURA_CHECK(norm_takes(size.channels), "norm: rows of {} channels", size.channels);
+    PICTURA_CHECK(supports_norm(size.channels), "norm: rows of {} channels", size.channels);
     launch(cuda::launch_norm, stream, size, x, position, period, weight, bias, out);
   }
 
   void norm_backward(const ActivationSize& size, const void* x, const void* position, int64_t period,
                      const float* weight, const void* grad_out, void* grad_x_out, float* sums_out,
                      Stream stream) override {
-    PICTURA_CHECK(norm_takes(size.channels), "norm_backward: rows of {} channels", size.channels);
+    PICTURA_CHECK(supports_norm(size.channels), "norm_backward: rows of {} channels", size.channels);
     launch(cuda::launch_norm_backward, stream, size, x, position, period, weight, grad_out, grad_x_out, sums_out);
   }
 
   void row_features(const RowSize& size, const float* rows, ActivationType type, void* out, Stream stream) override {
-    PICTURA_CHECK(size.width() <= RowSize::kMostWidth, "row_features: {} numbers per row", size.width());
+    PICTURA_CHECK(size.width() <= RowSize::kMaxWidth, "row_features: {} numbers per row", size.width());
     launch(cuda::launch_row_features, stream, size, rows, type, out);
   }
 
   void patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, Stream stream) override {
-    PICTURA_CHECK(PatchSize::takes(size.patch_px), "patches: of {} pixels squared", size.patch_px);
+    PICTURA_CHECK(PatchSize::supports(size.patch_px), "patches: of {} pixels squared", size.patch_px);
     launch(cuda::launch_patches, stream, size, images, type, out);
   }
 
@@ -88,8 +88,8 @@ class NetworkPassesCuda final : public NetworkPasses {
 
  private:
   static void check(const SetSize& size) {
-    PICTURA_CHECK(SetSize::takes(SetSize::kChannels, SetSize::kChannels, size.members.width(), size.most),
-                  "largest_embedding: {} members of {} numbers", size.most, size.members.width());
+    PICTURA_CHECK(SetSize::supports(SetSize::kChannels, SetSize::kChannels, size.members.width(), size.max_members),
+                  "largest_embedding: {} members of {} numbers", size.max_members, size.members.width());
   }
 
   template <typename Launcher, typename... Arguments>

@@ -404,7 +404,7 @@ void with_pairs(int64_t channels, F&& f) {
   }
 }
 
-/// Calls f with an integral constant, the side of a patch; does nothing for sides that PatchSize::takes() refuses.
+/// Calls f with an integral constant, the side of a patch; does nothing for sides that PatchSize::supports() refuses.
 template <typename F>
 void with_patch(int64_t patch_px, F&& f) {
   switch (patch_px) {

@@ -13,7 +13,7 @@ using Half = __nv_bfloat16;
 
 constexpr int kWarps = 4, kThreads = kWarps * kWarp;
 constexpr int kTile = 16;  // number of members that a warp processes at once
-constexpr int kChannels = SetSize::kChannels, kInputs = SetSize::kMostWidth;
+constexpr int kChannels = SetSize::kChannels, kInputs = SetSize::kMaxWidth;
 constexpr int kColumnTiles = kChannels / 8;
 // Strides of rows in shared memory, such that the rows that a warp reads together lie in different banks.
 constexpr int kInputStride = kInputs + 8, kChannelStride = kChannels + 8;
@@ -270,7 +270,7 @@ __global__ void __launch_bounds__(kThreads)
 
   for (int64_t set = blockIdx.x * int64_t{kWarps} + warp(); set < size.sets(); set += gridDim.x * int64_t{kWarps}) {
     const int count = counts[set * size.counts_stride];
-    const float* const its_members = members + set * size.most * size.members.columns;
+    const float* const its_members = members + set * size.max_members * size.members.columns;
     Largest largest;
     for (int first = 0; first < count; first += kTile) {
       inputs.load(size, its_members, count - first, [first](int row) { return first + row; });
@@ -309,10 +309,10 @@ struct Chosen {
 
   /// Finds the chosen members from the members of the lane's two channels. places_out: the places of the two channels'
   /// members, -1 without one. Returns the number of chosen members.
-  __device__ int find(const uint8_t (&which)[2], int most, int (&places_out)[2]) {
+  __device__ int find(const uint8_t (&which)[2], int max_members, int (&places_out)[2]) {
     int count = 0;
     places_out[0] = places_out[1] = -1;
-    for (int first = 0; first < most; first += 32) {
+    for (int first = 0; first < max_members; first += 32) {
       uint32_t bits = 0;
 #pragma unroll
       for (int i = 0; i < 2; ++i) {
@@ -393,7 +393,7 @@ __global__ void __launch_bounds__(kThreads)
     if (set < size.sets()) {
       const int64_t at = set * kChannels + 2 * lane();
       const uint8_t its_which[2] = {which[at], which[at + 1]};
-      count = tile.chosen.find(its_which, static_cast<int>(size.most), places);
+      count = tile.chosen.find(its_which, static_cast<int>(size.max_members), places);
 #pragma unroll
       for (int i = 0; i < 2; ++i) {
         its_grads[i] = grad_out[at + i];
@@ -409,7 +409,7 @@ __global__ void __launch_bounds__(kThreads)
     for (int t = 0; t < most_tiles; ++t) {
       const int first = t * kTile;
       if (first < count) {
-        tile.inputs.load(size, members + set * size.most * size.members.columns, count - first,
+        tile.inputs.load(size, members + set * size.max_members * size.members.columns, count - first,
                          [&](int row) { return tile.chosen.members[first + row]; });
         tile.scatter(first, places, its_grads);
         float inverse_deviations[2];

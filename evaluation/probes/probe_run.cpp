@@ -208,7 +208,7 @@ ProbeRun::ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptio
     config.auxiliary_observations = session->evaluation_world(worlds.steps).auxiliary_observations;
     std::unique_ptr<ObservedWorlds>& observed = observed_[config.auxiliary_observations];
     if (!observed) observed = std::make_unique<ObservedWorlds>(worlds.simulator, config, maps_, batch_);
-    participants_.push_back({session, kind.untrained ? session->untrained(worlds.seed) : nullptr,
+    participants_.push_back({session, kind.untrained ? session->make_untrained(worlds.seed) : nullptr,
                              session->make_renderer(), observed.get()});
     if (participants_.back().renderer) upload_maps(maps_, {}, participants_.back().renderer.get());
     if (session->reads_images() && !has_cameras) cameras_ = session->renderer_config();

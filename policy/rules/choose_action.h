@@ -77,7 +77,7 @@ PICTURA_HD inline void write_command(const int32_t* actions, Span<const uint8_t>
 }
 
 /// Slots whose agents are drawn, encoded and commanded.
-struct AskedSlots {
+struct DecidingSlots {
   const AgentStatus* status;
   Span<const uint8_t> mask;  // [slots] excludes slots with 0; empty: excludes none
   const uint8_t* left;       // [slots] includes agents that have just left a road that ends; null: includes none

@@ -25,7 +25,7 @@ struct ActivationSize {
 /// colors from 0 to 255.
 struct PatchSize {
   int64_t views = 0, cameras = 0, height_px = 0, width_px = 0, patch_px = 1;
-  static constexpr bool takes(int64_t patch_px) { return patch_px >= 1 && patch_px <= 4; }
+  static constexpr bool supports(int64_t patch_px) { return patch_px >= 1 && patch_px <= 4; }
   /// Channels of a position: rounded up to whole vectors of 8, as matrix units need them.
   PICTURA_HD static constexpr int64_t channels_of(int64_t patch_px) { return (3 * patch_px * patch_px + 7) / 8 * 8; }
   PICTURA_HD int64_t rows() const { return (height_px + patch_px - 1) / patch_px; }
@@ -55,7 +55,7 @@ struct RowSize {
   bool keeps_rows = false;
   PICTURA_HD int64_t kept() const { return keeps_rows ? columns : 0; }
   PICTURA_HD int64_t width() const { return kept() + features.count(); }
-  static constexpr int64_t kMostWidth = 256;
+  static constexpr int64_t kMaxWidth = 256;
 };
 
 /// Offsets of the denominators of features (see policy/row_features.h).
@@ -87,15 +87,15 @@ PICTURA_HD inline float row_feature(const RowFeatures& features, const float* ro
 /// Size of sets of members, each encoded by a linear layer, GELU, and a second linear layer, both of kChannels outputs.
 /// With has_norm the first layer's outputs are normalized before the GELU.
 struct SetSize {
-  RowSize members;  // of all sets, `most` a set including absent members; keeps_rows is set
-  int64_t most = 0;
+  RowSize members;  // of all sets, `max_members` a set including absent members; keeps_rows is set
+  int64_t max_members = 0;
   int64_t counts_stride = 1;  // elements from one set's member count to the next set's
   bool has_norm = false;
-  static constexpr int kChannels = 64, kMostWidth = 32, kMostMembers = 254, kNoMember = 255;
-  PICTURA_HD int64_t sets() const { return members.rows / most; }
-  static constexpr bool takes(int64_t channels, int64_t hidden_channels, int64_t width, int64_t most) {
-    return channels == kChannels && hidden_channels == kChannels && width <= kMostWidth && most >= 1 &&
-           most <= kMostMembers;
+  static constexpr int kChannels = 64, kMaxWidth = 32, kMaxMembers = 254, kNoMember = 255;
+  PICTURA_HD int64_t sets() const { return members.rows / max_members; }
+  static constexpr bool supports(int64_t channels, int64_t hidden_channels, int64_t width, int64_t max_members) {
+    return channels == kChannels && hidden_channels == kChannels && width <= kMaxWidth && max_members >= 1 &&
+           max_members <= kMaxMembers;
   }
   /// Number of partial sums of a gradient.
   static constexpr int64_t kSums = 264;
@@ -124,8 +124,8 @@ class NetworkPasses {
   NetworkPasses& operator=(const NetworkPasses&) = delete;
 
   /// Whether bias_gelu(), and norm() and bias_norm_gelu(), support rows of this number of channels.
-  static constexpr bool gelu_takes(int64_t channels) { return channels % 8 == 0 && channels <= 1024; }
-  static constexpr bool norm_takes(int64_t channels) {
+  static constexpr bool supports_gelu(int64_t channels) { return channels % 8 == 0 && channels <= 1024; }
+  static constexpr bool supports_norm(int64_t channels) {
     return channels % 64 == 0 && channels <= 512 && channels != 320 && channels != 448;
   }
 
@@ -158,7 +158,7 @@ class NetworkPasses {
     return std::clamp<int64_t>((8448 + period - 1) / period, 1, std::max<int64_t>(1, rows / period));
   }
 
-  /// Computes features of rows. out: [rows, width()], at most kMostWidth wide.
+  /// Computes features of rows. out: [rows, width()], at most kMaxWidth wide.
   virtual void row_features(const RowSize& size, const float* rows, ActivationType type, void* out, Stream stream) = 0;
 
   virtual void patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, Stream stream) = 0;

@@ -21,7 +21,7 @@ class PolicyExecutor {
   virtual int64_t memory_bytes() const = 0;
 
   /// Selects the asked slots in ascending order. slots_out [slots] has room for all slots. Returns their number.
-  virtual int64_t select_asked(const AskedSlots& asked, Span<int64_t> slots_out, Stream stream = {}) = 0;
+  virtual int64_t select_deciding(const DecidingSlots& asked, Span<int64_t> slots_out, Stream stream = {}) = 0;
   /// Chooses the actions of `slots`. log_probs: [slots.size(), kNumActions]; actions_out: [slots of the simulator],
   /// where actions of other slots remain unchanged.
   virtual void choose_actions(const SimulatorArrays& input, Span<const int64_t> slots, Span<const float> log_probs,

@@ -171,10 +171,10 @@ TEST_F(Removal, UntrainedPoliciesAnswerInTheSameStates) {
 
 TEST_F(Removal, WeightsOfUntrainedPoliciesAreOfTheSeed) {
   const PolicySession trained(policies_[kAgent], {.num_threads = 1, .device = "cpu"});
-  const auto hash_of = [&](uint64_t seed) { return trained.untrained(seed)->policy_hash(); };
+  const auto hash_of = [&](uint64_t seed) { return trained.make_untrained(seed)->policy_hash(); };
   EXPECT_EQ(hash_of(1), hash_of(1));
   EXPECT_NE(hash_of(1), hash_of(2));
-  EXPECT_EQ(trained.untrained(1)->training_world().walls, trained.training_world().walls);
+  EXPECT_EQ(trained.make_untrained(1)->training_world().walls, trained.training_world().walls);
 }
 
 TEST_F(Removal, BatchesDecideNothing) { expect_the_same_of_batches({1, 300}); }

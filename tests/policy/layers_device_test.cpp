@@ -163,11 +163,11 @@ TEST_P(DeviceLayers, LargestEmbedding) {
   for (const RowFeatures& features :
        {RowFeatures{}, RowFeatures{.points = 1, .position_unit_m = kScalePosition_m},
         RowFeatures{.points = 1, .of_segment = true, .position_unit_m = kScalePosition_m}}) {
-    for (const int64_t most : {1, 10, 80}) {
+    for (const int64_t max_members : {1, 10, 80}) {
       for (const bool has_norm : {false, true}) {
-        const at::Tensor members = numbers({sets, most, 7}, 1).to(at::kFloat),
+        const at::Tensor members = numbers({sets, max_members, 7}, 1).to(at::kFloat),
                          // Empty and full sets; entries beyond a column of counts are not read.
-            counts = at::arange(sets, at::kInt).remainder(most + 1).unsqueeze(1).repeat({1, 2}).select(1, 0);
+            counts = at::arange(sets, at::kInt).remainder(max_members + 1).unsqueeze(1).repeat({1, 2}).select(1, 0);
         const int64_t width = 7 + features.count();
         const std::vector<at::Tensor> parameters{numbers({64, width}, 1), numbers({64}, 2), 0.3 * numbers({64, 64}, 3),
                                                  numbers({64}, 4)};
@@ -209,7 +209,7 @@ TEST_P(DeviceLayers, LargestEmbedding) {
         const Layer layer = [&](const auto& in) {
           if (!in[0].is_cuda()) return plain(in);
           const at::Tensor its_members = on(members, in[0]), its_counts = on(counts, in[0]);
-          EXPECT_EQ(takes_sets(its_members, features, in[0], in[2]), GetParam() == Precision::bf16);
+          EXPECT_EQ(has_fused_set_encoder(its_members, features, in[0], in[2]), GetParam() == Precision::bf16);
           if (GetParam() != Precision::bf16) return plain(in);
           return with_clear_gradient(
               largest_embedding(its_members, its_counts, features, has_norm, in[0], in[1], in[2], in[3]));
@@ -265,7 +265,7 @@ TEST_P(DeviceLayers, RowFeatures) {
     const RowFeatures features{.points = c.points, .of_segment = c.of_segment, .position_unit_m = kScalePosition_m};
     const at::Tensor rows = numbers({31, 17, c.columns}, 1).to(at::kFloat), on_device = rows.to(at::kCUDA);
     const at::Tensor expected = with_row_features(rows.to(at::kDouble), features, at::kDouble);
-    ASSERT_TRUE(takes_feature_rows(on_device, features));
+    ASSERT_TRUE(has_fused_row_features(on_device, features));
     const at::Tensor got = with_row_features(on_device, features, activations());
     ASSERT_EQ(got.sizes(), expected.sizes());
     EXPECT_EQ(got.scalar_type(), activations());

@@ -221,16 +221,16 @@ TEST(HostLayers, DirectConvolutionsHaveTheSameBitsByVectorsOfAnyWidth) {
 }
 
 TEST(HostLayers, LargestEmbeddingIsTheMaximumOverTheMembersThatThereAre) {
-  const int64_t sets = 40, most = 23;
-  const at::Tensor members = float_numbers({sets, most, 7}, 0.1),
-                   counts = at::arange(sets, at::kInt).remainder(most + 1);
+  const int64_t sets = 40, max_members = 23;
+  const at::Tensor members = float_numbers({sets, max_members, 7}, 0.1),
+                   counts = at::arange(sets, at::kInt).remainder(max_members + 1);
   for (const RowFeatures& features : {RowFeatures{}, RowFeatures{.points = 1, .position_unit_m = kUnit_m},
                                       RowFeatures{.points = 2, .position_unit_m = kUnit_m},
                                       RowFeatures{.of_segment = true, .position_unit_m = kUnit_m},
                                       RowFeatures{.points = 1, .of_segment = true, .position_unit_m = kUnit_m}}) {
     const at::Tensor floats = members.to(at::kFloat);
     const at::Tensor hidden_weight = float_numbers({16, 7 + features.count()}, 1), weight = float_numbers({24, 16}, 3);
-    ASSERT_TRUE(takes_sets(floats, features, hidden_weight, weight));
+    ASSERT_TRUE(has_fused_set_encoder(floats, features, hidden_weight, weight));
     for (const bool has_norm : {false, true}) {
       const auto plain = [&](const std::vector<at::Tensor>& in) {
         const at::Tensor rows = features.count() > 0 ? with_row_features(members, features, at::kDouble) : members;

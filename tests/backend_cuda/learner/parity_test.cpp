@@ -144,8 +144,8 @@ std::vector<int64_t> same_selection(size_t room, const Executors& executors, con
 std::vector<int64_t> same_active(const Worlds& worlds, const Executors& executors, const std::vector<uint8_t>& mask) {
   const DeviceBuffer<uint8_t> copy = on_device(mask);
   return same_selection(kSlots, executors, [&](LearnerExecutor* executor, Span<int64_t> slots, bool on_device) {
-    return on_device ? executor->select_asked({worlds.cuda->arrays().state.status, copy.span(), nullptr}, slots)
-                     : executor->select_asked({worlds.cpu->arrays().state.status, mask, nullptr}, slots);
+    return on_device ? executor->select_deciding({worlds.cuda->arrays().state.status, copy.span(), nullptr}, slots)
+                     : executor->select_deciding({worlds.cpu->arrays().state.status, mask, nullptr}, slots);
   });
 }
 
@@ -358,16 +358,16 @@ TEST_F(CudaLearnerTest, SelectingAllocatesNothingAfterTheFirstCallOfASize) {
     return executors.device->select_kept(advantage_copy.span().subspan(0, size), valid_copy.span().subspan(0, size),
                                          0.5f, room_in(selected), stream);
   };
-  const auto select_asked = [&] {
-    return executors.device->select_asked({worlds.cuda->arrays().state.status, {}, nullptr}, {selected.data(), kSlots},
-                                          stream);
+  const auto select_deciding = [&] {
+    return executors.device->select_deciding({worlds.cuda->arrays().state.status, {}, nullptr},
+                                             {selected.data(), kSlots}, stream);
   };
-  const int64_t all = select(kMany), some = select(1000), active = select_asked();
+  const int64_t all = select(kMany), some = select(1000), active = select_deciding();
   // Selecting waits for its count, so that a capture could not detect this.
   const int64_t allocations = device_allocations;
   EXPECT_EQ(select(kMany), all);
   EXPECT_EQ(select(1000), some);
-  EXPECT_EQ(select_asked(), active);
+  EXPECT_EQ(select_deciding(), active);
   EXPECT_EQ(device_allocations, allocations);
 }
 
