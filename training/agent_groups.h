@@ -24,6 +24,7 @@ struct AgentGroups {
 
 /// Groups the agents of all ranks' rollouts with advantages, under a filter that keeps |advantages| of at least
 /// adv_threshold. A group without agents has NaN.
-AgentGroups group_agents(const Rollout& rollout, double adv_threshold, Communicator* communicator = alone());
+AgentGroups group_agents(const Rollout& rollout, double adv_threshold,
+                         Communicator* communicator = single_communicator());
 
 }  // namespace pictura

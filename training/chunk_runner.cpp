@@ -98,7 +98,7 @@ at::Tensor ChunkRunner::add_gradients(const Minibatch& minibatch, int64_t forwar
 
     // Both passes use the same mode: graphs keep no autograd state from which a backward pass could run call by call.
     const Mode mode = work.learn.next_mode(*graphs_, work.observe.is_captured());
-    if (mode == Mode::capture) graphs_->make_room();
+    if (mode == Mode::capture) graphs_->release_cached_memory();
     {
       const PhaseTimer::Scope timed(timer_, Phase::learn);
       work.learn.run(mode, graphs_,

@@ -56,8 +56,8 @@ bool Collector::collect_on_stream() {
     const at::Tensor slots = record(step);
     const Decision decision = decide(&run_, step, slots);
     are_finite.logical_and_(decision.are_finite());
-    ask_teacher(step, slots);
-    hold_actions(step, slots);
+    record_teacher_log_probs(step, slots);
+    repeat_held_actions(step, slots);
     run_.executor->choose_actions(simulator.arrays(), span_of<const int64_t>(slots),
                                   span_of<const float>(decision.log_probs),
                                   {.argmax = false, .seed = run_.config.run.seed}, rollout.actions_at(step), stream);
@@ -93,14 +93,14 @@ at::Tensor Collector::record(int64_t step) {
   return slots;
 }
 
-void Collector::hold_actions(int64_t step, const at::Tensor& deciding) {
+void Collector::repeat_held_actions(int64_t step, const at::Tensor& deciding) {
   Rollout& rollout = run_.rollout;
   if (!rollout.decides.defined()) return;
   rollout.decides.select(0, step).zero_().index_fill_(0, deciding, 1);
   if (step > 0) rollout.actions.select(0, step).copy_(rollout.actions.select(0, step - 1));
 }
 
-void Collector::ask_teacher(int64_t step, const at::Tensor& slots) {
+void Collector::record_teacher_log_probs(int64_t step, const at::Tensor& slots) {
   if (teacher_weight_at(run_.config.train, run_.agent_steps) == 0) return;
   const PhaseTimer::Scope timed(&run_.timer, Phase::forward);
   run_.rollout.teacher_log_probs.select(0, step).index_copy_(0, slots,

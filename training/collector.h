@@ -25,9 +25,9 @@ class Collector {
   // Records the simulator's observations of a step. Returns the slots of the agents that decide.
   at::Tensor record(int64_t step);
   // Repeats the previous step's actions of agents that do not decide.
-  void hold_actions(int64_t step, const at::Tensor& deciding);
+  void repeat_held_actions(int64_t step, const at::Tensor& deciding);
   // Records the teacher's log-probabilities at a step while its weight is not 0.
-  void ask_teacher(int64_t step, const at::Tensor& slots);
+  void record_teacher_log_probs(int64_t step, const at::Tensor& slots);
   void simulate(int64_t step);
 
   Run& run_;

@@ -12,7 +12,7 @@ void GradientDiagnosis::measure(const Minibatch& first, const Minibatches& minib
   const int64_t num_diagnosed =
       std::clamp<int64_t>(minibatches.global_size() * config.update_epochs / kPassesPerDiagnosed, 1,
                           std::min({kMaxDiagnosed, config.forward_chunk, first.global_size}));
-  const at::Tensor rows = first.rows.narrow(0, 0, minibatches.own_of_first(num_diagnosed));
+  const at::Tensor rows = first.rows.narrow(0, 0, minibatches.count_own_among_first(num_diagnosed));
   const at::Tensor& gradient = learner.optimizer->gradients();
   at::Tensor gradients = at::zeros({3, gradient.numel()}, gradient.options());
   // A single chunk, or none if all transitions belong to other ranks.

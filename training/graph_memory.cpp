@@ -30,7 +30,7 @@ c10::MempoolId_t pool_of(uint64_t id) { return {id, 0}; }
 
 }  // namespace
 
-void GraphMemory::serve(Stream stream, const std::function<void()>& work) {
+void GraphMemory::allocate_within(Stream stream, const std::function<void()>& work) {
   if (id_ == 0) id_ = new_id();
   const auto index = static_cast<c10::DeviceIndex>(device_.index);
   const auto is_own = [stream](cudaStream_t other) { return other == stream.handle; };
@@ -44,7 +44,7 @@ void GraphMemory::serve(Stream stream, const std::function<void()>& work) {
   work();
 }
 
-void GraphMemory::make_room() const { torch_allocator()->emptyCache(); }
+void GraphMemory::release_cached_memory() const { torch_allocator()->emptyCache(); }
 
 void GraphMemory::release() {
   if (id_ == 0) return;
@@ -65,10 +65,10 @@ GraphMemory::~GraphMemory() {
 }
 #else
 GraphMemory::~GraphMemory() = default;
-void GraphMemory::serve(Stream, const std::function<void()>&) {
+void GraphMemory::allocate_within(Stream, const std::function<void()>&) {
   fail("graphs: this torch has no graphs for {}", name_of(device_));
 }
-void GraphMemory::make_room() const {}
+void GraphMemory::release_cached_memory() const {}
 void GraphMemory::release() {}
 #endif
 

@@ -7,7 +7,7 @@
 
 namespace pictura {
 
-void keep_freed_memory() {
+void retain_freed_memory() {
 #ifdef __GLIBC__
   mallopt(M_MMAP_MAX, 0);  // glibc accepts no threshold above 32 MB
   mallopt(M_TRIM_THRESHOLD, INT_MAX);

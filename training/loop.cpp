@@ -48,13 +48,13 @@ class TrainingLoop {
 
   void go() {
     evaluate_if_due();
-    while (goes_on()) {
+    while (has_more_updates()) {
       UpdateRecord record;
       if (!collect(&record)) return;
-      improve(&record);
+      update_policy(&record);
       count(record);
       TrainProgress progress = log_.add(run_.update, run_.agent_steps, record);
-      time_.bound(&progress);
+      time_.limit_eta(&progress);
       update_image_size();
       evaluate_if_due();
       is_interrupted_ = any_rank_interrupted(run_.communicator);
@@ -70,11 +70,11 @@ class TrainingLoop {
   double agent_steps_per_s() const { return agent_steps_per_s_; }
 
  private:
-  bool goes_on() {
+  bool has_more_updates() {
     const TrainSection& train = run_.config.train;
     if (is_interrupted_ || is_out_of_time_) return false;
     if (run_.update >= train.updates || schedule_has_ended(train, run_.agent_steps)) return false;
-    is_out_of_time_ = time_.is_too_short_for(RunWork::update);
+    is_out_of_time_ = time_.would_exceed_limit(RunWork::update);
     return !is_out_of_time_;
   }
 
@@ -98,10 +98,10 @@ class TrainingLoop {
   }
 
   // Improves the policy on the rollout. Saves the minibatch of an update that fails with a number that is not finite.
-  void improve(UpdateRecord* record) {
+  void update_policy(UpdateRecord* record) {
     const Stopwatch watch;
     try {
-      record->stats = run_.improve();
+      record->stats = run_.update_policy();
     } catch (const NotFinite& error) {
       run_.communicator->step();  // throws if a rank is lost, whose numbers are meaningless
       if (!run_.communicator->is_first()) throw;
@@ -131,14 +131,14 @@ class TrainingLoop {
     const std::string change = run_.update_image_size();
     if (change.empty()) return;
     options_.notify(change);
-    time_.expect_growth(std::max(1.0, static_cast<double>(run_.image_size().pixels()) / pixels));
+    time_.scale_expected_duration(std::max(1.0, static_cast<double>(run_.image_size().pixels()) / pixels));
   }
 
   // Evaluates if an evaluation is due. An evaluation that was interrupted, or for which there is no time, is made when
   // the run resumes. All ranks evaluate at the same update.
   void evaluate_if_due() {
     if (!any_rank(evaluation_.is_due() && log_.lacks_evaluation(run_.update), run_.communicator)) return;
-    is_out_of_time_ = time_.is_too_short_for(RunWork::evaluation);
+    is_out_of_time_ = time_.would_exceed_limit(RunWork::evaluation);
     if (is_out_of_time_) return;
     const Ranks::LongWork evaluates(&ranks_);
     const std::optional<EvaluationRecord> record = evaluation_.evaluate();
@@ -169,7 +169,7 @@ class TrainingLoop {
 
 // Sets torch's process-wide settings.
 void set_up_torch(const Config& config, Device device) {
-  if (device.is_host()) keep_freed_memory();
+  if (device.is_host()) retain_freed_memory();
   at::set_num_threads(resolve_num_threads(config.run.num_threads));
   set_float32_products(config.train.precision);
   set_reproducible(config.train.reproducible);

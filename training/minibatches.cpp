@@ -56,7 +56,7 @@ Minibatch Minibatches::operator[](int64_t m) const {
           global_size_ * (m + 1) / count_ - global_size_ * m / count_};
 }
 
-int64_t Minibatches::own_of_first(int64_t count) const {
+int64_t Minibatches::count_own_among_first(int64_t count) const {
   return at::searchsorted(places_, at::full({}, count, places_.options())).item<int64_t>();
 }
 

@@ -37,7 +37,7 @@ class Minibatches {
   /// Minibatch m in the order of the last shuffle(), without advantages.
   Minibatch operator[](int64_t m) const;
   /// Number of this rank's transitions among the first `count` of the epoch.
-  int64_t own_of_first(int64_t count) const;
+  int64_t count_own_among_first(int64_t count) const;
 
  private:
   LearnerExecutor* const executor_;

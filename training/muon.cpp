@@ -162,7 +162,7 @@ void Muon::step(double learning_rate, const at::Tensor& failed) {
   step_.run(&graphs_, [this] { take_step(); });
 }
 
-void Muon::forget_addresses() {
+void Muon::discard_graph() {
   step_ = {};
   graphs_.release_memory();
 }

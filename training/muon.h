@@ -39,7 +39,7 @@ class Muon {
   /// change, whatever the gradients are. Does not wait for the device.
   void step(double learning_rate, const at::Tensor& failed);
   /// Discards the captured graph; must be called if gradients move.
-  void forget_addresses();
+  void discard_graph();
 
   /// Momentum of weight i, in its shape.
   at::Tensor momentum(size_t i) const { return parts_of(momentum_)[i]; }

@@ -35,7 +35,7 @@ void Optimizer::allocate_gradients() {
     value.mutable_grad() = gradients_.narrow(0, begin, value.numel()).view(value.sizes());
     begin += value.numel();
   }
-  if (muon_) muon_->forget_addresses();
+  if (muon_) muon_->discard_graph();
 }
 
 void Optimizer::clear_gradients() { gradients_.zero_(); }

@@ -42,7 +42,7 @@ struct Learner {
   Optimizer* optimizer;
   AdvantageFilter* filter;
   PhaseTimer* timer = nullptr;
-  Communicator* communicator = alone();
+  Communicator* communicator = single_communicator();
 };
 
 /// Key of an update: its inputs besides its rollout and its settings.

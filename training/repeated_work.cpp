@@ -14,7 +14,7 @@ std::unique_ptr<DeviceGraph> Graphs::capture(const std::function<void()>& work) 
   const Stream stream = current_stream(device_);
   std::unique_ptr<DeviceGraph> graph;
   try {
-    memory_.serve(stream, [&] { graph = capture_graph(device_, stream, work); });
+    memory_.allocate_within(stream, [&] { graph = capture_graph(device_, stream, work); });
   } catch (const c10::OutOfMemoryError&) {
     throw;
   } catch (const std::exception& error) {

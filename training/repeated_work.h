@@ -20,9 +20,9 @@ class GraphMemory {
   GraphMemory& operator=(const GraphMemory&) = delete;
 
   /// Calls `work`, whose tensors on the stream are allocated in this memory.
-  void serve(Stream stream, const std::function<void()>& work);
+  void allocate_within(Stream stream, const std::function<void()>& work);
   /// Releases torch's cached memory outside of it, which torch cannot do during capture.
-  void make_room() const;
+  void release_cached_memory() const;
   /// Releases the memory once it holds no tensor. Graphs captured before must not be launched any more.
   void release();
 
@@ -43,7 +43,7 @@ class Graphs {
   std::unique_ptr<DeviceGraph> capture(const std::function<void()>& work);
   void launch(DeviceGraph* graph);
   /// Frees memory. Must be called before capturing work that needs much memory.
-  void make_room() const { memory_.make_room(); }
+  void release_cached_memory() const { memory_.release_cached_memory(); }
   /// Releases the memory of graphs once no graph exists.
   void release_memory() { memory_.release(); }
 

@@ -133,7 +133,7 @@ Checkpoint Run::checkpoint(const std::vector<RecentUpdate>& recent) const {
   return checkpoint;
 }
 
-UpdateStats Run::improve() {
+UpdateStats Run::update_policy() {
   const UpdateKey key{config.run.seed, update, learning_rate_at(config.train, agent_steps),
                       teacher_weight_at(config.train, agent_steps)};
   UpdateStats stats;
@@ -187,7 +187,7 @@ ImageSize Run::image_size() const {
   return renderer ? ImageSize{rig.cameras[0].width_px, rig.cameras[0].height_px} : ImageSize{};
 }
 
-void Run::begin_with(const SavedPolicy& other) {
+void Run::load_policy(const SavedPolicy& other) {
   PICTURA_CHECK(
       !config.reads_images() || !other.config.reads_images() || other.rig.cameras.size() == rig.cameras.size(),
       "{}: its policy uses {} cameras, expected {}, as in {}", other.path, other.rig.cameras.size(), rig.cameras.size(),

@@ -19,14 +19,14 @@ struct Run {
   /// Creates a run that learns on `device`, where simulator and renderer also work. It trains the configuration's
   /// policy, or `policy` if it is given. Throws Error naming file and key for maps, cameras and sizes that cannot be
   /// used for training.
-  Run(const Config& config, Device device, Communicator* communicator = alone(),
+  Run(const Config& config, Device device, Communicator* communicator = single_communicator(),
       std::unique_ptr<const Policy> policy = nullptr);
 
   /// Calls `work`, with graphs on a stream that can be captured.
   void on_stream(const std::function<void()>& work) const;
 
   /// Copies the weights of another run. Throws Error naming the difference if the networks differ.
-  void begin_with(const SavedPolicy& other);
+  void load_policy(const SavedPolicy& other);
   /// Returns the current policy.
   SavedPolicy saved_policy() const;
   /// Returns the policy with averaged weights; only for runs that average them.
@@ -40,7 +40,7 @@ struct Run {
   /// was saved under another configuration or with other cameras.
   std::string restore(const Checkpoint& saved);
   /// Improves the policy on the rollout. Throws the errors of ppo_update().
-  UpdateStats improve();
+  UpdateStats update_policy();
   /// Throws Error naming a parameter that differs in a bit between ranks.
   void check_ranks_agree() const;
 

@@ -45,7 +45,7 @@ std::vector<RecentUpdate> RunKeeper::begin(Run* run) {
     saved_update_ = run->update;
   } else {
     if (!options_.init_from.empty()) {
-      run->begin_with(parse_policy(file_of_first(options_.init_from, communicator_), options_.init_from));
+      run->load_policy(parse_policy(file_of_first(options_.init_from, communicator_), options_.init_from));
     }
     if (!old_files_.empty()) {
       folder_ = path(".pictura-new-run");

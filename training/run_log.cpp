@@ -207,8 +207,9 @@ TrainProgress RunLog::add(int64_t update, int64_t agent_steps, const UpdateRecor
     progress.eta_s = std::min(progress.eta_s, elapsed_s / steps_done * steps_left);
   }
 
-  if (const std::optional<LossStats>& rejected = record.stats.rejected; rejected && !has_said_rejected_ && on_notice_) {
-    has_said_rejected_ = true;
+  if (const std::optional<LossStats>& rejected = record.stats.rejected;
+      rejected && !has_reported_rejected_ && on_notice_) {
+    has_reported_rejected_ = true;
     on_notice_(
         fmt::format("update {}: before its first step the learner's log-probabilities differ by {:.2g} in the mean "
                     "from the rollout's (expected less than {}), and {:.2g} of the ratios are clipped (less than {}): "

@@ -79,7 +79,7 @@ class RunLog {
   const Config config_;
   const int64_t first_update_, first_agent_steps_;
   const std::function<void(const std::string&)> on_notice_;
-  bool has_said_rejected_ = false;
+  bool has_reported_rejected_ = false;
   std::optional<EventFile> events_;
   std::optional<ProgressCsv> csv_;
   std::optional<ProgressCsv> evaluation_csv_;  // only if the run evaluates

@@ -19,7 +19,7 @@ std::string RunTime::key(RunWork work) const {
   return work == RunWork::evaluation ? machine_ + ", evaluation" : machine_;
 }
 
-bool RunTime::is_too_short_for(RunWork work) const {
+bool RunTime::would_exceed_limit(RunWork work) const {
   // 20 % longer than the longest so far, to allow for longer updates and for saving.
   const auto longest = run_.longest_update_s.find(key(work));
   const double expected_s = longest == run_.longest_update_s.end() ? 0 : 1.2 * longest->second;
@@ -36,7 +36,7 @@ void RunTime::add(RunWork work, double seconds) {
   }
 }
 
-void RunTime::expect_growth(double times) {
+void RunTime::scale_expected_duration(double times) {
   own_longest_update_s_ = 0;
   for (const RunWork work : {RunWork::update, RunWork::evaluation}) {
     const auto longest = run_.longest_update_s.find(key(work));
@@ -44,7 +44,7 @@ void RunTime::expect_growth(double times) {
   }
 }
 
-void RunTime::bound(TrainProgress* progress) const {
+void RunTime::limit_eta(TrainProgress* progress) const {
   if (minutes_ == 0 || left_s() >= progress->eta_s) return;
   progress->eta_s = std::max(0.0, left_s());
   progress->ends_by_minutes = true;

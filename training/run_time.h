@@ -21,13 +21,13 @@ class RunTime {
 
   /// Whether another piece of the work, as long as the longest so far, would exceed the limit on any rank. Collective:
   /// every rank must call it.
-  bool is_too_short_for(RunWork work) const;
+  bool would_exceed_limit(RunWork work) const;
   /// Records the duration of work.
   void add(RunWork work, double seconds);
   /// Scales the expected duration of work by `times`, until it is measured again.
-  void expect_growth(double times);
+  void scale_expected_duration(double times);
   /// Limits progress->eta_s to the remaining time.
-  void bound(TrainProgress* progress) const;
+  void limit_eta(TrainProgress* progress) const;
 
  private:
   std::string key(RunWork work) const;

@@ -76,7 +76,7 @@ Learnt learn(const std::vector<std::string>& more) {
     const int64_t launches_before = launches(), allocated = allocations();
     EXPECT_TRUE(collector.collect());
     const int64_t launches_between = launches();
-    const UpdateStats stats = run.improve();
+    const UpdateStats stats = run.update_policy();
     learnt.collecting.push_back(launches_between - launches_before);
     learnt.improving.push_back(launches() - launches_between);
     learnt.policies.push_back(run.policy->hash());

@@ -123,13 +123,13 @@ inline ExactRun run_exactly(const Config& config) {
   set_reproducible(config.train.reproducible);
   auto made = std::make_unique<ExactPolicy>(device);
   ExactPolicy* const policy = made.get();
-  Run run(config, device, alone(), std::move(made));
+  Run run(config, device, single_communicator(), std::move(made));
   run.simulator->reset();
   Collector collector(&run);
   ExactRun result;
   for (; run.update < 3; ++run.update) {
     EXPECT_TRUE(collector.collect());
-    const UpdateStats stats = run.improve();
+    const UpdateStats stats = run.update_policy();
     const Rollout& rollout = run.rollout;
     ExactRun::Update update;
     update.kept_fraction = stats.kept_fraction;

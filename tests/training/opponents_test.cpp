@@ -42,7 +42,7 @@ TEST_F(OpponentsTest, DriveAsTheyWereTrainedAndTheLearnerTheRest) {
   const Config config =
       load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml",
                   {"run.num_threads=1", "train.num_steps=12", others({vectors + "=0.3", images + "=0.3"})});
-  Opponents opponents(config, {}, alone());
+  Opponents opponents(config, {}, single_communicator());
   SimulatorConfig world = simulator_config(config);
   EXPECT_FALSE(world.vector_observations);
   opponents.add_arrays(&world);

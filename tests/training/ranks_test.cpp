@@ -53,14 +53,14 @@ Launch place(int rank, int size, int port) {
 }
 
 // Runs f(its ranks) in a thread each, and returns the error of each.
-std::vector<std::string> run_ranks(int size, const std::function<void(Ranks&)>& f, const Patience& patience = {}) {
+std::vector<std::string> run_ranks(int size, const std::function<void(Ranks&)>& f, const RankTimeouts& timeouts = {}) {
   const int port = free_port();
   std::vector<std::string> errors(static_cast<size_t>(size));
   std::vector<std::thread> threads;
   for (int rank = 0; rank < size; ++rank) {
     threads.emplace_back([&, rank] {
       errors[rank] = message_of([&] {
-        Ranks ranks(place(rank, size, port), patience);
+        Ranks ranks(place(rank, size, port), timeouts);
         f(ranks);
       });
     });
@@ -189,7 +189,7 @@ TEST(RanksLoseEachOther, WhenOneHangsButNotWhenItWorksForLong) {
                                                         ranks.check();
                                                       } else {
                                                         ranks.step();
-                                                        ranks.find_lost();
+                                                        ranks.throw_if_lost();
                                                       }
                                                     },
                                                     {.silent_s = 10, .no_progress_s = 1.5});

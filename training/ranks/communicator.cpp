@@ -70,7 +70,7 @@ SimulatorTotals totals_of_all(SimulatorTotals own, Communicator* communicator) {
   return own;
 }
 
-Communicator* alone() {
+Communicator* single_communicator() {
   static NullCommunicator communicator;
   return &communicator;
 }

@@ -49,10 +49,10 @@ class Communicator {
 SimulatorTotals totals_of_all(SimulatorTotals own, Communicator* communicator);
 
 /// Communicator of a single process, which lives as long as the process.
-Communicator* alone();
+Communicator* single_communicator();
 
-/// Creates the communicator of these ranks: alone(), NCCL if they learn on CUDA devices, one each, or Gloo. Throws
-/// Error if this build or this machine lacks the library. `ranks` must outlive it.
+/// Creates the communicator of these ranks: single_communicator(), NCCL if they learn on CUDA devices, one each, or
+/// Gloo. Throws Error if this build or this machine lacks the library. `ranks` must outlive it.
 std::unique_ptr<Communicator> make_communicator(Ranks* ranks, Device device);
 
 /// Creates a Gloo or NCCL communicator of any number of ranks.

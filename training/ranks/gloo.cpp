@@ -27,7 +27,7 @@ class GlooCommunicator final : public Communicator {
     try {
       group_ = c10::make_intrusive<c10d::ProcessGroupGloo>(store, rank(), size(), options);
     } catch (const std::exception& error) {
-      ranks_->find_lost();
+      ranks_->throw_if_lost();
       fail("rank {}: Gloo cannot connect the ranks: {}", rank(), error.what());
     }
   }
@@ -77,7 +77,7 @@ class GlooCommunicator final : public Communicator {
       throw;
     } catch (const std::exception& error) {
       has_failed_ = true;
-      ranks_->find_lost();
+      ranks_->throw_if_lost();
       fail("rank {}: Gloo: {}", rank(), error.what());
     }
   }

@@ -26,7 +26,7 @@ std::optional<int> integer(const char* name, int low, int high, std::optional<in
   return value;
 }
 
-constexpr int kMostRanks = 1 << 16;
+constexpr int kMaxRanks = 1 << 16;
 
 // Names of the variables in which a launcher passes a process its place.
 struct Names {
@@ -38,13 +38,13 @@ constexpr Names kSlurm{"SLURM_PROCID", "SLURM_STEP_NUM_TASKS", "SLURM_LOCALID"};
 
 Launch place_by(const Names& names) {
   Launch launch;
-  const std::optional<int> size = integer(names.size, 1, kMostRanks);
+  const std::optional<int> size = integer(names.size, 1, kMaxRanks);
   PICTURA_CHECK(size, "{} is set but {} is not: set both or neither", names.rank, names.size);
   launch.size = *size;
   const std::optional<int> rank = integer(names.rank, 0, launch.size - 1);
   PICTURA_CHECK(rank, "{} is set but {} is not: set both or neither", names.size, names.rank);
   launch.rank = *rank;
-  launch.local_rank = *integer(names.local_rank, 0, kMostRanks - 1, launch.rank);
+  launch.local_rank = *integer(names.local_rank, 0, kMaxRanks - 1, launch.rank);
   return launch;
 }
 

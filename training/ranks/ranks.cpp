@@ -21,7 +21,7 @@ using std::chrono::milliseconds;
 constexpr milliseconds kBetweenBeats{500};
 // Time limit of one request to the store, once all ranks have met there.
 constexpr milliseconds kStoreTimeout{20000};
-constexpr milliseconds kFarewell{5000};  // for the others to leave before the store closes
+constexpr milliseconds kShutdownTimeout{5000};  // for the others to leave before the store closes
 
 milliseconds milliseconds_of(double seconds) { return milliseconds(static_cast<int64_t>(1000 * seconds)); }
 
@@ -54,8 +54,8 @@ const std::string kFault = "fault";
 
 }  // namespace
 
-Ranks::Ranks(const Launch& launch, const Patience& patience)
-    : launch_(launch), patience_(patience), no_progress_s_(patience.no_progress_s) {
+Ranks::Ranks(const Launch& launch, const RankTimeouts& timeouts)
+    : launch_(launch), timeouts_(timeouts), no_progress_s_(timeouts.no_progress_s) {
   if (size() == 1) return;
   join();
   watcher_ = std::thread([this] { watch(); });
@@ -67,7 +67,7 @@ void Ranks::join() {
   options.port = static_cast<uint16_t>(launch_.port);
   options.isServer = rank() == 0 && !launch_.is_served;
   options.waitWorkers = false;
-  options.timeout = milliseconds_of(patience_.join_s);
+  options.timeout = milliseconds_of(timeouts_.join_s);
   try {
     const auto tcp = c10::make_intrusive<c10d::TCPStore>(launch_.address, options);
     store_ = c10::make_intrusive<c10d::PrefixStore>(fmt::format("pictura/{}", launch_.attempt), tcp);
@@ -84,7 +84,7 @@ void Ranks::join() {
         "rank {}: another process at {} already has this rank: give every process its own RANK, and every run "
         "its own MASTER_PORT",
         rank(), meeting);
-    const Clock::time_point end = Clock::now() + milliseconds_of(patience_.join_s);
+    const Clock::time_point end = Clock::now() + milliseconds_of(timeouts_.join_s);
     std::vector<int> missing;
     do {
       missing.clear();
@@ -94,7 +94,7 @@ void Ranks::join() {
       std::this_thread::sleep_for(milliseconds(missing.empty() ? 0 : 50));
     } while (!missing.empty() && Clock::now() < end);
     PICTURA_CHECK(missing.empty(), "rank {}: {} of {} ranks did not reach {} within {:.0f} s: {}", rank(),
-                  missing.size(), size(), meeting, patience_.join_s, fmt::join(missing, ", "));
+                  missing.size(), size(), meeting, timeouts_.join_s, fmt::join(missing, ", "));
     store_->setTimeout(kStoreTimeout);
   } catch (const c10::Error& error) {
     fail("rank {}: lost {}: {}", rank(), meeting, first_line(error));
@@ -112,7 +112,7 @@ Ranks::~Ranks() {
   if (rank() != 0 || launch_.is_served) return;
   // Waits for the other ranks, which lose the store with this process.
   try {
-    const Clock::time_point end = Clock::now() + kFarewell;
+    const Clock::time_point end = Clock::now() + kShutdownTimeout;
     while (store_->add("left", 0) < size() && Clock::now() < end) std::this_thread::sleep_for(milliseconds(20));
   } catch (const c10::Error&) {
     // The store is gone already, which no longer matters.
@@ -130,10 +130,10 @@ void Ranks::check() const {
   throw RankLost(why_lost_);
 }
 
-void Ranks::find_lost() const {
+void Ranks::throw_if_lost() const {
   if (size() == 1) return;
   std::unique_lock lock(mutex_);
-  changed_.wait_for(lock, milliseconds_of(patience_.silent_s) + 4 * kBetweenBeats, [this] { return is_lost_.load(); });
+  changed_.wait_for(lock, milliseconds_of(timeouts_.silent_s) + 4 * kBetweenBeats, [this] { return is_lost_.load(); });
   lock.unlock();
   check();
 }
@@ -161,7 +161,7 @@ std::vector<std::string> Ranks::texts(const std::string& key, const std::string&
     for (const std::vector<uint8_t>& bytes : store_->multiGet(keys)) all.emplace_back(bytes.begin(), bytes.end());
     return all;
   } catch (const c10::Error& error) {
-    find_lost();
+    throw_if_lost();
     fail("rank {}: the ranks cannot exchange {}: {}", rank(), key, first_line(error));
   }
 }
@@ -171,7 +171,7 @@ void Ranks::on_lost(std::function<void()> abort) {
   abort_ = std::move(abort);
 }
 
-void Ranks::lose(const std::string& why) {
+void Ranks::mark_lost(const std::string& why) {
   const std::lock_guard lock(mutex_);
   why_lost_ = why;
   is_lost_ = true;
@@ -270,7 +270,7 @@ class BeatHistory {
 }  // namespace
 
 void Ranks::watch() {
-  BeatHistory history(size(), patience_.silent_s);
+  BeatHistory history(size(), timeouts_.silent_s);
   std::vector<std::string> keys = keys_of_ranks("beat", size());
   keys.push_back(kFault);
   const auto exchange = std::make_shared<Exchange>();
@@ -284,7 +284,7 @@ void Ranks::watch() {
       exchange->own.steps = steps_;
       exchange->own.is_busy = busy_ > 0;
       values = exchange->values;
-      if (!exchange->error.empty() || seconds_since(exchange->last_round) > patience_.silent_s) {
+      if (!exchange->error.empty() || seconds_since(exchange->last_round) > timeouts_.silent_s) {
         return fmt::format(
             "{}: {}:{}, where the ranks meet, does not answer: it was killed or stopped, or its host is "
             "gone{}{}",
@@ -304,7 +304,7 @@ void Ranks::watch() {
   while (!ends_) {
     lock.unlock();
     const std::string why = is_lost_ ? "" : look();
-    if (!why.empty()) lose(why);
+    if (!why.empty()) mark_lost(why);
     lock.lock();
     changed_.wait_for(lock, kBetweenBeats, [this] { return ends_; });
   }

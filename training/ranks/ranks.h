@@ -24,7 +24,7 @@ class RankLost : public Error {
 };
 
 /// Time limits for other ranks.
-struct Patience {
+struct RankTimeouts {
   double join_s = 300;        // until all ranks have joined
   double silent_s = 20;       // without a heartbeat: the process was killed or stopped, or its host is gone
   double no_progress_s = 45;  // with heartbeats, but without a step: the rank hangs; see Ranks::set_no_progress_s()
@@ -34,7 +34,7 @@ class Ranks {
  public:
   /// Waits until all ranks have joined. Throws Error naming address and port if they cannot meet, the ranks that did
   /// not join, and a rank that two processes claim.
-  explicit Ranks(const Launch& launch, const Patience& patience = {});
+  explicit Ranks(const Launch& launch, const RankTimeouts& timeouts = {});
   /// Waits briefly for the other ranks if this process hosts the store.
   ~Ranks();
   Ranks(const Ranks&) = delete;
@@ -51,7 +51,7 @@ class Ranks {
   void check() const;
   /// Waits until a lost rank is identified, after a collective operation has failed, and throws RankLost. Returns if no
   /// rank is lost.
-  void find_lost() const;
+  void throw_if_lost() const;
   /// Announces the reason why this process ends to the other ranks. The first announcement counts.
   void announce(const std::string& why) noexcept;
 
@@ -82,10 +82,10 @@ class Ranks {
  private:
   void join();
   void watch();
-  void lose(const std::string& why);
+  void mark_lost(const std::string& why);
 
   const Launch launch_;
-  const Patience patience_;
+  const RankTimeouts timeouts_;
   c10::intrusive_ptr<c10d::Store> store_, watch_store_;  // watch_store_ is used by the watching thread only
   std::atomic<double> no_progress_s_;
   std::atomic<int64_t> steps_ = 0;
