@@ -94,7 +94,7 @@ std::string interval_of(const Estimate& estimate) { return interval_text(estimat
 
 size_t name_width(const ProbeResults& results) {
   size_t width = 6;
-  for (const ProbedPolicy& policy : results.policies) width = std::max(width, policy.answers_as().size());
+  for (const ProbedPolicy& policy : results.policies) width = std::max(width, policy.responding_name().size());
   return width;
 }
 
@@ -107,7 +107,7 @@ void print_table(const RemovalResults& results, const std::vector<RemovalRow>& r
                "|dV|", "|dP(brake)|", "changed");
   for (const RemovalRow& row : rows) {
     if (row.group.distance_band || row.cases == 0) continue;
-    print_result("{:{}} {:>10} {:>8} {:>7} {:>20} {:>20} {:>6.1f} %\n", results.policies[row.policy].answers_as(),
+    print_result("{:{}} {:>10} {:>8} {:>7} {:>20} {:>20} {:>6.1f} %\n", results.policies[row.policy].responding_name(),
                  width, row.group.occlusion_name(), row.cases, row.scenes, interval_of(row.abs_value_change),
                  interval_of(row.abs_brake_change), 100 * row.changed_share.value);
   }
@@ -120,7 +120,7 @@ void print_table(const PedestrianResults& results, const std::vector<PedestrianR
                "dP(brake)", "changed");
   for (const PedestrianRow& row : rows) {
     if (!row.phase || row.cases == 0) continue;
-    print_result("{:{}} {:>12} {:>8} {:>7} {:>20} {:>20} {:>6.1f} %\n", results.policies[row.policy].answers_as(),
+    print_result("{:{}} {:>12} {:>8} {:>7} {:>20} {:>20} {:>6.1f} %\n", results.policies[row.policy].responding_name(),
                  width, kPathPhaseNames[static_cast<size_t>(*row.phase)], row.cases, row.scenes,
                  interval_of(row.value_change), interval_of(row.brake_change), 100 * row.changed_share.value);
   }
@@ -135,10 +135,10 @@ void print_table(const CornerResults& results, const std::vector<CornerRow>& row
   for (const CornerRow& row : rows) {
     if (row.less_policy || row.less_case || row.revealed == 0) continue;
     print_result("{:{}} {:>8} {:>6} {:>9} {:>5.1f}-{:>5.1f} {:>20} {:>20} {:>20}\n",
-                 results.policies[row.policy].answers_as(), width, kCornerCaseNames[static_cast<size_t>(row.its_case)],
-                 kWallNames[row.walls ? 0 : 1], row.revealed, row.reveal_s.front(), row.reveal_s.back(),
-                 interval_of(row.at_reveal.distance_m), interval_of(row.at_reveal.speed_mps),
-                 interval_of(row.at_reveal.deceleration_mps2));
+                 results.policies[row.policy].responding_name(), width,
+                 kCornerCaseNames[static_cast<size_t>(row.its_case)], kWallNames[row.walls ? 0 : 1], row.revealed,
+                 row.reveal_s.front(), row.reveal_s.back(), interval_of(row.at_reveal.distance_m),
+                 interval_of(row.at_reveal.speed_mps), interval_of(row.at_reveal.deceleration_mps2));
   }
   print_result(
       "at the reveal, where line of sight past the walls opens; deceleration over the next 2 s, m/s2\n{}\n"

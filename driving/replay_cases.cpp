@@ -96,7 +96,7 @@ void write(const CaseReplayOptions& options, const ProbeResults& results, size_t
   probed.ego = place.ego;
   for (size_t policy = 0; policy < results.policies.size() && !results.responses.empty(); ++policy) {
     const PairedResponse& response = results.response(number, policy);
-    probed.answers.push_back({.policy = results.policies[policy].answers_as(),
+    probed.answers.push_back({.policy = results.policies[policy].responding_name(),
                               .value = double{response.value},
                               .value_without = double{response.value_without},
                               .brake = double{response.brake},
@@ -166,7 +166,7 @@ void write_case_replay(const CaseReplayOptions& options, const CornerOptions& pr
                                         options.recording);
   const std::string what = fmt::format("{}; from here on {} drives agent {}, and all other agents repeat their motion",
                                        about(state, results.scenes_of_pairs[pair].removed, results.control),
-                                       results.policies[0].answers_as(), state.ego);
+                                       results.policies[0].responding_name(), state.ego);
   write(options, results, pair, place, 0, {.what = what, .removed = state.user}, replay);
   const Takeover& probed = results.takeover(pair, true, CornerCase::hidden, 0);
   if (const int steps = replay.num_frames - 1; steps != probed.steps) {

@@ -92,7 +92,7 @@ void add_slot(const AgentStateView& state, int64_t slot, ScenarioCounts* counts)
 }
 
 // Gravity of the worst infraction of a vehicle's episode; 0: no infraction, or no vehicle.
-int gravity(const AgentStateView& state, int slot) {
+int severity(const AgentStateView& state, int slot) {
   if (state.agent_class[slot] != AgentClass::vehicle) return 0;
   const uint8_t events = state.episode_events[slot];
   return (events & kEventAtFault) ? 3 : (events & kEventOffRoad) ? 2 : (events & kEventRedLight) ? 1 : 0;
@@ -104,7 +104,7 @@ std::vector<int> worst_agents(const AgentStateView& state, int num_slots, int ag
   for (int begin = 0; begin < num_slots; begin += agents_per_world) {
     int gravest = 0;
     for (int agent = 1; agent < agents_per_world; ++agent) {
-      if (gravity(state, begin + agent) > gravity(state, begin + gravest)) gravest = agent;
+      if (severity(state, begin + agent) > severity(state, begin + gravest)) gravest = agent;
     }
     worst.push_back(gravest);
   }

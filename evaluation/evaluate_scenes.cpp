@@ -116,18 +116,18 @@ class BatchDrive {
     displacements_.resize(num_slots);
     driven_steps_.resize(num_slots);
     for (size_t slot = 0; slot < num_slots; ++slot) last_steps_[slot] = map_of(slot).rules.record.num_steps - 1;
-    take_out(slots_where([&](size_t slot) { return roles_[slot] == SceneRole::removed; }));
+    remove_agents(slots_where([&](size_t slot) { return roles_[slot] == SceneRole::removed; }));
     if (protocol.waypoints == Waypoints::path) set_path_waypoints();
     status_ = status();
   }
 
   /// Records the poses of all agents present at the start, from now on.
-  void keep_places() {
+  void start_recording_poses() {
     kept_slots_ = slots_where([&](size_t slot) {
       const CompiledMap& map = map_of(slot);
       return map.scenario->valid_of(track_of_slot_[slot])[map.start_step] != 0;
     });
-    places_.resize(kept_slots_.size() * static_cast<size_t>(protocol_.steps));
+    poses_.resize(kept_slots_.size() * static_cast<size_t>(protocol_.steps));
     // Boxes stand on the road of the map, recorded boxes near it. A constant offset per agent keeps boxes from rising
     // or falling at the start.
     const std::vector<AgentBox> boxes = host_copy(simulator_.scene().agents, device());
@@ -137,7 +137,7 @@ class BatchDrive {
       const float foot_m = map.scenario->states_of(track_of_slot_[slot])[map.start_step].position_m.z;
       rises_m_.push_back(foot_m + boxes[slot].height_m / 2 - boxes[slot].center_m.z);
     }
-    note_places(0);
+    record_poses(0);
   }
 
   /// Adds the recorded poses to each scene of the batch.
@@ -156,9 +156,9 @@ class BatchDrive {
       if (scene.rollouts.size() == 1) {
         scene.track_ids.push_back(map_of(slot).scenario->tracks[track_of_slot_[slot]].id);
       }
-      const auto first = places_.begin() + static_cast<ptrdiff_t>(i * steps);
-      std::vector<SimulatedState>& places = scene.rollouts.back();
-      places.insert(places.end(), first, first + static_cast<ptrdiff_t>(steps));
+      const auto first = poses_.begin() + static_cast<ptrdiff_t>(i * steps);
+      std::vector<SimulatedState>& poses = scene.rollouts.back();
+      poses.insert(poses.end(), first, first + static_cast<ptrdiff_t>(steps));
     }
   }
 
@@ -172,9 +172,9 @@ class BatchDrive {
     std::vector<uint8_t> driven, replayed;
     std::optional<DeviceCopy<uint8_t>> driven_mask, replayed_mask;
     const auto act = [&](int step) {
-      if (kept_slots_.empty() && !has_open(step)) return false;
+      if (kept_slots_.empty() && !has_remaining_drivers(step)) return false;
       if (protocol_.record_end == RecordEnd::vanish) {
-        take_out(slots_where([&](size_t slot) {
+        remove_agents(slots_where([&](size_t slot) {
           return last_steps_[slot] == step && !is_driven(slot, step) && status_[slot] == AgentStatus::recorded;
         }));
       }
@@ -193,7 +193,7 @@ class BatchDrive {
     };
     const auto after_step = [&](int step, const StepResult&) {
       measure(step + 1);
-      if (!kept_slots_.empty()) note_places(step);
+      if (!kept_slots_.empty()) record_poses(step);
       on_step(step + 1);
     };
     return !drive_steps(simulator_, commands, protocol_.steps, act, {}, after_step).is_interrupted;
@@ -249,7 +249,7 @@ class BatchDrive {
     return protocol_.record_end == RecordEnd::stand || step < last_steps_[slot];
   }
   /// Whether an agent drives in this step, or will drive later.
-  bool has_open(int step) const {
+  bool has_remaining_drivers(int step) const {
     for (size_t slot = 0; slot < roles_.size(); ++slot) {
       if (roles_[slot] != SceneRole::driven) continue;
       if (takeover_steps_[slot] > step || takes_actions(status_[slot])) return true;
@@ -277,7 +277,7 @@ class BatchDrive {
   }
 
   /// Removes agents, which remain absent unless they are commanded to follow the recording.
-  void take_out(const std::vector<int32_t>& slots) {
+  void remove_agents(const std::vector<int32_t>& slots) {
     if (slots.empty()) return;
     const DeviceCopy<int32_t> chosen(slots, device());
     const DeviceCopy<AgentStatus> absent(std::vector<AgentStatus>(slots.size(), AgentStatus::absent), device());
@@ -332,16 +332,16 @@ class BatchDrive {
   }
 
   /// Records poses after a step of the episode, and before the first step; absent agents keep their last pose.
-  void note_places(int step) {
+  void record_poses(int step) {
     const std::vector<AgentBox> boxes = host_copy(simulator_.scene().agents, device());
     const auto steps = static_cast<size_t>(protocol_.steps), at = static_cast<size_t>(step);
     for (size_t i = 0; i < kept_slots_.size(); ++i) {
       const auto slot = static_cast<size_t>(kept_slots_[i]);
-      SimulatedState* const places = &places_[i * steps];
+      SimulatedState* const poses = &poses_[i * steps];
       if (boxes[slot].drawn)
-        places[at] = simulated_state(map_of(slot).scenario->map, boxes[slot], rises_m_[i]);
+        poses[at] = simulated_state(map_of(slot).scenario->map, boxes[slot], rises_m_[i]);
       else if (at > 0)
-        places[at] = places[at - 1];
+        poses[at] = poses[at - 1];
     }
   }
 
@@ -357,9 +357,9 @@ class BatchDrive {
   std::vector<AgentStatus> status_;  // after the last step
   std::vector<Displacement> displacements_;
   std::vector<int32_t> driven_steps_;
-  std::vector<int32_t> kept_slots_;     // slots whose poses are recorded
-  std::vector<float> rises_m_;          // [kept_slots] height of the recorded box's centre above the box's
-  std::vector<SimulatedState> places_;  // [kept_slots * steps]
+  std::vector<int32_t> kept_slots_;    // slots whose poses are recorded
+  std::vector<float> rises_m_;         // [kept_slots] height of the recorded box's centre above the box's
+  std::vector<SimulatedState> poses_;  // [kept_slots * steps]
 };
 
 /// Worlds of one rollout of a batch whose numbers count from first_scene on. All rollouts of all scenes have different
@@ -490,7 +490,7 @@ SceneEvaluation evaluate_scenes(const EvaluatedDriver& driver, Renderer* rendere
         simulator = make_simulator(options.simulator, config, batch.maps, worlds);
       const double density = protocol.densities[i / protocol.rollouts];
       BatchDrive drive(batch, protocol, density, rollout, options.seed, simulator.get());
-      if (keeps_rollouts) drive.keep_places();
+      if (keeps_rollouts) drive.start_recording_poses();
       const Driving driving = driver.drive(*simulator);
       const double done = double(first) * num_drives * protocol.steps + double(end - first) * i * protocol.steps;
       const bool is_finished = drive.run(driving.controller.get(), [&](int steps) {

@@ -51,7 +51,7 @@ std::vector<int32_t> takeovers(const CompiledMap& map, const SceneProtocol& prot
     const int32_t step = first_step(map, track);
     if (step < 0 || (step > 0 && protocol.late != Late::drive)) continue;
     const Vec3 from = state_of(map, track, step).position_m, goal = map.rules.record.agents[track].goal_m;
-    if (protocol.least_way_m > 0 && passes(from, from, goal, protocol.least_way_m)) continue;
+    if (protocol.min_distance_to_goal_m > 0 && passes(from, from, goal, protocol.min_distance_to_goal_m)) continue;
     steps[track] = step;
   }
   return steps;
@@ -70,7 +70,7 @@ std::shared_ptr<const Scenario> protocol_scene(Scenario scenario, const ScenePro
   return std::make_shared<const Scenario>(std::move(scenario));
 }
 
-std::vector<uint8_t> thinned_out(const Scenario& scenario, double density, uint64_t seed) {
+std::vector<uint8_t> select_thinned_tracks(const Scenario& scenario, double density, uint64_t seed) {
   const auto scene = static_cast<uint32_t>(hash_of(scenario.id));
   std::vector<std::pair<uint32_t, size_t>> draws;
   for (size_t track = 0; track < scenario.tracks.size(); ++track) {
@@ -97,7 +97,7 @@ ScenePlan plan_scene(const CompiledMap& map, Span<const AgentBox> boxes, const S
   const size_t num_tracks = scene.tracks.size();
   PICTURA_CHECK(boxes.size() == num_tracks, "scene {}: expected {} boxes, got {}", scene.id, num_tracks, boxes.size());
   ScenePlan plan{std::vector<SceneRole>(num_tracks, SceneRole::replayed), takeovers(map, protocol)};
-  const std::vector<uint8_t> thinned = thinned_out(scene, density, seed);
+  const std::vector<uint8_t> thinned = select_thinned_tracks(scene, density, seed);
   for (size_t track = 0; track < num_tracks; ++track) {
     const bool is_named = plan.takeover_steps[track] >= 0;
     const bool is_other = static_cast<AgentClass>(map.rules.record.agents[track].agent_class) != AgentClass::vehicle;

@@ -14,7 +14,7 @@ std::shared_ptr<const Scenario> protocol_scene(Scenario scenario, const ScenePro
 
 /// Selects the tracks that thinning removes, [tracks]: of the n road users besides the self-driving car round((1 -
 /// density) n), by a draw of seed and scenario id. Tracks removed at a density are also removed at every lower density.
-std::vector<uint8_t> thinned_out(const Scenario& scenario, double density, uint64_t seed);
+std::vector<uint8_t> select_thinned_tracks(const Scenario& scenario, double density, uint64_t seed);
 
 enum class SceneRole : uint8_t { removed, replayed, driven };
 

@@ -68,8 +68,8 @@ constexpr std::array kRules{
     word_rule<&P::leave_at_goal, kYesNo>("leave_at_goal", "no, yes", "whether agents that arrive are removed"),
     word_rule<&P::waypoints, kWaypointsWords>(
         "waypoints", "goal, path", "the goal in all three slots, or two points on the recorded path and the goal"),
-    number_rule<&P::least_way_m, 0, 1000>("least_way_m", "0 to 1000",
-                                          "minimum distance to the goal; nearer road users follow the recording"),
+    number_rule<&P::min_distance_to_goal_m, 0, 1000>(
+        "least_way_m", "0 to 1000", "minimum distance to the goal; nearer road users follow the recording"),
     word_rule<&P::replay_experts, kYesNo>("replay_experts", "no, yes",
                                           "whether road users marked as expert are replayed"),
     number_rule<&P::rollouts, 1, 1000>("rollouts", "1 to 1000", "drives of each scene, each with its own draws"),
@@ -87,7 +87,7 @@ std::vector<SceneProtocol> make_protocols() {
   gpudrive.steps = 91;
   gpudrive.densities = {1.0};
   gpudrive.box_scale = 0.7f;
-  gpudrive.least_way_m = 0.2f;
+  gpudrive.min_distance_to_goal_m = 0.2f;
   gpudrive.replay_experts = true;
   gpudrive.max_driven = 64;
   gpudrive.after_infraction = AfterInfraction::leave;
@@ -113,7 +113,7 @@ std::vector<SceneProtocol> make_protocols() {
   waymax.start_step = 10;
   waymax.steps = 80;
   waymax.densities = {1.0};
-  waymax.least_way_m = 0;
+  waymax.min_distance_to_goal_m = 0;
   waymax.overlapping = Overlapping::drive;
   waymax.after_infraction = AfterInfraction::drive_on;
   waymax.leave_at_goal = false;

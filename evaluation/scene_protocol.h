@@ -29,7 +29,7 @@ struct SceneProtocol {
   int rollouts = 1;                               // drives of each scene, each with its own draws
   float box_scale = 1;                            // scale of all lengths and widths
   // Minimum distance from the start to the goal; a road user that starts nearer follows the recording. 0: no minimum.
-  float least_way_m = 2;
+  float min_distance_to_goal_m = 2;
   bool replay_experts = false;  // replays road users that the file marks for replay
   int max_driven = 0;  // > 0: drives only the self-driving car and the first others of a scene, up to this number
   Overlapping overlapping = Overlapping::replay;  // whose initial box touches a box or an edge, or is off the road

@@ -39,7 +39,7 @@ class CornerProbe {
   }
 
   void run() {
-    run_.run([this](const ProbeFrame& frame) { look_for_corners(frame); },
+    run_.run([this](const ProbeFrame& frame) { find_corners(frame); },
              [this](Simulator& simulator, int driver) {
                driven_ = &simulator;
                scenes_.add(simulator, driver);
@@ -57,7 +57,7 @@ class CornerProbe {
     CornerScene scene;
   };
 
-  void look_for_corners(const ProbeFrame& frame) {
+  void find_corners(const ProbeFrame& frame) {
     // Later states do not leave enough steps of the scene for a takeover.
     if (frame.step + kTakeoverSteps >= options_.worlds.steps) return;
     KeptScene kept;
@@ -109,7 +109,7 @@ class CornerProbe {
   }
 
   // Whether the hidden vehicle enters the junction before the takeover ends.
-  bool comes(const CornerState& state) const {
+  bool enters_junction(const CornerState& state) const {
     const auto map = static_cast<size_t>(state.map);
     const int32_t junction = corners_[map].at(state.approach).junction;
     const DrivenScene& scene = scenes_.of(state.scene);
@@ -123,7 +123,7 @@ class CornerProbe {
   void choose_pairs() {
     std::vector<CornerState> coming;
     for (const Found& found : hidden_) {
-      if (comes(found.state)) coming.push_back(found.state);
+      if (enters_junction(found.state)) coming.push_back(found.state);
     }
     results_.hidden_found = static_cast<int64_t>(coming.size());
     results_.empty_found = static_cast<int64_t>(empty_.size());
@@ -141,13 +141,13 @@ class CornerProbe {
       CornerScene scene = found->scene;
       for (int step = 0; step <= kTakeoverSteps; ++step)
         scene.user_m.push_back(scenes_.of(state.scene).box_at(state.step + step, state.user).center_m.xy());
-      scene.removed = options_.control == CornerControl::permuted ? another_of(scene, state) : state.user;
+      scene.removed = options_.control == CornerControl::permuted ? draw_other_vehicle(scene, state) : state.user;
       results_.scenes_of_pairs.push_back(std::move(scene));
     }
   }
 
   // Returns a vehicle near the ego other than the hidden one, drawn by the seed; -1: none.
-  int32_t another_of(const CornerScene& scene, const CornerState& state) const {
+  int32_t draw_other_vehicle(const CornerScene& scene, const CornerState& state) const {
     std::vector<int32_t> others;
     const auto num_agents = static_cast<int32_t>(scenes_.of(state.scene).bodies.size());
     const Vec2 ego_m = scene.boxes[state.ego].center_m.xy();

@@ -79,7 +79,7 @@ std::vector<bool> free_points(const CrossingPath& path, Span<const AgentBox> box
   return is_free;
 }
 
-std::optional<PathPart> used_part(Span<const float> visible_shares) {
+std::optional<PathPart> usable_part(Span<const float> visible_shares) {
   const auto is_hidden = [&](int i) { return i >= 0 && i < kPathPoints && visible_shares[i] == 0; };
   const auto is_visible = [&](int i) { return i < kPathPoints && visible_shares[i] > 0; };
   if (!is_hidden(kPathOrigin)) return {};

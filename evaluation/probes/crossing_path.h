@@ -43,6 +43,6 @@ struct PathPart {
 };
 /// Returns the used part. visible_shares: [kPathPoints] shares by Renderer::visibility, NaN where a pedestrian cannot
 /// stand. Empty if the path is not hidden at its origin, or if a part is too short or cut off by a NaN.
-std::optional<PathPart> used_part(Span<const float> visible_shares);
+std::optional<PathPart> usable_part(Span<const float> visible_shares);
 
 }  // namespace pictura

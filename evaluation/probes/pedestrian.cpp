@@ -46,7 +46,7 @@ struct Trial {
 
   // Whether the path may be used, by the points measured first: the hider hides the origin, and after it the pedestrian
   // is seen and then hidden again.
-  bool may_do() const {
+  bool is_promising() const {
     if (shares[kPathOrigin] != 0 || !(share_without_hider > 0)) return false;
     int i = kPathOrigin;
     const auto share = [&] { return i < kPathPoints ? shares[i] : -1; };
@@ -82,7 +82,7 @@ class PedestrianProbe {
       const int64_t due = quota_.due(frame.scene_of(world), frame.step);
       if (due > 0) searches.push_back({world, due, candidates_of(frame, world)});
     }
-    while (try_some(frame, &searches)) continue;
+    while (measure_candidates(frame, &searches)) continue;
   }
 
   // Returns all paths of a pedestrian from behind a vehicle in a world, in a random order.
@@ -120,7 +120,7 @@ class PedestrianProbe {
   }
 
   // Measures the next candidates of each world, and adds those that are usable. Returns false if there are none.
-  bool try_some(const ProbeFrame& frame, std::vector<Search>* searches) {
+  bool measure_candidates(const ProbeFrame& frame, std::vector<Search>* searches) {
     std::vector<Trial> trials;
     for (Search& search : *searches) {
       if (search.due == 0) continue;
@@ -130,7 +130,7 @@ class PedestrianProbe {
     if (trials.empty()) return false;
     for (Trial& trial : trials) trial.is_free = free_points(frame, trial);
     measure(frame, kCoarse, &trials);
-    std::erase_if(trials, [](const Trial& trial) { return !trial.may_do(); });
+    std::erase_if(trials, [](const Trial& trial) { return !trial.is_promising(); });
     measure(frame, 1, &trials);
     for (const Trial& trial : trials) {
       if (trial.search->due > 0 && take(frame, trial)) --trial.search->due;
@@ -197,7 +197,7 @@ class PedestrianProbe {
     const bool is_taken = std::any_of(results_.paths.begin(), results_.paths.end(), [&](const PedestrianPath& path) {
       return path.scene == scene && path.step == frame.step && path.ego == one.ego;
     });
-    const std::optional<PathPart> part = used_part(trial.shares);
+    const std::optional<PathPart> part = usable_part(trial.shares);
     if (is_taken || !part) return false;
 
     const Span<const AgentBox> boxes = boxes_of(frame, world);
@@ -240,7 +240,7 @@ class PedestrianProbe {
     }
     results_.paths.push_back(std::move(path));
     quota_.take(scene, 1);
-    run_.ask(frame, pairs);
+    run_.add_pairs(frame, pairs);
     return true;
   }
 

@@ -27,7 +27,7 @@ struct ProbedPolicy {
   std::string untrained_hash;  // hash of the fresh weights that respond in its place; empty: the policy itself responds
 
   /// Name of the responding policy in figures and tables.
-  std::string answers_as() const { return untrained_hash.empty() ? name : "untrained " + name; }
+  std::string responding_name() const { return untrained_hash.empty() ? name : "untrained " + name; }
 };
 
 struct ProbeResults {

@@ -259,7 +259,7 @@ std::vector<float> ProbeRun::run(const std::function<void(const ProbeFrame&)>& s
   } else {
     drive_by_controller();
   }
-  respond();
+  evaluate_pending();
   results_.seconds = since_start_.seconds();
   if (options_.worlds.on_progress && !results_.interrupted) options_.worlds.on_progress(1, 0);
   return std::move(visible_shares_);
@@ -344,16 +344,16 @@ void ProbeRun::drive_by_controller() {
   results_.setting.light_heads = driven.light_heads;
 }
 
-void ProbeRun::ask(const ProbeFrame& frame, Span<const ProbePair> pairs) {
+void ProbeRun::add_pairs(const ProbeFrame& frame, Span<const ProbePair> pairs) {
   for (size_t begin = 0; begin < pairs.size();) {
     const size_t count = std::min(static_cast<size_t>(batch_) - pending_->views.size(), pairs.size() - begin);
     add(frame, pairs.subspan(begin, count));
-    if (pending_->views.size() == static_cast<size_t>(batch_)) respond();
+    if (pending_->views.size() == static_cast<size_t>(batch_)) evaluate_pending();
     begin += count;
   }
 }
 
-// Keeps the states of pairs, and their observations, for respond().
+// Keeps the states of pairs, and their observations, for evaluate_pending().
 void ProbeRun::add(const ProbeFrame& frame, Span<const ProbePair> pairs) {
   KeptScene& scene = pending_->scene;
   const auto begin = static_cast<int64_t>(pending_->views.size()), count = static_cast<int64_t>(pairs.size());
@@ -376,9 +376,9 @@ void ProbeRun::add(const ProbeFrame& frame, Span<const ProbePair> pairs) {
       std::vector<int32_t> shown = others, without = others;
       if (pair.inserted) shown.erase(shown.begin() + (next++ - others.begin()));
       if (pair.hidden_box >= 0) without.push_back(scene.box_of(frame, world, pair.hidden_box));
-      if (pair.asked_box >= 0) {
+      if (pair.measured_box >= 0) {
         pending_->queries.push_back(
-            {static_cast<int32_t>(pending_->views.size()), scene.box_of(frame, world, pair.asked_box)});
+            {static_cast<int32_t>(pending_->views.size()), scene.box_of(frame, world, pair.measured_box)});
         pending_->asked.push_back(pending_->views.size());
       }
       pending_->views.push_back(scene.view_of(frame, world, pair.slot, shown));
@@ -423,7 +423,7 @@ std::vector<float> ProbeRun::visibility(const SceneBatch& scene, const std::vect
 }
 
 // Evaluates the pending pairs with all policies.
-void ProbeRun::respond() {
+void ProbeRun::evaluate_pending() {
   const size_t count = pending_->views.size(), num_policies = participants_.size();
   if (count == 0) return;
   const size_t first_share = visible_shares_.size();

@@ -77,7 +77,7 @@ struct ProbePair {
   int32_t slot = 0;
   int32_t hidden_box = -1;
   std::optional<InsertedBox> inserted;
-  int32_t asked_box = -1;  // box whose visibility is measured; -1: none, which gives NaN
+  int32_t measured_box = -1;  // box whose visibility is measured; -1: none, which gives NaN
 };
 
 /// Number of cases still to be drawn in each scene: equally many in each, spread evenly over its samples while enough
@@ -112,12 +112,12 @@ class ProbeRun final : public EvaluationObserver {
 
   /// Drives all scenes, each policy its share, or options.worlds.controller all, and passes their states at every
   /// sample_steps steps to `sample`, from the first sampled step on. Then evaluates the remaining pairs, and returns
-  /// the visibility of all pairs' asked_box, in the order of ask(). With `watch` states are only observed: ask() must
-  /// not be called.
+  /// the visibility of all pairs' measured_box, in the order of add_pairs(). With `watch` states are only observed:
+  /// add_pairs() must not be called.
   std::vector<float> run(const std::function<void(const ProbeFrame&)>& sample, const Watch& watch = {});
 
   /// Adds pairs of the current frame. Responses are appended to the results in this order.
-  void ask(const ProbeFrame& frame, Span<const ProbePair> pairs);
+  void add_pairs(const ProbeFrame& frame, Span<const ProbePair> pairs);
 
   /// Visibilities in the cameras of the first policy that reads images, or in the paper's.
   std::vector<float> visibility(const KeptScene& scene, const std::vector<View>& views,
@@ -152,7 +152,7 @@ class ProbeRun final : public EvaluationObserver {
   void drive();
   void drive_by_controller();
   void add(const ProbeFrame& frame, Span<const ProbePair> pairs);
-  void respond();
+  void evaluate_pending();
 
   const ProbeOptions& options_;
   const Device device_;

@@ -49,9 +49,10 @@ class RemovalProbe {
     std::vector<ProbePair> pairs;
     for (const DrawnCase& one : drawn) {
       results_.cases.push_back(one.facts);
-      pairs.push_back({.world = one.world, .slot = one.slot, .hidden_box = one.hidden_box, .asked_box = one.user_box});
+      pairs.push_back(
+          {.world = one.world, .slot = one.slot, .hidden_box = one.hidden_box, .measured_box = one.user_box});
     }
-    run_.ask(frame, pairs);
+    run_.add_pairs(frame, pairs);
   }
 
   // Returns all egos of a world with each of their road users, by ego and user.

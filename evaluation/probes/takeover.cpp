@@ -76,7 +76,7 @@ bool TakeoverWorlds::run(const std::vector<TakeoverStart>& starts, bool walls,
     Worlds* const worlds = prepare(policy, starts, walls);
     std::vector<Takeover*> runs;
     for (size_t i = 0; i < starts.size(); ++i) runs.push_back(&(*takeovers_out)[i * num_policies + policy]);
-    for (int step = 0; look(worlds, policy, starts, step, runs) && step < kTakeoverSteps; ++step) {
+    for (int step = 0; observe_step(worlds, policy, starts, step, runs) && step < kTakeoverSteps; ++step) {
       if (interrupted()) return false;
       const std::vector<int32_t> actions = decide(worlds, policy, starts, step);
       std::vector<Command> commands(static_cast<size_t>(worlds->simulator->num_slots()));
@@ -145,8 +145,8 @@ void TakeoverWorlds::remove(Worlds* worlds, const std::vector<TakeoverStart>& st
 }
 
 // Records the current state in runs that have not ended; false if all have ended.
-bool TakeoverWorlds::look(Worlds* worlds, size_t policy, const std::vector<TakeoverStart>& starts, int step,
-                          const std::vector<Takeover*>& runs) {
+bool TakeoverWorlds::observe_step(Worlds* worlds, size_t policy, const std::vector<TakeoverStart>& starts, int step,
+                                  const std::vector<Takeover*>& runs) {
   const Device device = run_.device();
   Simulator& simulator = *worlds->simulator;
   const AgentStateView state = simulator.state();

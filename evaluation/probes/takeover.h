@@ -68,8 +68,8 @@ class TakeoverWorlds {
   std::vector<GeometryHandle> handles_of(bool walls) const;
   Worlds* prepare(size_t policy, const std::vector<TakeoverStart>& starts, bool walls);
   void remove(Worlds* worlds, const std::vector<TakeoverStart>& starts);
-  bool look(Worlds* worlds, size_t policy, const std::vector<TakeoverStart>& starts, int step,
-            const std::vector<Takeover*>& runs);
+  bool observe_step(Worlds* worlds, size_t policy, const std::vector<TakeoverStart>& starts, int step,
+                    const std::vector<Takeover*>& runs);
   std::vector<int32_t> decide(Worlds* worlds, size_t policy, const std::vector<TakeoverStart>& starts, int step);
 
   ProbeRun& run_;

@@ -73,7 +73,7 @@ TEST(CrossingPaths, AreHiddenThenSeenThenHiddenAgain) {
   fill(begin, seen, 0);
   fill(seen, again, 1);
   fill(again, again + 12 * kMetre, 0);
-  const auto part = used_part(shares);
+  const auto part = usable_part(shares);
   ASSERT_TRUE(part);
   EXPECT_EQ(part->begin, begin);
   EXPECT_EQ(part->first_seen, seen);
@@ -82,7 +82,7 @@ TEST(CrossingPaths, AreHiddenThenSeenThenHiddenAgain) {
   const auto with = [&shares](int i, float share) {
     std::vector<float> others = shares;
     others[i] = share;
-    return used_part(others);
+    return usable_part(others);
   };
   EXPECT_FALSE(with(kPathOrigin, 0.1f)) << "not hidden at its origin";
   EXPECT_FALSE(with(kPathOrigin - 1, 0.1f)) << "too short a time before it is seen";
@@ -90,8 +90,8 @@ TEST(CrossingPaths, AreHiddenThenSeenThenHiddenAgain) {
   EXPECT_FALSE(with(seen + 2, 0)) << "too short a glance";
   EXPECT_FALSE(with(again + 2, 0.1f)) << "too short a time after it is seen";
   fill(seen, again, 0.8f);
-  EXPECT_FALSE(used_part(shares)) << "never seen whole";
-  EXPECT_FALSE(used_part(std::vector<float>(kPathPoints, 0))) << "never seen";
+  EXPECT_FALSE(usable_part(shares)) << "never seen whole";
+  EXPECT_FALSE(usable_part(std::vector<float>(kPathPoints, 0))) << "never seen";
 }
 
 // ---- the probe

@@ -163,7 +163,7 @@ TEST_F(Removal, UntrainedPoliciesAnswerInTheSameStates) {
   EXPECT_GT(seen_changes, 20);
   EXPECT_EQ(control.policies[kVectorized].untrained_hash, control.policies[kLikeForLike].untrained_hash)
       << "one architecture, one seed";
-  EXPECT_EQ(control.policies[kAgent].answers_as(), "untrained agent");
+  EXPECT_EQ(control.policies[kAgent].responding_name(), "untrained agent");
   const auto json = nlohmann::json::parse(removal_summary_json(control, summarize(control), ""));
   EXPECT_EQ(json.at("control"), "untrained");
   EXPECT_EQ(json.at("policy")[0].at("untrained_hash"), control.policies[kAgent].untrained_hash);

@@ -56,7 +56,7 @@ TEST(SceneProtocols, AreDataAndTheirRulesCanBeChosenOtherwise) {
   set_scene_rule("late=drive", &protocol);
   set_scene_rule("least_way_m=0.5", &protocol);
   EXPECT_EQ(protocol.late, Late::drive);
-  EXPECT_FLOAT_EQ(protocol.least_way_m, 0.5f);
+  EXPECT_FLOAT_EQ(protocol.min_distance_to_goal_m, 0.5f);
   const auto refusal = [&](const std::string& rule) {
     return test::message_of<UsageError>([&] { set_scene_rule(rule, &protocol); });
   };
@@ -75,15 +75,16 @@ TEST(SceneProtocols, AreDataAndTheirRulesCanBeChosenOtherwise) {
 TEST(SceneProtocols, ThinTheSameRoadUsersForASeed) {
   const auto scene = crossing({.num_vehicles = 40});
   const auto others = static_cast<int>(scene->tracks.size()) - 1;
-  EXPECT_EQ(count_of(thinned_out(*scene, 1, 1)), 0);
-  const std::vector<uint8_t> some = thinned_out(*scene, 0.75, 1), many = thinned_out(*scene, 0.5, 1);
+  EXPECT_EQ(count_of(select_thinned_tracks(*scene, 1, 1)), 0);
+  const std::vector<uint8_t> some = select_thinned_tracks(*scene, 0.75, 1),
+                             many = select_thinned_tracks(*scene, 0.5, 1);
   EXPECT_EQ(count_of(some), std::lround(0.25 * others));
   EXPECT_EQ(count_of(many), std::lround(0.5 * others));
   for (size_t track = 0; track < some.size(); ++track) EXPECT_LE(some[track], many[track]);
-  EXPECT_EQ(thinned_out(*scene, 0.5, 1), many);
-  EXPECT_NE(thinned_out(*scene, 0.5, 2), many);
+  EXPECT_EQ(select_thinned_tracks(*scene, 0.5, 1), many);
+  EXPECT_NE(select_thinned_tracks(*scene, 0.5, 2), many);
   for (uint64_t seed = 0; seed < 50; ++seed) {
-    EXPECT_EQ(thinned_out(*scene, 0.1, seed)[scene->sdc_track], 0) << "never the own car";
+    EXPECT_EQ(select_thinned_tracks(*scene, 0.1, seed)[scene->sdc_track], 0) << "never the own car";
   }
 }
 
