@@ -177,7 +177,7 @@ void run_map(const CLI::App& command, const MapArguments& arguments) {
   progress.finish();
   const double load_ms = 1e3 * watch.seconds();
   throw_if_interrupted();
-  print_mends(*map, report.source);
+  print_repairs(*map, report.source);
   const MapPictureOptions picture{.size_px = arguments.size_px, .box = shown_box(arguments)};
   if (!arguments.png.empty()) draw_map_png(*map, arguments.png, picture);
   throw_if_interrupted();

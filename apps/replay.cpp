@@ -44,7 +44,7 @@ Replay record(ReplayArguments arguments, uint64_t seed, ProgressLine* line_out) 
   DrivenWorld world = make_world(options, arguments.policy);
   if (arguments.steps == 0) arguments.steps = world.simulator->config().episode_steps;
   check_replay_room(world.simulator->num_slots(), arguments.steps);
-  settle_followed(world, &arguments.recording);
+  resolve_followed(world, &arguments.recording);
   Recording recording(*world.simulator, {arguments.policy, world.session.get(), world.renderer.get()},
                       arguments.recording);
   const auto on_step = [&](int step, const StepResult&) {
@@ -60,8 +60,8 @@ void run_replay(const ReplayArguments& arguments) {
   if (arguments.gallery.empty()) {
     const Replay replay = record(arguments, arguments.world.seed, &line);
     line.finish();
-    if (!arguments.out.empty()) write_replay_and_say_so(arguments.out, replay);
-    if (!arguments.mcap.empty()) write_mcap_and_say_so(arguments.mcap, replay);
+    if (!arguments.out.empty()) write_replay_with_message(arguments.out, replay);
+    if (!arguments.mcap.empty()) write_mcap_with_message(arguments.mcap, replay);
     if (arguments.json) print_json(facts_of(arguments.out.empty() ? arguments.mcap : arguments.out, replay));
     return;
   }
@@ -74,7 +74,7 @@ void run_replay(const ReplayArguments& arguments) {
       const Replay replay = record(arguments, seed, &line);
       line.finish();
       const std::string path = pages.file(fmt::format("seed_{}.html", seed));
-      write_replay_and_say_so(path, replay);
+      write_replay_with_message(path, replay);
       replays.push_back(facts_of(path, replay));
     }
   } catch (const Interrupted&) {

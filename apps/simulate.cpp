@@ -199,7 +199,7 @@ void run_simulate(SimulateArguments arguments) {
   if (film_agent >= simulator->num_slots()) {
     fail_usage("--film-agent: expected 0 to {}, got {}", simulator->num_slots() - 1, film_agent);
   }
-  settle_followed(world, &arguments.recording);
+  resolve_followed(world, &arguments.recording);
   SimulationRun run{.spawned = simulator->spawn_report(), .of_class = spawned_by_class(*simulator)};
   std::unique_ptr<Film> film;
   if (!arguments.video.empty()) {
@@ -246,8 +246,8 @@ void run_simulate(SimulateArguments arguments) {
   if (film && steps > 0) film->close();  // an interrupt may come before the first frame
   if (recording) {
     const Replay replay = recording->finish();
-    if (!arguments.replay.empty()) write_replay_and_say_so(arguments.replay, replay);
-    if (!arguments.mcap.empty()) write_mcap_and_say_so(arguments.mcap, replay);
+    if (!arguments.replay.empty()) write_replay_with_message(arguments.replay, replay);
+    if (!arguments.mcap.empty()) write_mcap_with_message(arguments.mcap, replay);
   }
   if (saved) {
     write_scene_file(arguments.scene, saved->scenario());

@@ -44,7 +44,7 @@ std::string quoted(const std::string& word) {
   return text;
 }
 
-void say_what_was_written(const std::string& path, const Replay& replay) {
+void report_file(const std::string& path, const Replay& replay) {
   std::error_code none;  // set for devices, which have no size
   const auto bytes = std::filesystem::file_size(path, none);
   print_message("{}: {} agents, {} steps{}\n", path, replay.num_agents, replay.num_frames - 1,
@@ -53,7 +53,7 @@ void say_what_was_written(const std::string& path, const Replay& replay) {
 
 }  // namespace
 
-void settle_followed(const DrivenWorld& world, RecordingOptions* options_inout) {
+void resolve_followed(const DrivenWorld& world, RecordingOptions* options_inout) {
   const int num_agents = world.simulator->num_slots(), followed = options_inout->followed.value_or(world.first_agent);
   if (followed >= num_agents) fail_usage("--follow: expected 0 to {}, got {}", num_agents - 1, followed);
   options_inout->followed = followed;
@@ -127,14 +127,14 @@ void Recording::after_step(const StepResult& result) { parts_->recorder.after_st
 
 Replay Recording::finish() { return parts_->recorder.finish(origin_of(parts_->driver)); }
 
-void write_replay_and_say_so(const std::string& path, const Replay& replay) {
+void write_replay_with_message(const std::string& path, const Replay& replay) {
   write_replay(path, replay);
-  say_what_was_written(path, replay);
+  report_file(path, replay);
 }
 
-void write_mcap_and_say_so(const std::string& path, const Replay& replay) {
+void write_mcap_with_message(const std::string& path, const Replay& replay) {
   write_mcap(path, replay);
-  say_what_was_written(path, replay);
+  report_file(path, replay);
 }
 
 void write_index(FilledFolder* pages) {

@@ -16,12 +16,12 @@ class PolicySession;
 struct DrivenWorld;
 
 struct RecordingOptions {
-  std::optional<int> followed;  // empty: settle_followed() chooses
+  std::optional<int> followed;  // empty: resolve_followed() chooses
   bool cameras = false;
 };
 
 /// Follows the world's first agent if none was requested. Throws UsageError if the world lacks the requested agent.
-void settle_followed(const DrivenWorld& world, RecordingOptions* options_inout);
+void resolve_followed(const DrivenWorld& world, RecordingOptions* options_inout);
 
 /// Driver of a recorded world, and the renderer of its images. A controller has no session; its cameras are the
 /// paper's.
@@ -58,8 +58,8 @@ class Recording final : public StepObserver {
 };
 
 /// Writes a replay to `path`, and reports the file on stderr.
-void write_replay_and_say_so(const std::string& path, const Replay& replay);
-void write_mcap_and_say_so(const std::string& path, const Replay& replay);
+void write_replay_with_message(const std::string& path, const Replay& replay);
+void write_mcap_with_message(const std::string& path, const Replay& replay);
 
 /// Removes the pages of a gallery that earlier calls wrote, lists the other pages, and reports the gallery on stderr.
 void write_index(FilledFolder* pages);

@@ -103,7 +103,7 @@ void write(const CaseReplayOptions& options, const ProbeResults& results, size_t
                               .brake_without = double{response.brake_without}});
   }
   replay.probed = std::move(probed);
-  write_replay_and_say_so(options.path, replay);
+  write_replay_with_message(options.path, replay);
   print_message("{}\n", replay.probed->what);
   compare_speed(options.path, replay, frame, place.ego, place.ego_speed_mps);
 }

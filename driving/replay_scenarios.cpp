@@ -108,7 +108,7 @@ ScenarioCounts drive(const EvaluateOptions& options, const RecordedScenario& sce
 
 // Sort key of scenarios, larger is worse: share of vehicles with infractions, then of collisions at fault, then less
 // distance.
-std::array<double, 3> badness(const ScenarioCounts& counts) {
+std::array<double, 3> severity_key(const ScenarioCounts& counts) {
   const auto vehicles = static_cast<double>(std::max<int64_t>(1, counts.vehicles));
   return {static_cast<double>(counts.at_fault_infraction) / vehicles, static_cast<double>(counts.at_fault) / vehicles,
           -counts.distance_m / vehicles};
@@ -134,8 +134,8 @@ void write(const EvaluateOptions& options, const EvaluationResults& results, con
   ScenarioCounts counts;
   const RecordedScenario scenario{.number = place.scenario,
                                   .agents_per_world = results.densities[place.density].agents_per_world};
-  write_replay_and_say_so(path,
-                          record_scenario(options, scenario, following_worst(recording, results, place), &counts));
+  write_replay_with_message(path,
+                            record_scenario(options, scenario, following_worst(recording, results, place), &counts));
   const ScenarioCounts& evaluated = counts_of(results, place);
   if (counts.any_infraction == evaluated.any_infraction && counts.goals == evaluated.goals) return;
   print_message(
@@ -155,7 +155,7 @@ std::vector<ScenarioPlace> worst_scenarios(const EvaluationResults& results, int
     }
   }
   std::stable_sort(places.begin(), places.end(), [&](const ScenarioPlace& a, const ScenarioPlace& b) {
-    return badness(counts_of(results, a)) > badness(counts_of(results, b));
+    return severity_key(counts_of(results, a)) > severity_key(counts_of(results, b));
   });
   places.resize(std::min(places.size(), static_cast<size_t>(count)));
   return places;

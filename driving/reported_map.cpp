@@ -14,7 +14,7 @@ std::shared_ptr<const RoadMap> load_reported_map(const std::string& name) {
   return map;
 }
 
-void print_mends(const RoadMap& map, const std::string& source) {
+void print_repairs(const RoadMap& map, const std::string& source) {
   if (map.mends.empty()) return;
   for (const std::string& line : describe_repairs(map.mends, source)) {
     print_message("repaired: {}\n", printable(line));

@@ -13,6 +13,6 @@ std::shared_ptr<const RoadMap> load_reported_map(const std::string& name);
 
 /// Prints a line on stderr for each kind of repaired fault: the number, the repair, and the first fault. `source` names
 /// the file.
-void print_mends(const RoadMap& map, const std::string& source);
+void print_repairs(const RoadMap& map, const std::string& source);
 
 }  // namespace pictura

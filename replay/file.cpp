@@ -307,7 +307,7 @@ Json case_json(const ReplayCase& probed) {
                 {"heading_ddeg", box.heading_ddeg},
                 {"path_cm", probed.path_cm}};
   }
-  for (const ReplayAnswer& answer : probed.answers) {
+  for (const ReplayResponse& answer : probed.answers) {
     answers.push_back({{"policy", answer.policy},
                        {"value", answer.value},
                        {"value_without", answer.value_without},
@@ -609,7 +609,7 @@ void write_replay(const std::string& path, const Replay& replay) {
   elements += fmt::format("{}{}{}\n", kDataBegin, text.data, kEnd);
   if (!images.empty()) elements += fmt::format("{}{}{}\n", kImagesBegin, base64(images), kEnd);
   const std::string title = fmt::format("{}, {}, seed {}", replay.origin.map, replay.origin.policy, replay.origin.seed);
-  write_file(path, filled(page::replay_html(), {{"title", html_text(title)}, {"elements", elements}}));
+  write_file(path, fill_template(page::replay_html(), {{"title", html_text(title)}, {"elements", elements}}));
 }
 
 Replay read_replay(const std::string& path) { return of_page(path, replay_from); }

@@ -77,7 +77,7 @@ int write_gallery(const std::string& folder) {
     return a.at("infractions").get<int64_t>() > b.at("infractions").get<int64_t>();
   });
   write_file((std::filesystem::path(folder) / kIndex).string(),
-             filled(page::gallery_html(), {{"entries", script_text(Json(entries))}}));
+             fill_template(page::gallery_html(), {{"entries", script_text(Json(entries))}}));
   return static_cast<int>(entries.size());
 }
 

@@ -97,7 +97,7 @@ HttpRequest parse_head(std::string_view head) {
   const size_t path = line.find(' '), version = line.find(' ', path + 1);
   if (path == line.npos || version == line.npos || line[path + 1] != '/' ||
       (line.substr(version) != " HTTP/1.1" && line.substr(version) != " HTTP/1.0")) {
-    throw HttpRefusal{400, "expected METHOD /PATH HTTP/1.1"};
+    throw HttpError{400, "expected METHOD /PATH HTTP/1.1"};
   }
   HttpRequest request;
   request.method = line.substr(0, path);
@@ -107,7 +107,7 @@ HttpRequest parse_head(std::string_view head) {
     const std::string_view field = next_line();
     const size_t colon = field.find(':');
     if (colon == field.npos || colon == 0 || field.substr(0, colon).find_first_of(" \t") != field.npos) {
-      throw HttpRefusal{400, "expected NAME: VALUE in the header"};
+      throw HttpError{400, "expected NAME: VALUE in the header"};
     }
     request.fields.emplace_back(in_lower_case(field.substr(0, colon)), without_spaces(field.substr(colon + 1)));
   }
@@ -115,26 +115,26 @@ HttpRequest parse_head(std::string_view head) {
 }
 
 size_t body_bytes(const HttpRequest& request) {
-  if (request.count("transfer-encoding") > 0) throw HttpRefusal{501, "transfer codings are not supported"};
+  if (request.count("transfer-encoding") > 0) throw HttpError{501, "transfer codings are not supported"};
   for (const auto& [name, value] : request.fields) {
     if (name == "content-encoding" && in_lower_case(value) != "identity")
-      throw HttpRefusal{415, "encodings are not supported"};
+      throw HttpError{415, "encodings are not supported"};
   }
   if (request.count("content-length") == 0) return 0;
   const std::optional<uint64_t> bytes = parse_unsigned(request.value("content-length"));
-  if (request.count("content-length") > 1 || !bytes) throw HttpRefusal{400, "expected one Content-Length, a number"};
-  if (*bytes > kMaxRequestBodyBytes) throw HttpRefusal{413, "the request is too long"};
+  if (request.count("content-length") > 1 || !bytes) throw HttpError{400, "expected one Content-Length, a number"};
+  if (*bytes > kMaxRequestBodyBytes) throw HttpError{413, "the request is too long"};
   return *bytes;
 }
 
-/// Reads a request; empty if the connection or the time ends before it is complete. Throws HttpRefusal.
+/// Reads a request; empty if the connection or the time ends before it is complete. Throws HttpError.
 std::optional<HttpRequest> read_request(int socket) {
   const Clock::time_point end = Clock::now() + kMaxRequestTime;
   constexpr std::string_view kHeadEnd = "\r\n\r\n";
   std::string text;
   size_t head;
   while ((head = text.find(kHeadEnd)) == text.npos) {
-    if (text.size() >= kMaxRequestHeadBytes) throw HttpRefusal{431, "the header is too long"};
+    if (text.size() >= kMaxRequestHeadBytes) throw HttpError{431, "the header is too long"};
     if (!read_some(socket, kMaxRequestHeadBytes - text.size(), end, &text)) return std::nullopt;
   }
   HttpRequest request = parse_head(std::string_view(text).substr(0, head));
@@ -266,7 +266,7 @@ void HttpServer::answer_one(int socket) const {
     const std::optional<HttpRequest> request = read_request(socket);
     if (!request) return;
     handler_(*request, answer);
-  } catch (const HttpRefusal& refusal) {
+  } catch (const HttpError& refusal) {
     answer.send(refusal.status, "text/plain", refusal.why + "\n");
   } catch (const std::bad_alloc&) {
     return;

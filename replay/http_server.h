@@ -26,7 +26,7 @@ struct HttpRequest {
 };
 
 /// Exception for a request that is refused.
-struct HttpRefusal {
+struct HttpError {
   int status;
   std::string why;
 };
@@ -56,7 +56,7 @@ class HttpServer {
   using Handler = std::function<void(const HttpRequest&, HttpAnswer&)>;
 
   /// Listens on the loopback, or on all addresses, at `port` (0: a free one), which it shares with no other server.
-  /// Answers num_threads requests at a time by calls of `handler`, which may throw HttpRefusal; `fields`, header lines,
+  /// Answers num_threads requests at a time by calls of `handler`, which may throw HttpError; `fields`, header lines,
   /// are part of every answer. Throws std::system_error if it cannot listen.
   HttpServer(bool everywhere, int port, int num_threads, std::string fields, Handler handler);
   /// Closes all connections. Handlers that wait for anything but their connection must have been told to return.

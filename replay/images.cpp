@@ -17,7 +17,7 @@ namespace {
 // bytes after it.
 
 /// Probability that a bit is 0, in 1/32768, and the number of bits seen.
-struct Chance {
+struct BitModel {
   uint16_t zero = 16384;
   uint8_t seen = 0;
 
@@ -35,7 +35,7 @@ constexpr uint32_t kLeastRange = 1u << 24;
 
 class Encoder {
  public:
-  int bit(Chance* chance, int value) {
+  int bit(BitModel* chance, int value) {
     const uint32_t bound = (range_ >> kChanceBits) * chance->zero;
     if (value == 0) {
       range_ = bound;
@@ -78,7 +78,7 @@ class Decoder {
   explicit Decoder(std::string_view bytes) : bytes_(bytes) {
     for (int i = 0; i < 5; ++i) code_ = code_ << 8 | next();  // the first byte is 0
   }
-  int bit(Chance* chance, int /*value*/) {
+  int bit(BitModel* chance, int /*value*/) {
     const uint32_t bound = (range_ >> kChanceBits) * chance->zero;
     const int value = code_ < bound ? 0 : 1;
     if (value == 0) {
@@ -105,7 +105,7 @@ class Decoder {
 
 /// Codes a number of `bits` bits, highest bit first, each conditioned on the previous bits.
 template <typename Coder>
-int code_number(Coder* coder, Chance* tree, int bits, int value) {
+int code_number(Coder* coder, BitModel* tree, int bits, int value) {
   int node = 1;
   for (int i = bits - 1; i >= 0; --i) node = node << 1 | coder->bit(tree + node, value >> i & 1);
   return node - (1 << bits);
@@ -162,7 +162,7 @@ class PixelCoder {
     const int brightness = code_number(&coder_, brightness_[hue][p.highest() >> 5], 8, pixel.highest());
     const Pixel guess = shade(hues_[hue], brightness);
     const auto near = [&](int channel, uint8_t guessed, uint8_t value) {
-      Chance* chances = rounding_[hue][channel];
+      BitModel* chances = rounding_[hue][channel];
       if (coder_.bit(chances, value != guessed) == 0) return guessed;
       return static_cast<uint8_t>(coder_.bit(chances + 1, value > guessed) ? guessed + 1 : guessed - 1);
     };
@@ -194,11 +194,11 @@ class PixelCoder {
 
   Coder coder_;
   std::vector<ReplayHue> hues_;
-  Chance is_candidate_[kCandidates][64 * kNumHows * kNumHows * kNumHows];
-  Chance hue_[kNumHues][kNumHues][kNumHues];
-  Chance brightness_[kNumHues][8][256];
-  Chance rounding_[kNumHues][3][2];
-  Chance free_[3][16][256];
+  BitModel is_candidate_[kCandidates][64 * kNumHows * kNumHows * kNumHows];
+  BitModel hue_[kNumHues][kNumHues][kNumHues];
+  BitModel brightness_[kNumHues][8][256];
+  BitModel rounding_[kNumHues][3][2];
+  BitModel free_[3][16][256];
 };
 
 /// Codes all frames; next(offset) returns the pixel to write at a byte, put(offset, pixel) receives the coded pixel.

@@ -78,7 +78,7 @@ void LiveWorld::after_reset(Span<const uint8_t> world_mask) {
 
 void LiveWorld::keep_newest(size_t num_episodes) {
   begins_episode_ = recorder_.recorded().episodes.size() > num_episodes;
-  recorder_.forget();
+  recorder_.discard_history();
   ++step_;  // frame number in the count of pages
 }
 
@@ -111,7 +111,7 @@ LiveJson LiveWorld::frame() const {
           {"metrics", metrics}};
 }
 
-LiveJson LiveWorld::look(const std::optional<ReplayDecision>& decision, int agent) {
+LiveJson LiveWorld::agent_message(const std::optional<ReplayDecision>& decision, int agent) {
   LiveJson made = nullptr;
   if (decision) made = {{"probabilities", decision->probabilities}, {"value", decision->value}};
   return {{"step", step_},

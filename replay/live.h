@@ -30,7 +30,7 @@ class LiveWorld final : public StepObserver {
   LiveJson begin() const;
   /// Message with the newest frame, for pages that know the previous frame.
   LiveJson frame() const;
-  LiveJson look(const std::optional<ReplayDecision>& decision, int agent);
+  LiveJson agent_message(const std::optional<ReplayDecision>& decision, int agent);
 
   int num_agents() const { return recorder_.recorded().num_agents; }
   int64_t step() const { return step_; }

@@ -12,10 +12,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::milliseconds kMaxBehind{500};       // steps delayed by more are not caught up
-constexpr std::chrono::seconds kKeysHold{1}, kHandsOn{5};  // without messages from the driving page
-constexpr std::chrono::milliseconds kGoodbye{1000};
-constexpr std::chrono::milliseconds kGlance{50};  // maximum wait of one is_due()
+constexpr std::chrono::milliseconds kMaxBehind{500};              // steps delayed by more are not caught up
+constexpr std::chrono::seconds kKeysHold{1}, kDrivingTimeout{5};  // without messages from the driving page
+constexpr std::chrono::milliseconds kCloseTimeout{1000};
+constexpr std::chrono::milliseconds kPollInterval{50};  // maximum wait of one is_due()
 
 }  // namespace
 
@@ -34,7 +34,7 @@ struct LiveView::Parts {
   }
 
   LiveJson status() const { return {{"paused", paused}, {"pace", pace}, {"watched", watched}, {"driven", driven}}; }
-  LiveJson look() { return world.look(decide(watched), watched); }
+  LiveJson agent_message() { return world.agent_message(decide(watched), watched); }
 
   void apply(const LiveRequest& asked) {
     if (asked.paused) paused = *asked.paused;
@@ -55,25 +55,25 @@ struct LiveView::Parts {
     }
     if (asked.watched && *asked.watched != watched) {
       watched = *asked.watched;
-      server.send("look", [this] { return look(); });
+      server.send("look", [this] { return agent_message(); });
     }
   }
 
   // Handles pages' requests since the last call, and sends them pending messages.
-  void attend() {
+  void process_requests() {
     const std::vector<LiveRequest> requests = server.take_requests();
     for (const LiveRequest& asked : requests) apply(asked);
-    const bool silent = driven >= 0 && Clock::now() - heard > kHandsOn;
+    const bool silent = driven >= 0 && Clock::now() - heard > kDrivingTimeout;
     if (silent) driven = -1;
     if (!requests.empty() || silent) server.send("status", [this] { return status(); });
-    if (!server.has_newcomers()) return;
+    if (!server.has_ungreeted_pages()) return;
     if (!has_begun) due = Clock::now();
     has_begun = true;
-    server.greet({{"begin", world.begin()}, {"status", status()}, {"look", look()}});
+    server.send_initial_events({{"begin", world.begin()}, {"status", status()}, {"look", agent_message()}});
   }
 
   bool is_due() {
-    attend();
+    process_requests();
     const auto now = Clock::now();
     if (has_begun && paused && steps_asked > 0) {
       --steps_asked;
@@ -85,7 +85,7 @@ struct LiveView::Parts {
       due = std::max(due, now - kMaxBehind) + std::chrono::duration_cast<Clock::duration>(pause);
       return true;
     }
-    server.wait_until(runs ? std::min(due, now + kGlance) : now + kGlance);
+    server.wait_until(runs ? std::min(due, now + kPollInterval) : now + kPollInterval);
     return false;
   }
 
@@ -98,7 +98,7 @@ struct LiveView::Parts {
 
   void tell_of_frame() {
     server.send("frame", [this] { return world.frame(); });
-    server.send("look", [this] { return look(); });
+    server.send("look", [this] { return agent_message(); });
   }
 
   Simulator& simulator;
@@ -135,9 +135,9 @@ void LiveView::after_reset(Span<const uint8_t> world_mask) {
 }
 
 void LiveView::finish() {
-  parts_->attend();
+  parts_->process_requests();
   parts_->server.send("end", [this] { return LiveJson{{"step", parts_->world.step()}}; });
-  parts_->server.flush(kGoodbye);
+  parts_->server.flush(kCloseTimeout);
 }
 
 }  // namespace pictura

@@ -394,7 +394,7 @@ void Recorder::set_origin(ReplayOrigin origin) {
   parts.replay.origin = std::move(origin);
 }
 
-void Recorder::forget() {
+void Recorder::discard_history() {
   Replay& replay = parts_->replay;
   PICTURA_CHECK(replay.followed < 0, "replay: frames with decisions or images cannot be discarded");
   const auto keep_last = [](auto& values, int32_t count) { values.erase(values.begin(), values.end() - count); };

@@ -76,7 +76,7 @@ class Recorder final : public StepObserver {
   void set_origin(ReplayOrigin origin);
   /// Discards all frames but the last, which becomes the first of a replay; metrics continue. Not with a followed
   /// agent.
-  void forget();
+  void discard_history();
 
   /// Returns the complete replay, with this origin. The recorder cannot be used afterwards.
   Replay finish(ReplayOrigin origin);

@@ -209,10 +209,10 @@ struct ReplayMetrics {
 
 /// Response of a policy to a state with a road user, and to the same state without the user: values and braking
 /// probabilities.
-struct ReplayAnswer {
+struct ReplayResponse {
   std::string policy;
   double value = 0, value_without = 0, brake = 0, brake_without = 0;
-  bool operator==(const ReplayAnswer&) const = default;
+  bool operator==(const ReplayResponse&) const = default;
 };
 
 /// Case of a probe at a frame of this replay: one road user that is removed from the frame, or inserted into it, as one
@@ -223,7 +223,7 @@ struct ReplayCase {
   int32_t removed = -1;                         // agent, or -1
   std::optional<ReplayBox> inserted;            // road user inserted into the frame of the case
   std::vector<std::array<int32_t, 2>> path_cm;  // all positions of the inserted road user, in order
-  std::vector<ReplayAnswer> answers;            // of each evaluated policy
+  std::vector<ReplayResponse> answers;          // of each evaluated policy
   bool operator==(const ReplayCase&) const = default;
 };
 

@@ -115,12 +115,12 @@ struct LiveServer::Parts {
     check_asker(request);
     const std::string_view name = std::string_view(request.path).substr(token.size() + 2);
     const auto expect = [&request](std::string_view method) {
-      if (request.method != method) throw HttpRefusal{405, fmt::format("expected {}", method)};
+      if (request.method != method) throw HttpError{405, fmt::format("expected {}", method)};
     };
     if (name.empty()) {
       expect("GET");
       answer.send(200, "text/html; charset=utf-8",
-                  filled(page::replay_html(), {{"title", "live"}, {"elements", kLiveElement}}));
+                  fill_template(page::replay_html(), {{"title", "live"}, {"elements", kLiveElement}}));
     } else if (name == "events") {
       expect("GET");
       write_events(answer);
@@ -129,7 +129,7 @@ struct LiveServer::Parts {
       take_request(request);
       answer.send(204, "", "");
     } else {
-      throw HttpRefusal{404, "not found"};
+      throw HttpError{404, "not found"};
     }
   }
 
@@ -141,16 +141,16 @@ struct LiveServer::Parts {
       const std::lock_guard lock(mutex);
       return std::find(hosts.begin(), hosts.end(), host) != hosts.end();
     };
-    if (request.count("host") != 1 || !is_served()) throw HttpRefusal{403, "this host name is not served"};
+    if (request.count("host") != 1 || !is_served()) throw HttpError{403, "this host name is not served"};
     if (request.count("origin") > 0 && request.value("origin") != "http://" + host) {
-      throw HttpRefusal{403, "other origins are not served"};
+      throw HttpError{403, "other origins are not served"};
     }
     const std::string_view site = request.value("sec-fetch-site");
-    if (!site.empty() && site != "same-origin" && site != "none") throw HttpRefusal{403, "other sites are not served"};
+    if (!site.empty() && site != "same-origin" && site != "none") throw HttpError{403, "other sites are not served"};
     const std::string_view path = request.path;
     if (path.size() < token.size() + 2 || !is_equal(path.substr(1, token.size()), token) ||
         path[token.size() + 1] != '/') {
-      throw HttpRefusal{404, "not found"};
+      throw HttpError{404, "not found"};
     }
   }
 
@@ -159,7 +159,7 @@ struct LiveServer::Parts {
     {
       const std::lock_guard lock(mutex);
       if (listeners.size() >= kMaxLivePages) {
-        throw HttpRefusal{503, fmt::format("{} pages are already connected", kMaxLivePages)};
+        throw HttpError{503, fmt::format("{} pages are already connected", kMaxLivePages)};
       }
       listeners.push_back(listener);
     }
@@ -197,14 +197,14 @@ struct LiveServer::Parts {
     // Forms of other sites cannot send this type without a preflight request.
     std::string_view type = request.value("content-type");
     type = type.substr(0, type.find_first_of("; "));  // without its character set
-    if (type != "application/json") throw HttpRefusal{415, "expected Content-Type: application/json"};
+    if (type != "application/json") throw HttpError{415, "expected Content-Type: application/json"};
     try {
       const LiveRequest asked = parse_live_request(request.body, options.num_agents);
       const std::lock_guard lock(mutex);
-      if (requests.size() >= kMaxWaitingMessages) throw HttpRefusal{503, "too many pending requests"};
+      if (requests.size() >= kMaxWaitingMessages) throw HttpError{503, "too many pending requests"};
       requests.push_back(asked);
     } catch (const Error& error) {
-      throw HttpRefusal{400, error.what()};
+      throw HttpError{400, error.what()};
     }
     changed.notify_all();
   }
@@ -261,12 +261,12 @@ void LiveServer::send(std::string_view event, const std::function<LiveJson()>& m
   parts_->changed.notify_all();
 }
 
-bool LiveServer::has_newcomers() const {
+bool LiveServer::has_ungreeted_pages() const {
   const std::lock_guard lock(parts_->mutex);
   return std::any_of(parts_->listeners.begin(), parts_->listeners.end(), Parts::is_newcomer);
 }
 
-void LiveServer::greet(const std::vector<Message>& messages) {
+void LiveServer::send_initial_events(const std::vector<Message>& messages) {
   std::vector<Text> texts;
   for (const Message& message : messages) texts.push_back(event_text(message.event, message.data));
   {

@@ -42,13 +42,13 @@ class LiveServer {
   void send(std::string_view event, const std::function<LiveJson()>& message);
   /// Whether there are pages that have not been greeted, or that fell behind and have read everything that waited for
   /// them.
-  bool has_newcomers() const;
+  bool has_ungreeted_pages() const;
   /// Sends these events to such pages, which from now on receive the events of send().
   struct Message {
     std::string_view event;
     LiveJson data;
   };
-  void greet(const std::vector<Message>& messages);
+  void send_initial_events(const std::vector<Message>& messages);
 
   /// Returns the requests since the last call, in order.
   std::vector<LiveRequest> take_requests();

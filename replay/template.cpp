@@ -32,7 +32,7 @@ std::string script_text(const nlohmann::ordered_json& json) {
   return text;
 }
 
-std::string filled(std::string_view html, const std::vector<std::pair<std::string, std::string>>& values) {
+std::string fill_template(std::string_view html, const std::vector<std::pair<std::string, std::string>>& values) {
   // Names are searched in the template, not in values that have replaced other names.
   std::map<size_t, std::pair<size_t, const std::string*>> places;  // by begin: length, and replacement
   for (const auto& [name, text] : values) {

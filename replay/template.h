@@ -17,6 +17,6 @@ std::string html_text(std::string_view text);
 std::string script_text(const nlohmann::ordered_json& json);
 
 /// Returns the template with each {{name}} replaced; every name must be in it.
-std::string filled(std::string_view html, const std::vector<std::pair<std::string, std::string>>& values);
+std::string fill_template(std::string_view html, const std::vector<std::pair<std::string, std::string>>& values);
 
 }  // namespace pictura

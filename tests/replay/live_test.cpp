@@ -72,7 +72,7 @@ TEST(LiveWorld, ForgettingKeepsTheNewestChains) {
   for (const ReplayChain& chain : recorder.recorded().episodes.back().chains) {
     newest[chain.agent] = chain;
   }
-  recorder.forget();
+  recorder.discard_history();
   const Replay& kept = recorder.recorded();
   EXPECT_EQ(kept.num_frames, 1);
   EXPECT_EQ(kept.tracks[0].size(), 8u);

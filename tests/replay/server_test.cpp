@@ -120,7 +120,7 @@ TEST(LiveServer, TellsItsPagesAllInOrderWhileOthersComeAskAndGo) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(2);
   for (int step = 1; at_work > 0 && std::chrono::steady_clock::now() < end; ++step) {
     server->send("frame", [&] { return LiveJson{{"step", step}}; });
-    if (server->has_newcomers()) server->greet({{"begin", {{"step", step}}}});
+    if (server->has_ungreeted_pages()) server->send_initial_events({{"begin", {{"step", step}}}});
     take();
     server->wait_until(std::chrono::steady_clock::now() + std::chrono::milliseconds(2));
   }
@@ -147,7 +147,7 @@ TEST(LiveServer, EndsAtOnceWhateverItsConnectionsDo) {
   };
   connect(request_to(server->address(), "GET", "events"));  // this connection never reads
   while (server->num_pages() == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  server->greet({});
+  server->send_initial_events({});
   server->send("frame", [] { return LiveJson(std::string(kMaxWaitingBytes / 2, 'x')); });
   for (int i = 0; i < 30; ++i) connect("GET / HTT");  // more connections than threads
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
