@@ -17,7 +17,7 @@ namespace pictura {
 
 namespace {
 
-void complain(const std::string& message) { print_message("error: {}\n", printable(message)); }
+void print_error(const std::string& message) { print_message("error: {}\n", printable(message)); }
 
 /// Runs the command line. Returns the exit status.
 int run(CLI::App& app, int argc, char** argv) {
@@ -27,25 +27,25 @@ int run(CLI::App& app, int argc, char** argv) {
   } catch (const CLI::Success& success) {  // --help, --version
     return app.exit(success);
   } catch (const CLI::ParseError& error) {
-    complain(usage_error(app, error));
+    print_error(usage_error(app, error));
     return 2;
   } catch (const UsageError& error) {
-    complain(error.what());
+    print_error(error.what());
     return 2;
   } catch (const Interrupted& error) {
-    complain(error.what());
+    print_error(error.what());
     return 128 + interrupting_signal();
   } catch (const Error& error) {
-    complain(error.what());
+    print_error(error.what());
   } catch (const std::bad_alloc&) {
-    complain("out of memory");
+    print_error("out of memory");
   } catch (const std::exception& error) {
     // A library's message: lines after the first give the position in its code.
     std::string message = error.what();
     message.erase(std::min(message.find('\n'), message.size()));
     const bool lacks_memory =
         message.find("out of memory") != std::string::npos || message.find("allocate memory") != std::string::npos;
-    complain(lacks_memory ? "out of memory: " + message : message);
+    print_error(lacks_memory ? "out of memory: " + message : message);
   }
   return 1;
 }
@@ -55,7 +55,7 @@ int end_output(int status) {
   try {
     close_stdout();
   } catch (const Error& error) {
-    complain(error.what());
+    print_error(error.what());
     return status == 0 ? 1 : status;
   }
   return status;
@@ -112,8 +112,8 @@ int run_command(int argc, char** argv) {
   add_plot_command(app);
   add_completion_command(app);
   add_bench_command(app);
-  refuse_empty_values(&app);
-  app.parse_complete_callback([&app] { refuse_shared_files(app); });
+  reject_empty_values(&app);
+  app.parse_complete_callback([&app] { reject_shared_files(app); });
 
   return end_output(run(app, argc, argv));
 }

@@ -253,9 +253,9 @@ struct EvaluateArguments {
 void evaluate_in_scenes(const CLI::App& command, const EvaluateArguments& arguments) {
   const EvaluateOptions& evaluation = arguments.evaluation;
   check_driver(evaluation, /*has_parts=*/false, /*has_scenes=*/true);
-  refuse_recording_options(command, "--replay or --gallery");
-  refuse_options(command, {"--light-heads"}, "in recorded scenes, whose light heads are all beyond their stop line");
-  refuse_options(command, {"--others"}, "in recorded scenes");
+  reject_recording_options(command, "--replay or --gallery");
+  reject_options(command, {"--light-heads"}, "in recorded scenes, whose light heads are all beyond their stop line");
+  reject_options(command, {"--others"}, "in recorded scenes");
   if (arguments.severities.size() > 1) fail_usage("--camera-severity: in recorded scenes expected one, got several");
   SceneEvaluateOptions in_scenes;
   static_cast<DriverOptions&>(in_scenes) = evaluation;
@@ -279,9 +279,9 @@ void replay_worst(const EvaluateArguments& arguments, const EvaluationResults& r
 
 // Rejects options that do not allow several severities, and severities with --merge.
 void check_severities(const CLI::App& command, const EvaluateArguments& arguments) {
-  if (!arguments.parts.empty()) refuse_options(command, {"--camera-severity"}, "with --merge");
+  if (!arguments.parts.empty()) reject_options(command, {"--camera-severity"}, "with --merge");
   if (arguments.severities.size() == 1) return;
-  refuse_options(command, {"--out", "--infractions", "--replay", "--gallery"},
+  reject_options(command, {"--out", "--infractions", "--replay", "--gallery"},
                  "with several values of --camera-severity");
 }
 
@@ -314,7 +314,7 @@ void evaluate_in_towns(const CLI::App& command, EvaluateArguments* arguments) {
   if (evaluation.agents_per_world > 0) evaluation.densities.resize(1);
   check_driver(evaluation, merges, /*has_scenes=*/false);
   const bool records = !arguments->replay.empty() || !arguments->gallery.empty();
-  if (!records) refuse_recording_options(command, "--replay or --gallery");
+  if (!records) reject_recording_options(command, "--replay or --gallery");
   if (records && merges) fail_usage("--replay, --gallery: have no effect with --merge");
   if (lists_infractions && merges) fail_usage("--infractions: has no effect with --merge");
   if (!evaluation.others.empty()) {
@@ -361,15 +361,15 @@ void run_evaluate(const CLI::App& command, EvaluateArguments* arguments) {
     check_driver(evaluation, /*has_parts=*/false, /*has_scenes=*/false);
     return run_robust_evaluation(command, evaluation, arguments->json);
   }
-  refuse_idle_scene_options(command, arguments->scenes);
+  reject_idle_scene_options(command, arguments->scenes);
   const bool has_scenes = !arguments->scenes.protocol.empty();
   if (!has_scenes || command.count("--scenarios") > 0) parse_scenarios(arguments->scenarios, &evaluation);
   if (has_scenes) return evaluate_in_scenes(command, *arguments);
   if (arguments->parts.empty() || !has_scene_results(arguments->parts.front())) {
     return evaluate_in_towns(command, arguments);
   }
-  refuse_recording_options(command, "--replay or --gallery");
-  refuse_options(command, {"--infractions", "--replay", "--replays"}, "on parts of an evaluation in scenes");
+  reject_recording_options(command, "--replay or --gallery");
+  reject_options(command, {"--infractions", "--replay", "--replays"}, "on parts of an evaluation in scenes");
   merge_scene_evaluations(arguments->parts, arguments->out, arguments->json);
 }
 

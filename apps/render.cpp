@@ -180,7 +180,7 @@ void render_world(const RenderArguments& arguments) {
 }
 
 /// Tracks of a recorded scene whose views are drawn, in their order.
-std::vector<uint8_t> looking_tracks(const RenderArguments& arguments, const CompiledMap& map) {
+std::vector<uint8_t> viewed_tracks(const RenderArguments& arguments, const CompiledMap& map) {
   const Scenario& scenario = *map.scenario;
   if (arguments.tracks.empty() && scenario.sdc_track < 0) {
     // The file does not mark a self-driving car.
@@ -199,7 +199,7 @@ void render_recorded_scene(const RenderArguments& arguments) {
   const RendererConfig config = config_of(arguments);
   DrivenWorld world = make_world(arguments.world, "log");
   const CompiledMap& map = *world.simulator->maps()[0];
-  const std::vector<uint8_t> looks = looking_tracks(arguments, map);
+  const std::vector<uint8_t> looks = viewed_tracks(arguments, map);
   const auto renderer = open_renderer(arguments, config);
   Subject subject{{map.geometry}, world.simulator->scene(), {}, {}, {}};
   std::vector<View> views;
@@ -215,8 +215,8 @@ void render_recorded_scene(const RenderArguments& arguments) {
 }
 
 // Rejects options whose values a scene file contains.
-void refuse_world_options(const CLI::App& command) {
-  refuse_options(command,
+void reject_world_options(const CLI::App& command) {
+  reject_options(command,
                  {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--light-cycles",
                   "--light-heads", "--steps", "--views", "--size", "--square-pixels", "--rig", "--line-floor",
                   "--simulator", "--start", "--recorded-lights", "--tracks"},
@@ -263,19 +263,19 @@ void add_render_command(CLI::App& app) {
       "  pictura render validation.tfrecord-00000-of-00150#7 --start 10 --tracks self,1014 --out images");
   command->callback([arguments, size, command] {
     if (is_scene_file(arguments->world.map)) {
-      refuse_world_options(*command);
+      reject_world_options(*command);
       return render_scene_file(*arguments);
     }
     arguments->size_given = size->count() > 0;
     arguments->world.vector_observations = false;
     if (is_scene_name(arguments->world.map)) {
-      refuse_options(*command,
+      reject_options(*command,
                      {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--light-cycles",
                       "--light-heads", "--steps", "--views"},
                      "on a recorded scene, which defines it: --start and --tracks select from the scene");
       return render_recorded_scene(*arguments);
     }
-    refuse_scene_options(*command, arguments->world.map, {"--tracks"});
+    reject_scene_options(*command, arguments->world.map, {"--tracks"});
     render_world(*arguments);
   });
 }

@@ -117,8 +117,8 @@ void add_replay_command(CLI::App& app) {
     if (arguments->gallery.empty() && command->count("--episodes") > 0) {
       fail_usage("--episodes: has no effect without --gallery");
     }
-    settle_driving_options(*command, &arguments->world, &arguments->steps, &arguments->policy);
-    refuse_idle_backend_options(*command, arguments->policy);
+    resolve_driving_options(*command, &arguments->world, &arguments->steps, &arguments->policy);
+    reject_idle_backend_options(*command, arguments->policy);
     run_replay(*arguments);
   });
 }

@@ -96,7 +96,7 @@ void print_report(const RobustOptions& options, const RobustReport& report) {
 }  // namespace
 
 void run_robust_evaluation(const CLI::App& command, const EvaluateOptions& options, bool json) {
-  refuse_options(command, {"--map",
+  reject_options(command, {"--map",
                            "--agents",
                            "--steps",
                            "--seed",

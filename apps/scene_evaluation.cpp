@@ -177,13 +177,13 @@ void add_scene_options(CLI::App* command, SceneArguments* arguments) {
       ->check(one_of(realism_version_names()));
 }
 
-void refuse_idle_scene_options(const CLI::App& command, const SceneArguments& arguments) {
+void reject_idle_scene_options(const CLI::App& command, const SceneArguments& arguments) {
   if (arguments.protocol.empty()) {
-    refuse_options(command, {"--scenes", "--control", "--start", "--rule", "--csv", "--rollouts", "--realism"},
+    reject_options(command, {"--scenes", "--control", "--start", "--rule", "--csv", "--rollouts", "--realism"},
                    "without --protocol");
     return;
   }
-  refuse_options(command, {"--map", "--agents", "--merge", "--infractions", "--replay", "--replays", "--light-cycles"},
+  reject_options(command, {"--map", "--agents", "--merge", "--infractions", "--replay", "--replays", "--light-cycles"},
                  "with --protocol");
   if (arguments.scenes.empty()) fail_usage("--protocol: expected also --scenes");
 }

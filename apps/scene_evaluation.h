@@ -23,7 +23,7 @@ struct SceneArguments {
 void add_scene_options(CLI::App* command, SceneArguments* arguments);
 
 /// Throws UsageError for options that have no effect with, or without, --protocol.
-void refuse_idle_scene_options(const CLI::App& command, const SceneArguments& arguments);
+void reject_idle_scene_options(const CLI::App& command, const SceneArguments& arguments);
 
 /// Evaluates and prints a table, or one JSON object. densities: shares in %, or the protocol's if --density was not
 /// given. `options` holds the driver and the range of scenes. out: a file for later merging, or empty. After an

@@ -69,19 +69,19 @@ struct Displacement {
 };
 
 // Rejects options that would have no effect.
-void refuse_idle_options(const CLI::App& command, const SimulateArguments& arguments) {
+void reject_idle_options(const CLI::App& command, const SimulateArguments& arguments) {
   if (arguments.video.empty()) {
     for (const char* option : {"--film-width", "--film-agent"}) {
       if (command.count(option) > 0) fail_usage("{}: has no effect without --video", option);
     }
   }
   if (arguments.replay.empty() && arguments.mcap.empty() && !arguments.serve.is_asked) {
-    refuse_recording_options(command, "--replay, --mcap or --serve");
+    reject_recording_options(command, "--replay, --mcap or --serve");
   }
   if (!arguments.serve.is_asked && command.count("--serve-host") > 0) {
     fail_usage("--serve-host: has no effect without --serve");
   }
-  refuse_idle_backend_options(command, arguments.policy);
+  reject_idle_backend_options(command, arguments.policy);
 }
 
 /// Number of lives after the first of a slot, and of lives that ended by leaving, on roads that end, over all episodes.
@@ -291,8 +291,8 @@ void add_simulate_command(CLI::App& app) {
       "  pictura simulate validation.tfrecord-00000-of-00150#7 --policy runs/demo/checkpoint.ckpt --control vehicles\n"
       "  pictura simulate procedural:1 --policy lane --scene drive.scenario && pictura simulate drive.scenario");
   command->callback([arguments, command] {
-    settle_driving_options(*command, &arguments->world, &arguments->steps, &arguments->policy);
-    refuse_idle_options(*command, *arguments);
+    resolve_driving_options(*command, &arguments->world, &arguments->steps, &arguments->policy);
+    reject_idle_options(*command, *arguments);
     arguments->endless = arguments->serve.is_asked && command->count("--steps") == 0;
     run_simulate(*arguments);
   });

@@ -47,7 +47,7 @@ void for_each_class(const py::module_& module, F&& f) {
 }
 }  // namespace
 
-void refuse_unmade_objects(const py::module_& module) {
+void reject_uninitialized_objects(const py::module_& module) {
   for_each_class(module, [](const py::object&, py::detail::type_info* info) {
     info->operator_new = [](size_t) -> void* {
       fail("expected an object created by calling its class, got an object created by __new__ alone");

@@ -30,12 +30,12 @@ void check_process(std::string_view what, int num_threads, Device device);
 /// Scope without the GIL. If a thread wants the GIL back while the interpreter ends, Python before 3.14 ends the thread
 /// through an exception, which must not leave a destructor. The thread therefore waits for the end of the process, as
 /// in Python 3.14 and later.
-class WithoutGil {
+class GilRelease {
  public:
-  WithoutGil() : state_(PyEval_SaveThread()) {}
-  WithoutGil(const WithoutGil&) = delete;
-  WithoutGil& operator=(const WithoutGil&) = delete;
-  ~WithoutGil() {
+  GilRelease() : state_(PyEval_SaveThread()) {}
+  GilRelease(const GilRelease&) = delete;
+  GilRelease& operator=(const GilRelease&) = delete;
+  ~GilRelease() {
     try {
       PyEval_RestoreThread(state_);
     } catch (...) {
@@ -49,7 +49,7 @@ class WithoutGil {
 
 /// Makes methods of a module's classes reject objects that were created by __new__ alone, which have no C++ object:
 /// pybind11 would pass uninitialised memory. Call at the end of a module's definition.
-void refuse_unmade_objects(const py::module_& module);
+void reject_uninitialized_objects(const py::module_& module);
 
 /// Makes objects of a module's classes use pickle protocol 2 if 0 or 1 is requested. The old protocols copy the part of
 /// an object that belongs to pybind11's own base class, which ends the process. Call at the end of a module's
@@ -57,21 +57,21 @@ void refuse_unmade_objects(const py::module_& module);
 void pickle_by_new_protocols(const py::module_& module);
 
 /// Guard that admits one thread at a time into calls of an object.
-class Turnstile {
+class SingleCallGuard {
  public:
   /// Scope of a call. Throws Error if another thread is in a call.
   class Pass {
    public:
-    Pass(Turnstile* turnstile, std::string_view what) : turnstile_(turnstile) {
-      PICTURA_CHECK(!turnstile->is_taken_.exchange(true),
+    Pass(SingleCallGuard* call_guard, std::string_view what) : call_guard_(call_guard) {
+      PICTURA_CHECK(!call_guard->is_taken_.exchange(true),
                     "{}: another thread is in a call of this object, which serves one at a time", what);
     }
     Pass(const Pass&) = delete;
     Pass& operator=(const Pass&) = delete;
-    ~Pass() { turnstile_->is_taken_ = false; }
+    ~Pass() { call_guard_->is_taken_ = false; }
 
    private:
-    Turnstile* turnstile_;
+    SingleCallGuard* call_guard_;
   };
 
  private:
@@ -88,18 +88,18 @@ class Calls {
   template <typename Work>
   auto run(std::string_view what, Work&& work) {
     check_process(what, num_threads_, device_);
-    const Turnstile::Pass pass(turnstile_.get(), what);
-    const WithoutGil no_gil;
+    const SingleCallGuard::Pass pass(call_guard_.get(), what);
+    const GilRelease no_gil;
     return std::forward<Work>(work)();
   }
 
   /// Guard for other objects that call the same object.
-  const std::shared_ptr<Turnstile>& turnstile() const { return turnstile_; }
+  const std::shared_ptr<SingleCallGuard>& call_guard() const { return call_guard_; }
 
  private:
   int num_threads_;
   Device device_;
-  std::shared_ptr<Turnstile> turnstile_ = std::make_shared<Turnstile>();
+  std::shared_ptr<SingleCallGuard> call_guard_ = std::make_shared<SingleCallGuard>();
 };
 
 /// Runs long work in a separate thread and returns its result. Meanwhile the caller's thread handles ^C by raising
@@ -114,7 +114,7 @@ auto run_interruptibly(std::string_view what, int num_threads, Device device, Wo
   std::thread([task = std::move(task)] { (*task)(); }).detach();
   for (;;) {
     {
-      const WithoutGil no_gil;
+      const GilRelease no_gil;
       if (result.wait_for(std::chrono::milliseconds(20)) == std::future_status::ready) break;
     }
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
@@ -125,13 +125,13 @@ auto run_interruptibly(std::string_view what, int num_threads, Device device, Wo
 /// Runs long work, which checks interrupted() between its steps, in a separate thread. ^C ends the work in an orderly
 /// way, as it ends the command, and then raises KeyboardInterrupt. The work may call back into Python.
 template <typename Work>
-auto run_to_an_orderly_end(std::string_view what, int num_threads, Device device, Work work) {
+auto run_interruptible(std::string_view what, int num_threads, Device device, Work work) {
   check_process(what, num_threads, device);
   std::exception_ptr raised;
   auto result = std::async(std::launch::async, std::move(work));
   for (;;) {
     {
-      const WithoutGil no_gil;
+      const GilRelease no_gil;
       if (result.wait_for(std::chrono::milliseconds(20)) == std::future_status::ready) break;
     }
     if (!raised && PyErr_CheckSignals() != 0) {

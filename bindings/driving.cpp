@@ -217,7 +217,7 @@ void def_probe(py::module_* module, const char* name, Results (*ask)(const Probe
   const auto probe = [=](const ProbeArguments<Probe>& arguments) -> py::object {
     const std::string& cases_file = arguments.cases_file;
     check_case_replay(arguments.replay, most ? arguments.probe.*most : std::numeric_limits<int64_t>::max());
-    const Results results = run_to_an_orderly_end(name, arguments.probe.worlds.num_threads, {}, [&] {
+    const Results results = run_interruptible(name, arguments.probe.worlds.num_threads, {}, [&] {
       Results found = ask(arguments.probe);
       if (!cases_file.empty()) write_cases(cases_file, found);
       if (!arguments.replay.path.empty()) write_case_replay(arguments.replay, arguments.probe, found);
@@ -229,14 +229,14 @@ void def_probe(py::module_* module, const char* name, Results (*ask)(const Probe
 }
 
 /// Logits and values of a batch, in the memory of a session's device.
-struct Answers {
+struct Outputs {
   std::vector<float> on_host;
 #ifdef PICTURA_HAS_CUDA
   DeviceBuffer<float> on_device;
 #endif
   Span<float> all;
 
-  Answers(int64_t batch, Device device) {
+  Outputs(int64_t batch, Device device) {
     const auto count = static_cast<size_t>(batch * (kNumActions + 1));
 #ifdef PICTURA_HAS_CUDA
     if (!device.is_host()) {
@@ -255,7 +255,7 @@ struct Answers {
 /// Controller of a session, which holds session and renderer: both may be called from other threads.
 class SessionController final : public Controller {
  public:
-  SessionController(std::shared_ptr<PolicySession> session, std::shared_ptr<Turnstile> of_session,
+  SessionController(std::shared_ptr<PolicySession> session, std::shared_ptr<SingleCallGuard> of_session,
                     RendererInside renderer, std::unique_ptr<Controller> controller)
       : session_(std::move(session)),
         of_session_(std::move(of_session)),
@@ -264,15 +264,15 @@ class SessionController final : public Controller {
 
   std::string_view name() const override { return controller_->name(); }
   void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
-    const Turnstile::Pass in_session(of_session_.get(), "the controller's session");
-    std::optional<Turnstile::Pass> in_renderer;
-    if (renderer_.turnstile) in_renderer.emplace(renderer_.turnstile.get(), "the controller's renderer");
+    const SingleCallGuard::Pass in_session(of_session_.get(), "the controller's session");
+    std::optional<SingleCallGuard::Pass> in_renderer;
+    if (renderer_.call_guard) in_renderer.emplace(renderer_.call_guard.get(), "the controller's renderer");
     controller_->act(input, mask, commands_out, stream);
   }
 
  private:
   std::shared_ptr<PolicySession> session_;
-  std::shared_ptr<Turnstile> of_session_;
+  std::shared_ptr<SingleCallGuard> of_session_;
   RendererInside renderer_;
   std::unique_ptr<Controller> controller_;
 };
@@ -298,7 +298,7 @@ class PySession {
     ControllerInside inside;
     inside.of = of;
     inside.controller = std::make_shared<SessionController>(
-        session_, calls_.turnstile(), drawing, session_->make_controller(drawing.renderer.get(), argmax, seed));
+        session_, calls_.call_guard(), drawing, session_->make_controller(drawing.renderer.get(), argmax, seed));
     return of_main("Controller")(inside);
   }
 
@@ -354,13 +354,13 @@ class PySession {
     std::optional<RendererInside> inside;
     if (!renderer.is_none()) inside = inside_of<RendererInside>(renderer, "evaluate", "Renderer");
 
-    const auto answers = std::make_shared<Answers>(batch, device);
+    const auto answers = std::make_shared<Outputs>(batch, device);
     const auto count = static_cast<size_t>(batch);
     const Span<float> logits(answers->all.data(), count * kNumActions);
     const Span<float> values(answers->all.data() + count * kNumActions, count);
     calls_.run("evaluate", [&] {
-      std::optional<Turnstile::Pass> in_renderer;
-      if (inside) in_renderer.emplace(inside->turnstile.get(), "evaluate: renderer");
+      std::optional<SingleCallGuard::Pass> in_renderer;
+      if (inside) in_renderer.emplace(inside->call_guard.get(), "evaluate: renderer");
       session_->evaluate(input, inside ? inside->renderer.get() : nullptr, logits, values);
     });
     return py::make_tuple(LentArray{Array(logits.data(), {batch, kNumActions}, device), answers, {}, false, "logits"},
@@ -378,8 +378,8 @@ void bind_evaluation(py::module_& module) {
   def_with_options<EvaluateOptions>(
       &module, {"evaluate", {"checkpoint", "maps"}},
       [](const EvaluateOptions& options) {
-        return dict_of(run_to_an_orderly_end("evaluate", options.num_threads, {},
-                                             [&options] { return pictura::evaluate(options); }));
+        return dict_of(
+            run_interruptible("evaluate", options.num_threads, {}, [&options] { return pictura::evaluate(options); }));
       },
       R"(Runs the paper's evaluation, like `pictura evaluate`, in worlds that no training has.
 
@@ -402,8 +402,8 @@ pictura.Error naming file and key of bad input.)");
   def_with_options<RobustOptions>(
       &module, {"evaluate_robust", {"checkpoint"}},
       [](const RobustOptions& options) {
-        return dict_of(run_to_an_orderly_end("evaluate_robust", options.num_threads, {},
-                                             [&options] { return pictura::evaluate_robust(options); }));
+        return dict_of(run_interruptible("evaluate_robust", options.num_threads, {},
+                                         [&options] { return pictura::evaluate_robust(options); }));
       },
       R"(Runs the robust protocol, like `pictura evaluate --protocol robust`: a fixed set of generated towns, other drivers and
 randomized cameras (docs/how-to/robust_benchmark.md).
@@ -436,8 +436,8 @@ and 'all'; seconds, agent_steps, policy_hash. ^C raises KeyboardInterrupt.)");
           file.emplace(arguments.rollouts);
           options.on_rollouts = [&file](const SceneRollouts& scene) { file->write(scene); };
         }
-        const SceneEvaluation evaluation = run_to_an_orderly_end(
-            "evaluate_scenes", options.num_threads, {}, [&options] { return pictura::evaluate_scenes(options); });
+        const SceneEvaluation evaluation = run_interruptible("evaluate_scenes", options.num_threads, {},
+                                                             [&options] { return pictura::evaluate_scenes(options); });
         if (file) file->commit();
         return dict_of(evaluation, agents);
       },
@@ -544,7 +544,7 @@ void bind_driving(py::module_& module) {
   bind_evaluation(module);
   bind_probes(module);
   bind_session(module);
-  refuse_unmade_objects(module);
+  reject_uninitialized_objects(module);
   pickle_by_new_protocols(module);
 }
 

@@ -113,7 +113,7 @@ std::shared_ptr<Map> from_text(const std::string& text, const std::string& sourc
 py::array_t<uint8_t> draw(const RoadMap& map, int width_px, int height_px, const Scenario* scenario, int step) {
   RgbImage image;
   {
-    const WithoutGil no_gil;
+    const GilRelease no_gil;
     WorldPainter painter(map, width_px, height_px, {}, scenario);
     const std::vector<LightState> lights(map.lights.size(), LightState::off);
     WorldFrame frame;

@@ -55,6 +55,6 @@ PYBIND11_MODULE(_pictura, module) {
   pictura::python::bind_simulator(module);
   pictura::python::bind_replays(module);
   pictura::python::bind_realism(module);
-  pictura::python::refuse_unmade_objects(module);
+  pictura::python::reject_uninitialized_objects(module);
   pictura::python::pickle_by_new_protocols(module);
 }

@@ -83,7 +83,7 @@ struct SimulatorInside {
 /// Contents of a pictura.Renderer.
 struct RendererInside {
   std::shared_ptr<Renderer> renderer;
-  std::shared_ptr<Turnstile> turnstile;
+  std::shared_ptr<SingleCallGuard> call_guard;
 };
 
 /// Contents of a pictura.Controller.

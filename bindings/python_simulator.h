@@ -384,7 +384,7 @@ class PySimulator {
     const SimulatorCapacity needs = capacity_checked(maps, worlds);
     check_process("Simulator", config.num_threads, config.device);
     {
-      const WithoutGil no_gil;
+      const GilRelease no_gil;
       simulator_ = make_simulator(executor_, config, std::move(maps), std::move(worlds), &choice_);
     }
     check_device("Simulator", config.device, simulator_->device(), choice_);

@@ -207,7 +207,7 @@ class PyRenderer {
   explicit PyRenderer(std::shared_ptr<Renderer> renderer)
       : renderer_(std::move(renderer)), calls_(renderer_->config().num_threads, renderer_->device()) {}
 
-  RendererInside inside() const { return {renderer_, calls_.turnstile()}; }
+  RendererInside inside() const { return {renderer_, calls_.call_guard()}; }
   Renderer& renderer() { return *renderer_; }
   Calls& calls() { return calls_; }
   Stream stream() const { return stream_; }

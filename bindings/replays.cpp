@@ -75,7 +75,7 @@ class PyRecorder final : public StepObserver {
       inside_.run("write", [&] { finished_ = recorder_->finish(std::move(origin)); });
       recorder_.reset();
     }
-    const WithoutGil no_gil;
+    const GilRelease no_gil;
     is_html ? write_replay(path, *finished_) : write_mcap(path, *finished_);
   }
 
@@ -220,7 +220,7 @@ server, pictura.Error if the port is in use.)")
   module.def(
       "write_gallery",
       [](const std::string& folder) {
-        const WithoutGil no_gil;
+        const GilRelease no_gil;
         return write_gallery(folder);
       },
       py::arg("folder"),

@@ -340,7 +340,7 @@ All other given options are kept, for instance those of a pictura.PolicySession:
       .def(
           "save",
           [](const RecordedScene& self, const std::string& path) {
-            const WithoutGil no_gil;
+            const GilRelease no_gil;
             write_scene_file(path, *self.scenario());
           },
           py::arg("path"),

@@ -77,7 +77,7 @@ py::dict train_from_python(TrainArguments& arguments) {
       arguments.on_progress(dict_of(progress));
     };
   }
-  return dict_of(run_to_an_orderly_end("train", 0, {}, [&options] { return train(options); }));
+  return dict_of(run_interruptible("train", 0, {}, [&options] { return train(options); }));
 }
 
 void bind_train(py::module_& module) {

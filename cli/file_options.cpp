@@ -57,7 +57,7 @@ std::string file_named(const std::string& text) {
 
 }  // namespace
 
-void refuse_shared_files(const CLI::App& app) {
+void reject_shared_files(const CLI::App& app) {
   std::map<std::string, std::string> name_of_file;  // name of the option
   for (const bool writes : {false, true}) {
     for (const CLI::Option* option : app.get_options()) {
@@ -73,17 +73,17 @@ void refuse_shared_files(const CLI::App& app) {
       }
     }
   }
-  for (const CLI::App* each : app.get_subcommands()) refuse_shared_files(*each);
+  for (const CLI::App* each : app.get_subcommands()) reject_shared_files(*each);
 }
 
-void refuse_empty_values(CLI::App* command) {
+void reject_empty_values(CLI::App* command) {
   const auto complaint = [](const std::string& text) -> std::string {
     return text.empty() ? "expected a value, got an empty text" : "";
   };
   for (CLI::Option* option : command->get_options()) {
     if (option->get_items_expected_max() > 0) option->check(CLI::Validator(complaint, ""));
   }
-  for (CLI::App* each : command->get_subcommands([](CLI::App*) { return true; })) refuse_empty_values(each);
+  for (CLI::App* each : command->get_subcommands([](CLI::App*) { return true; })) reject_empty_values(each);
 }
 
 }  // namespace pictura

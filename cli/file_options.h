@@ -16,9 +16,9 @@ void add_map_or_scene(CLI::App* command, std::string* map_out, const std::string
 
 /// Rejects a command two of whose options write the same file, or one of which writes the policy or the rig that
 /// another reads. Devices may be shared; maps and scenes may be replaced.
-void refuse_shared_files(const CLI::App& app);
+void reject_shared_files(const CLI::App& app);
 
 /// Rejects empty texts for all options of a command and its subcommands, since an empty text would count as not given.
-void refuse_empty_values(CLI::App* command);
+void reject_empty_values(CLI::App* command);
 
 }  // namespace pictura

@@ -20,7 +20,7 @@ CLI::Option* add_cameras_option(CLI::App* command, RecordingOptions* options_out
                            "training, otherwise the paper's. A page holds 10 MB of images and draws the others");
 }
 
-void refuse_recording_options(const CLI::App& command, const std::string& needed) {
+void reject_recording_options(const CLI::App& command, const std::string& needed) {
   for (const char* option : {"--follow", "--cameras"}) {
     if (command.count(option) > 0) fail_usage("{}: has no effect without {}", option, needed);
   }

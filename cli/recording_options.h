@@ -14,6 +14,6 @@ void add_recording_options(CLI::App* command, RecordingOptions* options_out);
 /// Adds --cameras alone, for replays whose followed agent is fixed.
 CLI::Option* add_cameras_option(CLI::App* command, RecordingOptions* options_out);
 /// Throws UsageError if the command was given one of these options, which have no effect without `needed`.
-void refuse_recording_options(const CLI::App& command, const std::string& needed);
+void reject_recording_options(const CLI::App& command, const std::string& needed);
 
 }  // namespace pictura

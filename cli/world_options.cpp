@@ -67,13 +67,13 @@ void add_scene_options(CLI::App* command, WorldOptions* options_out) {
                     "Add the recorded lights to a recorded scene: drawn, observed and enforced");
 }
 
-void refuse_scene_options(const CLI::App& command, const std::string& map, std::initializer_list<const char*> more) {
+void reject_scene_options(const CLI::App& command, const std::string& map, std::initializer_list<const char*> more) {
   const std::string why = fmt::format("on {}, which is no recorded scene", map);
-  refuse_options(command, {"--start", "--recorded-lights"}, why);
-  refuse_options(command, more, why);
+  reject_options(command, {"--start", "--recorded-lights"}, why);
+  reject_options(command, more, why);
 }
 
-void refuse_options(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why) {
+void reject_options(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why) {
   for (const char* option : options) {
     if (command.count(option) > 0) fail_usage("{}: has no effect {}", option, why);
   }
@@ -112,18 +112,18 @@ void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_
   add_policy_backend_options(command, "auto, and as in training", world_out);
 }
 
-void settle_driving_options(const CLI::App& command, WorldOptions* world_inout, int* steps_inout,
-                            std::string* policy_inout) {
+void resolve_driving_options(const CLI::App& command, WorldOptions* world_inout, int* steps_inout,
+                             std::string* policy_inout) {
   if (!is_scene_name(world_inout->map)) {
-    return refuse_scene_options(command, world_inout->map, {"--control"});
+    return reject_scene_options(command, world_inout->map, {"--control"});
   }
-  refuse_options(command,
+  reject_options(command,
                  {"--agents", "--pedestrians", "--cyclists", "--parked", "--no-walls", "--light-cycles",
                   "--light-heads", "--blind", "--phantom-braking", "--inattentive"},
                  "on a recorded scene, which defines it");
   if (command.count("--policy") == 0) *policy_inout = "log";
   if (*policy_inout == "log") {
-    refuse_options(command, {"--control"}, "with the policy log, which drives all agents as recorded");
+    reject_options(command, {"--control"}, "with the policy log, which drives all agents as recorded");
   }
   if (command.count("--steps") == 0) {
     *steps_inout = 0;
@@ -132,9 +132,9 @@ void settle_driving_options(const CLI::App& command, WorldOptions* world_inout, 
   }
 }
 
-void refuse_idle_backend_options(const CLI::App& command, const std::string& policy) {
+void reject_idle_backend_options(const CLI::App& command, const std::string& policy) {
   if (!is_host_controller(policy)) return;
-  refuse_options(command, {"--device", "--renderer", "--samples"},
+  reject_options(command, {"--device", "--renderer", "--samples"},
                  fmt::format("with the policy '{}', which computes and draws nothing", policy));
 }
 

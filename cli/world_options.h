@@ -26,10 +26,10 @@ void add_light_heads_option(CLI::App* command, std::optional<LightHeads>* heads_
 /// Adds the options of recorded scenes: --start and --recorded-lights.
 void add_scene_options(CLI::App* command, WorldOptions* options_out);
 /// Throws UsageError if one of these options, or of `more` options of recorded scenes, was given for another map.
-void refuse_scene_options(const CLI::App& command, const std::string& map, std::initializer_list<const char*> more);
+void reject_scene_options(const CLI::App& command, const std::string& map, std::initializer_list<const char*> more);
 
 /// Throws UsageError if one of these options was given; `why` explains why it would have no effect.
-void refuse_options(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why);
+void reject_options(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why);
 
 /// Adds MAP, which may be a recorded scene, the options above, --light-cycles, --light-heads, --control, --start,
 /// --steps, --policy and the policy's device options.
@@ -38,10 +38,10 @@ void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_
 /// Adapts these options to a recorded scene, if MAP is one: all road users follow the recording unless a policy was
 /// requested, for as many steps as are recorded unless --steps was given (else *steps_inout becomes 0). Throws
 /// UsageError for options that have no effect on this kind of MAP.
-void settle_driving_options(const CLI::App& command, WorldOptions* world_inout, int* steps_inout,
-                            std::string* policy_inout);
+void resolve_driving_options(const CLI::App& command, WorldOptions* world_inout, int* steps_inout,
+                             std::string* policy_inout);
 
 /// Throws UsageError if backend options were given for a policy that neither computes nor draws.
-void refuse_idle_backend_options(const CLI::App& command, const std::string& policy);
+void reject_idle_backend_options(const CLI::App& command, const std::string& policy);
 
 }  // namespace pictura

@@ -84,7 +84,7 @@ Rig read_cameras(TomlFields* fields_inout) {
     camera.yaw_rad = radians_of(row.number("yaw_deg", kAny, 0));
     camera.pitch_rad = radians_of(row.number("pitch_deg", kAny, 0));
     camera.roll_rad = radians_of(row.number("roll_deg", kAny, 0));
-    row.refuse_unknown();
+    row.reject_unknown_keys();
     rig.cameras.push_back(camera);
   }
   return rig;
@@ -95,7 +95,7 @@ Rig load_rig(const std::string& path) {
   const toml::table table = parse_toml(read_file(path, 1 << 20), path);
   TomlFields fields(table, path);
   const Rig rig = read_cameras(&fields);
-  fields.refuse_unknown();
+  fields.reject_unknown_keys();
   PICTURA_CHECK(!rig.cameras.empty(), "{}: expected one or more [[camera]] tables", path);
   try {
     validate(rig);

@@ -181,7 +181,7 @@ void read_views(TomlFields* root, SceneFile* out) {
     out->view_names.push_back(name);
     out->view_captions.push_back(row.text("caption", name));
     out->views.push_back(read_view(&row, &out->scene));
-    row.refuse_unknown();
+    row.reject_unknown_keys();
   }
   if (out->views.empty()) root->throw_error("view", "expected one or more [[view]] tables");
   if (out->views.size() > kMaxViews) root->throw_error("view", fmt::format("expected at most {} views", kMaxViews));
@@ -221,23 +221,23 @@ SceneFile parse_scene(const std::string& text, const std::string& source, const 
   out.config.debug_palette = root.flag("debug_palette", false);
   for (TomlFields& row : root.tables("agent")) {
     out.scene.agents.push_back(read_agent(&row));
-    row.refuse_unknown();
+    row.reject_unknown_keys();
   }
   if (out.scene.agents.size() > kMaxAgents) root.throw_error("agent", fmt::format("expected at most {}", kMaxAgents));
   for (TomlFields& row : root.tables("line")) {
     read_line(&row, &out.geometry.strips);
-    row.refuse_unknown();
+    row.reject_unknown_keys();
   }
   for (TomlFields& row : root.tables("wall")) {
     read_wall(&row, &out.geometry.walls);
-    row.refuse_unknown();
+    row.reject_unknown_keys();
   }
   for (TomlFields& row : root.tables("light")) {
     read_light(&row, &out);
-    row.refuse_unknown();
+    row.reject_unknown_keys();
   }
   read_views(&root, &out);
-  root.refuse_unknown();
+  root.reject_unknown_keys();
   out.geometry.build_grids();
   out.scene.end_world(0);
   try {

@@ -78,7 +78,7 @@ std::vector<ConfigKey> config_keys() {
   return describer.keys;
 }
 
-std::vector<std::string> idle_settings(const Config& config) {
+std::vector<std::string> settings_without_effect(const Config& config) {
   std::vector<std::string> notices;
   const int64_t rollout = int64_t{config.simulator.num_slots} * config.train.num_steps;
   if (config.train.minibatch_size > rollout) {

@@ -17,7 +17,7 @@ struct ConfigKey {
 std::vector<ConfigKey> config_keys();
 
 /// Returns a sentence for each setting of a configuration that has no effect without being a contradiction.
-std::vector<std::string> idle_settings(const Config& config);
+std::vector<std::string> settings_without_effect(const Config& config);
 
 /// Returns the configuration with absolute paths of its files (rig, maps, teacher, backbone), for readers in any
 /// folder.

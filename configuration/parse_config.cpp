@@ -68,7 +68,7 @@ class Reader {
     if (!node) return;
     value = text_of(key, *node);
     if (any_name_ || std::find(known.begin(), known.end(), value) != known.end()) return;
-    refuse_name(key, *node, value, known);
+    reject_name(key, *node, value, known);
   }
 
   void device(const std::string& key, std::string& value) {
@@ -170,7 +170,7 @@ class Reader {
     if (!node) return;
     const std::string text = text_of(key, *node);
     const auto found = std::find(names.begin(), names.end(), text);
-    if (found == names.end()) refuse_name(key, *node, text, {names.begin(), names.end()});
+    if (found == names.end()) reject_name(key, *node, text, {names.begin(), names.end()});
     value = static_cast<Enum>(found - names.begin());
   }
 
@@ -189,14 +189,14 @@ class Reader {
   }
 
   /// Throws for the first key of the table that no call has read.
-  void refuse_unknown(const toml::table& table, const std::string& prefix = "") const {
+  void reject_unknown_keys(const toml::table& table, const std::string& prefix = "") const {
     for (const auto& [name, node] : table) {
       const std::string key = prefix + std::string(name.str());
       // An unknown section is reported by its first key.
       if (const toml::table* inner = node.as_table(); inner && (sections_.count(key) || !inner->empty()))
-        refuse_unknown(*inner, key + ".");
+        reject_unknown_keys(*inner, key + ".");
       else if (!known_.count(key))
-        refuse_unknown_key(key, node);
+        reject_unknown_key(key, node);
     }
   }
 
@@ -210,7 +210,7 @@ class Reader {
   }
 
  private:
-  [[noreturn]] void refuse_name(const std::string& key, const toml::node& node, const std::string& name,
+  [[noreturn]] void reject_name(const std::string& key, const toml::node& node, const std::string& name,
                                 const std::vector<std::string>& known) const {
     throw_error(key, fmt::format("expected one of {}, got {}{}", fmt::join(known, ", "), format_value(node),
                                  suggestion(name, known)));
@@ -226,7 +226,7 @@ class Reader {
 
   std::string line_of(const toml::node& node) const { return fmt::format("{}:{}", source_, node.source().begin.line); }
 
-  [[noreturn]] void refuse_unknown_key(const std::string& key, const toml::node& node) const {
+  [[noreturn]] void reject_unknown_key(const std::string& key, const toml::node& node) const {
     if (overridden_.count(key)) fail("--set {}: unknown key{}", key, suggestion_for(key));
     fail("{}: unknown key '{}'{}", line_of(node), key, suggestion_for(key));
   }
@@ -478,7 +478,7 @@ Config parse(const std::string& text, const std::string& source, const std::vect
   reader.old_schedule("train.schedule_updates", int64_t{config.simulator.num_slots} * config.train.num_steps,
                       config.train.schedule_agent_steps);
   for (const RemovedKey& key : kRemovedKeys) reader.removed(key);
-  reader.refuse_unknown(table);
+  reader.reject_unknown_keys(table);
   try {
     config.simulator.maps = expand_map_names(config.simulator.maps);
   } catch (const UsageError& error) {

@@ -36,12 +36,12 @@ Device open_learning_device(const Config& config, int local_rank) {
   const std::string why_not = cuda_rejection_reason();
   const bool draws_on_host =
       config.reads_images() && (renderer == "cpu" || renderer == "null" || renderer == "gl:osmesa");
-  const auto refuse_on_device = [&wanted](const char* key, const std::string& value, const char* instead) {
+  const auto reject_on_device = [&wanted](const char* key, const std::string& value, const char* instead) {
     fail("{}: \"{}\" uses host memory, but run.device is \"{}\": set it to {}", key, value, wanted, instead);
   };
   if (wanted.starts_with("cuda")) {
-    if (simulator == "cpu") refuse_on_device("simulator.backend", simulator, "\"cuda\" or \"auto\"");
-    if (draws_on_host) refuse_on_device("render.backend", renderer, "\"cuda\", \"gl:egl\" or \"auto\"");
+    if (simulator == "cpu") reject_on_device("simulator.backend", simulator, "\"cuda\" or \"auto\"");
+    if (draws_on_host) reject_on_device("render.backend", renderer, "\"cuda\", \"gl:egl\" or \"auto\"");
   }
   if (wanted == "cpu" || simulator == "cpu" || draws_on_host) {
     PICTURA_CHECK(simulator != "cuda",

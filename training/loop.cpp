@@ -193,7 +193,7 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
   const std::unique_ptr<Communicator> communicator = make_communicator(ranks, device);
   RunKeeper keeper(options, ranks, communicator.get());
   set_up_torch(config, device);
-  for (const std::string& notice : idle_settings(config)) options.notify(notice);
+  for (const std::string& notice : settings_without_effect(config)) options.notify(notice);
 
   Run run(config, device, communicator.get());
   const std::vector<RecentUpdate> recent = keeper.begin(&run);

@@ -176,7 +176,7 @@ std::vector<TomlFields> TomlFields::tables(std::string_view key) {
   return tables;
 }
 
-void TomlFields::refuse_unknown() const {
+void TomlFields::reject_unknown_keys() const {
   for (const auto& [key, node] : *table_) {
     if (std::find(known_.begin(), known_.end(), key.str()) == known_.end()) {
       fail("{}:{}: {}{}unknown key '{}'{}; known keys: {}", source_, node.source().begin.line, name_,

@@ -58,7 +58,7 @@ class TomlFields {
   std::vector<TomlFields> tables(std::string_view key);
 
   /// Throws for the first unread key; call after all keys were read.
-  void refuse_unknown() const;
+  void reject_unknown_keys() const;
   /// Throws "file:line: table: key: message".
   [[noreturn]] void throw_error(std::string_view key, std::string_view message) const;
 

@@ -109,9 +109,9 @@ TEST(Config, SettingsWithoutEffectAreSaid) {
   EXPECT_THAT(error_in("[simulator]\nnum_slots = 4\nmin_agents = 8\nmax_agents = 8\n"),
               HasSubstr("simulator.min_agents: expected at most simulator.num_slots (4), got 8"));
   Config config;
-  EXPECT_EQ(idle_settings(config).size(), 0u);
+  EXPECT_EQ(settings_without_effect(config).size(), 0u);
   config.simulator.num_slots = 4;
-  EXPECT_THAT(idle_settings(config), ElementsAre(HasSubstr("train.minibatch_size: 65536 are more than")));
+  EXPECT_THAT(settings_without_effect(config), ElementsAre(HasSubstr("train.minibatch_size: 65536 are more than")));
 }
 
 TEST(Config, EveryFileInConfigsReads) {
