@@ -25,7 +25,7 @@ using ::testing::HasSubstr;
 
 // ---- states
 
-TEST(BlindCorners, LiesWhereNoLightStopsAnybody) {
+TEST(BlindCorners, LieAtJunctionsWithoutLights) {
   const auto map = load_map("procedural:1");
   const BlindCorners corners = find_blind_corners(*map, make_walls(*map, {}));
   ASSERT_GT(corners.size(), 4u);
@@ -59,7 +59,7 @@ TEST(CornerPairs, AreOfLikeDistancesAndSpeeds) {
   EXPECT_EQ(pairs[0].empty.scene, 3) << "the likest";
 }
 
-TEST(CornerPairs, TakeNobodyTwiceAndScenesInTurn) {
+TEST(CornerPairs, TakeNoVehicleTwiceAndScenesInTurn) {
   // Ego 0 has two states with the same user; the second empty ego waits for a user for which the first is not similar
   // enough.
   const std::vector<CornerState> hidden{state(1, 0, 20, 5, 7, 20), state(1, 0, 21, 5, 7, 10), state(1, 2, 20, 5, 7),
@@ -139,7 +139,7 @@ TEST_F(Corner, PairsAreFoundAndAllPoliciesStartAlike) {
   EXPECT_GT(at_once, all.pairs.size() / 2) << "vectors hold whom cameras do not see";
 }
 
-TEST_F(Corner, WhoIsNotSeenChangesNothingForCamerasAndMuchForVectors) {
+TEST_F(Corner, UnseenVehiclesChangeNothingForCamerasAndMuchForVectors) {
   const CornerResults& all = results();
   size_t compared = 0;
   std::array<size_t, 3> differ{};

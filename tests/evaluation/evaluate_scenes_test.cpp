@@ -277,7 +277,7 @@ TEST_F(SceneEvaluations, PartsMergeIntoTheWhole) {
               HasSubstr("expected \"format\": \"pictura evaluation in scenes 1\""));
 }
 
-TEST_F(SceneEvaluations, KeepRolloutsOfEverybodyWhoIsThere) {
+TEST_F(SceneEvaluations, KeepRolloutsOfAllPresentAgents) {
   write(1);
   write(2, {.num_vehicles = 6});
   options_.protocol = scene_protocol("simagents");

@@ -61,7 +61,7 @@ Infraction infraction_of_the_first(const Start& first, const Start& second, int 
   return {};
 }
 
-TEST(Infractions, CollisionsSayWithWhomAndHow) {
+TEST(Infractions, CollisionsStateTheirPartnersAndKinds) {
   const Start driving{.x_m = 50, .speed_mps = 10};
   const Infraction behind = infraction_of_the_first(driving, {.x_m = 62});
   EXPECT_TRUE(behind.is(kEventAtFault));

@@ -142,7 +142,7 @@ TEST_F(Pedestrian, PathsAreFoundInAllScenes) {
   for (const auto& [scene, count] : of_scene) EXPECT_EQ(count, 2) << scene;
 }
 
-TEST_F(Pedestrian, WhoIsHiddenChangesNothingForCamerasAndMuchForVectors) {
+TEST_F(Pedestrian, HiddenPedestriansChangeNothingForCamerasAndMuchForVectors) {
   const PedestrianResults& all = results();
   int hidden = 0, near = 0, near_changes = 0;
   std::array<int, 3> hidden_changes{};
@@ -165,7 +165,7 @@ TEST_F(Pedestrian, WhoIsHiddenChangesNothingForCamerasAndMuchForVectors) {
   EXPECT_GT(near_changes, near * 9 / 10);
 }
 
-TEST_F(Pedestrian, NobodyChangesNothing) {
+TEST_F(Pedestrian, NoPedestrianChangesNothing) {
   const PedestrianResults control = controlled(PedestrianControl::nobody);
   ASSERT_EQ(control.points.size(), results().points.size());
   for (size_t i = 0; i < control.responses.size(); ++i) {

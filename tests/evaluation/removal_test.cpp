@@ -64,7 +64,7 @@ TEST_F(Removal, EachPolicyDrivesAnEqualShareOfTheScenes) {
   }
 }
 
-TEST_F(Removal, WhoCannotBeSeenChangesNothingForCamerasAndMuchForVectors) {
+TEST_F(Removal, UnseenAgentsChangeNothingForCamerasAndMuchForVectors) {
   const RemovalResults& all = results();
   int hidden = 0, outside = 0, visible = 0, seen_changes = 0;
   std::array<int, 3> unseen_changes{};
@@ -105,7 +105,7 @@ TEST_F(Removal, VectorPoliciesMissThePartnersThatTheyRead) {
   EXPECT_GT(changed[kLikeForLike], near * 3 / 4);
 }
 
-TEST_F(Removal, HidingNobodyChangesNothing) {
+TEST_F(Removal, HidingNoAgentChangesNothing) {
   const RemovalResults control = controlled(RemovalControl::nobody);
   ASSERT_EQ(control.cases.size(), 600u);
   for (const RemovalCase& one : control.cases) EXPECT_EQ(one.hidden, -1);

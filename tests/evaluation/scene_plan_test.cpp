@@ -98,7 +98,7 @@ class ScenePlans : public ::testing::Test {
   std::shared_ptr<const Scenario> scene_ = crossing();  // 4 of 8 vehicles move
 };
 
-TEST_F(ScenePlans, DriveWhoIsNotAtItsGoal) {
+TEST_F(ScenePlans, DriveTracksThatAreNotAtTheirGoals) {
   const ScenePlan all = plan(scene_protocol("womd"));
   for (size_t track = 0; track < all.roles.size(); ++track) {
     const bool drives = scene_->tracks[track].type == TrackType::vehicle && is_moving(*scene_, int32_t(track)) &&
@@ -127,7 +127,7 @@ TEST_F(ScenePlans, DriveWhoIsNotAtItsGoal) {
   EXPECT_LT(count_of(plan(protocol), SceneRole::removed), 4) << "who is driven stays";
 }
 
-TEST_F(ScenePlans, TakeOverWhoAppearsLater) {
+TEST_F(ScenePlans, TakeOverTracksThatAppearLater) {
   Scenario late = *scene_;
   int32_t mover = 0;
   while (!is_moving(late, mover) || late.tracks[size_t(mover)].type != TrackType::vehicle) ++mover;
@@ -149,7 +149,7 @@ TEST_F(ScenePlans, TakeOverWhoAppearsLater) {
   EXPECT_EQ(driven.takeover_steps[at], 7);
 }
 
-TEST_F(ScenePlans, LeaveWhoOverlapsToTheRecording) {
+TEST_F(ScenePlans, LeaveOverlappingTracksToTheRecording) {
   Scenario scene = *scene_;
   int32_t mover = 0;
   while (!is_moving(scene, mover) || scene.tracks[size_t(mover)].type != TrackType::vehicle) ++mover;

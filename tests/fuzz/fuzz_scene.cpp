@@ -34,7 +34,7 @@ void exercise(const Scenario& scenario) {
 }
 
 /// Checks that a scene made from a scenario gives the same scenario again and again.
-void exercise_statement(const Scenario& scenario) {
+void check_scene_round_trip(const Scenario& scenario) {
   Scenario stated = make_scenario(scene_of_scenario(scenario));
   stated.notes.clear();
   Scenario again = make_scenario(scene_of_scenario(stated));
@@ -101,7 +101,7 @@ bool fuzz_scene(std::string_view bytes, const std::string& name) {
     const Scenario scenario =
         name == "payload" ? make_scenario(womd::parse_scenario(bytes, "fuzz")) : parse_scenario_file(bytes, name);
     exercise(scenario);
-    exercise_statement(scenario);
+    check_scene_round_trip(scenario);
     return true;
   } catch (const Error&) {
     return false;

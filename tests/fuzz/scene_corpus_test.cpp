@@ -11,10 +11,11 @@ namespace pictura {
 namespace {
 
 /// Returns the file name of a seed: seeds of WOMD payloads have one name, whatever their style.
-std::string read_as(const std::string& seed) { return seed.substr(0, seed.find(' ')); }
+std::string seed_file_name(const std::string& seed) { return seed.substr(0, seed.find(' ')); }
 
 TEST(FuzzScenes, EverySeedIsAScene) {
-  for (const auto& [name, bytes] : test::scene_seeds()) EXPECT_TRUE(test::fuzz_scene(bytes, read_as(name))) << name;
+  for (const auto& [name, bytes] : test::scene_seeds())
+    EXPECT_TRUE(test::fuzz_scene(bytes, seed_file_name(name))) << name;
 }
 
 TEST(FuzzScenes, MutatedSeedsAreScenesOrErrors) {
@@ -32,7 +33,7 @@ TEST(FuzzScenes, MutatedSeedsAreScenesOrErrors) {
           default: changed[at] = static_cast<char>(random());
         }
       }
-      (test::fuzz_scene(changed, read_as(name)) ? scenes : errors)++;
+      (test::fuzz_scene(changed, seed_file_name(name)) ? scenes : errors)++;
     }
     EXPECT_GT(errors, 5) << name;
     // Checksums detect every change of a record.

@@ -84,7 +84,7 @@ TEST(BlindApproaches, WallsHideOnlyOnTheirLevelAndInTheirDirection) {
   expect_count(count_blind_approaches(map, short_wall), 2, 1, 2, 1);
 }
 
-TEST(BlindApproaches, AreFoundWithTheLanesOfWhomTheyHide) {
+TEST(BlindApproaches, AreFoundWithTheLanesOfHiddenTraffic) {
   const RoadMap map = Crossing().map;
   constexpr int32_t kEastwards = 1, kNorthwards = 5;  // the lanes that end at the junction
   EXPECT_TRUE(find_blind_crossings(map, {}).empty());

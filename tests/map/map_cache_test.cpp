@@ -320,7 +320,7 @@ TEST_F(MapCacheFolder, TheCacheCanBeTurnedOffOrBeMissing) {
   EXPECT_EQ(cache_file(), "");
 }
 
-TEST_F(MapCacheFolder, MendsAreCachedWithTheMap) {
+TEST_F(MapCacheFolder, RepairsAreCachedWithTheMap) {
   // A road linked to a missing one.
   const std::string text = small_file();
   write_source(std::string(text).replace(text.find("<link>"), 6,

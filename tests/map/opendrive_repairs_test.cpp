@@ -101,7 +101,7 @@ std::string shape(double s, double t, double a, double b = 0) {
 
 // Records along s.
 
-TEST(OpenDriveMends, ShapesComeInAnyOrderOfT) {
+TEST(OpenDriveRepairs, ShapesComeInAnyOrderOfT) {
   RoadText road = straight(lane_of(-1, "driving", 3)), sorted = road;
   road.left = sorted.left = lane_of(1, "driving", 3);
   road.lateral = shape(0, 0, 0.2) + shape(0, -9, 0.1) + shape(50, 0, 0.3) + shape(50, -9, 0.5);
@@ -111,7 +111,7 @@ TEST(OpenDriveMends, ShapesComeInAnyOrderOfT) {
   EXPECT_EQ(difference(map, sound(sorted.text())), "");
 }
 
-TEST(OpenDriveMends, RecordsOutOfOrderAreSorted) {
+TEST(OpenDriveRepairs, RecordsOutOfOrderAreSorted) {
   const auto map_of = [](const std::string& widths, const std::string& offsets, const std::string& speeds,
                          const std::string& heights, bool is_repaired) {
     RoadText road = straight(lane_with(widths + heights + speeds));
@@ -132,7 +132,7 @@ TEST(OpenDriveMends, RecordsOutOfOrderAreSorted) {
             "");
 }
 
-TEST(OpenDriveMends, RecordsBeyondTheEndAreLeftOut) {
+TEST(OpenDriveRepairs, RecordsBeyondTheEndAreLeftOut) {
   RoadText road = straight(lane_with(width(0, 3) + width(130, 9) +
                                      R"(<speed sOffset="130" max="1"/>)"
                                      R"(<height sOffset="130" inner="1" outer="1"/>)"));
@@ -143,14 +143,14 @@ TEST(OpenDriveMends, RecordsBeyondTheEndAreLeftOut) {
   EXPECT_EQ(difference(map, sound(straight().text())), "");
 }
 
-TEST(OpenDriveMends, RecordsBeforeTheStartApplyFromThere) {
+TEST(OpenDriveRepairs, RecordsBeforeTheStartApplyFromThere) {
   const RoadMap map = repaired(straight(lane_with(width(-2, 3) + R"(<speed sOffset="-1" max="9"/>)")).text(),
                                RepairKind::record_before_start, 2);
   EXPECT_FLOAT_EQ(map.lane_points.front().width_m, 3);
   EXPECT_FLOAT_EQ(map.lanes.front().speed_limit_mps, 9);
 }
 
-TEST(OpenDriveMends, MarksBeforeTheirSectionApplyFromItsStart) {
+TEST(OpenDriveRepairs, MarksBeforeTheirSectionApplyFromItsStart) {
   const auto road_with = [](const std::string& offset) {
     return straight(lane_with(width(0, 3) + "<roadMark sOffset=\"" + offset + "\" type=\"broken\" color=\"white\"/>"))
         .text();
@@ -160,20 +160,20 @@ TEST(OpenDriveMends, MarksBeforeTheirSectionApplyFromItsStart) {
   EXPECT_FALSE(sound(road_with("0")).markings.empty());
 }
 
-TEST(OpenDriveMends, WidthsBeginWithTheirSection) {
+TEST(OpenDriveRepairs, WidthsBeginWithTheirSection) {
   const RoadMap map = repaired(straight(lane_with(width(4, 3, 0.01))).text(), RepairKind::late_width);
   EXPECT_FLOAT_EQ(map.lane_points.front().width_m, 3);
   EXPECT_NEAR(map.lane_points.back().width_m, 3.96, 1e-3);
 }
 
-TEST(OpenDriveMends, ALaneWithoutWidthHasNoSurface) {
+TEST(OpenDriveRepairs, ALaneWithoutWidthHasNoSurface) {
   const RoadMap map =
       repaired(straight(lane_of(-1, "driving", 3) + lane_with("", -2, "shoulder")).text(), RepairKind::missing_width);
   EXPECT_EQ(map.lanes.size(), 1u);
   EXPECT_EQ(map.facts.lanes, 1);
 }
 
-TEST(OpenDriveMends, WidthsBelowZeroCountAsZero) {
+TEST(OpenDriveRepairs, WidthsBelowZeroCountAsZero) {
   const RoadMap map = repaired(straight(lane_with(width(0, 3) + width(50, 3, -0.1)) + lane_of(-2, "driving", 3)).text(),
                                RepairKind::negative_width);
   EXPECT_THAT(said(map), HasSubstr("road 1: <lane>: its width at s"));
@@ -183,7 +183,7 @@ TEST(OpenDriveMends, WidthsBelowZeroCountAsZero) {
   EXPECT_FLOAT_EQ(last_point(map, lane_named(map, "1", 0, -2)).width_m, 3);
 }
 
-TEST(OpenDriveMends, MissingCoefficientsAndHeightsAreZero) {
+TEST(OpenDriveRepairs, MissingCoefficientsAndHeightsAreZero) {
   RoadText road = straight(lane_with(R"(<width sOffset="0" a="3"/><height sOffset="0" outer="0"/>)"));
   road.geometry = R"(<geometry s="0" x="0" y="0" hdg="0" length="100"><spiral/></geometry>)";
   const RoadMap map = repaired(road.text(), RepairKind::missing_zero, 6);
@@ -193,7 +193,7 @@ TEST(OpenDriveMends, MissingCoefficientsAndHeightsAreZero) {
 
 // Sections and lanes.
 
-TEST(OpenDriveMends, SectionsAreSortedAndBeginWithTheRoad) {
+TEST(OpenDriveRepairs, SectionsAreSortedAndBeginWithTheRoad) {
   const std::string before = R"(<predecessor id="-1"/>)", after = R"(<successor id="-1"/>)";
   const auto section = [](double s, double lane_width, const std::string& link = "") {
     return fmt::format("<laneSection s=\"{}\"><center/><right>{}</right></laneSection>\n", s,
@@ -214,7 +214,7 @@ TEST(OpenDriveMends, SectionsAreSortedAndBeginWithTheRoad) {
               HasSubstr("road 1: <laneSection>: attribute s: expected the first section at 0, got 5"));
 }
 
-TEST(OpenDriveMends, GapsInLaneIdsAreFilled) {
+TEST(OpenDriveRepairs, GapsInLaneIdsAreFilled) {
   const RoadMap map =
       repaired(straight(lane_of(-1, "driving", 3) + lane_of(-4, "driving", 3) + lane_of(-2, "driving", 3)).text(),
                RepairKind::lane_gap);
@@ -223,7 +223,7 @@ TEST(OpenDriveMends, GapsInLaneIdsAreFilled) {
                   -7.5f);
 }
 
-TEST(OpenDriveMends, TheCenterLaneIsZero) {
+TEST(OpenDriveRepairs, TheCenterLaneIsZero) {
   const RoadMap map = repaired(replaced(straight().text(), "<lane id=\"0\"", "<lane id=\"3\""), RepairKind::center_id);
   EXPECT_EQ(difference(map, sound(straight().text())), "");
 }
@@ -247,7 +247,7 @@ int num_endless(const RoadMap& map) {
       std::count_if(map.lanes.begin(), map.lanes.end(), [](const Lane& lane) { return lane.is_endless; }));
 }
 
-TEST(OpenDriveMends, RoadsOfNoLengthAreAMillimetreLong) {
+TEST(OpenDriveRepairs, RoadsOfNoLengthAreAMillimetreLong) {
   RoadText road = straight();
   road.length = 1e-5;
   EXPECT_NEAR(repaired(road.text(), RepairKind::short_road).lanes[0].length_m, 1e-3, 1e-6);
@@ -255,7 +255,7 @@ TEST(OpenDriveMends, RoadsOfNoLengthAreAMillimetreLong) {
   EXPECT_EQ(repaired(road.text(), RepairKind::short_road).lanes.size(), 1u);
 }
 
-TEST(OpenDriveMends, ProfilesOfRoadsOfNoLengthAreConstant) {
+TEST(OpenDriveRepairs, ProfilesOfRoadsOfNoLengthAreConstant) {
   RoadText road = between_the_halves(2e-10, 2e-10);
   road.elevation = R"(<elevation s="0" a="0.5" b="-0.008" c="-4e9" d="1.5e19"/>)"
                    R"(<elevation s="1e-10" a="-700" b="0" c="0" d="0"/>)";
@@ -272,14 +272,14 @@ TEST(OpenDriveMends, ProfilesOfRoadsOfNoLengthAreConstant) {
   EXPECT_EQ(map.facts.z_min_m, 0);
 }
 
-TEST(OpenDriveMends, RoadsWithoutADrawnLengthHaveNone) {
+TEST(OpenDriveRepairs, RoadsWithoutADrawnLengthHaveNone) {
   const RoadMap map = repaired(ring_with(between_the_halves(0.1, 0).text()), RepairKind::short_road);
   EXPECT_EQ(num_endless(map), 3);
   EXPECT_NEAR(map.facts.driving_lane_km, 0.251, 1e-3);
   EXPECT_THAT(said(map), HasSubstr("road 3: <road>: attribute length: expected at least 0.001 with <geometry>, got 0"));
 }
 
-TEST(OpenDriveMends, SectionsOfNoLengthLeaveTheLaneOffset) {
+TEST(OpenDriveRepairs, SectionsOfNoLengthLeaveTheLaneOffset) {
   // In the last 20 um, the lane is the second beside a centre line 3.5 m further to the left.
   const auto section = [](double s, const std::string& lanes) {
     return fmt::format("<laneSection s=\"{}\"><center/><right>{}</right></laneSection>", s, lanes);
@@ -325,7 +325,7 @@ TEST(OpenDriveMends, SectionsOfNoLengthLeaveTheLaneOffset) {
   EXPECT_NEAR(radius_of(first_point(shifted, lane_named(shifted, "1", 2, -1))), 41.25, 1e-3);
 }
 
-TEST(OpenDriveMends, GeometriesOfNoLengthAreLeftOut) {
+TEST(OpenDriveRepairs, GeometriesOfNoLengthAreLeftOut) {
   RoadText road = straight();
   road.geometry = line_at(0, 0, 0, 0, 60) + line_at(60, 60, 0, 1, 0) + line_at(60, 60, 0, 0, 40);
   const RoadMap map = repaired(road.text(), RepairKind::empty_geometry);
@@ -333,7 +333,7 @@ TEST(OpenDriveMends, GeometriesOfNoLengthAreLeftOut) {
   EXPECT_FLOAT_EQ(map.lanes[0].length_m, 100);
 }
 
-TEST(OpenDriveMends, TheRoadIsWhatItsGeometrySays) {
+TEST(OpenDriveRepairs, TheRoadIsWhatItsGeometrySays) {
   for (const double length : {99.55, 100.45, 98.0, 101.1, 50.0, 500.0}) {
     RoadText road = straight();
     road.geometry = line_at(0, 0, 0, 0, length);
@@ -350,7 +350,7 @@ TEST(OpenDriveMends, TheRoadIsWhatItsGeometrySays) {
               HasSubstr("ends at 110000"));
 }
 
-TEST(OpenDriveMends, ProfilesAreHeldBeyondTheStatedLength) {
+TEST(OpenDriveRepairs, ProfilesAreHeldBeyondTheStatedLength) {
   // The lane tapers off, and the road climbs, within the 20 m that the file gives as its length.
   RoadText road = straight(lane_with(width(0, 4, -0.1)));
   road.length = 20;
@@ -365,7 +365,7 @@ TEST(OpenDriveMends, ProfilesAreHeldBeyondTheStatedLength) {
   EXPECT_NEAR(repaired(road.text(), RepairKind::line_length).facts.z_max_m, 7, 1e-6);
 }
 
-TEST(OpenDriveMends, SmallGapsOfShortRoadsAreBridged) {
+TEST(OpenDriveRepairs, SmallGapsOfShortRoadsAreBridged) {
   RoadText road = straight();
   road.length = 2;
   road.geometry = line_at(0, 0, 0, 0, 1) + line_at(1, 1, 0.3, 0, 1);
@@ -377,7 +377,7 @@ TEST(OpenDriveMends, SmallGapsOfShortRoadsAreBridged) {
   EXPECT_THROW(parse_opendrive(file_of(road.text()), "bad.xodr"), Error);
 }
 
-TEST(OpenDriveMends, JumpsAreSpreadOverTheRoad) {
+TEST(OpenDriveRepairs, JumpsAreSpreadOverTheRoad) {
   struct Case {
     double along, aside;
   };
@@ -406,7 +406,7 @@ TEST(OpenDriveMends, JumpsAreSpreadOverTheRoad) {
   }
 }
 
-TEST(OpenDriveMends, JumpsNearAnEndLeaveTheEnd) {
+TEST(OpenDriveRepairs, JumpsNearAnEndLeaveTheEnd) {
   RoadText road = straight();
   road.geometry = line_at(0, 0, 0, 0, 2) + line_at(2, 2, 1, 0, 49) + line_at(51, 51, 0, 0, 49);
   const RoadMap map = repaired(road.text(), RepairKind::geometry_jump, 2);
@@ -414,7 +414,7 @@ TEST(OpenDriveMends, JumpsNearAnEndLeaveTheEnd) {
   test::expect_at(map, last_point(map, map.lanes[0]).position_m, 100, -1.5);
 }
 
-TEST(OpenDriveMends, JumpsOfTheElevationAreSpreadOverTheRoad) {
+TEST(OpenDriveRepairs, JumpsOfTheElevationAreSpreadOverTheRoad) {
   for (const double rise : {2.0, -0.6, 12.0}) {
     RoadText road = straight();
     road.elevation = fmt::format(
@@ -438,7 +438,7 @@ TEST(OpenDriveMends, JumpsOfTheElevationAreSpreadOverTheRoad) {
 }
 
 /// Some writers begin a road with a geometry of no length with another heading.
-TEST(OpenDriveMends, GeometriesOfNextToNoLengthTurnNothing) {
+TEST(OpenDriveRepairs, GeometriesOfNextToNoLengthTurnNothing) {
   constexpr double kNorth = 1.5707963267948966;
   for (const std::string& geometry : {line_at(0, 0, 0, 0, 1e-9) + line_at(1e-9, 1e-9, 0, kNorth, 100),
                                       line_at(0, 0, 0, kNorth, 100) + line_at(100, 0, 100, 0, 1e-9)}) {
@@ -449,7 +449,7 @@ TEST(OpenDriveMends, GeometriesOfNextToNoLengthTurnNothing) {
   }
 }
 
-TEST(OpenDriveMends, LargeJumpsAreRefused) {
+TEST(OpenDriveRepairs, LargeJumpsAreRefused) {
   RoadText road = straight();
   road.geometry = line_at(0, 0, 0, 0, 50) + line_at(50, 50, 5.1, 0, 50);
   EXPECT_THAT(
@@ -463,7 +463,7 @@ TEST(OpenDriveMends, LargeJumpsAreRefused) {
               HasSubstr("expected at most 1000 gaps in a road"));
 }
 
-TEST(OpenDriveMends, GeometriesFollowEachOther) {
+TEST(OpenDriveRepairs, GeometriesFollowEachOther) {
   RoadText road = straight();
   road.geometry = line_at(0, 0, 0, 0, 50) + line_at(50.3, 50.3, 0, 0, 49.7);
   EXPECT_FLOAT_EQ(repaired(road.text(), RepairKind::geometry_station).lanes[0].length_m, 100);
@@ -488,7 +488,7 @@ TEST(OpenDriveMends, GeometriesFollowEachOther) {
 
 // Names of elements.
 
-TEST(OpenDriveMends, LanesWithoutATypeHaveOne) {
+TEST(OpenDriveRepairs, LanesWithoutATypeHaveOne) {
   const RoadMap center = repaired(ring_with("",
                                             [](RoadText* road) {
                                               road->sections =
@@ -504,19 +504,19 @@ TEST(OpenDriveMends, LanesWithoutATypeHaveOne) {
   EXPECT_THAT(said(side), HasSubstr("road 1: <lane>: attribute type is missing"));
 }
 
-TEST(OpenDriveMends, UnknownFlagsAreFalse) {
+TEST(OpenDriveRepairs, UnknownFlagsAreFalse) {
   const RoadMap map = repaired(replaced(straight().text(), "type=\"driving\"", "type=\"driving\" level=\"none\""),
                                RepairKind::unknown_flag);
   EXPECT_EQ(difference(map, sound(straight().text())), "");
 }
 
-TEST(OpenDriveMends, AttributesWithoutAValueAreMissing) {
+TEST(OpenDriveRepairs, AttributesWithoutAValueAreMissing) {
   const RoadMap map =
       sound(replaced(straight().text(), "type=\"driving\"", "type=\"driving\" level=\"\" direction=\"\""));
   EXPECT_EQ(difference(map, sound(straight().text())), "");
 }
 
-TEST(OpenDriveMends, UnknownNamesHaveAMeaning) {
+TEST(OpenDriveRepairs, UnknownNamesHaveAMeaning) {
   const RoadMap lanes =
       repaired(straight(lane_of(-1, "driving", 3) + lane_of(-2, "canal", 2)).text(), RepairKind::unknown_lane_type);
   EXPECT_EQ(lane_named(lanes, "1", 0, -2).type, LaneType::other);
@@ -533,7 +533,7 @@ std::string with_mark(const std::string& mark) {
   return road.text();
 }
 
-TEST(OpenDriveMends, UnknownMarksArePaintedByTheirLines) {
+TEST(OpenDriveRepairs, UnknownMarksArePaintedByTheirLines) {
   EXPECT_EQ(repaired(with_mark(R"(<roadMark sOffset="0" type="wavy"/>)"), RepairKind::unknown_mark).markings.size(),
             0u);
   const RoadMap lines =
@@ -550,7 +550,7 @@ TEST(OpenDriveMends, UnknownMarksArePaintedByTheirLines) {
       1u);
 }
 
-TEST(OpenDriveMends, SizesBelowZeroAreTheDefault) {
+TEST(OpenDriveRepairs, SizesBelowZeroAreTheDefault) {
   const std::string line = R"(<type name=""{}><line length="5" space="5" tOffset="0" sOffset="0"{}/></type>)";
   const auto mark = [&](const std::string& of_mark, const std::string& of_type, const std::string& of_line) {
     return with_mark("<roadMark sOffset=\"0\" type=\"solid\"" + of_mark + ">" +
@@ -563,19 +563,19 @@ TEST(OpenDriveMends, SizesBelowZeroAreTheDefault) {
             "");
 }
 
-TEST(OpenDriveMends, MarksBeyondTheirSectionAreLeftOut) {
+TEST(OpenDriveRepairs, MarksBeyondTheirSectionAreLeftOut) {
   EXPECT_EQ(
       repaired(with_mark(R"(<roadMark sOffset="105" type="solid"/>)"), RepairKind::record_beyond_end).markings.size(),
       0u);
 }
 
-TEST(OpenDriveMends, MarksOutOfOrderAreSorted) {
+TEST(OpenDriveRepairs, MarksOutOfOrderAreSorted) {
   const std::string solid = R"(<roadMark sOffset="0" type="solid"/>)", none = R"(<roadMark sOffset="40" type="none"/>)";
   EXPECT_EQ(difference(repaired(with_mark(none + solid), RepairKind::record_order), sound(with_mark(solid + none))),
             "");
 }
 
-TEST(OpenDriveMends, DashesOfNoLengthAreContinuous) {
+TEST(OpenDriveRepairs, DashesOfNoLengthAreContinuous) {
   const auto mark = [](const std::string& kind, const std::string& space) {
     return with_mark(
         fmt::format(R"(<roadMark sOffset="0" type="solid"><{}><line length="0" {} tOffset="0" sOffset="0" )"
@@ -588,7 +588,7 @@ TEST(OpenDriveMends, DashesOfNoLengthAreContinuous) {
   EXPECT_EQ(repaired(mark("explicit", ""), RepairKind::empty_line).markings.size(), 1u) << "the pattern of the type";
 }
 
-TEST(OpenDriveMends, SpeedsThatCannotBeReadAreLeftOut) {
+TEST(OpenDriveRepairs, SpeedsThatCannotBeReadAreLeftOut) {
   for (const char* speed : {R"(max="fast")", R"(max="-3")", R"(max="50" unit="knots")", "", R"(max="1e9")"}) {
     const RoadMap map =
         repaired(straight(lane_of(-1, "driving", 3, fmt::format("<speed sOffset=\"0\" {}/>", speed))).text(),
@@ -605,7 +605,7 @@ std::string with_rest(const std::string& rest) {
   return road.text();
 }
 
-TEST(OpenDriveMends, ObjectsThatCannotStandAreLeftOut) {
+TEST(OpenDriveRepairs, ObjectsThatCannotStandAreLeftOut) {
   for (const auto& [kind, object] : std::vector<std::pair<RepairKind, std::string>>{
            {RepairKind::misplaced_item, R"(<object id="1" type="crosswalk" s="500" t="0" length="2" width="2"/>)"},
            {RepairKind::misplaced_item,
@@ -624,7 +624,7 @@ TEST(OpenDriveMends, ObjectsThatCannotStandAreLeftOut) {
             0u);
 }
 
-TEST(OpenDriveMends, RepeatsThatCannotBeDrawnStandOnce) {
+TEST(OpenDriveRepairs, RepeatsThatCannotBeDrawnStandOnce) {
   const auto parking = [](const std::string& contents) {
     return with_rest(R"(<objects><object id="1" type="parking" s="5" t="-5" length="5" width="2">)" + contents +
                      "</object></objects>");
@@ -639,7 +639,7 @@ TEST(OpenDriveMends, RepeatsThatCannotBeDrawnStandOnce) {
       1u);
 }
 
-TEST(OpenDriveMends, SignalsOfOneIdAllStand) {
+TEST(OpenDriveRepairs, SignalsOfOneIdAllStand) {
   const RoadMap map = repaired(
       with_rest(
           R"(<signals><signal id="5" s="10" t="-4" orientation="+"/><signal id="5" s="20" t="-4" orientation="+"/>)"
@@ -653,7 +653,7 @@ TEST(OpenDriveMends, SignalsOfOneIdAllStand) {
             1u);
 }
 
-TEST(OpenDriveMends, ReferencesToWhatIsAbsentAreLeftOut) {
+TEST(OpenDriveRepairs, ReferencesToWhatIsAbsentAreLeftOut) {
   const std::string road = straight().text();
   const std::string control = R"(<controller id="4"><control signalId="6"/></controller>)";
   EXPECT_EQ(
@@ -689,7 +689,7 @@ std::string two_roads(const std::string& link_1, const std::string& link_2, cons
 
 int num_links(const RoadMap& map) { return static_cast<int>(map.lane_links.size()) / 2; }
 
-TEST(OpenDriveMends, LinksToWhatIsAbsentAreLeftOut) {
+TEST(OpenDriveRepairs, LinksToWhatIsAbsentAreLeftOut) {
   const std::string to_2 = link_to("successor", "2", "start"), to_1 = link_to("predecessor", "1", "end");
   EXPECT_EQ(num_links(sound(two_roads(to_2, to_1))), 1);
   EXPECT_THAT(said(repaired(two_roads(link_to("successor", "9", "start"), ""), RepairKind::missing_road)),
@@ -706,7 +706,7 @@ TEST(OpenDriveMends, LinksToWhatIsAbsentAreLeftOut) {
       0);
 }
 
-TEST(OpenDriveMends, LinksThatTrafficCannotFollowAreLeftOut) {
+TEST(OpenDriveRepairs, LinksThatTrafficCannotFollowAreLeftOut) {
   const std::string to_2 = link_to("successor", "2", "start"), to_1 = link_to("predecessor", "1", "end");
   const std::string sound_text = two_roads(to_2, to_1);
   const RoadMap dangling = repaired(two_roads("", ""), RepairKind::dangling_link);
@@ -728,7 +728,7 @@ TEST(OpenDriveMends, LinksThatTrafficCannotFollowAreLeftOut) {
       HasSubstr("which are 1.50 m apart there"));
 }
 
-TEST(OpenDriveMends, OneSidedLinksBecomeMutual) {
+TEST(OpenDriveRepairs, OneSidedLinksBecomeMutual) {
   const std::string to_2 = link_to("successor", "2", "start");
   const RoadMap map = repaired(two_roads(to_2, ""), RepairKind::one_sided_link);
   EXPECT_THAT(said(map),
@@ -736,7 +736,7 @@ TEST(OpenDriveMends, OneSidedLinksBecomeMutual) {
   EXPECT_EQ(difference(map, sound(two_roads(to_2, link_to("predecessor", "1", "end")))), "");
 }
 
-TEST(OpenDriveMends, GeometryShowsTheEndOfALink) {
+TEST(OpenDriveRepairs, GeometryShowsTheEndOfALink) {
   const std::string to_2 = link_to("successor", "2", "start"), to_1 = link_to("predecessor", "1", "end");
   const RoadMap map = repaired(two_roads(link_to("successor", "2", "end"), to_1), RepairKind::wrong_end);
   EXPECT_THAT(said(map),
@@ -749,7 +749,7 @@ TEST(OpenDriveMends, GeometryShowsTheEndOfALink) {
   EXPECT_EQ(num_links(repaired(two_roads(link_to("successor", "2", "middle"), to_1), RepairKind::missing_contact)), 1);
 }
 
-TEST(OpenDriveMends, LinksThatAreReturnedElsewhereAreKeptWhereTheEndsTouch) {
+TEST(OpenDriveRepairs, LinksThatAreReturnedElsewhereAreKeptWhereTheEndsTouch) {
   RoadText third = straight();
   third.id = "3";
   third.geometry = line_at(0, 0, 50, 0, 100);
@@ -768,7 +768,7 @@ TEST(OpenDriveMends, LinksThatAreReturnedElsewhereAreKeptWhereTheEndsTouch) {
   repaired(ring.text(), RepairKind::contrary_link);
 }
 
-TEST(OpenDriveMends, ConnectionsFindTheirEnds) {
+TEST(OpenDriveRepairs, ConnectionsFindTheirEnds) {
   const std::string good = test::three_roads();
   ASSERT_EQ(num_links(sound(good)), 4);
   // The connecting road begins at the incoming road; the file refers to its end.
@@ -799,7 +799,7 @@ TEST(OpenDriveMends, ConnectionsFindTheirEnds) {
   repaired(far.text() + test::three_roads("", fmt::format(fmt::runtime(more), "5", "2")), RepairKind::one_sided_link);
 }
 
-TEST(OpenDriveMends, JunctionsOfOtherKindsConnectNothing) {
+TEST(OpenDriveRepairs, JunctionsOfOtherKindsConnectNothing) {
   RoadText road = straight();
   road.link = R"(<successor elementType="junction" elementId="3"/>)";
   const RoadMap map = repaired(road.text() + R"(<junction id="3" type="virtual" mainRoad="2" sStart="1" sEnd="2"/>)",
@@ -808,7 +808,7 @@ TEST(OpenDriveMends, JunctionsOfOtherKindsConnectNothing) {
   EXPECT_EQ(map.junctions.size(), 1u);
 }
 
-TEST(OpenDriveMends, MarksThatRunBackAreCut) {
+TEST(OpenDriveRepairs, MarksThatRunBackAreCut) {
   // A right bend of 5 m radius, with a mark 8 m to its inner side.
   RoadText road;
   road.length = 15;
@@ -825,7 +825,7 @@ TEST(OpenDriveMends, MarksThatRunBackAreCut) {
 
 // Messages about repairs.
 
-TEST(OpenDriveMends, MendsAreGroupedWithTheMostFrequentFirst) {
+TEST(OpenDriveRepairs, RepairsAreGroupedWithTheMostFrequentFirst) {
   RoadText road = straight();
   for (int i = 0; i < 3; ++i) road.center_mark += R"(<roadMark sOffset="0" type="solid" color="pink"/>)";
   road.type = R"(<type s="125" type="town"/>)";
@@ -838,7 +838,7 @@ TEST(OpenDriveMends, MendsAreGroupedWithTheMostFrequentFirst) {
   EXPECT_EQ(map.mends.size(), 4u);
 }
 
-TEST(OpenDriveMends, TooManyFaultsAreRefused) {
+TEST(OpenDriveRepairs, TooManyFaultsAreRefused) {
   std::string marks;
   for (int i = 0; i < 1'000'001; ++i) marks += "<roadMark type='x'/>";
   RoadText road = straight();
@@ -847,7 +847,7 @@ TEST(OpenDriveMends, TooManyFaultsAreRefused) {
               HasSubstr("after 1000000 other faults"));
 }
 
-TEST(OpenDriveMends, FaultsWithoutAMeaningAreRefused) {
+TEST(OpenDriveRepairs, FaultsWithoutAMeaningAreRefused) {
   EXPECT_THROW(parse_opendrive("", "bad.xodr"), Error);
   EXPECT_THROW(parse_opendrive("<OpenDRIVE/>", "bad.xodr"), Error);
   for (const auto& [from, to] :
@@ -868,7 +868,7 @@ TEST(OpenDriveMends, FaultsWithoutAMeaningAreRefused) {
               HasSubstr("road 1: <road>: attribute id: another road already has it"));
 }
 
-TEST(OpenDriveMends, DamagedFilesGiveAValidMapOrAnError) {
+TEST(OpenDriveRepairs, DamagedFilesGiveAValidMapOrAnError) {
   // parse_opendrive validates its result; anything other than a map or an Error ends the test.
   const std::string valid_text = file_of(test::three_roads());
   std::mt19937 random(7);
@@ -895,7 +895,7 @@ TEST(OpenDriveMends, DamagedFilesGiveAValidMapOrAnError) {
   EXPECT_GT(repaired_maps, 60);
 }
 
-TEST(OpenDriveMends, EveryKindStandsInTheTable) {
+TEST(OpenDriveRepairs, EveryKindStandsInTheTable) {
   const std::string docs = read_file(PICTURA_OPENDRIVE_DOCS);
   for (const RepairKind kind : repair_kinds()) {
     if (kind >= kFirstLanelet2Mend) continue;

@@ -93,7 +93,7 @@ TEST(LaneRules, WidthsComeFromBordersThenNeighborsThenAConstant) {
   EXPECT_NEAR(tapered.map.lane_points[2].width_m, 4, 2e-2);
 }
 
-TEST(LaneRules, FaultyLanesAndLinksAreMendedAndCounted) {
+TEST(LaneRules, FaultyLanesAndLinksAreRepairedAndCounted) {
   LoggedScene scene = small_scene();
   scene.lanes.push_back(lane_at(2, 0, 20, 40));
   scene.lanes.push_back({.id = 3, .type = LoggedLaneType::surface, .points = {{1, 1, 0}}});

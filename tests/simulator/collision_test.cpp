@@ -152,7 +152,7 @@ TEST(Collision, ACyclistAtTheRearCornerIsAtFaultAlone) {
 /// A straight road with an obstacle at x = 100, and a car at 20 m/s: 2 m a step, from any start in between.
 struct At20MetresPerSecond : ::testing::Test {
   /// Returns the first event that the car meets on the way from x = 80 to x = 110, or kEventNone.
-  int meets(testing::Stage* stage, float phase_m) {
+  int first_event(testing::Stage* stage, float phase_m) {
     stage->put(0, {80 + phase_m, 0}, 0, 20);
     for (int i = 0; i < 15; ++i) {
       stage->step();
@@ -179,16 +179,16 @@ TEST_F(At20MetresPerSecond, NothingIsPassedUnnoticed) {
   waypoint.set(0, Conditioning::delta_goal_m, 0.5f);
   for (float phase_m = 0; phase_m < 2; phase_m += 0.1f) {
     SCOPED_TRACE(phase_m);
-    EXPECT_EQ(meets(&free_road, phase_m), kEventNone);
+    EXPECT_EQ(first_event(&free_road, phase_m), kEventNone);
     walker.put(1, {100, 0.9f}, kHalfPi, 0);
-    EXPECT_EQ(meets(&walker, phase_m), kEventCollision | kEventAtFault);
-    EXPECT_EQ(meets(&wall, phase_m), kEventWall);
-    EXPECT_EQ(meets(&edge, phase_m), kEventOffRoad);
-    EXPECT_EQ(meets(&light, phase_m), kEventRedLight);
+    EXPECT_EQ(first_event(&walker, phase_m), kEventCollision | kEventAtFault);
+    EXPECT_EQ(first_event(&wall, phase_m), kEventWall);
+    EXPECT_EQ(first_event(&edge, phase_m), kEventOffRoad);
+    EXPECT_EQ(first_event(&light, phase_m), kEventRedLight);
     waypoint.worlds.state.agents.waypoint_x_m[0] = 100;
     waypoint.worlds.state.agents.waypoint_y_m[0] = 0.45f;
     waypoint.worlds.state.agents.next_waypoint[0] = 0;
-    EXPECT_EQ(meets(&waypoint, phase_m), kEventWaypoint);
+    EXPECT_EQ(first_event(&waypoint, phase_m), kEventWaypoint);
   }
 }
 

@@ -34,7 +34,7 @@ Impairment impairment_of_slot(const Simulator& simulator, int slot) {
 }
 
 /// Returns the impairment of a slot's agent if it is active now.
-Impairment shown_of_slot(const Simulator& simulator, int slot) {
+Impairment active_impairment_of_slot(const Simulator& simulator, int slot) {
   const SlotTable& slots = simulator.slots();
   const int32_t world = slots.world_of_slot[slot];
   const Impairment impairment = impairment_of_slot(simulator, slot);
@@ -110,7 +110,7 @@ TEST(Impairment, HidesRoadUsersOrLightsFromListsAndImagesAndNothingElse) {
     // The other observations have no effect here, because the actions are the same.
     ASSERT_TRUE(testing::same_bits(impaired->scene().agents, plain->scene().agents)) << step;
     for (int slot = 0; slot < plain->num_slots(); ++slot) {
-      const Impairment shown = shown_of_slot(*impaired, slot);
+      const Impairment shown = active_impairment_of_slot(*impaired, slot);
       const bool is_present = plain->views()[slot].ego_agent >= 0;
       EXPECT_EQ(impaired->views()[slot].hides, is_present ? hidden_by(shown) : kHidesNothing);
       EXPECT_EQ(plain->views()[slot].hides, kHidesNothing);
@@ -142,7 +142,7 @@ TEST(Impairment, PhantomBrakingEndsAtRestAndNeverTurnsBack) {
   for (int step = 0; step < 300; ++step) {
     std::array<Impairment, kAgents> shown;
     std::array<float, kAgents> speed_mps, accel_mps2;
-    for (int slot = 0; slot < kAgents; ++slot) shown[slot] = shown_of_slot(*simulator, slot);
+    for (int slot = 0; slot < kAgents; ++slot) shown[slot] = active_impairment_of_slot(*simulator, slot);
     std::copy_n(simulator->state().speed_mps, kAgents, speed_mps.begin());
     std::copy_n(simulator->state().accel_long_mps2, kAgents, accel_mps2.begin());
     simulator->step(actions);

@@ -149,7 +149,7 @@ TEST(ObservationQueries, TheSeventeenthComesInUnlessThereIsAGap) {
   EXPECT_NEAR(partner(without, 15)[7] * kScaleSpeed_mps, 17, 1e-4f) << "with its speed";
 }
 
-TEST(ObservationQueries, HidingWhoIsOutOfRangeOrTheAgentItselfChangesNothing) {
+TEST(ObservationQueries, HidingAgentsOutOfRangeOrTheAgentItselfChangesNothing) {
   const auto simulator = queue_of(12, 20);
   const std::vector<int32_t> hidden{box_of_slot(simulator.get(), 8), box_of_slot(simulator.get(), 0)};
   ASSERT_GT(simulator->state().x_m[8] - simulator->state().x_m[0], kPartnerRange_m);

@@ -27,7 +27,7 @@ struct Observation : ::testing::Test {
     for (float x = 120; x > -20; x -= 12) map->building_lines.push_back({{x, -9, 0.5f}, {x - 12, -9, 0.5f}});
     return map;
   }
-  void look() { observe(stage.world(), 0, 1, true, stage.results.observation_view()); }
+  void write_observation() { observe(stage.world(), 0, 1, true, stage.results.observation_view()); }
   /// Returns a point in the ego frame.
   static Vec2 local(float x, float y) {
     const float c = std::cos(0.1f), s = std::sin(0.1f);
@@ -42,7 +42,7 @@ TEST_F(Observation, Ego) {
   agents.steer_rad[0] = 0.22f;
   agents.accel_long_mps2[0] = -2;
   agents.accel_lat_mps2[0] = 1;
-  look();
+  write_observation();
   const float* ego = stage.results.observation_view().ego.data();
   const float expected[kEgoFeatures] = {6 / 20.0f, 4 / 6.0f,   2 / 3.0f,    0.4f,          -0.4f,
                                         1 / 4.0f,  10 / 20.0f, 0.5f / 4.0f, std::cos(0.1f)};
@@ -50,7 +50,7 @@ TEST_F(Observation, Ego) {
 }
 
 TEST_F(Observation, PartnersAreTheNearestInOrder) {
-  look();
+  write_observation();
   const ObservationView out = stage.results.observation_view();
   ASSERT_EQ(out.set_counts[0], kMaxPartners);
   for (int i = 0; i < kMaxPartners; ++i) {
@@ -94,7 +94,7 @@ TEST(ObservationOfParkedCars, IsThatOfPartnersAtRest) {
 
 TEST_F(Observation, AuxiliarySlotsCanBeZero) {
   stage.worlds.setup.options.auxiliary_observations = false;
-  look();
+  write_observation();
   const ObservationView out = stage.results.observation_view();
   EXPECT_EQ(out.ego[7], 0);
   EXPECT_EQ(out.ego[8], 0);
@@ -104,21 +104,21 @@ TEST_F(Observation, AuxiliarySlotsCanBeZero) {
 
 TEST_F(Observation, ControlsAreStopLinesWithStateAndWhetherTheyHoldTheEgo) {
   stage.worlds.state.lights[0] = LightState::red;
-  look();
+  write_observation();
   const ObservationView out = stage.results.observation_view();
   ASSERT_EQ(out.set_counts[3], 1);
   const Vec2 left = local(120, 6), right = local(120, -2);
   const float expected[kControlFeatures] = {left.x / 120, left.y / 120, right.x / 120, right.y / 120, 0, 1, 1};
   for (size_t i = 0; i < kControlFeatures; ++i) EXPECT_NEAR(out.controls[i], expected[i], 1e-5) << i;
   stage.worlds.state.lights[0] = LightState::green;
-  look();
+  write_observation();
   EXPECT_EQ(out.controls[5], -1);
   stage.worlds.state.lights[0] = LightState::yellow;
-  look();
+  write_observation();
   EXPECT_EQ(out.controls[5], 0.5f);
   for (const LightState state : {LightState::off, LightState::unknown}) {
     stage.worlds.state.lights[0] = state;
-    look();
+    write_observation();
     EXPECT_EQ(out.controls[5], 0);
   }
   for (size_t i = kControlFeatures; i < kMaxControls * kControlFeatures; ++i) EXPECT_EQ(out.controls[i], 0);
@@ -136,7 +136,7 @@ TEST_F(Observation, ProductsAreRoundedBeforeTheyAreAdded) {
   for (int i = 0; i < 100; ++i) {
     const auto k = static_cast<float>(i);
     stage.put(0, {100 + 0.1f * k, 0.01f * k}, 0.03f * k, 8);
-    look();
+    write_observation();
     const Vec2 forward{agents.cos_heading[0], agents.sin_heading[0]}, left_of{-forward.y, forward.x};
     const ObservationView out = stage.results.observation_view();
     const Vec2 at{agents.x_m[0], agents.y_m[0]};
@@ -156,7 +156,7 @@ TEST_F(Observation, WaypointsStartWithTheActiveOne) {
     agents.waypoint_z_m[i] = 1;
   }
   agents.next_waypoint[0] = 1;
-  look();
+  write_observation();
   const ObservationView out = stage.results.observation_view();
   for (int i = 0; i < 3; ++i) {
     const int index = std::min(1 + i, 2);
@@ -172,7 +172,7 @@ TEST_F(Observation, ConditioningIsScaledByThePapersRanges) {
   stage.set(0, Conditioning::v_goal_mps, 20);
   stage.set(0, Conditioning::center_bias_m, 0.25f);
   stage.set(0, Conditioning::throttle, 1.25f);
-  look();
+  write_observation();
   const ObservationView out = stage.results.observation_view();
   EXPECT_NEAR(out.conditioning[static_cast<size_t>(Conditioning::delta_goal_m)], 0, 1e-6);
   EXPECT_NEAR(out.conditioning[static_cast<size_t>(Conditioning::v_goal_mps)], 1, 1e-6);
@@ -192,7 +192,7 @@ TEST_F(Observation, EveryCoefficientHasThePapersRange) {
     for (int i = 0; i < kNumConditioning; ++i) {
       stage.set(0, static_cast<Conditioning>(i), lows[i] + share * (highs[i] - lows[i]));
     }
-    look();
+    write_observation();
     const ObservationView out = stage.results.observation_view();
     for (size_t i = 0; i < kNumConditioning; ++i) {
       const bool is_fixed = lows[i] == highs[i];
@@ -201,10 +201,10 @@ TEST_F(Observation, EveryCoefficientHasThePapersRange) {
   }
   // A pedestrian's goal radius is below the range, and must differ from a vehicle's radius of 2 m.
   stage.set(0, Conditioning::delta_goal_m, 0.5f);
-  look();
+  write_observation();
   EXPECT_NEAR(stage.results.observation_view().conditioning[0], -1.3, 1e-6);
   stage.set(0, Conditioning::delta_goal_m, -50);
-  look();
+  write_observation();
   EXPECT_EQ(stage.results.observation_view().conditioning[0], -2);
 }
 
@@ -217,7 +217,7 @@ TEST_F(Observation, LanesBoundariesAndWallsAreAllThatIsInSight) {
     const float heading = random.uniform(-kPi, kPi);
     const Vec2 at{random.uniform(0, 200), random.uniform(-1, 5)};
     stage.put(0, at, heading, 0);
-    look();
+    write_observation();
     const ObservationView out = stage.results.observation_view();
     for (const EntitySet set : {EntitySet::lanes, EntitySet::boundaries, EntitySet::walls}) {
       const bool lanes = set == EntitySet::lanes, walls = set == EntitySet::walls;
@@ -296,7 +296,7 @@ TEST_F(Observation, PiecesAreAtMostTenMetresLong) {
 }
 
 TEST_F(Observation, PiecesOfTheStraightRoad) {
-  look();
+  write_observation();
   const ObservationView out = stage.results.observation_view();
   const auto expect_row = [](Span<const float> rows, Vec2 at, float heading_rad, float extent) {
     const float expected[kLaneFeatures] = {
@@ -316,7 +316,7 @@ TEST_F(Observation, PiecesOfTheStraightRoad) {
 }
 
 TEST_F(Observation, WallsAreTheirPiecesWithTheirHeights) {
-  look();
+  write_observation();
   const ObservationView out = stage.results.observation_view();
   const std::vector<WallFace> walls = make_walls(*stage.worlds.setup.maps[0]->road, {.wall_seed = 0});
   ASSERT_GT(walls.size(), 2u);
@@ -360,7 +360,7 @@ TEST_F(Observation, HaltedAndAbsentAgentsObserveNothingButTheyAreSeen) {
   AgentState& agents = stage.worlds.state.agents;
   agents.status[1] = AgentStatus::halted;
   agents.events[1] = kEventNone;
-  look();
+  write_observation();
   const ObservationView out = stage.results.observation_view();
   EXPECT_NEAR(out.partners[0], local(108.8f, 4).x / 120, 1e-5);
   observe(stage.world(), 1, 2, true, out);

@@ -104,7 +104,7 @@ TEST(OpenRoads, EveryControllerDrives) {
 }
 
 /// Expects that the step in which an agent leaves is valid and truncated, and that the slot's next step is invalid.
-TEST(OpenRoads, LeavingIsTruncatedAndNextStepsAreNobodys) {
+TEST(OpenRoads, LeavingIsTruncatedAndLaterStepsHaveNoAgent) {
   const auto simulator =
       make(testing::cars({.num_threads = 1, .reset_inactive_fraction = 2}), map_of(test::open_street()), {{0, 8, 0}});
   std::vector<uint8_t> left_before(8, 0);
@@ -220,7 +220,7 @@ TEST(OpenRoads, AgentsLeaveSteepRoads) {
   }
 }
 
-TEST(OpenRoads, ExitsOfOtherLevelsHoldNobody) {
+TEST(OpenRoads, ExitsOfOtherLevelsHoldNoAgent) {
   test::RoadText below, above;
   below.right = above.right = test::lane_of(-1, "driving", 3.5);
   above.id = "2";

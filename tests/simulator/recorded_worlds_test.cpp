@@ -143,7 +143,7 @@ TEST(RecordedWorlds, RecordedLightsShowWhatWasRecordedWhereTheyAreAskedFor) {
   EXPECT_GT(changes, 0);
 }
 
-TEST(RecordedWorlds, RedRecordedLightsHoldWhoDrives) {
+TEST(RecordedWorlds, RedRecordedLightsStopDrivenAgents) {
   const auto crosses = [](Simulator& simulator) {
     std::vector<Command> commands = recorded(simulator);
     commands[0] = {.action = kIdleAction};
@@ -293,7 +293,7 @@ Command place(const Scenario& scene, int32_t track, const TrackState& at) {
           .speed_mps = length(at.velocity_mps)};
 }
 
-TEST(RecordedWorlds, WhoArrivesLeavesAndNobodyMeetsIt) {
+TEST(RecordedWorlds, ArrivedAgentsLeaveAndMeetNoAgent) {
   const auto scene = crossing(kNobodyInTheWay);
   const int32_t self = mover(*scene, 40), other = self + 1;
   const auto simulator = world_with(scene, AfterInfraction::halt, /*leave_at_goal=*/true);

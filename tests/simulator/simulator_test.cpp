@@ -101,7 +101,7 @@ TEST(Simulator, RefusesMoreThanFitsBeforeItAllocates) {
   EXPECT_THAT(refuse(testing::cars(), testing::stadium(5000, 1), 500'000), HasSubstr("cells of 25 m in all"));
 }
 
-TEST(Simulator, RefusesAMapThatNobodyCanSpawnOn) {
+TEST(Simulator, RejectsAMapWithoutRoomToSpawn) {
   auto dead_end = testing::ring_road(40);
   for (Lane& lane : dead_end->lanes) lane.is_endless = false;
   EXPECT_THROW(make(testing::cars(), dead_end, {{0, 1, 0}}), Error);
@@ -724,7 +724,7 @@ TEST(Simulator, TotalsHaveEachRewardTermOfLiveAgents) {
   EXPECT_NEAR(terms.total(), totals.reward, 1e-4);
 }
 
-TEST(Simulator, TotalsSayWhenAgentsBeganToMoveAndWhoPassedAWaypoint) {
+TEST(Simulator, TotalsCountFirstMovesAndPassedWaypoints) {
   const auto simulator = make(testing::cars({.episode_steps = 60}), testing::stadium(400, 2), {{0, 10, 0}});
   const AgentStateView state = simulator->state();
   std::vector<int32_t> actions(10, kCoast);
@@ -839,7 +839,7 @@ TEST(Simulator, ParkedCarsStandOffTheRoadAndInTheWay) {
   EXPECT_EQ(simulator->state_hash(), hash);
 }
 
-TEST(Simulator, NobodySpawnsAcrossAStopLine) {
+TEST(Simulator, NoAgentSpawnsAcrossAStopLine) {
   auto map = testing::stadium(200, 1);
   for (const float x_m : {40.0f, 80.0f, 120.0f, 160.0f}) testing::add_light(map.get(), x_m, 4, 1, {0});
   const auto simulator = make(testing::cars(), map, draw_worlds(1, 2000, 4, 4, 1));
@@ -857,7 +857,7 @@ TEST(Simulator, NobodySpawnsAcrossAStopLine) {
   EXPECT_GT(on_straight, 400);
 }
 
-TEST(Simulator, AWorldWithNobodyEndsAfterOneStep) {
+TEST(Simulator, AWorldWithoutAgentsEndsAfterOneStep) {
   SimulatorConfig config = testing::cars();
   config.pedestrian_fraction = 1;  // the map has no walkway
   const auto simulator = make(config, testing::ring_road(40), {{0, 5, 0}});

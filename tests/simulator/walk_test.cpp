@@ -136,7 +136,7 @@ TEST(Walkways, StrollsHaveTheirLengthAndTurnBackAtDeadEnds) {
   }
 }
 
-SimulatorConfig walkers_only() {
+SimulatorConfig pedestrians_only() {
   SimulatorConfig config = testing::cars();
   config.pedestrian_fraction = 1;
   return config;
@@ -145,7 +145,7 @@ SimulatorConfig walkers_only() {
 TEST(Pedestrians, StandAndAimOnWalkwaysAndAreToldOfGoalsAndCollisionsAlone) {
   auto map = street();
   testing::add_crosswalk(map.get(), {{48.5f, -3, 0}, {51.5f, -3, 0}, {51.5f, 3, 0}, {48.5f, 3, 0}});
-  testing::Stage stage(map, 40, walkers_only());
+  testing::Stage stage(map, 40, pedestrians_only());
   const WorldView world = stage.world();
   int on_crosswalk = 0;
   for (int agent = 0; agent < 40; ++agent) {
@@ -213,7 +213,7 @@ TEST(Pedestrians, SpawnAtTheHeightOfTheirWalkwayWithTheirBoxes) {
   std::vector<Vec3> kerb = straight({0, -4}, {200, -4}, 20);  // within reach of the lane, at height 0
   for (Vec3& point : kerb) point.z = 0.5f;
   testing::add_side_lane(map.get(), LaneType::sidewalk, kerb);
-  const auto simulator = make_simulator("cpu", walkers_only(), {map}, {{0, 30, 0}});
+  const auto simulator = make_simulator("cpu", pedestrians_only(), {map}, {{0, 30, 0}});
   const AgentStateView state = simulator->state();
   int present = 0;
   for (size_t i = 0; i < 30; ++i) {
@@ -232,7 +232,7 @@ TEST(Pedestrians, DoNotAimAtPlacesUnderParkedCars) {
     const float x_m = 5 + 10 * static_cast<float>(i);
     map->parking_spaces.push_back({{x_m, i % 2 ? 5.0f : -5.0f, 0}, 0, 5, 2});
   }
-  SimulatorConfig config = walkers_only();
+  SimulatorConfig config = pedestrians_only();
   config.parked_cars = 30;
   const auto simulator = make_simulator("cpu", config, {map}, {{0, 100, 0}});
   ASSERT_GT(simulator->spawn_report().parked_placed, 10);

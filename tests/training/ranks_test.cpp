@@ -137,7 +137,7 @@ TEST_F(LaunchVariables, AreRefusedByName) {
   EXPECT_THAT(refusal({{"MASTER_PORT", "70000"}}), HasSubstr("MASTER_PORT"));
 }
 
-TEST(RanksMeet, OrSayWhoDidNotCome) {
+TEST(RanksMeet, OrReportMissingRanks) {
   const int port = free_port();
   EXPECT_THAT(message_of([&] { Ranks ranks(place(0, 3, port), {.join_s = 0.2}); }),
               AllOf(HasSubstr("2 of 3 ranks did not reach"), HasSubstr(std::to_string(port)), HasSubstr("1, 2")));

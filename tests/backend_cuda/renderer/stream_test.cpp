@@ -193,7 +193,7 @@ TEST_F(CudaStreamTest, RunsOnTheCallersStreamWithoutWaitingOrAllocating) {
 
 // Returns the minimum limit under which the stage's scene can be drawn, from the renderer's error messages.
 std::size_t min_scratch_bytes(int agents, std::size_t num_views, RendererConfig config) {
-  auto told = [](const std::function<void()>& work) -> std::size_t {
+  auto minimum_in_message = [](const std::function<void()>& work) -> std::size_t {
     const std::string message = test::message_of(work), marker = "max_scratch_bytes: expected at least ";
     const std::size_t at = message.find(marker);
     if (at != std::string::npos) return std::stoull(message.substr(at + marker.size()));
@@ -201,8 +201,8 @@ std::size_t min_scratch_bytes(int agents, std::size_t num_views, RendererConfig 
     return 0;
   };
   config.max_scratch_bytes = 0;
-  config.max_scratch_bytes = told([&] { Stage(agents, num_views, config); });
-  return told([&] { Stage(agents, num_views, config).draw(); });
+  config.max_scratch_bytes = minimum_in_message([&] { Stage(agents, num_views, config); });
+  return minimum_in_message([&] { Stage(agents, num_views, config).draw(); });
 }
 
 // Captures reject every call that allocates or waits.

@@ -164,11 +164,11 @@ void step_same(Simulator* cpu, Simulator* cuda, int steps, uint32_t first_step) 
   }
 }
 
-/// Steps both simulators. Compares results at every step, and all public outputs every `look_every` steps.
-void run_same(Simulator* cpu, Simulator* cuda, int steps, int look_every, uint32_t first_step = 0) {
+/// Steps both simulators. Compares results at every step, and all public outputs every `check_every` steps.
+void run_same(Simulator* cpu, Simulator* cuda, int steps, int check_every, uint32_t first_step = 0) {
   expect_same_view(cpu, cuda, 0);
   for (int done = 0; done < steps && !::testing::Test::HasFatalFailure();) {
-    const int stretch = std::min(look_every, steps - done);
+    const int stretch = std::min(check_every, steps - done);
     step_same(cpu, cuda, stretch, first_step + static_cast<uint32_t>(done) + 1);
     if (::testing::Test::HasFatalFailure()) return;
     done += stretch;
@@ -178,10 +178,10 @@ void run_same(Simulator* cpu, Simulator* cuda, int steps, int look_every, uint32
 }
 
 void expect_parity(const SimulatorConfig& config, const Maps& maps, const std::vector<WorldSpec>& worlds, int steps,
-                   int look_every = 100) {
+                   int check_every = 100) {
   const auto cpu = make_simulator("cpu", config, maps, worlds);
   const auto cuda = make_simulator("cuda", config, maps, worlds);
-  run_same(cpu.get(), cuda.get(), steps, look_every);
+  run_same(cpu.get(), cuda.get(), steps, check_every);
   const SpawnReport a = cpu->spawn_report(), b = cuda->spawn_report();
   EXPECT_EQ(a.spawned, b.spawned);
   EXPECT_EQ(a.parked_placed, b.parked_placed);

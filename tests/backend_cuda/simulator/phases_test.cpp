@@ -161,7 +161,7 @@ TEST(Phases, LetCrowdsEnter) {
   expect_same(config, {ramp}, {{0, 600, 0}, {0, 3, 1}}, 60, 18);
 }
 
-TEST(Phases, BeginWorldsThatNobodyFindsAPlaceIn) {
+TEST(Phases, BeginWorldsWithoutRoomForAgents) {
   SimulatorConfig config = testing::cars({.episode_steps = 30});
   config.pedestrian_fraction = 0.9f;  // the map has no walkway
   expect_same(config, {testing::ring_road(40)}, {{0, 2, 0}, {0, 1, 1}, {0, 1, 2}, {0, 30, 3}}, 40, 7);

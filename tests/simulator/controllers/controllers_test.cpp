@@ -184,7 +184,7 @@ TEST(Commands, KinematicStatesHaveEvents) {
   EXPECT_TRUE(second->state().events[0] & kEventWaypoint);
 }
 
-TEST(Commands, TheAbsentLeaveTheirEpisode) {
+TEST(Commands, AbsentAgentsLeaveTheirEpisode) {
   const auto simulator = make(testing::cars({.reset_inactive_fraction = 2}), testing::stadium(200, 2), {{0, 3, 0}});
   std::vector<Command> commands(3);
   commands[1] = absence();
