@@ -24,7 +24,9 @@ void warn_of(const std::vector<std::string>& names, const char* what) {
 
 void print_realism(const RealismReport& report) {
   warn_of(report.faults, "left out");
-  warn_of(report.unused, "rollouts without a scene");
+  std::vector<std::string> unused;
+  for (const std::string& id : report.unused) unused.push_back(fmt::format("scenario '{}'", id));
+  warn_of(unused, "rollouts without a scene");
   int64_t road_users = 0;
   for (const SceneRealism& scene : report.scenes) road_users += scene.scored;
   const RealismVersion& version = realism_version(report.version);

@@ -20,6 +20,8 @@ namespace {
 constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
 constexpr double kRealismStep_s = 0.1, kRealismStepTolerance = 0.01;  // WOMD's steps are of 0.1000 to 0.1002 s
 
+constexpr double kFarthest_m = 1e6;  // from a scene's origin
+
 // nuPlan's bounds of comfort.
 constexpr double kMinAcceleration_mps2 = -4.05, kMaxAcceleration_mps2 = 2.40, kMaxSideways_mps2 = 4.89;
 constexpr double kMaxTurnRate = 0.95, kMaxTurnAcceleration = 1.93, kMaxJerk_mps3 = 4.13;
@@ -251,9 +253,13 @@ std::vector<RealismPose> RealismScene::poses_of(const SceneRollouts& rollouts, s
       const RealismPose pose{static_cast<double>(state.x_m) - origin_m[0], static_cast<double>(state.y_m) - origin_m[1],
                              static_cast<double>(state.z_m) - origin_m[2], static_cast<double>(state.heading_rad),
                              true};
-      PICTURA_CHECK(std::isfinite(pose.x_m + pose.y_m + pose.z_m + pose.heading_rad),
-                    "scene {}: rollout {}: track {}: expected finite numbers, got {}, {}, {}, {} at step {}", id,
-                    rollout, track, state.x_m, state.y_m, state.z_m, state.heading_rad, step);
+      // False for NaN.
+      const bool is_near = std::abs(pose.x_m) + std::abs(pose.y_m) + std::abs(pose.z_m) <= kFarthest_m &&
+                           std::abs(pose.heading_rad) <= kFarthest_m;
+      PICTURA_CHECK(is_near,
+                    "scene {}: rollout {}: track {}: expected finite numbers, within {:g} m of the scene, got {}, {}, "
+                    "{}, {} at step {}",
+                    id, rollout, track, kFarthest_m, state.x_m, state.y_m, state.z_m, state.heading_rad, step);
       poses[found->second * num_poses() + kRealismHistory + step] = pose;
     }
   }
