@@ -50,9 +50,14 @@ struct Build {
   Eigen::Vector3d from_origin(const Eigen::Vector3d& p) const {
     return p - Eigen::Vector3d{map->origin_m[0], map->origin_m[1], map->origin_m[2]};
   }
+  /// Counts work on so many items, so that no file can take minutes.
+  void count_work(std::size_t items) {
+    constexpr std::size_t kItemsPerSample = 8;
+    for (std::size_t i = 0; i < items; i += kItemsPerSample) budget.count_sample();
+  }
   /// The points of a border about the origin.
-  Points points_of(const Border& border) const;
-  Points points_of(int32_t way) const { return points_of(Border{way, false}); }
+  Points points_of(const Border& border);
+  Points points_of(int32_t way) { return points_of(Border{way, false}); }
 
   int32_t first_node(const Border& border) const {
     const std::vector<int32_t>& nodes = file.ways[border.way].nodes;

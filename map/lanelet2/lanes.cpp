@@ -104,7 +104,7 @@ std::optional<LaneType> type_of_subtype(std::string_view subtype) {
 bool is_allowed(const Tags& tags, std::string_view participant) {
   constexpr std::string_view kPrefix = "participant:";
   return std::any_of(tags.begin(), tags.end(), [&](const auto& tag) {
-    if (!tag.first.starts_with(kPrefix) || tags.flag(tag.first) != true) return false;
+    if (!tag.first.starts_with(kPrefix) || flag_of(tag.second) != true) return false;
     const std::string_view who = tag.first.substr(kPrefix.size());
     return participant.starts_with(who) || who.starts_with(participant);
   });
@@ -266,6 +266,7 @@ class LaneBuilder {
     for (const int32_t index : relation.relations("regulatory_element")) {
       const Relation& rule = file_.relations[index];
       if (rule.tags.of("subtype") != "speed_limit" || rule.tags.flag("dynamic") == true) continue;
+      build_.count_work(rule.members.size());
       std::string_view stated = rule.tags.of("sign_type");
       for (const int32_t way : rule.ways("refers")) {
         if (stated.empty()) stated = file_.ways[way].tags.of("subtype");
@@ -375,7 +376,8 @@ class LaneBuilder {
 
 }  // namespace
 
-Points Build::points_of(const Border& border) const {
+Points Build::points_of(const Border& border) {
+  count_work(file.ways[border.way].nodes.size());
   Points points;
   for (const int32_t node : file.ways[border.way].nodes) points.push_back(from_origin(file.nodes[node].position_m));
   if (border.is_reversed) std::reverse(points.begin(), points.end());

@@ -21,6 +21,9 @@
 
 namespace pictura::lanelet2 {
 
+/// What Lanelet2 reads as true and as false; nothing for everything else.
+std::optional<bool> flag_of(std::string_view value);
+
 /// Keys and values, in the file's order. Refers to the document.
 class Tags {
  public:
@@ -28,8 +31,7 @@ class Tags {
   /// The value of the first tag with that key; empty where there is none.
   std::string_view of(std::string_view key) const;
   bool has(std::string_view key) const { return !of(key).empty(); }
-  /// What Lanelet2 reads as true and as false; nothing for everything else.
-  std::optional<bool> flag(std::string_view key) const;
+  std::optional<bool> flag(std::string_view key) const { return flag_of(of(key)); }
   auto begin() const { return tags_.begin(); }
   auto end() const { return tags_.end(); }
 

@@ -216,8 +216,7 @@ std::string_view Tags::of(std::string_view key) const {
   return {};
 }
 
-std::optional<bool> Tags::flag(std::string_view key) const {
-  const std::string_view value = of(key);
+std::optional<bool> flag_of(std::string_view value) {
   for (const std::string_view yes : {"yes", "true", "1"}) {
     if (value == yes) return true;
   }

@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <set>
 #include <string>
 
 #include "pictura/common/scene.h"
@@ -37,8 +38,9 @@ float nearest_share(const RoadMap& map, int32_t lane, Vec3 p) {
   return s_m / map.lanes[lane].length_m;
 }
 
-void add_unique(int32_t value, std::vector<int32_t>* values) {
-  if (std::find(values->begin(), values->end(), value) == values->end()) values->push_back(value);
+void sort_unique(std::vector<int32_t>* values) {
+  std::sort(values->begin(), values->end());
+  values->erase(std::unique(values->begin(), values->end()), values->end());
 }
 
 class RuleBuilder {
@@ -54,9 +56,10 @@ class RuleBuilder {
     for (const Lanelet& lanelet : build_.lanelets) {
       for (const int32_t rule : build_.relation_of(lanelet).relations("regulatory_element")) {
         is_referred_to_[rule] = true;
-        if (lanelet.lane >= 0) add_unique(lanelet.lane, &lanes_of_rule_[rule]);
+        if (lanelet.lane >= 0) lanes_of_rule_[rule].push_back(lanelet.lane);
       }
     }
+    for (std::vector<int32_t>& lanes : lanes_of_rule_) sort_unique(&lanes);
     for (std::size_t i = 0; i < file_.relations.size(); ++i) {
       if (file_.relations[i].tags.of("subtype") == "traffic_light") collect_light(static_cast<int32_t>(i));
     }
@@ -109,8 +112,9 @@ class RuleBuilder {
       approach.relation = index;
       approach.stop_line = lines.empty() ? -1 : lines.front();
     }
-    for (const int32_t head : heads) add_unique(head, &approach.heads);
-    for (const int32_t lane : lanes_of_rule_[index]) add_unique(lane, &approach.tagged);
+    const std::vector<int32_t>& lanes = lanes_of_rule_[index];
+    approach.heads.insert(approach.heads.end(), heads.begin(), heads.end());
+    approach.tagged.insert(approach.tagged.end(), lanes.begin(), lanes.end());
   }
 
   Vec3 center_of(int32_t way) const {
@@ -121,7 +125,9 @@ class RuleBuilder {
   }
 
   /// Tagged lanes lead to the stop line, or begin at it.
-  void find_lanes(Approach* approach) const {
+  void find_lanes(Approach* approach) {
+    sort_unique(&approach->heads);
+    sort_unique(&approach->tagged);
     std::optional<Vec3> stop;
     if (approach->stop_line >= 0) {
       const Points line = build_.points_of(approach->stop_line);
@@ -129,23 +135,24 @@ class RuleBuilder {
     }
     const auto add_driving = [&](IndexRange range, std::vector<int32_t>* lanes) {
       for (const int32_t lane : map_.links(range)) {
-        if (map_.lanes[lane].type == LaneType::driving) add_unique(lane, lanes);
+        if (map_.lanes[lane].type == LaneType::driving) lanes->push_back(lane);
       }
     };
     for (const int32_t index : approach->tagged) {
       const Lane& lane = map_.lanes[index];
+      build_.count_work(static_cast<std::size_t>(lane.points.size()));
       const bool begins_there = stop ? nearest_share(map_, index, *stop) < 0.5f : lane.in_junction;
-      add_unique(index, begins_there ? &approach->connecting : &approach->incoming);
+      (begins_there ? approach->connecting : approach->incoming).push_back(index);
       if (begins_there) add_driving(lane.predecessors, &approach->incoming);
     }
     // What follows a lane that another element of the line calls a lane from the line on is none that leads to it.
+    sort_unique(&approach->incoming);
+    sort_unique(&approach->connecting);
     std::erase_if(approach->incoming, [&](int32_t lane) {
-      return std::find(approach->connecting.begin(), approach->connecting.end(), lane) != approach->connecting.end();
+      return std::binary_search(approach->connecting.begin(), approach->connecting.end(), lane);
     });
-    const std::vector<int32_t> incoming = approach->incoming;
-    for (const int32_t lane : incoming) add_driving(map_.lanes[lane].successors, &approach->connecting);
-    std::sort(approach->incoming.begin(), approach->incoming.end());
-    std::sort(approach->connecting.begin(), approach->connecting.end());
+    for (const int32_t lane : approach->incoming) add_driving(map_.lanes[lane].successors, &approach->connecting);
+    sort_unique(&approach->connecting);
   }
 
   /// Sets the stop line, its left end first, and its heading.
@@ -205,6 +212,7 @@ class RuleBuilder {
   /// The first junction on the ways on from a light, or -1.
   int32_t junction_ahead(const Approach& approach) const {
     std::vector<std::pair<int32_t, float>> ahead;  // lanes, and the way up to their start
+    std::set<int32_t> known(approach.connecting.begin(), approach.connecting.end());
     for (const int32_t lane : approach.connecting) ahead.emplace_back(lane, 0.0f);
     for (std::size_t i = 0; i < ahead.size(); ++i) {
       const auto [index, way_m] = ahead[i];
@@ -213,8 +221,7 @@ class RuleBuilder {
       if (way_m + lane.length_m > kJunctionAhead_m) continue;
       for (const int32_t next : map_.links(lane.successors)) {
         build_.budget.count_sample();
-        const bool is_known = std::any_of(ahead.begin(), ahead.end(), [&](const auto& a) { return a.first == next; });
-        if (!is_known) ahead.emplace_back(next, way_m + lane.length_m);
+        if (known.insert(next).second) ahead.emplace_back(next, way_m + lane.length_m);
       }
     }
     for (const int32_t lane : approach.incoming) {
@@ -246,9 +253,11 @@ class RuleBuilder {
       for (const int32_t way : file_.relations[i].ways("refers")) {
         if (file_.ways[way].tags.of("type") != "traffic_sign") continue;
         std::vector<int32_t>& lanes = lanes_of_sign[way];
-        for (const int32_t lane : lanes_of_rule_[i]) add_unique(lane, &lanes);
+        lanes.insert(lanes.end(), lanes_of_rule_[i].begin(), lanes_of_rule_[i].end());
+        build_.count_work(lanes_of_rule_[i].size());
       }
     }
+    for (auto& [way, lanes] : lanes_of_sign) sort_unique(&lanes);
     for (std::size_t i = 0; i < file_.ways.size(); ++i) {
       const Way& way = file_.ways[i];
       if (way.tags.of("type") != "traffic_sign" || way.nodes.size() < 2) continue;

@@ -65,6 +65,19 @@ TEST(FuzzCorpus, EveryOpenDriveFileIsAMapOrAnError) {
   EXPECT_GT(errors, 15);
 }
 
+TEST(FuzzCorpus, EveryLanelet2FileAndItsMutationsAreMapsOrErrors) {
+  std::mt19937 random(13);
+  int maps = 0, errors = 0, changed_maps = 0;
+  for (const fs::path& path : corpus("lanelet2")) {
+    const std::string bytes = read_file(path.string());
+    (test::fuzz_lanelet2(bytes) ? maps : errors)++;
+    for (int i = 0; i < 100; ++i) changed_maps += test::fuzz_lanelet2(mutated(bytes, &random)) ? 1 : 0;
+  }
+  EXPECT_GE(maps, 6);
+  EXPECT_GE(errors, 5);
+  EXPECT_GT(changed_maps, 100);
+}
+
 /// Worst cases for small files: long, tightly wound and overlapping roads.
 TEST(FuzzCorpus, SmallFilesTakeLittleTime) {
   for (const fs::path& path : corpus("opendrive_slow")) {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "pictura/common/error.h"
+#include "pictura/map/lanelet2/lanelet2.h"
 #include "pictura/map/map_cache.h"
 #include "pictura/map/map_fields.h"
 #include "pictura/map/map_geometry.h"
@@ -52,19 +53,29 @@ std::string edited(std::string payload, std::string_view edits) {
   return payload;
 }
 
-}  // namespace
-
-bool fuzz_opendrive(std::string_view bytes) {
+/// Imports with mends and strictly; whether the latter made a map.
+template <typename Import>
+bool fuzz_import(Import&& import) {
   bool is_map = false;
   for (const bool strict : {false, true}) {
     is_map = false;
     try {
-      exercise(parse_opendrive(bytes, "fuzz.xodr", {.strict = strict}));
+      exercise(import(strict));
       is_map = true;
     } catch (const Error&) {
     }
   }
   return is_map;
+}
+
+}  // namespace
+
+bool fuzz_opendrive(std::string_view bytes) {
+  return fuzz_import([&](bool strict) { return parse_opendrive(bytes, "fuzz.xodr", {.strict = strict}); });
+}
+
+bool fuzz_lanelet2(std::string_view bytes) {
+  return fuzz_import([&](bool strict) { return parse_lanelet2(bytes, "fuzz.osm", {.strict = strict}); });
 }
 
 bool fuzz_map_cache(std::string_view bytes) {

@@ -11,6 +11,9 @@ namespace pictura::test {
 /// exceptions propagate, and a map that the cache does not restore exactly aborts.
 bool fuzz_opendrive(std::string_view bytes);
 
+/// Reads bytes as a Lanelet2 file. Returns whether it is a map.
+bool fuzz_lanelet2(std::string_view bytes);
+
 /// Reads a cached map. The first byte selects the kind of the rest: `f` a whole file, `p` a payload that gets a
 /// matching header, `e` edits of five bytes each (a position and a value) of a valid payload. Returns whether it is a
 /// map.

@@ -15,7 +15,6 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
-#include "pictura/map/lanelet2/osm.h"
 #include "pictura/map/load_map.h"
 #include "pictura/map/map_fields.h"
 #include "pictura/map/open_lanes.h"
@@ -800,9 +799,13 @@ TEST(Lanelet2, HostileFilesGiveAMapOrAnError) {
   EXPECT_EQ(try_import(rings.text()), 1);
   OsmText zigzag = street();
   std::vector<int> nodes;
-  for (int i = 0; i < 20000; ++i) nodes.push_back(i % 2 == 0 ? 1 : 2);
+  for (int i = 0; i < 5000; ++i) nodes.push_back(i % 2 == 0 ? 1 : 2);
   zigzag.way(30, nodes, {{"type", "line_thin"}, {"subtype", "dashed"}});
   EXPECT_EQ(try_import(zigzag.text()), 0);
+  OsmText shared = street();  // by thousands of lanelets
+  shared.way(30, nodes).node(8, 0, -9).node(9, 100, -9).way(31, {8, 9});
+  for (int i = 0; i < 2000; ++i) shared.lanelet(1000 + i, 30, 31);
+  EXPECT_EQ(try_import(shared.text()), 0);
 }
 
 TEST(Lanelet2, EveryKindOfFaultStandsInTheTable) {
