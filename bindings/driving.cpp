@@ -1,5 +1,5 @@
-// Evaluation, probes and saved policies, in the extension beside torch and in the one without. What they take and give
-// are objects of pictura._pictura.
+// Evaluation, probes and saved policies, in the extension with torch and in the one without. Their arguments and
+// results are objects of pictura._pictura.
 #include "pictura/bindings/driving.h"
 
 #include <array>
@@ -374,6 +374,31 @@ class PySession {
   Calls calls_;
 };
 
+py::dict dict_of(const RobustReport& report) {
+  py::list rows;
+  for (const RobustRow& row : report.rows) {
+    py::dict d;
+    d["part"] = row.condition.part;
+    d["name"] = row.condition.name;
+    d["not_driven"] = row.not_driven.empty() ? py::object(py::none()) : py::str(row.not_driven);
+    if (!row.counts.scenarios.empty()) add_row(report.metrics(row), &d);
+    rows.append(d);
+  }
+  py::dict pooled;
+  for (const auto& [part, row] : report.pooled()) {
+    py::dict d;
+    add_row(row, &d);
+    pooled[py::str(part)] = d;
+  }
+  py::dict d;
+  d["rows"] = rows;
+  d["pooled"] = pooled;
+  d["seconds"] = report.seconds;
+  d["agent_steps"] = report.agent_steps;
+  d["policy_hash"] = report.setting.policy_hash;
+  return d;
+}
+
 void bind_evaluation(py::module_& module) {
   def_with_options<EvaluateOptions>(
       &module, {"evaluate", {"checkpoint", "maps"}},
@@ -539,7 +564,7 @@ make_renderer(), with the simulator's geometries. Raises pictura.Error if a geom
 }  // namespace
 
 void bind_driving(py::module_& module) {
-  // Types and exceptions are defined by that extension.
+  // Types and exceptions are that extension's.
   py::module_::import("pictura._pictura");
   bind_evaluation(module);
   bind_probes(module);

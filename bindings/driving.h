@@ -1,11 +1,11 @@
-// What pictura._driving and pictura._training_MAJOR_MINOR have in common.
+// Common part of pictura._driving and pictura._training_MAJOR_MINOR.
 #pragma once
 
 #include <pybind11/pybind11.h>
 
 namespace pictura::python {
 
-/// Adds evaluate(), evaluate_scenes(), the probes and PolicySession.
+/// Adds the evaluations, the probes and PolicySession.
 void bind_driving(pybind11::module_& module);
 
 }  // namespace pictura::python

@@ -94,31 +94,6 @@ Returns a dict: agent_steps, updates, agent_steps_per_s, episode_return, km_driv
 training after the present update, saves, and raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
 }
 
-py::dict dict_of(const RobustReport& report) {
-  py::list rows;
-  for (const RobustRow& row : report.rows) {
-    py::dict d;
-    d["part"] = row.condition.part;
-    d["name"] = row.condition.name;
-    d["not_driven"] = row.not_driven.empty() ? py::object(py::none()) : py::str(row.not_driven);
-    if (!row.counts.scenarios.empty()) add_row(report.metrics(row), &d);
-    rows.append(d);
-  }
-  py::dict pooled;
-  for (const auto& [part, row] : report.pooled()) {
-    py::dict d;
-    add_row(row, &d);
-    pooled[py::str(part)] = d;
-  }
-  py::dict d;
-  d["rows"] = rows;
-  d["pooled"] = pooled;
-  d["seconds"] = report.seconds;
-  d["agent_steps"] = report.agent_steps;
-  d["policy_hash"] = report.setting.policy_hash;
-  return d;
-}
-
 }  // namespace
 
 }  // namespace pictura::python

@@ -1,4 +1,4 @@
-// Of builds without torch: the network computes on the host.
+// Devices in builds without torch, which compute policies on the host.
 #include <cstring>
 
 #include "pictura/common/error.h"

@@ -25,13 +25,13 @@ namespace {
 
 using Numbers = std::vector<float>;
 
-// Memory that a thread keeps from call to call.
+// Returns memory for at least `numbers` floats, kept from call to call.
 float* room(Numbers* memory, int64_t numbers) {
   if (memory->size() < static_cast<size_t>(numbers)) memory->resize(static_cast<size_t>(numbers));
   return memory->data();
 }
 
-/// A linear layer.
+/// Linear layer.
 struct Dense {
   int64_t in = 0, out = 0;
   Numbers weight, bias;  // [in, out]; [out]
@@ -55,7 +55,7 @@ struct Dense {
   }
 };
 
-/// The paper's per-group encoder.
+/// The paper's encoder of a group: two linear layers.
 struct Group {
   Dense hidden, out;
   bool layer_norm = false;
@@ -74,7 +74,7 @@ struct Group {
   }
 };
 
-/// Layer norm of rows, in place. Without weights: of no parameters.
+/// Layer norm of rows, in place; without parameters if `weight` is empty.
 struct Norm {
   Numbers weight, bias;
 
@@ -88,7 +88,7 @@ struct Norm {
   }
 };
 
-/// Takes the parameters of a file by name.
+/// Reads parameters of a file by name.
 class ParameterReader {
  public:
   explicit ParameterReader(const StoredPolicy& saved) : saved_(saved) {}
@@ -113,7 +113,7 @@ class ParameterReader {
     }
     fail("{}: has a different architecture: no parameter '{}'", saved_.path, name);
   }
-  /// Throws Error where the file has parameters that were not taken.
+  /// Throws Error if the file has parameters that were not read.
   void finish() const { check_parameter_count(saved_.path, saved_.parameters, taken_); }
 
   static Numbers transposed(const Numbers& matrix, int64_t rows, int64_t columns) {
@@ -129,7 +129,7 @@ class ParameterReader {
   size_t taken_ = 0;
 };
 
-/// Sets of members: see VectorEncoder.
+/// Encoder of entity sets: see VectorEncoder.
 class SetEncoder {
  public:
   SetEncoder(const Config& config, ParameterReader* read) : width_(config.policy.embedding_width) {
@@ -148,7 +148,7 @@ class SetEncoder {
 
   int64_t width() const { return static_cast<int64_t>(groups_.size()) * width_; }
 
-  /// Of agents [begin, begin + count): to [count, width()].
+  /// Encodes agents [begin, begin + count) to [count, width()].
   void encode(const ObservationView& arrays, int64_t begin, int64_t count, float* to) const {
     Numbers rows, activations, embeddings, largest(static_cast<size_t>(count * width_));
     std::vector<int32_t> which(largest.size()), counts(static_cast<size_t>(count));
@@ -169,7 +169,7 @@ class SetEncoder {
       host::largest_members(its_embeddings, counts.data(), count, width_, largest.data(), which.data());
       for (int64_t i = 0; i < count; ++i) {
         for (int64_t c = 0; c < width_; ++c) {
-          // Adding the bias to all members would change no order.
+          // Adding the bias to every member would not change the maximum.
           to[i * width() + static_cast<int64_t>(g) * width_ + c] =
               largest[i * width_ + c] + (counts[i] > 0 ? group.encoder.out.bias[c] : 0);
         }
@@ -197,7 +197,7 @@ class SetEncoder {
   std::vector<SetGroup> groups_;
 };
 
-/// Convolutions, and attention of learned queries over their output: see PerspectiveEncoder.
+/// Encoder of images: convolutions, and attention of learned queries over their output. See PerspectiveEncoder.
 class ImageEncoder {
  public:
   ImageEncoder(const PolicySection& config, int num_cameras, ParameterReader* read)
@@ -237,7 +237,7 @@ class ImageEncoder {
   int64_t width() const { return 4 * int64_t{config_.embedding_width}; }
   int64_t pooled_width() const { return num_cameras_ * width_; }
 
-  /// Features of all images, [agents, pooled_width()], for encode().
+  /// Returns the features of all images, [agents, pooled_width()], for encode().
   Numbers pool(const HostObservation& observation, int num_threads) {
     const int64_t of_agent = pooled_width();
     Numbers pooled(static_cast<size_t>(observation.agents * of_agent));
@@ -259,13 +259,13 @@ class ImageEncoder {
   void encode(const float* pooled, int64_t count, float* to) const { project_.apply(pooled, count, to); }
 
  private:
-  /// Of a thread.
+  /// Memory of a thread.
   struct Scratch {
     Numbers images, taps, next, scores, sums, attended, hidden;
   };
 
-  // What a query asks of its keys is asked of the tokens, q (W t) = (q W) t; values and output are one product with the
-  // weighted sums of tokens. See PerspectiveEncoder::attend().
+  // Folds the key weights into the queries, q (W t) = (q W) t, and the value weights into the output weights, as
+  // PerspectiveEncoder::attend() does.
   void make_attention(ParameterReader* read) {
     const int64_t heads = config_.attention_heads, of_head = width_ / heads, queries = config_.num_queries;
     const Norm norm = read->norm("attention.query_norm", width_);
@@ -325,7 +325,7 @@ class ImageEncoder {
     return sizes;
   }
 
-  // What is added to the tokens of a feature map, [rows * columns, width_].
+  // Returns the position embedding of each token of a feature map, [rows * columns, width_].
   Numbers positions(int64_t rows, int64_t columns) const {
     Numbers features;
     for (int64_t i = 0; i < rows * columns; ++i) {
@@ -341,7 +341,7 @@ class ImageEncoder {
     return where;
   }
 
-  // pixels: [3, height, width]; to: [width_].
+  // Computes the features of one image. pixels: [3, height, width]; to: [width_].
   void pool_image(const uint8_t* pixels, const HostImageBlock& block, const std::vector<host::ConvolutionSize>& sizes,
                   const Numbers& where, int camera, Scratch* scratch, float* to) const {
     float* x = room(&scratch->images, sizes[0].height * sizes[0].width * sizes[0].channels);
@@ -378,7 +378,7 @@ class ImageEncoder {
     mlp_norm_.apply(pooled, queries, width_);
     float* const hidden = room(&scratch->hidden, queries * mlp_hidden_.out);
     mlp_hidden_.apply_gelu(pooled, queries, hidden);
-    // The last layer is linear: a product with the mean instead of one with every query.
+    // The last layer is linear, so it is applied to the mean over the queries.
     Numbers mean(static_cast<size_t>(mlp_hidden_.out)), added(static_cast<size_t>(width_));
     mean_of_rows(hidden, queries, mlp_hidden_.out, mean.data());
     mlp_out_.apply(mean.data(), 1, added.data());
@@ -445,7 +445,7 @@ struct HostNetwork::Parts {
     read.finish();
   }
 
-  // Ego, and conditioning with waypoints, of agents [begin, begin + count), into columns [at, in_width) of `to`.
+  // Encodes ego, and conditioning with waypoints, of agents [begin, begin + count) to columns [at, in_width) of `to`.
   void encode_own(const ObservationView& arrays, int64_t begin, int64_t count, int64_t at, float* to) const {
     const int64_t ego_width = ego.hidden.in;
     Numbers egos, own;
@@ -471,7 +471,7 @@ struct HostNetwork::Parts {
     }
   }
 
-  // x: [count, in_width]. Returns [count, backbone_width].
+  // Runs the trunk. x: [count, in_width]. Returns [count, backbone_width].
   Numbers run_trunk(Numbers x, int64_t count) const {
     const Norm plain;
     for (size_t i = 0; i < trunk.size(); ++i) {
@@ -485,7 +485,7 @@ struct HostNetwork::Parts {
     return x;
   }
 
-  // Of agents [begin, begin + count). pooled: of ImageEncoder, of all agents.
+  // Computes agents [begin, begin + count). pooled: ImageEncoder::pool() of all agents.
   void forward(const ObservationView& arrays, const Numbers& pooled, int64_t begin, int64_t count, float* logits_out,
                float* values_out) const {
     const int64_t scene_width = images ? images->width() : sets->width();
@@ -504,7 +504,7 @@ struct HostNetwork::Parts {
   }
 
   const Config config;
-  std::unique_ptr<ImageEncoder> images;  // one of the two
+  std::unique_ptr<ImageEncoder> images;  // null for a vector policy, else sets is null
   std::unique_ptr<SetEncoder> sets;
   RowFeatures waypoint_features;
   Group ego, conditioning;
@@ -520,7 +520,7 @@ HostNetwork::~HostNetwork() = default;
 
 void HostNetwork::forward(const HostObservation& observation, int num_threads, float* logits_out,
                           float* values_out) const {
-  constexpr int64_t kAgentsAtOnce = 16;  // activations of few agents stay in a core's cache
+  constexpr int64_t kAgentsAtOnce = 16;  // their activations fit a core's cache
   const Numbers pooled = parts_->images ? parts_->images->pool(observation, num_threads) : Numbers();
   parallel_for(num_threads, (observation.agents + kAgentsAtOnce - 1) / kAgentsAtOnce, [&](int64_t block) {
     const int64_t begin = block * kAgentsAtOnce, count = std::min(kAgentsAtOnce, observation.agents - begin);

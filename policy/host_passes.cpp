@@ -226,8 +226,8 @@ namespace {
 
 constexpr int64_t kColors = 3;
 
-// `planes`: the three colors of an image. Small patches, of kPatch px, have bounds which the compiler knows; 0: of any
-// size.
+// Writes the patches of an image. `planes`: the image's three colors. The compiler knows the loop bounds of patches of
+// kPatch px that lie wholly in the image; 0: of any size.
 template <int64_t kPatch>
 void patches_of_image(const uint8_t* planes, int64_t height, int64_t width, [[maybe_unused]] int64_t patch_px,
                       float* out) {

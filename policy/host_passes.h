@@ -40,9 +40,9 @@ void unfold(const ConvolutionSize& size, const float* images, int64_t n, float* 
 /// Computes the gradient of the images from the gradient of the taps that unfold() gathers.
 void fold(const ConvolutionSize& size, const float* taps_grad, int64_t n, float* images_grad_out);
 
-/// u8 images [views, cameras, 3, height, width] as patches of patch_px^2 pixels: [views, rows,
-/// columns, 3 patch_px^2] of one camera; channel (c * patch_px + y) * patch_px + x is color c, 0 to 255, of pixel (x,
-/// y) of the patch, beyond the image 0. rows, columns: height and width over patch_px, rounded up.
+/// Splits u8 images [views, cameras, 3, height, width] of one camera into patches of patch_px^2 pixels:
+/// [views, rows, columns, 3 patch_px^2]. Channel (c * patch_px + y) * patch_px + x is color c, 0 to 255, of
+/// pixel (x, y) of the patch; pixels beyond the image are 0. rows, columns: height and width over patch_px, rounded up.
 void patches(const uint8_t* images, int64_t views, int64_t cameras, int64_t camera, int64_t height, int64_t width,
              int64_t patch_px, float* out);
 

@@ -1,11 +1,11 @@
-// Registers hold the sums of a few rows and columns while both matrices are read where they lie.
+// Registers hold the sums of a few rows and columns; both matrices are read in place.
 #include "pictura/policy/host_product.h"
 
 namespace pictura::host {
 
 namespace {
 
-// Rows [0, kRows) of the product, columns [0, kVectors * kFloats).
+// Computes rows [0, kRows) and columns [0, kVectors * kFloats) of the product.
 template <int kFloats, int kVectors, int kRows>
 PICTURA_INLINE void some_sums(const ReadMatrix& a, const float* b, int64_t inner, int64_t columns, float* out) {
   using Vector = typename VectorOf<kFloats>::Type;
@@ -24,7 +24,7 @@ PICTURA_INLINE void some_sums(const ReadMatrix& a, const float* b, int64_t inner
   }
 }
 
-// All rows, columns [0, kVectors * kFloats).
+// Computes all rows, columns [0, kVectors * kFloats).
 template <int kFloats, int kVectors>
 PICTURA_INLINE void all_rows(const ReadMatrix& a, const float* b, int64_t rows, int64_t inner, int64_t columns,
                              float* out) {

@@ -1,4 +1,4 @@
-// Sessions whose policy the host computes, without torch.
+// Sessions in which the host computes the policy, without torch.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -18,10 +18,10 @@ namespace pictura {
 
 namespace {
 
-// What is read of some agents' observations, one after the other.
+// Observation arrays of selected agents.
 class GatheredRows {
  public:
-  /// Throws Error naming an array of the configuration's policy that is not one of `batch` agents.
+  /// Throws Error naming an array that the policy reads and whose size is not that of `batch` agents.
   GatheredRows(const Config& config, const ObservationView& all, int64_t batch, Span<const int64_t> indices) {
 #define X(name, type, rows, features, part, comment)                                                           \
   if (config.reads(part)) {                                                                                    \
@@ -38,7 +38,7 @@ class GatheredRows {
 #undef X
   }
 
-  /// Zeroes the auxiliary slots of vectors (see simulator/observation.h), as in a world without them.
+  /// Writes zeros to the auxiliary slots of vectors (see simulator/observation.h), as in a world without them.
   void hide_auxiliary() {
     constexpr size_t kOfEgo = kEgoFeatures - 2, kOfPartner = kPartnerFeatures - 1;
     for (size_t i = 0; i < ego_.size(); ++i) ego_[i] = i % kEgoFeatures < kOfEgo ? ego_[i] : 0;
@@ -76,8 +76,8 @@ struct HostSession final : SessionParts {
   std::unique_ptr<PolicyController> make_controller(Renderer* renderer, bool argmax, uint64_t seed,
                                                     bool hides_auxiliary) const override;
 
-  /// Sets logits and values of the agents of a batch that `indices` name. What comes out for one depends on no other,
-  /// so that PolicyInput::full_chunk changes nothing.
+  /// Writes logits and values of the agents of a batch at `indices`. The result of an agent does not depend on the
+  /// other agents, so PolicyInput::full_chunk has no effect.
   void decide(const PolicyInput& input, int64_t batch, Span<const int64_t> indices, Renderer* renderer,
               float* logits_out, float* values_out) const {
     if (config.reads_images()) check_images(input, static_cast<size_t>(batch), renderer);
@@ -103,13 +103,13 @@ struct HostSession final : SessionParts {
   const std::unique_ptr<PolicyExecutor> executor;
 
  private:
-  // Pixels of the agents' images, to which the blocks point. Agents that are not drawn have black ones.
+  // Returns the pixels of the agents' images, to which the blocks point. Images of agents that are not drawn are black.
   std::vector<uint8_t> draw(const PolicyInput& input, Span<const int64_t> indices, Renderer* renderer,
                             std::vector<HostImageBlock>* blocks_out) const {
     const auto num_views = static_cast<int64_t>(indices.size());
     const ImageLayout layout = image_layout(rig, num_views, PixelFormat::u8);
     std::vector<uint8_t> pixels(layout.bytes());
-    // A block after the other, in each all images of an agent together.
+    // Blocks lie one after the other; within a block, the images of an agent are adjacent.
     std::vector<uint8_t*> begins;
     uint8_t* next = pixels.data();
     for (const BlockLayout& block : layout.blocks) {
@@ -127,7 +127,7 @@ struct HostSession final : SessionParts {
       places.push_back(i);
     }
     if (views.empty()) return pixels;
-    // Drawn without gaps, then moved apart where some are left out, from the last to the first.
+    // Images are drawn without gaps, then moved to their agents from the last to the first.
     std::vector<CameraImages> cameras;
     std::vector<int64_t> num_placed(layout.blocks.size());
     for (const CameraLayout& camera : layout.cameras) {
@@ -184,7 +184,7 @@ class HostController final : public PolicyController {
   int64_t num_driven() const override { return num_driven_; }
 
  private:
-  // Removes the slots whose agents hold their action: as DecisionClock::deciding().
+  // Removes the slots of agents that hold their action. Same rule as DecisionClock::deciding().
   void keep_deciding(const SimulatorArrays& input, std::vector<int64_t>* slots_inout) {
     const int64_t decision_steps = session_.config.policy.decision_steps, step = step_++;
     if (decision_steps == 1) return;

@@ -1,5 +1,5 @@
-// Where a network computes, and arrays in its memory. Without torch headers: torch_device.cpp has what of it is
-// torch's, host_device.cpp what builds without torch have instead, which compute on the host alone.
+// Device of a network, and arrays in its memory. Without torch headers: torch_device.cpp implements these functions
+// with torch, host_device.cpp for builds without torch, which compute on the host.
 #pragma once
 
 #include <memory>
@@ -17,23 +17,24 @@ namespace pictura {
 /// other memory.
 Device open_learning_device(const Config& config, int local_rank = 0);
 
-/// The stream of a device on which the network computes: torch's current one.
+/// Torch's current stream of a device, on which the network computes; null on the host. Autograd enqueues the backward
+/// pass on it too.
 Stream current_stream(Device device);
 
-/// Uninitialised memory of a device, for as long as the pointer lives.
+/// Returns uninitialised memory of a device, which is freed with the pointer.
 std::shared_ptr<std::byte> allocate_bytes(size_t bytes, Device device);
 void set_to_zero(std::byte* memory, size_t bytes, Device device);
-/// Copies on the current stream. A copy to the host has been made when the call returns, and what is copied from there
-/// is needed no more.
+/// Copies on the current stream. Returns when a copy to the host is complete, and when host memory that it reads may be
+/// freed.
 void copy_bytes(std::byte* to, Device to_device, const std::byte* from, Device from_device, size_t bytes);
 
-/// Elements in the memory of a device.
+/// Array in the memory of a device.
 template <typename T>
 class DeviceArray {
   static_assert(std::is_trivially_copyable_v<T>);
 
  public:
-  /// Uninitialised.
+  /// Allocates `size` uninitialised elements.
   DeviceArray(size_t size, Device device) : size_(size), memory_(allocate_bytes(size * sizeof(T), device)) {}
   Span<const T> span() const { return {data(), size_}; }
   Span<T> span() { return {data(), size_}; }
@@ -46,7 +47,7 @@ class DeviceArray {
   std::shared_ptr<std::byte> memory_;
 };
 
-/// A copy of the host's values in the memory of `device`.
+/// Copy of host values in the memory of `device`. The host values may be freed afterwards.
 template <typename T>
 class DeviceCopy : public DeviceArray<T> {
  public:
@@ -56,7 +57,7 @@ class DeviceCopy : public DeviceArray<T> {
   }
 };
 
-/// A copy on the host of an array in the memory of `device`.
+/// Returns a host copy of an array in the memory of `device`.
 template <typename T>
 std::vector<std::remove_const_t<T>> host_copy(Span<T> array, Device device) {
   static_assert(std::is_trivially_copyable_v<T>);

@@ -1,5 +1,5 @@
-// Tensors in the layout of safetensors (https://github.com/huggingface/safetensors), which other tools read: u64
-// length, a JSON header, raw data. Only for the files that write them.
+// Writer of safetensors (https://github.com/huggingface/safetensors), which other tools read: u64 length, a JSON
+// header, raw data.
 #pragma once
 
 #include <bit>
@@ -14,7 +14,7 @@ namespace pictura {
 
 enum class SafeType : uint8_t { f32, bf16, i64 };
 
-/// Name of a type in the header.
+/// Returns the name of a type in the header.
 std::string_view name_of(SafeType type);
 
 struct SafeTensor {
@@ -24,10 +24,10 @@ struct SafeTensor {
   std::string bytes;  // little endian, in row-major order
 };
 
-/// The bytes of a file. metadata: an object of strings.
+/// Returns the bytes of a file. metadata: an object of strings.
 std::string safetensors(const std::vector<SafeTensor>& tensors, const nlohmann::ordered_json& metadata);
 
-/// The nearest bfloat16 of a finite number, of two equally near ones the even.
+/// Returns the nearest bfloat16 of a finite number, ties to even.
 inline uint16_t bf16_of(float value) {
   const auto bits = std::bit_cast<uint32_t>(value);
   return static_cast<uint16_t>((bits + 0x7FFFu + ((bits >> 16) & 1u)) >> 16);

@@ -1,4 +1,4 @@
-// A policy as files hold it (policy/stored_policy.h), with its weights as torch's tensors.
+// Policy in a file (policy/stored_policy.h) with its weights as torch's tensors.
 #pragma once
 
 #include "pictura/policy/policy.h"
@@ -10,17 +10,17 @@ struct SavedPolicy : PolicyFacts {
   std::vector<NamedTensor> parameters;
 };
 
-/// Copies of tensors, and of values on the host in fp32.
+/// Copy stored tensors to torch's tensors in fp32 on the host, and back from any device.
 std::vector<NamedTensor> to_tensors(const std::vector<StoredTensor>& stored);
 std::vector<StoredTensor> to_stored(const std::vector<NamedTensor>& tensors);
 
-/// As the functions of stored_policy.h.
+/// As read_stored_policy(), parse_stored_policy() and write_stored_policy().
 SavedPolicy read_policy(const std::string& path, bool average = false);
 SavedPolicy parse_policy(const std::string& file, const std::string& path, bool average = false);
 void write_policy(const std::string& path, const SavedPolicy& policy, WeightType type, const std::string& commit);
 
-/// Copies `saved`, of the file `path`, into `parameters` in place. Throws Error naming the file and the first tensor
-/// that is missing, of another shape, or not finite.
+/// Copies `saved`, read from the file `path`, into `parameters` in place. Throws Error naming the file and the first
+/// tensor that is missing, of another shape, or not finite.
 void restore_tensors(const std::string& path, const std::vector<NamedTensor>& saved,
                      const std::vector<NamedTensor>& parameters);
 

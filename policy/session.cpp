@@ -44,21 +44,6 @@ Config with_session_options(const Config& trained, const SessionOptions& options
   return config;
 }
 
-Rig chosen_rig(const PolicyFacts& saved, const SessionOptions& options) {
-  const std::optional<Rig> named = named_rig(options);
-  if (!named) return saved.rig;
-  if (!saved.config.reads_images()) fail_usage("{}: its policy reads no images: no rig or size", saved.path);
-  if (options.rig.empty() && !saved.config.render.rig.empty()) {
-    fail_usage("{}: trained with the cameras of {}: expected a rig file with other sizes instead of a size", saved.path,
-               saved.config.render.rig);
-  }
-  const size_t expected = saved.rig.cameras.size();
-  if (named->cameras.size() != expected) {
-    fail_usage("{}: expected {} cameras, as in training, got {}", options.rig, expected, named->cameras.size());
-  }
-  return *named;
-}
-
 std::optional<Rig> named_rig(const SessionOptions& options) {
   const bool has_size = options.width_px != 0 || options.height_px != 0;
   if (has_size && !options.rig.empty()) fail_usage("rig: has its own sizes: expected a rig or a size, got both");
@@ -71,6 +56,21 @@ RendererConfig evaluation_renderer_config(const Config& config, const Rig& rig, 
   RendererConfig result = renderer_config(config, rig, device);
   result.randomization.seed = 0;
   return result;
+}
+
+Rig chosen_rig(const PolicyFacts& saved, const SessionOptions& options) {
+  std::optional<Rig> named = named_rig(options);
+  if (!named) return saved.rig;
+  if (!saved.config.reads_images()) fail_usage("{}: its policy reads no images: no rig or size", saved.path);
+  if (options.rig.empty() && !saved.config.render.rig.empty()) {
+    fail_usage("{}: trained with the cameras of {}: expected a rig file with other sizes instead of a size", saved.path,
+               saved.config.render.rig);
+  }
+  const size_t expected = saved.rig.cameras.size();
+  if (named->cameras.size() != expected) {
+    fail_usage("{}: expected {} cameras, as in training, got {}", options.rig, expected, named->cameras.size());
+  }
+  return *named;
 }
 
 void SessionParts::check_images(const PolicyInput& input, size_t batch, const Renderer* renderer) const {

@@ -50,21 +50,24 @@ std::optional<Rig> named_rig(const SessionOptions& options);
 /// a world.
 RendererConfig evaluation_renderer_config(const Config& config, const Rig& rig, Device device);
 
-/// Session with a policy, which serves one thread at a time.
+/// Session with a policy, which serves one thread at a time. Torch computes the policy if the build has it, else the
+/// host does (policy/host_network.h).
 class PolicySession {
  public:
   /// Opens the policy of a checkpoint, or of safetensors that training or `pictura export` wrote. Throws Error naming
   /// the file if it is neither, truncated, of another observation schema or architecture, or cannot run on this device.
   /// Throws UsageError if it cannot use the cameras of the options.
   explicit PolicySession(const std::string& path, const SessionOptions& options = {});
-  /// The policy of a configuration with cameras of `rig`, as it is when it is asked; it must outlive the session. Its
-  /// cameras are not randomized. Builds without torch lack it.
+  /// Wraps a policy of a configuration with the cameras of `rig`, with the policy's weights at each call; the policy
+  /// must outlive the session. Its cameras are not randomized. Builds without torch lack
+  /// this constructor.
   PolicySession(const Config& config, const Rig& rig, Device device, const Policy& policy);
   /// What an implementation made (policy/session_parts.h).
   explicit PolicySession(std::unique_ptr<SessionParts> parts);
   ~PolicySession();
-  /// The same policy as it is before training, in the same worlds and with the same cameras: weights are drawn from
-  /// `seed` as train draws them, but for those of a backbone's program. Throws Error in builds without torch.
+  /// Returns the same policy before training, in the same worlds and with the same cameras: weights are drawn from
+  /// `seed` as train draws them, except those of a backbone's program. Throws Error in builds without
+  /// torch.
   std::unique_ptr<PolicySession> make_untrained(uint64_t seed) const;
   PolicySession(const PolicySession&) = delete;
   PolicySession& operator=(const PolicySession&) = delete;

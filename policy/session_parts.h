@@ -1,4 +1,4 @@
-// What a PolicySession consists of: the settings of a policy that drives, and what computes.
+// Implementation of PolicySession: its settings, and the interface of what computes the policy.
 #pragma once
 
 #include <memory>
@@ -17,7 +17,7 @@ struct SessionParts {
   SessionParts(const SessionParts&) = delete;
   SessionParts& operator=(const SessionParts&) = delete;
 
-  /// As the functions of PolicySession.
+  /// Implement the functions of PolicySession.
   virtual std::string policy_hash() const = 0;
   virtual std::unique_ptr<SessionParts> untrained(uint64_t seed) const = 0;
   virtual void evaluate(const PolicyInput& input, Renderer* renderer, Span<float> logits_out,
@@ -31,18 +31,18 @@ struct SessionParts {
   const double camera_severity;
 
  protected:
-  /// Throws Error where what a policy with images needs is missing, or not that of a batch.
+  /// Throws Error if a policy with images lacks renderer, scene or views, or if their sizes do not fit the batch.
   void check_images(const PolicyInput& input, size_t batch, const Renderer* renderer) const;
-  /// Throws Error naming the precision where a policy's outputs are not finite.
+  /// Throws Error naming the precision if the policy's outputs are not finite.
   void check_outputs(bool are_finite) const;
 };
 
-/// The cameras that the options ask for, else those of training. No weight depends on sizes or poses. Throws as
+/// Returns the rig of the options, else the rig of training. No weight depends on sizes or poses. Throws as
 /// PolicySession does.
 Rig chosen_rig(const PolicyFacts& saved, const SessionOptions& options);
 
-/// A policy that torch computes; one that the host computes (policy/host_network.h), which throws Error where the
-/// options ask for another device, and where the policy has a program in place of convolutions.
+/// Open a session computed by torch, or by the host (policy/host_network.h). The latter throws Error if the options
+/// name another device, or if a program replaces the convolutions.
 std::unique_ptr<SessionParts> open_torch_session(const std::string& path, const SessionOptions& options);
 std::unique_ptr<SessionParts> open_host_session(const std::string& path, const SessionOptions& options);
 

@@ -1,5 +1,5 @@
-// A policy as files hold it: its weights and what it needs to drive, without the run that made it. Read from a
-// checkpoint or from safetensors (policy/safetensors.h). Without torch.
+// Policy in a file: its weights and everything it needs to drive, without the state of its run. Read from a checkpoint
+// or from safetensors (policy/safetensors.h). Without torch.
 #pragma once
 
 #include <cstdint>
@@ -13,20 +13,20 @@
 
 namespace pictura {
 
-/// A parameter by the name under which it is saved, in row-major order.
+/// Parameter with its name in files, in row-major order.
 struct StoredTensor {
   std::string name;
   std::vector<int64_t> shape;
   std::vector<float> values;
 };
 
-/// What a file says of a policy besides its weights.
+/// Content of a policy file besides the weights.
 struct PolicyFacts {
-  std::string path;  // where it was read from, for messages
+  std::string path;  // source file, for messages
   Config config;
   Rig rig;
-  std::string backbone_hash;  // Policy::backbone_hash; the program itself is in no file of ours
-  int64_t update = 0;         // of its run: updates done
+  std::string backbone_hash;  // Policy::backbone_hash; no file of ours contains the program itself
+  int64_t update = 0;         // of its run: completed updates
   int64_t agent_steps = 0;
   /// Learning-rate factors by parameter, where they are not 1: see Optimizer::rate_factors.
   std::map<std::string, double> rate_factors;
@@ -36,13 +36,13 @@ struct StoredPolicy : PolicyFacts {
   std::vector<StoredTensor> parameters;
 };
 
-/// The policy of a checkpoint, or of safetensors that write_stored_policy wrote. Throws Error naming the file when it
-/// is neither, truncated, damaged, or of another observation schema (naming the entry that differs), and with
-/// `average`, which asks for the average of weights that a checkpoint holds, where it holds none.
+/// Reads the policy of a checkpoint, or of safetensors that write_stored_policy() wrote. With `average` it reads the
+/// average of weights, which a checkpoint may hold. Throws Error naming the file if it is neither, truncated, damaged,
+/// of another observation schema (naming the entry that differs), or holds no average where one is requested.
 StoredPolicy read_stored_policy(const std::string& path, bool average = false);
 /// Returns the bytes of a policy file.
 std::string read_policy_file(const std::string& path);
-/// What they say.
+/// Parses the bytes of a policy file. Arguments and errors as for read_stored_policy().
 StoredPolicy parse_stored_policy(const std::string& file, const std::string& path, bool average = false);
 
 /// Writes safetensors to a temporary file and renames it to `path`. Metadata are text: config (TOML), schema and rig
@@ -55,14 +55,14 @@ void write_stored_policy(const std::string& path, const StoredPolicy& policy, We
 /// choose actions.
 void check_finite(const std::string& path, const std::vector<StoredTensor>& saved);
 
-/// The parameter of that name among `saved`, of the file `path`. Throws Error naming the file and the parameter where
-/// it is missing or of another shape.
+/// Returns the parameter of that name among `saved`, read from the file `path`. Throws Error naming the file and the
+/// parameter if it is missing or of another shape.
 const StoredTensor& find_parameter(const std::string& path, const std::vector<StoredTensor>& saved,
                                    const std::string& name, const std::vector<int64_t>& shape);
-/// Throws Error naming the file where `saved` has not as many parameters as a network expects.
+/// Throws Error naming the file if `saved` has another number of parameters than a network expects.
 void check_parameter_count(const std::string& path, const std::vector<StoredTensor>& saved, size_t expected);
 
-/// Hash of the parameters' bytes in their order: 16 hexadecimal digits.
+/// Returns 16 hexadecimal digits over the parameters' bytes, in their order.
 std::string hash_of_parameters(const std::vector<StoredTensor>& parameters);
 
 }  // namespace pictura

@@ -72,7 +72,7 @@ struct TorchSession final : SessionParts {
   }
 
   const std::unique_ptr<PolicyExecutor> executor;
-  const std::unique_ptr<const Policy> own_policy;  // null where it is another's
+  const std::unique_ptr<const Policy> own_policy;  // null if another object owns the policy
   const Policy& policy;
 
  private:

@@ -21,7 +21,7 @@ size_t first_convolution_among(const std::vector<NamedTensor>& tensors) {
   return static_cast<size_t>(first - tensors.begin());
 }
 
-// A function of stored tensors applied to a tensor.
+// Applies a function of stored tensors to a tensor.
 template <typename F>
 at::Tensor applied(const at::Tensor& tensor, const F& f) {
   const StoredTensor result = f(to_stored({{kFirstConvolution, tensor}}).front());

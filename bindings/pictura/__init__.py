@@ -1,8 +1,8 @@
 """Driving policies that learn by self-play from what a car's cameras see: maps, simulators and renderers for Python.
 
-The package holds the library's objects; environments are in pictura.envs, policies as torch modules in pictura.torch. train needs
-torch. evaluate, the probes and PolicySession use torch if the package was built for the installed torch; otherwise they compute
-policies on the CPU without torch. They are loaded on first use.
+The package holds the library's objects; environments are in pictura.envs, policies as torch modules in pictura.torch.
+train needs torch. evaluate, the probes and PolicySession use torch if the package was built for the installed version,
+else they compute policies on the CPU without it. They are loaded on first use.
 """
 
 import os
@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from pictura._processor import folder_of_extensions
 
-# Threads of torch's loops spin while they wait, for milliseconds unless this limits it (apps/limit_spinning.cpp says why).
-# It is read once, when the first of pictura and torch is imported.
+# Waiting threads of torch's loops spin for milliseconds unless this variable limits it; see apps/limit_spinning.cpp for
+# the reason. The variable is read once, when the first of pictura and torch is imported.
 if "OMP_WAIT_POLICY" not in os.environ:
     os.environ.setdefault("GOMP_SPINCOUNT", "2000")
 
@@ -98,9 +98,12 @@ def make_vec(maps="procedural:3", num_agents: int = 16, **options):
 
 
 def make_vec_for(policy, maps="procedural:3", num_agents: int = 16, **options):
-    """As make_vec, with the world, cameras and observation that a policy was trained with: its file, or what
-    pictura.torch.load_policy() read. options that are given count instead. A policy of decision_steps n expects its actions to be
-    held for n steps. Raises pictura.UsageError for a policy of no file."""
+    """Returns make_vec()'s environment with the world, cameras and observation of a policy's training.
+
+    policy: a file, or the result of pictura.torch.load_policy(). options: replace settings of the policy's training. A
+    policy of decision_steps n expects its actions to be held for n steps.
+    Raises pictura.UsageError for a policy without a file.
+    """
     from pictura.envs.gymnasium_vector import DriveVectorEnv
 
     path = policy if isinstance(policy, (str, os.PathLike)) else getattr(policy, "metadata", {}).get("path")

@@ -8,7 +8,7 @@ from pictura._load_training import torch_folder, usable_torch, why_no_torch
 
 
 def main() -> None:
-    """Becomes the command, with the same arguments: that of the torch that is installed, or the one without torch."""
+    """Replaces this process by the command for the installed torch, else by the one without torch, with its arguments."""
     folder = _load_training.folder() / "bin"
     program = folder / "pictura"
     if minor := usable_torch():

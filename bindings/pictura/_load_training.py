@@ -1,5 +1,5 @@
-"""Chooses what computes: an extension that was built with the minor version of the torch that is installed, or, on the CPU,
-the one without torch. No torch is imported for the choice, which takes a second."""
+"""Chooses the extension that computes policies: one that was built with the minor version of the installed torch, else
+the one without torch, on the CPU. The choice does not import torch, which takes a second."""
 
 import functools
 import importlib
@@ -12,12 +12,12 @@ import pictura
 
 
 def folder() -> pathlib.Path:
-    """Where the extensions and the command are that this processor runs."""
+    """Returns the folder of the extensions and the command for this processor."""
     return pathlib.Path(pictura.__path__[0])
 
 
 def built_torches() -> list[str]:
-    """Minor versions of torch that the package has a pictura._training for, as '2.11', in ascending order."""
+    """Returns the minor versions of torch that the package was built with, as '2.11', in ascending order."""
     names = [
         path.name[: -len(suffix)]
         for suffix in importlib.machinery.EXTENSION_SUFFIXES
@@ -28,14 +28,14 @@ def built_torches() -> list[str]:
 
 
 def torch_folder() -> pathlib.Path | None:
-    """Where torch is installed, or None."""
+    """Returns the folder of the installed torch, or None."""
     spec = importlib.util.find_spec("torch")
-    # A folder of that name is no torch.
+    # A folder of that name is not torch.
     return pathlib.Path(spec.origin).parent if spec and spec.origin else None
 
 
 def installed_torch() -> str | None:
-    """The version of the torch that is installed, as '2.11.0+cu130', or None."""
+    """Returns the version of the installed torch, as '2.11.0+cu130', or None."""
     its_folder = torch_folder()
     if its_folder is None:
         return None
@@ -44,14 +44,14 @@ def installed_torch() -> str | None:
 
 
 def usable_torch() -> str | None:
-    """The minor version of the torch that is installed, where the package was built for it, else None."""
+    """Returns the minor version of the installed torch if the package was built with it, else None."""
     installed = installed_torch()
     minor = ".".join(installed.split(".")[:2]) if installed else None
     return minor if minor in built_torches() else None
 
 
 def why_no_torch() -> str:
-    """What keeps the package from using torch, and the remedy, where usable_torch() is None."""
+    """Returns why the package cannot use torch, and the remedy, if usable_torch() is None."""
     built = built_torches()
     if not built:
         return (
@@ -68,19 +68,19 @@ def why_no_torch() -> str:
 
 @functools.cache
 def _extension():
-    """The extension module; one a process, since both know the same types."""
+    """Returns the extension module. A process loads one, since all register the same types."""
     if minor := usable_torch():
         import torch  # noqa: F401  (with what its own __init__ loads)
 
         return importlib.import_module(f"pictura._training_{minor.replace('.', '_')}")
     try:
         return importlib.import_module("pictura._driving")
-    except ModuleNotFoundError:  # built beside torch, which is not there
+    except ModuleNotFoundError:  # built with torch alone
         raise ImportError(why_no_torch()) from None
 
 
 def load(name: str):
-    """`name` of the extension. Raises ImportError naming what is missing and the remedy."""
+    """Returns `name` of the extension. Raises ImportError naming what is missing and the remedy."""
     if name == "train" and usable_torch() is None:
         raise ImportError(f"pictura.{name}: {why_no_torch()}")
     try:

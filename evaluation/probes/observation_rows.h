@@ -10,7 +10,7 @@
 
 namespace pictura {
 
-/// Of `count` agents, of the parts that a simulator observes: zeros at first.
+/// Observation arrays of `count` agents, zeros at first, for the parts that a simulator observes.
 class ObservationRows {
  public:
   ObservationRows(int64_t count, const SimulatorConfig& config) {
