@@ -1,5 +1,5 @@
-// Scalars for TensorBoard: records of the TFRecord format (length, masked CRC-32C, data, masked CRC-32C), each holding
-// an Event message of TensorFlow's event.proto, encoded by hand.
+// Scalars and configurations for TensorBoard: records of the TFRecord format (length, masked CRC-32C, data, masked
+// CRC-32C), each holding an Event message of TensorFlow's event.proto, encoded by hand.
 #pragma once
 
 #include <fstream>
@@ -14,14 +14,21 @@ namespace pictura {
 
 using Scalars = std::vector<std::pair<std::string, double>>;
 
+/// Keys of a configuration with their values as TOML.
+using Settings = std::vector<std::pair<std::string, std::string>>;
+
 class EventFile {
  public:
   /// Opens folder/events.out.tfevents.<time>.<process>. Throws Error naming the path.
   explicit EventFile(const std::string& folder);
   /// Appends one event and flushes. Throws Error if the disk is full.
   void write(int64_t step, const Scalars& scalars);
+  /// Appends a run's configuration: settings that are no lists as the hyperparameters of TensorBoard's page HParams,
+  /// the whole TOML as a text. Throws Error when the disk is full.
+  void write_configuration(const Settings& settings, const std::string& toml);
 
  private:
+  void write_summary(int64_t step, const std::string& summary);
   void write_record(const std::string& event);
   std::string path_;
   std::ofstream out_;

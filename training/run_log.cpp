@@ -9,6 +9,8 @@
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/numbers.h"
 #include "pictura/configuration/apply_config.h"
+#include "pictura/configuration/config_writer.h"
+#include "pictura/configuration/visit_keys.h"
 
 namespace pictura {
 
@@ -174,6 +176,11 @@ RunLog::RunLog(const std::string& folder, const Config& config, int64_t updates_
       minute_{{0, agent_steps}} {
   if (folder.empty()) return;
   events_.emplace(folder);
+  ConfigWriter writer;
+  visit(config, writer);
+  Settings settings;
+  for (const auto& [key, value] : writer.lines) settings.emplace_back(key.name, value);
+  events_->write_configuration(settings, writer.toml);
   csv_.emplace(folder + "/progress.csv", scalars_of(config, {}, {}), updates_done, on_notice);
   if (config_.train.evaluate_every > 0) {
     EvaluationRecord columns;

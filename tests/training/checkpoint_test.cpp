@@ -24,6 +24,7 @@ namespace {
 
 using test::message_of;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class Folder : public ::testing::Test {
  protected:
@@ -424,6 +425,22 @@ TEST_F(Events, RecordsAreFramedAsTfRecords) {
   // After the time (tag 0x09 and 8 bytes): step 300, then summary { value { tag: "loss" simple_value: 0.5 } }.
   const std::string expected("\x10\xac\x02\x2a\x0d\x0a\x0b\x0a\x04loss\x15\x00\x00\x00\x3f", 18);
   EXPECT_EQ(records[1].substr(9), expected);
+}
+
+TEST_F(Events, HoldTheConfigurationAsHyperparametersAndText) {
+  EventFile events(folder_.path());
+  events.write_configuration(
+      {{"train.gamma", "0.5"}, {"simulator.walls", "true"}, {"run.device", "\"cpu\""}, {"a", "[1]"}},
+      "[train]\ngamma = 0.5\n");
+  const std::string bytes = read_file(std::filesystem::directory_iterator(folder_.path())->path());
+  EXPECT_THAT(bytes, HasSubstr("_hparams_/session_start_info"));
+  // Entries of a map: field 1 the name, field 2 a google.protobuf.Value of a double, a bool, a string.
+  EXPECT_THAT(bytes, HasSubstr(std::string("\x0a\x18\x0a\x0btrain.gamma\x12\x09\x11\0\0\0\0\0\0\xe0\x3f", 26)));
+  EXPECT_THAT(bytes, HasSubstr("\x0a\x15\x0a\x0fsimulator.walls\x12\x02\x20\x01"));
+  EXPECT_THAT(bytes, HasSubstr("\x0a\x13\x0a\x0arun.device\x12\x05\x1a\x03"
+                               "cpu"));
+  EXPECT_THAT(bytes, Not(HasSubstr("[1]")));  // a list
+  EXPECT_THAT(bytes, HasSubstr("    [train]\n    gamma = 0.5\n"));
 }
 
 }  // namespace
