@@ -8,6 +8,7 @@
 #include "pictura/bindings/objects.h"
 #include "pictura/drawing/world.h"
 #include "pictura/map/load_map.h"
+#include "pictura/map/map_copy.h"
 #include "pictura/map/map_fields.h"
 
 namespace pictura::python {
@@ -145,7 +146,15 @@ py::dict facts_of(const MapFacts& facts) {
 }
 
 void bind_maps(py::module_& module) {
-  py::class_<Geometry>(module, "Geometry", "Geometry of a map for renderers: strips on the road, walls, light heads.")
+  py::class_<Geometry>(module, "Geometry", R"(
+Geometry of a map for renderers: strips on the road, walls, light heads.
+
+Examples:
+    >>> pictura.Map.load('procedural:3').geometry(walls=False).num_walls
+    0
+    >>> line = ([[0, 0, 0], [100, 0, 0]], 0.2, (1, 1, 1))     # points in m, width in m, white
+    >>> pictura.Geometry([line], walls=[[0, 5, 0, 50, 5, 0, 3]]).num_walls
+    1)")
       .def(py::init([](const std::vector<std::tuple<py::array_t<float, py::array::c_style | py::array::forcecast>,
                                                     float, std::array<float, 3>>>& lines,
                        const py::array_t<float, py::array::c_style | py::array::forcecast>& walls) {
@@ -190,7 +199,14 @@ Raises pictura.Error for other shapes; renderers reject numbers that are not fin
   py::class_<Map, std::shared_ptr<Map>>(module, "Map", R"(
 Road network: lanes, markings, edges, lights. Immutable; simulators and renderers share it.
 
-Positions are metres in the map's frame, z up; `origin_m` is the frame's origin in the file's coordinates.)")
+Positions are metres in the map's frame, z up; `origin_m` is the frame's origin in the file's coordinates.
+
+Examples:
+    >>> town = pictura.Map.load('procedural:3')                # or 'Town01', 'city:1', 'mytown.xodr'
+    >>> town.name, town.draw(320, 200).shape
+    ('procedural:3', (200, 320, 3))
+    >>> town.arrays()['lane_points'].shape[1]                  # x, y, z, heading, width, arc length
+    6)")
       .def_static(
           "load", load_named_map, py::arg("name"), py::kw_only(), py::arg("strict") = false,
           py::arg("chord_error_m") = OpenDriveOptions{}.chord_error_m,
@@ -241,8 +257,20 @@ light_heads: as for Simulator.)")
         return fmt::format("<pictura.Map {}: {} lanes, {:.1f} km>", self.road()->name, self.road()->lanes.size(),
                            self.road()->facts.driving_lane_km);
       });
-  module.def("map_folder", map_folder, "Returns the folder of towns: $PICTURA_DATA, or the user's data folder.");
-  module.def("known_towns", known_towns, "Returns the names of the towns in the map folder, sorted.");
+  module.def("_expand_map_names", expand_map_names, py::arg("names"),
+             "Returns the names of maps with every range of generated towns, such as 'procedural:1000-1011', in full.");
+  module.def("map_folder", map_folder, R"(
+Returns the folder of towns: $PICTURA_DATA, or the user's data folder.
+
+Examples:
+    >>> isinstance(pictura.map_folder(), str)
+    True)");
+  module.def("known_towns", known_towns, R"(
+Returns the names of the towns in the map folder, sorted.
+
+Examples:
+    >>> pictura.known_towns()      # doctest: +SKIP
+    ['Town01', 'Town02', 'Town03'])");
   py::list types;
   for (int i = 0; i <= static_cast<int>(LaneType::other); ++i) types.append(to_string(static_cast<LaneType>(i)));
   module.attr("LANE_TYPES") = py::tuple(types);

@@ -56,6 +56,7 @@ void bind_names(py::module_& module) {
   events["waypoint"] = static_cast<int>(kEventWaypoint);
   events["metric_goal"] = static_cast<int>(kEventMetricGoal);
   module.attr("EVENTS") = events;
+  module.attr("INFRACTIONS") = kInfractions;
   py::dict event_totals;
 #define X(name, logged, counted) event_totals[#name] = static_cast<int>(counted);
   PICTURA_EVENT_TOTALS(X)

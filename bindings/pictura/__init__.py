@@ -28,6 +28,7 @@ from pictura._pictura import (  # noqa: E402, F401
     EVENTS,
     HAS_CUDA,
     IDLE_ACTION,
+    INFRACTIONS,
     INSERTED_DTYPE,
     LANE_TYPES,
     LIGHT_STATES,
@@ -90,19 +91,76 @@ def __getattr__(name: str):
     return value
 
 
-def make_vec(maps="procedural:3", num_agents: int = 16, **options):
-    """Returns Gymnasium's vector environment of all agents; see pictura.envs.gymnasium_vector.DriveVectorEnv."""
+def make_vec(maps=None, num_agents: int | None = None, *, preset: str | None = None, **options):
+    """Returns Gymnasium's vector environment of all agents: one slot an agent, of one or many worlds.
+
+    Observations are dicts of arrays [slots, ...], actions int [slots] in [0, 12), rewards float32 [slots].
+    docs/reference/environment.md describes all of them, and the infos.
+
+    Args:
+        maps: Names or pictura.Map, one or several, taken in turn by the worlds: "procedural:3", "city:1", "Town01",
+            "mytown.xodr". None: those of the preset, else "procedural:3".
+        num_agents: Agents of each world. None: as the preset draws them, else 16.
+        preset: World, cameras, observation and reward of a configuration: "demo", a task that a CPU learns in minutes;
+            "town", the recipe of the released agents; "paper", the paper's training world. The last two need CARLA's
+            towns, or other maps.
+        options: Those of pictura.envs.gymnasium_vector.DriveVectorEnv (num_worlds, num_envs, autoreset, copy, ...), of
+            pictura.envs.Batch (observation, actions, device, rig, ...) and of pictura.Simulator (episode_steps,
+            conditioning, ...). They count instead of the preset's.
+
+    Returns:
+        pictura.envs.gymnasium_vector.DriveVectorEnv: It is at the start of no episode: call reset() first.
+
+    Raises:
+        pictura.UsageError: Names the option or the preset that there is not, and values that cannot be.
+        pictura.Error: Names file, line and element of a map that cannot be read; or there is no such device.
+
+    Examples:
+        >>> envs = pictura.make_vec("procedural:3", num_agents=16, num_worlds=4)
+        >>> observations, infos = envs.reset(seed=1)
+        >>> observations, rewards, terminated, truncated, infos = envs.step(np.full(envs.num_envs, 7))
+        >>> rewards.shape, observations["ego"].shape
+        ((64,), (64, 9))
+
+        Images of small cameras on the task of `scripts/demo`:
+
+        >>> envs = pictura.make_vec(preset="demo", num_envs=8)
+        >>> observations, infos = envs.reset(seed=1)
+        >>> observations["rgb"].shape
+        (8, 4, 3, 18, 32)
+    """
     from pictura.envs.gymnasium_vector import DriveVectorEnv
 
-    return DriveVectorEnv(maps, num_agents, **options)
+    if preset is None:
+        return DriveVectorEnv("procedural:3" if maps is None else maps, 16 if num_agents is None else num_agents, **options)
+    from pictura.presets import preset_options
+
+    return DriveVectorEnv(**preset_options(preset, maps, num_agents, **options))
 
 
 def make_vec_for(policy, maps="procedural:3", num_agents: int = 16, **options):
-    """Returns make_vec()'s environment with the world, cameras and observation of a policy's training.
+    """Returns make_vec()'s environment with the world, cameras and observation that a policy was trained with.
 
-    policy: a file, or the result of pictura.torch.load_policy(). options: replace settings of the policy's training. A
-    policy of decision_steps n expects its actions to be held for n steps.
-    Raises pictura.UsageError for a policy without a file.
+    A policy of decision_steps n expects its actions to be held for n steps.
+
+    Args:
+        policy: The name of a file, or what pictura.torch.load_policy() read.
+        maps: As in make_vec().
+        num_agents: Agents of each world.
+        options: As in make_vec(); they count instead of the policy's.
+
+    Returns:
+        pictura.envs.gymnasium_vector.DriveVectorEnv: At the start of no episode.
+
+    Raises:
+        pictura.UsageError: The policy is of no file, or there is no such option.
+        pictura.Error: Names the file that cannot be read.
+
+    Examples:
+        >>> envs = pictura.make_vec_for("models/perspective.safetensors", "procedural:3", num_agents=4)
+        >>> observations, infos = envs.reset(seed=1)
+        >>> observations["rgb"].shape
+        (4, 4, 3, 18, 32)
     """
     from pictura.envs.gymnasium_vector import DriveVectorEnv
 

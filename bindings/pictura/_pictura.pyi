@@ -7,7 +7,7 @@ import numpy
 import numpy.dtypes
 import numpy.typing
 import typing
-__all__: list[str] = ['AGENT_FIELDS', 'Array', 'BOX_DTYPE', 'COMMAND_DTYPE', 'CONDITIONING_NAMES', 'Camera', 'Controller', 'EVENTS', 'EVENT_TOTALS', 'Error', 'Geometry', 'HAS_CUDA', 'IDLE_ACTION', 'INSERTED_DTYPE', 'Images', 'LANE_TYPES', 'LIGHT_STATES', 'LINE_TYPES', 'LiveView', 'Map', 'NUM_ACTIONS', 'OBSERVATION_ARRAYS', 'QUERY_DTYPE', 'REALISM_VERSIONS', 'REWARD_TERMS', 'Recorder', 'Renderer', 'Rig', 'Scenario', 'Scene', 'SceneFile', 'SceneRecorder', 'Simulator', 'Snapshot', 'StepResult', 'TRACK_TYPES', 'UsageError', 'VIEW_DTYPE', 'draw_worlds', 'known_towns', 'make_views', 'map_folder', 'renderer_names', 'simulator_names', 'write_gallery']
+__all__: list[str] = ['AGENT_FIELDS', 'Array', 'BOX_DTYPE', 'COMMAND_DTYPE', 'CONDITIONING_NAMES', 'Camera', 'Controller', 'EVENTS', 'EVENT_TOTALS', 'Error', 'Geometry', 'HAS_CUDA', 'IDLE_ACTION', 'INFRACTIONS', 'INSERTED_DTYPE', 'Images', 'LANE_TYPES', 'LIGHT_STATES', 'LINE_TYPES', 'LiveView', 'Map', 'NUM_ACTIONS', 'OBSERVATION_ARRAYS', 'QUERY_DTYPE', 'REWARD_TERMS', 'Recorder', 'Renderer', 'Rig', 'Scenario', 'Scene', 'SceneFile', 'SceneRecorder', 'Simulator', 'Snapshot', 'StepResult', 'TRACK_TYPES', 'UsageError', 'VIEW_DTYPE', 'draw_worlds', 'known_towns', 'make_views', 'map_folder', 'renderer_names', 'simulator_names', 'write_gallery']
 class Error(RuntimeError):
     """
     The work failed; the message names what was expected and what came.
@@ -23,6 +23,14 @@ class Array:
     NumPy accesses it with `numpy.asarray(array)` if it is on the CPU; `numpy.from_dlpack`, `torch.from_dlpack`, JAX and CuPy access
     it on any device. The memory lives as long as any of these references, even after its simulator or renderer is gone. Its
     contents change with the calls that write it.
+    
+    Examples:
+        >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 4)])
+        >>> ego = simulator.observations['ego']
+        >>> ego.shape, ego.dtype, ego.device
+        ((4, 9), 'float32', 'cpu')
+        >>> ego.numpy().base is not None            # a view, not a copy
+        True
     """
     def __array__(self, dtype: typing.Any = None, copy: typing.Any = None) -> typing.Any:
         ...
@@ -80,6 +88,13 @@ class Array:
 class Geometry:
     """
     Geometry of a map for renderers: strips on the road, walls, light heads.
+    
+    Examples:
+        >>> pictura.Map.load('procedural:3').geometry(walls=False).num_walls
+        0
+        >>> line = ([[0, 0, 0], [100, 0, 0]], 0.2, (1, 1, 1))     # points in m, width in m, white
+        >>> pictura.Geometry([line], walls=[[0, 5, 0, 50, 5, 0, 3]]).num_walls
+        1
     """
     def __init__(self, lines: collections.abc.Sequence[tuple[typing.Annotated[numpy.typing.ArrayLike, numpy.float32], typing.SupportsFloat | typing.SupportsIndex, typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]]] = [], walls: typing.Annotated[numpy.typing.ArrayLike, numpy.float32] = ...) -> None:
         """
@@ -111,6 +126,13 @@ class Map:
     Road network: lanes, markings, edges, lights. Immutable; simulators and renderers share it.
     
     Positions are metres in the map's frame, z up; `origin_m` is the frame's origin in the file's coordinates.
+    
+    Examples:
+        >>> town = pictura.Map.load('procedural:3')                # or 'Town01', 'city:1', 'mytown.xodr'
+        >>> town.name, town.draw(320, 200).shape
+        ('procedural:3', (200, 320, 3))
+        >>> town.arrays()['lane_points'].shape[1]                  # x, y, z, heading, width, arc length
+        6
     """
     @staticmethod
     def from_text(text: str, source: str = 'text', *, strict: bool = False) -> Map:
@@ -179,6 +201,13 @@ class Scenario(Map):
     
     A scenario is the map of worlds whose agents are its tracks, in their order, from `start_step` on:
     pictura.Simulator([scene], [(0, scene.num_tracks)], **scene.world()). Commands of kind 3 and the controller 'log' replay it.
+    
+    Examples:
+        >>> scene = pictura.Scenario.load('drive.scenario')            # or FILE.tfrecord#7, FILE.json, a folder
+        >>> simulator = pictura.Simulator([scene], [(0, scene.num_tracks)], **scene.world())
+        >>> simulator.run(pictura.Controller('log', simulator), 10)    # all as recorded
+        >>> scene.tracks()['position_m'].shape == (scene.num_tracks, scene.num_steps, 3)
+        True
     """
     @staticmethod
     def from_arrays(tracks: dict, lanes: dict, *, lines: dict | None = None, edges: dict | None = None, crosswalks: dict | None = None, stop_signs: dict | None = None, lights: dict | None = None, dt_s: typing.SupportsFloat | typing.SupportsIndex = 0.1, current_step: typing.SupportsInt | typing.SupportsIndex | None = None, sdc_track: typing.SupportsInt | typing.SupportsIndex | None = None, id: str = '', origin_m: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"] | None = None, tolerance_m: typing.SupportsFloat | typing.SupportsIndex = 0.01) -> Scenario:
@@ -329,6 +358,14 @@ class SceneRecorder:
     """
     Records the present episode of a world of a simulator on the CPU as a scene: every step from now on, by any function, as long as
     the recorder lives.
+    
+    Examples:
+        >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 8)])
+        >>> recorder = pictura.SceneRecorder(simulator)
+        >>> simulator.run(pictura.Controller('lane', simulator), 30)
+        >>> recorder.scenario(id='my drive', self_agent=0).save('mine.scenario')
+        >>> recorder.num_steps
+        30
     """
     def __init__(self, simulator: typing.Any, *, world: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         """
@@ -353,6 +390,11 @@ class Camera:
     """
     Pinhole camera on a body: x forward, y left, z up, in metres from the rig's origin. Angles are radians: yaw is
     counter-clockwise, positive pitch looks up, positive roll is clockwise as seen from behind.
+    
+    Examples:
+        >>> roof = pictura.Camera('roof', 128, 72, position_m=(1.0, 0.0, 1.6), pitch_rad=-0.1)
+        >>> roof.focal_x_px
+        102.4000015258789
     """
     name: str
     def __getstate__(self) -> tuple[str, int, int, float, float, float, float, float, float, float, float, float, float]:
@@ -430,6 +472,12 @@ class Camera:
 class Rig:
     """
     One or more cameras of any sizes on a body, in the order of images.
+    
+    Examples:
+        >>> [camera.name for camera in pictura.Rig.paper(96, 54).cameras]
+        ['front', 'front_left', 'front_right', 'back']
+        >>> len(pictura.Rig([pictura.Camera('front', 64, 36, position_m=(1.5, 0, 1.4))]))
+        1
     """
     @staticmethod
     def load(path: str) -> Rig:
@@ -460,6 +508,11 @@ class Scene:
     """
     Moving objects: boxes of agents and states of lights, for one or more worlds. A simulator's `scene` follows the simulator; a
     scene of arrays is a copy of the arrays.
+    
+    Examples:
+        >>> car = pictura.Scene(center_m=[[12, 0, 0]], heading_rad=[0], size_m=[[4.4, 1.8, 1.5]], agent_class=[0])
+        >>> car.num_worlds, car.boxes.shape
+        (1, (1, 36))
     """
     def __init__(self, center_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], heading_rad: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], size_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], agent_class: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], *, world_begin: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, geometry: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, light_states: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, light_begin: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None) -> None:
         """
@@ -483,6 +536,17 @@ class Scene:
 class SceneFile:
     """
     Scene of one TOML file: geometry, boxes, rig and views.
+    
+    Examples:
+        >>> text = '''size_px = [96, 54]
+        ... [[view]]
+        ... x_m = 0.0
+        ... y_m = 0.0
+        ... heading_deg = 0.0
+        ... '''
+        >>> _ = pathlib.Path('empty.toml').write_text(text)
+        >>> pictura.SceneFile('empty.toml').view_names
+        ['view0']
     """
     def __init__(self, path: str) -> None:
         """
@@ -516,6 +580,12 @@ class Images:
     """
     Images of views by each camera of a rig, in the renderer's memory, and their planes if requested. A renderer can draw into them
     repeatedly.
+    
+    Examples:
+        >>> renderer = pictura.Renderer('cpu', pictura.Rig.paper(32, 18))
+        >>> images = renderer.make_images(num_views=5)
+        >>> images.rgb.shape, images.camera(0).shape
+        ((5, 4, 3, 18, 32), (5, 3, 18, 32))
     """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
@@ -551,6 +621,15 @@ class Renderer:
     """
     Draws scenes: 'cpu', 'cuda', 'gl' ('gl:egl', 'gl:osmesa'), 'null', or 'auto'. One thread at a time; several renderers are
     independent. On CUDA its work is enqueued on `stream`.
+    
+    Examples:
+        >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 4)])
+        >>> renderer = pictura.Renderer('cpu', pictura.Rig.paper(32, 18))
+        >>> for handle, geometry in simulator.geometries.items():
+        ...     renderer.upload(handle, geometry)
+        >>> images = renderer.render(simulator.scene, simulator.views)
+        >>> images.rgb.numpy().shape                    # views, cameras, channels, height, width
+        (4, 4, 3, 18, 32)
     """
     @staticmethod
     def _of(inside: _RendererInside) -> Renderer:
@@ -618,6 +697,12 @@ class Renderer:
 class StepResult:
     """
     Results of a step, one element per slot, in the simulator's memory; every step overwrites the same arrays.
+    
+    Examples:
+        >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 4)])
+        >>> result = simulator.step(np.full(4, pictura.IDLE_ACTION, np.int32))
+        >>> result.reward.shape, result.reward_terms.shape
+        ((4,), (4, 11))
     """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
@@ -659,6 +744,14 @@ class StepResult:
 class Snapshot:
     """
     State that a simulator keeps in its own memory.
+    
+    Examples:
+        >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 4)])
+        >>> before, snapshot = simulator.state_hash(), simulator.snapshot()
+        >>> simulator.run(pictura.Controller('lane', simulator), 10)
+        >>> simulator.restore(snapshot)
+        >>> simulator.state_hash() == before
+        True
     """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
@@ -672,6 +765,13 @@ class Controller:
     """
     Driver in one simulator on the CPU: 'lane' (the lane keeper), 'idm_lanes' (along lanes, behind others), 'idle' or 'random', in
     worlds of recorded scenes 'log', 'inverse' or 'idm', a policy of a pictura.PolicySession, or several of these.
+    
+    Examples:
+        >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 8)])
+        >>> simulator.run(pictura.Controller('lane', simulator), steps=50)
+        >>> commands = pictura.Controller('idle', simulator).act(simulator)
+        >>> commands['action'].shape
+        (8,)
     """
     @staticmethod
     def _of(inside: _ControllerInside) -> Controller:
@@ -706,19 +806,50 @@ class Simulator:
     
     One thread at a time; several simulators are independent. The GIL is released while C++ works. On CUDA its work is enqueued on
     `stream`, calls return before it is done, and invalid values raise an error in check() or a later call.
+    
+    Examples:
+        >>> town = pictura.Map.load('procedural:3')
+        >>> simulator = pictura.Simulator([town], [(0, 16)] * 4, seed=1)          # four worlds of sixteen agents
+        >>> result = simulator.step(np.full(simulator.num_slots, pictura.IDLE_ACTION, np.int32))
+        >>> result.reward.numpy().shape, simulator.observations['lanes'].numpy().shape
+        ((64,), (64, 80, 7))
     """
     def __init__(self, maps: collections.abc.Sequence[Map], worlds: collections.abc.Sequence, *, executor: str = 'auto', device: str = 'cpu', seed: typing.SupportsInt | typing.SupportsIndex = 0, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, dt_s: typing.SupportsFloat | typing.SupportsIndex = 0.10000000149011612, episode_steps: typing.SupportsInt | typing.SupportsIndex = 1280, reset_inactive_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.4000000059604645, pedestrian_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.10000000149011612, cyclist_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.10000000149011612, parked_cars: typing.SupportsInt | typing.SupportsIndex = 32, light_cycles: str = 'phases', walls: bool = True, wall_seed: typing.SupportsInt | typing.SupportsIndex = 0, light_heads: str = 'as_mapped', wall_observations: bool = False, reset_at_standstill: bool = False, blind: typing.SupportsFloat | typing.SupportsIndex = 0.0, phantom_braking: typing.SupportsFloat | typing.SupportsIndex = 0.0, inattentive: typing.SupportsFloat | typing.SupportsIndex = 0.0, stagger_episodes: bool = False, fixed_lights: bool = False, auxiliary_observations: bool = True, vector_observations: bool = True, conditioning: dict = {}, stream: typing.Any = None) -> None:
         """
-        maps: list of pictura.Map. worlds: list of (index of the map, agents), or (map, agents, global world), which keys the world's
-        random numbers. executor: 'cpu', 'cuda' or 'auto'. device: memory of observations and scenes. num_threads: of the host, 0 for
-        all. reset_inactive_fraction: a world resets when this fraction of its agents is inactive; more than 1: never. stagger_episodes:
-        the first episode of each world ends after a drawn number of steps. light_cycles: 'phases' (the lights of a junction take turns)
-        or 'independent' (each light has its own cycle). reset_at_standstill: accelerations end when the speed changes its sign. blind,
-        phantom_braking, inattentive: shares of impaired agents, drawn per episode, which are never valid. light_heads: 'as_mapped', or
-        'visible': heads beside or before their stop line are moved 10 m beyond it, 3.5 m high. conditioning: a number or (low, high) by
-        name, see CONDITIONING_NAMES; default: the paper's ranges. stream: a cudaStream_t as int; None: the legacy default stream. The
-        other defaults are the paper's training world. Raises pictura.UsageError naming an option that cannot be simulated,
-        pictura.Error if the device does not exist.
+        Simulators of worlds on maps, at the start of their first episodes. Defaults are the paper's training world.
+        
+        Args:
+            maps: Maps of the worlds.
+            worlds: One (index of the map, agents) or (map, agents, global world) a world; the global world keys its random numbers.
+            executor: 'cpu', 'cuda' or 'auto'.
+            device: Memory of observations and scenes: 'cpu', 'cuda' or 'cuda:INDEX'.
+            seed: Seed of all random numbers.
+            num_threads: Threads of the host; 0: all.
+            dt_s: Length of a step in seconds.
+            episode_steps: Steps after which a world's episode ends.
+            reset_inactive_fraction: A world's episode ends when this share of its agents is inactive; more than 1: never.
+            pedestrian_fraction: Share of pedestrians among the agents.
+            cyclist_fraction: Share of cyclists among the agents.
+            parked_cars: Parked cars of each world and episode.
+            light_cycles: 'phases', lights of a junction take turns, or 'independent', each light cycles alone.
+            walls: Whether buildings stand along the roads.
+            wall_seed: Draws the heights of walls.
+            light_heads: 'as_mapped', or 'visible': heads beside or before their stop line stand 10 m beyond it, 3.5 m high.
+            wall_observations: Whether the set `walls` is observed.
+            reset_at_standstill: Accelerations end where the speed changes its sign.
+            blind: Share of agents that see no other road user for some seconds. Impaired agents are drawn per episode and never valid.
+            phantom_braking: Share of agents that brake hard for some seconds.
+            inattentive: Share of agents that see no traffic light.
+            stagger_episodes: The first episode of each world ends after a drawn number of steps.
+            fixed_lights: Lights are green, yellow and red for 10, 3 and 2 s, as in evaluations; else times are drawn per episode.
+            auxiliary_observations: Whether auxiliary slots of observations are filled.
+            vector_observations: Whether the entity sets are observed.
+            conditioning: A number or (low, high) by name of CONDITIONING_NAMES; the paper's ranges otherwise.
+            stream: A cudaStream_t as int; None: the legacy default stream.
+        
+        Raises:
+            pictura.UsageError: Names what cannot be simulated.
+            pictura.Error: There is no such device.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
@@ -907,6 +1038,14 @@ class Recorder:
     """
     Records a world of a simulator on the CPU from now on: every step of the simulator, by any function, as long as the recorder
     lives.
+    
+    Examples:
+        >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 8)])
+        >>> recorder = pictura.Recorder(simulator, follow=0)
+        >>> simulator.run(pictura.Controller('lane', simulator), 50)
+        >>> recorder.write('drive.html')
+        >>> recorder.num_steps
+        50
     """
     def __init__(self, simulator: typing.Any, *, world: typing.SupportsInt | typing.SupportsIndex = 0, follow: typing.SupportsInt | typing.SupportsIndex = -1, rig: Rig | None = None) -> None:
         """
@@ -939,6 +1078,14 @@ class LiveView:
     """
     Page in the browser that shows the only world of a simulator on the CPU while it runs: pause, step, pace, and drive an agent
     with the keyboard. The simulator's steps then wait until they are due: in real time, or at the page's pace.
+    
+    Examples:
+        >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 8)])
+        >>> view = pictura.LiveView(simulator, wait_for_page=False)
+        >>> view.address.startswith('http://')
+        True
+        >>> simulator.run(pictura.Controller('lane', simulator), 3)
+        >>> view.close()
     """
     def __init__(self, simulator: typing.Any, *, port: typing.SupportsInt | typing.SupportsIndex = 0, host_name: str = '', follow: typing.SupportsInt | typing.SupportsIndex = 0, rig: Rig | None = None, wait_for_page: bool = True) -> None:
         """
@@ -967,6 +1114,10 @@ class LiveView:
         """
         Number of connected pages.
         """
+def _expand_map_names(names: collections.abc.Sequence[str]) -> list[str]:
+    """
+    Names of maps with every range of generated towns, as 'procedural:1000-1011', in full.
+    """
 def _hash64(data: bytes) -> int:
     """
     Returns the FNV-1a hash that ends files of the library.
@@ -994,34 +1145,64 @@ def _score_rollouts(path: str, scenes: collections.abc.Sequence[str], version: s
 def draw_worlds(seed: typing.SupportsInt | typing.SupportsIndex, num_slots: typing.SupportsInt | typing.SupportsIndex, min_agents: typing.SupportsInt | typing.SupportsIndex, max_agents: typing.SupportsInt | typing.SupportsIndex, num_maps: typing.SupportsInt | typing.SupportsIndex) -> list[tuple[int, int, int]]:
     """
     Draws worlds of sizes from U{min, max} until they fill the slots; they use the maps in turn.
+    
+    Examples:
+        >>> worlds = pictura.draw_worlds(seed=1, num_slots=100, min_agents=5, max_agents=40, num_maps=2)
+        >>> sum(agents for _, agents, _ in worlds)
+        100
     """
 def known_towns() -> list[str]:
     """
     Returns the names of the towns in the map folder, sorted.
+    
+    Examples:
+        >>> pictura.known_towns()      # doctest: +SKIP
+        ['Town01', 'Town02', 'Town03']
     """
 def make_views(origin_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], heading_rad: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], *, world: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, ego_agent: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, body_length_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32] | None = None) -> numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]:
     """
     Returns poses of a rig, a NumPy array of VIEW_DTYPE [n].
     
     origin_m [n, 3]: origin of the rig, on the ground. heading_rad [n]. world [n]: default: 0. ego_agent [n]: box of the scene that
-    is left out, -1 for none. body_length_m [n]: bodies shorter than 4.5 m move cameras nearer to their origin.
+    is left out, -1 for none. body_length_m [n]: bodies shorter than 4.5 m move cameras nearer to their origin. Raises
+    pictura.Error for other shapes.
+    
+    Examples:
+        >>> pictura.make_views(origin_m=[[0, 0, 0], [5, 0, 0]], heading_rad=[0, 1.5]).shape
+        (2,)
     """
 def map_folder() -> str:
     """
     Returns the folder of towns: $PICTURA_DATA, or the user's data folder.
+    
+    Examples:
+        >>> isinstance(pictura.map_folder(), str)
+        True
     """
 def renderer_names() -> list[str]:
     """
     Returns the renderers of this build.
+    
+    Examples:
+        >>> 'cpu' in pictura.renderer_names()
+        True
     """
 def simulator_names() -> list[str]:
     """
     Returns the executors of this build.
+    
+    Examples:
+        >>> 'cpu' in pictura.simulator_names()
+        True
     """
 def write_gallery(folder: str) -> int:
     """
     Writes FOLDER/index.html over the replays in the folder, worst first, and returns their number. Raises pictura.Error naming a
     page that is no replay.
+    
+    Examples:
+        >>> pictura.write_gallery('replays')            # doctest: +SKIP
+        4
     """
 AGENT_FIELDS: tuple = (('x_m', 'f32', 1, False, 'rear axle, or the centre of a pedestrian'), ('y_m', 'f32', 1, False, ''), ('z_m', 'f32', 1, False, 'height of the road under it'), ('heading_rad', 'f32', 1, False, 'counter-clockwise from x, in [-pi, pi]'), ('cos_heading', 'f32', 1, True, ''), ('sin_heading', 'f32', 1, True, ''), ('speed_mps', 'f32', 1, False, 'signed, along the heading'), ('accel_long_mps2', 'f32', 1, False, ''), ('accel_lat_mps2', 'f32', 1, False, 'positive to the left'), ('steer_rad', 'f32', 1, False, 'front wheel angle, positive to the left'), ('jerk_long_mps3', 'f32', 1, False, 'realised in the last step'), ('jerk_lat_mps3', 'f32', 1, False, ''), ('length_m', 'f32', 1, False, 'of the box'), ('width_m', 'f32', 1, False, ''), ('height_m', 'f32', 1, False, ''), ('lane', 'i32', 1, True, 'current lane, -1 none'), ('lane_offset_m', 'f32', 1, True, 'signed, positive to the left of the centre line'), ('lane_angle_rad', 'f32', 1, True, "heading less the lane's direction, in [-pi, pi]"), ('speed_limit_mps', 'f32', 1, True, 'of the current lane'), ('waypoint_x_m', 'f32', 3, False, 'the goal chain; passed ones stay until the chain is renewed'), ('waypoint_y_m', 'f32', 3, False, ''), ('waypoint_z_m', 'f32', 3, False, ''), ('next_waypoint', 'i32', 1, False, 'index of the active one, in [0, 3)'), ('goal_lane', 'i32', 1, False, 'lane (or piece of a walkway) of the last waypoint, where the next chain starts'), ('goal_lane_s_m', 'f32', 1, False, 'arc length of the last waypoint on it'), ('goal_chains', 'i32', 1, False, 'chains drawn in this episode'), ('goal_x_m', 'f32', 1, False, 'last waypoint that the metric Goals waits for, see rules/step.h'), ('goal_y_m', 'f32', 1, False, ''), ('goal_z_m', 'f32', 1, False, ''), ('goal_open', 'u8', 1, False, '1 while the metric waits for it'), ('conditioning', 'f32', 17, False, 'reward coefficients and dynamics multipliers; see simulator/conditioning.h'), ('agent_class', 'u8', 1, False, 'AgentClass'), ('status', 'u8', 1, False, 'AgentStatus'), ('refusal', 'u8', 1, True, 'SpawnFailure, of an absent agent'), ('halt_reason', 'u8', 1, False, 'Event bits that halted it'), ('events', 'u8', 1, False, 'Event bits of the last step'), ('goals_reached', 'i32', 1, False, 'last waypoints passed within 2 m in this episode'), ('waypoints_reached', 'i32', 1, False, 'waypoints of any kind that paid or passed in this episode'), ('distance_m', 'f32', 1, False, 'sum of |speed| dt in this episode'), ('first_motion_step', 'i32', 1, False, 'first step of this episode above kRest_mps, from 1; 0: none yet'), ('episode_events', 'u8', 1, False, "union of the episode's event bits"), ('episode_return', 'f32', 1, False, 'sum of rewards in this episode'), ('life', 'i32', 1, True, 'lives of this episode that ended before by leaving'), ('life_step', 'i32', 1, True, 'steps of this episode before the life began; counts are of a life'), ('left', 'u8', 1, True, '1: it left in the last step'))
 BOX_DTYPE: numpy.dtypes.VoidDType
@@ -1031,6 +1212,7 @@ EVENTS: dict = {'collision': 1, 'at_fault': 2, 'off_road': 4, 'red_light': 8, 'w
 EVENT_TOTALS: dict = {'goals_reached': 128, 'waypoints_reached': 96, 'collisions': 1, 'at_fault_collisions': 2, 'off_road': 4, 'red_light': 8, 'wall_contacts': 16}
 HAS_CUDA: bool = True
 IDLE_ACTION: int = 7
+INFRACTIONS: int = 29
 INSERTED_DTYPE: numpy.dtypes.VoidDType
 LANE_TYPES: tuple = ('driving', 'bidirectional', 'parking', 'ramp', 'shoulder', 'sidewalk', 'biking', 'median', 'border', 'stop', 'restricted', 'other')
 LIGHT_STATES: tuple = ('none', 'arrow_stop', 'arrow_caution', 'arrow_go', 'stop', 'caution', 'go', 'flashing_stop', 'flashing_caution')

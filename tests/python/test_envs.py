@@ -172,6 +172,38 @@ def test_the_vector_form_is_registered():
     forked.close()
 
 
+def test_presets_are_the_configurations_worlds():
+    envs = pictura.make_vec(preset="demo", seed=1)
+    simulator = envs.batch.simulator
+    assert [town.name for town in simulator.maps] == ["procedural:0"] and simulator.episode_steps == 600
+    assert envs.num_envs == 32 and all(4 <= agents <= 8 for _, agents, _ in simulator.worlds[:-1])
+    seen, _ = envs.reset(seed=1)
+    assert seen["rgb"].shape == (32, 4, 3, 18, 32) and "lanes" not in seen
+    told = dict(zip(pictura.CONDITIONING_NAMES, simulator.state["conditioning"].numpy().T))
+    assert (told["velocity"] == 0.5).all() and (told["steer"] == 0.5).all() and (told["timestep"] == np.float32(2.5e-5)).all()
+    # Arguments count instead of the preset's.
+    own = pictura.make_vec("procedural:3", 5, preset="demo", num_worlds=2, observation="vector", conditioning={"collision": 2}, episode_steps=50)
+    told = dict(zip(pictura.CONDITIONING_NAMES, own.batch.simulator.state["conditioning"].numpy().T))
+    assert (told["collision"] == 2).all() and (told["velocity"] == 0.5).all()
+    assert own.num_envs == 10 and own.batch.simulator.episode_steps == 50 and "lanes" in own.reset(seed=1)[0]
+
+
+@pytest.mark.parametrize("preset", ["town", "paper"])
+def test_presets_of_whole_towns_take_other_maps(preset):
+    envs = pictura.make_vec(["procedural:1", "procedural:2"], preset=preset, num_envs=40, seed=3)
+    seen, _ = envs.reset(seed=1)
+    size = {"town": (18, 32), "paper": (54, 96)}[preset]
+    assert seen["rgb"].shape == (40, 4, 3, *size) and len(envs.batch.simulator.maps) <= 2
+    assert envs.batch.simulator.episode_steps == {"town": 3000, "paper": 1280}[preset]
+
+
+def test_ranges_of_presets_are_expanded():
+    from pictura.presets import preset_options
+
+    options = preset_options("town", num_agents=4, num_worlds=1)
+    assert options["maps"][0] == "Town01" and options["maps"][-12:] == [f"procedural:{seed}" for seed in range(1000, 1012)]
+
+
 def test_wrong_options_are_named():
     for options, name in (
         ({"observation": "smells"}, "observation"),
@@ -180,7 +212,8 @@ def test_wrong_options_are_named():
         ({"array": "jax"}, "array"),
         ({"num_envs": 7, "num_agents": 4}, "num_envs"),
         ({"maps": []}, "maps"),
-        ({"maps": None}, "maps"),
+        ({"maps": 3}, "maps"),
+        ({"preset": "cars"}, "preset: expected one of demo, town, paper; got 'cars'"),
     ):
         with pytest.raises(pictura.UsageError, match=name):
             pictura.make_vec(**({"maps": "procedural:3"} | options))

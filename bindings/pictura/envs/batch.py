@@ -18,7 +18,10 @@ OBSERVATIONS = ("vector", "flat", "images", "both")
 ACTIONS = ("discrete", "multi_discrete")
 # Arrays of the vector observation, in the order of "flat".
 VECTOR_KEYS = ("ego", "partners", "lanes", "boundaries", "controls", "walls", "conditioning", "waypoints")
-NUM_LONGITUDINAL, NUM_LATERAL = 4, 3
+# Jerks in m/s^3 of action 3 i + k, or (i, k): LONGITUDINAL_JERKS_MPS3[i] and LATERAL_JERKS_MPS3[k], left positive. A test
+# measures that the simulator's are the same.
+LONGITUDINAL_JERKS_MPS3, LATERAL_JERKS_MPS3 = (-15.0, -4.0, 0.0, 4.0), (-4.0, 0.0, 4.0)
+NUM_LONGITUDINAL, NUM_LATERAL = len(LONGITUDINAL_JERKS_MPS3), len(LATERAL_JERKS_MPS3)
 STATUS_ACTIVE = 0
 # "human": a page in the browser, from the first reset on.
 RENDER_MODES = ["rgb_array", "human"]
@@ -48,12 +51,33 @@ def refuse_unknown(options: Mapping[str, Any], *makers: Callable[..., Any]) -> N
 class Batch:
     """Simulator whose slots are agents to be trained, with images if they are observed.
 
-    maps: names or pictura.Map, which the worlds use in turn. num_agents: of each world. observation: "vector" (a dict
-    of entity sets), "flat" (the same numbers as one float32 [slots, n]), "images" (uint8 rgb with ego, conditioning and
-    waypoints), or "both". actions: "discrete", 12 of them, or "multi_discrete", [longitudinal 4, lateral 3]. array:
-    "numpy", or "torch" for tensors over the simulator's memory; CUDA devices support "torch" only. rig: of the images;
-    default: the paper's. Other options are those of pictura.Simulator. Raises pictura.UsageError for values that do not
-    exist.
+    Args:
+        maps: Names or pictura.Map, one or several, taken in turn by the worlds.
+        num_agents: Agents of each world.
+        num_worlds: Independent copies of the simulation.
+        worlds: (index of the map, agents, global world) of each world, as pictura.draw_worlds() draws them, in place of
+            num_agents and num_worlds.
+        observation: "vector", a dict of entity sets; "flat", the same as one float32 [slots, n]; "images", uint8 rgb
+            with ego, conditioning and waypoints; or "both".
+        actions: "discrete", Discrete(12), or "multi_discrete", MultiDiscrete([longitudinal 4, lateral 3]).
+        seed: Seed of all random numbers until the first reset with another one.
+        device: "cpu", "cuda" or "cuda:INDEX".
+        array: "numpy", or "torch" for tensors over the simulator's memory; None: "numpy" on the CPU, "torch" on CUDA.
+        rig: Cameras of the images; None: the paper's four of 96x54 px.
+        renderer: "auto", or one of pictura.renderer_names().
+        num_threads: Threads of the host; 0: all.
+        options: Others of pictura.Simulator, as episode_steps, parked_cars or conditioning.
+
+    Raises:
+        pictura.UsageError: Names the option that there is not, or the value that it cannot have.
+
+    Examples:
+        >>> from pictura.envs import Batch
+        >>> batch = Batch("procedural:3", num_agents=8, num_worlds=2)
+        >>> batch.reset(seed=1)
+        >>> results = batch.step(np.full(16, pictura.IDLE_ACTION))
+        >>> results["reward"].shape, batch.observe()["ego"].shape
+        ((16,), (16, 9))
     """
 
     def __init__(
@@ -62,6 +86,7 @@ class Batch:
         num_agents: int = 16,
         num_worlds: int = 1,
         *,
+        worlds: Sequence[tuple[int, int, int]] | None = None,
         observation: str = "vector",
         actions: str = "discrete",
         seed: int = 0,
@@ -86,16 +111,18 @@ class Batch:
         if observation == "images":
             options.setdefault("vector_observations", False)
         self.observation, self.actions, self.array = observation, actions, array
+        if worlds is None:
+            worlds = [(world % len(loaded), num_agents, world) for world in range(num_worlds)]
         self.simulator = pictura.Simulator(
             loaded,
-            [(world % len(loaded), num_agents, world) for world in range(num_worlds)],
+            worlds,
             device=device,
             seed=seed,
             num_threads=num_threads,
             **options,
         )
         self.num_slots = self.simulator.num_slots
-        self.num_worlds, self.num_agents = num_worlds, num_agents
+        self.num_worlds, self.num_agents = len(worlds), num_agents
         self.live: pictura.LiveView | None = None
         self.renderer, self._images = None, None
         if observation in ("images", "both"):
@@ -216,8 +243,8 @@ class Batch:
         return self._state["status"] == STATUS_ACTIVE
 
     def info(self, copy: bool = True) -> dict[str, Any]:
-        """Returns the infos of every slot after a step, by name; docs/reference/python.md lists them. They are views of
-        the simulator's memory unless copied, except "active"."""
+        """Returns the infos of every slot after a step, by name; docs/reference/environment.md lists them. They are
+        views of the simulator's memory unless copied, except "active"."""
         results = self._result_views
         names = ("events", "halt_reason", "goals_reached", "waypoints_reached", "episode_return", "agent_class")
         info = {name: self._state[name] for name in names}

@@ -15,19 +15,36 @@ from pictura.envs.gymnasium_spaces import action_space, observation_space
 
 
 class DriveVectorEnv(gymnasium.vector.VectorEnv):
-    """All agents of all worlds.
+    """All agents of all worlds: the axis of environments is that of agents, "slots".
 
-    A slot whose agent has halted reports `terminated` once, then reward 0 and info["active"] false until its world resets:
-    agents of a world begin together. On roads that end a slot whose agent leaves reports `truncated` with that agent's last
-    observation, and waits, not active, until another agent enters.
+    A slot whose agent has halted reports `terminated` once, then reward 0 and info["active"] false until its world
+    resets: agents of a world begin together. On roads that end, a slot whose agent leaves reports `truncated` with that
+    agent's last observation, and waits, not active, until another agent enters. Learn from the transitions where
+    info["valid"] is true. docs/reference/environment.md describes observations, actions, rewards, ends and infos.
 
-    autoreset: with "next_step" the step after a world's end begins its next episode; its rewards are 0. With
-    "same_step" the step that ends an episode begins the next, and info["final_obs"] and info["final_info"] hold the
-    last observations and infos of the slots that ended in that step.
+    Args:
+        maps: Names or pictura.Map, one or several, taken in turn by the worlds.
+        num_agents: Agents of each world.
+        num_worlds: Independent copies of the simulation.
+        num_envs: Slots that there must be, a multiple of num_agents, in place of num_worlds.
+        autoreset: "next_step": the step after a world's end begins its next episode, with rewards of 0. "same_step":
+            the step that ends an episode begins the next one, and info["final_obs"] and info["final_info"] have, for
+            the slots that ended in that step, what was last observed.
+        render_mode: None or "rgb_array", the first world from above.
+        copy: Whether calls return copies. Without, they return views that the next step overwrites.
+        options: Those of pictura.envs.Batch, and through it of pictura.Simulator.
 
-    num_envs: the required number of slots; default: num_agents times num_worlds. copy: whether calls return copies;
-    otherwise they return views that the next step overwrites. Other options are those of pictura.envs.Batch. On CUDA
-    all arrays are torch tensors in device memory.
+    Raises:
+        pictura.UsageError: Names the option that there is not, or the value that it cannot have.
+        gymnasium.error.ResetNeeded: step() before the first reset().
+
+    Examples:
+        >>> from pictura.envs.gymnasium_vector import DriveVectorEnv
+        >>> envs = DriveVectorEnv("procedural:3", num_agents=8, num_worlds=2)
+        >>> observations, infos = envs.reset(seed=1)
+        >>> observations, rewards, terminated, truncated, infos = envs.step(np.full(envs.num_envs, 7))
+        >>> rewards.shape, observations["lanes"].shape, infos["valid"].dtype
+        ((16,), (16, 80, 7), dtype('bool'))
     """
 
     def __init__(
@@ -48,7 +65,7 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
             raise pictura.UsageError(f"autoreset: expected one of {', '.join(modes)}; got '{autoreset}'")
         if render_mode not in (None, "rgb_array"):
             raise pictura.UsageError(f"render_mode: expected None or 'rgb_array', got '{render_mode}'")
-        if num_envs is not None and num_envs != num_agents * num_worlds:
+        if num_envs is not None and options.get("worlds") is None and num_envs != num_agents * num_worlds:
             num_worlds, rest = divmod(num_envs, num_agents)
             if rest or num_worlds < 1:
                 raise pictura.UsageError(f"num_envs: expected a multiple of num_agents {num_agents}, got {num_envs}")
@@ -67,12 +84,17 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
         self._has_begun = False
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Starts new episodes in all worlds: of `seed`, or of the next one that this environment draws. Returns
+        (observations, infos)."""
         super().reset(seed=seed)
         self._has_begun = True
         self.batch.reset(self._next_seed())
         return self.batch.observe(self._copy), self._info(self._copy)
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+        """Advances every world by one step. actions: int [slots] in [0, 12), or [slots, 2] with "multi_discrete"; those
+        of slots that are not active are ignored. Returns (observations, rewards float32 [slots], terminated bool
+        [slots], truncated bool [slots], infos). Raises pictura.Error for other shapes and numbers."""
         if not self._has_begun:
             raise gymnasium.error.ResetNeeded("step: expected reset() before the first step")
         batch = self.batch
@@ -108,8 +130,18 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
 class AgentStatistics(gymnasium.vector.VectorWrapper):
     """Counts the agents' events like the simulator's totals: `statistics`, a dict of numbers since construction.
 
-    Steps of halted agents are not counted. Counts equal those of pictura.Simulator.totals(); sums equal them up to
-    rounding.
+    Steps of halted agents are not counted. Counts equal pictura.Simulator.totals(); sums equal them up to rounding.
+
+    Args:
+        env: Whose steps are counted.
+
+    Examples:
+        >>> from pictura.envs.gymnasium_vector import AgentStatistics
+        >>> envs = AgentStatistics(pictura.make_vec("procedural:3", num_agents=8))
+        >>> _ = envs.reset(seed=1)
+        >>> _ = envs.step(np.full(8, 7))
+        >>> envs.statistics["agent_steps"]
+        8
     """
 
     def __init__(self, env: DriveVectorEnv) -> None:
@@ -130,9 +162,3 @@ class AgentStatistics(gymnasium.vector.VectorWrapper):
         count["distance_m"] += float(info["distance_m"].sum())
         count["finished_return"] += float(info["episode_return"][ended].sum())
         return observation, reward, terminated, truncated, info
-
-
-def make_vec(maps: Any = "procedural:3", num_agents: int = 16, **options: Any) -> DriveVectorEnv:
-    """Returns a vector environment of all agents: pictura.make_vec("procedural:3", num_agents=16, num_worlds=64,
-    device="cuda")."""
-    return DriveVectorEnv(maps, num_agents, **options)

@@ -1,0 +1,76 @@
+"""Worlds of the configurations that `pictura train` takes, as arguments of environments."""
+
+from __future__ import annotations
+
+import pathlib
+import tomllib
+from typing import Any
+
+import pictura
+
+# Configurations by the names of presets; they lie beside this file.
+PRESETS = {"demo": "demo.toml", "town": "agent.toml", "paper": "paper.toml"}
+# Keys of [simulator] that say which worlds there are, and who else drives: not of one simulator.
+_OF_THE_RUN = ("backend", "maps", "map_copies", "num_slots", "min_agents", "max_agents")
+
+
+def preset_config(preset: str) -> dict[str, Any]:
+    """The configuration of a preset, by tables. docs/reference/configuration.md has its keys.
+
+    Args:
+        preset: "demo", "town" or "paper".
+
+    Raises:
+        pictura.UsageError: There is no such preset.
+
+    Examples:
+        >>> from pictura.presets import preset_config
+        >>> preset_config("demo")["render"]
+        {'width_px': 32, 'height_px': 18}
+    """
+    if preset not in PRESETS:
+        raise pictura.UsageError(f"preset: expected one of {', '.join(PRESETS)}; got '{preset}'")
+    with (pathlib.Path(__file__).parent / "configs" / PRESETS[preset]).open("rb") as file:
+        return tomllib.load(file)
+
+
+def preset_options(preset: str, maps: Any = None, num_agents: int | None = None, **given: Any) -> dict[str, Any]:
+    """Arguments of pictura.envs.gymnasium_vector.DriveVectorEnv for the world, cameras and observation of a preset.
+
+    Args:
+        preset: "demo", "town" or "paper".
+        maps: In place of the preset's.
+        num_agents: Of each world, in place of numbers that are drawn.
+        given: Other arguments, in place of the preset's; of `conditioning` those that are named. num_envs: slots in
+            place of the preset's.
+
+    Raises:
+        pictura.UsageError: There is no such preset.
+
+    Examples:
+        >>> from pictura.presets import preset_options
+        >>> preset_options("demo", episode_steps=100)["episode_steps"]
+        100
+    """
+    config = preset_config(preset)
+    simulator, render = config["simulator"], config.get("render", {})
+    options = {name: value for name, value in simulator.items() if name not in _OF_THE_RUN and not isinstance(value, dict)}
+    options |= simulator.get("dynamics", {})
+    options |= {name: value for name, value in simulator.get("others", {}).items() if name != "policies"}
+    options["stagger_episodes"] = config.get("train", {}).get("stagger_episodes", False)
+    conditioning = {name: tuple(ends) for name, ends in simulator.get("conditioning", {}).items()}
+    options["conditioning"] = conditioning | given.pop("conditioning", {})
+    options["maps"] = maps = maps or pictura._pictura._expand_map_names(simulator["maps"])
+    if config.get("policy", {}).get("modality", "perspective") == "perspective":
+        options["observation"] = "images"
+        if given.get("observation", "images") in ("images", "both"):
+            options["rig"] = pictura.Rig.paper(render["width_px"], render["height_px"])
+    if num_agents is None and "num_worlds" not in given:
+        maps = [maps] if isinstance(maps, (str, pictura.Map)) else list(maps)
+        num_slots = given.pop("num_envs", None) or simulator["num_slots"]
+        ends = simulator["min_agents"], simulator["max_agents"]
+        options["worlds"] = pictura.draw_worlds(given.get("seed", 0), num_slots, *ends, len(maps))
+        options["maps"] = maps[: len(options["worlds"])]  # taken in turn: the others have no world
+    else:
+        options["num_agents"] = num_agents or simulator["max_agents"]
+    return options | given
