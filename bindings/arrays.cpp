@@ -398,7 +398,15 @@ Array in the library's memory, lent without a copy.
 
 NumPy accesses it with `numpy.asarray(array)` if it is on the CPU; `numpy.from_dlpack`, `torch.from_dlpack`, JAX and CuPy access
 it on any device. The memory lives as long as any of these references, even after its simulator or renderer is gone. Its
-contents change with the calls that write it.)")
+contents change with the calls that write it.
+
+Examples:
+    >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 4)])
+    >>> ego = simulator.observations['ego']
+    >>> ego.shape, ego.dtype, ego.device
+    ((4, 9), 'float32', 'cpu')
+    >>> ego.numpy().base is not None            # a view, not a copy
+    True)")
       .def_property_readonly(
           "shape", [](const LentArray& lent) { return py::tuple(py::cast(values_of(lent.array.shape))); },
           py::doc("Lengths, a tuple of int."))

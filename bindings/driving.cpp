@@ -423,7 +423,14 @@ and 'inattentive': shares of agents that the policy drives while impaired. on_pr
 the remaining seconds, from a separate thread.
 Returns a dict: rows, one per density and driver (None: the evaluated driver), with its counts, and each metric as (value, half
 of its 95 % interval); seconds, agent_steps, policy_hash, light_cycles, others. ^C raises KeyboardInterrupt. Raises
-pictura.Error naming file and key of bad input.)");
+pictura.Error naming file and key of bad input.
+
+Examples:
+    >>> options = {'scenarios': 1, 'steps': 20, 'agents_per_world': 8}
+    >>> rows = pictura.evaluate('models/perspective.safetensors', ['procedural:1'], **options)['rows']
+    >>> sorted(rows[0])[:3]                         # doctest: +SKIP
+    ['agents_per_world', 'at_fault_collision_rate', 'camera_severity']
+    >>> lane_keeper = pictura.evaluate('', ['procedural:1'], controller='lane', **options))");
   def_with_options<RobustOptions>(
       &module, {"evaluate_robust", {"checkpoint"}},
       [](const RobustOptions& options) {
@@ -438,7 +445,12 @@ checkpoint: a policy's; '' with a controller: a name or a function, as for evalu
 arguments are those of evaluate(); seed, conditioning and camera_severity are fixed.
 Returns a dict: rows, one per condition, with part, name, not_driven (the reason if the condition does not apply, else None),
 counts, and each metric as (value, half of its 95 % interval); pooled: the same over the conditions of 'towns', 'others', 'cameras'
-and 'all'; seconds, agent_steps, policy_hash. ^C raises KeyboardInterrupt.)");
+and 'all'; seconds, agent_steps, policy_hash. ^C raises KeyboardInterrupt.
+
+Examples:
+    >>> report = pictura.evaluate_robust('models/perspective.safetensors', scenarios=2)  # doctest: +SKIP
+    >>> report['pooled']['towns']['km_per_infraction']                                   # doctest: +SKIP
+    (0.8, 0.2))");
   def_with_options<SceneArguments>(
       &module, {"evaluate_scenes", {"checkpoint", "scenes"}},
       [](SceneArguments& arguments) {
@@ -476,7 +488,12 @@ first on. rollouts: file of the rollouts, with the protocol 'simagents', in the 
 others as in evaluate().
 Returns a dict: rows, one per density, with each metric as (value, half of its 95 % interval); agents, one for every driven road
 user of a scene, density and rollout; scenes, scored, without_drivers, faults (skipped scenes, with reasons); seconds,
-agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error if no scene can be used.)");
+agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error if no scene can be used.
+
+Examples:
+    >>> results = pictura.evaluate_scenes('models/vector.safetensors', ['validation'])   # doctest: +SKIP
+    >>> results['scored'], len(results['faults'])                                        # doctest: +SKIP
+    (100, 0))");
 }
 
 void bind_probes(py::module_& module) {
@@ -492,7 +509,11 @@ replay: a page *.html that plays the scene of one case and shows its images with
 (docs/reference/replay.md); case: its number in cases_file, by default the case with the largest change in the first policy's
 value; cameras: keeps the ego's images of every step.
 Returns a dict, that of the command's summary.json (docs/explanation/probes.md). ^C raises KeyboardInterrupt. Raises
-pictura.Error naming file and key of bad input.)");
+pictura.Error naming file and key of bad input.
+
+Examples:
+    >>> policies, maps = ['models/perspective.safetensors'], ['procedural:1']
+    >>> pictura.probe_removal(policies, maps, removals=200, cases_file='cases.csv')      # doctest: +SKIP)");
   def_probe(
       &module, "probe_pedestrian", &probe_pedestrian, &write_pedestrian_cases, &pedestrian_summary_json, nullptr,
       R"(Measures how policies' value and braking change as a pedestrian emerges from behind a vehicle and is hidden again, like `pictura
@@ -503,7 +524,11 @@ probe_removal(). paths: total number, each through one state. hider_range_m: max
 begins. min_speed_mps: minimum speed of the ego, forwards. height_m: height of the pedestrian. control: 'none', 'nobody' or
 'untrained'. cases_file: a CSV file for every point of every path. replay, case, cameras: as in probe_removal().
 Returns a dict, that of the command's summary.json (docs/explanation/probes.md). ^C raises KeyboardInterrupt. Raises
-pictura.Error naming file and key of bad input.)");
+pictura.Error naming file and key of bad input.
+
+Examples:
+    >>> policies, maps = ['models/perspective.safetensors'], ['procedural:1']
+    >>> pictura.probe_pedestrian(policies, maps, paths=8, cases_file='paths.csv')        # doctest: +SKIP)");
   def_probe(
       &module, "probe_corner", &probe_corner, &write_corner_cases, &corner_summary_json, &CornerOptions::pairs,
       R"(Measures how policies approach blind corners with a hidden vehicle, and similar empty corners, like `pictura probe corner`.
@@ -515,13 +540,28 @@ driver: 'lane' drives the scenes instead of the policies. control: 'none', 'perm
 once. cases_file: a CSV file for every run. replay, case, cameras: as in probe_removal(); a case is a pair, by default that of
 the example's figure.
 Returns a dict, that of the command's summary.json (docs/explanation/probes.md). ^C raises KeyboardInterrupt. Raises
-pictura.Error naming file and key of bad input.)");
+pictura.Error naming file and key of bad input.
+
+Examples:
+    >>> policies, maps = ['models/perspective.safetensors'], ['procedural:1']
+    >>> pictura.probe_corner(policies, maps, pairs=20, cases_file='pairs.csv')           # doctest: +SKIP)");
 }
 
 void bind_session(py::module_& module) {
   py::class_<PySession> session(module, "PolicySession", R"(
 Saved policy: evaluates scenes and observations, and holds the world and cameras of its training. One thread at a time, also for
-renderers that are passed to it.)");
+renderers that are passed to it.
+
+Examples:
+    >>> session = pictura.PolicySession('models/perspective.safetensors')
+    >>> town = pictura.Map.load('procedural:3')
+    >>> simulator = pictura.Simulator([town], [(0, 8)], **session.training_world())
+    >>> renderer = session.make_renderer()          # None for a policy of lists
+    >>> for handle, geometry in simulator.geometries.items():
+    ...     renderer.upload(handle, geometry)
+    >>> simulator.run(session.make_controller(simulator, renderer), steps=20)
+    >>> simulator.totals()['distance_m'] > 0
+    True)");
   def_init_with_options<PolicyArguments>(
       &session, {"PolicySession", {"checkpoint"}},
       [](const PolicyArguments& arguments) {

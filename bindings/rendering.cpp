@@ -394,7 +394,12 @@ void bind_dtypes(py::module_& module) {
 void bind_rig(py::module_& module) {
   py::class_<Camera>(module, "Camera", R"(
 Pinhole camera on a body: x forward, y left, z up, in metres from the rig's origin. Angles are radians: yaw is
-counter-clockwise, positive pitch looks up, positive roll is clockwise as seen from behind.)")
+counter-clockwise, positive pitch looks up, positive roll is clockwise as seen from behind.
+
+Examples:
+    >>> roof = pictura.Camera('roof', 128, 72, position_m=(1.0, 0.0, 1.6), pitch_rad=-0.1)
+    >>> roof.focal_x_px
+    102.4000015258789)")
       .def(py::init([](const std::string& name, int width_px, int height_px, std::optional<float> focal_px,
                        std::array<float, 3> position_m, float yaw_rad, float pitch_rad, float roll_rad) {
              Camera camera;
@@ -454,7 +459,14 @@ counter-clockwise, positive pitch looks up, positive roll is clockwise as seen f
     validate(rig);
     return rig;
   };
-  py::class_<Rig>(module, "Rig", "One or more cameras of any sizes on a body, in the order of images.")
+  py::class_<Rig>(module, "Rig", R"(
+One or more cameras of any sizes on a body, in the order of images.
+
+Examples:
+    >>> [camera.name for camera in pictura.Rig.paper(96, 54).cameras]
+    ['front', 'front_left', 'front_right', 'back']
+    >>> len(pictura.Rig([pictura.Camera('front', 64, 36, position_m=(1.5, 0, 1.4))]))
+    1)")
       .def(py::init(made), py::arg("cameras"), "Raises pictura.Error unless there are 1 to 64 valid cameras.")
       .def_static("paper", paper_rig, py::arg("width_px") = 96, py::arg("height_px") = 54,
                   py::arg("square_pixels") = false,
@@ -470,7 +482,12 @@ counter-clockwise, positive pitch looks up, positive roll is clockwise as seen f
 void bind_scene(py::module_& module) {
   py::class_<Scene, std::shared_ptr<Scene>>(module, "Scene", R"(
 Moving objects: boxes of agents and states of lights, for one or more worlds. A simulator's `scene` follows the simulator; a
-scene of arrays is a copy of the arrays.)")
+scene of arrays is a copy of the arrays.
+
+Examples:
+    >>> car = pictura.Scene(center_m=[[12, 0, 0]], heading_rad=[0], size_m=[[4.4, 1.8, 1.5]], agent_class=[0])
+    >>> car.num_worlds, car.boxes.shape
+    (1, (1, 36)))")
       .def(
           py::init(&make_scene), py::arg("center_m"), py::arg("heading_rad"), py::arg("size_m"), py::arg("agent_class"),
           py::kw_only(), py::arg("world_begin") = py::none(), py::arg("geometry") = py::none(),
@@ -494,7 +511,19 @@ uploaded geometries; default: 0. light_states: 0 off, 1 red, 2 yellow, 3 green, 
           py::doc(
               "uint8 [boxes, 36], read-only: `numpy.asarray(boxes).view(BOX_DTYPE)[:, 0]` has their fields by name."));
 
-  py::class_<SceneFile>(module, "SceneFile", "Scene of one TOML file: geometry, boxes, rig and views.")
+  py::class_<SceneFile>(module, "SceneFile", R"(
+Scene of one TOML file: geometry, boxes, rig and views.
+
+Examples:
+    >>> text = '''size_px = [96, 54]
+    ... [[view]]
+    ... x_m = 0.0
+    ... y_m = 0.0
+    ... heading_deg = 0.0
+    ... '''
+    >>> _ = pathlib.Path('empty.toml').write_text(text)
+    >>> pictura.SceneFile('empty.toml').view_names
+    ['view0'])")
       .def(py::init(&load_scene), py::arg("path"), "Raises pictura.Error naming file, line, table and key.")
       .def_property_readonly("rig", [](const SceneFile& self) { return self.config.rig; })
       .def_property_readonly("line_floor_px", [](const SceneFile& self) { return self.config.line_floor_px; })
@@ -513,13 +542,24 @@ uploaded geometries; default: 0. light_states: 0 off, 1 red, 2 yellow, 3 green, 
              R"(Returns poses of a rig, a NumPy array of VIEW_DTYPE [n].
 
 origin_m [n, 3]: origin of the rig, on the ground. heading_rad [n]. world [n]: default: 0. ego_agent [n]: box of the scene that
-is left out, -1 for none. body_length_m [n]: bodies shorter than 4.5 m move cameras nearer to their origin.)");
+is left out, -1 for none. body_length_m [n]: bodies shorter than 4.5 m move cameras nearer to their origin. Raises
+pictura.Error for other shapes.
+
+Examples:
+    >>> pictura.make_views(origin_m=[[0, 0, 0], [5, 0, 0]], heading_rad=[0, 1.5]).shape
+    (2,))");
 }
 
 void bind_images(py::module_& module) {
   py::class_<Images, std::shared_ptr<Images>>(module, "Images", R"(
 Images of views by each camera of a rig, in the renderer's memory, and their planes if requested. A renderer can draw into them
-repeatedly.)")
+repeatedly.
+
+Examples:
+    >>> renderer = pictura.Renderer('cpu', pictura.Rig.paper(32, 18))
+    >>> images = renderer.make_images(num_views=5)
+    >>> images.rgb.shape, images.camera(0).shape
+    ((5, 4, 3, 18, 32), (5, 3, 18, 32)))")
       .def_property_readonly(
           "num_views", [](const Images& self) { return self.layout().num_views; }, py::doc("Capacity in views."))
       .def_property_readonly(
@@ -569,7 +609,16 @@ void bind_renderer(py::module_& module) {
   py::class_<RendererInside>(module, "_RendererInside");
   py::class_<PyRenderer>(module, "Renderer", R"(
 Draws scenes: 'cpu', 'cuda', 'gl' ('gl:egl', 'gl:osmesa'), 'null', or 'auto'. One thread at a time; several renderers are
-independent. On CUDA its work is enqueued on `stream`.)")
+independent. On CUDA its work is enqueued on `stream`.
+
+Examples:
+    >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 4)])
+    >>> renderer = pictura.Renderer('cpu', pictura.Rig.paper(32, 18))
+    >>> for handle, geometry in simulator.geometries.items():
+    ...     renderer.upload(handle, geometry)
+    >>> images = renderer.render(simulator.scene, simulator.views)
+    >>> images.rgb.numpy().shape                    # views, cameras, channels, height, width
+    (4, 4, 3, 18, 32))")
       .def(
           py::init([](const std::string& name, const std::optional<Rig>& rig, const std::string& device,
                       int num_threads, float line_floor_px, bool debug_palette, const std::string& samples,
@@ -641,7 +690,12 @@ the coverage when drawn alone, float32 [n]; NaN outside all cameras' frames.)")
       .def(
           "check", [](PyRenderer& self) { self.calls().run("check", [&] { self.renderer().check(self.stream()); }); },
           "Waits for the work on the stream; raises pictura.Error for faults found by a device.");
-  module.def("renderer_names", renderer_names, "Returns the renderers of this build.");
+  module.def("renderer_names", renderer_names, R"(
+Returns the renderers of this build.
+
+Examples:
+    >>> 'cpu' in pictura.renderer_names()
+    True)");
 }
 
 }  // namespace

@@ -151,7 +151,15 @@ py::dict dict_of(const ReplayMetrics& metrics) {
 void bind_replays(py::module_& module) {
   py::class_<PyRecorder, std::shared_ptr<PyRecorder>>(module, "Recorder", R"(
 Records a world of a simulator on the CPU from now on: every step of the simulator, by any function, as long as the recorder
-lives.)")
+lives.
+
+Examples:
+    >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 8)])
+    >>> recorder = pictura.Recorder(simulator, follow=0)
+    >>> simulator.run(pictura.Controller('lane', simulator), 50)
+    >>> recorder.write('drive.html')
+    >>> recorder.num_steps
+    50)")
       .def(
           py::init([](const py::object& simulator, int world, int follow, const std::optional<Rig>& rig) {
             SimulatorInside inside = inside_of<SimulatorInside>(simulator, "Recorder", "Simulator");
@@ -184,7 +192,15 @@ called repeatedly. policy: its name in the page. Raises pictura.Error naming the
 
   py::class_<PyLiveView, std::shared_ptr<PyLiveView>>(module, "LiveView", R"(
 Page in the browser that shows the only world of a simulator on the CPU while it runs: pause, step, pace, and drive an agent
-with the keyboard. The simulator's steps then wait until they are due: in real time, or at the page's pace.)")
+with the keyboard. The simulator's steps then wait until they are due: in real time, or at the page's pace.
+
+Examples:
+    >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 8)])
+    >>> view = pictura.LiveView(simulator, wait_for_page=False)
+    >>> view.address.startswith('http://')
+    True
+    >>> simulator.run(pictura.Controller('lane', simulator), 3)
+    >>> view.close())")
       .def(
           py::init([](const py::object& simulator, int port, const std::string& host_name, int follow,
                       const std::optional<Rig>& rig, bool wait_for_page) {
@@ -225,7 +241,11 @@ server, pictura.Error if the port is in use.)")
       },
       py::arg("folder"),
       R"(Writes FOLDER/index.html over the replays in the folder, worst first, and returns their number. Raises pictura.Error naming a
-page that is no replay.)");
+page that is no replay.
+
+Examples:
+    >>> pictura.write_gallery('replays')            # doctest: +SKIP
+    4)");
 }
 
 }  // namespace pictura::python

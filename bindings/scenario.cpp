@@ -214,7 +214,14 @@ void bind_scenarios(py::module_& module) {
 Recorded scene: a map, the tracks of all road users, and the recorded lights. Immutable.
 
 A scenario is the map of worlds whose agents are its tracks, in their order, from `start_step` on:
-pictura.Simulator([scene], [(0, scene.num_tracks)], **scene.world()). Commands of kind 3 and the controller 'log' replay it.)")
+pictura.Simulator([scene], [(0, scene.num_tracks)], **scene.world()). Commands of kind 3 and the controller 'log' replay it.
+
+Examples:
+    >>> scene = pictura.Scenario.load('drive.scenario')            # or FILE.tfrecord#7, FILE.json, a folder
+    >>> simulator = pictura.Simulator([scene], [(0, scene.num_tracks)], **scene.world())
+    >>> simulator.run(pictura.Controller('log', simulator), 10)    # all as recorded
+    >>> scene.tracks()['position_m'].shape == (scene.num_tracks, scene.num_steps, 3)
+    True)")
       .def_static(
           "load", load_scene, py::arg("name"), py::kw_only(), py::arg("start_step") = 0,
           R"(Loads a scene by name: FILE.json, FILE.bin, FILE.scenario, a file with '.tfrecord' in its name, or a folder of these; '#7' or
@@ -371,7 +378,15 @@ for all.)")
 
   py::class_<PySceneRecorder, std::shared_ptr<PySceneRecorder>>(module, "SceneRecorder", R"(
 Records the present episode of a world of a simulator on the CPU as a scene: every step from now on, by any function, as long as
-the recorder lives.)")
+the recorder lives.
+
+Examples:
+    >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 8)])
+    >>> recorder = pictura.SceneRecorder(simulator)
+    >>> simulator.run(pictura.Controller('lane', simulator), 30)
+    >>> recorder.scenario(id='my drive', self_agent=0).save('mine.scenario')
+    >>> recorder.num_steps
+    30)")
       .def(py::init([](const py::object& simulator, int world) {
              auto inside = inside_of<SimulatorInside>(simulator, "SceneRecorder", "Simulator");
              const auto watch = inside.watch;

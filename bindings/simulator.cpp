@@ -79,7 +79,13 @@ py::dict report_of(const SpawnReport& report) {
 
 void bind_step_result(py::module_& module) {
   py::class_<StepArraysOfPython>(module, "StepResult", R"(
-Results of a step, one element per slot, in the simulator's memory; every step overwrites the same arrays.)")
+Results of a step, one element per slot, in the simulator's memory; every step overwrites the same arrays.
+
+Examples:
+    >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 4)])
+    >>> result = simulator.step(np.full(4, pictura.IDLE_ACTION, np.int32))
+    >>> result.reward.shape, result.reward_terms.shape
+    ((4,), (4, 11)))")
       .def_readonly("reward", &StepArraysOfPython::reward, "float32 [slots].")
       .def_readonly("terminated", &StepArraysOfPython::terminated,
                     "bool [slots]: an infraction ended the agent's episode in this step.")
@@ -120,16 +126,40 @@ void define_construction(py::class_<PySimulator>* simulator) {
         return std::make_unique<PySimulator>(arguments.executor, arguments.config, arguments.maps,
                                              worlds_of(arguments.worlds), stream_of(arguments.stream));
       },
-      R"(maps: list of pictura.Map. worlds: list of (index of the map, agents), or (map, agents, global world), which keys the world's
-random numbers. executor: 'cpu', 'cuda' or 'auto'. device: memory of observations and scenes. num_threads: of the host, 0 for
-all. reset_inactive_fraction: a world resets when this fraction of its agents is inactive; more than 1: never. stagger_episodes:
-the first episode of each world ends after a drawn number of steps. light_cycles: 'phases' (the lights of a junction take turns)
-or 'independent' (each light has its own cycle). reset_at_standstill: accelerations end when the speed changes its sign. blind,
-phantom_braking, inattentive: shares of impaired agents, drawn per episode, which are never valid. light_heads: 'as_mapped', or
-'visible': heads beside or before their stop line are moved 10 m beyond it, 3.5 m high. conditioning: a number or (low, high) by
-name, see CONDITIONING_NAMES; default: the paper's ranges. stream: a cudaStream_t as int; None: the legacy default stream. The
-other defaults are the paper's training world. Raises pictura.UsageError naming an option that cannot be simulated,
-pictura.Error if the device does not exist.)");
+      R"(Simulators of worlds on maps, at the start of their first episodes. Defaults are the paper's training world.
+
+Args:
+    maps: Maps of the worlds.
+    worlds: One (index of the map, agents) or (map, agents, global world) a world; the global world keys its random numbers.
+    executor: 'cpu', 'cuda' or 'auto'.
+    device: Memory of observations and scenes: 'cpu', 'cuda' or 'cuda:INDEX'.
+    seed: Seed of all random numbers.
+    num_threads: Threads of the host; 0: all.
+    dt_s: Length of a step in seconds.
+    episode_steps: Steps after which a world's episode ends.
+    reset_inactive_fraction: A world's episode ends when this share of its agents is inactive; more than 1: never.
+    pedestrian_fraction: Share of pedestrians among the agents.
+    cyclist_fraction: Share of cyclists among the agents.
+    parked_cars: Parked cars of each world and episode.
+    light_cycles: 'phases', lights of a junction take turns, or 'independent', each light cycles alone.
+    walls: Whether buildings stand along the roads.
+    wall_seed: Draws the heights of walls.
+    light_heads: 'as_mapped', or 'visible': heads beside or before their stop line stand 10 m beyond it, 3.5 m high.
+    wall_observations: Whether the set `walls` is observed.
+    reset_at_standstill: Accelerations end where the speed changes its sign.
+    blind: Share of agents that see no other road user for some seconds. Impaired agents are drawn per episode and never valid.
+    phantom_braking: Share of agents that brake hard for some seconds.
+    inattentive: Share of agents that see no traffic light.
+    stagger_episodes: The first episode of each world ends after a drawn number of steps.
+    fixed_lights: Lights are green, yellow and red for 10, 3 and 2 s, as in evaluations; else times are drawn per episode.
+    auxiliary_observations: Whether auxiliary slots of observations are filled.
+    vector_observations: Whether the entity sets are observed.
+    conditioning: A number or (low, high) by name of CONDITIONING_NAMES; the paper's ranges otherwise.
+    stream: A cudaStream_t as int; None: the legacy default stream.
+
+Raises:
+    pictura.UsageError: Names what cannot be simulated.
+    pictura.Error: There is no such device.)");
   (*simulator)
       .def("_inside",
            [](PySimulator& self) {
@@ -351,8 +381,19 @@ void bind_functions(py::module_& module) {
         return worlds;
       },
       py::arg("seed"), py::arg("num_slots"), py::arg("min_agents"), py::arg("max_agents"), py::arg("num_maps"),
-      "Draws worlds of sizes from U{min, max} until they fill the slots; they use the maps in turn.");
-  module.def("simulator_names", simulator_names, "Returns the executors of this build.");
+      R"(
+Draws worlds of sizes from U{min, max} until they fill the slots; they use the maps in turn.
+
+Examples:
+    >>> worlds = pictura.draw_worlds(seed=1, num_slots=100, min_agents=5, max_agents=40, num_maps=2)
+    >>> sum(agents for _, agents, _ in worlds)
+    100)");
+  module.def("simulator_names", simulator_names, R"(
+Returns the executors of this build.
+
+Examples:
+    >>> 'cpu' in pictura.simulator_names()
+    True)");
 }
 
 }  // namespace
@@ -360,20 +401,43 @@ void bind_functions(py::module_& module) {
 void bind_simulator(py::module_& module) {
   bind_names(module);
   bind_step_result(module);
-  py::class_<Snapshot>(module, "Snapshot", "State that a simulator keeps in its own memory.");
+  py::class_<Snapshot>(module, "Snapshot", R"(
+State that a simulator keeps in its own memory.
+
+Examples:
+    >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 4)])
+    >>> before, snapshot = simulator.state_hash(), simulator.snapshot()
+    >>> simulator.run(pictura.Controller('lane', simulator), 10)
+    >>> simulator.restore(snapshot)
+    >>> simulator.state_hash() == before
+    True)");
 
   // All classes are declared first, so that signatures can name them.
   py::class_<SimulatorInside>(module, "_SimulatorInside");
   py::class_<ControllerInside>(module, "_ControllerInside");
   py::class_<PyController> controller_class(module, "Controller", R"(
 Driver in one simulator on the CPU: 'lane' (the lane keeper), 'idm_lanes' (along lanes, behind others), 'idle' or 'random', in
-worlds of recorded scenes 'log', 'inverse' or 'idm', a policy of a pictura.PolicySession, or several of these.)");
+worlds of recorded scenes 'log', 'inverse' or 'idm', a policy of a pictura.PolicySession, or several of these.
+
+Examples:
+    >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 8)])
+    >>> simulator.run(pictura.Controller('lane', simulator), steps=50)
+    >>> commands = pictura.Controller('idle', simulator).act(simulator)
+    >>> commands['action'].shape
+    (8,))");
   py::class_<PySimulator> simulator_class(module, "Simulator", R"(
 Many worlds, each on one map, stepped together. Arrays have one element per slot: the controlled agents of world 0, then those
 of world 1, and so on. Executors 'cpu' and 'cuda' give the same bits.
 
 One thread at a time; several simulators are independent. The GIL is released while C++ works. On CUDA its work is enqueued on
-`stream`, calls return before it is done, and invalid values raise an error in check() or a later call.)");
+`stream`, calls return before it is done, and invalid values raise an error in check() or a later call.
+
+Examples:
+    >>> town = pictura.Map.load('procedural:3')
+    >>> simulator = pictura.Simulator([town], [(0, 16)] * 4, seed=1)          # four worlds of sixteen agents
+    >>> result = simulator.step(np.full(simulator.num_slots, pictura.IDLE_ACTION, np.int32))
+    >>> result.reward.numpy().shape, simulator.observations['lanes'].numpy().shape
+    ((64,), (64, 80, 7)))");
   define_construction(&simulator_class);
   define_steps(&simulator_class);
   define_arrays(&simulator_class);

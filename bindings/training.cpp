@@ -91,7 +91,12 @@ limit; 0: none. on_progress: called after every update with a dict: update, upda
 episode_return, eta_s, scalars (those of progress.csv). on_notice: called with a text. Both are called from training's own
 thread, and their exceptions end training.
 Returns a dict: agent_steps, updates, agent_steps_per_s, episode_return, km_driven, checkpoint, policy_hash and more. ^C ends
-training after the present update, saves, and raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
+training after the present update, saves, and raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.
+
+Examples:
+    >>> report = pictura.train('configs/smoke.toml', 'runs/mine', old_run='overwrite')
+    >>> report['updates']
+    4)");
 }
 
 }  // namespace

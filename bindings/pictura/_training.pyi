@@ -10,6 +10,17 @@ class PolicySession:
     """
     Saved policy: evaluates scenes and observations, and holds the world and cameras of its training. One thread at a time, also for
     renderers that are passed to it.
+    
+    Examples:
+        >>> session = pictura.PolicySession('models/perspective.safetensors')
+        >>> town = pictura.Map.load('procedural:3')
+        >>> simulator = pictura.Simulator([town], [(0, 8)], **session.training_world())
+        >>> renderer = session.make_renderer()          # None for a policy of lists
+        >>> for handle, geometry in simulator.geometries.items():
+        ...     renderer.upload(handle, geometry)
+        >>> simulator.run(session.make_controller(simulator, renderer), steps=20)
+        >>> simulator.totals()['distance_m'] > 0
+        True
     """
     def __init__(self, checkpoint: str, *, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, backbone: str = '', conditioning: dict = {}, average: bool = False, decision_steps: typing.SupportsInt | typing.SupportsIndex = 0, camera_severity: typing.SupportsFloat | typing.SupportsIndex = 0.0, light_cycles: str = '', light_heads: str = '') -> None:
         """
@@ -74,6 +85,13 @@ def evaluate(checkpoint: str, maps: collections.abc.Sequence[str], *, controller
     Returns a dict: rows, one per density and driver (None: the evaluated driver), with its counts, and each metric as (value, half
     of its 95 % interval); seconds, agent_steps, policy_hash, light_cycles, others. ^C raises KeyboardInterrupt. Raises
     pictura.Error naming file and key of bad input.
+    
+    Examples:
+        >>> options = {'scenarios': 1, 'steps': 20, 'agents_per_world': 8}
+        >>> rows = pictura.evaluate('models/perspective.safetensors', ['procedural:1'], **options)['rows']
+        >>> sorted(rows[0])[:3]                         # doctest: +SKIP
+        ['agents_per_world', 'at_fault_collision_rate', 'camera_severity']
+        >>> lane_keeper = pictura.evaluate('', ['procedural:1'], controller='lane', **options)
     """
 def evaluate_robust(checkpoint: str, *, controller: str | collections.abc.Callable = '', scenarios: typing.SupportsInt | typing.SupportsIndex = 24, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, backbone: str = '', conditioning: dict = {}, average: bool = False, decision_steps: typing.SupportsInt | typing.SupportsIndex = 0, camera_severity: typing.SupportsFloat | typing.SupportsIndex = 0.0, on_progress: typing.Any = None) -> dict:
     """
@@ -86,6 +104,11 @@ def evaluate_robust(checkpoint: str, *, controller: str | collections.abc.Callab
     Returns a dict: rows, one per condition, with part, name, not_driven (the reason if the condition does not apply, else None),
     counts, and each metric as (value, half of its 95 % interval); pooled: the same over the conditions of 'towns', 'others', 'cameras'
     and 'all'; seconds, agent_steps, policy_hash. ^C raises KeyboardInterrupt.
+    
+    Examples:
+        >>> report = pictura.evaluate_robust('models/perspective.safetensors', scenarios=2)  # doctest: +SKIP
+        >>> report['pooled']['towns']['km_per_infraction']                                   # doctest: +SKIP
+        (0.8, 0.2)
     """
 def evaluate_scenes(checkpoint: str, scenes: collections.abc.Sequence[str], *, protocol: str = 'womd', controller: str | collections.abc.Callable = '', control: str | None = None, start_step: typing.SupportsInt | typing.SupportsIndex | None = None, steps: typing.SupportsInt | typing.SupportsIndex | None = None, densities: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, rules: dict = {}, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, num_scenes: typing.SupportsInt | typing.SupportsIndex = 0, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, backbone: str = '', conditioning: dict = {}, average: bool = False, decision_steps: typing.SupportsInt | typing.SupportsIndex = 0, camera_severity: typing.SupportsFloat | typing.SupportsIndex = 0.0, rollouts: str = '', on_progress: typing.Any = None) -> dict:
     """
@@ -100,6 +123,11 @@ def evaluate_scenes(checkpoint: str, scenes: collections.abc.Sequence[str], *, p
     Returns a dict: rows, one per density, with each metric as (value, half of its 95 % interval); agents, one for every driven road
     user of a scene, density and rollout; scenes, scored, without_drivers, faults (skipped scenes, with reasons); seconds,
     agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error if no scene can be used.
+    
+    Examples:
+        >>> results = pictura.evaluate_scenes('models/vector.safetensors', ['validation'])   # doctest: +SKIP
+        >>> results['scored'], len(results['faults'])                                        # doctest: +SKIP
+        (100, 0)
     """
 def probe_corner(policies: collections.abc.Sequence[str], maps: collections.abc.Sequence[str], *, agents_per_world: typing.SupportsInt | typing.SupportsIndex = 0, steps: typing.SupportsInt | typing.SupportsIndex = 600, density: str = 'medium', scenes: typing.SupportsInt | typing.SupportsIndex = 0, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, sample_steps: typing.SupportsInt | typing.SupportsIndex = 5, batch: typing.SupportsInt | typing.SupportsIndex = 256, pairs: typing.SupportsInt | typing.SupportsIndex = 200, max_distance_m: typing.SupportsFloat | typing.SupportsIndex = 25.0, min_speed_mps: typing.SupportsFloat | typing.SupportsIndex = 2.0, user_range_m: typing.SupportsFloat | typing.SupportsIndex = 50.0, driver: str = '', control: str = 'none', argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, backbone: str = '', conditioning: dict = {}, average: bool = False, decision_steps: typing.SupportsInt | typing.SupportsIndex = 0, camera_severity: typing.SupportsFloat | typing.SupportsIndex = 0.0, light_cycles: str = '', light_heads: str = '', cases_file: str = '', replay: str = '', case: typing.SupportsInt | typing.SupportsIndex | None = None, cameras: bool = False, on_progress: typing.Any = None) -> typing.Any:
     """
@@ -113,6 +141,10 @@ def probe_corner(policies: collections.abc.Sequence[str], maps: collections.abc.
     the example's figure.
     Returns a dict, that of the command's summary.json (docs/explanation/probes.md). ^C raises KeyboardInterrupt. Raises
     pictura.Error naming file and key of bad input.
+    
+    Examples:
+        >>> policies, maps = ['models/perspective.safetensors'], ['procedural:1']
+        >>> pictura.probe_corner(policies, maps, pairs=20, cases_file='pairs.csv')           # doctest: +SKIP
     """
 def probe_pedestrian(policies: collections.abc.Sequence[str], maps: collections.abc.Sequence[str], *, agents_per_world: typing.SupportsInt | typing.SupportsIndex = 0, steps: typing.SupportsInt | typing.SupportsIndex = 600, density: str = 'medium', scenes: typing.SupportsInt | typing.SupportsIndex = 0, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, sample_steps: typing.SupportsInt | typing.SupportsIndex = 10, batch: typing.SupportsInt | typing.SupportsIndex = 4096, paths: typing.SupportsInt | typing.SupportsIndex = 32, hider_range_m: typing.SupportsFloat | typing.SupportsIndex = 30.0, min_speed_mps: typing.SupportsFloat | typing.SupportsIndex = 1.0, height_m: typing.SupportsFloat | typing.SupportsIndex = 1.2000000476837158, control: str = 'none', argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, backbone: str = '', conditioning: dict = {}, average: bool = False, decision_steps: typing.SupportsInt | typing.SupportsIndex = 0, camera_severity: typing.SupportsFloat | typing.SupportsIndex = 0.0, light_cycles: str = '', light_heads: str = '', cases_file: str = '', replay: str = '', case: typing.SupportsInt | typing.SupportsIndex | None = None, cameras: bool = False, on_progress: typing.Any = None) -> typing.Any:
     """
@@ -125,6 +157,10 @@ def probe_pedestrian(policies: collections.abc.Sequence[str], maps: collections.
     'untrained'. cases_file: a CSV file for every point of every path. replay, case, cameras: as in probe_removal().
     Returns a dict, that of the command's summary.json (docs/explanation/probes.md). ^C raises KeyboardInterrupt. Raises
     pictura.Error naming file and key of bad input.
+    
+    Examples:
+        >>> policies, maps = ['models/perspective.safetensors'], ['procedural:1']
+        >>> pictura.probe_pedestrian(policies, maps, paths=8, cases_file='paths.csv')        # doctest: +SKIP
     """
 def probe_removal(policies: collections.abc.Sequence[str], maps: collections.abc.Sequence[str], *, agents_per_world: typing.SupportsInt | typing.SupportsIndex = 0, steps: typing.SupportsInt | typing.SupportsIndex = 600, density: str = 'medium', scenes: typing.SupportsInt | typing.SupportsIndex = 0, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, sample_steps: typing.SupportsInt | typing.SupportsIndex = 10, batch: typing.SupportsInt | typing.SupportsIndex = 4096, removals: typing.SupportsInt | typing.SupportsIndex = 88000, range_m: typing.SupportsFloat | typing.SupportsIndex = 50.0, control: str = 'none', argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, backbone: str = '', conditioning: dict = {}, average: bool = False, decision_steps: typing.SupportsInt | typing.SupportsIndex = 0, camera_severity: typing.SupportsFloat | typing.SupportsIndex = 0.0, light_cycles: str = '', light_heads: str = '', cases_file: str = '', replay: str = '', case: typing.SupportsInt | typing.SupportsIndex | None = None, cameras: bool = False, on_progress: typing.Any = None) -> typing.Any:
     """
@@ -139,6 +175,10 @@ def probe_removal(policies: collections.abc.Sequence[str], maps: collections.abc
     value; cameras: keeps the ego's images of every step.
     Returns a dict, that of the command's summary.json (docs/explanation/probes.md). ^C raises KeyboardInterrupt. Raises
     pictura.Error naming file and key of bad input.
+    
+    Examples:
+        >>> policies, maps = ['models/perspective.safetensors'], ['procedural:1']
+        >>> pictura.probe_removal(policies, maps, removals=200, cases_file='cases.csv')      # doctest: +SKIP
     """
 def train(config: str, out: str, *, overrides: collections.abc.Sequence[str] = [], old_run: str = 'refuse', init_from: str = '', minutes: typing.SupportsFloat | typing.SupportsIndex = 0.0, on_progress: typing.Any = None, on_notice: typing.Any = None) -> dict:
     """
@@ -151,4 +191,9 @@ def train(config: str, out: str, *, overrides: collections.abc.Sequence[str] = [
     thread, and their exceptions end training.
     Returns a dict: agent_steps, updates, agent_steps_per_s, episode_return, km_driven, checkpoint, policy_hash and more. ^C ends
     training after the present update, saves, and raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.
+    
+    Examples:
+        >>> report = pictura.train('configs/smoke.toml', 'runs/mine', old_run='overwrite')
+        >>> report['updates']
+        4
     """

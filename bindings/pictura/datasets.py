@@ -1,8 +1,8 @@
 """Scenes from files of other libraries, through pictura.Scenario.from_arrays().
 
-load_scenarionet() reads the pickles of ScenarioNet and MetaDrive (sd_*.pkl: Waymo, nuScenes, nuPlan, Argoverse 2). Nothing in a
-pickle is executed: it may hold only NumPy arrays and plain values. from_py123d() takes scenes of py123d, which it does
-not import.
+load_scenarionet() reads the pickles of ScenarioNet and MetaDrive (sd_*.pkl: Waymo, nuScenes, nuPlan, Argoverse 2).
+Nothing in a pickle is executed: it may hold only NumPy arrays and plain values. from_py123d() takes scenes of py123d,
+which it does not import.
 """
 
 from __future__ import annotations
@@ -361,6 +361,11 @@ def load_scenarionet(path: str | os.PathLike[str]) -> pictura.Scenario:
     and lights. It drops cones, barriers, sidewalks, driveways and speed bumps. Ids that are not integers are replaced
     by positions. Maps are flat, except in Waymo's frame. Raises pictura.Error naming the file and the part, also if a
     pickle names anything but NumPy arrays and builtins.
+
+    Examples:
+        >>> from pictura.datasets import load_scenarionet # doctest: +SKIP
+        >>> scene = load_scenarionet("sd_nuscenes_v1.0-mini_scene-0061.pkl") # doctest: +SKIP
+        >>> scene.save("scene-0061.scenario")            # pictura simulate scene-0061.scenario # doctest: +SKIP
     """
     path = os.fspath(path)
     if os.path.getsize(path) > _MAX_BYTES:
@@ -524,6 +529,10 @@ def from_py123d(scene: Any, *, radius_m: float = 200.0) -> pictura.Scenario:
     radius_m: radius around the self-driving car at the scene's present, within which maps of whole towns are kept. The
     scene keeps road users, lanes with links, neighbours, limits and the widths between their boundaries, lines, edges,
     crosswalks, stop signs and lights. Raises pictura.Error naming the scene and the part.
+
+    Examples:
+        >>> from pictura.datasets import from_py123d # doctest: +SKIP
+        >>> scene = from_py123d(scene_of_py123d, radius_m=150) # doctest: +SKIP
     """
     metadata = scene.get_scene_metadata()
     place = f"{metadata.dataset}: {metadata.initial_uuid}"

@@ -287,6 +287,10 @@ def run_curves(runs: Sequence[str], metrics: Sequence[str] = METRICS, x: str = "
     to the highest; "none" draws a line for each run. A line has at most MAX_RUN_POINTS points, each the mean of equally
     many consecutive updates. Raises PlotError naming a missing folder, file or column, or runs that have no stretch in
     common.
+
+    Examples:
+        >>> chart = plot.run_curves(["runs/a", "runs/b"], x="hours") # doctest: +SKIP
+        >>> plot.save(chart, "curves.png") # doctest: +SKIP
     """
     _need(runs and metrics, "run_curves: expected a run and a metric or more")
     read: list[_Run] = []
@@ -372,6 +376,12 @@ def evaluation_curves(path: str, x: str = "agent_steps") -> Chart:
 
     path: output of `scripts/reproduce_table --curves`. x: "agent_steps", or "hours" of one GPU. Raises PlotError naming
     the file, the line and what is missing.
+
+    Examples:
+        >>> from pictura import plot
+        >>> chart = plot.evaluation_curves("bench/results/agent_curves.json")
+        >>> chart.panels[0].title
+        'At-fault collision'
     """
     x_label = "time on one GPU (h)" if x == "hours" else "agent-steps"
     panels = {metric: Panel(title, x_label, y_label, starts_at_zero=True) for metric, title, y_label in _PROTOCOL}
@@ -407,6 +417,9 @@ def severity_curves(results: Sequence[str]) -> Chart:
 
     results: outputs of `pictura evaluate --camera-severity ... --json`; each file and density is a line. Raises
     PlotError naming the file and what is missing.
+
+    Examples:
+        >>> chart = plot.severity_curves(["severities.json"]) # doctest: +SKIP
     """
     panels = {metric: Panel(title, "severity", y_label, starts_at_zero=True) for metric, title, y_label in _PROTOCOL}
     for path in results:
@@ -467,7 +480,13 @@ def _add_point(panel: Panel, name: str, x: float, y: float) -> None:
 
 
 def render_rates(results: Sequence[str]) -> Chart:
-    """Returns rendering rates by size and number of egos, from the sweeps of `pictura bench render`."""
+    """Returns rendering rates by size and number of egos, from the sweeps of `pictura bench render`.
+
+    Examples:
+        >>> from pictura import plot
+        >>> len(plot.render_rates(["bench/results/gpu_check_sweeps.json"]).panels)
+        3
+    """
     egos_fixed, size_fixed = 2048, "96x54"
     by_size = _sweep(f"{egos_fixed:,} egos", _SIZE, _RATE)
     by_egos = _sweep(f"{size_fixed.replace('x', '×')} px", "egos in one call", _RATE)
@@ -485,7 +504,13 @@ def render_rates(results: Sequence[str]) -> Chart:
 
 
 def step_costs(results: Sequence[str]) -> Chart:
-    """Returns the cost of an agent-step by agents and worlds, from the sweeps of `pictura bench simulate`."""
+    """Returns the cost of an agent-step by agents and worlds, from the sweeps of `pictura bench simulate`.
+
+    Examples:
+        >>> from pictura import plot
+        >>> len(plot.step_costs(["bench/results/cuda_simulate_agents.json"]).panels)
+        2
+    """
     worlds_fixed, agents_fixed, cost = 64, 60, "time for an agent-step (ns)"
     by_agents = _sweep(f"{worlds_fixed} worlds", "agents in each world", cost)
     by_worlds = _sweep(f"{agents_fixed} agents in each world", "worlds", cost)
@@ -503,7 +528,13 @@ def step_costs(results: Sequence[str]) -> Chart:
 
 def rank_rates(results: Sequence[str]) -> Chart:
     """Returns rates and efficiencies by number of GPUs, from files of scripts/gpu_ranks: with a fixed number of agents
-    on each GPU, and with a fixed number in all."""
+    on each GPU, and with a fixed number in all.
+
+    Examples:
+        >>> from pictura import plot
+        >>> len(plot.rank_rates(["bench/results/gpu_ranks.json"]).panels)
+        4
+    """
     cases = {"each": "The same number of agents on each GPU", "in_all": "The same total number of agents"}
     rates = {case: _sweep(title, "GPUs", _RATE) for case, title in cases.items()}
     efficiencies = {
@@ -534,6 +565,11 @@ def breakdown_parts(results: Sequence[str], parts: Sequence[str], paper: dict[st
 
     parts: columns of the table; the third panel shows those of the first case. paper: the paper's seconds by size, of
     "total" and of "rendering".
+
+    Examples:
+        >>> parts = ["simulation", "rendering"] # doctest: +SKIP
+        >>> paper = {"96x54": {"total": 63.4, "rendering": 5.0}} # doctest: +SKIP
+        >>> chart = plot.breakdown_parts(["breakdown.json"], parts, paper) # doctest: +SKIP
     """
     seconds = "time of an update (s)"
     shown = {"total": _sweep("Whole update", _SIZE, seconds), "rendering": _sweep("Rendering", _SIZE, seconds)}
@@ -663,6 +699,9 @@ def probe_means(summary: str) -> Chart:
     For removal: absolute changes by occlusion of the user, and for wholly hidden users by distance. For pedestrian:
     changes relative to where the pedestrian is first seen, with its visibility as a strip. For corner: mean speeds
     since the takeover.
+
+    Examples:
+        >>> plot.save(plot.probe_means("probe_removal/summary.json"), "means.png") # doctest: +SKIP
     """
     content = _read_json(summary)
     kind = content.get("kind") if isinstance(content, dict) else None
@@ -684,6 +723,9 @@ def path_curves(folder: str, path: int, marks: Sequence[tuple[float, str]] = ())
     strip.
 
     marks: positions along the path in m, and their letters.
+
+    Examples:
+        >>> plot.save(plot.path_curves("probe_pedestrian", path=3), "path.png") # doctest: +SKIP
     """
     names = _names_of(_read_json(f"{folder}/summary.json"))
     rows = _read_cases(f"{folder}/cases.csv", path=str(path))
@@ -697,7 +739,11 @@ def path_curves(folder: str, path: int, marks: Sequence[tuple[float, str]] = ())
 
 
 def takeover_curves(folder: str, pair: int) -> Chart:
-    """Returns the speeds of one pair of `pictura probe corner` towards the hidden vehicle, with walls and without."""
+    """Returns the speeds of one pair of `pictura probe corner` towards the hidden vehicle, with walls and without.
+
+    Examples:
+        >>> plot.save(plot.takeover_curves("probe_corner", pair=2), "pair.png") # doctest: +SKIP
+    """
     names = _names_of(_read_json(f"{folder}/summary.json"))
     panels = []
     for walls in ("on", "off"):
@@ -852,6 +898,12 @@ def figure(chart: Chart, width_in: float | None = None) -> Figure:
     """Draws a chart. Lines have the series' names as labels. width_in: in inches; default: by the chart's panels.
 
     Raises MissingMatplotlib.
+
+    Examples:
+        >>> from pictura import plot
+        >>> chart = plot.Chart([plot.Panel("Return", "update", "", [plot.Series("mine", [0, 1], [0.1, 0.4])])])
+        >>> len(plot.figure(chart).axes)
+        1
     """
     matplotlib = _matplotlib("the chart")
     columns = min(chart.columns, len(chart.panels))
@@ -903,6 +955,11 @@ def save(chart: Chart, path: str) -> None:
     """Draws a chart into a file: vector graphics if its name ends in .svg, else a PNG.
 
     Without Matplotlib it writes the chart's panels to `path` and ".json", and raises MissingMatplotlib. Raises OSError.
+
+    Examples:
+        >>> from pictura import plot
+        >>> chart = plot.Chart([plot.Panel("Return", "update", "", [plot.Series("mine", [0, 1], [0.1, 0.4])])])
+        >>> plot.save(chart, "curve.svg")
     """
     try:
         matplotlib = _matplotlib(path)
@@ -919,7 +976,11 @@ def save(chart: Chart, path: str) -> None:
 
 
 def append_to(picture: str, chart: Chart) -> None:
-    """Draws a chart below a PNG picture, with the picture's width. Raises MissingMatplotlib."""
+    """Draws a chart below a PNG picture, with the picture's width. Raises MissingMatplotlib.
+
+    Examples:
+        >>> plot.append_to("case.png", plot.path_curves("probe_pedestrian", path=3)) # doctest: +SKIP
+    """
     _matplotlib(picture)
     import numpy as np
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -944,6 +1005,9 @@ def probe_charts(folder: str, pages: Sequence[dict[str, Any]] = ()) -> None:
     """Draws the charts of a folder of `pictura probe`: KIND.png with its means, and curves below its pictures.
 
     pages: for each picture its file ("picture"), and the arguments of path_curves() or takeover_curves().
+
+    Examples:
+        >>> plot.probe_charts("probe_removal") # doctest: +SKIP
     """
     summary = f"{folder}/summary.json"
     kind = _read_json(summary)["kind"]

@@ -7,10 +7,24 @@ from pictura._pictura import INSERTED_DTYPE, QUERY_DTYPE, Error
 def make_queries(slots, *, hidden=None, inserted=None, leaves_gaps=False):
     """Returns queries for Simulator.observe(), on the CPU, as the tuple (queries, hidden, inserted) of NumPy arrays.
 
-    slots: [n] of int. hidden: boxes that each query leaves out, as n lists of indices into the scene's boxes, or as
-    (indices, begin) with the indices of query i from begin[i] up to begin[i + 1]. inserted: boxes that each query adds,
-    likewise, of INSERTED_DTYPE. leaves_gaps: bool, or [n] of bool: whether rows of zeros replace hidden boxes. Raises
-    pictura.Error naming the argument that does not fit.
+    Args:
+        slots: Slots that observe, int [n].
+        hidden: Boxes that each query leaves out: n lists of indices into the scene's boxes, or (indices, begin) with
+            those of query i from begin[i] up to begin[i + 1].
+        inserted: Boxes that each query adds: likewise, of INSERTED_DTYPE.
+        leaves_gaps: bool, or bool [n]: whether rows of zeros replace hidden boxes.
+
+    Returns:
+        tuple: QUERY_DTYPE [n], int32 [hidden in all], INSERTED_DTYPE [inserted in all].
+
+    Raises:
+        pictura.Error: Names what does not fit.
+
+    Examples:
+        >>> simulator = pictura.Simulator([pictura.Map.load("procedural:3")], [(0, 8)])
+        >>> answers = simulator.observe(*pictura.make_queries([0, 0], hidden=[[], [1]]))
+        >>> answers["partners"].shape
+        (2, 16, 8)
     """
     queries = np.zeros(len(slots), QUERY_DTYPE)
     queries["slot"] = slots

@@ -29,7 +29,12 @@ _STATUS_HALTED, _STATUS_ABSENT = 1, 3
 
 def log_map(road: pictura.Map, entity: str = "world/map", recording: Any = None) -> None:
     """Logs marks, edges, stop lines, crosswalks and building lines of a map, once for all times. recording: a rerun
-    recording; default: the current one."""
+    recording; default: the current one.
+
+    Examples:
+        >>> rerun.init("pictura", spawn=True) # doctest: +SKIP
+        >>> pictura.rerun.log_map(pictura.Map.load("procedural:3")) # doctest: +SKIP
+    """
     arrays = road.arrays()
 
     def log(name: str, strips: list[np.ndarray], color: tuple[int, int, int]) -> None:
@@ -48,7 +53,11 @@ def log_map(road: pictura.Map, entity: str = "world/map", recording: Any = None)
 def log_world(simulator: pictura.Simulator, time_s: float, world: int = 0, entity: str = "world", recording: Any = None) -> None:
     """Logs the agents of a world of a simulator on the CPU in their present state, as boxes with arrows for their
     speed; halted agents are grey. Time is rerun's timeline "simulated", in seconds. Raises pictura.UsageError for a
-    simulator on a device or a world that does not exist."""
+    simulator on a device or a world that does not exist.
+
+    Examples:
+        >>> pictura.rerun.log_world(simulator, time_s=step * simulator.dt_s) # doctest: +SKIP
+    """
     if simulator.device != "cpu" or not 0 <= world < simulator.num_worlds:
         raise pictura.UsageError(
             f"log_world: expected a world of 0 to {simulator.num_worlds - 1} on cpu, got {world} on {simulator.device}"
@@ -79,7 +88,11 @@ def log_world(simulator: pictura.Simulator, time_s: float, world: int = 0, entit
 
 def log_images(images: pictura.Images, view: int, rig: pictura.Rig, entity: str = "cameras", recording: Any = None) -> None:
     """Logs the images of one view's cameras, each under the camera's name. images: uint8 or from 0 to 1, on the CPU, of
-    a rig of one size."""
+    a rig of one size.
+
+    Examples:
+        >>> pictura.rerun.log_images(renderer.render(simulator.scene, simulator.views), view=0, rig=renderer.rig) # doctest: +SKIP
+    """
     for pixels, camera in zip(images.rgb.numpy()[view], rig.cameras, strict=True):
         rows = np.moveaxis(pixels, 0, -1)
         if rows.dtype != np.uint8:

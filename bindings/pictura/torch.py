@@ -1,7 +1,8 @@
 """Policies of the library as torch modules. docs/explanation/network.md defines the arithmetic.
 
-load_policy() reads the weights that training writes (policy.safetensors) or a checkpoint; save_policy() writes them back, so
-that weights trained in Python run in the `pictura` command; export_onnx() writes a policy for ONNX Runtime and others.
+load_policy() reads the weights that training writes (policy.safetensors) or a checkpoint; save_policy() writes them
+back, so that weights trained in Python run in the `pictura` command; export_onnx() writes a policy for ONNX Runtime and
+others.
 """
 
 from __future__ import annotations
@@ -126,16 +127,33 @@ class _Attention(nn.Module):
 
 
 class Policy(nn.Module):
-    """Policy of either modality: forward(observation) returns logits [batch, 12] and values [batch].
+    """A policy of either modality: forward(observation) gives logits float32 [batch, 12] and values float32 [batch].
 
-    observation: float32 tensors by the names of pictura.Simulator.observations, [batch, ...] on the module's device: `ego`,
-    `conditioning` and `waypoints`; for the vector policy the entity sets and `set_counts`; for the perspective policy
-    `rgb` uint8 [batch, cameras, 3, height, width], or a list of these for cameras of several sizes in the order of the
-    rig. NumPy arrays are converted to tensors. config: the `policy` table of a configuration
-    (docs/reference/configuration.md). walls: whether a vector policy reads walls. metadata: contents of the file of a
-    policy that load_policy() read, besides the weights: `path`, `config` (the whole configuration of its training),
-    `schema`, `rig`, `update` and `agent_steps` among others; else empty. Raises pictura.UsageError if an observation
-    differs from those of the policy's training.
+    observation: float32 tensors by the names of pictura.Simulator.observations, [batch, ...] on the module's device:
+    `ego`, `conditioning` and `waypoints`; for the vector policy the entity sets and `set_counts`; for the perspective
+    one `rgb` uint8 [batch, cameras, 3, height, width], or a list of such for cameras of several sizes in the order of
+    the rig. NumPy's arrays become tensors first.
+
+    Args:
+        config: The `policy` table of a configuration (docs/reference/configuration.md).
+        num_cameras: Of a perspective policy.
+        walls: Whether a vector policy reads them.
+
+    Attributes:
+        metadata: What the file of a policy that load_policy() read says beside the weights: `path`, `config` (the whole
+            configuration of its training), `schema`, `rig`, `update` and `agent_steps` among others; else empty.
+
+    Raises:
+        pictura.UsageError: The observation is not what the policy was trained to read.
+
+    Examples:
+        >>> from pictura.torch import Policy
+        >>> policy = Policy({"modality": "vector", "embedding_width": 32, "backbone_layers": 2, "backbone_width": 64})
+        >>> envs = pictura.make_vec("procedural:3", num_agents=4)
+        >>> observations, infos = envs.reset(seed=1)
+        >>> logits, values = policy(observations)
+        >>> logits.shape, values.shape
+        (torch.Size([4, 12]), torch.Size([4]))
     """
 
     def __init__(self, config: Mapping[str, Any], num_cameras: int = 4, walls: bool = False) -> None:
@@ -179,6 +197,7 @@ class Policy(nn.Module):
         self.actor, self.critic = nn.Linear(inside, _NUM_ACTIONS), nn.Linear(inside, 1)
 
     def forward(self, observation: Mapping[str, Any]) -> tuple[Tensor, Tensor]:
+        """Logits float32 [batch, 12] and values float32 [batch] of an observation."""
         observation = self._read(observation)
         waypoints = observation["waypoints"].flatten(1)
         own = [observation["conditioning"].flatten(1), waypoints]
@@ -355,12 +374,20 @@ def _named(path: str) -> Iterator[None]:
 
 
 def load_policy(path: str | os.PathLike[str], average: bool = False) -> Policy:
-    """Returns the policy of policy.safetensors or a checkpoint (.ckpt), in fp32 on the CPU.
+    """Reads a policy from policy.safetensors or a checkpoint (.ckpt), in fp32 on the CPU.
 
-    average: loads the average of weights that a checkpoint of a run with train.weight_average holds.
+    Args:
+        path: The file.
+        average: Whether to take the average of weights that a checkpoint of a run with train.weight_average holds.
 
     Raises pictura.Error naming what is wrong with the file, pictura.UsageError for a backbone that is a separate
     program.
+
+    Examples:
+        >>> from pictura.torch import load_policy
+        >>> policy = load_policy("models/vector.safetensors")
+        >>> policy.modality, policy.metadata["config"]["policy"]["backbone_width"]
+        ('vector', 512)
     """
     path = os.fspath(path)
     with _named(path):
@@ -389,11 +416,23 @@ def _load(path: str, average: bool) -> Policy:
 
 
 def save_policy(policy: Policy, path: str | os.PathLike[str], like: str | os.PathLike[str]) -> None:
-    """Writes a policy's weights in place of those of `like`, a checkpoint (.ckpt) or safetensors of the same
-    architecture.
+    """Writes a policy's weights instead of those of a checkpoint (.ckpt) or safetensors of the same architecture.
 
-    Everything else in the file remains, including the type of its numbers, so that the `pictura` command accepts it.
-    The file is written completely or not at all. Raises pictura.Error if the architectures differ.
+    Everything else in the file stays, the type of its numbers too, so that the `pictura` command takes it. The file is
+    written whole or not at all.
+
+    Args:
+        policy: Whose weights are written.
+        path: The new file.
+        like: The file that has everything else.
+
+    Raises:
+        pictura.Error: The architectures differ, or `like` is damaged.
+
+    Examples:
+        >>> from pictura.torch import load_policy, save_policy
+        >>> policy = load_policy("models/vector.safetensors")
+        >>> save_policy(policy, "mine.safetensors", like="models/vector.safetensors")
     """
     path, like = os.fspath(path), os.fspath(like)
     weights = {name: value.detach().to("cpu", torch.float32).contiguous() for name, value in policy.state_dict().items()}
@@ -464,11 +503,22 @@ def export_onnx(policy: Policy, path: str | os.PathLike[str]) -> None:
     """Writes a policy as an ONNX model of opset 20, with torch's exporter, which needs the packages onnx and
     onnxscript.
 
-    Inputs are the arrays of an observation by name, as forward() reads them, [batch, ...] of any batch; images of
+    Inputs are the arrays of an observation by their names, as Policy reads them, [batch, ...] of any batch; images of
     cameras of several sizes are rgb_0, rgb_1, ... Outputs are `logits` float32 [batch, 12] and `value` float32 [batch].
-    The model's property `pictura` holds the policy file's contents besides its weights, without the path, as JSON. The
-    file is written completely or not at all. Raises pictura.Error if a package is missing, pictura.UsageError for an
-    image policy without a file.
+    The property `pictura` of the model is JSON of what the policy's file says beside its weights, without the path. The
+    file is written whole or not at all.
+
+    Args:
+        policy: The policy.
+        path: The file.
+
+    Raises:
+        pictura.Error: A package is missing.
+        pictura.UsageError: The policy reads images and is of no file, which would say their size.
+
+    Examples:
+        >>> from pictura.torch import export_onnx, load_policy
+        >>> export_onnx(load_policy("models/vector.safetensors"), "vector.onnx")      # doctest: +SKIP
     """
     for package in ("onnx", "onnxscript"):
         if importlib.util.find_spec(package) is None:

@@ -14,15 +14,32 @@ from pictura.envs.gymnasium_spaces import action_space, observation_space
 
 
 class DriveEnv(gymnasium.Env):
-    """One vehicle of a world.
+    """One vehicle of a world among others: gymnasium.make("pictura/Drive-v0").
 
-    others: the other agents keep their lanes ("lane"), stand ("idle"), act at random ("random"), or follow a policy, a
-    function from the observations of all slots to actions int32 [slots]. render_mode: "rgb_array", from above, or
-    "human", a live page in the browser.
+    An episode ends when the agent's infraction halts it (terminated) or when its world's does (truncated). It runs on
+    the CPU.
 
-    An episode ends when the agent's infraction halts it (terminated) or when its world's episode ends (truncated).
-    Other options are those of pictura.envs.Batch. The environment runs on the CPU, in one thread unless num_threads is
-    given, so that processes can be forked.
+    Args:
+        maps: A name or a pictura.Map.
+        num_agents: Agents of the world, the vehicle included.
+        others: What drives the others: "lane" keeps lanes, "idle" stands, "random" acts at random; or a policy, a
+            function from the observations of all slots, [slots, ...] by name, to actions int32 [slots].
+        render_mode: None; "rgb_array", the vehicle's surroundings from above, uint8 [height, width, 3]; or "human", a
+            live page in the browser from the first reset on.
+        num_threads: Threads of the host; 1, so that processes can be forked.
+        options: Those of pictura.envs.Batch, and through it of pictura.Simulator.
+
+    Raises:
+        pictura.UsageError: Names the option that there is not, or the value that it cannot have.
+        pictura.Error: step() with an action outside of the space; reset() where no vehicle finds a place.
+
+    Examples:
+        >>> import gymnasium
+        >>> env = gymnasium.make("pictura/Drive-v0", others="lane", observation="flat")
+        >>> observation, info = env.reset(seed=1)
+        >>> observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
+        >>> bool(info["active"]) != terminated
+        True
     """
 
     metadata = {"render_modes": RENDER_MODES, "render_fps": 10}
@@ -45,6 +62,7 @@ class DriveEnv(gymnasium.Env):
         self._slot = 0
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Starts an episode. Returns (observation, info)."""
         super().reset(seed=seed)
         for _ in range(100):
             self.batch.reset(int(self.np_random.integers(2**63)))
@@ -57,6 +75,8 @@ class DriveEnv(gymnasium.Env):
         raise pictura.Error("reset: no vehicle found a place in 100 episodes: expected a map or options with more room")
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """One step in which the agent does `action` and the others what they do. Returns (observation, reward,
+        terminated, truncated, info). Raises pictura.Error for an action outside of the space."""
         if not self.action_space.contains(action):
             raise pictura.Error(f"step: expected an action of {self.action_space}, got {action!r}")
         if self.batch.actions == "multi_discrete":
@@ -86,14 +106,28 @@ class DriveEnv(gymnasium.Env):
 
 
 class LogEnv(DriveEnv):
-    """One road user of a recorded scene from start_step on.
+    """One road user of a recorded scene: gymnasium.make("pictura/Log-v0", scene=...).
 
-    control: words that pictura.Scenario.mask takes; their first road user is driven, by default the self-driving car.
-    others: as recorded ("log"), or vehicles by the intelligent driver model along their recorded paths ("idm") or along
-    lanes ("idm_lanes"). scene: a name or a pictura.Scenario, whose world it is. The goal is the end of the road user's
-    recording.
+    Its goal is where its record ends. Before the first action it is as recorded.
 
-    Before the first action the road user is as recorded. Other options are those of DriveEnv.
+    Args:
+        scene: A name as pictura.Scenario.load() takes it, or a pictura.Scenario.
+        start_step: Step of the recording at which episodes begin.
+        control: Words that pictura.Scenario.mask() takes; the first road user that they name is the agent.
+        others: "log", as recorded; or vehicles by the intelligent driver model along their recorded paths, "idm", or
+            along lanes, "idm_lanes".
+        options: Those of DriveEnv.
+
+    Raises:
+        pictura.UsageError: Names the option that there is not, or the value that it cannot have.
+        pictura.Error: Names file and field of a scene that cannot be read.
+
+    Examples:
+        >>> import gymnasium
+        >>> env = gymnasium.make("pictura/Log-v0", scene="drive.scenario", start_step=0, control="vehicles")
+        >>> observation, info = env.reset(seed=1)
+        >>> observation["ego"].shape
+        (9,)
     """
 
     def __init__(

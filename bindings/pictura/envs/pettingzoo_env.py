@@ -13,13 +13,29 @@ from pictura.envs.gymnasium_spaces import action_space, observation_space
 
 
 class DriveParallelEnv(ParallelEnv):
-    """The agents agent_0, agent_1, ... of one world.
+    """agent_0, agent_1, ...: those that found a place and still drive are `agents`. An infraction terminates an agent,
+    the end of the world's episode truncates all that are left, and so does leaving a road that ends. An agent that
+    enters such a road instead of agent_3 is agent_3_1, the next one agent_3_2; possible_agents has the first ones
+    alone. infos have what pictura.envs.Batch.info() lists; "active" is whether the agent goes on. It runs on the CPU.
 
-    `agents` are those that found a place and still drive. An infraction terminates an agent; the end of the world's
-    episode truncates all remaining agents, and so does leaving a road that ends. An agent that enters such a road in
-    the place of agent_3 is agent_3_1, the next agent_3_2; possible_agents holds only the first agents. infos hold the
-    entries of pictura.envs.Batch.info(); "active" is whether the agent continues. Options are those of Batch; the
-    environment runs on the CPU.
+    Args:
+        maps: A name or a pictura.Map.
+        num_agents: Agents of the world.
+        render_mode: None; "rgb_array", from above; or "human", a live page in the browser.
+        num_threads: Threads of the host.
+        options: Those of pictura.envs.Batch, and through it of pictura.Simulator.
+
+    Raises:
+        pictura.UsageError: Names the option that there is not, or the value that it cannot have.
+        pictura.Error: step() without an action of a live agent.
+
+    Examples:
+        >>> from pictura.envs.pettingzoo_env import DriveParallelEnv
+        >>> env = DriveParallelEnv("procedural:3", num_agents=4)
+        >>> observations, infos = env.reset(seed=1)
+        >>> observations, rewards, terminations, truncations, infos = env.step({agent: 7 for agent in env.agents})
+        >>> sorted(rewards)
+        ['agent_0', 'agent_1', 'agent_2', 'agent_3']
     """
 
     metadata = {"name": "pictura_drive_v0", "render_modes": RENDER_MODES, "render_fps": 10, "is_parallelizable": True}
@@ -49,6 +65,7 @@ class DriveParallelEnv(ParallelEnv):
         return self.action_spaces[self.possible_agents[self._slot(agent)]]
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[dict, dict]:
+        """Starts an episode. Returns (observations, infos) of the live agents by name."""
         if seed is not None:
             self._random = np.random.default_rng(seed)
         for _ in range(100):
@@ -62,6 +79,9 @@ class DriveParallelEnv(ParallelEnv):
         raise pictura.Error("reset: no agent found a place in 100 episodes: expected a map or options with more room")
 
     def step(self, actions: dict[str, Any]) -> tuple[dict, dict, dict, dict, dict]:
+        """One step. actions: one of every live agent by name. Returns (observations, rewards, terminations,
+        truncations, infos) of the agents that acted, and of those that entered. Raises pictura.Error where an agent has
+        no action."""
         acting = self.agents
         missing = [agent for agent in acting if agent not in actions]
         if missing:

@@ -31,8 +31,27 @@ except ImportError:
 
 
 class DrivePufferEnv(_Base):
-    """All agents of all worlds, written into PufferLib's buffers. Observations are flat or, with observation="images",
-    one image per camera, since PufferLib supports a single Box. `masks` is false for halted agents.
+    """All agents of some worlds, written into the buffers that PufferLib gives. Observations are flat or, with
+    observation="images", one image per camera: PufferLib takes a single Box. `masks` is false for the halted.
+
+    Args:
+        maps: Names or pictura.Map, one or several, taken in turn by the worlds.
+        num_agents: Agents of each world.
+        num_worlds: Independent copies of the simulation.
+        buf: PufferLib's buffers by name; None: arrays of its own.
+        seed: Seed of all random numbers until the first reset with another one.
+        options: Those of pictura.envs.Batch, and through it of pictura.Simulator.
+
+    Raises:
+        pictura.UsageError: Names the option that there is not, or the value that it cannot have.
+
+    Examples:
+        >>> from pictura.envs.puffer_env import DrivePufferEnv
+        >>> env = DrivePufferEnv("procedural:3", num_agents=8)
+        >>> observations, _ = env.reset(seed=1)
+        >>> _ = env.step(np.full(8, 7))
+        >>> env.rewards.shape, env.masks.dtype
+        ((8,), dtype('bool'))
     """
 
     def __init__(
@@ -55,6 +74,7 @@ class DrivePufferEnv(_Base):
         return False
 
     def reset(self, seed: int | None = None) -> tuple[np.ndarray, list[dict[str, float]]]:
+        """Starts new episodes in all worlds. Returns (the buffer of observations, [])."""
         self.batch.reset(seed)
         self._before = self.batch.simulator.totals()
         self._observe()
@@ -63,6 +83,8 @@ class DrivePufferEnv(_Base):
         return self.observations, []
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, list[dict[str, float]]]:
+        """One step. Returns the buffers of observations, rewards, terminals and truncations, and a list that is empty
+        or has a dict of means over the agents' episodes that ended since the last one."""
         results = self.batch.step(actions)
         self.actions[:] = actions
         self.rewards[:] = results["reward"]

@@ -13,13 +13,27 @@ from pictura.envs.batch import Batch
 
 
 class DriveTorchRLEnv(EnvBase):
-    """Environment with batch_size [worlds].
+    """batch_size [worlds]. ("agents", "observation", ...), ("agents", "action"), ("agents", "reward") and ("agents",
+    "mask"), which is false for the halted and the absent, are [worlds, agents, ...]; done, terminated and truncated are
+    the worlds', [worlds, 1]. ("agents", "terminated") is true for the agents that an infraction has just ended,
+    ("agents", "truncated") for agents whose world ends or that leave by a road's end: their observation is still their
+    own. reset() takes "_reset" [worlds]. On CUDA nothing is copied to the host.
 
-    ("agents", "observation", ...), ("agents", "action"), ("agents", "reward") and ("agents", "mask"), which is false
-    for halted and absent agents, are [worlds, agents, ...]. done, terminated and truncated belong to worlds, [worlds,
-    1]. ("agents", "terminated") is true for agents that an infraction has just ended, ("agents", "truncated") for
-    agents whose world ends or that leave by a road's end: their observation is still their own. reset() takes "_reset"
-    [worlds]. Options are those of pictura.envs.Batch; on CUDA nothing is copied to the host.
+    Args:
+        maps: Names or pictura.Map, one or several, taken in turn by the worlds.
+        num_agents: Agents of each world.
+        num_worlds: The batch.
+        device: "cpu", "cuda" or "cuda:INDEX".
+        options: Those of pictura.envs.Batch, and through it of pictura.Simulator.
+
+    Raises:
+        pictura.UsageError: Names the option that there is not, or the value that it cannot have.
+
+    Examples:
+        >>> from pictura.envs.torchrl_env import DriveTorchRLEnv       # doctest: +SKIP
+        >>> env = DriveTorchRLEnv("procedural:3", num_agents=4, num_worlds=2)   # doctest: +SKIP
+        >>> env.rollout(10)["next", "agents", "reward"].shape          # doctest: +SKIP
+        torch.Size([2, 10, 4, 1])
     """
 
     def __init__(
