@@ -1,16 +1,24 @@
 """PPO in one file, in the style of CleanRL, on all agents of many worlds.
 
-A minute on a CPU:   python examples/ppo.py
-A GPU, with images:  python examples/ppo.py --device cuda --observation images --num-worlds 170 --total-timesteps 50000000
+Minutes on a CPU:    python examples/ppo.py
+A GPU, with images:  python examples/ppo.py --device cuda --observation images --num-envs 2720 --total-timesteps 50000000
+
+It prints the mean return of agents whose episode ended in the last ten updates, and goals, waypoints and
+infractions for 1,000 agent-steps, and writes
+progress.csv, config.toml and policy.pt into --out: `pictura plot runs/ppo_1 runs/ppo_2` draws their curves.
 
 Observations, rewards and actions stay in the simulator's memory: the tensors here are views of it, and only a rollout's
 storage is copied. Steps of halted agents are stored, since arrays are rectangular, and masked out of every loss.
 """
 
 import argparse
+import collections
+import csv
 import json
+import pathlib
 import time
 
+import gymnasium
 import torch
 from torch import nn
 
@@ -26,27 +34,61 @@ SETTINGS = {
 
 def parse_args() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--maps", nargs="+", default=["procedural:3"])
-    parser.add_argument("--num-agents", type=int, default=16, help="of each world")
+    parser.add_argument("--preset", choices=["demo", "town", "paper", "none"], default="demo")
+    parser.add_argument("--maps", nargs="+", help="in place of the preset's")
+    parser.add_argument("--num-envs", type=int, default=32, help="agents in all, in worlds of sizes that the preset draws")
+    parser.add_argument("--num-agents", type=int, help="of each world, with --num-worlds in place of --num-envs")
     parser.add_argument("--num-worlds", type=int, default=4)
     parser.add_argument("--observation", choices=["vector", "images"], default="vector")
-    parser.add_argument("--image-size", type=int, nargs=2, default=[96, 54], metavar=("WIDTH", "HEIGHT"))
+    parser.add_argument("--image-size", type=int, nargs=2, default=[32, 18], metavar=("WIDTH", "HEIGHT"))
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--total-timesteps", type=int, default=60_000, help="of slots")
-    parser.add_argument("--learning-rate", type=float, default=5e-4)
+    parser.add_argument("--total-timesteps", type=int, default=120_000, help="of slots")
+    parser.add_argument("--learning-rate", type=float, default=1e-3)
     parser.add_argument("--num-steps", type=int, default=64)
-    parser.add_argument("--gamma", type=float, default=0.99)
+    parser.add_argument("--gamma", type=float, default=0.98)
     parser.add_argument("--gae-lambda", type=float, default=0.95)
     parser.add_argument("--num-minibatches", type=int, default=4)
-    parser.add_argument("--update-epochs", type=int, default=2)
+    parser.add_argument("--update-epochs", type=int, default=4)
     parser.add_argument("--clip-coef", type=float, default=0.2)
-    parser.add_argument("--ent-coef", type=float, default=0.01)
+    parser.add_argument("--ent-coef", type=float, default=0.002)
     parser.add_argument("--vf-coef", type=float, default=0.5)
     parser.add_argument("--max-grad-norm", type=float, default=0.5)
-    parser.add_argument("--save", help="writes the weights to this path (torch.save)")
+    parser.add_argument("--out", default="runs/ppo", help="folder of what it writes; '' for none")
     parser.add_argument("--json", action="store_true", help="prints the last update as JSON, and nothing else")
     return parser.parse_args()
+
+
+def make_envs(args: argparse.Namespace) -> gymnasium.vector.VectorEnv:
+    options = {"preset": args.preset} if args.preset != "none" else {}
+    if args.num_agents or args.preset == "none":
+        options |= {"num_agents": args.num_agents or 16, "num_worlds": args.num_worlds}
+    else:
+        options["num_envs"] = args.num_envs
+    if args.observation == "images":
+        options["rig"] = pictura.Rig.paper(*args.image_size)
+    return pictura.make_vec(
+        args.maps, observation=args.observation, device=args.device, array="torch", seed=args.seed, copy=False, **options
+    )
+
+
+def measured(before: dict, now: dict, recent: collections.deque) -> dict[str, float]:
+    """What agents did between two totals of a simulator, by the names of `pictura train`."""
+    since = {name: now[name] - before[name] for name in now if name != "reward_terms"}
+    recent.append((since["finished_return"], since["finished_agent_episodes"]))
+    returns, finished = map(sum, zip(*recent))
+    steps = max(since["agent_steps"], 1)
+    events = ("goals_reached", "waypoints_reached", "at_fault_collisions", "collisions", "off_road", "red_light")
+    counts = {f"driving/{name.removesuffix('_reached')}_per_1000_steps": 1000 * since[name] / steps for name in events}
+    speed = since["distance_m"] / (0.1 * steps)
+    return {"charts/episode_return": returns / max(finished, 1), **counts, "driving/mean_speed_mps": speed}
+
+
+def write_config(folder: pathlib.Path, args: argparse.Namespace) -> None:
+    """The arguments as TOML, by which `pictura plot` finds runs that differ in their seed alone."""
+    settings = {name: value for name, value in vars(args).items() if name not in ("seed", "out", "json") and value is not None}
+    lines = [f"{name} = {json.dumps(value)}" for name, value in settings.items()]
+    (folder / "config.toml").write_text("\n".join([f"[run]\nseed = {args.seed}\n\n[ppo]", *lines]) + "\n")
 
 
 def main() -> None:
@@ -54,13 +96,10 @@ def main() -> None:
     torch.manual_seed(args.seed)
     torch.set_float32_matmul_precision("high")  # TF32 on CUDA
     sees_images = args.observation == "images"
-    rig = pictura.Rig.paper(*args.image_size) if sees_images else None
-    envs = pictura.make_vec(
-        args.maps, args.num_agents, num_worlds=args.num_worlds, observation=args.observation, rig=rig,
-        device=args.device, array="torch", seed=args.seed, copy=False,
-    )  # fmt: skip
+    envs = make_envs(args)
+    simulator = envs.batch.simulator
     device, n = torch.device(args.device), envs.num_envs
-    agent = Policy(SETTINGS | {"modality": "perspective" if sees_images else "vector"}, num_cameras=len(rig) if rig else 0)
+    agent = Policy(SETTINGS | {"modality": "perspective" if sees_images else "vector"}, num_cameras=4 if sees_images else 0)
     agent = agent.to(device)
     nn.init.normal_(agent.actor.weight, std=0.01)
     optimizer = torch.optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5, fused=device.type == "cuda")
@@ -73,8 +112,16 @@ def main() -> None:
     terminations, dones, valids = (torch.zeros(shape, dtype=torch.bool, device=device) for _ in range(3))
     num_updates = max(1, args.total_timesteps // (args.num_steps * n))
     start, before, agent_steps, summary = time.time(), 0, 0, {}
+    totals, recent = simulator.totals(), collections.deque(maxlen=10)
+    folder = pathlib.Path(args.out) if args.out else None
+    if folder:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_config(folder, args)
+        progress = (folder / "progress.csv").open("w", newline="")
+        rows_of_progress = csv.writer(progress)
 
     for update in range(1, num_updates + 1):
+        begin = time.time()
         for step in range(args.num_steps):
             for key, value in seen.items():
                 obs[key][step] = value
@@ -88,6 +135,7 @@ def main() -> None:
             seen, rewards[step], terminations[step], truncated, info = envs.step(action)
             # The step in which a world begins its next episode is not valid and is excluded from learning.
             dones[step], valids[step] = terminations[step] | truncated, info["valid"]
+        collected = time.time()
         with torch.no_grad():
             next_value = agent(seen)[1]
             advantages, last = torch.zeros_like(rewards), torch.zeros(n, device=device)
@@ -122,20 +170,36 @@ def main() -> None:
                 nn.utils.clip_grad_norm_(agent.parameters(), args.max_grad_norm)
                 optimizer.step()
 
+        now = simulator.totals()
+        driven, totals = measured(totals, now, recent), now
+        infractions = sum(driven[f"driving/{name}_per_1000_steps"] for name in ("collisions", "off_road", "red_light"))
         summary = {
             "update": update,
             "agent_steps": agent_steps,
             "SPS": round((agent_steps - before) / (time.time() - start)),
-            "reward_per_step": rewards[valids].mean().item(),
+            "return": driven["charts/episode_return"],
+            "goals": driven["driving/goals_per_1000_steps"],
+            "waypoints": driven["driving/waypoints_per_1000_steps"],
+            "infractions": infractions,
             "value_loss": value_loss.item(),
             "entropy": entropy.item(),
         }
+        if folder:
+            times = {"time/rollout_s": collected - begin, "time/update_s": time.time() - collected}
+            columns = {"update": update, "charts/agent_steps": agent_steps, **driven, "losses/entropy": entropy.item(), **times}
+            if update == 1:
+                rows_of_progress.writerow(columns)
+            rows_of_progress.writerow(columns.values())
+            progress.flush()
         if update == 1:  # the first update compiles kernels
             start, before = time.time(), agent_steps
         if not args.json and (update == 1 or update % 5 == 0 or update == num_updates):
             print(" ".join(f"{key} {value:.4g}" for key, value in summary.items()), flush=True)
-    if args.save:
-        torch.save(agent.state_dict(), args.save)
+    if folder:
+        saved = {"policy": agent.config, "num_cameras": agent.num_cameras, "weights": agent.state_dict()}
+        torch.save(saved, folder / "policy.pt")  # policy = Policy(saved["policy"], saved["num_cameras"]); load_state_dict(...)
+        if not args.json:
+            print(f"wrote {folder}/progress.csv, config.toml and policy.pt")
     if args.json:
         print(json.dumps(summary))
 
