@@ -2,7 +2,7 @@
 #   docker build -f docker/cpu.Dockerfile -t pictura .
 #   docker run --rm -v "$PWD:/data" pictura map procedural:7 --png town.png
 # With training: --build-arg TORCH=torch==2.11.0 (docs/how-to/docker.md says how it stays small).
-ARG BASE=debian:12
+ARG BASE=debian:12-slim
 FROM ${BASE} AS build
 ARG TORCH=""
 ARG PIP_EXTRA_INDEX_URL
@@ -14,7 +14,7 @@ ARG TORCH=""
 ARG PIP_EXTRA_INDEX_URL
 # hadolint ignore=DL3008
 RUN apt-get update -qq \
-    && apt-get install -y -qq --no-install-recommends python3 python3-venv libxext6 libxrender1 \
+    && apt-get install -y -qq --no-install-recommends python3 python3-venv fontconfig-config fonts-dejavu-core libxext6 libxrender1 \
     && rm -rf /var/lib/apt/lists/*
 RUN --mount=type=bind,from=build,source=/wheels,target=/wheels \
     python3 -m venv /opt/pictura \

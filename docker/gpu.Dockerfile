@@ -11,7 +11,7 @@ FROM ${BASE}
 ARG TORCH="torch==2.11.0"
 # hadolint ignore=DL3008
 RUN apt-get update -qq \
-    && apt-get install -y -qq --no-install-recommends python3 python3-venv libegl1 libxext6 libxrender1 \
+    && apt-get install -y -qq --no-install-recommends python3 python3-venv fontconfig-config fonts-dejavu-core libegl1 libxext6 libxrender1 \
     && rm -rf /var/lib/apt/lists/*
 RUN --mount=type=bind,from=build,source=/wheels,target=/wheels \
     python3 -m venv /opt/pictura \
