@@ -25,7 +25,7 @@ def command_lines(text):
     for block in blocks:
         for line in block.replace("\\\n", " ").splitlines():
             for part in re.split(r"&&|\||;|<\(", line):
-                match = re.match(r"\s*(?:[A-Z_]+=\S+ )*(?:torchrun .*?--no-python )?(?:\S*/)?pictura ((?!.*\.\.\.).*)", part)
+                match = re.match(r"\s*(?:[A-Z_]+=\S+ )*(?:torchrun .*?--no-python )?(?:docker run .*? )?(?:\S*/)?pictura(?:-gpu|-train)? ((?!.*\.\.\.).*)", part)
                 if match:
                     yield match.group(1).split(" # ")[0].split(" > ")[0].rstrip(" )")
 

@@ -1,8 +1,14 @@
-"""docs/reference/python.md names in its tables what there is; its code and that of docs/how-to/own_metric.md run."""
+"""Pages about Python: their code runs, the card of the environments is what its script writes, and docstrings have examples that are true."""
 
+import doctest
+import importlib
 import importlib.util
+import inspect
 import pathlib
+import pydoc
 import re
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -10,52 +16,110 @@ import pytest
 import pictura
 
 ROOT = pathlib.Path(__file__).parents[2]
-TEXT = (ROOT / "docs/reference/python.md").read_text()
+DOCS = ROOT / "docs"
+HAS_TORCH = importlib.util.find_spec("torch") is not None
+HAS_TRAINING = importlib.util.find_spec("pictura._built_torch") is not None and HAS_TORCH
+PACKAGES = {"envs.pettingzoo_env": "pettingzoo", "envs.torchrl_env": "torchrl", "envs.gymnasium": "gymnasium", "make_vec": "gymnasium",
+            "torch.": "torch", "rerun.": "rerun"}  # fmt: skip
+# Of the extension beside torch.
+OF_TRAINING = ("PolicySession", "evaluate", "evaluate_robust", "evaluate_scenes", "probe_corner", "probe_pedestrian", "probe_removal", "train", "make_vec_for")
 
 
-def test_the_tables_name_every_observation_and_info():
-    observations = TEXT.split("## Observations")[1].split("## Infos")[0]
-    for name, *_ in pictura.OBSERVATION_ARRAYS:
-        assert f"`{name}`" in observations, name
-    infos = TEXT.split("## Infos")[1].split("## Environments")[0]
-    from pictura.envs import Batch
-
-    batch = Batch("procedural:3", 4, num_threads=1)
-    batch.step(np.full(4, 7))
-    for name in batch.info():
-        assert f"`{name}`" in infos, name
+def blocks_of(page: str) -> list[str]:
+    return re.findall(r"^```python\n(.*?)^```", (DOCS / page).read_text(), re.S | re.M)
 
 
-def test_the_five_minutes_run(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {}
-    blocks = re.findall(r"```python\n(.*?)```", TEXT.split("## Five minutes")[1].split("## Recorded scenes")[0], re.S)
-    assert len(blocks) == 4
-    if importlib.util.find_spec("gymnasium") is None:
-        blocks = [block for block in blocks if "make_vec" not in block and "gymnasium" not in block]
+def run(blocks: list[str], page: str, names: dict[str, object] | None = None) -> dict[str, object]:
+    names = {} if names is None else names
     for block in blocks:
-        exec(compile(block, "docs/reference/python.md", "exec"), names)  # noqa: S102
-    assert (tmp_path / "drive.html").exists()
+        exec(compile(block, page, "exec"), names)  # noqa: S102
+    return names
+
+
+@pytest.fixture
+def checkout(tmp_path, monkeypatch):
+    """An empty folder with what the pages name of a checkout."""
+    for name in ("models", "configs", "bench"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_tutorial_runs(checkout):
+    pytest.importorskip("gymnasium")
+    blocks = blocks_of("tutorials/python.md")
+    assert len(blocks) == 5
+    names = run(blocks, "docs/tutorials/python.md")
+    assert names["envs"].num_envs == 16 and (checkout / "drive.html").exists()
+    assert len((DOCS / "tutorials/python.md").read_text().split()) < 1500
 
 
 def test_what_is_not_there_is_observed(make):
-    (block,) = re.findall(r"```python\n(.*?)```", TEXT.split("### Of what is not there")[1].split("## Infos")[0], re.S)
-    names: dict[str, object] = {"np": np, "pictura": pictura, "simulator": make(8)}
-    exec(compile(block, "docs/reference/python.md", "exec"), names)  # noqa: S102
+    names = run(blocks_of("reference/python/simulator.md"), "simulator.md", {"np": np, "pictura": pictura, "simulator": make(8)})
     assert names["answers"]["partners"].shape == (3, 16, 8)
 
 
-def test_a_metric_of_ones_own_is_counted(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "models").symlink_to(ROOT / "models")
+@pytest.mark.skipif(not HAS_TRAINING, reason="needs a package that was built beside torch")
+def test_a_released_policy_is_loaded_driven_and_exported(checkout):
+    for package in ("onnxscript", "onnxruntime"):
+        pytest.importorskip(package)
+    names = run(blocks_of("how-to/load_policy.md"), "load_policy.md")
+    expected = names["policy"]({name: array.torch() for name, array in names["simulator"].observations.items()})[0]
+    assert np.abs(names["logits"] - expected.detach().numpy()).max() < 1e-3
+    assert (checkout / "drive.html").exists() and (checkout / "mine.safetensors").exists()
+
+
+@pytest.mark.skipif(not HAS_TORCH, reason="needs torch")
+def test_a_network_of_ones_own_learns_from_images(checkout):
+    pytest.importorskip("gymnasium")
+    names = run(blocks_of("how-to/own_network.md"), "own_network.md")
+    assert names["judged"].statistics["agent_steps"] > 200 and (checkout / "network.pt").exists()
+
+
+@pytest.mark.skipif(not HAS_TRAINING, reason="needs a package that was built beside torch")
+@pytest.mark.parametrize("tracker, package", [("Weights & Biases", "wandb"), ("MLflow", "mlflow")])
+def test_runs_are_tracked_offline(tracker, package, checkout):
+    pytest.importorskip(package)
+    section = (DOCS / "how-to/track_experiments.md").read_text().split(f"## {tracker}")[1].split("\n## ")[0]
+    run(re.findall(r"^```python\n(.*?)^```", section, re.S | re.M), "track_experiments.md")
+    if package == "wandb":
+        assert len(list(checkout.glob("wandb/offline-run-*/*.wandb"))) == 2
+    else:
+        import mlflow
+
+        runs = mlflow.search_runs(experiment_names=["pictura"])
+        assert len(runs) == 2 and (runs["metrics.charts/agent_steps"] > 100).all()
+
+
+@pytest.mark.skipif(not HAS_TRAINING, reason="needs a package that was built beside torch")
+def test_tensorboard_reads_the_configuration(checkout):
+    pytest.importorskip("tensorboard")
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+    from tensorboard.plugins.hparams.metadata import SESSION_START_INFO_TAG, parse_session_start_info_plugin_data
+
+    pictura.train("configs/smoke.toml", "run", overrides=["train.gamma=0.5"])
+    events = EventAccumulator("run").Reload()
+    told = parse_session_start_info_plugin_data(events.SummaryMetadata(SESSION_START_INFO_TAG).plugin_data.content).hparams
+    assert told["train.gamma"].number_value == 0.5 and told["simulator.walls"].bool_value is False
+    assert told["policy.modality"].string_value == "perspective" and "simulator.maps" not in told
+    (text,) = events.Tensors("configuration/text_summary")
+    assert "    gamma = 0.5\n" in text.tensor_proto.string_val[0].decode()
+    assert len(events.Scalars("charts/episode_return")) == 4
+
+
+@pytest.mark.parametrize("page", ["docker", "load_policy", "own_network", "track_experiments"])
+def test_how_to_pages_are_short(page):
+    assert len((DOCS / f"how-to/{page}.md").read_text().split()) < 900
+
+
+def test_a_metric_of_ones_own_is_counted(checkout):
     names: dict[str, object] = {}
-    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs/how-to/own_metric.md").read_text(), re.S)
     needs = (None, None, "pictura._built_torch", "mcap")
-    for block, module in zip(blocks, needs, strict=True):
+    for block, module in zip(blocks_of("how-to/own_metric.md"), needs, strict=True):
         if module is None or importlib.util.find_spec(module) is not None:
-            exec(compile(block, "docs/how-to/own_metric.md", "exec"), names)  # noqa: S102
+            run([block], "docs/how-to/own_metric.md", names)
     assert names["hard_steps"].sum() > 0 and names["distance_m"].sum() > 1000
-    assert (tmp_path / "drive.html").exists()
+    assert (checkout / "drive.html").exists()
 
 
 def test_the_benchmarks_function_drives(monkeypatch):
@@ -67,8 +131,84 @@ def test_the_benchmarks_function_drives(monkeypatch):
         return {"rows": [{"part": "towns", "name": "grid towns", "not_driven": None, **row} for row in rows]}
 
     monkeypatch.setattr(pictura, "evaluate_robust", shorter)
-    page = "docs/how-to/robust_benchmark.md"
-    (block,) = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.S)
-    names: dict[str, object] = {}
-    exec(compile(block, page, "exec"), names)  # noqa: S102
+    names = run(blocks_of("how-to/robust_benchmark.md"), "docs/how-to/robust_benchmark.md")
     assert names["report"]["rows"][0]["vehicle_episodes"] > 0
+
+
+def test_the_card_is_what_the_lists_say():
+    pytest.importorskip("gymnasium")
+    out = subprocess.run([sys.executable, ROOT / "scripts/environment_card", "--check"], capture_output=True, text=True, timeout=120)
+    assert (out.returncode, out.stdout, out.stderr) == (0, "", ""), "run scripts/environment_card"
+
+
+def test_the_card_has_every_number_of_actions_and_arguments():
+    text = (DOCS / "reference/environment.md").read_text()
+    signature = pictura.Simulator.__init__.__doc__.split("->")[0]
+    for name in re.findall(r"(\w+): ", signature)[3:]:
+        assert f"\n| `{name}` | `" in text, name
+    assert len(re.findall(r"^\| \d+( \(idle\))? \| \(\d, \d\) \|", text, re.M)) == pictura.NUM_ACTIONS
+
+
+def test_actions_are_the_jerks_that_the_card_names(town):
+    from pictura.envs import batch
+
+    fixed = {name: 1.0 for name in ("throttle", "steer", "acceleration")}
+    simulator = pictura.Simulator([town], [(0, 12)], num_threads=1, pedestrian_fraction=0, cyclist_fraction=0, conditioning=fixed)
+    slots = np.flatnonzero(simulator.state["status"].numpy() == 0).astype(np.int32)
+    none = np.zeros(len(slots), np.float32)
+    simulator.set_state(slots, {"accel_long_mps2": none, "accel_lat_mps2": none, "speed_mps": none + 8})
+    simulator.step(np.arange(12, dtype=np.int32))
+    longitudinal, lateral = (simulator.state[f"accel_{name}_mps2"].numpy() / simulator.dt_s for name in ("long", "lat"))
+    assert len(slots) > 6
+    for slot in slots:
+        i, k = divmod(int(slot), batch.NUM_LATERAL)
+        assert longitudinal[slot] == pytest.approx(batch.LONGITUDINAL_JERKS_MPS3[i], abs=1e-3)
+        assert lateral[slot] == pytest.approx(batch.LATERAL_JERKS_MPS3[k], abs=1e-3)
+
+
+# What the pages of the reference name.
+PUBLIC = [
+    name for page in sorted((DOCS / "reference/python").glob("*.md")) for name in re.findall(r"^::: (pictura\S+)", page.read_text(), re.M)
+]
+
+
+def test_the_reference_has_every_public_name():
+    named = set(PUBLIC)
+    for file in ("_pictura.pyi", "_training.pyi", "torch.py", "plot.py", "datasets.py", "presets.py", "rerun.py"):
+        module, source = "" if file[0] == "_" else file.removesuffix(".py"), ROOT / "bindings/pictura" / file
+        for name in re.findall(r"^(?:class|def) ([a-zA-Z]\w+)", source.read_text(), re.M):
+            whole = ".".join(filter(None, ["pictura", module, name]))
+            internal = {"pictura.torch.point_features", "pictura.torch.segment_features", "pictura.plot.main"}
+            assert whole in named or whole in internal, f"{whole}: expected ':::' on a page of docs/reference/python"
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_a_docstring_has_an_example_that_is_true(name, checkout, monkeypatch):
+    short = name.removeprefix("pictura.")
+    for part, package in PACKAGES.items():
+        if short.startswith(part):
+            pytest.importorskip(package)
+    if short in OF_TRAINING and not HAS_TRAINING:
+        pytest.skip("needs a package that was built beside torch")
+    module, _, attribute = name.rpartition(".")
+    found = getattr(importlib.import_module(module), attribute)
+    text = inspect.getdoc(found)
+    if inspect.isclass(found) and (issubclass(found, Exception) or module == "pictura.plot"):
+        assert text
+        return
+    examples = doctest.DocTestParser().get_doctest(text, {"np": np, "pathlib": pathlib, "pictura": pictura}, name, None, 0)
+    assert examples.examples, f"{name}: expected an example"
+    if "drive.scenario" in text:
+        simulator = pictura.Simulator([pictura.Map.load("procedural:3")], [(0, 8)])
+        recorder = pictura.SceneRecorder(simulator)
+        simulator.run(pictura.Controller("lane", simulator), 30)
+        recorder.scenario(id="drive", self_agent=0).save("drive.scenario")
+    said: list[str] = []
+    doctest.DocTestRunner(verbose=False).run(examples, out=said.append)
+    assert not said, "".join(said)
+
+
+def test_help_of_make_vec_is_the_page():
+    text = pydoc.plain(pydoc.render_doc(pictura.make_vec))
+    for word in ("preset", "num_agents", "Raises", "UsageError", ">>> envs = ", "[slots, ...]"):
+        assert word in text, word

@@ -419,8 +419,8 @@ def test_a_users_settings_change_nothing_and_stay(tmp_path):
 
 
 def test_the_document_shows_charts(tmp_path, monkeypatch, curves):
-    document = pathlib.Path(__file__).parents[2] / "docs/reference/python.md"
-    (block,) = re.findall(r"```python\n(.*?)```", document.read_text().split("## Charts")[1].split("\n## ")[0], re.S)
+    document = pathlib.Path(__file__).parents[2] / "docs/reference/python/plot.md"
+    (block,) = re.findall(r"```python\n(.*?)```", document.read_text(), re.S)
     monkeypatch.chdir(tmp_path)
     metrics = ",".join(plot.METRICS)
     run = pathlib.Path(run_folder(tmp_path / "runs/a"))
@@ -428,7 +428,7 @@ def test_the_document_shows_charts(tmp_path, monkeypatch, curves):
     (tmp_path / "probe_removal").mkdir()
     write_summary(tmp_path / "probe_removal", "removal", [])
     curves({"name": "a", "points": [point(1, row("medium", 1))]})
-    exec(compile(block, "docs/reference/python.md", "exec"), {})  # noqa: S102
+    exec(compile(block, "docs/reference/python/plot.md", "exec"), {})  # noqa: S102
     assert (tmp_path / "curves.png").exists()
 
 

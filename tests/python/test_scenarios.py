@@ -235,12 +235,12 @@ def test_one_road_user_among_the_recorded_is_an_environment(folder, scene, other
 
 def test_the_documents_code_runs(folder, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    text = (pathlib.Path(__file__).parents[2] / "docs/reference/python.md").read_text()
-    blocks = re.findall(r"```python\n(.*?)```", text.split("## Recorded scenes")[1].split("## Arrays")[0], re.S)
+    text = (pathlib.Path(__file__).parents[2] / "docs/reference/python/scenes.md").read_text()
+    blocks = re.findall(r"```python\n(.*?)```", text, re.S)
     names: dict[str, object] = {"pictura": pictura}
     for block in blocks:
         block = block.replace("validation.tfrecord-00000-of-00150#7", str(folder / "womd.tfrecord"))
-        exec(compile(block, "docs/reference/python.md", "exec"), names)  # noqa: S102
+        exec(compile(block, "docs/reference/python/scenes.md", "exec"), names)  # noqa: S102
     assert names["errors"].shape == (12, 81) and names["simulator"].totals()["agent_steps"] > 0
     assert pictura.Scenario.load("drive.scenario").id == "my drive"
 

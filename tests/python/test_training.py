@@ -423,10 +423,10 @@ def test_corner_is_the_commands(trained, tmp_path):
 
 def test_the_documents_code_runs(tmp_path, monkeypatch, town):
     monkeypatch.chdir(tmp_path)
-    text = (pathlib.Path(__file__).parents[2] / "docs/reference/python.md").read_text()
+    text = (pathlib.Path(__file__).parents[2] / "docs/reference/python/training.md").read_text()
     (block,) = [each for each in re.findall(r"```python\n(.*?)```", text, re.S) if "pictura.train(" in each]
     names = {"pictura": pictura, "town": town}
-    exec(compile(block.replace("configs/smoke.toml", SMOKE), "docs/reference/python.md", "exec"), names)  # noqa: S102
+    exec(compile(block.replace("configs/smoke.toml", SMOKE), "docs/reference/python/training.md", "exec"), names)  # noqa: S102
     assert names["logits"].shape == (16, 12) and names["rows"][0]["vehicle_episodes"] > 0
 
 

@@ -67,6 +67,14 @@ class Images(unittest.TestCase):
         setup = re.search(r"^packages=\((.*?)^\)", (ROOT / "scripts/setup").read_text(), re.DOTALL | re.MULTILINE)[1]
         self.assertLessEqual(packages, set(setup.split()))
 
+    def test_are_built_as_their_page_says(self):
+        builds = re.findall(r"docker build -f (\S+) (.*) \.$", (ROOT / "docs/how-to/docker.md").read_text(), re.MULTILINE)
+        self.assertEqual({file for file, _ in builds}, {"docker/cpu.Dockerfile", "docker/gpu.Dockerfile"})
+        for file, options in builds:
+            arguments = re.findall(r"^ARG (\w+)", (ROOT / file).read_text(), re.MULTILINE)
+            for name in re.findall(r"--build-arg (\w+)=", options):
+                self.assertIn(name, arguments)
+
     def test_take_what_there_is(self):
         for path in DOCKERFILES:
             text = path.read_text()
