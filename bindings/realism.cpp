@@ -13,9 +13,9 @@ namespace pictura::python {
 namespace {
 
 using Ids = py::array_t<int64_t, py::array::c_style | py::array::forcecast>;
-using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
-SceneRollouts rollouts_of(const Ids& track_ids, const Numbers& center_m, const Numbers& heading_rad) {
+SceneRollouts rollouts_of(const Ids& track_ids, const Doubles& center_m, const Doubles& heading_rad) {
   if (track_ids.ndim() != 1) fail_usage("track_ids: expected [tracks], got {} dimensions", track_ids.ndim());
   const py::ssize_t tracks = track_ids.shape(0);
   if (center_m.ndim() != 4 || center_m.shape(1) != tracks || center_m.shape(3) != 3) {
@@ -59,8 +59,8 @@ py::dict arrays_of(const std::vector<RealismFeatures>& rollouts) {
   return arrays;
 }
 
-std::string score_of(const RecordedScene& scene, const Ids& track_ids, const Numbers& center_m,
-                     const Numbers& heading_rad, const std::string& version) {
+std::string score_of(const RecordedScene& scene, const Ids& track_ids, const Doubles& center_m,
+                     const Doubles& heading_rad, const std::string& version) {
   const SceneRollouts rollouts = rollouts_of(track_ids, center_m, heading_rad);
   return run_interruptibly("realism.score", 1, {}, [scenario = scene.scenario(), rollouts, version] {
     RealismReport report;
@@ -70,8 +70,8 @@ std::string score_of(const RecordedScene& scene, const Ids& track_ids, const Num
   });
 }
 
-py::tuple features_of(const RecordedScene& scene, const Ids& track_ids, const Numbers& center_m,
-                      const Numbers& heading_rad) {
+py::tuple features_of(const RecordedScene& scene, const Ids& track_ids, const Doubles& center_m,
+                      const Doubles& heading_rad) {
   const SceneRollouts rollouts = rollouts_of(track_ids, center_m, heading_rad);
   const auto [ids, recorded, simulated] =
       run_interruptibly("realism.features", 1, {}, [scenario = scene.scenario(), rollouts] {

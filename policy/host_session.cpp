@@ -62,7 +62,7 @@ struct HostSession final : SessionParts {
 
   std::string policy_hash() const override { return hash; }
 
-  std::unique_ptr<SessionParts> untrained(uint64_t /*seed*/) const override {
+  std::unique_ptr<SessionParts> make_untrained(uint64_t /*seed*/) const override {
     fail("policy: drawing weights as training does needs torch, which this build lacks: pip install pictura[train]");
   }
 
@@ -184,7 +184,7 @@ class HostController final : public PolicyController {
   int64_t num_driven() const override { return num_driven_; }
 
  private:
-  // Removes the slots of agents that hold their action. Same rule as DecisionClock::deciding().
+  // Removes the slots of agents that hold their action. Same rule as DecisionClock::select_deciding().
   void keep_deciding(const SimulatorArrays& input, std::vector<int64_t>* slots_inout) {
     const int64_t decision_steps = session_.config.policy.decision_steps, step = step_++;
     if (decision_steps == 1) return;
@@ -217,7 +217,7 @@ std::unique_ptr<PolicyController> HostSession::make_controller(Renderer* rendere
 
 std::unique_ptr<SessionParts> open_host_session(const std::string& path, const SessionOptions& options) {
   const StoredPolicy saved = read_stored_policy(path, options.average);
-  const Config config = adapted(saved.config, options);
+  const Config config = with_session_options(saved.config, options);
   const Device device = open_learning_device(config);
   PICTURA_CHECK(device.is_host(), "{}: {}: expected the host", path, name_of(device));
   return std::make_unique<HostSession>(saved, config, chosen_rig(saved, options), options.camera_severity);

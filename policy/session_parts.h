@@ -19,7 +19,7 @@ struct SessionParts {
 
   /// Implement the functions of PolicySession.
   virtual std::string policy_hash() const = 0;
-  virtual std::unique_ptr<SessionParts> untrained(uint64_t seed) const = 0;
+  virtual std::unique_ptr<SessionParts> make_untrained(uint64_t seed) const = 0;
   virtual void evaluate(const PolicyInput& input, Renderer* renderer, Span<float> logits_out,
                         Span<float> values_out) const = 0;
   virtual std::unique_ptr<PolicyController> make_controller(Renderer* renderer, bool argmax, uint64_t seed,

@@ -37,7 +37,7 @@ struct TorchSession final : SessionParts {
 
   std::string policy_hash() const override { return policy.hash(); }
 
-  std::unique_ptr<SessionParts> untrained(uint64_t seed) const override {
+  std::unique_ptr<SessionParts> make_untrained(uint64_t seed) const override {
     return std::make_unique<TorchSession>(with_seed(config, seed), device, rig, camera_severity);
   }
 
@@ -112,7 +112,7 @@ class TorchController final : public PolicyController {
     }
     const at::Tensor active = active_slots(input, mask, false, parts_.executor.get());
     num_driven_ = active.size(0);
-    const at::Tensor slots = clock_.deciding(input, active, step_++);
+    const at::Tensor slots = clock_.select_deciding(input, active, step_++);
     const Decision decision = parts_.decide({.observations = input.observations,
                                              .scene = &input.scene,
                                              .views = input.views,
@@ -146,7 +146,7 @@ std::unique_ptr<PolicyController> TorchSession::make_controller(Renderer* render
 
 std::unique_ptr<SessionParts> open_torch_session(const std::string& path, const SessionOptions& options) {
   const SavedPolicy saved = read_policy(path, options.average);
-  const Config config = adapted(saved.config, options);
+  const Config config = with_session_options(saved.config, options);
   const Device device = open_learning_device(config);
   auto session = std::make_unique<TorchSession>(config, device, chosen_rig(saved, options), options.camera_severity);
   restore_policy(saved, session->policy);
