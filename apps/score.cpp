@@ -9,14 +9,14 @@ namespace pictura {
 
 namespace {
 
-constexpr size_t kShownFaults = 10;
+constexpr size_t kShownNames = 10;
 
 void warn_of(const std::vector<std::string>& names, const char* what) {
-  for (size_t i = 0; i < std::min(names.size(), kShownFaults); ++i) {
+  for (size_t i = 0; i < std::min(names.size(), kShownNames); ++i) {
     print_message("warning: {}: {}\n", what, printable(names[i]));
   }
-  if (names.size() > kShownFaults) {
-    print_message("warning: {} more; --json lists all\n", names.size() - kShownFaults);
+  if (names.size() > kShownNames) {
+    print_message("warning: {} more; --json lists all\n", names.size() - kShownNames);
   }
 }
 
