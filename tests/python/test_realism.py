@@ -142,7 +142,7 @@ def test_refusals_name_what_is_wrong(scene, tmp_path):
         realism.score(scene, good._replace(heading_rad=good.heading_rad[:, :, :79]))
     broken = tmp_path / "broken.binproto"
     broken.write_bytes(b"\x0a\x05\x0a\x01")
-    with pytest.raises(pictura.Error, match="broken.binproto: field 1: expected at most the 2 bytes"):
+    with pytest.raises(pictura.Error, match="broken.binproto: field 1: expected at most the 2 remaining bytes"):
         realism.read_rollouts(broken)
     with pytest.raises(pictura.Error, match="nowhere.binproto"):
         realism.read_rollouts("nowhere.binproto")

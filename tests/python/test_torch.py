@@ -53,7 +53,7 @@ def test_saved_weights_are_read_back(reference, tmp_path):
     again = load_policy(tmp_path / "mine.safetensors")
     assert all(torch.equal(a, b) for a, b in zip(policy.state_dict().values(), again.state_dict().values()))
     other = load_policy(reference / "perspective.safetensors")
-    with pytest.raises(pictura.Error, match="different architecture"):
+    with pytest.raises(pictura.Error, match="its architecture differs from the policy"):
         save_policy(other, tmp_path / "x.safetensors", like=reference / "vector.safetensors")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.safetensors"]
 
