@@ -15,7 +15,7 @@ namespace pictura::lanelet2 {
 
 namespace {
 
-constexpr double kSamePoint_m = 1e-3;
+constexpr double kSameCorner_m = 1e-3;
 
 double area_of(const Points& a, std::size_t i, std::size_t j, std::size_t k) {
   const Eigen::Vector2d u = (a[j] - a[i]).head<2>(), v = (a[k] - a[i]).head<2>();
@@ -110,7 +110,7 @@ class AreaBuilder {
 
   static Points without_repeated(Points ring) {
     const auto is_same = [](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-      return plan_distance_m(a, b) < kSamePoint_m;
+      return plan_distance_m(a, b) < kSameCorner_m;
     };
     ring.erase(std::unique(ring.begin(), ring.end(), is_same), ring.end());
     while (ring.size() > 1 && is_same(ring.front(), ring.back())) ring.pop_back();

@@ -14,7 +14,7 @@ namespace pictura::lanelet2 {
 
 namespace {
 
-constexpr double kSamePoint_m = 0.01;
+constexpr double kSameOutlinePoint_m = 0.01;
 constexpr double kMaxWidth_m = 500.0;
 constexpr double kMaxRadius_m = 50e3;  // of a map
 constexpr float kBridged_m = 20.0f;    // of a lanelet between two of a junction
@@ -289,11 +289,11 @@ class LaneBuilder {
     std::vector<Vec3> ring;
     const auto add = [&](const Eigen::Vector3d& p) {
       const Vec3 point = to_vec3(p);
-      if (ring.empty() || length(point - ring.back()) > static_cast<float>(kSamePoint_m)) ring.push_back(point);
+      if (ring.empty() || length(point - ring.back()) > static_cast<float>(kSameOutlinePoint_m)) ring.push_back(point);
     };
     for (const Eigen::Vector3d& p : left) add(p);
     for (std::size_t i = right.size(); i-- > 0;) add(right[i]);
-    if (ring.size() > 1 && length(ring.back() - ring.front()) <= static_cast<float>(kSamePoint_m)) ring.pop_back();
+    if (ring.size() > 1 && length(ring.back() - ring.front()) <= static_cast<float>(kSameOutlinePoint_m)) ring.pop_back();
     if (ring.size() < 3) {
       return file_.where(relation).record_repair(build_.faults, RepairKind::empty_lanelet,
                                                  "expected a crosswalk with an area");
@@ -395,7 +395,7 @@ std::vector<CurvePoint> cut_line(const std::vector<CurvePoint>& line, SampleBudg
     if (!cut.empty()) {
       const CurvePoint last = cut.back();
       const double way_m = plan_distance_m(last.position_m, next.position_m);
-      if (way_m < kSamePoint_m) {
+      if (way_m < kSameOutlinePoint_m) {
         // The last point stays: others may begin there.
         if (i + 1 == line.size() && cut.size() > 1) cut.back() = next;
         continue;

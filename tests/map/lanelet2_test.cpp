@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -647,7 +648,7 @@ TEST(Lanelet2, MgrsCodesGiveTheReferenceOrThePlace) {
 
 TEST(Lanelet2, FilesAreLoadedCachedAndCopiedByName) {
   const ScratchFolder folder;
-  const EnvironmentVariable cache("XDG_CACHE_HOME", folder / "cache");
+  const EnvironmentVariable cache("XDG_CACHE_HOME", folder / "cache"), on("PICTURA_CACHE", std::nullopt);
   const std::string path = folder / "street.osm";
   write_file(path, geographic_street(49, 8.4));
   LoadReport report;

@@ -88,7 +88,7 @@ TEST(MapCache, DifferencesAreFoundAndNamed) {
       {"lanes[3].length_m: ", [](RoadMap* m) { m->lanes[3].length_m = std::nextafter(m->lanes[3].length_m, 1e3f); }},
       {"lanes[0].type: driving and sidewalk", [](RoadMap* m) { m->lanes[0].type = LaneType::sidewalk; }},
       {"signs[0].lanes.end: 2 and 1", [](RoadMap* m) { m->signs[0].lanes.end = 1; }},
-      {"signs: 1 and 0 of them", [](RoadMap* m) { m->signs.clear(); }},
+      {"signs: 1 and 0 elements", [](RoadMap* m) { m->signs.clear(); }},
       {"geo_reference: '+proj=tmerc +lat_0=49' and ''", [](RoadMap* m) { m->geo_reference.clear(); }},
       {"origin_m[2]: 0 and -0", [](RoadMap* m) { m->origin_m[2] = -0.0; }},
       {"facts.z_max_m: ", [](RoadMap* m) { m->facts.z_max_m = 7; }},

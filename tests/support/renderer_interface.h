@@ -156,7 +156,7 @@ inline void expect_refused_order(const MakeForRig& make) {
   const std::vector<View> views(1);
   const auto renderer = make(rig);
   EXPECT_THAT(message_of([&] { renderer->render({}, views, batch); }),
-              testing::ContainsRegex("images: expected planar channels.*, got interleaved ones"));
+              testing::ContainsRegex("images: expected planar channels.*, got interleaved channels"));
   if (renderer->draws_all_formats()) {
     batch.order = ChannelOrder::patches;
     batch.patch_px = 6;
