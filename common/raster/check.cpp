@@ -65,7 +65,7 @@ void check_images(const Renderer& renderer, std::size_t num_views, const ImageBa
                 "renderer {}: images: expected the format u8 or f32, got {}", name,
                 images.format == PixelFormat::f16 ? "f16" : "bf16");
   PICTURA_CHECK(images.order == ChannelOrder::planar || (draws_all && images.order == ChannelOrder::patches),
-                "renderer {}: images: expected planar channels{}, got {} channels", name,
+                "renderer {}: images: expected the channel order planar{}, got {}", name,
                 draws_all ? " or patches" : "", name_of(images.order));
   check_patch_px(name, images.order, images.patch_px);
   PICTURA_CHECK(images.num_views >= 0 && static_cast<std::size_t>(images.num_views) == num_views,

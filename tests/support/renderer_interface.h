@@ -156,7 +156,7 @@ inline void expect_refused_order(const MakeForRig& make) {
   const std::vector<View> views(1);
   const auto renderer = make(rig);
   EXPECT_THAT(message_of([&] { renderer->render({}, views, batch); }),
-              testing::ContainsRegex("images: expected planar channels.*, got interleaved channels"));
+              testing::ContainsRegex("images: expected the channel order planar.*, got interleaved"));
   if (renderer->draws_all_formats()) {
     batch.order = ChannelOrder::patches;
     batch.patch_px = 6;
@@ -166,7 +166,7 @@ inline void expect_refused_order(const MakeForRig& make) {
   }
   HostImages patches(rig, 1, PixelFormat::u8, Planes::none, ChannelOrder::patches);
   EXPECT_THAT(message_of([&] { renderer->render({}, views, patches.batch()); }),
-              testing::HasSubstr("images: expected planar channels, got patches ones"));
+              testing::HasSubstr("images: expected the channel order planar, got patches"));
   HostImages halves(rig, 1, PixelFormat::bf16);
   EXPECT_THAT(message_of([&] { renderer->render({}, views, halves.batch()); }),
               testing::HasSubstr("images: expected the format u8 or f32, got bf16"));
