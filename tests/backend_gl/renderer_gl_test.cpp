@@ -316,7 +316,7 @@ TEST_P(GlRenderer, RejectsUnsupportedFeaturesByName) {
   ImageBatch with_depth = images.batch();
   with_depth.cameras = cameras;
   expect_error([&] { renderer->render(town.scene.batch(), town.views, with_depth); },
-               "renderer " + name + ": images: camera 2: depth, class and instance planes");
+               "renderer " + name + ": images: camera 2: only cpu and cuda support depth, class and instance planes");
   float visibility = 0;
   expect_error(
       [&] {

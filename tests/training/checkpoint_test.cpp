@@ -280,7 +280,7 @@ TEST_F(CheckpointFile, TheSchemaIsThatOfTheArraysThatThePolicyReads) {
   write_file(path, sealed(changed));
   EXPECT_THAT(
       message_of([&] { read_checkpoint(path); }),
-      ::testing::AllOf(HasSubstr("a.ckpt: observation schema: walls"), HasSubstr("[80,7]"), HasSubstr("nothing")));
+      ::testing::AllOf(HasSubstr("a.ckpt: observation schema: walls"), HasSubstr("[80,7]"), HasSubstr("no value")));
 }
 
 TEST_F(CheckpointFile, SavedUnderTheOldNameOfTheBackendsItReadsAsBefore) {
