@@ -1,4 +1,5 @@
-"""Draws network.png, the network's layers, and summation_order.png, sums of the same numbers in other orders.
+"""Draws network.png, the network's layers, summation_order.png, sums of the same numbers in other orders, and
+training_update.png, the parts of an update.
 
     python3 scripts/drawings.py FOLDER    FOLDER: where to write, docs/images in scripts/figures
 """
@@ -7,12 +8,21 @@ import pathlib
 import sys
 
 import matplotlib
+import matplotlib.patches
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
 BLUE, ORANGE, GREY = "#4361ee", "#fb8500", "#8d99ae"
+UPDATE = [
+    ("Rollout", "one policy drives all agents\nof all worlds, each from\nits own observations"),
+    ("Advantages", "generalized advantage\nestimates; infractions end\nan episode"),
+    ("Filter", "transitions with small\nadvantages are dropped"),
+    ("Optimization", "equal minibatches, several\nepochs: PPO's clipped loss,\nvalue, entropy"),
+]
+COLORS = ["#4477aa", "#66ccee", "#228833", "#ccbb44"]
+WIDTH, GAP, HEIGHT = 2.3, 0.5, 1.35
 
 
 def save(figure, path):
@@ -79,12 +89,33 @@ def draw_sums(path):
     save(figure, path)
 
 
+def draw_update(path):
+    """Parts of one update of training, in order, and the way back."""
+    figure, axes = plt.subplots(figsize=(11, 2.6), dpi=100)
+    for i, ((title, text), color) in enumerate(zip(UPDATE, COLORS, strict=True)):
+        x = i * (WIDTH + GAP)
+        axes.add_patch(matplotlib.patches.FancyBboxPatch((x, 0), WIDTH, HEIGHT, boxstyle="round,pad=0.05", facecolor=color, alpha=0.25, edgecolor=color))
+        axes.text(x + WIDTH / 2, HEIGHT - 0.2, title, ha="center", va="center", fontsize=12, weight="bold")
+        axes.text(x + WIDTH / 2, 0.5, text, ha="center", va="center", fontsize=9)
+        if i + 1 < len(UPDATE):
+            arrow = {"arrowstyle": "-|>", "color": "black", "linewidth": 1.4}
+            axes.annotate("", (x + WIDTH + GAP - 0.07, HEIGHT / 2), (x + WIDTH + 0.07, HEIGHT / 2), arrowprops=arrow)
+    last = len(UPDATE) * (WIDTH + GAP) - GAP
+    axes.plot([last - WIDTH / 2, last - WIDTH / 2, WIDTH / 2], [-0.07, -0.4, -0.4], color="black", linewidth=1.4)
+    axes.annotate("", (WIDTH / 2, -0.05), (WIDTH / 2, -0.42), arrowprops={"arrowstyle": "-|>", "color": "black", "linewidth": 1.4})
+    axes.text(last / 2, -0.54, "new weights; worlds continue where they are", ha="center", va="center", fontsize=9)
+    axes.set(xlim=(-0.1, last + 0.1), ylim=(-0.7, HEIGHT + 0.1))
+    axes.axis("off")
+    save(figure, path)
+
+
 def main():
     if len(sys.argv) != 2:
         sys.exit(f"error: drawings.py: expected a folder, got '{' '.join(sys.argv[1:])}'")
     folder = pathlib.Path(sys.argv[1])
     draw_network(folder / "network.png")
     draw_sums(folder / "summation_order.png")
+    draw_update(folder / "training_update.png")
 
 
 if __name__ == "__main__":
