@@ -49,10 +49,12 @@ install(FILES ${PROJECT_SOURCE_DIR}/map/opendrive/opendrive.h DESTINATION ${head
   COMPONENT simulator)
 install(FILES ${PROJECT_SOURCE_DIR}/map/procedural/procedural_town.h ${PROJECT_SOURCE_DIR}/map/procedural/town_options.h
   DESTINATION ${header_folder}/map/procedural COMPONENT simulator)
-pictura_install_headers(simulator map PATTERN "opendrive" EXCLUDE PATTERN "lanelet2" EXCLUDE PATTERN "procedural" EXCLUDE
+pictura_install_headers(simulator map PATTERN "opendrive" EXCLUDE PATTERN "lanelet2" EXCLUDE
+  PATTERN "procedural" EXCLUDE
   PATTERN "womd" EXCLUDE PATTERN "gpudrive" EXCLUDE PATTERN "pufferdrive" EXCLUDE
   PATTERN "logged_scene.h" EXCLUDE PATTERN "conversion.h" EXCLUDE
-  PATTERN "import.h" EXCLUDE PATTERN "polyline.h" EXCLUDE PATTERN "road_edges.h" EXCLUDE PATTERN "surface.h" EXCLUDE)
+  PATTERN "import.h" EXCLUDE PATTERN "polyline.h" EXCLUDE PATTERN "polyline_lanes.h" EXCLUDE PATTERN "stripes.h" EXCLUDE
+  PATTERN "road_edges.h" EXCLUDE PATTERN "surface.h" EXCLUDE)
 pictura_install_headers(simulator simulator)
 install(FILES ${PROJECT_SOURCE_DIR}/backends/make_controller.h ${PROJECT_SOURCE_DIR}/backends/make_simulator.h
               ${PROJECT_SOURCE_DIR}/backends/upload_maps.h DESTINATION ${header_folder}/backends COMPONENT simulator)

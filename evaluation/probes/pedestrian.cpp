@@ -20,7 +20,7 @@ constexpr size_t kMaxTries = 48, kTriesAtOnce = 12;
 constexpr int kCoarse = 4;
 static_assert(kPathOrigin % kCoarse == 0 && kCoarse * kPathSpacing_m <= min_of(kPathHidden_m, kPathSeen_m));
 constexpr float kMinHiderDistance_m = 5, kSameHeight_m = 0.5f;
-constexpr float kAhead = 0.7f;  // minimum cosine of the angle between the ego's heading and the hider
+constexpr float kMinCosineAhead = 0.7f;  // of the angle between the ego's heading and the hider
 
 // Candidate path in a world of a frame.
 struct Candidate {
@@ -101,7 +101,7 @@ class PedestrianProbe {
         const Vec2 apart = hider.center_m.xy() - view.origin_m.xy();
         const float distance_m = length(apart);
         if (distance_m < kMinHiderDistance_m || distance_m > options_.hider_range_m) continue;
-        if (dot(apart, heading) < kAhead * distance_m) continue;
+        if (dot(apart, heading) < kMinCosineAhead * distance_m) continue;
         if (std::abs(hider.center_m.z - view.origin_m.z) > kSameHeight_m) continue;
         for (const CrossingPath& path : paths_behind(hider, view.origin_m.xy()))
           all.push_back({ego, box - first_box, path});
