@@ -65,7 +65,7 @@ class DeviceTarget final : public RenderTarget {
  private:
   RenderCase render_case_;
   DeviceScene scene_;
-  DeviceCopy<View> view_copy_;
+  DeviceUpload<View> view_copy_;
   Span<const View> views_;
   DeviceImages staged_;
   ImageBatch batch_;

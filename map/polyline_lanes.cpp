@@ -57,8 +57,8 @@ void set_lane_links(const LaneLinks& links, RoadMap* map) {
   }
 }
 
-LaneSegments segments_of(const RoadMap& map, LanePredicate is_wanted) {
-  LaneSegments result;
+LanePieces segments_of(const RoadMap& map, LanePredicate is_wanted) {
+  LanePieces result;
   std::vector<Aabb2> boxes;
   for (std::size_t lane = 0; lane < map.lanes.size(); ++lane) {
     if (!is_wanted(map.lanes[lane])) continue;
@@ -86,19 +86,19 @@ std::optional<Vec2> crossing(Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
 void find_crossing_junctions(LanePredicate is_wanted, float bridged_m,
                              const std::function<void(std::size_t)>& count_work, RoadMap* map_inout) {
   RoadMap& map = *map_inout;
-  const LaneSegments driven = segments_of(map, is_wanted);
+  const LanePieces driven = segments_of(map, is_wanted);
   // Lanes that fork, merge or continue each other share an end.
   const auto is_end = [&](int32_t lane, Vec2 p) {
     return length(start_of(map, lane).position_m.xy() - p) < kSharedEnd_m ||
            length(end_of(map, lane).position_m.xy() - p) < kSharedEnd_m;
   };
   std::vector<std::pair<int32_t, int32_t>> crossings;
-  for (const LaneSegment& segment : driven.segments) {
+  for (const LanePiece& segment : driven.segments) {
     const Aabb2 box{{min_of(segment.a_m.x, segment.b_m.x), min_of(segment.a_m.y, segment.b_m.y)},
                     {max_of(segment.a_m.x, segment.b_m.x), max_of(segment.a_m.y, segment.b_m.y)}};
     visit_items(driven.grid.view(), box, [&](std::size_t item) {
       count_work(4);
-      const LaneSegment& other = driven.segments[item];
+      const LanePiece& other = driven.segments[item];
       if (other.lane <= segment.lane) return;
       if (map.lanes[other.lane].source_road == map.lanes[segment.lane].source_road) return;  // both directions of one
       const std::optional<Vec2> place = crossing(segment.a_m, segment.b_m, other.a_m, other.b_m);

@@ -32,17 +32,18 @@ using LaneLinks = std::set<std::pair<int32_t, int32_t>>;
 /// Sets the successors and predecessors of all lanes.
 void set_lane_links(const LaneLinks& links, RoadMap* map);
 
-/// Lanes in a grid, for what crosses them and for what is near.
-struct LaneSegment {
+/// Straight piece of a lane's center line.
+struct LanePiece {
   Vec3 a_m, b_m;
   int32_t lane = 0;
 };
-struct LaneSegments {
-  std::vector<LaneSegment> segments;
+/// Pieces of lanes in a grid, for searches of crossing and near lanes.
+struct LanePieces {
+  std::vector<LanePiece> segments;
   Grid grid;
 };
 using LanePredicate = bool (*)(const Lane&);
-LaneSegments segments_of(const RoadMap& map, LanePredicate is_wanted);
+LanePieces segments_of(const RoadMap& map, LanePredicate is_wanted);
 
 /// Where two segments cross in plan at about one height, ends included; nothing for parallel ones.
 std::optional<Vec2> crossing(Vec3 a, Vec3 b, Vec3 c, Vec3 d);

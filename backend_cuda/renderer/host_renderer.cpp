@@ -84,10 +84,10 @@ class HostRendererCuda final : public Renderer {
   HostGeometries geometries_;  // for checks
   DeviceScene scene_;
   DeviceImages images_;
-  DeviceCopy<View> views_;
-  DeviceCopy<int32_t> count_;
-  DeviceCopy<VisibilityQuery> queries_;
-  DeviceCopy<float> visibility_;
+  DeviceUpload<View> views_;
+  DeviceUpload<int32_t> count_;
+  DeviceUpload<VisibilityQuery> queries_;
+  DeviceUpload<float> visibility_;
 };
 
 }  // namespace

@@ -12,7 +12,7 @@ namespace pictura {
 
 /// Device memory that grows to the largest copied array and never shrinks.
 template <typename T>
-class DeviceCopy {
+class DeviceUpload {
  public:
   /// Copies from the host on the stream. Pageable host memory may be overwritten after the call returns.
   Span<const T> assign(Span<const T> host, cudaStream_t stream) {
@@ -52,9 +52,9 @@ class DeviceScene {
 
  private:
   SceneBatch batch_;
-  DeviceCopy<int32_t> world_begin_, geometry_, light_begin_, hidden_agents_;
-  DeviceCopy<AgentBox> agents_;
-  DeviceCopy<LightState> light_states_;
+  DeviceUpload<int32_t> world_begin_, geometry_, light_begin_, hidden_agents_;
+  DeviceUpload<AgentBox> agents_;
+  DeviceUpload<LightState> light_states_;
 };
 
 /// Device memory for images whose destination is on the host: colour as in image_layout, and the planes that the host
@@ -112,15 +112,15 @@ class DeviceImages {
 
  private:
   struct CameraPlanes {
-    DeviceCopy<float> depth_m;
-    DeviceCopy<uint8_t> class_id;
-    DeviceCopy<uint16_t> instance_id;
+    DeviceUpload<float> depth_m;
+    DeviceUpload<uint8_t> class_id;
+    DeviceUpload<uint16_t> instance_id;
   };
   std::size_t pixels_of(std::size_t camera, int num_views) const {
     return static_cast<std::size_t>(num_views * layout_.cameras[camera].size.pixels());
   }
   ImageLayout layout_;
-  DeviceCopy<uint8_t> color_;
+  DeviceUpload<uint8_t> color_;
   Span<uint8_t> color_bytes_;
   std::vector<CameraPlanes> planes_;
   std::vector<CameraImages> cameras_;

@@ -34,11 +34,11 @@ struct NearLane {
 };
 
 /// Returns the nearest lane segment within reach, on the level of p.
-NearLane nearest_lane(Conversion* conversion, const LaneSegments& lanes, Vec3 p, float reach_m) {
+NearLane nearest_lane(Conversion* conversion, const LanePieces& lanes, Vec3 p, float reach_m) {
   NearLane best;
   visit_items(lanes.grid.view(), box_around(p, reach_m), [&](std::size_t item) {
     conversion->count_work(4);
-    const LaneSegment& segment = lanes.segments[item];
+    const LanePiece& segment = lanes.segments[item];
     const Vec2 a = segment.a_m.xy(), way = segment.b_m.xy() - a;
     const float t = clamp(dot(p.xy() - a, way) / max_of(dot(way, way), 1e-12f), 0.0f, 1.0f);
     const float z = segment.a_m.z + t * (segment.b_m.z - segment.a_m.z);
@@ -50,8 +50,7 @@ NearLane nearest_lane(Conversion* conversion, const LaneSegments& lanes, Vec3 p,
 }
 
 /// Whether most edges near lanes have the lane on their right, contrary to the convention.
-bool are_reversed(Conversion* conversion, const LaneSegments& lanes,
-                  const std::vector<std::vector<CurvePoint>>& lines) {
+bool are_reversed(Conversion* conversion, const LanePieces& lanes, const std::vector<std::vector<CurvePoint>>& lines) {
   int left = 0, right = 0;
   for (const std::vector<CurvePoint>& line : lines) {
     for (std::size_t i = 1; i < line.size(); ++i) {
@@ -66,7 +65,7 @@ bool are_reversed(Conversion* conversion, const LaneSegments& lanes,
   return left + right >= kMinVotes && right > left;
 }
 
-bool crosses_a_lane(Conversion* conversion, const LaneSegments& lanes, Vec3 a, Vec3 b) {
+bool crosses_a_lane(Conversion* conversion, const LanePieces& lanes, Vec3 a, Vec3 b) {
   const Aabb2 box{{min_of(a.x, b.x), min_of(a.y, b.y)}, {max_of(a.x, b.x), max_of(a.y, b.y)}};
   // Long pieces pass through many cells.
   const double cells = ((box.high.x - box.low.x) / kCell_m + 1) * ((box.high.y - box.low.y) / kCell_m + 1);
@@ -74,7 +73,7 @@ bool crosses_a_lane(Conversion* conversion, const LaneSegments& lanes, Vec3 a, V
   bool crosses = false;
   visit_items(lanes.grid.view(), box, [&](std::size_t item) {
     conversion->count_work(4);
-    const LaneSegment& segment = lanes.segments[item];
+    const LanePiece& segment = lanes.segments[item];
     crosses = crosses || crossing(a, b, segment.a_m, segment.b_m).has_value();
   });
   return crosses;
@@ -106,7 +105,7 @@ void append_dashes(Conversion* conversion, const std::vector<CurvePoint>& line, 
 void make_edges(Conversion* conversion) {
   LoggedScene& scene = conversion->scene;
   RoadMap& map = conversion->out->map;
-  const LaneSegments lanes = segments_of(map, is_driven);
+  const LanePieces lanes = segments_of(map, is_driven);
   // Parts between jumps that cross a lane.
   std::vector<std::vector<CurvePoint>> lines;
   for (const LoggedEdge& edge : scene.edges) {
@@ -205,7 +204,7 @@ void make_signs(Conversion* conversion) {
     crosswalk.outline.end = static_cast<int32_t>(map.outline_points.size());
     map.crosswalks.push_back(crosswalk);
   }
-  const LaneSegments lanes = segments_of(map, is_any);
+  const LanePieces lanes = segments_of(map, is_any);
   for (const LoggedStopSign& logged : scene.stop_signs) {
     // 206 is a stop sign in OpenDRIVE's catalogue.
     Sign sign{.name = std::to_string(logged.id), .type = "206", .subtype = "-1", .country = "OpenDRIVE"};

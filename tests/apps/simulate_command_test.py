@@ -7,7 +7,7 @@ import signal
 import subprocess
 import unittest
 
-from command_case import PICTURA, CommandCase, has_torch, needs_ffmpeg, run
+from command_case import PICTURA, CommandCase, needs_ffmpeg, run
 
 TOWNS = sorted(path.stem for path in pathlib.Path(os.environ.get("PICTURA_DATA", "/nowhere")).glob("carla/*.xodr"))
 
@@ -82,7 +82,7 @@ class Simulation(CommandCase):
         self.assert_refused(2, "--agents", *simulate, "--agents", 0)
         self.assert_refused(2, "100000000", *simulate, "--agents", 100_000_000)
         self.assert_refused(2, "4097", *simulate, "--agents", 4097)
-        self.assert_refused(1 if has_torch() else 2, "no/such.ckpt", *simulate, "--policy", "no/such.ckpt")
+        self.assert_refused(1, "no/such.ckpt", *simulate, "--policy", "no/such.ckpt")
         self.assert_refused(2, "got 'lan'; did you mean 'lane'?", *simulate, "--policy", "lan")
         if shutil.which("ffmpeg"):
             self.assert_refused(1, "/proc/nowhere", *simulate, "--agents", 2, "--steps", 2, "--video", "/proc/nowhere/a.mp4")

@@ -35,7 +35,7 @@ struct Stage {
   Snapshot town;
   RendererConfig config;
   DeviceScene scene;
-  DeviceCopy<View> view_copy;
+  DeviceUpload<View> view_copy;
   Span<const View> views;
   std::unique_ptr<Renderer> renderer;
   DeviceImages images;
@@ -164,7 +164,7 @@ class Blocker {
 TEST_F(CudaStreamTest, RunsOnTheCallersStreamWithoutWaitingOrAllocating) {
   Stage stage(60, 12, {.rig = paper_rig()});
   const std::vector<uint8_t> expected = bytes_of(stage.draw());
-  DeviceCopy<VisibilityQuery> query_copy;
+  DeviceUpload<VisibilityQuery> query_copy;
   const std::vector<VisibilityQuery> host_queries{{0, 1}, {2, 3}};
   const Span<const VisibilityQuery> queries = query_copy.assign(Span<const VisibilityQuery>(host_queries), nullptr);
   DeviceBuffer<float> answers(host_queries.size());
@@ -258,7 +258,7 @@ TEST_F(CudaStreamTest, ACaptureAfterReserveNeedsNoCallBefore) {
   const uint64_t generation = stage.renderer->generation();
   HostImages host = stage.host_images();
   const ImageBatch batch = stage.images.like(host.batch());
-  DeviceCopy<VisibilityQuery> query_copy;
+  DeviceUpload<VisibilityQuery> query_copy;
   const std::vector<VisibilityQuery> host_queries{{0, 1}, {2, 3}};
   const Span<const VisibilityQuery> queries = query_copy.assign(Span<const VisibilityQuery>(host_queries), nullptr);
   DeviceBuffer<float> answers(host_queries.size());
@@ -355,7 +355,7 @@ TEST_F(CudaStreamTest, TheNumberOfViewsIsReadOnTheDevice) {
       EXPECT_TRUE(std::all_of(border, bytes.end(), [](uint8_t byte) { return byte == 0x5A; }));
     }
     // Queries of views that are not drawn return NaN.
-    DeviceCopy<VisibilityQuery> query_copy;
+    DeviceUpload<VisibilityQuery> query_copy;
     std::vector<VisibilityQuery> host_queries;
     for (int32_t agent = 0; agent < 30; ++agent) host_queries.insert(host_queries.end(), {{1, agent}, {3, agent}});
     const Span<const VisibilityQuery> queries = query_copy.assign(Span<const VisibilityQuery>(host_queries), nullptr);
