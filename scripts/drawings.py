@@ -1,5 +1,5 @@
-"""Draws network.png, the network's layers, summation_order.png, sums of the same numbers in other orders, and
-training_update.png, the parts of an update.
+"""Draws network.png, the network's layers, summation_order.png, sums of the same numbers in other orders,
+training_update.png, the parts of an update, and realism_likelihood.png, the likelihood of a recorded value.
 
     python3 scripts/drawings.py FOLDER    FOLDER: where to write, docs/images in scripts/figures
 """
@@ -89,6 +89,22 @@ def draw_sums(path):
     save(figure, path)
 
 
+def draw_likelihood(path):
+    """Histogram of a feature over rollouts, and the recorded value whose bin gives the likelihood."""
+    speeds = np.random.default_rng(2).normal(11, 2.5, 32 * 80).clip(0, 25)
+    counts, edges = np.histogram(speeds, bins=10, range=(0, 25))
+    likelihood = (counts + 0.1) / (len(speeds) + 0.1 * 10)
+    recorded = 13.2
+    chosen = np.searchsorted(edges, recorded) - 1
+    figure, axes = plt.subplots(figsize=(7, 2.6))
+    axes.bar(edges[:-1], likelihood, width=2.5, align="edge", color=[ORANGE if i == chosen else BLUE + "88" for i in range(10)], edgecolor="white")
+    axes.axvline(recorded, color="black", linewidth=1.4)
+    axes.annotate(f"recorded: p = {likelihood[chosen]:.2f}", (recorded + 0.3, likelihood.max() * 0.95))
+    axes.set(xlabel="linear speed of all rollouts and steps, m/s", ylabel="likelihood", xlim=(0, 25))
+    figure.tight_layout()
+    save(figure, path)
+
+
 def draw_update(path):
     """Parts of one update of training, in order, and the way back."""
     figure, axes = plt.subplots(figsize=(11, 2.6), dpi=100)
@@ -116,6 +132,7 @@ def main():
     draw_network(folder / "network.png")
     draw_sums(folder / "summation_order.png")
     draw_update(folder / "training_update.png")
+    draw_likelihood(folder / "realism_likelihood.png")
 
 
 if __name__ == "__main__":
