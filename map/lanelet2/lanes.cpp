@@ -293,7 +293,8 @@ class LaneBuilder {
     };
     for (const Eigen::Vector3d& p : left) add(p);
     for (std::size_t i = right.size(); i-- > 0;) add(right[i]);
-    if (ring.size() > 1 && length(ring.back() - ring.front()) <= static_cast<float>(kSameOutlinePoint_m)) ring.pop_back();
+    if (ring.size() > 1 && length(ring.back() - ring.front()) <= static_cast<float>(kSameOutlinePoint_m))
+      ring.pop_back();
     if (ring.size() < 3) {
       return file_.where(relation).record_repair(build_.faults, RepairKind::empty_lanelet,
                                                  "expected a crosswalk with an area");

@@ -293,7 +293,8 @@ TEST(PufferDrive, BytesBeyondTheEndAndMissingOnesAreRefused) {
           << length;
     }
   }
-  EXPECT_THAT(message_of([&] { read_binary(""); }), HasSubstr("as v1: n_objects: expected 4 bytes, got the remaining 0"));
+  EXPECT_THAT(message_of([&] { read_binary(""); }),
+              HasSubstr("as v1: n_objects: expected 4 bytes, got the remaining 0"));
 }
 
 TEST(SceneFiles, TypesOfFilesAreToldByName) {
