@@ -1,6 +1,6 @@
 // Pedestrians: the walkways that a map gives them, where they stand and go, and their events.
-#include <chrono>
 #include <cmath>
+#include <ctime>
 #include <set>
 
 #include <gtest/gtest.h>
@@ -83,9 +83,9 @@ TEST(Walkways, ManyCrosswalksTakeTimeAsTheirNumber) {
     const float x = (static_cast<float>(i) + 0.5f) * (kLength_m / kCrosswalks);
     testing::add_crosswalk(map.get(), {{x - 0.1f, -4, 0}, {x + 0.1f, -4, 0}, {x + 0.1f, 4, 0}, {x - 0.1f, 4, 0}});
   }
-  const auto begin = std::chrono::steady_clock::now();
+  const std::clock_t begin = std::clock();  // of the process, whatever else the machine computes
   const Walkways walkways = world_map(*map).walkways;
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(4));
+  EXPECT_LT(std::clock() - begin, 4 * CLOCKS_PER_SEC);
   EXPECT_EQ(networks(walkways), 1);
 }
 
