@@ -14,14 +14,14 @@ namespace pictura {
 
 namespace {
 
-// Goals in a condition as a share of those in the first one; NaN where the first one has none.
+// Ratio of a condition's goals to those of the first condition; NaN if the first has none.
 double goals_kept(const RobustReport& report, const EvaluateRow& row) {
   return row.goals_per_vehicle.value / report.metrics(report.rows.front()).goals_per_vehicle.value;
 }
 
 std::string number_text(double value) { return std::isfinite(value) ? fmt::format("{:.2f}", value) : "-"; }
 
-// The first text is of a wider column.
+// Prints a row's name and its texts in columns; the first column of texts is wider.
 void print_columns(const std::string& name, const std::vector<std::string>& texts) {
   std::string line = fmt::format("{:24}", name);
   for (size_t i = 0; i < texts.size(); ++i) line += fmt::format(" {:>{}}", texts[i], i == 0 ? 18 : 11);

@@ -1,4 +1,4 @@
-// `pictura score`: how realistic the rollouts of a file are, by the recorded scenes that they begin in.
+// `pictura score`: realism of a file's rollouts, compared with the recorded scenes in which they begin.
 #include "pictura/apps/commands.h"
 #include "pictura/apps/realism_table.h"
 #include "pictura/cli/interval_text.h"

@@ -25,7 +25,7 @@ std::vector<std::string> seeds(const std::string& family) {
   return maps;
 }
 
-// What decides which conditions apply to a driver.
+// Properties of a driver that decide which conditions apply.
 struct Abilities {
   bool sees_images = false, reads_observations = false;
 };
@@ -37,7 +37,7 @@ Abilities abilities_of(const RobustOptions& options) {
   return {.sees_images = session.reads_images(), .reads_observations = true};
 }
 
-// Why the condition does not apply; empty: it does.
+// Returns why the condition does not apply, or nothing if it applies.
 std::string reason_against(const RobustCondition& condition, const Abilities& abilities) {
   if (condition.camera_severity > 0 && !abilities.sees_images) return "sees no images";
   if (condition.name == "impaired" && !abilities.reads_observations) return "reads no observations";
