@@ -54,7 +54,7 @@ void print_table(const RobustReport& report, int scenarios) {
       "vehicles\n");
   print_result("+- is the half width of a 95 % confidence interval over {} scenarios of {} steps a condition\n",
                scenarios, kRobustSteps);
-  if (scenarios < kRobustScenarios) {
+  if (scenarios != kRobustScenarios) {
     print_result("a trial: only {} scenarios a condition are comparable with others' numbers\n", kRobustScenarios);
   }
 }
