@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
 #include <map>
 
 #include "pictura/apps/commands.h"
@@ -22,6 +23,7 @@
 #include "pictura/evaluation/estimate_json.h"
 #include "pictura/evaluation/infractions.h"
 #include "pictura/evaluation/mixed_traffic.h"
+#include "pictura/evaluation/progress.h"
 #include "pictura/evaluation/robust_protocol.h"
 #include "pictura/replay/gallery.h"
 #include "pictura/simulator/controllers/host_controllers.h"
@@ -288,14 +290,12 @@ void check_severities(const CLI::App& command, const EvaluateArguments& argument
 // Evaluates at each severity, in the same worlds, until an interrupt.
 Reports evaluate_severities(const std::vector<double>& severities, EvaluateOptions* evaluation) {
   EvaluationProgress progress("the completed scenarios");
-  const auto count = static_cast<double>(severities.size());
-  Reports reports;
-  evaluation->on_progress = [&](double done, double eta_s) {
-    const auto finished = static_cast<double>(reports.size());
-    const double each_s = done < 1 ? eta_s / (1 - done) : 0;
-    progress.update((finished + done) / count, eta_s + (count - finished - 1) * each_s);
+  const std::function<void(double, double)> update = [&progress](double done, double eta_s) {
+    progress.update(done, eta_s);
   };
+  Reports reports;
   for (const double severity : severities) {
+    evaluation->on_progress = progress_of_part(update, std::ssize(reports), std::ssize(severities));
     evaluation->camera_severity = severity;
     reports.push_back(evaluate(*evaluation));
     if (reports.back().interrupted) break;

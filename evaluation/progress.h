@@ -1,6 +1,7 @@
 // Progress of an evaluation: the completed fraction and the remaining time. Has no torch headers.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 
 #include "pictura/common/support/stopwatch.h"
@@ -33,5 +34,15 @@ class EvaluationClock {
   const Stopwatch since_start_;
   double first_s_ = -1, first_fraction_ = 0;
 };
+
+/// Returns the progress callback of the part that runs after `finished` parts of `count` equally long ones.
+inline std::function<void(double, double)> progress_of_part(const std::function<void(double, double)>& on_progress,
+                                                            std::ptrdiff_t finished, std::ptrdiff_t count) {
+  return [&on_progress, finished, count](double done, double eta_s) {
+    const double each_s = done < 1 ? eta_s / (1 - done) : 0;
+    on_progress((static_cast<double>(finished) + done) / static_cast<double>(count),
+                eta_s + static_cast<double>(count - finished - 1) * each_s);
+  };
+}
 
 }  // namespace pictura

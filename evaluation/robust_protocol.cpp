@@ -5,6 +5,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/configuration/simulator_section.h"
+#include "pictura/evaluation/progress.h"
 #include "pictura/map/load_map.h"
 #include "pictura/policy/session.h"
 
@@ -101,8 +102,8 @@ RobustReport evaluate_robust(const RobustOptions& options) {
     report.rows.push_back({condition, {}, reason_against(condition, abilities)});
   }
   const auto applies = [](const RobustRow& row) { return row.not_driven.empty(); };
-  const auto num_driven = static_cast<double>(std::count_if(report.rows.begin(), report.rows.end(), applies));
-  double finished = 0;
+  const auto num_driven = static_cast<int>(std::count_if(report.rows.begin(), report.rows.end(), applies));
+  int finished = 0;
   EvaluateOptions evaluation;
   static_cast<DriverOptions&>(evaluation) = options;
   evaluation.scenarios = options.scenarios;
@@ -110,14 +111,9 @@ RobustReport evaluate_robust(const RobustOptions& options) {
   evaluation.light_cycles = LightCycles::independent;
   evaluation.light_heads = LightHeads::as_mapped;
   evaluation.densities = {Density::light};  // agents_per_world replaces its number
-  if (options.on_progress) {
-    evaluation.on_progress = [&](double done, double eta_s) {
-      const double each_s = done < 1 ? eta_s / (1 - done) : 0;
-      options.on_progress((finished + done) / num_driven, eta_s + (num_driven - finished - 1) * each_s);
-    };
-  }
   for (RobustRow& row : report.rows) {
     if (!applies(row)) continue;
+    if (options.on_progress) evaluation.on_progress = progress_of_part(options.on_progress, finished, num_driven);
     evaluation.maps = row.condition.maps;
     evaluation.agents_per_world = row.condition.agents_per_world;
     evaluation.others = row.condition.others;
