@@ -1,8 +1,8 @@
 // Torch's loops run on libgomp, whose waiting threads spin for milliseconds. Beside one other busy process this makes
 // them ten times slower: threads that have used up their processor time by spinning are missing when work arrives.
 // GOMP_SPINCOUNT limits the spinning, but libgomp reads the environment once, before main and every constructor of the
-// program. So the command sets the variable, unless the environment already says how threads wait, and restarts itself
-// before libraries are initialised, which is most of the start-up time.
+// program. So the command sets the variable, unless the environment already specifies how threads wait, and restarts
+// itself before libraries are initialised, which is most of the start-up time.
 #include <array>
 #include <string_view>
 

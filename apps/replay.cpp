@@ -78,7 +78,7 @@ void run_replay(const ReplayArguments& arguments) {
       replays.push_back(facts_of(path, replay));
     }
   } catch (const Interrupted&) {
-    if (!replays.empty()) write_index(&pages);  // of the completed replays
+    if (!replays.empty()) write_index(&pages);  // index of the completed replays
     throw;
   }
   write_index(&pages);

@@ -19,7 +19,7 @@ struct FaceInstance {
   // Plane compared_plane . p = 1, whose depth is tested; 0: the face's own depth.
   Vec3 compared_plane;
   Rgb color;
-  int32_t layer = 0;  // of the image array
+  int32_t layer = 0;  // layer of the image array
 };
 
 class ImageFaces {

@@ -34,7 +34,7 @@ bool has_extension(const gl::Functions& functions, const char* wanted) {
 
 // Cameras of one size, whose images share an array.
 struct SizeGroup {
-  std::vector<std::size_t> cameras;  // of the rig
+  std::vector<std::size_t> cameras;  // indices in the rig
   std::unique_ptr<gl::ImageArray> array;
 };
 

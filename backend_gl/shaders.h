@@ -54,9 +54,9 @@ uniform sampler2DMSArray drawn;
 #else
 uniform sampler2DArray drawn;
 #endif
-uniform ivec2 size;      // of an image in pixels
+uniform ivec2 size;      // width and height of an image, pixels
 uniform int grid;        // texels of a pixel along each axis
-uniform int samples;     // of a texel
+uniform int samples;     // samples of a texel
 uniform int plane_words;
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) writeonly buffer Images {

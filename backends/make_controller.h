@@ -12,8 +12,8 @@ namespace pictura {
 
 /// Makes a controller: "random" (uniform actions, keyed by seed, world, agent and step), "idle" (no jerk), "lane" (the
 /// lane keeper), and in recorded scenes "log", "inverse" and "idm"; see host_controllers.h. "lane" and "idm" run on the
-/// host for any memory of the simulator, and their name() says so. The controller is for this simulator alone, which
-/// must outlive it. Throws UsageError listing the known names.
+/// host for any memory of the simulator, and their name() states this. The controller is for this simulator alone,
+/// which must outlive it. Throws UsageError listing the known names.
 std::unique_ptr<Controller> make_controller(const std::string& name, Simulator& simulator, uint64_t seed);
 
 }  // namespace pictura

@@ -274,7 +274,7 @@ class HistoryBench {
   std::unique_ptr<SceneHistory> history_;
   std::vector<int64_t> present_rows_;  // rows of present agents at every step
   std::size_t first_of_last_step_ = 0;
-  std::vector<View> views_;  // of the last step, on the host
+  std::vector<View> views_;  // views of the last step, on the host
   std::vector<CheckedView> seen_;
   std::vector<Elements<int64_t>> history_choices_;
   std::vector<Elements<View>> present_choices_;

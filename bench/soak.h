@@ -38,7 +38,7 @@ struct VisibilityFault {
 };
 
 struct SoakResult {
-  std::string choice;  // of the last renderer
+  std::string choice;  // choice of the last renderer
   int64_t scenes = 0, images = 0, queries = 0;
   double seconds = 0;
   ImageError error;  // over all images

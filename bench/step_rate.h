@@ -12,7 +12,7 @@ namespace pictura {
 struct StepTiming {
   int64_t steps = 0;
   double elapsed_s = 0;
-  int64_t agent_steps = 0;  // of active agents
+  int64_t agent_steps = 0;  // steps of active agents
   int64_t slot_steps = 0;
 };
 

@@ -196,7 +196,7 @@ void visit_options(PolicyArguments& arguments, Visitor&& v) {
   visit_light_options(arguments, v);
 }
 
-/// Throws UsageError if `replay` is no page, or if the requested case is not below `count`.
+/// Throws UsageError if `replay` names no page, or if the requested case is not below `count`.
 void check_case_replay(const CaseReplayOptions& replay, int64_t count) {
   const std::string& path = replay.path;
   if (path.empty() && (replay.number || replay.recording.cameras)) {

@@ -23,7 +23,7 @@ CLI::Option* add_sampled_option(CLI::App* command, bool* argmax_out);
 /// Adds --average, which selects the average of weights that a checkpoint holds.
 CLI::Option* add_average_option(CLI::App* command, bool* average_out);
 
-/// Says how far an evaluation is, and once, where it takes long, for how long and what can be done about it.
+/// Reports the progress of an evaluation. For a long one it also prints, once, the expected time and how to shorten it.
 class EvaluationProgress {
  public:
   /// `finished` names the result reported after an interrupt: "the completed scenarios".

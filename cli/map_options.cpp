@@ -8,7 +8,7 @@ namespace pictura {
 
 namespace {
 
-// Whether a piece is NAME=VALUE, which is no map's name.
+// Whether a piece is NAME=VALUE, which cannot be the name of a map.
 bool is_option_of_town(const std::string& piece) {
   const std::size_t equals = piece.find('=');
   return equals != std::string::npos && piece.find_first_of(":/") > equals;

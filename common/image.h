@@ -82,7 +82,7 @@ CameraImages camera_images(const ImageLayout& layout, int camera, void* first);
 /// Images that render() fills. All renderers draw planar images. Renderers with Renderer::draws_all_formats also draw
 /// patches of 4, 8, 12 or 16 px; other requests are refused.
 struct ImageBatch {
-  Device device;  // of all spans and pointers below
+  Device device;  // device of all spans and pointers below
   PixelFormat format = PixelFormat::u8;
   int num_views = 0;
   Span<const CameraImages> cameras;  // [cameras of the rig]

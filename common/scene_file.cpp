@@ -47,7 +47,7 @@ AgentBox read_agent(TomlFields* row) {
 std::vector<std::vector<Vec3>> dashes_of(const std::vector<Vec3>& points_m, float dash_m, float gap_m) {
   std::vector<std::vector<Vec3>> dashes;
   bool painted = true;
-  float left_m = dash_m;  // of the current dash or gap
+  float left_m = dash_m;  // remaining length of the current dash or gap
   std::vector<Vec3> dash{points_m[0]};
   auto close = [&] {
     if (painted && dash.size() >= 2) dashes.push_back(dash);

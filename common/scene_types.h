@@ -83,7 +83,7 @@ constexpr int kMaxBoxesPerWorld = 8192;
 
 /// All moving objects of all worlds at one step.
 struct SceneBatch {
-  Device device;                        // of all spans
+  Device device;                        // device of all spans
   Span<const int32_t> world_begin;      // [worlds + 1] first agent of each world; ends with the number of agents
   Span<const AgentBox> agents;          // [agents] controlled and parked agents
   Span<const GeometryHandle> geometry;  // [worlds]

@@ -92,7 +92,7 @@ struct Film::Parts {
   float width_m;
   WorldPainter painter;
   std::unique_ptr<Renderer> renderer;
-  std::vector<int> order;  // of the cameras
+  std::vector<int> order;  // indices of the cameras
   HostImages images;
   int row_px;  // height of a row of cameras, including the gap above it
   RgbImage frame;

@@ -210,7 +210,7 @@ void MapLayers::paint_crosswalk(GroundPen& pen, const Crosswalk& crosswalk) cons
       along = side / longest;
     }
   }
-  double reach = 0, low = 0, high = 0;  // of corners from the centre: distance, and range along the bars' direction
+  double reach = 0, low = 0, high = 0;  // maximum distance of corners from the centre; range along the bars
   for (int32_t i = 0; i < count; ++i) {
     const Vector2d from_center = corner(i) - center;
     reach = std::max(reach, from_center.norm());

@@ -35,14 +35,14 @@ struct WorldMark {
 
 /// Changing state of one world; spans are read only during draw().
 struct WorldFrame {
-  Span<const AgentBox> agents;      // of this world
+  Span<const AgentBox> agents;      // agents of this world
   Span<const LightState> lights;    // [map.lights]
   Span<const LightHead> heads;      // [map.lights] positions of heads, or empty: as mapped
   Span<const AgentStatus> status;   // [agents] or empty: all active
   Span<const uint8_t> halt_reason;  // [agents] Event bits: a ring in the colour of the reason, and counts in the legend
   Span<const AgentGoal> goals;      // each gets a thin line from its agent
   int highlighted = -1;             // index of the agent with a halo and the waypoints below, or -1
-  Span<const Vec2> waypoints_m;     // of the highlighted agent: waypoints still to pass, nearest first
+  Span<const Vec2> waypoints_m;     // waypoints that the highlighted agent has still to pass, nearest first
   Span<const WorldMark> marks;      // the last covers earlier ones
   std::string caption;              // one line at the top left, or empty
   int recorded_step = -1;           // step of the painter's scenario whose road users are drawn; -1: none

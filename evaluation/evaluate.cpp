@@ -98,7 +98,7 @@ int severity(const AgentStateView& state, int slot) {
   return (events & kEventAtFault) ? 3 : (events & kEventOffRoad) ? 2 : (events & kEventRedLight) ? 1 : 0;
 }
 
-// Returns the first agent with the gravest infraction of each world; worlds have `agents_per_world` slots each.
+// Returns the first agent with the most severe infraction of each world; worlds have `agents_per_world` slots each.
 std::vector<int> worst_agents(const AgentStateView& state, int num_slots, int agents_per_world) {
   std::vector<int> worst;
   for (int begin = 0; begin < num_slots; begin += agents_per_world) {

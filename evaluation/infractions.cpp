@@ -121,8 +121,8 @@ struct InfractionObserver::Frame : WorldArrays {
 struct InfractionObserver::WorldStep {
   const WorldSpec& spec;
   const RoadMap& map;
-  const std::vector<StopLine>& stop_lines;  // of the map's lights
-  const std::vector<LightHead>& heads;      // of the map's lights
+  const std::vector<StopLine>& stop_lines;  // stop lines of the map's lights
+  const std::vector<LightHead>& heads;      // heads of the map's lights
   const Frame &before, &after;
   size_t first_slot, num_agents, first_box, num_boxes, first_light;
 

@@ -72,7 +72,7 @@ class InfractionObserver final : public EvaluationObserver {
   struct WorldStep;
   Infraction describe(const WorldStep& step, size_t agent) const;
 
-  std::vector<Infraction> found_, found_now_;  // of completed worlds; of the present worlds
+  std::vector<Infraction> found_, found_now_;  // infractions of completed worlds; of the present worlds
   std::unique_ptr<Frame> before_, after_;
   Simulator* simulator_ = nullptr;
   int step_ = 0;

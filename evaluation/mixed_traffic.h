@@ -61,7 +61,7 @@ class MixedTraffic {
   size_t impaired_driver(Impairment impairment) const;
   size_t drawn_driver(uint32_t global_world, uint32_t agent) const;
 
-  DriverOptions options_;  // of the evaluated driver; the others use its argmax and seed
+  DriverOptions options_;  // options of the evaluated driver; the others use its argmax and seed
   std::vector<std::unique_ptr<Other>> others_;
 };
 

@@ -1,4 +1,4 @@
-// The realism score: how likely recorded road users are under what simulated rollouts do, and what else is told of
+// The realism score: how likely recorded road users are under what simulated rollouts do, and other measures of
 // rollouts: displacement, events, time to collision, comfort and progress. docs/explanation/realism.md has the
 // definitions and their sources. Without torch headers.
 #pragma once
@@ -20,7 +20,7 @@ namespace pictura {
 
 /// How one feature is scored.
 struct RealismTerm {
-  double weight = 0;         // of 1 in all
+  double weight = 0;         // the weights of all terms sum to 1
   double low = 0, high = 0;  // values are cut off at these
   int bins = 0;              // 0: the feature is an event, once a rollout or never
   double smoothing = 0;      // added to the count of every bin
@@ -53,8 +53,8 @@ struct SceneRealism {
   // Shares of scored road users with such an event in a rollout, and in the recording.
   double collision_rate = 0, off_road_rate = 0, red_light_rate = 0;
   double recorded_collision_rate = 0, recorded_off_road_rate = 0, recorded_red_light_rate = 0;
-  // Of scored vehicles: share of steps with a time to collision below kShortTimeToCollision_s, share of vehicles that
-  // hold all bounds of comfort, and share of the recorded path that is passed.
+  // Means over scored vehicles: share of steps with a time to collision below kShortTimeToCollision_s, share of
+  // vehicles within all bounds of comfort, and share of the recorded path that is passed.
   double short_time_to_collision = 0, recorded_short_time_to_collision = 0;
   double comfort = 0, recorded_comfort = 0;
   double progress = 0;
@@ -91,7 +91,7 @@ class RealismScene {
 
   std::shared_ptr<const Scenario> scenario_;
   RealismRoad road_;
-  std::vector<int32_t> tracks_;  // of the objects
+  std::vector<int32_t> tracks_;  // tracks of the objects
   std::vector<RealismObject> objects_;
   std::vector<size_t> scored_;  // indices of objects
   std::vector<RealismPose> recorded_;
@@ -101,7 +101,7 @@ class RealismScene {
 /// The log-likelihoods of recorded values of one road user under the simulated ones, [steps]; NaN where the recorded
 /// value is NaN. Simulated values that are NaN are left out; where none is left, every value is NaN.
 std::vector<double> log_likelihoods(const RealismTerm& term, Span<const double> recorded, Span<const double> simulated);
-/// Of an event that `count` of `rollouts` have.
+/// The log-likelihood of a recorded event, or of its absence, if `count` of `rollouts` have the event.
 double event_log_likelihood(const RealismTerm& term, bool recorded, int count, int rollouts);
 
 /// The scores of many scenes.

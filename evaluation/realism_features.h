@@ -65,7 +65,7 @@ class RealismRoad {
   /// Horizontal metres from a place to the nearest edge of its level; positive: off the road. Within
   /// +-kRoadSideReach_m.
   double edge_distance_m(double x_m, double y_m, double z_m) const;
-  /// Of the outermost of a box's four lower corners.
+  /// The distance of the outermost of a box's four lower corners.
   double edge_distance_m(const RealismObject& object, const RealismPose& pose) const;
   /// Whether the middle of a box's front crosses, from one pose to the next, stop lines in their direction of travel
   /// whose lights are all red at that step of the recording. Heights within 2 m of the line, headings within 45

@@ -78,8 +78,8 @@ struct DensityResult {
   int first_scenario = 0;
   std::vector<ScenarioCounts> scenarios;
   std::string driver;  // driver of the vehicles: one of EvaluateOptions::others; empty: the evaluated driver
-  // Agent with the gravest infraction of each scenario: a collision at fault, else off-road, else a red light; agent 0
-  // if there is none. Not in files.
+  // Agent with the most severe infraction of each scenario: a collision at fault, else off-road, else a red light;
+  // agent 0 if there is none. Not in files.
   std::vector<int> worst_agents;
 };
 
@@ -94,11 +94,11 @@ struct EvaluationSetting {
   int steps = 0;
   bool argmax = true;
   uint64_t seed = 0;
-  std::string precision, device;                        // of the network; "cpu" or "cuda"
+  std::string precision, device;                        // precision of the network; "cpu" or "cuda"
   std::string renderer, samples;                        // empty for policies without images
   std::vector<std::string> image_sizes;                 // "96x54", one per camera
   std::string light_heads = "as_mapped";                // see map/map_geometry.h; default of files without it
-  std::array<double, kNumConditioning> conditioning{};  // of every agent, in the order of simulator/conditioning.h
+  std::array<double, kNumConditioning> conditioning{};  // same for all agents, in the order of simulator/conditioning.h
   LightCycles light_cycles = LightCycles::phases;
   std::vector<std::string> others;  // other drivers, see MixedTraffic::setting()
   double camera_severity = 0;       // severity of randomized cameras (SessionOptions)

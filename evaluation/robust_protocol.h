@@ -38,7 +38,7 @@ struct RobustRow {
 };
 
 struct RobustReport {
-  EvaluationSetting setting;  // of the first condition
+  EvaluationSetting setting;  // setting of the first condition
   std::vector<RobustRow> rows;
   bool interrupted = false;  // ^C came; finished conditions are reported
   double seconds = 0;
@@ -47,7 +47,7 @@ struct RobustReport {
   /// Returns the metrics of a row's scenarios.
   EvaluateRow metrics(const RobustRow& row) const;
   /// Returns metrics by the names "towns", "others", "cameras" and "all", each over the scenarios of its part's rows;
-  /// "all" leaves out "carla", whose files not everybody has. Parts that were not driven are left out.
+  /// "all" leaves out "carla", whose files users must supply. Parts that were not driven are left out.
   std::vector<std::pair<std::string, EvaluateRow>> pooled() const;
 };
 

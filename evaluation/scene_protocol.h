@@ -35,7 +35,7 @@ struct SceneProtocol {
   Overlapping overlapping = Overlapping::replay;  // whose initial box touches a box or an edge, or is off the road
   Others others = Others::replay;                 // pedestrians, cyclists and other non-vehicles
   Late late = Late::replay;
-  RecordEnd record_end = RecordEnd::stand;  // of road users that follow the recording, after its end
+  RecordEnd record_end = RecordEnd::stand;  // what road users that follow the recording do after its end
   AfterInfraction after_infraction = AfterInfraction::halt;
   bool leave_at_goal = true;
   Waypoints waypoints = Waypoints::goal;  // the goal three times, or points on the recorded path before it

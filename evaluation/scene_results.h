@@ -53,7 +53,7 @@ struct SceneResults {
   std::vector<std::vector<SceneCounts>> counts;  // [densities][scored scenes]
 
   int scored() const { return counts.empty() ? 0 : static_cast<int>(counts.front().size()); }
-  int64_t agent_steps() const;  // of driven agents
+  int64_t agent_steps() const;  // steps of driven agents
 };
 
 /// One driven road user in one rollout of one scene at one density.

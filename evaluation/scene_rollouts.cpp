@@ -75,12 +75,13 @@ int64_t read_trajectory(std::string_view message, std::vector<SimulatedState>* s
   return *id;
 }
 
-/// Adds a rollout; the first one says which objects there are, and for how many steps.
+/// Adds a rollout; the first one determines the objects and the number of steps.
 void read_joint_scene(std::string_view message, SceneRollouts* scene_inout) {
   const bool is_first = scene_inout->rollouts.empty();
   const auto steps = static_cast<size_t>(scene_inout->steps);
   std::vector<SimulatedState> states(scene_inout->track_ids.size() * steps), one;
-  std::unordered_map<int64_t, size_t> places;  // of objects that are still to come
+  // Index by id: in the first rollout of the objects read so far, later of those still missing.
+  std::unordered_map<int64_t, size_t> places;
   for (size_t i = 0; i < scene_inout->track_ids.size(); ++i) places[scene_inout->track_ids[i]] = i;
   size_t count = 0;
   for (womd::WireReader reader(message); reader.next();) {

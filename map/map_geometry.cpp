@@ -14,7 +14,7 @@ namespace pictura {
 namespace {
 
 constexpr float kRoadEdgeWidth_m = 0.15f;
-constexpr float kCrosswalkWidth_m = 0.3f;  // of the outline of a crosswalk
+constexpr float kCrosswalkWidth_m = 0.3f;  // line width of a crosswalk's outline
 constexpr float kStopLineWidth_m = 0.4f;
 constexpr float kSameStopLine_m = 8.0f;
 // Buildings have 1 to 4 pieces (about 8 m each) and are mostly separated by gaps of 1 or 2 pieces.

@@ -19,7 +19,7 @@ bool has_endless_roads(const RoadMap& map);
 struct LaneOpening {
   int32_t lane = -1;
   Vec3 middle_m;
-  Vec2 direction;  // of traffic, unit vector
+  Vec2 direction;  // direction of traffic, unit vector
   float half_width_m = 0;
 };
 
@@ -28,8 +28,8 @@ struct OpenLanes {
   // [lanes] Longest way of a route beyond the end of the lane, or of a lane beside it. 0: routes end with the lane.
   // Infinite on endless lanes, and on lanes of other types.
   std::vector<float> way_after_m;
-  std::vector<LaneOpening> exits;    // of lanes where routes end, except at missing links
-  std::vector<LaneOpening> entries;  // of open lanes without predecessors, of themselves or of lanes beside them
+  std::vector<LaneOpening> exits;    // exits of lanes where routes end, except at missing links
+  std::vector<LaneOpening> entries;  // entries of open lanes; these and the lanes beside them have no predecessors
 
   /// A missing link: the end of a lane where routes end, within 1 m of the start of another lane.
   struct MissingLink {

@@ -104,7 +104,7 @@ std::vector<CurvePoint> sample_curve(const CurveBreaks& curve, double tolerance_
   constexpr double kSafety = 0.9;      // margin far above rounding errors
   const std::vector<double>& breaks = curve.s;
   std::vector<CurvePoint> dense{eval(breaks.front())};
-  double low = 0, high = 0, bend = 0;  // of the current interval
+  double low = 0, high = 0, bend = 0;  // range of s and bound of the second derivative in the current interval
   auto refine = [&](auto&& self, const CurvePoint& a, const CurvePoint& b, int depth) -> void {
     budget->count_sample();
     if (depth < kMaxDepth) {

@@ -72,7 +72,7 @@ enum class RepairKind : uint8_t {
   unlisted_light,
   laneless_light,
   missing_link,
-  // Of Lanelet2 files.
+  // Repairs of Lanelet2 files:
   repeated_element,
   missing_element,
   missing_position,

@@ -17,7 +17,7 @@ enum class WeightType {
 
 struct ExportedPolicy {
   int64_t parameters = 0, file_bytes = 0;
-  int64_t updates = 0, agent_steps = 0;  // of the run
+  int64_t updates = 0, agent_steps = 0;  // updates and agent-steps of the run
   std::string policy_hash;               // hash of the weights in the file
 };
 

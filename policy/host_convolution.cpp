@@ -10,7 +10,7 @@ constexpr int kChannelMultiple = 8;
 
 // Inputs of outputs in an array: each output reads `run` numbers in each of `kernel` rows, which are row_step apart.
 struct Windows {
-  const int64_t* begins;  // of the windows' first rows
+  const int64_t* begins;  // first element of each window's first row
   int64_t count, kernel, run, row_step;
 };
 

@@ -211,7 +211,7 @@ class ImageEncoder {
       const std::string name = fmt::format("conv.{}", i);
       const Numbers& weight = read->take(name + ".weight", {out, in, kernel, kernel});
       Dense layer{kernel * kernel * in, out, Numbers(weight.size()), read->take(name + ".bias", {out})};
-      const float scale = i == 0 ? 255.0f : 1.0f;  // of pixels
+      const float scale = i == 0 ? 255.0f : 1.0f;  // the first convolution reads pixels of 0 to 255
       for (int64_t o = 0; o < out; ++o) {
         for (int64_t c = 0; c < in; ++c) {
           for (int64_t tap = 0; tap < kernel * kernel; ++tap) {
@@ -409,7 +409,7 @@ class ImageEncoder {
   const PolicySection config_;
   const int64_t num_cameras_, width_;  // channels of a token
   const int patch_px_;
-  std::vector<Dense> convolutions_;  // of taps [kernel, kernel, in]
+  std::vector<Dense> convolutions_;  // inputs: [kernel, kernel, in]
   Norm token_norm_, mlp_norm_;
   Dense position_, attended_, mlp_hidden_, mlp_out_, project_;
   Numbers queries_;  // [cameras, queries, width_]
@@ -510,7 +510,7 @@ struct HostNetwork::Parts {
   Group ego, conditioning;
   std::vector<Dense> trunk;
   Dense actor, critic;
-  int64_t in_width = 0;  // of the trunk
+  int64_t in_width = 0;  // input width of the trunk
 };
 
 HostNetwork::HostNetwork(const StoredPolicy& saved, int num_cameras)

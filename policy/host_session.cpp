@@ -120,7 +120,7 @@ struct HostSession final : SessionParts {
       next += num_views * cameras * 3 * block.size.pixels();
     }
     std::vector<View> views;
-    std::vector<int64_t> places;  // of the views among the agents
+    std::vector<int64_t> places;  // indices of the views among the agents
     for (int64_t i = 0; i < num_views; ++i) {
       if (!input.is_drawn.empty() && !input.is_drawn[indices[i]]) continue;
       views.push_back(input.views[indices[i]]);

@@ -102,7 +102,7 @@ class PolicyNetwork final : public Policy {
   at::Tensor run_trunk(at::Tensor x) const;
 
   GroupEncoder ego_, conditioning_;
-  bool layer_norm_, residual_;  // of the trunk
+  bool layer_norm_, residual_;  // options of the trunk
   std::vector<Linear> backbone_;
   Linear actor_, critic_;
 

@@ -13,7 +13,7 @@
 namespace pictura {
 
 struct SessionOptions {
-  int num_threads = 0;            // of torch and renderers; 0: all
+  int num_threads = 0;            // threads of torch and renderers; 0: all
   std::string device = "auto";    // as run.device of a configuration
   std::string simulator = "cpu";  // as simulator.backend; for the simulators that it drives in
   std::string renderer, samples;  // as render.backend and render.samples; empty: as in training

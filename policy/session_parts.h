@@ -41,8 +41,8 @@ struct SessionParts {
 /// PolicySession does.
 Rig chosen_rig(const PolicyFacts& saved, const SessionOptions& options);
 
-/// Open a session computed by torch, or by the host (policy/host_network.h). The latter throws Error if the options
-/// name another device, or if a program replaces the convolutions.
+/// Open a session computed by torch, or by the host (policy/host_network.h). open_host_session throws Error if the
+/// options name another device, or if a program replaces the convolutions.
 std::unique_ptr<SessionParts> open_torch_session(const std::string& path, const SessionOptions& options);
 std::unique_ptr<SessionParts> open_host_session(const std::string& path, const SessionOptions& options);
 

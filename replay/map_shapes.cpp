@@ -85,7 +85,7 @@ std::vector<ReplayShape> map_shapes(const CompiledMap& map) {
 
 ReplayScenery map_scenery(const StaticGeometry& geometry) {
   ReplayScenery scenery;
-  Vec3 end;  // of the line
+  Vec3 end;  // end of the last line
   for (const Strip& strip : geometry.strips) {
     ReplayLine next{strip.kind,
                     replay_hue(strip.color),

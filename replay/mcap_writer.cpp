@@ -76,7 +76,7 @@ void McapWriter::put(std::string_view bytes) {
 }
 
 uint16_t McapWriter::add_channel(std::string_view topic, std::string_view schema_name, std::string_view schema) {
-  const uint16_t id = ++num_channels_;  // of the channel and of its schema; 0 is reserved
+  const uint16_t id = ++num_channels_;  // id of the channel and of its schema; 0 is reserved
   std::string content;
   put_fixed(id, &content);
   put_text(schema_name, &content);

@@ -41,7 +41,7 @@ class McapWriter {
   uint16_t num_channels_ = 0;
   std::string chunk_;
   uint64_t first_ns_ = 0, last_ns_ = 0;
-  std::map<uint16_t, std::vector<std::pair<uint64_t, uint64_t>>> entries_;  // of the chunk: time, offset of messages
+  std::map<uint16_t, std::vector<std::pair<uint64_t, uint64_t>>> entries_;  // times and offsets of the chunk's messages
   std::map<uint16_t, uint64_t> counts_;
   std::vector<ChunkIndex> chunks_;
   uint64_t num_messages_ = 0, num_metadata_ = 0, begin_ns_ = 0, end_ns_ = 0;

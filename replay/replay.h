@@ -242,7 +242,7 @@ struct Replay {
   int32_t followed = -1;  // agent with decisions and images, or -1
   std::vector<ReplayShape> map;
   ReplayScenery scenery;
-  std::vector<ReplayCamera> cameras;  // of every agent
+  std::vector<ReplayCamera> cameras;  // cameras of every agent
   float line_floor_px = 0;            // line floor of their images
   std::vector<ReplayEpisode> episodes;
   std::array<std::vector<int32_t>, kNumTracks> tracks;  // [frames, agents]

@@ -24,7 +24,7 @@ STEPS = ["equal", "updates", "killed", "rate"]
 MINIBATCH_OF_AN_AGENT = 0.8  # transitions: 16,384 with 20,480 agents
 WARM_UP_UPDATES = 3  # the first updates compile kernels and select algorithms
 CHUNK = 4096
-GRADIENT_TOLERANCE = 1e-4  # of each parameter's largest; or twice the effect of another chunk size on one GPU
+GRADIENT_TOLERANCE = 1e-4  # share of each parameter's largest gradient; or twice the effect of another chunk size on one GPU
 END_S = 60  # time limit for ranks to end after one was killed
 
 

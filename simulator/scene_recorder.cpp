@@ -137,7 +137,7 @@ Scenario SceneRecorder::scenario(std::string id, int self_agent) const {
   scenario.map = recorded ? recorded->map : *map.road;  // recorded lights are not part of it
   if (recorded && self_agent < 0) self_agent = recorded->sdc_track;
   const auto steps = static_cast<size_t>(num_steps_);
-  std::vector<std::pair<size_t, size_t>> lives;  // of each box, first lives before later ones
+  std::vector<std::pair<size_t, size_t>> lives;  // box and life; first lives before later ones
   for (size_t i = 0; i < bodies_.size(); ++i) lives.emplace_back(i, 0);
   for (size_t i = 0; i < bodies_.size(); ++i) {
     for (size_t life = 1; life < bodies_[i].size(); ++life) lives.emplace_back(i, life);

@@ -217,8 +217,8 @@ class Simulator {
   /// Advances every world by one step. actions: i32 [slots] on device(), each in [0, kNumActions); actions of inactive
   /// agents are ignored. A world whose last step ended its episode is reset instead, and its slots are not valid in
   /// that step (next-step autoreset). Throws Error, leaving the state unchanged, for another array, and for an action
-  /// out of range; on a device, the latter is latched. On a device a step neither allocates nor waits, and a CUDA graph
-  /// can capture it.
+  /// out of range; on a device, an error of an action is latched. On a device a step neither allocates nor waits, and a
+  /// CUDA graph can capture it.
   StepResult step(const Array& actions, Stream stream = {});
   /// Advances every world by commands, [slots], as a Controller writes them; see command.h. Commands that are actions
   /// alone give the same bits as the overload for actions.

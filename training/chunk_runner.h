@@ -66,7 +66,7 @@ class ChunkRunner {
     Minibatch chunk;
     Observation observation;
     Policy::Output output;
-    at::Tensor weight;  // of the chunk in its minibatch
+    at::Tensor weight;  // weight of the chunk in its minibatch
     Losses losses;
     int64_t last_use = 0;
   };

@@ -173,7 +173,7 @@ void set_up_torch(const Config& config, Device device) {
   at::set_num_threads(resolve_num_threads(config.run.num_threads));
   set_float32_products(config.train.precision);
   set_reproducible(config.train.reproducible);
-  release_unused_memory(device);  // of an earlier run
+  release_unused_memory(device);  // memory of an earlier run
 }
 
 TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {

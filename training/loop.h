@@ -64,7 +64,7 @@ struct TrainReport {
   int64_t agent_steps = 0, updates = 0;  // over all ranks, as everything below except the device's bytes
   double agent_steps_per_s = 0, episode_return = 0, km_driven = 0;
   int ranks = 1;
-  double evaluation_s = 0;  // of this process, in train.evaluate_every's evaluations, which no rate counts
+  double evaluation_s = 0;  // time of this process in train.evaluate_every's evaluations, which no rate counts
   bool interrupted = false, out_of_time = false;
   std::string checkpoint, policy_hash;
   // Memory of a CUDA device, else 0. device_bytes: in use by all processes after the last update, including torch's

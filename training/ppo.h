@@ -14,7 +14,7 @@ namespace pictura {
 
 /// State of the advantage filter (rules/advantage_filter.h) across rollouts.
 struct AdvantageFilter {
-  double average = -1;  // of the rollouts' maxima or quantiles; negative before the first
+  double average = -1;  // average of the rollouts' maxima or quantiles; negative before the first
 };
 
 /// Upper bounds of the difference between a rollout's log-probabilities and the learner's before the first step, when

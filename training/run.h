@@ -54,7 +54,7 @@ struct Run {
   Config in_force;  // config_at(config, agent_steps) of the last update_image_size()
   const Device device;
   Communicator* const communicator;
-  const std::vector<WorldSpec> all_worlds;       // of all ranks
+  const std::vector<WorldSpec> all_worlds;       // worlds of all ranks
   Rig rig;                                       // current rig
   const std::unique_ptr<const Teacher> teacher;  // null without train.teacher
   const std::unique_ptr<Opponents> opponents;    // null without simulator.others.policies

@@ -52,7 +52,7 @@ class RunKeeper {
   Ranks* const ranks_;
   Communicator* const communicator_;
   std::optional<FolderLock> lock_;
-  std::vector<std::string> old_files_;  // of an earlier run
+  std::vector<std::string> old_files_;  // files of an earlier run
   std::string folder_;
   int64_t saved_update_ = -1;
   Stopwatch since_saved_;

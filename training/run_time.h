@@ -37,7 +37,7 @@ class RunTime {
   const Stopwatch start_;
   Run& run_;
   const std::string machine_;
-  double own_longest_update_s_ = 0;  // of this process
+  double own_longest_update_s_ = 0;  // longest update of this process
 };
 
 }  // namespace pictura

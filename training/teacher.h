@@ -23,7 +23,7 @@ class Teacher {
   at::Tensor log_probs(const SimulatorArrays& input, const at::Tensor& slots) const;
 
  private:
-  const Config config_;  // of the teacher
+  const Config config_;  // configuration of the teacher
   const ChunkSizes chunks_;
   const Device device_;
   const std::unique_ptr<const Policy> policy_;

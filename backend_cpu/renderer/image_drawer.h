@@ -133,9 +133,9 @@ class ImageDrawer {
   std::vector<int32_t> first_fragment_;  // [pixels of the rows] first fragment of each list
   std::vector<PixelFragment> fragments_;
   std::vector<PixelFragment> collected_;
-  std::vector<uint64_t> visible_;                  // of the collected fragments
+  std::vector<uint64_t> visible_;                  // visible samples of each collected fragment
   std::vector<std::size_t> pixel_ends_;            // end of each pixel's fragments among the collected fragments
-  std::vector<PixelAccumulator::Weight> weights_;  // of one pixel
+  std::vector<PixelAccumulator::Weight> weights_;  // weights of one pixel's fragments
 };
 
 }  // namespace pictura

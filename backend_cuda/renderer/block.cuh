@@ -34,7 +34,7 @@ struct Part {
 /// Drawing order of a tile whose fragments do not fit at once: vertical bands from left to right, each in parts from
 /// top to bottom.
 struct PartPlan {
-  int band_begin, band_px;  // of the current band
+  int band_begin, band_px;  // first column and width of the current band
   int wide_px, rows;        // maximum size of a part
   Part part;                // next part
 };

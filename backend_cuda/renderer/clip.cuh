@@ -18,7 +18,7 @@ constexpr int kLaneCorners = 8;
 
 /// Shared memory of a warp that clips.
 struct ClipShared {
-  Quad quad;  // of one lane, read by all lanes
+  Quad quad;  // quad of one lane, read by all lanes
   // Corners: one column per lane, or the first row for the whole warp. Two additional rows, since a cut and a kept
   // corner may be written past the last before the count is checked.
   static constexpr int kRows = kLaneCorners + 2;
@@ -90,7 +90,7 @@ __device__ void copy_words_async(Value* to, const Value& from) {
 
 /// A face whose corners are distributed over the lanes, one each; the other members are the same in all lanes.
 struct WarpFace {
-  Vec3 corner;  // of lanes below count
+  Vec3 corner;  // the lane's corner; valid in lanes below count
   int count = 0;
   FacePlane plane;
   Rgb color;

@@ -23,7 +23,7 @@ struct CullShared {
   // Arrays of strips and of walls, in the order of pieces_of.
   const Ball* balls[2];
   const int32_t* items[2];
-  int32_t offsets[kWarpSize];  // of non-empty rows, see cull_pieces
+  int32_t offsets[kWarpSize];  // offsets of non-empty rows, see cull_pieces
 };
 static_assert(FaceBatch::kEntries == kWarpSize);
 

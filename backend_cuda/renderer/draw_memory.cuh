@@ -40,7 +40,7 @@ struct DrawMemory {
   __device__ static bool covers_fully(uint32_t coded_pixel) { return (coded_pixel & kCoversFully) != 0; }
 
   BlockState* state;
-  const ScreenFace* faces;   // of the image
+  const ScreenFace* faces;   // faces of the image
   const PolygonEdge* edges;  // indexed by the faces' edge_begin
   Word* pixels;              // [max_pixels] of the current part, see PixelWord
   Word* rows;                // [max_rows] of faces: face in the upper half, row of the part in the lower

@@ -40,7 +40,7 @@ union GeometryShared {
 /// Shared memory of a block of pictura_setup_faces. With the 1 KiB that each block reserves, 32 blocks leave 28 KiB of
 /// L1 cache on an SM with 256 KiB for both. This is enough, because little of the data is read twice.
 struct FaceSetupState {
-  FaceSetupContext contexts[2];  // of this batch and the next, alternating
+  FaceSetupContext contexts[2];  // contexts of this batch and the next, alternating
   FaceShared storage;
 };
 __device__ inline FaceSetupState* face_setup_state() { return reinterpret_cast<FaceSetupState*>(block_memory); }

@@ -38,7 +38,7 @@ void check_backends(const std::vector<std::string>& backends, const std::vector<
 struct BenchContext {
   std::string workload, backend;
   std::string device = processor_name();
-  std::string driver;  // of a GPU
+  std::string driver;  // driver of a GPU
 
   /// Adds a GPU and its driver to the device; does nothing for an empty name.
   void add_gpu(const std::string& name, const std::string& driver_name);

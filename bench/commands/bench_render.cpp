@@ -180,7 +180,7 @@ void run_render(RenderArguments arguments) {
   };
   DrivenWorlds worlds;
   std::vector<BenchResult> results;
-  std::vector<std::string> choices;  // of the last case of each renderer
+  std::vector<std::string> choices;  // choice of each renderer in its last case
   for (std::size_t i = 0; i < cases.size(); ++i) {
     RenderCase& measured = cases[i].measured;
     if (i == 0 || cases[i].crowd != cases[i - 1].crowd) worlds = drive(cases[i].crowd);

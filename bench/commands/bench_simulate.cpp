@@ -35,7 +35,7 @@ struct SimulateArguments {
 
 /// Worlds that are measured together.
 struct SimulateCase {
-  std::string name;  // of the worlds
+  std::string name;  // name of the worlds
   std::vector<WorldSpec> worlds;
   bool vector_observations = true;
 };

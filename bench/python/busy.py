@@ -15,7 +15,7 @@ import tempfile
 import time
 
 def processor_s() -> float:
-    """Of all processors, since the system started."""
+    """Returns the busy time of all processors since the system started."""
     with open("/proc/stat") as file:
         user, nice, system, _, _, irq, softirq = map(int, file.readline().split()[1:8])
     return (user + nice + system + irq + softirq) / os.sysconf("SC_CLK_TCK")

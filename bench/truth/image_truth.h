@@ -60,7 +60,7 @@ class PooledError {
  private:
   double squared_ = 0, max_error_ = 0;
   std::size_t count_ = 0;
-  std::vector<std::size_t> histogram_ = std::vector<std::size_t>(8 * 255 + 1);  // of |error|
+  std::vector<std::size_t> histogram_ = std::vector<std::size_t>(8 * 255 + 1);  // counts by |error|
 };
 
 }  // namespace pictura

@@ -15,7 +15,7 @@ import numpy as np
 from pictura import _pictura
 
 _TYPES = {name: i for i, name in enumerate(_pictura.TRACK_TYPES)}
-# Of a box's length: from its centre to the rear axle, whose middle on the ground is a vehicle's place by the standard, and between axles.
+# Shares of a box's length: from its centre to the rear axle, whose middle on the ground is a vehicle's place by the standard, and between axles.
 _REAR_AXLE, _WHEELBASE = 0.3, 0.6
 # What the format asks of vehicles and no recording has.
 _MAX_SPEED, _MAX_ACCELERATION, _MAX_STEERING, _WHEEL_DIAMETER, _MASS = "69.5", "10", "0.7", "0.6", "75"

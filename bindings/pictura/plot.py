@@ -73,7 +73,7 @@ class Series:
     name: str
     x: list[float] = field(default_factory=list)
     y: list[float] = field(default_factory=list)
-    low: list[float] = field(default_factory=list)  # of a band behind the line: as long as the line, or empty
+    low: list[float] = field(default_factory=list)  # lower edge of a band behind the line: as long as the line, or empty
     high: list[float] = field(default_factory=list)
     dashed: bool = False
 
@@ -302,7 +302,7 @@ def run_curves(runs: Sequence[str], metrics: Sequence[str] = METRICS, x: str = "
     if len(set(names)) < len(names):
         names = [run.folder for run in read]
 
-    members: list[list[int]] = []  # of each line: indices of its runs
+    members: list[list[int]] = []  # indices of the runs of each line
     for i, run in enumerate(read):
         same = next((lines for lines in members if read[lines[0]].settings == run.settings), None)
         if same is None:
@@ -528,7 +528,7 @@ def step_costs(results: Sequence[str]) -> Chart:
 
 def rank_rates(results: Sequence[str]) -> Chart:
     """Returns rates and efficiencies by number of GPUs, from files of scripts/gpu_ranks: with a fixed number of agents
-    on each GPU, and with a fixed number in all.
+    on each GPU, and with a fixed total.
 
     Examples:
         >>> from pictura import plot
@@ -561,7 +561,7 @@ def rank_rates(results: Sequence[str]) -> Chart:
 
 
 def breakdown_parts(results: Sequence[str], parts: Sequence[str], paper: dict[str, dict[str, float]]) -> Chart:
-    """Returns the seconds of an update by size, from `pictura bench breakdown`, beside the paper's.
+    """Returns the seconds of an update by size, from `pictura bench breakdown`, with the paper's for comparison.
 
     parts: columns of the table; the third panel shows those of the first case. paper: the paper's seconds by size, of
     "total" and of "rendering".

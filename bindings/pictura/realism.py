@@ -1,4 +1,4 @@
-"""How realistic simulated road users are: the realism score of rollouts of recorded scenes, and what else is told of them.
+"""The realism score of rollouts of recorded scenes, and their other measures.
 
 docs/explanation/realism.md has the definitions. Rollouts are arrays: track_ids int64 [tracks], all that the scene has at its step 10;
 center_m [rollouts, tracks, 80, 3], the boxes' centres in the coordinates of the scene's file after each of the 80 steps that follow;

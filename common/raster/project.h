@@ -29,7 +29,7 @@ struct alignas(16) ScreenFace {
   uint16_t min_area_units = 0;  // see min_area()
   // Inverse depth at screen point (x, y): inverse_depth_x * x + inverse_depth_y * y + inverse_depth_0.
   float inverse_depth_x = 0, inverse_depth_y = 0, inverse_depth_0 = 0;
-  uint32_t object_id = 0;  // of its primitive, see common/raster/visibility.h
+  uint32_t object_id = 0;  // id of its primitive, see common/raster/visibility.h
   // Range of the inverse depth over the face's corners; for strips, widened by kWidenedDepth.
   float inverse_depth_low = 0, inverse_depth_high = 0;
   float nearest_standing = 1;  // see nearest_standing(); 1 except for strips that are seen from below

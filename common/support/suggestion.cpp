@@ -38,7 +38,7 @@ std::size_t distance(std::string_view a, std::string_view b) {
 }  // namespace
 
 std::string nearest_word(std::string_view word, const std::vector<std::string>& known) {
-  constexpr std::size_t kMaxLetters = 100;  // of a name; the time grows with its square
+  constexpr std::size_t kMaxLetters = 100;  // maximum length of a name; the time grows with its square
   if (word.empty() || word.size() > kMaxLetters) return "";
   std::string nearest;
   std::size_t minimum = word.size();

@@ -28,8 +28,8 @@ BlindCorners find_blind_corners(const RoadMap& map, Span<const WallFace> walls);
 
 /// Criteria of the states to find.
 struct CornerSearch {
-  float min_distance_m = 8, max_distance_m = 25;  // of the ego's reference point from the corner's entry
-  float min_speed_mps = 2;                        // of the ego, and of the hidden vehicle
+  float min_distance_m = 8, max_distance_m = 25;  // from the ego's reference point to the corner's entry
+  float min_speed_mps = 2;                        // minimum speed of the ego and of the hidden vehicle
   float user_range_m = 50;  // maximum distance of the hidden vehicle from its entry into the junction
 };
 

@@ -20,7 +20,7 @@ constexpr size_t kMaxTries = 48, kTriesAtOnce = 12;
 constexpr int kCoarse = 4;
 static_assert(kPathOrigin % kCoarse == 0 && kCoarse * kPathSpacing_m <= min_of(kPathHidden_m, kPathSeen_m));
 constexpr float kMinHiderDistance_m = 5, kSameHeight_m = 0.5f;
-constexpr float kMinCosineAhead = 0.7f;  // of the angle between the ego's heading and the hider
+constexpr float kMinCosineAhead = 0.7f;  // cosine of the angle between the ego's heading and the hider
 
 // Candidate path in a world of a frame.
 struct Candidate {

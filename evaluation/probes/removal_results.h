@@ -31,7 +31,8 @@ struct RemovalCase {
   bool user_halted = false;
   float distance_m = 0;  // on the ground, from the ego's rear axle to the centre of the user
   float ego_speed_mps = 0;
-  float visible_share = 0;  // of the user, in the ego's cameras: Renderer::visibility; NaN: outside all cameras' frames
+  /// Share of the user that the ego's cameras show, see Renderer::visibility; NaN: outside all cameras' frames.
+  float visible_share = 0;
 
   bool is_in_frame() const { return visible_share == visible_share; }
   float occlusion() const { return 1 - visible_share; }

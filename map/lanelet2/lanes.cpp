@@ -16,8 +16,8 @@ namespace {
 
 constexpr double kSameOutlinePoint_m = 0.01;
 constexpr double kMaxWidth_m = 500.0;
-constexpr double kMaxRadius_m = 50e3;  // of a map
-constexpr float kBridged_m = 20.0f;    // of a lanelet between two of a junction
+constexpr double kMaxRadius_m = 50e3;  // maximum distance of a map's points from its origin, along each axis
+constexpr float kBridged_m = 20.0f;    // maximum length of a lanelet between two of a junction
 
 /// Positive where `p` is on the left of the line. At corners the side is that of the sum of both normals.
 double side_of(const Points& line, const Eigen::Vector3d& p) {
@@ -261,7 +261,7 @@ class LaneBuilder {
     return static_cast<int32_t>(map_.lanes.size()) - 1;
   }
 
-  /// Of a regulatory element, else of the lanelet's tags, else by its subtype and location.
+  /// Speed limit of a regulatory element, else of the lanelet's tags, else by its subtype and location.
   double speed_limit_mps(const Relation& relation) const {
     for (const int32_t index : relation.relations("regulatory_element")) {
       const Relation& rule = file_.relations[index];

@@ -80,7 +80,7 @@ struct OsmFile {
   std::vector<Node> nodes;
   std::vector<Way> ways;
   std::vector<Relation> relations;
-  std::string geo_reference;  // of the coordinates, a PROJ string; may be empty
+  std::string geo_reference;  // reference of the coordinates, a PROJ string; may be empty
 
   opendrive::SourceLocation where(const Node& node) const { return place("node", "node", node); }
   opendrive::SourceLocation where(const Way& way) const { return place("way", "way", way); }
@@ -94,7 +94,7 @@ struct OsmFile {
   }
 };
 
-/// Reads `text`; `name` names it in messages. Mends what opendrive::Faults and docs/reference/lanelet2.md say; throws
+/// Reads `text`; `name` names it in messages. Repairs the faults that docs/reference/lanelet2.md lists; throws
 /// Error naming file, line and element for all other faults.
 void read_osm(std::string_view text, const std::string& name, opendrive::Faults* faults, OsmFile* file_out);
 

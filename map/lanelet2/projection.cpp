@@ -12,9 +12,9 @@ namespace pictura {
 namespace {
 
 constexpr double kDegree_rad = std::numbers::pi / 180;
-constexpr double kScale = 0.9996, kFalseEasting_m = 500e3, kFalseNorthing_m = 10'000e3;  // of UTM
-constexpr double kSquare_m = 100e3, kRowCycle_m = 2'000e3;                               // of MGRS
-constexpr double kSemiMajorAxis_m = 6378137.0, kFlattening = 1 / 298.257223563;          // of WGS 84
+constexpr double kScale = 0.9996, kFalseEasting_m = 500e3, kFalseNorthing_m = 10'000e3;  // constants of UTM
+constexpr double kSquare_m = 100e3, kRowCycle_m = 2'000e3;                               // constants of MGRS
+constexpr double kSemiMajorAxis_m = 6378137.0, kFlattening = 1 / 298.257223563;          // constants of WGS 84
 
 double central_meridian_deg(const UtmZone& zone) { return 6.0 * zone.number - 183; }
 

@@ -13,7 +13,7 @@ namespace pictura::lanelet2 {
 
 namespace {
 
-constexpr double kMaxLocal_m = 1e8;  // of coordinates of any projection
+constexpr double kMaxLocal_m = 1e8;  // maximum magnitude of coordinates of any projection
 
 bool is_deleted(pugi::xml_node element) { return std::string_view(element.attribute("action").value()) == "delete"; }
 

@@ -21,7 +21,7 @@ namespace {
 constexpr float kNearHeadHeight_m = 3.5f, kFarHeadHeight_m = 5.5f, kLowestHead_m = 1.5f;
 constexpr float kFarHead_m = 5.0f;
 constexpr float kMinStopLine_m = 0.1f;
-constexpr float kJunctionAhead_m = 40.0f;  // of a light
+constexpr float kJunctionAhead_m = 40.0f;  // maximum way from a light to its junction
 
 /// The place along a lane, from 0 to 1, that is nearest to a point.
 float nearest_share(const RoadMap& map, int32_t lane, Vec3 p) {
@@ -230,7 +230,7 @@ class RuleBuilder {
     return -1;
   }
 
-  /// Of several heads the one farthest ahead, which those who wait see.
+  /// Sets the head: among several the one farthest ahead, which waiting vehicles see.
   void set_head(const Approach& approach, Vec2 forward, TrafficLight* light) const {
     const Vec3 middle = (light->stop_a_m + light->stop_b_m) * 0.5f;
     float best_m = -std::numeric_limits<float>::infinity();

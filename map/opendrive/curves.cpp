@@ -221,7 +221,8 @@ Eigen::Vector3d point_beside(const FileRoad& road, const Station& station, doubl
 
 /// Bounds of a cubic and its derivatives over an interval.
 struct Bounds {
-  double low = 0, high = 0, slope = 0, bend = 0;  // of the value; of the magnitudes of its two derivatives
+  double low = 0, high = 0, slope = 0,
+         bend = 0;  // low, high: range of the value; slope, bend: maximum magnitudes of its derivatives
 };
 
 /// Computes bounds from Bernstein coefficients, which bound a polynomial.

@@ -79,7 +79,7 @@ bool applies_to(const FileLane& lane, const FileRoad& road, Orientation orientat
 
 void split_at_lights(Network* network) {
   const std::unordered_set<std::string> controlled = controlled_signals(*network);
-  std::unordered_set<std::string> lights, referenced;  // of lights without a controller
+  std::unordered_set<std::string> lights, referenced;  // ids of lights without a controller
   for (const FileRoad& road : network->roads) {
     for (const FileSignal& signal : road.signals) {
       if (signal.type == kLightType && !controlled.contains(signal.id)) lights.insert(signal.id);

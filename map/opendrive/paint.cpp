@@ -281,7 +281,7 @@ void add_parking_space(Build* build, std::size_t road_index, const FileObject& o
     std::swap(width_m, length_m);
     heading += 0.5 * std::numbers::pi;
   }
-  // Of the two headings, that of the traffic on this side of the road is used.
+  // The heading of the traffic on this side of the road is used, not the opposite one.
   const bool forward = travels_forward(road, object.t > 0 ? 1 : -1);
   const double traffic = pose.heading + (forward ? 0.0 : std::numbers::pi);
   if (std::cos(heading - traffic) < 0) heading += std::numbers::pi;

@@ -92,7 +92,7 @@ class SignalBuilder {
 
   /// An approach without a controller: all heads there share one line.
   struct UncontrolledLine {
-    std::size_t signal_index = 0;  // of the first head
+    std::size_t signal_index = 0;  // index of the first head
     Approach approach;
   };
 

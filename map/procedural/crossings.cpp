@@ -6,7 +6,7 @@ namespace pictura::town {
 
 namespace {
 
-constexpr double kMaxTurnRadius_m = 14;  // of the left border of all turns except right turns
+constexpr double kMaxTurnRadius_m = 14;  // radius of the left border of all turns except right turns
 // Additional width half-way of lanes that turn across the junction, so that no sliver remains between adjacent lanes.
 constexpr double kTurningExtra_m = 0.5;
 constexpr double kCrosswalkBegin_m = 0.6, kCrosswalkEnd_m = 3.4;  // distance beyond the stop line

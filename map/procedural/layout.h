@@ -44,7 +44,7 @@ struct Node {
   double z = 0;        // height of the junction, or of an overpass's lower street
   double upper_z = 0;  // height of an overpass's upper street
   NodeKind kind = NodeKind::crossing;
-  bool on_border = false;         // of the grid
+  bool on_border = false;         // whether the node is on the border of the grid
   bool upper_runs_north = false;  // direction of an overpass's upper street
   bool has_lights = false, far_side_heads = false, has_crosswalks = false;
   std::vector<Arm> arms;  // counter-clockwise

@@ -14,7 +14,7 @@ namespace pictura::conversion {
 namespace {
 
 constexpr float kMarkWidth_m = 0.15f;
-constexpr double kStripeOffset_m = 0.15;  // of the two stripes of a double line from its middle
+constexpr double kStripeOffset_m = 0.15;  // distance of the two stripes of a double line from its middle
 /// Minimum length of gaps. Edges are dense; longer pieces are gaps of the recording, which are kept unless they cross a
 /// lane.
 constexpr double kJump_m = 2.0;

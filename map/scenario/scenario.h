@@ -43,7 +43,7 @@ struct RecordedTrack {
   int64_t id = 0;  // as in the file
   TrackType type = TrackType::unset;
   RecordedControl control = RecordedControl::unstated;
-  float length_m = 0, width_m = 0, height_m = 0;  // of the last valid state
+  float length_m = 0, width_m = 0, height_m = 0;  // size in the last valid state
   int32_t first_valid = 0, last_valid = 0;        // steps; gaps in between are possible
   int32_t num_valid = 0;                          // at least one
 };
@@ -83,7 +83,7 @@ struct ConversionNote {
 };
 
 struct Scenario {
-  std::string id;      // of the recording, such as "637f20cafde22ff8"; may be empty
+  std::string id;      // id of the recording, such as "637f20cafde22ff8"; may be empty
   std::string format;  // "womd", "gpudrive", "pufferdrive v1", ...
   float dt_s = 0.1f;
   int32_t num_steps = 0;

@@ -24,7 +24,7 @@ struct SceneCacheKey {
 /// Kind of a file: the beginning of its header.
 struct FieldFileKind {
   std::array<char, 8> magic{};
-  uint32_t version = 1;    // of the header
+  uint32_t version = 1;    // version of the header
   uint64_t layout = 0;     // hash of the description of the payload's layout
   const char* other = "";  // reason in messages about a file of another layout
 };

@@ -35,7 +35,7 @@ struct PatchSize {
 /// Columns of a segment's row (docs/reference/observation.md) from which features are computed, besides x and y of its
 /// middle.
 struct SegmentColumn {
-  static constexpr int kCos = 4, kSin = 5;  // of the segment's direction
+  static constexpr int kCos = 4, kSin = 5;  // cosine and sine of the segment's direction
 };
 
 /// Features to compute from a row (see policy/row_features.h): those of each of the `points` pairs (x, y) at the row's
@@ -87,7 +87,7 @@ PICTURA_HD inline float row_feature(const RowFeatures& features, const float* ro
 /// Size of sets of members, each encoded by a linear layer, GELU, and a second linear layer, both of kChannels outputs.
 /// With has_norm the first layer's outputs are normalized before the GELU.
 struct SetSize {
-  RowSize members;  // of all sets, `max_members` a set including absent members; keeps_rows is set
+  RowSize members;  // members of all sets, `max_members` a set including absent members; keeps_rows is set
   int64_t max_members = 0;
   int64_t counts_stride = 1;  // elements from one set's member count to the next set's
   bool has_norm = false;

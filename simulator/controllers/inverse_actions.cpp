@@ -17,7 +17,7 @@ namespace {
 /// A sequence of actions: its last action, and its predecessor in the beam of the previous step.
 struct Sequence {
   Motion motion;
-  double cost = 0;            // of all steps
+  double cost = 0;            // sum over all steps
   double predicted_cost = 0;  // including the cost of returning to the record
   float error_m = 0;
   int32_t action = 0;

@@ -35,7 +35,7 @@ struct InverseTable {
   /// Throws UsageError where multipliers of the dynamics differ from 1, and for worlds without a record.
   explicit InverseTable(const Simulator& simulator);
   std::vector<ActionTable> worlds;
-  std::vector<int32_t> actions;  // of all maps in sequence
+  std::vector<int32_t> actions;  // actions of all maps in sequence
 };
 
 /// Controller that replays inverse actions.

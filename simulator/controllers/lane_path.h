@@ -29,7 +29,7 @@ struct PathPoint {
   float speed_mps = 0;  // maximum
 };
 
-/// Returns the index of the point nearest to a place: the search goes on from `from` as long as points get nearer.
+/// Returns the index of the point nearest to a place: the search continues from `from` as long as points get nearer.
 size_t nearest_point(const std::vector<PathPoint>& path, size_t from, Vec2 place_m);
 
 /// Points every kSpacing_m along the route. `graph` is the graph of the view's map; the graph and the view's arrays

@@ -15,7 +15,7 @@ constexpr float kPlannedSpeed_mps = 2;
 constexpr size_t kStrideSteps = 4;
 
 struct DrivingPlan {
-  std::vector<int32_t> actions;  // of the coming steps
+  std::vector<int32_t> actions;  // actions of the coming steps
   bool is_clear = false;  // clear to the horizon or out through an exit; otherwise it ends where it leaves the road
 };
 

@@ -51,9 +51,9 @@ struct MapLane {
 /// Place where agents leave an open map: a line across the end of a lane.
 struct Exit {
   Vec3 middle_m;
-  Vec2 direction;  // of traffic, unit vector
+  Vec2 direction;  // direction of traffic, unit vector
   float half_width_m = 0;
-  float slope = 0;  // of the lane there, rise per metre
+  float slope = 0;  // slope of the lane there, rise per metre
 };
 
 /// A lane at whose start agents enter an open map. Per step, one agent enters among the entries of one turn.
@@ -89,7 +89,7 @@ constexpr float kWalkReach_m = 5.0f;
 struct StopLine {
   Vec3 left_m, right_m;
   Vec3 middle_m;
-  Vec2 direction;  // of the controlled traffic
+  Vec2 direction;  // direction of the controlled traffic
   float half_length_m = 0;
   float beyond_left_m = 0, beyond_right_m = 0;  // from its ends to the far side of the lanes of oncoming traffic
   int32_t junction = -1, phase = 0, num_phases = 1;
@@ -122,7 +122,7 @@ struct RecordedAgent {
 
 /// State of a recorded agent at one step.
 struct RecordedState {
-  Vec3 position_m;  // of the reference point
+  Vec3 position_m;  // position of the reference point
   float heading_rad = 0;
   float speed_mps = 0;  // signed, along the heading
   int32_t is_present = 0;
@@ -147,7 +147,7 @@ struct MapView {
   Span<const ObservedPiece> lane_pieces, boundary_pieces, wall_pieces;
   Span<const Vec2> lane_middles, boundary_middles, wall_middles;  // the pieces' middles, in a quarter of the bytes
   GridView segment_cells, edge_cells, wall_cells, stop_line_cells;
-  GridView walk_cells;                                                // of pairs of walk_pieces
+  GridView walk_cells;                                                // cells of pairs of walk_pieces
   GridView near_lane_pieces, near_boundary_pieces, near_wall_pieces;  // per cell and sector
   GridView near_stop_lines;
   Span<const RecordedAgent> recorded_agents;  // in the order of the worlds' agents; empty without a record

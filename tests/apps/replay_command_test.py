@@ -171,7 +171,7 @@ class Replays(CommandCase):
         header = header_of(path)
         self.assertEqual([(c["width_px"], c["height_px"]) for c in header["cameras"]], [(16, 9)] * 4)
         self.assertRegex(header["policy_hash"], "^[0-9a-f]{16}$")
-        actions = self.numbers_of(path, "action")[2 * 21 : 3 * 21]  # of agent 2, order 0
+        actions = self.numbers_of(path, "action")[2 * 21 : 3 * 21]  # actions of agent 2, order 0
         decisions = self.decisions_of(path)
         asked = 0
         for frame in range(20):

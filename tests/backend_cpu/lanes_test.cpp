@@ -1,4 +1,4 @@
-// Rules for eight lanes at once compared with rules for one lane: equal to the bit.
+// Rules for eight lanes at once are bitwise identical to rules for one lane.
 #include <bit>
 #include <cmath>
 #include <random>

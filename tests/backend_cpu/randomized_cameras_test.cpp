@@ -73,7 +73,7 @@ TEST(RandomizedImages, TurnAsTheirAnglesSay) {
                              expected = drawn(town, town.views, randomized({}, expected_rig));
   int far_off = 0;
   for (std::size_t i = 0; i < image.size(); ++i) far_off += std::abs(int{image[i]} - int{expected[i]}) > 2;
-  EXPECT_LT(far_off, 20);  // of 15,552 values
+  EXPECT_LT(far_off, 20);  // the images have 15,552 values
 }
 
 // Minibatches and films redraw earlier views from a history: other views, in another order.

@@ -64,7 +64,7 @@ COMPILER_TESTS = re.compile(r"^(common/portable|tests|bench)/")
 OTHER_PARSER = re.compile(r"\b(std::)?(strto(d|f|ld)|atof|sto(d|f|ld)|sscanf)\(")
 JSON_PARSER = re.compile(r"\b(json|Json)::(parse|sax_parse)\(")
 JSON_HOME = "common/support/json.h"
-# Printing that throws or that nobody judges where a stream takes nothing; and writers that truncate what is there. Those of
+# Printing that throws, or whose failures are not checked; and writers that truncate existing files. Writers of
 # runs append to files that run_files() has found to be no links.
 OTHER_PRINTER = re.compile(r"\bfmt::print\(|\bstd::(cout|cerr|fwrite|fputs|puts|printf|fprintf)\b")
 PRINTER_HOME = "common/support/messages.cpp"

@@ -29,7 +29,7 @@ def shorter(line):
     words = shlex.split(line, comments=True)
     for i, word in enumerate(words[:-1]):
         takes_over = words[:2] == ["probe", "corner"] and word == "--steps"  # for 80 steps
-        if word in AT_MOST and words[i + 1].isdigit() and not takes_over:  # --scenarios 0:4 is no number
+        if word in AT_MOST and words[i + 1].isdigit() and not takes_over:  # --scenarios 0:4 is not a number
             words[i + 1] = str(min(int(words[i + 1]), AT_MOST[word]))
         if word == "--config":
             words[i + 1] = "configs/smoke.toml"

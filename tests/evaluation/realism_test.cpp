@@ -34,7 +34,7 @@ TEST(RealismBoxes, AreApartByTheirRoundedSidesAndCorners) {
   EXPECT_NEAR(rounded_box_distance_m(car, {10, 0, kQuarterTurn, 4, 2}), 7, 1e-12);
   // Corner to corner: without rounding the corners are (3, 4) apart. Each radius is 0.7, so the cores' are (4.4, 5.4).
   EXPECT_NEAR(rounded_box_distance_m(car, {7, 6, 0, 4, 2}), std::hypot(4.4, 5.4) - 1.4, 1e-12);
-  // Overlap: the least way apart is sideways, 0.5 m.
+  // Overlap: the shortest way apart is sideways, 0.5 m.
   EXPECT_NEAR(rounded_box_distance_m(car, {1, 1.5, 0, 4, 2}), -0.5, 1e-12);
   EXPECT_NEAR(rounded_box_distance_m(car, car), -2, 1e-12);
   // Sharp corners would overlap, rounded ones do not: cores' corners are (0.7, 0.7) * 2 less 0.1 apart.
@@ -143,7 +143,7 @@ Scenario straight_road() {
   return make_scenario(std::move(scene));
 }
 
-/// Car 7 goes on from its place at step 10 with this velocity, the other one stands.
+/// Car 7 continues from its place at step 10 with this velocity; car 9 stands.
 SceneRollouts rollout_at(double speed_mps, double sideways_mps, int count = 1) {
   SceneRollouts rollouts{"straight", kRealismSteps, {7, 9}, {}};
   std::vector<SimulatedState> states;
@@ -218,7 +218,7 @@ TEST(RealismScenes, ScoreWhatTheRecordingIsUnderRollouts) {
   EXPECT_NEAR(same.progress, 1, 1e-6);
   EXPECT_NEAR(same.score_by_object, same.score, 1e-12) << "of one road user";
 
-  // Half of them at 4 m/s: half as likely, but for the speeds in which they change.
+  // Half of them at 4 m/s: half as likely, except for the speeds, in which they differ.
   SceneRollouts mixed = rollout_at(8, 0, 1);
   mixed.rollouts.push_back(rollout_at(4, 0).rollouts[0]);
   const SceneRealism half = scene.score(mixed, version);

@@ -28,7 +28,7 @@ void exercise(const RoadMap& map) {
   }
 }
 
-/// The payload of a valid map with content in all of its vectors.
+/// The payload of a valid map none of whose vectors is empty.
 const std::string& valid_payload() {
   static const std::string payload = [] {
     RoadMap map = parse_opendrive(procedural_town({.blocks_x = 1, .blocks_y = 1}), "town");
@@ -53,7 +53,7 @@ std::string edited(std::string payload, std::string_view edits) {
   return payload;
 }
 
-/// Imports with mends and strictly; whether the latter made a map.
+/// Imports with repairs, then strictly. Returns whether the strict import made a map.
 template <typename Import>
 bool fuzz_import(Import&& import) {
   bool is_map = false;

@@ -219,7 +219,7 @@ TEST(Lanelet2, LanesFollowWhereBordersShareTheirPoints) {
   const RoadMap map = sound(text);
   EXPECT_THAT(names_of(map, map.links(lane_named(map, "20").successors)), UnorderedElementsAre("21", "22"));
   EXPECT_THAT(names_of(map, map.links(lane_named(map, "22").predecessors)), ElementsAre("20"));
-  EXPECT_THAT(names_of(map, map.links(lane_named(map, "23").predecessors)), IsEmpty());  // nobody walks from a road
+  EXPECT_THAT(names_of(map, map.links(lane_named(map, "23").predecessors)), IsEmpty());  // no walkway continues a road
   // Lanes that fork share an end and do not cross.
   EXPECT_EQ(map.facts.junctions, 0);
 }
@@ -322,7 +322,7 @@ TEST(Lanelet2, LinesArePainted) {
   EXPECT_NEAR(lengths_of(solid)[0], std::hypot(100, 2), 1e-3);
   EXPECT_EQ(solid.provenance.markings[0].line, 7);
   const RoadMap dashed = painted({{"type", "line_thick"}, {"subtype", "dashed"}, {"color", "yellow"}});
-  ASSERT_EQ(dashed.markings.size(), 9u);  // of 3 m every 12 m, in the middle of 100 m
+  ASSERT_EQ(dashed.markings.size(), 9u);  // dashes of 3 m every 12 m, in the middle of 100 m
   EXPECT_FLOAT_EQ(dashed.markings[0].width_m, 0.25f);
   EXPECT_EQ(dashed.markings[0].color, MarkColor::yellow);
   EXPECT_TRUE(dashed.markings[0].broken);
@@ -479,7 +479,7 @@ TEST(Lanelet2, LightsHaveStopLinesHeadsLanesAndPhases) {
     EXPECT_NEAR(a.y, 2, 1e-4);  // the left end
     EXPECT_NEAR(b.y, -2, 1e-4);
     EXPECT_NEAR(east.stop_heading_rad, 0, 1e-6);
-    EXPECT_NEAR(head.x, 12, 1e-4);  // of two heads the one beyond the crossing
+    EXPECT_NEAR(head.x, 12, 1e-4);  // the head beyond the crossing, of two
     EXPECT_NEAR(head.y, 0, 1e-4);
     EXPECT_NEAR(head.z, 5, 1e-4);
     EXPECT_NEAR(east.head_facing.x, -1, 1e-6);
@@ -792,7 +792,7 @@ TEST(Lanelet2, HostileFilesGiveAMapOrAnError) {
     maps += try_import(changed);
   }
   EXPECT_GT(maps, 10);
-  // Elements that refer to each other, lanelets on lanelets, and a line that goes to and fro for ever.
+  // Elements that refer to each other, lanelets on lanelets, and a line that goes back and forth 5,000 times.
   OsmText rings = street();
   rings.relation(90, {{"relation", "regulatory_element", 91}}, {{"type", "lanelet"}})
       .relation(91, {{"relation", "regulatory_element", 90}}, {{"type", "lanelet"}});

@@ -14,7 +14,7 @@ namespace pictura {
 namespace {
 
 struct MapCase {
-  std::string name;  // of the file, without .xodr
+  std::string name;  // name of the file, without .xodr
   std::string kind;  // contents of the file
 };
 

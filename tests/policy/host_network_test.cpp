@@ -30,7 +30,7 @@ using test::message_of;
 using test::numbers;
 using ::testing::HasSubstr;
 
-// Of logits and values: those of released policies reach 400, of which fp32 has steps of 3e-5.
+// Relative tolerance of logits and values: those of released policies reach 400, where fp32 has steps of 3e-5.
 constexpr double kTolerance = 1e-4;
 
 double largest_difference(const std::vector<float>& got, const std::vector<float>& expected) {
@@ -155,7 +155,7 @@ TEST_P(ReleasedPolicy, HoldsActionsAsTorchsDoes) {
     before.clear();
     for (const Command& command : commands) before.push_back(command.action);
     simulator_->step(expected);
-    if (step == 6) simulator_->reset();  // all begin anew, and decide at once
+    if (step == 6) simulator_->reset();  // all episodes restart, and all agents decide at once
   }
   EXPECT_EQ(different, 0);
   EXPECT_GT(changed, 0);

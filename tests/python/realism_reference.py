@@ -44,7 +44,7 @@ def corners(x, y, heading, length, width):
 
 
 def box_distance(a, b):
-    """Of two rounded boxes (x, y, heading, length, width): the origin's distance to the Minkowski difference of their cores."""
+    """Distance of two rounded boxes (x, y, heading, length, width): the origin's to the Minkowski difference of their cores, less both radii."""
     radii = [ROUNDING * min(box[3:]) / 2 for box in (a, b)]
     cores = [corners(*box[:3], box[3] - 2 * r, box[4] - 2 * r) for box, r in zip((a, b), radii)]
     polygon = hull((cores[0][:, None] - cores[1][None]).reshape(-1, 2))
@@ -206,7 +206,7 @@ class Reference:
         crossed = []
         for (left, right), state in zip(np.asarray(self.lights["stop_lines"]), states[:, step]):
             across = right[:2] - left[:2]
-            way = np.array([-across[1], across[0]]) / np.linalg.norm(across)  # of traffic
+            way = np.array([-across[1], across[0]]) / np.linalg.norm(across)  # direction of traffic
             turned = (pair[1, 3] - np.arctan2(way[1], way[0]) + np.pi) % (2 * np.pi) - np.pi
             before, after = (front - left[:2]) @ way
             if state == 0 or abs(turned) > np.pi / 4 or abs(pair[1, 2] - self.size[me, 2] / 2 - left[2]) > 2:

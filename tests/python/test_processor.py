@@ -35,7 +35,7 @@ def test_a_processor_without_avx2_runs_the_other_build(tmp_path, monkeypatch):
 
 
 def hashes() -> list[str]:
-    """Of states, observations and images of worlds after 200 steps."""
+    """Hashes of states, observations and images of worlds after 200 steps."""
     found = []
     for name in ("procedural:3", "city:2"):
         town = pictura.Map.load(name)

@@ -497,7 +497,7 @@ def test_functions_see_what_the_cameras_see():
     seen.clear()
     pictura.evaluate("", maps, controller=idle, camera_severity=1, **options)
     assert len(seen) == len(plain) and not np.array_equal(seen[0]["rgb"], plain[0])
-    # The same images as a renderer of one's own draws, in the same world.
+    # The same images as those of a separate renderer in the same world.
     simulator = pictura.Simulator([pictura.Map.load(maps[0])], [(0, 8, 0x80000000)], seed=1, episode_steps=8, fixed_lights=True)
     renderer = pictura.Renderer("cpu", pictura.Rig.paper(32, 18))
     for handle, geometry in simulator.geometries.items():

@@ -214,7 +214,7 @@ TEST(RecordedWorlds, AnActionTakesOverFromWhatTheRecordImplies) {
     EXPECT_NEAR(simulator->state().speed_mps[self], speed_mps, 1e-3);
     EXPECT_NEAR(length((box.center_m - from.position_m).xy()), speed_mps * 0.1f, 1e-3);
     EXPECT_EQ(simulator->totals().agent_steps, 1);
-    // All other agents go on as recorded. The agent can return to its record.
+    // All other agents continue as recorded. The agent can return to its record.
     simulator->step(recorded(*simulator));
     expect_as_recorded(*simulator, *scene, taken_at + 2);
   }

@@ -80,7 +80,7 @@ TEST(PartsOfWorlds, StepAndSaveAsOneSimulatorDoes) {
   const std::vector<uint8_t> joined = join_saved_states(*part, all, saved);
   EXPECT_EQ(joined, whole->save());
 
-  // The joined state is divided into another number of parts, which go on as the whole does.
+  // The joined state is divided into another number of parts, which continue as the whole does.
   step(whole.get(), 40, 60);
   std::vector<std::vector<uint8_t>> later;
   for (int i = 0; i < 2; ++i) {

@@ -508,7 +508,7 @@ TEST(Simulator, StaggeredWorldsEndTheirFirstEpisodesAtDifferentTimes) {
   EXPECT_THAT(second, ::testing::Each(kSteps));
   // The mean of 200 draws of U{64, ..., 100} is 82 +- 0.75.
   EXPECT_NEAR(std::accumulate(first.begin(), first.end(), 0.0) / kWorlds, 82, 3);
-  EXPECT_GE(std::set<int32_t>(first.begin(), first.end()).size(), 30u);  // of 37 possible lengths
+  EXPECT_GE(std::set<int32_t>(first.begin(), first.end()).size(), 30u);  // there are 37 possible lengths
 
   // Another seed gives other lengths; a reset to that seed gives the lengths of a new simulator.
   config.seed = 4;

@@ -83,7 +83,7 @@ TEST(Walkways, ManyCrosswalksTakeTimeAsTheirNumber) {
     const float x = (static_cast<float>(i) + 0.5f) * (kLength_m / kCrosswalks);
     testing::add_crosswalk(map.get(), {{x - 0.1f, -4, 0}, {x + 0.1f, -4, 0}, {x + 0.1f, 4, 0}, {x - 0.1f, 4, 0}});
   }
-  const std::clock_t begin = std::clock();  // of the process, whatever else the machine computes
+  const std::clock_t begin = std::clock();  // processor time of the process, independent of other load
   const Walkways walkways = world_map(*map).walkways;
   EXPECT_LT(std::clock() - begin, 4 * CLOCKS_PER_SEC);
   EXPECT_EQ(networks(walkways), 1);

@@ -70,7 +70,7 @@ void add_roads(const FixtureOptions& options, LoggedScene* scene) {
     }
     right.entries = {approach_id(arm)};
     right.exits = {exit_id((arm + 1) % 4)};
-    // Shared ends of neighbouring arms are equal to the last bit.
+    // Shared ends of neighbouring arms are bitwise identical.
     right.points.front() = in.points.back();
     straight.points.front() = in.points.back();
     scene->lanes.insert(scene->lanes.end(), {in, out, straight, right});

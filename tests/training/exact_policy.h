@@ -81,7 +81,7 @@ struct ExactRun {
   struct Update {
     // Tensors of Rollout.
     std::vector<NamedTensor> rollout;
-    std::vector<at::Tensor> images;  // of some active agents
+    std::vector<at::Tensor> images;  // images of some active agents
     std::vector<at::Tensor> learnt;  // see ExactPolicy
     double kept_fraction = 0, adv_threshold = 0;
   };

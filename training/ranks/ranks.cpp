@@ -188,7 +188,7 @@ struct Exchange {
   std::condition_variable changed;
   Beat own;
   bool ends = false, has_ended = false;
-  std::vector<std::vector<uint8_t>> values;  // of the last round; empty before the first
+  std::vector<std::vector<uint8_t>> values;  // values of the last round; empty before the first
   Clock::time_point last_round = Clock::now();
   std::string error;  // reason why there are no more rounds
 

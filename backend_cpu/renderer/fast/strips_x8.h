@@ -17,7 +17,7 @@ struct StripsX8 {
   Vec2x8 corner[4];
   Vec2x8 low, high;  // bounds on screen
   Float8 inverse_depth_low, inverse_depth_high;
-  Vec3x8 normal;  // of the plane
+  Vec3x8 normal;  // normal of the plane
   Float8 offset;
   Vec3x8 color;  // red, green, blue
 

@@ -35,7 +35,7 @@ TEST_F(Interrupts, TheFirstSignalIsKept) {
   EXPECT_FALSE(interrupted());
 }
 
-// Of several cooperating processes, each gets the signal from the others and, a moment later, itself.
+// Each of several cooperating processes gets the signal from the others and, a moment later, directly.
 TEST_F(Interrupts, ASignalThatAnotherProcessHasToldOfIsTheSameRequest) {
   record_interrupt(SIGTERM);
   std::raise(SIGTERM);
