@@ -52,7 +52,7 @@ TURNS = forbidden_turns()
 
 
 def turns_in(text):
-    text = re.sub(r"`[^`]*`", "``", text)
+    text = re.sub(r"`[^`]*`|(?<!\w)'\w+'", "``", text)
     text = re.sub(r"\]\([^)]*\)", "]", text).replace("*", "")
     return [(match.group(), instead) for pattern, instead in TURNS for match in pattern.finditer(text)]
 
