@@ -22,7 +22,7 @@ struct DrivenOptions {
 
 struct DrivenWorlds {
   std::unique_ptr<Simulator> simulator;  // owns the scene and its maps
-  std::vector<View> views;               // of agents that found a place: one per world, then the next of each world
+  std::vector<View> views;               // views of placed agents: one per world, then the next of each world
 };
 
 /// Makes and drives enough worlds for the views, on the maps in turn. Throws Error when a map cannot be read, or too

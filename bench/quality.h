@@ -33,7 +33,7 @@ struct Quality {
   PooledError area;                                                 // exact coverage as alpha, front to back
   PooledError oracle;                                               // the CPU renderer
   PooledError oracle_bytes;                                         // the CPU renderer, rounded to bytes
-  double worst_image_db = std::numeric_limits<double>::infinity();  // of the oracle
+  double worst_image_db = std::numeric_limits<double>::infinity();  // worst PSNR of an image of the oracle
   int images = 0;
 
   void add(const Quality& other);

@@ -8,7 +8,7 @@ namespace pictura {
 
 struct RunSection {
   uint64_t seed = 1;            // seed of the whole run
-  int num_threads = 0;          // of simulator, renderer and torch; 0: all
+  int num_threads = 0;          // threads of simulator, renderer and torch; 0: all
   std::string device = "auto";  // learning device: cpu, cuda, cuda:N or auto
 };
 

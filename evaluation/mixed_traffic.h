@@ -18,7 +18,7 @@ std::vector<std::string> impairment_names();
 /// Driver besides the evaluated driver: a policy, a controller, or the evaluated policy itself while impaired.
 struct OtherDriver {
   std::string name;  // a saved policy's file, a name of town_controller_names(), or an impairment
-  double share = 0;  // of vehicles; of all agents for an impairment
+  double share = 0;  // share of vehicles; for an impairment, of all agents
   Impairment impairment = Impairment::none;  // impairment of this name
 };
 constexpr size_t kMaxOtherDrivers = 8;

@@ -14,7 +14,7 @@ namespace pictura {
 
 constexpr const char* kRobustProtocol = "robust";  // name in commands
 constexpr int kRobustScenarios = 24;               // per condition
-constexpr int kRobustSteps = 1200;                 // of 0.1 s
+constexpr int kRobustSteps = 1200;                 // steps of 0.1 s
 constexpr uint64_t kRobustSeed = 1;
 
 /// Worlds of one row of the table.
@@ -22,7 +22,7 @@ struct RobustCondition {
   std::string part;                 // "towns", "carla", "others" or "cameras"
   std::string name;                 // unique
   std::vector<std::string> maps;    // as load_map() takes them
-  int agents_per_world = 0;         // of all classes
+  int agents_per_world = 0;         // agents of all classes
   std::vector<std::string> others;  // as other_drivers() takes them
   double camera_severity = 0;       // as SessionOptions::camera_severity
 };

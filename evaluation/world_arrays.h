@@ -14,8 +14,8 @@ struct WorldArrays {
   std::vector<AgentStatus> status;                          // [slots]
   std::vector<AgentClass> agent_class;                      // [slots]
   std::vector<float> speed_mps;                             // [slots]
-  std::vector<AgentBox> boxes;                              // of agents, then of parked cars, world after world
-  std::vector<LightState> lights;                           // of the maps' stop lines, world after world
+  std::vector<AgentBox> boxes;                              // boxes of agents, then of parked cars, world after world
+  std::vector<LightState> lights;                           // lights of the maps' stop lines, world after world
   std::vector<int32_t> slot_begin, box_begin, light_begin;  // [worlds + 1]
 
   explicit WorldArrays(Simulator& simulator)

@@ -18,7 +18,7 @@ constexpr float kCarLength_m = 4.5f, kCarWidth_m = 2.0f, kCarHeight_m = 1.5f;
 /// A path through a junction, including the lanes that lead to it.
 struct Path {
   int32_t approach = -1;     // lane before the junction
-  int32_t road = -1;         // of the approach lane
+  int32_t road = -1;         // road of the approach lane
   std::vector<Vec3> points;  // from far enough before the junction, if the lanes extend that far
   std::vector<float> s_m;    // [points] arc length, 0 at the start of the junction
   size_t first_inside = 0;   // index of the point at arc length 0

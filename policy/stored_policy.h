@@ -26,7 +26,7 @@ struct PolicyFacts {
   Config config;
   Rig rig;
   std::string backbone_hash;  // Policy::backbone_hash; no file of ours contains the program itself
-  int64_t update = 0;         // of its run: completed updates
+  int64_t update = 0;         // completed updates of its run
   int64_t agent_steps = 0;
   /// Learning-rate factors by parameter, where they are not 1: see Optimizer::rate_factors.
   std::map<std::string, double> rate_factors;

@@ -20,7 +20,7 @@ struct LiveViewOptions {
   int port = 0;                // 0: a free one
   std::string host_name;       // if set: listens on all addresses, for pages that address this machine by this name
   int watched = 0;             // initial agent whose decisions and images pages get
-  RendererConfig cameras;      // of every agent
+  RendererConfig cameras;      // cameras of every agent
   bool sends_images = false;   // images of the watched agent, drawn here; else pages draw them
   bool waits_for_page = true;  // waits for the first page before the first step
 };

@@ -17,7 +17,7 @@ namespace pictura {
 struct RecorderOptions {
   int world = 0;
   int followed = -1;          // agent of the world whose decisions and images are recorded, or -1
-  RendererConfig cameras;     // of every agent, for viewers of the replay
+  RendererConfig cameras;     // cameras of every agent, for viewers of the replay
   bool keeps_images = false;  // images of the followed agent, drawn by the CPU renderer
 };
 

@@ -223,7 +223,7 @@ struct ReplayCase {
   int32_t removed = -1;                         // agent, or -1
   std::optional<ReplayBox> inserted;            // road user inserted into the frame of the case
   std::vector<std::array<int32_t, 2>> path_cm;  // all positions of the inserted road user, in order
-  std::vector<ReplayResponse> answers;          // of each evaluated policy
+  std::vector<ReplayResponse> answers;          // response of each evaluated policy
   bool operator==(const ReplayCase&) const = default;
 };
 

@@ -35,7 +35,7 @@ struct CompiledMap {
   MapOptions options;
   MapRules rules;            // data that the simulator's rules read
   StaticGeometry geometry;   // data that renderers draw
-  uint64_t fingerprint = 0;  // of all road-map data that the simulator reads
+  uint64_t fingerprint = 0;  // hash of all road-map data that the simulator reads
 };
 
 /// Compiles a map. Throws Error naming the map when agents cannot drive on it or have no place to spawn, and UsageError

@@ -94,7 +94,7 @@ struct SimulatorCapacity {
   int64_t worlds = 0, slots = 0;
   int64_t lights = 0;     // traffic lights of all worlds
   int64_t maps = 0;       // at the same time
-  int64_t map_bytes = 0;  // of the rules of all maps
+  int64_t map_bytes = 0;  // bytes of the rules of all maps
 
   /// Returns the number of controlled agents and parked cars.
   int64_t boxes(const SimulatorConfig& config) const { return slots + worlds * config.parked_cars; }

@@ -15,7 +15,7 @@ namespace pictura {
 /// Targets of all of a rollout's transitions, which losses read by row: [steps * slots].
 struct Targets {
   at::Tensor actions;            // i64
-  at::Tensor old_log_probs;      // of these actions
+  at::Tensor old_log_probs;      // log-probabilities of these actions
   at::Tensor returns;            // in units of rewards
   at::Tensor teacher_log_probs;  // [steps * slots, kNumActions], of all actions; undefined without a teacher
   at::Tensor teacher_weight;     // [], weight of the KL divergence from the teacher; undefined without one

@@ -16,11 +16,11 @@ namespace pictura {
 /// Work and time of one update.
 struct UpdateCost {
   int64_t agent_steps = 0, slot_steps = 0;  // in its rollout
-  double kept_fraction = 0;                 // of valid transitions, by the filter
+  double kept_fraction = 0;                 // share of valid transitions that the filter keeps
   int64_t minibatches = 0;
   double first_kl = 0;                 // KL divergence of the first minibatch before parameters change: rounding only
   double rollout_s = 0, update_s = 0;  // wall time of the rollout, and of the update
-  PhaseSeconds phases_s{};             // of both
+  PhaseSeconds phases_s{};             // phases of both
 };
 
 /// Progress of a run, given to on_progress after every update.
@@ -33,7 +33,7 @@ struct TrainProgress {
   double eta_s = 0;              // to the last update, the end of the schedule or of `minutes`, whichever comes first
   bool ends_by_minutes = false;  // the end of `minutes` comes first: eta_s is a bound
   Scalars scalars;               // values logged for this update, as in progress.csv
-  UpdateCost cost;               // of this update
+  UpdateCost cost;               // cost of this update
 };
 
 /// Treatment of an existing run in the folder.

@@ -24,7 +24,7 @@ constexpr double kMaxAbsLogRatio = 1e-3, kMaxClipFraction = 1e-3;
 /// Statistics of an update.
 struct UpdateStats {
   LossStats all;                      // means over its minibatches
-  LossStats first;                    // of the first minibatch, before the parameters change
+  LossStats first;                    // losses of the first minibatch, before the parameters change
   std::optional<LossStats> rejected;  // `first` by the rollout's log-probabilities, if these were recomputed
   std::vector<LossStats> epochs;      // means over each epoch's minibatches
   GradientNorms gradient_norms;

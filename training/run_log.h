@@ -40,8 +40,8 @@ struct UpdateRecord {
   UpdateStats stats;
   AgentGroups agents;
   double rollout_s = 0, update_s = 0;  // wall time of the rollout, and of the update
-  PhaseSeconds phases_s{};             // of both
-  ImageSize image_size;                // of the first camera; 0 without images
+  PhaseSeconds phases_s{};             // phases of both
+  ImageSize image_size;                // size of the first camera's images; 0 without images
 };
 
 /// Results of an evaluation within a run.
@@ -49,7 +49,7 @@ struct EvaluationRecord {
   EvaluateRow row;
   std::optional<EvaluateRow> average_row;  // with averaged weights, for runs that average them
   double seconds = 0;                      // wall time
-  ImageSize image_size;                    // of the first camera; 0 without images
+  ImageSize image_size;                    // size of the first camera's images; 0 without images
 };
 
 class RunLog {

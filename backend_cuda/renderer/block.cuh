@@ -54,16 +54,16 @@ struct WarpState {
 struct BlockState {
   PreparedImage current;   // image that is being drawn
   PreparedImage upcoming;  // next image
-  Scratch scratch;         // of this block
-  ScreenFace* faces;       // of the current image
-  PolygonEdge* edges;      // of all images in the pool
+  Scratch scratch;         // scratch memory of this block
+  ScreenFace* faces;       // faces of the current image
+  PolygonEdge* edges;      // edges of all images in the pool
   // During culling and face set-up.
   ViewState view;
   FaceSetupContext context;
   SetupCounts listed;
   int32_t num_entries, num_faces, num_clipped, overflow, usable;
   // During drawing.
-  ImageEffect effect;  // of the current image
+  ImageEffect effect;  // effect on the current image
   int32_t num_rows, num_candidates, num_fragments, num_added, divides, num_composited, next_fragments, image;
   Part part, upcoming_part;
   PartPlan plan;

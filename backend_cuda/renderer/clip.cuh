@@ -29,7 +29,7 @@ struct ClipShared {
 /// An edge of a lane's face, packed into 16 bits.
 struct LaneEdge {
   int lane, from, to;  // lane of the face, and rows of the edge's corners
-  bool is_clockwise;   // of the face
+  bool is_clockwise;   // orientation of the face
   __device__ uint16_t packed() const {
     return static_cast<uint16_t>(lane | from << 5 | to << 9 | (is_clockwise ? 1 << 13 : 0));
   }

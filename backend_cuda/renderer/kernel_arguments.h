@@ -199,7 +199,7 @@ struct DrawCounters {
   int32_t cost_buckets[kNumCostBuckets] = {};         // number of images drawn from the pool, by bucket
   int32_t deferred = 0;                               // number of images that did not fit into the pool
   int32_t overflow = 0;                               // number of images left to the last launch
-  int32_t finished_blocks = 0;                        // of the last launch
+  int32_t finished_blocks = 0;                        // number of finished blocks of the last launch
 };
 
 struct DrawTask {

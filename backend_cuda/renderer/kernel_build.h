@@ -12,7 +12,7 @@ namespace pictura::cuda {
 /// PICTURA_RANDOMIZES_CAMERAS.
 struct KernelTarget {
   int compute_capability = 0;       // 10 * major + minor
-  int num_cameras = 0;              // of the rig; 0: any
+  int num_cameras = 0;              // number of the rig's cameras; 0: any
   int width_px = 0, height_px = 0;  // if all cameras have the same size; 0: any
   bool randomizes_cameras = true;   // false: RendererConfig::randomization is off
 };

@@ -93,7 +93,7 @@ struct CornerRow {
   int64_t ended_early = 0;                               // runs that an infraction ended
   int64_t entered_input = 0;                             // runs in which the policy read the hidden vehicle
   std::array<double, 3> reveal_s{};                      // 10th, 50th and 90th percentile
-  std::array<Estimate, kTakeoverSteps + 1> speed_mps{};  // of runs that have not ended
+  std::array<Estimate, kTakeoverSteps + 1> speed_mps{};  // mean over runs that have not ended
   std::array<int64_t, kTakeoverSteps + 1> driving{};     // number of runs that have not ended
 };
 

@@ -40,7 +40,7 @@ struct Takeover {
   // at which the user is in the policy's input: seen by cameras, or among the nearest partners. -1: never.
   int32_t sight_step = -1, input_step = -1;
   float sight_distance_m = std::numeric_limits<float>::quiet_NaN();  // at sight_step, between the boxes' centres
-  std::array<float, kTakeoverSteps + 1> speed_mps, x_m, y_m;         // of the ego's reference point
+  std::array<float, kTakeoverSteps + 1> speed_mps, x_m, y_m;         // motion of the ego's reference point
 
   Takeover() {
     for (auto* of_state : {&speed_mps, &x_m, &y_m}) of_state->fill(std::numeric_limits<float>::quiet_NaN());

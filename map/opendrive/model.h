@@ -90,7 +90,7 @@ struct GeometryPiece {
 /// One stripe of a mark, from <line>.
 struct MarkLine {
   double length = 0, space = 0;  // lengths of a dash and of the following gap; explicit lines have no gap
-  double t_offset = 0;           // of the stripe's centre line, to the left of the lane's border
+  double t_offset = 0;           // offset of the stripe's centre line to the left of the lane's border
   double s_offset = 0;           // start of the first dash, from the start of the mark
   double width = 0;              // 0: use the mark's width
   std::optional<MarkColor> color;

@@ -20,7 +20,7 @@ constexpr double kMaxTurn_rad = 100.0;    // per geometry: 16 turns, enough for 
 constexpr double kMaxGap_m = 0.1;         // between two geometries of a reference line, and of its length
 constexpr double kMaxLengthError = 0.01;  // relative error of a <paramPoly3>'s length, in addition to kMaxGap_m
 constexpr double kMaxJump_m = 5.0;        // larger gaps have no single meaning
-constexpr double kMaxStep_m = 0.5;        // of the elevation: larger steps are walls to cars
+constexpr double kMaxStep_m = 0.5;        // maximum step of the elevation: larger ones are walls to cars
 constexpr std::size_t kMaxJumps = 1000;   // per road: bounds the time of smoothing
 // Maximum turn at a geometry shorter than kStationTolerance_m; beyond it, the heading of the geometry has no meaning.
 constexpr double kMaxKink_rad = 0.2;

@@ -27,7 +27,7 @@ struct Arm {
   int direction = 0;
   bool at_start = false;                            // the street starts here
   bool has_arrivals = true, has_departures = true;  // whether traffic arrives at the node, and leaves it, on this arm
-  double heading = 0;                               // of the reference line, away from the node
+  double heading = 0;                               // heading of the reference line, away from the node
   double mouth_m = 0;                               // distance from the node to the street's end
 };
 

@@ -18,7 +18,7 @@ static_assert(std::endian::native == std::endian::little, "the files are little-
 // Maximum counts of a scene; beyond them, the next layout is tried.
 constexpr int32_t kMaxTracks = kMaxScenarioTracks, kMaxRoads = 1'000'000, kMaxPoints = 1'000'000, kMaxLinks = 10'000;
 constexpr int32_t kMaxGraphLanes = 30'000;  // the matrix has the square of this size
-constexpr int32_t kHistorySteps = 10;       // of WOMD, from which the files are made; the files do not contain it
+constexpr int32_t kHistorySteps = 10;       // history of WOMD, the files' source; the files do not contain it
 
 /// Reads numbers in sequence. Throws FieldError at the end of the bytes.
 class Cursor {

@@ -26,7 +26,7 @@ struct Conversion {
   Eigen::Vector3d origin{0, 0, 0};
   std::vector<std::size_t> logged_lane{};             // [map.lanes] index into scene.lanes
   std::unordered_map<int64_t, int32_t> lane_of_id{};  // index into map.lanes
-  int64_t remaining_work = 400'000'000;               // of all loops whose length depends on a file
+  int64_t remaining_work = 400'000'000;               // work left for all loops whose length depends on a file
 
   /// Counts work, so that no file can take minutes. Throws Error at the limit.
   void count_work(std::size_t amount) {

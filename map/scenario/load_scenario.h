@@ -16,7 +16,7 @@ namespace pictura {
 struct SceneRef {
   std::string file;
   int32_t record = -1;             // in a TFRecord file; -1: the file is the scene
-  uint64_t offset = 0, bytes = 0;  // of the record's payload
+  uint64_t offset = 0, bytes = 0;  // place and size of the record's payload
   std::string id;                  // scenario_id if the index has it, or empty
 };
 

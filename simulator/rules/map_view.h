@@ -25,7 +25,7 @@ struct LaneSegment {
   Vec2 direction;  // unit vector
   float length_m = 0;
   float slope = 0;        // rise per metre
-  float heading_rad = 0;  // of the lane at a
+  float heading_rad = 0;  // heading of the lane at a
   float turn_rad = 0;     // heading at the end minus heading at a
   float half_width_m = 0;
   float s_m = 0;          // arc length at a
@@ -152,7 +152,7 @@ struct MapView {
   GridView near_stop_lines;
   Span<const RecordedAgent> recorded_agents;  // in the order of the worlds' agents; empty without a record
   Span<const RecordedState> recorded_states;  // [recorded_agents, recorded_steps]
-  Span<const SideEdge> side_edges;            // of maps with a record, for road_side()
+  Span<const SideEdge> side_edges;            // edges of maps with a record, for road_side()
   GridView side_cells;
   Span<const LightState> recorded_lights;         // [stop_lines, recorded_steps]; if empty, lights follow plans
   int32_t recorded_steps = 0;                     // from the step at which episodes start

@@ -38,8 +38,8 @@ struct WorldView {
   uint32_t global_world = 0;
   uint32_t episode = 0;
   int step = 0;                      // steps done in the episode
-  AgentStateView agents{};           // of all worlds, indexed by slot
-  int first_slot = 0;                // of this world
+  AgentStateView agents{};           // state of all worlds, indexed by slot
+  int first_slot = 0;                // first slot of this world
   int num_agents = 0;                // controlled
   int first_box = 0;                 // first box of this world in the scene
   int num_boxes = 0;                 // controlled and parked

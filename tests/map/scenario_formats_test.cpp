@@ -117,7 +117,7 @@ struct OldScene {
   bool has_z = false, has_ids = false, has_degrees = false;
   std::string height, more, lights = "{}";
   std::string invalid = R"({"x":0.0001,"y":0.0001})";  // position while the second vehicle is absent
-  int32_t first_step = 0;                              // of the second vehicle
+  int32_t first_step = 0;                              // first step of the second vehicle
 
   std::string list(const std::function<std::string(int)>& of_step, int count = 91) const {
     std::string text;

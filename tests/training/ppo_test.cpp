@@ -265,9 +265,10 @@ TEST(Permutation, MixesWell) {
       distance += static_cast<double>(step) / static_cast<double>(20 * (kSize - 1));
     }
   }
-  EXPECT_LT(neighbours, 100);                                            // 40 expected
-  EXPECT_NEAR(distance, static_cast<double>(kSize) / 3, kSize / 100.0);  // of two independent uniform places
-  EXPECT_LT(*std::max_element(counts, counts + kParts), 9);              // 2 expected
+  EXPECT_LT(neighbours, 100);  // 40 expected
+  // The mean distance of two independent uniform places is a third of the range.
+  EXPECT_NEAR(distance, static_cast<double>(kSize) / 3, kSize / 100.0);
+  EXPECT_LT(*std::max_element(counts, counts + kParts), 9);  // 2 expected
 }
 
 TEST(DrawAction, FollowsTheCumulativeProbabilities) {

@@ -265,7 +265,7 @@ Rollout part_of(const Rollout& whole, int64_t begin, int64_t end) {
 
 struct Learnt {
   std::vector<std::string> hashes;  // after each update
-  std::vector<at::Tensor> steps;    // of each parameter, in the first update
+  std::vector<at::Tensor> steps;    // step of each parameter in the first update
   UpdateStats first, last;
 };
 
