@@ -10,8 +10,8 @@ import fnmatch
 import io
 import pathlib
 import re
-import subprocess
 import sys
+import tempfile
 import tokenize
 import unittest
 
@@ -38,7 +38,8 @@ EXEMPT = {
     "docs/developer/*.md": {"page"},
     "CONTRIBUTING.md": {"page"},
 }
-SOURCES = ("*.h", "*.cpp", "*.cu", "*.cuh", "*.py", "*.pyi", "*.cmake", "CMakeLists.txt", "scripts/*")
+GENERATED = {"build", "carry", "out", "runs"}
+SOURCES = ("*.h", "*.cpp", "*.cu", "*.cuh", "*.py", "*.pyi", "*.cmake", "*CMakeLists.txt", "scripts/*")
 
 
 def forbidden_turns():
@@ -128,40 +129,45 @@ def counted_words():
 
 
 def comments(path):
-    """[(line, text)] of the comments of a source file; consecutive lines of one comment are joined."""
+    """[(line, text)] of the comments of a source file. Consecutive lines are joined; a comment after code begins a new one."""
     text = path.read_text(errors="replace")
     lines = []
     if path.suffix in (".py", ".pyi") or text.startswith("#!/usr/bin/env python"):
         try:
             for token in tokenize.generate_tokens(io.StringIO(text).readline):
                 if token.type == tokenize.COMMENT:
-                    lines.append((token.start[0], token.string.lstrip("#! ")))
+                    lines.append((token.start[0], token.string.lstrip("#! "), bool(token.line[: token.start[1]].strip())))
                 elif token.type == tokenize.STRING and token.string.lstrip("rRbBfF").startswith('"""'):
-                    lines += [(token.start[0] + i, part.strip(' "')) for i, part in enumerate(token.string.split("\n"))]
+                    lines += [(token.start[0] + i, part.strip(' "'), i == 0) for i, part in enumerate(token.string.split("\n"))]
         except (tokenize.TokenError, SyntaxError):
             return []
     else:
         mark = r"//[/!]?<?" if path.suffix in (".h", ".cpp", ".cu", ".cuh") else r"#"
         for number, line in enumerate(text.split("\n"), 1):
             if match := re.search(rf"(?:^|\s){mark} ?(.*)$", line):
-                lines.append((number, match[1].strip()))
+                lines.append((number, match[1].strip(), bool(line[: match.start()].strip())))
     joined = []
-    for number, line in lines:
-        if joined and joined[-1][2] == number - 1 and line and joined[-1][1]:
+    for number, line, begins in lines:
+        if joined and joined[-1][2] == number - 1 and line and joined[-1][1] and not begins:
             joined[-1] = (joined[-1][0], f"{joined[-1][1]} {line}", number)
         else:
             joined.append((number, line, number))
     return [(number, line) for number, line, _ in joined]
 
 
-def comment_report():
-    listed = subprocess.run(["git", "ls-files", "-z", *SOURCES], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+def sources():
+    """Paths of the repository's sources, also of those that git does not know yet."""
+    top = [path for path in sorted(ROOT.iterdir()) if path.name[0] != "." and path.name not in GENERATED]
+    paths = [inner for path in top for inner in ([path] if path.is_file() else sorted(path.rglob("*")))]
+    return [path for path in paths if path.is_file() and any(fnmatch.fnmatch(name_of(path), pattern) for pattern in SOURCES)]
+
+
+def comment_violations():
     found = []
-    for name in listed.split("\0"):
-        path = ROOT / name
-        if name and path.is_file() and path != pathlib.Path(__file__):
+    for path in sources():
+        if path != pathlib.Path(__file__).resolve():
             for line, text in comments(path):
-                found += [f"{name}:{line}: '{turn}': {instead}" for turn, instead in turns_in(text)]
+                found += [f"{name_of(path)}:{line}: '{turn}': {instead}" for turn, instead in turns_in(text)]
     return found
 
 
@@ -212,10 +218,23 @@ class Rules(unittest.TestCase):
         path = pathlib.Path(__file__)
         self.assertIn(' Rules that do not hold'.strip(), " ".join(text for _, text in comments(path)))
         self.assertTrue(any("Each rule finds" in text for _, text in comments(path)))
+        with tempfile.TemporaryDirectory() as folder:
+            source = pathlib.Path(folder) / "a.h"
+            source.write_text("// One\n// comment.\nint a;  // of a\nint b;  // of b\n        // and c\n")
+            self.assertEqual([text for _, text in comments(source)], ["One comment.", "of a", "of b and c"])
+
+
+class Comments(unittest.TestCase):
+    maxDiff = 0  # the message lists the violations
+
+    def test_comments_have_no_forbidden_turns(self):
+        self.assertGreater(len(sources()), 500)
+        found = comment_violations()
+        self.assertEqual(found, [], "\n" + "\n".join(found))
 
 
 class Pages(unittest.TestCase):
-    maxDiff = 0  # the messages say it
+    maxDiff = 0  # the messages list the violations
 
     def test_pages_keep_the_rules(self):
         found = [line for path in pages.documents() for line in page_violations(path)]
@@ -234,7 +253,7 @@ class Pages(unittest.TestCase):
 
 if __name__ == "__main__":
     if "--comments" in sys.argv:
-        found = comment_report()
+        found = comment_violations()
         print("\n".join([*found, f"{len(found)} turns in comments"]))
     elif "--report" in sys.argv:
         report()
