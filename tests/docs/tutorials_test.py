@@ -18,7 +18,7 @@ from pages import ROOT
 
 PICTURA = ""
 PAGES = [ROOT / "README.md"] + [ROOT / f"docs/tutorials/{name}.md" for name in ("first_run", "gpu", "reward", "rig", "map", "look", "probe")]
-PAGES += [ROOT / f"docs/how-to/{name}.md" for name in ("train", "evaluate", "probe")]
+PAGES += [ROOT / f"docs/how-to/{name}.md" for name in ("train", "evaluate", "probe", "own_reward")]
 # Maximum values of options that take long.
 AT_MOST = {"--steps": 20, "--agents": 8, "--scenarios": 2, "--episodes": 1, "--follow": 3, "--egos": 8, "--slots": 32, "--removals": 20, "--paths": 1}
 # Live pages wait for a browser; tests/replay/live_test.py tests them.

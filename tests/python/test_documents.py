@@ -107,7 +107,7 @@ def test_tensorboard_reads_the_configuration(checkout):
     assert len(events.Scalars("charts/episode_return")) == 4
 
 
-@pytest.mark.parametrize("page", ["docker", "load_policy", "own_network", "track_experiments"])
+@pytest.mark.parametrize("page", ["docker", "load_policy", "own_network", "own_reward", "track_experiments"])
 def test_how_to_pages_are_short(page):
     assert len((DOCS / f"how-to/{page}.md").read_text().split()) < 900
 
@@ -120,6 +120,16 @@ def test_a_metric_of_ones_own_is_counted(checkout):
             run([block], "docs/how-to/own_metric.md", names)
     assert names["hard_steps"].sum() > 0 and names["distance_m"].sum() > 1000
     assert (checkout / "drive.html").exists()
+
+
+def test_a_reward_of_your_own_is_paid(capsys):
+    pytest.importorskip("gymnasium")
+    names = run(blocks_of("how-to/own_reward.md"), "docs/how-to/own_reward.md")
+    straight, weaving = (float(line.split()[1]) for line in capsys.readouterr().out.splitlines()[-2:])
+    assert straight > weaving
+    lanes = names["infos"]["reward_terms"][:, [5, 6]].sum(1)
+    np.testing.assert_allclose(names["without_lanes"], names["rewards"] - lanes, atol=1e-6)
+    assert np.abs(lanes).max() > 0 and names["weights"].shape == (64, 17)
 
 
 def test_the_benchmarks_function_drives(monkeypatch):
