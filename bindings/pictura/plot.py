@@ -692,13 +692,13 @@ def _corner_means(summary: dict[str, Any]) -> Chart:
 _PROBES = {"removal": _removal_means, "pedestrian": _pedestrian_means, "corner": _corner_means}
 
 
-def probe_means(summary: str) -> Chart:
+def probe_means(summary: str, names: dict[str, str] | None = None) -> Chart:
     """Returns the means of a probe with their 95 % intervals, like the paper's figures, from summary.json of `pictura
     probe`.
 
     For removal: absolute changes by occlusion of the user, and for wholly hidden users by distance. For pedestrian:
     changes relative to where the pedestrian is first seen, with its visibility as a strip. For corner: mean speeds
-    since the takeover.
+    since the takeover. names: names of policies in the legend, where they differ from those in the file.
 
     Examples:
         >>> plot.save(plot.probe_means("probe_removal/summary.json"), "means.png") # doctest: +SKIP
@@ -707,9 +707,12 @@ def probe_means(summary: str) -> Chart:
     kind = content.get("kind") if isinstance(content, dict) else None
     _need(kind in _PROBES, f"{summary}: expected the summary of a probe of {', '.join(_PROBES)}")
     try:
-        return _PROBES[kind](content)
+        chart = _PROBES[kind](content)
     except KeyError as error:
         raise PlotError(f"{summary}: expected a key {error}") from None
+    for series in (series for panel in chart.panels for series in panel.series):
+        series.name = (names or {}).get(series.name, series.name)
+    return chart
 
 
 def _read_cases(file_name: str, /, **wanted: str) -> list[dict[str, str]]:

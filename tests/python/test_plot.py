@@ -295,6 +295,8 @@ def test_removal_shows_occlusion_and_distances_of_hidden_users(tmp_path):
     assert lines_of(chart, 3)["a"] == ([15], [0.2])
     assert chart.panels[0].series[0].low == [0.4, 0]  # no mean of magnitudes is below 0
     assert chart.panels[0].series[0].high == pytest.approx([0.6, 0.15])
+    named = plot.probe_means(f"{tmp_path}/summary.json", names={"a": "an earlier a"})
+    assert set(lines_of(named, 0)) == {"an earlier a", "untrained b"}
 
 
 def test_pedestrian_shows_places_that_half_of_the_paths_have(tmp_path):
