@@ -89,7 +89,7 @@ void add_score_command(CLI::App& app) {
   add_threads_option(command, &arguments->num_threads);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
-      "docs/explanation/realism.md says what the numbers are. Scenes that the file lacks are counted and left out.\n"
+      "docs/explanation/realism.md defines the numbers. Scenes that the file lacks are counted and left out.\n"
       "Examples:\n"
       "  pictura evaluate models/vector.safetensors --protocol simagents --scenes validation --sampled --rollouts "
       "r.binproto\n"

@@ -85,7 +85,7 @@ enum class RepairKind : uint8_t {
 };
 
 /// The first kind that only Lanelet2 files have; those before it are in the table of docs/reference/opendrive.md.
-inline constexpr RepairKind kFirstLanelet2Mend = RepairKind::repeated_element;
+inline constexpr RepairKind kFirstLanelet2Repair = RepairKind::repeated_element;
 
 /// The fault, as "records out of order", and what is done about it, as "sorted".
 const char* to_string(RepairKind kind);

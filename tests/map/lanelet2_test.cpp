@@ -51,7 +51,7 @@ RoadMap sound(const OsmText& text) {
 }
 
 /// Imports a map with faults of one kind; strict reading must refuse it with the message of one.
-RoadMap mended(const OsmText& text, RepairKind kind, std::size_t count = 1) {
+RoadMap repaired(const OsmText& text, RepairKind kind, std::size_t count = 1) {
   RoadMap map = import(text);
   std::vector<std::string> messages;
   for (const Repair& repair : map.mends) {
@@ -229,7 +229,7 @@ TEST(Lanelet2, LanesThatMeetWithoutSharedPointsAreToldOf) {
   text.node(1, 0, 3).node(2, 50, 3).node(4, 0, 0).node(5, 50, 0);
   text.node(102, 50, 3).node(3, 100, 3).node(105, 50, 0).node(6, 100, 0);
   text.way(11, {1, 2}).way(12, {4, 5}).way(13, {102, 3}).way(14, {105, 6}).lanelet(20, 11, 12).lanelet(21, 13, 14);
-  const RoadMap map = mended(text, RepairKind::missing_link);
+  const RoadMap map = repaired(text, RepairKind::missing_link);
   EXPECT_THAT(map.mends[0].message, HasSubstr("lanelet 20: <relation>: ends 0.00 m from the start of lanelet 21"));
   EXPECT_EQ(map.mends[0].line, 15);
 }
@@ -679,48 +679,49 @@ TEST(Lanelet2, FilesAreLoadedCachedAndCopiedByName) {
   EXPECT_GT(map_file_bytes(path + "@49,8.4"), 100);
 }
 
-TEST(Lanelet2, FaultsWithOneMeaningAreMended) {
+TEST(Lanelet2, FaultsWithOneMeaningAreRepaired) {
   const auto with = [](const std::function<void(OsmText*)>& add) {
     OsmText text = street();
     add(&text);
     return text;
   };
-  mended(with([](OsmText* text) { text->way(11, {3, 4}); }), RepairKind::repeated_element);
-  mended(with([](OsmText* text) { text->node(1, 5, 5); }), RepairKind::repeated_element);
-  const RoadMap missing = mended(with([](OsmText* text) { text->way(30, {1, 77, 2}); }), RepairKind::missing_element);
+  repaired(with([](OsmText* text) { text->way(11, {3, 4}); }), RepairKind::repeated_element);
+  repaired(with([](OsmText* text) { text->node(1, 5, 5); }), RepairKind::repeated_element);
+  const RoadMap missing = repaired(with([](OsmText* text) { text->way(30, {1, 77, 2}); }), RepairKind::missing_element);
   EXPECT_EQ(message_of(missing.mends[0], "road.osm"),
             "road.osm:10: way 30: <way>: refers to node 77, which does not exist");
-  mended(with([](OsmText* text) { text->lanelet(21, 11, 12, {}, {99}); }), RepairKind::missing_element);
-  mended(with([](OsmText* text) { text->line(R"(<node id="9" lat="1" lon="2"/>)").way(30, {1, 9, 2}); }),
-         RepairKind::missing_position);
-  mended(with([](OsmText* text) { text->way(30, {1}); }), RepairKind::short_way);
+  repaired(with([](OsmText* text) { text->lanelet(21, 11, 12, {}, {99}); }), RepairKind::missing_element);
+  repaired(with([](OsmText* text) { text->line(R"(<node id="9" lat="1" lon="2"/>)").way(30, {1, 9, 2}); }),
+           RepairKind::missing_position);
+  repaired(with([](OsmText* text) { text->way(30, {1}); }), RepairKind::short_way);
   const RoadMap borderless =
-      mended(with([](OsmText* text) {
-               text->relation(21, {{"way", "left", 11}}, {{"type", "lanelet"}, {"subtype", "road"}});
-             }),
-             RepairKind::borderless_lanelet);
+      repaired(with([](OsmText* text) {
+                 text->relation(21, {{"way", "left", 11}}, {{"type", "lanelet"}, {"subtype", "road"}});
+               }),
+               RepairKind::borderless_lanelet);
   EXPECT_EQ(borderless.lanes.size(), 1u);
-  mended(with([](OsmText* text) {
-           text->node(8, 0, 3.5).way(30, {1, 8}).node(9, 0, 0).way(31, {3, 9}).lanelet(21, 30, 31);
-         }),
-         RepairKind::empty_lanelet);
-  EXPECT_EQ(mended(street({{"subtype", "canal"}}), RepairKind::unknown_subtype).lanes[0].type, LaneType::other);
-  EXPECT_FLOAT_EQ(mended(street({{"speed_limit", "fast"}}), RepairKind::unreadable_speed).lanes[0].speed_limit_mps,
+  repaired(with([](OsmText* text) {
+             text->node(8, 0, 3.5).way(30, {1, 8}).node(9, 0, 0).way(31, {3, 9}).lanelet(21, 30, 31);
+           }),
+           RepairKind::empty_lanelet);
+  EXPECT_EQ(repaired(street({{"subtype", "canal"}}), RepairKind::unknown_subtype).lanes[0].type, LaneType::other);
+  EXPECT_FLOAT_EQ(repaired(street({{"speed_limit", "fast"}}), RepairKind::unreadable_speed).lanes[0].speed_limit_mps,
                   50 / 3.6f);
-  mended(street({}, {{"type", "line_thin"}, {"subtype", "solid"}, {"color", "pink"}}), RepairKind::unknown_color);
-  mended(with([](OsmText* text) { text->way(30, {1, 2}, {{"type", "parking_space"}}); }), RepairKind::shapeless_object);
-  mended(with([](OsmText* text) {
-           text->relation(30, {{"way", "outer", 11}}, {{"type", "multipolygon"}, {"subtype", "parking"}});
-         }),
-         RepairKind::open_area);
-  mended(with([](OsmText* text) {  // crosses itself
-           text->way(30, {1, 2, 3, 4, 1});
-           text->relation(31, {{"way", "outer", 30}}, {{"type", "multipolygon"}, {"subtype", "parking"}});
-         }),
-         RepairKind::open_area);
-  mended(with([](OsmText* text) { text->relation(30, {{"way", "refers", 11}}, {{"subtype", "traffic_light"}}); }),
-         RepairKind::laneless_light);
-  mended(with([](OsmText* text) { text->relation(30, {}, {{"subtype", "traffic_light"}}); }), RepairKind::empty_rule);
+  repaired(street({}, {{"type", "line_thin"}, {"subtype", "solid"}, {"color", "pink"}}), RepairKind::unknown_color);
+  repaired(with([](OsmText* text) { text->way(30, {1, 2}, {{"type", "parking_space"}}); }),
+           RepairKind::shapeless_object);
+  repaired(with([](OsmText* text) {
+             text->relation(30, {{"way", "outer", 11}}, {{"type", "multipolygon"}, {"subtype", "parking"}});
+           }),
+           RepairKind::open_area);
+  repaired(with([](OsmText* text) {  // crosses itself
+             text->way(30, {1, 2, 3, 4, 1});
+             text->relation(31, {{"way", "outer", 30}}, {{"type", "multipolygon"}, {"subtype", "parking"}});
+           }),
+           RepairKind::open_area);
+  repaired(with([](OsmText* text) { text->relation(30, {{"way", "refers", 11}}, {{"subtype", "traffic_light"}}); }),
+           RepairKind::laneless_light);
+  repaired(with([](OsmText* text) { text->relation(30, {}, {{"subtype", "traffic_light"}}); }), RepairKind::empty_rule);
 }
 
 TEST(Lanelet2, DeletedElementsAreNotThere) {
@@ -812,7 +813,7 @@ TEST(Lanelet2, HostileFilesGiveAMapOrAnError) {
 TEST(Lanelet2, EveryKindOfFaultStandsInTheTable) {
   const std::string docs = read_file(PICTURA_LANELET2_DOCS);
   for (const RepairKind kind : repair_kinds()) {
-    if (kind < kFirstLanelet2Mend) continue;
+    if (kind < kFirstLanelet2Repair) continue;
     EXPECT_THAT(docs, HasSubstr(fmt::format("| {} | {} |", to_string(kind), action_of(kind))));
   }
 }

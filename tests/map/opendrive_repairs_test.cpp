@@ -898,7 +898,7 @@ TEST(OpenDriveRepairs, DamagedFilesGiveAValidMapOrAnError) {
 TEST(OpenDriveRepairs, EveryKindStandsInTheTable) {
   const std::string docs = read_file(PICTURA_OPENDRIVE_DOCS);
   for (const RepairKind kind : repair_kinds()) {
-    if (kind >= kFirstLanelet2Mend) continue;
+    if (kind >= kFirstLanelet2Repair) continue;
     EXPECT_THAT(docs, HasSubstr(fmt::format("| {} | {} |", to_string(kind), action_of(kind))));
   }
 }
