@@ -17,8 +17,7 @@ import pictura
 
 ROOT = pathlib.Path(__file__).parents[2]
 DOCS = ROOT / "docs"
-HAS_TORCH = importlib.util.find_spec("torch") is not None
-HAS_TRAINING = importlib.util.find_spec("pictura._built_torch") is not None and HAS_TORCH
+HAS_TRAINING = all(importlib.util.find_spec(name) is not None for name in ("torch", "pictura._built_torch"))
 PACKAGES = {"envs.pettingzoo_env": "pettingzoo", "envs.torchrl_env": "torchrl", "envs.gymnasium": "gymnasium", "make_vec": "gymnasium",
             "torch.": "torch", "rerun.": "rerun"}  # fmt: skip
 # Of the extension beside torch.
@@ -69,11 +68,11 @@ def test_a_released_policy_is_loaded_driven_and_exported(checkout):
     assert (checkout / "drive.html").exists() and (checkout / "mine.safetensors").exists()
 
 
-@pytest.mark.skipif(not HAS_TORCH, reason="needs torch")
-def test_a_network_of_ones_own_learns_from_images(checkout):
+@pytest.mark.skipif(not HAS_TRAINING, reason="needs a package that was built beside torch")
+def test_a_network_of_your_own_learns_from_images(checkout):
     pytest.importorskip("gymnasium")
     names = run(blocks_of("how-to/own_network.md"), "own_network.md")
-    assert names["judged"].statistics["agent_steps"] > 200 and (checkout / "network.pt").exists()
+    assert names["report"]["agent_steps"] > 200 and (checkout / "network.pt").exists()
 
 
 @pytest.mark.skipif(not HAS_TRAINING, reason="needs a package that was built beside torch")
