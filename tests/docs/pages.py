@@ -18,7 +18,8 @@ def without_blocks(text):
     lines, in_code = [], False
     for line in text.split("\n"):
         is_fence = bool(FENCE.match(line))
-        lines.append("" if in_code or is_fence else line)
+        is_indented = line.startswith("    ") and not ITEM.match(line) and (not lines or not lines[-1].strip())
+        lines.append("" if in_code or is_fence or is_indented else line)
         in_code ^= is_fence
     return "\n".join(lines)
 
@@ -63,9 +64,9 @@ def blocks(text):
     found, is_open = [], False
     for number, line in enumerate(without_blocks(text).split("\n"), 1):
         stripped = line.strip()
-        if not stripped or stripped.startswith("|") or re.match(r"#+ ", stripped) or ITEM.match(line) or line.startswith("    ") and not is_open:
+        if not stripped or stripped.startswith("|") or re.match(r"#+ ", stripped) or ITEM.match(line):
             is_open = False
-        if not stripped or line.startswith("    ") and not is_open and not ITEM.match(line):
+        if not stripped:
             continue
         if stripped.startswith("|"):
             cells = re.split(r"(?<!\\)\|", stripped.strip("|"))

@@ -192,6 +192,7 @@ class Rules(unittest.TestCase):
 
     def test_lengths(self):
         self.assertEqual(self.rules("# T\n" + "a b. \n\n" * 10, page_words=20), ["page"])
+        self.assertEqual(self.rules("# T\n" + "a.\n\n    a command of many words\n    another one\n\n" * 10, page_words=20), [])
         self.assertEqual(self.rules("# T\n" + "word\n" * 121), ["paragraph"])
         self.assertEqual(self.rules("# T\n- " + "word " * 121), ["paragraph"])
         self.assertEqual(self.rules("# T\n" + "- word\n" * 121), [])
