@@ -4,14 +4,16 @@
 #include <cmath>
 #include <cstdint>
 
+#include "pictura/common/portable/hypot.h"
+
 namespace pictura {
 
 void check_import_options(const OpenDriveOptions& options) {
   PICTURA_CHECK(options.chord_error_m >= 1e-3f && options.chord_error_m <= 10.0f,
                 "import options: expected a chord error in [0.001, 10] m, got {}", options.chord_error_m);
   const PlanMap& plan = options.plan;
-  const double sum = std::hypot(plan.xx + plan.yy, plan.yx - plan.xy);
-  const double difference = std::hypot(plan.xx - plan.yy, plan.yx + plan.xy);
+  const double sum = hypot_of(plan.xx + plan.yy, plan.yx - plan.xy);
+  const double difference = hypot_of(plan.xx - plan.yy, plan.yx + plan.xy);
   PICTURA_CHECK(plan.determinant() > 0 && sum + difference <= 3 && sum - difference >= 1,
                 "import options: expected a plan that does not mirror and stretches by 0.5 to 1.5, got rows ({}, {}) "
                 "and ({}, {})",

@@ -14,6 +14,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/math.h"
+#include "pictura/common/portable/hypot.h"
 #include "pictura/common/support/interrupt.h"
 
 namespace pictura {
@@ -31,7 +32,7 @@ struct CurvePoint {
 
 /// Distance in plan.
 inline double plan_distance_m(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::hypot(b.x() - a.x(), b.y() - a.y());
+  return hypot_of(b.x() - a.x(), b.y() - a.y());
 }
 
 /// Whether the distance in plan is at most `limit_m`.

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "pictura/common/error.h"
+#include "pictura/common/portable/hypot.h"
 #include "pictura/common/support/json.h"
 
 namespace pictura::gpudrive {
@@ -303,7 +304,7 @@ void convert_degrees(LoggedScene* scene) {
     for (const LoggedState& state : track.states) {
       if (!state.valid) continue;
       is_large = is_large || std::abs(state.heading_rad) > kLargest_rad;
-      if (!(std::hypot(state.velocity_x_mps, state.velocity_y_mps) > kMoving_mps)) continue;
+      if (!(hypot_of(state.velocity_x_mps, state.velocity_y_mps) > kMoving_mps)) continue;
       const double motion = std::atan2(state.velocity_y_mps, state.velocity_x_mps);
       fit += std::cos(state.heading_rad - motion);
       fit_of_degrees += std::cos(kRadians * state.heading_rad - motion);

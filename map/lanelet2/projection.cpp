@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "pictura/common/error.h"
+#include "pictura/common/portable/hypot.h"
 
 namespace pictura {
 
@@ -51,9 +52,9 @@ GridPoint to_utm(const GeoPoint& place, const UtmZone& zone) {
   const double lon = std::remainder(place.longitude_deg - central_meridian_deg(zone), 360) * kDegree_rad;
   const double tau = std::tan(lat);
   const double sigma = std::sinh(eccentricity * std::atanh(eccentricity * std::sin(lat)));
-  const double conformal = tau * std::hypot(1, sigma) - sigma * std::hypot(1, tau);
+  const double conformal = tau * hypot_of(1, sigma) - sigma * hypot_of(1, tau);
   const double xi0 = std::atan2(conformal, std::cos(lon));
-  const double eta0 = std::asinh(std::sin(lon) / std::hypot(conformal, std::cos(lon)));
+  const double eta0 = std::asinh(std::sin(lon) / hypot_of(conformal, std::cos(lon)));
   double xi = xi0, eta = eta0;
   for (std::size_t j = 0; j < alpha.size(); ++j) {
     const double k = 2.0 * static_cast<double>(j + 1);

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "pictura/common/portable/hypot.h"
+
 namespace pictura::opendrive {
 
 namespace {
@@ -56,7 +58,7 @@ double derivative_of(const std::array<double, 4>& c, double p) { return c[1] + p
 double second_derivative_of(const std::array<double, 4>& c, double p) { return 2 * c[2] + p * 6 * c[3]; }
 
 double speed_of(const PlaneCubic& cubic, double p) {
-  return std::hypot(derivative_of(cubic.u, p), derivative_of(cubic.v, p));
+  return hypot_of(derivative_of(cubic.u, p), derivative_of(cubic.v, p));
 }
 
 double length_between(const PlaneCubic& cubic, double from, double to) {

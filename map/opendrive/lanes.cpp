@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "pictura/common/portable/hypot.h"
 #include "pictura/map/opendrive/build.h"
 
 namespace pictura::opendrive {
@@ -78,7 +79,7 @@ void choose_origin(Build* build) {
   for (const FileRoad& road : build->network.roads) {
     for (const GeometryPiece& piece : road.geometry) {
       const Eigen::Vector2d xy = start_of(road, piece);
-      const double radius_m = std::hypot(xy.x() - build->map->origin_m[0], xy.y() - build->map->origin_m[1]);
+      const double radius_m = hypot_of(xy.x() - build->map->origin_m[0], xy.y() - build->map->origin_m[1]);
       if (radius_m > kMaxMapRadius_m) {
         road.where.fail("lies {:.0f} m from the middle of the map; expected at most {} m", radius_m, kMaxMapRadius_m);
       }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "pictura/common/portable/hypot.h"
 #include "pictura/map/opendrive/build.h"
 #include "pictura/map/stripes.h"
 
@@ -253,7 +254,7 @@ void add_stop_line(Build* build, std::size_t road, const FileObject& object) {
 
 /// Metres of a deformed road per metre in a direction, given as an angle from the road's heading.
 double stretch_towards(const Pose& pose, double angle) {
-  return std::hypot(pose.stretch * std::cos(angle), std::sin(angle));
+  return hypot_of(pose.stretch * std::cos(angle), std::sin(angle));
 }
 
 void add_parking_space(Build* build, std::size_t road_index, const FileObject& object) {

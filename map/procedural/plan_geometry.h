@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "pictura/common/portable/hypot.h"
 #include "pictura/map/opendrive/model.h"
 
 namespace pictura::town {
@@ -65,7 +66,7 @@ inline double max_curvature(const Curve& curve) {
 /// Arc (or line) that leaves `from` along its heading and ends at `to_m`.
 inline opendrive::GeometryPiece arc_to(const Pose& from, const Eigen::Vector2d& to_m) {
   const Eigen::Vector2d apart = to_m - from.position_m;
-  const double chord = std::hypot(apart.x(), apart.y());
+  const double chord = hypot_of(apart.x(), apart.y());
   const double chord_heading = std::atan2(apart.y(), apart.x());
   const double half_turn = wrap_to_pi(chord_heading - from.heading);
   if (std::abs(half_turn) < 1e-9) return piece_of({from.position_m, chord_heading}, chord, 0);

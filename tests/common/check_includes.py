@@ -64,6 +64,8 @@ COMPILER_TESTS = re.compile(r"^(common/portable|tests|bench)/")
 OTHER_PARSER = re.compile(r"\b(std::)?(strto(d|f|ld)|atof|sto(d|f|ld)|sscanf)\(")
 JSON_PARSER = re.compile(r"\b(json|Json)::(parse|sax_parse)\(")
 JSON_HOME = "common/support/json.h"
+# hypot() of the standard library, whose last bit differs by processor, in the geometry of maps.
+OTHER_HYPOT = re.compile(r"\bstd::hypot\(")
 # Printing that throws, or whose failures are not checked; and writers that truncate existing files. Writers of
 # runs append to files that run_files() has found to be no links.
 OTHER_PRINTER = re.compile(r"\bfmt::print\(|\bstd::(cout|cerr|fwrite|fputs|puts|printf|fprintf)\b")
@@ -117,6 +119,8 @@ def faults_in(root: pathlib.Path) -> list[str]:
             if not name.startswith("tests/"):
                 if OTHER_PARSER.search(line):
                     faults.append(f"{where} expected a parser of common/support/numbers.h, which no locale changes")
+                if OTHER_HYPOT.search(line) and name.startswith("map/"):
+                    faults.append(f"{where} expected hypot_of() of common/portable/hypot.h, which no processor changes")
                 if OTHER_PRINTER.search(line) and name != PRINTER_HOME:
                     faults.append(f"{where} expected print_result() or print_message() of {PRINTER_HOME}")
                 if OTHER_WRITER.search(line) and name not in MAY_APPEND:
@@ -177,13 +181,15 @@ def self_test() -> None:
         "map/q.cpp": "double x = std::strtod(text, &end);\n",
         "map/r.cpp": "const Json json = Json::parse(text);\n",
         "apps/s.cpp": 'fmt::print("text");\n',
+        "map/u.cpp": "const double length = std::hypot(x, y);\n",
+        "simulator/v.cpp": "const float length = std::hypot(x, y);\n",
         "map/t.cpp": "std::ofstream out(path);\n",
         "training/w.cpp": "RandomStream random({.purpose = Purpose::minibatch});\n",
         "evaluation/x.cpp": "RandomStream random({.purpose = Purpose::minibatch});\n",
         "evaluation/y.cpp": "RandomStream random({.purpose = Purpose::removal_case});\n",
     }
     expected = {"common/a.h", "backend_cpu/renderer/renderer.cpp", "backend_cpu/renderer/a.h", "backend_cpu/renderer/fast/z.h", "backend_cpu/elsewhere.cpp", "simulator/b.cpp",
-                "simulator/h.cpp", "simulator/l.h", "common/o.h", "simulator/m.h", "simulator/rules/u.h", "map/c.cpp", "map/d.cpp", "map/q.cpp", "map/r.cpp", "apps/s.cpp", "map/t.cpp", "training/w.cpp", "backend_gl/f.cpp", "common/g.h", "apps/i.cpp", "bench/j.cpp"}
+                "simulator/h.cpp", "simulator/l.h", "common/o.h", "simulator/m.h", "simulator/rules/u.h", "map/c.cpp", "map/d.cpp", "map/q.cpp", "map/r.cpp", "apps/s.cpp", "map/t.cpp", "map/u.cpp", "training/w.cpp", "backend_gl/f.cpp", "common/g.h", "apps/i.cpp", "bench/j.cpp"}
     with tempfile.TemporaryDirectory() as folder:
         root = pathlib.Path(folder)
         for name, text in cases.items():
