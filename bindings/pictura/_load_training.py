@@ -57,7 +57,7 @@ def why_no_torch() -> str:
         return (
             "this package was built without torch: install a wheel that has it, or build one from a checkout:"
             " pip install torch scikit-build-core pybind11 cmake, then"
-            " pip install --no-build-isolation -Ccmake.define.PICTURA_WITH_TORCH=ON ."
+            " pip install --no-build-isolation --config-settings=cmake.define.PICTURA_WITH_TORCH=ON ."
         )
     found = installed_torch()
     remedy = f"pip install 'torch=={built[-1]}.*'"
