@@ -22,7 +22,7 @@ CLI::Validator whole_number(uint64_t low, uint64_t high = kMaxCount);
 CLI::Validator number(double low, double high);
 
 /// Adds an option that takes numbers from low to high, whole numbers for an integer. The help shows the default, unless
-/// there is none or it is out of range, which means that nothing was given.
+/// there is none. A default out of range means "not given", and is not shown either.
 template <typename T>
 CLI::Option* add_number_option(CLI::App* command, const std::string& flag, T& value, const std::string& help,
                                double low, double high = kMaxCount) {

@@ -123,8 +123,8 @@ struct Estimate {
 struct RatioTerm {
   double part = 0, whole = 0;
 };
-/// Estimates the ratio of the sums; infinite if the divisor is 0. A mean of one number per scenario is the ratio with
-/// wholes of 1.
+/// Estimates the sum of the parts divided by the sum of the wholes; infinite if the divisor is 0. If every whole is 1,
+/// this is the mean of the parts.
 Estimate estimate_ratio(const std::vector<RatioTerm>& scenarios);
 /// Estimates the ratio of part_of(counts) and whole_of(counts) over scenarios.
 template <typename Counts, typename Part, typename Whole>

@@ -61,7 +61,7 @@ class LaneGraph {
     bool is_change = false;
   };
   /// Result of a search. Node n < lanes is the start of lane n. Node lanes + n is the position on lane n beside the
-  /// start position, which only lane changes reach.
+  /// start position; only lane changes reach it.
   struct Search {
     double begin_fraction = 0;            // start position as a fraction of its lane's length
     std::vector<double> cost_m;           // [nodes] minimum costs

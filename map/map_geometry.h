@@ -18,7 +18,7 @@ enum class LightHeads : uint8_t { as_mapped, visible };
 constexpr std::array<const char*, 2> kLightHeadsNames{"as_mapped", "visible"};
 constexpr float kVisibleHeadAhead_m = 10.0f, kVisibleHeadHeight_m = 3.5f;
 
-/// Returns the placement of a name. Throws UsageError listing the valid names for any other name.
+/// Returns the placement that has this name. Throws UsageError listing the valid names if there is none.
 LightHeads light_heads_named(const std::string& name);
 std::string name_of(LightHeads heads);
 

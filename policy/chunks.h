@@ -1,6 +1,6 @@
 // Splits a batch into chunks that pass through the network one after the other. All chunks of a batch have the same
-// size. On a device few sizes occur at all, so that what libraries select and build for a size (cuDNN's plans, CUDA
-// graphs) is built once, however many agents are active.
+// size. On a device only few different sizes occur, regardless of the number of active agents, because cuDNN's plans
+// and CUDA graphs must be built for each size.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,6 @@
-// The paper's two policies (appendix, table of the policy architecture): one trunk with actor and critic, behind either
-// encoders of four entity sets (five with walls) or one image branch as wide as four. Plain tensors and functions, no
-// torch modules.
+// The paper's two policies (appendix, table of the policy architecture): a trunk with actor and critic. Its input comes
+// from encoders of four entity sets (five with walls), or from an image branch whose output is as wide as that of four
+// encoders. Plain tensors and functions, no torch modules.
 #pragma once
 
 #include <functional>

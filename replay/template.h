@@ -13,7 +13,7 @@ namespace pictura {
 /// Escapes a text for HTML.
 std::string html_text(std::string_view text);
 
-/// Returns JSON for a script element, which no text in it can end.
+/// Returns JSON for a script element, escaped so that no text in it can end the element.
 std::string script_text(const nlohmann::ordered_json& json);
 
 /// Returns the template with each {{name}} replaced; every name must be in it.

@@ -25,7 +25,7 @@ struct NetworkSize {
   static constexpr double kBytesPerParameter = 20;
   /// Estimated bytes of a transition in a forward and backward pass, with the largest images of render.schedule.
   double transition_bytes = 0;
-  /// Bytes with this number of transitions at once.
+  /// Memory for processing this number of transitions at once.
   double bytes(double transitions) const { return kBytesPerParameter * parameters + transition_bytes * transitions; }
 };
 NetworkSize network_size(const Config& config, Device device);

@@ -12,7 +12,7 @@ namespace pictura {
 /// Makes a device the calling thread's current device, and restores the previous device at the end of the scope.
 class DeviceGuard {
  public:
-  /// Throws Error naming the device where it is not a CUDA device or does not exist.
+  /// Throws Error naming the device if it is not a CUDA device or does not exist.
   explicit DeviceGuard(Device device) : index_(device.index) {
     PICTURA_CHECK(!device.is_host(), "cuda: expected a CUDA device, got {}", name_of(device));
     PICTURA_CUDA(cudaGetDevice(&previous_));

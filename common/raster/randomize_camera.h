@@ -1,6 +1,6 @@
 // Randomized cameras: rotation, shift and zoom of a view's camera, and changes to the colours of its image. All are
 // functions of the view's key and the camera's index, so that a redrawn image has the same bits on every device. Every
-// value is drawn whatever the ranges are: a larger range changes no other effect.
+// value is drawn even if its range is 0, so that the range of one effect does not change other effects.
 #pragma once
 
 #include "pictura/common/camera_randomization.h"

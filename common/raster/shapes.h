@@ -289,8 +289,8 @@ constexpr float kEqualDepth = 1e-4f;
 /// A solid stands on a strip if their outlines overlap on the ground plane and the centre of its base is at most this
 /// far from the strip's plane. The distance is positive because upright boxes cut into slopes.
 constexpr float kStanding_m = 0.5f;
-/// Maximum depth to which solids that stand on a strip extend through its plane. It bounds only what culling may hide
-/// of a strip that is seen from below.
+/// Maximum depth to which solids that stand on a strip extend through its plane. Only culling uses it: an occluder
+/// hides a strip that is seen from below only if it is in front of such solids, too.
 constexpr float kThroughStrip_m = 4.0f * kStanding_m;
 
 /// Rank of a strip: where strips of one level overlap, the lower rank is in front.

@@ -1,5 +1,5 @@
-// Refusal of files that are not regular where a text is read whole: opening a FIFO waits for its writer, and signals
-// that are polled between steps would not stop the wait.
+// Refuses files that are not regular before a text is read as a whole. Opening a FIFO would wait for its writer, and
+// signals could not stop the wait, since they are polled only between steps.
 #pragma once
 
 #include <filesystem>

@@ -53,7 +53,7 @@ PICTURA_HD inline AgentField invalid_field(const MapView& map, const RuleOptions
   return AgentField::none;
 }
 
-/// Fields of one agent, stored by themselves.
+/// Fields of one agent, stored outside of the state's arrays.
 struct AgentRecord {
 #define X(name, type, per_agent, first, comment) type name[per_agent];
   PICTURA_AGENT_FIELDS(X)

@@ -18,7 +18,7 @@ PICTURA_HD inline bool takes_actions(const WorldView& world, int agent) {
   return takes_actions(world.agents.status[world.first_slot + agent]);
 }
 
-/// Whether the agent left the map in the last step, where roads end.
+/// Whether the agent left the map in the last step, at the end of a road.
 PICTURA_HD inline bool has_left(const WorldView& world, int agent) {
   return world.map.is_open && world.agents.left[world.first_slot + agent] != 0;
 }

@@ -12,7 +12,7 @@ struct Launch {
   std::string address = "127.0.0.1";  // host of rank 0, where the processes meet
   int port = 29500;                   // port at that address
   bool is_served = false;             // the launcher listens there (torchrun); else rank 0 listens
-  std::string attempt;                // name of one of a launcher's attempts
+  std::string attempt;                // name of the launcher's attempt, which differs after a restart
 };
 
 /// Reads the launch from RANK, WORLD_SIZE, LOCAL_RANK (default: RANK), MASTER_ADDR (127.0.0.1) and MASTER_PORT (29500),
