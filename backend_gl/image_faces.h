@@ -9,8 +9,8 @@
 
 namespace pictura::gl {
 
-/// Bounds on the ratio of a strip corner's depth to that of its compared plane there. The minimum is practically
-/// infinite distance, beyond the plane's horizon; the maximum is the oracle's limit of nearness.
+/// Bounds on the ratio of a strip corner's depth to that of its compared plane there. The minimum stands for a
+/// practically infinite distance, beyond the plane's horizon; the maximum is the oracle's limit for near depths.
 constexpr float kMinInverseDepth = 1e-4f, kMaxInverseDepth = kWidenedDepth;
 
 /// One instance of the draw call: a flat quadrilateral, in camera coordinates.

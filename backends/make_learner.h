@@ -11,7 +11,7 @@
 
 namespace pictura {
 
-/// Makes the executor of a learner. Throws Error where the device is a CUDA device that does not exist.
+/// Makes the executor of a learner. Throws Error if the device is a CUDA device that does not exist.
 std::unique_ptr<LearnerExecutor> make_learner_executor(Device device);
 std::unique_ptr<SceneHistory> make_scene_history(Device device, const SceneHistorySize& size);
 

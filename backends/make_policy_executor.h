@@ -10,14 +10,14 @@
 
 namespace pictura {
 
-/// Empty where this build and this machine have a CUDA device, else the reason why not.
+/// Empty if this build supports CUDA and this machine has a CUDA device, else the reason.
 std::string cuda_unavailable_reason();
 
 /// Product name of a device, such as "NVIDIA H100 80GB HBM3"; "host" for the host. Throws Error for a device that does
 /// not exist.
 std::string product_name(Device device);
 
-/// Makes the executor of a policy. Throws Error where the device is a CUDA device that does not exist.
+/// Makes the executor of a policy. Throws Error if the device is a CUDA device that does not exist.
 std::unique_ptr<PolicyExecutor> make_policy_executor(Device device);
 
 /// Makes the passes of a network. Throws Error for the host, which has none.

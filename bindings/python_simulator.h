@@ -263,7 +263,7 @@ class PySimulator {
   }
 
  private:
-  /// Shape of an observation array; arrays that are no sets have one row.
+  /// Shape of an observation array; arrays that are not sets have one row.
   static Dims shape_of(int64_t count, int64_t rows, int64_t features) {
     return rows == 1 ? Dims{count, features} : Dims{count, rows, features};
   }

@@ -101,7 +101,7 @@ struct Array {
       : Array(container.data(), {static_cast<int64_t>(container.size())}, Device{}) {}
 
   bool is_contiguous() const { return strides == shape.contiguous_strides(); }
-  /// Returns the elements of a contiguous array as a span. Throws Error where element type, shape or device differ, the
+  /// Returns the elements of a contiguous array as a span. Throws Error if element type, shape or device differ, the
   /// array has gaps, or T is not const and the array is read-only. The error names `what` ("step: actions"), the
   /// expected and the actual array.
   template <typename T>

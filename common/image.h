@@ -28,8 +28,8 @@ struct ImageSize {
 };
 /// Number of values of one image of this size: channels of pixels, including the padding of patches of side `patch_px`.
 int64_t image_values(ImageSize size, ChannelOrder order, int patch_px = kDefaultPatch_px);
-/// Throws Error where the order is of patches and renderers do not write patches of this side. The message begins with
-/// the renderer's name if there is one. Allocates only for the message.
+/// Throws Error if the order is patches and renderers do not write patches of this side. The message begins with the
+/// renderer's name if there is one. Allocates only for the message.
 void check_patch_px(std::string_view renderer, ChannelOrder order, int patch_px);
 
 /// Place of one camera's images in the memory of a layout. Channel c of pixel (x, y) of a view is the value offset +

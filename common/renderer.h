@@ -59,7 +59,7 @@ class Renderer {
 
   /// Copies a map's geometry. The caller chooses the handle, in [0, kNumGeometryHandles), that refers to the geometry
   /// in SceneBatch::geometry, so that one scene serves several renderers. Later calls use this geometry instead of the
-  /// handle's previous one. Waits for the stream. Throws Error where the handle or the geometry is invalid.
+  /// handle's previous one. Waits for the stream. Throws Error if the handle or the geometry is invalid.
   virtual void upload(GeometryHandle handle, const StaticGeometry& geometry, Stream stream = {}) = 0;
   /// Frees a handle after all earlier calls; does nothing for a handle without geometry. The memory may be kept for
   /// later uploads.
@@ -73,7 +73,7 @@ class Renderer {
   virtual uint64_t generation() const { return 0; }
 
   /// Draws every camera of the rig for every view and writes each pixel of their images. Views at and beyond
-  /// views.num_views are neither read nor drawn, and their images are not written. Throws Error where an array lies on
+  /// views.num_views are neither read nor drawn, and their images are not written. Throws Error if an array lies on
   /// the wrong device, where a handle, an index or the number of views is out of range, and where the images do not fit
   /// the rig and all views. On a CUDA device, a view with an invalid world, handle, pose or range of hidden agents is a
   /// latched fault, and its images are black. A wrong number of views is a latched fault too, and is clamped. Boxes,
@@ -87,7 +87,7 @@ class Renderer {
   virtual void visibility(const SceneBatch& scene, const ViewBatch& views, Span<const VisibilityQuery> queries,
                           Span<float> visibility_out, Stream stream = {}) = 0;
 
-  /// Throws Error where a latched fault has reached the host. Does not wait.
+  /// Throws Error if a latched fault has reached the host. Does not wait.
   virtual void poll() {}
   /// Waits for the work on this stream, then polls.
   virtual void check(Stream /*stream*/ = {}) {}

@@ -71,7 +71,8 @@ struct RandomKey {
   PICTURA_HD constexpr bool is_in_range() const { return agent < kMaxAgents; }
 };
 
-/// Stream of draws of one key. A key out of range would share the draws of another key, so it ends a debug build.
+/// Stream of draws of one key. A key out of range would share the draws of another key, so a debug build terminates the
+/// program.
 class RandomStream {
  public:
   PICTURA_HD explicit RandomStream(const RandomKey& key)

@@ -22,7 +22,7 @@ struct SceneHistorySize {
 /// allocate nor wait.
 class SceneHistory {
  public:
-  /// Throws Error where the history has more agents or lights than a scene can have.
+  /// Throws Error if the history has more agents or lights than a scene can have.
   explicit SceneHistory(const SceneHistorySize& size);
   virtual ~SceneHistory() = default;
   SceneHistory(const SceneHistory&) = delete;
@@ -32,7 +32,7 @@ class SceneHistory {
   const SceneHistorySize& size() const { return size_; }
 
   /// Stores a scene and the views of its agents at `step`, replacing the step's previous content. Steps must be filled
-  /// in order first. Throws Error where the scene is of another device or size, hides agents, or a step is left out.
+  /// in order first. Throws Error if the scene is of another device or size, hides agents, or a step is left out.
   void put(int step, const SceneBatch& scene, Span<const View> views, Stream stream = {});
 
   /// Returns the scene of all steps that have been put.

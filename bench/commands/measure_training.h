@@ -25,8 +25,8 @@ struct TrainingMeasurement {
   TrainReport report;
 };
 
-/// Trains in a temporary folder. The learning rate stays constant, so that no schedule ends. Throws Error where an
-/// update took no agent-step or no minibatch. Throws Error where the policy, before its parameters change, gives
+/// Trains in a temporary folder. The learning rate stays constant, so that no schedule ends. Throws Error if an
+/// update took no agent-step or no minibatch. Throws Error if the policy, before its parameters change, gives
 /// actions other probabilities than in the rollout, because it then did not get the agents' observations. Throws the
 /// exceptions of train().
 TrainingMeasurement measure_training(const TrainingCase& training_case);

@@ -10,8 +10,8 @@
 
 namespace pictura {
 
-// Two types rather than one, since a program may hold code of both: their memory layout is equal, but their calling
-// conventions differ.
+// Two types rather than one, since a program may contain code with and without AVX2: their memory layouts are equal,
+// but their calling conventions differ.
 #if defined(__AVX2__) && !defined(__CUDACC__)
 inline namespace float8_in_a_register {
 
@@ -180,7 +180,7 @@ struct SmallestKeys {
     __m256d carried = _mm256_setzero_pd();  // the element before each four
     for (__m256d& four : keys) {
       const __m256d rotated = _mm256_permute4x64_pd(four, 0x93);
-      // Each element becomes the larger of the new key and its predecessor, if that is smaller than itself.
+      // An element that is larger than the new key becomes the larger of its predecessor and the new key.
       four = _mm256_max_pd(_mm256_min_pd(four, all_new), _mm256_blend_pd(rotated, carried, 1));
       carried = rotated;
     }

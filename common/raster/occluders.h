@@ -64,7 +64,7 @@ struct Occluders {
   int32_t count = 0;
   Occluder occluder[kMaxCount];
 
-  /// Whether one occluder hides all of a face's bounds that is in the image.
+  /// Whether one occluder hides the part of a face's bounds that is in the image.
   PICTURA_HD bool occludes(const PinholeCamera& camera, const ScreenBounds& bounds) const {
     const Aabb2 box = bounds.in_image(camera);
     // Minimum of a linear function over the box.

@@ -60,7 +60,7 @@ constexpr std::uint32_t crc32c(std::string_view bytes) {
   return ~crc;
 }
 
-/// CRC-32C as TFRecord files store it, masked so that the checksum of bytes that contain a checksum differs from it.
+/// CRC-32C as TFRecord files store it: masked, because the bytes of a record may themselves contain checksums.
 constexpr std::uint32_t masked_crc32c(std::string_view bytes) {
   const std::uint32_t crc = crc32c(bytes);
   return ((crc >> 15) | (crc << 17)) + 0xA282EAD8u;

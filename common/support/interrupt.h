@@ -20,7 +20,7 @@ void record_interrupt(int signal);
 void clear_interrupt();
 
 inline bool interrupted() { return interrupting_signal() != 0; }
-/// Throws Interrupted where a signal is recorded.
+/// Throws Interrupted if a signal is recorded.
 void throw_if_interrupted();
 
 /// A piece of work that a signal stops. A signal from before the work began does not stop it: such work is part of an
@@ -29,7 +29,7 @@ class InterruptibleWork {
  public:
   /// `message` describes the interrupted work.
   explicit InterruptibleWork(std::string message) : message_(std::move(message)) {}
-  /// Throws Interrupted where a signal came after the work began.
+  /// Throws Interrupted if a signal came after the work began.
   void check() const;
 
  private:

@@ -18,8 +18,8 @@ struct NamedOption {
 /// Changes of a key's value that a resumed run accepts: none (fixed), any (free), or any with a notice (reported).
 enum class Resume { fixed, free, reported };
 
-/// Relevance of a key to evaluations: its value counts where evaluations read its section at all, or a separate option
-/// of evaluations replaces it.
+/// Relevance of a key to evaluations. counts: evaluations that read the key's section use its value. replaced: a
+/// separate option of evaluations replaces it.
 enum class Evaluation { counts, replaced };
 
 /// A key of configurations, with the details that its type, default and range do not give.
