@@ -19,7 +19,8 @@ void check_import_options(const OpenDriveOptions& options);
 /// Bounds the import time of small files and the memory of large ones.
 SampleBudget import_budget(std::size_t text_bytes, const std::string& source, const InterruptibleWork& work);
 
-/// Calls import() -> RoadMap; errors that do not name the file, which are about it as a whole, get its name.
+/// Calls import() -> RoadMap. Adds the file's name to errors that do not name it, because they are about the file as a
+/// whole.
 template <typename Import>
 RoadMap import_named(const std::string& source, Import&& import) {
   try {

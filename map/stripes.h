@@ -10,8 +10,8 @@ namespace pictura {
 /// Dashes of 3 m with gaps of 9 m: the North American pattern, which CARLA's towns imitate.
 constexpr double kDash_m = 3.0, kDashPeriod_m = 12.0;
 
-/// The line moved to its left in plan, none of whose points (at least two) repeats the one before; corners are mitred,
-/// sharp ones at most to twice the offset.
+/// The line moved to its left in plan. It must have at least two points, of which none repeats the previous one.
+/// Corners are mitred, sharp corners at most to twice the offset.
 std::vector<CurvePoint> moved_left(const std::vector<CurvePoint>& line, double offset_m);
 
 /// The part of a line between two lengths along it.

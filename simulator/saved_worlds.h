@@ -11,7 +11,7 @@
 namespace pictura {
 
 /// Returns the worlds of part `part` of `num_parts`: consecutive worlds, at least one per part, with about equally many
-/// agents in every part. Throws UsageError where there are fewer worlds than parts.
+/// agents in every part. Throws UsageError if there are fewer worlds than parts.
 std::vector<WorldSpec> worlds_in_part(const std::vector<WorldSpec>& all, int part, int num_parts);
 
 /// Joins the saved states of the parts' simulators, in order, into the saved state of a simulator of all these worlds.
@@ -33,7 +33,7 @@ std::vector<std::shared_ptr<const SavedWorld>> extract_worlds(const Simulator& s
                                                               const std::vector<size_t>& worlds);
 
 /// Returns the saved state of this simulator with its worlds, in order, in these states: input of restore(). The worlds
-/// may come from simulators with other observations or other walls. Throws Error where a world differs from the kept
+/// may come from simulators with other observations or other walls. Throws Error if a world differs from the kept
 /// one.
 std::vector<uint8_t> saved_state_of(const Simulator& simulator, const std::vector<const SavedWorld*>& worlds);
 

@@ -20,7 +20,7 @@ class SceneRecorder final : public StepObserver {
   /// the simulator does not work in host memory or has no such world.
   explicit SceneRecorder(Simulator& simulator, int world = 0);
 
-  /// Records a step of the episode; steps after the episode are ignored. Throws Error where a scene would become too
+  /// Records a step of the episode; steps after the episode are ignored. Throws Error if a scene would become too
   /// long.
   void after_step(const StepResult& result) override;
   void after_reset(Span<const uint8_t> world_mask) override;

@@ -195,10 +195,10 @@ class Simulator {
   /// Sets fields of chosen agents. slots: i32 [n] on device(), each at most once. fields: by their names in fields.h,
   /// of their types, [n] or [n, per agent], on device(). Dependent values are recomputed: an agent's lane, its height
   /// (of the road on the level of z_m), its box, view and observation. An active agent gets no halt_reason, and an
-  /// agent that gets a place after it found none counts as spawned. The results of the last step stay. Throws Error,
-  /// leaving the state unchanged, for other arrays, for dependent fields (see is_derived() in agent_state_arrays.h),
-  /// and for slots and values that restore() would refuse; on a device, faults of slots and values are latched. On a
-  /// device the call does not wait, and a CUDA graph can capture it.
+  /// agent that gets a place after it found none counts as spawned. The results of the last step remain unchanged.
+  /// Throws Error, leaving the state unchanged, for other arrays, for dependent fields (see is_derived() in
+  /// agent_state_arrays.h), and for slots and values that restore() would refuse; on a device, faults of slots and
+  /// values are latched. On a device the call does not wait, and a CUDA graph can capture it.
   void set_state(const Array& slots, Span<const NamedArray> fields, Stream stream = {});
 
   /// Writes the observations that slots would have without some boxes of their worlds and with additional boxes: one

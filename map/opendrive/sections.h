@@ -12,8 +12,8 @@ namespace pictura::opendrive {
 /// lanes and their continuations are linked to each other.
 std::vector<FileLane> continue_lanes(std::vector<FileLane>* lanes, double ds);
 
-/// Removes a section without length. The previous section ends at its end, links lead through it, and the lane offset
-/// is that of the sections beside it.
+/// Removes a section without length. The previous section is extended over it, its neighbours are linked to each other,
+/// and the lane offset is that of the adjacent sections.
 void bridge_section(std::size_t index, FileRoad* road);
 
 /// Makes elevation, banking, lane offset and widths constant from s on, where the file's description ends. Cubics are

@@ -21,8 +21,8 @@ bool can_spread_jump(double jump_m, double road_length_m);
 
 /// Moves the line around each jump so that the jump vanishes. Before a jump, the line moves towards the following
 /// geometry, and after it towards the preceding geometry. The shift is a smoothstep of s over ten metres, or over ten
-/// times the jump if that is more, but at most over the whole road. Stations and both ends of the road stay. Jumps are
-/// in the order of their pieces.
+/// times the jump if that is more, but at most over the whole road. Stations and both ends of the road are unchanged.
+/// Jumps are in the order of their pieces.
 void spread_jumps(const std::vector<Jump>& jumps, FileRoad* road);
 
 /// A step of a road's elevation at s.

@@ -19,7 +19,7 @@ std::string write_opendrive(const Network& network);
 namespace pictura {
 
 /// Reads the text of an OpenDRIVE file and writes only the data that the importer uses. Throws Error naming `source`,
-/// line and element where the importer rejects the file.
+/// line and element if the importer rejects the file.
 std::string export_opendrive(std::string_view text, const std::string& source);
 
 }  // namespace pictura

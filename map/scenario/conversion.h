@@ -34,7 +34,7 @@ struct Conversion {
     if (remaining_work < 0) fail("{}: its map exceeds the work limit of a scene", scene.source);
   }
   Eigen::Vector3d from_origin(const Eigen::Vector3d& p) const { return p - origin; }
-  /// Rounds a point as a map stores it where a program stated the scene, so that scene_of_scenario() returns the same
+  /// If a program stated the scene, rounds a point as a map stores it, so that scene_of_scenario() returns the same
   /// point.
   Eigen::Vector3d rounded(const Eigen::Vector3d& p) const {
     if (!scene.is_authored) return p;

@@ -55,7 +55,7 @@ class WireReader {
   uint32_t field() const { return field_; }
   WireType type() const { return type_; }
 
-  // Value of the field; FieldError unless the field has this wire type.
+  // Value of the field. Throws FieldError unless the field has this wire type.
   std::string_view bytes() const { return expect(WireType::bytes), bytes_; }
   double number64() const { return expect(WireType::fixed64), std::bit_cast<double>(number_); }
   float number32() const { return expect(WireType::fixed32), std::bit_cast<float>(static_cast<uint32_t>(number_)); }
@@ -78,7 +78,7 @@ class WireReader {
     WireReader packed(bytes());
     while (!packed.rest_.empty()) visit(std::bit_cast<double>(packed.take_number<uint64_t>()));
   }
-  /// The same for a repeated float.
+  /// Calls visit(value) for a repeated float, whether packed or not.
   template <typename Visit>
   void numbers32(Visit&& visit) const {
     if (type_ == WireType::fixed32) return visit(number32());

@@ -23,16 +23,17 @@ struct InverseActions {
 
 /// Searches each unbroken run of valid states separately, from its first state, with accelerations and steering angle
 /// 0, as a takeover starts. A beam search keeps the best kBeamWidth sequences of actions. The cost of a sequence sums
-/// the squared distance from the recorded places, a small cost for deviations of speed and heading, and the way back to
-/// the record that the last motion leaves. Without the small cost the path would weave. Multipliers of the dynamics are
-/// 1, and `rules` are those of the worlds in which the actions are taken. Throws UsageError for a map without a record.
+/// the squared distance from the recorded places, a small cost for deviations of speed and heading, and the predicted
+/// cost of returning to the record from the last motion. Without the small cost the path would weave. Multipliers of
+/// the dynamics are 1, and `rules` are those of the worlds in which the actions are taken. Throws UsageError for a map
+/// without a record.
 InverseActions find_inverse_actions(const CompiledMap& scene, float dt_s, int num_threads = 0,
                                     const DynamicsRules& rules = {});
 constexpr int kBeamWidth = 48;
 
 /// Inverse actions of all worlds of one simulator, as TabledCommands reads them.
 struct InverseTable {
-  /// Throws UsageError where multipliers of the dynamics differ from 1, and for worlds without a record.
+  /// Throws UsageError if multipliers of the dynamics differ from 1, and for worlds without a record.
   explicit InverseTable(const Simulator& simulator);
   std::vector<ActionTable> worlds;
   std::vector<int32_t> actions;  // actions of all maps in sequence

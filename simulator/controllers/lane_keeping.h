@@ -25,7 +25,7 @@ class LaneKeepingAgent {
  public:
   /// `world` refers to the simulator's agents and lights, which are current at every act(), and must not have been
   /// stepped in this life yet. The graph is that of the world's map. The arrays of the world and the graph must outlive
-  /// this object. `search_nodes` are the nodes that the slot's previous life left.
+  /// this object. `search_nodes` is the number of search nodes that the slot's previous life did not use.
   LaneKeepingAgent(const WorldView& world, int agent, const LaneGraph& graph, size_t search_nodes = kMaxSearchNodes);
 
   /// Returns the action for the current state of agents and lights.
@@ -46,7 +46,7 @@ class LaneKeepingAgent {
   static constexpr size_t kMaxSearchNodes = 300'000, kMaxSearchNodesOfOpen = 2'000, kSearchNodesPerStep = 500,
                           kMinSearchNodes = 20'000;
 
-  enum class Driving { pursues, brakes, brakes_straight };  // along the path; on the path; without steering
+  enum class Driving { pursues, brakes, brakes_straight };  // pursues the path; brakes on it; brakes straight ahead
 
   void follow_goals();
   void plan();

@@ -38,7 +38,7 @@ struct DynamicsParameters {
 /// Contribution of a step to the distance driven, at the speed after the step.
 PICTURA_HD inline float driven_m(float speed_mps, float dt_s) { return fabsf(speed_mps) * dt_s; }
 
-/// Clamps `value`, which first stops at zero where its sign differs from that of `before`.
+/// Clamps `value`; if its sign differs from that of `before`, it becomes 0 first.
 PICTURA_HD inline float stop_at_zero(float before, float value, float low, float high) {
   return before * value < 0.0f ? 0.0f : clamp(value, low, high);
 }

@@ -56,7 +56,8 @@ struct Exit {
   float slope = 0;  // slope of the lane there, rise per metre
 };
 
-/// A lane at whose start agents enter an open map. Per step, one agent enters among the entries of one turn.
+/// A lane at whose start agents enter an open map. Entries with the same `turn` form a cluster: per step, one agent
+/// enters through one of them.
 struct Entry {
   int32_t lane = 0, turn = 0;
 };

@@ -29,7 +29,7 @@ PICTURA_HD inline void observe_ego(const WorldView& world, int slot, float* out)
   out[8] = auxiliary && agents.lane[slot] >= 0 ? cos_of(agents.lane_angle_rad[slot]) : 0.0f;
 }
 
-/// Observes the conditioning, scaled by the paper's training ranges whatever the ranges of the run are, so that a
+/// Observes the conditioning, scaled by the paper's training ranges regardless of the run's ranges, so that a
 /// coefficient has the same observed value in all runs; fixed coefficients give 0. Values below the range, as
 /// pedestrians have, are distinguished down to -2.
 template <typename ThreadGroup = SingleThread>
@@ -109,8 +109,7 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
   }
 }
 
-/// Variant of nearest_partners() for a sequence of boxes: box_at(i) is one of num_boxes, and counts where
-/// is_present(i).
+/// Variant of nearest_partners() for a sequence of num_boxes boxes: box_at(i) counts if is_present(i).
 template <typename ThreadGroup, typename BoxAt, typename IsPresent>
 PICTURA_HD auto nearest_boxes(int num_boxes, const BoxAt& box_at, const IsPresent& is_present, Vec2 origin,
                               const ThreadGroup& group) {

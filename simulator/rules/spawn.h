@@ -317,8 +317,8 @@ PICTURA_HD inline bool straddles_stop_line(const MapView& map, const AgentBox& b
   return false;
 }
 
-/// Whether an agent may start its episode with this box. Agents never start across a stop line, whatever its light
-/// shows, because driving on from there would not count as crossing the line.
+/// Whether an agent may start its episode with this box. Agents never start across a stop line, regardless of its
+/// light, because driving on from there would not count as crossing the line.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool may_spawn(const MapView& map, const AgentBox& box, const ThreadGroup& group = {}) {
   return fits_map(map, box, group) && (box.agent_class == AgentClass::pedestrian || !straddles_stop_line(map, box));

@@ -7,8 +7,8 @@
 
 namespace pictura {
 
-/// The nearest of the added items, in ascending order of squared distance, then item; items are not negative. Without
-/// branches, since processors cannot predict the place of an item in the order.
+/// The nearest of the added items, in ascending order of squared distance, then item; items are not negative. The code
+/// has no branches, since processors cannot predict the place of an item in the order.
 template <int capacity>
 class NearestOfOneThread {
  public:
@@ -19,7 +19,7 @@ class NearestOfOneThread {
   /// Offers all items except `except` whose places are less than the root of below2 from a point.
   PICTURA_HD void offer_all(const Vec2* places, const int32_t* items, int num_items, int32_t except, Vec2 from,
                             float below2) {
-    // Near items are gathered first, because whether an item is near is as hard to predict.
+    // Near items are gathered first, because whether an item is near is as hard to predict as its place in the order.
     float near_distance2[kGathered + 8];
     int32_t near_items[kGathered + 8];
     int num_near = 0;
