@@ -40,7 +40,7 @@ at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& counts
 /// Softmax over tokens. scores: [matrices, tokens, columns].
 at::Tensor token_softmax(const at::Tensor& scores);
 
-/// Whether feature_rows() supports these rows, [..., columns]: f32 on a CUDA device, few enough numbers a row.
+/// Whether feature_rows() supports these rows, [..., columns]: f32 on a CUDA device, with few enough numbers in a row.
 bool has_fused_row_features(const at::Tensor& rows, const RowFeatures& features);
 /// Features of rows, [..., columns], as RowSize describes them, in `type`. Without gradient.
 at::Tensor feature_rows(const at::Tensor& rows, const RowFeatures& features, bool keeps_rows, at::ScalarType type);

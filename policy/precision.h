@@ -13,12 +13,12 @@ void set_float32_products(Precision precision);
 
 /// Sets, for the whole process, whether torch computes the same bits in every run: deterministic algorithms, including
 /// cuDNN's, and a workspace that makes cuBLAS reproducible. Torch and cuBLAS read the workspace from the environment
-/// variable CUBLAS_WORKSPACE_CONFIG at their first product on a device, so call this function before. Throws Error if
-/// that variable has another value.
+/// variable CUBLAS_WORKSPACE_CONFIG at their first product on a device, so call this function before that product.
+/// Throws Error if that variable has another value.
 void set_reproducible(bool reproducible);
 
 /// Scope in which cuDNN times its algorithms for every new size and selects the fastest (its autotuner), unless torch
-/// is set to be reproducible. For updates only: rollouts have as many sizes as numbers of active agents.
+/// is set to be reproducible. For updates only: in rollouts the size changes with the number of active agents.
 class Autotuner {
  public:
   Autotuner();

@@ -42,8 +42,8 @@ class PolicyController : public Controller {
   virtual int64_t num_driven() const = 0;
 };
 
-/// Returns the cameras that the options name; nullopt where they name none. Throws UsageError where they name both a
-/// rig file and a size, Error as load_rig().
+/// Returns the cameras that the options name; nullopt if they name none. Throws UsageError if they name both a rig file
+/// and a size, and Error as load_rig() does.
 std::optional<Rig> named_rig(const SessionOptions& options);
 
 /// Returns renderer_config() of a configuration for evaluations, in which all policies see through the same cameras of
@@ -58,11 +58,10 @@ class PolicySession {
   /// the file if it is neither, truncated, of another observation schema or architecture, or cannot run on this device.
   /// Throws UsageError if it cannot use the cameras of the options.
   explicit PolicySession(const std::string& path, const SessionOptions& options = {});
-  /// Wraps a policy of a configuration with the cameras of `rig`, with the policy's weights at each call; the policy
-  /// must outlive the session. Its cameras are not randomized. Builds without torch lack
-  /// this constructor.
+  /// Wraps a policy of a configuration with the cameras of `rig`. Each call uses the policy's current weights; the
+  /// policy must outlive the session. Its cameras are not randomized. Builds without torch lack this constructor.
   PolicySession(const Config& config, const Rig& rig, Device device, const Policy& policy);
-  /// What an implementation made (policy/session_parts.h).
+  /// Creates a session from the parts that an implementation made (policy/session_parts.h).
   explicit PolicySession(std::unique_ptr<SessionParts> parts);
   ~PolicySession();
   /// Returns the same policy before training, in the same worlds and with the same cameras: weights are drawn from

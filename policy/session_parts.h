@@ -1,4 +1,4 @@
-// Implementation of PolicySession: its settings, and the interface of what computes the policy.
+// Implementation of PolicySession: its settings, and the interface of the code that computes the policy.
 #pragma once
 
 #include <memory>

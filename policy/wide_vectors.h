@@ -3,8 +3,8 @@
 
 #if defined(__x86_64__) && defined(__GNUC__)
 #define PICTURA_HAS_WIDE_VECTORS 1
-/// Attribute of a function that is called only if has_wide_vectors() is true. Functions that it inlines are compiled
-/// alike.
+/// Attribute of a function that is called only if has_wide_vectors() is true. Functions that it inlines are compiled in
+/// the same way.
 #define PICTURA_WIDE [[gnu::target("avx512f,avx512bw,avx512dq,avx512vl,fma")]]
 #else
 #define PICTURA_HAS_WIDE_VECTORS 0

@@ -23,7 +23,7 @@ struct Targets {
 
 /// Losses of a chunk: means over its rows, with gradients.
 struct Losses {
-  at::Tensor total;                   // the loss that is minimised: the others with their coefficients
+  at::Tensor total;                   // the minimised loss: the sum of the others times their coefficients
   at::Tensor policy, value, entropy;  // without coefficients
   at::Tensor stats;                   // stacked() statistics, without gradients
 };

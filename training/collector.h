@@ -33,7 +33,7 @@ class Collector {
   Run& run_;
   DecisionClock clock_;
   Graphs graphs_;
-  std::vector<RepeatedWork> records_, simulations_;  // by step, whose part of the rollout they write
+  std::vector<RepeatedWork> records_, simulations_;  // one per step, which writes that step of the rollout
 };
 
 }  // namespace pictura

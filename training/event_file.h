@@ -23,7 +23,7 @@ class EventFile {
   explicit EventFile(const std::string& folder);
   /// Appends one event and flushes. Throws Error if the disk is full.
   void write(int64_t step, const Scalars& scalars);
-  /// Appends a run's configuration: settings that are no lists as the hyperparameters of TensorBoard's page HParams,
+  /// Appends a run's configuration: settings that are not lists as the hyperparameters of TensorBoard's page HParams,
   /// the whole TOML as a text. Throws Error when the disk is full.
   void write_configuration(const Settings& settings, const std::string& toml);
 

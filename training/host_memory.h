@@ -3,8 +3,9 @@
 
 namespace pictura {
 
-/// Retains freed memory in the process for later allocations, large blocks too, instead of mapping new memory for each
-/// tensor page by page, zeroed by the kernel. Affects the whole process; does nothing if the C library is not glibc.
+/// Retains freed memory, including large blocks, in the process for later allocations. Otherwise the kernel would map
+/// and zero new memory, page by page, for each tensor. Affects the whole process; does nothing if the C library is not
+/// glibc.
 void retain_freed_memory();
 
 }  // namespace pictura

@@ -53,7 +53,7 @@ struct TrainOptions {
   std::string commit;     // commit of this program, for the metadata of policy.safetensors
   Launch launch;          // place of this process among those that train together
   std::function<void(const TrainProgress&)> on_progress;  // called by rank 0 only, as is on_notice
-  std::function<void(const std::string&)> on_notice;      // receives messages for users that are no errors
+  std::function<void(const std::string&)> on_notice;      // receives messages for users that are not errors
 
   void notify(const std::string& notice) const {
     if (on_notice) on_notice(notice);
@@ -70,7 +70,7 @@ struct TrainReport {
   // Memory of a CUDA device, else 0. device_bytes: in use by all processes after the last update, including torch's
   // cache; peak_tensor_bytes: peak memory of tensors.
   int64_t device_bytes = 0, peak_tensor_bytes = 0;
-  std::string device, simulator, renderer;  // that learnt, simulated and drew; no renderer without images
+  std::string device, simulator, renderer;  // name of each; empty renderer without images
 };
 
 /// Error thrown if the tensors of a run do not fit into the device's memory; a smaller train.forward_chunk may fit.

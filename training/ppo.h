@@ -25,7 +25,7 @@ constexpr double kMaxAbsLogRatio = 1e-3, kMaxClipFraction = 1e-3;
 struct UpdateStats {
   LossStats all;                      // means over its minibatches
   LossStats first;                    // losses of the first minibatch, before the parameters change
-  std::optional<LossStats> rejected;  // `first` by the rollout's log-probabilities, if these were recomputed
+  std::optional<LossStats> rejected;  // `first` with the rollout's log-probabilities, if these were recomputed
   std::vector<LossStats> epochs;      // means over each epoch's minibatches
   GradientNorms gradient_norms;
   double learning_rate = 0;

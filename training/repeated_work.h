@@ -39,7 +39,8 @@ class Graphs {
 
   bool are_used() const { return are_used_; }
   /// Captures a graph of the work that `work` enqueues on torch's current stream, which must not be a stream that waits
-  /// for others. Throws Error naming the key if the work cannot be captured; c10::OutOfMemoryError.
+  /// for others. Throws Error naming the key if the work cannot be captured, and c10::OutOfMemoryError if memory is too
+  /// small.
   std::unique_ptr<DeviceGraph> capture(const std::function<void()>& work);
   void launch(DeviceGraph* graph);
   /// Frees memory. Must be called before capturing work that needs much memory.

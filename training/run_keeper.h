@@ -24,8 +24,8 @@ class RunKeeper {
   RunKeeper(const TrainOptions& options, Ranks* ranks, Communicator* communicator);
 
   /// Starts the run as the options specify: from its last checkpoint, from the weights of another run, or from new
-  /// weights, when the untrained policy is saved too. A run that is overwritten stays until the first save(). Returns
-  /// the recent updates for the mean return.
+  /// weights, in which case the untrained policy is saved too. A run that is overwritten stays until the first save().
+  /// Returns the recent updates for the mean return.
   std::vector<RecentUpdate> begin(Run* run);
 
   /// Whether the configuration asks for a checkpoint after the run's last update.

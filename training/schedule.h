@@ -15,8 +15,8 @@ double learning_rate_at(const TrainSection& config, int64_t agent_steps);
 bool schedule_has_ended(const TrainSection& config, int64_t agent_steps);
 
 /// Growth factor of logits after an update of this number of agent-steps: they double every sharpen_agent_steps, as if
-/// the softmax's temperature halved. So a policy that starts to drive by chance has to learn to do so with certainty,
-/// and its most likely actions become what it has learnt.
+/// the softmax's temperature halved. So a policy whose agents start moving only by chance has to learn to start with
+/// certainty, and its most likely actions become the learnt behaviour.
 double logit_growth(const TrainSection& config, int64_t agent_steps);
 
 /// Weight of the KL divergence from the teacher's actions in an update that starts after `agent_steps`: it falls

@@ -16,8 +16,8 @@ class WeightAverage {
   /// Restarts at the policy's parameters, with no update averaged.
   void restart();
   /// Adds the parameters after an update: average += w (parameters - average), with w = max(1 / n, 1 - 2^(-1 /
-  /// half_life_updates)) for the n-th update. So the first update replaces the initial average, the mean of all updates
-  /// follows, and the exponential average once its window is full. Initial weights, which are noise, never count. Does
+  /// half_life_updates)) for the n-th update. So the average is at first the parameters after the first update, then
+  /// the mean over all updates, and finally an exponential average. Initial weights, which are noise, never count. Does
   /// not wait for the device.
   void update();
 

@@ -1,5 +1,6 @@
-// Advantage filter (paper, appendix, optimization; after Gigaflow): keeps transitions whose advantage is not small
-// against an exponential average over rollouts, of their largest |advantage| or of a quantile of their |advantages|.
+// Advantage filter (paper, appendix, optimization; after Gigaflow): keeps transitions whose |advantage| is not small
+// compared with an exponential average over rollouts. It averages the rollouts' largest |advantages|, or a quantile of
+// their |advantages|.
 #pragma once
 
 #include <algorithm>
