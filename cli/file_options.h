@@ -8,7 +8,7 @@
 namespace pictura {
 
 /// Validator that accepts names that end in `ending`, such as .png, or in `other`, if it is given, and names without
-/// ending, such as devices. So no file's ending promises another format.
+/// ending, such as devices. So no file gets the ending of another format.
 CLI::Validator file_ending(const std::string& ending, const std::string& other = "");
 
 /// Adds MAP, which may be a recorded scene; `more` names further kinds.

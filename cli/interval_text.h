@@ -7,7 +7,7 @@
 
 namespace pictura {
 
-/// "0.123 +- 0.045": the estimate and the half width of its interval; "-" for what there is not.
+/// "0.123 +- 0.045": the estimate and the half width of its interval; "-" for a missing estimate.
 std::string interval_text(const Estimate& estimate, int decimals = 3);
 
 }  // namespace pictura

@@ -29,7 +29,7 @@ class ProgressLine {
   /// Updates the line with the remaining time, when the fraction `done` of the work has been done since the line's
   /// creation.
   void update(const std::string& text, double done);
-  /// Prints the last text for good.
+  /// Prints the last text, which then remains.
   void finish();
 
  private:

@@ -34,8 +34,8 @@ struct RecordedTakeover {
   int step = 0, agent = 0, steps = 0;
 };
 
-/// Drives a scenario again, on the host, and records it. `counts_out` receives its counts. Floating point gives other
-/// bits in batches of other sizes and on devices, so a policy may drive differently than in its evaluation.
+/// Drives a scenario again, on the host, and records it. `counts_out` receives its counts. Floating-point results
+/// depend on the batch size and on the device, so a policy may drive differently than in its evaluation.
 Replay record_scenario(const EvaluateOptions& options, const RecordedScenario& scenario,
                        const RecordingOptions& recording, ScenarioCounts* counts_out);
 

@@ -25,17 +25,17 @@ struct SceneEvaluateOptions : DriverOptions {
   // Called for every scored scene; the protocol must satisfy check_rollouts().
   std::function<void(const SceneRollouts&)> on_rollouts;
   std::string
-      realism;  // one of realism_version_names(): rollouts are scored, of that protocol too; empty: they are not
+      realism;  // one of realism_version_names(): scores rollouts; empty: no scores
   std::function<void(double done_fraction, double eta_s)> on_progress;
 };
 
 struct SceneEvaluation {
   SceneResults results;
   std::vector<SceneRow> rows;  // by the densities of the protocol
-  int found = 0;               // scenes that there were to evaluate
-  bool interrupted = false;    // ^C came; what is finished is reported
-  double seconds = 0;          // with the loading of scenes
-  RealismReport realism;       // where it was asked for
+  int found = 0;               // number of scenes to evaluate
+  bool interrupted = false;    // by ^C; finished scenes are reported
+  double seconds = 0;          // including the loading of scenes
+  RealismReport realism;       // if it was requested
 
   /// Scenes, files and ends of files that are left out, with reasons.
   std::vector<std::string> faults() const;

@@ -24,9 +24,9 @@ struct DriverOptions : SessionOptions {
   // Name of a controller of make_controller(), for instance "lane", that drives instead of the checkpoint's policy. It
   // drives in the policy's world, or in the paper's world without a checkpoint.
   std::string controller;
-  // Makes the controller of that name where a program brings its own. It drives on the host and reads vectors. Where
-  // the options name cameras (rig, or width_px and height_px), it reads their images, too: drawn by the renderer, which
-  // holds the simulator's maps. Without cameras the renderer is null.
+  // Makes the controller of that name, if a program has its own controllers. The controller drives on the host and
+  // reads vectors. If the options name cameras (rig, or width_px and height_px), it also reads their images, drawn by
+  // the renderer, which holds the simulator's maps. Without cameras the renderer is null.
   std::function<std::unique_ptr<Controller>(const Simulator&, Renderer*)> make_own_controller;
   bool argmax = true;
   uint64_t seed = 1;

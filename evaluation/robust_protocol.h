@@ -1,5 +1,5 @@
 // Robust protocol: one table of how well a driver drives in generated towns, among other drivers, and with randomized
-// cameras. Everything but the driver is fixed, so that numbers of different drivers are comparable. Without torch
+// cameras. Everything except the driver is fixed, so that numbers of different drivers are comparable. Without torch
 // headers.
 #pragma once
 
@@ -34,13 +34,13 @@ const std::vector<RobustCondition>& robust_conditions();
 struct RobustRow {
   RobustCondition condition;
   DensityResult counts;    // no scenarios where the condition does not apply
-  std::string not_driven;  // why the condition does not apply to the driver; empty where it does
+  std::string not_driven;  // why the condition does not apply to the driver; empty if it applies
 };
 
 struct RobustReport {
   EvaluationSetting setting;  // setting of the first condition
   std::vector<RobustRow> rows;
-  bool interrupted = false;  // ^C came; finished conditions are reported
+  bool interrupted = false;  // by ^C; finished conditions are reported
   double seconds = 0;
   int64_t agent_steps = 0;
 
@@ -65,9 +65,10 @@ void visit_options(RobustOptions& options, Visitor&& v) {
   v.callback({"on_progress"}, options.on_progress);
 }
 
-/// Evaluates a driver in every condition that applies to it. Conditions of cameras apply to policies that see images,
-/// impaired drivers to drivers that read observations, "carla" where the map folder holds the eight towns. Throws
-/// UsageError for another seed, camera_severity, conditioning or lights than the protocol's; else as evaluate().
+/// Evaluates a driver in every condition that applies to it. The conditions "cameras" apply only to policies that see
+/// images, the condition "impaired" only to drivers that read observations, and "carla" only if the map folder holds
+/// the eight towns. Throws UsageError for another seed, camera_severity, conditioning or lights than the protocol's;
+/// otherwise throws as evaluate() does.
 RobustReport evaluate_robust(const RobustOptions& options);
 
 }  // namespace pictura

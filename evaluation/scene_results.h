@@ -46,7 +46,7 @@ struct SceneCounts {
 struct SceneResults {
   EvaluationSetting setting;  // its maps are the locations of the scenes
   SceneProtocol protocol;
-  std::vector<std::string> unread;  // files, and ends of files, that are no scenes, over all scenes, with reasons
+  std::vector<std::string> unread;  // files, and ends of files, that hold no readable scenes, with reasons
   int first_scene = 0, num_scenes = 0;
   int without_drivers = 0;          // scenes left out without a road user to drive, since all are parked or absent
   std::vector<std::string> faults;  // scenes left out because they cannot be read or simulated, with reasons

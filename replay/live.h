@@ -36,7 +36,7 @@ class LiveWorld final : public StepObserver {
   int64_t step() const { return step_; }
 
  private:
-  /// Reduces the recording to its newest frame, after which there were `num_episodes` episodes before it.
+  /// Reduces the recording to its newest frame. `num_episodes` is the number of episodes before that frame.
   void keep_newest(size_t num_episodes);
 
   Recorder recorder_;
