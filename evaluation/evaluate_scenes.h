@@ -24,8 +24,7 @@ struct SceneEvaluateOptions : DriverOptions {
   std::function<void(const SceneAgent&)> on_agent;
   // Called for every scored scene; the protocol must satisfy check_rollouts().
   std::function<void(const SceneRollouts&)> on_rollouts;
-  std::string
-      realism;  // one of realism_version_names(): scores rollouts; empty: no scores
+  std::string realism;  // one of realism_version_names(): scores rollouts; empty: no scores
   std::function<void(double done_fraction, double eta_s)> on_progress;
 };
 

@@ -34,7 +34,7 @@ struct SimulatorSetup : SimulatorParts {
   /// Allocates for this capacity, so that assigning another setup within it moves no array.
   void reserve(const SimulatorCapacity& capacity);
 
-  /// Returns a view of a world without state: its map, its range in the arrays and the keys of its random numbers.
+  /// Returns a world's view, without state: its map, its range in the arrays and the keys of its random numbers.
   WorldView view(int world, const MapView& map, const RuleOptions& its_options) const;
 
   RuleOptions options;

@@ -21,7 +21,7 @@ class RolloutObservations {
   /// Observations without images: arrays [num_steps + 1, slots, ...].
   explicit RolloutObservations(Observation arrays) : arrays_(std::move(arrays)) {}
 
-  /// Draws with another renderer from now on, whose rig has the same number of cameras. Kept images are lost.
+  /// From now on draws with another renderer. Its rig must have the same number of cameras. Kept images are lost.
   void set_renderer(Renderer* renderer);
 
   /// Records the simulator's present observations as those of `step`. slots: i64 [n], the slots whose images are kept.

@@ -1,5 +1,5 @@
-// Search for a way where a path cannot be followed without leaving the road. The search over the agent's own motions
-// swings out before tight curves and keeps clear of kerbs.
+// Search for a drivable way at places where the agent cannot follow its path without leaving the road. The search over
+// the agent's own motions swings out before tight curves and keeps clear of kerbs.
 #pragma once
 
 #include <cstddef>

@@ -21,8 +21,8 @@ PICTURA_HD inline void clear_result(const StepArrays& results, int slot) {
   results.sums[slot] = {};
 }
 
-/// Whether a command is valid. Any command to an agent that takes no actions is, because it is ignored; commands to
-/// follow a record need a record.
+/// Whether a command is valid. Commands to an agent that takes no actions are ignored, so any such command is valid.
+/// Commands to follow a record need a record.
 template <typename CommandType>
 PICTURA_HD bool accepts(const WorldView& world, int agent, const CommandType& command) {
   if (!takes_actions(world, agent)) return true;

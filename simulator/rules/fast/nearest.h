@@ -16,7 +16,7 @@ class NearestOfOneThread {
     keys_.insert(is_one ? key_of(distance2, item) : Keys::kNone);
     count_ += is_one;
   }
-  /// Offers all items except `except` whose places are less than the root of below2 from a point.
+  /// Offers the items whose squared distance from a point is below below2, except item `except`.
   PICTURA_HD void offer_all(const Vec2* places, const int32_t* items, int num_items, int32_t except, Vec2 from,
                             float below2) {
     // Near items are gathered first, because whether an item is near is as hard to predict as its place in the order.
