@@ -58,7 +58,7 @@ AgentState counted_state(Simulator& simulator) {
   return host;
 }
 
-// Adds a life that has ended, or that the last step cuts off.
+// Adds a life of an agent that has ended, or that the last step cuts off.
 void add_life(const AgentStateView& state, int64_t slot, ScenarioCounts* counts) {
   const AgentStatus status = state.status[slot];
   if (state.agent_class[slot] != AgentClass::vehicle) return;
@@ -91,7 +91,8 @@ void add_slot(const AgentStateView& state, int64_t slot, ScenarioCounts* counts)
   if (has_body(status)) add_life(state, slot, counts);
 }
 
-// Gravity of the worst infraction of a vehicle's episode; 0: no infraction, or no vehicle.
+// Severity of the worst infraction of a vehicle's episode; 0 without an infraction, and for agents that are no
+// vehicles.
 int severity(const AgentStateView& state, int slot) {
   if (state.agent_class[slot] != AgentClass::vehicle) return 0;
   const uint8_t events = state.episode_events[slot];

@@ -37,7 +37,7 @@ class EvaluationObserver : public StepObserver {
 struct EvaluateOptions : DriverOptions {
   std::vector<std::string> maps;  // as load_map() takes them; the paper's eight towns
   std::vector<Density> densities{Density::light, Density::medium, Density::dense};
-  int agents_per_world = 0;         // > 0: replaces the densities' numbers
+  int agents_per_world = 0;         // > 0: replaces the densities' numbers of agents
   std::vector<std::string> others;  // other drivers, as other_drivers() reads them; see evaluation/mixed_traffic.h
   int first_scenario = 0, scenarios = 200, steps = 3000;
   std::function<void(double done_fraction, double eta_s)> on_progress;
@@ -61,13 +61,13 @@ void visit_options(EvaluateOptions& options, Visitor&& v) {
 }
 
 struct EvaluateReport {
-  // Counts of the completed densities, in the order of options.densities; for each density first those of the evaluated
-  // driver, then those of the others.
+  // Counts of the completed densities, in the order of options.densities. For each density the counts of the evaluated
+  // driver come first, then those of the other drivers.
   EvaluationResults results;
   std::vector<EvaluateRow> rows;  // row of each result
   bool interrupted = false;  // an interrupt (common/support/interrupt.h) came before the last density was completed
-  // Wall time without loading maps and creating the renderer, and agent-steps of active agents of all classes; 0 for
-  // merged parts.
+  // seconds: wall time without loading maps and creating the renderer. agent_steps: steps of active agents of all
+  // classes. Both are 0 for merged parts.
   double seconds = 0;
   int64_t agent_steps = 0;
 };
@@ -77,7 +77,7 @@ struct EvaluationWorlds {
   CompiledMaps maps;             // EvaluateOptions::maps, compiled with the map options of the session's world
   Renderer* renderer = nullptr;  // renderer of the session's images, with the maps as 0, 1, ...; null without images
   std::unique_ptr<Simulator> simulator;  // created by the first evaluation
-  std::string maps_hash;                 // as EvaluationSetting::maps_hash; computed by the first evaluation
+  std::string maps_hash;                 // value of EvaluationSetting::maps_hash; computed by the first evaluation
 };
 
 /// Compiles the options' maps for a world of that configuration.

@@ -30,7 +30,7 @@ namespace pictura {
 
 namespace {
 
-// Number of worlds simulated together: on a device enough to saturate it.
+// Number of worlds simulated together; on a device, enough worlds to saturate it.
 int scenes_at_once(const SceneEvaluateOptions& options, Device device) {
   if (options.scenes_at_once > 0) return options.scenes_at_once;
   return device.is_host() ? 16 : 256;
@@ -84,7 +84,8 @@ Array array_of(const DeviceCopy<T>& copy, const Dims& shape, Device device) {
   return Array(copy.span().data(), shape, device);
 }
 
-/// State of a box of the map in the coordinates of the scene's file; its centre is rise_m above the box's.
+/// Converts a box to a state in the coordinates of the scene's file. The state's centre is rise_m above the box's
+/// centre.
 SimulatedState simulated_state(const RoadMap& map, const AgentBox& box, float rise_m) {
   const std::array<double, 3> center_m = file_position_m(map.origin_m, box.center_m + Vec3{0, 0, rise_m});
   return {static_cast<float>(center_m[0]), static_cast<float>(center_m[1]), static_cast<float>(center_m[2]),
@@ -128,8 +129,8 @@ class BatchDrive {
       return map.scenario->valid_of(track_of_slot_[slot])[map.start_step] != 0;
     });
     poses_.resize(kept_slots_.size() * static_cast<size_t>(protocol_.steps));
-    // Boxes stand on the road of the map, recorded boxes near it. A constant offset per agent keeps boxes from rising
-    // or falling at the start.
+    // Simulated boxes stand exactly on the road, whereas recorded boxes are slightly above or below it. A constant
+    // offset per agent prevents a jump in height at the start.
     const std::vector<AgentBox> boxes = host_copy(simulator_.scene().agents, device());
     for (const int32_t kept : kept_slots_) {
       const auto slot = static_cast<size_t>(kept);
@@ -358,12 +359,12 @@ class BatchDrive {
   std::vector<Displacement> displacements_;
   std::vector<int32_t> driven_steps_;
   std::vector<int32_t> kept_slots_;    // slots whose poses are recorded
-  std::vector<float> rises_m_;         // [kept_slots] height of the recorded box's centre above the box's
+  std::vector<float> rises_m_;         // [kept_slots] height of the recorded box's centre above the simulated box's
   std::vector<SimulatedState> poses_;  // [kept_slots * steps]
 };
 
-/// Worlds of one rollout of a batch whose numbers count from first_scene on. All rollouts of all scenes have different
-/// world numbers, which key the draws.
+/// Returns the worlds of one rollout of a batch; scene numbers count from first_scene on. All rollouts of all scenes
+/// have different world numbers, since the random draws are keyed by world number.
 std::vector<WorldSpec> worlds_of(const LoadedScenes& batch, int first_scene, int rollout, int num_rollouts) {
   std::vector<WorldSpec> worlds;
   for (size_t i = 0; i < batch.maps.size(); ++i) {
@@ -390,8 +391,8 @@ std::string hash_of(const std::vector<SceneRef>& scenes, int num_threads) {
   return hash.hex();
 }
 
-/// Finds the scenes of the options, and the parts that are no scenes. Writes the hash of all scenes to `hash_out` if
-/// requested.
+/// Finds the scenes of the options, and the files without readable scenes. Writes the hash of all scenes to `hash_out`
+/// if requested.
 SceneIndex find_all(const SceneEvaluateOptions& options, std::string* hash_out) {
   if (options.scenes.empty()) fail_usage("evaluate: expected scenes, got none");
   SceneIndex all;
@@ -410,7 +411,7 @@ SceneIndex find_all(const SceneEvaluateOptions& options, std::string* hash_out) 
   return all;
 }
 
-/// Adds the agents of a batch's scene, [drives][scenes][driven], to the counts of each density.
+/// Adds the agents of one scene of a batch to the counts of each density. agents: [drives][scenes][driven].
 void count_agents(const std::vector<std::vector<std::vector<SceneAgent>>>& agents, size_t scene,
                   const SceneEvaluateOptions& options, SceneResults* results) {
   const auto num_rollouts = static_cast<size_t>(options.protocol.rollouts);

@@ -81,8 +81,8 @@ EvaluatedDriver controller_driver(const DriverOptions& options, int steps) {
   Config config = options.checkpoint.empty() ? Config() : read_stored_policy(options.checkpoint).config;
   config.policy.modality = rig ? Modality::perspective : Modality::vector;
   config = with_session_options(config, options);
-  config.policy.modality = is_own ? Modality::vector : Modality::perspective;  // other controllers read no vectors,
-  if (!rig) config.render.backend = "auto";                                    // and nothing is drawn
+  config.policy.modality = is_own ? Modality::vector : Modality::perspective;  // other controllers read no vectors;
+  if (!rig) config.render.backend = "auto";                                    // without cameras, nothing is drawn
   const std::string& name = options.controller;
   const bool is_on_host = is_own || drives_on_host(name);
   if (is_on_host && options.device == "auto" && options.simulator == "auto") config.run.device = "cpu";

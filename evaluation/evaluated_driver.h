@@ -24,9 +24,9 @@ struct DriverOptions : SessionOptions {
   // Name of a controller of make_controller(), for instance "lane", that drives instead of the checkpoint's policy. It
   // drives in the policy's world, or in the paper's world without a checkpoint.
   std::string controller;
-  // Makes the controller of that name, if a program has its own controllers. The controller drives on the host and
-  // reads vectors. If the options name cameras (rig, or width_px and height_px), it also reads their images, drawn by
-  // the renderer, which holds the simulator's maps. Without cameras the renderer is null.
+  // Creates the controller if a program supplies its own; `controller` is then its name. The controller drives on the
+  // host and reads vectors. If the options define cameras (rig, or width_px and height_px), it also reads their images,
+  // drawn by the renderer that it is given, which holds the simulator's maps. Without cameras the renderer is null.
   std::function<std::unique_ptr<Controller>(const Simulator&, Renderer*)> make_own_controller;
   bool argmax = true;
   uint64_t seed = 1;
@@ -55,13 +55,13 @@ std::unique_ptr<PolicyController> policy_controller(PolicySession& session, Rend
 
 /// Driver under evaluation. Its `drive` needs the session, renderer and options that it was created from.
 struct EvaluatedDriver {
-  SimulatorConfig world;      // the paper's evaluation: fixed conditioning and lights, no early end
+  SimulatorConfig world;      // world of the paper's evaluation: fixed conditioning and lights, no early end
   EvaluationSetting setting;  // the driver's part of the setting
   Device device;
   std::function<Driving(Simulator&)> drive;
 };
 
-/// A session's part of an evaluation's setting: policy, precision, device and images.
+/// Returns the part of an evaluation's setting that a session determines: policy, precision, device and images.
 EvaluationSetting setting_of(const PolicySession& session);
 
 /// Creates the driver of a session's policy, for episodes of `steps` steps.

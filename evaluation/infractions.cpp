@@ -20,10 +20,10 @@ namespace {
 
 constexpr float kLaneChange_s = 3, kMergeAhead_m = 30;
 constexpr float kCurveRadius_m = 50;       // maximum radius of a curve
-constexpr float kJunctionTurn_rad = 0.5f;  // a junction's lane that turns less is straight
+constexpr float kJunctionTurn_rad = 0.5f;  // a lane in a junction that turns less is straight
 constexpr float kJustRed_s = 1, kFarHead_m = 10;
 
-// Point on a lane's centre line nearest to a position.
+// Point on a lane's centre line that is nearest to a position.
 struct LanePlace {
   float s_m = 0;       // distance from the lane's start
   float radius_m = 0;  // radius of the line there, over 10 m to both sides
@@ -65,7 +65,7 @@ Contact contact_of(const AgentBox& own, const AgentBox& other) {
   constexpr float kCos45 = 0.70710678f;
   if (same <= -kCos45) return Contact::head_on;
   if (same < kCos45) return Contact::crossing;
-  // One vehicle is behind the other along its direction, up to an overlap by rounding.
+  // Whether one vehicle is behind the other along its direction; a small overlap from rounding is tolerated.
   constexpr float kTouching_m = 0.2f;
   const float along = std::fabs(dot((other.center_m - own.center_m).xy(), other_forward));
   const float reach = 0.5f * other.length_m + half_extent(footprint(own), other_forward);

@@ -14,8 +14,8 @@ namespace pictura {
 enum class CollisionPartner : uint8_t { none, vehicle, cyclist, pedestrian, parked_car };
 /// Motion of the partner at the start of the step; halted agents keep their pose until the episode ends.
 enum class PartnerMotion : uint8_t { none, moving, standing, halted };
-/// Geometry of a collision, by the angle between the headings (up to 45 degrees, from 135 degrees on, and between). For
-/// equal directions it depends on whether one vehicle was behind the other before contact.
+/// Geometry of a collision, by the angle between the two headings: head_on from 135 degrees on, crossing between 45 and
+/// 135 degrees. Up to 45 degrees it is rear_end if one vehicle was behind the other before contact, else side_swipe.
 enum class Contact : uint8_t { none, rear_end, side_swipe, crossing, head_on };
 /// Shape of the lane at the infraction.
 enum class RoadShape : uint8_t { no_lane, straight, curve, junction_straight, junction_left, junction_right };
@@ -26,8 +26,8 @@ const char* to_string(PartnerMotion motion);
 const char* to_string(Contact contact);
 const char* to_string(RoadShape shape);
 
-/// First and only infraction of one agent in an episode, since the agent halts. Values are those at the start of the
-/// step.
+/// First infraction of one agent in an episode; it is the only one, since the agent then halts. Values are those at the
+/// start of the step.
 struct Infraction {
   int agents_per_world = 0, scenario = 0;
   std::string map;
@@ -46,8 +46,8 @@ struct Infraction {
   int partner_agent = -1;  // agent in its scenario; parked cars are numbered after the agents
   float partner_speed_mps = 0;
   // Values of red lights:
-  float red_for_s = 0;            // how long the light has been red; infinite if it has always been
-  float stop_line_to_head_m = 0;  // distance on the ground
+  float red_for_s = 0;            // how long the light has been red; infinite: since the episode's start
+  float stop_line_to_head_m = 0;  // horizontal distance
 
   bool is(Event event) const { return (events & event) != 0; }
 };
@@ -64,7 +64,7 @@ class InfractionObserver final : public EvaluationObserver {
   void after_step(const StepResult& result) override;
   void end() override;
 
-  /// Infractions in completed worlds, in the order in which they happened.
+  /// Infractions in completed worlds, in the order in which the infractions happened.
   const std::vector<Infraction>& found() const { return found_; }
 
  private:
@@ -86,9 +86,9 @@ struct InfractionGroup {
   std::string how;
   int64_t count = 0;
 };
-/// Groups the paper's three infractions of vehicles by their circumstances, the most frequent group first: collisions
-/// by partner, its motion, contact, road shape, lane changes and merges; leaving the road by its shape; red lights by
-/// how long they were red and where the head stands.
+/// Groups the paper's three infractions of vehicles by their circumstances, the most frequent group first. Collisions
+/// are grouped by partner, partner's motion, contact, road shape, lane changes and merges; leaving the road by the
+/// road's shape; red lights by the time for which they had been red and the position of the head.
 std::vector<InfractionGroup> group_infractions(const std::vector<Infraction>& infractions);
 
 /// Writes all infractions, one row each. Throws Error naming the path.

@@ -77,7 +77,7 @@ std::vector<OtherDriver> other_drivers(const std::vector<std::string>& texts) {
   return others;
 }
 
-/// Policy with its session and renderer; neither for a controller or an impairment.
+/// A policy has a session and, for images, a renderer; a controller and an impairment have neither.
 struct MixedTraffic::Other {
   OtherDriver driver;
   std::unique_ptr<PolicySession> session;

@@ -18,7 +18,7 @@ std::vector<std::string> impairment_names();
 /// Driver besides the evaluated driver: a policy, a controller, or the evaluated policy itself while impaired.
 struct OtherDriver {
   std::string name;  // a saved policy's file, a name of town_controller_names(), or an impairment
-  double share = 0;  // share of vehicles; for an impairment, of all agents
+  double share = 0;  // share of vehicles; for an impairment, share of all agents
   Impairment impairment = Impairment::none;  // impairment of this name
 };
 constexpr size_t kMaxOtherDrivers = 8;
@@ -32,9 +32,9 @@ std::vector<OtherDriver> other_drivers(const std::vector<std::string>& texts);
 /// their order.
 class MixedTraffic {
  public:
-  /// Opens the others on `device`, with argmax and seed of the options. Renderers of policies with images hold the maps
-  /// under the handles 0, 1, ... Conditioning is the world's. Throws UsageError for impairments of an input that a
-  /// controller does not read.
+  /// Opens the other drivers on `device`, with argmax and seed of the options. Renderers of policies with images hold
+  /// the maps under the handles 0, 1, ... All drivers have the world's conditioning. Throws UsageError for an
+  /// impairment of observations if the evaluated driver is a controller that does not read them.
   MixedTraffic(const std::vector<OtherDriver>& others, const DriverOptions& options, Device device,
                const CompiledMaps& maps);
   ~MixedTraffic();
@@ -46,11 +46,13 @@ class MixedTraffic {
   std::string name(size_t driver) const;
   /// Entries of the others in an evaluation's setting: a policy's hash or a controller's name, and its share.
   std::vector<std::string> setting() const;
-  /// Returns the world with every array that a driver reads, and with impaired agents.
+  /// Returns the configuration of the world, extended by all arrays that one of the drivers reads, and by impaired
+  /// agents.
   SimulatorConfig adapted(SimulatorConfig world) const;
 
-  /// Driver of each slot, [slots], drawn from seed, global world and agent: first of impaired agents, of any class,
-  /// then of the other vehicles. Driver 0 drives all pedestrians and cyclists that are not impaired.
+  /// Returns the driver of each slot, [slots], drawn from seed, global world and agent. Impaired agents, of any class,
+  /// are drawn first; then the other vehicles are assigned. Driver 0 drives all pedestrians and cyclists that are not
+  /// impaired.
   std::vector<uint8_t> driver_of_slots(Simulator& simulator) const;
   /// Combines `own`, driver 0, with the others for a simulator at the start of its episodes. This object must outlive
   /// the result.

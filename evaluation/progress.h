@@ -13,8 +13,8 @@ class EvaluationClock {
   /// Creates a clock. on_progress(completed fraction, remaining seconds) may be empty.
   explicit EvaluationClock(const std::function<void(double, double)>& on_progress) : on_progress_(on_progress) {}
 
-  /// Reports progress from the second call on: the first step compiles and tunes, so its duration does not predict the
-  /// others.
+  /// Reports progress from the second call on. The first step includes compilation and tuning, so its duration does not
+  /// predict that of later steps.
   void update(double fraction) {
     if (!on_progress_) return;
     if (first_s_ < 0) {

@@ -20,7 +20,7 @@ namespace {
 constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
 constexpr double kRealismStep_s = 0.1, kRealismStepTolerance = 0.01;  // WOMD's steps are of 0.1000 to 0.1002 s
 
-constexpr double kFarthest_m = 1e6;  // from a scene's origin
+constexpr double kFarthest_m = 1e6;  // maximum distance of a state from the scene's origin
 
 // nuPlan's bounds of comfort.
 constexpr double kMinAcceleration_mps2 = -4.05, kMaxAcceleration_mps2 = 2.40, kMaxSideways_mps2 = 4.89;
@@ -38,7 +38,8 @@ constexpr std::array kFeatures{RealismFeature::speed,
                                RealismFeature::red_light};
 
 std::vector<RealismVersion> make_versions() {
-  // The challenge's published configurations; histograms add 0.1 to every bin, events 0.001, the default of the schema.
+  // Published configurations of the challenge. The smoothing of histograms is 0.1 per bin; that of events is 0.001, the
+  // default value of the schema.
   constexpr double kOfHistogram = 0.1, kOfEvent = 0.001;
   RealismVersion of_2024{"2024", {}};
   const auto set = [](RealismFeature feature, RealismTerm term, RealismVersion* version) {
@@ -61,7 +62,7 @@ std::vector<RealismVersion> make_versions() {
   return {of_2024, of_2025};
 }
 
-/// A sum and how many there are of it.
+/// Accumulator of a mean; ignores NaN.
 struct Mean {
   double sum = 0;
   int64_t count = 0;
@@ -85,7 +86,7 @@ double weighted_mean(const RealismVersion& version, const RealismLikelihoods& li
   return weights > 0 ? sum / weights : kNoValue;
 }
 
-/// Whether an event happens at a step that the recording has; NaN where it has none.
+/// Whether an event happens at a step with a recorded value (1 or 0); NaN if no step has one.
 double has_event(Span<const double> values, Span<const double> recorded) {
   double happens = kNoValue;
   for (size_t step = 0; step < values.size(); ++step) {
@@ -95,7 +96,8 @@ double has_event(Span<const double> values, Span<const double> recorded) {
   return happens;
 }
 
-/// Means over 0.7 s around each step, without which recorded places, of centimetres of noise, have no jerk to speak of.
+/// Returns means over the 0.7 s around each step. Recorded positions have centimetres of noise, which would dominate
+/// the jerk of unsmoothed values.
 std::vector<double> smoothed(Span<const double> values) {
   constexpr size_t kHalf = 3;
   std::vector<double> out(values.size(), kNoValue);
@@ -107,7 +109,8 @@ std::vector<double> smoothed(Span<const double> values) {
   return out;
 }
 
-/// Whether a vehicle's motion holds all bounds of comfort; NaN where it is not there for long enough.
+/// Whether a vehicle's motion stays within all bounds of comfort (1 or 0); NaN if the vehicle is present for too few
+/// steps.
 double is_comfortable(const RealismFeatures& features, size_t object) {
   const std::vector<double> speeds = smoothed(features.of(object, RealismFeature::speed)),
                             turn_rates = smoothed(features.of(object, RealismFeature::turn_rate)),
@@ -117,7 +120,7 @@ double is_comfortable(const RealismFeatures& features, size_t object) {
   double holds = kNoValue;
   for (size_t step = 0; step < features.num_steps(); ++step) {
     if (std::isnan(accelerations[step])) continue;
-    // What is NaN breaks no bound.
+    // A NaN breaks no bound, since comparisons with it are false.
     const bool breaks =
         accelerations[step] < kMinAcceleration_mps2 || accelerations[step] > kMaxAcceleration_mps2 ||
         std::abs(speeds[step] * turn_rates[step]) > kMaxSideways_mps2 || std::abs(turn_rates[step]) > kMaxTurnRate ||
@@ -253,7 +256,7 @@ std::vector<RealismPose> RealismScene::poses_of(const SceneRollouts& rollouts, s
       const RealismPose pose{static_cast<double>(state.x_m) - origin_m[0], static_cast<double>(state.y_m) - origin_m[1],
                              static_cast<double>(state.z_m) - origin_m[2], static_cast<double>(state.heading_rad),
                              true};
-      // False for NaN.
+      // A NaN makes both comparisons false.
       const bool is_near = std::abs(pose.x_m) + std::abs(pose.y_m) + std::abs(pose.z_m) <= kFarthest_m &&
                            std::abs(pose.heading_rad) <= kFarthest_m;
       PICTURA_CHECK(is_near,
@@ -274,7 +277,8 @@ RealismFeatures RealismScene::features(const SceneRollouts& rollouts, size_t rol
   return features_of(poses_of(rollouts, rollout));
 }
 
-/// The share of an object's recorded path up to the place on it that is nearest to `end`; NaN where it is short.
+/// Returns the share of an object's recorded path up to the point of the path that is nearest to `end`; NaN if the path
+/// is shorter than kMovingTrack_m.
 double RealismScene::progress_of(size_t object, const RealismPose& end) const {
   double passed_m = 0, length_m = 0, nearest_m2 = std::numeric_limits<double>::infinity();
   const RealismPose* last = nullptr;
@@ -311,7 +315,7 @@ SceneRealism RealismScene::score(const SceneRollouts& rollouts, const RealismVer
   for (size_t rollout = 0; rollout < rollouts.rollouts.size(); ++rollout) {
     const std::vector<RealismPose> poses = poses_of(rollouts, rollout);
     simulated.push_back(features_of(poses));
-    Mean displacement_m;  // over road users
+    Mean displacement_m;  // mean over road users
     for (size_t i = 0; i < scored_.size(); ++i) {
       Mean over_steps;
       for (size_t at = scored_[i] * num_poses() + kRealismHistory; at < (scored_[i] + 1) * num_poses(); ++at) {
@@ -405,14 +409,14 @@ RealismReport score_rollouts(const std::string& path, const std::vector<std::str
     SceneRealism realism;
   };
   std::map<std::string, int> uses;
-  // In turns, so that progress can be told between them.
+  // Scenes are scored in groups; progress is reported after each group.
   const auto turn = static_cast<size_t>(4 * resolve_num_threads(num_threads));
   for (size_t first = 0; first < all.size(); first += turn) {
     std::vector<Outcome> outcomes(std::min(turn, all.size() - first));
     parallel_for(num_threads, static_cast<int64_t>(outcomes.size()), [&](int64_t item) {
       const SceneRef& scene = all[first + static_cast<size_t>(item)];
       Outcome& outcome = outcomes[static_cast<size_t>(item)];
-      // Where the index knows the id, a scene without rollouts is not read.
+      // If the index knows the scene's id, a scene without rollouts need not be read.
       if (!scene.id.empty() && !file.has(scene.id)) return;
       try {
         auto scenario = std::make_shared<const Scenario>(load_scenario(scene));

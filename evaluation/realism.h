@@ -1,6 +1,6 @@
-// The realism score: how likely recorded road users are under what simulated rollouts do, and other measures of
-// rollouts: displacement, events, time to collision, comfort and progress. docs/explanation/realism.md has the
-// definitions and their sources. Without torch headers.
+// The realism score, which is the likelihood of recorded motion under the distribution of simulated rollouts, and other
+// measures of rollouts: displacement, events, time to collision, comfort and progress. docs/explanation/realism.md has
+// the definitions and their sources. Has no torch headers.
 #pragma once
 
 #include <array>
@@ -18,68 +18,70 @@
 
 namespace pictura {
 
-/// How one feature is scored.
+/// Scoring rule of one feature.
 struct RealismTerm {
   double weight = 0;         // the weights of all terms sum to 1
-  double low = 0, high = 0;  // values are cut off at these
-  int bins = 0;              // 0: the feature is an event, once a rollout or never
+  double low = 0, high = 0;  // values are clamped to this range
+  int bins = 0;              // histogram bins; 0: the feature is an event, which a rollout has or lacks
   double smoothing = 0;      // added to the count of every bin
 };
 
-/// The weights and bins of one year's challenge.
+/// Weights and bins of the challenge of one year.
 struct RealismVersion {
   std::string name;
   std::array<RealismTerm, kNumRealismFeatures> terms;  // by RealismFeature
 };
 const std::vector<RealismVersion>& realism_versions();
 std::vector<std::string> realism_version_names();
-/// Throws UsageError listing the names.
+/// Returns the version of this name. Throws UsageError listing the names.
 const RealismVersion& realism_version(const std::string& name);
 
-/// The steps of the recording that precede the rollouts, and theirs.
+/// Last recorded step before the rollouts, and number of steps of a rollout.
 constexpr int32_t kRealismStart = 10, kRealismSteps = 80;
 
 using RealismLikelihoods = std::array<double, kNumRealismFeatures>;
 
-/// What rollouts of one scene get. NaN where the scene has nothing to score.
+/// Results of the rollouts of one scene. A value is NaN if the scene has nothing to compute it from.
 struct SceneRealism {
   std::string scenario_id;
-  int rollouts = 0, scored = 0;  // scored road users
-  // In (0, 1]. pooled: exp of the mean log-likelihood over all road users and steps; by_object: the mean over road
-  // users of exp of the mean over steps.
+  int rollouts = 0, scored = 0;  // scored: number of scored road users
+  // Likelihoods in (0, 1]. pooled: exp of the mean log-likelihood over all road users and steps. by_object: mean over
+  // road users of exp of the mean log-likelihood over the steps of one.
   RealismLikelihoods pooled, by_object;
-  double score = 0, score_by_object = 0;  // weighted means of these, over the features that the scene has
-  double ade_m = 0, min_ade_m = 0;        // mean over rollouts, and least of one rollout, of means over road users
-  // Shares of scored road users with such an event in a rollout, and in the recording.
+  double score = 0, score_by_object = 0;  // weighted means of pooled and of by_object over features that are not NaN
+  double ade_m = 0, min_ade_m = 0;        // mean and minimum over rollouts of the mean over road users
+  // Shares of scored road users with the event: in rollouts, and in the recording.
   double collision_rate = 0, off_road_rate = 0, red_light_rate = 0;
   double recorded_collision_rate = 0, recorded_off_road_rate = 0, recorded_red_light_rate = 0;
-  // Means over scored vehicles: share of steps with a time to collision below kShortTimeToCollision_s, share of
-  // vehicles within all bounds of comfort, and share of the recorded path that is passed.
+  // Shares over the scored vehicles of all rollouts, or of the recording: steps with a time to collision below
+  // kShortTimeToCollision_s, and vehicles within all bounds of comfort. progress: mean share of the recorded path up to
+  // its point nearest to the vehicle's final position.
   double short_time_to_collision = 0, recorded_short_time_to_collision = 0;
   double comfort = 0, recorded_comfort = 0;
   double progress = 0;
 };
 constexpr double kShortTimeToCollision_s = 0.95;
 
-/// A scene as the score asks for it.
+/// A recorded scene, prepared for scoring.
 class RealismScene {
  public:
-  /// Throws Error naming the scene where it has no step after kRealismStart, steps other than 0.1 s, or no road user to
-  /// score. Scored are the self-driving car and the tracks to predict, as far as they are there at kRealismStart;
-  /// where the scene names no tracks to predict, all that are there.
+  /// Throws Error naming the scene if it has no step after kRealismStart, a time step other than 0.1 s, or no road user
+  /// to score. The scored road users are the self-driving car and the tracks to predict, if they are present at
+  /// kRealismStart. If the scene lists no tracks to predict, all present road users are scored.
   explicit RealismScene(std::shared_ptr<const Scenario> scenario);
 
   const Scenario& scenario() const { return *scenario_; }
-  /// The ids of the tracks that are there at kRealismStart, all of which rollouts have, and of those that are scored.
+  /// track_ids() returns the ids of the tracks that are present at kRealismStart; every rollout must contain all of
+  /// them. scored_ids() returns the ids of the scored ones among them.
   std::vector<int64_t> track_ids() const;
   std::vector<int64_t> scored_ids() const;
 
   const RealismFeatures& recorded_features() const { return recorded_features_; }
-  /// One rollout's. Throws Error naming the track that is missing, unknown, or twice there, or the state that is not
-  /// finite.
+  /// Returns the features of one rollout. Throws Error naming a track that is missing, unknown or duplicate, or a state
+  /// that is not finite or is too far from the scene.
   RealismFeatures features(const SceneRollouts& rollouts, size_t rollout) const;
 
-  /// Throws as features() does, and where there is no rollout.
+  /// Returns the results of all rollouts. Throws Error as features() does, and if there are no rollouts.
   SceneRealism score(const SceneRollouts& rollouts, const RealismVersion& version) const;
 
  private:
@@ -98,31 +100,34 @@ class RealismScene {
   RealismFeatures recorded_features_;
 };
 
-/// The log-likelihoods of recorded values of one road user under the simulated ones, [steps]; NaN where the recorded
-/// value is NaN. Simulated values that are NaN are left out; where none is left, every value is NaN.
+/// Returns the log-likelihoods [steps] of one road user's recorded values under the histogram of the simulated values;
+/// NaN where the recorded value is NaN. Simulated NaNs are ignored; if all simulated values are NaN, so are all
+/// results.
 std::vector<double> log_likelihoods(const RealismTerm& term, Span<const double> recorded, Span<const double> simulated);
-/// The log-likelihood of a recorded event, or of its absence, if `count` of `rollouts` have the event.
+/// Returns the log-likelihood of a recorded event, or of its absence, if `count` of `rollouts` have the event.
 double event_log_likelihood(const RealismTerm& term, bool recorded, int count, int rollouts);
 
-/// The scores of many scenes.
+/// Scores of many scenes.
 struct RealismReport {
   std::string version;
   std::vector<SceneRealism> scenes;
-  std::vector<std::string> faults;  // scenes that cannot be read or scored, and why
-  int without_rollouts = 0;         // scenes that the file of rollouts does not have
-  std::vector<std::string> unused;  // scenario ids of rollouts without a scene
+  std::vector<std::string> faults;  // scenes that cannot be read or scored, with reasons
+  int without_rollouts = 0;         // number of scenes that are missing in the file of rollouts
+  std::vector<std::string> unused;  // scenario ids in the file of rollouts that belong to no scene
 };
 
-/// Scores the rollouts of a file by the scenes of that name, as find_scenes() takes them. Throws Error where the file
-/// cannot be read or not one scene is scored. on_progress(share done) is called by the calling thread.
+/// Scores the rollouts in the file `path`. `scenes`: names of the recorded scenes, as find_scenes() takes them. Throws
+/// Error if the file cannot be read or no scene is scored. on_progress(completed fraction) is called by the calling
+/// thread.
 RealismReport score_rollouts(const std::string& path, const std::vector<std::string>& scenes,
                              const RealismVersion& version, int num_threads,
                              const std::function<void(double)>& on_progress = {});
 
-/// Mean over the scenes that have it.
+/// Returns the mean over the scenes in which the member or the feature is not NaN.
 Estimate mean_of(const RealismReport& report, double SceneRealism::* member);
 Estimate mean_of(const RealismReport& report, RealismFeature feature);
-/// The weighted mean of a group's likelihoods, scene by scene: kinematic, interactive or map.
+/// A group of features: kinematic, interactive or map. The likelihood of a group is, in each scene, the weighted mean
+/// of the likelihoods of its features.
 struct RealismGroup {
   const char* name;
   std::vector<RealismFeature> features;
@@ -130,7 +135,7 @@ struct RealismGroup {
 const std::vector<RealismGroup>& realism_groups();
 Estimate mean_of(const RealismReport& report, const RealismGroup& group);
 
-/// As one object; estimates as two keys, see add_estimate().
+/// Returns the report as one JSON object; add_estimate() writes each estimate as two keys.
 Json realism_json(const RealismReport& report);
 
 }  // namespace pictura

@@ -23,7 +23,7 @@ Point operator-(Point a, Point b) { return {a.x - b.x, a.y - b.y}; }
 double dot(Point a, Point b) { return a.x * b.x + a.y * b.y; }
 double cross(Point a, Point b) { return a.x * b.y - a.y * b.x; }
 
-/// A box's axes and half sides, without its rounding.
+/// Axes and half sides of a box, reduced by the radius of its rounded corners.
 struct Core {
   Point center, forward, left;
   double half_length, half_width, radius;
@@ -52,7 +52,7 @@ struct Core {
     }
     return points;
   }
-  /// From a point outside.
+  /// Distance to a point outside.
   double distance_to(Point point) const {
     const Point away = point - center;
     return std::hypot(std::max(std::abs(dot(away, forward)) - half_length, 0.0),
@@ -79,7 +79,7 @@ RealismBox box_of(const RealismObject& object, const RealismPose& pose) {
   return {pose.x_m, pose.y_m, pose.heading_rad, object.length_m, object.width_m};
 }
 
-/// Speeds over three dimensions, by central differences.
+/// Returns speeds in three dimensions, by central differences.
 std::vector<double> speeds_mps(Span<const RealismPose> poses, double dt_s) {
   std::vector<double> speeds(poses.size(), kUndefined);
   for (size_t i = 1; i + 1 < poses.size(); ++i) {
@@ -108,7 +108,7 @@ const char* to_string(RealismFeature feature) {
 
 double rounded_box_distance_m(const RealismBox& box_a, const RealismBox& box_b) {
   const Core a(box_a), b(box_b);
-  // Boxes are apart along one of their axes, or overlap along all: by the separating axis theorem.
+  // Separating axis theorem: two boxes are either apart along one of their axes, or they overlap.
   double gap = -kFar;
   for (const Point axis : {a.forward, a.left, b.forward, b.left}) {
     gap = std::max(gap, std::abs(dot(b.center - a.center, axis)) - a.reach_along(axis) - b.reach_along(axis));
@@ -150,7 +150,8 @@ double RealismRoad::edge_distance_m(double x_m, double y_m, double z_m) const {
   bool is_on_road = edge.has_on_road_side(place_m);
   const int32_t neighbor = t <= 0 ? edge.before : t >= 1 ? edge.next : -1;
   if (neighbor >= 0) {
-    // At a corner the road is where both edges have it, or either, as it turns to the road's side or away from it.
+    // At a corner two edges meet. If they turn away from the road, a point on the road side of either edge is on the
+    // road. If they turn towards the road, the point must be on the road side of both edges.
     const PlaneEdge other(sides_.edges[static_cast<size_t>(neighbor)]);
     const double turn = t <= 0 ? cross(other.way, edge.way) : cross(edge.way, other.way);
     if (other.has_on_road_side(place_m) != is_on_road) is_on_road = turn > 0;
@@ -190,7 +191,7 @@ bool RealismRoad::runs_red_light(const RealismObject& object, const RealismPose&
     if (std::abs(foot_m - static_cast<double>(light.stop_a_m.z)) > kLineHeight_m) continue;
     const Point a{static_cast<double>(light.stop_a_m.x), static_cast<double>(light.stop_a_m.y)};
     const Point line = Point{static_cast<double>(light.stop_b_m.x), static_cast<double>(light.stop_b_m.y)} - a;
-    // a is the left end: traffic comes from where this is negative.
+    // `a` is the left end of the line, so the cross product is negative on the side from which traffic comes.
     const double before = cross(line, start - a), after = before + cross(line, way);
     if (!(before < 0 && after >= 0)) continue;
     const double along =

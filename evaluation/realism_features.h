@@ -1,6 +1,6 @@
-// What the realism score compares between recorded and simulated road users: motion, nearness, time to collision, road
-// edges and red lights, step by step. docs/explanation/realism.md has the definitions and their sources. Without torch
-// headers.
+// Features of recorded and simulated road users that the realism score compares at each step: motion, distances, time
+// to collision, road edges and red lights. docs/explanation/realism.md has the definitions and their sources. Has no
+// torch headers.
 #pragma once
 
 #include <cstdint>
@@ -14,21 +14,21 @@ namespace pictura {
 
 enum class RealismFeature : uint8_t {
   speed,              // m/s, in three dimensions
-  acceleration,       // m/s^2, of the speed
+  acceleration,       // m/s^2, derivative of the speed
   turn_rate,          // rad/s
   turn_acceleration,  // rad/s^2
   nearest_object,     // m, to the nearest other road user; negative: overlap
   collision,          // 0 or 1
-  time_to_collision,  // s, of vehicles, behind what they follow
-  road_edge,          // m, of the outermost corner; positive: off the road
+  time_to_collision,  // s, to the road user that a vehicle follows; vehicles only
+  road_edge,          // m, from the box's outermost corner; positive: off the road
   off_road,           // 0 or 1
-  red_light,          // 0 or 1, of vehicles
+  red_light,          // 0 or 1; vehicles only
 };
 constexpr size_t kNumRealismFeatures = 10;
-/// "linear_speed", "linear_acceleration", "angular_speed", ...: the names in reports.
+/// Name in reports: "linear_speed", "linear_acceleration", "angular_speed", ...
 const char* to_string(RealismFeature feature);
 
-/// A box's centre, in metres of the map.
+/// Centre and heading of a box, in map coordinates.
 struct RealismPose {
   double x_m = 0, y_m = 0, z_m = 0, heading_rad = 0;
   bool is_valid = false;
@@ -44,40 +44,42 @@ struct RealismBox {
   double x_m = 0, y_m = 0, heading_rad = 0, length_m = 0, width_m = 0;
 };
 
-/// Metres between two boxes whose corners are rounded by kCornerRounding of half of the shorter side; negative: how far
-/// one must move at least until they only touch.
+/// Returns the distance in metres between two boxes whose corners have a radius of kCornerRounding times half the
+/// shorter side. If the boxes overlap, returns the negative of the smallest shift that separates them.
 double rounded_box_distance_m(const RealismBox& a, const RealismBox& b);
 constexpr double kCornerRounding = 0.7;
 
-/// Seconds until `follower` reaches `leader` at constant speeds, where it follows it: the leader's box is ahead in the
-/// follower's frame and overlaps it laterally, and their headings differ by at most 75 degrees, by at most 10 where the
-/// overlap is below 0.5 m. gap_m_out receives the distance along the follower's heading, infinity where it follows
-/// nothing. At most kMaxTimeToCollision_s, also where the gap does not close or a speed is NaN.
+/// Returns the seconds until `follower` reaches `leader` at constant speeds. The follower follows the leader if the
+/// leader's box is ahead in the follower's frame and overlaps the follower's laterally, and if the headings differ by
+/// at most 75 degrees (10 degrees if the overlap is below 0.5 m). gap_m_out receives the distance along the follower's
+/// heading; infinity if it does not follow the leader. The result is at most kMaxTimeToCollision_s; it has this value
+/// also if the follower does not follow the leader, the gap does not close, or a speed is NaN.
 double time_to_collision_s(const RealismBox& follower, double follower_mps, const RealismBox& leader, double leader_mps,
                            double* gap_m_out);
 constexpr double kMaxTimeToCollision_s = 5.0;
 
-/// The map of a scene, and its lights, as features ask for them.
+/// Road edges and traffic lights of a scene, prepared for the computation of features.
 class RealismRoad {
  public:
   explicit RealismRoad(const Scenario& scenario) : sides_(side_edges_of(scenario.map)), scenario_(scenario) {}
 
-  /// Horizontal metres from a place to the nearest edge of its level; positive: off the road. Within
-  /// +-kRoadSideReach_m.
+  /// Returns the horizontal distance in metres from a place to the nearest road edge on the same level; positive: off
+  /// the road. If no edge is within kRoadSideReach_m, returns -kRoadSideReach_m.
   double edge_distance_m(double x_m, double y_m, double z_m) const;
-  /// The distance of the outermost of a box's four lower corners.
+  /// Returns the maximum of this distance over the four lower corners of a box.
   double edge_distance_m(const RealismObject& object, const RealismPose& pose) const;
-  /// Whether the middle of a box's front crosses, from one pose to the next, stop lines in their direction of travel
-  /// whose lights are all red at that step of the recording. Heights within 2 m of the line, headings within 45
-  /// degrees.
+  /// Whether the middle of a box's front crosses a stop line between two poses, in the line's direction of travel,
+  /// while its light is red at that step of the recording. If it crosses several lines at once, the lights of all must
+  /// be red. A line is ignored if the box is over 2 m above or below it, or heads over 45 degrees away from its
+  /// direction.
   bool runs_red_light(const RealismObject& object, const RealismPose& from, const RealismPose& to, int32_t step) const;
 
  private:
   SideEdges sides_;
-  const Scenario& scenario_;  // must live as long
+  const Scenario& scenario_;  // must outlive this object
 };
 
-/// Features of some objects of a scene: [objects][kNumRealismFeatures][steps]; NaN where a step has none.
+/// Features of some objects of a scene: [objects][kNumRealismFeatures][steps]. NaN where a feature is undefined.
 class RealismFeatures {
  public:
   RealismFeatures() = default;
@@ -99,14 +101,15 @@ class RealismFeatures {
   std::vector<double> values_;
 };
 
-/// Steps before the first one with features, from which its speeds and accelerations come.
+/// Number of poses before the first step with features. The speed and acceleration at that step are computed from them.
 constexpr size_t kRealismHistory = 2;
 
-/// Derivatives by central differences over two steps of dt_s; [steps] NaN where one of the two is not there.
+/// Returns derivatives [steps] by central differences over two steps of dt_s; NaN where a neighbouring value is
+/// missing.
 std::vector<double> central_differences(Span<const double> values, double dt_s, bool are_angles = false);
 
-/// The features of objects[scored[i]] among all objects. poses: [objects][kRealismHistory + steps], of which the pose
-/// kRealismHistory is at the step first_step of the recording.
+/// Returns the features of objects[scored[i]] for each i, among all objects. poses: [objects][kRealismHistory + steps];
+/// index kRealismHistory of the second axis is step first_step of the recording.
 RealismFeatures realism_features(const std::vector<RealismObject>& objects, const std::vector<size_t>& scored,
                                  Span<const RealismPose> poses, const RealismRoad& road, int32_t first_step,
                                  double dt_s);

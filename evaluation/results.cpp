@@ -16,9 +16,9 @@ namespace {
 
 constexpr const char* kResultsFormat = "pictura evaluation 2";
 constexpr const char* kResultsFormatAtFaultAlone = "pictura evaluation 1";
-// Format 1 lacks these counts, and its "infractions" are at_fault_infraction.
+// Counts that format 1 lacks; its "infractions" are at_fault_infraction.
 constexpr const char* kCountsOfFormat2[] = {"collision", "wall_contact", "any_infraction", "at_fault_infraction"};
-// Files of format 2 may lack these.
+// Counts that files of format 2 may lack.
 constexpr const char* kLaterCounts[] = {"asked",        "spawned",         "entered",   "left",
                                         "driven_steps", "reversing_steps", "red_waits", "red_wait_moved_m",
                                         "stuck_at_end", "never_moved"};

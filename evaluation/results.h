@@ -15,34 +15,35 @@
 namespace pictura {
 
 // List of counts: X(type, name in files).
-#define PICTURA_SCENARIO_COUNTS(X)                                                                                  \
-  X(int64_t, vehicles)                                                                                              \
-  X(int64_t, collision) /* at fault or not */                                                                       \
-  X(int64_t, at_fault)  /* collisions at fault only */                                                              \
-  X(int64_t, off_road)                                                                                              \
-  X(int64_t, red_light)                                                                                             \
-  X(int64_t, wall_contact)   /* in neither kind of infraction below */                                              \
-  X(int64_t, any_infraction) /* a collision, off-road or a red light: the paper's (appendix, metric definitions) */ \
-  X(int64_t, at_fault_infraction) /* a collision at fault, off-road or a red light */                               \
-  X(int64_t, active_at_end)       /* vehicles that have not halted by the last step, or before they left */         \
-  X(int64_t, never_moved)         /* vehicles that stayed at rest (kRest_mps); 0 in files of earlier versions */    \
-  X(int64_t, goals)                                                                                                 \
-  X(int64_t, waypoints)                                                                                             \
-  X(double, distance_m)                                                                                             \
-  X(double, returns)                                                                                                \
-  X(int64_t, asked) /* these four: agents of all classes, see SpawnReport; 0 in files of earlier versions */        \
-  X(int64_t, spawned)                                                                                               \
-  X(int64_t, entered)                                                                                               \
+#define PICTURA_SCENARIO_COUNTS(X)                                                                                 \
+  X(int64_t, vehicles)                                                                                             \
+  X(int64_t, collision) /* at fault or not */                                                                      \
+  X(int64_t, at_fault)  /* collisions at fault only */                                                             \
+  X(int64_t, off_road)                                                                                             \
+  X(int64_t, red_light)                                                                                            \
+  X(int64_t, wall_contact)        /* counted neither in any_infraction nor in at_fault_infraction */               \
+  X(int64_t, any_infraction)      /* a collision, off-road or a red light (paper, appendix, metric definitions) */ \
+  X(int64_t, at_fault_infraction) /* a collision at fault, off-road or a red light */                              \
+  X(int64_t, active_at_end)       /* vehicles that had not halted by the last step, or when they left */           \
+  X(int64_t, never_moved)         /* vehicles that stayed at rest (kRest_mps); 0 in files of earlier versions */   \
+  X(int64_t, goals)                                                                                                \
+  X(int64_t, waypoints)                                                                                            \
+  X(double, distance_m)                                                                                            \
+  X(double, returns)                                                                                               \
+  X(int64_t, asked) /* from here on: agents of all classes, see SpawnReport; 0 in files of earlier versions */     \
+  X(int64_t, spawned)                                                                                              \
+  X(int64_t, entered)                                                                                              \
   X(int64_t, left)
 
-// List of standing counts: X(type, name in files). A wait at a red light lasts from a step in which the bumper is at
-// most 5 m before the line, at rest (kRest_mps), until the light changes or no longer applies to the vehicle.
-#define PICTURA_STANDING_COUNTS(X)                                               \
-  X(int64_t, driven_steps)    /* of active vehicles */                           \
-  X(int64_t, reversing_steps) /* of these: backwards, not at rest (kRest_mps) */ \
-  X(int64_t, red_waits)                                                          \
-  X(double, red_wait_moved_m) /* forwards or backwards */                        \
-  X(int64_t, stuck_at_end)    /* active in the last step, with less than 5 m of progress in 60 s */
+// List of standing counts: X(type, name in files). A wait at a red light begins at a step in which the vehicle is at
+// rest (kRest_mps) with its bumper at most 5 m before the line. It ends when the light changes or no longer applies to
+// the vehicle.
+#define PICTURA_STANDING_COUNTS(X)                                                                \
+  X(int64_t, driven_steps)    /* steps of active vehicles */                                      \
+  X(int64_t, reversing_steps) /* of the driven steps: those backwards, not at rest (kRest_mps) */ \
+  X(int64_t, red_waits)                                                                           \
+  X(double, red_wait_moved_m) /* distance moved during waits, forwards or backwards */            \
+  X(int64_t, stuck_at_end)    /* vehicles that are active in the last step, with less than 5 m of progress in 60 s */
 
 /// Counts of how the vehicles of one scenario stand and reverse. 0 in files of earlier versions.
 struct StandingCounts {
@@ -51,8 +52,8 @@ struct StandingCounts {
 #undef X
 };
 
-/// Counts over the vehicles of one scenario. On roads that end they are counted over lives, each of which counts as a
-/// vehicle. An event counts once per vehicle, however often it happens.
+/// Counts over the vehicles of one scenario. On roads that end, an agent's slot is reused after the agent leaves; each
+/// of these lives counts as a vehicle. An event counts once per vehicle, however often it happens.
 struct ScenarioCounts {
 #define X(type, name) type name = 0;
   PICTURA_SCENARIO_COUNTS(X)
@@ -79,25 +80,25 @@ struct DensityResult {
   std::vector<ScenarioCounts> scenarios;
   std::string driver;  // driver of the vehicles: one of EvaluateOptions::others; empty: the evaluated driver
   // Agent with the most severe infraction of each scenario: a collision at fault, else off-road, else a red light;
-  // agent 0 if there is none. Not in files.
+  // agent 0 if there is no infraction. This field is not stored in files.
   std::vector<int> worst_agents;
 };
 
-/// Setting that determines an evaluation's numbers. Parts can be merged if all of it is equal.
+/// Setting that determines an evaluation's numbers. Parts can be merged if their settings are equal.
 struct EvaluationSetting {
-  std::string policy_hash;  // hash of the weights; a controller's name
+  std::string policy_hash;  // hash of the policy's weights, or the controller's name
   std::vector<std::string> maps;
-  // Hashes of the maps' roads (of the bytes of recorded scenes' files), and of the poses and lenses of all cameras.
-  // Empty in files of earlier versions, and if they were not requested.
+  // maps_hash: hash of the maps' roads, or of the bytes of recorded scenes' files. cameras_hash: hash of the poses and
+  // lenses of all cameras. Empty in files of earlier versions, and if not requested.
   std::string maps_hash, cameras_hash;
   std::map<std::string, std::string> config;  // see keys_of_evaluation(); empty in files of earlier versions
   int steps = 0;
   bool argmax = true;
   uint64_t seed = 0;
-  std::string precision, device;                        // precision of the network; "cpu" or "cuda"
-  std::string renderer, samples;                        // empty for policies without images
-  std::vector<std::string> image_sizes;                 // "96x54", one per camera
-  std::string light_heads = "as_mapped";                // see map/map_geometry.h; default of files without it
+  std::string precision, device;          // precision of the network; "cpu" or "cuda"
+  std::string renderer, samples;          // empty for policies without images
+  std::vector<std::string> image_sizes;   // "96x54", one per camera
+  std::string light_heads = "as_mapped";  // see map/map_geometry.h; this default holds for files without the key
   std::array<double, kNumConditioning> conditioning{};  // same for all agents, in the order of simulator/conditioning.h
   LightCycles light_cycles = LightCycles::phases;
   std::vector<std::string> others;  // other drivers, see MixedTraffic::setting()
@@ -113,18 +114,19 @@ struct EvaluationResults {
   std::vector<DensityResult> densities;
 };
 
-/// Ratio of sums over scenarios. 95 % of such intervals, value +- half_width_95, contain the ratio over all scenarios
-/// that could be drawn, by the linearised variance between scenarios; infinite for one scenario.
+/// Ratio of sums over scenarios with its 95 % confidence interval, value +- half_width_95, for the ratio over all
+/// scenarios that could be drawn. The half width follows from the linearised variance between scenarios; it is infinite
+/// for one scenario.
 struct Estimate {
   double value = 0, half_width_95 = 0;
 };
 
-/// One scenario's terms of a ratio's sums.
+/// Terms of one scenario in the two sums of a ratio: part is the dividend's, whole the divisor's.
 struct RatioTerm {
   double part = 0, whole = 0;
 };
-/// Estimates the sum of the parts divided by the sum of the wholes; infinite if the divisor is 0. If every whole is 1,
-/// this is the mean of the parts.
+/// Estimates the ratio of the sums; infinite if the divisor is 0. With `whole` 1 in every term, the ratio is the mean
+/// of `part` over scenarios.
 Estimate estimate_ratio(const std::vector<RatioTerm>& scenarios);
 /// Estimates the ratio of part_of(counts) and whole_of(counts) over scenarios.
 template <typename Counts, typename Part, typename Whole>
@@ -152,7 +154,8 @@ struct EvaluateRow {
   // Rates per km, since lives on roads that end are short.
   Estimate at_fault_collisions_per_km, off_road_per_km, red_lights_per_km, goals_per_km;
   int64_t asked = 0, spawned = 0, entered = 0, left = 0;
-  // See StandingCounts: fraction of driving time; mean per wait, NaN without waits; fraction of vehicles.
+  // From StandingCounts. reversing_share: fraction of driving time. red_wait_moved_m: mean per wait, NaN without waits.
+  // stuck_at_end_share: fraction of vehicles.
   Estimate reversing_share, red_wait_moved_m, stuck_at_end_share;
   int64_t red_waits = 0;
 };

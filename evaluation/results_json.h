@@ -32,10 +32,11 @@ Counts counts_from(const Json& json) {
 void check_same(const Json& first, const std::string& first_name, const Json& other, const std::string& other_name,
                 const std::string& within = "");
 
-/// Reads a file's JSON. Throws Error naming the file unless it has one of these formats, the first of which is the
-/// current format.
+/// Reads a file's JSON. Throws Error naming the file unless it has one of `formats`; the first of them is the current
+/// format.
 Json read_results_json(const std::string& path, const std::vector<std::string>& formats);
-/// Calls parse(), and throws Error naming the file if parse() misses a JSON value or throws a JSON exception.
+/// Calls parse(). Throws Error naming the file if parse() throws a JSON exception, for instance because a value is
+/// missing.
 void parse_results(const std::string& path, const std::function<void()>& parse);
 
 }  // namespace pictura

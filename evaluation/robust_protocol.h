@@ -1,5 +1,5 @@
-// Robust protocol: one table of how well a driver drives in generated towns, among other drivers, and with randomized
-// cameras. Everything except the driver is fixed, so that numbers of different drivers are comparable. Without torch
+// Robust protocol: one table of a driver's performance in generated towns, among other drivers, and with randomized
+// cameras. Everything but the driver is fixed, so that numbers of different drivers are comparable. Has no torch
 // headers.
 #pragma once
 
@@ -33,14 +33,14 @@ const std::vector<RobustCondition>& robust_conditions();
 /// Metrics of the evaluated driver in one condition.
 struct RobustRow {
   RobustCondition condition;
-  DensityResult counts;    // no scenarios where the condition does not apply
-  std::string not_driven;  // why the condition does not apply to the driver; empty if it applies
+  DensityResult counts;    // has no scenarios if the condition does not apply
+  std::string not_driven;  // reason for which the condition does not apply to the driver; empty if it applies
 };
 
 struct RobustReport {
   EvaluationSetting setting;  // setting of the first condition
   std::vector<RobustRow> rows;
-  bool interrupted = false;  // by ^C; finished conditions are reported
+  bool interrupted = false;  // an interrupt came; completed conditions are reported
   double seconds = 0;
   int64_t agent_steps = 0;
 
@@ -52,7 +52,7 @@ struct RobustReport {
 };
 
 struct RobustOptions : DriverOptions {
-  int scenarios = kRobustScenarios;  // per condition; other numbers give a trial that is not comparable
+  int scenarios = kRobustScenarios;  // per condition; results of another number than the default are not comparable
   std::function<void(double done_fraction, double eta_s)> on_progress;
 };
 
@@ -65,9 +65,9 @@ void visit_options(RobustOptions& options, Visitor&& v) {
   v.callback({"on_progress"}, options.on_progress);
 }
 
-/// Evaluates a driver in every condition that applies to it. The conditions "cameras" apply only to policies that see
-/// images, the condition "impaired" only to drivers that read observations, and "carla" only if the map folder holds
-/// the eight towns. Throws UsageError for another seed, camera_severity, conditioning or lights than the protocol's;
+/// Evaluates a driver in every condition that applies to it. Conditions with randomized cameras apply to policies that
+/// read images, conditions with impaired drivers to drivers that read observations, and "carla" if the map folder holds
+/// the eight towns. Throws UsageError for a seed, camera_severity, conditioning or lights other than the protocol's;
 /// otherwise throws as evaluate() does.
 RobustReport evaluate_robust(const RobustOptions& options);
 

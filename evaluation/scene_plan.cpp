@@ -29,7 +29,8 @@ int32_t first_step(const CompiledMap& map, size_t track) {
   return -1;
 }
 
-/// Whether the box cannot start a drive: it touches an edge, is off the road, or touches another box that stays.
+/// Whether an agent cannot start driving from its box, because the box touches an edge, is off the road, or touches a
+/// box that is not removed.
 bool overlaps(const MapView& map, Span<const AgentBox> boxes, const std::vector<SceneRole>& roles, size_t track) {
   const AgentBox& box = boxes[track];
   if (!fits_map(map, box)) return true;

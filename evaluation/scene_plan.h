@@ -12,8 +12,9 @@ namespace pictura {
 /// Adapts a scene to a protocol: scales its boxes. Throws Error if its time step is not 0.1 s.
 std::shared_ptr<const Scenario> protocol_scene(Scenario scenario, const SceneProtocol& protocol);
 
-/// Selects the tracks that thinning removes, [tracks]: of the n road users besides the self-driving car round((1 -
-/// density) n), by a draw of seed and scenario id. Tracks removed at a density are also removed at every lower density.
+/// Selects the tracks that thinning removes, [tracks]. It removes round((1 - density) n) of the n road users besides
+/// the self-driving car, drawn by seed and scenario id. Tracks removed at a density are also removed at every lower
+/// density.
 std::vector<uint8_t> select_thinned_tracks(const Scenario& scenario, double density, uint64_t seed);
 
 enum class SceneRole : uint8_t { removed, replayed, driven };
@@ -23,11 +24,11 @@ struct ScenePlan {
   std::vector<int32_t> takeover_steps;  // [tracks] episode step at which a driven track appears
 };
 
-/// Whether the scene has a road user to drive, ignoring density and overlaps. If not, all vehicles are parked, or there
-/// is none.
+/// Whether the scene has a road user to drive, ignoring density and overlaps. If not, all vehicles are parked, or the
+/// scene has no vehicle.
 bool has_drivers(const CompiledMap& map, const SceneProtocol& protocol);
 
-/// Plans the roles in a world of the map, compiled from protocol.start_step on. boxes [tracks]: boxes of its scene at
+/// Plans the roles in a world of the map, which must be compiled from protocol.start_step on. boxes: [tracks] boxes at
 /// the start of the episode.
 ScenePlan plan_scene(const CompiledMap& map, Span<const AgentBox> boxes, const SceneProtocol& protocol, double density,
                      uint64_t seed);

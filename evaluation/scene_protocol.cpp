@@ -106,7 +106,8 @@ std::vector<SceneProtocol> make_protocols() {
   puffer3.box_scale = 1;
   puffer3.leave_at_goal = false;
 
-  // Waymax: the self-driving car alone for 8 s after 11 warm-up states; events are counted and end nothing.
+  // Waymax: only the self-driving car is driven, for 8 s after 11 warm-up states; events are counted, but end no
+  // episode.
   SceneProtocol waymax = paper;
   waymax.name = "waymax";
   waymax.control = "self";
@@ -118,7 +119,8 @@ std::vector<SceneProtocol> make_protocols() {
   waymax.after_infraction = AfterInfraction::drive_on;
   waymax.leave_at_goal = false;
 
-  // The Waymo sim-agents challenge: all road users present at the start, regardless of events, 32 times.
+  // The Waymo sim-agents challenge: all road users present at the start are driven in 32 rollouts, regardless of
+  // events.
   SceneProtocol simagents = waymax;
   simagents.name = "simagents";
   simagents.control = "all";

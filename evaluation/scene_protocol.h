@@ -19,23 +19,26 @@ enum class RecordEnd : uint8_t { stand, vanish };
 enum class Waypoints : uint8_t { goal, path };
 
 /// Protocol: the driven road users, their goals, and the treatment of events. The default values are the paper's
-/// (zero-shot evaluation, appendix B), and ours where the paper is silent; docs/explanation/evaluation.md lists which.
+/// (zero-shot evaluation, appendix B). Where the paper states none, they are this project's choice;
+/// docs/explanation/evaluation.md lists these choices.
 struct SceneProtocol {
   std::string name = "womd";
   std::string control = "self,vehicles";  // tracks_selected_by() of the scene
-  int start_step = 0;                     // first step in the recording
+  int start_step = 0;                     // step of the recording at which episodes begin
   int steps = 600;
   std::vector<double> densities{1.0, 0.75, 0.5};  // shares of a scene's road users that remain
-  int rollouts = 1;                               // drives of each scene, each with its own draws
+  int rollouts = 1;                               // number of drives of each scene, each with its own random draws
   float box_scale = 1;                            // scale of all lengths and widths
   // Minimum distance from the start to the goal; a road user that starts nearer follows the recording. 0: no minimum.
   float min_distance_to_goal_m = 2;
-  bool replay_experts = false;  // replays road users that the file marks for replay
-  int max_driven = 0;  // > 0: drives only the self-driving car and the first others of a scene, up to this number
-  Overlapping overlapping = Overlapping::replay;  // whose initial box touches a box or an edge, or is off the road
-  Others others = Others::replay;                 // pedestrians, cyclists and other non-vehicles
+  bool replay_experts = false;  // replays road users that the file marks as experts
+  // > 0: maximum number of driven road users per scene: the self-driving car, then others in the order of the file.
+  int max_driven = 0;
+  // Role of road users whose initial box touches another box or an edge, or is off the road.
+  Overlapping overlapping = Overlapping::replay;
+  Others others = Others::replay;  // role of pedestrians, cyclists and other non-vehicles that `control` excludes
   Late late = Late::replay;
-  RecordEnd record_end = RecordEnd::stand;  // what road users that follow the recording do after its end
+  RecordEnd record_end = RecordEnd::stand;  // behavior of replayed road users after the end of their recording
   AfterInfraction after_infraction = AfterInfraction::halt;
   bool leave_at_goal = true;
   Waypoints waypoints = Waypoints::goal;  // the goal three times, or points on the recorded path before it
@@ -61,8 +64,8 @@ void set_scene_rule(const std::string& assignment, SceneProtocol* protocol_inout
 /// Returns names and values of all rules.
 std::vector<std::pair<std::string, std::string>> rules_of(const SceneProtocol& protocol);
 
-/// Throws UsageError naming an invalid setting: steps below 1, densities that are not above 0 and at most 1, or words
-/// that name no tracks.
+/// Throws UsageError naming an invalid setting, for instance steps below 1, a density outside (0, 1], or a word of
+/// `control` that selects no kind of tracks.
 void check(const SceneProtocol& protocol);
 
 /// Row of the paper's table on WOMD (zero-shot self-play, 44,073 scenes of the validation set).

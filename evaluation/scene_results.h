@@ -44,11 +44,12 @@ struct SceneCounts {
 
 /// Counts of an evaluation in the scenes first_scene, first_scene + 1, ... of all scenes of its setting.
 struct SceneResults {
-  EvaluationSetting setting;  // its maps are the locations of the scenes
+  EvaluationSetting setting;  // `maps` holds SceneEvaluateOptions::scenes
   SceneProtocol protocol;
-  std::vector<std::string> unread;  // files, and ends of files, that hold no readable scenes, with reasons
+  // Files and trailing parts of files without readable scenes, with reasons; of the whole input, not only this range.
+  std::vector<std::string> unread;
   int first_scene = 0, num_scenes = 0;
-  int without_drivers = 0;          // scenes left out without a road user to drive, since all are parked or absent
+  int without_drivers = 0;          // scenes left out because all of their road users are parked or absent
   std::vector<std::string> faults;  // scenes left out because they cannot be read or simulated, with reasons
   std::vector<std::vector<SceneCounts>> counts;  // [densities][scored scenes]
 
@@ -68,8 +69,8 @@ struct SceneAgent {
   int events = 0;  // events of its episode: bits of Event
   bool arrived = false;
   float distance_m = 0;
-  // Distance from the recording: mean over its recorded steps while the agent drives, and at the last of them; NaN
-  // without such steps.
+  // Distance from the recorded positions: mean over the steps that are recorded while the agent drives, and at the last
+  // of these steps; NaN without such steps.
   float mean_displacement_m = std::numeric_limits<float>::quiet_NaN(), final_displacement_m = mean_displacement_m;
 };
 
@@ -84,7 +85,7 @@ struct SceneRow {
   double km_driven = 0;
   Estimate at_fault_collision_rate, off_road_rate, goal_rate;
   Estimate collision_rate;       // at fault or not
-  Estimate mean_displacement_m;  // mean over vehicles of each vehicle's mean
+  Estimate mean_displacement_m;  // mean over vehicles of SceneAgent::mean_displacement_m
 };
 SceneRow row_of(double density, const std::vector<SceneCounts>& scenes);
 /// Returns a row for each density of the protocol; empty if no scene was scored.
@@ -100,7 +101,7 @@ SceneResults merge(const std::vector<SceneResults>& parts, const std::vector<std
 /// missing.
 void write_results(const std::string& path, const SceneResults& results);
 SceneResults read_scene_results(const std::string& path);
-/// Whether the file declares results of scenes, rather than of towns or anything else.
+/// Whether the file contains results of recorded scenes, rather than results of towns or other data.
 bool has_scene_results(const std::string& path);
 
 /// Lines of a CSV file, each with its newline; the first line names the columns.

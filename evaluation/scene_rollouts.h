@@ -1,5 +1,5 @@
-// Rollouts of recorded scenes in the shape that the Waymo Open Sim Agents Challenge asks for, and their file, written
-// and read. realism.h scores them. Without torch headers.
+// Rollouts of recorded scenes as the Waymo Open Sim Agents Challenge defines them, and a writer and a reader of their
+// file format. realism.h scores rollouts. Has no torch headers.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,8 @@ struct SimulatedState {
   float heading_rad = 0;  // in [-pi, pi], from x towards y
 };
 
-/// Rollouts of one scene: the state of every road user that is present at the protocol's start after each step of each
-/// rollout. A road user that left, or that the recording lost, keeps its last state.
+/// Rollouts of one scene: the states, after each step of each rollout, of every road user that is present at the
+/// protocol's start. A road user that left, or that the recording no longer contains, keeps its last state.
 struct SceneRollouts {
   std::string scenario_id;
   int steps = 0;
@@ -55,16 +55,17 @@ class RolloutsFile {
   size_t size_ = 0;  // bytes
 };
 
-/// A file of such messages, one after the other, ours or of another program.
+/// Reader of a file of one or several concatenated messages SimAgentsChallengeSubmission, written by RolloutsFile or by
+/// another program.
 class RolloutsReader {
  public:
-  /// Reads the file and finds its scenes. Throws Error naming the file, and the field where there is one: bytes that
-  /// are no such message, a submission of another type, a scenario that is there twice.
+  /// Reads the file and lists its scenes. Throws Error naming the file and the field if the bytes are no such message,
+  /// the submission has another type, or a scenario occurs twice.
   explicit RolloutsReader(const std::string& path);
-  std::vector<std::string> scenario_ids() const;  // in order of their names
+  std::vector<std::string> scenario_ids() const;  // in alphabetical order
   bool has(const std::string& scenario_id) const { return scenes_.contains(scenario_id); }
-  /// One scene. Throws Error naming file, scenario and field: trajectories of different lengths, rollouts of different
-  /// objects, an object that is there twice.
+  /// Reads one scene. Throws Error naming file, scenario and field if trajectories have different lengths, rollouts
+  /// contain different objects, or an object occurs twice.
   SceneRollouts read(const std::string& scenario_id) const;
 
  private:

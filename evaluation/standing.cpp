@@ -11,8 +11,8 @@ namespace pictura {
 
 namespace {
 
-// Maximum distance of a waiting front bumper from its line. Vehicles behind the first are farther away, and may close
-// up.
+// Maximum distance of a waiting vehicle's front bumper from the stop line. Vehicles behind the first one are farther
+// away, and may close up, so they do not count as waiting.
 constexpr float kWaitReach_m = 5;
 constexpr float kStuckWithin_m = 5, kStuckFor_s = 60;
 
@@ -63,7 +63,7 @@ void StandingObserver::after_step(const StepResult& /*result*/) {
       ++counts.driven_steps;
       counts.reversing_steps += speed_mps < -kRest_mps;
       Progress& progress = progress_[slot];
-      // A smaller distance means another life in the slot.
+      // A distance smaller than before means that another agent has taken the slot.
       const float gone_m = distance_m[slot] - progress.distance_m;
       if (gone_m < 0 || gone_m > kStuckWithin_m) progress = {step_, distance_m[slot]};
 

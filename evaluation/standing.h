@@ -1,4 +1,4 @@
-// Standing vehicles: whether they wait at red lights without creeping, reverse, or remain stuck.
+// Observer of standing vehicles: whether they wait at red lights without creeping, reverse, or remain stuck.
 #pragma once
 
 #include <cstdint>

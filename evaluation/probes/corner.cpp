@@ -18,7 +18,7 @@ namespace {
 CornerOptions with_half_progress(CornerOptions options) {
   if (const auto report = options.worlds.on_progress) {
     options.worlds.on_progress = [report, since_start = Stopwatch()](double done, double eta_s) {
-      report(done / 2, 2 * eta_s + since_start.seconds());  // assumes that the rest takes as long
+      report(done / 2, 2 * eta_s + since_start.seconds());  // assumes that the second half takes as long as the first
     };
   }
   return options;
@@ -58,7 +58,7 @@ class CornerProbe {
   };
 
   void find_corners(const ProbeFrame& frame) {
-    // Later states do not leave enough steps of the scene for a takeover.
+    // After later states the scene has too few steps left for a takeover.
     if (frame.step + kTakeoverSteps >= options_.worlds.steps) return;
     KeptScene kept;
     std::vector<View> views;
@@ -91,7 +91,7 @@ class CornerProbe {
     }
   }
 
-  // Keeps worlds of the frame in which policies may take over: some 50 KB each, until pairs are chosen.
+  // Keeps the worlds of the frame in which policies may take over, until pairs are chosen. A world takes some 50 KB.
   void keep(const ProbeFrame& frame, const std::vector<size_t>& worlds) {
     if (worlds.empty()) return;
     const std::vector<uint8_t> saved = driven_->save(current_stream(run_.device()));

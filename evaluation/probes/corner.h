@@ -15,7 +15,7 @@ struct CornerOptions : ProbeOptions {
     batch = 256;
     worlds.adds_walls = true;  // walls make the corners blind
   }
-  int64_t pairs = 200;  // total, from all scenes in turn; fewer if fewer are found
+  int64_t pairs = 200;  // total number, taken from all scenes in turn; smaller if fewer are found
   CornerSearch search;
   CornerControl control = CornerControl::none;
 };
@@ -45,14 +45,14 @@ void visit_options(CornerOptions& options, Visitor&& v) {
 }
 
 /// Drives evaluation worlds as probe_removal() does, or lets options.worlds.controller drive all of them, and searches
-/// their states for egos before blind corners (find_corner_states()). Hidden states are kept if no part of the hidden
-/// vehicle is visible (Renderer::visibility, in the cameras of the first policy that reads images, or in the paper's)
-/// and the vehicle enters the junction within kTakeoverSteps. States of both kinds are kept if their scene continues
-/// for kTakeoverSteps. match_corners() forms the pairs.
-/// From each state each policy drives the ego for kTakeoverSteps (TakeoverWorlds), in worlds with walls and without:
-/// with the hidden vehicle, without it, and from the empty corner. `batch` pairs run at once. An interrupt ends the
-/// probe with the completed pairs. Throws UsageError if scenes cannot be shared equally, Error naming file and key for
-/// bad input.
+/// their states for egos before blind corners (find_corner_states()). A hidden state is kept if the vehicle enters the
+/// junction within kTakeoverSteps and no part of it is visible. Visibility is measured by Renderer::visibility, in the
+/// cameras of the first policy that reads images, or in the paper's cameras. States of both kinds are kept only if
+/// their scene continues for kTakeoverSteps. match_corners() forms the pairs.
+/// Each policy then drives the ego for kTakeoverSteps (TakeoverWorlds), in worlds with walls and without: from the
+/// hidden state, from the hidden state without its vehicle, and from the empty corner. `batch` pairs run at once. An
+/// interrupt ends the probe with the completed pairs. Throws UsageError if scenes cannot be shared equally, Error
+/// naming file and key for bad input.
 CornerResults probe_corner(const CornerOptions& options);
 /// Probes open policies of one device, with their renderers and cameras; options.policies names them.
 CornerResults probe_corner(const std::vector<PolicySession*>& sessions, const CornerOptions& options);

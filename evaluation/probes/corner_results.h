@@ -55,22 +55,22 @@ struct CornerResults : ProbeResults {
   }
 };
 
-/// Reveal of a run: the time at which the line of sight to the hidden vehicle opens, or to where it would be. At an
-/// empty corner the reveal is at the time of the same policy's reveal in the pair's hidden state.
+/// Reveal of a run: the time at which the line of sight opens to the hidden vehicle, or to its place if it is removed.
+/// At an empty corner, the reveal has the time of the same policy's reveal from the pair's hidden state.
 struct Reveal {
   int32_t step = 0;
   std::optional<float> distance_m;  // to the hidden vehicle, between the boxes' centres
-  float corner_m = 0;               // to the corner's entry, by the distance driven; negative beyond it
+  float corner_m = 0;  // remaining distance to the corner's entry along the driven path; negative beyond the entry
   float speed_mps = 0;
   float approach_mps = 0;                  // mean speed before the reveal
-  std::optional<float> deceleration_mps2;  // over the next 2 s, if the run lasts as long
+  std::optional<float> deceleration_mps2;  // mean over the 2 s after the reveal, if the run lasts that long
 };
-/// Returns the reveal of a run; empty if the run ends before.
+/// Returns the reveal of a run; empty if the run ends before the reveal.
 std::optional<Reveal> reveal_of(const CornerResults& results, size_t pair, bool walls, CornerCase its_case,
                                 size_t policy);
 
-/// Pair at whose reveal policies' speeds differ most, with walls and the hidden vehicle; the first pair if no pair has
-/// a reveal for every policy.
+/// Returns the pair at whose reveal the policies' speeds differ most, in runs with walls and the hidden vehicle; the
+/// first pair if no pair has a reveal for every policy.
 size_t example_of(const CornerResults& results);
 
 /// Measures of a run at the reveal, by their names in files.
@@ -78,8 +78,8 @@ struct CornerMeasures {
   Estimate distance_m, corner_m, speed_mps, approach_mps, deceleration_mps2;
 };
 
-/// Statistics of one policy's runs of a case; or differences of two runs of each pair: from another policy's run of the
-/// same state, or from the same policy's run of another case. Estimates are over scenes.
+/// Statistics of one policy's runs of a case, or of differences between two runs of each pair. A difference subtracts
+/// less_policy's run of the same case, or the same policy's run of less_case. Estimates are over scenes.
 struct CornerRow {
   bool walls = true;
   CornerCase its_case = CornerCase::hidden;

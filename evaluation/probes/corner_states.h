@@ -13,8 +13,9 @@ namespace pictura {
 
 struct ProbeFrame;
 
-/// Lane into a junction without traffic lights, and lanes whose traffic crosses it and is hidden from it by walls
-/// (find_blind_crossings()). Traffic lights would stop one of the two, so that neither need look out for the other.
+/// Lane into a junction without traffic lights, and the lanes whose traffic crosses that lane and is hidden from it by
+/// walls (find_blind_crossings()). Junctions with lights are excluded, since a light stops one of the two streams of
+/// traffic.
 struct BlindCorner {
   int32_t junction = -1;
   Vec3 entry_m;  // end of the lane
@@ -37,15 +38,15 @@ struct CornerSearch {
 struct CornerState {
   int32_t scene = 0, map = 0, driver = 0;  // number of its scenario; indices of its map and driver
   int32_t step = 0;                        // steps done in the scenario
-  int32_t ego = 0, approach = -1;          // approach: lane of the ego
+  int32_t ego = 0, approach = -1;          // approach: the ego's lane
   int32_t user = -1;                       // hidden vehicle; -1: none comes
   float distance_m = 0, speed_mps = 0;     // distance of the ego from the entry, and its speed
   View view;                               // view of the ego, with the indices of its frame
 };
 
-/// Finds the states of a world of a frame. A state has a hidden vehicle if walls hide a vehicle that drives on the
-/// corner's hidden lanes, in range, from the ego's front camera, `front`; the nearest one counts. A state is empty if
-/// no vehicle or cyclist is on these lanes in range, or in the junction.
+/// Finds the states in one world of a frame. A state has a hidden vehicle if walls hide, from the ego's front camera
+/// `front`, a vehicle that drives in range on the corner's hidden lanes; the nearest such vehicle is used. A state is
+/// empty if no vehicle or cyclist is in range on these lanes, or in the junction.
 std::vector<CornerState> find_corner_states(const ProbeFrame& frame, size_t world, const RoadMap& map,
                                             const BlindCorners& corners, const LineOfSight& line_of_sight,
                                             const PinholeCamera& front, const CornerSearch& search);
@@ -56,8 +57,8 @@ struct CornerPair {
 /// Tolerances within which two states are similar.
 constexpr float kSameDistance_m = 1, kSameSpeed_mps = 0.5f;
 /// Returns at most `count` pairs of similar states of different egos or scenes, from all scenes in turn, in the order
-/// of the hidden states. For an ego that approaches one hidden vehicle the first state is used, and for an ego that
-/// approaches an empty corner one state: the most similar one.
+/// of the hidden states. Of the states in which an ego approaches one hidden vehicle, only the first is used. Of the
+/// states in which an ego approaches an empty corner, only the most similar one is used.
 std::vector<CornerPair> match_corners(const std::vector<CornerState>& hidden, const std::vector<CornerState>& empty,
                                       int64_t count);
 

@@ -1,5 +1,5 @@
-// Straight paths of a pedestrian through a frozen state: paths on which a pedestrian could emerge from behind a
-// vehicle, and the part of a path that is hidden, seen, and hidden again. Has no torch headers.
+// Straight paths on which a pedestrian could emerge from behind a vehicle in a frozen state, and the part of a path on
+// which the pedestrian is hidden, seen, and hidden again. Has no torch headers.
 #pragma once
 
 #include <optional>
@@ -34,7 +34,8 @@ struct CrossingPath {
 /// and turned by 30 degrees to either side, in both directions.
 std::vector<CrossingPath> paths_behind(const AgentBox& box, Vec2 eye_m);
 
-/// Whether a pedestrian could stand at each point, [kPathPoints]: in no drawn box, and in no wall of its height.
+/// Whether a pedestrian could stand at each point, [kPathPoints]: the point is in no drawn box, and in no wall at its
+/// height.
 std::vector<bool> free_points(const CrossingPath& path, Span<const AgentBox> boxes, Span<const WallFace> walls);
 
 /// Part of a path: hidden from begin on, seen from first_seen on, hidden again from hidden_again on, up to end.

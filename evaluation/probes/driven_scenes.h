@@ -16,7 +16,7 @@ struct DrivenState {
   AgentStatus status = AgentStatus::absent;
 };
 
-/// Scene up to its last step, or to the step at which all of its agents had halted.
+/// States of a scene up to its last step, or up to the step at which all of its agents had halted.
 struct DrivenScene {
   WorldSpec world;
   int driver = 0;                   // index of its driver

@@ -14,9 +14,10 @@ namespace pictura {
 
 namespace {
 
-// Maximum number of paths tried in one world and step, and number of tries in a call, which changes no result.
+// Maximum number of paths tried in one world and step, and number of tries per call, which does not change results.
 constexpr size_t kMaxTries = 48, kTriesAtOnce = 12;
-// Interval between the points of a tried path that are measured first: no part of a used path is shorter.
+// Interval between the points of a tried path that are measured first. No part of a used path is shorter, so every part
+// has a measured point.
 constexpr int kCoarse = 4;
 static_assert(kPathOrigin % kCoarse == 0 && kCoarse * kPathSpacing_m <= min_of(kPathHidden_m, kPathSeen_m));
 constexpr float kMinHiderDistance_m = 5, kSameHeight_m = 0.5f;
@@ -44,8 +45,8 @@ struct Trial {
   std::vector<float> shares = std::vector<float>(kPathPoints, std::numeric_limits<float>::quiet_NaN());
   float share_without_hider = 0;  // at the origin
 
-  // Whether the path may be used, by the points measured first: the hider hides the origin, and after it the pedestrian
-  // is seen and then hidden again.
+  // Whether the path may be used, as far as the points measured first show: the hider hides the origin, and beyond the
+  // origin the pedestrian is seen and then hidden again.
   bool is_promising() const {
     if (shares[kPathOrigin] != 0 || !(share_without_hider > 0)) return false;
     int i = kPathOrigin;

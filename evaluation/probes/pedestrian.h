@@ -10,11 +10,11 @@ namespace pictura {
 class PolicySession;
 
 struct PedestrianOptions : ProbeOptions {
-  int64_t paths = 32;        // total, equally many in each scene; fewer if fewer are found
+  int64_t paths = 32;        // total number, equal in each scene; smaller if fewer are found
   float hider_range_m = 30;  // maximum distance of a vehicle that hides a path
   float min_speed_mps = 1;   // minimum speed of the ego, forwards
-  // Height of the pedestrian: a child's. Vehicles of the world are 1.5 m high, so they never wholly hide its own
-  // pedestrians of 1.7 m from cameras above them.
+  // Height of the inserted pedestrian, a child. Vehicles are 1.5 m high, so cameras above that height always see part
+  // of the world's own pedestrians, which are 1.7 m high.
   float height_m = 1.2f;
   PedestrianControl control = PedestrianControl::none;
 };

@@ -13,7 +13,7 @@
 
 namespace pictura {
 
-/// Presence of the pedestrian.
+/// Controls of the probe.
 enum class PedestrianControl : uint8_t {
   none,
   nobody,     // a control: no pedestrian is inserted, so no response may change
@@ -32,8 +32,8 @@ struct PedestrianPath {
   int32_t step = 0;                        // steps done in the scenario
   int32_t ego = 0, hider = 0;              // the hider is the box behind which the path begins
   float ego_speed_mps = 0, hider_distance_m = 0;
-  int32_t first_point = 0, num_points = 0;   // range in PedestrianResults::points
-  int32_t first_seen = 0, hidden_again = 0;  // points of this range, counted from the path's first
+  int32_t first_point = 0, num_points = 0;   // the path's range in PedestrianResults::points
+  int32_t first_seen = 0, hidden_again = 0;  // first points of these phases, as indices within the path's range
   // State for pictures:
   std::vector<AgentBox> boxes;
   std::vector<AgentStatus> status;  // [boxes]
@@ -65,8 +65,8 @@ struct PedestrianResults : ProbeResults {
   RendererConfig cameras;
 };
 
-/// Responses of one policy over all points of a phase, or over the points at one offset from where the pedestrian is
-/// first seen.
+/// Responses of one policy over all points of a phase, or over the points of all paths at one offset from the point at
+/// which the pedestrian is first seen.
 struct PedestrianRow : ResponseMeans {
   int policy = 0;
   std::optional<PathPhase> phase;

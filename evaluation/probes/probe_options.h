@@ -17,12 +17,13 @@ struct ProbeOptions {
   }
 
   // Worlds and devices: maps, the first of `densities` or agents_per_world, steps, argmax, seed, devices, conditioning,
-  // progress. `first_scenario` and `scenarios` are the scenes; each policy drives an equal number of them, one range
-  // after the other; 0: default_probe_scenes(). `policies` are evaluated.
+  // progress. `first_scenario` and `scenarios` select the scenes (scenarios 0: default_probe_scenes()). Each policy
+  // drives an equal number of them: the first policy the first range, and so on. The policies that respond are
+  // `policies`.
   EvaluateOptions worlds;
   std::vector<std::string> policies;  // checkpoints or safetensors
   int sample_steps = 10;              // interval between sampled states
-  int batch = 4096;                   // cases in a call, rounded up to whole passes; changes only memory and time
+  int batch = 4096;                   // cases per call, rounded up to whole passes; affects only memory and time
 };
 
 /// Visits the options of all probes besides policies, worlds and devices.
@@ -47,7 +48,8 @@ void visit_options(ProbeOptions& probe, Visitor&& v) {
 /// two passes, so that equal inputs give equal bits.
 constexpr int probe_pass(Device device) { return device.is_host() ? 256 : 2048; }
 
-/// Number of scenes that gives each policy equally many on each map, and each map two or more.
+/// Returns the default number of scenes: each policy drives equally many on each map, and each map has two scenes or
+/// more.
 int default_probe_scenes(size_t num_policies, size_t num_maps);
 
 }  // namespace pictura

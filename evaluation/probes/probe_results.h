@@ -34,7 +34,7 @@ struct ProbeResults {
   EvaluationSetting setting;  // setting of the worlds; its policy-specific parts are the first policy's
   std::string density;
   int agents_per_world = 0;
-  int first_scene = 0, scenes = 0;  // driven scenes: an equal share by each policy, in their order
+  int first_scene = 0, scenes = 0;  // driven scenes: each policy drives an equal share, in the order of policies
   int sample_steps = 0;
   std::vector<ProbedPolicy> policies;
   std::string controller;                 // controller that drove all scenes; empty: the policies drove
@@ -57,7 +57,7 @@ struct ResponseMeans {
   int scenes = 0;  // number of scenes with such cases
   Estimate abs_value_change, abs_brake_change;
   Estimate value_change, brake_change;  // signed
-  Estimate changed_share;               // share of cases in which value or probability differ in a bit
+  Estimate changed_share;               // share of cases in which value or probability differ in at least one bit
 };
 
 /// Mean over scenes of the mean of each scene's values.
@@ -99,8 +99,8 @@ std::vector<size_t> sorted_order(size_t count, const Key& key) {
   return order;
 }
 
-/// CSV fields of responses, with a row for each case: names for the header, and values of a case, for each policy:
-/// value, d_value, p_brake and d_p_brake. Both begin with a comma.
+/// CSV fields of responses: names for the header, and values for the row of one case. Each policy has the fields value,
+/// d_value, p_brake and d_p_brake. Both texts begin with a comma.
 std::string response_header(const ProbeResults& results);
 std::string response_fields(const ProbeResults& results, size_t one);
 

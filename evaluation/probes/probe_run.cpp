@@ -52,14 +52,15 @@ class SceneOnDevice {
   SceneBatch scene_;
 };
 
-// Name of a policy in figures: its file, or its run, since files have the same names in all runs.
+// Name of a policy in figures: the name of its file, or of its run, since checkpoint files have the same names in all
+// runs.
 std::string short_name(const std::string& path) {
   const std::filesystem::path absolute = std::filesystem::absolute(path);
   const std::string stem = absolute.stem().string();
   return stem == "checkpoint" || stem == "policy" ? absolute.parent_path().filename().string() : stem;
 }
 
-// Short names of policies; paths if short names are equal, and numbered if paths are equal too.
+// Short names of policies; paths if short names are equal; numbered paths if paths are equal too.
 std::vector<std::string> names_of(const std::vector<std::string>& paths) {
   std::vector<std::string> names;
   for (const std::string& path : paths) names.push_back(short_name(path));
@@ -150,8 +151,8 @@ int64_t CaseQuota::due(int32_t scene, int step) const {
   return (left + times_left - 1) / times_left;
 }
 
-// Worlds with the observations of one kind of policies: with or without auxiliary slots. All kinds are stepped by the
-// same commands, so that their states are bit-identical.
+// Worlds with the observations of one kind of policies: with or without auxiliary slots. The worlds of all kinds are
+// stepped by the same commands, so that their states are bit-identical.
 struct ProbeRun::ObservedWorlds {
   const SimulatorConfig config;
   std::unique_ptr<Simulator> simulator;
@@ -166,14 +167,14 @@ struct ProbeRun::ObservedWorlds {
 
 struct ProbeRun::Participant {
   PolicySession* session = nullptr;          // drives
-  std::unique_ptr<PolicySession> untrained;  // responds in its place
+  std::unique_ptr<PolicySession> untrained;  // responds instead of `session`
   std::unique_ptr<Renderer> renderer;        // renderer of its images, with the maps
-  ObservedWorlds* worlds = nullptr;          // worlds that it drives in and observes
+  ObservedWorlds* worlds = nullptr;          // worlds in which it drives and which it observes
 
   PolicySession& answering() const { return untrained ? *untrained : *session; }
 };
 
-// Pairs whose states and observations are kept until there are enough for a call.
+// Pairs whose states and observations are kept until a call is full.
 struct ProbeRun::Pending {
   KeptScene scene;
   std::vector<View> views, views_without;
@@ -361,7 +362,8 @@ void ProbeRun::add(const ProbeFrame& frame, Span<const ProbePair> pairs) {
   std::vector<int32_t> hidden;
   std::vector<InsertedBox> inserted;
   for (size_t first = 0, end = 0; first < pairs.size(); first = end) {
-    // Pairs of one world, which contains all of their inserted boxes; each is hidden from the views of the others.
+    // Pairs of one world. The kept world contains the inserted boxes of all of these pairs; each box is hidden from the
+    // views of the other pairs.
     const size_t world = pairs[first].world;
     std::vector<InsertedBox> its_inserted;
     for (end = first; end < pairs.size() && pairs[end].world == world; ++end) {
@@ -401,7 +403,8 @@ void ProbeRun::add(const ProbeFrame& frame, Span<const ProbePair> pairs) {
   const DeviceCopy<InsertedBox> inserted_boxes(inserted, device_);
   const Stream stream = current_stream(device_);
   for (const auto& [auxiliary, observed] : observed_) {
-    Simulator& simulator = observed->simulator ? *observed->simulator : *driven_;  // evaluate() owns the driving one
+    // evaluate() owns the simulator that drives.
+    Simulator& simulator = observed->simulator ? *observed->simulator : *driven_;
     simulator.observe(asked.span(), {}, inserted_boxes.span(), observed->rows.rows(begin, count), stream);
     simulator.observe(asked_without.span(), hidden_boxes.span(), {}, observed->rows_without.rows(begin, count), stream);
   }

@@ -50,7 +50,7 @@ struct ProbeFrame {
   }
 };
 
-/// Worlds of frames of any steps in one scene, on the host.
+/// Worlds copied from frames of any steps and joined to one scene, on the host.
 struct KeptScene {
   std::vector<int32_t> world_begin{0}, light_begin{0}, hidden;
   std::vector<AgentBox> boxes;
@@ -66,12 +66,12 @@ struct KeptScene {
   int32_t first_inserted(const ProbeFrame& frame, size_t world) const {
     return box_of(frame, world, frame.box_begin[world + 1]);
   }
-  /// View of a slot of that world without the given boxes of this scene.
+  /// Returns the view of a slot of the last added world, without the given boxes of this scene.
   View view_of(const ProbeFrame& frame, size_t world, int32_t slot, const std::vector<int32_t>& without);
 };
 
-/// Agent of a frame in a state with and without a box: hidden_box is hidden in the second state, `inserted` is inserted
-/// in the first, or neither.
+/// Agent of a frame, in two states that differ by one box. Either hidden_box is hidden in the second state, or
+/// `inserted` is inserted in the first state, or the states are equal.
 struct ProbePair {
   size_t world = 0;
   int32_t slot = 0;
@@ -80,8 +80,8 @@ struct ProbePair {
   int32_t measured_box = -1;  // box whose visibility is measured; -1: none, which gives NaN
 };
 
-/// Number of cases still to be drawn in each scene: equally many in each, spread evenly over its samples while enough
-/// are available.
+/// Number of cases still to be drawn in each scene. All scenes have equally many cases, spread evenly over the scene's
+/// samples as far as enough cases are available.
 class CaseQuota {
  public:
   CaseQuota(int64_t cases, const ProbeOptions& options) : cases_(cases), options_(options) {}
@@ -107,13 +107,13 @@ class ProbeRun final : public EvaluationObserver {
            const ProbeKind& kind);
   ~ProbeRun() override;
 
-  /// Called with the worlds before every step, and their driver.
+  /// Called before every step, with the worlds and their driver.
   using Watch = std::function<void(Simulator& simulator, int driver)>;
 
-  /// Drives all scenes, each policy its share, or options.worlds.controller all, and passes their states at every
-  /// sample_steps steps to `sample`, from the first sampled step on. Then evaluates the remaining pairs, and returns
-  /// the visibility of all pairs' measured_box, in the order of add_pairs(). With `watch` states are only observed:
-  /// add_pairs() must not be called.
+  /// Drives all scenes: each policy drives its share, or options.worlds.controller drives all. Passes the scenes'
+  /// states to `sample` at every sample_steps steps, from the first sampled step on. Then evaluates the remaining
+  /// pairs, and returns the visibility of every pair's measured_box, in the order of add_pairs(). If `watch` is given,
+  /// states are only observed, and add_pairs() must not be called.
   std::vector<float> run(const std::function<void(const ProbeFrame&)>& sample, const Watch& watch = {});
 
   /// Adds pairs of the current frame. Responses are appended to the results in this order.
@@ -127,7 +127,7 @@ class ProbeRun final : public EvaluationObserver {
                                 const std::vector<VisibilityQuery>& queries);
   /// Renderer configuration of that policy's images.
   const RendererConfig& cameras() const { return cameras_; }
-  /// First of these cameras, in the ego's frame.
+  /// First camera of that configuration, in the ego's frame.
   const PinholeCamera& front_camera() const { return front_camera_; }
   const CompiledMaps& maps() const { return maps_; }
   Renderer& measuring() { return *measuring_; }

@@ -12,7 +12,7 @@ namespace pictura {
 class PolicySession;
 
 struct RemovalOptions : ProbeOptions {
-  int64_t removals = 88'000;  // total, equally many in each scene; fewer if a scene has fewer
+  int64_t removals = 88'000;  // total number, equal in each scene; smaller if a scene has fewer
   float range_m = 50;         // maximum distance of the removed users
   RemovalControl control = RemovalControl::none;
 };
@@ -29,14 +29,15 @@ void visit_options(RemovalOptions& options, Visitor&& v) {
            options.control, kRemovalControlNames);
 }
 
-/// Drives evaluation worlds, those of evaluate() with the same numbers, in the world of the first policy: its
-/// population, walls and conditioning apply to all policies. In the states of every `sample_steps` steps it draws
-/// distinct pairs of an active vehicle, the ego, and another active or halted agent within range_m, the user; parked
-/// cars are no users.
-/// Each policy gets its input of the state, unchanged and with the user hidden from this ego: for vectors
-/// Simulator::observe, for images a view without the user. Images are those of each policy's training; occlusion is
-/// measured in the cameras of the first policy that reads images, or in the paper's. An interrupt ends the probe with
-/// the completed cases. Throws UsageError if scenes cannot be shared equally, Error naming file and key for bad input.
+/// Drives evaluation worlds, which are those of evaluate() with the same numbers, in the world configuration of the
+/// first policy: its population, walls and conditioning apply to all policies. Every `sample_steps` steps it draws
+/// distinct pairs from the state: the ego, an active vehicle, and the user, another active or halted agent within
+/// range_m. Parked cars are not drawn as users.
+/// Each policy gets its input of the unchanged state, and its input with the user hidden from this ego: vectors by
+/// Simulator::observe, images by a view without the user. Each policy reads images as in its training; occlusion is
+/// measured in the cameras of the first policy that reads images, or in the paper's cameras. An interrupt ends the
+/// probe with the completed cases. Throws UsageError if scenes cannot be shared equally, Error naming file and key for
+/// bad input.
 RemovalResults probe_removal(const RemovalOptions& options);
 /// Probes open policies of one device, with their renderers and cameras; options.policies names them.
 RemovalResults probe_removal(const std::vector<PolicySession*>& sessions, const RemovalOptions& options);

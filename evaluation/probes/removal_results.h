@@ -21,12 +21,12 @@ enum class RemovalControl : uint8_t {
 };
 constexpr std::array<const char*, 4> kRemovalControlNames{"none", "nobody", "permuted", "untrained"};
 
-/// One road user hidden from one ego, in one state. Agents are numbered in their world.
+/// Case: one road user hidden from one ego, in one state. Agents are numbered within their world.
 struct RemovalCase {
   int32_t scene = 0, map = 0, driver = 0;  // number of its scenario; indices of its map and driver
   int32_t step = 0;                        // steps done in the scenario
   int32_t ego = 0, user = 0;
-  int32_t hidden = -1;  // hidden agent; -1: none; the user without a control
+  int32_t hidden = -1;  // hidden agent: without a control, `user`; -1: none
   AgentClass user_class = AgentClass::vehicle;
   bool user_halted = false;
   float distance_m = 0;  // on the ground, from the ego's rear axle to the centre of the user
@@ -45,11 +45,11 @@ struct RemovalResults : ProbeResults {
   std::vector<RemovalCase> cases;  // by scene, step, ego and user, for each driver
 };
 
-/// Cases of one kind: occlusion of the user, and its distance.
+/// Group of cases by the user's occlusion and distance.
 struct RemovalGroup {
   static constexpr int kOcclusionBins = 10;
-  /// Bin of occlusion. -1: users outside all cameras' frames. [0, kOcclusionBins): occlusions from bin / 10 up to, but
-  /// excluding, (bin + 1) / 10. kOcclusionBins: in the frame, and wholly hidden.
+  /// Bin of occlusion. -1: users outside all cameras' frames. Below kOcclusionBins: occlusions in [bin / 10, (bin + 1)
+  /// / 10). kOcclusionBins: users within a frame that are wholly hidden.
   int occlusion_bin = -1;
   std::optional<int> distance_band;  // band of kDistanceBand_m, counted from 0; empty: all distances
 
@@ -65,8 +65,8 @@ struct RemovalRow : ResponseMeans {
   double mean_occlusion = 0;  // mean over the cases; NaN outside frames
 };
 
-/// Returns the rows: for each policy all distances, then each band; for each of these the bins of occlusion and the
-/// users outside frames.
+/// Returns the rows. Each policy has rows for all distances together, then for each distance band; each of these has a
+/// row per bin of occlusion, and last a row for users outside all frames.
 std::vector<RemovalRow> summarize(const RemovalResults& results);
 
 /// Writes a row for each case, with a header: its data, and for each policy value, d_value, p_brake and d_p_brake.

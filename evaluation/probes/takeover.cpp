@@ -58,7 +58,7 @@ TakeoverWorlds::TakeoverWorlds(ProbeRun& run, const ProbeOptions& options, const
 
 TakeoverWorlds::~TakeoverWorlds() = default;
 
-// Handles of maps with walls are those that the run uploaded.
+// Maps with walls have the handles that the run uploaded.
 std::vector<GeometryHandle> TakeoverWorlds::handles_of(bool walls) const {
   std::vector<GeometryHandle> handles;
   for (size_t i = 0; i < sights_.size(); ++i) {

@@ -21,7 +21,8 @@ struct ProbeOptions;
 constexpr int kTakeoverSteps = 80;
 constexpr double kTakeoverStep_s = 0.1;
 
-/// Number of runs in every pass through a network, each at its own place: equal inputs give equal bits.
+/// Number of runs in every pass through a network. Each run keeps its place in the pass, so that equal inputs give
+/// bit-identical outputs.
 constexpr int takeover_pass(Device device) { return device.is_host() ? 8 : 256; }
 
 struct TakeoverStart {
@@ -36,8 +37,9 @@ struct TakeoverStart {
 struct Takeover {
   int32_t steps = 0;     // steps that the ego drove: kTakeoverSteps, or fewer if an infraction ended the run
   uint8_t ended_by = 0;  // Event bits of that infraction
-  // First step at which no wall of the map is between the ego's eye and the user, or where it would be; and first step
-  // at which the user is in the policy's input: seen by cameras, or among the nearest partners. -1: never.
+  // sight_step: first step at which no wall of the map is between the ego's eye and the user, or its place if it is
+  // removed. input_step: first step at which the user is in the policy's input, that is, seen by cameras or among the
+  // nearest partners. -1: never.
   int32_t sight_step = -1, input_step = -1;
   float sight_distance_m = std::numeric_limits<float>::quiet_NaN();  // at sight_step, between the boxes' centres
   std::array<float, kTakeoverSteps + 1> speed_mps, x_m, y_m;         // motion of the ego's reference point
